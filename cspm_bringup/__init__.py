@@ -1,0 +1,1 @@
+"""What runs it all: scenario runner, recorder, command line."""

@@ -1,0 +1,1 @@
+"""Waves, motion controller, tension distribution, force controller, and their design."""

@@ -1,0 +1,1 @@
+"""Prescribed motions of winch frame and target: seas, vessels, recorded files, moves."""

@@ -1,0 +1,1 @@
+"""The contract: topics, plain data types, test-bed and scenario files, recordings."""

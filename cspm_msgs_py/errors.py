@@ -1,0 +1,25 @@
+"""The errors that a user may meet, and the exit code that each one means."""
+
+
+class CspmError(Exception):
+    """Base of all errors that carry one line for the user."""
+
+    exit_code = 1
+
+
+class InputError(CspmError):
+    """Bad usage or bad input: the line says what, where, and what is allowed."""
+
+    exit_code = 2
+
+
+class DivergenceError(CspmError):
+    """The simulation left the range in which its equations hold."""
+
+
+class ConvergenceError(CspmError):
+    """An iterative solution did not converge or is not unique near the guess."""
+
+
+class SingularityError(CspmError):
+    """A kinematic map was asked for at a pose where it does not exist."""

@@ -1,0 +1,60 @@
+"""Where a test-bed's numbers come from.
+
+Any value of a test-bed file may be written as `{value: …, provenance: …}`; `unwrap_provenance`
+separates the two.
+"""
+
+from __future__ import annotations
+
+from typing import Any, Literal, NamedTuple
+
+from pydantic import Field, model_validator
+from typing_extensions import Self
+
+from cspm_msgs_py.yaml_file import StrictModel, validate
+
+
+class Provenance(StrictModel):
+    """Origin of one value.
+
+    `thesis`: published in the thesis; `reconstructed`: chosen so that the published results hold, or
+    assumed where nothing fixes it; `fitted`: identified from the recording with SHA-256 `recording`;
+    `measured`, `datasheet`: as the words say.
+    """
+
+    provenance: Literal["thesis", "reconstructed", "fitted", "measured", "datasheet"]
+    recording: str | None = Field(None, pattern=r"^[0-9a-f]{64}$")
+    note: str = ""
+
+    @model_validator(mode="after")
+    def _fitted_from(self) -> Self:
+        if self.provenance == "fitted" and self.recording is None:
+            raise ValueError("recording: missing, allowed: the SHA-256 of the fitted recording")
+        return self
+
+
+class _Unwrapped(NamedTuple):
+    content: Any
+    provenance: dict[str, Provenance]
+
+
+def unwrap_provenance(content: object, source: str) -> _Unwrapped:
+    """Return `content` with plain values, and the provenance of each wrapped one by key path.
+
+    Raises:
+        InputError: a provenance is not one of the allowed words, or a fitted one names no recording.
+    """
+    found: dict[str, Provenance] = {}
+
+    def walk(node: object, path: str) -> object:
+        if isinstance(node, dict):
+            if "value" in node and "provenance" in node:
+                about = {key: value for key, value in node.items() if key != "value"}
+                found[path] = validate(Provenance, about, f"{source}: {path}")
+                return node["value"]
+            return {k: walk(v, f"{path}.{k}" if path else str(k)) for k, v in node.items()}
+        if isinstance(node, list):
+            return [walk(item, f"{path}[{i}]") for i, item in enumerate(node)]
+        return node
+
+    return _Unwrapped(walk(content, ""), found)

@@ -1,0 +1,224 @@
+"""The scenario file: which machine, which motions, which controllers, at which rates."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from pathlib import Path
+from typing import Annotated, Any, Literal
+
+from pydantic import Field, NonNegativeInt, PositiveFloat, PositiveInt, model_validator
+from typing_extensions import Self
+
+from cspm_msgs_py.errors import InputError
+from cspm_msgs_py.motion_spec import MotionSpec, StillMotion
+from cspm_msgs_py.yaml_file import StrictModel, parse_yaml, read_yaml, validate
+
+Pose = tuple[float, float, float, float, float, float]
+ORIGIN: Pose = (0.0, 0.0, 0.0, 0.0, 0.0, 0.0)
+DOFS = ("surge", "sway", "heave", "roll", "pitch", "yaw")
+
+
+class Rates(StrictModel):
+    """How often each part runs [Hz]; every rate divides the plant's."""
+
+    plant: PositiveInt = 1000
+    winches: PositiveInt = 1000
+    load_cells: PositiveInt = 1000
+    motion_capture: PositiveInt = 100
+    wave_trajectory: PositiveInt = 1000
+    motion_controller: PositiveInt = 100
+    tension_distribution: PositiveInt = 100
+    force_controller: PositiveInt = 1000
+
+    @model_validator(mode="after")
+    def _divide(self) -> Self:
+        if 1_000_000_000 % self.plant:
+            raise ValueError(
+                f"plant: {self.plant} Hz, allowed: a rate whose period is a whole number of ns"
+            )
+        for name, rate in self:
+            if self.plant % rate:
+                raise ValueError(
+                    f"{name}: {rate} Hz does not divide the plant's {self.plant} Hz, allowed: a"
+                    f" divisor of {self.plant}"
+                )
+        return self
+
+
+class Body(StrictModel):
+    """A body with a prescribed motion about a mean pose in world_ned (x y z φ θ ψ; m, rad)."""
+
+    mean_pose: Pose = ORIGIN
+    motion: MotionSpec = StillMotion()
+
+
+class PidGains(StrictModel):
+    """Gains of Kp·e + Ki·∫e + Kd·ė, thesis (7-2); per metre or radian."""
+
+    kp: float
+    ki: float
+    kd: float
+
+
+class PiGains(StrictModel):
+    """Gains of Kp·(e + ω_i·∫e), thesis (7-4); Kp in N·m/N at the motor shaft, ω_i in rad/s."""
+
+    kp: float
+    integral_frequency: float
+
+
+class MotionControl(StrictModel):
+    """Motion controller: crossover [rad/s] per controlled DOF, or the gains themselves.
+
+    Gains that are absent are designed at `design_pose` for the crossover frequencies.
+    """
+
+    crossover: dict[Literal["surge", "sway", "heave", "pitch", "yaw"], PositiveFloat] = {
+        "surge": 12.0,
+        "sway": 10.0,
+        "heave": 12.0,
+        "pitch": 12.0,
+        "yaw": 10.0,
+    }
+    design_pose: Pose = (0.0, 0.0, 2.0, 0.0, 0.0, 0.0)
+    derivative_filter: PositiveFloat = 200.0
+    gains: dict[Literal["surge", "sway", "heave", "pitch", "yaw"], PidGains] | None = None
+
+
+class ForceControl(StrictModel):
+    """Force controllers: closed-loop bandwidth [rad/s] to design for, or the gains per cable."""
+
+    bandwidth: PositiveFloat = 800.0
+    gains: dict[str, PiGains] | None = None
+
+
+class TensionDistribution(StrictModel):
+    """How a wanted wrench becomes tensions."""
+
+    method: Literal["pseudo_inverse"] = "pseudo_inverse"
+
+
+class ClosedLoop(StrictModel):
+    """Motion controller, tension distribution and force controllers of the thesis (chapter 7)."""
+
+    mode: Literal["closed_loop"] = "closed_loop"
+    motion: MotionControl = MotionControl()
+    tension_distribution: TensionDistribution = TensionDistribution()
+    force: ForceControl = ForceControl()
+
+
+class LockedWinches(StrictModel):
+    """All winches braked at their initial angle; the bar moves by the winch frame alone."""
+
+    mode: Literal["locked_winches"] = "locked_winches"
+
+
+class Sine(StrictModel):
+    """amplitude·sin(2π·frequency·t + phase) [as the signal, Hz, rad]."""
+
+    amplitude: float
+    frequency: PositiveFloat
+    phase: float = 0.0
+
+
+class Signal(StrictModel):
+    """A constant plus sines."""
+
+    offset: float = 0.0
+    sines: tuple[Sine, ...] = ()
+
+
+class TorqueProfile(StrictModel):
+    """Prescribed motor torque per cable [N·m]; a cable that is not named gets zero."""
+
+    mode: Literal["torque"] = "torque"
+    torque: dict[str, Signal] = {}
+
+
+Control = Annotated[ClosedLoop | LockedWinches | TorqueProfile, Field(discriminator="mode")]
+
+
+class Requirement(StrictModel):
+    """Largest allowed error of the bar's pose [m], [rad]."""
+
+    position: PositiveFloat = 0.002
+    angle: PositiveFloat = 0.004
+
+
+class Scenario(StrictModel):
+    """One experiment. Build it with `load_scenario` or `parse_scenario`."""
+
+    name: str
+    description: str = ""
+    testbed: str
+    duration: PositiveFloat
+    seed: NonNegativeInt = 1
+    rates: Rates = Rates()
+    sensors: Literal["testbed", "ideal"] = "testbed"
+    winch_frame: Body = Body()
+    target: Body = Body()
+    bar_offset: Pose = ORIGIN
+    control: Control = ClosedLoop()
+    requirement: Requirement = Requirement()
+
+    @model_validator(mode="after")
+    def _whole_steps(self) -> Self:
+        steps = self.duration * self.rates.plant
+        if abs(steps - round(steps)) > 1e-6 * max(1.0, steps) or round(steps) < 1:
+            raise ValueError(
+                f"duration: {self.duration:g} s, allowed: a whole number of the plant's periods"
+                f" of 1/{self.rates.plant} s"
+            )
+        return self
+
+    @property
+    def bar_mean_pose(self) -> Pose:
+        """The bar's mean reference: the target's mean pose plus the offset [m, rad]."""
+        x, y, z, roll, pitch, yaw = (
+            a + b for a, b in zip(self.target.mean_pose, self.bar_offset, strict=True)
+        )
+        return (x, y, z, roll, pitch, yaw)
+
+
+def load_scenario(path: Path, overrides: Sequence[str] = ()) -> Scenario:
+    """Read and check a scenario file, with `key.path=value` overrides put over it first.
+
+    Raises:
+        InputError: naming file, key, value and what is allowed.
+    """
+    return _checked(read_yaml(path), str(path), overrides)
+
+
+def parse_scenario(text: str, source: str) -> Scenario:
+    """Check a scenario's YAML text; `source` names it in errors.
+
+    Raises:
+        InputError: naming source, key, value and what is allowed.
+    """
+    return _checked(parse_yaml(text, source), source, ())
+
+
+def _checked(content: object, source: str, overrides: Sequence[str]) -> Scenario:
+    for override in overrides:
+        content = _override(content, override)
+    return validate(Scenario, content, source)
+
+
+def _override(content: object, override: str) -> dict[str, Any]:
+    key, separator, text = override.partition("=")
+    if not separator or not key or not all(key.split(".")):
+        raise InputError(f"--set {override}: allowed: key.path=value, such as seed=2")
+    if not isinstance(content, dict):
+        raise InputError(f"--set {override}: the scenario is not a mapping of keys to values")
+    value = parse_yaml(text, f"--set {override}")
+    root: dict[str, Any] = dict(content)
+    node = root
+    *parents, leaf = key.split(".")
+    for parent in parents:
+        inner = node.get(parent, {})
+        if not isinstance(inner, dict):
+            raise InputError(f"--set {override}: {parent} is no mapping, allowed: keys inside one")
+        node[parent] = dict(inner)
+        node = node[parent]
+    node[leaf] = value
+    return root

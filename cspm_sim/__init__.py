@@ -1,0 +1,1 @@
+"""The model: kinematics, bar, cables, winches, sensors, effects, plant."""

@@ -1,0 +1,120 @@
+"""Where the machine hangs at rest: tensions, bar attitude and unstretched lengths."""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+from scipy.optimize import brentq, lsq_linear, root_scalar
+
+from cspm_msgs_py.errors import ConvergenceError
+from cspm_sim.kernels import bar as bar_kernel
+from cspm_sim.kernels.cable import OFFSET_LENGTH, elastic_tension
+from cspm_sim.kernels.plant import PlantParameters
+from cspm_sim.kinematics import geometry, rotation
+
+Array = NDArray[np.float64]
+
+WRENCH_TOLERANCE = 1e-9  # of the weight
+PREFERENCE = 1e-8
+
+
+class Equilibrium(NamedTuple):
+    """A state of rest.
+
+    Attributes:
+        bar_pose: x y z φ θ ψ, its roll adapted where the cables cannot hold the wanted one.
+        tensions: shape (n,) [N].
+        unstretched_lengths: shape (n,) [m].
+    """
+
+    bar_pose: Array
+    tensions: Array
+    unstretched_lengths: Array
+
+
+def gravity_wrench(parameters: PlantParameters, bar_pose: ArrayLike) -> Array:
+    """Return gravity's force and moment about the bar frame's origin in world axes, shape (6,)."""
+    bar = parameters.bar
+    force = np.array([0.0, 0.0, bar[bar_kernel.MASS] * parameters.gravity])
+    arm = rotation(bar_pose) @ bar[bar_kernel.COM : bar_kernel.COM + 3]
+    return np.concatenate([force, np.cross(arm, force)])
+
+
+def find_equilibrium(
+    parameters: PlantParameters, bar_pose: ArrayLike, frame_pose: ArrayLike, limits: Array
+) -> Equilibrium:
+    """Return the state of rest at `bar_pose`, tensions least in norm within `limits` (n, 2) [N].
+
+    Where the cables cannot balance every moment (the thesis's machine, in roll), the roll is found
+    at which gravity needs none.
+
+    Raises:
+        ConvergenceError: no tensions within the limits hold the bar at rest near this pose.
+    """
+    pose = np.array(bar_pose, dtype=float)
+
+    def imbalance(roll: float) -> float:
+        pose[3] = roll
+        structure = -geometry(parameters.cables, pose, frame_pose).bar.T
+        direction = np.linalg.svd(structure)[0][:, -1]
+        return float(direction @ gravity_wrench(parameters, pose) * np.sign(direction[3]))
+
+    start = float(pose[3])
+    if not _balanced(parameters, pose, frame_pose):
+        found = root_scalar(imbalance, x0=start, x1=start + 1e-3, xtol=1e-14)
+        pose[3] = found.root if found.converged else start
+    tensions = _hold(parameters, pose, frame_pose, limits)
+    lengths = geometry(parameters.cables, pose, frame_pose).lengths
+    return Equilibrium(pose, tensions, unstretched_lengths(parameters, lengths, tensions))
+
+
+def unstretched_lengths(parameters: PlantParameters, lengths: Array, tensions: Array) -> Array:
+    """Return l0 (n,) [m] at which cables stretched to `lengths` carry `tensions` at rest."""
+    out = np.empty(len(lengths))
+    for i, (length, tension) in enumerate(zip(lengths, tensions, strict=True)):
+        bounds = (0.5 * length, length)
+        args = (length, tension, parameters, i)
+        out[i] = brentq(_excess_tension, *bounds, args, xtol=1e-15) if tension > 0 else length
+    return out
+
+
+def _excess_tension(
+    unstretched: float, length: float, tension: float, parameters: PlantParameters, i: int
+) -> float:
+    cables, tables = parameters.cables, parameters.tables
+    elastic = unstretched + cables[i, OFFSET_LENGTH]
+    return float(elastic_tension(length - unstretched, elastic, cables, tables, i)[0] - tension)
+
+
+def _balanced(parameters: PlantParameters, pose: Array, frame_pose: ArrayLike) -> bool:
+    structure = -geometry(parameters.cables, pose, frame_pose).bar.T
+    wrench = -gravity_wrench(parameters, pose)
+    tensions = np.linalg.pinv(structure, rcond=1e-9) @ wrench
+    return _residual(structure, tensions, wrench) < WRENCH_TOLERANCE
+
+
+def _residual(structure: Array, tensions: Array, wrench: Array) -> float:
+    return float(np.linalg.norm(structure @ tensions - wrench) / np.linalg.norm(wrench))
+
+
+def _hold(
+    parameters: PlantParameters, pose: Array, frame_pose: ArrayLike, limits: Array
+) -> Array:
+    structure = -geometry(parameters.cables, pose, frame_pose).bar.T
+    wrench = -gravity_wrench(parameters, pose)
+    tensions: Array = np.linalg.pinv(structure, rcond=1e-9) @ wrench
+    if (tensions < limits[:, 0]).any() or (tensions > limits[:, 1]).any():
+        n = len(tensions)
+        rows = np.vstack([structure, PREFERENCE * np.eye(n)])
+        goal = np.concatenate([wrench, np.zeros(n)])
+        tensions = lsq_linear(rows, goal, (limits[:, 0], limits[:, 1]), tol=1e-14).x
+    residual = _residual(structure, tensions, wrench)
+    if residual > 1e-6:
+        place = ", ".join(f"{value:.4g}" for value in pose)
+        raise ConvergenceError(
+            f"no tensions within the limits hold the bar at rest at [{place}] (m, rad): wrench"
+            f" residual {residual:.2g} of the weight"
+        )
+    return tensions

@@ -1,0 +1,1 @@
+"""Compiled kernels: pure functions of flat float64 arrays, SI units, no checks."""

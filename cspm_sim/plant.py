@@ -1,0 +1,143 @@
+"""The plant: the machine's state, stepped at a fixed period."""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from cspm_msgs_py.errors import DivergenceError, InputError
+from cspm_msgs_py.scenario import DOFS
+from cspm_msgs_py.testbed import Testbed
+from cspm_sim.equilibrium import find_equilibrium
+from cspm_sim.kernels.plant import (
+    BAR_STATES,
+    plant_advance,
+    plant_tensions,
+)
+from cspm_sim.motion import Motion
+from cspm_sim.parameters import plant_parameters
+
+Array = NDArray[np.float64]
+
+
+class Plant:
+    """Bar, cables and winches on a moving winch frame.
+
+    Time is a count of steps of `period_ns`; `step` advances it by one. Read-only views of the
+    current state: `bar_state` (12: position, Euler angles, velocity in world axes, ω in bar axes),
+    `unstretched_lengths`, `angles`, `speeds` (n each), `tensions` (n) and `frame` (18).
+    """
+
+    def __init__(
+        self,
+        testbed: Testbed,
+        frame_motion: Motion,
+        period_ns: int,
+        *,
+        bar_pose: ArrayLike | None = None,
+        bar_twist: ArrayLike | None = None,
+        locked: bool = False,
+    ) -> None:
+        """Put the machine at rest in equilibrium.
+
+        Args:
+            testbed: the machine.
+            frame_motion: the winch frame's motion; it stands still where the machine has none.
+            period_ns: step [ns].
+            bar_pose: where the bar hangs at the start, x y z φ θ ψ.
+            bar_twist: its velocity then: v in world axes, ω in bar axes.
+            locked: hold all motors still.
+
+        Raises:
+            InputError: the test-bed has a bar and no pose for it, or a cable of length zero.
+            ConvergenceError: no tensions hold the bar at this pose.
+        """
+        self.testbed = testbed
+        self.parameters = plant_parameters(testbed)
+        self.period_ns = period_ns
+        self.frame_motion = frame_motion
+        self.locked = locked
+        self.steps = 0
+        n = len(testbed.cables)
+        first = BAR_STATES if testbed.bar else 0
+        self.state: Array = np.zeros(first + 3 * n)
+        self.bar_state = self.state[:first]
+        self.unstretched_lengths = self.state[first : first + n]
+        self.angles = self.state[first + n : first + 2 * n]
+        self.speeds = self.state[first + 2 * n :]
+        self.frame: Array = frame_motion.at(0.0)
+        self._outputs = np.zeros((2, n))
+        self.tensions = self._outputs[0]
+        self.lengths = self._outputs[1]
+        self._frames = np.zeros((3, 18))
+        self._work = np.zeros((5, len(self.state)))
+        self._place(bar_pose, bar_twist)
+        self._observe()
+
+    @property
+    def time(self) -> float:
+        """Time since the start [s]."""
+        return self.steps * self.period_ns * 1e-9
+
+    def step(self, torque: Array) -> None:
+        """Advance by one period with the motor torques (n,) [N·m] held.
+
+        Raises:
+            DivergenceError: a state is no longer finite, or the pitch passed ±π/2.
+        """
+        bad = plant_advance(
+            self.state,
+            torque,
+            self.frame_motion.knots,
+            self.frame_motion.spacing,
+            self.frame_motion.periodic,
+            self.steps,
+            1,
+            self.locked,
+            self.period_ns * 1e-9,
+            self.parameters,
+            self._frames,
+            self._work,
+        )
+        self.steps += 1
+        self.frame[:] = self._frames[0]
+        if bad >= 0:
+            raise DivergenceError(f"t = {self.time:.3f} s: {self.state_name(bad)} is not finite")
+        if self.testbed.bar and abs(self.bar_state[4]) > 0.5 * np.pi:
+            raise DivergenceError(
+                f"t = {self.time:.3f} s: pitch {self.bar_state[4]:.3f} rad passed ±π/2, where the"
+                " Euler angles end"
+            )
+        self._observe()
+
+    def state_name(self, index: int) -> str:
+        """Return the name of a state, such as `speed of surge_2`."""
+        first = len(self.bar_state)
+        if index < first:
+            kind, dof = divmod(index, 6)
+            return f"bar {DOFS[dof]}" + (" rate" if kind else "")
+        kind, cable = divmod(index - first, len(self.testbed.cables))
+        name = ("unstretched length", "motor angle", "motor speed")[kind]
+        return f"{name} of {self.testbed.cable_names[cable]}"
+
+    def applied_torque(self, torque: Array) -> Array:
+        """Return what the drives deliver for a torque command, (n,) [N·m]: the limits applied."""
+        limit = np.array([cable.torque_limit for cable in self.testbed.cables])
+        return np.clip(torque, -limit, limit)
+
+    def _observe(self) -> None:
+        plant_tensions(self.state, self.frame, self.parameters, self._outputs)
+
+    def _place(self, bar_pose: ArrayLike | None, bar_twist: ArrayLike | None) -> None:
+        if self.testbed.bar is None:
+            self._observe()
+            self.unstretched_lengths[:] = self.lengths
+            return
+        if bar_pose is None:
+            raise InputError("plant: this test-bed has a bar, a pose to start from is required")
+        limits = np.array([cable.tension_limits for cable in self.testbed.cables], dtype=float)
+        rest = find_equilibrium(self.parameters, bar_pose, self.frame[:6], limits)
+        self.bar_state[:6] = rest.bar_pose
+        if bar_twist is not None:
+            self.bar_state[6:] = np.asarray(bar_twist, dtype=float)
+        self.unstretched_lengths[:] = rest.unstretched_lengths

@@ -10,7 +10,7 @@ from scipy.optimize import brentq, lsq_linear, root_scalar
 
 from cspm_msgs_py.errors import ConvergenceError
 from cspm_sim.kernels import bar as bar_kernel
-from cspm_sim.kernels.cable import OFFSET_LENGTH, elastic_tension
+from cspm_sim.kernels.cable import OFFSET_LENGTH, elastic_tension, law_scale
 from cspm_sim.kernels.plant import PlantParameters
 from cspm_sim.kinematics import geometry, rotation
 
@@ -37,7 +37,7 @@ class Equilibrium(NamedTuple):
 def gravity_wrench(parameters: PlantParameters, bar_pose: ArrayLike) -> Array:
     """Return gravity's force and moment about the bar frame's origin in world axes, shape (6,)."""
     bar = parameters.bar
-    force = np.array([0.0, 0.0, bar[bar_kernel.MASS] * parameters.gravity])
+    force = np.array([0.0, 0.0, bar[bar_kernel.MASS] * bar[bar_kernel.GRAVITY]])
     arm = rotation(bar_pose) @ bar[bar_kernel.COM : bar_kernel.COM + 3]
     return np.concatenate([force, np.cross(arm, force)])
 
@@ -85,7 +85,9 @@ def _excess_tension(
 ) -> float:
     cables, tables = parameters.cables, parameters.tables
     elastic = unstretched + cables[i, OFFSET_LENGTH]
-    return float(elastic_tension(length - unstretched, elastic, cables, tables, i)[0] - tension)
+    scale = law_scale(elastic, cables, i)
+    found, _ = elastic_tension(length - unstretched, elastic, scale, cables, tables, i)
+    return float(found - tension)
 
 
 def _balanced(parameters: PlantParameters, pose: Array, frame_pose: ArrayLike) -> bool:

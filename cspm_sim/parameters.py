@@ -12,7 +12,6 @@ from cspm_msgs_py.testbed import Bar, Cable, EffectEntry, ExponentialStiffness, 
 from cspm_sim.effects import Block, Effect, catalogue
 from cspm_sim.kernels import bar as bar_kernel
 from cspm_sim.kernels import cable as cable_kernel
-from cspm_sim.kernels import winch as winch_kernel
 from cspm_sim.kernels.effect_call import kernel_address
 from cspm_sim.kernels.plant import BAR_BLOCK, WINCH_BLOCK, PlantParameters
 from cspm_sim.stiffness import POINTS, law_slope, law_table
@@ -32,25 +31,23 @@ def plant_parameters(testbed: Testbed) -> PlantParameters:
     actions = [action for entry in testbed.effects for action in _actions(entry, testbed)]
     width = max((len(values) for *_, values in actions), default=1)
     return PlantParameters(
-        gravity=testbed.gravity,
-        bar=_bar_array(testbed.bar) if testbed.bar else np.zeros(0),
+        bar=_bar_array(testbed.bar, testbed.gravity) if testbed.bar else np.zeros(0),
         cables=np.array(rows),
         tables=np.array(tables),
-        winches=np.array([_winch_row(cable) for cable in testbed.cables]),
-        effect_blocks=np.array([_BLOCKS[e.block] for e, _, _ in actions], dtype=np.int64),
-        effect_elements=np.array([element for _, element, _ in actions], dtype=np.int64),
-        effect_addresses=np.array(
-            [kernel_address(e.kernel) for e, _, _ in actions], dtype=np.int64
-        ),
+        effects=np.array(
+            [(_BLOCKS[e.block], element, kernel_address(e.kernel)) for e, element, _ in actions],
+            dtype=np.int64,
+        ).reshape(len(actions), 3),
         effect_parameters=np.array(
             [values + [0.0] * (width - len(values)) for *_, values in actions], dtype=float
         ).reshape(len(actions), width),
     )
 
 
-def _bar_array(bar: Bar) -> Array:
+def _bar_array(bar: Bar, gravity: float) -> Array:
     out = np.zeros(bar_kernel.BAR_COLUMNS)
     out[bar_kernel.MASS] = bar.mass
+    out[bar_kernel.GRAVITY] = gravity
     out[bar_kernel.COM : bar_kernel.COM + 3] = bar.com
     out[bar_kernel.INERTIA : bar_kernel.INERTIA + 9] = bar.inertia.matrix.ravel()
     inverse = np.linalg.inv(bar.inertia.matrix)
@@ -58,18 +55,12 @@ def _bar_array(bar: Bar) -> Array:
     return out
 
 
-def _winch_row(cable: Cable) -> Array:
-    out = np.zeros(winch_kernel.WINCH_COLUMNS)
-    out[winch_kernel.RADIUS] = cable.drum_radius / cable.gear_ratio
-    out[winch_kernel.INERTIA] = cable.rotor_inertia
-    out[winch_kernel.TORQUE_LIMIT] = cable.torque_limit
-    return out
-
-
 def _cable_row(cable: Cable) -> tuple[Array, Array]:
     row = np.zeros(cable_kernel.CABLE_COLUMNS)
     table = np.zeros((POINTS, 2))
-    row[cable_kernel.FLOOR_TENSION] = row[cable_kernel.FLOOR_SLOPE] = 1.0
+    row[cable_kernel.RADIUS] = cable.drum_radius / cable.gear_ratio
+    row[cable_kernel.INERTIA] = cable.rotor_inertia
+    row[cable_kernel.TORQUE_LIMIT] = cable.torque_limit
     law, damping = cable.stiffness, cable.damping
     if not (cable.exit and cable.attachment and law and damping and cable.tension_limits):
         return row, table
@@ -85,7 +76,10 @@ def _cable_row(cable: Cable) -> tuple[Array, Array]:
         row[cable_kernel.LAW_SCALE] = law.a
         row[cable_kernel.LAW_EXPONENT] = law.b
         row[cable_kernel.FLOOR_SLOPE] = law_slope(law, law.floor_tension)
-        table, row[cable_kernel.TABLE_STEP] = law_table(law, cable.tension_limits[1])
+        row[cable_kernel.FLOOR_SCALED] = law.floor_tension / row[cable_kernel.FLOOR_SLOPE]
+        table, step = law_table(law, cable.tension_limits[1])
+        row[cable_kernel.TABLE_STEP] = step
+        row[cable_kernel.TABLE_STEPS] = 1.0 / step
     return row, table
 
 

@@ -11,6 +11,7 @@ from cspm_msgs_py.testbed import Testbed
 from cspm_sim.equilibrium import find_equilibrium
 from cspm_sim.kernels.plant import (
     BAR_STATES,
+    make_scratch,
     plant_advance,
     plant_tensions,
 )
@@ -70,7 +71,7 @@ class Plant:
         self.tensions = self._outputs[0]
         self.lengths = self._outputs[1]
         self._frames = np.zeros((3, 18))
-        self._work = np.zeros((5, len(self.state)))
+        self._scratch = make_scratch(len(self.state), n)
         self._place(bar_pose, bar_twist)
         self._observe()
 
@@ -97,7 +98,7 @@ class Plant:
             self.period_ns * 1e-9,
             self.parameters,
             self._frames,
-            self._work,
+            self._scratch,
         )
         self.steps += 1
         self.frame[:] = self._frames[0]
@@ -126,7 +127,7 @@ class Plant:
         return np.clip(torque, -limit, limit)
 
     def _observe(self) -> None:
-        plant_tensions(self.state, self.frame, self.parameters, self._outputs)
+        plant_tensions(self.state, self.frame, self.parameters, self._scratch, self._outputs)
 
     def _place(self, bar_pose: ArrayLike | None, bar_twist: ArrayLike | None) -> None:
         if self.testbed.bar is None:

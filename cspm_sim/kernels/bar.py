@@ -13,7 +13,8 @@ MASS = 0
 COM = 1
 INERTIA = 4  # about the centre of mass, bar axes, row by row
 INVERSE_INERTIA = 13
-BAR_COLUMNS = 22
+GRAVITY = 22
+BAR_COLUMNS = 23
 
 # What effects on the bar read and change: velocity of the bar frame's origin, world axes, and the
 # wrench that the effect adds there, world axes.
@@ -22,7 +23,7 @@ WRENCH = 6
 BAR_SIGNALS = 12
 
 
-@njit(cache=True, error_model="numpy")
+@njit(cache=True, error_model="numpy", inline="always")
 def _times(bar: Array, first: int, x: float, y: float, z: float) -> Vector:
     return (
         bar[first] * x + bar[first + 1] * y + bar[first + 2] * z,
@@ -31,9 +32,9 @@ def _times(bar: Array, first: int, x: float, y: float, z: float) -> Vector:
     )
 
 
-@njit(cache=True, error_model="numpy")
+@njit(cache=True, error_model="numpy", inline="always")
 def bar_acceleration(
-    bar: Array, gravity: float, rotation: Matrix, rate: Vector, force: Vector, moment: Vector
+    bar: Array, rotation: Matrix, rate: Vector, force: Vector, moment: Vector
 ) -> tuple[Vector, Vector]:
     """Return v̇ of the bar frame's origin (world axes) and ω̇ (bar axes).
 
@@ -54,5 +55,5 @@ def bar_acceleration(
     nx, ny, nz = cross(wx, wy, wz, sx, sy, sz)
     px, py, pz = rotate(rotation, tx + nx, ty + ny, tz + nz)
     mass = bar[MASS]
-    linear = (force[0] / mass - px, force[1] / mass - py, force[2] / mass + gravity - pz)
+    linear = (force[0] / mass - px, force[1] / mass - py, force[2] / mass + bar[GRAVITY] - pz)
     return linear, (ax, ay, az)

@@ -1,10 +1,11 @@
 """Cable lengths and the structure matrix of all cables at once."""
 
+import numpy as np
 from numba import njit
 from numpy import float64
 from numpy.typing import NDArray
 
-from cspm_sim.kernels.cable import EXIT, cable_span
+from cspm_sim.kernels.cable import ARM, DIRECTION, EXIT, LENGTH, SPAN_COLUMNS, cable_spans
 from cspm_sim.kernels.rotation import cross, rotate, rotation_from_euler
 
 Array = NDArray[float64]
@@ -19,27 +20,19 @@ def cable_geometry(
     `cables` are parameter rows (see `kernels.cable`), poses x y z φ θ ψ, twists in world axes.
     """
     still = (0.0, 0.0, 0.0)
-    bar_rotation = rotation_from_euler(bar_pose[3], bar_pose[4], bar_pose[5])
-    bar_position = (bar_pose[0], bar_pose[1], bar_pose[2])
-    frame_rotation = rotation_from_euler(frame_pose[3], frame_pose[4], frame_pose[5])
-    frame_position = (frame_pose[0], frame_pose[1], frame_pose[2])
+    body_rotation = rotation_from_euler(bar_pose[3], bar_pose[4], bar_pose[5])
+    body = ((bar_pose[0], bar_pose[1], bar_pose[2]), body_rotation, still, still)
+    base_rotation = rotation_from_euler(frame_pose[3], frame_pose[4], frame_pose[5])
+    base = ((frame_pose[0], frame_pose[1], frame_pose[2]), base_rotation, still, still)
+    spans = np.empty((cables.shape[0], SPAN_COLUMNS))
+    cable_spans(cables, base, body, spans)
     for i in range(cables.shape[0]):
-        (ux, uy, uz), (bx, by, bz), length, _ = cable_span(
-            cables,
-            i,
-            frame_position,
-            frame_rotation,
-            still,
-            still,
-            bar_position,
-            bar_rotation,
-            still,
-            still,
-        )
+        ux, uy, uz = spans[i, DIRECTION], spans[i, DIRECTION + 1], spans[i, DIRECTION + 2]
+        bx, by, bz = spans[i, ARM], spans[i, ARM + 1], spans[i, ARM + 2]
         ax, ay, az = rotate(
-            frame_rotation, cables[i, EXIT], cables[i, EXIT + 1], cables[i, EXIT + 2]
+            base_rotation, cables[i, EXIT], cables[i, EXIT + 1], cables[i, EXIT + 2]
         )
-        lengths[i] = length
+        lengths[i] = spans[i, LENGTH]
         bar[i, 0], bar[i, 1], bar[i, 2] = ux, uy, uz
         bar[i, 3], bar[i, 4], bar[i, 5] = cross(bx, by, bz, ux, uy, uz)
         frame[i, 0], frame[i, 1], frame[i, 2] = -ux, -uy, -uz

@@ -9,9 +9,11 @@ from numpy.typing import NDArray
 Array = NDArray[float64]
 Vector = tuple[float, float, float]
 Matrix = tuple[float, float, float, float, float, float, float, float, float]
+# Position, rotation, velocity and angular velocity of a body, in world axes.
+Placement = tuple[Vector, Matrix, Vector, Vector]
 
 
-@njit(cache=True, error_model="numpy")
+@njit(cache=True, error_model="numpy", forceinline=True)
 def rotation_from_euler(roll: float, pitch: float, yaw: float) -> Matrix:
     """Return R_world_body, row by row."""
     cr, sr = cos(roll), sin(roll)
@@ -30,7 +32,7 @@ def rotation_from_euler(roll: float, pitch: float, yaw: float) -> Matrix:
     )
 
 
-@njit(cache=True, error_model="numpy")
+@njit(cache=True, error_model="numpy", forceinline=True)
 def rotate(rotation: Matrix, x: float, y: float, z: float) -> Vector:
     """Return R·[x, y, z]."""
     return (
@@ -40,7 +42,7 @@ def rotate(rotation: Matrix, x: float, y: float, z: float) -> Vector:
     )
 
 
-@njit(cache=True, error_model="numpy")
+@njit(cache=True, error_model="numpy", forceinline=True)
 def rotate_back(rotation: Matrix, x: float, y: float, z: float) -> Vector:
     """Return Rᵀ·[x, y, z]."""
     return (
@@ -50,7 +52,7 @@ def rotate_back(rotation: Matrix, x: float, y: float, z: float) -> Vector:
     )
 
 
-@njit(cache=True, error_model="numpy")
+@njit(cache=True, error_model="numpy", forceinline=True)
 def cross(
     ax: float, ay: float, az: float, bx: float, by: float, bz: float
 ) -> Vector:
@@ -58,7 +60,7 @@ def cross(
     return ay * bz - az * by, az * bx - ax * bz, ax * by - ay * bx
 
 
-@njit(cache=True, error_model="numpy")
+@njit(cache=True, error_model="numpy", forceinline=True)
 def body_rate_to_euler_rate(
     roll: float, pitch: float, wx: float, wy: float, wz: float
 ) -> Vector:
@@ -68,7 +70,7 @@ def body_rate_to_euler_rate(
     return wx + sin(pitch) * yaw_rate, cr * wy - sr * wz, yaw_rate
 
 
-@njit(cache=True, error_model="numpy")
+@njit(cache=True, error_model="numpy", forceinline=True)
 def euler_rate_to_world_rate(
     pitch: float, yaw: float, roll_rate: float, pitch_rate: float, yaw_rate: float
 ) -> Vector:

@@ -81,7 +81,9 @@ class Sea(StrictModel):
 
 
 class JonswapMotion(Sea):
-    """A small body that follows a JONSWAP sea, each coordinate scaled to a given excursion.
+    """A body that follows a JONSWAP sea, each coordinate scaled to a given excursion.
+
+    Every coordinate has the shape of the sea's spectrum within the band.
 
     Attributes:
         amplitudes: largest absolute excursion of x, y, z [m], roll, pitch, yaw [rad] over one

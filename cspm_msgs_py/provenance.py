@@ -17,9 +17,9 @@ from cspm_msgs_py.yaml_file import StrictModel, validate
 class Provenance(StrictModel):
     """Origin of one value.
 
-    `thesis`: published in the thesis; `reconstructed`: chosen so that the published results hold, or
-    assumed where nothing fixes it; `fitted`: identified from the recording with SHA-256 `recording`;
-    `measured`, `datasheet`: as the words say.
+    `thesis`: published in the thesis; `reconstructed`: chosen so that the published results hold,
+    or assumed where nothing fixes it; `fitted`: identified from the recording with SHA-256
+    `recording`; `measured`, `datasheet`: as the words say.
     """
 
     provenance: Literal["thesis", "reconstructed", "fitted", "measured", "datasheet"]
@@ -42,7 +42,7 @@ def unwrap_provenance(content: object, source: str) -> _Unwrapped:
     """Return `content` with plain values, and the provenance of each wrapped one by key path.
 
     Raises:
-        InputError: a provenance is not one of the allowed words, or a fitted one names no recording.
+        InputError: a provenance is none of the allowed words, or a fitted one names no recording.
     """
     found: dict[str, Provenance] = {}
 

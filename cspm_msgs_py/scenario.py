@@ -70,7 +70,8 @@ class PiGains(StrictModel):
 class MotionControl(StrictModel):
     """Motion controller: crossover [rad/s] per controlled DOF, or the gains themselves.
 
-    Gains that are absent are designed at `design_pose` for the crossover frequencies.
+    Gains that are absent are designed at `design_pose` for the crossover frequencies. The derivative
+    term has a pole at `derivative_filter` [rad/s]; integral terms stop at `integral_limits` [N, N·m].
     """
 
     crossover: dict[Literal["surge", "sway", "heave", "pitch", "yaw"], PositiveFloat] = {
@@ -82,6 +83,7 @@ class MotionControl(StrictModel):
     }
     design_pose: Pose = (0.0, 0.0, 2.0, 0.0, 0.0, 0.0)
     derivative_filter: PositiveFloat = 200.0
+    integral_limits: tuple[PositiveFloat, PositiveFloat] = (20.0, 5.0)
     gains: dict[Literal["surge", "sway", "heave", "pitch", "yaw"], PidGains] | None = None
 
 

@@ -46,7 +46,9 @@ class Sensor(StrictModel):
     @field_validator("noise", "resolution", mode="before")
     @classmethod
     def _listed(cls, value: object) -> object:
-        return [value] if isinstance(value, int | float) else value
+        if isinstance(value, int | float):
+            return (value,)
+        return tuple(value) if isinstance(value, list) else value
 
 
 def quantities(topic: Topic) -> tuple[str, ...]:

@@ -1,7 +1,7 @@
 """The test-bed file: one machine's geometry, parameters, sensors and known effects.
 
-SI units, radians, z down. Exit points are in winch_frame_ned (in world_ned where the test-bed has no
-winch frame), attachment points in bar_ned (in world_ned where it has no bar). Winch quantities
+SI units, radians, z down. Exit points are in winch_frame_ned (in world_ned where the test-bed has
+no winch frame), attachment points in bar_ned (in world_ned where it has no bar). Winch quantities
 are at the motor shaft unless the name says drum.
 """
 
@@ -186,7 +186,7 @@ class Testbed(StrictModel):
     bar: Bar | None = None
     winch_frame: WinchFrame | None = None
     cables: Annotated[tuple[Cable, ...], Field(min_length=1)]
-    sensors: dict[str, Sensor] = {}
+    sensors: dict[str, Sensor] = Field(default_factory=dict)
     effects: tuple[EffectEntry, ...] = ()
 
     @model_validator(mode="after")

@@ -3,21 +3,27 @@
 from __future__ import annotations
 
 import io
-from collections.abc import Iterable
+import json
 from pathlib import Path
 from typing import Any, TypeVar
 
 from pydantic import BaseModel, ConfigDict, ValidationError
 from ruamel.yaml import YAML
+from ruamel.yaml.constructor import DuplicateKeyError
 from ruamel.yaml.error import MarkedYAMLError, YAMLError
 
 from cspm_msgs_py.errors import InputError
+from cspm_msgs_py.model_fault import fault_line
+
+DEEPEST = 50
+DEPTH_ALLOWED = f"allowed: at most {DEEPEST} levels"
+KINDS = {type(None): "an empty file", list: "a list", str: "a text", int: "a number"}
 
 
 class StrictModel(BaseModel):
     """Base of all file models: frozen, unknown keys refused, only finite numbers."""
 
-    model_config = ConfigDict(frozen=True, extra="forbid", strict=False, allow_inf_nan=False)
+    model_config = ConfigDict(frozen=True, extra="forbid", allow_inf_nan=False)
 
 
 Model = TypeVar("Model", bound=BaseModel)
@@ -45,17 +51,29 @@ def parse_yaml(text: str, source: str) -> Any:  # noqa: ANN401 - whatever the te
         InputError: the text is not YAML or repeats a key.
     """
     try:
-        return YAML(typ="safe", pure=True).load(text)
+        content = YAML(typ="safe", pure=True).load(text)
     except MarkedYAMLError as err:
-        line = err.problem_mark.line + 1 if err.problem_mark else 0
-        problem = " ".join(str(err.problem).split())
-        raise InputError(f"{source}: line {line}: {problem}") from None
-    except YAMLError as err:
+        raise InputError(f"{source}: {_yaml_fault(err)}") from None
+    except (YAMLError, ValueError) as err:
         raise InputError(f"{source}: not YAML ({' '.join(str(err).split())})") from None
+    except RecursionError:
+        raise InputError(f"{source}: nested without end, {DEPTH_ALLOWED}") from None
+    _check_shape(content, source)
+    return content
+
+
+def _yaml_fault(err: MarkedYAMLError) -> str:
+    line = err.problem_mark.line + 1 if err.problem_mark else 0
+    problem = " ".join(str(err.problem).split())
+    if isinstance(err, DuplicateKeyError):
+        return f"line {line}: {problem.removeprefix('found ')}, allowed: each key once"
+    if problem.startswith("but "):
+        problem = f"{' '.join(str(err.context).split())}, {problem}"
+    return f"line {line}: not YAML: {problem}"
 
 
 def dump_yaml(content: Any) -> str:  # noqa: ANN401 - any plain data
-    """Return plain data as YAML text in block style, keys in the given order."""
+    """Return plain data as YAML text, innermost lists in one line, keys in the given order."""
     yaml = YAML(typ="safe", pure=True)
     yaml.default_flow_style = None
     yaml.sort_base_mapping_type_on_output = False  # type: ignore[assignment]
@@ -72,83 +90,26 @@ def validate(model: type[Model], content: object, source: str) -> Model:
         InputError: naming source, key, value and what is allowed, for the first fault found.
     """
     if not isinstance(content, dict):
-        kind = "an empty file" if content is None else type(content).__name__
+        kind = KINDS.get(type(content), type(content).__name__)
         raise InputError(f"{source}: {kind}, allowed: a mapping of keys to values")
+    # YAML and JSON hold the same data, and pydantic's JSON mode alone takes lists for tuples while
+    # refusing text and truth values where a number belongs.
+    text = json.dumps(content, default=str)
     try:
-        return model.model_validate(content)
+        return model.model_validate_json(text, strict=True)
     except ValidationError as err:
-        raise InputError(f"{source}: {_one_line(err)}") from None
+        raise InputError(f"{source}: {fault_line(err, model)}") from None
 
 
-def _one_line(err: ValidationError) -> str:
-    faults = err.errors(include_url=False)
-    # A misspelt key shows as one unknown and one missing: the unknown one is what was typed.
-    fault = min(faults, key=lambda f: f["type"] != "extra_forbidden")
-    key = key_path(fault["loc"])
-    more = f" (and {len(faults) - 1} more faults)" if len(faults) > 1 else ""
-    if fault["type"] == "extra_forbidden":
-        return f"{key}: unknown key, allowed: {_siblings(err, fault['loc'])}{more}"
-    if fault["type"] == "missing":
-        return f"{key}: missing, a value is required{more}"
-    text = fault["msg"].removeprefix("Value error, ")
-    if fault["type"] == "value_error":
-        return f"{key}: {text}{more}" if key else f"{text}{more}"
-    return f"{key}: {_shorten(fault['input'])}, allowed: {_allowed(text)}{more}"
-
-
-def key_path(loc: Iterable[int | str]) -> str:
-    """Return a fault's place as `cables[2].drum_radius`."""
-    path = ""
-    for part in loc:
-        path += f"[{part}]" if isinstance(part, int) else f".{part}" if path else part
-    return path
-
-
-def _allowed(text: str) -> str:
-    text = text.removeprefix("Input should be ").removeprefix("a valid ")
-    return text[0].lower() + text[1:]
-
-
-def _shorten(value: object, limit: int = 60) -> str:
-    text = repr(value)
-    return text if len(text) <= limit else text[: limit - 1] + "…"
-
-
-def _siblings(err: ValidationError, loc: tuple[int | str, ...]) -> str:
-    """List the keys that the model at `loc`'s parent knows, found through the error's schema."""
-    fields = _fields_at(err.title, loc[:-1])
-    return ", ".join(fields) if fields else "the keys in the documentation"
-
-
-def _fields_at(title: str, loc: tuple[int | str, ...]) -> list[str]:
-    model = next((m for m in _all_models(StrictModel) if m.__name__ == title), None)
-    for part in loc:
-        if model is None:
-            return []
-        if isinstance(part, int):
-            continue
-        tagged = [m for m in _all_models(StrictModel) if _tag_of(m) == part]
-        if part in model.model_fields:
-            model = _model_of(model.model_fields[part].annotation)
-        elif tagged:
-            model = tagged[0]
-    return list(model.model_fields) if model else []
-
-
-def _tag_of(model: type[BaseModel]) -> object:
-    field = model.model_fields.get("type") or model.model_fields.get("law")
-    return field.default if field else None
-
-
-def _model_of(annotation: Any) -> type[BaseModel] | None:  # noqa: ANN401 - any type form
-    if isinstance(annotation, type) and issubclass(annotation, BaseModel):
-        return annotation
-    for inner in getattr(annotation, "__args__", ()):
-        found = _model_of(inner)
-        if found:
-            return found
-    return None
-
-
-def _all_models(base: type[BaseModel]) -> list[type[BaseModel]]:
-    return [m for sub in base.__subclasses__() for m in (sub, *_all_models(sub))]
+def _check_shape(node: object, source: str, depth: int = 0) -> None:
+    """Refuse what no model holds: an anchor inside itself, bottomless nesting, lists as keys."""
+    if depth > DEEPEST:
+        raise InputError(f"{source}: nested without end, {DEPTH_ALLOWED}")
+    if isinstance(node, dict):
+        for key, inner in node.items():
+            if isinstance(key, tuple):
+                raise InputError(f"{source}: {list(key)} as a key, allowed: text")
+            _check_shape(inner, source, depth + 1)
+    elif isinstance(node, list):
+        for inner in node:
+            _check_shape(inner, source, depth + 1)

@@ -91,7 +91,10 @@ def _small_body(
     """Return one period of the scaled response of a small body, and the knots' spacing."""
     waves = sea_of(spec, seed)
     elevation = wave_amplitudes(spec, waves, 1.0)
-    number = wave_number(waves.angular_frequency, gravity)
+    # A ship is too long to follow the slope of the band's shortest waves. With the peak's wave
+    # number for all of them, its angles have the same spectrum as the elevation.
+    peak = np.array([2.0 * pi / spec.peak_period])
+    number = np.repeat(wave_number(peak, gravity), len(waves.direction))
     response = small_body_response(waves.direction, number, mean_yaw)
     phasor = waves.phasor(spec.position, gravity)
     count = knot_count(spec.period, waves.frequency[-1], max(spec.amplitudes))

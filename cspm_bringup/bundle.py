@@ -1,0 +1,91 @@
+"""A run's description as it travels inside its recording, and out of it again."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from pathlib import Path
+
+from cspm_msgs_py.errors import InputError
+from cspm_msgs_py.motion_spec import FileMotion, VesselMotion
+from cspm_msgs_py.scenario import Body, Scenario, parse_scenario
+from cspm_msgs_py.testbed import TestbedFile, parse_testbed
+from cspm_msgs_py.yaml_file import dump_yaml
+
+SCENARIO = "scenario.yaml"
+TESTBED = "testbed.yaml"
+
+
+@dataclass(frozen=True)
+class Bundle:
+    """A resolved scenario, its test-bed, and the files that its motions read, by name."""
+
+    scenario: Scenario
+    testbed: TestbedFile
+    files: dict[str, bytes]
+
+    def attachments(self) -> dict[str, bytes]:
+        """Return the recording's attachments by name."""
+        text = dump_yaml(self.scenario.model_dump(mode="json"))
+        described = {SCENARIO: text.encode(), TESTBED: self.testbed.text.encode()}
+        return described | self.files
+
+    def write_files(self, folder: Path) -> None:
+        """Put the motions' files where the scenario's relative paths find them."""
+        for name, content in self.files.items():
+            (folder / name).write_bytes(content)
+
+
+def make_bundle(scenario: Scenario, testbed: TestbedFile, folder: Path) -> Bundle:
+    """Return the self-contained description of a run whose scenario file lies in `folder`.
+
+    Raises:
+        InputError: a file that a motion reads cannot be read.
+    """
+    files: dict[str, bytes] = {}
+
+    def contained(body: Body, role: str) -> Body:
+        motion = body.motion
+        if isinstance(motion, FileMotion):
+            name = _take(folder / motion.path, role, files)
+            return body.model_copy(update={"motion": motion.model_copy(update={"path": name})})
+        if isinstance(motion, VesselMotion):
+            name = _take(folder / motion.rao, role, files)
+            return body.model_copy(update={"motion": motion.model_copy(update={"rao": name})})
+        return body
+
+    changes: dict[str, object] = {
+        "testbed": TESTBED,
+        "winch_frame": contained(scenario.winch_frame, "winch_frame"),
+        "target": contained(scenario.target, "target"),
+    }
+    return Bundle(scenario.model_copy(update=changes), testbed, files)
+
+
+def read_bundle(attachments: Mapping[str, bytes], source: str) -> Bundle:
+    """Return the description that a recording carries.
+
+    Raises:
+        InputError: the recording carries none, or a damaged one.
+    """
+    missing = [name for name in (SCENARIO, TESTBED) if name not in attachments]
+    if missing:
+        raise InputError(
+            f"{source}: carries no {' and no '.join(missing)}, allowed: a recording made by cspm"
+        )
+    texts = {name: attachments[name].decode(errors="replace") for name in (SCENARIO, TESTBED)}
+    return Bundle(
+        parse_scenario(texts[SCENARIO], f"{source}: {SCENARIO}"),
+        parse_testbed(texts[TESTBED], f"{source}: {TESTBED}"),
+        {name: content for name, content in attachments.items() if name not in texts},
+    )
+
+
+def _take(path: Path, role: str, files: dict[str, bytes]) -> str:
+    try:
+        content = path.read_bytes()
+    except OSError as err:
+        raise InputError(f"{path}: not readable ({err.strerror}), allowed: a file") from None
+    name = f"{role}_motion{path.suffix}"
+    files[name] = content
+    return name

@@ -1,0 +1,38 @@
+"""The scenarios that come with the package, and how a name on the command line finds one."""
+
+from __future__ import annotations
+
+import sys
+from pathlib import Path
+
+from cspm_msgs_py.errors import InputError
+
+
+def scenario_folders() -> list[Path]:
+    """Return where scenarios are looked for: the source tree, then the installed data."""
+    return [
+        Path(__file__).resolve().parents[1] / "scenarios",
+        Path(sys.prefix) / "share" / "cspm" / "scenarios",
+    ]
+
+
+def scenario_names() -> list[str]:
+    """Return the names of all scenarios that come with the package."""
+    return sorted({path.stem for folder in scenario_folders() for path in folder.glob("*.yaml")})
+
+
+def find_scenario(name: str) -> Path:
+    """Return the scenario file that `name` means: a path, or a name from the library.
+
+    Raises:
+        InputError: there is none; the line lists the library.
+    """
+    path = Path(name)
+    if path.suffix in {".yaml", ".yml"} or path.is_file():
+        if path.is_file():
+            return path
+        raise InputError(f"{name}: no such file, allowed: a scenario file")
+    for folder in scenario_folders():
+        if (folder / f"{name}.yaml").is_file():
+            return folder / f"{name}.yaml"
+    raise InputError(f"{name}: no such scenario, allowed: {', '.join(scenario_names())} or a file")

@@ -1,0 +1,77 @@
+"""What a run amounts to: errors, tensions and shares, in constant memory."""
+
+from __future__ import annotations
+
+import numpy as np
+from numba import njit
+from numpy.typing import NDArray
+
+Array = NDArray[np.float64]
+
+BINS = 2000
+
+
+class Tally:
+    """Largest and mean-square pose errors, tension range, and their envelopes over time.
+
+    Attributes:
+        envelope: shape (BINS, 2, 6 + n): lowest and highest pose error and tension per time bin.
+        bin_steps: plant steps per bin.
+    """
+
+    def __init__(self, steps: int, n_cables: int) -> None:
+        """Prepare for `steps` steps of a machine with `n_cables` cables."""
+        self.bin_steps = max(1, -(-steps // BINS))
+        self.envelope: Array = np.empty((BINS, 2, 6 + n_cables))
+        self.envelope[:, 0], self.envelope[:, 1] = np.inf, -np.inf
+        self.steps = 0
+        self._squares = np.zeros(6)
+        self._counts = np.zeros(2, dtype=np.int64)
+
+    def add(self, error: Array, tensions: Array, slack: bool, infeasible: bool) -> None:
+        """Count one step with pose error (6,) [m, rad] and tensions (n,) [N]."""
+        _add(self.envelope[self.steps // self.bin_steps], error, tensions, self._squares)
+        self.steps += 1
+        self._counts[0] += slack
+        self._counts[1] += infeasible
+
+    @property
+    def max_error(self) -> Array:
+        """Largest absolute pose error (6,) [m, rad]."""
+        used = self._used()[:, :, :6]
+        return np.abs(used).max(axis=(0, 1)) if len(used) else np.zeros(6)
+
+    @property
+    def rms_error(self) -> Array:
+        """Root mean square pose error (6,) [m, rad]."""
+        return np.sqrt(self._squares / max(1, self.steps))
+
+    @property
+    def tension_range(self) -> tuple[float, float]:
+        """Lowest and highest tension of any cable [N]."""
+        used = self._used()[:, :, 6:]
+        return (float(used.min()), float(used.max())) if used.size else (0.0, 0.0)
+
+    @property
+    def slack_share(self) -> float:
+        """Share of time with any cable slack."""
+        return float(self._counts[0] / max(1, self.steps))
+
+    @property
+    def infeasible_share(self) -> float:
+        """Share of time with a wrench that no allowed tensions give."""
+        return float(self._counts[1] / max(1, self.steps))
+
+    def _used(self) -> Array:
+        return self.envelope[: -(-self.steps // self.bin_steps)]
+
+
+@njit(cache=True)
+def _add(envelope: Array, error: Array, tensions: Array, squares: Array) -> None:
+    for d in range(6):
+        squares[d] += error[d] * error[d]
+        envelope[0, d] = min(envelope[0, d], error[d])
+        envelope[1, d] = max(envelope[1, d], error[d])
+    for i in range(tensions.shape[0]):
+        envelope[0, 6 + i] = min(envelope[0, 6 + i], tensions[i])
+        envelope[1, 6 + i] = max(envelope[1, 6 + i], tensions[i])

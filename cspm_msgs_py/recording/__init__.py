@@ -1,0 +1,1 @@
+"""Recordings: rosbag2 folders with an MCAP file, written and read without ROS."""

@@ -1,0 +1,391 @@
+"""One MCAP file being read, with or without its index; it need not be complete."""
+
+from __future__ import annotations
+
+import struct
+import zlib
+from collections.abc import Iterator
+from pathlib import Path
+from types import TracebackType
+from typing import NamedTuple
+
+import numpy as np
+from mcap.records import (
+    Attachment,
+    AttachmentIndex,
+    Channel,
+    ChunkIndex,
+    Footer,
+    Header,
+    McapRecord,
+    Metadata,
+    MetadataIndex,
+    Schema,
+    Statistics,
+)
+from numpy.typing import NDArray
+from typing_extensions import Self
+
+from cspm_msgs_py.errors import InputError
+from cspm_msgs_py.recording.chunk import (
+    ChunkHead,
+    Messages,
+    chunk_head,
+    decompress,
+    index_entries,
+    other_records,
+    read_messages,
+)
+from cspm_msgs_py.recording.records import (
+    HEAD,
+    MAGIC,
+    Opcode,
+    Span,
+    parse,
+    parse_attachment,
+    read_at,
+    spans,
+    spans_in,
+)
+
+_FOOTER_SIZE = HEAD.size + 20 + len(MAGIC)
+_HEAD_SIZE = 256
+_RUN = 1 << 22
+
+
+class ChunkPlace(NamedTuple):
+    """Where a chunk stands: its record, and the Message Index records that follow it.
+
+    A run of Message records outside any chunk is treated as a chunk without compression; for it
+    `loose` is set and `record` covers the run.
+    """
+
+    record: Span
+    index_end: int
+    loose: bool = False
+
+
+class McapFile:
+    """The content of one MCAP file.
+
+    A file that was closed is read by its summary, any other by walking over its records: all
+    records that are complete are there.
+
+    Attributes:
+        path: the file.
+        profile: such as `ros2`.
+        library: what wrote it.
+        complete: whether the file was closed, with a footer.
+        end: offset after the last complete record of the data section.
+        schemas: by id.
+        channels: by id.
+        chunks: in file order.
+        statistics: the writer's own counts, None where it left none.
+    """
+
+    def __init__(self, path: Path) -> None:
+        """Open a file and find its records.
+
+        Raises:
+            InputError: it is missing, not an MCAP file, or its summary is damaged.
+        """
+        self.path = path
+        self.schemas: dict[int, Schema] = {}
+        self.channels: dict[int, Channel] = {}
+        self.chunks: list[ChunkPlace] = []
+        self.statistics: Statistics | None = None
+        self._attachments: list[Span] = []
+        self._metadata: list[Span] = []
+        try:
+            self._file = path.open("rb")
+            self._size = self._file.seek(0, 2)
+        except OSError as err:
+            raise InputError(f"{path}: {_reason(err)}") from None
+        try:
+            self._read()
+        except BaseException:
+            self._file.close()
+            raise
+
+    def _read(self) -> None:
+        if self._size == 0:
+            raise InputError(f"{self.path}: an empty file, allowed: an MCAP file")
+        self._file.seek(0)
+        if self._file.read(len(MAGIC)) != MAGIC:
+            raise InputError(f"{self.path}: not an MCAP file (its first bytes are no MCAP magic)")
+        first = next(spans(self._file, len(MAGIC), self._size), None)
+        if first is None or first.opcode != Opcode.HEADER:
+            raise InputError(f"{self.path}: an MCAP file that ends before its header does")
+        header = parse(Header, self._content(first), str(self.path))
+        self.profile, self.library = header.profile, header.library
+        footer = self._footer()
+        self.complete = footer is not None
+        self.end = self._size
+        if footer is None or not self._read_summary(footer):
+            self._scan(first.end)
+
+    def _content(self, span: Span) -> bytes:
+        return read_at(self._file, span.content, span.length, self.path)
+
+    def _footer(self) -> Footer | None:
+        if self._size < len(MAGIC) + _FOOTER_SIZE:
+            return None
+        tail = read_at(self._file, self._size - _FOOTER_SIZE, _FOOTER_SIZE, self.path)
+        if not tail.endswith(MAGIC) or HEAD.unpack_from(tail) != (Opcode.FOOTER, 20):
+            return None
+        return parse(Footer, tail[HEAD.size : -len(MAGIC)], str(self.path))
+
+    def _read_summary(self, footer: Footer) -> bool:
+        """Take all from the summary; return whether it tells where the messages are."""
+        start, end = footer.summary_start, self._size - _FOOTER_SIZE
+        if start == 0:
+            return False
+        if not len(MAGIC) <= start <= end:
+            raise InputError(f"{self.path}: the footer points outside the file")
+        summary = read_at(self._file, start, end - start, self.path)
+        head = HEAD.pack(Opcode.FOOTER, 20) + struct.pack("<QQ", start, footer.summary_offset_start)
+        if footer.summary_crc and zlib.crc32(summary + head) != footer.summary_crc:
+            raise InputError(f"{self.path}: the summary's CRC does not fit")
+        self.end = start
+        for span in spans_in(summary):
+            self._take_summary(span, summary[span.content : span.end])
+        self.chunks.sort(key=lambda place: place.record.offset)
+        return self._summary_suffices()
+
+    def _take_summary(self, span: Span, content: bytes) -> None:
+        kind = _SUMMARY_KINDS.get(span.opcode)
+        if kind is None:
+            return
+        record = parse(kind, content, str(self.path))
+        if isinstance(record, Statistics):
+            self.statistics = record
+        elif isinstance(record, ChunkIndex):
+            self.chunks.append(self._indexed_chunk(record))
+        elif isinstance(record, AttachmentIndex):
+            self._attachments.append(_span(Opcode.ATTACHMENT, record.offset, record.length))
+        elif isinstance(record, MetadataIndex):
+            self._metadata.append(_span(Opcode.METADATA, record.offset, record.length))
+        else:
+            self._take_definition(record)
+
+    def _take_definition(self, record: McapRecord) -> None:
+        if isinstance(record, Schema):
+            self.schemas[record.id] = record
+        elif isinstance(record, Channel):
+            self.channels[record.id] = record
+
+    def _indexed_chunk(self, index: ChunkIndex) -> ChunkPlace:
+        span = _span(Opcode.CHUNK, index.chunk_start_offset, index.chunk_length)
+        index_end = span.end + index.message_index_length
+        if span.length < 0 or index_end > self.end:
+            raise InputError(f"{self.path}: the index points outside the data section")
+        return ChunkPlace(span, index_end)
+
+    def _summary_suffices(self) -> bool:
+        """Return whether the summary has all channels and chunks; else the file is walked over."""
+        statistics = self.statistics
+        if statistics is None:
+            return bool(self.channels and self.chunks)
+        if statistics.message_count == 0:
+            return bool(self.channels) or statistics.channel_count == 0
+        return bool(self.channels and self.chunks) and statistics.chunk_count == len(self.chunks)
+
+    def _scan(self, start: int) -> None:
+        self.chunks, self._attachments, self._metadata = [], [], []
+        self.end, closed = start, False
+        for span in spans(self._file, start, self._size):
+            closed = span.opcode in (Opcode.DATA_END, Opcode.FOOTER)
+            if closed:
+                break
+            self._take_data(span)
+            self.end = span.end
+        if self.complete and not closed:
+            raise InputError(f"{self.path}: no record at byte {self.end}")
+        for place in self.chunks:
+            self._take_definitions(place)
+        if not (self.complete or self.channels):
+            raise InputError(f"{self.path}: not closed, and holds no channel and no message")
+
+    def _take_data(self, span: Span) -> None:
+        if span.opcode in (Opcode.SCHEMA, Opcode.CHANNEL):
+            kind = _DEFINITIONS[span.opcode]
+            self._take_definition(parse(kind, self._content(span), str(self.path)))
+        elif span.opcode == Opcode.CHUNK:
+            self.chunks.append(ChunkPlace(span, span.end))
+        elif span.opcode == Opcode.MESSAGE_INDEX and self.chunks:
+            if self.chunks[-1].index_end == span.offset:
+                self.chunks[-1] = self.chunks[-1]._replace(index_end=span.end)
+        elif span.opcode == Opcode.MESSAGE:
+            self._take_loose(span)
+        elif span.opcode == Opcode.ATTACHMENT:
+            self._attachments.append(span)
+        elif span.opcode == Opcode.METADATA:
+            self._metadata.append(span)
+
+    def _take_loose(self, span: Span) -> None:
+        """Put a message outside any chunk to the run before it, or begin one."""
+        last = self.chunks[-1] if self.chunks else None
+        if last and last.loose and last.index_end == span.offset and last.record.length < _RUN:
+            run = last.record._replace(length=last.record.length + HEAD.size + span.length)
+        else:
+            run = span
+            self.chunks.append(ChunkPlace(span, span.end, loose=True))
+        self.chunks[-1] = ChunkPlace(run, run.end, loose=True)
+
+    def _take_definitions(self, place: ChunkPlace) -> None:
+        """Take the schemas and channels in a chunk whose messages need them.
+
+        Raises:
+            InputError: messages of a channel that no record describes.
+        """
+        used = set(index_entries(self.index_records(place)) or ())
+        if used and used <= self.channels.keys():
+            return
+        try:
+            messages, content = self.messages(place), self.chunk_content(place)
+        except InputError:
+            # A damaged chunk is refused when its messages are asked for; the others are good.
+            return
+        for span in other_records(content):
+            if span.opcode in _DEFINITIONS:
+                kind = _DEFINITIONS[span.opcode]
+                record = parse(kind, content[span.content : span.end], self._where(place))
+                self._take_definition(record)
+        unknown = set(messages.channels.tolist()) - self.channels.keys()
+        if unknown:
+            raise InputError(
+                f"{self._where(place)}: messages on channel {min(unknown)}, which no record"
+                " describes"
+            )
+
+    def _where(self, place: ChunkPlace) -> str:
+        return f"{self.path}: chunk at byte {place.record.offset}"
+
+    def record_bytes(self, start: int, end: int) -> bytes:
+        """Return the file's bytes between two offsets.
+
+        Raises:
+            InputError: they cannot be read.
+        """
+        return read_at(self._file, start, end - start, self.path)
+
+    @property
+    def size(self) -> int:
+        """Length of the file [bytes]."""
+        return self._size
+
+    def index_records(self, place: ChunkPlace) -> bytes:
+        """Return the Message Index records after a chunk, empty if there are none."""
+        return self.record_bytes(place.record.end, place.index_end)
+
+    def head(self, place: ChunkPlace) -> ChunkHead:
+        """Return what stands before a chunk's data.
+
+        Raises:
+            InputError: the record is damaged.
+        """
+        if place.loose:
+            size = HEAD.size + place.record.length
+            return ChunkHead(0, 0, size, 0, "", -HEAD.size, size)
+        length = min(place.record.length, _HEAD_SIZE)
+        content = self.record_bytes(place.record.content, place.record.content + length)
+        return chunk_head(content, place.record.length, self._where(place))
+
+    def chunk_data(self, place: ChunkPlace, head: ChunkHead) -> bytes:
+        """Return a chunk's data as they are in the file."""
+        start = place.record.content + head.data
+        return self.record_bytes(start, start + head.data_size)
+
+    def chunk_content(self, place: ChunkPlace) -> bytes:
+        """Return a chunk's decompressed content.
+
+        Raises:
+            InputError: it is damaged.
+        """
+        head = self.head(place)
+        return decompress(self.chunk_data(place, head), head, self._where(place))
+
+    def messages(self, place: ChunkPlace) -> Messages:
+        """Return a chunk's messages.
+
+        Raises:
+            InputError: it is damaged.
+        """
+        content, where = self.chunk_content(place), self._where(place)
+        return read_messages(content, b"" if place.loose else self.index_records(place), where)
+
+    def may_hold(self, place: ChunkPlace, channels: set[int]) -> bool:
+        """Return False only if the chunk's index names none of the channels."""
+        entries = None if place.loose else index_entries(self.index_records(place))
+        return entries is None or not channels.isdisjoint(entries)
+
+    def times(self, place: ChunkPlace) -> dict[int, NDArray[np.uint64]]:
+        """Return log time and offset of each message of a chunk, shape (n, 2), by channel id.
+
+        From the Message Index where there is one, else from the chunk.
+
+        Raises:
+            InputError: the index contradicts the chunk's head, or the chunk is damaged.
+        """
+        entries = None if place.loose else index_entries(self.index_records(place))
+        if entries is None:
+            return self.messages(place).index()
+        head = self.head(place)
+        for table in entries.values():
+            if len(table) and not (
+                head.first_ns <= table[:, 0].min() <= table[:, 0].max() <= head.last_ns
+            ):
+                raise InputError(f"{self._where(place)}: its index has other times than it")
+        return entries
+
+    def attachments(self) -> Iterator[Attachment]:
+        """Yield the attachments.
+
+        Raises:
+            InputError: one is damaged.
+        """
+        for span in self._attachments:
+            yield parse_attachment(self._content(span), f"{self.path}: byte {span.offset}")
+
+    def metadata(self) -> Iterator[Metadata]:
+        """Yield the metadata records.
+
+        Raises:
+            InputError: one is damaged.
+        """
+        for span in self._metadata:
+            yield parse(Metadata, self._content(span), f"{self.path}: byte {span.offset}")
+
+    def close(self) -> None:
+        """Close the file."""
+        self._file.close()
+
+    def __enter__(self) -> Self:
+        return self
+
+    def __exit__(
+        self,
+        kind: type[BaseException] | None,
+        error: BaseException | None,
+        trace: TracebackType | None,
+    ) -> None:
+        self.close()
+
+
+def _span(opcode: int, offset: int, length: int) -> Span:
+    """Return the place of a record of which the whole length is known."""
+    return Span(opcode, offset, length - HEAD.size)
+
+
+def _reason(err: OSError) -> str:
+    return "no such file" if isinstance(err, FileNotFoundError) else str(err.strerror)
+
+
+_DEFINITIONS: dict[int, type[McapRecord]] = {Opcode.SCHEMA: Schema, Opcode.CHANNEL: Channel}
+_SUMMARY_KINDS: dict[int, type[McapRecord]] = {
+    **_DEFINITIONS,
+    Opcode.STATISTICS: Statistics,
+    Opcode.CHUNK_INDEX: ChunkIndex,
+    Opcode.ATTACHMENT_INDEX: AttachmentIndex,
+    Opcode.METADATA_INDEX: MetadataIndex,
+}

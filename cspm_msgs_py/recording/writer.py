@@ -1,0 +1,245 @@
+"""Recording while a loop runs: blocks of log time go to a thread that writes them as chunks.
+
+How much a killed process loses follows from the structure: one block being filled, one waiting and
+one being written. With blocks of 0.05 s that is at most 0.15 s of log time.
+"""
+
+from __future__ import annotations
+
+import threading
+from collections.abc import Mapping
+from importlib.metadata import version
+from pathlib import Path
+from queue import SimpleQueue
+from types import TracebackType
+
+import zstandard
+from mcap.records import Attachment, Header, Metadata, Schema
+from mcap.records import Channel as ChannelRecord
+from typing_extensions import Self
+
+from cspm_msgs_py.errors import CspmError, InputError
+from cspm_msgs_py.layout import layout_of
+from cspm_msgs_py.message import carries_row
+from cspm_msgs_py.recording.block import Batch, Part, PayloadRecords, RowRecords, compress, merge
+from cspm_msgs_py.recording.channel import Channel
+from cspm_msgs_py.recording.rosbag2_metadata import (
+    ROS_DISTRO,
+    FileEntry,
+    TopicEntry,
+    contract_qos,
+    write_metadata,
+)
+from cspm_msgs_py.recording.sink import McapSink
+from cspm_msgs_py.ros_types import MESSAGE_ENCODING, SCHEMA_ENCODING, definition, type_hash
+from cspm_msgs_py.topics import Topic
+from cspm_msgs_py.yaml_file import dump_yaml
+
+BLOCK_NS = 50_000_000
+METADATA_NAME = "cspm"
+_BLOCKS_UNDERWAY = 2
+_COMPRESSION_LEVEL = -1
+_Block = list[Batch]
+
+
+class RecordingWriter:
+    """Writes one recording: a rosbag2 folder with an MCAP file.
+
+    Append from one thread only. Leaving the context closes the recording, also on an exception;
+    the process may be killed at any time, see `cspm_msgs_py.recording.recover`.
+    """
+
+    def __init__(
+        self,
+        folder: Path,
+        topics: Mapping[str, Topic],
+        *,
+        attachments: Mapping[str, bytes],
+        metadata: Mapping[str, str],
+        block_ns: int = BLOCK_NS,
+    ) -> None:
+        """Create the folder and the head of the file.
+
+        Args:
+            folder: a new folder; its name becomes the recording's.
+            topics: every topic that may be recorded, by name.
+            attachments: files to keep in the recording, by name.
+            metadata: the record named `cspm`.
+            block_ns: log time per chunk [ns].
+
+        Raises:
+            InputError: the folder exists or cannot be created, or a topic's type is unknown.
+        """
+        self.folder = folder = Path(folder).absolute()
+        self.path = folder / f"{folder.name}_0.mcap"
+        self._topics = list(topics.values())
+        self._hashes = [type_hash(topic.ros_type) for topic in self._topics]
+        self._records = [_records(topic, i + 1) for i, topic in enumerate(self._topics)]
+        self._block_ns = block_ns
+        self._channels = [Channel(topic.name, self._turn) for topic in self._topics]
+        self._by_name = {channel.name: channel for channel in self._channels}
+        self._counts = [0] * len(self._topics)
+        try:
+            folder.mkdir(parents=True)
+            self._sink = McapSink(self.path, Header("ros2", f"cspm {version('cspm')}"))
+            self._write_head(attachments, metadata)
+            self._write_metadata()
+        except FileExistsError:
+            raise InputError(f"{folder}: exists, allowed: a new folder") from None
+        except OSError as err:
+            raise InputError(f"{folder}: cannot be written ({err.strerror})") from None
+        self._room = threading.Semaphore(_BLOCKS_UNDERWAY)
+        self._blocks: SimpleQueue[_Block | None] = SimpleQueue()
+        self._failure: str | None = None
+        self._closed = False
+        self._thread = threading.Thread(target=self._run, name="recording", daemon=True)
+        self._thread.start()
+
+    def channel(self, name: str) -> Channel:
+        """Return the channel of a topic; keep it, looking it up costs time.
+
+        Raises:
+            InputError: the topic was not declared or carries no row of numbers.
+        """
+        channel = self._declared(name)
+        if isinstance(self._records[self._channels.index(channel)], PayloadRecords):
+            raise InputError(f"{name}: carries no row of numbers, allowed: append_payload")
+        return channel
+
+    def append_payload(self, name: str, log_ns: int, payload: bytes) -> None:
+        """Record a message of a topic without rows, such as `/diagnostics`, from its CDR bytes.
+
+        Raises:
+            InputError: the topic was not declared, or its messages are rows.
+            CspmError: writing failed earlier.
+        """
+        channel = self._declared(name)
+        if isinstance(self._records[self._channels.index(channel)], RowRecords):
+            raise InputError(f"{name}: carries a row of numbers, allowed: channel({name!r}).append")
+        channel.append_payload(log_ns, payload)
+
+    def _declared(self, name: str) -> Channel:
+        try:
+            return self._by_name[name]
+        except KeyError:
+            raise InputError(
+                f"{name}: not a topic of this recording, allowed: {', '.join(self._by_name)}"
+            ) from None
+
+    @property
+    def counts(self) -> dict[str, int]:
+        """Messages written by topic; complete once the recording is closed."""
+        return dict(zip(self._by_name, self._counts, strict=True))
+
+    def _turn(self, log_ns: int) -> None:
+        """Hand the filled block to the thread and begin the one that holds `log_ns`."""
+        self._raise_failure()
+        if self._closed:
+            raise CspmError(f"{self.path}: the recording is closed")
+        # Waiting comes first: an interrupt while waiting leaves the block being filled as it is.
+        self._room.acquire()
+        end = (log_ns // self._block_ns + 1) * self._block_ns
+        self._blocks.put([channel.take(end) for channel in self._channels])
+
+    def _raise_failure(self) -> None:
+        if self._failure is not None:
+            raise CspmError(f"{self.path}: recording failed ({self._failure})")
+
+    def _run(self) -> None:
+        compressor = zstandard.ZstdCompressor(level=_COMPRESSION_LEVEL)
+        while (block := self._blocks.get()) is not None:
+            if self._failure is None:
+                try:
+                    self._write_block(block, compressor)
+                except InputError as err:
+                    self._failure = str(err)
+                except OSError as err:
+                    self._failure = err.strerror or str(err)
+                except Exception as err:
+                    self._failure = repr(err)
+            self._room.release()
+
+    def _write_block(self, block: _Block, compressor: zstandard.ZstdCompressor) -> None:
+        parts = [
+            Part(i + 1, self._topics[i].name, self._counts[i], batch, self._records[i])
+            for i, batch in enumerate(block)
+            if batch.logs
+        ]
+        if parts:
+            content, index = merge(parts)
+            self._sink.add_chunk(compress(content, index, compressor), index)
+            for part in parts:
+                self._counts[part.channel - 1] += len(part.batch.logs)
+
+    def close(self) -> None:
+        """Write what is left, the index and the counts; a second call does nothing.
+
+        Raises:
+            CspmError: writing failed; what was written before can be recovered.
+        """
+        if self._closed:
+            return
+        self._closed = True
+        self._blocks.put([channel.take(-1) for channel in self._channels])
+        self._blocks.put(None)
+        self._thread.join()
+        try:
+            if self._failure is None:
+                self._sink.finish()
+                self._write_metadata()
+        except OSError as err:
+            self._failure = err.strerror or str(err)
+        finally:
+            self._sink.close()
+        self._raise_failure()
+
+    def __enter__(self) -> Self:
+        return self
+
+    def __exit__(
+        self,
+        kind: type[BaseException] | None,
+        error: BaseException | None,
+        trace: TracebackType | None,
+    ) -> None:
+        try:
+            self.close()
+        except CspmError:
+            # What ended the block matters more than that its recording could not be closed.
+            if error is None:
+                raise
+
+    def _write_head(self, attachments: Mapping[str, bytes], metadata: Mapping[str, str]) -> None:
+        """Write all that a killed file must not lose before the first message."""
+        self._sink.add_metadata(Metadata("rosbag2", {"ROS_DISTRO": ROS_DISTRO}))
+        self._sink.add_metadata(Metadata(METADATA_NAME, dict(metadata)))
+        for name, content in attachments.items():
+            self._sink.add_attachment(Attachment(0, 0, name, "application/yaml", bytes(content)))
+        types = list(dict.fromkeys(topic.ros_type for topic in self._topics))
+        for i, ros_type in enumerate(types):
+            text = definition(ros_type).encode()
+            self._sink.add_schema(Schema(i + 1, text, SCHEMA_ENCODING, ros_type))
+        qos = dump_yaml(contract_qos())
+        for i, topic in enumerate(self._topics):
+            about = {"offered_qos_profiles": qos, "topic_type_hash": self._hashes[i]}
+            schema = types.index(topic.ros_type) + 1
+            self._sink.add_channel(
+                ChannelRecord(i + 1, topic.name, MESSAGE_ENCODING, about, schema)
+            )
+
+    def _write_metadata(self) -> None:
+        qos = contract_qos()
+        entries = [
+            TopicEntry(topic.name, topic.ros_type, self._hashes[i], qos, self._counts[i])
+            for i, topic in enumerate(self._topics)
+        ]
+        first, last = self._sink.span_ns
+        write_metadata(
+            self.folder, entries, [FileEntry(self.path.name, first, last, sum(self._counts))]
+        )
+
+
+def _records(topic: Topic, channel: int) -> RowRecords | PayloadRecords:
+    if carries_row(topic.ros_type):
+        return RowRecords(layout_of(topic), channel)
+    return PayloadRecords(channel)

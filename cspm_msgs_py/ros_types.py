@@ -1,0 +1,108 @@
+"""ROS 2 message classes and definitions without ROS, loaded when first needed.
+
+The definitions are those of ROS 2 Jazzy as `rosbags` ships them. Loading takes about 0.1 s, which
+is why nothing here happens at import.
+"""
+
+from __future__ import annotations
+
+from functools import cache
+from typing import TYPE_CHECKING, Any
+
+from cspm_msgs_py.errors import InputError
+
+if TYPE_CHECKING:
+    from rosbags.typesys.store import Typestore
+
+SCHEMA_ENCODING = "ros2msg"
+MESSAGE_ENCODING = "cdr"
+
+
+@cache
+def typestore() -> Typestore:
+    """Return the message classes of ROS 2 Jazzy."""
+    from rosbags.typesys import Stores, get_typestore
+
+    return get_typestore(Stores.ROS2_JAZZY)
+
+
+def message_class(ros_type: str) -> Any:  # noqa: ANN401 - classes are generated at run time
+    """Return the class of `package/msg/Type`.
+
+    Raises:
+        InputError: ROS 2 Jazzy has no such type.
+    """
+    try:
+        return typestore().types[ros_type]
+    except KeyError:
+        raise InputError(
+            f"message type {ros_type!r} is unknown, allowed: the common interfaces of ROS 2 Jazzy"
+        ) from None
+
+
+def definition(ros_type: str) -> str:
+    """Return the definition with those of all nested types, as the encoding `ros2msg` wants it.
+
+    Raises:
+        InputError: ROS 2 Jazzy has no such type.
+    """
+    message_class(ros_type)
+    return typestore().generate_msgdef(ros_type, ros_version=2)[0]
+
+
+def type_hash(ros_type: str) -> str:
+    """Return the type's hash `RIHS01_…` as rosbag2 keeps it.
+
+    Raises:
+        InputError: ROS 2 Jazzy has no such type.
+    """
+    message_class(ros_type)
+    return typestore().hash_rihs01(ros_type)
+
+
+def serialize(message: Any) -> bytes:  # noqa: ANN401 - classes are generated at run time
+    """Return a message's CDR bytes, little endian, padding zero."""
+    return bytes(typestore().serialize_cdr(message, message.__msgtype__))
+
+
+def deserialize(payload: bytes, ros_type: str) -> Any:  # noqa: ANN401 - see message_class
+    """Return the message that CDR bytes hold.
+
+    Raises:
+        InputError: the type is unknown or the bytes do not hold it.
+    """
+    message_class(ros_type)
+    try:
+        return typestore().deserialize_cdr(payload, ros_type)
+    except Exception as err:
+        raise InputError(
+            f"{len(payload)} bytes that are no {ros_type} ({type(err).__name__})"
+        ) from None
+
+
+def check_definition(ros_type: str, encoding: str, text: str) -> None:
+    """Refuse a recorded definition whose fields are not those of ROS 2 Jazzy.
+
+    Raises:
+        InputError: another schema encoding, an unknown type, or other fields.
+    """
+    from rosbags.typesys import get_types_from_idl, get_types_from_msg
+
+    message_class(ros_type)
+    try:
+        if encoding == SCHEMA_ENCODING:
+            found = get_types_from_msg(text, ros_type)
+        elif encoding == "ros2idl":
+            found = get_types_from_idl(text)
+        else:
+            raise InputError(
+                f"schema of {ros_type} has the encoding {encoding!r}, allowed: {SCHEMA_ENCODING}"
+            )
+    except InputError:
+        raise
+    except Exception:
+        raise InputError(f"schema of {ros_type} is not a message definition") from None
+    known = typestore().fielddefs
+    for name, (_, fields) in found.items():
+        if name not in known or known[name][1] != fields:
+            raise InputError(f"schema of {ros_type}: {name} has other fields than in ROS 2 Jazzy")

@@ -1,0 +1,221 @@
+import re
+from typing import Annotated, Literal
+
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+from pydantic import Field, PositiveFloat, ValidationError, model_validator
+
+from cspm_msgs_py.errors import InputError
+from cspm_msgs_py.yaml_file import StrictModel, dump_yaml, parse_yaml, read_yaml, validate
+
+
+class Round(StrictModel):
+    kind: Literal["round"] = "round"
+    radius: PositiveFloat
+
+
+class Square(StrictModel):
+    kind: Literal["square"] = "square"
+    side: PositiveFloat
+    angle: float = 0.0
+
+    @model_validator(mode="after")
+    def _upright(self):
+        if self.angle > 1.0:
+            raise ValueError(f"angle: {self.angle:g}, allowed: ≤ 1")
+        return self
+
+
+Shape = Annotated[Round | Square, Field(discriminator="kind")]
+
+
+class Drawer(StrictModel):
+    name: str
+    count: int = 1
+    open: bool = False
+    shapes: tuple[Shape, ...] = ()
+    lid: Shape | None = None
+    corner: tuple[float, float] = (0.0, 0.0)
+    marks: dict[str, Round] = Field(default_factory=dict)
+    sizes: dict[Literal["small", "large"], float] = Field(default_factory=dict)
+
+
+DRAWER = {"name": "d"}
+FAULTS = [
+    ({}, "name: missing, a value is required"),
+    ({"name": 3}, "name: 3, allowed: text"),
+    ({"name": True}, "name: True, allowed: text"),
+    ({**DRAWER, "nme": 1}, "nme: unknown key, allowed: name, count, open, shapes, lid, corner"),
+    ({**DRAWER, 3: 1}, "3: unknown key, allowed: name, count"),
+    ({**DRAWER, "count": 1.5}, "count: 1.5, allowed: a whole number without decimal point"),
+    ({**DRAWER, "count": "1"}, "count: '1', allowed: a whole number without decimal point"),
+    ({**DRAWER, "count": True}, "count: True, allowed: a whole number without decimal point"),
+    ({**DRAWER, "count": None}, "count: None, allowed: a whole number without decimal point"),
+    ({**DRAWER, "open": 1}, "open: 1, allowed: true or false"),
+    ({**DRAWER, "shapes": 1}, "shapes: 1, allowed: a list"),
+    ({**DRAWER, "corner": {"x": 1}}, "corner: {'x': 1}, allowed: a list"),
+    ({**DRAWER, "corner": [1]}, "corner[1]: missing, a value is required"),
+    ({**DRAWER, "corner": [1, 2, 3]}, "corner: [1, 2, 3], allowed: a list of at most 2"),
+    ({**DRAWER, "corner": [1, "2"]}, "corner[1]: '2', allowed: a number"),
+    ({**DRAWER, "corner": [1, True]}, "corner[1]: True, allowed: a number"),
+    ({**DRAWER, "corner": [1, float("nan")]}, "corner[1]: nan, allowed: a finite number"),
+    ({**DRAWER, "corner": [float("-inf"), 1]}, "corner[0]: -inf, allowed: a finite number"),
+    ({**DRAWER, "lid": 3}, "lid: 3, allowed: a mapping of keys to values"),
+    ({**DRAWER, "lid": {"side": 1}}, "lid.kind: missing, allowed: 'round' or 'square'"),
+    ({**DRAWER, "lid": {"kind": "oval"}}, "lid.kind: 'oval', allowed: 'round' or 'square'"),
+    ({**DRAWER, "lid": {"kind": [1]}}, "lid.kind: '[1]', allowed: 'round' or 'square'"),
+    ({**DRAWER, "lid": {"kind": "round"}}, "lid.radius: missing, a value is required"),
+    ({**DRAWER, "lid": {"kind": "round", "radius": -1}}, "lid.radius: -1, allowed: greater than 0"),
+    (
+        {**DRAWER, "lid": {"kind": "round", "side": 1}},
+        "lid.side: unknown key, allowed: kind, radius (and 1 more fault)",
+    ),
+    (
+        {**DRAWER, "shapes": [{"kind": "round", "radius": 1}, {"kind": "square", "size": 1}]},
+        "shapes[1].size: unknown key, allowed: kind, side, angle (and 1 more fault)",
+    ),
+    (
+        {**DRAWER, "lid": {"kind": "square", "side": 1, "angle": 2}},
+        "lid.angle: 2, allowed: ≤ 1",
+    ),
+    ({**DRAWER, "marks": []}, "marks: [], allowed: a mapping of keys to values"),
+    ({**DRAWER, "marks": {"a": {"radius": 0}}}, "marks.a.radius: 0, allowed: greater than 0"),
+    ({**DRAWER, "marks": {"a": {"r": 1}}}, "marks.a.r: unknown key, allowed: kind, radius"),
+    ({**DRAWER, "sizes": {"tiny": 1}}, "sizes.tiny: 'tiny', allowed: 'small' or 'large'"),
+    ({"count": "x", "open": 3}, "name: missing, a value is required (and 2 more faults)"),
+]
+
+
+@pytest.mark.parametrize(("content", "text"), FAULTS)
+def test_each_fault_is_one_line_with_key_value_and_what_is_allowed(content, text):
+    with pytest.raises(InputError) as caught:
+        validate(Drawer, content, "d.yaml")
+    line = str(caught.value)
+    assert line.startswith(f"d.yaml: {text}")
+    if "more fault" not in text:
+        assert "more fault" not in line or "unknown key" in line
+    assert "\n" not in line
+
+
+@pytest.mark.parametrize(
+    ("content", "kind"),
+    [(None, "an empty file"), ([1], "a list"), ("a", "a text"), (3, "a number"), (1.5, "float")],
+)
+def test_what_is_no_mapping_is_refused(content, kind):
+    with pytest.raises(InputError) as caught:
+        validate(Drawer, content, "d.yaml")
+    assert str(caught.value) == f"d.yaml: {kind}, allowed: a mapping of keys to values"
+
+
+def test_a_whole_model_is_read():
+    drawer = validate(
+        Drawer,
+        {
+            "name": "d",
+            "open": True,
+            "shapes": [{"kind": "round", "radius": 1}],
+            "lid": {"kind": "square", "side": 2.5},
+            "corner": [1, 2.5],
+            "sizes": {"small": 3},
+        },
+        "d.yaml",
+    )
+    assert drawer.shapes == (Round(radius=1.0),)
+    assert drawer.lid == Square(side=2.5)
+    assert drawer.corner == (1.0, 2.5)
+    assert drawer.sizes == {"small": 3.0}
+    assert drawer.open is True
+
+
+def test_a_long_value_is_shortened():
+    with pytest.raises(InputError) as caught:
+        validate(Drawer, {"name": list(range(1000))}, "d.yaml")
+    assert len(str(caught.value)) < 120
+    assert "…, allowed: text" in str(caught.value)
+
+
+def test_models_are_frozen():
+    drawer = validate(Drawer, DRAWER, "d.yaml")
+    with pytest.raises(ValidationError, match="frozen"):
+        drawer.name = "e"
+
+
+@pytest.mark.parametrize(
+    ("text", "fault"),
+    [
+        ("a: b: c", "line 1: not YAML: mapping values are not allowed here"),
+        ("a: 1\nb: [", "line 2: not YAML: expected the node content, but found '<stream end>'"),
+        (
+            "a: 1\nb: 2\na: 3\n",
+            'line 3: duplicate key "a" with value "3" (original value: "1"), allowed: each key onc',
+        ),
+        (
+            "a: 1\n---\nb: 2",
+            "line 2: not YAML: expected a single document in the stream, but found another documen",
+        ),
+        ("a: *b", "line 1: not YAML: found undefined alias 'b'"),
+        ("a: !b 3", "line 1: not YAML: could not determine a constructor for the tag '!b'"),
+        ("a: !!python/name:os.system", "line 1: not YAML: could not determine a constructor"),
+        ("a: 2020-13-45", "not YAML (month must be in 1..12)"),
+        ("\x00\x01", "not YAML (unacceptable character #x0000: special characters"),
+        ("a: &b [*b]", "nested without end, allowed: at most 50 levels"),
+        ("a: &b {c: *b}", "nested without end, allowed: at most 50 levels"),
+        ("a: " + "[" * 60 + "]" * 60, "nested without end, allowed: at most 50 levels"),
+        ("a: " + "[" * 5000, "nested without end, allowed: at most 50 levels"),
+        ("? [1, 2]\n: 3", "[1, 2] as a key, allowed: text"),
+        ("? {a: 1}\n: 3", "line 1: not YAML: found unhashable key"),
+    ],
+)
+def test_text_that_is_not_yaml_is_refused_in_one_line(text, fault):
+    with pytest.raises(InputError) as caught:
+        parse_yaml(text, "d.yaml")
+    assert str(caught.value).startswith(f"d.yaml: {fault}")
+    assert "\n" not in str(caught.value)
+
+
+@given(text=st.text(max_size=60))
+def test_any_text_is_read_or_refused_in_one_line(text):
+    line = "d.yaml: read"
+    try:
+        validate(Drawer, parse_yaml(text, "d.yaml"), "d.yaml")
+    except InputError as err:
+        line = str(err)
+    assert re.fullmatch(r"d\.yaml: [^\n]+", line)
+
+
+def test_files_that_cannot_be_read(tmp_path):
+    binary = tmp_path / "binary.yaml"
+    binary.write_bytes(bytes(range(256)))
+    for path, fault in [
+        (tmp_path / "none.yaml", "no such file"),
+        (tmp_path, "not a readable text file"),
+        (binary, "not a readable text file ('utf-8' codec can't decode byte 0x80"),
+    ]:
+        with pytest.raises(InputError) as caught:
+            read_yaml(path)
+        assert str(caught.value).startswith(f"{path}: {fault}")
+        assert "\n" not in str(caught.value)
+
+
+plain = st.recursive(
+    st.none()
+    | st.booleans()
+    | st.integers(-(10**9), 10**9)
+    | st.floats(allow_nan=False, allow_infinity=False)
+    | st.text(st.characters(codec="ascii", exclude_categories=["Cc"]), max_size=20),
+    lambda inner: (
+        st.lists(inner, max_size=3)
+        | st.dictionaries(st.from_regex(r"[a-z]{1,6}", fullmatch=True), inner, max_size=3)
+    ),
+    max_leaves=8,
+)
+
+
+@given(content=plain)
+def test_what_is_dumped_is_read_back(content):
+    assert parse_yaml(dump_yaml(content), "d.yaml") == content
+
+
+def test_dumping_keeps_the_order_of_keys():
+    assert dump_yaml({"b": 1, "a": [1, 2]}) == "b: 1\na: [1, 2]\n"

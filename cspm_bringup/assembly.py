@@ -9,7 +9,13 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from cspm_control.design import design_force_gains, design_motion_gains
+from cspm_control.design import (
+    check_separation,
+    design_force_gains,
+    design_motion_gains,
+    force_margins,
+    motion_margins,
+)
 from cspm_control.force_controller import ForceController
 from cspm_control.motion_controller import MotionController
 from cspm_control.tension_distribution import PseudoInverse
@@ -76,19 +82,27 @@ def resolve(scenario: Scenario, testbed: Testbed) -> Scenario:
         raise InputError("control.mode: closed_loop without a bar, allowed: torque, locked_winches")
     parameters = plant_parameters(testbed)
     motion, force = control.motion, control.force
-    if motion.gains is None:
-        gains = design_motion_gains(testbed, parameters, motion.design_pose, motion.crossover)
-        motion = motion.model_copy(update={"gains": gains})
-    if force.gains is None:
-        found = design_force_gains(testbed, parameters, motion.design_pose, force.bandwidth)
-        force = force.model_copy(update={"gains": found})
-    missing = set(testbed.cable_names) ^ set(force.gains or {})
+    pose = motion.design_pose
+    designed = motion.gains is None and force.gains is None
+    motion_gains = motion.gains or design_motion_gains(testbed, parameters, pose, motion.crossover)
+    force_gains = force.gains or design_force_gains(testbed, parameters, pose, force.bandwidth)
+    if designed:
+        check_separation(
+            motion_margins(testbed, parameters, pose, motion_gains),
+            force_margins(testbed, parameters, pose, force_gains),
+        )
+    missing = set(testbed.cable_names) ^ set(force_gains)
     if missing:
         raise InputError(
             f"control.force.gains: {', '.join(sorted(missing))}, allowed: exactly the cables"
             f" {', '.join(testbed.cable_names)}"
         )
-    control = control.model_copy(update={"motion": motion, "force": force})
+    control = control.model_copy(
+        update={
+            "motion": motion.model_copy(update={"gains": motion_gains}),
+            "force": force.model_copy(update={"gains": force_gains}),
+        }
+    )
     return scenario.model_copy(update={"control": control})
 
 
@@ -109,6 +123,11 @@ def assemble(scenario: Scenario, testbed: Testbed, folder: Path) -> Assembly:
         references["/bar/reference"] = _motion(scenario, target, testbed, folder)
     control = scenario.control
     sensors = _sensors(scenario, testbed, period_ns)
+    generator = (
+        TorqueGenerator(control.torque, testbed.cable_names)
+        if isinstance(control, TorqueProfile)
+        else None
+    )
     return Assembly(
         scenario=scenario,
         testbed=testbed,
@@ -118,6 +137,7 @@ def assemble(scenario: Scenario, testbed: Testbed, folder: Path) -> Assembly:
             frame,
             period_ns,
             bar_pose=references["/bar/reference"].at(0.0)[:6] if testbed.bar else None,
+            tensions=_balanced_tensions(testbed, generator) if generator else None,
             locked=isinstance(control, LockedWinches),
         ),
         sensors=sensors,
@@ -127,12 +147,16 @@ def assemble(scenario: Scenario, testbed: Testbed, folder: Path) -> Assembly:
             if isinstance(control, ClosedLoop)
             else None
         ),
-        torque_generator=(
-            TorqueGenerator(control.torque, testbed.cable_names)
-            if isinstance(control, TorqueProfile)
-            else None
-        ),
+        torque_generator=generator,
     )
+
+
+def _balanced_tensions(testbed: Testbed, generator: TorqueGenerator) -> Array:
+    """Return the tensions that the first torques hold, so that a rig does not start with a jerk."""
+    radii = np.array([cable.drum_radius / cable.gear_ratio for cable in testbed.cables])
+    has_cable = np.array([cable.has_cable for cable in testbed.cables])
+    tensions: Array = np.maximum(0.0, generator.step(0) / radii) * has_cable
+    return tensions
 
 
 def _motion(scenario: Scenario, body: Body, testbed: Testbed, folder: Path) -> Motion:

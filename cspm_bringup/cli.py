@@ -8,7 +8,6 @@ from pathlib import Path
 from typing import Annotated
 
 import typer
-from rich.console import Console
 
 from cspm_bringup.library import find_scenario, scenario_names
 from cspm_msgs_py.errors import CspmError, InputError
@@ -87,7 +86,7 @@ def info(
     """Show a recording's topics, rates, gaps, duration and scenario."""
     from cspm_bringup.commands import info_command
 
-    info_command(bag, Console(), json)
+    info_command(bag, json)
 
 
 @app.command()
@@ -101,7 +100,7 @@ def recover(
     """Restore a recording whose writer was killed, with its index and metadata."""
     from cspm_bringup.commands import recover_command
 
-    recover_command(bag, out, Console(), json)
+    recover_command(bag, out, json)
 
 
 @app.command()

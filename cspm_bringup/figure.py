@@ -23,8 +23,6 @@ def draw_run(
     requirement: Requirement,
     cables: Sequence[str],
     period: float,
-    *,
-    has_bar: bool,
 ) -> None:
     """Write the picture of a run as PNG: the envelope of every signal, so that no spike is lost.
 
@@ -34,23 +32,24 @@ def draw_run(
         requirement: limits drawn into the errors.
         cables: names, in the order of the tensions.
         period: the plant's period [s].
-        has_bar: whether there are pose errors to draw.
     """
+    has_bar = result.has_bar
     used = -(-result.tally.steps // result.tally.bin_steps)
     envelope = result.tally.envelope[:used]
-    time = np.arange(used) * result.tally.bin_steps * period
+    thousandths: Array = 1e3 * envelope
+    time = np.arange(used, dtype=np.float64) * (result.tally.bin_steps * period)
     figure = Figure(figsize=(11, 9 if has_bar else 4), layout="constrained")
     FigureCanvasAgg(figure)
     rows = figure.subplots(3 if has_bar else 1, 1, sharex=True, squeeze=False)[:, 0]
     if has_bar:
-        _errors(rows[0], time, 1e3 * envelope[:, :, :3], DOFS[:3], 1e3 * requirement.position, "mm")
-        _errors(rows[1], time, 1e3 * envelope[:, :, 3:6], DOFS[3:], 1e3 * requirement.angle, "mrad")
+        _errors(rows[0], time, thousandths[:, :, :3], DOFS[:3], 1e3 * requirement.position, "mm")
+        _errors(rows[1], time, thousandths[:, :, 3:6], DOFS[3:], 1e3 * requirement.angle, "mrad")
     for i, name in enumerate(cables):
         _band(rows[-1], time, envelope[:, :, 6 + i], name)
     rows[-1].set_ylabel("tension [N]")
     rows[-1].set_xlabel("time [s]")
     rows[-1].legend(loc="upper right", ncols=4, fontsize="small")
-    rows[0].set_title(f"{result.scenario}, seed {result.seed}: reference − pose, and tensions")
+    rows[0].set_title(f"{result.scenario}, seed {result.seed}")
     figure.savefig(path, dpi=110)
 
 
@@ -60,9 +59,10 @@ def _errors(
     for i, name in enumerate(names):
         _band(axes, time, bands[:, :, i], name)
     for side in (-limit, limit):
-        axes.axhline(side, color="black", linestyle="--", linewidth=0.8)
-    axes.set_ylabel(f"error [{unit}]")
-    axes.legend(loc="upper right", ncols=3, fontsize="small")
+        label = "required" if side > 0 else None
+        axes.axhline(side, color="black", linestyle="--", linewidth=0.8, label=label)
+    axes.set_ylabel(f"reference − pose [{unit}]")
+    axes.legend(loc="upper right", ncols=4, fontsize="small")
 
 
 def _band(axes: Axes, time: Array, band: Array, name: str) -> None:

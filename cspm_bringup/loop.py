@@ -49,7 +49,6 @@ class Loop:
         self._parts = parts
         self._publish = publish
         self._publish_statuses = publish_statuses
-        self._steps = round(parts.scenario.duration * rates.plant)
         self._reference_divider = rates.plant // rates.wave_trajectory
         self._status_divider = max(1, rates.plant // DIAGNOSTICS_RATE)
         cables = plant.parameters.cables
@@ -70,11 +69,6 @@ class Loop:
     def infeasible(self) -> bool:
         """Whether the last wrench cannot be met within the tension limits."""
         return self._cascade is not None and self._cascade.infeasible
-
-    @property
-    def done(self) -> bool:
-        """Whether the scenario's duration has passed."""
-        return self._parts.plant.steps >= self._steps
 
     def step(self) -> None:
         """Publish everything that belongs to the current instant, then advance the plant.
@@ -108,7 +102,9 @@ class Loop:
         slack = [n for n, t in zip(names, plant.tensions, strict=True) if t <= 0.0]
         events = []
         if self.slack:
-            events.append(f"slack since {self._last_good.taut:.3f} s ({', '.join(slack) or 'none now'})")
+            events.append(
+                f"slack since {self._last_good.taut:.3f} s ({', '.join(slack) or 'none now'})"
+            )
         if self.infeasible:
             events.append(f"wrench infeasible since {self._last_good.feasible:.3f} s")
         if self._parts.testbed.bar:
@@ -150,9 +146,7 @@ class Loop:
             bar_twist_row(plant.bar_state, twist)
             found.append(("/bar/pose", plant.bar_state[:6], pose))
             found.append(("/bar/twist", twist, twist))
-        winches = np.concatenate(
-            (plant.angles, plant.speeds, plant.applied_torque(self._torque))
-        )
+        winches = np.concatenate((plant.angles, plant.speeds, plant.applied_torque(self._torque)))
         found.append(("/winches/state", winches, winches))
         found.append(("/cables/tension", plant.tensions, plant.tensions))
         lengths = plant.unstretched_lengths
@@ -173,6 +167,8 @@ class Loop:
         self._slack_steps = 0
         level = Level.WARN if share else Level.OK
         statuses = [
-            Status(level, "plant", "slack cable" if share else "ok", {"slack_share": f"{share:.3f}"})
+            Status(
+                level, "plant", "slack cable" if share else "ok", {"slack_share": f"{share:.3f}"}
+            )
         ]
         return statuses + (self._cascade.statuses() if self._cascade else [])

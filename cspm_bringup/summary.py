@@ -38,26 +38,32 @@ def write_json(path: Path, data: Any) -> None:  # noqa: ANN401 - any plain data
 
 
 def print_summary(console: Console, result: RunResult, requirement: Requirement) -> None:
-    """Print errors against the requirement, tensions and speed."""
+    """Print pose errors (against the requirement where a controller ran), tensions and speed."""
     data = summary_data(result)
-    table = Table(title=f"{result.scenario}, seed {result.seed}, {result.simulated:g} s")
-    for column in ("", "max error", "RMS error", "required", "RMS within"):
-        table.add_column(column, justify="left" if not column else "right")
-    for i, dof in enumerate(DOFS):
-        error, limit, scale, unit = data["errors"][dof], requirement.angle, 1e3, "mrad"
-        if i < 3:
-            limit, unit = requirement.position, "mm"
-        table.add_row(
-            dof,
-            f"{error['max'] * scale:.3f} {unit}",
-            f"{error['rms'] * scale:.3f} {unit}",
-            f"± {limit * scale:g} {unit}",
-            "[green]yes[/]" if error["rms"] <= limit else "[red]no[/]",
-        )
-    if result.tally.steps:
-        console.print(table)
+    if result.has_bar and result.tally.steps:
+        console.print(_error_table(result, data["errors"], requirement))
+    tension = f"tensions {data['tension']['min']:.2f} to {data['tension']['max']:.2f} N"
     console.print(
-        f"tensions {data['tension']['min']:.2f} to {data['tension']['max']:.2f} N · any cable slack"
-        f" {data['slack_share']:.2%} of the time · wrench infeasible"
-        f" {data['infeasible_share']:.1%} · {result.real_time_factor:.1f} × real time"
+        f"{tension} · any cable slack {data['slack_share']:.2%} of the time · wrench infeasible"
+        f" {data['infeasible_share']:.1%} of the time",
+        soft_wrap=True,
     )
+    console.print(f"simulated {result.simulated:g} s at {result.real_time_factor:.1f} × real time")
+
+
+def _error_table(
+    result: RunResult, errors: dict[str, dict[str, float]], requirement: Requirement
+) -> Table:
+    what = "reference − pose" if result.controlled else "mean pose − pose, nothing controls it"
+    table = Table(title=f"{result.scenario}, seed {result.seed}: {what}")
+    columns = ["", "max", "RMS"] + ["required", "RMS within"] * result.controlled
+    for column in columns:
+        table.add_column(column, justify="right" if column else "left")
+    for i, dof in enumerate(DOFS):
+        limit, unit = (requirement.position, "mm") if i < 3 else (requirement.angle, "mrad")
+        cells = [dof] + [f"{1e3 * errors[dof][kind]:.3f} {unit}" for kind in ("max", "rms")]
+        if result.controlled:
+            verdict = "[green]yes[/]" if errors[dof]["rms"] <= limit else "[red]no[/]"
+            cells += [f"± {1e3 * limit:g} {unit}", verdict]
+        table.add_row(*cells)
+    return table

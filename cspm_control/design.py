@@ -1,4 +1,4 @@
-"""Gains of the motion and force controllers by the thesis's procedure (chapter 7), and their margins.
+"""Controller gains by the thesis's procedure (chapter 7), and the margins of their loops.
 
 Both designs see the linear model with frozen cable directions of chapter 6, one loop at a time.
 """
@@ -39,12 +39,12 @@ CONTROLLED_DOFS = tuple(DOFS[axis] for axis in CONTROLLED_AXES)
 INTEGRAL_ZERO = 1.0 / 40.0
 DERIVATIVE_ZERO = 1.0 / 3.0
 
-# Requirements on the motion loops (7-1): the bandwidth is the fastest wave of table 1-3.
+# Requirements on the motion loops, section 7-1: the bandwidth is the fastest wave of table 1-3.
 PHASE_MARGIN = np.radians(60.0)
 GAIN_MARGIN = 6.0  # dB
 LOW_FREQUENCY_GAIN = 20.0  # dB
 MOTION_BANDWIDTH = 7.3  # rad/s
-# Requirements on the force loops (7-2).
+# Requirements on the force loops, section 7-2.
 LARGEST_FORCE_BANDWIDTH = 1000.0  # rad/s
 BANDWIDTH_RATIO = 10.0
 
@@ -86,13 +86,10 @@ def margins(loop: Response, frequencies: Array) -> Margins:
     values = loop(frequencies)
 
     def crossings(measure: Callable[[ComplexArray], Array]) -> Array:
-        sign = np.sign(measure(values))
-        return np.array(
-            [
-                _refine(loop, measure, frequencies[i], frequencies[i + 1])
-                for i in np.flatnonzero(sign[1:] != sign[:-1])
-            ]
-        )
+        above = measure(values) > 0.0
+        places = np.flatnonzero(above[1:] != above[:-1])
+        pairs = [(frequencies[i], frequencies[i + 1]) for i in places]
+        return np.array([_refine(loop, measure, *pair) for pair in pairs])
 
     unit = crossings(lambda value: np.abs(value) - 1.0)
     real = crossings(np.imag)
@@ -114,7 +111,7 @@ def design_motion_gains(
     design_pose: ArrayLike,
     crossover: Mapping[Dof, float],
 ) -> dict[Dof, PidGains]:
-    """Return the PID per DOF with |L| = 1 at its crossover frequency and zeros in fixed ratio to it.
+    """Return the PID per DOF with |L| = 1 at its crossover and zeros in fixed ratio to it.
 
     Args:
         testbed: the machine.
@@ -225,22 +222,21 @@ def check_separation(motion: Mapping[Dof, Margins], force: Mapping[str, Margins]
     least = BANDWIDTH_RATIO * motion[dof].bandwidth
     if force[cable].bandwidth < least:
         raise InputError(
-            f"control.force: {cable} has a bandwidth of {force[cable].bandwidth:.4g} rad/s, allowed:"
-            f" at least {least:.4g} rad/s, {BANDWIDTH_RATIO:g} times that of {dof}"
+            f"control.force: {cable} has a bandwidth of {force[cable].bandwidth:.4g} rad/s,"
+            f" allowed: at least {least:.4g} rad/s, {BANDWIDTH_RATIO:g} times that of {dof}"
         )
 
 
 def _refine(
     loop: Response, measure: Callable[[ComplexArray], Array], low: float, high: float
 ) -> float:
-    def at(log_frequency: float) -> float:
-        return float(measure(loop(np.exp([log_frequency])))[0])
+    def at(frequency: float) -> float:
+        return float(measure(loop(np.array([frequency])))[0])
 
-    ends = np.log([low, high])
-    # The exponential of the logarithm may step over a root that lies on a grid point.
-    if at(ends[0]) * at(ends[1]) > 0.0:
-        return high
-    return float(np.exp(brentq(at, *ends, xtol=1e-10)))
+    ends = at(low), at(high)
+    if ends[0] * ends[1] > 0.0:  # a root on the grid itself, rounded to either side of it
+        return low if abs(ends[0]) < abs(ends[1]) else high
+    return float(brentq(at, low, high, xtol=1e-10 * low))
 
 
 def _motion_plant(
@@ -265,8 +261,7 @@ def _motion_loop(plant: StateSpace, dof: str, gains: PidGains) -> Response:
     def loop(frequencies: Array) -> ComplexArray:
         s = 1j * frequencies
         controller = gains.kp + gains.ki / s + gains.kd * s
-        response: ComplexArray = controller * plant.response(frequencies)[:, output, column]
-        return response
+        return np.asarray(controller * plant.response(frequencies)[:, output, column])
 
     return loop
 
@@ -274,8 +269,7 @@ def _motion_loop(plant: StateSpace, dof: str, gains: PidGains) -> Response:
 def _force_loop(plant: StateSpace, i: int, gains: PiGains) -> Response:
     def loop(frequencies: Array) -> ComplexArray:
         controller = gains.kp * (1.0 + gains.integral_frequency / (1j * frequencies))
-        response: ComplexArray = controller * plant.response(frequencies)[:, i, i]
-        return response
+        return np.asarray(controller * plant.response(frequencies)[:, i, i])
 
     return loop
 
@@ -340,10 +334,4 @@ def _check_force(name: str, bandwidth: float, found: Margins) -> None:
             f"control.force.bandwidth: at {bandwidth:g} rad/s the loop of {name} already falls"
             f" below −3 dB at {found.bandwidth:.4g} rad/s, allowed: a bandwidth above the"
             " resonances of the cables"
-        )
-    if found.phase_margin < PHASE_MARGIN:
-        raise InputError(
-            f"control.force.bandwidth: {name} at {bandwidth:g} rad/s has a phase margin of"
-            f" {np.degrees(found.phase_margin):.3g}°, allowed: at least"
-            f" {np.degrees(PHASE_MARGIN):.3g}°"
         )

@@ -8,7 +8,7 @@ import numpy as np
 from numba import njit
 from numpy.typing import NDArray
 
-from cspm_msgs_py.scenario import DOFS, PidGains
+from cspm_msgs_py.scenario import DOFS, ControlledDof, PidGains
 from cspm_msgs_py.testbed import Bar
 from cspm_sim.kernels.rotation import cross, euler_from_quaternion, rotate, rotation_from_euler
 
@@ -25,7 +25,7 @@ class MotionController:
 
     def __init__(
         self,
-        gains: Mapping[str, PidGains],
+        gains: Mapping[ControlledDof, PidGains],
         bar: Bar,
         gravity: float,
         *,

@@ -47,7 +47,7 @@ class PseudoInverse:
         self._lengths = np.zeros(n)
 
     def step(self, wrench: Array, bar_pose: Array, frame_pose: Array) -> Distribution:
-        """Return tensions for a wrench row (6,), at the measured pose rows (7,) of bar and frame."""
+        """Return tensions for a wrench row (6,) at measured pose rows (7,) of bar and frame."""
         tensions = np.empty(len(self._cables))
         residual, saturated = _pseudo_inverse(
             wrench,
@@ -73,7 +73,7 @@ def _pseudo_inverse(
     jacobians: Array,
     out: Array,
 ) -> tuple[float, int]:
-    """Write the limited tensions to `out`; return the relative residual and how many are limited."""
+    """Write limited tensions to `out`; return relative residual and how many are limited."""
     n, m = cables.shape[0], len(CONTROLLED_AXES)
     bar, frame = np.empty(6), np.empty(6)
     bar[:3] = bar_pose[:3]

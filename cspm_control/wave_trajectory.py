@@ -22,9 +22,7 @@ class WaveTrajectory:
     def step(self, stamp_ns: int) -> Array:
         """Return the reference row (19,) at `stamp_ns`; `values` keeps pose and derivatives."""
         motion = self.motion
-        evaluate_motion(
-            stamp_ns * 1e-9, motion.knots, motion.spacing, motion.periodic, self.values
-        )
+        evaluate_motion(stamp_ns * 1e-9, motion.knots, motion.spacing, motion.periodic, self.values)
         row = np.empty(19)
         reference_row(self.values, row)
         return row

@@ -16,6 +16,7 @@ if TYPE_CHECKING:
 
 SCHEMA_ENCODING = "ros2msg"
 MESSAGE_ENCODING = "cdr"
+_EXTRA_BYTES = (0, 4, 8)  # rclpy's serialiser appends up to 8 bytes, rosbags overlooks up to 3
 
 
 @cache
@@ -72,12 +73,13 @@ def deserialize(payload: bytes, ros_type: str) -> Any:  # noqa: ANN401 - see mes
         InputError: the type is unknown or the bytes do not hold it.
     """
     message_class(ros_type)
-    try:
-        return typestore().deserialize_cdr(payload, ros_type)
-    except Exception as err:
-        raise InputError(
-            f"{len(payload)} bytes that are no {ros_type} ({type(err).__name__})"
-        ) from None
+    reason = ""
+    for extra in _EXTRA_BYTES:
+        try:
+            return typestore().deserialize_cdr(payload[: len(payload) - extra], ros_type)
+        except Exception as err:
+            reason = reason or type(err).__name__
+    raise InputError(f"{len(payload)} bytes that are no {ros_type} ({reason})")
 
 
 def check_definition(ros_type: str, encoding: str, text: str) -> None:

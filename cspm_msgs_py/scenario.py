@@ -15,6 +15,7 @@ from cspm_msgs_py.yaml_file import StrictModel, parse_yaml, read_yaml, validate
 
 Pose = tuple[float, float, float, float, float, float]
 ORIGIN: Pose = (0.0, 0.0, 0.0, 0.0, 0.0, 0.0)
+ControlledDof = Literal["surge", "sway", "heave", "pitch", "yaw"]
 DOFS = ("surge", "sway", "heave", "roll", "pitch", "yaw")
 
 
@@ -70,11 +71,12 @@ class PiGains(StrictModel):
 class MotionControl(StrictModel):
     """Motion controller: crossover [rad/s] per controlled DOF, or the gains themselves.
 
-    Gains that are absent are designed at `design_pose` for the crossover frequencies. The derivative
-    term has a pole at `derivative_filter` [rad/s]; integral terms stop at `integral_limits` [N, N·m].
+    Gains that are absent are designed at `design_pose` for the crossover frequencies. The
+    derivative term has a pole at `derivative_filter` [rad/s]; integral terms stop at
+    `integral_limits` [N, N·m].
     """
 
-    crossover: dict[Literal["surge", "sway", "heave", "pitch", "yaw"], PositiveFloat] = {
+    crossover: dict[ControlledDof, PositiveFloat] = {
         "surge": 12.0,
         "sway": 10.0,
         "heave": 12.0,
@@ -84,7 +86,7 @@ class MotionControl(StrictModel):
     design_pose: Pose = (0.0, 0.0, 2.0, 0.0, 0.0, 0.0)
     derivative_filter: PositiveFloat = 200.0
     integral_limits: tuple[PositiveFloat, PositiveFloat] = (20.0, 5.0)
-    gains: dict[Literal["surge", "sway", "heave", "pitch", "yaw"], PidGains] | None = None
+    gains: dict[ControlledDof, PidGains] | None = None
 
 
 class ForceControl(StrictModel):

@@ -101,9 +101,7 @@ def _residual(structure: Array, tensions: Array, wrench: Array) -> float:
     return float(np.linalg.norm(structure @ tensions - wrench) / np.linalg.norm(wrench))
 
 
-def _hold(
-    parameters: PlantParameters, pose: Array, frame_pose: ArrayLike, limits: Array
-) -> Array:
+def _hold(parameters: PlantParameters, pose: Array, frame_pose: ArrayLike, limits: Array) -> Array:
     structure = -geometry(parameters.cables, pose, frame_pose).bar.T
     wrench = -gravity_wrench(parameters, pose)
     tensions: Array = np.linalg.pinv(structure, rcond=1e-9) @ wrench

@@ -1,7 +1,7 @@
 """Kinematics of the cables, thesis chapter 2: lengths from poses and poses from lengths.
 
-Poses are x y z φ θ ψ in world_ned (m, rad). A cable's vector runs from its exit on the winch frame to
-its attachment on the bar (2-2).
+Poses are x y z φ θ ψ in world_ned (m, rad). A cable's vector runs from its exit on the winch frame
+to its attachment on the bar (2-2).
 """
 
 from __future__ import annotations
@@ -27,7 +27,10 @@ Array = NDArray[np.float64]
 # Euler rates per angular velocity grow without bound towards θ = ±π/2; closer than this they would
 # be numbers without meaning.
 SMALLEST_COSINE = 1e-3
-RANK_TOLERANCE = 1e-9
+# Singular values below this share of the largest: near such a pose a length error of a micrometre
+# is a pose error without meaning.
+RANK_TOLERANCE = 1e-6
+STEP_TOLERANCE = 1e-15
 LENGTH_TOLERANCE = 1e-9
 
 
@@ -63,7 +66,7 @@ def inverse_kinematics(cables: Array, bar_pose: ArrayLike, frame_pose: ArrayLike
 
 
 def euler_rate_map(pose: ArrayLike) -> Array:
-    """Return J_w of (2-7), shape (3, 3): ω in world axes = J_w·[φ̇, θ̇, ψ̇]."""
+    """Return J_w of (2-6), shape (3, 3): ω in world axes = J_w·[φ̇, θ̇, ψ̇]."""
     _, _, _, _, pitch, yaw = _pose(pose)
     columns = [euler_rate_to_world_rate(pitch, yaw, *rate) for rate in np.eye(3)]
     return np.array(columns).T
@@ -95,6 +98,7 @@ def forward_kinematics(
     frame_pose: ArrayLike,
     guess: ArrayLike,
     known: Mapping[str, float] | None = None,
+    tolerance: float = 1e-9,
 ) -> Array:
     """Return the bar's pose (6,) whose cable lengths are `lengths`, nearest to `guess`.
 
@@ -105,18 +109,23 @@ def forward_kinematics(
         guess: start of the search.
         known: DOFs that are given, by name, such as `{"roll": 0.0}`. The thesis's machine needs its
             roll so: all its attachments lie on one line, and turning about it changes no length.
+        tolerance: largest allowed difference of a length [m]; measured ones need their noise.
 
     Raises:
+        InputError: `lengths` are not one positive number per cable, or `known` names no or every
+            DOF.
         ConvergenceError: no pose near the guess has these lengths, or more than one has.
     """
     known = dict(known or {})
     free = [i for i, dof in enumerate(DOFS) if dof not in known]
+    if not free:
+        raise InputError("known: all six DOFs, allowed: at least one left to be found")
     base = _pose(guess).copy()
     for name, value in known.items():
         if name not in DOFS:
             raise InputError(f"known: no DOF '{name}', allowed: {', '.join(DOFS)}")
         base[DOFS.index(name)] = value
-    wanted = np.asarray(lengths, dtype=float)
+    wanted = _lengths(lengths, len(cables))
 
     def pose_of(values: Array) -> Array:
         pose = base.copy()
@@ -129,10 +138,11 @@ def forward_kinematics(
     def slope(values: Array) -> Array:
         return euler_jacobian(cables, pose_of(values), frame_pose)[:, free]
 
-    solution = least_squares(residual, base[free], slope, method="trf", xtol=1e-15, ftol=1e-15)
+    tolerances = dict.fromkeys(("xtol", "ftol", "gtol"), STEP_TOLERANCE)
+    solution = least_squares(residual, base[free], slope, method="trf", **tolerances)
     _check_unique(slope(solution.x), [DOFS[i] for i in free])
     worst = float(np.max(np.abs(solution.fun)))
-    if worst > 1e-7:
+    if worst > tolerance:
         raise ConvergenceError(
             f"forward kinematics: lengths differ by {worst:.3g} m at the nearest pose, allowed:"
             " lengths that one pose has"
@@ -157,6 +167,17 @@ def _check_unique(slope: Array, names: list[str]) -> None:
         f"forward kinematics: the lengths do not fix {', '.join(loose)} near the guess (rank {rank}"
         f" of {slope.shape[1]}), allowed: give it as known"
     )
+
+
+def _lengths(value: ArrayLike, count: int) -> Array:
+    lengths = np.asarray(value, dtype=float)
+    if lengths.shape != (count,):
+        raise InputError(f"lengths: shape {lengths.shape}, allowed: ({count},), one per cable")
+    if not np.isfinite(lengths).all():
+        raise InputError("lengths: not finite, allowed: finite numbers")
+    if lengths.min() <= 0.0:
+        raise InputError(f"lengths: {lengths.min():g} m, allowed: > 0")
+    return lengths
 
 
 def _pose(value: ArrayLike) -> Array:

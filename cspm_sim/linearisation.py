@@ -1,9 +1,9 @@
 """The linear model of bar, cables and winches about a state of rest, thesis (2-31) and chapter 6.
 
-The thesis holds the cable directions fixed and the stiffness matrix constant (`exact=False`): the bar
-then meets no static stiffness where the winches are free, a double integrator in every direction. In
+The thesis holds the cable directions fixed and the stiffness matrix constant (`exact=False`): where
+the winches are free the bar then meets no static stiffness and drifts like a double integrator. In
 truth the cables turn, and their tension pulls the bar back like a pendulum: `exact=True` is the
-derivative of the plant itself. The two agree above about 5 rad/s on the thesis's machine.
+derivative of the plant itself.
 
 Effects beyond the thesis's model are left out of both.
 """
@@ -48,15 +48,14 @@ class StateSpace:
     outputs: tuple[str, ...]
 
     def response(self, frequencies: ArrayLike) -> ComplexArray:
-        """Return G(jω), shape (frequencies, outputs, inputs), for ω of shape (frequencies,) [rad/s].
+        """Return G(jω), shape (m, outputs, inputs), for frequencies ω of shape (m,) [rad/s].
 
         Every ω must differ from an undamped pole; 0 is one where the bar is free to drift.
         """
         s = 1j * np.atleast_1d(np.asarray(frequencies, dtype=float))[:, None, None]
         resolvent = s * np.eye(len(self.A)) - self.A
         forced = np.linalg.solve(resolvent, np.broadcast_to(self.B, (len(s), *self.B.shape)))
-        response: ComplexArray = self.C @ forced + self.D
-        return response
+        return np.asarray(self.C @ forced + self.D, dtype=np.complex128)
 
 
 class OperatingPoint(NamedTuple):
@@ -178,7 +177,7 @@ def motion_subsystem(
 ) -> StateSpace:
     """Return the model from a wanted wrench to the pose x y z φ θ ψ, thesis (6-2, 6-3).
 
-    A wrench becomes torques by (6-1), τ = −N⁻¹R(Jᵀ)†w, as if cables were rigid and winches massless.
+    A wrench becomes torques by (6-1), τ = −N⁻¹R(Jᵀ)†w, as if cables were rigid.
 
     Args:
         model: of `linear_model`.

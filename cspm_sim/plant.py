@@ -8,7 +8,8 @@ from numpy.typing import ArrayLike, NDArray
 from cspm_msgs_py.errors import DivergenceError, InputError
 from cspm_msgs_py.scenario import DOFS
 from cspm_msgs_py.testbed import Testbed
-from cspm_sim.equilibrium import find_equilibrium
+from cspm_sim.equilibrium import find_equilibrium, unstretched_lengths
+from cspm_sim.kernels.cable import TORQUE_LIMIT
 from cspm_sim.kernels.plant import (
     BAR_STATES,
     make_scratch,
@@ -36,7 +37,7 @@ class Plant:
         period_ns: int,
         *,
         bar_pose: ArrayLike | None = None,
-        bar_twist: ArrayLike | None = None,
+        tensions: ArrayLike | None = None,
         locked: bool = False,
     ) -> None:
         """Put the machine at rest in equilibrium.
@@ -46,7 +47,8 @@ class Plant:
             frame_motion: the winch frame's motion; it stands still where the machine has none.
             period_ns: step [ns].
             bar_pose: where the bar hangs at the start, x y z φ θ ψ.
-            bar_twist: its velocity then: v in world axes, ω in bar axes.
+            tensions: what the cables carry at the start, (n,) [N], where there is no bar to hold;
+                absent: nothing.
             locked: hold all motors still.
 
         Raises:
@@ -72,7 +74,7 @@ class Plant:
         self.lengths = self._outputs[1]
         self._frames = np.zeros((3, 18))
         self._scratch = make_scratch(len(self.state), n)
-        self._place(bar_pose, bar_twist)
+        self._place(bar_pose, tensions)
         self._observe()
 
     @property
@@ -123,22 +125,25 @@ class Plant:
 
     def applied_torque(self, torque: Array) -> Array:
         """Return what the drives deliver for a torque command, (n,) [N·m]: the limits applied."""
-        limit = np.array([cable.torque_limit for cable in self.testbed.cables])
-        return np.clip(torque, -limit, limit)
+        limits = self.parameters.cables[:, TORQUE_LIMIT]
+        return np.minimum(limits, np.maximum(-limits, torque))
 
     def _observe(self) -> None:
         plant_tensions(self.state, self.frame, self.parameters, self._scratch, self._outputs)
 
-    def _place(self, bar_pose: ArrayLike | None, bar_twist: ArrayLike | None) -> None:
+    def _place(self, bar_pose: ArrayLike | None, tensions: ArrayLike | None) -> None:
         if self.testbed.bar is None:
+            # The lengths are needed first; any positive unstretched length serves for them.
+            self.unstretched_lengths[:] = 1.0
             self._observe()
-            self.unstretched_lengths[:] = self.lengths
+            carried = np.zeros(len(self.lengths)) if tensions is None else np.asarray(tensions)
+            self.unstretched_lengths[:] = unstretched_lengths(
+                self.parameters, self.lengths.copy(), carried
+            )
             return
         if bar_pose is None:
             raise InputError("plant: this test-bed has a bar, a pose to start from is required")
         limits = np.array([cable.tension_limits for cable in self.testbed.cables], dtype=float)
         rest = find_equilibrium(self.parameters, bar_pose, self.frame[:6], limits)
         self.bar_state[:6] = rest.bar_pose
-        if bar_twist is not None:
-            self.bar_state[6:] = np.asarray(bar_twist, dtype=float)
         self.unstretched_lengths[:] = rest.unstretched_lengths

@@ -65,7 +65,7 @@ class SensorModel:
         self._samples: deque[tuple[int, int, Array]] = deque()
 
     def observe(self, step: int, now_ns: int, values: Array) -> tuple[int, Array] | None:
-        """Take a sample if one is due; return stamp [ns] and row of the one that arrives, if any."""
+        """Take a sample if one is due; return stamp [ns] and row of one that arrives, if any."""
         if step % self._divider == 0:
             self._samples.append((step + self._delay_steps, now_ns, self._sample(values)))
         if self._samples and self._samples[0][0] <= step:

@@ -23,7 +23,7 @@ POINTS = 2048
 # The table ends where the slope passes the material cap at any elastic length in this range [m];
 # beyond it the law goes on as a straight line.
 ELASTIC_LENGTHS = (0.02, 100.0)
-LONGEST_TENSION_FACTOR = 50.0
+LONGEST_TENSION_FACTOR = 5.0
 
 
 def law_slope(law: ExponentialStiffness, tension: Array | float) -> Array:
@@ -33,7 +33,7 @@ def law_slope(law: ExponentialStiffness, tension: Array | float) -> Array:
 
 
 def law_table(law: ExponentialStiffness, tension_limit: float) -> tuple[Array, float]:
-    """Return t and dt/ds, shape (POINTS, 2), at equal steps of s beyond the floor, and the step [N].
+    """Return t and dt/ds, (POINTS, 2), at equal steps of s beyond the floor, and the step [N].
 
     Args:
         law: the law's parameters.

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import struct
 import zlib
-from collections.abc import Iterable, Iterator
+from collections.abc import Callable, Iterable, Iterator
 from typing import Any, NamedTuple
 
 import lz4.frame  # type: ignore[import-untyped]
@@ -19,10 +19,13 @@ Bytes = NDArray[np.uint8]
 Integers = NDArray[np.int64]
 Prefixes = NDArray[np.void]
 
+ChunkIndex = dict[int, NDArray[np.uint64]]
+"""Log time [ns] and offset of each message, shape (n, 2), by channel id."""
+
 LARGEST_CHUNK = 1 << 30
 _PREFIX = MESSAGE_PREFIX.itemsize
 _CHUNK_HEAD = struct.Struct("<QQQII")
-_INDEX_HEAD = struct.Struct("<HI")
+_INDEX_HEAD = struct.Struct("<BQHI")
 _INDEX_ENTRY = 16
 
 
@@ -108,10 +111,15 @@ def _lz4(data: bytes, size: int) -> bytes:
     if announced > size:
         raise ValueError(f"{announced} bytes announced, {size} expected")
     decompressor = lz4.frame.LZ4FrameDecompressor()
-    return bytes(decompressor.decompress(data, max_length=size))
+    content: bytes = decompressor.decompress(data, max_length=size)
+    return content
 
 
-_DECOMPRESS = {"zstd": _zstd, "lz4": _lz4, "": lambda data, size: data}
+_DECOMPRESS: dict[str, Callable[[bytes, int], bytes]] = {
+    "zstd": _zstd,
+    "lz4": _lz4,
+    "": lambda data, size: data,
+}
 
 
 def _first_line(err: BaseException) -> str:
@@ -173,25 +181,25 @@ class Messages:
         payloads: Bytes = windows[self.offsets + _PREFIX]
         return payloads
 
-    def index(self) -> dict[int, NDArray[np.uint64]]:
+    def index(self) -> ChunkIndex:
         """Return log time and offset of each message, shape (n, 2), by channel id."""
         entries = np.stack([self.prefixes["log"], self.offsets.astype(np.uint64)], axis=1)
         return {int(c): entries[self.channels == c] for c in np.unique(self.channels)}
 
 
-def read_messages(content: bytes, index_records: bytes, where: str) -> Messages:
+def read_messages(content: bytes, index: ChunkIndex | None, where: str) -> Messages:
     """Return the messages of a chunk.
 
     Args:
         content: the chunk's content.
-        index_records: the Message Index records that follow the chunk, or nothing. They are
+        index: what the Message Index records after the chunk say, None without any. They are
             believed only where they agree with the content and account for all of it.
         where: names the chunk in errors.
 
     Raises:
         InputError: the content is not a sequence of records.
     """
-    return _by_index(content, index_records) or scan_messages(content, where)
+    return (_by_index(content, index) if index else None) or scan_messages(content, where)
 
 
 def scan_messages(content: bytes, where: str) -> Messages:
@@ -218,33 +226,25 @@ def other_records(content: bytes) -> Iterator[Span]:
     return (span for span in spans_in(content) if span.opcode != Opcode.MESSAGE)
 
 
-def index_entries(index_records: bytes) -> dict[int, NDArray[np.uint64]] | None:
-    """Return log time and offset of each message by channel, None if the records are no index."""
-    found: dict[int, list[NDArray[np.uint64]]] = {}
+def read_index(records: bytes) -> ChunkIndex | None:
+    """Return what the Message Index records after a chunk say, None if they are none."""
+    index: ChunkIndex = {}
     end = 0
-    for span in spans_in(index_records):
-        if span.opcode != Opcode.MESSAGE_INDEX or span.length < _INDEX_HEAD.size:
+    while end + _INDEX_HEAD.size <= len(records):
+        opcode, length, channel, size = _INDEX_HEAD.unpack_from(records, end)
+        start, end = end + _INDEX_HEAD.size, end + HEAD.size + length
+        fits = size == end - start and size % _INDEX_ENTRY == 0 and end <= len(records)
+        if opcode != Opcode.MESSAGE_INDEX or not fits or channel in index:
             return None
-        channel, size = _INDEX_HEAD.unpack_from(index_records, span.content)
-        if size % _INDEX_ENTRY or size != span.length - _INDEX_HEAD.size:
-            return None
-        start = span.content + _INDEX_HEAD.size
-        entries = np.frombuffer(index_records, "<u8", size // 8, start).reshape(-1, 2)
-        found.setdefault(channel, []).append(entries)
-        end = span.end
-    if not found or end != len(index_records):
-        return None
-    return {channel: np.concatenate(parts) for channel, parts in found.items()}
+        index[channel] = np.frombuffer(records, "<u8", size // 8, start).reshape(-1, 2)
+    return index if index and end == len(records) else None
 
 
-def _by_index(content: bytes, index_records: bytes) -> Messages | None:
-    entries = index_entries(index_records)
-    if not entries:
-        return None
-    table = np.concatenate(list(entries.values()))
+def _by_index(content: bytes, index: ChunkIndex) -> Messages | None:
+    table = np.concatenate(list(index.values()))
     if not len(table) or table[:, 1].max() > max(len(content) - _PREFIX, 0):
         return None
-    channels = np.repeat(list(entries), [len(e) for e in entries.values()])
+    channels = np.repeat(list(index), [len(entries) for entries in index.values()])
     order = np.argsort(table[:, 1])
     offsets = table[order, 1].astype(np.int64)
     prefixes = _prefixes(content, offsets)
@@ -271,4 +271,5 @@ def _prefixes(content: bytes, offsets: Integers) -> Prefixes:
 def _windows(content: bytes, size: int) -> Bytes:
     """Return a view whose row i is the `size` bytes from offset i on."""
     shape = (max(len(content) - size + 1, 0), size)
-    return np.ndarray(shape, np.uint8, content, strides=(1, 1))
+    windows: Bytes = np.ndarray(shape, np.uint8, content, strides=(1, 1))
+    return windows

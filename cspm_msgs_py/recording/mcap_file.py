@@ -4,17 +4,14 @@ from __future__ import annotations
 
 import struct
 import zlib
-from collections.abc import Iterator
 from pathlib import Path
 from types import TracebackType
 from typing import NamedTuple
 
-import numpy as np
 from mcap.records import (
     Attachment,
     AttachmentIndex,
     Channel,
-    ChunkIndex,
     Footer,
     Header,
     McapRecord,
@@ -23,17 +20,18 @@ from mcap.records import (
     Schema,
     Statistics,
 )
-from numpy.typing import NDArray
+from mcap.records import ChunkIndex as ChunkIndexRecord
 from typing_extensions import Self
 
 from cspm_msgs_py.errors import InputError
 from cspm_msgs_py.recording.chunk import (
     ChunkHead,
+    ChunkIndex,
     Messages,
     chunk_head,
     decompress,
-    index_entries,
     other_records,
+    read_index,
     read_messages,
 )
 from cspm_msgs_py.recording.records import (
@@ -76,15 +74,21 @@ class McapFile:
         profile: such as `ros2`.
         library: what wrote it.
         complete: whether the file was closed, with a footer.
-        end: offset after the last complete record of the data section.
+        end: offset after the last complete record, the file's length if no data is missing.
         schemas: by id.
         channels: by id.
         chunks: in file order.
+        attachments: places of the attachments.
+        metadata: places of the metadata records.
         statistics: the writer's own counts, None where it left none.
     """
 
-    def __init__(self, path: Path) -> None:
+    def __init__(self, path: Path, *, use_summary: bool = True) -> None:
         """Open a file and find its records.
+
+        Args:
+            path: the file.
+            use_summary: False treats a closed file as one that was not: its summary is not read.
 
         Raises:
             InputError: it is missing, not an MCAP file, or its summary is damaged.
@@ -94,20 +98,20 @@ class McapFile:
         self.channels: dict[int, Channel] = {}
         self.chunks: list[ChunkPlace] = []
         self.statistics: Statistics | None = None
-        self._attachments: list[Span] = []
-        self._metadata: list[Span] = []
+        self.attachments: list[Span] = []
+        self.metadata: list[Span] = []
         try:
             self._file = path.open("rb")
             self._size = self._file.seek(0, 2)
         except OSError as err:
             raise InputError(f"{path}: {_reason(err)}") from None
         try:
-            self._read()
+            self._read(use_summary)
         except BaseException:
             self._file.close()
             raise
 
-    def _read(self) -> None:
+    def _read(self, use_summary: bool) -> None:
         if self._size == 0:
             raise InputError(f"{self.path}: an empty file, allowed: an MCAP file")
         self._file.seek(0)
@@ -118,7 +122,7 @@ class McapFile:
             raise InputError(f"{self.path}: an MCAP file that ends before its header does")
         header = parse(Header, self._content(first), str(self.path))
         self.profile, self.library = header.profile, header.library
-        footer = self._footer()
+        footer = self._footer() if use_summary else None
         self.complete = footer is not None
         self.end = self._size
         if footer is None or not self._read_summary(footer):
@@ -146,7 +150,6 @@ class McapFile:
         head = HEAD.pack(Opcode.FOOTER, 20) + struct.pack("<QQ", start, footer.summary_offset_start)
         if footer.summary_crc and zlib.crc32(summary + head) != footer.summary_crc:
             raise InputError(f"{self.path}: the summary's CRC does not fit")
-        self.end = start
         for span in spans_in(summary):
             self._take_summary(span, summary[span.content : span.end])
         self.chunks.sort(key=lambda place: place.record.offset)
@@ -159,12 +162,12 @@ class McapFile:
         record = parse(kind, content, str(self.path))
         if isinstance(record, Statistics):
             self.statistics = record
-        elif isinstance(record, ChunkIndex):
+        elif isinstance(record, ChunkIndexRecord):
             self.chunks.append(self._indexed_chunk(record))
         elif isinstance(record, AttachmentIndex):
-            self._attachments.append(_span(Opcode.ATTACHMENT, record.offset, record.length))
+            self.attachments.append(_span(Opcode.ATTACHMENT, record.offset, record.length))
         elif isinstance(record, MetadataIndex):
-            self._metadata.append(_span(Opcode.METADATA, record.offset, record.length))
+            self.metadata.append(_span(Opcode.METADATA, record.offset, record.length))
         else:
             self._take_definition(record)
 
@@ -174,10 +177,10 @@ class McapFile:
         elif isinstance(record, Channel):
             self.channels[record.id] = record
 
-    def _indexed_chunk(self, index: ChunkIndex) -> ChunkPlace:
+    def _indexed_chunk(self, index: ChunkIndexRecord) -> ChunkPlace:
         span = _span(Opcode.CHUNK, index.chunk_start_offset, index.chunk_length)
         index_end = span.end + index.message_index_length
-        if span.length < 0 or index_end > self.end:
+        if span.length < 0 or index_end > self._size:
             raise InputError(f"{self.path}: the index points outside the data section")
         return ChunkPlace(span, index_end)
 
@@ -191,7 +194,7 @@ class McapFile:
         return bool(self.channels and self.chunks) and statistics.chunk_count == len(self.chunks)
 
     def _scan(self, start: int) -> None:
-        self.chunks, self._attachments, self._metadata = [], [], []
+        self.chunks, self.attachments, self.metadata = [], [], []
         self.end, closed = start, False
         for span in spans(self._file, start, self._size):
             closed = span.opcode in (Opcode.DATA_END, Opcode.FOOTER)
@@ -201,6 +204,8 @@ class McapFile:
             self.end = span.end
         if self.complete and not closed:
             raise InputError(f"{self.path}: no record at byte {self.end}")
+        if closed:
+            self.end = self._size
         for place in self.chunks:
             self._take_definitions(place)
         if not (self.complete or self.channels):
@@ -218,9 +223,9 @@ class McapFile:
         elif span.opcode == Opcode.MESSAGE:
             self._take_loose(span)
         elif span.opcode == Opcode.ATTACHMENT:
-            self._attachments.append(span)
+            self.attachments.append(span)
         elif span.opcode == Opcode.METADATA:
-            self._metadata.append(span)
+            self.metadata.append(span)
 
     def _take_loose(self, span: Span) -> None:
         """Put a message outside any chunk to the run before it, or begin one."""
@@ -229,7 +234,7 @@ class McapFile:
             run = last.record._replace(length=last.record.length + HEAD.size + span.length)
         else:
             run = span
-            self.chunks.append(ChunkPlace(span, span.end, loose=True))
+            self.chunks.append(ChunkPlace(run, run.end, loose=True))
         self.chunks[-1] = ChunkPlace(run, run.end, loose=True)
 
     def _take_definitions(self, place: ChunkPlace) -> None:
@@ -238,7 +243,7 @@ class McapFile:
         Raises:
             InputError: messages of a channel that no record describes.
         """
-        used = set(index_entries(self.index_records(place)) or ())
+        used = set(self.index(place) or ())
         if used and used <= self.channels.keys():
             return
         try:
@@ -274,9 +279,14 @@ class McapFile:
         """Length of the file [bytes]."""
         return self._size
 
-    def index_records(self, place: ChunkPlace) -> bytes:
-        """Return the Message Index records after a chunk, empty if there are none."""
-        return self.record_bytes(place.record.end, place.index_end)
+    def index(self, place: ChunkPlace) -> ChunkIndex | None:
+        """Return what the Message Index records after a chunk say, None without any.
+
+        Of the last chunk of a file that was not closed some may be missing: None as well.
+        """
+        if not self.complete and place is self.chunks[-1]:
+            return None
+        return read_index(self.record_bytes(place.record.end, place.index_end))
 
     def head(self, place: ChunkPlace) -> ChunkHead:
         """Return what stands before a chunk's data.
@@ -305,21 +315,16 @@ class McapFile:
         head = self.head(place)
         return decompress(self.chunk_data(place, head), head, self._where(place))
 
-    def messages(self, place: ChunkPlace) -> Messages:
-        """Return a chunk's messages.
+    def messages(self, place: ChunkPlace, index: ChunkIndex | None = None) -> Messages:
+        """Return a chunk's messages; `index` is what `index` returned for it, if it is known.
 
         Raises:
             InputError: it is damaged.
         """
-        content, where = self.chunk_content(place), self._where(place)
-        return read_messages(content, b"" if place.loose else self.index_records(place), where)
+        content = self.chunk_content(place)
+        return read_messages(content, index or self.index(place), self._where(place))
 
-    def may_hold(self, place: ChunkPlace, channels: set[int]) -> bool:
-        """Return False only if the chunk's index names none of the channels."""
-        entries = None if place.loose else index_entries(self.index_records(place))
-        return entries is None or not channels.isdisjoint(entries)
-
-    def times(self, place: ChunkPlace) -> dict[int, NDArray[np.uint64]]:
+    def times(self, place: ChunkPlace) -> ChunkIndex:
         """Return log time and offset of each message of a chunk, shape (n, 2), by channel id.
 
         From the Message Index where there is one, else from the chunk.
@@ -327,34 +332,32 @@ class McapFile:
         Raises:
             InputError: the index contradicts the chunk's head, or the chunk is damaged.
         """
-        entries = None if place.loose else index_entries(self.index_records(place))
-        if entries is None:
+        index = self.index(place)
+        if index is None:
             return self.messages(place).index()
         head = self.head(place)
-        for table in entries.values():
+        for table in index.values():
             if len(table) and not (
-                head.first_ns <= table[:, 0].min() <= table[:, 0].max() <= head.last_ns
+                head.first_ns <= table[:, 0].min() <= table[:, 0].max() <= head.last_ns < 2**63
             ):
                 raise InputError(f"{self._where(place)}: its index has other times than it")
-        return entries
+        return index
 
-    def attachments(self) -> Iterator[Attachment]:
-        """Yield the attachments.
-
-        Raises:
-            InputError: one is damaged.
-        """
-        for span in self._attachments:
-            yield parse_attachment(self._content(span), f"{self.path}: byte {span.offset}")
-
-    def metadata(self) -> Iterator[Metadata]:
-        """Yield the metadata records.
+    def attachment(self, place: Span) -> Attachment:
+        """Return the attachment at one of `attachments`.
 
         Raises:
-            InputError: one is damaged.
+            InputError: it is damaged.
         """
-        for span in self._metadata:
-            yield parse(Metadata, self._content(span), f"{self.path}: byte {span.offset}")
+        return parse_attachment(self._content(place), f"{self.path}: byte {place.offset}")
+
+    def metadata_record(self, place: Span) -> Metadata:
+        """Return the metadata record at one of `metadata`.
+
+        Raises:
+            InputError: it is damaged.
+        """
+        return parse(Metadata, self._content(place), f"{self.path}: byte {place.offset}")
 
     def close(self) -> None:
         """Close the file."""
@@ -385,7 +388,7 @@ _DEFINITIONS: dict[int, type[McapRecord]] = {Opcode.SCHEMA: Schema, Opcode.CHANN
 _SUMMARY_KINDS: dict[int, type[McapRecord]] = {
     **_DEFINITIONS,
     Opcode.STATISTICS: Statistics,
-    Opcode.CHUNK_INDEX: ChunkIndex,
+    Opcode.CHUNK_INDEX: ChunkIndexRecord,
     Opcode.ATTACHMENT_INDEX: AttachmentIndex,
     Opcode.METADATA_INDEX: MetadataIndex,
 }

@@ -80,9 +80,9 @@ class Recording:
         types: dict[str, list[str]] = {}
         counts: Counter[str] = Counter()
         for file in self.files:
-            found = _counts(file)
+            found = message_counts(file)
             for channel in file.channels.values():
-                kind = _type_of(file, channel)
+                kind = message_type(file, channel)
                 known = types.setdefault(channel.topic, [])
                 known.extend([kind] if kind not in known else [])
                 counts[channel.topic] += found[channel.id]
@@ -91,12 +91,14 @@ class Recording:
     @cached_property
     def attachments(self) -> dict[str, bytes]:
         """Attached files by name."""
-        return {a.name: a.data for file in self.files for a in file.attachments()}
+        found = [file.attachment(place) for file in self.files for place in file.attachments]
+        return {attachment.name: attachment.data for attachment in found}
 
     @cached_property
     def metadata(self) -> dict[str, dict[str, str]]:
         """Metadata records by name."""
-        return {m.name: dict(m.metadata) for file in self.files for m in file.metadata()}
+        found = [file.metadata_record(place) for file in self.files for place in file.metadata]
+        return {record.name: dict(record.metadata) for record in found}
 
     @cached_property
     def _span_ns(self) -> tuple[int, int]:
@@ -190,8 +192,9 @@ class Recording:
             }
             wanted = {channel for channels in ids.values() for channel in channels}
             for place in file.chunks:
-                if file.may_hold(place, wanted):
-                    messages = file.messages(place)
+                index = file.index(place)
+                if index is None or not wanted.isdisjoint(index):
+                    messages = file.messages(place, index)
                     yield from ((name, messages.select(ids[name])) for name in names)
 
     def _check_count(self, name: str, count: int) -> None:
@@ -265,12 +268,13 @@ def mcap_paths(path: Path) -> list[Path]:
     return bag.files
 
 
-def _type_of(file: McapFile, channel: Channel) -> str:
+def message_type(file: McapFile, channel: Channel) -> str:
+    """Return the name of a channel's schema, `none` if it has none."""
     schema = file.schemas.get(channel.schema_id)
     return schema.name if schema else "none"
 
 
-def _counts(file: McapFile) -> Counter[int]:
+def message_counts(file: McapFile) -> Counter[int]:
     """Return the number of messages by channel id, from the statistics or else the indexes."""
     if file.complete and file.statistics is not None:
         return Counter(file.statistics.channel_message_counts)

@@ -76,7 +76,7 @@ class RowCollector:
         if self._waiting and self._waiting[0].shape[1] != matrix.shape[1]:
             self._decode()
         self._waiting.append(matrix)
-        if sum(map(len, self._waiting)) >= _BATCH:
+        if len(self._waiting) * len(matrix) >= _BATCH:
             self._decode()
 
     def result(self) -> Rows:

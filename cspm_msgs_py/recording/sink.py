@@ -29,7 +29,7 @@ from numpy.typing import NDArray
 from cspm_msgs_py.recording.records import HEAD, MAGIC, Opcode, pack
 
 Index = NDArray[np.uint64]
-_INDEX_IN_MEMORY = 1 << 20
+_INDEX_IN_MEMORY = 1 << 16
 _COPY = 1 << 16
 _INDEX_HEAD = struct.Struct("<BQHI")
 

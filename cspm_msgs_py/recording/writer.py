@@ -133,11 +133,13 @@ class RecordingWriter:
 
     def _turn(self, log_ns: int) -> None:
         """Hand the filled block to the thread and begin the one that holds `log_ns`."""
-        self._raise_failure()
         if self._closed:
             raise CspmError(f"{self.path}: the recording is closed")
         # Waiting comes first: an interrupt while waiting leaves the block being filled as it is.
         self._room.acquire()
+        if self._failure is not None:
+            self._room.release()
+            self._raise_failure()
         end = (log_ns // self._block_ns + 1) * self._block_ns
         self._blocks.put([channel.take(end) for channel in self._channels])
 

@@ -37,10 +37,10 @@ class Effect:
         id: the public name.
         block: the block it changes.
         parameters: its numbers, in the kernel's order.
-        kernel: `kernel(parameters, signals)`, compiled when used; reads the block's signals and adds
-            to them (see `kernels.winch` and `kernels.bar` for their order).
-        regressors: from the block's signals over time, shape (samples, signals), the columns whose
-            weighted sum the effect adds to the block's residual, shape (samples, parameters).
+        kernel: `kernel(parameters, signals)`, compiled when used; reads the block's signals and
+            adds to them (see `kernels.winch` and `kernels.bar` for their order).
+        regressors: from the block's signals over time, shape (samples, signals), the columns
+            whose weighted sum the effect adds to the block's residual, shape (samples, parameters).
         equation: the effect in one line.
         shows: how it looks in the block's residual.
         twins: effects it is easily confused with.

@@ -103,7 +103,7 @@ def law_curve(scaled: float, cables: Array, tables: Array, i: int) -> tuple[floa
 def _capped_tension(
     elongation: float, elastic_length: float, scale: float, cables: Array, tables: Array, i: int
 ) -> tuple[float, float]:
-    """Return tension and stiffness past the cap: a line of slope E·A/l from where the law meets it."""
+    """Return tension and stiffness past the cap, a line of slope E·A/l from where both meet."""
     cap = cables[i, AXIAL_RIGIDITY] / elastic_length
     low = cables[i, FLOOR_SCALED]
     high = low + (tables.shape[1] - 1) * cables[i, TABLE_STEP]
@@ -122,7 +122,7 @@ def law_scale(elastic_length: float, cables: Array, i: int) -> float:
     """Return a/l^b [N/m], which turns cable i's elongation into the scaled one; 0 if linear."""
     if cables[i, LAW_SCALE] == 0.0:
         return 0.0
-    # Twice as fast as a power; this is the most expensive line of the plant.
+    # Faster than a power, in the most expensive line of the plant.
     return cables[i, LAW_SCALE] * exp(-cables[i, LAW_EXPONENT] * log(elastic_length))
 
 
@@ -130,7 +130,7 @@ def law_scale(elastic_length: float, cables: Array, i: int) -> float:
 def elastic_tension(
     elongation: float, elastic_length: float, scale: float, cables: Array, tables: Array, i: int
 ) -> tuple[float, float]:
-    """Return tension [N] and tangent stiffness [N/m] at an elongation l − l0 [m], thesis (3-7, 3-10).
+    """Return tension [N] and tangent stiffness [N/m] at an elongation [m], thesis (3-7, 3-10).
 
     `scale` is `law_scale` at this elastic length. Zero for elongation ≤ 0; continuous, with
     continuous slope for elongation > 0, and increasing.

@@ -197,8 +197,8 @@ def plant_rate(
 ) -> None:
     """Write the state's time derivative to `out`.
 
-    `torque` is the motor torque per winch [N·m], `frame` the winch frame's placement, `locked` holds all motors still, `period` is the step for dry friction [s];
-    then come the fields of `PlantParameters`, and scratch.
+    `torque` is the motor torque per winch [N·m], `frame` the winch frame's placement, `locked` holds
+    all motors still, `period` is the step for dry friction [s]; then come the fields of `PlantParameters`, and scratch.
     """
     n = cables.shape[0]
     has_bar = bar.shape[0] > 0
@@ -212,9 +212,7 @@ def plant_rate(
         tension = spans[i, TENSION]
         if effects.shape[0] > 0:
             radius = cables[i, RADIUS]
-            _effects_on_winch(
-                i, angle, speed, tension, radius, effects, effect_parameters, signals
-            )
+            _effects_on_winch(i, angle, speed, tension, radius, effects, effect_parameters, signals)
         out[first + n + i] = speed
         out[first + 2 * n + i] = winch_acceleration(
             torque[i], tension, speed, period, cables, i, signals

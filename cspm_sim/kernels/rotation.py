@@ -53,17 +53,13 @@ def rotate_back(rotation: Matrix, x: float, y: float, z: float) -> Vector:
 
 
 @njit(cache=True, error_model="numpy", forceinline=True)
-def cross(
-    ax: float, ay: float, az: float, bx: float, by: float, bz: float
-) -> Vector:
+def cross(ax: float, ay: float, az: float, bx: float, by: float, bz: float) -> Vector:
     """Return a × b."""
     return ay * bz - az * by, az * bx - ax * bz, ax * by - ay * bx
 
 
 @njit(cache=True, error_model="numpy", forceinline=True)
-def body_rate_to_euler_rate(
-    roll: float, pitch: float, wx: float, wy: float, wz: float
-) -> Vector:
+def body_rate_to_euler_rate(roll: float, pitch: float, wx: float, wy: float, wz: float) -> Vector:
     """Return φ̇, θ̇, ψ̇ for the angular velocity ω in body axes; singular at θ = ±π/2."""
     cr, sr = cos(roll), sin(roll)
     yaw_rate = (sr * wy + cr * wz) / cos(pitch)
@@ -74,7 +70,7 @@ def body_rate_to_euler_rate(
 def euler_rate_to_world_rate(
     pitch: float, yaw: float, roll_rate: float, pitch_rate: float, yaw_rate: float
 ) -> Vector:
-    """Return ω in world axes for the Euler rates: J_w of (2-7) times the rates."""
+    """Return ω in world axes for the Euler rates: J_w of (2-6) times the rates."""
     cp, sp = cos(pitch), sin(pitch)
     cy, sy = cos(yaw), sin(yaw)
     return (

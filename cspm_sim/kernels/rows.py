@@ -50,7 +50,7 @@ def reference_row(motion: Array, out: Array) -> None:
     dr, dp, dy = motion[9], motion[10], motion[11]
     ax, ay, az = euler_rate_to_world_rate(pitch, yaw, motion[15], motion[16], motion[17])
     cp, sp, cy, sy = cos(pitch), sin(pitch), cos(yaw), sin(yaw)
-    # The rest is the time derivative of J_w (2-7) times the Euler rates.
+    # The rest is the time derivative of J_w (2-6) times the Euler rates.
     out[16] = ax - dr * (sy * cp * dy + cy * sp * dp) - cy * dy * dp
     out[17] = ay + dr * (cy * cp * dy - sy * sp * dp) - sy * dy * dp
     out[18] = az - cp * dp * dr

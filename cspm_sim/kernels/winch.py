@@ -38,8 +38,9 @@ def winch_acceleration(
 ) -> float:
     """Return q̈ [rad/s²] of J q̈ = τ − (r/n)·t − resistance − dry friction, thesis (2-21).
 
-    Dry friction is set-valued at standstill. It takes whatever value within its limit would stop
-    the shaft in one step of `period` [s]: exact while sliding, and a winch that sticks stays put.
+    Dry friction is set-valued at standstill. It takes whatever value within its limit makes the
+    speed decay over one step of `period` [s]: exact while sliding, and a winch that sticks does not
+    creep.
     """
     limited = _clip(torque, cables[i, TORQUE_LIMIT])
     net = limited - cables[i, RADIUS] * tension - signals[RESISTANCE]

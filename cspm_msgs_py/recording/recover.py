@@ -1,0 +1,328 @@
+"""Restoring a recording that was not closed: every complete message, with index and metadata."""
+
+from __future__ import annotations
+
+import os
+from collections import Counter
+from collections.abc import Callable
+from contextlib import ExitStack, suppress
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any, TypeVar
+
+import lz4.frame  # type: ignore[import-untyped]
+import zstandard
+from mcap.records import Channel, Chunk, Header, Schema
+
+from cspm_msgs_py.errors import CspmError, InputError
+from cspm_msgs_py.recording.block import compress
+from cspm_msgs_py.recording.chunk import ChunkHead, chunk_head, other_records, scan_messages
+from cspm_msgs_py.recording.mcap_file import ChunkPlace, McapFile
+from cspm_msgs_py.recording.reader import message_counts, message_type
+from cspm_msgs_py.recording.records import HEAD, Opcode, parse, spans_in
+from cspm_msgs_py.recording.rosbag2_metadata import (
+    FILE_NAME,
+    FileEntry,
+    TopicEntry,
+    read_bag,
+    write_metadata,
+)
+from cspm_msgs_py.recording.sink import McapSink
+from cspm_msgs_py.yaml_file import parse_yaml
+
+BROKEN_SUFFIX = ".broken"
+_COMPRESSION_LEVEL = 1
+Item = TypeVar("Item")
+
+
+@dataclass(frozen=True)
+class RecoveryReport:
+    """What was restored.
+
+    Attributes:
+        path: the recording that is whole now.
+        restored: its files that were not; empty if all were closed and nothing was done.
+        kept: where the originals are now.
+        counts: messages by topic, of the whole recording.
+        end_ns: log time of the last message [ns], 0 without any.
+        damaged: chunks and attachments left out because their content is damaged.
+        lost_bytes: what could not be used at the ends of the files [bytes].
+    """
+
+    path: Path
+    restored: list[Path]
+    kept: list[Path]
+    counts: dict[str, int]
+    end_ns: int
+    damaged: int
+    lost_bytes: int
+
+    @property
+    def messages(self) -> int:
+        """Number of messages in the recording."""
+        return sum(self.counts.values())
+
+
+def recover(path: Path, out: Path | None = None) -> RecoveryReport:
+    """Restore a recording so that every reader can use it.
+
+    Files that were closed are left alone. Any other is written anew beside the original, which
+    is then kept under its name with `.broken` added; at every instant one of the two has its name.
+
+    Args:
+        path: a rosbag2 folder, with or without `metadata.yaml`, or an MCAP file.
+        out: a new folder for the restored recording; absent: in place.
+
+    Raises:
+        InputError: nothing to restore there, or `out` or a `.broken` file exists.
+        CspmError: the restored file cannot be written.
+    """
+    path = Path(path)
+    files = _files(path)
+    try:
+        if out is not None:
+            return _restore_to(files, Path(out))
+        return _restore_in_place(path, files)
+    except OSError as err:
+        raise CspmError(f"{path}: cannot be restored ({err.strerror})") from None
+
+
+def _files(path: Path) -> list[Path]:
+    if not path.exists():
+        raise InputError(f"{path}: no such file or folder")
+    if not path.is_dir():
+        return [path]
+    if (path / FILE_NAME).exists():
+        with suppress(InputError):
+            return read_bag(path).files
+    files = sorted(path.glob("*.mcap"))
+    if not files:
+        raise InputError(f"{path}: a folder without MCAP files, allowed: a rosbag2 folder")
+    return files
+
+
+def _restore_in_place(path: Path, files: list[Path]) -> RecoveryReport:
+    restored, kept, damaged, lost = [], [], 0, 0
+    for file in files:
+        if _is_whole(file):
+            continue
+        broken, beside = Path(f"{file}{BROKEN_SUFFIX}"), Path(f"{file}.restoring")
+        if broken.exists():
+            raise InputError(f"{broken}: exists, allowed: move it away first")
+        result = _restore(file, beside)
+        damaged, lost = damaged + result[0], lost + result[1]
+        _exchange(file, beside, broken)
+        restored.append(file)
+        kept.append(broken)
+    folder = path if path.is_dir() else path.parent
+    if path.is_dir() or (folder / FILE_NAME).exists():
+        files = files if path.is_dir() else _files(folder)
+        counts, end = _describe(folder, files, write=bool(restored) or not _has_metadata(folder))
+    else:
+        counts, end = _describe(folder, files, write=False)
+    return RecoveryReport(path, restored, kept, counts, end, damaged, lost)
+
+
+def _has_metadata(folder: Path) -> bool:
+    try:
+        read_bag(folder)
+    except InputError:
+        return False
+    return True
+
+
+def _restore_to(files: list[Path], out: Path) -> RecoveryReport:
+    if out.exists():
+        raise InputError(f"{out}: exists, allowed: a new folder")
+    out.mkdir(parents=True)
+    targets, damaged, lost = [], 0, 0
+    for i, file in enumerate(files):
+        targets.append(out / f"{out.name}_{i}.mcap")
+        result = _restore(file, targets[-1])
+        damaged, lost = damaged + result[0], lost + result[1]
+    counts, end = _describe(out, targets, write=True)
+    return RecoveryReport(out, targets, files, counts, end, damaged, lost)
+
+
+def _exchange(file: Path, beside: Path, broken: Path) -> None:
+    """Give `beside` the name of `file`, and that the name `broken`."""
+    try:
+        os.link(file, broken)
+    except OSError:
+        os.rename(file, broken)
+    os.replace(beside, file)
+
+
+def _is_whole(path: Path) -> bool:
+    try:
+        with McapFile(path) as file:
+            return file.complete and bool(file.statistics or file.chunks or not file.channels)
+    except InputError:
+        return False
+
+
+def _restore(path: Path, target: Path) -> tuple[int, int]:
+    """Write what is whole in a file to `target`; return damaged records and unused bytes."""
+    with McapFile(path, use_summary=False) as source:
+        tail, rest = _tail(source)
+        sink = McapSink(target, Header(source.profile, source.library))
+        try:
+            damaged = _copy(source, tail, sink)
+            sink.finish()
+        except BaseException:
+            sink.close()
+            target.unlink(missing_ok=True)
+            raise
+        return damaged, rest
+
+
+def _copy(source: McapFile, tail: bytes, sink: McapSink) -> int:
+    damaged = 0
+    _take_definitions(source, tail)
+    for schema in source.schemas.values():
+        sink.add_schema(schema)
+    for channel in source.channels.values():
+        sink.add_channel(channel)
+    for get, places, put in (
+        (source.metadata_record, source.metadata, sink.add_metadata),
+        (source.attachment, source.attachments, sink.add_attachment),
+    ):
+        damaged += sum(not _try(get, place, put) for place in places)
+    compressor = zstandard.ZstdCompressor(level=_COMPRESSION_LEVEL)
+    for place in source.chunks:
+        damaged += not _copy_chunk(source, place, sink, compressor)
+    if tail:
+        index = scan_messages(tail, str(source.path)).index()
+        if index:
+            sink.add_chunk(compress(tail, index, compressor), index)
+    return damaged
+
+
+def _try(get: Callable[[Any], Item], place: object, put: Callable[[Any], None]) -> bool:
+    try:
+        item = get(place)
+    except InputError:
+        return False
+    put(item)
+    return True
+
+
+def _copy_chunk(
+    source: McapFile, place: ChunkPlace, sink: McapSink, compressor: zstandard.ZstdCompressor
+) -> bool:
+    """Copy a chunk and index it anew; return whether it was whole."""
+    try:
+        head, messages = source.head(place), source.messages(place)
+    except InputError:
+        return False
+    index = messages.index()
+    if not index:
+        return True
+    if place.loose:
+        chunk = compress(messages.content, index, compressor)
+    else:
+        logs = messages.prefixes["log"]
+        chunk = Chunk(
+            compression=head.compression,
+            data=source.chunk_data(place, head),
+            message_start_time=int(logs.min()),
+            message_end_time=int(logs.max()),
+            uncompressed_crc=head.crc,
+            uncompressed_size=head.size,
+        )
+    sink.add_chunk(chunk, index)
+    return True
+
+
+def _tail(source: McapFile) -> tuple[bytes, int]:
+    """Return the complete records of a chunk that the end of the file cuts, and the bytes unused.
+
+    What a compressed chunk holds up to the cut is decompressed as far as it goes.
+    """
+    rest = source.record_bytes(source.end, source.size)
+    if len(rest) < HEAD.size or rest[0] != Opcode.CHUNK:
+        return b"", len(rest)
+    where = f"{source.path}: chunk at byte {source.end}"
+    _, length = HEAD.unpack_from(rest)
+    try:
+        head = chunk_head(rest[HEAD.size :], length, where)
+    except InputError:
+        return b"", len(rest)
+    content = _decompress_part(rest[HEAD.size + head.data :], head)
+    spans = list(spans_in(content))
+    if not spans:
+        return b"", len(rest)
+    content = content[: spans[-1].end]
+    known = {*source.channels, *_channels_in(content)}
+    try:
+        used = set(scan_messages(content, where).channels.tolist())
+    except InputError:
+        return b"", len(rest)
+    return (content, 0) if used and used <= known else (b"", len(rest))
+
+
+def _channels_in(content: bytes) -> set[int]:
+    return {
+        int.from_bytes(content[span.content : span.content + 2], "little")
+        for span in other_records(content)
+        if span.opcode == Opcode.CHANNEL
+    }
+
+
+def _decompress_part(data: bytes, head: ChunkHead) -> bytes:
+    try:
+        if head.compression == "zstd":
+            return bytes(zstandard.ZstdDecompressor().decompressobj().decompress(data))
+        if head.compression == "lz4":
+            return bytes(lz4.frame.LZ4FrameDecompressor().decompress(data))
+    except (zstandard.ZstdError, RuntimeError, MemoryError):
+        return b""
+    return data if head.compression == "" else b""
+
+
+def _take_definitions(source: McapFile, content: bytes) -> None:
+    for span in other_records(content):
+        body = content[span.content : span.end]
+        if span.opcode == Opcode.SCHEMA:
+            schema = parse(Schema, body, str(source.path))
+            source.schemas.setdefault(schema.id, schema)
+        elif span.opcode == Opcode.CHANNEL:
+            channel = parse(Channel, body, str(source.path))
+            source.channels.setdefault(channel.id, channel)
+
+
+def _describe(folder: Path, paths: list[Path], *, write: bool) -> tuple[dict[str, int], int]:
+    """Return messages by topic and the last log time; write `metadata.yaml` if asked to."""
+    entries: list[FileEntry] = []
+    channels: dict[str, tuple[McapFile, Channel]] = {}
+    counts: Counter[str] = Counter()
+    with ExitStack() as stack:
+        for path in paths:
+            file = stack.enter_context(McapFile(path))
+            found = message_counts(file)
+            for channel in file.channels.values():
+                channels.setdefault(channel.topic, (file, channel))
+                counts[channel.topic] += found[channel.id]
+            entries.append(_file_entry(file, found.total()))
+        topics = [
+            _topic_entry(file, channel, counts[name]) for name, (file, channel) in channels.items()
+        ]
+    if write:
+        write_metadata(folder, topics, entries)
+    return {topic.name: topic.count for topic in topics}, max(e.last_ns for e in entries)
+
+
+def _file_entry(file: McapFile, count: int) -> FileEntry:
+    heads = [file.head(place) for place in file.chunks]
+    first = min((head.first_ns for head in heads), default=0)
+    last = max((head.last_ns for head in heads), default=0)
+    return FileEntry(file.path.name, first, last, count)
+
+
+def _topic_entry(file: McapFile, channel: Channel, count: int) -> TopicEntry:
+    ros_type = message_type(file, channel)
+    qos: list[dict[str, Any]] = []
+    with suppress(InputError):
+        qos = parse_yaml(channel.metadata.get("offered_qos_profiles", ""), channel.topic) or []
+    hash_ = channel.metadata.get("topic_type_hash", "")
+    return TopicEntry(channel.topic, ros_type, hash_, qos, count, channel.message_encoding)

@@ -6,7 +6,8 @@ from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
-from scipy.optimize import brentq, lsq_linear, root_scalar
+from scipy.linalg import null_space
+from scipy.optimize import brentq, lsq_linear, nnls, root_scalar
 
 from cspm_msgs_py.errors import ConvergenceError
 from cspm_sim.kernels import bar as bar_kernel
@@ -17,7 +18,8 @@ from cspm_sim.kinematics import geometry, rotation
 Array = NDArray[np.float64]
 
 WRENCH_TOLERANCE = 1e-9  # of the weight
-PREFERENCE = 1e-8
+RESIDUAL_TOLERANCE = 1e-6
+RANK_TOLERANCE = 1e-9
 
 
 class Equilibrium(NamedTuple):
@@ -93,7 +95,7 @@ def _excess_tension(
 def _balanced(parameters: PlantParameters, pose: Array, frame_pose: ArrayLike) -> bool:
     structure = -geometry(parameters.cables, pose, frame_pose).bar.T
     wrench = -gravity_wrench(parameters, pose)
-    tensions = np.linalg.pinv(structure, rcond=1e-9) @ wrench
+    tensions = np.linalg.pinv(structure, rcond=RANK_TOLERANCE) @ wrench
     return _residual(structure, tensions, wrench) < WRENCH_TOLERANCE
 
 
@@ -104,17 +106,33 @@ def _residual(structure: Array, tensions: Array, wrench: Array) -> float:
 def _hold(parameters: PlantParameters, pose: Array, frame_pose: ArrayLike, limits: Array) -> Array:
     structure = -geometry(parameters.cables, pose, frame_pose).bar.T
     wrench = -gravity_wrench(parameters, pose)
-    tensions: Array = np.linalg.pinv(structure, rcond=1e-9) @ wrench
-    if (tensions < limits[:, 0]).any() or (tensions > limits[:, 1]).any():
-        n = len(tensions)
-        rows = np.vstack([structure, PREFERENCE * np.eye(n)])
-        goal = np.concatenate([wrench, np.zeros(n)])
-        tensions = lsq_linear(rows, goal, (limits[:, 0], limits[:, 1]), tol=1e-14).x
+    tensions = least_tensions(structure, wrench, limits)
     residual = _residual(structure, tensions, wrench)
-    if residual > 1e-6:
+    if residual > RESIDUAL_TOLERANCE:
         place = ", ".join(f"{value:.4g}" for value in pose)
         raise ConvergenceError(
             f"no tensions within the limits hold the bar at rest at [{place}] (m, rad): wrench"
             f" residual {residual:.2g} of the weight"
         )
     return tensions
+
+
+def least_tensions(structure: Array, wrench: Array, limits: Array) -> Array:
+    """Return the tensions (n,) [N] least in norm with structure·t = wrench and limits (n, 2).
+
+    Where none are within the limits: those that come closest to the wrench.
+
+    The pseudo-inverse's solution is normal to the null space, so the least tensions are the least
+    distance from it within the null space under linear inequalities, which non-negative least
+    squares solves: Lawson, Hanson, Solving Least Squares Problems (1974), chapter 23.
+    """
+    low, high = limits[:, 0], limits[:, 1]
+    base: Array = np.linalg.pinv(structure, rcond=RANK_TOLERANCE) @ wrench
+    null = null_space(structure, rcond=RANK_TOLERANCE)
+    rows = np.vstack([np.hstack([null.T, -null.T]), np.concatenate([low - base, base - high])])
+    goal = np.zeros(len(rows))
+    goal[-1] = 1.0
+    gap = rows @ nnls(rows, goal)[0] - goal
+    if np.linalg.norm(gap) < RESIDUAL_TOLERANCE:
+        return np.asarray(lsq_linear(structure, wrench, (low, high), tol=1e-14).x)
+    return np.clip(base - null @ (gap[:-1] / gap[-1]), low, high)

@@ -208,8 +208,6 @@ class McapFile:
             self.end = self._size
         for place in self.chunks:
             self._take_definitions(place)
-        if not (self.complete or self.channels):
-            raise InputError(f"{self.path}: not closed, and holds no channel and no message")
 
     def _take_data(self, span: Span) -> None:
         if span.opcode in (Opcode.SCHEMA, Opcode.CHANNEL):
@@ -265,6 +263,15 @@ class McapFile:
 
     def _where(self, place: ChunkPlace) -> str:
         return f"{self.path}: chunk at byte {place.record.offset}"
+
+    def check_not_bare(self) -> None:
+        """Refuse a file that was not closed and tells nothing of any message.
+
+        Raises:
+            InputError: it is such a file.
+        """
+        if not (self.complete or self.channels):
+            raise InputError(f"{self.path}: not closed, and holds no channel and no message")
 
     def record_bytes(self, start: int, end: int) -> bytes:
         """Return the file's bytes between two offsets.

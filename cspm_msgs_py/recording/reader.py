@@ -65,6 +65,7 @@ class Recording:
         try:
             for file in mcap_paths(path):
                 self.files.append(McapFile(file))
+                self.files[-1].check_not_bare()
         except BaseException:
             self.close()
             raise

@@ -165,6 +165,8 @@ def _restore(path: Path, target: Path) -> tuple[int, int]:
     """Write what is whole in a file to `target`; return damaged records and unused bytes."""
     with McapFile(path, use_summary=False) as source:
         tail, rest = _tail(source)
+        _take_definitions(source, tail)
+        source.check_not_bare()
         sink = McapSink(target, Header(source.profile, source.library))
         try:
             damaged = _copy(source, tail, sink)
@@ -178,7 +180,6 @@ def _restore(path: Path, target: Path) -> tuple[int, int]:
 
 def _copy(source: McapFile, tail: bytes, sink: McapSink) -> int:
     damaged = 0
-    _take_definitions(source, tail)
     for schema in source.schemas.values():
         sink.add_schema(schema)
     for channel in source.channels.values():

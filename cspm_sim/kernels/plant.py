@@ -197,8 +197,9 @@ def plant_rate(
 ) -> None:
     """Write the state's time derivative to `out`.
 
-    `torque` is the motor torque per winch [N·m], `frame` the winch frame's placement, `locked` holds
-    all motors still, `period` is the step for dry friction [s]; then come the fields of `PlantParameters`, and scratch.
+    `torque` is the motor torque per winch [N·m], `frame` the winch frame's placement; `locked`
+    holds all motors still; `period` is the step for dry friction [s]; then come the fields of
+    `PlantParameters`, and scratch.
     """
     n = cables.shape[0]
     has_bar = bar.shape[0] > 0

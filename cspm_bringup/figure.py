@@ -66,6 +66,6 @@ def _errors(
 
 
 def _band(axes: Axes, time: Array, band: Array, name: str) -> None:
-    axes.fill_between(time, band[:, 0], band[:, 1], label=name, alpha=0.8, linewidth=0.4)
+    axes.fill_between(time, band[:, 0], band[:, 1], label=name, alpha=0.8, linewidth=1.0)
     axes.grid(alpha=0.3)
     axes.margins(x=0)

@@ -44,8 +44,8 @@ def print_summary(console: Console, result: RunResult, requirement: Requirement)
         console.print(_error_table(result, data["errors"], requirement))
     tension = f"tensions {data['tension']['min']:.2f} to {data['tension']['max']:.2f} N"
     console.print(
-        f"{tension} · any cable slack {data['slack_share']:.2%} of the time · wrench infeasible"
-        f" {data['infeasible_share']:.1%} of the time",
+        f"{tension} · any cable slack {data['slack_share']:.2%} of the time · wanted wrench not met"
+        f" within the tension limits {data['infeasible_share']:.1%} of the time",
         soft_wrap=True,
     )
     console.print(f"simulated {result.simulated:g} s at {result.real_time_factor:.1f} × real time")

@@ -100,7 +100,8 @@ def _balanced(parameters: PlantParameters, pose: Array, frame_pose: ArrayLike) -
 
 
 def _residual(structure: Array, tensions: Array, wrench: Array) -> float:
-    return float(np.linalg.norm(structure @ tensions - wrench) / np.linalg.norm(wrench))
+    weight = np.linalg.norm(wrench) or 1.0  # without gravity: in N
+    return float(np.linalg.norm(structure @ tensions - wrench) / weight)
 
 
 def _hold(parameters: PlantParameters, pose: Array, frame_pose: ArrayLike, limits: Array) -> Array:

@@ -146,8 +146,8 @@ def test_without_damping_and_work_the_energy_stays(machines):
         for c in machines["general"].cables
     )
     testbed = machines["general"].model_copy(update={"cables": cables})
-    still = Motion.still(np.array([0.1, -0.1, 0.05, 0.05, -0.1, 0.2]))
-    plant = Plant(testbed, still, 100_000, bar_pose=[0, 0, 2, 0, 0, 0], locked=True)
+    still = Motion.still(np.array([0.05, 0.02, 0.05, 0.01, -0.02, 0.03]))
+    plant = Plant(testbed, still, 100_000, bar_pose=[0.05, 0, 2, 0, 0, 0], locked=True)
     plant.bar_state[6:] = [0.02, -0.02, 0.01, 0.05, 0.1, -0.1]
     keeper = Bookkeeper(testbed, still)
     none = np.zeros(8)

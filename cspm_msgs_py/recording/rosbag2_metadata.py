@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import os
 from collections.abc import Sequence
+from copy import deepcopy
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -97,7 +98,7 @@ def _topic(topic: TopicEntry) -> dict[str, Any]:
             "name": topic.name,
             "type": topic.ros_type,
             "serialization_format": topic.encoding,
-            "offered_qos_profiles": topic.qos,
+            "offered_qos_profiles": deepcopy(topic.qos),  # the same list twice makes an alias
             "type_description_hash": topic.type_hash,
         },
         "message_count": topic.count,

@@ -2,23 +2,24 @@
 PYTHON ?= python3
 VENV := .venv
 BIN := $(VENV)/bin
+PIP := $(BIN)/python -m pip install --quiet --disable-pip-version-check
 SCENARIO ?= worst_case
 
 .PHONY: help run test test-fast lint bench coverage clean
+
 help: ## show this list
 	@grep -hE '^[a-z-]+:.*## ' Makefile | sed -E 's/:.*## /\t/' | expand -t 12
 
 run: $(VENV)/run.stamp ## build what a run needs and simulate the worst-case sea (SCENARIO=calm for another)
-	$(BIN)/cspm run $(SCENARIO)
+	@$(BIN)/cspm run $(SCENARIO)
 
-test: $(VENV)/test.stamp ## build what the tests need; lint, types, fast tests, then the slow ones
-	$(MAKE) --no-print-directory lint
+test: lint ## build what the tests need; then style, types and all tests
 	$(BIN)/python -m pytest
 
 test-fast: $(VENV)/test.stamp ## the tests without the slow ones
 	$(BIN)/python -m pytest -m "not slow"
 
-lint: $(VENV)/test.stamp ## ruff and mypy
+lint: $(VENV)/test.stamp ## style and types
 	$(BIN)/ruff check .
 	$(BIN)/ruff format --check .
 	$(BIN)/mypy
@@ -30,16 +31,22 @@ bench: $(VENV)/test.stamp ## measure speed, start-up and memory; prints a table
 	$(BIN)/python -m bench
 
 clean: ## remove the environment and caches
-	rm -rf $(VENV) build *.egg-info .pytest_cache .mypy_cache .ruff_cache
+	rm -rf $(VENV) build *.egg-info .pytest_cache .mypy_cache .ruff_cache .hypothesis htmlcov .coverage
+	find . -name __pycache__ -type d -prune -exec rm -rf {} +
 
 $(VENV)/pip.stamp:
-	$(PYTHON) -m venv $(VENV) || { rm -rf $(VENV); echo "cspm: python3 needs its venv module (Debian, Ubuntu: apt install python3-venv)" >&2; exit 1; }
-	touch $@
+	@echo "cspm: building the environment in $(VENV), about a minute"
+	@$(PYTHON) -c 'import sys; sys.exit(sys.version_info < (3, 10))' || \
+	  { echo "cspm: $(PYTHON) is older than 3.10, allowed: make PYTHON=python3.10 or newer" >&2; exit 1; }
+	@$(PYTHON) -m venv $(VENV) || \
+	  { rm -rf $(VENV); echo "cspm: $(PYTHON) lacks its venv module (Debian, Ubuntu: apt install python3-venv)" >&2; exit 1; }
+	@touch $@
 
 $(VENV)/run.stamp: $(VENV)/pip.stamp pyproject.toml
-	$(BIN)/pip install --quiet --disable-pip-version-check -e .
-	touch $@
+	@$(PIP) -e .
+	@touch $@
 
 $(VENV)/test.stamp: $(VENV)/run.stamp pyproject.toml
-	$(BIN)/pip install --quiet --disable-pip-version-check -e '.[test]'
-	touch $@
+	@echo "cspm: adding what the tests need"
+	@$(PIP) -e '.[test]'
+	@touch $@

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
+from math import floor, pi
 
 import numpy as np
 from numba import njit
@@ -74,6 +75,12 @@ class MotionController:
 
 
 @njit(cache=True, error_model="numpy")
+def _turn(angle: float) -> float:
+    """Return the same turn within ±π, the shorter way round."""
+    return angle - 2.0 * pi * floor(angle / (2.0 * pi) + 0.5)
+
+
+@njit(cache=True, error_model="numpy")
 def _pid(
     pose: Array,
     reference: Array,
@@ -90,7 +97,7 @@ def _pid(
     wanted = euler_from_quaternion(reference[3:7])
     found = euler_from_quaternion(pose[3:7])
     for d in range(6):
-        error = reference[d] - pose[d] if d < 3 else wanted[d - 3] - found[d - 3]
+        error = reference[d] - pose[d] if d < 3 else _turn(wanted[d - 3] - found[d - 3])
         if not started:
             last[d] = error
             integral[d] = -gains[d, 0] * error

@@ -8,6 +8,7 @@ import numpy as np
 from numba import njit
 from numpy.typing import NDArray
 
+from cspm_msgs_py.errors import SingularityError
 from cspm_sim.kernels.kinematics import cable_geometry
 from cspm_sim.kernels.rotation import euler_from_quaternion
 
@@ -47,18 +48,29 @@ class PseudoInverse:
         self._lengths = np.zeros(n)
 
     def step(self, wrench: Array, bar_pose: Array, frame_pose: Array) -> Distribution:
-        """Return tensions for a wrench row (6,) at measured pose rows (7,) of bar and frame."""
+        """Return tensions for a wrench row (6,) at measured pose rows (7,) of bar and frame.
+
+        Raises:
+            SingularityError: at these poses no tensions give some wrench.
+        """
         tensions = np.empty(len(self._cables))
-        residual, saturated = _pseudo_inverse(
-            wrench,
-            bar_pose,
-            frame_pose,
-            self._cables,
-            self._limits,
-            self._lengths,
-            self._jacobians,
-            tensions,
-        )
+        try:
+            residual, saturated = _pseudo_inverse(
+                wrench,
+                bar_pose,
+                frame_pose,
+                self._cables,
+                self._limits,
+                self._lengths,
+                self._jacobians,
+                tensions,
+            )
+        except np.linalg.LinAlgError:
+            place = ", ".join(f"{value:.4g}" for value in bar_pose)
+            raise SingularityError(
+                f"tension distribution: with the bar measured at [{place}] (m, quaternion) the"
+                " cables cannot give every force and every moment but roll"
+            ) from None
         return Distribution(tensions, residual, saturated, residual <= RESIDUAL_TOLERANCE)
 
 

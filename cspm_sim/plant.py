@@ -86,8 +86,13 @@ class Plant:
         """Advance by one period with the motor torques (n,) [N·m] held.
 
         Raises:
+            InputError: another number of torques than cables.
             DivergenceError: a state is no longer finite, or the pitch passed ±π/2.
         """
+        if torque.shape != self.speeds.shape:
+            raise InputError(
+                f"torque: shape {torque.shape}, allowed: {self.speeds.shape}, one per cable"
+            )
         bad = plant_advance(
             self.state,
             torque,

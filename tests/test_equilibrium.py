@@ -63,8 +63,8 @@ def test_the_thesis_machine_at_its_operating_point(thesis):
 @pytest.mark.parametrize("name", ["thesis", "general", "point"])
 def test_forces_and_moments_balance_at_rest(request, name):
     testbed = request.getfixturevalue(name)
-    poses = random_poses(6, seed=4, reach=0.03, angle=0.02)
-    frame = np.array([0.02, -0.01, 0.03, 0.01, -0.01, 0.02])
+    poses = random_poses(6, seed=4, reach=0.02, angle=0.01)
+    frame = np.array([0.01, 0.005, 0.03, 0.002, -0.003, 0.005])
     for pose in poses:
         if name == "point":
             pose[3:] = 0.0

@@ -56,7 +56,7 @@ def test_a_turn_about_the_vertical_and_a_move_change_nothing(request, name, turn
     knots[:, :3] += place
     knots[:, 5] += turn
     plant = start(testbed, motion)
-    pose = np.concatenate([place + turned @ POSE[:3], POSE[3:] + [0, 0, turn]])
+    pose = np.concatenate([place + turned @ POSE[:3], np.add(POSE[3:], [0, 0, turn])])
     twist = np.concatenate([turned @ plant.bar_state[6:9], plant.bar_state[9:]])
     other = start(testbed, Motion(knots, motion.spacing), pose, twist)
     torques = torques_about_rest(plant, 0.2, count=8)
@@ -65,7 +65,8 @@ def test_a_turn_about_the_vertical_and_a_move_change_nothing(request, name, turn
     assert other.tensions == pytest.approx(plant.tensions, abs=1e-8)
     assert other.speeds == pytest.approx(plant.speeds, abs=1e-8)
     assert other.bar_state[:3] == pytest.approx(place + turned @ plant.bar_state[:3], abs=1e-10)
-    assert other.bar_state[3:6] == pytest.approx(plant.bar_state[3:6] + [0, 0, turn], abs=1e-10)
+    attitude = np.add(plant.bar_state[3:6], [0, 0, turn])
+    assert other.bar_state[3:6] == pytest.approx(attitude, abs=1e-10)
     assert other.bar_state[6:9] == pytest.approx(turned @ plant.bar_state[6:9], abs=1e-9)
     assert other.bar_state[9:] == pytest.approx(plant.bar_state[9:], abs=1e-9)
 
@@ -78,7 +79,7 @@ def test_a_frame_in_steady_motion_feels_nothing_of_it(general):
     knots[:, :3] += speed * motion.spacing * np.arange(len(knots))[:, None]
     knots[:, 6:9] += speed
     plant = start(general, motion)
-    twist = plant.bar_state[6:] + [*speed, 0, 0, 0]
+    twist = np.add(plant.bar_state[6:], [*speed, 0, 0, 0])
     other = start(general, Motion(knots, motion.spacing), POSE, twist)
     torques = torques_about_rest(plant, 0.2, count=8)
     run(plant, torques, 50_000_000)

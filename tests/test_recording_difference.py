@@ -40,7 +40,7 @@ def test_other_chunks_make_no_difference(tmp_path, original):
     assert compare(tmp_path / "b", original) is None
 
 
-@settings(deadline=None, max_examples=25)
+@settings(deadline=None, max_examples=12)
 @given(
     name=st.sampled_from([name for name, topic in ROW_TOPICS.items() if topic.width]),
     step=st.integers(0, STEPS - 1),

@@ -51,6 +51,18 @@ class ChunkHead(NamedTuple):
     data_size: int
 
 
+class ChunkPlace(NamedTuple):
+    """Where a chunk stands: its record, and the Message Index records that follow it.
+
+    A run of Message records outside any chunk is treated as a chunk without compression; for it
+    `loose` is set and `record` covers the run.
+    """
+
+    record: Span
+    index_end: int
+    loose: bool = False
+
+
 def chunk_head(content: bytes, length: int, where: str) -> ChunkHead:
     """Return a chunk's head.
 

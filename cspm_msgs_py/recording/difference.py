@@ -5,7 +5,7 @@ from __future__ import annotations
 import struct
 from collections import Counter
 from collections.abc import Iterator
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from itertools import zip_longest
 from typing import Any, NamedTuple
 
@@ -14,7 +14,8 @@ import numpy as np
 from cspm_msgs_py.errors import InputError
 from cspm_msgs_py.layout import layout_of
 from cspm_msgs_py.message import NANOSECONDS, carries_row, topic_of
-from cspm_msgs_py.recording.mcap_file import ChunkPlace, McapFile
+from cspm_msgs_py.recording.chunk import ChunkPlace
+from cspm_msgs_py.recording.mcap_file import McapFile
 from cspm_msgs_py.recording.reader import Recording
 from cspm_msgs_py.ros_types import deserialize, serialize
 
@@ -73,9 +74,11 @@ def first_difference(
         return found
     places = [_places(first), _places(second)]
     equal = sum(1 for _ in _equal_chunks(*places))
-    skipped = _count(places[0][:equal])
     streams = [_Stream(own[equal:]) for own in places]
-    return _message_difference(first, streams, skipped, log_times=log_times)
+    found = _message_difference(first, streams, log_times=log_times)
+    if found is None or found.index is None:
+        return found
+    return replace(found, index=found.index + _count(places[0][:equal], found.topic))
 
 
 def _topic_difference(first: Recording, second: Recording) -> Difference | None:
@@ -114,12 +117,13 @@ def _raw(place: _Place) -> tuple[str, bytes]:
     return head.compression, place.file.chunk_data(place.chunk, head)
 
 
-def _count(places: list[_Place]) -> Counter[str]:
-    counts: Counter[str] = Counter()
-    for place in places:
-        for channel, table in place.file.times(place.chunk).items():
-            counts[place.file.channels[channel].topic] += len(table)
-    return counts
+def _count(places: list[_Place], topic: str) -> int:
+    """Return the number of messages of a topic in some chunks."""
+    count = 0
+    for file, chunk in places:
+        ids = [channel.id for channel in file.channels.values() if channel.topic == topic]
+        count += len(file.messages(chunk).select(ids))
+    return count
 
 
 class _Stream:
@@ -138,19 +142,19 @@ class _Stream:
             self.exhausted = True
             return
         messages = place.file.messages(place.chunk)
-        names = _channel_names(place.file)
         logs = messages.logs.tolist()
         found = zip(messages.channels.tolist(), logs, messages.payloads(), strict=True)
         for channel, log, payload in found:
-            self.waiting.setdefault(names[channel], []).append(_Message(log, payload))
+            self.waiting.setdefault(place.file.topic_of(channel), []).append(_Message(log, payload))
         self.reached = max([self.reached, *logs])
 
 
 def _message_difference(
-    first: Recording, streams: list[_Stream], done: Counter[str], *, log_times: bool
+    first: Recording, streams: list[_Stream], *, log_times: bool
 ) -> Difference | None:
     types = {name: info.ros_type for name, info in first.topics.items()}
     one, other = streams
+    done: Counter[str] = Counter()
     while running := [stream for stream in streams if not stream.exhausted]:
         min(running, key=lambda stream: stream.reached).advance()
         found = [

@@ -6,7 +6,6 @@ import struct
 import zlib
 from pathlib import Path
 from types import TracebackType
-from typing import NamedTuple
 
 from mcap.records import (
     Attachment,
@@ -27,6 +26,7 @@ from cspm_msgs_py.errors import InputError
 from cspm_msgs_py.recording.chunk import (
     ChunkHead,
     ChunkIndex,
+    ChunkPlace,
     Messages,
     chunk_head,
     decompress,
@@ -49,18 +49,6 @@ from cspm_msgs_py.recording.records import (
 _FOOTER_SIZE = HEAD.size + 20 + len(MAGIC)
 _HEAD_SIZE = 256
 _RUN = 1 << 22
-
-
-class ChunkPlace(NamedTuple):
-    """Where a chunk stands: its record, and the Message Index records that follow it.
-
-    A run of Message records outside any chunk is treated as a chunk without compression; for it
-    `loose` is set and `record` covers the run.
-    """
-
-    record: Span
-    index_end: int
-    loose: bool = False
 
 
 class McapFile:
@@ -165,9 +153,9 @@ class McapFile:
         elif isinstance(record, ChunkIndexRecord):
             self.chunks.append(self._indexed_chunk(record))
         elif isinstance(record, AttachmentIndex):
-            self.attachments.append(_span(Opcode.ATTACHMENT, record.offset, record.length))
+            self.attachments.append(Span.whole(Opcode.ATTACHMENT, record.offset, record.length))
         elif isinstance(record, MetadataIndex):
-            self.metadata.append(_span(Opcode.METADATA, record.offset, record.length))
+            self.metadata.append(Span.whole(Opcode.METADATA, record.offset, record.length))
         else:
             self._take_definition(record)
 
@@ -178,7 +166,7 @@ class McapFile:
             self.channels[record.id] = record
 
     def _indexed_chunk(self, index: ChunkIndexRecord) -> ChunkPlace:
-        span = _span(Opcode.CHUNK, index.chunk_start_offset, index.chunk_length)
+        span = Span.whole(Opcode.CHUNK, index.chunk_start_offset, index.chunk_length)
         index_end = span.end + index.message_index_length
         if span.length < 0 or index_end > self._size:
             raise InputError(f"{self.path}: the index points outside the data section")
@@ -263,6 +251,18 @@ class McapFile:
 
     def _where(self, place: ChunkPlace) -> str:
         return f"{self.path}: chunk at byte {place.record.offset}"
+
+    def topic_of(self, channel: int) -> str:
+        """Return the topic of a channel.
+
+        Raises:
+            InputError: no record describes the channel.
+        """
+        if channel not in self.channels:
+            raise InputError(
+                f"{self.path}: messages on channel {channel}, which no record describes"
+            )
+        return self.channels[channel].topic
 
     def check_not_bare(self) -> None:
         """Refuse a file that was not closed and tells nothing of any message.
@@ -380,11 +380,6 @@ class McapFile:
         trace: TracebackType | None,
     ) -> None:
         self.close()
-
-
-def _span(opcode: int, offset: int, length: int) -> Span:
-    """Return the place of a record of which the whole length is known."""
-    return Span(opcode, offset, length - HEAD.size)
 
 
 def _reason(err: OSError) -> str:

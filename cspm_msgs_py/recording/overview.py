@@ -11,7 +11,6 @@ import numpy as np
 from numpy.typing import NDArray
 
 from cspm_msgs_py.errors import InputError
-from cspm_msgs_py.recording.mcap_file import McapFile
 from cspm_msgs_py.recording.reader import Recording
 from cspm_msgs_py.recording.rosbag2_metadata import read_bag
 from cspm_msgs_py.yaml_file import parse_yaml
@@ -200,16 +199,7 @@ def _chunk_times(recording: Recording) -> Iterator[tuple[str, Times]]:
     for file in recording.files:
         for place in file.chunks:
             for channel, table in file.times(place).items():
-                yield _topic_name(file, channel), table[:, 0].astype(np.int64)
-
-
-def _topic_name(file: McapFile, channel: int) -> str:
-    try:
-        return file.channels[channel].topic
-    except KeyError:
-        raise InputError(
-            f"{file.path}: messages on channel {channel}, which no record describes"
-        ) from None
+                yield file.topic_of(channel), table[:, 0].astype(np.int64)
 
 
 def _own_name(recording: Recording, attachment: str) -> str | None:

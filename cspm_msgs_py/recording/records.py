@@ -44,6 +44,11 @@ class Span(NamedTuple):
     offset: int
     length: int
 
+    @classmethod
+    def whole(cls, opcode: int, offset: int, length: int) -> Span:
+        """Return the place of a record of which the length with opcode and length is known."""
+        return cls(opcode, offset, length - HEAD.size)
+
     @property
     def content(self) -> int:
         """Offset of the content."""

@@ -16,8 +16,14 @@ from mcap.records import Channel, Chunk, Header, Schema
 
 from cspm_msgs_py.errors import CspmError, InputError
 from cspm_msgs_py.recording.block import compress
-from cspm_msgs_py.recording.chunk import ChunkHead, chunk_head, other_records, scan_messages
-from cspm_msgs_py.recording.mcap_file import ChunkPlace, McapFile
+from cspm_msgs_py.recording.chunk import (
+    ChunkHead,
+    ChunkPlace,
+    chunk_head,
+    other_records,
+    scan_messages,
+)
+from cspm_msgs_py.recording.mcap_file import McapFile
 from cspm_msgs_py.recording.reader import message_counts, message_type
 from cspm_msgs_py.recording.records import HEAD, Opcode, parse, spans_in
 from cspm_msgs_py.recording.rosbag2_metadata import (

@@ -1,0 +1,373 @@
+import importlib
+import pkgutil
+from pathlib import Path
+
+import numpy as np
+import pytest
+from conftest import WINCH, build, changed, general_content, rig_content
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+import cspm_sim.effects as effects_package
+from cspm_msgs_py.errors import InputError
+from cspm_sim.effects import Block, catalogue
+from cspm_sim.kernels import bar as bar_kernel
+from cspm_sim.kernels import winch as winch_kernel
+from cspm_sim.kernels.cable import CABLE_COLUMNS, INERTIA, RADIUS, TORQUE_LIMIT
+from cspm_sim.motion import Motion
+from cspm_sim.parameters import plant_parameters
+from cspm_sim.plant import Plant
+
+STILL = Motion.still(np.zeros(6))
+UNITS = {"N·m", "N·m·s/rad", "N·s/m", "N·s²/m²", "m", "rad", "kg", "kg·m²", "s", "Hz", "N", "1"}
+WORDS = ("friction", "damping", "drag")
+EFFECTS = list(catalogue().values())
+BLOCKS = {Block.WINCH: winch_kernel.WINCH_SIGNALS, Block.BAR: bar_kernel.BAR_SIGNALS}
+
+
+def bench(entries, **winch):
+    """One winch without cable."""
+    cables = [{"name": "w", **WINCH, "rotor_inertia": 1e-3, **winch}]
+    return build({"name": "bench", "cables": cables, "effects": entries})
+
+
+def entry(effect, elements=(), **parameters):
+    return {"effect": effect, "elements": list(elements), "parameters": parameters}
+
+
+def middle(effect):
+    return np.array([0.5 * (p.minimum + p.maximum) for p in effect.parameters])
+
+
+def samples(effect, count=40, seed=1):
+    """Signals of the effect's block as over a motion: what it reads random, what it adds to zero."""
+    signals = np.random.default_rng(seed).normal(size=(count, BLOCKS[effect.block]))
+    if effect.block is Block.WINCH:
+        signals[:, winch_kernel.WINCH_TENSION] = np.abs(signals[:, winch_kernel.WINCH_TENSION])
+        signals[:, winch_kernel.WINDING_RADIUS] = 0.02
+        signals[:, winch_kernel.RESISTANCE] = signals[:, winch_kernel.DRY_LIMIT] = 0.0
+    else:
+        signals[:, bar_kernel.WRENCH : bar_kernel.WRENCH + 6] = 0.0
+    return signals
+
+
+def contribution(effect, parameters, signals):
+    """What the kernel adds to its block's residual, (samples, channels)."""
+    rows = np.zeros((1, CABLE_COLUMNS))
+    rows[0, RADIUS], rows[0, INERTIA], rows[0, TORQUE_LIMIT] = 0.02, 1e-3, 10.0
+    out = []
+    for row in signals:
+        after = row.copy()
+        effect.kernel(parameters, after)
+        if effect.block is Block.BAR:
+            out.append(after[bar_kernel.WRENCH : bar_kernel.WRENCH + 6])
+            continue
+        speed = row[winch_kernel.SPEED]
+        both = [
+            winch_kernel.winch_acceleration(0.0, 0.0, speed, 1e-6, rows, 0, s) for s in (row, after)
+        ]
+        out.append([1e-3 * (both[0] - both[1])])
+    return np.array(out)
+
+
+def test_each_file_declares_one_effect_of_its_name():
+    names = {m.name for m in pkgutil.iter_modules(effects_package.__path__)} - {"effect"}
+    assert names == set(catalogue())
+    for name in names:
+        module = importlib.import_module(f"cspm_sim.effects.{name}")
+        assert module.EFFECT.id == name
+        assert module.EFFECT is catalogue()[name]
+    assert list(catalogue()) == sorted(catalogue())
+
+
+def test_nothing_else_names_an_effect():
+    package = Path(effects_package.__file__).parents[1]
+    for path in package.rglob("*.py"):
+        if path.parent.name != "effects":
+            text = path.read_text(encoding="utf-8")
+            assert not [effect for effect in catalogue() if effect in text], path
+
+
+@pytest.mark.parametrize("effect", EFFECTS, ids=lambda e: e.id)
+def test_an_effect_declares_all_that_its_readers_need(effect):
+    assert effect.parameters
+    names = [parameter.name for parameter in effect.parameters]
+    assert len(set(names)) == len(names)
+    for parameter in effect.parameters:
+        assert parameter.unit in UNITS
+        assert np.isfinite([parameter.minimum, parameter.maximum]).all()
+        assert parameter.minimum < parameter.maximum
+    for text in (effect.equation, effect.shows, effect.separating_experiment, effect.reference):
+        assert len(text) > 10
+        assert "\n" not in text
+    assert effect.twins
+    assert effect.id not in effect.twins
+    assert len(set(effect.twins)) == len(effect.twins)
+
+
+@pytest.mark.parametrize("effect", EFFECTS, ids=lambda e: e.id)
+def test_twins_in_the_catalogue_name_each_other(effect):
+    for twin in effect.twins:
+        if twin in catalogue():
+            assert effect.id in catalogue()[twin].twins
+
+
+@pytest.mark.parametrize("effect", EFFECTS, ids=lambda e: e.id)
+def test_regressors_times_parameters_are_what_the_kernel_adds(effect):
+    signals = samples(effect)
+    parameters = middle(effect) * np.linspace(0.5, 1.5, len(effect.parameters))
+    regressors = effect.regressors(signals)
+    channels = 6 if effect.block is Block.BAR else 1
+    assert regressors.shape == (len(signals), channels, len(parameters))
+    added = contribution(effect, parameters, signals)
+    assert np.abs(added).max() > 0.0
+    assert regressors @ parameters == pytest.approx(added, rel=1e-9, abs=1e-12)
+
+
+@pytest.mark.parametrize("effect", EFFECTS, ids=lambda e: e.id)
+def test_a_kernel_adds_to_what_others_added(effect):
+    """Two effects on one element add up, and a kernel changes nothing that is only to be read."""
+    signals = samples(effect)[0]
+    once, twice = signals.copy(), signals.copy()
+    effect.kernel(middle(effect), once)
+    effect.kernel(middle(effect), twice)
+    effect.kernel(middle(effect), twice)
+    assert twice - signals == pytest.approx(2.0 * (once - signals), rel=1e-12)
+    read = slice(0, 4) if effect.block is Block.WINCH else slice(0, 6)
+    assert (once[read] == signals[read]).all()
+
+
+@pytest.mark.parametrize(
+    "effect", [e for e in EFFECTS if any(w in e.id for w in WORDS)], ids=lambda e: e.id
+)
+def test_friction_and_damping_take_energy_from_any_motion(effect):
+    signals = samples(effect, count=200, seed=7)
+    for parameters in (middle(effect), np.array([p.maximum for p in effect.parameters])):
+        added = contribution(effect, parameters, signals)
+        if effect.block is Block.BAR:
+            power = np.sum(added * signals[:, :6], axis=1)
+        else:
+            power = -added[:, 0] * signals[:, winch_kernel.SPEED]
+        assert (power < 0.0).all()
+
+
+@pytest.mark.parametrize("coefficient", [1e-3, 2e-2])
+def test_viscous_friction_makes_speed_decay_exponentially(coefficient):
+    machine = bench([entry("winch_viscous_friction", ["w"], coefficient=coefficient)])
+    plant = Plant(machine, STILL, 1_000_000)
+    plant.speeds[:] = 7.0
+    for _ in range(300):
+        plant.step(np.zeros(1))
+    decay = np.exp(-coefficient / 1e-3 * 0.3)
+    assert plant.speeds[0] == pytest.approx(7.0 * decay, rel=1e-5)
+    assert plant.angles[0] == pytest.approx(7.0 * (1 - decay) * 1e-3 / coefficient, rel=1e-5)
+
+
+@pytest.mark.parametrize("side", [1.0, -1.0])
+def test_coulomb_friction_stops_a_winch_at_constant_deceleration(side):
+    machine = bench([entry("winch_coulomb_friction", torque=0.02)])
+    plant = Plant(machine, STILL, 1_000_000)
+    plant.speeds[:] = side * 5.0
+    speeds = []
+    for _ in range(400):
+        plant.step(np.zeros(1))
+        speeds.append(plant.speeds[0])
+    times = 1e-3 * np.arange(1, 401)
+    expected = side * np.maximum(0.0, 5.0 - 20.0 * times)
+    assert speeds == pytest.approx(expected, abs=1e-9)
+    assert plant.angles[0] == pytest.approx(side * 5.0**2 / 40.0, rel=1e-6)
+
+
+@pytest.mark.parametrize("side", [1.0, -1.0])
+def test_coulomb_friction_sticks_below_its_limit_and_breaks_away_above(side):
+    plant = Plant(bench([entry("winch_coulomb_friction", torque=0.02)]), STILL, 1_000_000)
+    for torque in (0.0, 0.01, 0.0199, 0.02):
+        for _ in range(100):
+            plant.step(np.array([side * torque]))
+        assert plant.speeds[0] == pytest.approx(0.0, abs=1e-12)
+        assert plant.angles[0] == pytest.approx(0.0, abs=1e-12)
+    for _ in range(100):
+        plant.step(np.array([side * 0.03]))
+    assert plant.speeds[0] == pytest.approx(side * 0.01 / 1e-3 * 0.1, rel=1e-9)
+
+
+def test_coulomb_friction_holds_a_loaded_winch_still():
+    """A cable of 0.5 N·m pull at the shaft, a motor that gives 0.45: the friction bears the rest."""
+    content = {**rig_content(), "effects": [entry("winch_coulomb_friction", torque=0.1)]}
+    plant = Plant(build(content), STILL, 1_000_000, tensions=[20.0])
+    begin = plant.state.copy()
+    for _ in range(500):
+        plant.step(np.array([0.45]))
+    assert plant.state == pytest.approx(begin, abs=1e-9)
+    for _ in range(500):
+        plant.step(np.array([0.35]))
+    assert plant.tensions[0] < 19.5
+    assert plant.tensions[0] == pytest.approx((0.35 + 0.1) / 0.025, abs=1.0)
+
+
+@pytest.mark.parametrize("frequency", [0.5, 2.0, 8.0])
+def test_coulomb_friction_takes_four_times_torque_times_amplitude_per_cycle(frequency):
+    """A winch made to swing by its torque, with and without friction: the motors' extra work."""
+    limit, amplitude = 0.05, 0.6
+    omega = 2 * np.pi * frequency
+    period_ns = round(1e9 / frequency / 8000 / 1000) * 1000
+    machine = bench([entry("winch_coulomb_friction", torque=limit)], torque_limit=100.0)
+    plant = Plant(machine, STILL, period_ns)
+    step, inertia = period_ns * 1e-9, 1e-3
+    plant.speeds[:] = amplitude * omega
+    plant.angles[:] = 0.0
+    work, tops = 0.0, []
+    for k in range(16000):
+        time = (k + 0.5) * step
+        wanted_speed = amplitude * omega * np.cos(omega * time)
+        # Feed forward all that the wanted swing needs, friction included.
+        torque = -inertia * amplitude * omega**2 * np.sin(omega * time)
+        torque += limit * np.sign(wanted_speed)
+        before = plant.angles[0]
+        plant.step(np.array([torque]))
+        if k >= 8000:
+            work += torque * (plant.angles[0] - before)
+            tops.append(plant.angles[0])
+    swing = 0.5 * (max(tops) - min(tops))
+    assert swing == pytest.approx(amplitude, rel=0.01)
+    assert work == pytest.approx(4.0 * limit * swing, rel=0.01)
+
+
+def test_bar_damping_acts_in_world_axes():
+    """Slack cables, no gravity: each axis's velocity decays by its own coefficient, tilted or not."""
+    coefficients = dict(
+        zip(
+            ("surge", "sway", "heave", "roll", "pitch", "yaw"),
+            (5.0, 10.0, 20.0, 0.0, 0.0, 0.0),
+            strict=True,
+        )
+    )
+    content = {**general_content(), "gravity": 0.0}
+    content["effects"] = [entry("bar_linear_damping", ["bar"], **coefficients)]
+    content = changed(content, "bar.com", [0.0, 0.0, 0.0])
+    plant = Plant(build(content), STILL, 1_000_000, bar_pose=[0, 0, 2, 0, 0, 0], locked=True)
+    plant.unstretched_lengths += 2.0
+    plant.bar_state[3:6] = [0.4, -0.7, 1.2]
+    plant.bar_state[6:9] = [1.0, 2.0, -3.0]
+    for _ in range(200):
+        plant.step(np.zeros(8))
+    decay = np.exp(-np.array([5.0, 10.0, 20.0]) / 5.0 * 0.2)
+    assert plant.bar_state[6:9] == pytest.approx(decay * [1.0, 2.0, -3.0], rel=1e-10)
+    assert (plant.bar_state[9:] == 0.0).all()
+
+
+@pytest.mark.parametrize("axis", range(3))
+def test_bar_damping_slows_a_turn_about_its_world_axis(axis):
+    content = {**general_content(), "gravity": 0.0}
+    content = changed(content, "bar.com", [0.0, 0.0, 0.0])
+    content = changed(content, "bar.inertia", {"ixx": 0.1, "iyy": 0.1, "izz": 0.1})
+    names = ("surge", "sway", "heave", "roll", "pitch", "yaw")
+    values = dict.fromkeys(names, 0.0) | {names[3 + axis]: 0.2}
+    content["effects"] = [entry("bar_linear_damping", **values)]
+    plant = Plant(build(content), STILL, 1_000_000, bar_pose=[0, 0, 2, 0, 0, 0], locked=True)
+    plant.unstretched_lengths += 2.0
+    plant.bar_state[3:6] = [0.0, 0.0, np.pi / 2]
+    # Yawed by 90°, world x is the bar's −y, world y its x.
+    world = np.array([0.5, 0.4, 0.3])
+    plant.bar_state[9:] = [world[1], -world[0], world[2]]
+    for _ in range(3):
+        plant.step(np.zeros(8))
+    x, y, z = plant.bar_state[9:]
+    expected = world.copy()
+    expected[axis] *= np.exp(-0.2 / 0.1 * 0.003)
+    assert [-y, x, z] == pytest.approx(expected, abs=1e-5)
+
+
+def test_elements_are_those_named_and_all_when_none_is_named():
+    content = general_content()
+    content["effects"] = [entry("winch_viscous_friction", ["c2", "c5"], coefficient=0.01)]
+    assert plant_parameters(build(content)).effects[:, 1].tolist() == [2, 5]
+    content["effects"] = [entry("winch_viscous_friction", coefficient=0.01)]
+    assert plant_parameters(build(content)).effects[:, 1].tolist() == list(range(8))
+    content["effects"] = [
+        entry(
+            "bar_linear_damping",
+            **dict.fromkeys(("surge", "sway", "heave", "roll", "pitch", "yaw"), 1.0),
+        )
+    ]
+    assert plant_parameters(build(content)).effects[:, :2].tolist() == [[1, 0]]
+
+
+def test_an_effect_acts_on_its_element_alone():
+    content = general_content()
+    content["effects"] = [entry("winch_viscous_friction", ["c2"], coefficient=0.05)]
+    with_friction, without = (
+        Plant(build({**content, "effects": e}), STILL, 1_000_000, bar_pose=[0, 0, 2, 0, 0, 0])
+        for e in (content["effects"], [])
+    )
+    for plant in (with_friction, without):
+        plant.unstretched_lengths += 1.0
+        plant.speeds[:] = 5.0
+        plant.step(np.zeros(8))
+    same = with_friction.speeds == without.speeds
+    assert same.tolist() == [True, True, False, True, True, True, True, True]
+    assert with_friction.speeds[2] < without.speeds[2]
+
+
+@pytest.mark.parametrize(
+    ("effects", "text"),
+    [
+        (
+            [entry("winch_friction", torque=1.0)],
+            "effects: winch_friction: no such effect, allowed: " + ", ".join(catalogue()),
+        ),
+        (
+            [entry("winch_coulomb_friction", ["c9"], torque=0.1)],
+            "effects: winch_coulomb_friction: no element 'c9', allowed: c0, c1, c2, c3, c4, c5, c6,"
+            " c7",
+        ),
+        (
+            [entry("winch_coulomb_friction", ["c1"], tork=0.1)],
+            "effects: winch_coulomb_friction: parameters ['tork'], allowed: exactly ['torque']",
+        ),
+        (
+            [entry("winch_coulomb_friction", ["c1"])],
+            "effects: winch_coulomb_friction: parameters [], allowed: exactly ['torque']",
+        ),
+        (
+            [entry("winch_coulomb_friction", ["c1"], torque=-0.1)],
+            "effects: winch_coulomb_friction: torque = -0.1 N·m, allowed: 0 to 1",
+        ),
+        (
+            [entry("winch_viscous_friction", ["c1"], coefficient=0.2)],
+            "effects: winch_viscous_friction: coefficient = 0.2 N·m·s/rad, allowed: 0 to 0.1",
+        ),
+        (
+            [
+                entry(
+                    "bar_linear_damping",
+                    ["c1"],
+                    **dict.fromkeys(("surge", "sway", "heave", "roll", "pitch", "yaw"), 1.0),
+                )
+            ],
+            "effects: bar_linear_damping: elements ['c1'], allowed: [bar] or none",
+        ),
+    ],
+)
+def test_faulty_entries_are_refused_in_one_line(effects, text):
+    with pytest.raises(InputError) as caught:
+        plant_parameters(build({**general_content(), "effects": effects}))
+    assert str(caught.value) == text
+
+
+def test_an_effect_on_a_bar_needs_a_bar():
+    values = dict.fromkeys(("surge", "sway", "heave", "roll", "pitch", "yaw"), 1.0)
+    with pytest.raises(InputError) as caught:
+        plant_parameters(bench([entry("bar_linear_damping", **values)]))
+    assert str(caught.value) == (
+        "effects: bar_linear_damping: this test-bed has no bar, allowed: effects on winches"
+    )
+
+
+@settings(max_examples=30, deadline=None)
+@given(share=st.floats(0.0, 1.0))
+def test_bounds_themselves_are_allowed(share):
+    for effect in EFFECTS:
+        values = {p.name: p.minimum + share * (p.maximum - p.minimum) for p in effect.parameters}
+        machine = build({**general_content(), "effects": [entry(effect.id, **values)]})
+        assert len(plant_parameters(machine).effects) in (1, 8)

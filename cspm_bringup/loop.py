@@ -62,7 +62,7 @@ class Loop:
         self._references: dict[str, Array] = {}
         self._slack_steps = 0
         self._now = 0
-        self._last_good = _LastGood(-1.0, -1.0)
+        self._last_good = _LastGood(0.0, 0.0)
         self.slack = False
 
     @property

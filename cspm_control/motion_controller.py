@@ -21,7 +21,8 @@ class MotionController:
 
     The wrench holds the bar's nominal weight and adds PID terms; a DOF without gains (roll in the
     thesis) gets none. The first output is the weight alone: the integrators start so that they
-    cancel the proportional term, and the derivative from the first error.
+    cancel the proportional term, as far as their limits let them, and the derivative from the first
+    error. Angles differ by the shorter way round.
     """
 
     def __init__(

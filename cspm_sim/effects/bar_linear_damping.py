@@ -14,7 +14,7 @@ def _kernel(parameters: Array, signals: Array) -> None:
 
 
 def _regressors(signals: Array) -> Array:
-    return np.asarray(-signals[:, VELOCITY : VELOCITY + 6])
+    return np.asarray(-signals[:, VELOCITY : VELOCITY + 6, None] * np.eye(6))
 
 
 EFFECT = Effect(

@@ -39,8 +39,10 @@ class Effect:
         parameters: its numbers, in the kernel's order.
         kernel: `kernel(parameters, signals)`, compiled when used; reads the block's signals and
             adds to them (see `kernels.winch` and `kernels.bar` for their order).
-        regressors: from the block's signals over time, shape (samples, signals), the columns
-            whose weighted sum the effect adds to the block's residual, shape (samples, parameters).
+        regressors: from the block's signals over time, shape (samples, signals), what one unit of
+            each parameter adds to the block's residual, shape (samples, channels, parameters); a
+            winch's residual has one channel, torque against positive motion, the bar's six, the
+            wrench. The sum over the parameters is what `kernel` adds.
         equation: the effect in one line.
         shows: how it looks in the block's residual.
         twins: effects it is easily confused with.

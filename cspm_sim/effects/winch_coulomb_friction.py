@@ -11,7 +11,7 @@ def _kernel(parameters: Array, signals: Array) -> None:
 
 
 def _regressors(signals: Array) -> Array:
-    return np.sign(signals[:, [SPEED]])
+    return np.asarray(np.sign(signals[:, SPEED])[:, None, None])
 
 
 EFFECT = Effect(

@@ -1,0 +1,94 @@
+"""Which package may import which, held by reading the source."""
+
+import ast
+import importlib
+import pkgutil
+import sys
+from itertools import pairwise
+from pathlib import Path
+
+import pytest
+
+ROOT = Path(__file__).resolve().parents[1]
+ORDER = ("cspm_msgs_py", "cspm_sim", "cspm_control", "cspm_ident", "cspm_bringup")
+PACKAGES = [name for name in ORDER if (ROOT / name).is_dir()]
+ROS = {
+    "rclpy",
+    "rosidl_runtime_py",
+    "rosidl_parser",
+    "ament_index_python",
+    "launch",
+    "launch_ros",
+    "builtin_interfaces",
+    *(f"{kind}_msgs" for kind in ("sensor", "geometry", "trajectory", "diagnostic", "rosgraph")),
+    *(f"{kind}_msgs" for kind in ("std", "nav", "tf2")),
+}
+
+
+def imported(text):
+    """Top-level names of all modules that a source text imports, wherever in it."""
+    for node in ast.walk(ast.parse(text)):
+        if isinstance(node, ast.Import):
+            yield from (alias.name.split(".")[0] for alias in node.names)
+        elif isinstance(node, ast.ImportFrom) and node.level == 0:
+            yield (node.module or "").split(".")[0]
+
+
+def later(package):
+    return set(ORDER[ORDER.index(package) + 1 :])
+
+
+def wrong_imports(package, name, text):
+    """Imports that go against the order, or to ROS from where ROS must not be."""
+    may_use_ros = package == "cspm_bringup" or "node" in name or "ros" in name
+    found = set(imported(text))
+    return found & (later(package) | (set() if may_use_ros else ROS))
+
+
+@pytest.mark.parametrize("package", PACKAGES)
+def test_imports_go_one_way_and_ros_stays_outside(package):
+    for path in sorted((ROOT / package).rglob("*.py")):
+        wrong = wrong_imports(package, path.stem, path.read_text(encoding="utf-8"))
+        assert not wrong, f"{path.relative_to(ROOT)} imports {sorted(wrong)}"
+
+
+@pytest.mark.parametrize(("before", "after"), list(pairwise(ORDER)))
+def test_the_check_sees_an_import_against_the_order(before, after):
+    for text in (
+        f"import {after}",
+        f"from {after}.x import y",
+        f"def f():\n    import {after}.x as z",
+        f"if True:\n    from {after} import x",
+    ):
+        assert wrong_imports(before, "any", text) == {after}
+    assert wrong_imports(after, "any", f"import {before}\nimport numpy") == set()
+
+
+def test_the_check_sees_ros_where_it_must_not_be():
+    text = "import rclpy\nfrom sensor_msgs.msg import JointState"
+    assert wrong_imports("cspm_sim", "plant", text) == {"rclpy", "sensor_msgs"}
+    assert wrong_imports("cspm_sim", "plant_node", text) == set()
+    assert wrong_imports("cspm_bringup", "runner", text) == set()
+
+
+def modules():
+    for package in PACKAGES:
+        yield package
+        for info in pkgutil.walk_packages([str(ROOT / package)], f"{package}."):
+            text = (ROOT / (info.name.replace(".", "/") + ".py")) if not info.ispkg else None
+            if text is None or not set(imported(text.read_text(encoding="utf-8"))) & ROS:
+                yield info.name
+
+
+@pytest.mark.parametrize("name", sorted(modules()))
+def test_a_module_imports_and_exports_what_it_says(name):
+    if name.endswith("__main__"):
+        pytest.skip("runs when imported")
+    module = importlib.import_module(name)
+    assert module.__doc__, f"{name} says nothing about itself"
+    for exported in getattr(module, "__all__", ()):
+        assert hasattr(module, exported)
+
+
+def test_nothing_brought_ros_in():
+    assert not ROS & set(sys.modules)

@@ -68,6 +68,9 @@ def read_bundle(attachments: Mapping[str, bytes], source: str) -> Bundle:
     Raises:
         InputError: the recording carries none, or a damaged one.
     """
+    outside = [name for name in attachments if Path(name).name != name]
+    if outside:
+        raise InputError(f"{source}: attachment {outside[0]!r}, allowed: names without folders")
     missing = [name for name in (SCENARIO, TESTBED) if name not in attachments]
     if missing:
         raise InputError(

@@ -6,7 +6,9 @@ import dataclasses
 from collections.abc import Sequence
 from pathlib import Path
 
+from rich import box
 from rich.console import Console
+from rich.markup import escape
 from rich.progress import BarColumn, Progress, TaskID, TextColumn, TimeRemainingColumn
 from rich.table import Table
 
@@ -16,16 +18,23 @@ from cspm_bringup.figure import draw_run
 from cspm_bringup.resim import resimulate
 from cspm_bringup.run import RECORD_NAME, RunResult, run
 from cspm_bringup.summary import print_summary, summary_data, write_json
+from cspm_msgs_py.errors import DivergenceError
 from cspm_msgs_py.recording.overview import overview
 from cspm_msgs_py.recording.recover import recover
 from cspm_msgs_py.scenario import load_scenario
 from cspm_msgs_py.testbed import load_testbed
 
+PIPE_WIDTH = 130
+
 
 def run_command(
     path: Path, overrides: Sequence[str], folder: Path | None, json: Path | None
 ) -> bool:
-    """Run a scenario file, show the result, and return whether it ran to its end."""
+    """Run a scenario file, show the result, and return whether it ran to its end.
+
+    Raises:
+        DivergenceError: it diverged; what was recorded and drawn up to then is kept.
+    """
     console = Console()
     scenario = load_scenario(path, overrides)
     testbed = load_testbed(path.parent / scenario.testbed)
@@ -40,44 +49,50 @@ def run_command(
         period = 1.0 / scenario.rates.plant
         names = testbed.testbed.cable_names
         draw_run(result.folder / "run.png", result, requirement, names, period)
-        console.print(f"recording {result.folder}, picture {result.folder.name}/run.png")
+        _say(console, f"recording {result.folder}, picture {result.folder.name}/run.png")
     if result.failure:
-        console.print(f"[red]diverged[/] at {result.failure}", highlight=False)
+        raise DivergenceError(f"diverged at {result.failure}")
     if result.interrupted:
-        console.print(f"interrupted after {result.simulated:g} s; the recording is complete so far")
-    return not (result.failure or result.interrupted)
+        kept = "; the recording is complete so far" if result.folder else ""
+        _say(console, f"interrupted after {result.simulated:g} s{kept}")
+    return not result.interrupted
 
 
 def info_command(bag: Path, json: Path | None) -> None:
     """Show what a recording holds."""
-    console = Console()
+    console = Console() if Console().is_terminal else Console(width=PIPE_WIDTH)
     found = overview(bag)
-    table = Table(title=str(found.path))
-    for column in ("topic", "type", "messages", "rate [Hz]", "longest gap [ms]", "at [s]"):
-        table.add_column(column, justify="left" if column in {"topic", "type"} else "right")
+    table = Table(title=escape(str(found.path)), box=box.SIMPLE)
+    table.add_column("topic", no_wrap=True)
+    # The one that gives way where the terminal is narrow.
+    table.add_column("type", overflow="ellipsis")
+    for column in ("messages", "rate [Hz]", "longest gap [ms]", "at [s]"):
+        table.add_column(escape(column), justify="right", no_wrap=True)
     for topic in found.topics:
         table.add_row(
-            topic.name,
-            topic.ros_type,
+            escape(topic.name),
+            escape(topic.ros_type),
             str(topic.count),
             "" if topic.rate_hz is None else f"{topic.rate_hz:.1f}",
             "" if topic.gap_ns is None else f"{topic.gap_ns * 1e-6:.3f}",
             "" if topic.gap_at_ns is None else f"{(topic.gap_at_ns - found.start_ns) * 1e-9:.3f}",
         )
     console.print(table)
-    console.print(
+    _say(
+        console,
         f"{found.message_count} messages over {found.duration_s:.3f} s,"
         f" {found.size_bytes / 1e6:.1f} MB, {found.storage} {found.profile}, written by"
-        f" {found.library or 'unknown'}"
+        f" {found.library or 'unknown'}",
     )
     if found.scenario or found.testbed:
         record = found.metadata.get(RECORD_NAME, {})
-        console.print(
+        _say(
+            console,
             f"scenario {found.scenario}, seed {record.get('seed', 'unknown')}, test-bed"
-            f" {found.testbed}, mode {record.get('mode', 'unknown')}"
+            f" {found.testbed}, mode {record.get('mode', 'unknown')}",
         )
     if not found.complete:
-        console.print(f"[yellow]cut short[/]: `cspm recover {bag}` restores its index")
+        _say(console, f"cut short: `cspm recover {bag}` restores its index")
     if json is not None:
         write_json(json, dataclasses.asdict(found) | {"path": str(found.path)})
 
@@ -87,13 +102,13 @@ def recover_command(bag: Path, out: Path | None, json: Path | None) -> None:
     console = Console()
     report = recover(bag, out)
     if not report.restored:
-        console.print(f"{report.path}: complete, nothing to restore")
+        _say(console, f"{report.path}: complete, nothing to restore")
     else:
-        console.print(
+        _say(
+            console,
             f"{report.path}: {report.messages} messages up to {report.end_ns * 1e-9:.3f} s,"
             f" {report.lost_bytes} bytes at the end unusable, {report.damaged} damaged chunks left"
             f" out; the original is kept as {', '.join(path.name for path in report.kept)}",
-            soft_wrap=True,
         )
     if json is not None:
         paths = {name: [str(p) for p in getattr(report, name)] for name in ("restored", "kept")}
@@ -104,14 +119,15 @@ def resim_command(bag: Path, json: Path | None) -> bool:
     """Repeat a recorded run, and return whether every message is identical."""
     console = Console()
     with _progress(console) as bar:
-        task = bar.add_task(f"repeating {bag.name}", total=None, speed=0.0)
+        task = bar.add_task(f"repeating {escape(bag.name)}", total=None, speed=0.0)
         found = resimulate(bag, lambda now, total: _show(bar, task, now, total))
     if found.difference is None:
-        console.print(f"identical: all {found.messages} messages, bit for bit")
+        end = "" if found.cut_ns is None else f", up to {found.cut_ns * 1e-9:g} s, where it was cut"
+        _say(console, f"identical: all {found.messages} messages, bit for bit{end}")
     else:
-        console.print(f"different: {found.difference}", soft_wrap=True, highlight=False)
+        _say(console, f"different: {found.difference}")
         if not found.same_version:
-            console.print(f"the recording was made by version {found.recorded_version}")
+            _say(console, f"the recording was made by version {found.recorded_version}")
     if json is not None:
         difference = dataclasses.asdict(found.difference) if found.difference else None
         identical = {"identical": difference is None, "first_difference": difference}
@@ -122,8 +138,13 @@ def resim_command(bag: Path, json: Path | None) -> bool:
 def _run_with_progress(bundle: Bundle, folder: Path | None, console: Console) -> RunResult:
     scenario = bundle.scenario
     with _progress(console) as bar:
-        task = bar.add_task(scenario.name, total=scenario.duration, speed=0.0)
+        task = bar.add_task(escape(scenario.name), total=scenario.duration, speed=0.0)
         return run(bundle, folder, lambda now: _show(bar, task, now, scenario.duration))
+
+
+def _say(console: Console, text: str) -> None:
+    """Print a line as it is: file names are no markup, and nothing is broken at the width."""
+    console.print(text, markup=False, highlight=False, soft_wrap=True)
 
 
 def _progress(console: Console) -> Progress:

@@ -21,12 +21,14 @@ class Resimulation:
 
     Attributes:
         difference: the first place where it differs, None if every message is identical.
-        messages: how many messages were compared.
+        messages: how many messages the recording holds.
+        cut_ns: the instant inside which the recording ends [ns], None if its last is whole.
         recorded_version: version of the package that made the recording.
     """
 
     difference: Difference | None
     messages: int
+    cut_ns: int | None
     recorded_version: str
 
     @property
@@ -45,7 +47,13 @@ def resimulate(path: Path, progress: Callable[[float, float], None]) -> Resimula
     Raises:
         InputError: no recording, or none that cspm made by simulation.
     """
-    recording = Recording(path)
+    with Recording(path) as recording:
+        return _repeat(recording, path, progress)
+
+
+def _repeat(
+    recording: Recording, path: Path, progress: Callable[[float, float], None]
+) -> Resimulation:
     bundle = read_bundle(recording.attachments, str(path))
     clock = recording.topics.get("/clock")
     if clock is None or not clock.count:
@@ -54,9 +62,27 @@ def resimulate(path: Path, progress: Callable[[float, float], None]) -> Resimula
     with tempfile.TemporaryDirectory(prefix="cspm-resim-") as place:
         folder = Path(place) / "again"
         run(bundle, folder, lambda now: progress(now, duration), steps=clock.count)
-        difference = first_difference(recording, Recording(folder))
+        with Recording(folder) as repeated:
+            difference = first_difference(recording, repeated)
+            cut = difference is not None and _is_cut(recording, repeated, difference)
     return Resimulation(
-        difference=difference,
+        difference=None if cut else difference,
         messages=sum(topic.count for topic in recording.topics.values()),
+        cut_ns=recording.end_ns if cut else None,
         recorded_version=recording.metadata.get(RECORD_NAME, {}).get("package_version", "unknown"),
     )
+
+
+def _is_cut(recording: Recording, repeated: Recording, difference: Difference) -> bool:
+    """Return whether the difference is only that the recording ends inside its last instant.
+
+    Messages of one instant are written in one order, so what a cut leaves of it comes first.
+    """
+    if difference.field != "message" or difference.first != "missing":
+        return False
+    file = repeated.files[-1]
+    messages = file.messages(file.chunks[-1])
+    ids = [channel.id for channel in file.channels.values() if channel.topic == difference.topic]
+    # The earliest difference is the topic's last message of all: nothing before it is missing.
+    at_end = difference.index == repeated.topics[difference.topic].count - 1
+    return at_end and recording.end_ns in messages.select(ids).logs[-1:]

@@ -7,6 +7,7 @@ from pathlib import Path
 from typing import Any
 
 from rich.console import Console
+from rich.markup import escape
 from rich.table import Table
 
 from cspm_bringup.run import MODE, RunResult
@@ -55,7 +56,7 @@ def _error_table(
     result: RunResult, errors: dict[str, dict[str, float]], requirement: Requirement
 ) -> Table:
     what = "reference − pose" if result.controlled else "mean pose − pose, nothing controls it"
-    table = Table(title=f"{result.scenario}, seed {result.seed}: {what}")
+    table = Table(title=f"{escape(result.scenario)}, seed {result.seed}: {what}")
     columns = ["", "max", "RMS"] + ["required", "RMS within"] * result.controlled
     for column in columns:
         table.add_column(column, justify="right" if column else "left")

@@ -16,11 +16,10 @@ import numpy as np
 from pydantic import Field, NonNegativeFloat, PositiveFloat, field_validator, model_validator
 from typing_extensions import Self
 
-from cspm_msgs_py.errors import InputError
 from cspm_msgs_py.provenance import Provenance, unwrap_provenance
 from cspm_msgs_py.sensor_spec import Sensor, check_sensor_topics
 from cspm_msgs_py.topics import Topic, contract_topics
-from cspm_msgs_py.yaml_file import StrictModel, parse_yaml, validate
+from cspm_msgs_py.yaml_file import StrictModel, parse_yaml, read_text, validate
 
 Vector3 = tuple[float, float, float]
 Name = Annotated[str, Field(pattern=r"^[A-Za-z][A-Za-z0-9_]*$")]
@@ -260,13 +259,7 @@ def load_testbed(path: Path) -> TestbedFile:
     Raises:
         InputError: naming file, key, value and what is allowed.
     """
-    try:
-        text = path.read_text(encoding="utf-8")
-    except FileNotFoundError:
-        raise InputError(f"{path}: no such file, allowed: a test-bed file") from None
-    except (OSError, UnicodeDecodeError) as err:
-        raise InputError(f"{path}: not a readable text file ({err})") from None
-    return parse_testbed(text, str(path))
+    return parse_testbed(read_text(path), str(path))
 
 
 def parse_testbed(text: str, source: str) -> TestbedFile:

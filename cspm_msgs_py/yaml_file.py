@@ -35,13 +35,21 @@ def read_yaml(path: Path) -> Any:  # noqa: ANN401 - whatever the file holds
     Raises:
         InputError: the file is missing, unreadable, not YAML, or repeats a key.
     """
+    return parse_yaml(read_text(path), str(path))
+
+
+def read_text(path: Path) -> str:
+    """Return a text file's content.
+
+    Raises:
+        InputError: the file is missing or unreadable.
+    """
     try:
-        text = path.read_text(encoding="utf-8")
+        return path.read_text(encoding="utf-8")
     except FileNotFoundError:
-        raise InputError(f"{path}: no such file") from None
+        raise InputError(f"{path}: no such file, allowed: a YAML file") from None
     except (OSError, UnicodeDecodeError) as err:
-        raise InputError(f"{path}: not a readable text file ({err})") from None
-    return parse_yaml(text, str(path))
+        raise InputError(f"{path}: not a readable text file ({err}), allowed: a YAML file") from None
 
 
 def parse_yaml(text: str, source: str) -> Any:  # noqa: ANN401 - whatever the text holds

@@ -216,4 +216,4 @@ def test_an_override_of_what_is_no_scenario(tmp_path):
 def test_files_that_cannot_be_read(tmp_path):
     with pytest.raises(InputError) as caught:
         load_scenario(tmp_path / "none.yaml")
-    assert str(caught.value) == f"{tmp_path / 'none.yaml'}: no such file"
+    assert str(caught.value) == f"{tmp_path / 'none.yaml'}: no such file, allowed: a YAML file"

@@ -24,7 +24,7 @@ from cspm_msgs_py.recording.recover import recover
 from cspm_msgs_py.scenario import load_scenario
 from cspm_msgs_py.testbed import load_testbed
 
-PIPE_WIDTH = 130
+PIPE_WIDTH = 140
 
 
 def run_command(

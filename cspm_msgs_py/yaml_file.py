@@ -49,7 +49,7 @@ def read_text(path: Path) -> str:
     except FileNotFoundError:
         raise InputError(f"{path}: no such file, allowed: a YAML file") from None
     except (OSError, UnicodeDecodeError) as err:
-        raise InputError(f"{path}: not a readable text file ({err}), allowed: a YAML file") from None
+        raise InputError(f"{path}: unreadable ({err}), allowed: a YAML file") from None
 
 
 def parse_yaml(text: str, source: str) -> Any:  # noqa: ANN401 - whatever the text holds

@@ -32,7 +32,7 @@ def plant_parameters(testbed: Testbed) -> PlantParameters:
     width = max((len(values) for *_, values in actions), default=1)
     return PlantParameters(
         bar=_bar_array(testbed.bar, testbed.gravity) if testbed.bar else np.zeros(0),
-        cables=np.array(rows),
+        cables=np.asfortranarray(rows),
         tables=np.array(tables),
         effects=np.array(
             [(_BLOCKS[e.block], element, kernel_address(e.kernel)) for e, element, _ in actions],

@@ -305,8 +305,8 @@ def test_files_that_cannot_be_read(tmp_path):
     binary.write_bytes(b"\xff\xfe\x00name")
     for path, fault in [
         (tmp_path / "none.yaml", "no such file, allowed: a YAML file"),
-        (tmp_path, "not a readable text file"),
-        (binary, "not a readable text file"),
+        (tmp_path, "unreadable"),
+        (binary, "unreadable"),
         (empty, "an empty file, allowed: a mapping of keys to values"),
     ]:
         with pytest.raises(InputError) as caught:

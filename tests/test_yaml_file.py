@@ -189,8 +189,8 @@ def test_files_that_cannot_be_read(tmp_path):
     binary.write_bytes(bytes(range(256)))
     for path, fault in [
         (tmp_path / "none.yaml", "no such file"),
-        (tmp_path, "not a readable text file"),
-        (binary, "not a readable text file ('utf-8' codec can't decode byte 0x80"),
+        (tmp_path, "unreadable"),
+        (binary, "unreadable ('utf-8' codec can't decode byte 0x80"),
     ]:
         with pytest.raises(InputError) as caught:
             read_yaml(path)

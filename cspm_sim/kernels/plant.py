@@ -81,7 +81,7 @@ def make_scratch(n_states: int, n_cables: int) -> Scratch:
     """Return scratch arrays for a plant of this size."""
     return Scratch(
         stages=np.zeros((3, n_states)),
-        spans=np.zeros((n_cables, SPAN_COLUMNS)),
+        spans=np.zeros((n_cables, SPAN_COLUMNS), order="F"),
         signals=np.zeros(max(BAR_SIGNALS, WINCH_SIGNALS)),
     )
 
@@ -224,7 +224,7 @@ def plant_rate(
         _bar_rate(state, placement, bar, effects, effect_parameters, spans, signals, out)
 
 
-@njit(cache=True, error_model="numpy")
+@njit(cache=True, error_model="numpy", _nrt=False)
 def plant_tensions(
     state: Array, frame: Array, p: PlantParameters, scratch: Scratch, out: Array
 ) -> None:
@@ -239,7 +239,7 @@ def plant_tensions(
         out[1, i] = spans[i, LENGTH]
 
 
-@njit(cache=True, error_model="numpy")
+@njit(cache=True, error_model="numpy", _nrt=False)
 def plant_step(
     state: Array,
     torque: Array,
@@ -292,7 +292,7 @@ def plant_step(
     return bad
 
 
-@njit(cache=True, error_model="numpy")
+@njit(cache=True, error_model="numpy", _nrt=False)
 def plant_advance(
     state: Array,
     torque: Array,
@@ -306,6 +306,7 @@ def plant_advance(
     p: PlantParameters,
     frames: Array,
     scratch: Scratch,
+    outputs: Array,
 ) -> int:
     """Advance `state` by `steps` steps from step number `start` with `torque` held.
 
@@ -319,5 +320,7 @@ def plant_advance(
         bad = plant_step(state, torque, frames, locked, period, p, scratch)
         if bad >= 0:
             return bad
-        frames[0, :] = frames[2, :]
+        for d in range(frames.shape[1]):
+            frames[0, d] = frames[2, d]
+    plant_tensions(state, frames[0], p, scratch, outputs)
     return -1

@@ -15,6 +15,7 @@ from cspm_msgs_py.layout import layout_of
 from cspm_msgs_py.message import message_of
 from cspm_msgs_py.recording import Recording
 from cspm_msgs_py.ros_types import definition, serialize, typestore
+from cspm_msgs_py.yaml_file import dump_yaml, parse_yaml
 
 STEPS = 230
 SAMPLES = Path(__file__).resolve().parents[2] / "shared" / "data" / "mcap_samples"
@@ -210,8 +211,11 @@ def test_a_split_bag_is_one_recording(tmp_path, sample):
     (both / "calm_0.mcap").write_bytes((folder / "calm_0.mcap").read_bytes())
     (both / "calm_1.mcap").write_bytes((tmp_path / "b" / "calm" / "calm_0.mcap").read_bytes())
     text = (folder / "metadata.yaml").read_text()
-    names = "relative_file_paths: [calm_0.mcap, calm_1.mcap]"
-    (both / "metadata.yaml").write_text(text.replace("relative_file_paths: [calm_0.mcap]", names))
+    content = parse_yaml(text, "metadata.yaml")
+    names = content["rosbag2_bagfile_information"]["relative_file_paths"]
+    assert names == ["calm_0.mcap"]
+    names.append("calm_1.mcap")
+    (both / "metadata.yaml").write_text(dump_yaml(content))
     with Recording(both) as recording:
         found = recording.rows("/bar/pose")
         assert (recording.start_ns, recording.end_ns) == (7_000_000_000, 8_229_000_000)

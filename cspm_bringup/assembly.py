@@ -9,6 +9,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from cspm_bringup.plants import SIM, AnyPlant, make_plant
 from cspm_control.design import (
     check_separation,
     design_force_gains,
@@ -28,7 +29,6 @@ from cspm_msgs_py.testbed import Testbed
 from cspm_sim.kernels.cable import RADIUS
 from cspm_sim.motion import Motion
 from cspm_sim.parameters import plant_parameters
-from cspm_sim.plant import Plant
 from cspm_sim.sensors import SensorModel
 
 Array = NDArray[np.float64]
@@ -62,7 +62,7 @@ class Assembly:
     scenario: Scenario
     testbed: Testbed
     period_ns: int
-    plant: Plant
+    plant: AnyPlant
     sensors: dict[str, SensorModel]
     references: dict[str, WaveTrajectory]
     controllers: Controllers | None
@@ -106,8 +106,10 @@ def resolve(scenario: Scenario, testbed: Testbed) -> Scenario:
     return scenario.model_copy(update={"control": control})
 
 
-def assemble(scenario: Scenario, testbed: Testbed, folder: Path) -> Assembly:
+def assemble(scenario: Scenario, testbed: Testbed, folder: Path, plant: str = SIM) -> Assembly:
     """Build all parts of a resolved scenario; `folder` is where its relative paths start.
+
+    `plant` is one of `PLANTS`.
 
     Raises:
         InputError: scenario and test-bed do not fit together.
@@ -132,7 +134,8 @@ def assemble(scenario: Scenario, testbed: Testbed, folder: Path) -> Assembly:
         scenario=scenario,
         testbed=testbed,
         period_ns=period_ns,
-        plant=Plant(
+        plant=make_plant(
+            plant,
             testbed,
             frame,
             period_ns,

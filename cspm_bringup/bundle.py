@@ -6,6 +6,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
 
+from cspm_bringup.plants import SIM
 from cspm_msgs_py.errors import InputError
 from cspm_msgs_py.motion_spec import FileMotion, VesselMotion
 from cspm_msgs_py.scenario import Body, Scenario, parse_scenario
@@ -18,11 +19,12 @@ TESTBED = "testbed.yaml"
 
 @dataclass(frozen=True)
 class Bundle:
-    """A resolved scenario, its test-bed, and the files that its motions read, by name."""
+    """A resolved scenario, its test-bed, files that its motions read, by name, and its plant."""
 
     scenario: Scenario
     testbed: TestbedFile
     files: dict[str, bytes]
+    plant: str = SIM
 
     def attachments(self) -> dict[str, bytes]:
         """Return the recording's attachments by name."""
@@ -68,7 +70,7 @@ def read_bundle(attachments: Mapping[str, bytes], source: str) -> Bundle:
     Raises:
         InputError: the recording carries none, or a damaged one.
     """
-    outside = [name for name in attachments if Path(name).name != name]
+    outside = [name for name in attachments if Path(name).name != name or name == ".."]
     if outside:
         raise InputError(f"{source}: attachment {outside[0]!r}, allowed: names without folders")
     missing = [name for name in (SCENARIO, TESTBED) if name not in attachments]

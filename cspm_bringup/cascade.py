@@ -44,18 +44,18 @@ class Cascade:
         """Return the torque command (n,) [N·m] at plant step `step`; `send` gets what is new."""
         motion, distribution, force = self._controllers
         pose, tension = measured.get("/bar/pose"), measured.get("/cables/tension")
-        due_motion, due_distribution, due_force = (step % d == 0 for d in self._dividers)
-        if due_motion and pose is not None and reference is not None:
+        every_motion, every_distribution, every_force = self._dividers
+        if step % every_motion == 0 and pose is not None and reference is not None:
             self._wrench = motion.step(pose, reference)
             send("/wrench_command", self._wrench)
-        if due_distribution and pose is not None and self._wrench is not None:
+        if step % every_distribution == 0 and pose is not None and self._wrench is not None:
             found = distribution.step(
                 self._wrench, pose, measured.get("/winch_frame/pose", UNMOVED)
             )
             self._tensions, self.infeasible = found.tensions, not found.feasible
             self._saturated = found.saturated
             send("/tension_command", self._tensions)
-        if due_force and tension is not None and self._tensions is not None:
+        if step % every_force == 0 and tension is not None and self._tensions is not None:
             self._torque = force.step(self._tensions, tension)
             send("/winches/torque_command", self._torque)
         self._counts["steps"] += 1

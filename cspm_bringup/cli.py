@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import sys
 from datetime import datetime
+from itertools import chain, count
 from pathlib import Path
 from typing import Annotated, NoReturn
 
@@ -89,6 +90,14 @@ def run(
     mode: Annotated[
         str, typer.Option(metavar="MODE", help="How to run: inprocess, all in one process.")
     ] = "inprocess",
+    plant: Annotated[
+        str,
+        typer.Option(
+            metavar="PLANT",
+            help="Whose equations to simulate: sim, or mujoco, a second implementation on the"
+            " MuJoCo engine.",
+        ),
+    ] = "sim",
     duration: Annotated[
         float | None,
         typer.Option(metavar="SECONDS", help="Simulated time, instead of the scenario's."),
@@ -128,17 +137,23 @@ def run(
     if mode != "inprocess":
         raise InputError(f"--mode {mode}: allowed: inprocess")
     from cspm_bringup.commands import run_command
+    from cspm_bringup.plants import PLANTS
 
+    if plant not in PLANTS:
+        raise InputError(f"--plant {plant}: allowed: {', '.join(PLANTS)}")
     settings = [f"duration={duration}"] * (duration is not None)
     settings += [f"seed={seed}"] * (seed is not None)
     folder = out if out is not None else _new_folder(Path(scenario).stem)
     path = find_scenario(scenario)
-    finished = run_command(path, [*(overrides or []), *settings], folder if record else None, json)
+    place = folder if record else None
+    finished = run_command(path, [*(overrides or []), *settings], place, json, plant)
     raise typer.Exit(0 if finished else RUN_FAILED)
 
 
 def _new_folder(name: str) -> Path:
-    return Path("recordings") / f"{name}-{datetime.now():%Y%m%d-%H%M%S}"
+    first = Path("recordings") / f"{name}-{datetime.now():%Y%m%d-%H%M%S}"
+    later = (first.with_name(f"{first.name}-{number}") for number in count(2))
+    return next(folder for folder in chain([first], later) if not folder.exists())
 
 
 @app.command(epilog="Example: cspm info recordings/calm-20260131-120000")

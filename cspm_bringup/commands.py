@@ -14,21 +14,26 @@ from rich.table import Table
 
 from cspm_bringup.assembly import resolve
 from cspm_bringup.bundle import Bundle, make_bundle
-from cspm_bringup.figure import draw_run
+from cspm_bringup.plants import SIM
 from cspm_bringup.resim import resimulate
 from cspm_bringup.run import RECORD_NAME, RunResult, run
 from cspm_bringup.summary import print_summary, summary_data, write_json
-from cspm_msgs_py.errors import DivergenceError
+from cspm_msgs_py.errors import DivergenceError, InputError
 from cspm_msgs_py.recording.overview import overview
 from cspm_msgs_py.recording.recover import recover
 from cspm_msgs_py.scenario import load_scenario
-from cspm_msgs_py.testbed import load_testbed
+from cspm_msgs_py.testbed import TestbedFile, load_testbed
+from cspm_sim.parameters import plant_parameters
 
 PIPE_WIDTH = 140
 
 
 def run_command(
-    path: Path, overrides: Sequence[str], folder: Path | None, json: Path | None
+    path: Path,
+    overrides: Sequence[str],
+    folder: Path | None,
+    json: Path | None,
+    plant: str = SIM,
 ) -> bool:
     """Run a scenario file, show the result, and return whether it ran to its end.
 
@@ -37,14 +42,20 @@ def run_command(
     """
     console = Console()
     scenario = load_scenario(path, overrides)
-    testbed = load_testbed(path.parent / scenario.testbed)
+    testbed_path = path.parent / scenario.testbed
+    testbed = load_testbed(testbed_path)
+    _check_effects(testbed, testbed_path)
     bundle = make_bundle(resolve(scenario, testbed.testbed), testbed, path.parent)
+    bundle = dataclasses.replace(bundle, plant=plant)
     result = _run_with_progress(bundle, folder, console)
     requirement = scenario.requirement
     print_summary(console, result, requirement)
     if json is not None:
         write_json(json, summary_data(result))
     if result.folder is not None:
+        # Loading matplotlib takes a quarter of a second, which the first step need not wait for.
+        from cspm_bringup.figure import draw_run
+
         write_json(result.folder / "summary.json", summary_data(result))
         period = 1.0 / scenario.rates.plant
         names = testbed.testbed.cable_names
@@ -56,6 +67,14 @@ def run_command(
         kept = "; the recording is complete so far" if result.folder else ""
         _say(console, f"interrupted after {result.simulated:g} s{kept}")
     return not result.interrupted
+
+
+def _check_effects(testbed: TestbedFile, path: Path) -> None:
+    """Let a fault among the effects, which only the model can see, name the test-bed's file."""
+    try:
+        plant_parameters(testbed.testbed)
+    except InputError as err:
+        raise InputError(f"{path}: {err}") from None
 
 
 def info_command(bag: Path, json: Path | None) -> None:
@@ -89,7 +108,8 @@ def info_command(bag: Path, json: Path | None) -> None:
         _say(
             console,
             f"scenario {found.scenario}, seed {record.get('seed', 'unknown')}, test-bed"
-            f" {found.testbed}, mode {record.get('mode', 'unknown')}",
+            f" {found.testbed}, mode {record.get('mode', 'unknown')}, plant"
+            f" {record.get('plant', SIM)}",
         )
     if not found.complete:
         _say(console, f"cut short: `cspm recover {bag}` restores its index")
@@ -131,7 +151,8 @@ def resim_command(bag: Path, json: Path | None) -> bool:
     if json is not None:
         difference = dataclasses.asdict(found.difference) if found.difference else None
         identical = {"identical": difference is None, "first_difference": difference}
-        write_json(json, identical | {"messages": found.messages})
+        cut = None if found.cut_ns is None else found.cut_ns * 1e-9
+        write_json(json, identical | {"messages": found.messages, "cut_at_s": cut})
     return found.difference is None
 
 

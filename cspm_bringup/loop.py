@@ -15,12 +15,13 @@ from numpy.typing import NDArray
 
 from cspm_bringup.assembly import Assembly
 from cspm_bringup.cascade import Cascade
+from cspm_bringup.truth import Quantity, Truth
 from cspm_msgs_py.diagnostics import Level, Status
-from cspm_sim.kernels.cable import HAS_CABLE, RADIUS
-from cspm_sim.kernels.rows import bar_twist_row, motion_twist_row, pose_row
+from cspm_msgs_py.errors import DivergenceError
+from cspm_sim.sensors import SensorModel
 
 Array = NDArray[np.float64]
-# Takes log time [ns], stamp [ns] and row.
+# Takes log time [ns], stamp [ns] and row; the row may change after the call.
 Publish = Callable[[int, int, Array], None]
 PublishStatuses = Callable[[int, list[Status]], None]
 
@@ -33,6 +34,15 @@ class _LastGood(NamedTuple):
 
     taut: float
     feasible: float
+
+
+class _Tap(NamedTuple):
+    """A true quantity, its sensor if it has one, and where truth and measurement are published."""
+
+    quantity: Quantity
+    publish_truth: Publish | None
+    sensor: SensorModel | None
+    publish_measured: Publish | None
 
 
 class Loop:
@@ -51,13 +61,22 @@ class Loop:
         self._publish_statuses = publish_statuses
         self._reference_divider = rates.plant // rates.wave_trajectory
         self._status_divider = max(1, rates.plant // DIAGNOSTICS_RATE)
-        cables = plant.parameters.cables
-        self._has_cable = cables[:, HAS_CABLE] > 0.0
+        cables = parts.testbed.cables
+        # Where there is no cable nothing is slack.
+        self._slack_limit = np.array([0.0 if cable.has_cable else -1.0 for cable in cables])
         # Before anything is measured the winches hold what hangs on them.
-        self._torque: Array = cables[:, RADIUS] * plant.tensions
+        radii = np.array([cable.drum_radius / cable.gear_ratio for cable in cables])
+        self._torque: Array = radii * plant.tensions
         self._cascade = (
             Cascade(parts.controllers, rates, self._torque) if parts.controllers else None
         )
+        self._truth = Truth(plant)
+        self._taps = [
+            _Tap(
+                q, publish.get("/truth" + q.topic), parts.sensors.get(q.topic), publish.get(q.topic)
+            )
+            for q in self._truth.quantities
+        ]
         self._measured: dict[str, Array] = {}
         self._references: dict[str, Array] = {}
         self._slack_steps = 0
@@ -74,7 +93,8 @@ class Loop:
         """Publish everything that belongs to the current instant, then advance the plant.
 
         Raises:
-            DivergenceError: the plant left the range of its equations.
+            DivergenceError: the plant left the range of its equations, or the bar that is to be
+                controlled has turned over.
         """
         step = self._parts.plant.steps
         self._now = step * self._parts.period_ns
@@ -86,7 +106,7 @@ class Loop:
         self._observe(step)
         self._command(step)
         plant = self._parts.plant
-        self.slack = bool(((plant.tensions <= 0.0) & self._has_cable).any())
+        self.slack = bool((plant.tensions <= self._slack_limit).any())
         self._slack_steps += self.slack
         self._last_good = _LastGood(
             self._last_good.taut if self.slack else self._now * 1e-9,
@@ -95,6 +115,11 @@ class Loop:
         if step % self._status_divider == 0:
             self._publish_statuses(self._now, self._statuses())
         plant.step(self._torque)
+        if self._cascade is not None and abs(plant.bar_state[3]) > np.pi:
+            raise DivergenceError(
+                f"t = {plant.time:.3f} s: bar roll {plant.bar_state[3]:.3f} rad passed ±π, the bar"
+                " has turned over"
+            )
 
     def history(self) -> str:
         """Return what preceded the current instant, in words, for the report of a divergence."""
@@ -119,39 +144,17 @@ class Loop:
 
     def _observe(self, step: int) -> None:
         """Publish the truth and what the sensors make of it."""
-        for topic, values, row in self._truth():
-            self._send("/truth" + topic, row)
-            sensor = self._parts.sensors.get(topic)
-            arrival = sensor.observe(step, self._now, values) if sensor else None
+        now = self._now
+        self._truth.update(self._torque)
+        for quantity, publish_truth, sensor, publish_measured in self._taps:
+            if publish_truth is not None:
+                publish_truth(now, now, quantity.row)
+            arrival = sensor.observe(step, now, quantity.values) if sensor else None
             if arrival is not None:
                 stamp, measured = arrival
-                self._measured[topic] = measured
-                publish = self._publish.get(topic)
-                if publish is not None:
-                    publish(self._now, stamp, measured)
-
-    def _truth(self) -> list[tuple[str, Array, Array]]:
-        """Return topic, values as sensors take them, and row, of all true quantities."""
-        plant = self._parts.plant
-        found: list[tuple[str, Array, Array]] = []
-        if self._parts.testbed.winch_frame:
-            pose, twist = np.empty(7), np.empty(6)
-            pose_row(plant.frame, pose)
-            motion_twist_row(plant.frame, twist)
-            found.append(("/winch_frame/pose", plant.frame[:6], pose))
-            found.append(("/winch_frame/twist", twist, twist))
-        if self._parts.testbed.bar:
-            pose, twist = np.empty(7), np.empty(6)
-            pose_row(plant.bar_state, pose)
-            bar_twist_row(plant.bar_state, twist)
-            found.append(("/bar/pose", plant.bar_state[:6], pose))
-            found.append(("/bar/twist", twist, twist))
-        winches = np.concatenate((plant.angles, plant.speeds, plant.applied_torque(self._torque)))
-        found.append(("/winches/state", winches, winches))
-        found.append(("/cables/tension", plant.tensions, plant.tensions))
-        lengths = plant.unstretched_lengths
-        found.append(("/cables/unstretched_length", lengths, lengths))
-        return found
+                self._measured[quantity.topic] = measured
+                if publish_measured is not None:
+                    publish_measured(now, stamp, measured)
 
     def _command(self, step: int) -> None:
         parts = self._parts

@@ -4,11 +4,12 @@ from __future__ import annotations
 
 import tempfile
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from importlib.metadata import version
 from pathlib import Path
 
 from cspm_bringup.bundle import read_bundle
+from cspm_bringup.plants import SIM
 from cspm_bringup.run import RECORD_NAME, run
 from cspm_msgs_py.errors import InputError
 from cspm_msgs_py.recording.difference import Difference, first_difference
@@ -54,7 +55,8 @@ def resimulate(path: Path, progress: Callable[[float, float], None]) -> Resimula
 def _repeat(
     recording: Recording, path: Path, progress: Callable[[float, float], None]
 ) -> Resimulation:
-    bundle = read_bundle(recording.attachments, str(path))
+    record = recording.metadata.get(RECORD_NAME, {})
+    bundle = replace(read_bundle(recording.attachments, str(path)), plant=record.get("plant", SIM))
     clock = recording.topics.get("/clock")
     if clock is None or not clock.count:
         raise InputError(f"{path}: has no /clock messages, allowed: a simulated recording")
@@ -69,20 +71,28 @@ def _repeat(
         difference=None if cut else difference,
         messages=sum(topic.count for topic in recording.topics.values()),
         cut_ns=recording.end_ns if cut else None,
-        recorded_version=recording.metadata.get(RECORD_NAME, {}).get("package_version", "unknown"),
+        recorded_version=record.get("package_version", "unknown"),
     )
 
 
 def _is_cut(recording: Recording, repeated: Recording, difference: Difference) -> bool:
     """Return whether the difference is only that the recording ends inside its last instant.
 
-    Messages of one instant are written in one order, so what a cut leaves of it comes first.
+    Messages of one instant are written in one order, so what a cut leaves of it comes first. The
+    difference is the earliest, so that nothing before that instant is missing.
     """
-    if difference.field != "message" or difference.first != "missing":
+    if (difference.field, difference.first) != ("message", "missing"):
         return False
-    file = repeated.files[-1]
-    messages = file.messages(file.chunks[-1])
-    ids = [channel.id for channel in file.channels.values() if channel.topic == difference.topic]
-    # The earliest difference is the topic's last message of all: nothing before it is missing.
+    (last_ns, left), (whole_ns, whole) = _last_instant(recording), _last_instant(repeated)
     at_end = difference.index == repeated.topics[difference.topic].count - 1
-    return at_end and recording.end_ns in messages.select(ids).logs[-1:]
+    follows = left == whole[: len(left)] and difference.topic in whole[len(left) :]
+    return last_ns == whole_ns and at_end and follows
+
+
+def _last_instant(recording: Recording) -> tuple[int, list[str]]:
+    """Return the last log time [ns] and the topics of its messages, as they were written."""
+    file = recording.files[-1]
+    messages = file.messages(file.chunks[-1])
+    last = messages.logs == messages.logs.max()
+    topics = [file.topic_of(channel) for channel in messages.channels[last].tolist()]
+    return int(messages.logs.max()), topics

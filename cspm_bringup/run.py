@@ -86,7 +86,7 @@ def run(
     """
     with tempfile.TemporaryDirectory(prefix="cspm-") as place:
         bundle.write_files(Path(place))
-        parts = assemble(bundle.scenario, bundle.testbed.testbed, Path(place))
+        parts = assemble(bundle.scenario, bundle.testbed.testbed, Path(place), bundle.plant)
     scenario = bundle.scenario
     steps = steps or round(scenario.duration * scenario.rates.plant)
     if folder is None:
@@ -119,6 +119,7 @@ def metadata(bundle: Bundle) -> dict[str, str]:
         "scenario": bundle.scenario.name,
         "seed": str(bundle.scenario.seed),
         "mode": MODE,
+        "plant": bundle.plant,
         "package_version": version("cspm"),
         "testbed": bundle.testbed.testbed.name,
         "testbed_sha256": bundle.testbed.sha256,

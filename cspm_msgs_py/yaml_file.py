@@ -81,9 +81,9 @@ def _yaml_fault(err: MarkedYAMLError) -> str:
 
 
 def dump_yaml(content: Any) -> str:  # noqa: ANN401 - any plain data
-    """Return plain data as YAML text, innermost lists in one line, keys in the given order."""
+    """Return plain data as YAML text in block style, keys in the given order."""
     yaml = YAML(typ="safe", pure=True)
-    yaml.default_flow_style = None
+    yaml.default_flow_style = False
     yaml.sort_base_mapping_type_on_output = False  # type: ignore[assignment]
     yaml.width = 100
     stream = io.StringIO()

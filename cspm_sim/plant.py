@@ -106,6 +106,7 @@ class Plant:
             self.parameters,
             self._frames,
             self._scratch,
+            self._outputs,
         )
         self.steps += 1
         self.frame[:] = self._frames[0]
@@ -116,7 +117,6 @@ class Plant:
                 f"t = {self.time:.3f} s: pitch {self.bar_state[4]:.3f} rad passed ±π/2, where the"
                 " Euler angles end"
             )
-        self._observe()
 
     def state_name(self, index: int) -> str:
         """Return the name of a state, such as `speed of surge_2`."""

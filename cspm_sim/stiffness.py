@@ -11,6 +11,8 @@ the curve is the straight line t = g(floor)·s through the origin.
 
 from __future__ import annotations
 
+from functools import lru_cache
+
 import numpy as np
 from numpy.typing import NDArray
 from scipy.integrate import solve_ivp
@@ -32,6 +34,8 @@ def law_slope(law: ExponentialStiffness, tension: Array | float) -> Array:
     return np.asarray(np.exp(law.c * t) - np.exp(law.d * t))
 
 
+# A machine has few kinds of cable, and is built more than once in the course of a run.
+@lru_cache(maxsize=64)
 def law_table(law: ExponentialStiffness, tension_limit: float) -> tuple[Array, float]:
     """Return t and dt/ds, (POINTS, 2), at equal steps of s beyond the floor, and the step [N].
 
@@ -52,7 +56,9 @@ def law_table(law: ExponentialStiffness, tension_limit: float) -> tuple[Array, f
         atol=1e-12,
     )
     tension = solution.y[0]
-    return np.stack([tension, law_slope(law, tension)], axis=1), float(s[1])
+    table = np.stack([tension, law_slope(law, tension)], axis=1)
+    table.setflags(write=False)
+    return table, float(s[1])
 
 
 def _end_tension(law: ExponentialStiffness, tension_limit: float) -> float:

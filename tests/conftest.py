@@ -3,11 +3,16 @@
 import copy
 from pathlib import Path
 
+import hypothesis
 import numpy as np
 import pytest
 
 from cspm_msgs_py.testbed import Testbed, load_testbed
 from cspm_msgs_py.yaml_file import validate
+
+# The first call of a kernel may compile it, which takes longer than any sensible deadline.
+hypothesis.settings.register_profile("cspm", deadline=None)
+hypothesis.settings.load_profile("cspm")
 
 THESIS = Path(__file__).resolve().parents[1] / "scenarios" / "testbeds" / "thesis.yaml"
 

@@ -10,7 +10,14 @@ from pathlib import Path
 import pytest
 
 ROOT = Path(__file__).resolve().parents[1]
-ORDER = ("cspm_msgs_py", "cspm_sim", "cspm_control", "cspm_ident", "cspm_bringup")
+ORDER = (
+    "cspm_msgs_py",
+    "cspm_mujoco",
+    "cspm_sim",
+    "cspm_control",
+    "cspm_ident",
+    "cspm_bringup",
+)
 PACKAGES = [name for name in ORDER if (ROOT / name).is_dir()]
 ROS = {
     "rclpy",

@@ -2,7 +2,7 @@ from math import cos, sin
 
 import numpy as np
 import pytest
-from hypothesis import given
+from hypothesis import given, settings
 from hypothesis import strategies as st
 from scipy.spatial.transform import Rotation
 
@@ -31,6 +31,7 @@ def parabola(pose, rate, acceleration, time):
     return pose + rate * time + 0.5 * acceleration * time**2
 
 
+@settings(deadline=None)  # the first call compiles
 @given(pose=poses)
 def test_pose_row_is_position_and_the_quaternion_of_scipy(pose):
     row = written(pose_row, 7, pose)
@@ -41,6 +42,7 @@ def test_pose_row_is_position_and_the_quaternion_of_scipy(pose):
     assert np.linalg.norm(row[3:]) == pytest.approx(1.0, abs=1e-15)
 
 
+@settings(deadline=None)  # the first call compiles
 @given(pose=poses)
 def test_the_angles_come_back_from_the_quaternion(pose):
     row = written(pose_row, 7, pose)
@@ -48,6 +50,7 @@ def test_the_angles_come_back_from_the_quaternion(pose):
     np.testing.assert_allclose(euler_from_quaternion(-2.0 * row[3:]), pose[3:], atol=1e-13)
 
 
+@settings(deadline=None)  # the first call compiles
 @given(pose=poses, rate=rates)
 def test_motion_twist_is_the_rate_of_the_rotation_in_world_axes(pose, rate):
     row = written(motion_twist_row, 6, np.concatenate([pose, rate, np.zeros(6)]))
@@ -57,6 +60,7 @@ def test_motion_twist_is_the_rate_of_the_rotation_in_world_axes(pose, rate):
     np.testing.assert_allclose(row[3:], (ahead * behind.inv()).as_rotvec() / (2 * STEP), atol=1e-6)
 
 
+@settings(deadline=None)  # the first call compiles
 @given(pose=poses, rate=rates)
 def test_bar_twist_is_velocity_and_the_body_rate_turned_to_world_axes(pose, rate):
     row = written(bar_twist_row, 6, np.concatenate([pose, rate]))
@@ -64,6 +68,7 @@ def test_bar_twist_is_velocity_and_the_body_rate_turned_to_world_axes(pose, rate
     np.testing.assert_allclose(row[3:], rotation_of(pose).apply(rate[3:]), atol=1e-13)
 
 
+@settings(deadline=None)  # the first call compiles
 @given(pose=poses, rate=rates, acceleration=rates)
 def test_reference_row_holds_the_derivatives_of_its_pose(pose, rate, acceleration):
     row = written(reference_row, 19, np.concatenate([pose, rate, acceleration]))
@@ -102,6 +107,7 @@ def test_corrupt_adds_noise_then_rounds_where_there_is_a_resolution():
     np.testing.assert_allclose(out, [1.5, 0.6, -0.5, 0.0], atol=1e-15)
 
 
+@settings(deadline=None)  # the first call compiles
 @given(value=st.floats(-1e3, 1e3), resolution=st.sampled_from([7.7e-4, 0.005, 0.25]))
 def test_rounding_takes_the_nearest_step(value, resolution):
     out = np.empty(1)

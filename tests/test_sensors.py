@@ -16,9 +16,7 @@ TENSIONS = np.array([7.0, 9.0])
 
 def sensor(name, *, ideal=False, rate=1000, seed=1, period_ns=PERIOD_NS, **description):
     spec = Sensor(**{"noise": 0.0, "resolution": 0.0, "rate": 1000, **description})
-    return SensorModel(
-        TOPICS[name], spec, rate=rate, period_ns=period_ns, seed=seed, ideal=ideal
-    )
+    return SensorModel(TOPICS[name], spec, rate=rate, period_ns=period_ns, seed=seed, ideal=ideal)
 
 
 def observed(model, steps, values):
@@ -137,12 +135,11 @@ def test_pose_resolution_acts_on_angles_and_comes_back_from_the_quaternion():
 
 
 def test_a_rate_above_the_sensors_is_refused():
-    sensor("/bar/pose", noise=(0, 0), resolution=(0, 0), rate=100)
+    spec = Sensor(noise=(0.0, 0.0), resolution=(0.0, 0.0), rate=100)
+    settings = {"period_ns": PERIOD_NS, "seed": 1, "ideal": True}
+    SensorModel(TOPICS["/bar/pose"], spec, rate=100, **settings)
     with pytest.raises(InputError) as caught:
-        spec = {"noise": (0.0, 0.0), "resolution": (0.0, 0.0), "rate": 100}
-        SensorModel(
-            TOPICS["/bar/pose"], Sensor(**spec), rate=200, period_ns=PERIOD_NS, seed=1, ideal=True
-        )
+        SensorModel(TOPICS["/bar/pose"], spec, rate=200, **settings)
     assert str(caught.value) == (
         "rates: /bar/pose at 200 Hz, allowed: at most 100 Hz, the sensor's"
     )

@@ -205,6 +205,8 @@ def test_the_table_starts_at_the_floor_and_reaches_past_the_cap(laws):
         assert table[0, 0] == laws[kind].floor_tension
         assert (np.diff(table, axis=0) > 0).all()
         assert step > 0
+        stiffest = laws[kind].axial_rigidity / (laws[kind].a * 100.0 ** (1.0 - laws[kind].b))
+        assert table[-1, 1] == pytest.approx(1.05 * stiffest, rel=0.01)
         assert table[:, 1] == pytest.approx(law_slope(laws[kind], table[:, 0]), rel=1e-14)
 
 
@@ -258,3 +260,17 @@ def test_a_law_without_growth_is_still_a_law():
     table, step = law_table(flat, 35.0)
     assert (np.diff(table[:, 0]) > 0).all()
     assert step > 0
+
+
+def test_past_the_end_of_its_table_the_law_goes_on_as_a_line():
+    """A law that levels off far below the material's cap: its slope there is a/l^b."""
+    flat = {**EXPONENTIAL, "c": 0.0, "diameter": 5e-3}
+    line = cable("c", (0, 0, 0), (0, 0, 2), flat, tension_limits=[0.0, 20.0])
+    p, length = plant_parameters(build({"name": "flat", "cables": [line]})), 2.3
+    scale = law_scale(length, p.cables, 0)
+    stretches = np.linspace(0.04, 0.4, 50)
+    law = [elastic_tension(e, length, scale, p.cables, p.tables, 0) for e in stretches]
+    tensions, tangents = np.array(law).T
+    assert 0.8 * tensions[0] < p.tables[0, -1, 0] < tensions[-1] / 3.0
+    assert tangents == pytest.approx(7000.0 / length**1.05, rel=3e-4)
+    assert np.diff(tensions) == pytest.approx(7000.0 / length**1.05 * np.diff(stretches), rel=3e-4)

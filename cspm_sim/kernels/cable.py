@@ -58,7 +58,8 @@ def cable_spans(cables: Array, frame: Placement, body: Placement, spans: Array) 
         y = bp[1] + by - fp[1] - ay
         z = bp[2] + bz - fp[2] - az
         length = sqrt(x * x + y * y + z * z)
-        inverse = 1.0 / length
+        # A winch without cable has no length and no direction.
+        inverse = 1.0 / length if length > 0.0 else 0.0
         ux, uy, uz = x * inverse, y * inverse, z * inverse
         ex, ey, ez = cross(fw[0], fw[1], fw[2], ax, ay, az)
         wx, wy, wz = cross(bw[0], bw[1], bw[2], bx, by, bz)
@@ -99,22 +100,31 @@ def law_curve(scaled: float, cables: Array, tables: Array, i: int) -> tuple[floa
     return tension, g0 + s * (2.0 * c2 + s * 3.0 * c3)
 
 
-@njit(cache=True, error_model="numpy")
+@njit(cache=True, error_model="numpy", _nrt=False)
 def _capped_tension(
     elongation: float, elastic_length: float, scale: float, cables: Array, tables: Array, i: int
 ) -> tuple[float, float]:
     """Return tension and stiffness past the cap, a line of slope E·A/l from where both meet."""
     cap = cables[i, AXIAL_RIGIDITY] / elastic_length
-    low = cables[i, FLOOR_SCALED]
-    high = low + (tables.shape[1] - 1) * cables[i, TABLE_STEP]
-    for _ in range(60):
-        middle = 0.5 * (low + high)
-        if scale * law_curve(middle, cables, tables, i)[1] < cap:
+    wanted = cap / scale
+    low, high = 0, tables.shape[1] - 1
+    while high - low > 1:
+        middle = (low + high) // 2
+        if tables[i, middle, 1] < wanted:
             low = middle
         else:
             high = middle
-    tension, _ = law_curve(low, cables, tables, i)
-    return tension + cap * (elongation - low / scale), cap
+    # Within its interval the slope is the parabola of `law_curve`.
+    g0, g1 = tables[i, low, 1], tables[i, high, 1]
+    d = (tables[i, high, 0] - tables[i, low, 0]) * cables[i, TABLE_STEPS]
+    linear, quadratic = 2.0 * (3.0 * d - 2.0 * g0 - g1), 3.0 * (g0 + g1 - 2.0 * d)
+    missing = wanted - g0
+    s = 0.0
+    if missing > 0.0:
+        s = 2.0 * missing / (linear + sqrt(linear * linear + 4.0 * quadratic * missing))
+    scaled = cables[i, FLOOR_SCALED] + (low + s) * cables[i, TABLE_STEP]
+    tension, _ = law_curve(scaled, cables, tables, i)
+    return tension + cap * (elongation - scaled / scale), cap
 
 
 @njit(cache=True, error_model="numpy", inline="always")
@@ -164,7 +174,8 @@ def cable_tensions(
     for i in range(n):
         unstretched = state[first + i]
         # The winch winds stretched cable, thesis (2-16..2-18).
-        rate = -unstretched * cables[i, RADIUS] * state[first + 2 * n + i] / spans[i, LENGTH]
+        length = spans[i, LENGTH] if spans[i, LENGTH] > 0.0 else 1.0
+        rate = -unstretched * cables[i, RADIUS] * state[first + 2 * n + i] / length
         elastic_length = unstretched + cables[i, OFFSET_LENGTH]
         elastic, _ = elastic_tension(
             spans[i, LENGTH] - unstretched, elastic_length, spans[i, TENSION], cables, tables, i

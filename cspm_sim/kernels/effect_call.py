@@ -7,6 +7,7 @@ effect, even one outside this package, needs no change and no recompilation of t
 from __future__ import annotations
 
 from collections.abc import Callable
+from functools import cache
 from typing import Any
 
 from llvmlite import ir
@@ -26,6 +27,7 @@ SIGNATURE = types.void(POINTER, POINTER)
 _interpreted: dict[int, Kernel] = {}
 
 
+@cache
 def kernel_address(kernel: Kernel) -> int:
     """Compile `kernel(parameters, signals)` and return its address.
 

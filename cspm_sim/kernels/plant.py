@@ -56,7 +56,8 @@ class PlantParameters(NamedTuple):
 
     Attributes:
         bar: bar parameters and gravity, empty without a bar; see `kernels.bar`.
-        cables: shape (n, CABLE_COLUMNS), cables with their winches; see `kernels.cable`.
+        cables: shape (n, CABLE_COLUMNS), cables with their winches; see `kernels.cable`. In column
+            order in memory, so that a processor takes several cables at a time.
         tables: shape (n, points, 2): tension and its slope along the stiffness law.
         effects: shape (m, 3): block, element (cable index, 0 for the bar), kernel address.
         effect_parameters: shape (m, widest).
@@ -70,7 +71,11 @@ class PlantParameters(NamedTuple):
 
 
 class Scratch(NamedTuple):
-    """Arrays that the kernels write between calls, so that stepping allocates nothing."""
+    """Arrays that the kernels write between calls, so that stepping allocates nothing.
+
+    The kernels are compiled with `_nrt=False`: without numba's memory management, whose reference
+    counts took half of a step's time, and which would not compile if anything were allocated.
+    """
 
     stages: Array
     spans: Array
@@ -311,7 +316,8 @@ def plant_advance(
     """Advance `state` by `steps` steps from step number `start` with `torque` held.
 
     The winch frame follows the motion of `knots` (see `motion.Motion`) and is left in `frames[0]`,
-    shape (3, 18). Returns the first bad state, or -1 when all states are finite.
+    shape (3, 18); `outputs` is left as by `plant_tensions`. Returns the first bad state, or -1 when
+    all states are finite.
     """
     evaluate_motion(start * period, knots, spacing, periodic, frames[0])
     for k in range(start, start + steps):

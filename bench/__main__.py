@@ -1,0 +1,71 @@
+"""Measure everything and print one table."""
+
+from __future__ import annotations
+
+import argparse
+import json
+from pathlib import Path
+
+from rich.console import Console
+from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeElapsedColumn
+
+from bench.closed_loop import measure_closed_loop
+from bench.figure import Advance, Figure
+from bench.machine import describe_machine, is_busy
+from bench.memory import measure_memory
+from bench.plant import measure_against_mujoco, measure_plant
+from bench.report import print_report
+from bench.start_up import measure_start_up
+from bench.volume import QUICK, USUAL, Volume, full
+
+
+def main() -> None:
+    """Run the command line."""
+    parser = argparse.ArgumentParser(prog="python -m bench", description=__doc__)
+    size = parser.add_mutually_exclusive_group()
+    size.add_argument("--quick", action="store_true", help="half a minute: fewer, shorter runs")
+    size.add_argument("--full", action="store_true", help="record the whole hour: 6 GB on disk")
+    parser.add_argument("--json", type=Path, metavar="FILE", help="also write the figures as JSON")
+    arguments = parser.parse_args()
+    volume = QUICK if arguments.quick else full(USUAL) if arguments.full else USUAL
+    console = Console()
+    machine = describe_machine()
+    if is_busy():
+        console.print("[yellow]other programs are at work[/]: the figures will be too low")
+    figures = _measure(volume, console)
+    print_report(console, machine, figures)
+    if arguments.json is not None:
+        data = {"machine": machine, "figures": [figure.data() for figure in figures]}
+        arguments.json.write_text(json.dumps(data, indent=2, ensure_ascii=False) + "\n")
+
+
+def _measure(volume: Volume, console: Console) -> list[Figure]:
+    with Progress(
+        TextColumn("{task.description}"),
+        BarColumn(),
+        MofNCompleteColumn(),
+        TimeElapsedColumn(),
+        console=console,
+        transient=True,
+    ) as progress:
+        task = progress.add_task("building", total=volume.parts)
+
+        def advance(group: str) -> None:
+            progress.update(task, description=group, advance=1)
+
+        return _figures(volume, advance)
+
+
+def _figures(volume: Volume, advance: Advance) -> list[Figure]:
+    return [
+        *measure_plant(volume.plant, advance),
+        *measure_against_mujoco(volume.plant, advance),
+        *measure_closed_loop(volume.loops, volume.loop_duration, advance),
+        *measure_start_up(volume.first_runs, volume.later_runs, advance),
+        *measure_memory(volume.silent_duration, False, advance),
+        *measure_memory(volume.recorded_duration, True, advance),
+    ]
+
+
+if __name__ == "__main__":
+    main()

@@ -1,0 +1,31 @@
+"""How much is measured."""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+
+class Volume(NamedTuple):
+    """Repetitions and simulated times [s] of each measurement."""
+
+    plant: int
+    loops: int
+    loop_duration: float
+    first_runs: int
+    later_runs: int
+    silent_duration: float
+    recorded_duration: float
+
+    @property
+    def parts(self) -> int:
+        """How many parts report that they are done."""
+        return 2 * self.plant + 2 * self.loops + self.first_runs + self.later_runs + 2
+
+
+USUAL = Volume(200, 5, 20.0, 2, 5, 3600.0, 600.0)
+QUICK = Volume(50, 2, 5.0, 1, 2, 120.0, 60.0)
+
+
+def full(volume: Volume) -> Volume:
+    """Return the same with an hour recorded."""
+    return volume._replace(recorded_duration=3600.0)

@@ -1,0 +1,80 @@
+"""The implementations of the test-bed that a run may be made with."""
+
+from __future__ import annotations
+
+from typing import Protocol
+
+import numpy as np
+from numpy.typing import NDArray
+
+from cspm_msgs_py.errors import InputError
+from cspm_msgs_py.testbed import Testbed
+from cspm_sim.motion import Motion
+
+Array = NDArray[np.float64]
+
+SIM = "sim"
+MUJOCO = "mujoco"
+PLANTS = (SIM, MUJOCO)
+
+
+class AnyPlant(Protocol):
+    """What a run needs of a plant; the attributes are those of `cspm_sim.plant.Plant`.
+
+    The arrays keep their place while the plant moves.
+    """
+
+    testbed: Testbed
+    steps: int
+    bar_state: Array
+    angles: Array
+    speeds: Array
+    tensions: Array
+    unstretched_lengths: Array
+    frame: Array
+
+    @property
+    def time(self) -> float:
+        """Time since the start [s]."""
+
+    def step(self, torque: Array) -> None:
+        """Advance by one period with the motor torques (n,) [N·m] held."""
+
+    def applied_torque(self, torque: Array) -> Array:
+        """Return what the drives deliver for a torque command, (n,) [N·m]."""
+
+
+def make_plant(
+    name: str,
+    testbed: Testbed,
+    frame_motion: Motion,
+    period_ns: int,
+    *,
+    bar_pose: Array | None,
+    tensions: Array | None,
+    locked: bool,
+) -> AnyPlant:
+    """Return the plant of this name, at rest; see `cspm_sim.plant.Plant` for the arguments.
+
+    Raises:
+        InputError: no such plant, or one that is not installed or cannot be this machine.
+        ConvergenceError: no tensions hold the bar at this pose.
+    """
+    if name == SIM:
+        from cspm_sim.plant import Plant
+
+        return Plant(
+            testbed, frame_motion, period_ns, bar_pose=bar_pose, tensions=tensions, locked=locked
+        )
+    if name != MUJOCO:
+        raise InputError(f"plant {name}: allowed: {', '.join(PLANTS)}")
+    try:
+        from cspm_mujoco.plant import MujocoPlant
+    except ModuleNotFoundError as err:
+        raise InputError(
+            f"plant {name}: {err.name} is not installed, allowed: after `pip install cspm[mujoco]`"
+        ) from None
+    motion = frame_motion.at
+    return MujocoPlant(
+        testbed, motion, period_ns, bar_pose=bar_pose, tensions=tensions, locked=locked
+    )

@@ -1,0 +1,1 @@
+"""A second, independent implementation of the test-bed, on MuJoCo's rigid-body dynamics."""

@@ -1,0 +1,83 @@
+"""The test-bed's known effects, in the forms that MuJoCo has for them."""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from cspm_msgs_py.errors import InputError
+from cspm_msgs_py.testbed import EffectEntry, Testbed
+
+Array = NDArray[np.float64]
+
+_BAR_DAMPING = ("surge", "sway", "heave", "roll", "pitch", "yaw")
+_PARAMETERS = {
+    "bar_linear_damping": _BAR_DAMPING,
+    "winch_viscous_friction": ("coefficient",),
+    "winch_coulomb_friction": ("torque",),
+}
+
+
+class Extras(NamedTuple):
+    """What acts beside cables, motors and gravity.
+
+    Attributes:
+        drag: on the bar per world axis, about its origin, (6,) [N·s/m, N·m·s/rad].
+        damping: of the winches, (n,) [N·m·s/rad].
+        friction: dry friction of the winches, (n,) [N·m].
+    """
+
+    drag: Array
+    damping: Array
+    friction: Array
+
+
+def find_extras(testbed: Testbed) -> Extras:
+    """Return the sum of a machine's effects.
+
+    Raises:
+        InputError: an effect that this plant does not have, or a wrong element or parameter.
+    """
+    n = len(testbed.cables)
+    extras = Extras(np.zeros(6), np.zeros(n), np.zeros(n))
+    for entry in testbed.effects:
+        values = _values(entry)
+        if entry.effect == "bar_linear_damping":
+            if testbed.bar is None or entry.elements not in ((), ("bar",)):
+                raise InputError(
+                    f"effects: {entry.effect}: elements {list(entry.elements)}, allowed: [bar] or"
+                    " none, on a machine with a bar"
+                )
+            extras.drag[:] += values
+            continue
+        target = extras.damping if entry.effect == "winch_viscous_friction" else extras.friction
+        target[_winches(entry, testbed)] += values[0]
+    return extras
+
+
+def _values(entry: EffectEntry) -> list[float]:
+    names = _PARAMETERS.get(entry.effect)
+    if names is None:
+        allowed = ", ".join(_PARAMETERS)
+        raise InputError(f"effects: {entry.effect}: not in the MuJoCo plant, allowed: {allowed}")
+    if set(entry.parameters) != set(names):
+        raise InputError(
+            f"effects: {entry.effect}: parameters {sorted(entry.parameters)}, allowed: exactly"
+            f" {list(names)}"
+        )
+    negative = [name for name in names if not entry.parameters[name] >= 0.0]
+    if negative:
+        raise InputError(f"effects: {entry.effect}: {negative[0]} below 0, allowed: 0 and more")
+    return [entry.parameters[name] for name in names]
+
+
+def _winches(entry: EffectEntry, testbed: Testbed) -> list[int]:
+    names = testbed.cable_names
+    unknown = [element for element in entry.elements if element not in names]
+    if unknown:
+        allowed = ", ".join(names)
+        raise InputError(f"effects: {entry.effect}: no element '{unknown[0]}', allowed: {allowed}")
+    # Without repetition in `names` each element has one place; one named twice counts twice.
+    return sorted({names.index(element) for element in entry.elements or names})

@@ -133,15 +133,15 @@ def compare(case: Case) -> Agreement:
 _HEAD = """\
 # Agreement of the two plants
 
-`cspm run --plant mujoco` simulates the same test-bed a second time, with other code: MuJoCo holds
-bar (quaternion), rotors and unstretched lengths and integrates them; the cable law is inverted from
-its integral at every call; effects are MuJoCo's own joint damping and dry friction. It shares test-bed
-files, controllers and prescribed motions with the first plant, and not one line of its equations
+`cspm run --plant mujoco` simulates the same test-bed a second time, with other code. MuJoCo holds
+bar (as a quaternion), rotors and unstretched lengths and integrates them; the cable law is found
+from its integral at every call; friction of the winches is MuJoCo's own. The two plants share
+test-bed files, prescribed motions, sensors and controllers, and not one line of the equations
 (`tests/test_mujoco_independence.py`).
 
-The table has the RMS of *MuJoCo − ours* over all steps of 1 ms, true values, from the same seed:
-surge, sway and heave in m, angles in rad, tension over all cables in N. Below each first line of a
-scenario stands the RMS of the motion itself about its mean.
+The table has the RMS of *MuJoCo − ours* over all steps of 1 ms, of true values, from the same seed:
+surge, sway and heave in m, angles in rad, tension over all cables in N, and the largest difference
+of any tension. Below stands the RMS of the motion itself about its mean.
 
 This page is generated: `python -m cspm_bringup.agreement > docs/agreement.md`.
 """
@@ -149,27 +149,27 @@ This page is generated: `python -m cspm_bringup.agreement > docs/agreement.md`.
 _CAUSES = """
 ## Why they differ
 
-- **Rounding of the sensors** makes all of the difference in the first two lines. The load cells round
-  to 5 mN. A difference of 10⁻⁹ N now and then moves a measured tension to the next step, the force
-  controller answers, and the runs go on as two members of one ensemble: same noise, same waves, the
-  difference bounded by the loop. With ideal sensors, or with the resolutions alone set to zero, it is
-  a thousand to a million times smaller.
+- **Rounding of the sensors** makes all of the difference in the first two comparisons. The load
+  cells round to 5 mN. A difference of 10⁻⁹ N now and then takes a measured tension to the next
+  step, the force controller answers, and the two runs go on apart, as far as the loops let them.
+  With ideal sensors the difference is more than ten thousand times smaller, and likewise with
+  noise and no rounding (`tests/test_mujoco_run.py`).
 - **The table of the cable law.** Ours reads tension from a table that is within 10⁻⁹ N of the
-  integral; MuJoCo's plant evaluates the integral. This is what is left with locked winches, whatever
-  the step.
-- **The integration.** Both use the classical Runge-Kutta scheme, ours on Euler angles, MuJoCo's on a
-  quaternion. At equal steps most of its error is common to both and does not show; the line with ours
-  at 0.25 ms shows it whole. It falls with the fourth power of the step
+  integral; MuJoCo's plant evaluates the integral. This is what is left with locked winches.
+- **The integration.** Both use the classical Runge-Kutta scheme, ours on Euler angles, MuJoCo's on
+  a quaternion. At equal steps most of its error is common to both and does not show; the line with
+  ours at 0.25 ms shows it. It falls with the fourth power of the step
   (`tests/test_mujoco_plant.py`).
-- **Dry friction** is not in the table, since the thesis's machine has none. Ours stops a shaft within
-  one step; MuJoCo's is a constraint that creeps at some 10⁻⁵ rad/s under load. Instants of sticking
-  differ by a few steps.
+- **Dry friction** is not in the table, since the thesis's machine has none. Ours stops a shaft
+  within one step; MuJoCo's is a constraint that creeps, slower than 10⁻⁴ rad/s. Instants of
+  sticking differ by a few steps.
 
 ## Limits of the MuJoCo plant
 
-- Effects: `bar_linear_damping`, `winch_viscous_friction`, `winch_coulomb_friction`. Others are refused.
-- MuJoCo calls back into this process at each stage, and has one such callback per process: one thread
-  may step such plants.
+- Effects: `bar_linear_damping`, `winch_viscous_friction`, `winch_coulomb_friction`. Others are
+  refused.
+- MuJoCo calls back into the process at each stage of a step, and a process has one such callback:
+  only one thread may step such plants.
 - It needs `pip install 'cspm[mujoco]'`.
 """
 

@@ -18,6 +18,8 @@ Array = NDArray[np.float64]
 CONTROLLED_AXES = (0, 1, 2, 4, 5)
 # A wrench counts as met when what is missing is below this share of it.
 RESIDUAL_TOLERANCE = 1e-6
+# A pivot below this share of its diagonal is round-off: the rows do not have full rank.
+SMALLEST_PIVOT = 1e-12
 
 
 class Distribution(NamedTuple):
@@ -54,24 +56,49 @@ class PseudoInverse:
             SingularityError: at these poses no tensions give some wrench.
         """
         tensions = np.empty(len(self._cables))
-        try:
-            residual, saturated = _pseudo_inverse(
-                wrench,
-                bar_pose,
-                frame_pose,
-                self._cables,
-                self._limits,
-                self._lengths,
-                self._jacobians,
-                tensions,
-            )
-        except np.linalg.LinAlgError:
+        residual, saturated = _pseudo_inverse(
+            wrench,
+            bar_pose,
+            frame_pose,
+            self._cables,
+            self._limits,
+            self._lengths,
+            self._jacobians,
+            tensions,
+        )
+        if saturated < 0:
             place = ", ".join(f"{value:.4g}" for value in bar_pose)
             raise SingularityError(
                 f"tension distribution: with the bar measured at [{place}] (m, quaternion) the"
                 " cables cannot give every force and every moment but roll"
-            ) from None
+            )
         return Distribution(tensions, residual, saturated, residual <= RESIDUAL_TOLERANCE)
+
+
+@njit(cache=True, error_model="numpy")
+def _solve_gram(rows: Array, wanted: Array) -> bool:
+    """Solve (A·Aᵀ)·y = w by Cholesky's method for A = `rows` (m, n), y left in `wanted`.
+
+    Returns False, with nothing solved, where A has no full row rank. A library's solver would do
+    the same; compiling the call to it takes seconds of every first run.
+    """
+    m = rows.shape[0]
+    factor = np.zeros((m, m))
+    for i in range(m):
+        for j in range(i + 1):
+            diagonal = (rows[i] * rows[j]).sum()
+            rest = diagonal - (factor[i, :j] * factor[j, :j]).sum()
+            if i == j:
+                if not rest > SMALLEST_PIVOT * diagonal:
+                    return False
+                factor[i, i] = np.sqrt(rest)
+            else:
+                factor[i, j] = rest / factor[j, j]
+    for i in range(m):
+        wanted[i] = (wanted[i] - (factor[i, :i] * wanted[:i]).sum()) / factor[i, i]
+    for i in range(m - 1, -1, -1):
+        wanted[i] = (wanted[i] - (factor[i + 1 :, i] * wanted[i + 1 :]).sum()) / factor[i, i]
+    return True
 
 
 @njit(cache=True, error_model="numpy")
@@ -85,7 +112,10 @@ def _pseudo_inverse(
     jacobians: Array,
     out: Array,
 ) -> tuple[float, int]:
-    """Write limited tensions to `out`; return relative residual and how many are limited."""
+    """Write limited tensions to `out`; return relative residual and how many are limited.
+
+    How many is −1, and nothing is written, where no tensions give some wrench.
+    """
     n, m = cables.shape[0], len(CONTROLLED_AXES)
     bar, frame = np.empty(6), np.empty(6)
     bar[:3] = bar_pose[:3]
@@ -99,10 +129,16 @@ def _pseudo_inverse(
         wanted[row] = wrench[axis]
         for i in range(n):
             structure[row, i] = -jacobians[0, i, axis]
-    tensions = structure.T @ np.linalg.solve(structure @ structure.T, wanted)
+    multipliers = wanted.copy()
+    if not _solve_gram(structure, multipliers):
+        return 0.0, -1
     saturated = 0
     for i in range(n):
-        out[i] = min(limits[i, 1], max(limits[i, 0], tensions[i]))
-        saturated += out[i] != tensions[i]
-    missing = np.linalg.norm(structure @ out - wanted)
-    return missing / max(np.linalg.norm(wanted), 1e-12), saturated
+        tension = (structure[:, i] * multipliers).sum()
+        out[i] = min(limits[i, 1], max(limits[i, 0], tension))
+        saturated += out[i] != tension
+    missing = asked = 0.0
+    for row in range(m):
+        missing += ((structure[row] * out).sum() - wanted[row]) ** 2
+        asked += wanted[row] ** 2
+    return np.sqrt(missing / max(asked, 1e-24)), saturated

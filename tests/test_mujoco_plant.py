@@ -12,76 +12,24 @@ from conftest import (
     rig_content,
     with_bar,
 )
+from mujoco_pairs import (
+    MS,
+    POSE,
+    drive,
+    gaps,
+    pair,
+    radii,
+    run_free,
+    still,
+    swinging_torques,
+    waving,
+)
 from scipy.spatial.transform import Rotation
 
 from cspm_msgs_py.errors import ConvergenceError, DivergenceError, InputError
-from cspm_msgs_py.testbed import EffectEntry
 from cspm_mujoco.plant import MujocoPlant
 from cspm_sim.motion import Motion
 from cspm_sim.plant import Plant
-
-MS = 1_000_000
-POSE = [0.02, -0.03, 1.9, 0.0, 0.05, -0.04]
-
-
-def still():
-    return Motion.still(np.zeros(6))
-
-
-def waving(seconds, seed=0):
-    """A winch frame that moves in all six coordinates."""
-    rng = np.random.default_rng(seed)
-    rates = 2 * np.pi * rng.uniform(0.3, 1.5, 6)
-    sizes, phases = rng.uniform(0.01, 0.04, 6), rng.uniform(0, 6, 6)
-    turns = np.arange(0, seconds + 0.1, 0.01)[:, None] * rates + phases
-    parts = (np.sin(turns), rates * np.cos(turns), -(rates**2) * np.sin(turns))
-    return Motion(np.hstack([sizes * part for part in parts]), 0.01)
-
-
-def pair(testbed, motion=None, pose=POSE, period_ns=MS, substeps=1, **arguments):
-    """Both plants of one machine."""
-    motion = motion or still()
-    if testbed.bar:
-        arguments["bar_pose"] = pose
-    return (
-        Plant(testbed, motion, period_ns, **arguments),
-        MujocoPlant(testbed, motion.at, period_ns, substeps=substeps, **arguments),
-    )
-
-
-def radii(testbed):
-    return np.array([c.drum_radius / c.gear_ratio for c in testbed.cables])
-
-
-def run_free(plant, steps):
-    for _ in range(steps):
-        plant.step(np.zeros(len(plant.tensions)))
-
-
-def gaps(ours, theirs):
-    """Largest difference of each view of the two plants' states."""
-    names = ("bar_state", "angles", "speeds", "tensions", "unstretched_lengths", "frame")
-    return {n: np.abs(getattr(ours, n) - getattr(theirs, n)).max(initial=0.0) for n in names}
-
-
-def drive(ours, theirs, torques, hold=100):
-    """Hold each row of torques for some steps; return the largest gaps seen on the way."""
-    worst = gaps(ours, theirs)
-    for torque in torques:
-        for _ in range(hold):
-            ours.step(torque)
-            theirs.step(torque)
-        worst = {name: max(worst[name], gap) for name, gap in gaps(ours, theirs).items()}
-    assert ours.steps == theirs.steps
-    assert ours.time == theirs.time
-    return worst
-
-
-def swinging_torques(plant, count, share=0.1, seed=3):
-    rng = np.random.default_rng(seed)
-    balance = radii(plant.testbed) * plant.tensions
-    return balance * (1.0 + share * rng.standard_normal((count, len(balance))))
-
 
 # Rest
 
@@ -258,82 +206,6 @@ def test_applied_torque_is_limited(rig):
     plant = MujocoPlant(rig, still().at, MS)
     for wanted, applied in ((5.0, 2.0), (-5.0, -2.0), (0.3, 0.3)):
         assert plant.applied_torque(np.array([wanted])) == applied
-
-
-# Effects
-
-
-def with_effect(testbed, effect, elements=(), **parameters):
-    entry = EffectEntry(effect=effect, elements=elements, parameters=parameters)
-    return testbed.model_copy(update={"effects": (*testbed.effects, entry)})
-
-
-DRAG = {"surge": 3.0, "sway": 5.0, "heave": 2.0, "roll": 0.3, "pitch": 0.2, "yaw": 0.4}
-
-
-@pytest.mark.compiled
-@pytest.mark.parametrize(
-    ("effect", "parameters"),
-    [("bar_linear_damping", DRAG), ("winch_viscous_friction", {"coefficient": 0.01})],
-)
-def test_smooth_effects_agree(general, effect, parameters):
-    machine = with_effect(general, effect, **parameters)
-    ours, theirs = pair(machine, waving(1.0))
-    _, without = pair(general, waving(1.0))
-    torques = swinging_torques(ours, 5)
-    worst = drive(ours, theirs, torques)
-    for torque in torques:
-        for _ in range(100):
-            without.step(torque)
-    assert worst["bar_state"] < 1e-7
-    assert np.abs(without.bar_state - ours.bar_state).max() > 1e-3
-
-
-@pytest.mark.compiled
-def test_friction_of_one_winch_is_on_that_winch(general):
-    machine = with_effect(general, "winch_viscous_friction", ("c2",), coefficient=0.02)
-    ours, theirs = pair(machine)
-    assert drive(ours, theirs, swinging_torques(ours, 3))["speeds"] < 1e-5
-
-
-@pytest.mark.compiled
-def test_a_dry_winch_slides_alike_and_stays_where_it_is(general):
-    machine = with_effect(general, "winch_coulomb_friction", torque=0.01)
-    ours, theirs = pair(machine)
-    balance = radii(machine) * ours.tensions
-    for _ in range(300):
-        theirs.step(balance + 0.009)  # within the friction: nothing turns
-    assert np.abs(theirs.speeds).max() < 1e-4
-    ours, theirs = pair(machine)
-    worst = drive(ours, theirs, balance + 0.05 * np.array([[1.0], [-1.0], [1.0]]) * np.ones(8))
-    # Each resolves the instant of sticking in its own way, to a few steps.
-    assert np.abs(ours.speeds).max() > 0.1
-    assert worst["bar_state"] < 2e-3
-
-
-def test_effects_that_it_does_not_have_are_refused(general):
-    machine = with_effect(general, "bar_quadratic_drag", surge=1.0)
-    with pytest.raises(
-        InputError,
-        match=r"^effects: bar_quadratic_drag: not in the MuJoCo plant, allowed: bar_linear_damping,"
-        r" winch_viscous_friction, winch_coulomb_friction$",
-    ):
-        MujocoPlant(machine, still().at, MS, bar_pose=POSE)
-
-
-@pytest.mark.parametrize(
-    ("effect", "elements", "parameters", "text"),
-    [
-        ("winch_coulomb_friction", ("c9",), {"torque": 0.1}, "no element 'c9', allowed: c0, c1"),
-        ("winch_coulomb_friction", (), {"force": 0.1}, r"\['force'\], allowed: exactly \['torque'"),
-        ("winch_viscous_friction", (), {"coefficient": -1.0}, "coefficient below 0, allowed: 0"),
-        ("bar_linear_damping", ("c1",), DRAG, r"\['c1'\], allowed: \[bar\]"),
-    ],
-)
-def test_wrong_effects_are_refused(general, effect, elements, parameters, text):
-    machine = with_effect(general, effect, elements, **parameters)
-    with pytest.raises(InputError, match=text):
-        MujocoPlant(machine, still().at, MS, bar_pose=POSE)
 
 
 # What it refuses

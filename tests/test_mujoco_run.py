@@ -2,6 +2,7 @@
 
 import re
 import sys
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -17,6 +18,7 @@ from cspm_bringup.run import RECORD_NAME
 from cspm_msgs_py.errors import InputError
 from cspm_msgs_py.recording import Recording
 from cspm_msgs_py.scenario import DOFS
+from cspm_msgs_py.testbed import load_testbed
 
 PAGE = Path(__file__).resolve().parents[1] / "docs" / "agreement.md"
 NUMBER = re.compile(r"\d\.\de[-+]\d\d")
@@ -26,7 +28,7 @@ def command(monkeypatch, *words):
     monkeypatch.setattr(sys, "argv", ["cspm", *map(str, words)])
     with pytest.raises(SystemExit) as caught:
         cli.main()
-    return caught.value.code
+    return caught.value.code or 0
 
 
 def record(monkeypatch, folder, plant):
@@ -95,6 +97,22 @@ def test_rounding_sensors_set_them_apart_within_the_sensors_resolution():
     found = compare(Case("worst_case", "", ("duration=3",)))
     assert (found.pose < 1e-4).all()
     assert 1e-6 < found.tension < 0.01
+
+
+@pytest.mark.compiled
+def test_noise_without_rounding_does_not_set_them_apart(monkeypatch):
+    def unrounded(path):
+        found = load_testbed(path)
+        sensors = {
+            name: sensor.model_copy(update={"resolution": (0.0,) * len(sensor.resolution)})
+            for name, sensor in found.testbed.sensors.items()
+        }
+        return replace(found, testbed=found.testbed.model_copy(update={"sensors": sensors}))
+
+    monkeypatch.setattr("cspm_bringup.agreement.load_testbed", unrounded)
+    found = compare(Case("worst_case", "", ("duration=3",)))
+    assert (found.pose < 1e-9).all()
+    assert found.tension < 1e-7
 
 
 def rows():

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from importlib.metadata import version as metadata_version
 from typing import Protocol
 
 import numpy as np
@@ -16,6 +17,8 @@ Array = NDArray[np.float64]
 SIM = "sim"
 MUJOCO = "mujoco"
 PLANTS = (SIM, MUJOCO)
+# Earlier ones end the process when a control callback fails, and integrate damping otherwise.
+OLDEST_MUJOCO = 4
 
 
 class AnyPlant(Protocol):
@@ -74,6 +77,12 @@ def make_plant(
         raise InputError(
             f"plant {name}: {err.name} is not installed, allowed: after `pip install cspm[mujoco]`"
         ) from None
+    found = metadata_version("mujoco")
+    if int(found.split(".")[0]) < OLDEST_MUJOCO:
+        raise InputError(
+            f"plant {name}: MuJoCo {found} is installed, allowed: {OLDEST_MUJOCO}.0 or newer, which"
+            " needs Python 3.11 or newer"
+        )
     motion = frame_motion.at
     return MujocoPlant(
         testbed, motion, period_ns, bar_pose=bar_pose, tensions=tensions, locked=locked

@@ -65,6 +65,7 @@ class MujocoPlant:
         self.locked = locked
         self.steps = 0
         self._substeps = substeps
+        self._failure: DivergenceError | None = None
         self._motion = frame_motion
         extras = find_extras(testbed)
         self._rows = np.array([cable_row(cable) for cable in testbed.cables])
@@ -133,6 +134,8 @@ class MujocoPlant:
             mujoco.mj_step(self._model, self._data, nstep=self._substeps)
         finally:
             mujoco.set_mjcb_control(before)
+        if self._failure is not None:
+            raise self._failure
         self.steps += 1
         self.frame[:] = self._motion(self.time)
         self._check_finite()
@@ -144,7 +147,16 @@ class MujocoPlant:
 
     def _at_stage(self, model: object, data: object) -> None:
         """Tell MuJoCo the forces at the state and time of a stage of its integrator."""
-        self._evaluate(self._motion(self._data.time))
+        if self._failure is not None:
+            return
+        try:
+            self._evaluate(self._motion(self._data.time))
+        except DivergenceError as err:
+            # Not every version of MuJoCo lets an exception pass; `step` raises it.
+            self._failure = err
+            self._bar_wrench[:] = 0.0
+            self._load[:] = 0.0
+            return
         self._bar_wrench[:] = self._wrench
         if not self.locked:
             np.multiply(self._radii, self.tensions, out=self._load)

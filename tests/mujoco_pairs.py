@@ -1,10 +1,13 @@
 """Both plants of one machine, side by side."""
 
 import numpy as np
+import pytest
 
-from cspm_mujoco.plant import MujocoPlant
 from cspm_sim.motion import Motion
 from cspm_sim.plant import Plant
+
+pytest.importorskip("mujoco", minversion="4.0", reason="the MuJoCo plant needs MuJoCo 4")
+from cspm_mujoco.plant import MujocoPlant
 
 MS = 1_000_000
 POSE = [0.02, -0.03, 1.9, 0.0, 0.05, -0.04]

@@ -31,8 +31,9 @@ def test_smooth_effects_agree(general, effect, parameters):
     for torque in torques:
         for _ in range(100):
             without.step(torque)
-    assert worst["bar_state"] < 1e-7
-    assert np.abs(without.bar_state - ours.bar_state).max() > 1e-3
+    shown = np.abs(without.bar_state - ours.bar_state).max()
+    assert shown > 1e-3
+    assert worst["bar_state"] < 1e-3 * shown
 
 
 @pytest.mark.compiled

@@ -20,6 +20,8 @@ from cspm_msgs_py.recording import Recording
 from cspm_msgs_py.scenario import DOFS
 from cspm_msgs_py.testbed import load_testbed
 
+pytest.importorskip("mujoco", minversion="4.0", reason="the MuJoCo plant needs MuJoCo 4")
+
 PAGE = Path(__file__).resolve().parents[1] / "docs" / "agreement.md"
 NUMBER = re.compile(r"\d\.\de[-+]\d\d")
 
@@ -84,6 +86,15 @@ def test_it_says_what_to_install(monkeypatch):
 
 
 @pytest.mark.compiled
+def test_an_old_mujoco_is_one_line(monkeypatch):
+    monkeypatch.setattr("cspm_bringup.plants.metadata_version", lambda _: "3.17.0")
+    bundle = bundle_of("rest")
+    with pytest.raises(
+        InputError, match=r"^plant mujoco: MuJoCo 3.17.0 is installed, allowed: 4.0 or"
+    ):
+        assemble(bundle.scenario, bundle.testbed.testbed, Path(), "mujoco")
+
+
 def test_both_plants_agree_in_closed_loop():
     case = Case("worst_case", "", ("duration=6", "sensors=ideal", "target.motion.ramp=2"))
     found = compare(case)

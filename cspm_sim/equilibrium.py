@@ -126,6 +126,9 @@ def least_tensions(structure: Array, wrench: Array, limits: Array) -> Array:
     The pseudo-inverse's solution is normal to the null space, so the least tensions are the least
     distance from it within the null space under linear inequalities, which non-negative least
     squares solves: Lawson, Hanson, Solving Least Squares Problems (1974), chapter 23.
+
+    Raises:
+        ConvergenceError: that search did not come to an end.
     """
     low, high = limits[:, 0], limits[:, 1]
     base: Array = np.linalg.pinv(structure, rcond=RANK_TOLERANCE) @ wrench
@@ -133,7 +136,10 @@ def least_tensions(structure: Array, wrench: Array, limits: Array) -> Array:
     rows = np.vstack([np.hstack([null.T, -null.T]), np.concatenate([low - base, base - high])])
     goal = np.zeros(len(rows))
     goal[-1] = 1.0
-    gap = rows @ nnls(rows, goal)[0] - goal
+    try:
+        gap = rows @ nnls(rows, goal)[0] - goal
+    except RuntimeError as err:
+        raise ConvergenceError(f"least tensions within the limits: {err}") from None
     if np.linalg.norm(gap) < RESIDUAL_TOLERANCE:
         return np.asarray(lsq_linear(structure, wrench, (low, high), tol=1e-14).x)
     return np.clip(base - null @ (gap[:-1] / gap[-1]), low, high)

@@ -85,7 +85,6 @@ def test_it_says_what_to_install(monkeypatch):
         assemble(bundle.scenario, bundle.testbed.testbed, Path(), "mujoco")
 
 
-@pytest.mark.compiled
 def test_an_old_mujoco_is_one_line(monkeypatch):
     monkeypatch.setattr("cspm_bringup.plants.metadata_version", lambda _: "3.17.0")
     bundle = bundle_of("rest")
@@ -95,6 +94,7 @@ def test_an_old_mujoco_is_one_line(monkeypatch):
         assemble(bundle.scenario, bundle.testbed.testbed, Path(), "mujoco")
 
 
+@pytest.mark.compiled
 def test_both_plants_agree_in_closed_loop():
     case = Case("worst_case", "", ("duration=6", "sensors=ideal", "target.motion.ramp=2"))
     found = compare(case)

@@ -21,7 +21,8 @@ from cspm_bringup.bundle import make_bundle
 from cspm_bringup.library import find_scenario
 from cspm_bringup.loop import Loop
 from cspm_bringup.plants import MUJOCO, SIM
-from cspm_msgs_py.scenario import DOFS, load_scenario
+from cspm_msgs_py.dofs import DOFS
+from cspm_msgs_py.scenario import load_scenario
 from cspm_msgs_py.testbed import load_testbed
 
 Array = NDArray[np.float64]

@@ -12,7 +12,8 @@ from matplotlib.figure import Figure
 from numpy.typing import NDArray
 
 from cspm_bringup.run import RunResult
-from cspm_msgs_py.scenario import DOFS, Requirement
+from cspm_msgs_py.dofs import DOFS
+from cspm_msgs_py.scenario import Requirement
 
 Array = NDArray[np.float64]
 

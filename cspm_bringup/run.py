@@ -100,11 +100,11 @@ def run(
 def recorded_topics(parts: Assembly) -> dict[str, Topic]:
     """Return the topics that this run publishes: measured ones only where a sensor is."""
     topics = parts.testbed.topics
-    commands = {"/tension_command", "/winches/torque_command", "/wrench_command"}
-    published = set(commands) if parts.controllers else set()
-    if parts.torque_generator:
-        published = {"/winches/torque_command"}
-    published |= set(parts.sensors) | set(parts.references) | {"/clock", DIAGNOSTICS.name}
+    published = {"/clock", DIAGNOSTICS.name, *parts.sensors, *parts.references}
+    if parts.controllers:
+        published |= {"/wrench_command", "/tension_command", "/winches/torque_command"}
+    elif parts.torque_generator:
+        published.add("/winches/torque_command")
     return {
         name: topic
         for name, topic in topics.items()

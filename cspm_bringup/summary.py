@@ -11,7 +11,8 @@ from rich.markup import escape
 from rich.table import Table
 
 from cspm_bringup.run import MODE, RunResult
-from cspm_msgs_py.scenario import DOFS, Requirement
+from cspm_msgs_py.dofs import DOFS
+from cspm_msgs_py.scenario import Requirement
 
 
 def summary_data(result: RunResult) -> dict[str, Any]:

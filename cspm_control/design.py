@@ -13,8 +13,9 @@ from numpy.typing import ArrayLike, NDArray
 from scipy.optimize import brentq
 
 from cspm_control.tension_distribution import CONTROLLED_AXES
+from cspm_msgs_py.dofs import DOFS
 from cspm_msgs_py.errors import InputError
-from cspm_msgs_py.scenario import DOFS, PidGains, PiGains
+from cspm_msgs_py.scenario import PidGains, PiGains
 from cspm_msgs_py.testbed import Testbed
 from cspm_sim.kernels.plant import PlantParameters
 from cspm_sim.kinematics import RANK_TOLERANCE

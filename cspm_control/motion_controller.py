@@ -9,7 +9,8 @@ import numpy as np
 from numba import njit
 from numpy.typing import NDArray
 
-from cspm_msgs_py.scenario import DOFS, ControlledDof, PidGains
+from cspm_msgs_py.dofs import DOFS, ControlledDof
+from cspm_msgs_py.scenario import PidGains
 from cspm_msgs_py.testbed import Bar
 from cspm_sim.kernels.rotation import cross, euler_from_quaternion, rotate, rotation_from_euler
 

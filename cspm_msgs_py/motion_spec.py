@@ -21,6 +21,7 @@ from pydantic import (
 )
 from typing_extensions import Self
 
+from cspm_msgs_py.dofs import DOFS
 from cspm_msgs_py.yaml_file import StrictModel
 
 Six = tuple[float, float, float, float, float, float]
@@ -96,9 +97,8 @@ class JonswapMotion(Sea):
     @field_validator("amplitudes")
     @classmethod
     def _plausible(cls, amplitudes: Six) -> Six:
-        names = ("surge", "sway", "heave", "roll", "pitch", "yaw")
         limits = (float("inf"),) * 3 + (pi / 2, pi / 2, pi)
-        for name, value, limit in zip(names, amplitudes, limits, strict=True):
+        for name, value, limit in zip(DOFS, amplitudes, limits, strict=True):
             if not 0.0 <= value < limit:
                 allowed = "≥ 0 m" if limit > pi else f"0 ≤ amplitude < {limit:.4f} rad"
                 raise ValueError(f"{name} {value:g}, allowed: {allowed}")

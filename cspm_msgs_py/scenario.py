@@ -9,14 +9,13 @@ from typing import Annotated, Any, Literal
 from pydantic import Field, NonNegativeInt, PositiveFloat, PositiveInt, model_validator
 from typing_extensions import Self
 
+from cspm_msgs_py.dofs import ControlledDof
 from cspm_msgs_py.errors import InputError
 from cspm_msgs_py.motion_spec import MotionSpec, StillMotion
 from cspm_msgs_py.yaml_file import StrictModel, parse_yaml, read_yaml, validate
 
 Pose = tuple[float, float, float, float, float, float]
 ORIGIN: Pose = (0.0, 0.0, 0.0, 0.0, 0.0, 0.0)
-ControlledDof = Literal["surge", "sway", "heave", "pitch", "yaw"]
-DOFS = ("surge", "sway", "heave", "roll", "pitch", "yaw")
 
 
 class Rates(StrictModel):

@@ -7,14 +7,14 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from cspm_msgs_py.dofs import DOFS
 from cspm_msgs_py.errors import InputError
 from cspm_msgs_py.testbed import EffectEntry, Testbed
 
 Array = NDArray[np.float64]
 
-_BAR_DAMPING = ("surge", "sway", "heave", "roll", "pitch", "yaw")
 _PARAMETERS = {
-    "bar_linear_damping": _BAR_DAMPING,
+    "bar_linear_damping": DOFS,
     "winch_viscous_friction": ("coefficient",),
     "winch_coulomb_friction": ("torque",),
 }

@@ -13,8 +13,8 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 from scipy.optimize import least_squares
 
+from cspm_msgs_py.dofs import DOFS
 from cspm_msgs_py.errors import ConvergenceError, InputError, SingularityError
-from cspm_msgs_py.scenario import DOFS
 from cspm_sim.kernels.kinematics import cable_geometry
 from cspm_sim.kernels.rotation import (
     body_rate_to_euler_rate,

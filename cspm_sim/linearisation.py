@@ -17,8 +17,9 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from cspm_msgs_py.dofs import DOFS
 from cspm_msgs_py.errors import InputError
-from cspm_msgs_py.scenario import DOFS, ORIGIN
+from cspm_msgs_py.scenario import ORIGIN
 from cspm_msgs_py.testbed import Testbed
 from cspm_sim.equilibrium import find_equilibrium, gravity_wrench
 from cspm_sim.kernels import bar as bar_kernel

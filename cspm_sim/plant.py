@@ -5,8 +5,8 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from cspm_msgs_py.dofs import DOFS
 from cspm_msgs_py.errors import DivergenceError, InputError
-from cspm_msgs_py.scenario import DOFS
 from cspm_msgs_py.testbed import Testbed
 from cspm_sim.equilibrium import find_equilibrium, unstretched_lengths
 from cspm_sim.kernels.cable import TORQUE_LIMIT

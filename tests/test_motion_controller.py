@@ -5,7 +5,8 @@ import pytest
 from scipy.spatial.transform import Rotation
 
 from cspm_control.motion_controller import MotionController
-from cspm_msgs_py.scenario import DOFS, PidGains
+from cspm_msgs_py.dofs import DOFS
+from cspm_msgs_py.scenario import PidGains
 from cspm_msgs_py.testbed import Bar
 from cspm_sim.kernels.rows import pose_row
 

@@ -14,7 +14,8 @@ from cspm_bringup.figure import draw_run
 from cspm_bringup.run import run
 from cspm_bringup.summary import print_summary, summary_data, write_json
 from cspm_bringup.tally import BINS, Tally
-from cspm_msgs_py.scenario import DOFS, Requirement
+from cspm_msgs_py.dofs import DOFS
+from cspm_msgs_py.scenario import Requirement
 from cspm_sim.kernels.rotation import euler_from_quaternion
 
 REQUIREMENT = Requirement()

@@ -15,6 +15,7 @@ from cspm_control.waves.sea import Array, Complex, WaveSet, draw_waves, wave_num
 from cspm_control.waves.small_body import small_body_response
 from cspm_control.waves.spectrum import jonswap
 from cspm_control.waves.vessel import read_vessel
+from cspm_msgs_py.dofs import DOFS
 from cspm_msgs_py.errors import InputError
 from cspm_msgs_py.motion_spec import (
     FileMotion,
@@ -27,7 +28,6 @@ from cspm_msgs_py.motion_spec import (
 )
 from cspm_sim.motion import Motion
 
-DOFS = ("surge", "sway", "heave", "roll", "pitch", "yaw")
 UNEXCITED = 1e-6  # response below this share of the waves cannot honestly be scaled up
 
 

@@ -2,10 +2,9 @@
 
 import numpy as np
 
+from cspm_msgs_py.dofs import DOFS
 from cspm_sim.effects.effect import Array, Block, Effect, EffectParameter
 from cspm_sim.kernels.bar import VELOCITY, WRENCH
-
-_AXES = ("surge", "sway", "heave", "roll", "pitch", "yaw")
 
 
 def _kernel(parameters: Array, signals: Array) -> None:
@@ -22,7 +21,7 @@ EFFECT = Effect(
     block=Block.BAR,
     parameters=tuple(
         EffectParameter(axis, "N·s/m" if i < 3 else "N·m·s/rad", 0.0, 100.0)
-        for i, axis in enumerate(_AXES)
+        for i, axis in enumerate(DOFS)
     ),
     kernel=_kernel,
     regressors=_regressors,

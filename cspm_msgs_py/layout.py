@@ -26,7 +26,7 @@ Stamps = NDArray[np.int64]
 Rows = NDArray[np.float64]
 
 _MARK_SECONDS, _MARK_NANOSECONDS = 0x5AC3_71E9, 0x2F1B_96D5
-_LATEST_SECOND = 2**31 - 1
+LATEST_SECOND = 2**31 - 1
 
 
 @dataclass(frozen=True, eq=False)
@@ -75,11 +75,11 @@ class Layout:
         seconds, nanoseconds = np.divmod(stamp_ns, NANOSECONDS)
         if (
             len(seconds)
-            and not -_LATEST_SECOND - 1 <= seconds.min() <= seconds.max() <= _LATEST_SECOND
+            and not -LATEST_SECOND - 1 <= seconds.min() <= seconds.max() <= LATEST_SECOND
         ):
             worst = stamp_ns[np.argmax(np.abs(seconds))]
             raise InputError(
-                f"{self.topic.name}: stamp {worst} ns, allowed: ±{_LATEST_SECOND} s (int32 seconds)"
+                f"{self.topic.name}: stamp {worst} ns, allowed: ±{LATEST_SECOND} s (int32 seconds)"
             )
         records["sec"] = seconds
         records["nanosec"] = nanoseconds
@@ -121,18 +121,18 @@ class Layout:
         return stamps, rows
 
     @cached_property
-    def _constant(self) -> NDArray[np.intp]:
-        """Offsets that hold neither stamp nor number nor padding.
+    def constant(self) -> NDArray[np.intp]:
+        """Offsets that hold neither stamp nor number nor padding, ascending.
 
         Padding is what a reader does not look at: the message read is the same whatever stands
-        there. Some serialisers leave it uninitialised.
+        there. Some serialisers leave it uninitialised; the template's is zero.
         """
         free = np.zeros(self.size, dtype=bool)
         free[self.seconds : self.seconds + 8] = True
         for offset, count in self.runs:
             free[offset : offset + 8 * count] = True
         template = self.template.tobytes()
-        for offset in np.flatnonzero(~free).tolist():
+        for offset in np.flatnonzero(~free & (self.template == 0)).tolist():
             changed = bytearray(template)
             changed[offset] ^= 0xFF
             try:
@@ -144,16 +144,27 @@ class Layout:
 
     def matches(self, payload: Bytes) -> NDArray[np.bool_]:
         """Return which of the CDR bytes, shape (n, size), are this topic's message, shape (n,)."""
-        same = payload[:, self._constant] == self.template[self._constant]
+        same = payload[:, self.constant] == self.template[self.constant]
         return np.asarray(same.all(axis=1))
 
 
 @cache
 def layout_of(topic: Topic) -> Layout:
-    """Return the layout of a topic's messages.
+    """Return the layout of a topic's messages, found once and kept for the process's life.
 
     Raises:
         InputError: the topic's type carries no row, or its columns do not fit its names.
+    """
+    return find_layout(topic)
+
+
+def find_layout(topic: Topic) -> Layout:
+    """Return the layout of a topic's messages without keeping it.
+
+    For topics that others make up, of which there is no end.
+
+    Raises:
+        InputError: as `layout_of`.
     """
     _check_columns(topic)
     marks = np.ldexp(np.arange(1, topic.width + 1) * 1.23456789e5 + 0.987654321, -7)

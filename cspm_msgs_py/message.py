@@ -85,13 +85,13 @@ def _joint_topic(name: str, message: Any) -> Topic:  # noqa: ANN401 - see time_o
 
 
 def _reference_topic(name: str, message: Any) -> Topic:  # noqa: ANN401 - see time_of
-    points = message.points
-    lists = ("transforms", "velocities", "accelerations")
-    if len(points) != 1 or any(len(getattr(points[0], part)) != 1 for part in lists):
-        raise InputError(
-            f"{name}: a trajectory of {len(points)} points, allowed: one point with one transform,"
-            " velocity and acceleration"
-        )
+    allowed = "allowed: one point with one transform, velocity and acceleration"
+    if len(message.points) != 1:
+        raise InputError(f"{name}: a trajectory of {len(message.points)} points, {allowed}")
+    for part in ("transforms", "velocities", "accelerations"):
+        count = len(getattr(message.points[0], part))
+        if count != 1:
+            raise InputError(f"{name}: a point with {count} {part}, {allowed}")
     frame, names = message.header.frame_id, tuple(message.joint_names)
     return Topic(name, message.__msgtype__, frame, POSE + TWIST + ACCELERATION, names)
 

@@ -6,6 +6,8 @@ is why nothing here happens at import.
 
 from __future__ import annotations
 
+import re
+from collections.abc import Sequence
 from functools import cache
 from typing import TYPE_CHECKING, Any
 
@@ -15,7 +17,12 @@ if TYPE_CHECKING:
     from rosbags.typesys.store import Typestore
 
 SCHEMA_ENCODING = "ros2msg"
+IDL_ENCODING = "ros2idl"
 MESSAGE_ENCODING = "cdr"
+NO_FIELDS = "structure_needs_at_least_one_member"
+"""Name of the byte that CDR has in place of a message without fields."""
+
+_IDL_SECTION = re.compile(r"^={80}\nIDL: .*$", re.MULTILINE)
 _EXTRA_BYTES = (0, 4, 8)  # rclpy's serialiser appends up to 8 bytes, rosbags overlooks up to 3
 
 
@@ -94,8 +101,10 @@ def check_definition(ros_type: str, encoding: str, text: str) -> None:
     try:
         if encoding == SCHEMA_ENCODING:
             found = get_types_from_msg(text, ros_type)
-        elif encoding == "ros2idl":
-            found = get_types_from_idl(text)
+        elif encoding == IDL_ENCODING:
+            found = {}
+            for section in _IDL_SECTION.split(text):
+                found.update(get_types_from_idl(section) if section.strip() else {})
         else:
             raise InputError(
                 f"schema of {ros_type} has the encoding {encoding!r}, allowed: {SCHEMA_ENCODING}"
@@ -104,7 +113,14 @@ def check_definition(ros_type: str, encoding: str, text: str) -> None:
         raise
     except Exception:
         raise InputError(f"schema of {ros_type} is not a message definition") from None
+    if ros_type not in found:
+        raise InputError(f"schema of {ros_type} defines another type")
     known = typestore().fielddefs
     for name, (_, fields) in found.items():
-        if name not in known or known[name][1] != fields:
+        if name not in known or _real(known[name][1]) != _real(fields):
             raise InputError(f"schema of {ros_type}: {name} has other fields than in ROS 2 Jazzy")
+
+
+def _real(fields: Sequence[tuple[str, Any]]) -> list[tuple[str, Any]]:
+    """Return the fields without the one that stands in for none."""
+    return [field for field in fields if field[0] != NO_FIELDS]

@@ -12,6 +12,7 @@ from typing_extensions import Self
 from cspm_msgs_py.dofs import ControlledDof
 from cspm_msgs_py.errors import InputError
 from cspm_msgs_py.motion_spec import MotionSpec, StillMotion
+from cspm_msgs_py.safety_spec import Safety
 from cspm_msgs_py.yaml_file import StrictModel, parse_yaml, read_yaml, validate
 
 Pose = tuple[float, float, float, float, float, float]
@@ -162,6 +163,7 @@ class Scenario(StrictModel):
     target: Body = Body()
     bar_offset: Pose = ORIGIN
     control: Control = ClosedLoop()
+    safety: Safety = Safety()
     requirement: Requirement = Requirement()
 
     @model_validator(mode="after")
@@ -192,13 +194,13 @@ def load_scenario(path: Path, overrides: Sequence[str] = ()) -> Scenario:
     return _checked(read_yaml(path), str(path), overrides)
 
 
-def parse_scenario(text: str, source: str) -> Scenario:
-    """Check a scenario's YAML text; `source` names it in errors.
+def parse_scenario(text: str, source: str, overrides: Sequence[str] = ()) -> Scenario:
+    """Check a scenario's YAML text, overrides as above; `source` names it in errors.
 
     Raises:
         InputError: naming source, key, value and what is allowed.
     """
-    return _checked(parse_yaml(text, source), source, ())
+    return _checked(parse_yaml(text, source), source, overrides)
 
 
 def _checked(content: object, source: str, overrides: Sequence[str]) -> Scenario:

@@ -22,6 +22,8 @@ WRENCH = ("fx", "fy", "fz", "mx", "my", "mz")
 
 QOS_RELIABILITY = "reliable"
 QOS_DEPTH = 10
+# What a sender keeps for readers that are held up: 0.1 s at 1 kHz.
+SENDER_DEPTH = 100
 
 
 @dataclass(frozen=True)
@@ -75,6 +77,10 @@ def _reference(name: str, body_frame: str) -> Topic:
 
 CLOCK = Topic("/clock", "rosgraph_msgs/msg/Clock", "", ())
 DIAGNOSTICS = Topic("/diagnostics", "diagnostic_msgs/msg/DiagnosticArray", "", ())
+EMERGENCY_STOP = Topic("/emergency_stop", "std_msgs/msg/Bool", "", ())
+BRAKE = Topic("/winches/brake", "std_msgs/msg/Bool", "", ())
+# Whether the winches are in their safe state, so that nobody's wanted wrench is followed.
+SAFE = Topic("/winches/safe", "std_msgs/msg/Bool", "", ())
 
 
 def contract_topics(

@@ -127,14 +127,23 @@ def write_metadata(folder: Path, topics: Sequence[TopicEntry], files: Sequence[F
 
 @dataclass(frozen=True)
 class Bag:
-    """What a folder's `metadata.yaml` names: how the messages are stored, and in which files."""
+    """What a folder's `metadata.yaml` names: how the messages are stored, and in which files.
+
+    `compression` is `none`, or what is compressed with zstd: `file` or `message`. The chunks of an
+    MCAP file may be compressed in any case.
+    """
 
     storage: str
     files: list[Path]
+    compression: str = "none"
 
 
-def read_bag(folder: Path) -> Bag:
+def read_bag(folder: Path, *, compressions: Sequence[str] = ("none",)) -> Bag:
     """Return the storage and files of a bag.
+
+    Args:
+        folder: the bag's folder.
+        compressions: which of `none`, `file` and `message` the caller can read.
 
     Raises:
         InputError: no or unusable `metadata.yaml`, or a file that it names is missing.
@@ -152,16 +161,20 @@ def read_bag(folder: Path) -> Bag:
             [str(n) for n in bag["relative_file_paths"]],
         )
         mode = str(bag.get("compression_mode") or "none").lower()
+        method = str(bag.get("compression_format"))
     except (KeyError, TypeError, AttributeError):
         raise InputError(f"{path}: not the metadata of a rosbag2 folder") from None
-    if mode != "none":
+    if mode not in compressions:
         raise InputError(
-            f"{path}: compression_mode {mode!r}, allowed: none (chunks may be compressed)"
+            f"{path}: compression_mode {mode!r}, allowed: {', '.join(compressions)} (chunks may be"
+            " compressed)"
         )
+    if mode != "none" and method != "zstd":
+        raise InputError(f"{path}: compression_format {method!r}, allowed: zstd")
     files = [folder / Path(name).name for name in names]
     if not files:
         raise InputError(f"{path}: names no file")
     for file in files:
         if not file.is_file():
             raise InputError(f"{file}: no such file, but {FILE_NAME} names it")
-    return Bag(storage, files)
+    return Bag(storage, files, mode)

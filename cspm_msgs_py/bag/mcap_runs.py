@@ -1,0 +1,113 @@
+"""An MCAP file as runs of messages, one for each chunk."""
+
+from __future__ import annotations
+
+from collections.abc import Collection, Iterator
+from functools import partial
+from pathlib import Path
+
+import numpy as np
+
+from cspm_msgs_py.bag.run import LATEST_NS, StoredChannel, StoredMessage, StoredRun
+from cspm_msgs_py.errors import InputError
+from cspm_msgs_py.recording.chunk import ChunkPlace, Messages
+from cspm_msgs_py.recording.mcap_file import McapFile
+from cspm_msgs_py.recording.reader import message_counts, message_type
+
+_SpanNs = tuple[int, int]
+
+
+class McapRuns:
+    """An MCAP file, closed by its writer or not, chunked or not; see `StoredFile`."""
+
+    def __init__(self, path: Path) -> None:
+        """Open the file.
+
+        Raises:
+            InputError: it is not an MCAP file, or damaged.
+        """
+        self.path = path
+        self._file = McapFile(path)
+        try:
+            self._file.check_not_bare()
+            self.channels = _channels(self._file)
+            self.runs = [
+                StoredRun(*span, partial(self._read, place, span))
+                for place in self._file.chunks
+                if (span := self._span(place)) is not None
+            ]
+        except BaseException:
+            self._file.close()
+            raise
+
+    def _span(self, place: ChunkPlace) -> _SpanNs | None:
+        """Return first and last log time of a chunk [ns], None if it has no message."""
+        if not place.loose:
+            head = self._file.head(place)
+            # Writers say 0 or nonsense of a chunk without messages, and 0 may also be a log time.
+            if 0 < head.first_ns <= head.last_ns:
+                return self._checked(place, head.first_ns, head.last_ns)
+        times = [table[:, 0] for table in self._file.times(place).values() if len(table)]
+        if not times:
+            return None
+        first, last = min(int(t.min()) for t in times), max(int(t.max()) for t in times)
+        return self._checked(place, first, last)
+
+    def _checked(self, place: ChunkPlace, first_ns: int, last_ns: int) -> _SpanNs:
+        if last_ns > LATEST_NS:
+            raise InputError(
+                f"{self._where(place)}: log time {last_ns} ns, allowed: up to {LATEST_NS} ns"
+            )
+        return first_ns, last_ns
+
+    def _read(
+        self, place: ChunkPlace, span: _SpanNs, channels: Collection[int], start_ns: int
+    ) -> Iterator[StoredMessage]:
+        index = self._file.index(place)
+        if index is not None and index.keys().isdisjoint(channels):
+            return
+        messages = self._file.messages(place, index)
+        logs = messages.prefixes["log"]
+        if len(logs) and not span[0] <= logs.min() <= logs.max() <= span[1]:
+            raise InputError(f"{self._where(place)}: holds other times than its head says")
+        chosen = _ordered(messages.select(channels), start_ns)
+        yield from zip(
+            chosen.logs.tolist(), chosen.channels.tolist(), chosen.payloads(), strict=True
+        )
+
+    def _where(self, place: ChunkPlace) -> str:
+        return f"{self.path}: chunk at byte {place.record.offset}"
+
+    def close(self) -> None:
+        """Close the file."""
+        self._file.close()
+
+
+def _channels(file: McapFile) -> list[StoredChannel]:
+    counts = message_counts(file)
+    channels = []
+    for channel in file.channels.values():
+        schema = file.schemas.get(channel.schema_id)
+        channels.append(
+            StoredChannel(
+                id=channel.id,
+                topic=channel.topic,
+                ros_type=message_type(file, channel),
+                count=counts[channel.id],
+                encoding=channel.message_encoding,
+                schema_encoding=schema.encoding if schema else "",
+                definition=schema.data.decode("utf-8", errors="replace") if schema else "",
+            )
+        )
+    return channels
+
+
+def _ordered(messages: Messages, start_ns: int) -> Messages:
+    """Return the messages not before `start_ns` [ns] in order of log time, else as they stand."""
+    logs = messages.logs
+    order = np.flatnonzero(logs >= start_ns)
+    if (np.diff(logs[order]) < 0).any():
+        order = order[np.argsort(logs[order], kind="stable")]
+    elif len(order) == len(messages):
+        return messages
+    return Messages(messages.content, messages.offsets[order], messages.prefixes[order])

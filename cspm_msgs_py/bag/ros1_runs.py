@@ -1,0 +1,271 @@
+"""A ROS 1 bag as runs of messages, one for each chunk.
+
+Format: https://wiki.ros.org/Bags/Format/2.0. A record is the length of its header, the header, the
+length of its data and the data; a header is fields, each its length and `name=value`; numbers are
+little endian, a time is seconds and nanoseconds, unsigned 32 bit each. The reader of `rosbags`
+holds an entry for each message in memory and orders those of one log time by connection, which is
+why the chunks are read here.
+"""
+
+from __future__ import annotations
+
+import bz2
+import struct
+from collections import Counter
+from collections.abc import Callable, Collection, Iterator
+from contextlib import contextmanager
+from functools import partial
+from operator import itemgetter
+from pathlib import Path
+from typing import NamedTuple
+
+import lz4.frame  # type: ignore[import-untyped]
+
+from cspm_msgs_py.bag.run import StoredChannel, StoredMessage, StoredRun
+from cspm_msgs_py.errors import InputError
+from cspm_msgs_py.message import NANOSECONDS
+from cspm_msgs_py.recording.chunk import LARGEST_CHUNK
+from cspm_msgs_py.recording.records import read_at
+
+MAGIC = b"#ROSBAG V"
+ENCODING, SCHEMA_ENCODING = "ros1", "ros1msg"
+_VERSION = b"2.0\n"
+_MESSAGE, _BAG, _CHUNK, _CHUNK_INFO, _CONNECTION = (bytes([op]) for op in (2, 3, 5, 6, 7))
+_LARGEST_HEADER = 1 << 20
+_UINT32 = struct.Struct("<I")
+_UINT64 = struct.Struct("<Q")
+_TWO = struct.Struct("<II")
+
+_Fields = dict[bytes, bytes]
+
+
+class _Record(NamedTuple):
+    """A record: its header's fields, offset and length of its data."""
+
+    fields: _Fields
+    data: int
+    length: int
+
+    @property
+    def end(self) -> int:
+        return self.data + self.length
+
+
+class _ChunkInfo(NamedTuple):
+    """What the index says about a chunk: its place, log times [ns], and messages by channel."""
+
+    place: int
+    first_ns: int
+    last_ns: int
+    counts: dict[int, int]
+
+
+class Ros1Runs:
+    """A ROS 1 bag of format 2.0; see `StoredFile`."""
+
+    def __init__(self, path: Path) -> None:
+        """Open the bag and read its index.
+
+        Raises:
+            InputError: it is not such a bag, was not closed, or is damaged.
+        """
+        self.path = path
+        self._file = path.open("rb")
+        try:
+            with self._damage("index"):
+                infos = self._read_index()
+        except BaseException:
+            self._file.close()
+            raise
+        self.runs = [
+            StoredRun(info.first_ns, info.last_ns, partial(self._read, info))
+            for info in sorted(infos, key=itemgetter(0))
+            if sum(info.counts.values())
+        ]
+
+    @contextmanager
+    def _damage(self, what: str) -> Iterator[None]:
+        """Turn what reading damaged bytes raises into one line."""
+        try:
+            yield
+        except (struct.error, KeyError, ValueError) as err:
+            raise InputError(f"{self.path}: damaged {what} ({_reason(err)})") from None
+
+    def _read_index(self) -> list[_ChunkInfo]:
+        """Return the chunks; set `channels`."""
+        if self._bytes(len(MAGIC), len(_VERSION)) != _VERSION:
+            raise InputError(f"{self.path}: a ROS 1 bag of another format, allowed: V2.0")
+        head = self._record(len(MAGIC) + len(_VERSION), _BAG).fields
+        if head.get(b"encryptor"):
+            raise InputError(f"{self.path}: an encrypted bag, allowed: one that is not")
+        (end,) = _UINT64.unpack(head[b"index_pos"])
+        if end == 0:
+            raise InputError(
+                f"{self.path}: a ROS 1 bag that was not closed, allowed: one with an index"
+                " (`rosbag reindex` restores it)"
+            )
+        connections, infos = [], []
+        for _ in range(_uint32(head[b"conn_count"])):
+            connections.append(self._record(end, _CONNECTION))
+            end = connections[-1].end
+        for _ in range(_uint32(head[b"chunk_count"])):
+            record = self._record(end, _CHUNK_INFO)
+            infos.append(_chunk_info(record.fields, self._bytes(record.data, record.length)))
+            end = record.end
+        counts: Counter[int] = Counter()
+        for info in infos:
+            counts.update(info.counts)
+        self.channels = [self._channel(record, counts) for record in connections]
+        unknown = counts.keys() - {channel.id for channel in self.channels}
+        if unknown:
+            raise ValueError(f"messages on connection {min(unknown)}, which no record describes")
+        return infos
+
+    def _bytes(self, offset: int, length: int) -> bytes:
+        return read_at(self._file, offset, length, self.path)
+
+    def _record(self, offset: int, opcode: bytes) -> _Record:
+        """Return the record at an offset of the file.
+
+        Raises:
+            ValueError: it is not one of the kind `opcode`.
+        """
+        length = _uint32(self._bytes(offset, 4))
+        if length > _LARGEST_HEADER:
+            raise ValueError(f"no record at byte {offset}")
+        header = self._bytes(offset + 4, length + 4)
+        fields = _fields(header[:-4])
+        if fields.get(b"op") != opcode:
+            raise ValueError(f"no record of kind {opcode[0]} at byte {offset}")
+        return _Record(fields, offset + 8 + length, _uint32(header[-4:]))
+
+    def _channel(self, record: _Record, counts: Counter[int]) -> StoredChannel:
+        about = _fields(self._bytes(record.data, record.length))
+        id_ = _uint32(record.fields[b"conn"])
+        return StoredChannel(
+            id=id_,
+            topic=record.fields[b"topic"].decode(),
+            ros_type=about[b"type"].decode(),
+            count=counts[id_],
+            encoding=ENCODING,
+            schema_encoding=SCHEMA_ENCODING,
+            definition=about[b"message_definition"].decode(errors="replace"),
+        )
+
+    def _read(
+        self, info: _ChunkInfo, channels: Collection[int], start_ns: int
+    ) -> Iterator[StoredMessage]:
+        if info.counts.keys().isdisjoint(channels):
+            return
+        with self._damage(f"chunk at byte {info.place}"):
+            messages = list(_messages(self._content(info.place)))
+        times = [log for log, _, _ in messages]
+        if len(times) != sum(info.counts.values()) or not (
+            info.first_ns <= min(times) <= max(times) <= info.last_ns
+        ):
+            raise InputError(
+                f"{self.path}: chunk at byte {info.place}: other messages than its index says"
+            )
+        wanted = frozenset(channels)
+        messages.sort(key=itemgetter(0))
+        yield from (
+            message for message in messages if message[0] >= start_ns and message[1] in wanted
+        )
+
+    def _content(self, place: int) -> bytes:
+        record = self._record(place, _CHUNK)
+        size, compression = _uint32(record.fields[b"size"]), record.fields[b"compression"].decode()
+        if compression not in _DECOMPRESS:
+            raise ValueError(f"compression {compression!r}, allowed: {', '.join(_DECOMPRESS)}")
+        if size > LARGEST_CHUNK:
+            raise ValueError(f"{size} bytes, allowed: up to {LARGEST_CHUNK}")
+        data = self._bytes(record.data, record.length)
+        try:
+            content = _DECOMPRESS[compression](data, size)
+        except (OSError, EOFError, RuntimeError) as err:
+            raise ValueError(f"no {compression} data: {_reason(err)}") from None
+        if len(content) != size:
+            raise ValueError(f"{len(content)} bytes where {size} are announced")
+        return content
+
+    def close(self) -> None:
+        """Close the file."""
+        self._file.close()
+
+
+def _bz2(data: bytes, size: int) -> bytes:
+    return bz2.BZ2Decompressor().decompress(data, max_length=size)
+
+
+def _lz4(data: bytes, size: int) -> bytes:
+    content: bytes = lz4.frame.LZ4FrameDecompressor().decompress(data, max_length=size)
+    return content
+
+
+_DECOMPRESS: dict[str, Callable[[bytes, int], bytes]] = {
+    "none": lambda data, size: data,
+    "bz2": _bz2,
+    "lz4": _lz4,
+}
+
+
+def _reason(err: BaseException) -> str:
+    if isinstance(err, KeyError):
+        return f"no field {err.args[0].decode()}"
+    if isinstance(err, struct.error):
+        return "a number cut short"
+    return " ".join(str(err).split()) or type(err).__name__
+
+
+def _uint32(value: bytes) -> int:
+    (number,) = _UINT32.unpack(value)
+    return int(number)
+
+
+def _time_ns(value: bytes) -> int:
+    seconds, nanoseconds = _TWO.unpack(value)
+    return int(seconds) * NANOSECONDS + int(nanoseconds)
+
+
+def _fields(header: bytes) -> _Fields:
+    """Return a header's fields.
+
+    Raises:
+        ValueError: it does not consist of fields.
+    """
+    fields, offset = {}, 0
+    while offset < len(header):
+        (length,) = _UINT32.unpack_from(header, offset)
+        end = offset + 4 + length
+        name, equals, value = header[offset + 4 : end].partition(b"=")
+        if not equals or end > len(header):
+            raise ValueError("a header field without name or cut short")
+        fields[name] = value
+        offset = end
+    return fields
+
+
+def _chunk_info(fields: _Fields, data: bytes) -> _ChunkInfo:
+    (place,) = _UINT64.unpack(fields[b"chunk_pos"])
+    first, last = _time_ns(fields[b"start_time"]), _time_ns(fields[b"end_time"])
+    return _ChunkInfo(place, first, last, dict(_TWO.iter_unpack(data)))
+
+
+def _messages(content: bytes) -> Iterator[StoredMessage]:
+    """Yield the messages of a chunk's content as they stand in it.
+
+    Raises:
+        ValueError, struct.error, KeyError: it is not a sequence of records.
+    """
+    offset = 0
+    while offset < len(content):
+        (length,) = _UINT32.unpack_from(content, offset)
+        data = offset + 8 + length
+        (size,) = _UINT32.unpack_from(content, data - 4)
+        end = data + size
+        if end > len(content):
+            raise ValueError(f"a record of it ends {end - len(content)} bytes behind its end")
+        fields = _fields(content[offset + 4 : data - 4])
+        if fields[b"op"] == _MESSAGE:
+            yield _time_ns(fields[b"time"]), _uint32(fields[b"conn"]), content[data:end]
+        offset = end

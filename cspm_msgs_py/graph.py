@@ -1,0 +1,80 @@
+"""Which node sends and which node reads each topic of a scenario."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+from cspm_msgs_py.schedule import (
+    FORCE_CONTROLLER,
+    MOTION_CONTROLLER,
+    PLANT,
+    TENSION_DISTRIBUTION,
+    TORQUE_COMMAND,
+    WAVE_TRAJECTORY,
+    Schedule,
+)
+from cspm_msgs_py.topics import DIAGNOSTICS
+
+RECORDER = "recorder"
+PLAYER = "player"
+STAGES = (WAVE_TRAJECTORY, MOTION_CONTROLLER, TENSION_DISTRIBUTION, FORCE_CONTROLLER)
+NODES = (PLANT, *STAGES, RECORDER, PLAYER)
+
+
+@dataclass(frozen=True)
+class Edges:
+    """One topic's ends: names of the nodes that send it, and of those that read it."""
+
+    senders: tuple[str, ...]
+    readers: tuple[str, ...]
+
+
+def graph_of(schedule: Schedule, nodes: Sequence[str]) -> dict[str, Edges]:
+    """Return sender and readers of every topic among `nodes`, by topic in contract order.
+
+    A player among them stands for the plant and for the nodes that are absent, and reads what
+    those that are present send.
+    """
+    present = set(nodes)
+    source = PLAYER if PLAYER in present else PLANT
+    senders = {name: source for name in schedule.topics}
+    readers: dict[str, list[str]] = {name: [] for name in schedule.topics}
+    for node, plan in schedule.nodes.items():
+        if source == PLANT or node in present:
+            senders.update(dict.fromkeys(plan.outputs, node))
+            for topic in plan.outputs:
+                readers[topic].append(PLAYER)
+        for topic in (*plan.inputs, *plan.held):
+            readers[topic].append(node)
+    if TORQUE_COMMAND in readers:
+        readers[TORQUE_COMMAND].append(PLANT)
+    found = {
+        topic: Edges(
+            tuple({senders[topic]} & present),
+            tuple(node for node in (*readers[topic], RECORDER) if node in present),
+        )
+        for topic in schedule.topics
+    }
+    reporting = tuple(node for node in (PLANT, PLAYER, *schedule.nodes) if node in present)
+    found[DIAGNOSTICS.name] = Edges(reporting, tuple({RECORDER} & present))
+    return found
+
+
+def followers(schedule: Schedule, nodes: Sequence[str], window: int) -> tuple[str, ...]:
+    """Return the nodes whose progress the plant must wait for beside the torque command.
+
+    A torque proves that the nodes which it comes from have read what they computed it from. What
+    came since, or before the first, is unread at worst; a node is waited for where that may be more
+    than `window` messages of a topic.
+    """
+    unread, proven = 0, set()
+    for node in (FORCE_CONTROLLER, TENSION_DISTRIBUTION, MOTION_CONTROLLER):
+        plan = schedule.nodes.get(node)
+        if plan is not None:
+            unread += plan.divider
+            most = max(unread, schedule.topics[TORQUE_COMMAND].first + 1)
+            finest = min(schedule.topics[name].divider for name in (*plan.inputs, *plan.held))
+            proven |= {node} if most <= window * finest else set()
+    ordered = (*schedule.nodes, RECORDER)
+    return tuple(node for node in ordered if node in set(nodes) - proven)

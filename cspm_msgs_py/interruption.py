@@ -1,0 +1,27 @@
+"""An orderly end on Ctrl-C: signals become a flag that work looks at between two steps."""
+
+from __future__ import annotations
+
+import signal
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from types import FrameType
+
+
+@contextmanager
+def interruptible() -> Iterator[Callable[[], bool]]:
+    """Give what tells whether SIGINT or SIGTERM came; a second one ends the program as usual."""
+    seen: list[int] = []
+
+    def note(number: int, _: FrameType | None) -> None:
+        seen.append(number)
+        for each, handler in previous.items():
+            signal.signal(each, handler)
+
+    signals = (signal.SIGINT, signal.SIGTERM)
+    previous = {each: signal.signal(each, note) for each in signals}
+    try:
+        yield lambda: bool(seen)
+    finally:
+        for each, handler in previous.items():
+            signal.signal(each, handler)

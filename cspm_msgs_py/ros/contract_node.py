@@ -1,0 +1,181 @@
+"""A ROS 2 node that speaks the contract: canonical bytes out, checked rows in."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Callable, Collection
+from importlib import import_module
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+from rclpy.clock import Clock, ClockType
+from rclpy.context import Context
+from rclpy.duration import Duration
+from rclpy.node import Node
+from rclpy.publisher import Publisher
+from rclpy.qos import DurabilityPolicy
+
+from cspm_msgs_py.complaints import Complaints
+from cspm_msgs_py.diagnostics import Status, encode_diagnostics
+from cspm_msgs_py.errors import InputError
+from cspm_msgs_py.ros.intake import Intake
+from cspm_msgs_py.ros.qos import contract_qos
+from cspm_msgs_py.topics import DIAGNOSTICS, QOS_DEPTH, SENDER_DEPTH, Topic
+from cspm_msgs_py.wire import WireReader, WireWriter
+
+Array = NDArray[np.float64]
+
+
+class ContractNode:
+    """Publishes rows and receives them.
+
+    Messages travel as bytes that we serialise ourselves: rclpy's objects would cost several times
+    the time, and its serialiser leaves padding uninitialised.
+
+    Attributes:
+        node: rclpy's node.
+        intake: where its messages are taken from, if no executor brings them.
+    """
+
+    def __init__(self, name: str, context: Context, *, polled: bool = False) -> None:
+        """Make a node; a `polled` one gets its messages when somebody empties its intake."""
+        self.node = Node(name, context=context)
+        self.intake = Intake(self.node) if polled else None
+        self._publishers: dict[str, tuple[Publisher, frozenset[str]]] = {}
+        self._steady = Clock(clock_type=ClockType.STEADY_TIME)
+        self._complaints = Complaints(self.warn)
+
+    @property
+    def name(self) -> str:
+        """The node's name."""
+        return str(self.node.get_name())
+
+    def publisher(
+        self, topic: Topic, readers: Collection[str] = ()
+    ) -> Callable[[int, int, Array], None]:
+        """Return what publishes (log time [ns], which ROS has no use for, stamp [ns], row).
+
+        `readers` are the nodes that `matched` is to see.
+        """
+        writer, publish = WireWriter(topic), self.raw_publisher(topic, readers)
+        encode = writer.encode
+
+        def send(_: int, stamp_ns: int, row: Array) -> None:
+            publish(encode(stamp_ns, row))
+
+        return send
+
+    def raw_publisher(self, topic: Topic, readers: Collection[str] = ()) -> Callable[[bytes], None]:
+        """Return what publishes a topic's CDR bytes."""
+        qos = contract_qos(SENDER_DEPTH)
+        made = self.node.create_publisher(ros_class(topic.ros_type), topic.name, qos)
+        self._publishers[topic.name] = (made, frozenset(readers))
+        # What `Publisher.publish` does with bytes, without its checks of each message.
+        publish: Callable[[bytes], None] = made.handle.publish_raw
+        return publish
+
+    def status_publisher(self, readers: Collection[str] = ()) -> Callable[[int, Status], None]:
+        """Return what publishes a status on `/diagnostics` (stamp [ns], status)."""
+        publish = self.raw_publisher(DIAGNOSTICS, readers)
+        return lambda stamp_ns, status: publish(encode_diagnostics(stamp_ns, [status]))
+
+    def subscribe(
+        self, topic: Topic, take: Callable[[bytes], None], depth: int = QOS_DEPTH
+    ) -> None:
+        """Have `take` called with each message's CDR bytes; at most `depth` wait for it."""
+        message_class = ros_class(topic.ros_type)
+        if self.intake is None:
+            qos = contract_qos(depth)
+            self.node.create_subscription(message_class, topic.name, take, qos, raw=True)
+            return
+        self.intake.subscribe(
+            topic,
+            message_class,
+            lambda payload, _: take(payload),
+            numbered=False,
+            depth=depth,
+        )
+
+    def subscribe_rows(
+        self,
+        topic: Topic,
+        receive: Callable[[int, Array], None],
+        refuse: Callable[[str], None],
+        depth: int = QOS_DEPTH,
+    ) -> None:
+        """Have `receive` called with stamp [ns] and row, or `refuse` with what is wrong.
+
+        An `InputError` that `receive` raises counts as something wrong with the message. Who needs
+        every message lets many wait: strangers' push out genuine ones.
+        """
+        decode = WireReader(topic).decode
+
+        def take(payload: bytes) -> None:
+            try:
+                receive(*decode(payload))
+            except InputError as err:
+                refuse(str(err))
+
+        self.subscribe(topic, take, depth)
+
+    def unmatched(self) -> list[str]:
+        """Return `topic (reader)` for each reader that is not connected to our publisher yet."""
+        missing = []
+        for topic, (publisher, readers) in self._publishers.items():
+            if not readers:
+                continue
+            missing += [f"{topic} ({name})" for name in self.unconnected(publisher, readers)]
+        return missing
+
+    def unconnected(self, publisher: Publisher, readers: Collection[str]) -> list[str]:
+        """Return which of `readers`, by node, a publisher of this node does not reach yet.
+
+        Others may listen as well; those who ask for another type or for stored messages are never
+        reached.
+        """
+        found = [
+            info
+            for info in self.node.get_subscriptions_info_by_topic(publisher.topic_name)
+            if info.topic_type == _ros_type(publisher.msg_type)
+            and info.qos_profile.durability == DurabilityPolicy.VOLATILE
+        ]
+        absent = set(readers) - {info.node_name for info in found}
+        if not absent and publisher.get_subscription_count() < len(found):
+            return [f"{len(found)} readers"]
+        return sorted(absent)
+
+    def deliver(self, seconds: float) -> bool:
+        """Wait until all that was sent has come to those who read it; return whether it has."""
+        end = time.monotonic() + seconds
+        return all(
+            publisher.wait_for_all_acked(Duration(seconds=max(0.0, end - time.monotonic())))
+            for publisher in self.node.publishers
+        )
+
+    def every(self, seconds: float, call: Callable[[], None]) -> Any:  # noqa: ANN401 - rclpy's timer
+        """Have `call` called at an interval of wall time; return the timer."""
+        return self.node.create_timer(seconds, call, clock=self._steady)
+
+    def now_ns(self) -> int:
+        """Return the time on the ROS clock [ns], simulated where `use_sim_time` says so."""
+        return int(self.node.get_clock().now().nanoseconds)
+
+    def complain(self, subject: str, text: str) -> None:
+        """Say what is wrong with a topic's messages; a flood of them does not fill the log."""
+        self._complaints.add(subject, text)
+
+    def warn(self, text: str) -> None:
+        """Say something on the node's log."""
+        self.node.get_logger().warning(text)
+
+
+def _ros_type(message_class: type) -> str:
+    package, kind, *_ = message_class.__module__.split(".")
+    return f"{package}/{kind}/{message_class.__name__}"
+
+
+def ros_class(ros_type: str) -> Any:  # noqa: ANN401 - rosidl's classes have no types
+    """Return rclpy's class of `package/msg/Type`."""
+    package, kind, name = ros_type.split("/")
+    return getattr(import_module(f"{package}.{kind}"), name)

@@ -1,0 +1,72 @@
+"""Who starts and ends a run in real time: when all is there, and when its time is over."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Collection
+
+from cspm_msgs_py.ros.contract_node import ContractNode
+from cspm_msgs_py.ros.rendezvous import PlantSide
+
+_LOOK_EVERY_S = 0.02
+# From the announcement to the start, so that all know in time.
+_NOTICE_NS = 200_000_000
+
+
+class Leader:
+    """Waits for all nodes and inputs, sets the start, and tells the end.
+
+    Attributes:
+        start_ns: when the run begins [ns], None while something is missing.
+        end_ns: when it ended [ns].
+    """
+
+    def __init__(
+        self,
+        node: ContractNode,
+        period_ns: int,
+        others: Collection[str],
+        duration_ns: int,
+        *,
+        missing: Callable[[], list[str]] = list,
+        on_start: Callable[[int], None] = lambda _: None,
+        on_end: Callable[[int], None] = lambda _: None,
+    ) -> None:
+        """Lead from `node`.
+
+        Args:
+            node: the leading node.
+            period_ns: the plant's [ns].
+            others: names of the other nodes of the run.
+            duration_ns: how long the run lasts [ns].
+            missing: what else is not there yet, in words.
+            on_start: called with the first instant [ns].
+            on_end: called with the last instant [ns].
+        """
+        self._node, self._duration_ns = node, duration_ns
+        self._side = PlantSide(node, period_ns, others, lambda _name, _step: None)
+        self._missing, self._on_start, self._on_end = missing, on_start, on_end
+        self._timer = node.every(_LOOK_EVERY_S, self._look)
+        self.start_ns: int | None = None
+        self.end_ns: int | None = None
+
+    def waiting(self) -> list[str]:
+        """Return what is missing before the run can start."""
+        return [*self._side.unmatched(), *self._missing()]
+
+    def end(self) -> None:
+        """End the run now."""
+        if self.end_ns is None:
+            self.end_ns = self._node.now_ns()
+            self._timer.cancel()
+            self._side.tell_end_at(self.end_ns)
+            self._on_end(self.end_ns)
+
+    def _look(self) -> None:
+        now = self._node.now_ns()
+        if self.start_ns is None:
+            if not self.waiting():
+                self.start_ns = now + _NOTICE_NS
+                self._side.tell_start_at(self.start_ns)
+                self._on_start(self.start_ns)
+        elif now >= self.start_ns + self._duration_ns:
+            self.end()

@@ -1,0 +1,123 @@
+"""A controller's node in real time."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from functools import partial
+
+import numpy as np
+from numpy.typing import NDArray
+
+from cspm_msgs_py.graph import Edges
+from cspm_msgs_py.ros.contract_node import ContractNode, ros_class
+from cspm_msgs_py.ros.guard_ports import GuardPorts
+from cspm_msgs_py.ros.qos import contract_qos
+from cspm_msgs_py.ros.rendezvous import FollowerSide
+from cspm_msgs_py.sample_and_hold import SampleAndHold, WallTrajectory
+from cspm_msgs_py.schedule import CLOCK, Schedule
+from cspm_msgs_py.stage import Guard, Stage
+from cspm_msgs_py.topics import DIAGNOSTICS, SAFE, Topic
+
+Array = NDArray[np.float64]
+
+
+class RealtimeNode:
+    """Feeds a stage with the latest messages, at its own rate."""
+
+    def __init__(
+        self,
+        node: ContractNode,
+        stage: Stage,
+        guard: Guard | None,
+        schedule: Schedule,
+        topics: Mapping[str, Topic],
+        edges: Mapping[str, Edges],
+        stale_after: float,
+        *,
+        on_start: Callable[[int], None] | None = None,
+        on_safe: Callable[[bool], None] | None = None,
+    ) -> None:
+        """Connect the stage; `guard` is the same stage where it has a safe state.
+
+        Args:
+            node: the ROS node, named as the stage.
+            stage: the controller.
+            guard: the stage itself where it commands winches.
+            schedule: of the scenario, for rates and delays.
+            topics: of the test-bed, by name.
+            edges: who reads what in this run.
+            stale_after: age beyond its due at which an input is too old [s].
+            on_start: called with the first instant [ns] of the run.
+            on_safe: called with whether the winches are in their safe state.
+        """
+        plan = schedule.nodes[stage.node]
+        self._node = node
+        publish = {name: node.publisher(topics[name], edges[name].readers) for name in plan.outputs}
+        status = node.status_publisher(edges[DIAGNOSTICS.name].readers)
+        self._loop = SampleAndHold(stage, schedule, stale_after, publish, status, guard)
+        for name in (*plan.inputs, *plan.held):
+            if name != CLOCK:
+                refuse = partial(self._refuse, name)
+                node.subscribe_rows(topics[name], partial(self._receive, name), refuse)
+        if guard is not None:
+            GuardPorts(node, guard, node.now_ns)
+        if on_safe is not None:
+            node.node.create_subscription(
+                ros_class(SAFE.ros_type),
+                SAFE.name,
+                lambda message: on_safe(bool(message.data)),
+                contract_qos(),
+            )
+        self._on_start = on_start
+        self._leader = FollowerSide(node, schedule.period_ns, on_start=self._start)
+        node.every(plan.divider * schedule.period_ns * 1e-9, self._tick)
+
+    @property
+    def ended(self) -> bool:
+        """Whether the run is over."""
+        return self._leader.end_ns is not None
+
+    def _receive(self, topic: str, stamp_ns: int, row: Array) -> None:
+        self._loop.receive(topic, stamp_ns, row, self._node.now_ns())
+
+    def _refuse(self, topic: str, reason: str) -> None:
+        self._loop.refuse(self._node.now_ns(), reason)
+        self._node.complain(topic, reason)
+
+    def _start(self, start_ns: int) -> None:
+        if self._on_start is not None:
+            self._on_start(start_ns)
+        self._loop.start(start_ns)
+
+    def _tick(self) -> None:
+        self._loop.tick(self._node.now_ns())
+
+
+class RealtimeWaveNode:
+    """Sends the references by the wall."""
+
+    def __init__(
+        self,
+        node: ContractNode,
+        stage: Stage,
+        schedule: Schedule,
+        topics: Mapping[str, Topic],
+        edges: Mapping[str, Edges],
+    ) -> None:
+        """Connect the wave trajectory; arguments as `RealtimeNode`."""
+        plan = schedule.nodes[stage.node]
+        self._node = node
+        publish = {name: node.publisher(topics[name], edges[name].readers) for name in plan.outputs}
+        status = node.status_publisher(edges[DIAGNOSTICS.name].readers)
+        self._loop = WallTrajectory(stage, schedule, publish, status)
+        self._leader = FollowerSide(node, schedule.period_ns, on_start=self._loop.start)
+        # Twice as often as references are due: a timer that is late skips calls.
+        node.every(0.5e-9 * plan.divider * schedule.period_ns, self._tick)
+
+    @property
+    def ended(self) -> bool:
+        """Whether the run is over."""
+        return self._leader.end_ns is not None
+
+    def _tick(self) -> None:
+        self._loop.tick(self._node.now_ns())

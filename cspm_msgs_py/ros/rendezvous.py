@@ -1,0 +1,178 @@
+"""The nodes of a run find each other, start and end together.
+
+Followers tell the leader, which is the plant where there is a simulated one, on `/run/progress`
+that they are connected (stamp −1 s); in lockstep also, later, through which instant they are
+complete. The leader tells all on `/run/start` that the run begins, in real time at which instant
+the motions do. It tells all on `/run/end` at which instant the run ended.
+"""
+
+from __future__ import annotations
+
+import time
+from collections import Counter
+from collections.abc import Callable, Collection
+
+from cspm_msgs_py.errors import InputError
+from cspm_msgs_py.ros.contract_node import ContractNode, ros_class
+from cspm_msgs_py.ros.intake import DEPTH
+from cspm_msgs_py.ros.qos import contract_qos
+
+PROGRESS, START, END = "/run/progress", "/run/start", "/run/end"
+_HEADER = "std_msgs/msg/Header"
+_NANOSECONDS = 1_000_000_000
+_LOOK_EVERY_S = 0.05
+_READY = -1
+# How long it may take on one machine until all who are there are seen.
+_SETTLE_S = 0.5
+
+
+class FollowerSide:
+    """A follower's side.
+
+    Attributes:
+        end_ns: the instant at which the run ended [ns], once the leader has told.
+    """
+
+    def __init__(
+        self,
+        node: ContractNode,
+        period_ns: int,
+        on_end: Callable[[int], None] = lambda _: None,
+        on_start: Callable[[int], None] = lambda _: None,
+    ) -> None:
+        """Announce the node as soon as all its readers are connected.
+
+        Args:
+            node: the node.
+            period_ns: the plant's [ns].
+            on_end: called with the last step of a lockstep run; raises `InputError` if that cannot
+                be this run's.
+            on_start: called with the first instant [ns] of a run in real time.
+        """
+        self._node = node
+        self._period_ns = period_ns
+        self._on_end = on_end
+        self._header = ros_class(_HEADER)
+        self._publisher = node.node.create_publisher(self._header, PROGRESS, contract_qos())
+        self._on_start = on_start
+        node.node.create_subscription(self._header, START, self._start, contract_qos(DEPTH))
+        node.node.create_subscription(self._header, END, self._end, contract_qos(DEPTH))
+        self._timer = node.every(_LOOK_EVERY_S, self._announce)
+        self.end_ns: int | None = None
+
+    @property
+    def end_step(self) -> int | None:
+        """The last step of a lockstep run, once the plant has told."""
+        return None if self.end_ns is None else self.end_ns // self._period_ns
+
+    def tell(self, step: int) -> None:
+        """Tell that this node is complete through `step`."""
+        self._timer.cancel()
+        self._send(step * self._period_ns)
+
+    def _announce(self) -> None:
+        if self._publisher.get_subscription_count() and not self._node.unmatched():
+            self._send(_READY * _NANOSECONDS)
+
+    def _send(self, stamp_ns: int) -> None:
+        message = self._header(frame_id=self._node.name)
+        message.stamp.sec, message.stamp.nanosec = divmod(stamp_ns, _NANOSECONDS)
+        self._publisher.publish(message)
+
+    def _end(self, message: object) -> None:
+        end_ns = _stamp_of(message)
+        try:
+            self._on_end(end_ns // self._period_ns)
+        except InputError as err:
+            self._node.complain(END, f"{END}: {err}")
+            return
+        self.end_ns = end_ns
+        self._timer.cancel()
+
+    def _start(self, message: object) -> None:
+        self._timer.cancel()
+        self._on_start(_stamp_of(message))
+
+
+class PlantSide:
+    """The leader's side.
+
+    Attributes:
+        absent: nodes of the run that have not announced themselves yet.
+    """
+
+    def __init__(
+        self,
+        node: ContractNode,
+        period_ns: int,
+        others: Collection[str],
+        on_progress: Callable[[str, int], None],
+    ) -> None:
+        """Listen to `others`, the nodes that belong to the run beside the leader."""
+        self._node = node
+        self._period_ns = period_ns
+        self._others = frozenset(others)
+        self._on_progress = on_progress
+        self._header = ros_class(_HEADER)
+        self._publisher = node.node.create_publisher(self._header, END, contract_qos())
+        self._starter = node.node.create_publisher(self._header, START, contract_qos())
+        self._progress = node.node.create_subscription(
+            self._header, PROGRESS, self._take, contract_qos(DEPTH)
+        )
+        self._settled = time.monotonic() + _SETTLE_S
+        self.absent = set(others)
+
+    def unmatched(self) -> list[str]:
+        """Return what is still missing before the run can start."""
+        if self.absent:
+            return sorted(self.absent)
+        for publisher in (self._starter, self._publisher):
+            deaf = self._node.unconnected(publisher, self._others)
+            if deaf:
+                return [f"{publisher.topic_name} ({', '.join(deaf)})"]
+        if time.monotonic() < self._settled:
+            return ["who else is in this ROS domain"]
+        return self.doubled() or self._node.unmatched()
+
+    def doubled(self) -> list[str]:
+        """Return which of the run's names stand for more than one node, as in two runs at once."""
+        names = {self._publisher.topic_name: {self._node.name}}
+        names[self._progress.topic_name] = set(self._others)
+        return [
+            f"one node {name} instead of {count} (ROS_DOMAIN_ID keeps runs apart)"
+            for topic, wanted in names.items()
+            for name, count in self._senders(topic).items()
+            if name in wanted and count > 1
+        ]
+
+    def _senders(self, topic: str) -> Counter[str]:
+        found = self._node.node.get_publishers_info_by_topic(topic)
+        return Counter(str(info.node_name) for info in found)
+
+    def tell_end(self, step: int) -> None:
+        """Tell all that a lockstep run ended with `step`."""
+        self.tell_end_at(step * self._period_ns)
+
+    def tell_end_at(self, stamp_ns: int) -> None:
+        """Tell all at which instant [ns] the run ended."""
+        self._publisher.publish(self._stamped(stamp_ns))
+
+    def tell_start_at(self, stamp_ns: int) -> None:
+        """Tell all at which instant [ns] the run begins: on the ROS clock, in lockstep 0."""
+        self._starter.publish(self._stamped(stamp_ns))
+
+    def _stamped(self, stamp_ns: int) -> object:
+        message = self._header(frame_id=self._node.name)
+        message.stamp.sec, message.stamp.nanosec = divmod(stamp_ns, _NANOSECONDS)
+        return message
+
+    def _take(self, message: object) -> None:
+        name, total = message.frame_id, _stamp_of(message)  # type: ignore[attr-defined]
+        self.absent.discard(name)
+        if total >= 0 and name in self._others:
+            self._on_progress(name, total // self._period_ns)
+
+
+def _stamp_of(message: object) -> int:
+    stamp = message.stamp  # type: ignore[attr-defined]
+    return int(stamp.sec) * _NANOSECONDS + int(stamp.nanosec)

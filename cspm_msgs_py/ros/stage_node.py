@@ -1,0 +1,102 @@
+"""A controller's node in lockstep."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from functools import partial
+
+from cspm_msgs_py.graph import Edges
+from cspm_msgs_py.lockstep import Acknowledgement, Follower
+from cspm_msgs_py.ros.contract_node import ContractNode
+from cspm_msgs_py.ros.guard_ports import GuardPorts
+from cspm_msgs_py.ros.intake import DEPTH
+from cspm_msgs_py.ros.rendezvous import FollowerSide
+from cspm_msgs_py.schedule import Schedule
+from cspm_msgs_py.stage import Guard, Stage
+from cspm_msgs_py.topics import DIAGNOSTICS, Topic
+
+
+class StageNode:
+    """Feeds a stage with messages as the lockstep schedule asks.
+
+    Attributes:
+        refused: how many messages were unusable, and why the last was.
+    """
+
+    def __init__(
+        self,
+        node: ContractNode,
+        stage: Stage,
+        schedule: Schedule,
+        topics: Mapping[str, Topic],
+        edges: Mapping[str, Edges],
+        *,
+        tells_progress: bool,
+        guard: Guard | None = None,
+    ) -> None:
+        """Connect the stage.
+
+        Args:
+            node: the ROS node, named as the stage.
+            stage: the controller.
+            schedule: of the run.
+            topics: of the test-bed, by name.
+            edges: who reads what in this run.
+            tells_progress: whether the plant waits for this node's progress.
+            guard: the stage itself where it has a safe state.
+        """
+        plan = schedule.nodes[stage.node]
+        self._node = node
+        self._acknowledgement = Acknowledgement() if tells_progress else None
+        publish = {name: node.publisher(topics[name], edges[name].readers) for name in plan.outputs}
+        status = node.status_publisher(edges[DIAGNOSTICS.name].readers)
+        self._follower = Follower(stage, schedule, publish, status)
+        self._plant = FollowerSide(node, schedule.period_ns, self._end)
+        receive = self._receive_and_tell if tells_progress else self._follower.receive
+        for name in (*plan.inputs, *plan.held):
+            refuse = partial(self._refuse, name)
+            node.subscribe_rows(topics[name], partial(receive, name), refuse, DEPTH)
+        self._guard = guard
+        if guard is not None:
+            GuardPorts(node, guard, self._now_ns)
+        self.refused = (0, "")
+
+    @property
+    def ended(self) -> bool:
+        """Whether the plant has ended the run, and this node has computed all of it."""
+        last = self._plant.end_step
+        return last is not None and self._follower.completed >= last
+
+    @property
+    def progress(self) -> int:
+        """The plant step through which this node is complete."""
+        return self._follower.completed
+
+    def waiting(self) -> str:
+        """Return what the node waits for."""
+        return self._follower.waiting()
+
+    def _receive_and_tell(self, topic: str, stamp_ns: int, row: object) -> None:
+        self._follower.receive(topic, stamp_ns, row)  # type: ignore[arg-type]
+        self._tell()
+
+    def _tell(self) -> None:
+        reached = self._follower.reached
+        if self._acknowledgement is not None and self._acknowledgement.due(reached):
+            self._plant.tell(reached)
+
+    def _end(self, last_step: int) -> None:
+        self._follower.check_end(last_step)
+        if self._acknowledgement is not None:
+            self._acknowledgement.last = last_step
+            self._tell()
+
+    def _now_ns(self) -> int:
+        """Return the instant that was computed last [ns]: lockstep knows no other time."""
+        return self._follower.now_ns
+
+    def _refuse(self, topic: str, reason: str) -> None:
+        self.refused = (self.refused[0] + 1, reason)
+        self._node.complain(topic, reason)
+        if self._guard is not None:
+            self._guard.trip(self._now_ns(), reason)

@@ -1,0 +1,35 @@
+"""What a machine does when it can no longer be controlled: the scenario's safe state."""
+
+from __future__ import annotations
+
+from typing import Annotated, Literal
+
+from pydantic import Field, PositiveFloat
+
+from cspm_msgs_py.yaml_file import StrictModel
+
+LONGEST = 10.0  # s; a bar that nobody controls for longer is no longer where it was
+
+Wait = Annotated[float, Field(gt=0.0, le=LONGEST)]
+
+
+class Safety(StrictModel):
+    """The safe state and what leads to it.
+
+    Attributes:
+        state: `hold`: the winches hold the bar by their motors; `brake`: zero torque, brakes set.
+        ramp_time: from the tension measured last to the balancing one [s], in `hold`.
+        stale_after: an input older than this is stale [s]; in lockstep inputs are waited for.
+        tension_trip: a measured tension above it trips [N]; None: twice each cable's upper limit.
+        torque_slew: fastest change of a torque command [N·m/s]; None: from one torque limit to the
+            other within one period of the force controller, which never acts.
+        watchdog: the plant goes to the safe state by itself without a torque command for so long
+            [s].
+    """
+
+    state: Literal["hold", "brake"] = "hold"
+    ramp_time: Annotated[float, Field(ge=0.0, le=LONGEST)] = 0.5
+    stale_after: Wait = 0.05
+    tension_trip: PositiveFloat | None = None
+    torque_slew: PositiveFloat | None = None
+    watchdog: Wait = 0.05

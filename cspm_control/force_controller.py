@@ -39,6 +39,10 @@ class ForceController:
         self._started = False
         self.saturated = 0
 
+    def restart(self) -> None:
+        """Let the next output balance the measured tension again."""
+        self._started = False
+
     def step(self, wanted: Array, measured: Array) -> Array:
         """Return motor torques (n,) [N·m] for wanted and measured tensions (n,) [N].
 

@@ -57,6 +57,11 @@ class MotionController:
         self._memory = np.zeros((3, 6))
         self._started = False
 
+    def restart(self) -> None:
+        """Let the next wrench be the one that carries the bar, whatever the error."""
+        self._memory[:] = 0.0
+        self._started = False
+
     def step(self, bar_pose: Array, reference: Array) -> Array:
         """Return the wrench (6,) for a measured pose row (7,) and a reference row (19,)."""
         wrench = np.empty(6)

@@ -29,8 +29,8 @@ _STICKING_STEPS = 2.0
 _STICKING = "0.9999 0.9999 0.001 0.5 2"
 
 
-def build_model(testbed: Testbed, extras: Extras, timestep: float, *, locked: bool) -> Any:  # noqa: ANN401 - mujoco carries no types
-    """Return the compiled model; `timestep` in s, `locked` leaves the rotors out.
+def build_model(testbed: Testbed, extras: Extras, timestep: float) -> Any:  # noqa: ANN401 - mujoco carries no types
+    """Return the compiled model; `timestep` in s.
 
     Raises:
         InputError: MuJoCo refuses the machine.
@@ -51,8 +51,7 @@ def build_model(testbed: Testbed, extras: Extras, timestep: float, *, locked: bo
     if testbed.bar:
         _add_mass(hung, testbed.bar)
     _sites(hung, "attachment", ((c.name, c.attachment or ORIGIN) for c in testbed.cables))
-    if not locked:
-        _add_winches(root, world, testbed, extras, timestep)
+    _add_winches(root, world, testbed, extras, timestep)
     try:
         return mujoco.MjModel.from_xml_string(ElementTree.tostring(root, encoding="unicode"))
     except ValueError as err:

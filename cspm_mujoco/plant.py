@@ -62,7 +62,6 @@ class MujocoPlant:
         n = len(testbed.cables)
         self.testbed = testbed
         self.period_ns = period_ns
-        self.locked = locked
         self.steps = 0
         self._substeps = substeps
         self._failure: DivergenceError | None = None
@@ -73,9 +72,10 @@ class MujocoPlant:
         self._drag = extras.drag
         self._limits = np.array([cable.torque_limit for cable in testbed.cables])
         timestep = period_ns * 1e-9 / substeps
-        self._model = build_model(testbed, extras, timestep, locked=locked)
+        self._model = build_model(testbed, extras, timestep)
         self._data = mujoco.MjData(self._model)
         self._take_views(n)
+        self.locked = locked
         self.tensions: Array = np.zeros(n)
         self._winding, self._wrench = np.zeros(n), np.zeros(6)
         self._frame_body, self._body = np.zeros(9), np.zeros(9)
@@ -91,10 +91,9 @@ class MujocoPlant:
         self.bar_state: Array = np.zeros(12 if self.testbed.bar else 0)
         self._bar_position: Array = data.qpos[:first]
         self._bar_velocity: Array = data.qvel[:speed]
-        still = np.zeros(n)
-        self.angles: Array = still if self.locked else data.qpos[first:]
-        self.speeds: Array = still if self.locked else data.qvel[speed:]
-        self.unstretched_lengths: Array = np.zeros(n) if self.locked else data.act
+        self.angles: Array = data.qpos[first:]
+        self.speeds: Array = data.qvel[speed:]
+        self.unstretched_lengths: Array = data.act
         self._torque: Array = data.ctrl[:n]
         self._length_rates: Array = data.ctrl[n:]
         self._load: Array = data.qfrc_applied[speed:]
@@ -111,6 +110,19 @@ class MujocoPlant:
         """Time since the start [s]."""
         return self.steps * self.period_ns * 1e-9
 
+    @property
+    def locked(self) -> bool:
+        """Whether all motors are held still."""
+        return self._locked
+
+    @locked.setter
+    def locked(self, value: bool) -> None:
+        self._locked = value
+        if value:
+            # What stands still and is not pushed stays where it is.
+            for pushed in (self.speeds, self._torque, self._load, self._length_rates):
+                pushed[:] = 0.0
+
     def step(self, torque: Array) -> None:
         """Advance by one period with the motor torques (n,) [N·m] held.
 
@@ -125,7 +137,7 @@ class MujocoPlant:
         if not np.isfinite(torque).all():
             name = self.testbed.cable_names[int(np.argmin(np.isfinite(torque)))]
             raise DivergenceError(f"t = {self.time:.3f} s: torque of {name} is not finite")
-        if not self.locked:
+        if not self._locked:
             self._torque[:] = torque
         self._data.time = self.time
         before = mujoco.get_mjcb_control()
@@ -158,7 +170,7 @@ class MujocoPlant:
             self._load[:] = 0.0
             return
         self._bar_wrench[:] = self._wrench
-        if not self.locked:
+        if not self._locked:
             np.multiply(self._radii, self.tensions, out=self._load)
             np.negative(self._load, out=self._load)
             self._length_rates[:] = self._winding

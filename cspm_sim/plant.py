@@ -27,7 +27,8 @@ class Plant:
 
     Time is a count of steps of `period_ns`; `step` advances it by one. Read-only views of the
     current state: `bar_state` (12: position, Euler angles, velocity in world axes, ω in bar axes),
-    `unstretched_lengths`, `angles`, `speeds` (n each), `tensions` (n) and `frame` (18).
+    `unstretched_lengths`, `angles`, `speeds` (n each), `tensions` (n) and `frame` (18). `locked`
+    may be set at any time: the brakes, which stop the motors at once.
     """
 
     def __init__(
@@ -59,7 +60,6 @@ class Plant:
         self.parameters = plant_parameters(testbed)
         self.period_ns = period_ns
         self.frame_motion = frame_motion
-        self.locked = locked
         self.steps = 0
         n = len(testbed.cables)
         first = BAR_STATES if testbed.bar else 0
@@ -68,6 +68,7 @@ class Plant:
         self.unstretched_lengths = self.state[first : first + n]
         self.angles = self.state[first + n : first + 2 * n]
         self.speeds = self.state[first + 2 * n :]
+        self.locked = locked
         self.frame: Array = frame_motion.at(0.0)
         self._outputs = np.zeros((2, n))
         self.tensions = self._outputs[0]
@@ -81,6 +82,17 @@ class Plant:
     def time(self) -> float:
         """Time since the start [s]."""
         return self.steps * self.period_ns * 1e-9
+
+    @property
+    def locked(self) -> bool:
+        """Whether all motors are held still."""
+        return self._locked
+
+    @locked.setter
+    def locked(self, value: bool) -> None:
+        self._locked = value
+        if value:
+            self.speeds[:] = 0.0
 
     def step(self, torque: Array) -> None:
         """Advance by one period with the motor torques (n,) [N·m] held.
@@ -101,7 +113,7 @@ class Plant:
             self.frame_motion.periodic,
             self.steps,
             1,
-            self.locked,
+            self._locked,
             self.period_ns * 1e-9,
             self.parameters,
             self._frames,

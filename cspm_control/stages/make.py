@@ -1,0 +1,103 @@
+"""From scenario and test-bed to controllers."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+
+import numpy as np
+
+from cspm_control.force_controller import ForceController
+from cspm_control.motion_controller import MotionController
+from cspm_control.stages.distribution_stage import DistributionStage
+from cspm_control.stages.force_stage import ForceLimits, ForceStage
+from cspm_control.stages.motion_stage import MotionStage
+from cspm_control.stages.torque_stage import TorqueStage
+from cspm_control.tension_distribution import PseudoInverse
+from cspm_control.torque_profile import TorqueGenerator
+from cspm_msgs_py.errors import InputError
+from cspm_msgs_py.scenario import ClosedLoop, Scenario, TorqueProfile
+from cspm_msgs_py.schedule import FORCE_CONTROLLER, MOTION_CONTROLLER, TENSION_DISTRIBUTION
+from cspm_msgs_py.stage import Stage
+from cspm_msgs_py.testbed import Testbed
+from cspm_sim.kernels.cable import RADIUS
+from cspm_sim.parameters import plant_parameters
+from cspm_sim.safe_state import make_safe_state
+
+# A measured tension beyond this many times a cable's upper limit trips, unless the scenario says.
+TRIP_FACTOR = 2.0
+
+
+def make_controller(node: str, scenario: Scenario, testbed: Testbed) -> Stage:
+    """Return the controller that `node` runs in a resolved scenario.
+
+    Raises:
+        InputError: this scenario has no such controller.
+    """
+    control = scenario.control
+    if isinstance(control, TorqueProfile) and node == FORCE_CONTROLLER:
+        return torque_stage(control, scenario, testbed)
+    makers: dict[str, Callable[[ClosedLoop, Scenario, Testbed], Stage]] = {
+        MOTION_CONTROLLER: motion_stage,
+        TENSION_DISTRIBUTION: distribution_stage,
+        FORCE_CONTROLLER: force_stage,
+    }
+    if not isinstance(control, ClosedLoop) or node not in makers:
+        raise InputError(f"node {node}: scenario {scenario.name} ({control.mode}) has none")
+    return makers[node](control, scenario, testbed)
+
+
+def motion_stage(control: ClosedLoop, scenario: Scenario, testbed: Testbed) -> MotionStage:
+    """Return the motion controller; the test-bed has a bar, see `schedule_of`."""
+    motion = control.motion
+    if testbed.bar is None:
+        raise InputError("control.mode: closed_loop without a bar, allowed: torque, locked_winches")
+    return MotionStage(
+        MotionController(
+            motion.gains or {},
+            testbed.bar,
+            testbed.gravity,
+            period=1.0 / scenario.rates.motion_controller,
+            derivative_filter=motion.derivative_filter,
+            integral_limits=motion.integral_limits,
+        )
+    )
+
+
+def distribution_stage(
+    control: ClosedLoop, scenario: Scenario, testbed: Testbed
+) -> DistributionStage:
+    """Return the tension distribution."""
+    limits = np.array([cable.tension_limits for cable in testbed.cables], dtype=float)
+    return DistributionStage(PseudoInverse(plant_parameters(testbed).cables, limits))
+
+
+def force_stage(control: ClosedLoop, scenario: Scenario, testbed: Testbed) -> ForceStage:
+    """Return the force controllers."""
+    gains, rate = control.force.gains or {}, scenario.rates.force_controller
+    tensions = np.array([cable.tension_limits for cable in testbed.cables], dtype=float)
+    safety = scenario.safety
+    trip = safety.tension_trip
+    limits = ForceLimits(
+        tensions,
+        TRIP_FACTOR * tensions[:, 1] if trip is None else np.full(len(tensions), trip),
+        None if safety.torque_slew is None else safety.torque_slew / rate,
+    )
+    controller = ForceController(
+        [gains[cable.name] for cable in testbed.cables],
+        plant_parameters(testbed).cables[:, RADIUS].copy(),
+        np.array([cable.torque_limit for cable in testbed.cables]),
+        period=1.0 / rate,
+    )
+    state = make_safe_state(scenario, testbed)
+    return ForceStage(controller, limits, testbed.cable_names, state, safety, 1_000_000_000 // rate)
+
+
+def torque_stage(control: TorqueProfile, scenario: Scenario, testbed: Testbed) -> TorqueStage:
+    """Return the prescribed torques, one for each of the plant's periods."""
+    return TorqueStage(
+        TorqueGenerator(control.torque, testbed.cable_names),
+        np.array([cable.drum_radius / cable.gear_ratio for cable in testbed.cables]),
+        make_safe_state(scenario, testbed),
+        scenario.safety,
+        1_000_000_000 // scenario.rates.plant,
+    )

@@ -1,0 +1,39 @@
+"""The motion controller as a stage: bar pose and reference to wanted wrench."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+
+import numpy as np
+from numpy.typing import NDArray
+
+from cspm_control.motion_controller import MotionController
+from cspm_msgs_py.diagnostics import Level, Status
+from cspm_msgs_py.schedule import BAR_POSE, BAR_REFERENCE, MOTION_CONTROLLER, WRENCH
+from cspm_msgs_py.stage import Send
+
+Array = NDArray[np.float64]
+
+
+class MotionStage:
+    """Sends the wanted wrench."""
+
+    node = MOTION_CONTROLLER
+
+    def __init__(self, controller: MotionController) -> None:
+        self._controller = controller
+        self._suspended = False
+
+    def suspend(self, suspended: bool) -> None:
+        """Begin anew with every step while nobody follows the wrench; go on from there."""
+        self._suspended = suspended
+
+    def step(self, now_ns: int, inputs: Mapping[str, Array], send: Send) -> None:
+        """Send the wrench for the latest pose and reference."""
+        if self._suspended:
+            self._controller.restart()
+        send(WRENCH, self._controller.step(inputs[BAR_POSE], inputs[BAR_REFERENCE]))
+
+    def status(self) -> Status:
+        """Return that all is well: the motion controller has no limit of its own to meet."""
+        return Status(Level.OK, self.node, "ok", {})

@@ -1,0 +1,162 @@
+"""The simulated plant's node in lockstep."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Mapping
+from functools import partial
+
+import numpy as np
+from numpy.typing import NDArray
+
+from cspm_msgs_py.errors import CspmError, InputError
+from cspm_msgs_py.graph import Edges, followers
+from cspm_msgs_py.lockstep import WINDOW
+from cspm_msgs_py.ros.contract_node import ContractNode, ros_class
+from cspm_msgs_py.ros.intake import DEPTH
+from cspm_msgs_py.ros.qos import contract_qos
+from cspm_msgs_py.ros.rendezvous import PROGRESS, PlantSide
+from cspm_msgs_py.schedule import PLANT, TORQUE_COMMAND, Schedule
+from cspm_msgs_py.topics import BRAKE, DIAGNOSTICS
+from cspm_sim.any_plant import AnyPlant
+from cspm_sim.lockstep_plant import LockstepPlant
+from cspm_sim.sensors import SensorModel
+from cspm_sim.simulator import Simulator
+
+Array = NDArray[np.float64]
+_LOOK_EVERY_S = 0.02
+# Who is not found by then was not there at the start.
+_LOOK_AROUND_S = 2.0
+
+
+class PlantNode:
+    """Steps the plant as torque commands come; starts once all nodes of the run are connected.
+
+    Attributes:
+        started: whether the first state was published.
+        refused: how many messages were unusable, and why the last was.
+    """
+
+    def __init__(
+        self,
+        node: ContractNode,
+        plant: AnyPlant,
+        sensors: Mapping[str, SensorModel],
+        schedule: Schedule,
+        steps: int,
+        edges: Mapping[str, Edges],
+        nodes: tuple[str, ...],
+        *,
+        controlled: bool,
+    ) -> None:
+        """Connect the plant.
+
+        Args:
+            node: the ROS node.
+            plant: the machine.
+            sensors: by topic.
+            schedule: of the run.
+            steps: how many plant steps to make.
+            edges: who reads what in this run.
+            nodes: the nodes of this run.
+            controlled: whether a closed loop is to keep the bar upright.
+        """
+        topics = plant.testbed.topics
+        publish = {
+            name: node.publisher(topics[name], edge.readers)
+            for name, edge in edges.items()
+            if edge.senders == (PLANT,) and name != DIAGNOSTICS.name
+        }
+        simulator = Simulator(
+            plant, sensors, publish, period_ns=schedule.period_ns, controlled=controlled
+        )
+        status = node.status_publisher(edges[DIAGNOSTICS.name].readers)
+        waited_for = followers(schedule, nodes, WINDOW)
+        self._node, self._simulator, self._period_ns = node, simulator, schedule.period_ns
+        self._plant = LockstepPlant(simulator, schedule, steps, waited_for, status)
+        others = [name for name in nodes if name != PLANT]
+        self._others = PlantSide(node, schedule.period_ns, others, self._progress)
+        if TORQUE_COMMAND in schedule.topics:
+            refuse = partial(self._refuse, TORQUE_COMMAND)
+            node.subscribe_rows(topics[TORQUE_COMMAND], self._torque, refuse, DEPTH)
+        node.node.create_subscription(
+            ros_class(BRAKE.ros_type), BRAKE.name, self._brake, contract_qos()
+        )
+        self._brakes_at_start = plant.locked
+        self._timer = node.every(_LOOK_EVERY_S, self._look_around)
+        self._alone = 0.0
+        self._told_end = False
+        self.started = False
+        self.refused = (0, "")
+
+    @property
+    def finished(self) -> bool:
+        """Whether the run is over and everybody has all of it."""
+        return self._plant.finished
+
+    @property
+    def failure(self) -> str | None:
+        """What ended the run, in one line, if anything did."""
+        return self._plant.failure
+
+    @property
+    def simulated(self) -> float:
+        """Time simulated [s]."""
+        return (self._plant.last_step + 1) * self._period_ns * 1e-9
+
+    @property
+    def progress(self) -> int:
+        """The last step whose state was published, −1 before the first."""
+        return self._plant.last_step
+
+    def stop(self) -> None:
+        """End the run after the step underway."""
+        self._plant.stop()
+        self._tell_end()
+
+    def waiting(self) -> str:
+        """Return what the run waits for."""
+        if not self.started:
+            return f"plant waits for {', '.join(self._others.unmatched()) or 'its start'}"
+        return self._plant.waiting()
+
+    def _look_around(self) -> None:
+        """Start when all is there; end, when too late another run is found in this domain."""
+        if not self.started:
+            self._start()
+        elif time.monotonic() > self._alone:
+            self._timer.cancel()
+        elif doubled := self._others.doubled():
+            raise CspmError(f"plant: runs in {', '.join(doubled)}")
+
+    def _start(self) -> None:
+        if not self._others.unmatched():
+            self._alone = time.monotonic() + _LOOK_AROUND_S
+            self.started = True
+            self._others.tell_start_at(0)
+            self._plant.start()
+            self._tell_end()
+
+    def _torque(self, stamp_ns: int, row: Array) -> None:
+        self._plant.receive_torque(stamp_ns, row)
+        self._tell_end()
+
+    def _brake(self, message: object) -> None:
+        wanted = bool(message.data)  # type: ignore[attr-defined]
+        self._simulator.plant.locked = wanted or self._brakes_at_start
+
+    def _progress(self, name: str, step: int) -> None:
+        try:
+            self._plant.receive_progress(name, step)
+        except InputError as err:
+            self._refuse(PROGRESS, f"{PROGRESS}: {err}")
+        self._tell_end()
+
+    def _tell_end(self) -> None:
+        if self._plant.ended and not self._told_end:
+            self._told_end = True
+            self._others.tell_end(self._plant.last_step)
+
+    def _refuse(self, topic: str, reason: str) -> None:
+        self.refused = (self.refused[0] + 1, reason)
+        self._node.complain(topic, reason)

@@ -1,0 +1,130 @@
+"""The simulated plant in real time: it keeps step with the wall, whatever comes in time."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+
+import numpy as np
+from numpy.typing import NDArray
+
+from cspm_msgs_py.diagnostics import Level, Status
+from cspm_msgs_py.errors import DivergenceError
+from cspm_msgs_py.schedule import TORQUE_COMMAND, Schedule
+from cspm_sim.simulator import Simulator
+from cspm_sim.watchdog import Watchdog
+
+Array = NDArray[np.float64]
+
+# A step that is late is made up for, one more at each call, so that messages get their turn.
+_MOST_STEPS_AT_ONCE = 2
+
+
+class RealtimePlant:
+    """Publishes state k at the instant k, and goes on to k + 1 one period later.
+
+    Command k counts where it comes within that period: then the plant does what it does in
+    lockstep. Otherwise it holds what it has, and counts a deadline missed.
+
+    Attributes:
+        failure: what ended the run, in one line, if anything did.
+        missed: steps for which no torque command came in time.
+        late: steps made more than a period too late.
+        refused: how many messages were unusable, and why the last was.
+    """
+
+    def __init__(
+        self,
+        simulator: Simulator,
+        schedule: Schedule,
+        steps: int,
+        watchdog: Watchdog,
+        publish_status: Callable[[int, Status], None],
+    ) -> None:
+        """Take the plant, how many steps to make, and what looks after its drives."""
+        self._simulator = simulator
+        self._schedule = schedule
+        self._steps = steps
+        self._watchdog = watchdog
+        self._publish_status = publish_status
+        self._torque_timing = schedule.topics.get(TORQUE_COMMAND)
+        self._start_ns: int | None = None
+        self._step = -1
+        self._commanded = False
+        self.failure: str | None = None
+        self.missed = self.late = 0
+        self.refused = (0, "")
+
+    @property
+    def step(self) -> int:
+        """The last step whose state was published, −1 before the first."""
+        return self._step
+
+    @property
+    def ended(self) -> bool:
+        """Whether all steps are made, or the plant failed."""
+        return self.failure is not None or self._step >= self._steps
+
+    def start(self, start_ns: int) -> None:
+        """Begin at an instant [ns] on the ROS clock."""
+        self._start_ns = start_ns
+
+    def receive_torque(self, stamp_ns: int, torque: Array, now_ns: int) -> None:
+        """Take a torque command."""
+        self._watchdog.command(now_ns, torque)
+        self._simulator.torque = torque
+        period = self._schedule.period_ns
+        if self._start_ns is not None and stamp_ns > self._start_ns + (self._step - 0.5) * period:
+            self._commanded = True
+
+    def refuse(self, reason: str) -> None:
+        """Take note of an unusable message; commands that do not come trip the watchdog."""
+        self.refused = (self.refused[0] + 1, reason)
+
+    def receive_brake(self, wanted: bool) -> None:
+        """Set or release the brakes."""
+        self._watchdog.brake(wanted)
+
+    def tick(self, now_ns: int) -> None:
+        """Make the steps that are due; to be called at least once in every period."""
+        if self._start_ns is None or now_ns < self._start_ns or self.ended:
+            return
+        due = (now_ns - self._start_ns) // self._schedule.period_ns
+        for _ in range(min(_MOST_STEPS_AT_ONCE, due - self._step)):
+            if self._step >= 0 and not self._advance(now_ns):
+                return
+            self._step += 1
+            self.late += due > self._step
+            if self._step < self._steps:
+                self._observe(now_ns)
+
+    def _advance(self, now_ns: int) -> bool:
+        timing, simulator = self._torque_timing, self._simulator
+        if timing is not None and timing.latest(self._step) == self._step:
+            self.missed += not self._commanded
+            self._commanded = False
+        safe = self._watchdog.torque(now_ns)
+        if safe is not None:
+            simulator.torque = safe
+        try:
+            simulator.advance()
+        except DivergenceError as err:
+            events = "; ".join(simulator.history()) or "nothing unusual"
+            self.failure = f"{err}; before it: {events}"
+        return self.failure is None
+
+    def _observe(self, now_ns: int) -> None:
+        self._simulator.observe()
+        if self._step % self._schedule.plant_status_divider == 0:
+            level, name, message, values = self._simulator.status()
+            values = {
+                **values,
+                "deadlines_missed": str(self.missed),
+                "late_steps": str(self.late),
+                "refused": str(self.refused[0]),
+            }
+            if self.refused[0] and level == Level.OK:
+                level, message = Level.WARN, f"refused: {self.refused[1]}"
+            elif self.missed and level == Level.OK:
+                level, message = Level.WARN, "torque commands came too late"
+            self._publish_status(now_ns, Status(level, name, message, values))
+            self._publish_status(now_ns, self._watchdog.status())

@@ -1,0 +1,124 @@
+"""The simulated plant's node in real time."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+
+import numpy as np
+from numpy.typing import NDArray
+
+from cspm_msgs_py.graph import Edges
+from cspm_msgs_py.ros.contract_node import ContractNode, ros_class
+from cspm_msgs_py.ros.leader import Leader
+from cspm_msgs_py.ros.qos import contract_qos
+from cspm_msgs_py.schedule import CLOCK, PLANT, TORQUE_COMMAND, Schedule
+from cspm_msgs_py.topics import BRAKE, DIAGNOSTICS, Topic
+from cspm_sim.any_plant import AnyPlant
+from cspm_sim.realtime_plant import RealtimePlant
+from cspm_sim.sensors import SensorModel
+from cspm_sim.simulator import Publish, Simulator
+from cspm_sim.watchdog import Watchdog
+
+Array = NDArray[np.float64]
+RESET = "~/reset"
+
+
+class RealtimePlantNode:
+    """Steps the plant by the wall; it leads the run."""
+
+    def __init__(
+        self,
+        node: ContractNode,
+        plant: AnyPlant,
+        sensors: Mapping[str, SensorModel],
+        schedule: Schedule,
+        steps: int,
+        edges: Mapping[str, Edges],
+        nodes: tuple[str, ...],
+        watchdog: Watchdog,
+        *,
+        controlled: bool,
+    ) -> None:
+        """Connect the plant; arguments as `cspm_sim.plant_node.PlantNode`, and its watchdog."""
+        topics = plant.testbed.topics
+        self._node, self._watchdog = node, watchdog
+        self._start_ns = 0
+        publish = {
+            name: self._on_wall_clock(node, topics[name], edge)
+            for name, edge in edges.items()
+            if edge.senders == (PLANT,) and name not in (CLOCK, DIAGNOSTICS.name)
+        }
+        self._simulator = Simulator(
+            plant, sensors, publish, period_ns=schedule.period_ns, controlled=controlled
+        )
+        status = node.status_publisher(edges[DIAGNOSTICS.name].readers)
+        self._plant = RealtimePlant(self._simulator, schedule, steps, watchdog, status)
+        self.leader = Leader(
+            node,
+            schedule.period_ns,
+            [name for name in nodes if name != PLANT],
+            # One period more, in which the last step is made.
+            (steps + 1) * schedule.period_ns,
+            on_start=self._start,
+        )
+        if TORQUE_COMMAND in schedule.topics:
+            node.subscribe_rows(topics[TORQUE_COMMAND], self._torque, self._refuse)
+        node.node.create_subscription(
+            ros_class(BRAKE.ros_type), BRAKE.name, self._brake, contract_qos()
+        )
+        node.node.create_service(ros_class("std_srvs/srv/Trigger"), RESET, self._reset)
+        # Twice as often as steps are due: a timer that is late skips calls.
+        node.every(0.5e-9 * schedule.period_ns, self._tick)
+
+    @property
+    def ended(self) -> bool:
+        """Whether the run is over."""
+        return self.leader.end_ns is not None
+
+    @property
+    def failure(self) -> str | None:
+        """What ended the run, in one line, if anything did."""
+        return self._plant.failure
+
+    @property
+    def simulated(self) -> float:
+        """Time simulated [s]."""
+        return self._simulator.plant.time
+
+    def waiting(self) -> str:
+        """Return what the start waits for; empty once the run has begun."""
+        missing = [] if self.leader.start_ns is not None else self.leader.waiting()
+        return f"plant waits for {', '.join(missing)}" if missing else ""
+
+    def _on_wall_clock(self, node: ContractNode, topic: Topic, edge: Edges) -> Publish:
+        publish: Callable[[int, int, Array], None] = node.publisher(topic, edge.readers)
+
+        def send(log_ns: int, stamp_ns: int, row: Array) -> None:
+            publish(log_ns, stamp_ns + self._start_ns, row)
+
+        return send
+
+    def _start(self, start_ns: int) -> None:
+        self._start_ns = start_ns
+        self._plant.start(start_ns)
+
+    def _tick(self) -> None:
+        self._plant.tick(self._node.now_ns())
+        if self._plant.failure is not None:
+            self.leader.end()
+
+    def _torque(self, stamp_ns: int, row: Array) -> None:
+        self._plant.receive_torque(stamp_ns, row, self._node.now_ns())
+
+    def _refuse(self, reason: str) -> None:
+        self._plant.refuse(reason)
+        self._node.complain(TORQUE_COMMAND, reason)
+
+    def _brake(self, message: object) -> None:
+        self._plant.receive_brake(bool(message.data))  # type: ignore[attr-defined]
+
+    def _reset(self, _: object, response: object) -> object:
+        refusal = self._watchdog.reset()
+        response.success = refusal is None  # type: ignore[attr-defined]
+        response.message = refusal or "running"  # type: ignore[attr-defined]
+        return response

@@ -1,0 +1,141 @@
+"""The simulated test-bed as its surroundings see it: it is observed, then it advances."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from cspm_msgs_py.diagnostics import Level, Status
+from cspm_msgs_py.errors import DivergenceError
+from cspm_msgs_py.schedule import CLOCK
+from cspm_sim.any_plant import AnyPlant
+from cspm_sim.sensors import SensorModel
+from cspm_sim.truth import Quantity, Truth
+
+Array = NDArray[np.float64]
+# Takes log time [ns], stamp [ns] and row; the row may change after the call.
+Publish = Callable[[int, int, Array], None]
+
+NO_ROW = np.zeros(0)
+
+
+class _Tap(NamedTuple):
+    """A true quantity, its sensor if it has one, and where truth and measurement are published."""
+
+    quantity: Quantity
+    publish_truth: Publish | None
+    sensor: SensorModel | None
+    publish_measured: Publish | None
+
+
+class Simulator:
+    """A plant with its sensors.
+
+    Attributes:
+        torque: motor torques (n,) [N·m] that the plant holds.
+        measured: the latest row of each sensor, by topic.
+        slack: whether any cable is slack in the state last observed.
+    """
+
+    def __init__(
+        self,
+        plant: AnyPlant,
+        sensors: Mapping[str, SensorModel],
+        publish: Mapping[str, Publish],
+        *,
+        period_ns: int,
+        controlled: bool,
+    ) -> None:
+        """Take the parts.
+
+        Args:
+            plant: the machine.
+            sensors: by topic.
+            publish: where messages go, by topic; topics that are absent are not sent.
+            period_ns: the plant's [ns].
+            controlled: whether a closed loop is to keep the bar upright.
+        """
+        self.plant = plant
+        self._period_ns = period_ns
+        self._controlled = controlled
+        cables = plant.testbed.cables
+        # Where there is no cable nothing is slack.
+        self._slack_limit = np.array([0.0 if cable.has_cable else -1.0 for cable in cables])
+        # Before anything is commanded the winches hold what hangs on them.
+        radii = np.array([cable.drum_radius / cable.gear_ratio for cable in cables])
+        self.torque: Array = radii * plant.tensions
+        self._clock = publish.get(CLOCK)
+        self._truth = Truth(plant)
+        self._taps = [
+            _Tap(q, publish.get("/truth" + q.topic), sensors.get(q.topic), publish.get(q.topic))
+            for q in self._truth.quantities
+        ]
+        self.measured: dict[str, Array] = {}
+        self.slack = False
+        self._slack_steps = self._steps = 0
+        self._last_taut = 0.0
+
+    @property
+    def now_ns(self) -> int:
+        """The present instant [ns]."""
+        return self.plant.steps * self._period_ns
+
+    def observe(self) -> None:
+        """Publish the clock, the truth, and what the sensors make of it."""
+        now, step = self.now_ns, self.plant.steps
+        if self._clock is not None:
+            self._clock(now, now, NO_ROW)
+        self._truth.update(self.torque)
+        for quantity, publish_truth, sensor, publish_measured in self._taps:
+            if publish_truth is not None:
+                publish_truth(now, now, quantity.row)
+            arrival = sensor.observe(step, now, quantity.values) if sensor else None
+            if arrival is not None:
+                stamp, measured = arrival
+                self.measured[quantity.topic] = measured
+                if publish_measured is not None:
+                    publish_measured(now, stamp, measured)
+        self.slack = bool((self.plant.tensions <= self._slack_limit).any())
+        self._slack_steps += self.slack
+        self._steps += 1
+        if not self.slack:
+            self._last_taut = now * 1e-9
+
+    def advance(self) -> None:
+        """Move the plant by one period with `torque` held.
+
+        Raises:
+            DivergenceError: the plant left the range of its equations, or the bar that is to be
+                controlled has turned over.
+        """
+        plant = self.plant
+        plant.step(self.torque)
+        if self._controlled and abs(plant.bar_state[3]) > np.pi:
+            raise DivergenceError(
+                f"t = {plant.time:.3f} s: bar roll {plant.bar_state[3]:.3f} rad passed ±π, the bar"
+                " has turned over"
+            )
+
+    def status(self) -> Status:
+        """Return the share of steps with a slack cable since the last call."""
+        share = self._slack_steps / max(1, self._steps)
+        self._slack_steps = self._steps = 0
+        level = Level.WARN if share else Level.OK
+        values = {"slack_share": f"{share:.3f}"}
+        return Status(level, "plant", "slack cable" if share else "ok", values)
+
+    def history(self) -> list[str]:
+        """Return what preceded the present instant, in words, for the report of a divergence."""
+        plant = self.plant
+        names = plant.testbed.cable_names
+        slack = [n for n, t in zip(names, plant.tensions, strict=True) if t <= 0.0]
+        events = []
+        if self.slack:
+            events.append(f"slack since {self._last_taut:.3f} s ({', '.join(slack) or 'none now'})")
+        if plant.testbed.bar:
+            pose = ", ".join(f"{value:.3g}" for value in plant.bar_state[:6])
+            events.append(f"bar at [{pose}] (m, rad)")
+        return events

@@ -1,0 +1,116 @@
+"""The plant's own guard: what its drives do when nobody commands them any more."""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+from cspm_msgs_py.diagnostics import Level, Status
+from cspm_msgs_py.latch import Latch
+from cspm_msgs_py.scenario import Scenario
+from cspm_msgs_py.schedule import PLANT, TORQUE_COMMAND
+from cspm_sim.any_plant import AnyPlant
+from cspm_sim.safe_state import SafeState, Winches, make_safe_state
+
+Array = NDArray[np.float64]
+
+_SILENCE, _COMMAND = "silence", "command"
+
+
+class Watchdog:
+    """Brings the drives into the safe state when torque commands end or cannot be right.
+
+    It waits for a first command, and stays in the safe state until `reset`. It also keeps the
+    brakes, which are set by it or by command.
+    """
+
+    name = f"{PLANT}/watchdog"
+
+    def __init__(self, plant: AnyPlant, safe_state: SafeState, patience: float) -> None:
+        """Take the plant, where to go, and how long to wait for a command [s]."""
+        self._plant = plant
+        self._safe_state = safe_state
+        self._patience_ns = round(patience * 1e9)
+        self._latch = Latch()
+        self._commanded_ns: int | None = None
+        self._entered = False
+        self._brake_wanted = plant.locked
+
+    @property
+    def safe(self) -> bool:
+        """Whether the drives are in their safe state."""
+        return self._latch.open
+
+    def command(self, now_ns: int, torque: Array) -> None:
+        """Take note of a torque command (n,) [N·m] that came now."""
+        self._commanded_ns = now_ns
+        self._latch.stand(now_ns, _COMMAND, self._fault(torque))
+
+    def brake(self, wanted: bool) -> None:
+        """Set the plant's brakes, or release them as far as the safe state does not need them."""
+        self._brake_wanted = wanted
+        self._set_brakes()
+
+    def torque(self, now_ns: int) -> Array | None:
+        """Return the safe state's torques (n,) [N·m]; None while commands are to be followed.
+
+        To be called in every period, on the clock of `command`.
+        """
+        if self._commanded_ns is None:
+            return None
+        self._latch.stand(now_ns, _SILENCE, self._silence(now_ns, self._commanded_ns))
+        if not self._latch.open:
+            return None
+        if not self._entered:
+            self._entered = True
+            self._safe_state.begin(self._plant.tensions.copy())
+            self._set_brakes()
+        winches = Winches(self._plant.angles, self._plant.speeds)
+        return self._safe_state.torque(now_ns, winches)
+
+    def reset(self) -> str | None:
+        """Follow commands again; return why not in one line while a reason lasts."""
+        refusal = self._latch.release()
+        if refusal is None:
+            self._entered = False
+            self._set_brakes()
+        return refusal
+
+    def status(self) -> Status:
+        """Return that all is well, or the safe state with its reason."""
+        waits = self._commanded_ns is None
+        message = "waits for the first torque command" if waits else "ok"
+        return self._latch.status(self._safe_state.name, Status(Level.OK, self.name, message, {}))
+
+    def _set_brakes(self) -> None:
+        self._plant.locked = self._brake_wanted or (self._entered and self._safe_state.brake)
+
+    def _silence(self, now_ns: int, commanded_ns: int) -> str | None:
+        silent = now_ns - commanded_ns
+        if silent < 0:
+            before, now = commanded_ns * 1e-9, now_ns * 1e-9
+            return f"clock went back from {before:.3f} s to {now:.3f} s"
+        if silent <= self._patience_ns:
+            return None
+        old, allowed = -(-silent // 1_000_000), self._patience_ns * 1e-6
+        return f"no {TORQUE_COMMAND} for {old} ms, allowed: {allowed:g} ms"
+
+    def _fault(self, torque: Array) -> str | None:
+        names = self._plant.testbed.cable_names
+        if torque.shape != (len(names),):
+            return f"{TORQUE_COMMAND}: a row of shape {torque.shape}, allowed: ({len(names)},)"
+        good = np.isfinite(torque)
+        if good.all():
+            return None
+        i = int(np.argmin(good))
+        return f"{TORQUE_COMMAND}: {torque[i]} N·m of {names[i]}, allowed: finite numbers"
+
+
+def make_watchdog(scenario: Scenario, plant: AnyPlant) -> Watchdog:
+    """Return the watchdog of a scenario's plant.
+
+    Raises:
+        InputError: it is to hold the bar where the bar cannot hang.
+    """
+    state = make_safe_state(scenario, plant.testbed)
+    return Watchdog(plant, state, scenario.safety.watchdog)

@@ -1,0 +1,1 @@
+"""From recordings to a model: bring recordings in, compare them, identify parameters."""

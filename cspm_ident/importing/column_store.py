@@ -1,0 +1,52 @@
+"""Columns of any length kept on disk while an import works on them, so that memory is bounded."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from tempfile import TemporaryDirectory
+from types import TracebackType
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+from typing_extensions import Self
+
+Array = NDArray[Any]
+
+
+class ColumnStore:
+    """Arrays that grow by pieces and are read back as if they were in memory.
+
+    Leaving the context removes what was stored.
+    """
+
+    def __init__(self) -> None:
+        """Create an empty temporary folder."""
+        self._folder = TemporaryDirectory(prefix="cspm-import-")
+        self._kinds: dict[str, np.dtype[Any]] = {}
+        self._paths: dict[str, Path] = {}
+
+    def append(self, name: str, piece: Array) -> None:
+        """Add a piece, shape (n,), to the column of that name."""
+        if name not in self._paths:
+            self._paths[name] = Path(self._folder.name) / f"{len(self._paths)}.bin"
+            self._kinds[name] = piece.dtype
+        with self._paths[name].open("ab") as file:
+            file.write(np.ascontiguousarray(piece, dtype=self._kinds[name]).data)
+
+    def column(self, name: str) -> Array:
+        """Return a column, shape (n,), read from disk as it is used; empty if nothing was added."""
+        if name not in self._paths or not self._paths[name].stat().st_size:
+            return np.zeros(0, dtype=self._kinds.get(name, np.dtype(np.float64)))
+        return np.memmap(self._paths[name], dtype=self._kinds[name], mode="r")
+
+    def __enter__(self) -> Self:
+        return self
+
+    def __exit__(
+        self,
+        kind: type[BaseException] | None,
+        error: BaseException | None,
+        trace: TracebackType | None,
+    ) -> None:
+        self._folder.cleanup()

@@ -1,0 +1,172 @@
+"""A mapping laid against a test-bed and a file: what is to be read, and what becomes of it."""
+
+from __future__ import annotations
+
+from collections.abc import Collection
+from dataclasses import dataclass, replace
+
+from cspm_ident.importing.conversion import Conversion, conversion_of
+from cspm_ident.importing.mapping import ChannelSource, Clock, MappingFile
+from cspm_ident.importing.sources.source import Source
+from cspm_ident.importing.units import field_quantity
+from cspm_msgs_py.errors import InputError
+from cspm_msgs_py.message import PARTS
+from cspm_msgs_py.testbed import Testbed
+from cspm_msgs_py.topics import POSE, Topic
+
+ANGLES = ("roll", "pitch", "yaw")
+_QUATERNION = POSE[3:]
+_JOINTS = "sensor_msgs/msg/JointState"
+
+
+@dataclass(frozen=True)
+class PlannedField:
+    """One number of a message.
+
+    Attributes:
+        name: the field; of a pose also `roll`, `pitch`, `yaw`.
+        column: where it comes from, None for a constant.
+        constant: its value in SI, None for a column.
+        conversion: from raw to SI; None for a constant.
+        clock: name of the clock, empty for a constant.
+        stamps: column of the stamps; None with a rate.
+    """
+
+    name: str
+    column: str | None
+    constant: float | None = None
+    conversion: Conversion | None = None
+    clock: str = ""
+    stamps: str | None = None
+
+
+@dataclass(frozen=True)
+class PlannedTopic:
+    """One topic: as it will be recorded, and its fields in the order of the mapping."""
+
+    topic: Topic
+    fields: tuple[PlannedField, ...]
+
+
+@dataclass(frozen=True)
+class Plan:
+    """All topics, and the clocks by name."""
+
+    topics: tuple[PlannedTopic, ...]
+    clocks: dict[str, Clock]
+
+    @property
+    def numbers(self) -> list[str]:
+        """Columns with numbers, each once."""
+        found = [f.column for t in self.topics for f in t.fields if f.column is not None]
+        return list(dict.fromkeys(found))
+
+    @property
+    def times(self) -> list[str]:
+        """Columns with stamps, each once."""
+        found = [f.stamps for t in self.topics for f in t.fields if f.stamps is not None]
+        return list(dict.fromkeys(found))
+
+
+def plan_import(mapping: MappingFile, testbed: Testbed, source: Source) -> Plan:
+    """Return what an import will do.
+
+    Raises:
+        InputError: a topic or field that the test-bed has not, a message with numbers missing, a
+            unit that does not fit, or a clock that the file cannot have.
+    """
+    where = str(mapping.path)
+    clocks = dict(mapping.mapping.clocks)
+    if not clocks:
+        if not source.stamped:
+            raise InputError(f"{where}: clocks: missing, allowed: at least one with column or rate")
+        clocks["header"] = Clock(stamp="header")
+    possible = importable(testbed)
+    planned = []
+    for name, fields in mapping.mapping.channels.items():
+        if name not in possible:
+            raise InputError(
+                f"{where}: channels.{name}: no topic of test-bed {testbed.name} that can be"
+                f" imported, allowed: {', '.join(possible)}"
+            )
+        key = f"{where}: channels.{name}"
+        topic = _topic_with(possible[name], list(fields), key)
+        planned.append(
+            PlannedTopic(
+                topic,
+                tuple(
+                    _field(topic, field, fields[field], clocks, source, f"{key}.{field}")
+                    for field in fields
+                ),
+            )
+        )
+        if all(field.column is None for field in planned[-1].fields):
+            raise InputError(f"{key}: constants only, allowed: at least one column")
+    return Plan(tuple(planned), clocks)
+
+
+def importable(testbed: Testbed) -> dict[str, Topic]:
+    """Return the topics with numbers that somebody can have measured or commanded."""
+    return {
+        name: topic
+        for name, topic in testbed.topics.items()
+        if topic.fields and not name.startswith("/truth/")
+    }
+
+
+def _topic_with(topic: Topic, given: Collection[str], where: str) -> Topic:
+    """Return the topic with the parts that are given.
+
+    Raises:
+        InputError: a field is unknown, or one of a message that comes whole is missing.
+    """
+    wanted: tuple[str, ...] = topic.fields
+    if topic.ros_type == _JOINTS:
+        parts = tuple(p for p in topic.parts if any(f.startswith(f"{p}/") for f in given))
+        _check_known(given, topic.fields, where)
+        wanted = tuple(f"{part}/{joint}" for part in parts for joint in topic.joint_names)
+        topic = replace(topic, fields=wanted, parts=tuple(p for p in PARTS if p in parts))
+    elif "qw" in topic.fields:
+        angles = any(name in given for name in ANGLES)
+        euler = tuple(f for f in topic.fields if f not in _QUATERNION) + ANGLES
+        _check_known(given, {*topic.fields, *ANGLES}, where)
+        if angles and any(name in given for name in _QUATERNION):
+            raise InputError(f"{where}: angles and quaternion, allowed: one of both")
+        wanted = euler if angles else topic.fields
+    else:
+        _check_known(given, topic.fields, where)
+    missing = [field for field in wanted if field not in given]
+    if missing:
+        raise InputError(
+            f"{where}: without {', '.join(missing)}, allowed: all of {', '.join(wanted)};"
+            " `constant` gives what is known without a sensor"
+        )
+    return topic
+
+
+def _check_known(given: Collection[str], known: Collection[str], where: str) -> None:
+    for field in given:
+        if field not in known:
+            raise InputError(f"{where}: no field '{field}', allowed: {', '.join(sorted(known))}")
+
+
+def _field(
+    topic: Topic,
+    name: str,
+    given: ChannelSource,
+    clocks: dict[str, Clock],
+    source: Source,
+    where: str,
+) -> PlannedField:
+    if given.column is None:
+        return PlannedField(name, None, given.constant)
+    chosen = given.clock or next(iter(clocks))
+    clock = clocks[chosen]
+    if clock.stamp is not None:
+        stamps: str | None = source.stamp_column(given.column, clock.stamp)
+    elif clock.column is not None and source.stamped:
+        raise InputError(f"{where}: clock '{chosen}' has a column, allowed: stamp or rate in a bag")
+    else:
+        stamps = clock.column
+    conversion = conversion_of(given, field_quantity(topic, name), where)
+    return PlannedField(name, given.column, None, conversion, chosen, stamps)

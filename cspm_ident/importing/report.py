@@ -1,0 +1,191 @@
+"""What an import amounts to, before it is done."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping as MappingOf
+from dataclasses import asdict, dataclass
+from typing import Any
+
+import numpy as np
+
+from cspm_ident.importing.plan import PlannedTopic
+from cspm_ident.importing.relations import relation_suspicions
+from cspm_ident.importing.suspicion import Suspicion
+from cspm_ident.importing.time_base import Pace, pace_of
+from cspm_ident.importing.time_suspicions import held_suspicions, time_suspicions
+from cspm_ident.importing.topic_messages import LeftOut, TopicMessages
+from cspm_ident.importing.unwrapping import Unwrapped
+from cspm_ident.importing.value_suspicions import (
+    quaternion_suspicions,
+    resolution,
+    value_suspicions,
+)
+from cspm_msgs_py.testbed import Testbed
+from cspm_msgs_py.topics import POSE
+
+FIRST_ROWS = 5
+_SAFE_STEP = 0.25
+_HELD_SAMPLE = 100_000
+
+
+@dataclass(frozen=True)
+class FieldReport:
+    """One channel.
+
+    Attributes:
+        field: of the message.
+        source: column, or `constant`.
+        quantity: SI unit.
+        formula: the conversion.
+        raw: the first messages' raw numbers; empty for a constant.
+        converted: the same in SI.
+        low: least value [SI].
+        high: largest value [SI].
+        mean: mean value [SI].
+        deviation: standard deviation [SI].
+        resolution: step of its values [SI], None where there is none.
+        turns: how often a counter passed its end.
+    """
+
+    field: str
+    source: str
+    quantity: str
+    formula: str
+    raw: list[float]
+    converted: list[float]
+    low: float
+    high: float
+    mean: float
+    deviation: float
+    resolution: float | None
+    turns: int
+
+
+@dataclass(frozen=True)
+class TopicReport:
+    """One topic: its stamps, its channels, what became no message; first stamps from the origin."""
+
+    topic: str
+    pace: Pace
+    first_s: list[float]
+    fields: list[FieldReport]
+    left_out: LeftOut
+
+
+@dataclass(frozen=True)
+class ImportReport:
+    """All of it.
+
+    Attributes:
+        about: source, mapping and test-bed with their SHA-256.
+        kind: what the source is.
+        origin_ns: the first stamp of all; times in the report count from it [ns].
+        notes: how the source was read.
+        unused: columns of the source that the mapping leaves out.
+        topics: in the order of the mapping.
+        suspicions: what looks wrong.
+    """
+
+    about: dict[str, str]
+    kind: str
+    origin_ns: int
+    notes: list[str]
+    unused: list[str]
+    topics: list[TopicReport]
+    suspicions: list[Suspicion]
+
+    def data(self) -> dict[str, Any]:
+        """Return it as plain data; numbers that do not exist are None."""
+        plain: dict[str, Any] = _plain(asdict(self))
+        return plain
+
+
+def _plain(node: Any) -> Any:  # noqa: ANN401 - any nested data
+    if isinstance(node, dict):
+        return {key: _plain(inner) for key, inner in node.items()}
+    if isinstance(node, list | tuple):
+        return [_plain(inner) for inner in node]
+    if isinstance(node, np.generic):
+        node = node.item()
+    return None if isinstance(node, float) and not math.isfinite(node) else node
+
+
+def topic_report(
+    planned: PlannedTopic,
+    messages: TopicMessages,
+    raw: MappingOf[str, Any],
+    unwrapped: MappingOf[str, Unwrapped],
+    origin_ns: int,
+) -> TopicReport:
+    """Return what becomes of a topic.
+
+    Args:
+        planned: the topic.
+        messages: its messages.
+        raw: columns as they were read, by name.
+        unwrapped: what unwrapping found, by field.
+        origin_ns: times count from it [ns].
+    """
+    fields = []
+    for field in planned.fields:
+        values = messages.values(field.name)
+        places = messages.places[field.name]
+        first = [] if places is None else raw[field.column or ""][places[:FIRST_ROWS]].tolist()
+        known = values[~np.isnan(values)]
+        some = known if len(known) else np.full(1, np.nan)
+        fields.append(
+            FieldReport(
+                field=field.name,
+                source=field.column or "constant",
+                quantity=field.conversion.quantity if field.conversion else "",
+                formula=field.conversion.formula if field.conversion else f"{field.constant:g}",
+                raw=first,
+                converted=values[:FIRST_ROWS].tolist(),
+                low=float(some.min()),
+                high=float(some.max()),
+                mean=float(some.mean()),
+                deviation=float(some.std()),
+                resolution=resolution(values) if field.conversion else None,
+                turns=unwrapped[field.name].turns if field.name in unwrapped else 0,
+            )
+        )
+    stamps = messages.stamp_ns
+    first_s = ((stamps[:FIRST_ROWS] - origin_ns) * 1e-9).tolist()
+    pace = pace_of(stamps, origin_ns)
+    return TopicReport(planned.topic.name, pace, first_s, fields, messages.left_out)
+
+
+def suspicions_of(
+    planned: tuple[PlannedTopic, ...],
+    messages: MappingOf[str, TopicMessages],
+    unwrapped: MappingOf[str, MappingOf[str, Unwrapped]],
+    testbed: Testbed,
+) -> list[Suspicion]:
+    """Return all that looks wrong."""
+    found: list[Suspicion] = []
+    for one in planned:
+        name = one.topic.name
+        mine = messages[name]
+        sensor = testbed.sensors.get(name)
+        pace = pace_of(mine.stamp_ns, int(mine.stamp_ns[0]))
+        found += time_suspicions(name, pace, sensor.rate if sensor else None)
+        head = mine.rows(slice(_HELD_SAMPLE))
+        found += held_suspicions(name, head)
+        if "qw" in one.topic.fields:
+            found += quaternion_suspicions(name, head[:, POSE.index("qx") : POSE.index("qw") + 1])
+        for field in one.fields:
+            if field.conversion is None:
+                continue
+            values = mine.values(field.name)
+            quantity = field.conversion.quantity
+            found += value_suspicions(one.topic, field.name, quantity, values, testbed)
+            found += _unwrap_suspicions(f"{name} {field.name}", unwrapped[name].get(field.name))
+    return found + relation_suspicions(messages, testbed)
+
+
+def _unwrap_suspicions(where: str, found: Unwrapped | None) -> list[Suspicion]:
+    if found is None or found.largest_step <= _SAFE_STEP:
+        return []
+    text = f"a step of {found.largest_step:.2f} of the counter's range: which way round is a guess"
+    return [Suspicion(where, "wrap", text, {"step": found.largest_step})]

@@ -1,0 +1,1 @@
+"""Files that numbers come from: text tables, MATLAB files, bags."""

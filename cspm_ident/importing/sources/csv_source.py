@@ -1,0 +1,232 @@
+"""A text table, read in pieces."""
+
+from __future__ import annotations
+
+import csv
+import re
+from collections.abc import Collection, Iterator
+from pathlib import Path
+from typing import Any, TextIO
+
+import numpy as np
+from numpy.typing import NDArray
+
+from cspm_ident.importing.column_store import ColumnStore
+from cspm_ident.importing.mapping import CsvFormat
+from cspm_ident.importing.sources.source import Progress, check_columns
+from cspm_msgs_py.errors import InputError
+
+PIECE = 1 << 23  # characters read at once
+_DELIMITERS = (",", ";", "\t", "|")
+_TIME_CELL = 40  # characters
+Lines = list[str]
+Table = NDArray[Any]
+
+
+class CsvSource:
+    """A text table with a column per quantity; see `Source`."""
+
+    kind = "text table"
+    stamped = False
+
+    def __init__(self, path: Path, form: CsvFormat, mapping_path: str) -> None:
+        """Read the names of the columns.
+
+        Raises:
+            InputError: the file has no such line, or is no text in this encoding.
+        """
+        self.path, self._form = path, form
+        self.notes: list[str] = []
+        self._first = form.first_line or form.names_line + 1
+        with self._open() as file:
+            lines = _first_lines(file, self._first, path)
+        head = lines[form.names_line - 1] if form.names_line else lines[-1]
+        head = head.removeprefix(form.comment)
+        self._delimiter = self._find_delimiter(head)
+        if form.decimal == "," and self._delimiter == ",":
+            raise InputError(f"{mapping_path}: csv.delimiter: ',' is the decimal mark as well")
+        cells = [cell.strip() for cell in self._cells(head)]
+        self._width = len(cells)
+        self.columns = tuple(cells if form.names_line else (str(i + 1) for i in range(len(cells))))
+
+    def stamp_column(self, column: str, stamp: str) -> str:
+        """Refuse: rows of a table have no stamps of their own."""
+        raise InputError(f"{self.path}: stamp {stamp}, allowed: with bags; here column or rate")
+
+    def close(self) -> None:
+        """Do nothing: no file is open between calls."""
+
+    def read(
+        self,
+        numbers: Collection[str],
+        times: Collection[str],
+        store: ColumnStore,
+        progress: Progress,
+    ) -> None:
+        """Store columns; see `Source`."""
+        wanted = check_columns(numbers, times, self.columns, self.path)
+        places = {self.columns.index(name): name for name in wanted}
+        exact = {place for place, name in places.items() if name in times}
+        total, done = self.path.stat().st_size, 0
+        with self._open() as file:
+            for line, lines in self._pieces(file):
+                table = self._parse(lines, line, sorted(places), exact)
+                for place, name in places.items():
+                    piece = table[str(place)]
+                    if place in exact:
+                        piece = self._times(piece, line, name)
+                    store.append(name, piece)
+                done += sum(map(len, lines))
+                progress(min(done / total, 1.0))
+
+    def _open(self) -> TextIO:
+        encoding = self._form.encoding
+        # Spreadsheets put a mark before their text, which is no part of the first name.
+        encoding = "utf-8-sig" if encoding.lower() in ("utf-8", "utf8") else encoding
+        return self.path.open(encoding=encoding, errors="strict", newline=None)
+
+    def _find_delimiter(self, head: str) -> str | None:
+        if self._form.delimiter is not None:
+            return None if self._form.delimiter == "blank" else self._form.delimiter
+        found = max(_DELIMITERS, key=head.count)
+        if head.count(found) == 0:
+            blank = len(head.split()) > 1
+            self.notes.append(f"cells are separated by {'blanks' if blank else 'nothing'}")
+            return None if blank else ","
+        self.notes.append(f"cells are separated by {found!r}, by its first line")
+        return found
+
+    def _cells(self, line: str) -> list[str]:
+        if self._delimiter is None:
+            return line.split()
+        return next(csv.reader([line.rstrip("\n")], delimiter=self._delimiter), [])
+
+    def _pieces(self, file: TextIO) -> Iterator[tuple[int, Lines]]:
+        """Yield lines of numbers in pieces, each with the number of its first line."""
+        line = 1
+        try:
+            for _ in range(self._first - 1):
+                file.readline()
+                line += 1
+            while lines := file.readlines(PIECE):
+                following = line + len(lines)
+                if not lines[-1].endswith("\n") and len(self._cells(lines[-1])) < self._width:
+                    self.notes.append(f"line {following - 1}, the last, is cut short and left out")
+                    lines.pop()
+                if lines:
+                    yield line, lines
+                line = following
+        except UnicodeDecodeError as err:
+            raise InputError(_undecodable(self.path, err)) from None
+
+    def _parse(self, lines: Lines, line: int, places: list[int], exact: set[int]) -> Table:
+        kind = np.dtype([(str(p), f"U{_TIME_CELL}" if p in exact else "f8") for p in places])
+        text = lines
+        if self._form.decimal == ",":
+            text = [row.replace(",", ".") for row in text]
+        try:
+            table = self._load(text, kind, places)
+        except ValueError:
+            text = [self._filled(row) for row in text]
+            table = self._load_or_blame(text, kind, places, line, exact)
+        # An open quote swallows lines in silence.
+        if any('"' in row for row in lines):
+            rows = sum(not self._is_void(row) for row in lines)
+            if rows != len(table):
+                raise InputError(self._quoted(line, lines))
+        return table
+
+    def _load_or_blame(
+        self, text: Lines, kind: np.dtype[Any], places: list[int], line: int, exact: set[int]
+    ) -> Table:
+        try:
+            return self._load(text, kind, places)
+        except ValueError:
+            self._blame(text, line, places, exact)
+        raise InputError(self._quoted(line, text))
+
+    def _quoted(self, line: int, lines: Lines) -> str:
+        first = next((i for i, row in enumerate(lines) if row.count('"') % 2), 0)
+        return f"{self.path}: line {line + first}: a quote is left open, allowed: one line per row"
+
+    def _load(self, lines: Lines, kind: np.dtype[Any], places: list[int]) -> Table:
+        if all(self._is_void(row) for row in lines):
+            return np.zeros(0, dtype=kind)
+        return np.loadtxt(
+            lines,
+            dtype=kind,
+            delimiter=self._delimiter,
+            usecols=places,
+            comments=self._form.comment or None,
+            quotechar='"',
+            ndmin=1,
+        )
+
+    def _content(self, row: str) -> str:
+        return row.split(self._form.comment)[0] if self._form.comment else row
+
+    def _is_void(self, row: str) -> bool:
+        return not self._content(row).strip()
+
+    def _filled(self, row: str) -> str:
+        """Return a line with `nan` where there is no number."""
+        if self._delimiter is None or not row.strip():
+            return row
+        mark = re.escape(self._delimiter)
+        words = "|".join(map(re.escape, self._form.missing))
+        empty = rf"(?:[^\S{mark}\n]*(?:{words})?[^\S{mark}\n]*)"
+        return re.sub(rf"(^|(?<={mark})){empty}(?={mark}|\n|$)", "nan", row)
+
+    def _blame(self, lines: Lines, line: int, places: list[int], exact: set[int]) -> None:
+        """Refuse the first cell of these lines that is no number."""
+        for number, row in enumerate(lines, start=line):
+            if self._is_void(row):
+                continue
+            cells = self._cells(self._content(row))
+            for place in places:
+                where = f"{self.path}: line {number}, column '{self.columns[place]}'"
+                if place >= len(cells):
+                    raise InputError(f"{where}: only {len(cells)} cells, allowed: {self._width}")
+                if place not in exact and not _is_number(cells[place]):
+                    raise InputError(
+                        f"{where}: '{cells[place].strip()}', allowed: a number, nothing, or a text"
+                        " named in csv.missing"
+                    )
+
+    def _times(self, cells: NDArray[np.str_], line: int, name: str) -> NDArray[Any]:
+        """Return a column of times as longdouble; dates in ns since 1970."""
+        try:
+            return cells.astype(np.longdouble)
+        except ValueError:
+            pass
+        try:
+            dates = np.char.rstrip(np.char.strip(cells), "Z").astype("datetime64[ns]")
+        except ValueError:
+            bad = next(cell for cell in cells if not _is_number(cell))
+            raise InputError(
+                f"{self.path}: column '{name}' from line {line}: '{bad}', allowed: a number, or a"
+                " date and time as 2026-01-31T12:00:00.125"
+            ) from None
+        return np.where(np.isnat(dates), np.longdouble("nan"), dates.astype(np.int64))
+
+
+def _first_lines(file: TextIO, count: int, path: Path) -> Lines:
+    try:
+        lines = [line for line in (file.readline() for _ in range(count)) if line]
+    except UnicodeDecodeError as err:
+        raise InputError(_undecodable(path, err)) from None
+    if len(lines) < count:
+        raise InputError(f"{path}: {len(lines)} lines, allowed: numbers from line {count} on")
+    return lines
+
+
+def _undecodable(path: Path, err: UnicodeDecodeError) -> str:
+    return f"{path}: no {err.encoding} text ({err.reason}), allowed: as csv.encoding says"
+
+
+def _is_number(text: str) -> bool:
+    try:
+        float(text)
+    except ValueError:
+        return False
+    return True

@@ -1,0 +1,82 @@
+"""What an import needs of a file, whatever its kind."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Collection
+from pathlib import Path
+from typing import Protocol
+
+from cspm_ident.importing.column_store import ColumnStore
+from cspm_msgs_py.errors import InputError
+
+Progress = Callable[[float], None]
+"""Takes the share of the work done, 0 to 1."""
+
+
+class Source(Protocol):
+    """A file with named columns.
+
+    Attributes:
+        path: the file or folder.
+        kind: what it is, for people.
+        columns: names of its columns, as far as the file tells without being read.
+        notes: what a person should know about how it was read.
+        stamped: whether its rows are messages that bring their own stamps.
+    """
+
+    path: Path
+    kind: str
+    columns: tuple[str, ...]
+    notes: list[str]
+    stamped: bool
+
+    def stamp_column(self, column: str, stamp: str) -> str:
+        """Return the name of the column with the stamps, `header` or `log`, of another's rows."""
+
+    def read(
+        self,
+        numbers: Collection[str],
+        times: Collection[str],
+        store: ColumnStore,
+        progress: Progress,
+    ) -> None:
+        """Put columns into a store under their names.
+
+        Args:
+            numbers: columns to be stored as float64.
+            times: columns to be stored with every digit, as longdouble.
+            store: gets them.
+            progress: told the share that was read.
+
+        Raises:
+            InputError: a column is missing or holds other than numbers, or the file is damaged.
+        """
+
+    def close(self) -> None:
+        """Let go of the file."""
+
+
+def check_columns(
+    numbers: Collection[str],
+    times: Collection[str],
+    columns: Collection[str],
+    path: Path,
+    shown: int = 40,
+) -> list[str]:
+    """Return the wanted columns, each once.
+
+    Raises:
+        InputError: the file has one of them not, or twice, or it is wanted as number and as time.
+    """
+    names = [*columns]
+    for name in (wanted := list(dict.fromkeys([*numbers, *times]))):
+        if name not in names:
+            more = f" and {len(names) - shown} more" if len(names) > shown else ""
+            raise InputError(
+                f"{path}: no column '{name}', allowed: {', '.join(names[:shown])}{more}"
+            )
+        if names.count(name) > 1:
+            raise InputError(f"{path}: column '{name}' stands twice, allowed: each name once")
+        if name in numbers and name in times:
+            raise InputError(f"{path}: column '{name}' is clock and channel, allowed: one of both")
+    return wanted

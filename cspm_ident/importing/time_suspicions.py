@@ -1,0 +1,113 @@
+"""What looks wrong in the stamps of a topic."""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+from cspm_ident.importing.suspicion import Suspicion
+from cspm_ident.importing.time_base import Pace
+
+RATE_TOLERANCE = 0.01
+IRREGULAR_SHARE = 0.01
+_REGULAR = 0.8  # share of equal distances between events
+_EVENTS = 20
+
+
+def time_suspicions(topic: str, pace: Pace, sensor_rate: float | None) -> list[Suspicion]:
+    """Return what looks wrong in a topic's stamps.
+
+    Args:
+        topic: its name.
+        pace: its stamps.
+        sensor_rate: the highest rate that the test-bed's sensor delivers [Hz], if it says so.
+    """
+    found = []
+
+    def add(kind: str, text: str, **numbers: float) -> None:
+        found.append(Suspicion(topic, kind, text, numbers))
+
+    if pace.backwards:
+        add("backwards", f"time runs backwards {pace.backwards} times", count=pace.backwards)
+    if pace.duplicates:
+        add("duplicate", f"{pace.duplicates} stamps stand twice", count=pace.duplicates)
+    if pace.gaps and pace.step_s and pace.gap_at_s is not None:
+        _, median, longest = pace.step_s
+        add(
+            "gap",
+            f"{pace.gaps} gaps longer than 1.5 steps, the longest {longest:.6g} s at"
+            f" {pace.gap_at_s:.6g} s",
+            count=pace.gaps,
+            longest=longest,
+            at=pace.gap_at_s,
+        )
+    if pace.irregular > IRREGULAR_SHARE and pace.step_s:
+        low, median, _ = pace.step_s
+        add(
+            "irregular",
+            f"{pace.irregular:.1%} of the steps differ by more than 1 % from {median:.6g} s",
+            share=pace.irregular,
+            median=median,
+            shortest=low,
+        )
+    if sensor_rate and pace.rate_hz and pace.rate_hz > sensor_rate * (1 + RATE_TOLERANCE):
+        add(
+            "rate",
+            f"comes at {pace.rate_hz:.6g} Hz, the test-bed's sensor delivers {sensor_rate:g} Hz at"
+            " most",
+            found=pace.rate_hz,
+            sensor=sensor_rate,
+        )
+    return found
+
+
+def held_suspicions(topic: str, rows: NDArray[np.float64]) -> list[Suspicion]:
+    """Return whether a slower sensor was filled up, held or interpolated, to the topic's rate.
+
+    Such samples were never measured, and look like delay or damping later.
+
+    Args:
+        topic: its name.
+        rows: its numbers, shape (n, width).
+    """
+    if len(rows) < 3 * _EVENTS:
+        return []
+    steps = np.diff(rows, axis=0)
+    change = np.flatnonzero((steps != 0).any(axis=1))
+    if (every := _regular(change)) is not None and not _single_steps(steps[change]):
+        return [
+            Suspicion(
+                topic,
+                "held",
+                f"changes every {every} messages only: a slower sensor, its last value held?",
+                {"messages": float(every)},
+            )
+        ]
+    size = np.abs(rows).max(axis=0)
+    bend = np.abs(np.diff(rows, n=2, axis=0)) > 1e-9 * size
+    if (every := _regular(np.flatnonzero(bend.any(axis=1)))) is not None:
+        return [
+            Suspicion(
+                topic,
+                "interpolated",
+                f"bends every {every} messages only: a slower sensor, interpolated?",
+                {"messages": float(every)},
+            )
+        ]
+    return []
+
+
+def _single_steps(steps: NDArray[np.float64]) -> bool:
+    """Return whether all steps, shape (n, width), are alike: a coarse sensor at constant speed."""
+    sizes = np.abs(steps).max(axis=0)
+    shares = np.abs(steps[:, sizes > 0]) / sizes[sizes > 0]
+    return bool(((shares < 0.01) | (shares > 0.99)).mean() > _REGULAR)
+
+
+def _regular(events: NDArray[np.intp]) -> int | None:
+    """Return the distance between events if it is 2 or more and nearly always the same."""
+    if len(events) < _EVENTS:
+        return None
+    distances = np.diff(events)
+    usual = int(np.median(distances))
+    return usual if usual >= 2 and np.mean(distances == usual) > _REGULAR else None

@@ -1,0 +1,250 @@
+"""The messages of one topic: which samples stand together at one instant, and which are left out.
+
+No sample is moved in time and none is made: numbers of one message have the same stamp in the
+source, or there is no message.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from functools import reduce
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.spatial.transform import Rotation
+
+from cspm_ident.importing.mapping import Mapping, Segment
+from cspm_ident.importing.plan import ANGLES, PlannedTopic
+from cspm_ident.importing.time_base import Times, later_than_all_before
+from cspm_msgs_py.errors import InputError
+from cspm_msgs_py.topics import Topic
+
+Array = NDArray[np.float64]
+Index = NDArray[np.int64]
+_QUATERNION = ("qx", "qy", "qz", "qw")
+
+
+@dataclass(frozen=True)
+class Series:
+    """One column in SI with its stamps; several may share the same `times`.
+
+    Attributes:
+        values: shape (n,), on disk; a single number for a constant.
+        times: of the rows; None for a constant.
+    """
+
+    values: Array
+    times: Times | None
+
+
+@dataclass(frozen=True)
+class LeftOut:
+    """How many messages were not made, and why."""
+
+    no_time: int = 0
+    unpaired: int = 0
+    missing: int = 0
+    disorder: int = 0
+    segments: tuple[int, ...] = ()
+
+    @property
+    def total(self) -> int:
+        """Samples or messages left out in all."""
+        return self.no_time + self.unpaired + self.missing + self.disorder + sum(self.segments)
+
+
+@dataclass(frozen=True)
+class TopicMessages:
+    """The messages of a topic as stamps and places in columns.
+
+    Attributes:
+        topic: what they are.
+        stamp_ns: shape (n,).
+        series: the columns by field, in the order of the mapping.
+        places: for each field the row of each message, shape (n,); None for a constant.
+        left_out: what became no message.
+    """
+
+    topic: Topic
+    stamp_ns: Index
+    series: dict[str, Series]
+    places: dict[str, Index | None]
+    left_out: LeftOut
+
+    def values(self, field: str, chosen: slice = slice(None)) -> Array:
+        """Return a field of the chosen messages, shape (n,) [SI]."""
+        places = self.places[field]
+        if places is None:
+            return np.full(len(self.stamp_ns[chosen]), float(self.series[field].values))
+        return np.asarray(self.series[field].values[places[chosen]])
+
+    def rows(self, chosen: slice) -> Array:
+        """Return the rows of the chosen messages, shape (n, width)."""
+        columns: dict[str, Array] = {name: self.values(name, chosen) for name in self.series}
+        if "roll" in columns:
+            angles = np.stack([columns[name] for name in ANGLES[::-1]], axis=1)
+            turned = Rotation.from_euler("ZYX", angles).as_quat()
+            columns |= dict(zip(_QUATERNION, turned.T, strict=True))
+        return np.stack([columns[name] for name in self.topic.fields], axis=1)
+
+
+def gather(
+    planned: PlannedTopic,
+    series: dict[str, Series],
+    mapping: Mapping,
+    origin_ns: int,
+    where: str,
+    *,
+    trial: bool,
+) -> TopicMessages:
+    """Return the messages of a topic.
+
+    Args:
+        planned: the topic.
+        series: its columns by field.
+        mapping: what to do with what is missing, unpaired or out of order.
+        origin_ns: the instant that segments count from [ns].
+        where: names the topic in errors.
+        trial: keep what is out of order, so that it can be shown.
+
+    Raises:
+        InputError: numbers of one message never stand together, or the mapping refuses what it
+            finds.
+    """
+    stamps, places, no_time, unpaired = _paired(series, mapping, where)
+    left: dict[str, Any] = {"no_time": no_time, "unpaired": unpaired}
+    keep = np.ones(len(stamps), dtype=bool)
+    dropped = []
+    for segment in mapping.drop:
+        hit = keep & _inside(segment, planned.topic.name, stamps, origin_ns)
+        dropped.append(int(hit.sum()))
+        keep &= ~hit
+    left["segments"] = tuple(dropped)
+    keep, left["missing"] = _complete(stamps, keep, series, places, mapping, where, origin_ns)
+    keep, left["disorder"] = _in_order(stamps, keep, series, where, origin_ns, trial=trial)
+    if not keep.any():
+        raise InputError(f"{where}: no message is left, allowed: at least one")
+    places = {name: None if at is None else at[keep] for name, at in places.items()}
+    return TopicMessages(planned.topic, stamps[keep], series, places, LeftOut(**left))
+
+
+def _paired(
+    series: dict[str, Series], mapping: Mapping, where: str
+) -> tuple[Index, dict[str, Index | None], int, int]:
+    """Return stamps, places by field, and how many rows had no time or no partner."""
+    clocks: dict[int, tuple[Times, list[str]]] = {}
+    for name, one in series.items():
+        if one.times is not None:
+            clocks.setdefault(id(one.times), (one.times, []))[1].append(name)
+    groups = list(clocks.values())
+    rows = [np.flatnonzero(times.known) for times, _ in groups]
+    no_time = sum(int((~times.known).sum()) for times, _ in groups)
+    stamps = [times.stamp_ns[at] for (times, _), at in zip(groups, rows, strict=True)]
+    unpaired = 0
+    common = stamps[0]
+    if any(not np.array_equal(common, other) for other in stamps[1:]):
+        common = reduce(np.intersect1d, stamps)
+        unpaired = sum(len(own) - len(common) for own in stamps)
+        _check_pairs(groups, stamps, common, mapping, where)
+        rows = [_at(own, at, common) for own, at in zip(stamps, rows, strict=True)]
+    places: dict[str, Index | None] = dict.fromkeys(series)
+    for (_, names), at in zip(groups, rows, strict=True):
+        places |= dict.fromkeys(names, at)
+    return common, places, no_time, unpaired
+
+
+def _at(own: Index, rows: Index, common: Index) -> Index:
+    """Return for each common stamp the first row that has it."""
+    unique, first = np.unique(own, return_index=True)
+    return rows[first[np.searchsorted(unique, common)]]
+
+
+def _check_pairs(
+    groups: Sequence[tuple[Times, list[str]]],
+    stamps: Sequence[Index],
+    common: Index,
+    mapping: Mapping,
+    where: str,
+) -> None:
+    told = " and ".join(
+        f"{', '.join(names)} ({len(own)})" for (_, names), own in zip(groups, stamps, strict=True)
+    )
+    if len(common) and mapping.unpaired == "drop":
+        return
+    allowed = "numbers of one message from one instant; map what was measured at other instants"
+    if len(common):
+        allowed += " to another topic or leave it out, or unpaired: drop"
+    raise InputError(
+        f"{where}: {told} have {len(common)} stamps in common and nothing is interpolated, allowed:"
+        f" {allowed}{'' if len(common) else ' to another topic or leave it out'}"
+    )
+
+
+def _inside(segment: Segment, topic: str, stamps: Index, origin_ns: int) -> NDArray[np.bool_]:
+    if segment.topics and topic not in segment.topics:
+        return np.zeros(len(stamps), dtype=bool)
+    since = (stamps - origin_ns) * 1e-9
+    return np.asarray((since >= segment.start) & (since <= segment.end))
+
+
+def _complete(
+    stamps: Index,
+    keep: NDArray[np.bool_],
+    series: dict[str, Series],
+    places: dict[str, Index | None],
+    mapping: Mapping,
+    where: str,
+    origin_ns: int,
+) -> tuple[NDArray[np.bool_], int]:
+    """Return what to keep, and how many messages went because a number is missing."""
+    absent = keep & _absent(series, places, len(stamps))
+    count = int(absent.sum())
+    if mapping.nan == "keep" or not count:
+        return keep, 0
+    if mapping.nan == "refuse":
+        at = (int(stamps[absent][0]) - origin_ns) * 1e-9
+        raise InputError(
+            f"{where}: {count} messages with a number missing, the first at {at:.9g} s, allowed:"
+            " none, with nan: refuse"
+        )
+    return keep & ~absent, count
+
+
+def _absent(
+    series: dict[str, Series], places: dict[str, Index | None], count: int
+) -> NDArray[np.bool_]:
+    absent = np.zeros(count, dtype=bool)
+    for name, at in places.items():
+        if at is not None:
+            absent |= np.isnan(series[name].values[at])
+    return absent
+
+
+def _in_order(
+    stamps: Index,
+    keep: NDArray[np.bool_],
+    series: dict[str, Series],
+    where: str,
+    origin_ns: int,
+    *,
+    trial: bool,
+) -> tuple[NDArray[np.bool_], int]:
+    """Return what to keep, and how many messages went because their stamps are out of order."""
+    chosen = np.flatnonzero(keep)
+    late = chosen[~later_than_all_before(stamps[chosen])]
+    policies = {one.times.disorder for one in series.values() if one.times is not None}
+    if not len(late) or policies == {"keep"}:
+        return keep, 0
+    if "refuse" in policies:
+        if trial:
+            return keep, 0
+        at = (int(stamps[late[0]]) - origin_ns) * 1e-9
+        raise InputError(
+            f"{where}: {len(late)} stamps not later than one before, the first at {at:.9g} s,"
+            " allowed: rising stamps, or disorder: drop or keep in its clock"
+        )
+    keep = keep.copy()
+    keep[late] = False
+    return keep, len(late)

@@ -1,0 +1,99 @@
+"""Units that recordings come in, each with its quantity and its factor to SI."""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+
+from cspm_msgs_py.errors import InputError
+from cspm_msgs_py.topics import Topic
+
+COUNTS = "counts"
+ISO_TIME = "iso8601"
+_TURN = 2.0 * np.pi
+_DEGREE = np.pi / 180.0
+_POUND = 0.45359237
+_G = 9.80665
+_INCH = 0.0254
+
+_FACTORS: dict[str, dict[str, float]] = {
+    "rad": {"rad": 1.0, "mrad": 1e-3, "deg": _DEGREE, "turn": _TURN, "rev": _TURN},
+    "rad/s": {"rad/s": 1.0, "deg/s": _DEGREE, "rpm": _TURN / 60.0, "rev/s": _TURN},
+    "rad/s²": {"rad/s^2": 1.0, "deg/s^2": _DEGREE},
+    "m": {"m": 1.0, "cm": 1e-2, "mm": 1e-3, "um": 1e-6, "in": _INCH, "ft": 12 * _INCH},
+    "m/s": {"m/s": 1.0, "cm/s": 1e-2, "mm/s": 1e-3, "m/min": 1.0 / 60.0},
+    "m/s²": {"m/s^2": 1.0, "mm/s^2": 1e-3, "g": _G},
+    "N": {"N": 1.0, "mN": 1e-3, "kN": 1e3, "kgf": _G, "gf": 1e-3 * _G, "lbf": _POUND * _G},
+    "N·m": {
+        "N·m": 1.0,
+        "Nm": 1.0,
+        "mN·m": 1e-3,
+        "mNm": 1e-3,
+        "N·cm": 1e-2,
+        "Ncm": 1e-2,
+        "kN·m": 1e3,
+        "kgf·cm": 1e-2 * _G,
+        "lbf·in": _POUND * _G * _INCH,
+        "ozf·in": _POUND / 16.0 * _G * _INCH,
+    },
+    "1": {"1": 1.0, "%": 1e-2},
+    "V": {"V": 1.0, "mV": 1e-3},
+    "A": {"A": 1.0, "mA": 1e-3},
+    COUNTS: {COUNTS: 1.0},
+}
+TIME_FACTORS = {"s": 1.0, "ms": 1e-3, "us": 1e-6, "ns": 1e-9, "min": 60.0, "h": 3600.0}
+TIME_UNITS = (*TIME_FACTORS, ISO_TIME)
+
+_JOINT_QUANTITIES = {"position": "rad", "velocity": "rad/s", "effort": "N·m"}
+_FIELD_QUANTITIES = {
+    **dict.fromkeys(("x", "y", "z"), "m"),
+    **dict.fromkeys(("qx", "qy", "qz", "qw"), "1"),
+    **dict.fromkeys(("roll", "pitch", "yaw"), "rad"),
+    **dict.fromkeys(("vx", "vy", "vz"), "m/s"),
+    **dict.fromkeys(("wx", "wy", "wz"), "rad/s"),
+    **dict.fromkeys(("ax", "ay", "az"), "m/s²"),
+    **dict.fromkeys(("alphax", "alphay", "alphaz"), "rad/s²"),
+    **dict.fromkeys(("fx", "fy", "fz"), "N"),
+    **dict.fromkeys(("mx", "my", "mz"), "N·m"),
+}
+
+
+class Unit(NamedTuple):
+    """A unit: the SI unit of its quantity (`rad` for `deg`), and its factor to that."""
+
+    quantity: str
+    factor: float
+
+
+_UNITS = {
+    name: Unit(quantity, factor)
+    for quantity, factors in _FACTORS.items()
+    for name, factor in factors.items()
+}
+
+
+def unit_of(name: str, where: str) -> Unit:
+    """Return a unit by name; `where` names the key in errors.
+
+    Raises:
+        InputError: there is no such unit.
+    """
+    if name not in _UNITS:
+        raise InputError(f"{where}: unit '{name}', allowed: {', '.join(_UNITS)}")
+    return _UNITS[name]
+
+
+def units_for(quantity: str) -> tuple[str, ...]:
+    """Return the names of the units of a quantity, given by its SI unit."""
+    return tuple(_FACTORS[quantity])
+
+
+def field_quantity(topic: Topic, field: str) -> str:
+    """Return the SI unit of a field of a topic; `roll`, `pitch`, `yaw` are fields of poses too."""
+    part, _, joint = field.partition("/")
+    if not joint:
+        return _FIELD_QUANTITIES[field]
+    if topic.name in ("/cables/tension", "/tension_command"):
+        return "N"
+    return _JOINT_QUANTITIES[part]

@@ -5,12 +5,23 @@ BIN := $(VENV)/bin
 PIP := $(BIN)/python -m pip install --quiet --disable-pip-version-check
 SCENARIO ?= worst_case
 
+# ROS 2 Jazzy comes as wheels, unless a native one is sourced. Both at once would mix their libraries.
+ROS := wheels
+ifeq ($(ROS_DISTRO),jazzy)
+ifneq ($(wildcard $(addsuffix /rclpy/_rclpy_pybind11*.so,$(subst :, ,$(PYTHONPATH)))),)
+ROS := native
+# Its plugins for pytest are written for the pytest of its own distribution.
+export PYTEST_DISABLE_PLUGIN_AUTOLOAD := 1
+export PYTEST_ADDOPTS := -p pytest_cov
+endif
+endif
+
 .PHONY: help run test test-fast lint bench coverage clean
 
 help: ## show this list
 	@grep -hE '^[a-z-]+:.*## ' Makefile | sed -E 's/:.*## /\t/' | expand -t 12
 
-run: $(VENV)/run.stamp ## build what a run needs and simulate the worst-case sea (SCENARIO=calm for another)
+run: $(VENV)/$(ROS).stamp ## build what a run needs and simulate the worst-case sea (SCENARIO=calm for another)
 	@$(BIN)/cspm run $(SCENARIO)
 
 test: lint ## build what the tests need; then style, types and all tests
@@ -31,7 +42,7 @@ bench: $(VENV)/test.stamp ## measure speed, start-up and memory; prints a table
 	$(BIN)/python -m bench
 
 clean: ## remove the environment and caches
-	rm -rf $(VENV) build *.egg-info .pytest_cache .mypy_cache .ruff_cache .hypothesis htmlcov .coverage
+	rm -rf $(VENV) build install log *.egg-info .pytest_cache .mypy_cache .ruff_cache .hypothesis htmlcov .coverage
 	find . -name __pycache__ -type d -prune -exec rm -rf {} +
 
 $(VENV)/pip.stamp:
@@ -42,11 +53,19 @@ $(VENV)/pip.stamp:
 	  { rm -rf $(VENV); echo "cspm: $(PYTHON) lacks its venv module (Debian, Ubuntu: apt install python3-venv)" >&2; exit 1; }
 	@touch $@
 
-$(VENV)/run.stamp: $(VENV)/pip.stamp pyproject.toml
-	@$(PIP) -e .
+$(VENV)/wheels.stamp: $(VENV)/pip.stamp pyproject.toml setup.cfg
+	@$(PIP) -e '.[ros]'
+	@rm -f $(VENV)/native.stamp
 	@touch $@
 
-$(VENV)/test.stamp: $(VENV)/run.stamp pyproject.toml
+$(VENV)/native.stamp: $(VENV)/pip.stamp pyproject.toml setup.cfg
+	@echo "cspm: using the ROS 2 Jazzy that is sourced"
+	@$(PIP) -e '.[ros-native]'
+	@$(BIN)/python -m pip uninstall --quiet --yes ros-wheels-bootstrapper 2>/dev/null
+	@rm -f $(VENV)/wheels.stamp
+	@touch $@
+
+$(VENV)/test.stamp: $(VENV)/$(ROS).stamp
 	@echo "cspm: adding what the tests need"
 	@$(PIP) -e '.[test]'
 	@touch $@

@@ -6,12 +6,10 @@ Run `python -m cspm_bringup.agreement > docs/agreement.md` after a change in eit
 from __future__ import annotations
 
 import sys
-import tempfile
 import time
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 from importlib.metadata import version
-from pathlib import Path
 
 import numpy as np
 from numpy.typing import NDArray
@@ -99,10 +97,9 @@ def trace(scenario: str, overrides: Sequence[str], plant: str) -> Trace:
     loaded = load_scenario(path, overrides)
     testbed = load_testbed(path.parent / loaded.testbed)
     bundle = make_bundle(resolve(loaded, testbed.testbed), testbed, path.parent)
-    with tempfile.TemporaryDirectory(prefix="cspm-agreement-") as place:
-        bundle.write_files(Path(place))
-        parts = assemble(bundle.scenario, testbed.testbed, Path(place), plant)
-    loop = Loop(parts, {}, lambda _now, _statuses: None)
+    with bundle.unpacked() as place:
+        parts = assemble(bundle.scenario, testbed.testbed, place, plant)
+    loop = Loop(parts, {}, lambda _now, _status: None)
     steps = round(loaded.duration * loaded.rates.plant)
     poses, tensions = np.zeros((steps, 6)), np.zeros((steps, len(testbed.testbed.cables)))
     began = time.perf_counter()

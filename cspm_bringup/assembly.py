@@ -2,14 +2,14 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
-from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
-from cspm_bringup.plants import SIM, AnyPlant, make_plant
+from cspm_bringup.plants import SIM, make_plant
 from cspm_control.design import (
     check_separation,
     design_force_gains,
@@ -17,56 +17,50 @@ from cspm_control.design import (
     force_margins,
     motion_margins,
 )
-from cspm_control.force_controller import ForceController
-from cspm_control.motion_controller import MotionController
-from cspm_control.tension_distribution import PseudoInverse
+from cspm_control.stages.make import make_controller
+from cspm_control.stages.wave_stage import WaveStage
 from cspm_control.torque_profile import TorqueGenerator
 from cspm_control.wave_trajectory import WaveTrajectory
 from cspm_control.waves.build import build_motion
 from cspm_msgs_py.errors import InputError
-from cspm_msgs_py.scenario import Body, ClosedLoop, LockedWinches, Scenario, TorqueProfile
+from cspm_msgs_py.scenario import ClosedLoop, LockedWinches, Scenario, TorqueProfile
+from cspm_msgs_py.schedule import RATE_OF_SENSOR, WAVE_TRAJECTORY, Schedule, schedule_of
+from cspm_msgs_py.stage import Stage
 from cspm_msgs_py.testbed import Testbed
-from cspm_sim.kernels.cable import RADIUS
+from cspm_sim.any_plant import AnyPlant
 from cspm_sim.motion import Motion
 from cspm_sim.parameters import plant_parameters
 from cspm_sim.sensors import SensorModel
 
 Array = NDArray[np.float64]
 
-_RATE_OF_SENSOR = {
-    "/winch_frame/pose": "motion_capture",
-    "/winch_frame/twist": "motion_capture",
-    "/bar/pose": "motion_capture",
-    "/bar/twist": "motion_capture",
-    "/winches/state": "winches",
-    "/cables/tension": "load_cells",
-}
-
-
-class Controllers(NamedTuple):
-    """The thesis's cascade."""
-
-    motion: MotionController
-    distribution: PseudoInverse
-    force: ForceController
-
 
 @dataclass(frozen=True)
 class Assembly:
-    """Everything that one run steps; absent parts are None.
+    """Everything that one run steps.
 
     `references` holds the prescribed motions by topic, `/winch_frame/reference` and
-    `/bar/reference`, of the bodies that the machine has.
+    `/bar/reference`, of the bodies that the machine has; `stages` the controllers in the order in
+    which they compute.
     """
 
     scenario: Scenario
     testbed: Testbed
-    period_ns: int
+    schedule: Schedule
     plant: AnyPlant
     sensors: dict[str, SensorModel]
     references: dict[str, WaveTrajectory]
-    controllers: Controllers | None
-    torque_generator: TorqueGenerator | None
+    stages: list[Stage]
+
+    @property
+    def period_ns(self) -> int:
+        """The plant's period [ns]."""
+        return self.schedule.period_ns
+
+    @property
+    def controlled(self) -> bool:
+        """Whether a closed loop is to follow the reference."""
+        return isinstance(self.scenario.control, ClosedLoop)
 
 
 def resolve(scenario: Scenario, testbed: Testbed) -> Scenario:
@@ -115,105 +109,102 @@ def assemble(scenario: Scenario, testbed: Testbed, folder: Path, plant: str = SI
         InputError: scenario and test-bed do not fit together.
         ConvergenceError: the bar cannot hang at its first reference pose.
     """
-    period_ns = 1_000_000_000 // scenario.rates.plant
-    frame = _motion(scenario, scenario.winch_frame, testbed, folder)
-    if testbed.winch_frame is None and frame.knots.any():
-        raise InputError("winch_frame: this test-bed has none, allowed: no motion and no mean pose")
-    target = scenario.target.model_copy(update={"mean_pose": scenario.bar_mean_pose})
-    references = {"/winch_frame/reference": frame} if testbed.winch_frame else {}
-    if testbed.bar:
-        references["/bar/reference"] = _motion(scenario, target, testbed, folder)
-    control = scenario.control
-    sensors = _sensors(scenario, testbed, period_ns)
-    generator = (
-        TorqueGenerator(control.torque, testbed.cable_names)
-        if isinstance(control, TorqueProfile)
-        else None
-    )
+    schedule = schedule_of(scenario, testbed)
+    motions = _motions(scenario, testbed, folder)
+    references = {
+        name: WaveTrajectory(motions[name]) for name in schedule.topics if name in motions
+    }
     return Assembly(
         scenario=scenario,
         testbed=testbed,
-        period_ns=period_ns,
-        plant=make_plant(
-            plant,
-            testbed,
-            frame,
-            period_ns,
-            bar_pose=references["/bar/reference"].at(0.0)[:6] if testbed.bar else None,
-            tensions=_balanced_tensions(testbed, generator) if generator else None,
-            locked=isinstance(control, LockedWinches),
-        ),
-        sensors=sensors,
-        references={name: WaveTrajectory(motion) for name, motion in references.items()},
-        controllers=(
-            _controllers(control, scenario, testbed, sensors)
-            if isinstance(control, ClosedLoop)
-            else None
-        ),
-        torque_generator=generator,
+        schedule=schedule,
+        plant=_plant(scenario, testbed, motions, plant),
+        sensors=_sensors(scenario, testbed),
+        references=references,
+        stages=[
+            WaveStage(references)
+            if node == WAVE_TRAJECTORY
+            else make_controller(node, scenario, testbed)
+            for node in schedule.nodes
+        ],
     )
 
 
-def _balanced_tensions(testbed: Testbed, generator: TorqueGenerator) -> Array:
+def assemble_simulator(
+    scenario: Scenario, testbed: Testbed, folder: Path, plant: str
+) -> tuple[AnyPlant, dict[str, SensorModel]]:
+    """Build a resolved scenario's plant and its sensors; arguments and errors as `assemble`."""
+    motions = _motions(scenario, testbed, folder)
+    return _plant(scenario, testbed, motions, plant), _sensors(scenario, testbed)
+
+
+def assemble_stage(node: str, scenario: Scenario, testbed: Testbed, folder: Path) -> Stage:
+    """Build one stage of a resolved scenario; arguments and errors as `assemble`."""
+    if node != WAVE_TRAJECTORY:
+        return make_controller(node, scenario, testbed)
+    motions = _motions(scenario, testbed, folder)
+    names = schedule_of(scenario, testbed).nodes[node].outputs
+    return WaveStage({name: WaveTrajectory(motions[name]) for name in names})
+
+
+def _plant(
+    scenario: Scenario, testbed: Testbed, motions: Mapping[str, Motion], name: str
+) -> AnyPlant:
+    control = scenario.control
+    bar = motions["/bar/reference"].at(0.0)[:6] if testbed.bar else None
+    return make_plant(
+        name,
+        testbed,
+        motions["/winch_frame/reference"],
+        1_000_000_000 // scenario.rates.plant,
+        bar_pose=bar,
+        tensions=_balanced_tensions(testbed, control)
+        if isinstance(control, TorqueProfile)
+        else None,
+        locked=isinstance(control, LockedWinches),
+    )
+
+
+def _balanced_tensions(testbed: Testbed, control: TorqueProfile) -> Array:
     """Return the tensions that the first torques hold, so that a rig does not start with a jerk."""
+    first = TorqueGenerator(control.torque, testbed.cable_names).step(0)
     radii = np.array([cable.drum_radius / cable.gear_ratio for cable in testbed.cables])
     has_cable = np.array([cable.has_cable for cable in testbed.cables])
-    tensions: Array = np.maximum(0.0, generator.step(0) / radii) * has_cable
+    tensions: Array = np.maximum(0.0, first / radii) * has_cable
     return tensions
 
 
-def _motion(scenario: Scenario, body: Body, testbed: Testbed, folder: Path) -> Motion:
-    return build_motion(
-        body.motion,
-        body.mean_pose,
-        seed=scenario.seed,
-        duration=scenario.duration,
-        gravity=testbed.gravity,
-        folder=folder,
-    )
+def _motions(scenario: Scenario, testbed: Testbed, folder: Path) -> dict[str, Motion]:
+    """Return the motions of winch frame, moving or not, and bar, by reference topic."""
+    target = scenario.target.model_copy(update={"mean_pose": scenario.bar_mean_pose})
+    bodies = {"/winch_frame/reference": scenario.winch_frame}
+    if testbed.bar:
+        bodies["/bar/reference"] = target
+    motions = {
+        name: build_motion(
+            body.motion,
+            body.mean_pose,
+            seed=scenario.seed,
+            duration=scenario.duration,
+            gravity=testbed.gravity,
+            folder=folder,
+        )
+        for name, body in bodies.items()
+    }
+    if testbed.winch_frame is None and motions["/winch_frame/reference"].knots.any():
+        raise InputError("winch_frame: this test-bed has none, allowed: no motion and no mean pose")
+    return motions
 
 
-def _sensors(scenario: Scenario, testbed: Testbed, period_ns: int) -> dict[str, SensorModel]:
+def _sensors(scenario: Scenario, testbed: Testbed) -> dict[str, SensorModel]:
     return {
         name: SensorModel(
             testbed.topics[name],
             sensor,
-            rate=getattr(scenario.rates, _RATE_OF_SENSOR[name]),
-            period_ns=period_ns,
+            rate=getattr(scenario.rates, RATE_OF_SENSOR[name]),
+            period_ns=1_000_000_000 // scenario.rates.plant,
             seed=scenario.seed,
             ideal=scenario.sensors == "ideal",
         )
         for name, sensor in testbed.sensors.items()
     }
-
-
-def _controllers(
-    control: ClosedLoop, scenario: Scenario, testbed: Testbed, sensors: dict[str, SensorModel]
-) -> Controllers:
-    if testbed.bar is None:
-        raise InputError("control.mode: closed_loop without a bar, allowed: torque, locked_winches")
-    needed = ["/bar/pose", "/cables/tension"] + ["/winch_frame/pose"] * bool(testbed.winch_frame)
-    missing = [name for name in needed if name not in sensors]
-    if missing:
-        raise InputError(
-            f"sensors: {', '.join(missing)} missing, allowed in closed loop: {', '.join(needed)}"
-        )
-    motion, force, cables = control.motion, control.force, testbed.cables
-    rows = plant_parameters(testbed).cables
-    return Controllers(
-        MotionController(
-            motion.gains or {},
-            testbed.bar,
-            testbed.gravity,
-            period=1.0 / scenario.rates.motion_controller,
-            derivative_filter=motion.derivative_filter,
-            integral_limits=motion.integral_limits,
-        ),
-        PseudoInverse(rows, np.array([cable.tension_limits for cable in cables], dtype=float)),
-        ForceController(
-            [(force.gains or {})[cable.name] for cable in cables],
-            rows[:, RADIUS].copy(),
-            np.array([cable.torque_limit for cable in cables]),
-            period=1.0 / scenario.rates.force_controller,
-        ),
-    )

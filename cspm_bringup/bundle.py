@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+import tempfile
+from collections.abc import Iterator, Mapping
+from contextlib import contextmanager
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -32,10 +34,13 @@ class Bundle:
         described = {SCENARIO: text.encode(), TESTBED: self.testbed.text.encode()}
         return described | self.files
 
-    def write_files(self, folder: Path) -> None:
-        """Put the motions' files where the scenario's relative paths find them."""
-        for name, content in self.files.items():
-            (folder / name).write_bytes(content)
+    @contextmanager
+    def unpacked(self) -> Iterator[Path]:
+        """Give a folder in which the scenario's relative paths find the motions' files."""
+        with tempfile.TemporaryDirectory(prefix="cspm-") as place:
+            for name, content in self.files.items():
+                (Path(place) / name).write_bytes(content)
+            yield Path(place)
 
 
 def make_bundle(scenario: Scenario, testbed: TestbedFile, folder: Path) -> Bundle:

@@ -3,7 +3,9 @@
 from __future__ import annotations
 
 import dataclasses
-from collections.abc import Sequence
+import tempfile
+from collections.abc import Callable, Sequence
+from functools import partial
 from pathlib import Path
 
 from rich import box
@@ -14,11 +16,13 @@ from rich.table import Table
 
 from cspm_bringup.assembly import resolve
 from cspm_bringup.bundle import Bundle, make_bundle
-from cspm_bringup.plants import SIM
+from cspm_bringup.plants import EXTERNAL, SIM
 from cspm_bringup.resim import resimulate
-from cspm_bringup.run import RECORD_NAME, RunResult, run
+from cspm_bringup.ros_install import find_ros
+from cspm_bringup.run import INPROCESS, RECORD_NAME, run
+from cspm_bringup.run_result import RunResult
 from cspm_bringup.summary import print_summary, summary_data, write_json
-from cspm_msgs_py.errors import DivergenceError, InputError
+from cspm_msgs_py.errors import CspmError, InputError
 from cspm_msgs_py.recording.overview import overview
 from cspm_msgs_py.recording.recover import recover
 from cspm_msgs_py.scenario import load_scenario
@@ -26,6 +30,7 @@ from cspm_msgs_py.testbed import TestbedFile, load_testbed
 from cspm_sim.parameters import plant_parameters
 
 PIPE_WIDTH = 140
+REALTIME = "realtime"
 
 
 def run_command(
@@ -34,11 +39,12 @@ def run_command(
     folder: Path | None,
     json: Path | None,
     plant: str = SIM,
+    mode: str = INPROCESS,
 ) -> bool:
     """Run a scenario file, show the result, and return whether it ran to its end.
 
     Raises:
-        DivergenceError: it diverged; what was recorded and drawn up to then is kept.
+        CspmError: it diverged, or a node failed; what was recorded and drawn up to then is kept.
     """
     console = Console()
     scenario = load_scenario(path, overrides)
@@ -46,8 +52,13 @@ def run_command(
     testbed = load_testbed(testbed_path)
     _check_effects(testbed, testbed_path)
     bundle = make_bundle(resolve(scenario, testbed.testbed), testbed, path.parent)
-    bundle = dataclasses.replace(bundle, plant=plant)
-    result = _run_with_progress(bundle, folder, console)
+    external = plant == EXTERNAL
+    if external and mode != REALTIME:
+        raise InputError(f"--plant {EXTERNAL} --mode {mode}: allowed: --mode {REALTIME}")
+    if folder is not None and folder.exists():
+        raise InputError(f"{folder}: exists, allowed: a new folder")
+    bundle = dataclasses.replace(bundle, plant=SIM if external else plant)
+    result = _run_with_progress(bundle, folder, console, mode, external=external)
     requirement = scenario.requirement
     print_summary(console, result, requirement)
     if json is not None:
@@ -62,7 +73,8 @@ def run_command(
         draw_run(result.folder / "run.png", result, requirement, names, period)
         _say(console, f"recording {result.folder}, picture {result.folder.name}/run.png")
     if result.failure:
-        raise DivergenceError(f"diverged at {result.failure}")
+        diverged = result.failure.startswith("t = ")
+        raise CspmError(f"diverged at {result.failure}" if diverged else result.failure)
     if result.interrupted:
         kept = "; the recording is complete so far" if result.folder else ""
         _say(console, f"interrupted after {result.simulated:g} s{kept}")
@@ -103,8 +115,14 @@ def info_command(bag: Path, json: Path | None) -> None:
         f" {found.size_bytes / 1e6:.1f} MB, {found.storage} {found.profile}, written by"
         f" {found.library or 'unknown'}",
     )
-    if found.scenario or found.testbed:
-        record = found.metadata.get(RECORD_NAME, {})
+    record = found.metadata.get(RECORD_NAME, {})
+    if "source" in record:
+        _say(
+            console,
+            f"imported from {record['source']} (SHA-256 {record.get('source_sha256', 'unknown')}),"
+            f" mapping {record.get('mapping', 'unknown')}, test-bed {found.testbed}",
+        )
+    elif found.scenario or found.testbed:
         _say(
             console,
             f"scenario {found.scenario}, seed {record.get('seed', 'unknown')}, test-bed"
@@ -156,11 +174,42 @@ def resim_command(bag: Path, json: Path | None) -> bool:
     return found.difference is None
 
 
-def _run_with_progress(bundle: Bundle, folder: Path | None, console: Console) -> RunResult:
+def _run_with_progress(
+    bundle: Bundle, folder: Path | None, console: Console, mode: str, *, external: bool
+) -> RunResult:
     scenario = bundle.scenario
     with _progress(console) as bar:
         task = bar.add_task(escape(scenario.name), total=scenario.duration, speed=0.0)
-        return run(bundle, folder, lambda now: _show(bar, task, now, scenario.duration))
+
+        def show(now: float) -> None:
+            _show(bar, task, now, scenario.duration)
+
+        if mode == INPROCESS:
+            return run(bundle, folder, show)
+        if folder is not None:
+            return _ros_runner(mode, console, external)(bundle, folder, show)
+        # What a graph amounts to is read from its recording.
+        with tempfile.TemporaryDirectory(prefix="cspm-run-") as place:
+            runner = _ros_runner(mode, console, external)
+            result = runner(bundle, Path(place) / scenario.name, show)
+            return dataclasses.replace(result, folder=None)
+
+
+def _ros_runner(
+    mode: str, console: Console, external: bool
+) -> Callable[[Bundle, Path, Callable[[float], None]], RunResult]:
+    """Return what runs a scenario in a mode that needs ROS; only now is ROS loaded."""
+    find_ros(f"--mode {mode}")
+    if mode == "graph":
+        from cspm_bringup.graph_run import run_graph
+
+        return run_graph
+    from cspm_bringup.process_run import run_processes
+
+    def tell(waiting: str) -> None:
+        _say(console, waiting or "all is there")
+
+    return partial(run_processes, mode=mode, external=external, tell=tell)
 
 
 def _say(console: Console, text: str) -> None:

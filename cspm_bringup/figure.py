@@ -11,7 +11,7 @@ from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.figure import Figure
 from numpy.typing import NDArray
 
-from cspm_bringup.run import RunResult
+from cspm_bringup.run_result import RunResult
 from cspm_msgs_py.dofs import DOFS
 from cspm_msgs_py.scenario import Requirement
 

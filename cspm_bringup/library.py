@@ -2,18 +2,20 @@
 
 from __future__ import annotations
 
-import sys
 from pathlib import Path
 
 from cspm_msgs_py.errors import InputError
 
 
 def scenario_folders() -> list[Path]:
-    """Return where scenarios are looked for: the source tree, then the installed data."""
-    return [
-        Path(__file__).resolve().parents[1] / "scenarios",
-        Path(sys.prefix) / "share" / "cspm" / "scenarios",
-    ]
+    """Return where scenarios are looked for: the source tree, then the installation's `share`.
+
+    An installation is whatever holds this package: an environment, `~/.local`, or the prefix of a
+    colcon workspace, each as `PREFIX/lib/python3.X/site-packages`.
+    """
+    package = Path(__file__).resolve().parent
+    installed = [prefix / "share" / "cspm" / "scenarios" for prefix in package.parents]
+    return [package.parent / "scenarios", *installed]
 
 
 def scenario_names() -> list[str]:

@@ -1,8 +1,8 @@
 """The lockstep schedule without ROS: state k, command k, step k + 1.
 
-At each plant step the references are evaluated, the sensors observe, the controllers that are due
-compute, everything is published with the stamp of the state it belongs to, and the plant
-advances by one period with the new torques held.
+At each plant step the sensors observe, the stages that are due compute, everything is published
+with the stamp of the state it belongs to, and the plant advances by one period with the new torques
+held.
 """
 
 from __future__ import annotations
@@ -14,35 +14,22 @@ import numpy as np
 from numpy.typing import NDArray
 
 from cspm_bringup.assembly import Assembly
-from cspm_bringup.cascade import Cascade
-from cspm_bringup.truth import Quantity, Truth
-from cspm_msgs_py.diagnostics import Level, Status
-from cspm_msgs_py.errors import DivergenceError
-from cspm_sim.sensors import SensorModel
+from cspm_control.safety import GuardedStage
+from cspm_control.stages.distribution_stage import DistributionStage
+from cspm_msgs_py.diagnostics import Status
+from cspm_msgs_py.schedule import TORQUE_COMMAND, NodePlan
+from cspm_msgs_py.stage import Stage
+from cspm_sim.simulator import Publish, Simulator
 
 Array = NDArray[np.float64]
-# Takes log time [ns], stamp [ns] and row; the row may change after the call.
-Publish = Callable[[int, int, Array], None]
-PublishStatuses = Callable[[int, list[Status]], None]
-
-DIAGNOSTICS_RATE = 10
-NO_ROW = np.zeros(0)
+PublishStatus = Callable[[int, Status], None]
 
 
-class _LastGood(NamedTuple):
-    """When all cables were last taut, and the wrench last feasible [s]."""
+class _Due(NamedTuple):
+    """A stage and its share of the schedule."""
 
-    taut: float
-    feasible: float
-
-
-class _Tap(NamedTuple):
-    """A true quantity, its sensor if it has one, and where truth and measurement are published."""
-
-    quantity: Quantity
-    publish_truth: Publish | None
-    sensor: SensorModel | None
-    publish_measured: Publish | None
+    stage: Stage
+    plan: NodePlan
 
 
 class Loop:
@@ -52,42 +39,36 @@ class Loop:
     """
 
     def __init__(
-        self, parts: Assembly, publish: Mapping[str, Publish], publish_statuses: PublishStatuses
+        self, parts: Assembly, publish: Mapping[str, Publish], publish_status: PublishStatus
     ) -> None:
         """Take the parts, and where messages go: by topic; topics that are absent are not sent."""
-        plant, rates = parts.plant, parts.scenario.rates
-        self._parts = parts
         self._publish = publish
-        self._publish_statuses = publish_statuses
-        self._reference_divider = rates.plant // rates.wave_trajectory
-        self._status_divider = max(1, rates.plant // DIAGNOSTICS_RATE)
-        cables = parts.testbed.cables
-        # Where there is no cable nothing is slack.
-        self._slack_limit = np.array([0.0 if cable.has_cable else -1.0 for cable in cables])
-        # Before anything is measured the winches hold what hangs on them.
-        radii = np.array([cable.drum_radius / cable.gear_ratio for cable in cables])
-        self._torque: Array = radii * plant.tensions
-        self._cascade = (
-            Cascade(parts.controllers, rates, self._torque) if parts.controllers else None
+        self._publish_status = publish_status
+        self._schedule = schedule = parts.schedule
+        self._simulator = Simulator(
+            parts.plant,
+            parts.sensors,
+            publish,
+            period_ns=parts.period_ns,
+            controlled=parts.controlled,
         )
-        self._truth = Truth(plant)
-        self._taps = [
-            _Tap(
-                q, publish.get("/truth" + q.topic), parts.sensors.get(q.topic), publish.get(q.topic)
-            )
-            for q in self._truth.quantities
-        ]
-        self._measured: dict[str, Array] = {}
-        self._references: dict[str, Array] = {}
-        self._slack_steps = 0
-        self._now = 0
-        self._last_good = _LastGood(0.0, 0.0)
-        self.slack = False
+        self._known = self._simulator.measured
+        self._known[TORQUE_COMMAND] = self._simulator.torque
+        self._due = [_Due(stage, schedule.nodes[stage.node]) for stage in parts.stages]
+        found = [stage for stage in parts.stages if isinstance(stage, DistributionStage)]
+        self._distribution = found[0] if found else None
+        self._guards = [stage for stage in parts.stages if isinstance(stage, GuardedStage)]
+        self._last_feasible = 0.0
+
+    @property
+    def slack(self) -> bool:
+        """Whether any cable is slack."""
+        return self._simulator.slack
 
     @property
     def infeasible(self) -> bool:
         """Whether the last wrench cannot be met within the tension limits."""
-        return self._cascade is not None and self._cascade.infeasible
+        return self._distribution is not None and self._distribution.infeasible
 
     def step(self) -> None:
         """Publish everything that belongs to the current instant, then advance the plant.
@@ -96,82 +77,33 @@ class Loop:
             DivergenceError: the plant left the range of its equations, or the bar that is to be
                 controlled has turned over.
         """
-        step = self._parts.plant.steps
-        self._now = step * self._parts.period_ns
-        self._send("/clock", NO_ROW)
-        if step % self._reference_divider == 0:
-            for name, trajectory in self._parts.references.items():
-                self._references[name] = trajectory.step(self._now)
-                self._send(name, self._references[name])
-        self._observe(step)
-        self._command(step)
-        plant = self._parts.plant
-        self.slack = bool((plant.tensions <= self._slack_limit).any())
-        self._slack_steps += self.slack
-        self._last_good = _LastGood(
-            self._last_good.taut if self.slack else self._now * 1e-9,
-            self._last_good.feasible if self.infeasible else self._now * 1e-9,
-        )
-        if step % self._status_divider == 0:
-            self._publish_statuses(self._now, self._statuses())
-        plant.step(self._torque)
-        if self._cascade is not None and abs(plant.bar_state[3]) > np.pi:
-            raise DivergenceError(
-                f"t = {plant.time:.3f} s: bar roll {plant.bar_state[3]:.3f} rad passed ±π, the bar"
-                " has turned over"
-            )
+        simulator = self._simulator
+        step, now = simulator.plant.steps, simulator.now_ns
+        simulator.observe()
+        if step % self._schedule.plant_status_divider == 0:
+            self._publish_status(now, simulator.status())
+        for stage, plan in self._due:
+            if step >= plan.first and step % plan.divider == 0:
+                stage.step(now, self._known, self._send)
+                if step % plan.status_divider == 0:
+                    self._publish_status(now, stage.status())
+        if any(guard.brake for guard in self._guards):
+            simulator.plant.locked = True
+        if not self.infeasible:
+            self._last_feasible = now * 1e-9
+        simulator.torque = self._known[TORQUE_COMMAND]
+        simulator.advance()
 
     def history(self) -> str:
         """Return what preceded the current instant, in words, for the report of a divergence."""
-        plant, names = self._parts.plant, self._parts.testbed.cable_names
-        slack = [n for n, t in zip(names, plant.tensions, strict=True) if t <= 0.0]
-        events = []
-        if self.slack:
-            events.append(
-                f"slack since {self._last_good.taut:.3f} s ({', '.join(slack) or 'none now'})"
-            )
+        events = self._simulator.history()
         if self.infeasible:
-            events.append(f"wrench infeasible since {self._last_good.feasible:.3f} s")
-        if self._parts.testbed.bar:
-            pose = ", ".join(f"{value:.3g}" for value in plant.bar_state[:6])
-            events.append(f"bar at [{pose}] (m, rad)")
+            events.insert(0, f"wrench infeasible since {self._last_feasible:.3f} s")
         return "before it: " + "; ".join(events) if events else "nothing unusual before it"
 
     def _send(self, topic: str, row: Array) -> None:
+        self._known[topic] = row
         publish = self._publish.get(topic)
         if publish is not None:
-            publish(self._now, self._now, row)
-
-    def _observe(self, step: int) -> None:
-        """Publish the truth and what the sensors make of it."""
-        now = self._now
-        self._truth.update(self._torque)
-        for quantity, publish_truth, sensor, publish_measured in self._taps:
-            if publish_truth is not None:
-                publish_truth(now, now, quantity.row)
-            arrival = sensor.observe(step, now, quantity.values) if sensor else None
-            if arrival is not None:
-                stamp, measured = arrival
-                self._measured[quantity.topic] = measured
-                if publish_measured is not None:
-                    publish_measured(now, stamp, measured)
-
-    def _command(self, step: int) -> None:
-        parts = self._parts
-        if self._cascade is not None:
-            reference = self._references.get("/bar/reference")
-            self._torque = self._cascade.step(step, self._measured, reference, self._send)
-        elif parts.torque_generator is not None:
-            self._torque = parts.torque_generator.step(self._now)
-            self._send("/winches/torque_command", self._torque)
-
-    def _statuses(self) -> list[Status]:
-        share = self._slack_steps / self._status_divider
-        self._slack_steps = 0
-        level = Level.WARN if share else Level.OK
-        statuses = [
-            Status(
-                level, "plant", "slack cable" if share else "ok", {"slack_share": f"{share:.3f}"}
-            )
-        ]
-        return statuses + (self._cascade.statuses() if self._cascade else [])
+            now = self._simulator.now_ns
+            publish(now, now, row)

@@ -3,13 +3,13 @@
 from __future__ import annotations
 
 from importlib.metadata import version as metadata_version
-from typing import Protocol
 
 import numpy as np
 from numpy.typing import NDArray
 
 from cspm_msgs_py.errors import InputError
 from cspm_msgs_py.testbed import Testbed
+from cspm_sim.any_plant import AnyPlant
 from cspm_sim.motion import Motion
 
 Array = NDArray[np.float64]
@@ -17,34 +17,10 @@ Array = NDArray[np.float64]
 SIM = "sim"
 MUJOCO = "mujoco"
 PLANTS = (SIM, MUJOCO)
+# Not simulated: somebody's drivers are in the plant's place.
+EXTERNAL = "external"
 # Earlier ones end the process when a control callback fails, and integrate damping otherwise.
 OLDEST_MUJOCO = 4
-
-
-class AnyPlant(Protocol):
-    """What a run needs of a plant; the attributes are those of `cspm_sim.plant.Plant`.
-
-    The arrays keep their place while the plant moves.
-    """
-
-    testbed: Testbed
-    steps: int
-    bar_state: Array
-    angles: Array
-    speeds: Array
-    tensions: Array
-    unstretched_lengths: Array
-    frame: Array
-
-    @property
-    def time(self) -> float:
-        """Time since the start [s]."""
-
-    def step(self, torque: Array) -> None:
-        """Advance by one period with the motor torques (n,) [N·m] held."""
-
-    def applied_torque(self, torque: Array) -> Array:
-        """Return what the drives deliver for a torque command, (n,) [N·m]."""
 
 
 def make_plant(

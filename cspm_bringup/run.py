@@ -2,67 +2,30 @@
 
 from __future__ import annotations
 
-import signal
-import tempfile
 import time
-from collections.abc import Callable, Iterator, Mapping
-from contextlib import contextmanager
-from dataclasses import dataclass
+from collections.abc import Callable, Mapping
 from importlib.metadata import version
 from pathlib import Path
-from types import FrameType
 
 import numpy as np
 
 from cspm_bringup.assembly import Assembly, assemble
 from cspm_bringup.bundle import Bundle
-from cspm_bringup.loop import Loop, Publish
+from cspm_bringup.loop import Loop
+from cspm_bringup.run_result import RunResult
 from cspm_bringup.tally import Tally
-from cspm_msgs_py.diagnostics import Status, encode_diagnostics
+from cspm_msgs_py.diagnostics import Level, Status, encode_diagnostics
 from cspm_msgs_py.errors import DivergenceError
+from cspm_msgs_py.interruption import interruptible
 from cspm_msgs_py.recording.writer import RecordingWriter
+from cspm_msgs_py.schedule import schedule_of
 from cspm_msgs_py.topics import DIAGNOSTICS, Topic
+from cspm_sim.simulator import Publish
 
 CONTRACT_VERSION = "1"
 PROGRESS_STEPS = 50
-MODE = "inprocess"
+INPROCESS = "inprocess"
 RECORD_NAME = "cspm"
-
-
-@dataclass(frozen=True)
-class RunResult:
-    """What a run amounted to.
-
-    Attributes:
-        scenario: the scenario's name.
-        seed: of waves and sensors.
-        simulated: time simulated [s].
-        elapsed: wall time that took [s], without start-up and the first step.
-        tally: errors and tensions.
-        messages: how many messages each topic got.
-        folder: the recording, if one was made.
-        controlled: whether a closed loop was to follow the reference.
-        has_bar: whether the errors mean anything.
-        interrupted: whether the user ended it early.
-        failure: what went wrong, in one line, if anything did.
-    """
-
-    scenario: str
-    seed: int
-    simulated: float
-    elapsed: float
-    tally: Tally
-    messages: dict[str, int]
-    folder: Path | None
-    controlled: bool
-    has_bar: bool
-    interrupted: bool = False
-    failure: str | None = None
-
-    @property
-    def real_time_factor(self) -> float:
-        """Simulated time over elapsed time."""
-        return self.simulated / self.elapsed if self.elapsed > 0 else 0.0
 
 
 def run(
@@ -84,41 +47,51 @@ def run(
         InputError: scenario and test-bed do not fit, or the folder exists.
         ConvergenceError: the bar cannot hang where the scenario starts.
     """
-    with tempfile.TemporaryDirectory(prefix="cspm-") as place:
-        bundle.write_files(Path(place))
-        parts = assemble(bundle.scenario, bundle.testbed.testbed, Path(place), bundle.plant)
+    with bundle.unpacked() as place:
+        parts = assemble(bundle.scenario, bundle.testbed.testbed, place, bundle.plant)
     scenario = bundle.scenario
     steps = steps or round(scenario.duration * scenario.rates.plant)
     if folder is None:
         return _simulate(parts, None, progress, steps)
-    with RecordingWriter(
-        folder, recorded_topics(parts), attachments=bundle.attachments(), metadata=metadata(bundle)
-    ) as writer:
+    with new_recording(bundle, folder, INPROCESS) as writer:
         return _simulate(parts, writer, progress, steps)
 
 
-def recorded_topics(parts: Assembly) -> dict[str, Topic]:
-    """Return the topics that this run publishes: measured ones only where a sensor is."""
-    topics = parts.testbed.topics
-    published = {"/clock", DIAGNOSTICS.name, *parts.sensors, *parts.references}
-    if parts.controllers:
-        published |= {"/wrench_command", "/tension_command", "/winches/torque_command"}
-    elif parts.torque_generator:
-        published.add("/winches/torque_command")
-    return {
-        name: topic
-        for name, topic in topics.items()
-        if name in published or name.startswith("/truth/")
-    }
+def new_recording(bundle: Bundle, folder: Path, mode: str) -> RecordingWriter:
+    """Return the recording that a run by the schedule fills.
+
+    Raises:
+        InputError: the folder exists or cannot be created.
+    """
+    return recording_of(bundle, folder, mode, recorded_topics(bundle))
 
 
-def metadata(bundle: Bundle) -> dict[str, str]:
-    """Return the recording's metadata record."""
+def recording_of(
+    bundle: Bundle, folder: Path, mode: str, topics: Mapping[str, Topic]
+) -> RecordingWriter:
+    """Return a new recording of these topics that carries the run's description.
+
+    Raises:
+        InputError: the folder exists or cannot be created.
+    """
+    attachments, about = bundle.attachments(), metadata(bundle, mode)
+    return RecordingWriter(folder, topics, attachments=attachments, metadata=about)
+
+
+def recorded_topics(bundle: Bundle) -> dict[str, Topic]:
+    """Return the topics that a run publishes, in contract order."""
+    testbed = bundle.testbed.testbed
+    published = {*schedule_of(bundle.scenario, testbed).topics, DIAGNOSTICS.name}
+    return {name: topic for name, topic in testbed.topics.items() if name in published}
+
+
+def metadata(bundle: Bundle, mode: str) -> dict[str, str]:
+    """Return the metadata record of the recording of a run in a mode."""
     return {
         "contract_version": CONTRACT_VERSION,
         "scenario": bundle.scenario.name,
         "seed": str(bundle.scenario.seed),
-        "mode": MODE,
+        "mode": mode,
         "plant": bundle.plant,
         "package_version": version("cspm"),
         "testbed": bundle.testbed.testbed.name,
@@ -136,16 +109,19 @@ def _simulate(
     tally = Tally(steps, len(plant.tensions))
     publish: Mapping[str, Publish] = {}
     if writer is not None:
-        names = [name for name in recorded_topics(parts) if name != DIAGNOSTICS.name]
-        publish = {name: writer.channel(name).append for name in names}
+        publish = {name: writer.channel(name).append for name in parts.schedule.topics}
 
-    def publish_statuses(now_ns: int, statuses: list[Status]) -> None:
+    alarms: list[str] = []
+
+    def publish_status(now_ns: int, status: Status) -> None:
+        if status.level == Level.ERROR and not alarms:
+            alarms.append(f"{status.name}: {status.message}")
         if writer is not None:
-            writer.append_payload(DIAGNOSTICS.name, now_ns, encode_diagnostics(now_ns, statuses))
+            writer.append_payload(DIAGNOSTICS.name, now_ns, encode_diagnostics(now_ns, [status]))
 
-    loop = Loop(parts, publish, publish_statuses)
+    loop = Loop(parts, publish, publish_status)
     failure = None
-    with _interruptible() as interrupted:
+    with interruptible() as interrupted:
         began = time.perf_counter()
         try:
             # The first step of all compiles the kernels; it is no part of the speed.
@@ -163,15 +139,16 @@ def _simulate(
     return RunResult(
         scenario=scenario.name,
         seed=scenario.seed,
+        mode=INPROCESS,
         simulated=plant.time,
         elapsed=elapsed,
         tally=tally,
         messages=writer.counts if writer is not None else {},
         folder=writer.folder if writer is not None else None,
-        controlled=parts.controllers is not None,
+        controlled=parts.controlled,
         has_bar=parts.testbed.bar is not None,
         interrupted=stopped and failure is None,
-        failure=failure,
+        failure=failure or (alarms[0] if alarms else None),
     )
 
 
@@ -185,23 +162,3 @@ def _advance(loop: Loop, parts: Assembly, tally: Tally, steps: int) -> None:
         loop.step()
         error = reference.values[:6] - bar_pose if reference else zero
         tally.add(error, tensions, loop.slack, loop.infeasible)
-
-
-@contextmanager
-def _interruptible() -> Iterator[Callable[[], bool]]:
-    """Turn the first SIGINT or SIGTERM into a flag, so that a run ends between two steps."""
-    seen: list[int] = []
-
-    def note(number: int, _: FrameType | None) -> None:
-        seen.append(number)
-        # A second one means it: let it end the program the usual way.
-        for each, handler in previous.items():
-            signal.signal(each, handler)
-
-    signals = (signal.SIGINT, signal.SIGTERM)
-    previous = {each: signal.signal(each, note) for each in signals}
-    try:
-        yield lambda: bool(seen)
-    finally:
-        for each, handler in previous.items():
-            signal.signal(each, handler)

@@ -6,11 +6,12 @@ import json
 from pathlib import Path
 from typing import Any
 
+from rich import box
 from rich.console import Console
 from rich.markup import escape
 from rich.table import Table
 
-from cspm_bringup.run import MODE, RunResult
+from cspm_bringup.run_result import RunResult
 from cspm_msgs_py.dofs import DOFS
 from cspm_msgs_py.scenario import Requirement
 
@@ -23,7 +24,7 @@ def summary_data(result: RunResult) -> dict[str, Any]:
     return {
         "scenario": result.scenario,
         "seed": result.seed,
-        "mode": MODE,
+        "mode": result.mode,
         "duration_s": result.simulated,
         "real_time_factor": result.real_time_factor,
         "errors": {dof: {"max": float(peak), "rms": float(rms)} for dof, peak, rms in errors},
@@ -31,7 +32,7 @@ def summary_data(result: RunResult) -> dict[str, Any]:
         "slack_share": tally.slack_share,
         "infeasible_share": tally.infeasible_share,
         "messages": result.messages,
-    }
+    } | ({"realtime": result.timing} if result.timing else {})
 
 
 def write_json(path: Path, data: Any) -> None:  # noqa: ANN401 - any plain data
@@ -44,6 +45,8 @@ def print_summary(console: Console, result: RunResult, requirement: Requirement)
     data = summary_data(result)
     if result.has_bar and result.tally.steps:
         console.print(_error_table(result, data["errors"], requirement))
+    if result.timing:
+        console.print(_timing_table(result.timing))
     tension = f"tensions {data['tension']['min']:.2f} to {data['tension']['max']:.2f} N"
     console.print(
         f"{tension} · any cable slack {data['slack_share']:.2%} of the time · wanted wrench not met"
@@ -67,6 +70,20 @@ def _error_table(
         if result.controlled:
             cells += [f"± {1e3 * limit:g} {unit}", _verdict(errors[dof], limit)]
         table.add_row(*cells)
+    return table
+
+
+def _timing_table(timing: dict[str, dict[str, float]]) -> Table:
+    """Return what each node told of its deadlines; a cell is empty where it has none."""
+    table = Table(title="real time: totals of the run", box=box.SIMPLE, pad_edge=False)
+    keys = list(dict.fromkeys(key for told in timing.values() for key in told))
+    table.add_column("node", no_wrap=True)
+    for key in keys:
+        # Two lines each, so that all columns fit into 80 characters.
+        heading = key.replace("_", "\n", 1).replace("latency_ms", "late, ms")
+        table.add_column(heading, justify="right", no_wrap=True)
+    for node, told in timing.items():
+        table.add_row(node, *(f"{told[key]:g}" if key in told else "" for key in keys))
     return table
 
 

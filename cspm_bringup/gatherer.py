@@ -1,0 +1,215 @@
+"""From messages as they come to a recording in order: nothing missing, nothing twice.
+
+The schedule says which messages make a plant step whole. Only whole steps are written, so that the
+recording does not depend on the order in which the network delivers. A message that is not the next
+one of its topic, or not one at all, is refused and counted.
+"""
+
+from __future__ import annotations
+
+from bisect import bisect_left
+from collections.abc import Callable
+
+import numpy as np
+from numpy.typing import NDArray
+
+from cspm_msgs_py.diagnostics import decode_diagnostics, encode_diagnostics
+from cspm_msgs_py.errors import InputError
+from cspm_msgs_py.lockstep import ACKNOWLEDGE_EVERY, WINDOW, Sequence, check_end
+from cspm_msgs_py.recording.channel import Channel
+from cspm_msgs_py.recording.writer import BLOCK_NS, RecordingWriter
+from cspm_msgs_py.schedule import PLANT, Schedule
+from cspm_msgs_py.topics import DIAGNOSTICS, Topic
+from cspm_msgs_py.wire import WireReader
+
+Array = NDArray[np.float64]
+WRITE_EVERY_NS = 20_000_000
+
+
+class _Inlet:
+    """One topic: the stamps that it must bring, and what waits to be written."""
+
+    def __init__(self, topic: Topic, channel: Channel, schedule: Schedule) -> None:
+        self.sequence = Sequence(topic.name, schedule)
+        self._delay_ns = schedule.topics[topic.name].delay * schedule.period_ns
+        self._decode = WireReader(topic).decode
+        self._append = channel.append
+        self._logs: list[int] = []
+        self._messages: list[tuple[int, Array]] = []
+
+    def take(self, payload: bytes) -> None:
+        """Keep a message.
+
+        Raises:
+            InputError: it is unusable, or not the next one.
+        """
+        # What is unusable must not take the place of the message that it pretends to be.
+        stamp, row = self._decode(payload)
+        self.sequence.take(stamp)
+        self._logs.append(stamp + self._delay_ns)
+        self._messages.append((stamp, row))
+
+    def write(self, end_ns: int) -> None:
+        """Write what came before `end_ns`."""
+        count = bisect_left(self._logs, end_ns)
+        for log, (stamp, row) in zip(self._logs[:count], self._messages, strict=False):
+            self._append(log, stamp, row)
+        del self._logs[:count], self._messages[:count]
+
+
+class Gatherer:
+    """Gathers a lockstep run.
+
+    Attributes:
+        completed: the last plant step of which everything came, −1 at the start.
+        done: whether all of an ended run is there and written.
+        refused: how many messages were unusable, and why the last was.
+    """
+
+    def __init__(
+        self,
+        schedule: Schedule,
+        topics: dict[str, Topic],
+        writer: RecordingWriter,
+        acknowledge: Callable[[int], None],
+        complain: Callable[[str, str], None] = lambda _topic, _reason: None,
+    ) -> None:
+        """Take what is to come, where it goes, and whom to tell how far all is there.
+
+        `complain` gets topic and reason of each message that is refused.
+        """
+        self._schedule = schedule
+        self._writer = writer
+        self._acknowledge, self._complain = acknowledge, complain
+        self._inlets = {
+            name: _Inlet(topics[name], writer.channel(name), schedule) for name in schedule.topics
+        }
+        self._order = (PLANT, *schedule.nodes)
+        self._next_status = {PLANT: 0} | {
+            node: -(-plan.first // plan.status_divider) * plan.status_divider
+            for node, plan in schedule.nodes.items()
+        }
+        self._statuses: list[tuple[int, int, bytes]] = []
+        self._write_every = max(ACKNOWLEDGE_EVERY, WRITE_EVERY_NS // schedule.period_ns)
+        self._written = 0
+        self._target = ACKNOWLEDGE_EVERY - 1
+        self._left = 1
+        self._last: int | None = None
+        self.completed = -1
+        self.done = False
+        self.refused: tuple[int, str] = (0, "")
+
+    def receive(self, topic: str) -> Callable[[bytes, int], None]:
+        """Return what takes a topic's messages."""
+        keep = self._inlets[topic].take
+
+        def take(payload: bytes, _: int) -> None:
+            try:
+                keep(payload)
+            except InputError as err:
+                self._refuse(topic, str(err))
+                return
+            self._left -= 1
+            if self._left <= 0:
+                self._advance()
+
+        return take
+
+    def receive_diagnostics(self, payload: bytes, _: int) -> None:
+        """Take a message of `/diagnostics`."""
+        try:
+            stamp, [status] = decode_diagnostics(payload)
+            node = status.name
+            expected = self._next_status[node] * self._schedule.period_ns
+        except (InputError, ValueError, KeyError):
+            self._refuse(
+                DIAGNOSTICS.name, f"{DIAGNOSTICS.name}: not one status of a node of this run"
+            )
+            return
+        if stamp != expected:
+            self._refuse(
+                DIAGNOSTICS.name,
+                f"{DIAGNOSTICS.name}: {node} at {stamp} ns, allowed: {expected} ns",
+            )
+            return
+        self._next_status[node] += self._status_divider(node)
+        # Between processes the middleware pads what it carries.
+        canonical = encode_diagnostics(stamp, [status])
+        self._statuses.append((stamp, self._order.index(node), canonical))
+        self._left -= 1
+        if self._left <= 0:
+            self._advance()
+
+    def end(self, last_step: int) -> None:
+        """Note that the run ended with `last_step`; once that is whole, `done` is True.
+
+        Raises:
+            InputError: more is there already, or the plant cannot have been so far.
+        """
+        check_end(last_step, self.completed, self.completed + WINDOW + 2)
+        self._last = last_step
+        self._target = min(self._target, last_step)
+        self._advance()
+
+    def missing(self) -> list[str]:
+        """Return what the earliest incomplete step lacks."""
+        late = [n for n, i in self._inlets.items() if i.sequence.complete == self.completed]
+        silent = [n for n, step in self._next_status.items() if step == self.completed + 1]
+        return late + [f"{DIAGNOSTICS.name} of {node}" for node in silent]
+
+    def write_whole(self) -> None:
+        """Write all whole steps; for a run that ends without saying so."""
+        self._write(self._completed() + 1)
+
+    def _refuse(self, topic: str, reason: str) -> None:
+        self.refused = (self.refused[0] + 1, reason)
+        self._complain(topic, reason)
+
+    def _status_divider(self, node: str) -> int:
+        if node == PLANT:
+            return self._schedule.plant_status_divider
+        return self._schedule.nodes[node].status_divider
+
+    def _completed(self) -> int:
+        rows = min(inlet.sequence.complete for inlet in self._inlets.values())
+        return min(rows, min(self._next_status.values()) - 1)
+
+    def _advance(self) -> None:
+        """Acknowledge what is whole, and count what is missing for the next acknowledgement."""
+        self.completed = self._completed()
+        if self._last is not None and self.completed >= self._last and not self.done:
+            self._write(self._last + 1)
+            self.done = True
+        if self.completed >= self._target:
+            if self.completed + 1 >= self._written + self._write_every:
+                self._write(self.completed + 1)
+            self._acknowledge(self.completed)
+            self._target = self.completed + ACKNOWLEDGE_EVERY
+            if self._last is not None:
+                self._target = max(self.completed + 1, min(self._target, self._last))
+        # Early messages of later steps count as well; then this is reached early and counts anew.
+        self._left = max(
+            1,
+            sum(
+                -(-(self._target - inlet.sequence.complete) // self._schedule.topics[name].divider)
+                for name, inlet in self._inlets.items()
+                if inlet.sequence.complete < self._target
+            ),
+        )
+
+    def _write(self, end_step: int) -> None:
+        """Write everything before `end_step`, all topics in the contract's order."""
+        period_ns = self._schedule.period_ns
+        while self._written < end_step:
+            # All of a block has to be there before anything of the next one.
+            next_block_ns = (self._written * period_ns // BLOCK_NS + 1) * BLOCK_NS
+            self._written = min(end_step, -(-next_block_ns // period_ns))
+            self._write_before(self._written * period_ns)
+
+    def _write_before(self, end_ns: int) -> None:
+        for inlet in self._inlets.values():
+            inlet.write(end_ns)
+        due = sorted(entry for entry in self._statuses if entry[0] < end_ns)
+        self._statuses = [entry for entry in self._statuses if entry[0] >= end_ns]
+        for stamp, _, payload in due:
+            self._writer.append_payload(DIAGNOSTICS.name, stamp, payload)

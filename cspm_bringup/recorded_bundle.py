@@ -1,0 +1,35 @@
+"""What a recording says was run."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import replace
+from pathlib import Path
+
+from cspm_bringup.assembly import resolve
+from cspm_bringup.bundle import SCENARIO, Bundle, read_bundle
+from cspm_bringup.plants import SIM
+from cspm_bringup.run import RECORD_NAME
+from cspm_msgs_py.recording.reader import Recording
+from cspm_msgs_py.scenario import parse_scenario
+
+
+def recorded_bundle(path: Path, overrides: Sequence[str] = ()) -> Bundle:
+    """Return the description that a recording carries, resolved.
+
+    Args:
+        path: the recording.
+        overrides: values put over the scenario's, `key.path=value`.
+
+    Raises:
+        InputError: it carries none, or is no recording; or an override that cannot be used.
+    """
+    with Recording(path) as recording:
+        attachments = recording.attachments
+        record = recording.metadata.get(RECORD_NAME, {})
+    bundle = replace(read_bundle(attachments, str(path)), plant=record.get("plant", SIM))
+    if not overrides:
+        return bundle
+    text = attachments[SCENARIO].decode(errors="replace")
+    scenario = parse_scenario(text, f"{path}: {SCENARIO}", overrides)
+    return replace(bundle, scenario=resolve(scenario, bundle.testbed.testbed))

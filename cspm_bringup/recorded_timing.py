@@ -1,0 +1,50 @@
+"""What the nodes of a recorded run told of themselves on `/diagnostics`."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from pathlib import Path
+
+from cspm_msgs_py.diagnostics import Level, Status, decode_diagnostics
+from cspm_msgs_py.recording.reader import Recording
+from cspm_msgs_py.topics import DIAGNOSTICS
+
+# Totals since the start: the last counts. Largest since the last message: the largest counts.
+TOTALS = ("deadlines_missed", "late_steps", "stale_inputs", "refused", "lost")
+LARGEST = ("worst_latency_ms",)
+
+
+def first_alarm(path: Path) -> str | None:
+    """Return the first error that a node told, with its name, if one did.
+
+    Raises:
+        InputError: the recording cannot be read.
+    """
+    for status in _statuses(path):
+        if status.level == Level.ERROR:
+            return f"{status.name}: {status.message}"
+    return None
+
+
+def timing_of(path: Path) -> dict[str, dict[str, float]]:
+    """Return by node what it told of deadlines, stale and unusable inputs, and losses.
+
+    Raises:
+        InputError: the recording cannot be read.
+    """
+    found: dict[str, dict[str, float]] = {}
+    for status in _statuses(path):
+        for key, text in status.values.items():
+            if key in TOTALS:
+                found.setdefault(status.name, {})[key] = int(text)
+            elif key in LARGEST:
+                told = found.setdefault(status.name, {})
+                told[key] = max(told.get(key, 0.0), float(text))
+    return found
+
+
+def _statuses(path: Path) -> Iterator[Status]:
+    with Recording(path) as recording:
+        if recording.topics[DIAGNOSTICS.name].count:
+            for payload in recording.payloads(DIAGNOSTICS.name).payloads:
+                yield from decode_diagnostics(payload).statuses

@@ -1,0 +1,66 @@
+"""Start the nodes of one scenario, each in a process; all of them end when the plant does.
+
+ros2 launch cspm scenario.launch.py scenario:=calm pace:=realtime record:=/tmp/calm
+"""
+
+from datetime import datetime
+from pathlib import Path
+
+from launch import LaunchContext, LaunchDescription
+from launch.actions import DeclareLaunchArgument, OpaqueFunction, Shutdown
+from launch.substitutions import LaunchConfiguration
+from launch_ros.actions import Node
+
+EXTERNAL = "external"
+OTHERS = (
+    "wave_trajectory",
+    "motion_controller",
+    "tension_distribution",
+    "force_controller",
+    "recorder",
+)
+
+
+def generate_launch_description() -> LaunchDescription:
+    """Return the arguments and, from their values, the nodes."""
+    return LaunchDescription(
+        [
+            DeclareLaunchArgument(
+                "scenario", default_value="worst_case", description="a name or a file"
+            ),
+            DeclareLaunchArgument(
+                "pace", default_value="lockstep", choices=["lockstep", "realtime"]
+            ),
+            DeclareLaunchArgument(
+                "plant", default_value="sim", choices=["sim", "mujoco", EXTERNAL]
+            ),
+            DeclareLaunchArgument(
+                "record",
+                default_value="",
+                description="a new folder; empty for recordings/SCENARIO-DATE-TIME",
+            ),
+            OpaqueFunction(function=nodes),
+        ]
+    )
+
+
+def nodes(context: LaunchContext) -> list[Node]:
+    """Return the nodes that the arguments ask for; an external plant is not ours to start."""
+    scenario, pace, plant, record = (
+        LaunchConfiguration(name).perform(context)
+        for name in ("scenario", "pace", "plant", "record")
+    )
+    dated = f"recordings/{Path(scenario).stem}-{datetime.now():%Y%m%d-%H%M%S}"
+    parameters = {"scenario": scenario, "pace": pace, "folder": record or dated}
+    if plant == EXTERNAL:
+        return [node(name, parameters) for name in OTHERS]
+    parameters["plant"] = plant
+    plant_node = node("plant", parameters, on_exit=Shutdown(reason="the plant has ended"))
+    return [plant_node, *(node(name, parameters) for name in OTHERS)]
+
+
+def node(name: str, parameters: dict[str, str], **options: Shutdown) -> Node:
+    """Return a node of this package in a process of its own."""
+    return Node(
+        package="cspm", executable=name, parameters=[parameters], output="screen", **options
+    )

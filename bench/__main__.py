@@ -11,12 +11,15 @@ from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, T
 
 from bench.closed_loop import measure_closed_loop
 from bench.figure import Advance, Figure
+from bench.graph import measure_graph
 from bench.machine import describe_machine, is_busy
 from bench.memory import measure_memory
 from bench.plant import measure_against_mujoco, measure_plant
 from bench.report import print_report
 from bench.start_up import measure_start_up
 from bench.volume import QUICK, USUAL, Volume, full
+from cspm_bringup.ros_install import find_ros
+from cspm_msgs_py.errors import InputError
 
 
 def main() -> None:
@@ -24,7 +27,11 @@ def main() -> None:
     parser = argparse.ArgumentParser(prog="python -m bench", description=__doc__)
     size = parser.add_mutually_exclusive_group()
     size.add_argument("--quick", action="store_true", help="half a minute: fewer, shorter runs")
-    size.add_argument("--full", action="store_true", help="record the whole hour: 6 GB on disk")
+    size.add_argument(
+        "--full",
+        action="store_true",
+        help="record the whole hour: 6 GB on disk; 10 minutes in real time",
+    )
     parser.add_argument("--json", type=Path, metavar="FILE", help="also write the figures as JSON")
     arguments = parser.parse_args()
     volume = QUICK if arguments.quick else full(USUAL) if arguments.full else USUAL
@@ -61,10 +68,19 @@ def _figures(volume: Volume, advance: Advance) -> list[Figure]:
         *measure_plant(volume.plant, advance),
         *measure_against_mujoco(volume.plant, advance),
         *measure_closed_loop(volume.loops, volume.loop_duration, advance),
+        *_graph(volume, advance),
         *measure_start_up(volume.first_runs, volume.later_runs, advance),
         *measure_memory(volume.silent_duration, False, advance),
         *measure_memory(volume.recorded_duration, True, advance),
     ]
+
+
+def _graph(volume: Volume, advance: Advance) -> list[Figure]:
+    try:
+        find_ros("bench")
+    except InputError:
+        return []
+    return measure_graph(volume.graphs, volume.graph_duration, volume.realtime_duration, advance)
 
 
 if __name__ == "__main__":

@@ -126,11 +126,12 @@ def test_attachments_stay_in_their_folder(name):
     assert str(caught.value) == f"bag: attachment {name!r}, allowed: names without folders"
 
 
-def test_still_bodies_need_no_files(tmp_path):
+def test_still_bodies_need_no_files():
     path = SCENARIOS / "rest.yaml"
     bundle = make_bundle(load_scenario(path), load_testbed(TESTBED), SCENARIOS)
     assert bundle.files == {}
-    bundle.write_files(tmp_path)
-    assert list(tmp_path.iterdir()) == []
-    Bundle(bundle.scenario, bundle.testbed, {"a.csv": b"x"}).write_files(tmp_path)
-    assert (tmp_path / "a.csv").read_bytes() == b"x"
+    with bundle.unpacked() as place:
+        assert list(place.iterdir()) == []
+    with Bundle(bundle.scenario, bundle.testbed, {"a.csv": b"x"}).unpacked() as place:
+        assert (place / "a.csv").read_bytes() == b"x"
+    assert not place.exists()

@@ -131,7 +131,14 @@ REST = f"{SCENARIOS}/rest.yaml"
 @pytest.mark.parametrize(
     ("arguments", "line"),
     [
-        (["--mode", "graph"], "--mode graph: allowed: inprocess"),
+        (
+            ["--mode", "fast"],
+            "--mode fast: allowed: inprocess, graph, processes, realtime",
+        ),
+        (
+            ["--mode", "graph", "--plant", "external"],
+            "--plant external --mode graph: allowed: --mode realtime",
+        ),
         (["--duration", "-1"], f"{REST}: duration: -1.0, allowed: greater than 0"),
         (["--duration", "0"], f"{REST}: duration: 0.0, allowed: greater than 0"),
         (

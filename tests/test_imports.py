@@ -3,6 +3,7 @@
 import ast
 import importlib
 import pkgutil
+import subprocess
 import sys
 from itertools import pairwise
 from pathlib import Path
@@ -29,6 +30,18 @@ ROS = {
     "builtin_interfaces",
     *(f"{kind}_msgs" for kind in ("sensor", "geometry", "trajectory", "diagnostic", "rosgraph")),
     *(f"{kind}_msgs" for kind in ("std", "nav", "tf2")),
+    "std_srvs",
+}
+
+# These stand on modules that import ROS.
+ON_ROS = {
+    "cspm_bringup.graph_run",
+    "cspm_bringup.recorder_node",
+    "cspm_bringup.player_node",
+    "cspm_bringup.lockstep_player_node",
+    "cspm_bringup.replay_run",
+    "cspm_bringup.node_run",
+    "cspm_sim.plant_node",
 }
 
 
@@ -47,7 +60,7 @@ def later(package):
 
 def wrong_imports(package, name, text):
     """Imports that go against the order, or to ROS from where ROS must not be."""
-    may_use_ros = package == "cspm_bringup" or "node" in name or "ros" in name
+    may_use_ros = package == "cspm_bringup" or name.endswith("_node") or name.startswith("ros/")
     found = set(imported(text))
     return found & (later(package) | (set() if may_use_ros else ROS))
 
@@ -55,7 +68,8 @@ def wrong_imports(package, name, text):
 @pytest.mark.parametrize("package", PACKAGES)
 def test_imports_go_one_way_and_ros_stays_outside(package):
     for path in sorted((ROOT / package).rglob("*.py")):
-        wrong = wrong_imports(package, path.stem, path.read_text(encoding="utf-8"))
+        name = path.relative_to(ROOT / package).with_suffix("").as_posix()
+        wrong = wrong_imports(package, name, path.read_text(encoding="utf-8"))
         assert not wrong, f"{path.relative_to(ROOT)} imports {sorted(wrong)}"
 
 
@@ -75,27 +89,47 @@ def test_the_check_sees_ros_where_it_must_not_be():
     text = "import rclpy\nfrom sensor_msgs.msg import JointState"
     assert wrong_imports("cspm_sim", "plant", text) == {"rclpy", "sensor_msgs"}
     assert wrong_imports("cspm_sim", "plant_node", text) == set()
+    assert wrong_imports("cspm_msgs_py", "ros/session", text) == set()
+    assert wrong_imports("cspm_msgs_py", "rosy", text) == {"rclpy", "sensor_msgs"}
     assert wrong_imports("cspm_bringup", "runner", text) == set()
 
 
-def modules():
+def modules(*, with_ros):
     for package in PACKAGES:
-        yield package
+        if not with_ros:
+            yield package
         for info in pkgutil.walk_packages([str(ROOT / package)], f"{package}."):
-            text = (ROOT / (info.name.replace(".", "/") + ".py")) if not info.ispkg else None
-            if text is None or not set(imported(text.read_text(encoding="utf-8"))) & ROS:
+            place = ROOT / info.name.replace(".", "/")
+            text = (place / "__init__.py" if info.ispkg else place.with_suffix(".py")).read_text()
+            ros = set(imported(text)) & ROS or ".ros" in info.name or info.name in ON_ROS
+            if bool(ros) == with_ros:
                 yield info.name
 
 
-@pytest.mark.parametrize("name", sorted(modules()))
-def test_a_module_imports_and_exports_what_it_says(name):
-    if name.endswith("__main__"):
-        pytest.skip("runs when imported")
+def check_module(name):
     module = importlib.import_module(name)
     assert module.__doc__, f"{name} says nothing about itself"
     for exported in getattr(module, "__all__", ()):
         assert hasattr(module, exported)
 
 
-def test_nothing_brought_ros_in():
-    assert not ROS & set(sys.modules)
+@pytest.mark.parametrize("name", sorted(modules(with_ros=False)))
+def test_a_module_imports_and_exports_what_it_says(name):
+    if name.endswith("__main__"):
+        pytest.skip("runs when imported")
+    check_module(name)
+
+
+@pytest.mark.parametrize("name", sorted(modules(with_ros=True)))
+def test_a_module_on_ros_imports_and_exports_what_it_says(name):
+    pytest.importorskip("rclpy", reason="ROS 2 is not installed")
+    check_module(name)
+
+
+def test_the_command_line_and_a_run_in_process_bring_no_ros_in():
+    code = (
+        "import sys, cspm_bringup.commands, cspm_bringup.cli, cspm_bringup.run;"
+        f"sys.exit(sorted(set(sys.modules) & {ROS!r}))"
+    )
+    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=False)
+    assert done.stderr.strip() == "[]"

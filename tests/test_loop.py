@@ -37,6 +37,9 @@ class Listener:
         publish = {name: self.listen(name) for name in testbed.topics}
         self.loop = Loop(self.parts, publish, lambda now, found: self.statuses.append((now, found)))
 
+    def statuses_of(self, node):
+        return [(now, status) for now, status in self.statuses if status.name == node]
+
     def listen(self, name):
         return lambda log, stamp, row: self.messages[name].append((log, stamp, row.copy()))
 
@@ -97,18 +100,22 @@ def test_the_torque_in_the_winch_state_is_the_one_that_led_to_it(waves):
 
 def test_command_k_comes_from_what_was_measured_at_k(waves):
     """Controllers of their own, fed with the messages, repeat every command bit for bit."""
-    motion, distribution, force = assemble(
+    wave, motion, distribution, force = assemble(
         waves.parts.scenario, waves.parts.testbed, Path()
-    ).controllers
-    pose, frame = waves.rows("/bar/pose"), waves.rows("/winch_frame/pose")
-    reference, measured = waves.rows("/bar/reference"), waves.rows("/cables/tension")
+    ).stages
+    assert wave.node == "wave_trajectory"
+    measured = {name: waves.rows(name) for name in waves.parts.sensors}
+    references = waves.rows("/bar/reference")
+    known = {}
     for k, torque in enumerate(waves.rows("/winches/torque_command")):
+        known |= {name: rows[k] for name, rows in measured.items()}
+        known["/bar/reference"] = references[k]
         if k % 2 == 0:
-            wrench = motion.step(pose[k], reference[k])
-            np.testing.assert_array_equal(wrench, waves.rows("/wrench_command")[k // 2])
-            tensions = distribution.step(wrench, pose[k], frame[k]).tensions
-            np.testing.assert_array_equal(tensions, waves.rows("/tension_command")[k // 2])
-        np.testing.assert_array_equal(force.step(tensions, measured[k]), torque)
+            for stage, topic in ((motion, "/wrench_command"), (distribution, "/tension_command")):
+                stage.step(k * 1_000_000, known, known.__setitem__)
+                np.testing.assert_array_equal(known[topic], waves.rows(topic)[k // 2])
+        force.step(k * 1_000_000, known, known.__setitem__)
+        np.testing.assert_array_equal(known["/winches/torque_command"], torque)
 
 
 def test_what_is_measured_is_not_the_truth(waves):
@@ -152,7 +159,12 @@ def test_every_part_runs_at_its_own_rate():
             np.testing.assert_array_equal(found.log(topic), stamps(rate, 0.4))
     for topic in ("/clock", "/truth/bar/pose", "/truth/cables/unstretched_length"):
         np.testing.assert_array_equal(found.stamp(topic), stamps(1000, 0.4))
-    assert [now for now, _ in found.statuses] == [0, 100_000_000, 200_000_000, 300_000_000]
+    for node in ("plant", "wave_trajectory", "motion_controller", "force_controller"):
+        told = [now for now, _ in found.statuses_of(node)]
+        assert told == [0, 100_000_000, 200_000_000, 300_000_000]
+    # At 125 Hz no computation falls on a multiple of 0.1 s; the next one does.
+    told = [now for now, _ in found.statuses_of("tension_distribution")]
+    assert told == [0, 104_000_000, 208_000_000, 312_000_000]
 
 
 def test_the_plants_rate_sets_the_grid():
@@ -200,10 +212,9 @@ def test_all_is_well_at_rest():
     found = after(bundle_of("rest"), 200)
     assert not found.loop.slack
     assert not found.loop.infeasible
-    for _, statuses in found.statuses:
-        names = [status.name for status in statuses]
-        assert names == ["plant", "tension_distribution", "force_controller"]
-        assert {status.level for status in statuses} == {Level.OK}
+    names = ["plant", *found.parts.schedule.nodes]
+    assert [status.name for _, status in found.statuses] == 2 * names
+    assert {status.level for _, status in found.statuses} == {Level.OK}
     assert found.loop.history().startswith("before it: bar at [")
 
 
@@ -216,9 +227,9 @@ def test_slack_cables_are_told():
     assert not found.loop.infeasible
     first = np.flatnonzero((tensions <= 0.0).any(axis=1))[0]
     assert f"slack since {(first - 1) * 1e-3:.3f} s (surge_1)" in found.loop.history()
-    now, [plant] = found.statuses[-1]
+    now, plant = found.statuses_of("plant")[-1]
     assert (now, plant.level, plant.message) == (300_000_000, Level.WARN, "slack cable")
-    shares = [float(statuses[0].values["slack_share"]) for _, statuses in found.statuses]
+    shares = [float(told.values["slack_share"]) for _, told in found.statuses_of("plant")]
     expected = (tensions <= 0.0).any(axis=1)
     # A status counts the steps since the last one, its own among them.
     np.testing.assert_allclose(
@@ -234,7 +245,7 @@ def test_a_wrench_out_of_reach_is_told():
     found = after(noisy, 150)
     assert found.loop.infeasible
     assert "wrench infeasible since 0." in found.loop.history()
-    _, [_, distribution, _] = found.statuses[-1]
+    _, distribution = found.statuses_of("tension_distribution")[-1]
     assert (distribution.level, distribution.message) == (Level.WARN, "wrench infeasible")
     assert float(distribution.values["infeasible_share"]) > 0.5
 
@@ -275,3 +286,16 @@ def test_the_cables_are_in_the_files_order():
     topics = bundle_of("rest").testbed.testbed.topics
     for name in ("/winches/state", "/cables/tension", "/winches/torque_command"):
         assert topics[name].joint_names == THESIS_CABLES
+
+
+def test_a_trip_with_brakes_stops_the_winches():
+    free = Listener(bundle_of("worst_case")).run(50)
+    braked = Listener(bundle_of("worst_case", "safety.state=brake")).run(50)
+    braked.parts.stages[-1].trip(50_000_000, "for a test")
+    for found in (free, braked):
+        found.run(50)
+    speeds = braked.rows("/truth/winches/state")[:, 8:16]
+    assert np.abs(speeds[49]).min() > 0.0
+    assert np.abs(speeds[52:]).max() == 0.0
+    np.testing.assert_array_equal(braked.rows("/winches/torque_command")[51:], 0.0)
+    assert np.abs(free.rows("/truth/winches/state")[52:, 8:16]).max() > 0.0

@@ -68,7 +68,7 @@ def test_resim_repeats_it_on_the_plant_that_made_it(monkeypatch, recording):
 
 def test_an_unknown_plant_is_refused(monkeypatch, capsys):
     assert command(monkeypatch, "run", "rest", "--plant", "real", "--no-record") == 2
-    assert capsys.readouterr().err == "cspm: --plant real: allowed: sim, mujoco\n"
+    assert capsys.readouterr().err == "cspm: --plant real: allowed: sim, mujoco, external\n"
     bundle = bundle_of("rest")
     with pytest.raises(InputError, match=r"^plant real: allowed: sim, mujoco$"):
         assemble(bundle.scenario, bundle.testbed.testbed, Path(), "real")

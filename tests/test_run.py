@@ -154,7 +154,7 @@ def test_recorded_rates(tmp_path):
         np.testing.assert_array_equal(found.stamp_ns, expected)
         np.testing.assert_array_equal(found.log_ns, expected)
     with Recording(tmp_path / "bag") as recording:
-        assert recording.topics["/diagnostics"].count == 5
+        assert recording.topics["/diagnostics"].count == 5 * 5
 
 
 def test_the_same_seed_gives_the_same_recording(folder, tmp_path):
@@ -189,10 +189,10 @@ def test_the_recording_says_what_was_run(folder):
     with Recording(folder) as recording:
         assert recording.complete
         assert recording.attachments == bundle.attachments()
-        assert recording.metadata["cspm"] == metadata(bundle)
+        assert recording.metadata["cspm"] == metadata(bundle, "inprocess")
     found = overview(folder)
     assert (found.scenario, found.testbed, found.complete) == ("worst_case", "thesis", True)
-    assert metadata(bundle) == {
+    assert metadata(bundle, "inprocess") == {
         "contract_version": "1",
         "scenario": "worst_case",
         "seed": "1",

@@ -1,0 +1,65 @@
+"""The same closed loop as ROS 2 nodes, recorded, and how many messages are lost."""
+
+from __future__ import annotations
+
+import tempfile
+from collections.abc import Callable
+from pathlib import Path
+
+from bench.figure import Advance, Figure
+from bench.thesis_machine import worst_case
+from cspm_bringup.run_result import RunResult
+
+GROUP = "ROS 2 graph, worst case, recorded"
+DOMAIN_ID = 83
+
+
+def measure_graph(
+    repetitions: int, duration: float, realtime_duration: float, advance: Advance
+) -> list[Figure]:
+    """Simulate `duration` [s] in each mode in turns, and `realtime_duration` [s] by the wall."""
+    from cspm_bringup.graph_run import run_graph
+    from cspm_bringup.process_run import run_processes
+
+    factors: dict[str, list[float]] = {"graph": [], "processes": []}
+    runners: dict[str, Callable[..., RunResult]] = {"graph": run_graph, "processes": run_processes}
+    missing = 0
+    for _ in range(repetitions):
+        for name, runner in runners.items():
+            with tempfile.TemporaryDirectory(prefix="cspm-bench-") as place:
+                result = runner(worst_case(duration), Path(place) / "run", domain_id=DOMAIN_ID)
+            factors[name].append(result.real_time_factor)
+            missing += round(1000 * duration) - result.messages["/clock"]
+            advance(GROUP)
+    with tempfile.TemporaryDirectory(prefix="cspm-bench-") as place:
+        wall = run_processes(
+            worst_case(realtime_duration),
+            Path(place) / "run",
+            mode="realtime",
+            domain_id=DOMAIN_ID,
+        )
+    advance(GROUP)
+    note = f"{repetitions} runs of {duration:g} s simulated, all rates 1 kHz, in turns"
+    by_wall = f"real time, {wall.simulated:g} s, all rates 1 kHz, a process per node"
+    steps = max(1.0, 1000 * wall.simulated)
+    late = 100 * wall.timing["plant"]["deadlines_missed"] / steps
+    return [
+        Figure(GROUP, "one process, × real time", "", factors["graph"], 3.0, note=note),
+        Figure(GROUP, "a process per node, × real time", "", factors["processes"], 1.0, note=note),
+        Figure(GROUP, "in step: steps not recorded", "", [missing], at_most=0, note=note),
+        Figure(
+            GROUP,
+            "real time: messages lost",
+            "",
+            [wall.timing["recorder"]["lost"]],
+            at_most=0,
+            note=f"{by_wall}, by the senders' sequence numbers",
+        ),
+        Figure(
+            GROUP,
+            "real time: torque commands late",
+            "%",
+            [late],
+            note=f"{by_wall}, later than one period of 1 ms",
+        ),
+    ]

@@ -1,0 +1,79 @@
+"""Drives, load cells and motion capture: a driver to fill in, explained in docs/drivers.md."""
+
+import time
+from contextlib import suppress
+
+import rclpy
+from geometry_msgs.msg import Point, Pose, PoseStamped, Quaternion
+from rclpy.executors import ExternalShutdownException
+from rclpy.node import Node
+from sensor_msgs.msg import JointState
+from std_msgs.msg import Bool, Header
+
+CABLES = ["hoist_1", "hoist_2", "surge_1", "surge_2", "sway_1", "sway_2", "sway_3", "sway_4"]
+RADII = [0.0025] * 2 + [0.025] * 6  # drum radius over gear ratio [m]
+LIMITS = [0.5] * 2 + [2.0] * 2 + [1.0] * 4  # largest torques [N·m]
+POSES = {"/winch_frame/pose": Point(), "/bar/pose": Point(z=2.0)}  # z down [m]
+
+
+class Hardware:
+    """Stands for a machine whose bar is clamped: tensions follow the motors' torques."""
+
+    tensions, torques = [5.0] * 8, [5.0 * radius for radius in RADII]
+
+    def read(self) -> tuple[list[float], ...]:
+        """Return angles [rad], speeds [rad/s] and torques [N·m] of the motors, tensions [N]."""
+        pulls = [max(0.0, m / r) for m, r in zip(self.torques, RADII, strict=True)]
+        self.tensions = [t + 0.2 * (p - t) for t, p in zip(self.tensions, pulls, strict=True)]
+        return [0.0] * 8, [0.0] * 8, self.torques, self.tensions
+
+    def write(self, torques: list[float], brakes: bool) -> None:
+        """Command motor torques [N·m], positive winds in, and set or release the brakes."""
+        self.torques = self.torques if brakes else torques
+
+
+class Driver(Node):
+    """Publishes what is measured, writes what is commanded, brakes where commands fail."""
+
+    def __init__(self) -> None:
+        super().__init__("driver")
+        self.hardware, self.braked, self.tripped = Hardware(), False, False
+        self.commanded = float("inf")  # when the last command came; none came yet
+        self.watchdog = self.declare_parameter("watchdog", 0.05).value  # s
+        self.winches = self.create_publisher(JointState, "/winches/state", 10)
+        self.cells = self.create_publisher(JointState, "/cables/tension", 10)
+        self.poses = {name: self.create_publisher(PoseStamped, name, 10) for name in POSES}
+        self.create_subscription(JointState, "/winches/torque_command", self._command, 10)
+        self.create_subscription(Bool, "/winches/brake", self._brake, 10)
+        self.create_timer(1.0 / self.declare_parameter("rate", 200.0).value, self._measure)
+
+    def _measure(self) -> None:
+        header = Header(stamp=self.get_clock().now().to_msg(), frame_id="world_ned")
+        angles, speeds, torques, tensions = self.hardware.read()
+        self.tripped |= time.monotonic() - self.commanded > self.watchdog
+        if self.tripped:  # until it is restarted; without winch state the controllers stop as well
+            self.hardware.write([0.0] * 8, brakes=True)
+        else:
+            told = {"position": angles, "velocity": speeds, "effort": torques}
+            self.winches.publish(JointState(header=header, name=CABLES, **told))
+        self.cells.publish(JointState(header=header, name=CABLES, effort=tensions))
+        for name, place in POSES.items():
+            pose = Pose(position=place, orientation=Quaternion(w=1.0))
+            self.poses[name].publish(PoseStamped(header=header, pose=pose))
+
+    def _command(self, message: JointState) -> None:
+        self.commanded, torques = time.monotonic(), list(message.effort)
+        good = list(message.name) == CABLES and len(torques) == len(CABLES)
+        good = good and all(abs(t) <= most for t, most in zip(torques, LIMITS, strict=True))
+        self.tripped |= not good
+        if not self.tripped:
+            self.hardware.write(torques, self.braked)
+
+    def _brake(self, message: Bool) -> None:
+        self.braked = message.data
+
+
+if __name__ == "__main__":
+    rclpy.init()
+    with suppress(KeyboardInterrupt, ExternalShutdownException):
+        rclpy.spin(Driver())

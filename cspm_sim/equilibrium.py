@@ -36,6 +36,9 @@ class Equilibrium(NamedTuple):
     unstretched_lengths: Array
 
 
+NOTHING = np.zeros(6)
+
+
 def gravity_wrench(parameters: PlantParameters, bar_pose: ArrayLike) -> Array:
     """Return gravity's force and moment about the bar frame's origin in world axes, shape (6,)."""
     bar = parameters.bar
@@ -45,12 +48,16 @@ def gravity_wrench(parameters: PlantParameters, bar_pose: ArrayLike) -> Array:
 
 
 def find_equilibrium(
-    parameters: PlantParameters, bar_pose: ArrayLike, frame_pose: ArrayLike, limits: Array
+    parameters: PlantParameters,
+    bar_pose: ArrayLike,
+    frame_pose: ArrayLike,
+    limits: Array,
+    load: Array = NOTHING,
 ) -> Equilibrium:
     """Return the state of rest at `bar_pose`, tensions least in norm within `limits` (n, 2) [N].
 
     Where the cables cannot balance every moment (the thesis's machine, in roll), the roll is found
-    at which gravity needs none.
+    at which gravity needs none. `load` is a wrench on the bar beside gravity's, (6,), world axes.
 
     Raises:
         ConvergenceError: no tensions within the limits hold the bar at rest near this pose.
@@ -61,13 +68,13 @@ def find_equilibrium(
         pose[3] = roll
         structure = -geometry(parameters.cables, pose, frame_pose).bar.T
         direction = np.linalg.svd(structure)[0][:, -1]
-        return float(direction @ gravity_wrench(parameters, pose) * np.sign(direction[3]))
+        return float(direction @ (gravity_wrench(parameters, pose) + load) * np.sign(direction[3]))
 
     start = float(pose[3])
-    if not _balanced(parameters, pose, frame_pose):
+    if not _balanced(parameters, pose, frame_pose, load):
         found = root_scalar(imbalance, x0=start, x1=start + 1e-3, xtol=1e-14)
         pose[3] = found.root if found.converged else start
-    tensions = _hold(parameters, pose, frame_pose, limits)
+    tensions = _hold(parameters, pose, frame_pose, limits, load)
     lengths = geometry(parameters.cables, pose, frame_pose).lengths
     return Equilibrium(pose, tensions, unstretched_lengths(parameters, lengths, tensions))
 
@@ -92,9 +99,9 @@ def _excess_tension(
     return float(found - tension)
 
 
-def _balanced(parameters: PlantParameters, pose: Array, frame_pose: ArrayLike) -> bool:
+def _balanced(parameters: PlantParameters, pose: Array, frame_pose: ArrayLike, load: Array) -> bool:
     structure = -geometry(parameters.cables, pose, frame_pose).bar.T
-    wrench = -gravity_wrench(parameters, pose)
+    wrench = -gravity_wrench(parameters, pose) - load
     tensions = np.linalg.pinv(structure, rcond=RANK_TOLERANCE) @ wrench
     return _residual(structure, tensions, wrench) < WRENCH_TOLERANCE
 
@@ -104,9 +111,11 @@ def _residual(structure: Array, tensions: Array, wrench: Array) -> float:
     return float(np.linalg.norm(structure @ tensions - wrench) / weight)
 
 
-def _hold(parameters: PlantParameters, pose: Array, frame_pose: ArrayLike, limits: Array) -> Array:
+def _hold(
+    parameters: PlantParameters, pose: Array, frame_pose: ArrayLike, limits: Array, load: Array
+) -> Array:
     structure = -geometry(parameters.cables, pose, frame_pose).bar.T
-    wrench = -gravity_wrench(parameters, pose)
+    wrench = -gravity_wrench(parameters, pose) - load
     tensions = least_tensions(structure, wrench, limits)
     residual = _residual(structure, tensions, wrench)
     if residual > RESIDUAL_TOLERANCE:

@@ -9,7 +9,8 @@ from numpy.typing import NDArray
 
 from cspm_msgs_py.diagnostics import Status
 from cspm_msgs_py.errors import DivergenceError, InputError
-from cspm_msgs_py.lockstep import WINDOW, Sequence
+from cspm_msgs_py.graph import window_of
+from cspm_msgs_py.lockstep import Sequence
 from cspm_msgs_py.schedule import TORQUE_COMMAND, Schedule
 from cspm_sim.simulator import Simulator
 
@@ -41,7 +42,9 @@ class LockstepPlant:
         self._torques = Sequence(TORQUE_COMMAND, schedule) if self._torque_timing else None
         self._early: dict[int, Array] = {}
         self._progress = {name: schedule.idle_through(name) for name in followers}
+        self._windows = {name: window_of(name) for name in self._progress}
         self._slowest = min(self._progress.values(), default=-1)
+        self._furthest = self._allowed()
         # Where a topic's next message is not due yet, nothing is left to come until then.
         self._most_ahead = max(each.first + each.divider for each in schedule.topics.values())
         self._stopping = False
@@ -67,14 +70,15 @@ class LockstepPlant:
         """End the run after the step underway."""
         self._stopping = True
 
-    def receive_torque(self, stamp_ns: int, torque: Array) -> None:
-        """Take a torque command.
+    def receive_torque(self, stamp_ns: int, torque: Array, number: int | None = None) -> None:
+        """Take a torque command; `number` is its sender's, None where that is not known.
 
         Raises:
             InputError: it is not the one that is due.
+            CspmError: two senders send torque commands.
         """
         if self._torques is not None:
-            self._torques.take(stamp_ns)
+            self._torques.take(stamp_ns, number)
             # It may come before the step that it is for.
             self._early[stamp_ns // self._schedule.period_ns] = torque
             self.pump()
@@ -92,6 +96,7 @@ class LockstepPlant:
         if node in self._progress:
             self._progress[node] = max(step, self._progress[node])
             self._slowest = min(self._progress.values())
+            self._furthest = self._allowed()
             self.pump()
 
     def pump(self) -> None:
@@ -114,7 +119,8 @@ class LockstepPlant:
         """Return what the next step waits for."""
         if self._owes_torque():
             return f"plant waits for {TORQUE_COMMAND} of {self._now():.3f} s"
-        late = [n for n, step in self._progress.items() if step < self.last_step - WINDOW]
+        windows = self._windows
+        late = [n for n, step in self._progress.items() if step + windows[n] < self.last_step]
         if self._stopping:
             late = [n for n, step in self._progress.items() if step < self.last_step]
         return f"plant waits for {', '.join(late)} at {self._now():.3f} s"
@@ -129,8 +135,12 @@ class LockstepPlant:
         return self._torques.complete < self.last_step
 
     def _may_advance(self) -> bool:
-        behind = bool(self._progress) and self._slowest < self.last_step - WINDOW
-        return not self._owes_torque() and not behind
+        behind = bool(self._progress) and self._furthest < self.last_step
+        return not behind and not self._owes_torque()
+
+    def _allowed(self) -> int:
+        """Return the last step from which those who are waited for let the plant advance."""
+        return min((step + self._windows[n] for n, step in self._progress.items()), default=-1)
 
     def _observe(self) -> None:
         simulator = self._simulator

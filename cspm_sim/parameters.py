@@ -2,23 +2,17 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
-
 import numpy as np
 from numpy.typing import NDArray
 
-from cspm_msgs_py.errors import InputError
-from cspm_msgs_py.testbed import Bar, Cable, EffectEntry, ExponentialStiffness, Testbed
-from cspm_sim.effects import Block, Effect, catalogue
+from cspm_msgs_py.testbed import Bar, Cable, ExponentialStiffness, Testbed
+from cspm_sim.effect_entries import altered_testbed, hook_rows, read_actions
 from cspm_sim.kernels import bar as bar_kernel
 from cspm_sim.kernels import cable as cable_kernel
-from cspm_sim.kernels.effect_call import kernel_address
-from cspm_sim.kernels.plant import BAR_BLOCK, WINCH_BLOCK, PlantParameters
+from cspm_sim.kernels.plant import BAR_STATES, PlantParameters
 from cspm_sim.stiffness import POINTS, law_slope, law_table
 
 Array = NDArray[np.float64]
-
-_BLOCKS = {Block.WINCH: WINCH_BLOCK, Block.BAR: BAR_BLOCK}
 
 
 def plant_parameters(testbed: Testbed) -> PlantParameters:
@@ -27,21 +21,28 @@ def plant_parameters(testbed: Testbed) -> PlantParameters:
     Raises:
         InputError: an effect, one of its elements or parameters is unknown or out of bounds.
     """
-    rows, tables = zip(*(_cable_row(cable) for cable in testbed.cables), strict=True)
-    actions = [action for entry in testbed.effects for action in _actions(entry, testbed)]
-    width = max((len(values) for *_, values in actions), default=1)
+    actions = read_actions(testbed)
+    testbed = altered_testbed(testbed, actions)
+    gravity = testbed.gravity
+    rows, tables = zip(*(_cable_row(cable, gravity) for cable in testbed.cables), strict=True)
+    effects, effect_parameters = hook_rows(actions, plant_states(testbed))
     return PlantParameters(
-        bar=_bar_array(testbed.bar, testbed.gravity) if testbed.bar else np.zeros(0),
+        bar=_bar_array(testbed.bar, gravity) if testbed.bar else np.zeros(0),
         cables=np.asfortranarray(rows),
         tables=np.array(tables),
-        effects=np.array(
-            [(_BLOCKS[e.block], element, kernel_address(e.kernel)) for e, element, _ in actions],
-            dtype=np.int64,
-        ).reshape(len(actions), 3),
-        effect_parameters=np.array(
-            [values + [0.0] * (width - len(values)) for *_, values in actions], dtype=float
-        ).reshape(len(actions), width),
+        effects=effects,
+        effect_parameters=effect_parameters,
     )
+
+
+def nominal_parameters(testbed: Testbed) -> PlantParameters:
+    """Return the kernels' parameters without effects: what controllers know of the machine."""
+    return plant_parameters(testbed.model_copy(update={"effects": ()}))
+
+
+def plant_states(testbed: Testbed) -> int:
+    """Return the number of states of bar, cables and winches, which those of effects follow."""
+    return (BAR_STATES if testbed.bar else 0) + 3 * len(testbed.cables)
 
 
 def _bar_array(bar: Bar, gravity: float) -> Array:
@@ -55,9 +56,11 @@ def _bar_array(bar: Bar, gravity: float) -> Array:
     return out
 
 
-def _cable_row(cable: Cable) -> tuple[Array, Array]:
+def _cable_row(cable: Cable, gravity: float) -> tuple[Array, Array]:
     row = np.zeros(cable_kernel.CABLE_COLUMNS)
     table = np.zeros((POINTS, 2))
+    row[cable_kernel.GEAR_RATIO] = cable.gear_ratio
+    row[cable_kernel.GRAVITY_HERE] = gravity
     row[cable_kernel.RADIUS] = cable.drum_radius / cable.gear_ratio
     row[cable_kernel.INERTIA] = cable.rotor_inertia
     row[cable_kernel.TORQUE_LIMIT] = cable.torque_limit
@@ -81,38 +84,3 @@ def _cable_row(cable: Cable) -> tuple[Array, Array]:
         row[cable_kernel.TABLE_STEP] = step
         row[cable_kernel.TABLE_STEPS] = 1.0 / step
     return row, table
-
-
-def _actions(entry: EffectEntry, testbed: Testbed) -> Iterator[tuple[Effect, int, list[float]]]:
-    """Yield effect, element index and ordered parameter values, once per element."""
-    where = f"effects: {entry.effect}"
-    effect = catalogue().get(entry.effect)
-    if effect is None:
-        raise InputError(f"{where}: no such effect, allowed: {', '.join(catalogue())}")
-    values = _ordered_parameters(effect, entry, where)
-    if effect.block is Block.BAR:
-        if testbed.bar is None:
-            raise InputError(f"{where}: this test-bed has no bar, allowed: effects on winches")
-        if entry.elements not in ((), ("bar",)):
-            raise InputError(f"{where}: elements {list(entry.elements)}, allowed: [bar] or none")
-        yield effect, 0, values
-        return
-    for element in entry.elements or testbed.cable_names:
-        if element not in testbed.cable_names:
-            allowed = ", ".join(testbed.cable_names)
-            raise InputError(f"{where}: no element '{element}', allowed: {allowed}")
-        yield effect, testbed.cable_names.index(element), values
-
-
-def _ordered_parameters(effect: Effect, entry: EffectEntry, where: str) -> list[float]:
-    names = [parameter.name for parameter in effect.parameters]
-    given = entry.parameters
-    if set(given) != set(names):
-        raise InputError(f"{where}: parameters {sorted(given)}, allowed: exactly {names}")
-    for parameter in effect.parameters:
-        if not parameter.minimum <= given[parameter.name] <= parameter.maximum:
-            raise InputError(
-                f"{where}: {parameter.name} = {given[parameter.name]:g} {parameter.unit}, allowed:"
-                f" {parameter.minimum:g} to {parameter.maximum:g}"
-            )
-    return [given[name] for name in names]

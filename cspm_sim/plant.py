@@ -8,18 +8,34 @@ from numpy.typing import ArrayLike, NDArray
 from cspm_msgs_py.dofs import DOFS
 from cspm_msgs_py.errors import DivergenceError, InputError
 from cspm_msgs_py.testbed import Testbed
-from cspm_sim.equilibrium import find_equilibrium, unstretched_lengths
-from cspm_sim.kernels.cable import TORQUE_LIMIT
+from cspm_sim.effect_entries import read_actions
+from cspm_sim.effects import Hook
+from cspm_sim.equilibrium import (
+    Equilibrium,
+    find_equilibrium,
+    gravity_wrench,
+    unstretched_lengths,
+)
+from cspm_sim.kernels.affected_cables import reported_torques
+from cspm_sim.kernels.cable import DIRECTION, TORQUE_LIMIT
+from cspm_sim.kernels.hooks import HOOK
 from cspm_sim.kernels.plant import (
     BAR_STATES,
     make_scratch,
     plant_advance,
     plant_tensions,
+    state_count,
 )
 from cspm_sim.motion import Motion
 from cspm_sim.parameters import plant_parameters
+from cspm_sim.rest import frame_shift, memory_at_rest, static_wrench
 
 Array = NDArray[np.float64]
+
+SETTLING_STEPS = 50
+SETTLING_SHARE = 0.02  # of the length
+SETTLING_TOLERANCE = 1e-9  # [N]
+SETTLING_PROBE = 1e-7  # [m]
 
 
 class Plant:
@@ -58,16 +74,19 @@ class Plant:
         """
         self.testbed = testbed
         self.parameters = plant_parameters(testbed)
+        self._actions = read_actions(testbed)
         self.period_ns = period_ns
         self.frame_motion = frame_motion
         self.steps = 0
         n = len(testbed.cables)
         first = BAR_STATES if testbed.bar else 0
-        self.state: Array = np.zeros(first + 3 * n)
+        self.state: Array = np.zeros(state_count(self.parameters))
         self.bar_state = self.state[:first]
         self.unstretched_lengths = self.state[first : first + n]
         self.angles = self.state[first + n : first + 2 * n]
-        self.speeds = self.state[first + 2 * n :]
+        self.speeds = self.state[first + 2 * n : first + 3 * n]
+        self._memory = self.state[first + 3 * n :]
+        self._has_drives = bool((self.parameters.effects[:, HOOK] == Hook.DRIVE).any())
         self.locked = locked
         self.frame: Array = frame_motion.at(0.0)
         self._outputs = np.zeros((2, n))
@@ -132,18 +151,38 @@ class Plant:
 
     def state_name(self, index: int) -> str:
         """Return the name of a state, such as `speed of surge_2`."""
-        first = len(self.bar_state)
+        first, n = len(self.bar_state), len(self.testbed.cables)
         if index < first:
             kind, dof = divmod(index, 6)
             return f"bar {DOFS[dof]}" + (" rate" if kind else "")
-        kind, cable = divmod(index - first, len(self.testbed.cables))
+        if index >= first + 3 * n:
+            index -= first + 3 * n
+            for action in self._actions:
+                if index < action.effect.states:
+                    return f"state {index} of {action.effect.id} of {action.name}"
+                index -= action.effect.states
+        kind, cable = divmod(index - first, n)
         name = ("unstretched length", "motor angle", "motor speed")[kind]
         return f"{name} of {self.testbed.cable_names[cable]}"
 
     def applied_torque(self, torque: Array) -> Array:
-        """Return what the drives deliver for a torque command, (n,) [N·m]: the limits applied."""
+        """Return what the drives report for a torque command, (n,) [N·m]: limits and lags apply."""
         limits = self.parameters.cables[:, TORQUE_LIMIT]
-        return np.minimum(limits, np.maximum(-limits, torque))
+        applied = np.minimum(limits, np.maximum(-limits, torque))
+        if self._has_drives:
+            p, scratch = self.parameters, self._scratch
+            reported_torques(
+                self.state,
+                torque,
+                len(self.bar_state),
+                p.cables,
+                p.effects,
+                p.effect_parameters,
+                scratch.signals,
+                scratch.stages[0],
+                applied,
+            )
+        return applied
 
     def _observe(self) -> None:
         plant_tensions(self.state, self.frame, self.parameters, self._scratch, self._outputs)
@@ -157,10 +196,50 @@ class Plant:
             self.unstretched_lengths[:] = unstretched_lengths(
                 self.parameters, self.lengths.copy(), carried
             )
+            self._settle(carried, carried @ self._scratch.spans[:, DIRECTION : DIRECTION + 3])
             return
         if bar_pose is None:
             raise InputError("plant: this test-bed has a bar, a pose to start from is required")
-        limits = np.array([cable.tension_limits for cable in self.testbed.cables], dtype=float)
-        rest = find_equilibrium(self.parameters, bar_pose, self.frame[:6], limits)
+        rest, force = self._hang(bar_pose)
         self.bar_state[:6] = rest.bar_pose
         self.unstretched_lengths[:] = rest.unstretched_lengths
+        self._settle(rest.tensions, force)
+
+    def _hang(self, bar_pose: ArrayLike) -> tuple[Equilibrium, Array]:
+        """Return the equilibrium with all that effects add at rest, and the frame's force."""
+        limits = np.array([cable.tension_limits for cable in self.testbed.cables], dtype=float)
+        frame = self.frame[:6].copy()
+        rest = find_equilibrium(self.parameters, bar_pose, frame, limits)
+        if not self._actions:
+            return rest, np.zeros(3)
+        # The load at the pose at which the first load is held: it depends on the pose but little.
+        for _ in range(2):
+            load = static_wrench(self._actions, self.parameters, rest.bar_pose, frame)
+            force = (gravity_wrench(self.parameters, rest.bar_pose) + load)[:3]
+            frame[:3] = self.frame[:3] + frame_shift(self._actions, force)
+            rest = find_equilibrium(self.parameters, bar_pose, frame, limits, load)
+        return rest, force
+
+    def _settle(self, tensions: Array, force: Array) -> None:
+        """Bring the states of effects to rest, and the cables with them to their tensions."""
+        self._memory[:] = memory_at_rest(self._actions, self.parameters, tensions, force)
+        hooks = {hook for action in self._actions for hook in action.effect.kernels}
+        if not hooks & {Hook.CABLE, Hook.FRAME}:
+            return
+        lengths, loaded = self.unstretched_lengths, tensions > 0.0
+        for _ in range(SETTLING_STEPS):
+            excess = self._tensions_at_rest() - tensions
+            if np.abs(excess[loaded]).max(initial=0.0) <= SETTLING_TOLERANCE:
+                break
+            begin = lengths.copy()
+            lengths[:] += SETTLING_PROBE
+            slope = (self._tensions_at_rest() - tensions - excess) / SETTLING_PROBE
+            # A cable that is slack is shortened first; from the taut side Newton's steps converge.
+            step = np.where(loaded, SETTLING_SHARE * self.lengths, 0.0)
+            np.divide(excess, slope, out=step, where=loaded & (slope < 0.0))
+            lengths[:] = begin - step
+
+    def _tensions_at_rest(self) -> Array:
+        frame = np.concatenate([self.frame[:6], np.zeros(12)])
+        plant_tensions(self.state, frame, self.parameters, self._scratch, self._outputs)
+        return self.tensions.copy()

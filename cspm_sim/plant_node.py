@@ -9,7 +9,7 @@ from functools import partial
 import numpy as np
 from numpy.typing import NDArray
 
-from cspm_msgs_py.errors import CspmError, InputError
+from cspm_msgs_py.errors import InputError
 from cspm_msgs_py.graph import Edges, followers
 from cspm_msgs_py.lockstep import WINDOW
 from cspm_msgs_py.ros.contract_node import ContractNode, ros_class
@@ -78,7 +78,7 @@ class PlantNode:
         self._others = PlantSide(node, schedule.period_ns, others, self._progress)
         if TORQUE_COMMAND in schedule.topics:
             refuse = partial(self._refuse, TORQUE_COMMAND)
-            node.subscribe_rows(topics[TORQUE_COMMAND], self._torque, refuse, DEPTH)
+            node.subscribe_numbered_rows(topics[TORQUE_COMMAND], self._torque, refuse, DEPTH)
         node.node.create_subscription(
             ros_class(BRAKE.ros_type), BRAKE.name, self._brake, contract_qos()
         )
@@ -127,7 +127,7 @@ class PlantNode:
         elif time.monotonic() > self._alone:
             self._timer.cancel()
         elif doubled := self._others.doubled():
-            raise CspmError(f"plant: runs in {', '.join(doubled)}")
+            self._node.fail(f"plant: runs in {', '.join(doubled)}")
 
     def _start(self) -> None:
         if not self._others.unmatched():
@@ -137,8 +137,8 @@ class PlantNode:
             self._plant.start()
             self._tell_end()
 
-    def _torque(self, stamp_ns: int, row: Array) -> None:
-        self._plant.receive_torque(stamp_ns, row)
+    def _torque(self, stamp_ns: int, row: Array, number: int | None) -> None:
+        self._plant.receive_torque(stamp_ns, row, number)
         self._tell_end()
 
     def _brake(self, message: object) -> None:

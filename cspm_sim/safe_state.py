@@ -11,7 +11,7 @@ from cspm_msgs_py.errors import ConvergenceError, InputError
 from cspm_msgs_py.scenario import Scenario
 from cspm_msgs_py.testbed import Testbed
 from cspm_sim.equilibrium import find_equilibrium
-from cspm_sim.parameters import plant_parameters
+from cspm_sim.parameters import nominal_parameters
 
 Array = NDArray[np.float64]
 
@@ -153,7 +153,7 @@ def balancing_tensions(scenario: Scenario, testbed: Testbed) -> Array:
     limits = np.array([cable.tension_limits for cable in testbed.cables], dtype=float)
     bar, frame = scenario.bar_mean_pose, scenario.winch_frame.mean_pose
     try:
-        return find_equilibrium(plant_parameters(testbed), bar, frame, limits).tensions
+        return find_equilibrium(nominal_parameters(testbed), bar, frame, limits).tensions
     except ConvergenceError as err:
         raise InputError(
             f"safety.state: hold at the bar's mean pose, {err}, allowed: brake, or a mean pose at"

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import zlib
 from collections import deque
+from collections.abc import Sequence
 
 import numpy as np
 from numpy.typing import NDArray
@@ -12,6 +13,7 @@ from cspm_msgs_py.errors import InputError
 from cspm_msgs_py.sensor_spec import Sensor, quantities
 from cspm_msgs_py.topics import Topic
 from cspm_sim.kernels.rows import corrupt, pose_row
+from cspm_sim.sensor_fault import Past, SensorFault
 
 Array = NDArray[np.float64]
 
@@ -26,7 +28,15 @@ class SensorModel:
     """
 
     def __init__(
-        self, topic: Topic, sensor: Sensor, *, rate: int, period_ns: int, seed: int, ideal: bool
+        self,
+        topic: Topic,
+        sensor: Sensor,
+        *,
+        rate: int,
+        period_ns: int,
+        seed: int,
+        ideal: bool,
+        faults: Sequence[SensorFault] = (),
     ) -> None:
         """Make the sensor of `topic` at `rate` [Hz] for a plant of period `period_ns`.
 
@@ -37,6 +47,7 @@ class SensorModel:
             period_ns: the plant's period [ns].
             seed: of the run; the topic's name makes each sensor's noise its own.
             ideal: leave out noise, resolution and delay.
+            faults: what effects do to this sensor; see `sensor_faults`.
 
         Raises:
             InputError: the rate is above the sensor's, or the delay no multiple of the period.
@@ -63,15 +74,27 @@ class SensorModel:
         self._noise = np.zeros((_DRAWN_AT_ONCE, self._width))
         self._drawn = 0
         self._samples: deque[tuple[int, int, Array]] = deque()
+        self._faults = tuple(faults)
+        self._past = Past() if any(fault.is_late for fault in faults) else None
 
     def observe(self, step: int, now_ns: int, values: Array) -> tuple[int, Array] | None:
         """Take a sample if one is due; return stamp [ns] and row of one that arrives, if any."""
+        if self._past is not None:
+            self._past.note(now_ns * 1e-9, values)
         if step % self._divider == 0:
-            self._samples.append((step + self._delay_steps, now_ns, self._sample(values)))
+            sample = self._sample(self._faulty(now_ns * 1e-9, values))
+            self._samples.append((step + self._delay_steps, now_ns, sample))
         if self._samples and self._samples[0][0] <= step:
             _, stamp_ns, row = self._samples.popleft()
             return stamp_ns, row
         return None
+
+    def _faulty(self, time: float, values: Array) -> Array:
+        if self._past is not None:
+            values = self._past.at(time - sum(fault.lateness(time) for fault in self._faults))
+        for fault in self._faults:
+            values = fault.reading(values)
+        return values
 
     def _sample(self, values: Array) -> Array:
         index = self._drawn % _DRAWN_AT_ONCE

@@ -24,8 +24,12 @@ def test_page_holds_all_that_an_effect_declares(effect) -> None:
         row = (
             f"| `{parameter.name}` | {parameter.unit} |"
             f" {parameter.minimum:g} to {parameter.maximum:g} |"
+            + ("  |" if parameter.absent is None else f" {parameter.absent:g} |")
+            + f" {parameter.meaning} |\n"
         )
         assert row in page
+    for name, grid in effect.nonlinear.items():
+        assert f"`{name}` {', '.join(f'{value:g}' for value in grid)}" in page
     for text in (effect.equation, effect.shows, effect.separating_experiment, effect.reference):
         assert f": {text}.\n" in page
     assert all(f"`{twin}`" in page for twin in effect.twins)

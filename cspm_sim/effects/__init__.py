@@ -6,9 +6,28 @@ from functools import cache
 from importlib import import_module
 from pkgutil import iter_modules
 
-from cspm_sim.effects.effect import Block, Effect, EffectParameter
+from cspm_sim.effects.effect import (
+    Block,
+    Channel,
+    Effect,
+    EffectParameter,
+    Elements,
+    Hook,
+    Regression,
+    Sense,
+)
 
-__all__ = ["Block", "Effect", "EffectParameter", "catalogue"]
+__all__ = [
+    "Block",
+    "Channel",
+    "Effect",
+    "EffectParameter",
+    "Elements",
+    "Hook",
+    "Regression",
+    "Sense",
+    "catalogue",
+]
 
 
 @cache

@@ -3,7 +3,16 @@
 import numpy as np
 
 from cspm_msgs_py.dofs import DOFS
-from cspm_sim.effects.effect import Array, Block, Effect, EffectParameter
+from cspm_sim.effects.effect import (
+    Array,
+    Block,
+    Channel,
+    Effect,
+    EffectParameter,
+    Hook,
+    Regression,
+)
+from cspm_sim.effects.signals import BarSignal
 from cspm_sim.kernels.bar import VELOCITY, WRENCH
 
 
@@ -12,8 +21,9 @@ def _kernel(parameters: Array, signals: Array) -> None:
         signals[WRENCH + axis] -= parameters[axis] * signals[VELOCITY + axis]
 
 
-def _regressors(signals: Array) -> Array:
-    return np.asarray(-signals[:, VELOCITY : VELOCITY + 6, None] * np.eye(6))
+def _columns(signals: Array) -> Array:
+    first = BarSignal.VELOCITY
+    return np.asarray(-signals[:, first : first + 6, None] * np.eye(6))
 
 
 EFFECT = Effect(
@@ -23,8 +33,8 @@ EFFECT = Effect(
         EffectParameter(axis, "N·s/m" if i < 3 else "N·m·s/rad", 0.0, 100.0)
         for i, axis in enumerate(DOFS)
     ),
-    kernel=_kernel,
-    regressors=_regressors,
+    kernels={Hook.BAR: _kernel},
+    regression=Regression(Channel.WRENCH, _columns),
     equation="wrench on the bar = −coefficient·velocity, axis by axis in world_ned",
     shows="bar wrench residual is a straight line through zero against the same axis's velocity",
     twins=("cable_transverse_damping", "bar_quadratic_drag", "cable_axial_damping"),

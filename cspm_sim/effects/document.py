@@ -8,24 +8,38 @@ from __future__ import annotations
 import sys
 from collections.abc import Iterable, Mapping
 
-from cspm_sim.effects import Effect, catalogue
+from cspm_sim.effects import Effect, EffectParameter, Elements, catalogue
 
 _HEAD = """\
 # Effects
 
 Physics beyond the thesis's model. Each effect is one file in `cspm_sim/effects/`; a test-bed
 file switches it on under `effects:` (see [files.md](files.md)). Winch quantities are at the
-motor shaft, bar quantities in world_ned at the origin of bar_ned.
+motor shaft, bar quantities in world_ned at the origin of bar_ned. In the equations q is the motor
+angle, n the gear ratio, r the drum's radius, t the tension, ε the elongation.
+
+*Absent at* is the value at which an effect does nothing: it is then left out altogether. Effects of
+several entries add up; one with memory acts once per element. Effects of block `sensor` change what
+is measured and nothing else. *Searched over* lists the values at which a diagnosis looks for a
+parameter that does not enter the residual as a factor. Controllers and their design know the
+test-bed without its effects.
 
 This page is generated: `python -m cspm_sim.effects.document > docs/effects.md`.
 """
+
+_ELEMENTS = {
+    Elements.CABLES: "named cables, all where none is named",
+    Elements.BAR: "`bar`",
+    Elements.FRAME: "`winch_frame`",
+    Elements.BODIES: "`bar`, `winch_frame`, both where none is named",
+}
 
 
 def effects_page(effects: Mapping[str, Effect]) -> str:
     """Return the page in Markdown, one section per effect in the order given."""
     lines = [_HEAD, "| id | block | parameters |", "|---|---|---|"]
     lines += [_summary(effect) for effect in effects.values()]
-    return "\n".join([*lines, *(_section(effect) for effect in effects.values())]) + "\n"
+    return "\n".join([*lines, *(effect_section(effect) for effect in effects.values())]) + "\n"
 
 
 def _summary(effect: Effect) -> str:
@@ -33,13 +47,15 @@ def _summary(effect: Effect) -> str:
     return f"| [`{effect.id}`](#{effect.id}) | {effect.block.value} | {names} |"
 
 
-def _section(effect: Effect) -> str:
-    bounds = [
-        f"| `{p.name}` | {p.unit} | {p.minimum:g} to {p.maximum:g} |" for p in effect.parameters
-    ]
+def effect_section(effect: Effect) -> str:
+    """Return all that an effect declares, in Markdown."""
     facts = {
+        "Acts on": _ELEMENTS[effect.acts_on],
         "Equation": effect.equation,
+        "Memory": f"{effect.states} states per element" if effect.states else "none",
+        "Residual": effect.regression.channel.value,
         "Shows": effect.shows,
+        "Searched over": _grids(effect) or "nothing, all parameters are factors",
         "Twins": _listed(effect.twins),
         "Told apart by": effect.separating_experiment,
         "Reference": effect.reference,
@@ -47,12 +63,25 @@ def _section(effect: Effect) -> str:
     return "\n".join(
         [
             f"\n## {effect.id}\n",
-            "| parameter | unit | allowed |",
-            "|---|---|---|",
-            *bounds,
+            "| parameter | unit | allowed | absent at | meaning |",
+            "|---|---|---|---|---|",
+            *(_row(parameter) for parameter in effect.parameters),
             "",
             *(f"- {title}: {text}." for title, text in facts.items()),
         ]
+    )
+
+
+def _row(p: EffectParameter) -> str:
+    absent = "" if p.absent is None else f"{p.absent:g}"
+    bounds = f"{p.minimum:g} to {p.maximum:g}"
+    return f"| `{p.name}` | {p.unit} | {bounds} | {absent} | {p.meaning} |"
+
+
+def _grids(effect: Effect) -> str:
+    return "; ".join(
+        f"`{name}` {', '.join(f'{value:g}' for value in grid)}"
+        for name, grid in effect.nonlinear.items()
     )
 
 

@@ -2,61 +2,210 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
-from dataclasses import dataclass
-from enum import Enum
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, field
+from enum import Enum, IntEnum
 
 import numpy as np
 from numpy.typing import NDArray
 
+from cspm_msgs_py.testbed import Testbed
+from cspm_sim.kernels import hooks
+
 Array = NDArray[np.float64]
+Values = Mapping[str, float]
 
 
 class Block(Enum):
-    """The part of the plant that an effect changes."""
+    """The part of the test-bed that an effect belongs to."""
 
     WINCH = "winch"
+    CABLE = "cable"
     BAR = "bar"
+    FRAME = "frame"
+    SENSOR = "sensor"
+
+
+class Hook(IntEnum):
+    """Where in the plant's rates a kernel takes part; see `cspm_sim.kernels.hooks`."""
+
+    FRAME = hooks.FRAME
+    CABLE = hooks.CABLE
+    LOADED_CABLE = hooks.LOADED_CABLE
+    LOADED_FRAME = hooks.LOADED_FRAME
+    DRIVE = hooks.DRIVE
+    WINCH = hooks.WINCH
+    ATTACHMENT = hooks.ATTACHMENT
+    BAR = hooks.BAR
+    PENDANT = hooks.PENDANT
+
+
+class Elements(Enum):
+    """What an effect's `elements` name; none named means all."""
+
+    CABLES = "cables"
+    BAR = "bar"
+    FRAME = "winch_frame"
+    BODIES = "bodies"
+
+
+class Channel(Enum):
+    """A residual: what was measured less what the model says of its block.
+
+    Its value says what the residual's channels are; see `cspm_sim.effects.signals`.
+    """
+
+    SHAFT = "torque against positive motion that the winch equation misses [N·m]"
+    DRIVE = "commanded less reported torque [N·m]"
+    TENSION = "measured tension less that of the cable's law [N]"
+    WRENCH = "wrench on the bar that its equation misses, six channels [N, N·m]"
+    READING = "sensor's reading less what other sensors and the model say it should be"
 
 
 @dataclass(frozen=True)
 class EffectParameter:
-    """One number of an effect, with the range in which it is plausible."""
+    """One number of an effect, with the range in which it is plausible.
+
+    Attributes:
+        name: public name.
+        unit: SI.
+        minimum: least value allowed.
+        maximum: largest value allowed.
+        absent: the value at which the effect is not there; None for a number that only shapes it.
+        meaning: what the number is, where the equation does not say it.
+    """
 
     name: str
     unit: str
     minimum: float
     maximum: float
+    absent: float | None = 0.0
+    meaning: str = ""
+
+
+@dataclass(frozen=True)
+class Regression:
+    """How an effect shows in one residual, as columns that are weighted and summed.
+
+    Attributes:
+        channel: the residual.
+        columns: `columns(signals, **nonlinear)`: from the signals of `cspm_sim.effects.signals`,
+            shape (samples, signals), and values of the nonlinear parameters, what one unit of each
+            coefficient adds to the residual, shape (samples, channels, coefficients).
+    """
+
+    channel: Channel
+    columns: Callable[..., Array]
 
 
 @dataclass(frozen=True)
 class Effect:
-    """Physics that can be added to the plant and recognised in a recording.
+    """Physics that can be added to the test-bed and recognised in a recording.
 
     Attributes:
         id: the public name.
-        block: the block it changes.
-        parameters: its numbers, in the kernel's order.
-        kernel: `kernel(parameters, signals)`, compiled when used; reads the block's signals and
-            adds to them (see `kernels.winch` and `kernels.bar` for their order).
-        regressors: from the block's signals over time, shape (samples, signals), what one unit of
-            each parameter adds to the block's residual, shape (samples, channels, parameters); a
-            winch's residual has one channel, torque against positive motion, the bar's six, the
-            wrench. The sum over the parameters is what `kernel` adds.
+        block: the part that it belongs to.
+        parameters: its numbers, in the kernels' order.
         equation: the effect in one line.
-        shows: how it looks in the block's residual.
+        shows: how it looks in the residual.
         twins: effects it is easily confused with.
         separating_experiment: what tells it from its twins.
         reference: where the equation comes from.
+        regression: how it shows in its main residual.
+        partners: how the same coefficients show in further residuals at the same time.
+        nonlinear: coarse grids, by name, of the parameters on which the columns depend otherwise
+            than as a factor.
+        coefficients: from all parameters to the columns' weights; None: the parameters that are
+            not nonlinear, in order, each less its absent value.
+        from_coefficients: from weights and nonlinear values to all parameters; None: the inverse of
+            the default above.
+        kernels: by hook `kernel(parameters, signals)`, with memory `kernel(parameters, signals,
+            states, rates)`, compiled when used. They read the hook's signals and add to them.
+        states: how many numbers its memory holds, which follow the plant's own states.
+        rest: `rest(parameters, signals)`: its states in a machine at rest, shape (states,), from
+            the signals of its first hook; None: zeros.
+        alter: `alter(testbed, element, values)`: the test-bed with other parameters, for an effect
+            that is no more than that.
+        sense: what it does to a sensor's readings.
+        elements: what it can act on; None: that which its block says.
     """
 
     id: str
     block: Block
     parameters: tuple[EffectParameter, ...]
-    kernel: Callable[[Array, Array], None]
-    regressors: Callable[[Array], Array]
     equation: str
     shows: str
     twins: tuple[str, ...]
     separating_experiment: str
     reference: str
+    regression: Regression
+    partners: tuple[Regression, ...] = ()
+    nonlinear: Mapping[str, tuple[float, ...]] = field(default_factory=dict)
+    coefficients: Callable[[Values], Sequence[float]] | None = None
+    from_coefficients: Callable[[Sequence[float], Values], dict[str, float]] | None = None
+    kernels: Mapping[Hook, Callable[..., None]] = field(default_factory=dict)
+    states: int = 0
+    rest: Callable[[Array, Array], Sequence[float]] | None = None
+    alter: Callable[[Testbed, int, Values], Testbed] | None = None
+    sense: Sense | None = None
+    elements: Elements | None = None
+
+    @property
+    def acts_on(self) -> Elements:
+        """What its `elements` name."""
+        return self.elements or _ELEMENTS[self.block]
+
+    def regressors(self, signals: Array, **nonlinear: float) -> Array:
+        """Return the columns of its main residual, shape (samples, channels, coefficients)."""
+        return self.regression.columns(signals, **nonlinear)
+
+    def weights(self, values: Values) -> Array:
+        """Return what the columns are to be multiplied with for these parameters."""
+        if self.coefficients:
+            return np.asarray(self.coefficients(values), dtype=float)
+        return np.array([values[p.name] - (p.absent or 0.0) for p in self._linear])
+
+    def values(self, weights: Sequence[float], **nonlinear: float) -> dict[str, float]:
+        """Return all parameters for weights that a regression found."""
+        if self.from_coefficients:
+            return self.from_coefficients(weights, nonlinear)
+        found = {
+            p.name: float(weight) + (p.absent or 0.0)
+            for p, weight in zip(self._linear, weights, strict=True)
+        }
+        return {p.name: {**nonlinear, **found}[p.name] for p in self.parameters}
+
+    def is_absent(self, values: Values) -> bool:
+        """Return whether the effect does nothing with these parameters."""
+        acting = [p for p in self.parameters if p.absent is not None]
+        return bool(acting) and all(values[p.name] == p.absent for p in acting)
+
+    @property
+    def _linear(self) -> tuple[EffectParameter, ...]:
+        return tuple(p for p in self.parameters if p.name not in self.nonlinear)
+
+
+@dataclass(frozen=True)
+class Sense:
+    """What an effect does to the readings of a sensor.
+
+    Attributes:
+        topics: names of the topics, `{}` standing for a body.
+        reading: `reading(values, element, parameters)`: a copy of what the sensor takes in, changed
+            before noise; of a pose x y z φ θ ψ, of joints by kind and cable.
+        lateness: `lateness(time, parameters)`: by how much the reading is older than its stamp says
+            [s].
+    """
+
+    topics: tuple[str, ...]
+    reading: Callable[[Array, int, Array], Array] | None = None
+    lateness: Callable[[float, Array], float] | None = None
+
+
+_ELEMENTS = {
+    Block.WINCH: Elements.CABLES,
+    Block.CABLE: Elements.CABLES,
+    Block.BAR: Elements.BAR,
+    Block.FRAME: Elements.FRAME,
+    Block.SENSOR: Elements.CABLES,
+}

@@ -2,7 +2,16 @@
 
 import numpy as np
 
-from cspm_sim.effects.effect import Array, Block, Effect, EffectParameter
+from cspm_sim.effects.effect import (
+    Array,
+    Block,
+    Channel,
+    Effect,
+    EffectParameter,
+    Hook,
+    Regression,
+)
+from cspm_sim.effects.signals import WinchSignal
 from cspm_sim.kernels.winch import RESISTANCE, SPEED
 
 
@@ -10,19 +19,19 @@ def _kernel(parameters: Array, signals: Array) -> None:
     signals[RESISTANCE] += parameters[0] * signals[SPEED]
 
 
-def _regressors(signals: Array) -> Array:
-    return np.asarray(signals[:, SPEED][:, None, None])
+def _columns(signals: Array) -> Array:
+    return np.asarray(signals[:, WinchSignal.SPEED, None, None])
 
 
 EFFECT = Effect(
     id="winch_viscous_friction",
     block=Block.WINCH,
     parameters=(EffectParameter("coefficient", "N·m·s/rad", 0.0, 0.1),),
-    kernel=_kernel,
-    regressors=_regressors,
+    kernels={Hook.WINCH: _kernel},
+    regression=Regression(Channel.SHAFT, _columns),
     equation="resisting torque = coefficient·q̇",
     shows="winch torque residual is a straight line through zero against motor speed",
-    twins=("winch_coulomb_friction", "cable_axial_damping"),
+    twins=("winch_coulomb_friction", "winch_stribeck_friction", "cable_axial_damping"),
     separating_experiment="constant speeds over at least one decade at constant tension",
     reference="thesis (2-21); Armstrong-Hélouvry, Dupont, Canudas de Wit, Automatica 30(7), 1994",
 )

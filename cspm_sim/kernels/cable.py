@@ -29,7 +29,10 @@ HAS_CABLE = 17
 RADIUS = 18  # drum radius / gear ratio: cable wound per radian of the motor [m]
 INERTIA = 19  # all that turns [kg·m²]
 TORQUE_LIMIT = 20
-CABLE_COLUMNS = 21
+# What only effects read.
+GEAR_RATIO = 21
+GRAVITY_HERE = 22
+CABLE_COLUMNS = 23
 
 
 # Columns of a cable's span.

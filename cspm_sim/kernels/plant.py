@@ -2,7 +2,7 @@
 
 State: with a bar its position (3), Euler angles φ θ ψ (3), velocity in world axes (3) and angular
 velocity in bar axes (3); then per cable the unstretched length, the motor angle and the motor
-speed. 36 numbers for the thesis's machine (2-27).
+speed. 36 numbers for the thesis's machine (2-27). The states of effects with memory follow.
 """
 
 from math import isfinite
@@ -13,42 +13,37 @@ from numba import njit
 from numpy import float64, int64
 from numpy.typing import NDArray
 
-from cspm_sim.kernels.bar import BAR_SIGNALS, VELOCITY, WRENCH, bar_acceleration
+from cspm_sim.kernels.affected_cables import CABLE_SIGNALS, affected_cables
+from cspm_sim.kernels.bar import bar_acceleration
+from cspm_sim.kernels.bar_effects import END_SIGNALS, PENDANT_SIGNALS, effects_on_bar
 from cspm_sim.kernels.cable import (
     LENGTH,
-    RADIUS,
     SPAN_COLUMNS,
     TENSION,
     cable_spans,
     cable_tensions,
     cable_wrench,
 )
-from cspm_sim.kernels.effect_call import call_kernel
+from cspm_sim.kernels.hooks import FIRST_STATE, HOOK, STATES, WINCH, run_effects
 from cspm_sim.kernels.motion import evaluate_motion
 from cspm_sim.kernels.rotation import (
     Placement,
-    Vector,
     body_rate_to_euler_rate,
     euler_rate_to_world_rate,
     rotate,
     rotation_from_euler,
 )
 from cspm_sim.kernels.winch import (
-    ANGLE,
     DRY_LIMIT,
     RESISTANCE,
-    SPEED,
     WINCH_SIGNALS,
-    WINCH_TENSION,
-    WINDING_RADIUS,
+    fill_winch_signals,
     winch_acceleration,
 )
 
 Array = NDArray[float64]
 
 BAR_STATES = 12
-WINCH_BLOCK = 0
-BAR_BLOCK = 1
 
 
 class PlantParameters(NamedTuple):
@@ -59,7 +54,8 @@ class PlantParameters(NamedTuple):
         cables: shape (n, CABLE_COLUMNS), cables with their winches; see `kernels.cable`. In column
             order in memory, so that a processor takes several cables at a time.
         tables: shape (n, points, 2): tension and its slope along the stiffness law.
-        effects: shape (m, 3): block, element (cable index, 0 for the bar), kernel address.
+        effects: shape (m, ROW_COLUMNS): hook, element (cable index, 0 for bar and winch frame),
+            kernel address, first state; see `kernels.hooks`.
         effect_parameters: shape (m, widest).
     """
 
@@ -82,12 +78,18 @@ class Scratch(NamedTuple):
     signals: Array
 
 
+def state_count(p: PlantParameters) -> int:
+    """Return the number of states, those of effects included."""
+    own = (BAR_STATES if len(p.bar) else 0) + 3 * len(p.cables)
+    return int(max([own, *(p.effects[:, FIRST_STATE] + p.effects[:, STATES])]))
+
+
 def make_scratch(n_states: int, n_cables: int) -> Scratch:
     """Return scratch arrays for a plant of this size."""
     return Scratch(
         stages=np.zeros((3, n_states)),
         spans=np.zeros((n_cables, SPAN_COLUMNS), order="F"),
-        signals=np.zeros(max(BAR_SIGNALS, WINCH_SIGNALS)),
+        signals=np.zeros(max(CABLE_SIGNALS, END_SIGNALS, PENDANT_SIGNALS, WINCH_SIGNALS)),
     )
 
 
@@ -104,7 +106,7 @@ def frame_placement(frame: Array) -> Placement:
 
 
 @njit(cache=True, error_model="numpy", inline="always")
-def _bar_placement(state: Array, has_bar: bool) -> Placement:
+def bar_placement(state: Array, has_bar: bool) -> Placement:
     """Return the bar's placement; without a bar that of the world, where its cables end."""
     if not has_bar:
         zero = (0.0, 0.0, 0.0)
@@ -118,66 +120,39 @@ def _bar_placement(state: Array, has_bar: bool) -> Placement:
     )
 
 
-@njit(cache=True, error_model="numpy")
-def _effects_on_winch(
-    i: int,
-    angle: float,
-    speed: float,
-    tension: float,
-    radius: float,
-    effects: NDArray[int64],
-    effect_parameters: Array,
-    signals: Array,
-) -> None:
-    signals[ANGLE] = angle
-    signals[SPEED] = speed
-    signals[WINCH_TENSION] = tension
-    signals[WINDING_RADIUS] = radius
-    signals[RESISTANCE] = 0.0
-    signals[DRY_LIMIT] = 0.0
-    for e in range(effects.shape[0]):
-        if effects[e, 0] == WINCH_BLOCK and effects[e, 1] == i:
-            call_kernel(effects[e, 2], effect_parameters[e], signals)
-
-
-@njit(cache=True, error_model="numpy")
-def _effects_on_bar(
-    velocity: Vector,
-    rate: Vector,
-    effects: NDArray[int64],
-    effect_parameters: Array,
-    signals: Array,
-) -> None:
-    """Leave the wrench that the effects add at the bar frame's origin in `signals`."""
-    for d in range(3):
-        signals[VELOCITY + d] = velocity[d]
-        signals[VELOCITY + 3 + d] = rate[d]
-        signals[WRENCH + d] = 0.0
-        signals[WRENCH + 3 + d] = 0.0
-    for e in range(effects.shape[0]):
-        if effects[e, 0] == BAR_BLOCK:
-            call_kernel(effects[e, 2], effect_parameters[e], signals)
-
-
 @njit(cache=True, error_model="numpy", inline="always")
-def _bar_rate(
+def bar_rate(
     state: Array,
+    frame: Placement,
     placement: Placement,
     bar: Array,
+    cables: Array,
     effects: NDArray[int64],
     effect_parameters: Array,
     spans: Array,
     signals: Array,
     out: Array,
 ) -> None:
-    _, rotation, velocity, world_rate = placement
-    (fx, fy, fz), (mx, my, mz) = cable_wrench(spans)
+    """Write the time derivative of the bar's 12 states to `out`, under the tensions in `spans`."""
+    _, rotation, velocity, _ = placement
+    force, moment = cable_wrench(spans)
     if effects.shape[0] > 0:
-        _effects_on_bar(velocity, world_rate, effects, effect_parameters, signals)
-        fx, fy, fz = fx + signals[WRENCH], fy + signals[WRENCH + 1], fz + signals[WRENCH + 2]
-        mx, my, mz = mx + signals[WRENCH + 3], my + signals[WRENCH + 4], mz + signals[WRENCH + 5]
+        force, moment = effects_on_bar(
+            state,
+            frame,
+            placement,
+            force,
+            moment,
+            bar,
+            cables,
+            effects,
+            effect_parameters,
+            spans,
+            signals,
+            out,
+        )
     rate = (state[9], state[10], state[11])
-    linear, angular = bar_acceleration(bar, rotation, rate, (fx, fy, fz), (mx, my, mz))
+    linear, angular = bar_acceleration(bar, rotation, rate, force, moment)
     out[0], out[1], out[2] = velocity
     out[3], out[4], out[5] = body_rate_to_euler_rate(state[3], state[4], rate[0], rate[1], rate[2])
     out[6], out[7], out[8] = linear
@@ -209,24 +184,57 @@ def plant_rate(
     n = cables.shape[0]
     has_bar = bar.shape[0] > 0
     first = BAR_STATES if has_bar else 0
-    placement = _bar_placement(state, has_bar)
-    cable_spans(cables, frame, placement, spans)
-    cable_tensions(cables, tables, state, first, spans, out)
-    signals[RESISTANCE] = signals[DRY_LIMIT] = 0.0
-    for i in range(n):
-        angle, speed = state[first + n + i], state[first + 2 * n + i]
-        tension = spans[i, TENSION]
-        if effects.shape[0] > 0:
-            radius = cables[i, RADIUS]
-            _effects_on_winch(i, angle, speed, tension, radius, effects, effect_parameters, signals)
-        out[first + n + i] = speed
-        out[first + 2 * n + i] = winch_acceleration(
-            torque[i], tension, speed, period, cables, i, signals
+    placement = bar_placement(state, has_bar)
+    if effects.shape[0] > 0 and effects[0, HOOK] < WINCH:
+        frame = affected_cables(
+            state,
+            torque,
+            frame,
+            placement,
+            first,
+            locked,
+            period,
+            cables,
+            tables,
+            effects,
+            effect_parameters,
+            spans,
+            signals,
+            out,
         )
-        if locked:
-            out[first + 2 * n + i] = 0.0
+    else:
+        cable_spans(cables, frame, placement, spans)
+        cable_tensions(cables, tables, state, first, spans, out)
+        signals[RESISTANCE] = signals[DRY_LIMIT] = 0.0
+        on_winches = effects.shape[0] > 0 and effects[0, HOOK] == WINCH
+        cursor = 0
+        for i in range(n):
+            angle, speed = state[first + n + i], state[first + 2 * n + i]
+            tension = spans[i, TENSION]
+            if on_winches:
+                fill_winch_signals(angle, speed, tension, torque[i], cables, i, signals)
+                cursor = run_effects(
+                    WINCH, i, cursor, effects, effect_parameters, signals, state, out
+                )
+            out[first + n + i] = speed
+            out[first + 2 * n + i] = winch_acceleration(
+                torque[i], tension, speed, period, cables, i, signals
+            )
+            if locked:
+                out[first + 2 * n + i] = 0.0
     if has_bar:
-        _bar_rate(state, placement, bar, effects, effect_parameters, spans, signals, out)
+        bar_rate(
+            state,
+            frame,
+            placement,
+            bar,
+            cables,
+            effects,
+            effect_parameters,
+            spans,
+            signals,
+            out,
+        )
 
 
 @njit(cache=True, error_model="numpy", _nrt=False)
@@ -237,8 +245,27 @@ def plant_tensions(
     has_bar = p.bar.shape[0] > 0
     first = BAR_STATES if has_bar else 0
     spans = scratch.spans
-    cable_spans(p.cables, frame_placement(frame), _bar_placement(state, has_bar), spans)
-    cable_tensions(p.cables, p.tables, state, first, spans, scratch.stages[0])
+    placement = bar_placement(state, has_bar)
+    if p.effects.shape[0] > 0 and p.effects[0, HOOK] < WINCH:
+        affected_cables(
+            state,
+            scratch.stages[1],
+            frame_placement(frame),
+            placement,
+            first,
+            True,
+            1.0,
+            p.cables,
+            p.tables,
+            p.effects,
+            p.effect_parameters,
+            spans,
+            scratch.signals,
+            scratch.stages[0],
+        )
+    else:
+        cable_spans(p.cables, frame_placement(frame), placement, spans)
+        cable_tensions(p.cables, p.tables, state, first, spans, scratch.stages[0])
     for i in range(p.cables.shape[0]):
         out[0, i] = spans[i, TENSION]
         out[1, i] = spans[i, LENGTH]

@@ -15,11 +15,14 @@ WINCH_TENSION = 2
 WINDING_RADIUS = 3
 RESISTANCE = 4  # torque against positive motion [N·m]; an effect adds to it
 DRY_LIMIT = 5  # largest dry friction torque [N·m]; an effect adds to it
-WINCH_SIGNALS = 6
+REPORTED_TORQUE = 6  # what the drive says; effects of the drive change it
+COMMANDED_TORQUE = 7  # within the torque limit
+WINCH_SIGNALS = 8
 
 
 @njit(cache=True, error_model="numpy", inline="always")
-def _clip(value: float, limit: float) -> float:
+def clip(value: float, limit: float) -> float:
+    """Return the value nearest to `value` within ±limit."""
     # Comparisons, since min() and max() of floats are several times slower when compiled.
     if value > limit:
         return limit
@@ -42,9 +45,29 @@ def winch_acceleration(
     speed decay over one step of `period` [s]: exact while sliding, and a winch that sticks does not
     creep.
     """
-    limited = _clip(torque, cables[i, TORQUE_LIMIT])
+    limited = clip(torque, cables[i, TORQUE_LIMIT])
     net = limited - cables[i, RADIUS] * tension - signals[RESISTANCE]
     dry = signals[DRY_LIMIT]
     if dry > 0.0:
-        net -= _clip(net + cables[i, INERTIA] * speed / period, dry)
+        net -= clip(net + cables[i, INERTIA] * speed / period, dry)
     return net / cables[i, INERTIA]
+
+
+@njit(cache=True, error_model="numpy", inline="always")
+def fill_winch_signals(
+    angle: float,
+    speed: float,
+    tension: float,
+    torque: float,
+    cables: Array,
+    i: int,
+    signals: Array,
+) -> None:
+    """Write what effects on winch i read, and zero to what they add to."""
+    signals[ANGLE] = angle
+    signals[SPEED] = speed
+    signals[WINCH_TENSION] = tension
+    signals[WINDING_RADIUS] = cables[i, RADIUS]
+    signals[RESISTANCE] = 0.0
+    signals[DRY_LIMIT] = 0.0
+    signals[COMMANDED_TORQUE] = signals[REPORTED_TORQUE] = clip(torque, cables[i, TORQUE_LIMIT])

@@ -1,0 +1,115 @@
+"""The plant's blocks driven by given signals: winch motion, torques, or tensions."""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from cspm_sim.kernels.driven import drive_by_tensions, drive_by_torques, drive_by_winches
+from cspm_sim.kernels.plant import BAR_STATES, PlantParameters, make_scratch, state_count
+from cspm_sim.motion import Motion
+
+Array = NDArray[np.float64]
+
+
+class Driven(NamedTuple):
+    """What came out, at each step from the start's on; rows after the first bad one are NaN.
+
+    Attributes:
+        states: shape (steps + 1, states), as in `plant`; of a bar alone its 12.
+        tensions: shape (steps + 1, n) [N].
+        good: how many rows are finite.
+    """
+
+    states: Array
+    tensions: Array
+    good: int
+
+
+class DrivenPlant:
+    """A machine on a moving winch frame, whose blocks are run window by window.
+
+    Time is a count of steps from the frame motion's first knot. The states are the plant's:
+    bar (12), unstretched lengths, angles, speeds.
+    """
+
+    def __init__(self, parameters: PlantParameters, frame_motion: Motion, period_ns: int) -> None:
+        """Take machine, frame motion and step [ns]."""
+        self.parameters = parameters
+        self.frame_motion = frame_motion
+        self.period = period_ns * 1e-9
+        self.cables = len(parameters.cables)
+        self.first = BAR_STATES if len(parameters.bar) else 0
+        self.size = state_count(parameters)
+        self._scratch = make_scratch(self.size, self.cables)
+        self._frames = np.zeros((3, 18))
+        self._outputs = np.zeros((2, self.cables))
+
+    def by_winches(
+        self, start: int, state: Array, angles: Array, speeds: Array, bars: Array | None = None
+    ) -> Driven:
+        """Return bar and tensions under given winch motion.
+
+        Args:
+            start: step at which the window begins.
+            state: the state there; its angles and speeds are those given.
+            angles: at the motor shafts, (steps + 1, n) [rad].
+            speeds: their derivatives [rad/s].
+            bars: the bar's states, (steps + 1, 12), where the cables alone are to be run.
+        """
+        out = np.full((len(angles), self.size + self.cables), np.nan)
+        good = drive_by_winches(
+            state.copy(),
+            np.ascontiguousarray(angles),
+            np.ascontiguousarray(speeds),
+            np.zeros((0, BAR_STATES)) if bars is None else np.ascontiguousarray(bars),
+            *self._motion(start),
+            self.parameters,
+            self._frames,
+            self._scratch,
+            self._outputs,
+            out,
+        )
+        return self._result(out, good)
+
+    def by_torques(self, start: int, state: Array, torques: Array) -> Driven:
+        """Return the whole plant's motion under given torques, (steps, n) [N·m], each held."""
+        out = np.full((len(torques) + 1, self.size + self.cables), np.nan)
+        good = drive_by_torques(
+            state.copy(),
+            np.ascontiguousarray(torques),
+            *self._motion(start),
+            self.parameters,
+            self._frames,
+            self._scratch,
+            self._outputs,
+            out,
+        )
+        return self._result(out, good)
+
+    def by_tensions(self, start: int, bar_state: Array, tensions: Array) -> Driven:
+        """Return the bar's motion under given tensions, (steps + 1, n) [N]; `bar_state` has 12."""
+        out = np.full((len(tensions), BAR_STATES), np.nan)
+        # Memory begins at zero.
+        state = np.zeros(self.size)
+        state[:BAR_STATES] = bar_state
+        good = drive_by_tensions(
+            state,
+            np.ascontiguousarray(tensions),
+            *self._motion(start),
+            self.parameters,
+            self._frames,
+            self._scratch,
+            out,
+        )
+        out[good:] = np.nan
+        return Driven(out, tensions, good)
+
+    def _motion(self, start: int) -> tuple[Array, float, int, float]:
+        return self.frame_motion.knots, self.frame_motion.spacing, start, self.period
+
+    def _result(self, out: Array, good: int) -> Driven:
+        out[good:] = np.nan
+        return Driven(out[:, : self.size], out[:, self.size :], good)

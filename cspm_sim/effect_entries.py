@@ -1,0 +1,158 @@
+"""From a test-bed's `effects` to what acts: checked entries, changed parameters, rows of hooks."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Iterator, Sequence
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from cspm_msgs_py.errors import InputError
+from cspm_msgs_py.testbed import EffectEntry, Testbed
+from cspm_sim.effects import Block, Effect, Elements, Hook, catalogue
+from cspm_sim.kernels.effect_call import kernel_address
+from cspm_sim.kernels.hooks import ROW_COLUMNS
+
+Array = NDArray[np.float64]
+
+
+class Action(NamedTuple):
+    """One effect on one element.
+
+    Attributes:
+        effect: of the catalogue.
+        element: index of the cable, or of the body among those that the test-bed has.
+        name: of the element.
+        values: all its parameters, in the effect's order.
+    """
+
+    effect: Effect
+    element: int
+    name: str
+    values: dict[str, float]
+
+    @property
+    def where(self) -> str:
+        """The entry's place in error messages."""
+        return f"effects: {self.effect.id}"
+
+
+def read_actions(testbed: Testbed) -> list[Action]:
+    """Return a test-bed's effects one by one, without those whose parameters make them absent.
+
+    Raises:
+        InputError: an effect, one of its elements or parameters is unknown or out of bounds, or an
+            effect with memory stands twice on one element.
+    """
+    actions = [action for entry in testbed.effects for action in _of_entry(entry, testbed)]
+    seen = set()
+    for action in actions:
+        place = action.effect.id, action.name
+        if action.effect.states and place in seen:
+            raise InputError(f"{action.where}: twice on {action.name}, allowed: once per element")
+        seen.add(place)
+    return [action for action in actions if not action.effect.is_absent(action.values)]
+
+
+def altered_testbed(testbed: Testbed, actions: Iterable[Action]) -> Testbed:
+    """Return the test-bed with the parameters as effects change them.
+
+    Raises:
+        InputError: a changed parameter is out of bounds.
+    """
+    for action in actions:
+        if action.effect.alter:
+            try:
+                testbed = action.effect.alter(testbed, action.element, action.values)
+            except InputError as err:
+                raise InputError(f"{action.where}: {err}") from None
+    return testbed
+
+
+def first_states(actions: Sequence[Action], n_states: int) -> list[int]:
+    """Return the index of each action's first state, the plant having `n_states`; -1 for none."""
+    ends = np.cumsum([n_states] + [action.effect.states for action in actions])
+    return [
+        int(end) if action.effect.states else -1
+        for end, action in zip(ends[:-1], actions, strict=True)
+    ]
+
+
+def hook_rows(actions: Sequence[Action], n_states: int) -> tuple[NDArray[np.int64], Array]:
+    """Return `effects` and `effect_parameters` of `PlantParameters`."""
+    first = first_states(actions, n_states)
+    calls = sorted(
+        (int(hook), action.element, k)
+        for k, action in enumerate(actions)
+        for hook in action.effect.kernels
+    )
+    width = max((len(actions[k].values) for *_, k in calls), default=1)
+    effects = np.zeros((len(calls), ROW_COLUMNS), dtype=np.int64)
+    parameters = np.zeros((len(calls), width))
+    for row, (hook, element, k) in enumerate(calls):
+        effect, values = actions[k].effect, list(actions[k].values.values())
+        address = kernel_address(effect.kernels[Hook(hook)], effect.states > 0)
+        effects[row] = hook, element, address, first[k], effect.states
+        parameters[row, : len(values)] = values
+    return effects, parameters
+
+
+def _of_entry(entry: EffectEntry, testbed: Testbed) -> Iterator[Action]:
+    where = f"effects: {entry.effect}"
+    effect = catalogue().get(entry.effect)
+    if effect is None:
+        raise InputError(f"{where}: no such effect, allowed: {', '.join(catalogue())}")
+    values = _ordered(effect, entry, where)
+    if effect.acts_on is Elements.CABLES:
+        yield from _on_cables(effect, entry, testbed, values, where)
+    else:
+        yield from _on_bodies(effect, entry, testbed, values, where)
+
+
+def _on_cables(
+    effect: Effect, entry: EffectEntry, testbed: Testbed, values: dict[str, float], where: str
+) -> Iterator[Action]:
+    names = testbed.cable_names
+    for element in entry.elements or names:
+        if element not in names:
+            raise InputError(f"{where}: no element '{element}', allowed: {', '.join(names)}")
+        index = names.index(element)
+        if effect.block is Block.CABLE and not testbed.cables[index].has_cable:
+            with_cable = [cable.name for cable in testbed.cables if cable.has_cable]
+            allowed = ", ".join(with_cable) or "effects on winches"
+            raise InputError(f"{where}: {element} has no cable, allowed: {allowed}")
+        yield Action(effect, index, element, values)
+
+
+def _on_bodies(
+    effect: Effect, entry: EffectEntry, testbed: Testbed, values: dict[str, float], where: str
+) -> Iterator[Action]:
+    if effect.acts_on is Elements.BAR and testbed.bar is None:
+        raise InputError(f"{where}: this test-bed has no bar, allowed: effects on winches")
+    bodies = [effect.acts_on.value]
+    if effect.acts_on is Elements.BODIES:
+        present = {"winch_frame": testbed.winch_frame, "bar": testbed.bar}
+        bodies = [name for name, body in present.items() if body is not None]
+    if not bodies:
+        raise InputError(f"{where}: nothing moves here, allowed: a test-bed with bar or frame")
+    for element in entry.elements or bodies:
+        if element not in bodies:
+            raise InputError(
+                f"{where}: elements {list(entry.elements)}, allowed: [{', '.join(bodies)}] or none"
+            )
+        yield Action(effect, bodies.index(element), element, values)
+
+
+def _ordered(effect: Effect, entry: EffectEntry, where: str) -> dict[str, float]:
+    names = [parameter.name for parameter in effect.parameters]
+    given = entry.parameters
+    if set(given) != set(names):
+        raise InputError(f"{where}: parameters {sorted(given)}, allowed: exactly {names}")
+    for parameter in effect.parameters:
+        if not parameter.minimum <= given[parameter.name] <= parameter.maximum:
+            raise InputError(
+                f"{where}: {parameter.name} = {given[parameter.name]:g} {parameter.unit}, allowed:"
+                f" {parameter.minimum:g} to {parameter.maximum:g}"
+            )
+    return {name: given[name] for name in names}

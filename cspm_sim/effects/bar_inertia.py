@@ -1,0 +1,56 @@
+"""A bar that is harder or easier to turn than the test-bed file says."""
+
+import numpy as np
+
+from cspm_msgs_py.testbed import Testbed
+from cspm_sim.effects.alteration import altered_bar
+from cspm_sim.effects.bar_motion import bar_motion
+from cspm_sim.effects.effect import (
+    Array,
+    Block,
+    Channel,
+    Effect,
+    EffectParameter,
+    Regression,
+    Values,
+)
+
+_MOMENTS = ("ixx", "iyy", "izz")
+
+
+def _alter(testbed: Testbed, element: int, values: Values) -> Testbed:
+    if testbed.bar is None:
+        return testbed
+    inertia = testbed.bar.inertia.model_dump()
+    changed = {name: inertia[name] + values[name] for name in _MOMENTS}
+    return altered_bar(testbed, inertia={**inertia, **changed})
+
+
+def _columns(signals: Array) -> Array:
+    motion = bar_motion(signals)
+    to_bar = motion.rotation.transpose(0, 2, 1)
+    omega = np.einsum("kij,kj->ki", to_bar, motion.omega)
+    alpha = np.einsum("kij,kj->ki", to_bar, motion.alpha)
+    columns = []
+    for axis in np.eye(3):
+        moment = -(axis * alpha + np.cross(omega, axis * omega))
+        world = np.einsum("kij,kj->ki", motion.rotation, moment)
+        columns.append(np.hstack([np.zeros(world.shape), world]))
+    return np.stack(columns, -1)
+
+
+EFFECT = Effect(
+    id="bar_inertia",
+    block=Block.BAR,
+    parameters=tuple(
+        EffectParameter(name, "kg·m²", -10.0, 10.0, meaning="added to the same entry of inertia")
+        for name in _MOMENTS
+    ),
+    alter=_alter,
+    regression=Regression(Channel.WRENCH, _columns),
+    equation="the bar's inertia about its centre of mass, bar axes = that of the file + diagonal",
+    shows="bar wrench residual is a moment in proportion to angular acceleration",
+    twins=("payload_swing",),
+    separating_experiment="turn the bar to and fro at two frequencies; held still it shows nothing",
+    reference="thesis (2-12)",
+)

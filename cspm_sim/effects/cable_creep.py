@@ -1,0 +1,62 @@
+"""A cable that goes on stretching under load, and recovers."""
+
+from collections.abc import Sequence
+from math import exp
+
+import numpy as np
+
+from cspm_sim.effects.effect import (
+    Array,
+    Block,
+    Channel,
+    Effect,
+    EffectParameter,
+    Hook,
+    Regression,
+)
+from cspm_sim.effects.signals import CableSignal
+from cspm_sim.kernels.affected_cables import ELASTIC_TENSION, ELONGATION_ADDED
+
+
+def _stretch(parameters: Array, signals: Array, states: Array, rates: Array) -> None:
+    signals[ELONGATION_ADDED] -= states[0]
+
+
+def _creep(parameters: Array, signals: Array, states: Array, rates: Array) -> None:
+    rates[0] = (parameters[0] * signals[ELASTIC_TENSION] - states[0]) / parameters[1]
+
+
+def _rest(parameters: Array, signals: Array) -> Sequence[float]:
+    return (parameters[0] * signals[ELASTIC_TENSION],)
+
+
+def _columns(signals: Array, time_constant: float) -> Array:
+    """Return what creep adds that was at rest under the first sample's tension."""
+    time = signals[:, CableSignal.TIME]
+    tension = signals[:, CableSignal.TENSION] - signals[:, CableSignal.DAMPER]
+    crept = np.full(len(time), tension[0])
+    for k in range(1, len(time)):
+        fading = exp(-(time[k] - time[k - 1]) / time_constant)
+        mean = 0.5 * (tension[k] + tension[k - 1])
+        crept[k] = mean + (crept[k - 1] - mean) * fading
+    return np.asarray((-signals[:, CableSignal.STIFFNESS] * (crept - crept[0]))[:, None, None])
+
+
+EFFECT = Effect(
+    id="cable_creep",
+    block=Block.CABLE,
+    parameters=(
+        EffectParameter("compliance", "m/N", 0.0, 0.1, meaning="of the whole cable"),
+        EffectParameter("time_constant", "s", 0.01, 1e5, absent=None),
+    ),
+    kernels={Hook.CABLE: _stretch, Hook.LOADED_CABLE: _creep},
+    states=1,
+    rest=_rest,
+    regression=Regression(Channel.TENSION, _columns),
+    nonlinear={"time_constant": (0.1, 0.3, 1.0, 3.0, 10.0, 30.0, 100.0, 300.0)},
+    equation="t = law(ε − e), time_constant·de/dt = compliance·t − e, t without damping",
+    shows="tension at fixed length falls slowly after a load step, and recovers after unloading",
+    twins=("cable_hysteresis", "cable_stiffness"),
+    separating_experiment="hold for several time constants after a step of load up, then down",
+    reference="Findley, Lai, Onaran, Creep and Relaxation, 1976: a Kelvin-Voigt element in series",
+)

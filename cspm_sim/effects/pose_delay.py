@@ -1,0 +1,38 @@
+"""A motion capture whose readings are older than their stamps say."""
+
+import numpy as np
+
+from cspm_sim.effects.effect import (
+    Array,
+    Block,
+    Channel,
+    Effect,
+    EffectParameter,
+    Elements,
+    Regression,
+    Sense,
+)
+from cspm_sim.effects.signals import PoseSignal
+
+
+def _lateness(time: float, parameters: Array) -> float:
+    return float(parameters[0])
+
+
+def _columns(signals: Array) -> Array:
+    return np.asarray(-signals[:, PoseSignal.RATE : PoseSignal.RATE + 6, None])
+
+
+EFFECT = Effect(
+    id="pose_delay",
+    block=Block.SENSOR,
+    parameters=(EffectParameter("delay", "s", 0.0, 1.0),),
+    sense=Sense(("/{}/pose", "/{}/twist"), lateness=_lateness),
+    elements=Elements.BODIES,
+    regression=Regression(Channel.READING, _columns),
+    equation="pose and twist stamped τ = those at τ − delay",
+    shows="tension residuals as of a damper stiffness·delay; pose lags behind the winches' motion",
+    twins=("cable_axial_damping", "winch_torque_lag", "clock_skew"),
+    separating_experiment="sweep the frequency: a phase in proportion to it, alike in all cables",
+    reference="latency of optical motion capture; first order of the shift in time",
+)

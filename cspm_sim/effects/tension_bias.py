@@ -1,0 +1,37 @@
+"""A load cell whose zero is off."""
+
+import numpy as np
+
+from cspm_sim.effects.effect import (
+    Array,
+    Block,
+    Channel,
+    Effect,
+    EffectParameter,
+    Regression,
+    Sense,
+)
+
+
+def _reading(values: Array, element: int, parameters: Array) -> Array:
+    read = values.copy()
+    read[element] += parameters[0]
+    return read
+
+
+def _columns(signals: Array) -> Array:
+    return np.ones((len(signals), 1, 1))
+
+
+EFFECT = Effect(
+    id="tension_bias",
+    block=Block.SENSOR,
+    parameters=(EffectParameter("bias", "N", -100.0, 100.0),),
+    sense=Sense(("/cables/tension",), _reading),
+    regression=Regression(Channel.READING, _columns),
+    equation="measured tension = tension + bias",
+    shows="the same constant in torque, tension and wrench residuals of one cable",
+    twins=("winch_torque_offset", "bar_constant_wrench"),
+    separating_experiment="read the cell with its cable slack, and at three tension levels",
+    reference="zero balance of strain-gauge load cells, OIML R 60",
+)

@@ -1,0 +1,70 @@
+"""A drum that turns about a point beside its centre."""
+
+from collections.abc import Sequence
+from math import atan2, cos, hypot, pi, sin
+
+import numpy as np
+
+from cspm_sim.effects.effect import (
+    Array,
+    Block,
+    Channel,
+    Effect,
+    EffectParameter,
+    Hook,
+    Regression,
+    Values,
+)
+from cspm_sim.effects.signals import CableSignal, WinchSignal
+from cspm_sim.kernels.affected_cables import DRUM_GEAR, MOTOR_ANGLE, RADIUS_ADDED
+
+
+def _kernel(parameters: Array, signals: Array) -> None:
+    gear = signals[DRUM_GEAR]
+    signals[RADIUS_ADDED] += parameters[0] / gear * cos(signals[MOTOR_ANGLE] / gear + parameters[1])
+
+
+def _torque(signals: Array) -> Array:
+    gear = signals[:, WinchSignal.GEAR]
+    drum = signals[:, WinchSignal.ANGLE] / gear
+    load = (signals[:, WinchSignal.TENSION] / gear)[:, None]
+    return np.asarray(load * np.stack([np.cos(drum), -np.sin(drum)], -1))[:, None]
+
+
+def _tension(signals: Array) -> Array:
+    drum = signals[:, CableSignal.ANGLE] / signals[:, CableSignal.GEAR]
+    wound = np.stack([np.sin(drum) - np.sin(drum[0]), np.cos(drum) - np.cos(drum[0])], -1)
+    stiffness = signals[:, CableSignal.STIFFNESS] * signals[:, CableSignal.WOUND]
+    return np.asarray(stiffness[:, None] * wound)[:, None]
+
+
+def _weights(values: Values) -> tuple[float, float]:
+    eccentricity, phase = values["eccentricity"], values["phase"]
+    return eccentricity * cos(phase), eccentricity * sin(phase)
+
+
+def _values(weights: Sequence[float], _: Values) -> dict[str, float]:
+    return {"eccentricity": hypot(*weights), "phase": atan2(weights[1], weights[0])}
+
+
+EFFECT = Effect(
+    id="winch_drum_eccentricity",
+    block=Block.WINCH,
+    parameters=(
+        EffectParameter("eccentricity", "m", 0.0, 0.01),
+        EffectParameter("phase", "rad", -pi, pi, absent=None),
+    ),
+    kernels={Hook.CABLE: _kernel},
+    regression=Regression(Channel.SHAFT, _torque),
+    partners=(Regression(Channel.TENSION, _tension),),
+    coefficients=_weights,
+    from_coefficients=_values,
+    equation="winding radius = r + eccentricity·cos(q/n + phase), in torque and cable alike",
+    shows=(
+        "a line at one per turn of the drum in torque, in proportion to tension, and a quarter turn"
+        " behind it in the cable's length"
+    ),
+    twins=("winch_torque_ripple",),
+    separating_experiment="several turns of the drum at constant speed, at two tension levels",
+    reference="geometry; thesis (2-16) and (2-21) with a radius that changes",
+)

@@ -1,0 +1,59 @@
+"""Torque at a winch's shaft that comes and goes with its angle: cogging, ripple, gear mesh."""
+
+from collections.abc import Sequence
+from math import atan2, cos, hypot, pi, sin
+
+import numpy as np
+
+from cspm_sim.effects.effect import (
+    Array,
+    Block,
+    Channel,
+    Effect,
+    EffectParameter,
+    Hook,
+    Regression,
+    Values,
+)
+from cspm_sim.effects.signals import WinchSignal
+from cspm_sim.kernels.winch import ANGLE, RESISTANCE
+
+
+def _kernel(parameters: Array, signals: Array) -> None:
+    signals[RESISTANCE] -= parameters[0] * sin(parameters[1] * signals[ANGLE] + parameters[2])
+
+
+def _columns(signals: Array, order: float) -> Array:
+    turned = order * signals[:, WinchSignal.ANGLE]
+    return np.asarray(-np.stack([np.sin(turned), np.cos(turned)], -1)[:, None])
+
+
+def _weights(values: Values) -> tuple[float, float]:
+    amplitude, phase = values["amplitude"], values["phase"]
+    return amplitude * cos(phase), amplitude * sin(phase)
+
+
+def _values(weights: Sequence[float], nonlinear: Values) -> dict[str, float]:
+    amplitude, phase = hypot(*weights), atan2(weights[1], weights[0])
+    return {"amplitude": amplitude, "order": nonlinear["order"], "phase": phase}
+
+
+EFFECT = Effect(
+    id="winch_torque_ripple",
+    block=Block.WINCH,
+    parameters=(
+        EffectParameter("amplitude", "N·m", 0.0, 1.0),
+        EffectParameter("order", "1", 0.0, 1000.0, absent=None),
+        EffectParameter("phase", "rad", -pi, pi, absent=None),
+    ),
+    kernels={Hook.WINCH: _kernel},
+    regression=Regression(Channel.SHAFT, _columns),
+    nonlinear={"order": (1, 2, 3, 4, 5, 6, 7, 8, 9, 10, 12, 14, 16, 18, 20, 24, 30, 36, 42, 48)},
+    coefficients=_weights,
+    from_coefficients=_values,
+    equation="torque at the shaft = reported torque + amplitude·sin(order·q + phase)",
+    shows="winch torque residual has a line at a fixed order of the motor angle, none in tension",
+    twins=("winch_drum_eccentricity",),
+    separating_experiment="several turns at constant speed, at two tension levels",
+    reference="Holtz, Springob, IEEE Trans. Industrial Electronics 43(2), 1996",
+)

@@ -1,0 +1,256 @@
+"""Parts of the plant driven by what was measured instead of by what is simulated.
+
+Winch-driven: motor angles given, bar and cables simulated. Torque-driven: the whole plant.
+Tension-driven: tensions given, the bar alone simulated. All take the classical Runge-Kutta step of
+`plant_step`. Time begins with the motion's first knot; a window begins at a step of it.
+"""
+
+from math import isfinite
+
+from numba import njit
+from numpy import float64
+from numpy.typing import NDArray
+
+from cspm_sim.kernels.cable import TENSION, cable_spans
+from cspm_sim.kernels.motion import evaluate_motion
+from cspm_sim.kernels.plant import (
+    BAR_STATES,
+    PlantParameters,
+    Scratch,
+    bar_placement,
+    bar_rate,
+    frame_placement,
+    plant_rate,
+    plant_step,
+    plant_tensions,
+)
+
+Array = NDArray[float64]
+
+
+@njit(cache=True, error_model="numpy")
+def _turn(
+    state: Array, first: int, angles: Array, speeds: Array, k: int, half: int, period: float
+) -> None:
+    """Put the winches where they were measured, `half` half steps after step k.
+
+    Between samples the angle is their cubic Hermite interpolant, and the speed its derivative.
+    """
+    n = angles.shape[1]
+    for i in range(n):
+        if half == 1:
+            q0, q1, v0, v1 = angles[k, i], angles[k + 1, i], speeds[k, i], speeds[k + 1, i]
+            angle = 0.5 * (q0 + q1) + 0.125 * period * (v0 - v1)
+            speed = 1.5 * (q1 - q0) / period - 0.25 * (v0 + v1)
+        else:
+            angle, speed = angles[k + half // 2, i], speeds[k + half // 2, i]
+        state[first + n + i] = angle
+        state[first + 2 * n + i] = speed
+
+
+@njit(cache=True, error_model="numpy")
+def _hold(state: Array, bars: Array, k: int, half: int) -> None:
+    """Put the bar where it was measured, `half` half steps after step k; if it was."""
+    if bars.shape[0] == 0:
+        return
+    for d in range(BAR_STATES):
+        if half == 1:
+            state[d] = 0.5 * (bars[k, d] + bars[k + 1, d])
+        else:
+            state[d] = bars[k + half // 2, d]
+
+
+@njit(cache=True, error_model="numpy")
+def _note(
+    state: Array, frame: Array, p: PlantParameters, scratch: Scratch, outputs: Array, row: Array
+) -> bool:
+    """Write state and tensions to `row`; return whether all are finite."""
+    plant_tensions(state, frame, p, scratch, outputs)
+    size, n = state.shape[0], p.cables.shape[0]
+    whole = True
+    for j in range(size):
+        row[j] = state[j]
+        whole = whole and isfinite(state[j])
+    for i in range(n):
+        row[size + i] = outputs[0, i]
+    return whole
+
+
+@njit(cache=True, error_model="numpy")
+def drive_by_winches(
+    state: Array,
+    angles: Array,
+    speeds: Array,
+    bars: Array,
+    knots: Array,
+    spacing: float,
+    start: int,
+    period: float,
+    p: PlantParameters,
+    frames: Array,
+    scratch: Scratch,
+    outputs: Array,
+    out: Array,
+) -> int:
+    """Simulate bar and cables under measured winch motion; return how many rows are good.
+
+    `angles`, `speeds`: (steps + 1, n) [rad, rad/s] at the motor shafts; `bars`: the bar's states,
+    (steps + 1, 12), which leaves the cables alone to be simulated, or (0, 12) to simulate it too;
+    `knots`, `spacing`: the winch frame's motion; `frames` (3, 18) and `outputs` (2, n): scratch.
+    `out`, (steps + 1, states + n), takes the states and the tensions at each step.
+    """
+    steps = angles.shape[0] - 1
+    first = BAR_STATES if p.bar.shape[0] > 0 else 0
+    stage, rate, total = scratch.stages[0], scratch.stages[1], scratch.stages[2]
+    evaluate_motion(start * period, knots, spacing, False, frames[0])
+    _turn(state, first, angles, speeds, 0, 0, period)
+    _hold(state, bars, 0, 0)
+    for k in range(steps):
+        if not _note(state, frames[0], p, scratch, outputs, out[k]):
+            return k
+        evaluate_motion((start + k + 0.5) * period, knots, spacing, False, frames[1])
+        evaluate_motion((start + k + 1) * period, knots, spacing, False, frames[2])
+        for j in range(state.shape[0]):
+            stage[j], total[j] = state[j], 0.0
+        for s in range(4):
+            _turn(stage, first, angles, speeds, k, (s + 1) // 2, period)
+            _hold(stage, bars, k, (s + 1) // 2)
+            plant_rate(
+                stage,
+                outputs[0],
+                frame_placement(frames[(s + 1) // 2]),
+                False,
+                period,
+                p.bar,
+                p.cables,
+                p.tables,
+                p.effects,
+                p.effect_parameters,
+                scratch.spans,
+                scratch.signals,
+                rate,
+            )
+            weight = 1.0 if s == 0 or s == 3 else 2.0
+            reach = 0.5 * period if s < 2 else period
+            for j in range(state.shape[0]):
+                total[j] += weight * rate[j]
+                stage[j] = state[j] + reach * rate[j]
+        for j in range(state.shape[0]):
+            state[j] += period / 6.0 * total[j]
+        _turn(state, first, angles, speeds, k, 2, period)
+        _hold(state, bars, k, 2)
+        for d in range(frames.shape[1]):
+            frames[0, d] = frames[2, d]
+    return steps + 1 if _note(state, frames[0], p, scratch, outputs, out[steps]) else steps
+
+
+@njit(cache=True, error_model="numpy")
+def drive_by_torques(
+    state: Array,
+    torques: Array,
+    knots: Array,
+    spacing: float,
+    start: int,
+    period: float,
+    p: PlantParameters,
+    frames: Array,
+    scratch: Scratch,
+    outputs: Array,
+    out: Array,
+) -> int:
+    """Simulate the whole plant under measured torques; return how many rows are good.
+
+    `torques`: (steps, n) [N·m] at the motor shafts, each held over its step; the rest as in
+    `drive_by_winches`.
+    """
+    steps = torques.shape[0]
+    evaluate_motion(start * period, knots, spacing, False, frames[0])
+    for k in range(steps):
+        if not _note(state, frames[0], p, scratch, outputs, out[k]):
+            return k
+        evaluate_motion((start + k + 0.5) * period, knots, spacing, False, frames[1])
+        evaluate_motion((start + k + 1) * period, knots, spacing, False, frames[2])
+        plant_step(state, torques[k], frames, False, period, p, scratch)
+        for d in range(frames.shape[1]):
+            frames[0, d] = frames[2, d]
+    return steps + 1 if _note(state, frames[0], p, scratch, outputs, out[steps]) else steps
+
+
+@njit(cache=True, error_model="numpy")
+def _bar_rate_under(
+    state: Array,
+    tensions: Array,
+    frame: Array,
+    p: PlantParameters,
+    scratch: Scratch,
+    out: Array,
+) -> None:
+    placement = bar_placement(state, True)
+    cable_spans(p.cables, frame_placement(frame), placement, scratch.spans)
+    for i in range(tensions.shape[0]):
+        scratch.spans[i, TENSION] = tensions[i]
+    bar_rate(
+        state,
+        frame_placement(frame),
+        placement,
+        p.bar,
+        p.cables,
+        p.effects,
+        p.effect_parameters,
+        scratch.spans,
+        scratch.signals,
+        out,
+    )
+
+
+@njit(cache=True, error_model="numpy")
+def drive_by_tensions(
+    state: Array,
+    tensions: Array,
+    knots: Array,
+    spacing: float,
+    start: int,
+    period: float,
+    p: PlantParameters,
+    frames: Array,
+    scratch: Scratch,
+    out: Array,
+) -> int:
+    """Simulate the bar alone under measured tensions; return how many rows are good.
+
+    `state`: the plant's, of which the bar's 12 and the effects' memory are used; `tensions`:
+    (steps + 1, n) [N], joined by straight lines; `out`: (steps + 1, 12); the rest as in
+    `drive_by_winches`.
+    """
+    steps, n = tensions.shape[0] - 1, tensions.shape[1]
+    stage, rate, total = scratch.stages[0], scratch.stages[1], scratch.stages[2]
+    pull = scratch.stages[0][BAR_STATES : BAR_STATES + n]
+    evaluate_motion(start * period, knots, spacing, False, frames[0])
+    for d in range(BAR_STATES):
+        out[0, d] = state[d]
+    for k in range(steps):
+        evaluate_motion((start + k + 0.5) * period, knots, spacing, False, frames[1])
+        evaluate_motion((start + k + 1) * period, knots, spacing, False, frames[2])
+        for j in range(state.shape[0]):
+            stage[j], total[j], rate[j] = state[j], 0.0, 0.0
+        for s in range(4):
+            later = 0.5 * ((s + 1) // 2)
+            for i in range(n):
+                pull[i] = (1.0 - later) * tensions[k, i] + later * tensions[k + 1, i]
+            _bar_rate_under(stage, pull, frames[(s + 1) // 2], p, scratch, rate)
+            weight = 1.0 if s == 0 or s == 3 else 2.0
+            reach = 0.5 * period if s < 2 else period
+            for j in range(state.shape[0]):
+                total[j] += weight * rate[j]
+                stage[j] = state[j] + reach * rate[j]
+        whole = True
+        for j in range(state.shape[0]):
+            state[j] += period / 6.0 * total[j]
+            whole = whole and isfinite(state[j])
+        for j in range(BAR_STATES):
+            out[k + 1, j] = state[j]
+        if not whole:
+            return k + 1
+        for d in range(frames.shape[1]):
+            frames[0, d] = frames[2, d]
+    return steps + 1

@@ -1,0 +1,85 @@
+"""What effects do to sensors: readings that are changed or older than their stamps say."""
+
+from __future__ import annotations
+
+from collections import deque
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from cspm_msgs_py.testbed import Testbed
+from cspm_sim.effect_entries import Action, read_actions
+
+Array = NDArray[np.float64]
+
+
+@dataclass(frozen=True)
+class SensorFault:
+    """One effect on one element of a sensor."""
+
+    action: Action
+
+    @property
+    def is_late(self) -> bool:
+        """Whether readings can be older than their stamps say."""
+        sense = self.action.effect.sense
+        return sense is not None and sense.lateness is not None
+
+    def lateness(self, time: float) -> float:
+        """Return by how much a reading stamped `time` [s] is older than that [s]."""
+        sense = self.action.effect.sense
+        if sense is None or sense.lateness is None:
+            return 0.0
+        return sense.lateness(time, self._parameters)
+
+    def reading(self, values: Array) -> Array:
+        """Return the quantities as the faulty sensor takes them in."""
+        sense = self.action.effect.sense
+        if sense is None or sense.reading is None:
+            return values
+        return sense.reading(values, self.action.element, self._parameters)
+
+    @property
+    def _parameters(self) -> Array:
+        return np.array(list(self.action.values.values()))
+
+
+class Past:
+    """The latest history of a sensor's quantities, as far as it is still asked for.
+
+    Between instants it is a straight line, before the first it stands still.
+    """
+
+    def __init__(self) -> None:
+        """Begin without history."""
+        self._rows: deque[tuple[float, Array]] = deque()
+
+    def note(self, time: float, values: Array) -> None:
+        """Add the present, later than all before."""
+        self._rows.append((time, values.copy()))
+
+    def at(self, time: float) -> Array:
+        """Return the quantities at a time [s] no earlier than any asked for before."""
+        rows = self._rows
+        while len(rows) > 1 and rows[1][0] <= time:
+            rows.popleft()
+        begin, first = rows[0]
+        if time <= begin or len(rows) == 1:
+            return first
+        end, second = rows[1]
+        return np.asarray(first + (time - begin) / (end - begin) * (second - first))
+
+
+def sensor_faults(testbed: Testbed, topic: str) -> list[SensorFault]:
+    """Return what a test-bed's effects do to the sensor of a topic.
+
+    Raises:
+        InputError: an effect, one of its elements or parameters is unknown or out of bounds.
+    """
+    faults = []
+    for action in read_actions(testbed):
+        sense = action.effect.sense
+        if sense and topic in (name.format(action.name) for name in sense.topics):
+            faults.append(SensorFault(action))
+    return faults

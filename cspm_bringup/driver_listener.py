@@ -200,7 +200,7 @@ class _Ear:
         self._intake.subscribe(
             self._topic,
             ros_class(self._topic.ros_type),
-            lambda payload, received_ns: self.samples.append((received_ns, payload)),
+            lambda payload, received_ns, _: self.samples.append((received_ns, payload)),
             reliability="reliable" if reliable else "best_effort",
         )
 

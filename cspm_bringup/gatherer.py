@@ -8,14 +8,14 @@ one of its topic, or not one at all, is refused and counted.
 from __future__ import annotations
 
 from bisect import bisect_left
-from collections.abc import Callable
+from collections.abc import Callable, Collection
 
 import numpy as np
 from numpy.typing import NDArray
 
 from cspm_msgs_py.diagnostics import decode_diagnostics, encode_diagnostics
 from cspm_msgs_py.errors import InputError
-from cspm_msgs_py.lockstep import ACKNOWLEDGE_EVERY, WINDOW, Sequence, check_end
+from cspm_msgs_py.lockstep import RECORDED_EVERY, RECORDER_WINDOW, Sequence, check_end
 from cspm_msgs_py.recording.channel import Channel
 from cspm_msgs_py.recording.writer import BLOCK_NS, RecordingWriter
 from cspm_msgs_py.schedule import PLANT, Schedule
@@ -23,7 +23,7 @@ from cspm_msgs_py.topics import DIAGNOSTICS, Topic
 from cspm_msgs_py.wire import WireReader
 
 Array = NDArray[np.float64]
-WRITE_EVERY_NS = 20_000_000
+WRITE_EVERY_NS = 16_000_000
 
 
 class _Inlet:
@@ -32,22 +32,33 @@ class _Inlet:
     def __init__(self, topic: Topic, channel: Channel, schedule: Schedule) -> None:
         self.sequence = Sequence(topic.name, schedule)
         self._delay_ns = schedule.topics[topic.name].delay * schedule.period_ns
-        self._decode = WireReader(topic).decode
+        reader = WireReader(topic)
+        self._decode, self._decode_block = reader.decode, reader.decode_block
         self._append = channel.append
         self._logs: list[int] = []
         self._messages: list[tuple[int, Array]] = []
 
-    def take(self, payload: bytes) -> None:
+    def take(self, payload: bytes, number: int | None) -> None:
         """Keep a message.
 
         Raises:
             InputError: it is unusable, or not the next one.
+            CspmError: two senders send the topic.
         """
         # What is unusable must not take the place of the message that it pretends to be.
         stamp, row = self._decode(payload)
-        self.sequence.take(stamp)
+        self.sequence.take(stamp, number)
         self._logs.append(stamp + self._delay_ns)
         self._messages.append((stamp, row))
+
+    def take_block(self, payloads: list[bytes], numbers: list[int | None]) -> bool:
+        """Keep messages if each is sound and the next one; else keep none and return False."""
+        decoded = self._decode_block(payloads)
+        if decoded is None or not self.sequence.take_block(decoded[0], numbers):
+            return False
+        self._logs += [stamp + self._delay_ns for stamp in decoded[0]]
+        self._messages += zip(*decoded, strict=True)
+        return True
 
     def write(self, end_ns: int) -> None:
         """Write what came before `end_ns`."""
@@ -73,10 +84,12 @@ class Gatherer:
         writer: RecordingWriter,
         acknowledge: Callable[[int], None],
         complain: Callable[[str, str], None] = lambda _topic, _reason: None,
+        reporting: Collection[str] = (),
     ) -> None:
         """Take what is to come, where it goes, and whom to tell how far all is there.
 
-        `complain` gets topic and reason of each message that is refused.
+        `complain` gets topic and reason of each message that is refused. The nodes in `reporting`
+        send their statuses themselves, and nothing else on `/diagnostics`.
         """
         self._schedule = schedule
         self._writer = writer
@@ -89,23 +102,27 @@ class Gatherer:
             node: -(-plan.first // plan.status_divider) * plan.status_divider
             for node, plan in schedule.nodes.items()
         }
+        self._reports = dict.fromkeys(reporting, 0)
         self._statuses: list[tuple[int, int, bytes]] = []
-        self._write_every = max(ACKNOWLEDGE_EVERY, WRITE_EVERY_NS // schedule.period_ns)
+        self._write_every = max(RECORDED_EVERY, WRITE_EVERY_NS // schedule.period_ns)
         self._written = 0
-        self._target = ACKNOWLEDGE_EVERY - 1
+        self._target = RECORDED_EVERY - 1
         self._left = 1
         self._last: int | None = None
         self.completed = -1
         self.done = False
         self.refused: tuple[int, str] = (0, "")
 
-    def receive(self, topic: str) -> Callable[[bytes, int], None]:
-        """Return what takes a topic's messages."""
+    def receive(self, topic: str) -> Callable[[bytes, int, int | None], None]:
+        """Return what takes a topic's messages: bytes, time of reception, sender's number.
+
+        It raises `CspmError` where two senders send the topic.
+        """
         keep = self._inlets[topic].take
 
-        def take(payload: bytes, _: int) -> None:
+        def take(payload: bytes, _: int, number: int | None = None) -> None:
             try:
-                keep(payload)
+                keep(payload, number)
             except InputError as err:
                 self._refuse(topic, str(err))
                 return
@@ -115,8 +132,26 @@ class Gatherer:
 
         return take
 
-    def receive_diagnostics(self, payload: bytes, _: int) -> None:
-        """Take a message of `/diagnostics`."""
+    def receive_block(self, topic: str) -> Callable[[list[bytes], list[int | None]], None]:
+        """Return what takes several of a topic's messages at once: bytes, senders' numbers.
+
+        What is not as it should be is found by looking at one after the other, as `receive` does.
+        """
+        keep, receive = self._inlets[topic].take_block, self.receive(topic)
+
+        def take(payloads: list[bytes], numbers: list[int | None]) -> None:
+            if not keep(payloads, numbers):
+                for payload, number in zip(payloads, numbers, strict=True):
+                    receive(payload, 0, number)
+                return
+            self._left -= len(payloads)
+            if self._left <= 0:
+                self._advance()
+
+        return take
+
+    def receive_diagnostics(self, payload: bytes, _: int, number: int | None = None) -> None:
+        """Take a message of `/diagnostics`; `number` is its sender's, None where not known."""
         try:
             stamp, [status] = decode_diagnostics(payload)
             node = status.name
@@ -132,6 +167,15 @@ class Gatherer:
                 f"{DIAGNOSTICS.name}: {node} at {stamp} ns, allowed: {expected} ns",
             )
             return
+        if number is not None and node in self._reports:
+            if number != self._reports[node] + 1:
+                self._refuse(
+                    DIAGNOSTICS.name,
+                    f"{DIAGNOSTICS.name}: {node} at {stamp} ns is its sender's message {number},"
+                    f" allowed: {self._reports[node] + 1}; a second sender",
+                )
+                return
+            self._reports[node] = number
         self._next_status[node] += self._status_divider(node)
         # Between processes the middleware pads what it carries.
         canonical = encode_diagnostics(stamp, [status])
@@ -146,15 +190,17 @@ class Gatherer:
         Raises:
             InputError: more is there already, or the plant cannot have been so far.
         """
-        check_end(last_step, self.completed, self.completed + WINDOW + 2)
+        check_end(last_step, self.completed, self.completed + RECORDER_WINDOW + 2)
         self._last = last_step
         self._target = min(self._target, last_step)
         self._advance()
 
     def missing(self) -> list[str]:
         """Return what the earliest incomplete step lacks."""
-        late = [n for n, i in self._inlets.items() if i.sequence.complete == self.completed]
-        silent = [n for n, step in self._next_status.items() if step == self.completed + 1]
+        # What came since the last acknowledgement counts as well.
+        completed = self._completed()
+        late = [n for n, i in self._inlets.items() if i.sequence.complete == completed]
+        silent = [n for n, step in self._next_status.items() if step == completed + 1]
         return late + [f"{DIAGNOSTICS.name} of {node}" for node in silent]
 
     def write_whole(self) -> None:
@@ -184,7 +230,7 @@ class Gatherer:
             if self.completed + 1 >= self._written + self._write_every:
                 self._write(self.completed + 1)
             self._acknowledge(self.completed)
-            self._target = self.completed + ACKNOWLEDGE_EVERY
+            self._target = self.completed + RECORDED_EVERY
             if self._last is not None:
                 self._target = max(self.completed + 1, min(self._target, self._last))
         # Early messages of later steps count as well; then this is reached early and counts anew.

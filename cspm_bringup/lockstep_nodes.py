@@ -8,13 +8,14 @@ from cspm_bringup.assembly import assemble_simulator, assemble_stage
 from cspm_bringup.bundle import Bundle
 from cspm_bringup.recorder_node import RecorderNode
 from cspm_control.safety import GuardedStage
-from cspm_msgs_py.graph import followers, graph_of
+from cspm_msgs_py.graph import PLAYER, followers, graph_of
 from cspm_msgs_py.lockstep import WINDOW
 from cspm_msgs_py.recording.writer import RecordingWriter
 from cspm_msgs_py.ros.contract_node import ContractNode
 from cspm_msgs_py.ros.stage_node import StageNode
 from cspm_msgs_py.scenario import ClosedLoop
 from cspm_msgs_py.schedule import Schedule, schedule_of
+from cspm_msgs_py.topics import DIAGNOSTICS
 from cspm_sim.plant_node import PlantNode
 
 
@@ -70,4 +71,7 @@ class LockstepRun:
 
     def recorder(self, node: ContractNode, writer: RecordingWriter) -> RecorderNode:
         """Return the recorder's node."""
-        return RecorderNode(node, self.schedule, self.bundle.testbed.testbed.topics, writer)
+        schedule, topics = self.schedule, self.bundle.testbed.testbed.topics
+        # A player speaks for all who are absent, in one row of messages.
+        reporting = graph_of(schedule, self.members)[DIAGNOSTICS.name].senders
+        return RecorderNode(node, schedule, topics, writer, set(reporting) - {PLAYER})

@@ -18,8 +18,9 @@ from cspm_bringup.reproduction import Reproduction
 from cspm_msgs_py.bag import BagStream
 from cspm_msgs_py.diagnostics import decode_diagnostics
 from cspm_msgs_py.graph import PLAYER, RECORDER, graph_of
-from cspm_msgs_py.lockstep import WINDOW, Sequence
+from cspm_msgs_py.lockstep import RECORDER_WINDOW, WINDOW, Sequence
 from cspm_msgs_py.ros.contract_node import ContractNode
+from cspm_msgs_py.ros.intake import DEPTH
 from cspm_msgs_py.ros.rendezvous import PlantSide
 from cspm_msgs_py.topics import DIAGNOSTICS
 from cspm_msgs_py.wire import WireReader
@@ -77,8 +78,8 @@ class LockstepPlayerNode:
         self._sequences = {name: Sequence(name, self._schedule) for name in read}
         self._decode = {name: WireReader(topics[name]).decode for name in read}
         for name in read:
-            node.subscribe_rows(
-                topics[name], partial(self._take, name), partial(self._refuse, name)
+            node.subscribe_numbered_rows(
+                topics[name], partial(self._take, name), partial(self._refuse, name), DEPTH
             )
         others = [name for name in run.members if name != PLAYER]
         self._others = PlantSide(node, self._schedule.period_ns, others, self._note_progress)
@@ -150,7 +151,9 @@ class LockstepPlayerNode:
         return min(found, default=self.last_step)
 
     def _ready(self) -> bool:
-        return self._slowest() >= self.last_step - WINDOW
+        found = [each.complete + WINDOW for each in self._sequences.values()]
+        found += [] if self._recorded is None else [self._recorded + RECORDER_WINDOW]
+        return min(found, default=self.last_step) >= self.last_step
 
     def _play(self, instant: Instant) -> None:
         self.last_step += 1
@@ -164,8 +167,8 @@ class LockstepPlayerNode:
         names = {status.name for status in decode_diagnostics(payload).statuses}
         return self._present.isdisjoint(names)
 
-    def _take(self, topic: str, stamp_ns: int, row: Array) -> None:
-        self._sequences[topic].take(stamp_ns)
+    def _take(self, topic: str, stamp_ns: int, row: Array, number: int | None) -> None:
+        self._sequences[topic].take(stamp_ns, number)
         self.reproductions[topic].take(stamp_ns, row)
         self._pump()
 

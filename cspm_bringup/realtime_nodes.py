@@ -11,6 +11,7 @@ from cspm_bringup.realtime_recorder_node import RealtimeRecorderNode
 from cspm_bringup.run import recording_of
 from cspm_bringup.warm_up import warm_up
 from cspm_control.safety import GuardedStage, check_real_time
+from cspm_control.stages.angle_stage import AngleStage
 from cspm_control.stages.motion_stage import MotionStage
 from cspm_control.stages.torque_stage import TorqueStage
 from cspm_msgs_py.errors import InputError
@@ -114,7 +115,7 @@ class RealtimeRun:
             topics,
             edges,
             safety.stale_after,
-            on_start=stage.start if isinstance(stage, TorqueStage) else None,
+            on_start=stage.start if isinstance(stage, TorqueStage | AngleStage) else None,
             on_safe=stage.suspend if isinstance(stage, MotionStage) else None,
         )
 

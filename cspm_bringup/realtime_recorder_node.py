@@ -80,7 +80,7 @@ class RealtimeRecorderNode:
         message_class = ros_class(topic.ros_type)
         if not carries_row(topic.ros_type):
 
-            def keep(payload: bytes, log_ns: int) -> None:
+            def keep(payload: bytes, log_ns: int, _: int | None) -> None:
                 if name == DIAGNOSTICS.name and not self._looks_right(payload):
                     return
                 self._writer.append_payload(name, log_ns, payload)
@@ -90,7 +90,7 @@ class RealtimeRecorderNode:
         bucket = Bucket(topic, self._writer.channel(name), self._refuse)
         self._buckets[name] = bucket
 
-        def take(payload: bytes, log_ns: int) -> None:
+        def take(payload: bytes, log_ns: int, _: int | None) -> None:
             self._came.add(name)
             bucket.payloads.append(payload)
             bucket.logs.append(log_ns)

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass
 
+from cspm_msgs_py.lockstep import RECORDER_WINDOW, WINDOW
 from cspm_msgs_py.schedule import (
     FORCE_CONTROLLER,
     MOTION_CONTROLLER,
@@ -61,15 +62,22 @@ def graph_of(schedule: Schedule, nodes: Sequence[str]) -> dict[str, Edges]:
     return found
 
 
+def window_of(node: str) -> int:
+    """Return how many steps the plant may be ahead of a node's last acknowledgement."""
+    return RECORDER_WINDOW if node == RECORDER else WINDOW
+
+
 def followers(schedule: Schedule, nodes: Sequence[str], window: int) -> tuple[str, ...]:
     """Return the nodes whose progress the plant must wait for beside the torque command.
 
-    A torque proves that the nodes which it comes from have read what they computed it from. What
-    came since, or before the first, is unread at worst; a node is waited for where that may be more
-    than `window` messages of a topic.
+    A torque proves that the nodes which it comes from, in a closed loop those before the force
+    controller as well, have read what they computed it from. What came since, or before the first,
+    is unread at worst; a node is waited for where that may be more than `window` messages of a
+    topic.
     """
     unread, proven = 0, set()
-    for node in (FORCE_CONTROLLER, TENSION_DISTRIBUTION, MOTION_CONTROLLER):
+    chain = (FORCE_CONTROLLER, TENSION_DISTRIBUTION, MOTION_CONTROLLER, WAVE_TRAJECTORY)
+    for node in chain if MOTION_CONTROLLER in schedule.nodes else chain[:1]:
         plan = schedule.nodes.get(node)
         if plan is not None:
             unread += plan.divider

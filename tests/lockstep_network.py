@@ -6,7 +6,7 @@ from pathlib import Path
 from cspm_bringup.assembly import assemble
 from cspm_msgs_py.diagnostics import encode_diagnostics
 from cspm_msgs_py.graph import RECORDER, followers, graph_of
-from cspm_msgs_py.lockstep import WINDOW, Acknowledgement, Follower
+from cspm_msgs_py.lockstep import RECORDER_WINDOW, WINDOW, Acknowledgement, Follower
 from cspm_msgs_py.schedule import PLANT
 from cspm_msgs_py.topics import QOS_DEPTH
 from cspm_msgs_py.wire import WireWriter
@@ -138,7 +138,8 @@ class Network:
     def _put(self, key, message):
         queue = self.queues.setdefault(key, deque())
         queue.append(message)
-        if len(queue) > self._depth:
+        # The recorder has room for more than the contract asks of a reader.
+        if len(queue) > (RECORDER_WINDOW + 1 if key[1] == RECORDER else self._depth):
             queue.popleft()
             self.lost += 1
 

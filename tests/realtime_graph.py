@@ -11,8 +11,9 @@ from pathlib import Path
 
 import numpy as np
 from ros_graph import new_domain
-from run_samples import THESIS_CABLES, bundle_of
+from run_samples import bundle_of
 
+from bench.slow_machine import slow_overrides
 from cspm_bringup.bundle import SCENARIO
 from cspm_bringup.node_parameters import REALTIME, NodeParameters, write_parameters
 from cspm_msgs_py.diagnostics import decode_diagnostics
@@ -30,34 +31,11 @@ TESTS = Path(__file__).resolve().parent
 PATIENCE_S = 30.0
 STALE_AFTER = 0.5
 
-RATES = (
-    "rates={plant: 200, winches: 200, load_cells: 200, motion_capture: 100, wave_trajectory: 100,"
-    " motion_controller: 100, tension_distribution: 100, force_controller: 200}"
-)
-# Far below what is designed for 1 kHz: stable at 200 Hz even where commands are 0.15 s late.
-FORCE_GAINS = {"hoist": (0.0006, 12.0), "surge": (0.007, 12.0), "sway": (0.015, 6.0)}
-MOTION_GAINS = {
-    "surge": (17.0, 1.4, 13.0),
-    "sway": (12.0, 0.9, 12.0),
-    "heave": (39.0, 3.3, 30.0),
-    "pitch": (5.0, 0.4, 3.9),
-    "yaw": (1.0, 0.07, 1.0),
-}
-
 
 def slow_bundle(*overrides, scenario="rest"):
     """Return a scenario of the thesis's machine at 200 Hz, patient with a busy computer."""
-    kinds = [(name, *FORCE_GAINS[name.partition("_")[0]]) for name in THESIS_CABLES]
-    force = ", ".join(
-        f"{name}: {{kp: {kp}, integral_frequency: {frequency}}}" for name, kp, frequency in kinds
-    )
-    motion = ", ".join(
-        f"{dof}: {{kp: {kp}, ki: {ki}, kd: {kd}}}" for dof, (kp, ki, kd) in MOTION_GAINS.items()
-    )
-    gains = f"force: {{gains: {{{force}}}}}, motion: {{gains: {{{motion}}}}}"
-    control = f"control={{mode: closed_loop, {gains}}}"
     wait = (f"safety.stale_after={STALE_AFTER}", f"safety.watchdog={STALE_AFTER}")
-    return bundle_of(scenario, RATES, control, *wait, *overrides)
+    return bundle_of(scenario, *slow_overrides(), *wait, *overrides)
 
 
 def warm_processes():

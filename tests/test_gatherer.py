@@ -15,8 +15,8 @@ from test_schedule import delayed
 from cspm_bringup.gatherer import Gatherer
 from cspm_bringup.run import new_recording, run
 from cspm_msgs_py.diagnostics import encode_diagnostics
-from cspm_msgs_py.errors import InputError
-from cspm_msgs_py.lockstep import ACKNOWLEDGE_EVERY, WINDOW
+from cspm_msgs_py.errors import CspmError, InputError
+from cspm_msgs_py.lockstep import RECORDED_EVERY, RECORDER_WINDOW
 from cspm_msgs_py.message import header_of
 from cspm_msgs_py.recording import Recording
 from cspm_msgs_py.ros_types import message_class, serialize
@@ -68,7 +68,7 @@ def case(request, tmp_path_factory):
 class Intake:
     """A gatherer that records to a folder, with what it told."""
 
-    def __init__(self, bundle, folder, acknowledge=None):
+    def __init__(self, bundle, folder, acknowledge=None, reporting=()):
         self.told, self.complaints = [], []
         schedule = schedule_of(bundle.scenario, bundle.testbed.testbed)
         self.writer = new_recording(bundle, folder, "graph")
@@ -78,6 +78,7 @@ class Intake:
             self.writer,
             acknowledge or self.told.append,
             lambda topic, reason: self.complaints.append((topic, reason)),
+            reporting,
         )
         self._receive = {name: self.gatherer.receive(name) for name in schedule.topics}
 
@@ -193,8 +194,8 @@ def test_nothing_is_acknowledged_before_all_of_it_is_there(case, tmp_path):
             intake.take("/clock", payload)
             step = next(clock)
             assert not intake.told or intake.told[-1] <= step
-            assert step - max(intake.told, default=-1) <= ACKNOWLEDGE_EVERY
-        assert intake.gatherer.completed >= 40 - ACKNOWLEDGE_EVERY
+            assert step - max(intake.told, default=-1) <= RECORDED_EVERY
+        assert intake.gatherer.completed >= 40 - RECORDED_EVERY
 
 
 def test_a_silent_node_is_missed(case, tmp_path):
@@ -215,7 +216,7 @@ def test_an_end_that_cannot_be_is_refused(case, tmp_path):
             intake.gatherer.end(5000)
         deliver_through(intake, case, 60)
         reached = intake.gatherer.completed
-        for last in (reached - 1, -1, reached + WINDOW + 3):
+        for last in (reached - 1, -1, reached + RECORDER_WINDOW + 3):
             with pytest.raises(InputError, match=rf"^the last step is {last}, allowed: {reached} "):
                 intake.gatherer.end(last)
         assert not intake.gatherer.done
@@ -327,6 +328,33 @@ def test_other_diagnostics_are_refused(fresh, payload, reason):
     assert fresh.complaints == [("/diagnostics", f"/diagnostics: {reason}")]
     fresh.gatherer.receive_diagnostics(encode_diagnostics(0, [(0, "plant", "ok", {})]), 0)
     assert fresh.gatherer.refused[0] == 1
+
+
+def test_a_status_is_known_by_its_senders_number(tmp_path):
+    """Of nodes that speak for themselves; who speaks for others has other numbers."""
+    intake = Intake(REST, tmp_path / "bag", reporting=["plant"])
+    with intake.writer:
+        take, period = intake.gatherer.receive_diagnostics, 100 * MS
+        status = {name: (0, name, "ok", {}) for name in ("plant", "force_controller")}
+        take(encode_diagnostics(0, [status["plant"]]), 0, 2)
+        assert intake.gatherer.refused == (
+            1,
+            "/diagnostics: plant at 0 ns is its sender's message 2, allowed: 1; a second sender",
+        )
+        take(encode_diagnostics(0, [status["plant"]]), 0, 1)
+        take(encode_diagnostics(period, [status["plant"]]), 0, 1)
+        assert intake.gatherer.refused[0] == 2
+        take(encode_diagnostics(period, [status["plant"]]), 0, 2)
+        take(encode_diagnostics(0, [status["force_controller"]]), 0, 77)
+        assert intake.gatherer.refused[0] == 2
+
+
+def test_two_senders_of_a_topic_are_an_error(fresh):
+    encode = WireWriter(REST.testbed.testbed.topics["/cables/tension"]).encode
+    take = fresh.gatherer.receive("/cables/tension")
+    take(encode(0, np.arange(8.0)), 0, 1)
+    with pytest.raises(CspmError, match=r"^/cables/tension: two senders"):
+        take(encode(0, np.ones(8)), 0, 1)
 
 
 def test_ten_thousand_statuses_are_refused(fresh):

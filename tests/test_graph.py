@@ -104,24 +104,24 @@ def test_the_names_of_all_nodes_are_the_contracts():
         # At 1 kHz a torque proves that its chain has read everything.
         (["rates.motion_capture=1000", *[f"rates.{n}=1000" for n in STAGES[1:3]]], {}, set()),
         # At 100 Hz ten references come between two wrenches.
-        ([], {}, {"motion_controller"}),
+        ([], {}, {"wave_trajectory", "motion_controller"}),
         # Ten tensions and states come between two torques, ten poses between two wrenches.
         (
             ["rates.force_controller=100", "rates.motion_capture=1000"],
             {},
-            {"motion_controller", "tension_distribution", "force_controller"},
+            set(STAGES),
         ),
         # Slow controllers that read slow topics are proven.
         (
             [f"rates.{n}=100" for n in ("wave_trajectory", "winches", "load_cells", STAGES[-1])],
             {},
-            set(),
+            {"wave_trajectory"},
         ),
         # Before the first torque nothing is proven: it comes with the first pose.
         (
             ["rates.motion_capture=1000", *[f"rates.{n}=1000" for n in STAGES[1:3]]],
             {"/bar/pose": WINDOW},
-            {"motion_controller", "tension_distribution", "force_controller"},
+            set(STAGES),
         ),
         (
             ["rates.motion_capture=1000", *[f"rates.{n}=1000" for n in STAGES[1:3]]],
@@ -133,7 +133,7 @@ def test_the_names_of_all_nodes_are_the_contracts():
 def test_whom_the_plant_waits_for(overrides, delays, expected):
     found = schedule("rest", *overrides, delays=delays)
     waited_for = followers(found, everybody(found), WINDOW)
-    assert set(waited_for) == {"wave_trajectory", RECORDER, *expected}
+    assert set(waited_for) == {RECORDER, *expected}
     assert len(waited_for) == len(set(waited_for))
 
 

@@ -41,7 +41,7 @@ class Reader:
             self.intake.subscribe(
                 topic,
                 ros_class(topic.ros_type),
-                lambda payload, at, keep=keep: keep.append((payload, at)),
+                lambda payload, at, _, keep=keep: keep.append((payload, at)),
                 **arguments,
             )
 

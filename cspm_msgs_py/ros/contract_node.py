@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import inspect
 import time
 from collections.abc import Callable, Collection
 from importlib import import_module
@@ -18,7 +19,7 @@ from rclpy.qos import DurabilityPolicy
 
 from cspm_msgs_py.complaints import Complaints
 from cspm_msgs_py.diagnostics import Status, encode_diagnostics
-from cspm_msgs_py.errors import InputError
+from cspm_msgs_py.errors import CspmError, InputError
 from cspm_msgs_py.ros.intake import Intake
 from cspm_msgs_py.ros.qos import contract_qos
 from cspm_msgs_py.topics import DIAGNOSTICS, QOS_DEPTH, SENDER_DEPTH, Topic
@@ -36,6 +37,7 @@ class ContractNode:
     Attributes:
         node: rclpy's node.
         intake: where its messages are taken from, if no executor brings them.
+        failure: why the session is to end, in one line, if `fail` was called.
     """
 
     def __init__(self, name: str, context: Context, *, polled: bool = False) -> None:
@@ -45,6 +47,7 @@ class ContractNode:
         self._publishers: dict[str, tuple[Publisher, frozenset[str]]] = {}
         self._steady = Clock(clock_type=ClockType.STEADY_TIME)
         self._complaints = Complaints(self.warn)
+        self.failure: str | None = None
 
     @property
     def name(self) -> str:
@@ -92,7 +95,24 @@ class ContractNode:
         self.intake.subscribe(
             topic,
             message_class,
-            lambda payload, _: take(payload),
+            lambda payload, *_: take(payload),
+            numbered=False,
+            depth=depth,
+        )
+
+    def subscribe_numbered(
+        self, topic: Topic, take: Callable[[bytes, int | None], None], depth: int = QOS_DEPTH
+    ) -> None:
+        """As `subscribe`, with the number that its sender gave each message, None if unknown."""
+        message_class = ros_class(topic.ros_type)
+        if self.intake is None:
+            numbered, qos = _Numbered(take), contract_qos(depth)
+            self.node.create_subscription(message_class, topic.name, numbered, qos, raw=True)
+            return
+        self.intake.subscribe(
+            topic,
+            message_class,
+            lambda payload, _, number: take(payload, number),
             numbered=False,
             depth=depth,
         )
@@ -106,8 +126,7 @@ class ContractNode:
     ) -> None:
         """Have `receive` called with stamp [ns] and row, or `refuse` with what is wrong.
 
-        An `InputError` that `receive` raises counts as something wrong with the message. Who needs
-        every message lets many wait: strangers' push out genuine ones.
+        An `InputError` that `receive` raises counts as something wrong with the message.
         """
         decode = WireReader(topic).decode
 
@@ -118,6 +137,30 @@ class ContractNode:
                 refuse(str(err))
 
         self.subscribe(topic, take, depth)
+
+    def subscribe_numbered_rows(
+        self,
+        topic: Topic,
+        receive: Callable[[int, Array, int | None], None],
+        refuse: Callable[[str], None],
+        depth: int,
+    ) -> None:
+        """As `subscribe_rows`, with the number that its sender gave each message, None if unknown.
+
+        Any other `CspmError` that `receive` raises is the node's failure. Who needs every message
+        lets many wait, `depth` of them: strangers' push out genuine ones.
+        """
+        decode = WireReader(topic).decode
+
+        def take(payload: bytes, number: int | None) -> None:
+            try:
+                receive(*decode(payload), number)
+            except InputError as err:
+                refuse(str(err))
+            except CspmError as err:
+                self.fail(str(err))
+
+        self.subscribe_numbered(topic, take, depth)
 
     def unmatched(self) -> list[str]:
         """Return `topic (reader)` for each reader that is not connected to our publisher yet."""
@@ -165,9 +208,31 @@ class ContractNode:
         """Say what is wrong with a topic's messages; a flood of them does not fill the log."""
         self._complaints.add(subject, text)
 
+    def fail(self, text: str) -> None:
+        """Have the session end with what is wrong; the first one counts.
+
+        An exception in a callback would be told by ROS as well, with its traceback.
+        """
+        self.failure = self.failure or text
+
     def warn(self, text: str) -> None:
         """Say something on the node's log."""
         self.node.get_logger().warning(text)
+
+
+class _Numbered:
+    """What the executor calls with a message and its sender's number for it."""
+
+    # By this rclpy sees that the information on the message is wanted.
+    __signature__ = inspect.signature(lambda message, info: None)
+
+    def __init__(self, take: Callable[[bytes, int | None], None]) -> None:
+        self._take = take
+
+    def __call__(self, message: Any, info: dict[str, int] | None = None) -> None:  # noqa: ANN401
+        # The events executor of rclpy 7.1 passes both as one argument.
+        payload, found = message if info is None else (message, info)
+        self._take(payload, found["publication_sequence_number"])
 
 
 def _ros_type(message_class: type) -> str:

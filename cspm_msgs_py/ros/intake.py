@@ -7,6 +7,7 @@ has come since the last look costs a third of it.
 from __future__ import annotations
 
 from collections.abc import Callable
+from typing import Any
 
 from rclpy.impl.implementation_singleton import rclpy_implementation
 from rclpy.node import Node
@@ -29,7 +30,7 @@ class Intake:
 
     def __init__(self, node: Node) -> None:
         self._node = node
-        self._inlets: list[_Inlet] = []
+        self._inlets: list[_Inlet | _BlockInlet] = []
 
     @property
     def lost(self) -> dict[str, int]:
@@ -40,27 +41,43 @@ class Intake:
         self,
         topic: Topic,
         message_class: type,
-        receive: Callable[[bytes, int], None],
+        receive: Callable[[bytes, int, int | None], None],
         *,
         numbered: bool = True,
         reliability: str = QOS_RELIABILITY,
         depth: int = DEPTH,
     ) -> None:
-        """Have `receive` called with CDR bytes and time of reception [ns] of each message.
+        """Have `receive` called with each message's CDR bytes, time of reception [ns], and number.
 
-        `numbered` says whether the senders' numbers are to show losses: of one sender, and of
-        others that may come and go. `reliability` is asked of them, `depth` messages wait.
+        The number is its sender's, None where the middleware tells none. `numbered` says whether
+        the numbers are to show losses: of one sender, and of others that may come and go.
+        `reliability` is asked of them, `depth` messages wait.
         """
+        handle = self._handle(topic, message_class, reliability, depth)
+        self._inlets.append(_Inlet(topic.name, handle, message_class, receive, numbered))
+
+    def subscribe_blocks(
+        self,
+        topic: Topic,
+        message_class: type,
+        receive: Callable[[list[bytes], list[int | None]], None],
+    ) -> None:
+        """Have `receive` called with the CDR bytes and numbers of all that came between looks."""
+        handle = self._handle(topic, message_class, QOS_RELIABILITY, DEPTH)
+        self._inlets.append(_BlockInlet(topic.name, handle, message_class, receive))
+
+    def _handle(
+        self, topic: Topic, message_class: type, reliability: str, depth: int
+    ) -> rclpy_implementation.Subscription:
         node = self._node
         check_for_type_support(message_class)
         with node.handle:
-            handle = rclpy_implementation.Subscription(
+            return rclpy_implementation.Subscription(
                 node.handle,
                 message_class,
                 node.resolve_topic_name(topic.name),
                 contract_qos(depth, reliability=reliability).get_c_qos_profile(),
             )
-        self._inlets.append(_Inlet(topic.name, handle, message_class, receive, numbered))
 
     def take(self) -> None:
         """Hand on everything that has come."""
@@ -89,7 +106,7 @@ class _Inlet:
         topic: str,
         handle: rclpy_implementation.Subscription,
         message_class: type,
-        receive: Callable[[bytes, int], None],
+        receive: Callable[[bytes, int, int | None], None],
         numbered: bool,
     ) -> None:
         self.topic, self.handle = topic, handle
@@ -105,16 +122,58 @@ class _Inlet:
         taken = self.handle.take_message(self._class, True)
         if taken is None:
             return False
-        payload, info = taken
-        if self._numbers is not None:
-            self._numbers.add(info["publication_sequence_number"])
-        self._receive(payload, info["received_timestamp"])
+        self._hand_on(*taken)
         return True
 
     def take(self) -> None:
-        take, message_class, receive = self.handle.take_message, self._class, self._receive
+        take, message_class = self.handle.take_message, self._class
         while (taken := take(message_class, True)) is not None:
+            self._hand_on(*taken)
+
+    def _hand_on(self, payload: bytes, info: dict[str, Any]) -> None:
+        number = info["publication_sequence_number"]
+        if self._numbers is not None and number is not None:
+            self._numbers.add(number)
+        self._receive(payload, info["received_timestamp"], number)
+
+
+class _BlockInlet:
+    """One subscription whose messages are handed on together."""
+
+    def __init__(
+        self,
+        topic: str,
+        handle: rclpy_implementation.Subscription,
+        message_class: type,
+        receive: Callable[[list[bytes], list[int | None]], None],
+    ) -> None:
+        self.topic, self.handle = topic, handle
+        self._class, self._receive = message_class, receive
+        self._numbers = SequenceNumbers()
+
+    @property
+    def lost(self) -> int:
+        """Messages missing by their numbers."""
+        return self._numbers.lost
+
+    def take_one(self) -> bool:
+        return self._take(1)
+
+    def take(self) -> None:
+        # A flood does not keep its reader from all else.
+        self._take(DEPTH)
+
+    def _take(self, most: int) -> bool:
+        take, message_class = self.handle.take_message, self._class
+        payloads: list[bytes] = []
+        numbers: list[int | None] = []
+        while len(payloads) < most and (taken := take(message_class, True)) is not None:
             payload, info = taken
-            if self._numbers is not None:
-                self._numbers.add(info["publication_sequence_number"])
-            receive(payload, info["received_timestamp"])
+            payloads.append(payload)
+            numbers.append(info["publication_sequence_number"])
+        for number in numbers:
+            if number is not None:
+                self._numbers.add(number)
+        if payloads:
+            self._receive(payloads, numbers)
+        return bool(payloads)

@@ -18,7 +18,7 @@ from rclpy.signals import SignalHandlerOptions
 from rclpy.task import Future
 from typing_extensions import Self
 
-from cspm_msgs_py.errors import InputError
+from cspm_msgs_py.errors import CspmError, InputError
 from cspm_msgs_py.interruption import interruptible
 from cspm_msgs_py.ros.contract_node import ContractNode
 
@@ -87,11 +87,14 @@ class Session:
 
         `done` is looked at some 50 times a second, and before anything else. A signal sets
         `stopped` and ends nothing.
+
+        Raises:
+            CspmError: a node failed.
         """
         over = Future()
 
         def look() -> None:
-            if done() or not self.context.ok():
+            if done() or self._failure() is not None or not self.context.ok():
                 over.set_result(None)
 
         timer = self._nodes[0].every(_LOOK_EVERY_S, look)
@@ -106,7 +109,12 @@ class Session:
         finally:
             timer.cancel()
             self._nodes[0].node.destroy_timer(timer)
+        if (failure := self._failure()) is not None:
+            raise CspmError(failure)
         return done()
+
+    def _failure(self) -> str | None:
+        return next((node.failure for node in self._nodes if node.failure is not None), None)
 
     def _poll_until(self, done: Callable[[], bool], timeout_s: float | None) -> None:
         """Hand on messages node by node; services, timers and the handshake have their turn."""

@@ -5,6 +5,9 @@ from __future__ import annotations
 from collections.abc import Mapping
 from functools import partial
 
+import numpy as np
+from numpy.typing import NDArray
+
 from cspm_msgs_py.graph import Edges
 from cspm_msgs_py.lockstep import Acknowledgement, Follower
 from cspm_msgs_py.ros.contract_node import ContractNode
@@ -14,6 +17,8 @@ from cspm_msgs_py.ros.rendezvous import FollowerSide
 from cspm_msgs_py.schedule import Schedule
 from cspm_msgs_py.stage import Guard, Stage
 from cspm_msgs_py.topics import DIAGNOSTICS, Topic
+
+Array = NDArray[np.float64]
 
 
 class StageNode:
@@ -55,8 +60,7 @@ class StageNode:
         receive = self._receive_and_tell if tells_progress else self._follower.receive
         for name in (*plan.inputs, *plan.held):
             refuse = partial(self._refuse, name)
-            node.subscribe_rows(topics[name], partial(receive, name), refuse, DEPTH)
-        self._guard = guard
+            node.subscribe_numbered_rows(topics[name], partial(receive, name), refuse, DEPTH)
         if guard is not None:
             GuardPorts(node, guard, self._now_ns)
         self.refused = (0, "")
@@ -76,8 +80,8 @@ class StageNode:
         """Return what the node waits for."""
         return self._follower.waiting()
 
-    def _receive_and_tell(self, topic: str, stamp_ns: int, row: object) -> None:
-        self._follower.receive(topic, stamp_ns, row)  # type: ignore[arg-type]
+    def _receive_and_tell(self, topic: str, stamp_ns: int, row: Array, number: int | None) -> None:
+        self._follower.receive(topic, stamp_ns, row, number)
         self._tell()
 
     def _tell(self) -> None:
@@ -97,6 +101,5 @@ class StageNode:
 
     def _refuse(self, topic: str, reason: str) -> None:
         self.refused = (self.refused[0] + 1, reason)
+        # What is refused changes nothing, the safe state included: that is for real time.
         self._node.complain(topic, reason)
-        if self._guard is not None:
-            self._guard.trip(self._now_ns(), reason)

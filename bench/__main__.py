@@ -15,6 +15,7 @@ from bench.graph import measure_graph
 from bench.machine import describe_machine, is_busy
 from bench.memory import measure_memory
 from bench.plant import measure_against_mujoco, measure_plant
+from bench.reaction import print_reactions
 from bench.report import print_report
 from bench.start_up import measure_start_up
 from bench.volume import QUICK, USUAL, Volume, full
@@ -32,8 +33,12 @@ def main() -> None:
         action="store_true",
         help="record the whole hour: 6 GB on disk; 10 minutes in real time",
     )
+    size.add_argument("--reactions", type=int, metavar="N", help="kill and stop nodes N times each")
     parser.add_argument("--json", type=Path, metavar="FILE", help="also write the figures as JSON")
     arguments = parser.parse_args()
+    if arguments.reactions:
+        print_reactions(Console(), arguments.reactions)
+        return
     volume = QUICK if arguments.quick else full(USUAL) if arguments.full else USUAL
     console = Console()
     machine = describe_machine()

@@ -23,13 +23,21 @@ from cspm_control.torque_profile import TorqueGenerator
 from cspm_control.wave_trajectory import WaveTrajectory
 from cspm_control.waves.build import build_motion
 from cspm_msgs_py.errors import InputError
-from cspm_msgs_py.scenario import ClosedLoop, LockedWinches, Scenario, TorqueProfile
+from cspm_msgs_py.scenario import (
+    AngleProfile,
+    ClosedLoop,
+    Control,
+    LockedWinches,
+    Scenario,
+    TorqueProfile,
+)
 from cspm_msgs_py.schedule import RATE_OF_SENSOR, WAVE_TRAJECTORY, Schedule, schedule_of
 from cspm_msgs_py.stage import Stage
 from cspm_msgs_py.testbed import Testbed
 from cspm_sim.any_plant import AnyPlant
 from cspm_sim.motion import Motion
-from cspm_sim.parameters import plant_parameters
+from cspm_sim.parameters import nominal_parameters
+from cspm_sim.sensor_fault import sensor_faults
 from cspm_sim.sensors import SensorModel
 
 Array = NDArray[np.float64]
@@ -73,8 +81,10 @@ def resolve(scenario: Scenario, testbed: Testbed) -> Scenario:
     if not isinstance(control, ClosedLoop):
         return scenario
     if testbed.bar is None:
-        raise InputError("control.mode: closed_loop without a bar, allowed: torque, locked_winches")
-    parameters = plant_parameters(testbed)
+        raise InputError(
+            "control.mode: closed_loop without a bar, allowed: torque, angle, locked_winches"
+        )
+    parameters = nominal_parameters(testbed)
     motion, force = control.motion, control.force
     pose = motion.design_pose
     designed = motion.gains is None and force.gains is None
@@ -158,15 +168,18 @@ def _plant(
         motions["/winch_frame/reference"],
         1_000_000_000 // scenario.rates.plant,
         bar_pose=bar,
-        tensions=_balanced_tensions(testbed, control)
-        if isinstance(control, TorqueProfile)
-        else None,
+        tensions=_start_tensions(testbed, control),
         locked=isinstance(control, LockedWinches),
     )
 
 
-def _balanced_tensions(testbed: Testbed, control: TorqueProfile) -> Array:
-    """Return the tensions that the first torques hold, so that a rig does not start with a jerk."""
+def _start_tensions(testbed: Testbed, control: Control) -> Array | None:
+    """Return what the cables carry at the start, so that a rig does not start with a jerk."""
+    if isinstance(control, AngleProfile):
+        paths = [control.angle.get(name) for name in testbed.cable_names]
+        return np.array([path.tension if path else 0.0 for path in paths])
+    if not isinstance(control, TorqueProfile):
+        return None
     first = TorqueGenerator(control.torque, testbed.cable_names).step(0)
     radii = np.array([cable.drum_radius / cable.gear_ratio for cable in testbed.cables])
     has_cable = np.array([cable.has_cable for cable in testbed.cables])
@@ -205,6 +218,7 @@ def _sensors(scenario: Scenario, testbed: Testbed) -> dict[str, SensorModel]:
             period_ns=1_000_000_000 // scenario.rates.plant,
             seed=scenario.seed,
             ideal=scenario.sensors == "ideal",
+            faults=sensor_faults(testbed, name),
         )
         for name, sensor in testbed.sensors.items()
     }

@@ -18,7 +18,10 @@ RUN_FAILED = 1
 class _Listed(typer.core.TyperGroup):
     """Lists the commands in the order in which a newcomer needs them."""
 
-    order = ("run", "info", "recover", "resim", "import", "replay", "check-drivers", "node")
+    order = (
+        *("run", "info", "recover", "resim", "import", "identify"),
+        *("replay", "check-drivers", "node"),
+    )
 
     def list_commands(self, ctx: typer.Context) -> list[str]:  # type: ignore[override]
         """Return the names, those without a place at the end."""

@@ -6,12 +6,14 @@ separates the two.
 
 from __future__ import annotations
 
-from typing import Any, Literal, NamedTuple
+from typing import Annotated, Any, Literal, NamedTuple
 
 from pydantic import Field, model_validator
 from typing_extensions import Self
 
 from cspm_msgs_py.yaml_file import StrictModel, validate
+
+Sha256 = Annotated[str, Field(pattern=r"^[0-9a-f]{64}$")]
 
 
 class Provenance(StrictModel):
@@ -19,12 +21,17 @@ class Provenance(StrictModel):
 
     `thesis`: published in the thesis; `reconstructed`: chosen so that the published results hold,
     or assumed where nothing fixes it; `fitted`: identified from the recording with SHA-256
-    `recording`; `measured`, `datasheet`: as the words say.
+    `recording` and those in `further_recordings`; `measured`, `datasheet`: as the words say.
+    `window` is the time [s] of the recording that was used, `interval` holds the value with 95 %
+    probability; an end that nothing bounds is None.
     """
 
     provenance: Literal["thesis", "reconstructed", "fitted", "measured", "datasheet"]
-    recording: str | None = Field(None, pattern=r"^[0-9a-f]{64}$")
+    recording: Sha256 | None = None
     note: str = ""
+    further_recordings: tuple[Sha256, ...] = ()
+    window: tuple[float, float] | None = None
+    interval: tuple[float | None, float | None] | None = None
 
     @model_validator(mode="after")
     def _fitted_from(self) -> Self:

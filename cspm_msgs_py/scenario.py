@@ -3,10 +3,18 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from itertools import pairwise
 from pathlib import Path
 from typing import Annotated, Any, Literal
 
-from pydantic import Field, NonNegativeInt, PositiveFloat, PositiveInt, model_validator
+from pydantic import (
+    Field,
+    NonNegativeFloat,
+    NonNegativeInt,
+    PositiveFloat,
+    PositiveInt,
+    model_validator,
+)
 from typing_extensions import Self
 
 from cspm_msgs_py.dofs import ControlledDof
@@ -139,7 +147,46 @@ class TorqueProfile(StrictModel):
     torque: dict[str, Signal] = {}
 
 
-Control = Annotated[ClosedLoop | LockedWinches | TorqueProfile, Field(discriminator="mode")]
+class AnglePath(StrictModel):
+    """Motor angle over time, counted from where the motor stands at the start, positive winds in.
+
+    `points` are pairs of time [s] and angle [rad], joined by straight lines and gone through
+    `cycles` times; then the last angle stays. `tension` is what the cable carries at the start [N],
+    where there is no bar.
+    """
+
+    points: Annotated[tuple[tuple[NonNegativeFloat, float], ...], Field(min_length=1)]
+    cycles: PositiveInt = 1
+    tension: NonNegativeFloat = 0.0
+
+    @model_validator(mode="after")
+    def _in_order(self) -> Self:
+        times = [time for time, _ in self.points]
+        if times[0] != 0.0 or any(later <= earlier for earlier, later in pairwise(times)):
+            raise ValueError(f"points: times {times}, allowed: from 0, each later than the last")
+        first, last = self.points[0][1], self.points[-1][1]
+        if self.cycles > 1 and (len(times) < 2 or first != last):
+            raise ValueError(
+                f"cycles: {self.cycles} of points from {first:g} to {last:g} rad, allowed: 1, or"
+                " points that end where they began"
+            )
+        return self
+
+
+class AngleProfile(StrictModel):
+    """Prescribed motor angle per cable, kept by a position servo; one not named stays where it is.
+
+    `bandwidth` [rad/s] is that of the servo on the rotor alone.
+    """
+
+    mode: Literal["angle"] = "angle"
+    bandwidth: PositiveFloat = 60.0
+    angle: dict[str, AnglePath] = {}
+
+
+Control = Annotated[
+    ClosedLoop | LockedWinches | TorqueProfile | AngleProfile, Field(discriminator="mode")
+]
 
 
 class Requirement(StrictModel):

@@ -13,7 +13,7 @@ from dataclasses import dataclass
 from typing import NamedTuple
 
 from cspm_msgs_py.errors import InputError
-from cspm_msgs_py.scenario import ClosedLoop, Scenario, TorqueProfile
+from cspm_msgs_py.scenario import AngleProfile, ClosedLoop, Scenario, TorqueProfile
 from cspm_msgs_py.testbed import Testbed
 
 DIAGNOSTICS_RATE = 10
@@ -123,7 +123,8 @@ def schedule_of(scenario: Scenario, testbed: Testbed) -> Schedule:
     """Return the schedule of a scenario on a test-bed.
 
     Raises:
-        InputError: a closed loop is wanted of a machine without bar or without the sensors for it.
+        InputError: a closed loop is wanted of a machine without bar or without the sensors for it,
+            or angles of one that does not measure them.
     """
     if isinstance(scenario.control, ClosedLoop):
         _check_closed_loop(testbed)
@@ -140,7 +141,7 @@ def schedule_of(scenario: Scenario, testbed: Testbed) -> Schedule:
     def add(node: str, rate: int, inputs: tuple[str, ...], outputs: tuple[str, ...]) -> None:
         divider = rates.plant // rate
         first = -(-max(timings[name].first for name in inputs) // divider) * divider
-        held = tuple(name for name in HELD.get(node, ()) if name in timings)
+        held = tuple(n for n in HELD.get(node, ()) if n in timings and n not in inputs)
         paced = [timings[name] for name in (*inputs, *held) if timings[name].first <= first]
         if divider < min(each.divider for each in paced):
             # Else it would compute from one message all that is due until the next one.
@@ -159,19 +160,30 @@ def schedule_of(scenario: Scenario, testbed: Testbed) -> Schedule:
         add(FORCE_CONTROLLER, rates.force_controller, *force)
     elif isinstance(scenario.control, TorqueProfile):
         add(FORCE_CONTROLLER, rates.plant, (CLOCK,), (TORQUE_COMMAND,))
+    elif isinstance(scenario.control, AngleProfile):
+        add(FORCE_CONTROLLER, rates.force_controller, _servo_inputs(testbed), (TORQUE_COMMAND,))
     ordered = {name: timings[name] for name in names if name in timings}
     return Schedule(period_ns, ordered, nodes, status_divider(rates.plant, 1))
 
 
 def _check_closed_loop(testbed: Testbed) -> None:
     if testbed.bar is None:
-        raise InputError("control.mode: closed_loop without a bar, allowed: torque, locked_winches")
+        raise InputError(
+            "control.mode: closed_loop without a bar, allowed: torque, angle, locked_winches"
+        )
     needed = [BAR_POSE, TENSION] + [FRAME_POSE] * bool(testbed.winch_frame)
     missing = [name for name in needed if name not in testbed.sensors]
     if missing:
         raise InputError(
             f"sensors: {', '.join(missing)} missing, allowed in closed loop: {', '.join(needed)}"
         )
+
+
+def _servo_inputs(testbed: Testbed) -> tuple[str, ...]:
+    if WINCH_STATE not in testbed.sensors:
+        raise InputError(f"sensors: {WINCH_STATE} missing, allowed in mode angle: {WINCH_STATE}")
+    # The servo itself needs no tension; its guard trips where one is too high.
+    return (WINCH_STATE,) + (TENSION,) * (TENSION in testbed.sensors)
 
 
 def status_divider(plant_rate: int, divider: int) -> int:

@@ -42,6 +42,7 @@ RUNS = {
     "calm": (bundle_of("calm"), 600),
     "worst case": (bundle_of("worst_case"), 600),
     "torques, no bar": (bundle_of("one_winch"), 250),
+    "angles, no bar": (bundle_of("rig_stiffness_sway"), 250),
     "late sensors": (late(bundle_of("rest"), **LATE), 200),
     "odd rates": (bundle_of("rest", *[f"rates.{rate}" for rate in ODD]), 200),
 }

@@ -64,11 +64,11 @@ FAULTS = [
     ({"bar_offset": [0] * 7}, "bar_offset: [0, 0, 0, 0, 0, 0, 0], allowed: a list of at most 6"),
     (
         {"control": {"mode": "foo"}},
-        "control.mode: 'foo', allowed: 'closed_loop', 'locked_winches' or 'torque'",
+        "control.mode: 'foo', allowed: 'closed_loop', 'locked_winches', 'torque' or 'angle'",
     ),
     (
         {"control": {}},
-        "control.mode: missing, allowed: 'closed_loop', 'locked_winches' or 'torque'",
+        "control.mode: missing, allowed: 'closed_loop', 'locked_winches', 'torque' or 'angle'",
     ),
     ({"control": {"mode": "locked_winches", "x": 1}}, "control.x: unknown key, allowed: mode"),
     (

@@ -5,9 +5,12 @@ from __future__ import annotations
 from collections.abc import Callable
 
 import numpy as np
+from numpy.typing import NDArray
 
+from cspm_control.angle_servo import AngleGenerator, AngleServo
 from cspm_control.force_controller import ForceController
 from cspm_control.motion_controller import MotionController
+from cspm_control.stages.angle_stage import AngleStage
 from cspm_control.stages.distribution_stage import DistributionStage
 from cspm_control.stages.force_stage import ForceLimits, ForceStage
 from cspm_control.stages.motion_stage import MotionStage
@@ -15,12 +18,12 @@ from cspm_control.stages.torque_stage import TorqueStage
 from cspm_control.tension_distribution import PseudoInverse
 from cspm_control.torque_profile import TorqueGenerator
 from cspm_msgs_py.errors import InputError
-from cspm_msgs_py.scenario import ClosedLoop, Scenario, TorqueProfile
+from cspm_msgs_py.scenario import AngleProfile, ClosedLoop, Scenario, TorqueProfile
 from cspm_msgs_py.schedule import FORCE_CONTROLLER, MOTION_CONTROLLER, TENSION_DISTRIBUTION
 from cspm_msgs_py.stage import Stage
 from cspm_msgs_py.testbed import Testbed
 from cspm_sim.kernels.cable import RADIUS
-from cspm_sim.parameters import plant_parameters
+from cspm_sim.parameters import nominal_parameters
 from cspm_sim.safe_state import make_safe_state
 
 # A measured tension beyond this many times a cable's upper limit trips, unless the scenario says.
@@ -36,6 +39,8 @@ def make_controller(node: str, scenario: Scenario, testbed: Testbed) -> Stage:
     control = scenario.control
     if isinstance(control, TorqueProfile) and node == FORCE_CONTROLLER:
         return torque_stage(control, scenario, testbed)
+    if isinstance(control, AngleProfile) and node == FORCE_CONTROLLER:
+        return angle_stage(control, scenario, testbed)
     makers: dict[str, Callable[[ClosedLoop, Scenario, Testbed], Stage]] = {
         MOTION_CONTROLLER: motion_stage,
         TENSION_DISTRIBUTION: distribution_stage,
@@ -50,7 +55,9 @@ def motion_stage(control: ClosedLoop, scenario: Scenario, testbed: Testbed) -> M
     """Return the motion controller; the test-bed has a bar, see `schedule_of`."""
     motion = control.motion
     if testbed.bar is None:
-        raise InputError("control.mode: closed_loop without a bar, allowed: torque, locked_winches")
+        raise InputError(
+            "control.mode: closed_loop without a bar, allowed: torque, angle, locked_winches"
+        )
     return MotionStage(
         MotionController(
             motion.gains or {},
@@ -68,7 +75,7 @@ def distribution_stage(
 ) -> DistributionStage:
     """Return the tension distribution."""
     limits = np.array([cable.tension_limits for cable in testbed.cables], dtype=float)
-    return DistributionStage(PseudoInverse(plant_parameters(testbed).cables, limits))
+    return DistributionStage(PseudoInverse(nominal_parameters(testbed).cables, limits))
 
 
 def force_stage(control: ClosedLoop, scenario: Scenario, testbed: Testbed) -> ForceStage:
@@ -76,15 +83,14 @@ def force_stage(control: ClosedLoop, scenario: Scenario, testbed: Testbed) -> Fo
     gains, rate = control.force.gains or {}, scenario.rates.force_controller
     tensions = np.array([cable.tension_limits for cable in testbed.cables], dtype=float)
     safety = scenario.safety
-    trip = safety.tension_trip
     limits = ForceLimits(
         tensions,
-        TRIP_FACTOR * tensions[:, 1] if trip is None else np.full(len(tensions), trip),
+        tension_trips(scenario, testbed),
         None if safety.torque_slew is None else safety.torque_slew / rate,
     )
     controller = ForceController(
         [gains[cable.name] for cable in testbed.cables],
-        plant_parameters(testbed).cables[:, RADIUS].copy(),
+        nominal_parameters(testbed).cables[:, RADIUS].copy(),
         np.array([cable.torque_limit for cable in testbed.cables]),
         period=1.0 / rate,
     )
@@ -101,3 +107,34 @@ def torque_stage(control: TorqueProfile, scenario: Scenario, testbed: Testbed) -
         scenario.safety,
         1_000_000_000 // scenario.rates.plant,
     )
+
+
+def angle_stage(control: AngleProfile, scenario: Scenario, testbed: Testbed) -> AngleStage:
+    """Return the position servos.
+
+    Raises:
+        InputError: a path names no cable, or the bandwidth is beyond what the rate allows.
+    """
+    cables, rate = testbed.cables, scenario.rates.force_controller
+    return AngleStage(
+        AngleGenerator(control.angle, testbed.cable_names),
+        AngleServo(
+            np.array([cable.rotor_inertia for cable in cables]),
+            np.array([cable.torque_limit for cable in cables]),
+            control.bandwidth,
+            period=1.0 / rate,
+        ),
+        np.array([cable.drum_radius / cable.gear_ratio for cable in cables]),
+        tension_trips(scenario, testbed),
+        testbed.cable_names,
+        make_safe_state(scenario, testbed),
+        scenario.safety,
+        1_000_000_000 // rate,
+    )
+
+
+def tension_trips(scenario: Scenario, testbed: Testbed) -> NDArray[np.float64]:
+    """Return the highest tension that each load cell may show while all is well, (n,) [N]."""
+    trip = scenario.safety.tension_trip
+    limits = [cable.tension_limits or (0.0, np.inf) for cable in testbed.cables]
+    return np.array([TRIP_FACTOR * most if trip is None else trip for _, most in limits])

@@ -1,0 +1,178 @@
+"""Commands that identify parameters from recordings: identify stiffness, identify damping."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated
+
+import typer
+
+from cspm_bringup.cli_app import Json, app
+from cspm_msgs_py.errors import InputError
+
+if TYPE_CHECKING:
+    from cspm_bringup.identify_rig import RigRequest
+
+identify = typer.Typer(
+    no_args_is_help=True,
+    help="Fit parameters to recordings, with 95 % intervals, and write them into a test-bed file.",
+)
+app.add_typer(identify, name="identify")
+
+Recordings = Annotated[
+    list[Path],
+    typer.Argument(
+        metavar="BAG…",
+        help="Recordings of machines without bar, each winch pulling a cable that is fixed to a"
+        " load cell: all lengths in one recording, or a recording for each.",
+    ),
+]
+MachineFile = Annotated[
+    Path | None,
+    typer.Option(
+        "--testbed",
+        metavar="FILE",
+        help="The machine that was recorded, instead of what the recordings carry.",
+    ),
+]
+Cables = Annotated[
+    str | None,
+    typer.Option(
+        metavar="NAME,NAME",
+        help="Which cables to use: those of one kind. Otherwise all.",
+    ),
+]
+Verify = Annotated[
+    list[str] | None,
+    typer.Option(
+        metavar="CABLE",
+        help="A cable that judges the law without being fitted; may be repeated. Where several"
+        " recordings have a cable of that name: RECORDING:CABLE.",
+    ),
+]
+StiffnessFile = Annotated[
+    Path | None,
+    typer.Option(
+        "--stiffness",
+        metavar="FILE",
+        help="A test-bed file whose stiffness laws to use, instead of those of the machine"
+        " recorded; the damping is put into it unless --into says otherwise.",
+    ),
+]
+Into = Annotated[
+    Path | None,
+    typer.Option(
+        metavar="FILE",
+        help="The test-bed file that the law is put into; otherwise the machine recorded.",
+    ),
+]
+IntoCables = Annotated[
+    str | None,
+    typer.Option(
+        metavar="NAME,NAME",
+        help="The cables there that get the law; otherwise those identified.",
+    ),
+]
+Cutoff = Annotated[
+    float | None,
+    typer.Option(metavar="HZ", help="Cut-off of the filter without phase."),
+]
+Out = Annotated[
+    Path | None,
+    typer.Option(metavar="FOLDER", help="A new folder for pictures and the fitted test-bed file."),
+]
+
+
+def _request(
+    recordings: list[Path],
+    testbed: Path | None,
+    cables: str | None,
+    verify: list[str] | None,
+    into: Path | None,
+    into_cables: str | None,
+    cutoff: float | None,
+    out: Path | None,
+    stiffness: Path | None = None,
+) -> RigRequest:
+    from cspm_bringup.identify_rig import RigRequest
+
+    if cutoff is not None and not cutoff > 0.0:
+        raise InputError(f"--cutoff {cutoff:g}: allowed: a frequency above 0 Hz")
+    return RigRequest(
+        recordings=tuple(recordings),
+        testbed=testbed,
+        cables=_names("--cables", cables),
+        verify=tuple(verify or ()),
+        stiffness=stiffness,
+        into=into,
+        into_cables=_names("--into-cables", into_cables),
+        cutoff=cutoff,
+        out=out,
+    )
+
+
+def _names(option: str, text: str | None) -> tuple[str, ...]:
+    names = tuple(name.strip() for name in text.split(",")) if text is not None else ()
+    if not all(names):
+        raise InputError(f"{option} {text}: allowed: names with commas between them")
+    return names
+
+
+@identify.command(
+    epilog="""Example:
+
+cspm run rig_stiffness_hoist --out ramps
+
+cspm identify stiffness ramps --verify hoist_180 --out hoist_stiffness""",
+)
+def stiffness(
+    recordings: Recordings,
+    testbed: MachineFile = None,
+    cables: Cables = None,
+    verify: Verify = None,
+    into: Into = None,
+    into_cables: IntoCables = None,
+    cutoff: Cutoff = None,
+    out: Out = None,
+    json: Json = None,
+) -> None:
+    """Identify the stiffness law of one kind of cable from slow ramps at several lengths.
+
+    Stretching and releasing are kept apart, and the hysteresis between them is told.
+    """
+    from cspm_bringup.identify_stiffness_command import identify_stiffness_command
+
+    asked = _request(recordings, testbed, cables, verify, into, into_cables, cutoff, out)
+    identify_stiffness_command(asked, json)
+
+
+@identify.command(
+    epilog="""Example:
+
+cspm run rig_damping_hoist --out sines
+
+cspm identify damping sines --stiffness hoist_stiffness/fitted_testbed.yaml --verify hoist_180
+--out hoist_damping""",
+)
+def damping(
+    recordings: Recordings,
+    stiffness_file: StiffnessFile = None,
+    testbed: MachineFile = None,
+    cables: Cables = None,
+    verify: Verify = None,
+    into: Into = None,
+    into_cables: IntoCables = None,
+    cutoff: Cutoff = None,
+    out: Out = None,
+    json: Json = None,
+) -> None:
+    """Identify the damping of one kind of cable from multi-sines at several lengths.
+
+    Identify the stiffness first, and give its fitted test-bed file by --stiffness.
+    """
+    from cspm_bringup.identify_damping_command import identify_damping_command
+
+    asked = _request(
+        recordings, testbed, cables, verify, into, into_cables, cutoff, out, stiffness_file
+    )
+    identify_damping_command(asked, json)

@@ -1,0 +1,121 @@
+"""Prescribed motor angles as a stage, in the place of the force controllers, guarded."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+
+import numpy as np
+from numpy.typing import NDArray
+
+from cspm_control.angle_servo import AngleGenerator, AngleServo
+from cspm_control.safety import GuardedStage
+from cspm_msgs_py.diagnostics import Level, Status
+from cspm_msgs_py.safety_spec import Safety
+from cspm_msgs_py.schedule import TENSION, WINCH_STATE
+from cspm_msgs_py.stage import Send
+from cspm_sim.safe_state import SafeState
+
+Array = NDArray[np.float64]
+
+
+class AngleStage(GuardedStage):
+    """Sends the torques that keep the motors on their paths.
+
+    Angles count from those measured first, since an encoder's zero is anywhere.
+    """
+
+    def __init__(
+        self,
+        generator: AngleGenerator,
+        servo: AngleServo,
+        radii: Array,
+        trip: Array,
+        names: tuple[str, ...],
+        safe_state: SafeState,
+        safety: Safety,
+        period_ns: int,
+    ) -> None:
+        """Make the stage.
+
+        Args:
+            generator: the angles wanted.
+            servo: what keeps them.
+            radii: cable wound per radian of the motor, (n,) [m].
+            trip: highest tension that is measured while all is well, (n,) [N].
+            names: the cables'.
+            safe_state: where to go.
+            safety: the scenario's.
+            period_ns: of the stage [ns].
+        """
+        super().__init__(safe_state, safety, period_ns, len(names))
+        self._generator, self._servo = generator, servo
+        self._radii, self._trip, self._names = radii, trip, names
+        self._first: Array | None = None
+        self._tensions: Array | None = None
+        self._start_ns = 0
+        self._steps = self._limited = 0
+
+    def start(self, start_ns: int) -> None:
+        """Let the paths begin at an instant [ns]; untold they begin at 0."""
+        self._start_ns = start_ns
+
+    def step(self, now_ns: int, inputs: Mapping[str, Array], send: Send) -> None:
+        """Send the torques for the latest winch state."""
+        winches, tensions = inputs[WINCH_STATE], inputs.get(TENSION)
+        self._begin_step(now_ns, winches)
+        fault = self._fault(winches, tensions)
+        if fault:
+            self._latch.trip(now_ns, fault)
+        if self._latch.open:
+            self._send_safe(now_ns, send)
+            return
+        self._tensions = None if tensions is None else tensions.copy()
+        angles, speeds, _ = np.split(winches, 3)
+        wanted, rates = self._generator.step(now_ns - self._start_ns)
+        if self._first is None:
+            self._first = angles - wanted
+            self._servo.restart(self._holding())
+        torque = self._servo.step(wanted + self._first, rates, angles, speeds)
+        self._steps += 1
+        self._limited += self._servo.saturated > 0
+        self._send(now_ns, torque, send)
+
+    def status(self) -> Status:
+        """Return how the servos fared since last asked."""
+        values = {"saturated_share": f"{self._limited / max(1, self._steps):.3f}"}
+        limited = self._limited > 0
+        self._steps = self._limited = 0
+        level, text = (Level.WARN, "torque at its limit") if limited else (Level.OK, "ok")
+        return self._latch.status(self._safe_state.name, Status(level, self.node, text, values))
+
+    def _restart(self) -> None:
+        # From where the motors are now, so that a reset brings no jump.
+        self._first = None
+
+    def _present_tensions(self) -> Array | None:
+        return self._tensions
+
+    def _holding(self) -> Array:
+        tensions = self._tensions
+        return np.zeros(len(self._radii)) if tensions is None else self._radii * tensions
+
+    def _fault(self, winches: Array, tensions: Array | None) -> str | None:
+        if winches.shape != (self._width,):
+            return f"{WINCH_STATE}: a row of shape {winches.shape}, allowed: {(self._width,)}"
+        n = len(self._names)
+        if not np.isfinite(winches).all():
+            i = int(np.argmin(np.isfinite(winches)))
+            return f"{WINCH_STATE}: {winches[i]} of {self._names[i % n]}, allowed: finite numbers"
+        if tensions is None:
+            return None
+        if tensions.shape != (n,):
+            return f"{TENSION}: a row of shape {tensions.shape}, allowed: {(n,)}"
+        # Written so that NaN fails as well; minus infinity is below no trip.
+        good = (tensions > -np.inf) & (tensions <= self._trip)
+        if good.all():
+            return None
+        i = int(np.argmin(good))
+        if np.isfinite(tensions[i]):
+            most = f"at most {self._trip[i]:g} N"
+            return f"{TENSION}: {tensions[i]:.1f} N in {self._names[i]}, allowed: {most}"
+        return f"{TENSION}: {tensions[i]} N in {self._names[i]}, allowed: finite numbers"

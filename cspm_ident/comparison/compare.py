@@ -1,0 +1,234 @@
+"""Simulate a recording from its own measured inputs and hold both together."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, replace
+from typing import Any, NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from cspm_ident.block_simulation import BlockSimulation, Drive, Simulated, Window
+from cspm_ident.comparison.channel import Channel
+from cspm_ident.comparison.floor import NoiseSource, noise_of, propagated
+from cspm_ident.comparison.metrics import error_bins
+from cspm_ident.signals.delays import Delay, find_delays
+from cspm_ident.signals.measurement import BAR, TENSION, WINCHES, Measurement
+from cspm_ident.signals.samples import Samples
+from cspm_ident.signals.timeline import Timeline
+from cspm_msgs_py.dofs import DOFS
+from cspm_msgs_py.errors import InputError
+from cspm_msgs_py.testbed import Testbed
+
+Array = NDArray[np.float64]
+Progress = Callable[[str], None]
+
+HORIZONS = {Drive.WINCH: None, Drive.CABLE: None, Drive.TORQUE: 0.5, Drive.TENSION: 0.5}
+
+
+@dataclass(frozen=True, eq=False)
+class Comparison:
+    """A recording beside its simulation.
+
+    Attributes:
+        measurement: what was recorded.
+        drive: what drove the whole.
+        horizon: longest window of it [s], None for as long as nothing is missing.
+        channels: the whole's, then those of the blocks, each driven by measured signals alone.
+        delays: of the sensors, as found.
+        applied: delays that were taken out, by topic [s].
+        noise: where each sensor's noise comes from, by topic.
+        windows: how many there were, and how many of them diverged.
+        bands: what was kept of the smoothed inputs [Hz], by topic.
+    """
+
+    measurement: Measurement
+    drive: Drive
+    horizon: float | None
+    channels: list[Channel]
+    delays: list[Delay]
+    applied: dict[str, float]
+    noise: dict[str, NoiseSource]
+    windows: tuple[int, int]
+    bands: dict[str, float]
+
+    def data(self) -> dict[str, Any]:
+        """Return the figures as plain data for JSON."""
+        return {
+            "recording": str(self.measurement.path),
+            "sha256": self.measurement.sha256,
+            "drive": self.drive.value,
+            "horizon_s": self.horizon,
+            "windows": self.windows[0],
+            "diverged": self.windows[1],
+            "delays": [delay.data() for delay in self.delays],
+            "applied_delays_s": self.applied,
+            "noise_from": {name: source.value for name, source in self.noise.items()},
+            "bands_hz": {k: v if np.isfinite(v) else None for k, v in self.bands.items()},
+            "channels": [channel.data() for channel in self.channels],
+        }
+
+
+class _Run(NamedTuple):
+    """One drive's outcome: what came out, and the scatter that noisy inputs give it."""
+
+    simulated: Simulated
+    scatter: Simulated
+    windows: list[Window]
+
+
+def compare(
+    measurement: Measurement,
+    drive: Drive = Drive.WINCH,
+    *,
+    horizon: float | None = None,
+    delays: Mapping[str, float] | None = None,
+    repeat: Measurement | None = None,
+    progress: Progress = lambda _: None,
+) -> Comparison:
+    """Simulate a recording and compare, the whole and block by block.
+
+    Args:
+        measurement: what was recorded, with the machine to simulate.
+        drive: which measured signals drive the whole.
+        horizon: longest window [s]; absent: 0.5 s where the drive is integrated twice or more,
+            otherwise as long as nothing is missing.
+        delays: of sensors, by topic [s]; absent: those found, where they matter.
+        repeat: the same experiment once more, from which the noise is taken.
+        progress: called with what is being done.
+
+    Raises:
+        InputError: a sensor that the drive needs is missing.
+    """
+    machine = measurement.machine
+    timeline = Timeline(measurement)
+    BlockSimulation(timeline, machine).check(drive)
+    progress("delays of the sensors")
+    found = find_delays(timeline, machine) if delays is None else []
+    applied = {d.topic: d.seconds for d in found if d.matters} if delays is None else dict(delays)
+    timeline = timeline.delayed(applied)
+    progress("noise of the sensors")
+    noise, sources = noise_of(measurement, repeat)
+    horizon = HORIZONS[drive] if horizon is None else horizon
+    channels: list[Channel] = []
+    windows = (0, 0)
+    for block, each in _blocks(timeline, machine, drive):
+        progress(f"{block}, driven by {each.value}")
+        run = _run(timeline, machine, each, horizon if block == "whole" else HORIZONS[each], noise)
+        channels += _channels(timeline, run, block, noise)
+        if block == "whole":
+            windows = (len(run.windows), len(run.simulated.failed))
+    if not channels:
+        raise InputError(
+            f"{measurement.path}: --drive {drive.value} gives nothing that was measured, allowed:"
+            " a recording with the drive's outputs"
+        )
+    return Comparison(
+        measurement, drive, horizon, channels, found, applied, sources, windows, timeline.bands
+    )
+
+
+def _blocks(timeline: Timeline, machine: Testbed, drive: Drive) -> list[tuple[str, Drive]]:
+    """Return the whole, and each block whose sensors are there."""
+    found = [("whole", drive)]
+    simulation = BlockSimulation(timeline, machine)
+    if machine.bar is None:
+        return found
+    for block, each in (("cable", Drive.CABLE), ("bar", Drive.TENSION)):
+        if each is drive:
+            continue
+        try:
+            simulation.check(each)
+        except InputError:
+            continue
+        found.append((block, each))
+    return found
+
+
+def _run(
+    timeline: Timeline,
+    machine: Testbed,
+    drive: Drive,
+    horizon: float | None,
+    noise: Mapping[str, Array],
+) -> _Run:
+    simulation = BlockSimulation(timeline, machine)
+    windows = simulation.windows(drive, horizon)
+    simulated = simulation.run(drive, windows)
+    return _Run(simulated, propagated(timeline, machine, drive, windows, noise), windows)
+
+
+def _channels(
+    timeline: Timeline, run: _Run, block: str, noise: Mapping[str, Array]
+) -> list[Channel]:
+    measurement = timeline.measurement
+    cables = measurement.machine.cable_names
+    outputs: list[tuple[str, Samples | None, Array, Array, tuple[str, ...], str]] = [
+        (BAR, measurement.bar_pose, run.simulated.bars, run.scatter.bars, DOFS, "m"),
+        (TENSION, measurement.tension, run.simulated.tensions, run.scatter.tensions, cables, "N"),
+        (WINCHES, measurement.angle, run.simulated.angles, run.scatter.angles, cables, "rad"),
+    ]
+    found = []
+    for topic, samples, simulated, scatter, names, unit in outputs:
+        if samples is None or not simulated.size:
+            continue
+        for i, name in enumerate(names):
+            shown = "rad" if topic == BAR and i >= 3 else unit
+            stem = {BAR: "bar/pose", TENSION: "cables/tension", WINCHES: "winches/angle"}[topic]
+            # The scatter's RMS is that of a difference between two draws of the noise.
+            own = float(np.nan_to_num(np.sqrt(np.nanmean(scatter[:, i] ** 2))))
+            floor = float(np.hypot(noise[topic][i], own))
+            channel = _channel(
+                timeline, f"{stem}/{name}", shown, block, topic, samples, simulated, i, floor
+            )
+            if channel is not None:
+                found.append(channel)
+    return found
+
+
+def _channel(
+    timeline: Timeline,
+    name: str,
+    unit: str,
+    block: str,
+    topic: str,
+    samples: Samples,
+    simulated: Array,
+    i: int,
+    floor: float,
+) -> Channel | None:
+    times = samples.times - timeline.delays.get(topic, 0.0)
+    inside = (times >= timeline.times[0]) & (times <= timeline.times[-1])
+    at = np.interp(times[inside], timeline.times, simulated[:, i])
+    whole = np.isfinite(at)
+    if whole.sum() < 4:
+        return None
+    channel = Channel(
+        name,
+        unit,
+        block,
+        samples.times[inside][whole],
+        samples.values[inside, i][whole],
+        at[whole],
+        floor,
+    )
+    return replace(channel, bins=_bins(timeline, channel, topic, i))
+
+
+def _bins(timeline: Timeline, channel: Channel, topic: str, i: int) -> dict[str, list[Any]]:
+    """Return the error against time and what is likely to drive it."""
+
+    def at(signal: Array | None, column: int) -> Array | None:
+        if signal is None:
+            return None
+        return np.asarray(np.interp(channel.times, timeline.times, signal[:, column]))
+
+    rates = timeline.bar_twists if topic == BAR else timeline.speeds
+    quantities: dict[str, Array | None] = {"time_s": channel.times, "value": channel.measured}
+    quantities["speed"] = at(rates, i)
+    if topic != BAR:
+        quantities["angle_rad"] = at(timeline.angles, i)
+        quantities["tension_n"] = at(timeline.smooth_tensions, i)
+    bins = {n: error_bins(channel.error, q) for n, q in quantities.items() if q is not None}
+    return {name: found for name, found in bins.items() if found}

@@ -1,0 +1,95 @@
+"""What was estimated, and how well."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from enum import Enum
+from math import isfinite
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from cspm_ident.estimation.identifiability import Direction
+
+Array = NDArray[np.float64]
+
+
+class Interval(Enum):
+    """How the intervals are made."""
+
+    LIKELIHOOD = "likelihood"
+    SANDWICH = "sandwich"
+    BOOTSTRAP = "bootstrap"
+
+
+@dataclass(frozen=True)
+class Estimate:
+    """Parameters with intervals.
+
+    Attributes:
+        names: of all parameters, frozen ones included.
+        units: of the values.
+        values: shape (parameters,).
+        sd: standard deviations; infinite where not excited, 0 where frozen.
+        ci95: lower and upper ends, shape (parameters, 2); (−∞, ∞) where the data does not excite
+            the parameter, NaN where it was frozen.
+        correlation: of the estimates, shape (parameters, parameters); NaN where sd is not finite
+            or 0.
+        frozen: names of those that kept their start value.
+        at_bound: names of those that the bounds hold; their intervals are not valid, profile them.
+        unexcited: combinations of parameters that the data does not see.
+        effective_samples: how many independent samples say as much about a constant.
+        degrees_of_freedom: of the t distribution that the intervals use.
+        method: how values and intervals were made, in words.
+    """
+
+    names: tuple[str, ...]
+    units: tuple[str, ...]
+    values: Array
+    sd: Array
+    ci95: Array
+    correlation: Array
+    frozen: tuple[str, ...]
+    at_bound: tuple[str, ...]
+    unexcited: tuple[Direction, ...]
+    effective_samples: float
+    degrees_of_freedom: float
+    method: str
+
+    def value(self, name: str) -> float:
+        """Return the value of one parameter."""
+        return float(self.values[self.names.index(name)])
+
+    def interval(self, name: str) -> tuple[float, float]:
+        """Return the interval of one parameter."""
+        lower, upper = self.ci95[self.names.index(name)]
+        return float(lower), float(upper)
+
+    def data(self) -> dict[str, Any]:
+        """Return everything as plain data for JSON; null stands for infinite and for none."""
+        return {
+            "method": self.method,
+            "effective_samples": self.effective_samples,
+            "degrees_of_freedom": self.degrees_of_freedom,
+            "parameters": [self._parameter(i) for i in range(len(self.names))],
+            "correlation": [[_finite(value) for value in row] for row in self.correlation],
+            "unexcited": [direction.data() for direction in self.unexcited],
+        }
+
+    def _parameter(self, i: int) -> dict[str, Any]:
+        name, frozen = self.names[i], self.names[i] in self.frozen
+        return {
+            "name": name,
+            "unit": self.units[i],
+            "value": float(self.values[i]),
+            "sd": None if frozen else _finite(self.sd[i]),
+            "ci95": None if frozen else [_finite(end) for end in self.ci95[i]],
+            "frozen": frozen,
+            "at_bound": name in self.at_bound,
+            "excited": bool(frozen or isfinite(self.sd[i])),
+        }
+
+
+def _finite(value: float) -> float | None:
+    return float(value) if isfinite(value) else None

@@ -1,0 +1,157 @@
+"""A recording's measured signals; never the truth that a simulation records beside them."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from pathlib import Path
+
+import numpy as np
+from numpy.typing import NDArray
+
+from cspm_ident.recording_hash import recording_sha256
+from cspm_ident.signals.samples import Samples, ordered
+from cspm_msgs_py.errors import InputError
+from cspm_msgs_py.recording.reader import Recording
+from cspm_msgs_py.recording.rows import Rows
+from cspm_msgs_py.testbed import Testbed, TestbedFile, load_testbed, parse_testbed
+from cspm_msgs_py.topics import Topic
+from cspm_sim.kernels.rotation import euler_from_quaternion
+
+Array = NDArray[np.float64]
+
+TESTBED_ATTACHMENT = "testbed.yaml"
+FRAME, BAR, WINCHES, TENSION = (
+    "/winch_frame/pose",
+    "/bar/pose",
+    "/winches/state",
+    "/cables/tension",
+)
+COMMAND = "/winches/torque_command"
+
+
+@dataclass(frozen=True, eq=False)
+class Measurement:
+    """What was measured on one machine. Absent sensors are None.
+
+    Attributes:
+        path: the recording.
+        sha256: of its MCAP files, in order.
+        testbed: the machine as it was described.
+        frame_pose, bar_pose: x y z φ θ ψ in world_ned [m, rad], angles without jumps.
+        angle, speed, torque: at the motor shafts [rad, rad/s, N·m], one column per cable.
+        tension: [N], one column per cable.
+        command: commanded torque [N·m].
+    """
+
+    path: Path
+    sha256: str
+    testbed: TestbedFile
+    frame_pose: Samples | None = None
+    bar_pose: Samples | None = None
+    angle: Samples | None = None
+    speed: Samples | None = None
+    torque: Samples | None = None
+    tension: Samples | None = None
+    command: Samples | None = None
+
+    @property
+    def machine(self) -> Testbed:
+        """The machine as it was described."""
+        return self.testbed.testbed
+
+    @property
+    def sensors(self) -> dict[str, Samples]:
+        """The sensors that there are, by topic; of `/winches/state` the angle or what there is."""
+        winches = next((s for s in (self.angle, self.speed, self.torque) if s is not None), None)
+        found = {
+            FRAME: self.frame_pose,
+            BAR: self.bar_pose,
+            WINCHES: winches,
+            TENSION: self.tension,
+        }
+        return {name: samples for name, samples in found.items() if samples is not None}
+
+    @property
+    def duration(self) -> float:
+        """Time of the last sample of all sensors [s]."""
+        return max((float(s.times[-1]) for s in self.sensors.values()), default=0.0)
+
+    def with_testbed(self, testbed: TestbedFile) -> Measurement:
+        """Return the same, said to be of another description of the machine."""
+        return replace(self, testbed=testbed)
+
+
+def read_measurement(path: Path, testbed: Path | None = None) -> Measurement:
+    """Read what a recording measured.
+
+    Args:
+        path: the recording.
+        testbed: the machine's file, instead of the one that the recording carries.
+
+    Raises:
+        InputError: no recording, no test-bed, other cables than the test-bed's, or no samples.
+    """
+    with Recording(path) as recording:
+        machine = _testbed(recording, path, testbed)
+        topics = machine.testbed.topics
+        wanted = (FRAME, BAR, WINCHES, TENSION, COMMAND)
+        names = [n for n in wanted if n in topics and _count(recording, n)]
+        rows = recording.rows_of(names)
+        found = {name: recording.topic(name) for name in names}
+    if not names:
+        raise InputError(f"{path}: no measured topic, allowed: at least one of {', '.join(wanted)}")
+    _check_cables(found, machine.testbed, path)
+    start = min(int(rows[name].stamp_ns.min()) for name in names)
+    parts: dict[str, Samples] = {}
+    for name in names:
+        parts.update(_samples(name, found[name], rows[name], start, machine.testbed))
+    return Measurement(path, recording_sha256(path), machine, **parts)
+
+
+def _testbed(recording: Recording, path: Path, testbed: Path | None) -> TestbedFile:
+    if testbed is not None:
+        return load_testbed(testbed)
+    attached = recording.attachments.get(TESTBED_ATTACHMENT)
+    if attached is None:
+        raise InputError(f"{path}: carries no {TESTBED_ATTACHMENT}, allowed: --testbed FILE")
+    return parse_testbed(attached.decode(errors="replace"), f"{path}: {TESTBED_ATTACHMENT}")
+
+
+def _count(recording: Recording, name: str) -> int:
+    return recording.topics[name].count if name in recording.topics else 0
+
+
+def _check_cables(found: dict[str, Topic], machine: Testbed, path: Path) -> None:
+    for name, topic in found.items():
+        if topic.joint_names and set(topic.joint_names) != set(machine.cable_names):
+            raise InputError(
+                f"{path}: {name}: cables {', '.join(topic.joint_names)}, allowed: the test-bed's,"
+                f" {', '.join(machine.cable_names)}"
+            )
+
+
+def _samples(
+    name: str, topic: Topic, rows: Rows, start_ns: int, machine: Testbed
+) -> dict[str, Samples]:
+    times = np.asarray((rows.stamp_ns - start_ns) * 1e-9, dtype=np.float64)
+    if name in (FRAME, BAR):
+        found = ordered(times, _euler(rows.rows))
+        found.values[:, 3:] = np.unwrap(found.values[:, 3:], axis=0)
+        return {"frame_pose" if name == FRAME else "bar_pose": found}
+    kinds = {WINCHES: {"position": "angle", "velocity": "speed", "effort": "torque"}}
+    kinds[TENSION], kinds[COMMAND] = {"effort": "tension"}, {"effort": "command"}
+    out = {}
+    for part, kind in kinds[name].items():
+        if part in topic.parts:
+            columns = [topic.fields.index(f"{part}/{cable}") for cable in machine.cable_names]
+            out[kind] = ordered(times, rows.rows[:, columns])
+    return {kind: samples for kind, samples in out.items() if len(samples.times)}
+
+
+def _euler(rows: Array) -> Array:
+    """Return x y z φ θ ψ, (n, 6), of pose rows (n, 7)."""
+    out = np.empty((len(rows), 6))
+    out[:, :3] = rows[:, :3]
+    for i, quaternion in enumerate(rows[:, 3:]):
+        out[i, 3:] = euler_from_quaternion(quaternion)
+    return out

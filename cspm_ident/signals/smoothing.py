@@ -1,0 +1,107 @@
+"""From noisy samples to smooth functions of time, without phase.
+
+Whatever enters one equation is smoothed alike, or the difference of the smoothings would look like
+physics: so the band is chosen once per sensor and is told.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.interpolate import CubicSpline
+from scipy.signal import butter, sosfiltfilt, welch
+
+from cspm_ident.signals.samples import Samples
+
+Array = NDArray[np.float64]
+
+ORDER = 4
+# Below a fifth of all samples, the upper end of the spectrum is taken for noise.
+_NOISE_SHARE = 0.2
+_ABOVE_NOISE = 4.0
+_MARGIN = 1.5
+_HIGHEST = 0.4
+_SEGMENT_S = 4.0
+
+
+@dataclass(frozen=True, eq=False)
+class Smooth:
+    """A sensor as smooth functions of time, one piece per stretch without hole.
+
+    Attributes:
+        spans: beginning and end of each piece [s], shape (m, 2).
+        pieces: cubic splines of the smoothed values.
+        band: what was kept [Hz]; infinite where nothing was smoothed.
+    """
+
+    spans: Array
+    pieces: tuple[CubicSpline, ...]
+    band: float
+
+    def at(self, times: Array, derivative: int = 0) -> Array:
+        """Return the values at `times` (k,) [s], or a time derivative; NaN in holes. (k, width)."""
+        width = self.pieces[0].c.shape[2]
+        out = np.full((len(times), width), np.nan)
+        for (start, end), piece in zip(self.spans, self.pieces, strict=True):
+            inside = (times >= start) & (times <= end)
+            if inside.any():
+                out[inside] = piece(times[inside], derivative)
+        return out
+
+
+def smooth(samples: Samples, band: float | None = None) -> Smooth:
+    """Return the samples without what lies above `band` [Hz]; absent: see `band_of`."""
+    rate = samples.rate
+    band = band_of(samples) if band is None else band
+    kept = band if band < _HIGHEST * rate else np.inf
+    sos = butter(ORDER, kept, fs=rate, output="sos") if np.isfinite(kept) else None
+    spans, pieces = [], []
+    for span in samples.spans:
+        times, values = samples.times[span], samples.values[span]
+        if len(times) < 4:
+            continue
+        if sos is not None:
+            values = _filtered(times, values, samples.interval, sos)
+        spans.append((times[0], times[-1]))
+        pieces.append(CubicSpline(times, values))
+    return Smooth(np.array(spans).reshape(len(spans), 2), tuple(pieces), kept)
+
+
+def _filtered(times: Array, values: Array, interval: float, sos: Array) -> Array:
+    """Filter forwards and backwards; the filter takes each sample for the next in line."""
+    padding = min(len(times) - 1, round(3.0 / interval))
+    return np.asarray(sosfiltfilt(sos, values, axis=0, padtype="odd", padlen=padding))
+
+
+def band_of(samples: Samples) -> float:
+    """Return the frequency [Hz] up to which the sensor shows more than its noise, with a margin.
+
+    Its noise is what its spectrum has in the highest fifth of the frequencies. Infinite where the
+    spectrum stands out up to there, or is too short to tell.
+    """
+    longest = max(samples.spans, key=lambda span: span.stop - span.start)
+    values = samples.values[longest]
+    length = min(len(values) - 1, round(_SEGMENT_S * samples.rate))
+    if length < 32:
+        return float("inf")
+    frequencies, power = welch(
+        np.diff(values, axis=0), samples.rate, nperseg=length, detrend="linear", axis=0
+    )
+    # Of differences, since drift leaks over the whole spectrum; undone by their gain.
+    gain = 4.0 * np.sin(np.pi * frequencies[1:] / samples.rate) ** 2
+    power, frequencies = power[1:] / gain[:, None], frequencies[1:]
+    top = round((1.0 - _NOISE_SHARE) * len(frequencies))
+    noise = np.median(power[top:], axis=0)
+    standing_out = (power[:top] > _ABOVE_NOISE * noise) & (noise > 0.0)
+    if not standing_out.any():
+        return float(frequencies[0] * _MARGIN) if (noise > 0.0).any() else float("inf")
+    last = int(np.flatnonzero(_lasting(standing_out).any(axis=1)).max(initial=0))
+    return float(frequencies[last] * _MARGIN)
+
+
+def _lasting(standing_out: NDArray[np.bool_]) -> NDArray[np.bool_]:
+    """Return where two neighbouring frequencies stand out: one alone happens by chance."""
+    pairs = standing_out[1:] & standing_out[:-1]
+    return np.concatenate([pairs, np.zeros((1, pairs.shape[1]), dtype=bool)])

@@ -1,0 +1,272 @@
+"""Measured signals on the steps of a simulation, as its inputs and initial states."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from functools import cached_property
+from types import MappingProxyType
+
+import numpy as np
+from numpy.typing import NDArray
+
+from cspm_ident.signals.measurement import Measurement
+from cspm_ident.signals.samples import Samples
+from cspm_ident.signals.smoothing import Smooth, band_of, smooth
+from cspm_ident.signals.winch_motion import WinchMotion, winch_motion
+from cspm_msgs_py.errors import InputError
+from cspm_sim.kernels.rotation import euler_rate_to_world_rate, rotate_back, rotation_from_euler
+from cspm_sim.motion import Motion
+
+Array = NDArray[np.float64]
+
+PERIOD_NS = 1_000_000
+_KNOT_S = 0.005
+
+
+class Timeline:
+    """All that a simulation can take from a measurement, at steps of one period.
+
+    Poses and angles are smoothed in the band in which they rise above their noise; torques and
+    tensions are as measured.
+
+    Attributes:
+        measurement: where it comes from.
+        period_ns: the step [ns].
+        times: of the steps, on the measurement's clock [s], shape (k,).
+    """
+
+    def __init__(
+        self,
+        measurement: Measurement,
+        period_ns: int = PERIOD_NS,
+        delays: Mapping[str, float] = MappingProxyType({}),
+    ) -> None:
+        """Lay the steps over the time in which all sensors deliver.
+
+        Args:
+            measurement: what was recorded.
+            period_ns: the step [ns].
+            delays: by topic, by how much its stamps are late [s].
+
+        Raises:
+            InputError: the sensors never deliver together.
+        """
+        self.measurement = measurement
+        self.period_ns = period_ns
+        self.delays = dict(delays)
+        sensors = measurement.sensors.values()
+        start = max(float(s.times[0]) for s in sensors)
+        end = min(float(s.times[-1]) for s in sensors)
+        steps = int((end - start) / (period_ns * 1e-9) + 1e-6)
+        if steps < 2:
+            raise InputError(
+                f"{measurement.path}: its sensors share {max(0.0, end - start):.3f} s, allowed:"
+                " sensors that measure at the same time"
+            )
+        self.times: Array = np.asarray(start + np.arange(steps + 1) * (period_ns * 1e-9))
+
+    @property
+    def period(self) -> float:
+        """The step [s]."""
+        return self.period_ns * 1e-9
+
+    def delayed(self, delays: Mapping[str, float]) -> Timeline:
+        """Return the same signals with other delays [s], by topic, without smoothing them again."""
+        other = Timeline(self.measurement, self.period_ns, delays)
+        other.__dict__.update(
+            {name: getattr(self, name) for name in ("_frame", "_bar", "_tension", "_winches")}
+        )
+        other.times = self.times
+        return other
+
+    def slowly(self, period_ns: int, band: float) -> Timeline:
+        """Return the same signals at longer steps, tensions and angles smoothed to `band` [Hz]."""
+        other = Timeline(self.measurement, period_ns, self.delays)
+        other.__dict__.update({name: getattr(self, name) for name in ("_frame", "_bar")})
+        tension, angle = self.measurement.tension, self.measurement.angle
+        other.__dict__["_tension"] = None if tension is None else smooth(tension, band)
+        if angle is not None:
+            slow = smooth(angle, band)
+            moved = WinchMotion(slow.at(other.times), slow.at(other.times, 1), band)
+            other.__dict__["_winches"] = moved
+        return other
+
+    def within(self, first: int, last: int) -> Timeline:
+        """Return the stretch from step `first` to `last`, without smoothing it again."""
+        other = self.delayed(self.delays)
+        other.times = self.times[first : last + 1]
+        if self._winches is not None:
+            cut = slice(first, last + 1)
+            moved = self._winches
+            other.__dict__["_winches"] = moved._replace(
+                angles=moved.angles[cut], speeds=moved.speeds[cut]
+            )
+        return other
+
+    @cached_property
+    def bands(self) -> dict[str, float]:
+        """What was kept of each smoothed sensor [Hz], by topic."""
+        found = {"/winch_frame/pose": self._frame, "/bar/pose": self._bar}
+        found["/cables/tension"] = self._tension
+        bands = {name: each.band for name, each in found.items() if each is not None}
+        if self._winches is not None:
+            bands["/winches/state"] = self._winches.band
+        return bands
+
+    @cached_property
+    def pose_band(self) -> float:
+        """The band of both poses [Hz]: cables see their difference, so both are smoothed alike."""
+        poses = (self.measurement.frame_pose, self.measurement.bar_pose)
+        return max((band_of(s) for s in poses if s is not None), default=float("inf"))
+
+    @cached_property
+    def motion(self) -> Motion:
+        """The winch frame's motion from the first step on; it stands still where not measured."""
+        if self._frame is None:
+            return Motion.still(np.zeros(6))
+        times = np.arange(self.times[0], self.times[-1] + 2 * _KNOT_S, _KNOT_S)
+        late = self._late("/winch_frame/pose")
+        inside = np.clip(times + late, self._frame.spans[0, 0], self._frame.spans[-1, 1])
+        knots = np.hstack([self._frame.at(inside, d) for d in range(3)])
+        return Motion(_bridged(knots), _KNOT_S)
+
+    @cached_property
+    def frame_poses(self) -> Array:
+        """The winch frame's pose x y z φ θ ψ, shape (k, 6); NaN in holes."""
+        if self._frame is None:
+            return np.zeros((len(self.times), 6))
+        return self._frame.at(self.times + self._late("/winch_frame/pose"))
+
+    @cached_property
+    def bars(self) -> Array | None:
+        """The bar's states: position, Euler angles, velocity (world), ω (bar axes), (k, 12)."""
+        if self._bar is None:
+            return None
+        out = np.hstack([self._bar.at(self.times + self._late("/bar/pose")), self.bar_twists])
+        for row in out:
+            turn = rotation_from_euler(row[3], row[4], row[5])
+            row[9:] = rotate_back(turn, row[9], row[10], row[11])
+        return out
+
+    @cached_property
+    def bar_poses(self) -> Array:
+        """The bar's pose, shape (k, 6); the world's where there is no bar, NaN in holes."""
+        return np.zeros((len(self.times), 6)) if self.bars is None else self.bars[:, :6]
+
+    @cached_property
+    def bar_twists(self) -> Array:
+        """Velocity and ω of the bar in world axes, shape (k, 6)."""
+        if self._bar is None:
+            return np.zeros((len(self.times), 6))
+        times = self.times + self._late("/bar/pose")
+        return _twists(self._bar.at(times), self._bar.at(times, 1))
+
+    @cached_property
+    def frame_twists(self) -> Array:
+        """Velocity and ω of the winch frame in world axes, shape (k, 6)."""
+        if self._frame is None:
+            return np.zeros((len(self.times), 6))
+        times = self.times + self._late("/winch_frame/pose")
+        return _twists(self._frame.at(times), self._frame.at(times, 1))
+
+    @property
+    def angles(self) -> Array | None:
+        """Motor angles, shape (k, n) [rad]."""
+        return None if self._winches is None else self._winches.angles
+
+    @property
+    def speeds(self) -> Array | None:
+        """Motor speeds, the derivative of `angles`, (k, n) [rad/s]."""
+        return None if self._winches is None else self._winches.speeds
+
+    @cached_property
+    def smooth_tensions(self) -> Array | None:
+        """Tensions in the band above their noise, shape (k, n) [N]."""
+        late = self._late("/cables/tension")
+        return None if self._tension is None else self._tension.at(self.times + late)
+
+    @cached_property
+    def tensions(self) -> Array | None:
+        """Tensions as measured, joined by straight lines, shape (k, n) [N]; NaN in holes."""
+        samples = self.measurement.tension
+        late = self._late("/cables/tension")
+        return None if samples is None else joined(samples, self.times + late)
+
+    @cached_property
+    def torques(self) -> Array | None:
+        """Torque held from each step to the next, shape (k, n) [N·m]; NaN in holes.
+
+        A drive reports the torque that it applied up to the stamp.
+        """
+        samples = self.measurement.torque
+        if samples is None:
+            return None
+        later = np.searchsorted(samples.times, self.times + 0.5 * self.period)
+        out: Array = samples.values[np.minimum(later, len(samples.times) - 1)].copy()
+        out[_far(samples, self.times)] = np.nan
+        return out
+
+    def _late(self, topic: str) -> float:
+        return self.delays.get(topic, 0.0)
+
+    @cached_property
+    def _frame(self) -> Smooth | None:
+        samples = self.measurement.frame_pose
+        return None if samples is None else smooth(samples, self.pose_band)
+
+    @cached_property
+    def _bar(self) -> Smooth | None:
+        samples = self.measurement.bar_pose
+        return None if samples is None else smooth(samples, self.pose_band)
+
+    @cached_property
+    def _winches(self) -> WinchMotion | None:
+        angle, speed = self.measurement.angle, self.measurement.speed
+        return None if angle is None else winch_motion(angle, speed, self.times)
+
+    @cached_property
+    def _tension(self) -> Smooth | None:
+        samples = self.measurement.tension
+        return None if samples is None else smooth(samples)
+
+
+def joined(samples: Samples, times: Array) -> Array:
+    """Return samples joined by straight lines at `times`; NaN in holes and outside."""
+    columns = [np.interp(times, samples.times, column) for column in samples.values.T]
+    out = np.stack(columns, axis=1)
+    out[_far(samples, times)] = np.nan
+    return out
+
+
+def whole_stretches(columns: list[Array], shortest: int) -> list[tuple[int, int]]:
+    """Return first and last step of each stretch of at least `shortest` steps without NaN."""
+    whole = np.ones(len(columns[0]), dtype=bool)
+    for column in columns:
+        whole &= np.isfinite(column).reshape(len(column), -1).all(axis=1)
+    edges = np.flatnonzero(np.diff(np.concatenate([[False], whole, [False]]).astype(int)))
+    pairs = [(int(a), int(b) - 1) for a, b in zip(edges[::2], edges[1::2], strict=True)]
+    return [(a, b) for a, b in pairs if b - a >= shortest]
+
+
+def _twists(poses: Array, rates: Array) -> Array:
+    """Return v and ω in world axes, (k, 6), of poses x y z φ θ ψ and their rates."""
+    out: Array = rates.copy()
+    for row, pose in zip(out, poses, strict=True):
+        row[3:] = euler_rate_to_world_rate(pose[4], pose[5], row[3], row[4], row[5])
+    return out
+
+
+def _far(samples: Samples, times: Array) -> NDArray[np.bool_]:
+    inside = np.zeros(len(times), dtype=np.bool_)
+    slack = samples.interval
+    for span in samples.spans:
+        t = samples.times[span]
+        inside |= (times >= t[0] - slack) & (times <= t[-1] + slack)
+    return ~inside
+
+
+def _bridged(knots: Array) -> Array:
+    """Put straight lines where the frame was not seen; no window lies there."""
+    whole = np.isfinite(knots).all(axis=1)
+    index = np.arange(len(knots))
+    return np.stack([np.interp(index, index[whole], c[whole]) for c in knots.T], axis=1)

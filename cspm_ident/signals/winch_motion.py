@@ -1,0 +1,73 @@
+"""Winch motion from encoders and, where the drives report it, speed."""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from cspm_ident.signals.samples import Samples
+from cspm_ident.signals.smoothing import smooth
+
+Array = NDArray[np.float64]
+
+# Encoders alone: above this band their steps would look like speed.
+ENCODER_BAND_HZ = 100.0
+# With speeds: slow motion from the encoders, fast from the speeds.
+CROSSOVER_HZ = 5.0
+# Largest share of the speed's variance at which encoder and speed may disagree to be joined.
+_DISAGREEMENT = 0.02
+
+
+class WinchMotion(NamedTuple):
+    """Angles and speeds on common times, consistent with each other.
+
+    Attributes:
+        angles: shape (k, n) [rad]; NaN in holes.
+        speeds: shape (k, n) [rad/s].
+        band: highest frequency kept [Hz]; infinite where the speeds were used.
+    """
+
+    angles: Array
+    speeds: Array
+    band: float
+
+
+def winch_motion(angle: Samples, speed: Samples | None, times: Array) -> WinchMotion:
+    """Return the motion at `times` (k,) [s].
+
+    An encoder's steps hide fast motion, which the drive's speed shows; the speed drifts when it is
+    summed up, which the encoder does not. So each gives the band in which it is better, where both
+    agree in the band that they share.
+    """
+    alone = smooth(angle, ENCODER_BAND_HZ)
+    angles, speeds = alone.at(times), alone.at(times, 1)
+    if speed is None or not _agree(angle, speed):
+        return WinchMotion(angles, speeds, alone.band)
+    fast = np.stack([np.interp(times, speed.times, c) for c in speed.values.T], axis=1)
+    summed = _integral(speed)
+    rest = Samples(angle.times, angle.values - summed_at(summed, angle.times))
+    slow = smooth(rest, CROSSOVER_HZ)
+    return WinchMotion(
+        summed_at(summed, times) + slow.at(times), fast + slow.at(times, 1), float("inf")
+    )
+
+
+def summed_at(summed: Samples, times: Array) -> Array:
+    """Return summed samples joined by straight lines at `times`, shape (k, n)."""
+    return np.stack([np.interp(times, summed.times, c) for c in summed.values.T], axis=1)
+
+
+def _integral(speed: Samples) -> Samples:
+    steps = 0.5 * (speed.values[1:] + speed.values[:-1]) * np.diff(speed.times)[:, None]
+    return Samples(speed.times, np.vstack([np.zeros(steps.shape[1]), np.cumsum(steps, axis=0)]))
+
+
+def _agree(angle: Samples, speed: Samples) -> bool:
+    """Return whether the speeds are the angles' derivatives, in the band that both show well."""
+    slow_angle, slow_speed = smooth(angle, CROSSOVER_HZ), smooth(speed, CROSSOVER_HZ)
+    derived, said = slow_angle.at(speed.times, 1), slow_speed.at(speed.times)
+    apart, whole = np.nanvar(derived - said, axis=0), np.nanvar(said, axis=0)
+    # What stands still tells nothing; its speed is noise, and small.
+    return bool((apart <= _DISAGREEMENT * whole.max()).all())

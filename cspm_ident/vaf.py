@@ -1,0 +1,13 @@
+"""Variance accounted for."""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+Array = NDArray[np.float64]
+
+
+def vaf(measured: Array, modelled: Array) -> float:
+    """Return (1 − var(y − ŷ)/var(y))·100 %, thesis (3-9), for signals of one shape."""
+    return float(100.0 * (1.0 - np.var(measured - modelled) / np.var(measured)))

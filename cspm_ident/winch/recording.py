@@ -1,0 +1,119 @@
+"""What was measured at one winch."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from cspm_ident.signals.measurement import Measurement
+from cspm_ident.signals.samples import Samples
+from cspm_ident.signals.smoothing import smooth
+from cspm_ident.signals.timeline import joined
+from cspm_msgs_py.errors import InputError
+from cspm_sim.effects.signals import WinchSignal
+
+Array = NDArray[np.float64]
+
+
+@dataclass(frozen=True, eq=False)
+class WinchSignals:
+    """Readings of one winch, at the motor shaft.
+
+    Attributes:
+        angle: [rad], one column.
+        torque: as the drive reports it, positive winds in [N·m], one column.
+        tension: of its cable [N], one column; None where it has no cable.
+        radius: drum radius / gear ratio [m].
+        gear: gear ratio.
+        torque_age: how long before its stamp the reported torque acted, on average [s]: half a
+            period where a drive reports what it applied up to the stamp.
+    """
+
+    angle: Samples
+    torque: Samples
+    tension: Samples | None
+    radius: float
+    gear: float = 1.0
+    torque_age: float = 0.0
+
+
+def winch_signals(measurement: Measurement, cable: str, torque_age: float = 0.0) -> WinchSignals:
+    """Return the readings of one winch of a recording.
+
+    Args:
+        measurement: what was recorded.
+        cable: name of the winch's cable.
+        torque_age: see `WinchSignals`.
+
+    Raises:
+        InputError: no such cable, or no angle, torque or (where there is a cable) tension recorded.
+    """
+    machine, path = measurement.machine, measurement.path
+    if cable not in machine.cable_names:
+        raise InputError(f"{path}: no cable {cable}, allowed: {', '.join(machine.cable_names)}")
+    index = list(machine.cable_names).index(cable)
+    description = machine.cables[index]
+    angle, torque, tension = measurement.angle, measurement.torque, measurement.tension
+    if angle is None or torque is None:
+        raise InputError(
+            f"{path}: {cable} has no angle or no torque in /winches/state, "
+            "allowed: recordings with both"
+        )
+    if description.stiffness is None:
+        tension = None
+    elif tension is None:
+        raise InputError(
+            f"{path}: {cable} pulls a cable whose tension was not recorded, "
+            "allowed: recordings with /cables/tension"
+        )
+    return WinchSignals(
+        angle.column(index),
+        torque.column(index),
+        tension.column(index) if tension is not None else None,
+        description.drum_radius / description.gear_ratio,
+        description.gear_ratio,
+        torque_age,
+    )
+
+
+def signal_rows(signals: WinchSignals, band: float | None = None) -> list[tuple[Array, Array]]:
+    """Return the winch's signals at equal steps, one table for each stretch without a hole.
+
+    Angle, speed and acceleration come from one smooth function. Torque and tension are joined by
+    straight lines.
+
+    Args:
+        signals: the readings.
+        band: kept of the angle [Hz]; by default what stands out of its noise.
+
+    Returns:
+        Pairs of times [s], shape (n,), and signals, shape (n, len(WinchSignal)).
+    """
+    smoothed = smooth(signals.angle, band)
+    step = signals.angle.interval
+    tables = []
+    for start, end in smoothed.spans:
+        times = start + step * np.arange(int((end - start) / step + 1e-6) + 1)
+        times = np.minimum(times, end)
+        rows = np.zeros((len(times), len(WinchSignal)))
+        columns = (WinchSignal.ANGLE, WinchSignal.SPEED, WinchSignal.ACCELERATION)
+        for derivative, column in enumerate(columns):
+            rows[:, column] = smoothed.at(times, derivative)[:, 0]
+        rows[:, WinchSignal.TORQUE] = joined(signals.torque, times + signals.torque_age)[:, 0]
+        rows[:, WinchSignal.TORQUE_RATE] = np.gradient(rows[:, WinchSignal.TORQUE], step)
+        if signals.tension is not None:
+            rows[:, WinchSignal.TENSION] = joined(signals.tension, times)[:, 0]
+        rows[:, WinchSignal.RADIUS] = signals.radius
+        rows[:, WinchSignal.GEAR] = signals.gear
+        rows[:, WinchSignal.TIME] = times
+        tables += _whole(times, rows)
+    return tables
+
+
+def _whole(times: Array, rows: Array) -> list[tuple[Array, Array]]:
+    """Return the stretches of rows without NaN."""
+    finite = np.isfinite(rows).all(axis=1)
+    edges = np.flatnonzero(np.diff(np.concatenate([[False], finite, [False]]).astype(int)))
+    return [(times[a:b], rows[a:b]) for a, b in zip(edges[::2], edges[1::2], strict=True)]

@@ -1,0 +1,58 @@
+"""How often intervals contain the truth; the whole table is `python -m bench.coverage`."""
+
+import numpy as np
+import pytest
+from scipy.stats import binom
+
+from bench.coverage import DEFAULT, PLAIN, Count, Spring, Winch, coloured, measure_coverage
+
+RUNS = 60
+# With a coverage of 90 to 97 % no more than one in a thousand experiments of 60 runs ends outside.
+FEWEST = binom.ppf(1e-3, RUNS, 0.90)
+
+
+class OnlyTwo:
+    """An experiment without the kinds of interval that are not compared here."""
+
+    def __init__(self, experiment):
+        self.names, self.truth = experiment.names, experiment.truth
+        self._experiment = experiment
+
+    def intervals(self, rng):
+        for method, ends in self._experiment.intervals(rng):
+            yield method, ends
+            if method == DEFAULT:
+                return
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("experiment", [Winch(), Spring()], ids=["linear", "simulated"])
+def test_intervals_contain_the_truth_and_those_of_plain_least_squares_do_not(experiment):
+    counts = measure_coverage(OnlyTwo(experiment), RUNS, seed=7)
+    ours = [count for count in counts if count.method == DEFAULT]
+    plain = [count for count in counts if count.method == PLAIN]
+    assert len(ours) == len(plain) == len(experiment.names)
+    for count in ours:
+        assert count.inside >= FEWEST, count
+    # Not so long that they say nothing either: at 99.5 % all of so many would rarely be inside.
+    total = sum(count.inside for count in ours)
+    assert total < binom.ppf(1.0 - 1e-3, RUNS * len(ours), 0.985)
+    for count in plain:
+        assert count.inside < FEWEST, count
+
+
+def test_noise_of_the_experiments_has_the_colour_it_says():
+    """Unit variance, a tenth of it white, the rest with 0.1 s of memory."""
+    noise = coloured(np.random.default_rng(1), 400_000, 0.01)
+    assert noise.var() == pytest.approx(1.0, abs=0.03)
+    lags = [np.mean(noise[k:] * noise[: len(noise) - k]) for k in (1, 10, 20)]
+    np.testing.assert_allclose(lags, 0.9 * np.exp([-0.1, -1.0, -2.0]), atol=0.03)
+
+
+def test_exact_bounds_of_a_count():
+    """Half of the ends' probability lies beyond each, by the distribution of the count itself."""
+    low, high = Count("", "", 188, 200).bounds
+    assert binom.sf(187, 200, low) == pytest.approx(0.025)
+    assert binom.cdf(188, 200, high) == pytest.approx(0.025)
+    assert Count("", "", 10, 10).bounds[1] == 1.0
+    assert Count("", "", 0, 10).bounds[0] == 0.0

@@ -24,6 +24,7 @@ def main() -> None:
     """Run the command line; every error is one line on stderr and an exit code."""
     # They add their commands when they are loaded.
     import_module("cspm_bringup.cli_recordings")
+    import_module("cspm_bringup.cli_compare")
     import_module("cspm_bringup.cli_identify")
     import_module("cspm_bringup.cli_ros")
     try:

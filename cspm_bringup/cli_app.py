@@ -19,7 +19,7 @@ class _Listed(typer.core.TyperGroup):
     """Lists the commands in the order in which a newcomer needs them."""
 
     order = (
-        *("run", "info", "recover", "resim", "import", "identify"),
+        *("run", "info", "recover", "resim", "import", "compare", "identify"),
         *("replay", "check-drivers", "node"),
     )
 

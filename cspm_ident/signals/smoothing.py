@@ -21,7 +21,7 @@ ORDER = 4
 # Below a fifth of all samples, the upper end of the spectrum is taken for noise.
 _NOISE_SHARE = 0.2
 _ABOVE_NOISE = 4.0
-_MARGIN = 1.5
+_MARGIN = 2.0
 _HIGHEST = 0.4
 _SEGMENT_S = 4.0
 

@@ -1,0 +1,187 @@
+"""The report page of a comparison: measured over simulated over residual, zoomed together."""
+
+from __future__ import annotations
+
+from html import escape
+from itertools import pairwise
+from pathlib import Path
+
+import numpy as np
+import plotly.graph_objects as go
+from numpy.typing import NDArray
+from plotly.subplots import make_subplots
+
+from cspm_ident.comparison.channel import Channel
+from cspm_ident.comparison.compare import Comparison
+
+Array = NDArray[np.float64]
+
+# Points per line: with the extremes of what lies between them, no spike is lost.
+POINTS = 4000
+_ROW_PIXELS = 150
+_BLOCKS = {
+    "whole": "The whole, driven by {drive}",
+    "cable": "Cables alone, driven by measured winch and bar motion",
+    "bar": "Bar alone, driven by measured tensions",
+}
+_STYLE = """<style>
+body {font-family: sans-serif; margin: 2em; color: #222}
+table {border-collapse: collapse; margin: 1em 0}
+td, th {padding: 0.2em 0.8em; text-align: right; border-bottom: 1px solid #ddd}
+td:first-child, th:first-child {text-align: left}
+</style>"""
+
+
+def write_page(path: Path, comparison: Comparison) -> None:
+    """Write one HTML file that needs no network.
+
+    Raises:
+        OSError: the file cannot be written.
+    """
+    title = f"{comparison.measurement.path.name}: measured and simulated"
+    parts = [
+        f"<!doctype html><html lang=en><head><meta charset=utf-8><title>{escape(title)}</title>",
+        _STYLE,
+        f"</head><body><h1>{escape(title)}</h1>",
+        _about(comparison),
+    ]
+    first = True
+    for block in _BLOCKS:
+        channels = [channel for channel in comparison.channels if channel.block == block]
+        if not channels:
+            continue
+        heading = _BLOCKS[block].format(drive=comparison.drive.value)
+        parts.append(f"<h2>{escape(heading)}</h2>{_table(channels)}")
+        parts.append(_html(_lines(channels), script=first))
+        parts.append(_html(_spectra(channels), script=False))
+        parts.append(_html(_bins(channels), script=False))
+        first = False
+    parts.append("</body></html>")
+    path.write_text("\n".join(parts), encoding="utf-8")
+
+
+def _about(comparison: Comparison) -> str:
+    lines = []
+    for delay in comparison.delays:
+        ends = f"{1e3 * delay.interval[0]:.2f} to {1e3 * delay.interval[1]:.2f} ms"
+        use = "taken out" if delay.topic in comparison.applied else "too small to matter, left in"
+        told = f"{1e3 * delay.seconds:.2f} ms late (95 %: {ends}), {use}"
+        told = told if delay.known else "delay: this recording cannot tell"
+        lines.append(f"{delay.topic}: {told}")
+    for topic, source in comparison.noise.items():
+        lines.append(f"{topic}: noise from {source.value}")
+    for topic, band in comparison.bands.items():
+        if np.isfinite(band):
+            lines.append(f"{topic}: smoothed to {band:.3g} Hz as an input")
+    count, failed = comparison.windows
+    horizon = f"{comparison.horizon:g} s each" if comparison.horizon else "as long as nothing lacks"
+    lines.append(f"{count} windows, {horizon}; {failed} diverged")
+    return "<ul>" + "".join(f"<li>{escape(line)}</li>" for line in lines) + "</ul>"
+
+
+def _table(channels: list[Channel]) -> str:
+    heads = ("channel", "VAF %", "NRMSE", "RMS error", "noise floor", "bias", "lag ms", "unit")
+    rows = ["<tr>" + "".join(f"<th>{head}</th>" for head in heads) + "</tr>"]
+    for c in channels:
+        cells = (
+            c.name,
+            "at rest" if c.vaf is None else f"{c.vaf:.3f}",
+            "" if c.nrmse is None else f"{c.nrmse:.4f}",
+            f"{c.rms:.3g}",
+            f"{c.floor:.3g}",
+            f"{c.bias:.2g}",
+            "" if c.lag is None else f"{1e3 * c.lag:.2f}",
+            c.unit,
+        )
+        rows.append("<tr>" + "".join(f"<td>{escape(cell)}</td>" for cell in cells) + "</tr>")
+    return f"<table>{''.join(rows)}</table>"
+
+
+def _html(figure: go.Figure, *, script: bool) -> str:
+    return str(figure.to_html(full_html=False, include_plotlyjs=script))
+
+
+def _lines(channels: list[Channel]) -> go.Figure:
+    """Return two rows per channel, both signals and their difference, on one time axis."""
+    figure = make_subplots(
+        rows=2 * len(channels), cols=1, shared_xaxes=True, vertical_spacing=0.2 / len(channels)
+    )
+    for i, channel in enumerate(channels):
+        for values, name, colour, row in (
+            (channel.measured, "measured", "#1f77b4", 2 * i + 1),
+            (channel.simulated, "simulated", "#ff7f0e", 2 * i + 1),
+            (channel.error, "measured − simulated", "#555555", 2 * i + 2),
+        ):
+            times, shown = thinned(channel.times, values)
+            figure.add_scatter(
+                x=times,
+                y=shown,
+                name=name,
+                legendgroup=name,
+                showlegend=i == 0,
+                line={"color": colour, "width": 1},
+                row=row,
+                col=1,
+            )
+        label = f"{channel.name.split('/', 1)[-1]}<br>[{channel.unit}]"
+        figure.update_yaxes(title_text=label, title_font_size=10, row=2 * i + 1, col=1)
+        figure.update_yaxes(title_text="error", title_font_size=10, row=2 * i + 2, col=1)
+    figure.update_xaxes(matches="x")
+    figure.update_xaxes(title_text="time [s]", row=2 * len(channels), col=1)
+    height = 2 * len(channels) * _ROW_PIXELS + 150
+    figure.update_layout(height=height, hovermode="x", margin={"t": 60}, template="plotly_white")
+    return figure
+
+
+def _spectra(channels: list[Channel]) -> go.Figure:
+    figure = go.Figure()
+    for channel in channels:
+        frequencies, values = channel.coherence
+        if channel.moves and len(frequencies):
+            figure.add_scatter(x=frequencies, y=values, name=channel.name, mode="lines")
+    figure.update_xaxes(type="log", title_text="frequency [Hz]")
+    figure.update_yaxes(title_text="coherence, measured with simulated", range=[0, 1.02])
+    figure.update_layout(height=400, template="plotly_white", title="Coherence")
+    return figure
+
+
+def _bins(channels: list[Channel]) -> go.Figure:
+    """Return bias and RMS of the error against each quantity, in multiples of the floor."""
+    names = list(dict.fromkeys(name for channel in channels for name in channel.bins))
+    figure = make_subplots(rows=1, cols=max(1, len(names)), subplot_titles=names)
+    for i, channel in enumerate(channels):
+        colour = f"hsl({360 * i // len(channels)}, 60%, 45%)"
+        for name, bins in channel.bins.items():
+            scale = channel.floor or 1.0
+            figure.add_scatter(
+                x=[each.centre for each in bins],
+                y=[each.bias / scale for each in bins],
+                error_y={"type": "data", "array": [each.rms / scale for each in bins]},
+                name=channel.name,
+                legendgroup=channel.name,
+                showlegend=name == names[0],
+                line={"color": colour},
+                row=1,
+                col=names.index(name) + 1,
+            )
+    figure.update_yaxes(title_text="mean error / noise floor, bars: RMS", row=1, col=1)
+    figure.update_layout(height=450, template="plotly_white", title="Error against its drivers")
+    return figure
+
+
+def thinned(times: Array, values: Array) -> tuple[Array, Array]:
+    """Return at most about `POINTS` points that keep each stretch's least and greatest value.
+
+    Args:
+        times: shape (n,) [s].
+        values: shape (n,).
+    """
+    if len(values) <= POINTS:
+        return times, values
+    edges = np.linspace(0, len(values), POINTS // 2 + 1).astype(int)
+    chosen = [
+        index
+        for a, b in pairwise(edges.tolist())
+        for index in sorted({a + int(np.argmin(values[a:b])), a + int(np.argmax(values[a:b]))})
+    ]
+    return times[chosen], values[chosen]

@@ -1,0 +1,1 @@
+"""A whole machine identified by output error: bar, cables and damping from recordings."""

@@ -1,0 +1,69 @@
+"""A machine with fitted numbers in it."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+
+from cspm_ident.system.choice import (
+    AXES,
+    MOMENTS,
+    BarPlace,
+    Chosen,
+    EffectPlace,
+    absent_values,
+    same_place,
+)
+from cspm_msgs_py.testbed import Bar, EffectEntry, Testbed
+
+_PRODUCTS = ("ixy", "ixz", "iyz")
+
+
+def machine_with(testbed: Testbed, chosen: Sequence[Chosen], values: Sequence[float]) -> Testbed:
+    """Return the machine with these values, in the order of `chosen`.
+
+    A tensor of inertia that no body has is not refused here, so that a search may pass through it.
+    """
+    bar, effects = testbed.bar, list(testbed.effects)
+    for each, value in zip(chosen, values, strict=True):
+        if isinstance(each.place, EffectPlace):
+            _put_effect(testbed, effects, each.place, float(value))
+        elif bar is not None:
+            bar = _put_bar(bar, each.place, float(value))
+    return testbed.model_copy(update={"bar": bar, "effects": tuple(effects)})
+
+
+def bar_values(place: BarPlace, value: float, bar: Bar) -> Mapping[str, float]:
+    """Return the numbers of `bar`, by key, that a value stands for."""
+    if place.key == "inertia":
+        keys = (*MOMENTS, *_PRODUCTS)
+        found = {f"inertia.{key}": value * float(getattr(bar.inertia, key)) for key in keys}
+        return {key: number for key, number in found.items() if number}
+    return {place.key: value}
+
+
+def _put_bar(bar: Bar, place: BarPlace, value: float) -> Bar:
+    for key, number in bar_values(place, value, bar).items():
+        head, _, part = key.partition(".")
+        if head == "com":
+            com = [number if axis == part else old for axis, old in zip(AXES, bar.com, strict=True)]
+            bar = bar.model_copy(update={"com": tuple(com)})
+        elif head == "inertia":
+            inertia = bar.inertia.model_copy(update={part: number})
+            bar = bar.model_copy(update={"inertia": inertia})
+        else:
+            bar = bar.model_copy(update={key: number})
+    return bar
+
+
+def _put_effect(
+    testbed: Testbed, effects: list[EffectEntry], place: EffectPlace, value: float
+) -> None:
+    for i, entry in enumerate(effects):
+        if same_place(testbed, place, entry.effect, entry.elements):
+            parameters = {**entry.parameters, place.parameter: value}
+            effects[i] = entry.model_copy(update={"parameters": parameters})
+            return
+    parameters = {**absent_values(place.effect), place.parameter: value}
+    effects.append(
+        EffectEntry(effect=place.effect, elements=place.elements, parameters=parameters)
+    )

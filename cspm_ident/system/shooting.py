@@ -1,0 +1,186 @@
+"""Windows of a recording simulated from free initial states: multiple shooting (Bock 1981)."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+
+import numpy as np
+from numpy.typing import NDArray
+
+from cspm_ident.block_simulation import BlockSimulation, Drive, Window
+from cspm_ident.comparison.floor import noise_of
+from cspm_ident.signals.measurement import BAR, TENSION, Measurement
+from cspm_ident.signals.timeline import Timeline
+from cspm_msgs_py.errors import InputError
+from cspm_msgs_py.testbed import Testbed
+from cspm_sim.driven_plant import DrivenPlant
+
+Array = NDArray[np.float64]
+
+# Steps over which tensions are averaged: 10 ms, the usual interval of a motion capture.
+_BLOCK = 10
+# Of the initial states: position, angles, velocity, ω, unstretched lengths.
+_STEPS = np.array([1e-6] * 6 + [1e-5] * 6)
+_LENGTH_STEP = 1e-8
+# A residual where the simulation diverged, in standard deviations of the sensor.
+_DIVERGED = 1e4
+# Directions of the initial state that the window sees less than this share of the best.
+_UNSEEN = 1e-8
+
+
+@dataclass(eq=False)
+class Shooting:
+    """One recording cut into windows.
+
+    Attributes:
+        timeline: its signals.
+        windows: first and last step of each.
+        starts: what is added to the state measured at each window's start: bar (12) and unstretched
+            lengths, shape (windows, 12 + n).
+        spans: per window, an orthonormal basis of what changes of its start do to all residuals.
+        weights: by kind, one over the standard deviation of each channel.
+    """
+
+    timeline: Timeline
+    windows: list[Window]
+    starts: Array
+    weights: dict[str, Array]
+    spans: list[Array] = field(default_factory=list)
+
+    @property
+    def kinds(self) -> tuple[str, ...]:
+        """The groups of channels, in the order of the residuals of a window."""
+        return tuple(self.weights)
+
+    def residuals(self, machine: Testbed) -> list[dict[str, Array]]:
+        """Return measured less simulated over the sensor's noise, per window and kind.
+
+        Each is (samples, channels), and free of what other initial states would explain.
+        """
+        raw = self.raw_residuals(machine)
+        if not self.spans:
+            return raw
+        return [self._freed(i, part) for i, part in enumerate(raw)]
+
+    def raw_residuals(self, machine: Testbed) -> list[dict[str, Array]]:
+        """Return the same with the initial states as they are."""
+        simulation = BlockSimulation(self.timeline, machine)
+        plant = DrivenPlant(simulation.parameters, self.timeline.motion, self.timeline.period_ns)
+        return [
+            self._window(plant, window, _started(simulation, window[0], start))
+            for window, start in zip(self.windows, self.starts, strict=True)
+        ]
+
+    def relinearise(self, machine: Testbed) -> None:
+        """Move the initial states to their best for a machine, and free the residuals of them."""
+        base = self.raw_residuals(machine)
+        kept, columns = self.starts, []
+        width = kept.shape[1]
+        steps = np.concatenate([_STEPS, np.full(width - len(_STEPS), _LENGTH_STEP)])
+        for step, unit in zip(steps, np.eye(width), strict=True):
+            self.starts = kept + step * unit
+            columns.append(self.raw_residuals(machine))
+        self.starts, self.spans = kept.copy(), []
+        for i, part in enumerate(base):
+            target = self._row(part)
+            slopes = [
+                (self._row(c[i]) - target) / s for c, s in zip(columns, steps, strict=True)
+            ]
+            span, change = _solved(np.stack(slopes, axis=1), target)
+            self.spans.append(span)
+            self.starts[i] -= change
+
+    def _row(self, part: dict[str, Array]) -> Array:
+        return np.concatenate([part[kind].ravel() for kind in self.kinds])
+
+    def _freed(self, i: int, part: dict[str, Array]) -> dict[str, Array]:
+        """Return a window's residuals without the part that other starts explain."""
+        row, span = self._row(part), self.spans[i]
+        row -= span @ (span.T @ row)
+        ends = np.cumsum([part[kind].size for kind in self.kinds])[:-1]
+        rows = np.split(row, ends)
+        return {k: r.reshape(part[k].shape) for k, r in zip(self.kinds, rows, strict=True)}
+
+    def _window(self, plant: DrivenPlant, window: Window, state: Array) -> dict[str, Array]:
+        start, end = window
+        rows, line = slice(start, end + 1), self.timeline
+        angles, speeds = np.asarray(line.angles)[rows], np.asarray(line.speeds)[rows]
+        driven = plant.by_winches(start, state, angles, speeds)
+        found = {}
+        for kind, weight in self.weights.items():
+            if kind == BAR:
+                error = _pose_error(line, window, driven.states[:, :6])
+            else:
+                error = _averaged(np.asarray(line.tensions)[rows] - driven.tensions)
+            found[kind] = np.nan_to_num(error * weight, nan=_DIVERGED)
+        return found
+
+
+def make_shooting(measurement: Measurement, horizon: float, most_windows: int) -> Shooting:
+    """Return a recording cut into windows, before any sensitivity.
+
+    Args:
+        measurement: what was recorded, with the machine as described.
+        horizon: length of the windows [s].
+        most_windows: so many, spread evenly, where there are more.
+
+    Raises:
+        InputError: a sensor is missing, or no window is long enough.
+    """
+    line = Timeline(measurement)
+    simulation = BlockSimulation(line, measurement.machine)
+    simulation.check(Drive.WINCH)
+    least = 0.5 * horizon / line.period
+    windows = [w for w in simulation.windows(Drive.WINCH, horizon) if w[1] - w[0] >= least]
+    if not windows:
+        raise InputError(
+            f"{measurement.path}: no stretch of {0.5 * horizon:g} s without a hole, allowed: a"
+            " shorter --horizon"
+        )
+    if len(windows) > most_windows:
+        kept = np.linspace(0, len(windows) - 1, most_windows).round().astype(int)
+        windows = [windows[i] for i in kept]
+    noise, _ = noise_of(measurement, None)
+    kinds = [BAR] + [TENSION] * (line.tensions is not None)
+    weights = {kind: 1.0 / _positive(noise[kind]) for kind in kinds}
+    width = len(_STEPS) + len(measurement.machine.cables)
+    return Shooting(line, windows, np.zeros((len(windows), width)), weights)
+
+
+def _started(simulation: BlockSimulation, step: int, change: Array) -> Array:
+    state = simulation.state_at(step)
+    state[: len(change)] += change
+    return state
+
+
+def _pose_error(line: Timeline, window: Window, simulated: Array) -> Array:
+    """Return the error of the pose at the sensor's own samples, at most one per 10 ms."""
+    samples = line.measurement.bar_pose
+    times = line.times[window[0] : window[1] + 1]
+    if samples is None:
+        return np.zeros((0, 6))
+    chosen = samples.within(times[0], times[-1])
+    skip = max(1, round(_BLOCK * line.period / max(samples.interval, 1e-9)))
+    at, values = chosen.times[::skip], chosen.values[::skip]
+    model = [np.interp(at, times, column) for column in simulated.T]
+    return np.asarray(values - np.stack(model, axis=1))
+
+
+def _averaged(error: Array) -> Array:
+    count = len(error) // _BLOCK
+    return np.asarray(error[: count * _BLOCK].reshape(count, _BLOCK, -1).mean(axis=1))
+
+
+def _solved(slopes: Array, target: Array) -> tuple[Array, Array]:
+    """Return an orthonormal basis of the columns that show, and the least squares solution."""
+    size = np.linalg.norm(slopes, axis=0) + 1e-300
+    left, values, right = np.linalg.svd(slopes / size, full_matrices=False)
+    seen = values > _UNSEEN * values[0]
+    span = left[:, seen]
+    return span, (right[seen].T @ ((span.T @ target) / values[seen])) / size
+
+
+def _positive(noise: Array) -> Array:
+    """Keep a sensor without noise from weighing infinitely."""
+    least = noise[noise > 0.0].min() if (noise > 0.0).any() else 1.0
+    return np.maximum(noise, least)

@@ -1,0 +1,96 @@
+"""Measured signals: holes, smoothing without phase, noise, winch motion."""
+
+import numpy as np
+import pytest
+
+from cspm_ident.signals.noise import noise_above_band, noise_between
+from cspm_ident.signals.samples import Samples, ordered
+from cspm_ident.signals.smoothing import band_of, smooth
+from cspm_ident.signals.winch_motion import ENCODER_BAND_HZ, winch_motion
+
+RATE = 1000.0
+TIMES = np.arange(0, 20, 1 / RATE)
+
+
+def wave(frequency, times=TIMES):
+    return np.sin(2 * np.pi * frequency * times)[:, None]
+
+
+def noise(deviation, seed=1, times=TIMES):
+    return deviation * np.random.default_rng(seed).standard_normal((len(times), 1))
+
+
+def test_samples_come_in_order_once_and_whole():
+    times = np.array([0.0, 0.2, 0.1, 0.1, 0.3])
+    values = np.array([[0.0], [2.0], [1.0], [9.0], [np.nan]])
+    found = ordered(times, values)
+    assert found.times.tolist() == [0.0, 0.1, 0.2]
+    assert found.values[:, 0].tolist() == [0.0, 1.0, 2.0]
+
+
+def test_a_hole_parts_the_samples_and_a_missing_one_does_not():
+    times = np.concatenate([np.arange(50) * 0.01, 1.0 + np.arange(50) * 0.01])
+    assert Samples(times, times[:, None]).spans == [slice(0, 50), slice(50, 100)]
+    once = np.delete(np.arange(100) * 0.01, 40)
+    assert Samples(once, once[:, None]).spans == [slice(0, 99)]
+
+
+def test_smoothing_leaves_what_is_in_the_band_where_it_is():
+    found = smooth(Samples(TIMES, wave(1.0) + noise(0.1)), band=5.0)
+    inner = TIMES[2000:-2000]
+    # Noise left: 0.1·√(2·5/1000) = 0.01; a lag of 5 ms would be an error of 0.03.
+    assert np.abs(found.at(inner) - wave(1.0, inner)).max() < 0.05
+    rate = 2 * np.pi * np.cos(2 * np.pi * inner)[:, None]
+    assert np.sqrt(np.mean((found.at(inner, 1) - rate) ** 2)) < 0.3
+
+
+def test_smoothing_knows_nothing_of_holes():
+    times = np.concatenate([TIMES[:5000], TIMES[8000:]])
+    found = smooth(Samples(times, wave(1.0, times)))
+    assert np.isnan(found.at(np.array([6.5]))).all()
+    assert np.isfinite(found.at(np.array([4.0, 9.0]))).all()
+
+
+@pytest.mark.parametrize("frequency", [2.0, 8.0, 30.0])
+def test_the_band_ends_above_the_signal_and_well_below_the_rate(frequency):
+    found = band_of(Samples(TIMES, wave(frequency) + noise(0.05)))
+    assert frequency < found < 3 * frequency + 2
+
+
+def test_a_signal_without_noise_is_not_smoothed():
+    chirp = np.sin(2 * np.pi * 12 * TIMES**2)[:, None]
+    assert not np.isfinite(smooth(Samples(TIMES, chirp)).band)
+
+
+def test_noise_is_found_beside_a_signal_and_between_repeats():
+    first = Samples(TIMES, wave(1.0) + noise(0.05, seed=1))
+    second = Samples(TIMES, wave(1.0) + noise(0.05, seed=2))
+    assert noise_above_band(first)[0] == pytest.approx(0.05, rel=0.05)
+    assert noise_between(first, second)[0] == pytest.approx(0.05, rel=0.05)
+    # A motion that is not repeated counts as noise, which is why repeats must be repeats.
+    assert noise_between(first, Samples(TIMES, wave(1.3)))[0] > 0.5
+
+
+def encoder(step):
+    """Fast motion of 3 mrad at 60 Hz on a slow one; angle in steps, speed with noise."""
+    angle = 0.5 * wave(0.5) + 0.003 * wave(60.0)
+    speed = 0.5 * np.pi * np.cos(np.pi * TIMES) + 0.003 * 120 * np.pi * np.cos(120 * np.pi * TIMES)
+    rounded = np.round(angle / step) * step
+    return angle, Samples(TIMES, rounded), Samples(TIMES, speed[:, None] + noise(0.01))
+
+
+def test_speeds_show_motion_that_an_encoder_hides():
+    angle, rounded, speed = encoder(step=0.01)
+    inner = slice(2000, -2000)
+    both = winch_motion(rounded, speed, TIMES)
+    alone = winch_motion(rounded, None, TIMES)
+    error = [np.sqrt(np.mean((m.angles - angle)[inner] ** 2)) for m in (both, alone)]
+    assert error[0] < 0.5 * error[1]
+    assert not np.isfinite(both.band)
+    assert alone.band == ENCODER_BAND_HZ
+
+
+def test_a_speed_of_the_wrong_sign_is_not_used():
+    _, rounded, speed = encoder(step=0.001)
+    wrong = Samples(speed.times, -speed.values)
+    assert winch_motion(rounded, wrong, TIMES).band == ENCODER_BAND_HZ

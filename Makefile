@@ -4,6 +4,8 @@ VENV := .venv
 BIN := $(VENV)/bin
 PIP := $(BIN)/python -m pip install --quiet --disable-pip-version-check
 SCENARIO ?= worst_case
+# One worker per processor; a file's tests stay together, since they share what they set up.
+SPREAD := -n logical --dist loadfile
 
 # ROS 2 Jazzy comes as wheels, unless a native one is sourced. Both at once would mix their libraries.
 ROS := wheels
@@ -12,7 +14,7 @@ ifneq ($(wildcard $(addsuffix /rclpy/_rclpy_pybind11*.so,$(subst :, ,$(PYTHONPAT
 ROS := native
 # Its plugins for pytest are written for the pytest of its own distribution.
 export PYTEST_DISABLE_PLUGIN_AUTOLOAD := 1
-export PYTEST_ADDOPTS := -p pytest_cov
+export PYTEST_ADDOPTS := -p pytest_cov -p xdist
 endif
 endif
 
@@ -25,10 +27,11 @@ run: $(VENV)/$(ROS).stamp ## build what a run needs and simulate the worst-case 
 	@$(BIN)/cspm run $(SCENARIO)
 
 test: lint ## build what the tests need; then style, types and all tests
-	$(BIN)/python -m pytest
+	$(BIN)/python -m pytest $(SPREAD) -m "not alone"
+	$(BIN)/python -m pytest -m alone
 
 test-fast: $(VENV)/test.stamp ## the tests without the slow ones
-	$(BIN)/python -m pytest -m "not slow"
+	$(BIN)/python -m pytest $(SPREAD) -m "not slow"
 
 lint: $(VENV)/test.stamp ## style and types
 	$(BIN)/ruff check .

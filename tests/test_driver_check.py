@@ -78,11 +78,11 @@ class TestSoundSignals:
     @pytest.mark.parametrize(
         ("scenario", "seconds", "overrides"),
         [
-            ("worst_case", 60.0, ["seed=2"]),
-            ("worst_case", 30.0, ["sensors=ideal"]),
-            ("worst_case", 30.0, ["rates.motion_capture=100"]),
-            ("calm", 60.0, ["seed=3"]),
-            ("verification_long", 30.0, []),
+            ("worst_case", 24.0, ["seed=2"]),
+            ("worst_case", 12.0, ["sensors=ideal"]),
+            ("worst_case", 12.0, ["rates.motion_capture=100"]),
+            ("calm", 24.0, ["seed=3"]),
+            ("verification_long", 12.0, []),
         ],
     )
     def test_no_window_of_a_sound_run_has_anything_wrong(

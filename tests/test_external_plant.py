@@ -24,7 +24,7 @@ from cspm_msgs_py.schedule import (
 )
 
 load_ros()
-pytestmark = pytest.mark.slow
+pytestmark = [pytest.mark.slow, pytest.mark.alone]
 
 MS = 1_000_000
 MEASURED = (FRAME_POSE, BAR_POSE, WINCH_STATE, TENSION)

@@ -19,7 +19,7 @@ load_ros()
 from cspm_bringup.graph_run import run_graph  # noqa: E402
 from cspm_bringup.process_run import run_processes  # noqa: E402
 
-pytestmark = [pytest.mark.compiled, pytest.mark.slow]
+pytestmark = [pytest.mark.compiled, pytest.mark.slow, pytest.mark.alone]
 
 STRANGER = Path(__file__).resolve().with_name("hostile_stranger.py")
 STEPS = 600

@@ -21,7 +21,7 @@ from cspm_msgs_py.recording.recover import recover
 
 load_ros()
 
-pytestmark = [pytest.mark.compiled, pytest.mark.slow]
+pytestmark = [pytest.mark.compiled, pytest.mark.slow, pytest.mark.alone]
 
 ON_BOARD = ("plant", "recorder")
 ASHORE = ("wave_trajectory", "motion_controller", "tension_distribution", "force_controller")

@@ -122,7 +122,7 @@ def told(capfd, monkeypatch, name, *args):
     return code, err
 
 
-NO_SUCH_SCENARIO = "nothing: no such scenario, allowed: calm, one_winch, "
+NO_SUCH_SCENARIO = "nothing: no such scenario, allowed: calm, "
 
 
 @pytest.mark.parametrize(
@@ -257,6 +257,7 @@ def present(session, names):
 
 
 @pytest.mark.slow
+@pytest.mark.alone
 @pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM])
 def test_a_signal_ends_every_node_that_waits(tmp_path, number):
     """The plant waits for somebody who never comes; the others for it."""
@@ -278,6 +279,7 @@ def test_a_signal_ends_every_node_that_waits(tmp_path, number):
 
 
 @pytest.mark.slow
+@pytest.mark.alone
 @pytest.mark.parametrize(
     ("first", "number"),
     [

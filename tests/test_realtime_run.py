@@ -25,7 +25,7 @@ from cspm_msgs_py.recording import Recording, overview
 from cspm_msgs_py.schedule import FORCE_CONTROLLER, PLANT, TENSION, TORQUE_COMMAND
 
 load_ros()
-pytestmark = pytest.mark.slow
+pytestmark = [pytest.mark.slow, pytest.mark.alone]
 
 CSPM = [sys.executable, "-c", "from cspm_bringup.cli import main; main()"]
 MS = 1_000_000

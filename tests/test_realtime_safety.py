@@ -37,7 +37,7 @@ from cspm_msgs_py.schedule import (
 from cspm_sim.safe_state import balancing_tensions
 
 load_ros()
-pytestmark = pytest.mark.slow
+pytestmark = [pytest.mark.slow, pytest.mark.alone]
 
 MS = 1_000_000
 PERIOD = 5 * MS

@@ -233,16 +233,17 @@ class Run:
 @pytest.mark.slow
 @pytest.mark.compiled
 @pytest.mark.parametrize(
-    ("name", "plant"), [("worst_case", "sim"), ("calm", "sim"), ("worst_case", "mujoco")]
+    ("name", "plant", "trips"),
+    [("worst_case", "sim", 4), ("calm", "sim", 3), ("worst_case", "mujoco", 1)],
 )
-def test_hold_keeps_the_bar_and_a_reset_takes_it_up_again(name, plant):
+def test_hold_keeps_the_bar_and_a_reset_takes_it_up_again(name, plant, trips):
     """At random instants of the run: neither down nor up by 0.1 m, no cable slack or overloaded."""
     if plant == "mujoco":
         pytest.importorskip("mujoco", minversion="4.0", reason="the MuJoCo plant needs MuJoCo 4")
     run = Run(name, plant=plant)
     run.go(12_000)
     rng = np.random.default_rng(1)
-    for _ in range(4):
+    for _ in range(trips):
         run.go(int(rng.integers(2000, 4000)))
         heave, tensions = run.trip(5000)
         assert np.abs(heave).max() < 0.1

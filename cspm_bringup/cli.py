@@ -67,6 +67,8 @@ cspm run my_scenario.yaml --seed 2 --no-record --json result.json
 
 cspm run worst_case --set sensors=ideal --set rates.motion_controller=100
 
+cspm run calm --testbed fitted/fitted_testbed.yaml
+
 cspm run calm --mode graph
 
 cspm run calm --mode realtime --plant external
@@ -94,6 +96,13 @@ def run(
             " MuJoCo engine; or external, nobody's: your drivers take the plant's place.",
         ),
     ] = "sim",
+    testbed: Annotated[
+        Path | None,
+        typer.Option(
+            metavar="FILE",
+            help="The machine to simulate, such as one that was fitted, instead of the scenario's.",
+        ),
+    ] = None,
     duration: Annotated[
         float | None,
         typer.Option(metavar="SECONDS", help="Simulated time, instead of the scenario's."),
@@ -142,5 +151,5 @@ def run(
     folder = out if out is not None else new_folder(Path(scenario).stem)
     path = find_scenario(scenario)
     place = folder if record else None
-    finished = run_command(path, [*(overrides or []), *settings], place, json, plant, mode)
+    finished = run_command(path, [*(overrides or []), *settings], place, json, plant, mode, testbed)
     raise typer.Exit(0 if finished else RUN_FAILED)

@@ -1,4 +1,4 @@
-"""Commands that identify parameters from recordings: identify stiffness, identify damping."""
+"""Commands that identify parameters from recordings: identify stiffness, damping, system."""
 
 from __future__ import annotations
 
@@ -12,6 +12,7 @@ from cspm_msgs_py.errors import InputError
 
 if TYPE_CHECKING:
     from cspm_bringup.identify_rig import RigRequest
+    from cspm_ident.estimation import Prior
 
 identify = typer.Typer(
     no_args_is_help=True,
@@ -176,3 +177,106 @@ def damping(
         recordings, testbed, cables, verify, into, into_cables, cutoff, out, stiffness_file
     )
     identify_damping_command(asked, json)
+
+
+@identify.command(
+    epilog="""Examples:
+
+cspm run factor_six_mid --out mid
+
+cspm identify system mid --fit bar.mass,axial_damping,bar_damping.surge --out fitted
+
+cspm identify system short long --held-out mid --prior bar.mass=4.1±0.2 --freeze bar.inertia=1.1
+
+cspm run calm --testbed fitted/fitted_testbed.yaml""",
+)
+def system(
+    recordings: Annotated[
+        list[Path],
+        typer.Argument(
+            metavar="BAG…",
+            help="Recordings of one machine with bar: poses of bar and winch frame, motor angles"
+            " and, better, tensions; several lengths tell more.",
+        ),
+    ],
+    testbed: MachineFile = None,
+    fit: Annotated[
+        str | None,
+        typer.Option(
+            metavar="NAME,NAME",
+            help="What to fit; a wrong name lists all. Usually mass, centre of mass along the bar,"
+            " inertia, stiffness, damping along and across the cables, damping of the roll.",
+        ),
+    ] = None,
+    freeze: Annotated[
+        list[str] | None,
+        typer.Option(metavar="NAME[=VALUE]", help="Keeps its value, or that one; repeatable."),
+    ] = None,
+    prior: Annotated[
+        list[str] | None,
+        typer.Option(
+            metavar="NAME=MEAN±SD",
+            help="What a datasheet or a scale says, with its standard"
+            " deviation; MEAN+-SD works as well; repeatable.",
+        ),
+    ] = None,
+    horizon: Annotated[
+        float | None,
+        typer.Option(metavar="S", help="Length of the windows, otherwise 4 s."),
+    ] = None,
+    held_out: Annotated[
+        list[Path] | None,
+        typer.Option("--held-out", metavar="BAG", help="Judges without being fitted; repeatable."),
+    ] = None,
+    profile: Annotated[
+        list[str] | None,
+        typer.Option(
+            metavar="NAME", help="Also its profile likelihood, which is slow; repeatable."
+        ),
+    ] = None,
+    out: Annotated[
+        Path | None,
+        typer.Option(metavar="FOLDER", help="A new folder for picture and fitted test-bed file."),
+    ] = None,
+    json: Json = None,
+) -> None:
+    """Identify bar, cables and damping of a whole machine from its motion.
+
+    Windows of each recording are simulated from measured motor angles and the frame's pose, and
+    compared with the bar's pose and the tensions.
+    """
+    from cspm_bringup.identify_system_command import SystemRequest, identify_system_command
+
+    asked = SystemRequest(
+        recordings=tuple(recordings),
+        held_out=tuple(held_out or ()),
+        testbed=testbed,
+        names=_names("--fit", fit),
+        frozen=dict(_frozen(text) for text in freeze or ()),
+        priors=dict(_prior(text) for text in prior or ()),
+        profiled=tuple(profile or ()),
+        horizon=horizon,
+        out=out,
+    )
+    identify_system_command(asked, json)
+
+
+def _frozen(text: str) -> tuple[str, float | None]:
+    name, equals, value = text.partition("=")
+    return name, _number("--freeze", text, value) if equals else None
+
+
+def _prior(text: str) -> tuple[str, Prior]:
+    from cspm_ident.estimation import Prior
+
+    name, _, rest = text.partition("=")
+    mean, _, deviation = rest.replace("+-", "±").partition("±")
+    return name, Prior(_number("--prior", text, mean), _number("--prior", text, deviation))
+
+
+def _number(option: str, text: str, part: str) -> float:
+    try:
+        return float(part)
+    except ValueError:
+        form = "NAME=MEAN±SD" if option == "--prior" else "NAME or NAME=VALUE"
+        raise InputError(f"{option} {text}: allowed: {form}") from None

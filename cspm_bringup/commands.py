@@ -40,15 +40,25 @@ def run_command(
     json: Path | None,
     plant: str = SIM,
     mode: str = INPROCESS,
+    machine: Path | None = None,
 ) -> bool:
     """Run a scenario file, show the result, and return whether it ran to its end.
+
+    Args:
+        path: the scenario.
+        overrides: of its values, `KEY=VALUE`.
+        folder: a new one for the recording; None records nothing.
+        json: where to write what is printed.
+        plant: whose equations to simulate.
+        mode: how to run.
+        machine: a test-bed file instead of the scenario's.
 
     Raises:
         CspmError: it diverged, or a node failed; what was recorded and drawn up to then is kept.
     """
     console = Console()
     scenario = load_scenario(path, overrides)
-    testbed_path = path.parent / scenario.testbed
+    testbed_path = machine or path.parent / scenario.testbed
     testbed = load_testbed(testbed_path)
     _check_effects(testbed, testbed_path)
     bundle = make_bundle(resolve(scenario, testbed.testbed), testbed, path.parent)

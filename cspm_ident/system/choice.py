@@ -193,9 +193,7 @@ def _present(testbed: Testbed, place: EffectPlace) -> float:
     return absent_values(place.effect)[place.parameter]
 
 
-def same_place(
-    testbed: Testbed, place: EffectPlace, effect: str, elements: Iterable[str]
-) -> bool:
+def same_place(testbed: Testbed, place: EffectPlace, effect: str, elements: Iterable[str]) -> bool:
     """Return whether an entry is that of a place: the same effect on the same elements."""
     if effect != place.effect:
         return False

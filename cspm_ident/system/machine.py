@@ -4,6 +4,9 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 
+import numpy as np
+from numpy.typing import NDArray
+
 from cspm_ident.system.choice import (
     AXES,
     MOMENTS,
@@ -15,10 +18,14 @@ from cspm_ident.system.choice import (
 )
 from cspm_msgs_py.testbed import Bar, EffectEntry, Testbed
 
+Array = NDArray[np.float64]
+
 _PRODUCTS = ("ixy", "ixz", "iyz")
 
 
-def machine_with(testbed: Testbed, chosen: Sequence[Chosen], values: Sequence[float]) -> Testbed:
+def machine_with(
+    testbed: Testbed, chosen: Sequence[Chosen], values: Sequence[float] | Array
+) -> Testbed:
     """Return the machine with these values, in the order of `chosen`.
 
     A tensor of inertia that no body has is not refused here, so that a search may pass through it.
@@ -64,6 +71,4 @@ def _put_effect(
             effects[i] = entry.model_copy(update={"parameters": parameters})
             return
     parameters = {**absent_values(place.effect), place.parameter: value}
-    effects.append(
-        EffectEntry(effect=place.effect, elements=place.elements, parameters=parameters)
-    )
+    effects.append(EffectEntry(effect=place.effect, elements=place.elements, parameters=parameters))

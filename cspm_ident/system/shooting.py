@@ -22,6 +22,8 @@ _BLOCK = 10
 # Of the initial states: position, angles, velocity, ω, unstretched lengths.
 _STEPS = np.array([1e-6] * 6 + [1e-5] * 6)
 _LENGTH_STEP = 1e-8
+# With fewer segments of a spectrum noise passes for motion, and dampers of the cables see it.
+_SHORTEST = 12.0  # s
 # A residual where the simulation diverged, in standard deviations of the sensor.
 _DIVERGED = 1e4
 # Directions of the initial state that the window sees less than this share of the best.
@@ -83,9 +85,7 @@ class Shooting:
         self.starts, self.spans = kept.copy(), []
         for i, part in enumerate(base):
             target = self._row(part)
-            slopes = [
-                (self._row(c[i]) - target) / s for c, s in zip(columns, steps, strict=True)
-            ]
+            slopes = [(self._row(c[i]) - target) / s for c, s in zip(columns, steps, strict=True)]
             span, change = _solved(np.stack(slopes, axis=1), target)
             self.spans.append(span)
             self.starts[i] -= change
@@ -125,9 +125,14 @@ def make_shooting(measurement: Measurement, horizon: float, most_windows: int) -
         most_windows: so many, spread evenly, where there are more.
 
     Raises:
-        InputError: a sensor is missing, or no window is long enough.
+        InputError: a sensor is missing, the recording is short, or no window is long enough.
     """
     line = Timeline(measurement)
+    if line.times[-1] - line.times[0] < _SHORTEST:
+        raise InputError(
+            f"{measurement.path}: {line.times[-1] - line.times[0]:.1f} s, allowed: at least"
+            f" {_SHORTEST:g} s, from which motion can be told from the noise of its sensors"
+        )
     simulation = BlockSimulation(line, measurement.machine)
     simulation.check(Drive.WINCH)
     least = 0.5 * horizon / line.period

@@ -1,0 +1,258 @@
+"""Output error of bar pose and tensions over windows of several recordings."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.optimize import least_squares
+
+from cspm_ident.estimation import Profile, Solution, find_profile, fit
+from cspm_ident.estimation.estimate import Interval
+from cspm_ident.estimation.parameter import free_indices, prior_rows, scales
+from cspm_ident.estimation.problem import Problem
+from cspm_ident.signals.measurement import Measurement
+from cspm_ident.system.choice import Chosen
+from cspm_ident.system.judgement import Judgement, judge
+from cspm_ident.system.machine import machine_with
+from cspm_ident.system.shooting import Shooting, make_shooting
+from cspm_msgs_py.errors import InputError
+from cspm_msgs_py.testbed import Testbed
+
+Array = NDArray[np.float64]
+Progress = Callable[[str], None]
+
+HORIZON = 4.0  # s
+MOST_WINDOWS = 12
+# The initial states are free to first order only, so they are found anew for better parameters.
+_MOST_PASSES = 8
+_EVALUATIONS = 3  # of a pass
+_STILL = 1e-3  # scales
+_ROUNDS = 1
+# Of a scale: below it rounding of the simulation shows in the differences.
+_STEP = 1e-4
+
+
+@dataclass(frozen=True, eq=False)
+class SystemResult:
+    """A machine identified from recordings.
+
+    Attributes:
+        chosen: what was fitted.
+        solution: values, intervals, directions that were not excited.
+        machine: the one that was found.
+        horizon: of the windows [s].
+        windows: how many of each recording were used.
+        searched: recordings that were fitted, in order.
+        judgements: how well both machines predict each recording, searched first, then held out.
+        profiles: those asked for.
+        settled: whether parameters and initial states came to stand still.
+    """
+
+    chosen: tuple[Chosen, ...]
+    solution: Solution
+    machine: Testbed
+    horizon: float
+    windows: tuple[int, ...]
+    searched: tuple[Measurement, ...]
+    judgements: tuple[Judgement, ...]
+    profiles: tuple[Profile, ...]
+    settled: bool
+
+    def data(self) -> dict[str, Any]:
+        """Return everything as plain data for JSON."""
+        return {
+            "recordings": [{"path": str(m.path), "sha256": m.sha256} for m in self.searched],
+            "horizon_s": self.horizon,
+            "windows": list(self.windows),
+            "settled": self.settled,
+            "nominal": {each.name: each.nominal for each in self.chosen},
+            "estimate": self.solution.estimate.data(),
+            "judgements": [each.data() for each in self.judgements],
+            "profiles": [
+                {
+                    "name": p.name,
+                    "ci95": [end if np.isfinite(end) else None for end in p.ci95],
+                    "values": p.values.tolist(),
+                    "deviance": p.deviance.tolist(),
+                    "threshold": p.threshold,
+                }
+                for p in self.profiles
+            ],
+        }
+
+
+def identify_system(
+    searched: Sequence[Measurement],
+    chosen: Sequence[Chosen],
+    *,
+    held_out: Sequence[Measurement] = (),
+    profiled: Sequence[str] = (),
+    horizon: float = HORIZON,
+    most_windows: int = MOST_WINDOWS,
+    progress: Progress = lambda _: None,
+) -> SystemResult:
+    """Fit a machine's numbers to recordings and judge what was found.
+
+    Bar and cables are simulated window by window from measured motor angles and frame pose. Each
+    window's initial state is free: its effect on the residuals is projected out to first order
+    (variable projection, Golub and Pereyra 1973), about the best known state.
+
+    Args:
+        searched: to fit, at least one, all of one machine.
+        chosen: what to fit, as from `choose` for that machine.
+        held_out: to judge only.
+        profiled: parameters whose profile likelihood is wanted.
+        horizon: length of a window [s].
+        most_windows: of each recording, evenly spread.
+        progress: called with what is being done.
+
+    Raises:
+        InputError: no recording, a sensor or a long enough window is missing, nothing is free, or
+            a recording is both searched and held out.
+    """
+    _check(searched, held_out, horizon)
+    machine = searched[0].machine
+    progress("signals")
+    shootings = [make_shooting(each, horizon, most_windows) for each in searched]
+    theta = np.array([each.nominal for each in chosen])
+    problem = make_problem(machine, chosen, shootings)
+    theta, settled = _search(problem, machine, chosen, shootings, theta, progress)
+    progress("intervals")
+    # Whitened, what the noise on the frame's pose does to the tensions would outweigh the rest.
+    solution = fit(
+        problem, list(theta), whiten=False, interval=Interval.SANDWICH, iterations=_ROUNDS
+    )
+    profiles = []
+    for name in profiled:
+        progress(f"profile of {name}")
+        profiles.append(find_profile(problem, solution, name))
+    found = machine_with(machine, chosen, solution.estimate.values)
+    return SystemResult(
+        tuple(chosen),
+        solution,
+        found,
+        horizon,
+        tuple(len(shooting.windows) for shooting in shootings),
+        tuple(searched),
+        _judged(searched, held_out, {"nominal": machine, "fitted": found}, progress),
+        tuple(profiles),
+        settled,
+    )
+
+
+def _judged(
+    searched: Sequence[Measurement],
+    held_out: Sequence[Measurement],
+    machines: Mapping[str, Testbed],
+    progress: Progress,
+) -> tuple[Judgement, ...]:
+    found = []
+    for i, each in enumerate([*searched, *held_out]):
+        progress(f"prediction of {each.path.name}")
+        found.append(judge(each, machines, i >= len(searched)))
+    return tuple(found)
+
+
+def _search(
+    problem: Problem,
+    machine: Testbed,
+    chosen: Sequence[Chosen],
+    shootings: Sequence[Shooting],
+    theta: Array,
+    progress: Progress,
+) -> tuple[Array, bool]:
+    """Return where parameters and initial states stand still, and whether they came to.
+
+    Residuals are weighted by sensor noise.
+
+    No noise model is fitted on the way: what wrong parameters leave would pass for noise.
+    """
+    unit, free = scales(problem.parameters), free_indices(problem.parameters)
+    if not len(free):
+        raise InputError("identify system: nothing is free, allowed: at least one to be fitted")
+    nominal = theta
+    limits = np.array([(p.lower, p.upper) for p in problem.parameters])[free].T / unit[free]
+    for number in range(_MOST_PASSES):
+        progress(f"initial states and parameters, pass {number + 1}")
+        for shooting in shootings:
+            shooting.relinearise(machine_with(machine, chosen, theta))
+        before, theta = theta, _improved(problem, theta, nominal, limits)
+        if np.all(np.abs(theta - before) <= _STILL * unit):
+            return theta, True
+    return theta, False
+
+
+def _improved(problem: Problem, theta: Array, held: Array, limits: Array) -> Array:
+    unit, free = scales(problem.parameters), free_indices(problem.parameters)
+    where, means, deviations = prior_rows(problem.parameters)
+    # What nothing excites must not wander off on the way; what is excited hardly feels one scale.
+    where, means = np.concatenate([where, free]), np.concatenate([means, held[free]])
+    deviations = np.concatenate([deviations, unit[free]])
+
+    def whole(some: Array) -> Array:
+        moved = theta.copy()
+        moved[free] = some * unit[free]
+        return np.asarray(moved)
+
+    def residual(some: Array) -> Array:
+        values = whole(some)
+        parts = [part.ravel() for part in problem.residuals(values)]
+        return np.concatenate([*parts, (values[where] - means) / deviations])
+
+    def jacobian(some: Array) -> Array:
+        parts = [part.reshape(-1, len(free)) for part in problem.jacobians(whole(some))]
+        prior = np.zeros((len(where), len(free)))
+        prior[np.arange(len(where)), np.searchsorted(free, where)] = 1.0 / deviations
+        return np.asarray(np.concatenate([*parts, prior]) * unit[free])
+
+    start = theta[free] / unit[free]
+    found = least_squares(residual, start, jacobian, limits, max_nfev=_EVALUATIONS)
+    return whole(found.x)
+
+
+def make_problem(
+    machine: Testbed, chosen: Sequence[Chosen], shootings: Sequence[Shooting]
+) -> Problem:
+    """Return what is to be solved: per recording, window and kind of channel a residual."""
+
+    def residual(theta: Array) -> list[Array]:
+        moved = machine_with(machine, chosen, theta)
+        return [
+            part[kind]
+            for shooting in shootings
+            for part in shooting.residuals(moved)
+            for kind in shooting.kinds
+        ]
+
+    groups = [
+        f"{i} {kind}"
+        for i, shooting in enumerate(shootings)
+        for _ in shooting.windows
+        for kind in shooting.kinds
+    ]
+    return Problem(residual, [each.parameter for each in chosen], groups, step=_STEP)
+
+
+def _check(
+    searched: Sequence[Measurement], held_out: Sequence[Measurement], horizon: float
+) -> None:
+    if not searched:
+        raise InputError("identify system: no recording, allowed: one or more")
+    if not 0.1 <= horizon <= 60.0:
+        raise InputError(f"--horizon {horizon:g}: allowed: 0.1 to 60 s")
+    first = searched[0].machine
+    for each in [*searched[1:], *held_out]:
+        if each.machine != first:
+            raise InputError(
+                f"{each.path}: another test-bed than {searched[0].path}, allowed: recordings of"
+                " one machine, or --testbed FILE for all"
+            )
+    for each in held_out:
+        if each.sha256 in {other.sha256 for other in searched}:
+            raise InputError(
+                f"--held-out {each.path}: is fitted to as well, allowed: a recording that is not"
+            )

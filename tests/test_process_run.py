@@ -268,15 +268,16 @@ def test_a_node_that_is_killed_is_named(tmp_path, node):
 
 
 @pytest.mark.slow
+@pytest.mark.alone
 @pytest.mark.parametrize("node", NODES)
 def test_a_node_that_is_stopped_is_named(tmp_path, node):
     witness = Witness(lambda nodes: nodes[node].suspend())
     with pytest.raises(CspmError) as caught:
-        processes(LONG, tmp_path / "bag", witness, patience_s=3.0)
+        processes(LONG, tmp_path / "bag", witness, patience_s=8.0)
     others = "|".join(set(NODES) - {node})
     assert re.match(
         rf"no answer from {node}; (?:{others}) ended with exit code 1 before the run did: cspm:"
-        rf" nothing moved for 3 s: (?:{others}) waits for \S.*$",
+        rf" nothing moved for 8 s: (?:{others}) waits for \S.*$",
         str(caught.value),
     )
     assert gone(list(witness.nodes.values()), 0.0)

@@ -228,6 +228,9 @@ def test_listeners_that_cannot_be_served_do_not_keep_a_run_from_starting(tmp_pat
     assert_same(tmp_path / "inprocess", tmp_path / "graph")
 
 
+@pytest.mark.slow
+@pytest.mark.alone
+@pytest.mark.usefixtures("uncrowded")  # two seconds must do to find the other run
 @pytest.mark.parametrize(
     ("name", "topic"), [("plant", END), ("motion_controller", "/run/progress")]
 )

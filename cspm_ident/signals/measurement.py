@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass, replace
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -75,6 +76,11 @@ class Measurement:
     def duration(self) -> float:
         """Time of the last sample of all sensors [s]."""
         return max((float(s.times[-1]) for s in self.sensors.values()), default=0.0)
+
+    def with_samples(self, name: str, samples: Samples) -> Measurement:
+        """Return the same with other samples of one sensor, by attribute name."""
+        changed: dict[str, Any] = {name: samples}
+        return replace(self, **changed)
 
     def with_testbed(self, testbed: TestbedFile) -> Measurement:
         """Return the same, said to be of another description of the machine."""

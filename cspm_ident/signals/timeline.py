@@ -169,6 +169,22 @@ class Timeline:
         times = self.times + self._late("/winch_frame/pose")
         return _twists(self._frame.at(times), self._frame.at(times, 1))
 
+    def body_motion(self, body: str) -> tuple[Array, Array, Array]:
+        """Return pose x y z φ θ ψ, its rates and accelerations, each (k, 6); NaN in holes.
+
+        Args:
+            body: `bar` or `frame`; one that is not measured stands still at the world's origin.
+        """
+        topic, found = {
+            "bar": ("/bar/pose", self._bar),
+            "frame": ("/winch_frame/pose", self._frame),
+        }[body]
+        if found is None:
+            still = np.zeros((len(self.times), 6))
+            return still, still, still
+        times = self.times + self._late(topic)
+        return found.at(times), found.at(times, 1), found.at(times, 2)
+
     @property
     def angles(self) -> Array | None:
         """Motor angles, shape (k, n) [rad]."""

@@ -128,6 +128,7 @@ class Effect:
             that is no more than that.
         sense: what it does to a sensor's readings.
         elements: what it can act on; None: that which its block says.
+        plausible: whether parameters within their bounds go together; None: always.
     """
 
     id: str
@@ -149,6 +150,7 @@ class Effect:
     alter: Callable[[Testbed, int, Values], Testbed] | None = None
     sense: Sense | None = None
     elements: Elements | None = None
+    plausible: Callable[[Values], bool] | None = None
 
     @property
     def acts_on(self) -> Elements:
@@ -174,6 +176,11 @@ class Effect:
             for p, weight in zip(self._linear, weights, strict=True)
         }
         return {p.name: {**nonlinear, **found}[p.name] for p in self.parameters}
+
+    def is_plausible(self, values: Values) -> bool:
+        """Return whether values are such as the catalogue allows."""
+        within = all(p.minimum <= values[p.name] <= p.maximum for p in self.parameters)
+        return within and (self.plausible is None or self.plausible(values))
 
     def is_absent(self, values: Values) -> bool:
         """Return whether the effect does nothing with these parameters."""

@@ -18,6 +18,7 @@ from cspm_sim.effects.effect import (
     Hook,
     Regression,
 )
+from cspm_sim.effects.linear_response import linear_response
 from cspm_sim.effects.signals import FrameSignal
 from cspm_sim.kernels.affected_cables import FRAME_FORCE, FRAME_SHIFT, FRAME_SHIFT_RATE
 
@@ -45,14 +46,11 @@ def _rest(parameters: Array, signals: Array) -> Sequence[float]:
 
 def _columns(signals: Array, frequency: float, damping: float) -> Array:
     """Return what a frame adds that was at rest under the first sample's force."""
-    from scipy.signal import lsim
-
     omega = 2.0 * pi * frequency
     time = signals[:, FrameSignal.TIME]
     force = signals[:, FrameSignal.FORCE : FrameSignal.FORCE + 3]
-    system = ([omega**2], [1.0, 2.0 * damping * omega, omega**2])
-    change = (force - force[0]).T
-    shift = np.stack([lsim(system, column, time - time[0])[1] for column in change], -1)
+    denominator = (1.0, 2.0 * damping * omega, omega**2)
+    shift = linear_response((omega**2,), denominator, time, force - force[0])
     direction = signals[:, FrameSignal.DIRECTION : FrameSignal.DIRECTION + 3]
     shorter = np.sum(direction * shift, axis=1)
     return np.asarray((-signals[:, FrameSignal.STIFFNESS] * shorter)[:, None, None])

@@ -20,6 +20,7 @@ from cspm_sim.effects.effect import (
     Regression,
     Values,
 )
+from cspm_sim.effects.linear_response import linear_response
 from cspm_sim.effects.signals import BarSignal
 from cspm_sim.kernels.bar import VELOCITY, WRENCH
 from cspm_sim.kernels.bar_effects import FREE_ACCELERATION, MOBILITY, PENDANT_GRAVITY
@@ -69,17 +70,10 @@ def _columns(signals: Array, length: float, damping: float) -> Array:
     gravity = signals[0, BarSignal.GRAVITY]
     wrench = np.zeros((len(time), 6, 1))
     driven = -acceleration[:, :2] - damping * velocity[:, :2]
-    wrench[:, :2, 0] = gravity / length * _swing(time, driven, gravity / length, damping)
+    swung = linear_response((1.0,), (1.0, damping, gravity / length), time, driven)
+    wrench[:, :2, 0] = gravity / length * swung
     wrench[:, 2, 0] = gravity - acceleration[:, 2] - damping * velocity[:, 2]
     return wrench
-
-
-def _swing(time: Array, driven: Array, stiffness: float, damping: float) -> Array:
-    """Return x of ẍ + damping·ẋ + stiffness·x = driven, (samples, 2), from rest."""
-    from scipy.signal import lsim
-
-    system = ([1.0], [1.0, damping, stiffness])
-    return np.stack([lsim(system, column, time - time[0])[1] for column in driven.T], -1)
 
 
 def _weights(values: Values) -> tuple[float]:

@@ -14,7 +14,7 @@ from cspm_sim.effects.effect import (
     Sense,
 )
 from cspm_sim.effects.signals import PoseSignal
-from cspm_sim.kinematics import euler_rate_map, rotation
+from cspm_sim.kinematics import rotation
 
 
 def _reading(values: Array, element: int, parameters: Array) -> Array:
@@ -29,10 +29,17 @@ def _reading(values: Array, element: int, parameters: Array) -> Array:
 
 def _columns(signals: Array) -> Array:
     """Return the first order of the offset."""
+    from scipy.spatial.transform import Rotation
+
+    angles = signals[:, PoseSignal.POSE + 3 : PoseSignal.POSE + 6]
+    (sine, _, _), (cosine, level, _) = np.sin(angles).T, np.cos(angles).T
+    steep = np.tan(angles[:, 1])
     out = np.zeros((len(signals), 6, 6))
-    for k, pose in enumerate(signals[:, PoseSignal.POSE : PoseSignal.POSE + 6]):
-        out[k, :3, :3] = rotation(pose)
-        out[k, 3:, 3:] = np.linalg.inv(euler_rate_map(pose)) @ rotation(pose)
+    out[:, :3, :3] = Rotation.from_euler("ZYX", angles[:, ::-1]).as_matrix()
+    # From ω in body axes to Euler rates.
+    out[:, 3, 3], out[:, 3, 4], out[:, 3, 5] = 1.0, sine * steep, cosine * steep
+    out[:, 4, 4], out[:, 4, 5] = cosine, -sine
+    out[:, 5, 4], out[:, 5, 5] = sine / level, cosine / level
     return out
 
 

@@ -12,6 +12,7 @@ from cspm_sim.effects.effect import (
     EffectParameter,
     Hook,
     Regression,
+    Values,
 )
 from cspm_sim.effects.signals import WinchSignal
 from cspm_sim.kernels.winch import DRY_LIMIT, SPEED
@@ -29,6 +30,10 @@ def _columns(signals: Array, stribeck_speed: float) -> Array:
     return np.asarray(np.sign(speed)[:, None] * np.stack([near_rest, 1.0 - near_rest], -1))[:, None]
 
 
+def _falls(values: Values) -> bool:
+    return values["breakaway_torque"] >= values["coulomb_torque"]
+
+
 EFFECT = Effect(
     id="winch_stribeck_friction",
     block=Block.WINCH,
@@ -40,6 +45,7 @@ EFFECT = Effect(
     kernels={Hook.WINCH: _kernel},
     regression=Regression(Channel.SHAFT, _columns),
     nonlinear={"stribeck_speed": (0.03, 0.1, 0.3, 1.0, 3.0, 10.0)},
+    plausible=_falls,
     equation=(
         "resisting torque = (coulomb + (breakaway − coulomb)·exp(−(q̇/stribeck_speed)²))·sign(q̇);"
         " at q̇ = 0 whatever holds, up to breakaway"

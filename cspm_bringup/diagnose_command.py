@@ -1,0 +1,135 @@
+"""What `cspm diagnose` does."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from pathlib import Path
+
+from rich import box
+from rich.console import Console
+from rich.table import Table
+
+from cspm_bringup.summary import write_json
+from cspm_ident.diagnosis.diagnose import Diagnosis, diagnose
+from cspm_ident.diagnosis.improved_file import improved_testbed
+from cspm_ident.diagnosis.verdict import (
+    IMPROVED,
+    channel_of,
+    diagnosis_data,
+    statement_of,
+    unit_of,
+    unknown_statement,
+    verdict_of,
+)
+from cspm_ident.signals.measurement import read_measurement
+from cspm_msgs_py.errors import InputError
+
+REPORT = "diagnosis.json"
+
+
+@dataclass(frozen=True)
+class DiagnoseRequest:
+    """What was asked for.
+
+    Attributes:
+        recordings: in which to look.
+        held_out: on which to judge; none: the last part of each recording.
+        testbed: the machine as it is believed to be, instead of the recorded one.
+        out: a new folder for what is written; None: nothing is.
+    """
+
+    recordings: Sequence[Path]
+    held_out: Sequence[Path]
+    testbed: Path | None
+    out: Path | None
+
+
+def diagnose_command(asked: DiagnoseRequest, json: Path | None) -> None:
+    """Diagnose, print, and write what was asked for.
+
+    Raises:
+        InputError: naming what is wrong in recordings, test-bed or options.
+    """
+    console = Console()
+    if asked.out is not None and asked.out.exists():
+        raise InputError(f"{asked.out}: exists, allowed: a new folder")
+    twice = set(asked.recordings) & set(asked.held_out)
+    if twice:
+        raise InputError(
+            f"--held-out {twice.pop()}: is searched as well, allowed: recordings that are not"
+        )
+    with console.status("reading") as status:
+        searched = [read_measurement(path, asked.testbed) for path in asked.recordings]
+        held_out = [read_measurement(path, asked.testbed) for path in asked.held_out]
+        found = diagnose(searched, held_out, status.update)
+    print_diagnosis(console, found)
+    data = diagnosis_data(found)
+    if asked.out is not None:
+        _write(asked.out, found, data)
+        console.print(f"written {asked.out}", soft_wrap=True, highlight=False)
+    if json is not None:
+        write_json(json, data)
+
+
+def explain_command(name: str) -> None:
+    """Print what an effect is, how it shows and what it is confused with.
+
+    Raises:
+        InputError: no such effect.
+    """
+    from rich.markdown import Markdown
+
+    from cspm_sim.effects import catalogue
+    from cspm_sim.effects.document import effect_section
+
+    effects = catalogue()
+    if name not in effects:
+        raise InputError(f"--explain {name}: allowed: {', '.join(effects)}")
+    Console().print(Markdown(effect_section(effects[name])))
+
+
+def print_diagnosis(console: Console, found: Diagnosis) -> None:
+    """Print verdict, findings and how the fit changes on data that was not searched."""
+    console.print(f"verdict: [bold]{verdict_of(found).value}[/]")
+    for named in found.findings.named:
+        console.print(f"• {statement_of(found, named)}", soft_wrap=True, highlight=False)
+        for rival, _ in named.alternatives:
+            console.print(
+                f"  as well explained by {rival.effect.id} on {', '.join(rival.elements)};"
+                f" to tell: {rival.effect.separating_experiment}",
+                soft_wrap=True,
+                highlight=False,
+            )
+    for driver, _, share in found.findings.unknown:
+        console.print(f"• {unknown_statement(driver, share)}", soft_wrap=True, highlight=False)
+    for named in found.rejected:
+        console.print(
+            f"not kept: {named.hypothesis.effect.id} on {', '.join(named.hypothesis.elements)}"
+            " did not help on held-out data",
+            soft_wrap=True,
+            highlight=False,
+        )
+    console.print(_fit_table(found))
+    silent = ", ".join(name for name, _ in found.silent)
+    if silent:
+        console.print(f"not testable here: {silent}", soft_wrap=True, highlight=False)
+
+
+def _fit_table(found: Diagnosis) -> Table:
+    judged = "held-out recordings" if found.held_out else "the last part, not searched"
+    table = Table(title=f"root mean square residual, {judged}", box=box.SIMPLE_HEAD)
+    for heading in ("residual", "before", "re-tuned", "after", "noise", "unit"):
+        table.add_column(heading, justify="left" if heading in ("residual", "unit") else "right")
+    for fit in found.fit:
+        numbers = (fit.before, fit.retuned, fit.after, fit.noise)
+        table.add_row(channel_of(fit), *(f"{number:.3g}" for number in numbers), unit_of(fit))
+    return table
+
+
+def _write(folder: Path, found: Diagnosis, data: dict[str, object]) -> None:
+    folder.mkdir(parents=True)
+    write_json(folder / REPORT, data)
+    if found.findings.named:
+        improved = improved_testbed(found, str(folder / IMPROVED))
+        (folder / IMPROVED).write_text(improved.text, encoding="utf-8")

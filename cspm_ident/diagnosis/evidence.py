@@ -1,0 +1,193 @@
+"""Sums of products of residuals and columns over blocks of time: all that selection needs.
+
+Every least-squares fit, its errors under coloured residuals and its cross-validation follow from
+them, so that hundreds of hypotheses cost no second look at the signals.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from cspm_ident.diagnosis.columns import Candidate, Place
+from cspm_ident.diagnosis.drivers import Driver
+from cspm_ident.diagnosis.equation import Equation
+
+Array = NDArray[np.float64]
+Index = NDArray[np.intp]
+
+
+class PlaceEvidence(NamedTuple):
+    """One residual's sums.
+
+    Attributes:
+        place: which.
+        columns: indices of the columns that enter, ascending, shape (m,).
+        grams: Σ [columns, y]ᵀ[columns, y] per block, shape (blocks, m + 1, m + 1).
+        whole: their sum over the blocks.
+        rows: samples times channels per block, shape (blocks,).
+    """
+
+    place: Place
+    columns: Index
+    grams: Array
+    whole: Array
+    rows: Array
+
+
+@dataclass(frozen=True, eq=False)
+class Evidence:
+    """All residuals of one or several recordings.
+
+    Attributes:
+        slices: the columns of each candidate and driver.
+        width: number of columns.
+        nuisance: indices of the columns that are always fitted.
+        places: the residuals.
+        times: of the blocks' beginnings [s], shape (blocks,).
+        recording: index of each block's recording, shape (blocks,).
+    """
+
+    slices: dict[Candidate | Driver, slice]
+    width: int
+    nuisance: Index
+    places: tuple[PlaceEvidence, ...]
+    times: Array
+    recording: NDArray[np.intp]
+
+    @property
+    def terms(self) -> tuple[Candidate | Driver, ...]:
+        """Everything that has columns."""
+        return tuple(self.slices)
+
+    def left(self, columns: Index, weights: Array) -> dict[Place, float]:
+        """Return Σ residual² of each place for some columns' weights."""
+        found = {}
+        full = np.zeros(self.width)
+        full[columns] = weights
+        for place in self.places:
+            vector = np.append(full[place.columns], -1.0)
+            found[place.place] = float(vector @ place.whole @ vector)
+        return found
+
+    def left_with(self, weights: Mapping[Candidate, Array]) -> dict[Place, float]:
+        """Return Σ residual² of each place for given weights, its own nuisance fitted."""
+        found = {}
+        full = np.zeros(self.width)
+        for term, values in weights.items():
+            if term in self.slices:
+                full[self.slices[term]] = values
+        for place in self.places:
+            free = np.isin(place.columns, self.nuisance)
+            vector = np.append(full[place.columns], -1.0)
+            left = float(vector @ place.whole @ vector)
+            if free.any():
+                inside = np.append(free, False)
+                own = place.whole[np.ix_(inside, inside)]
+                cross = place.whole[inside] @ vector
+                left -= float(cross @ np.linalg.pinv(own, hermitian=True) @ cross)
+            found[place.place] = left
+        return found
+
+    @property
+    def blocks(self) -> int:
+        """Number of blocks."""
+        return len(self.times)
+
+
+def gather(recordings: Sequence[Sequence[Equation]], block_s: float) -> Evidence:
+    """Return the sums of all equations, in blocks of `block_s` seconds.
+
+    Args:
+        recordings: the equations of each.
+        block_s: longer than the residuals remember.
+    """
+    equations = [(r, e) for r, each in enumerate(recordings) for e in each]
+    slices, width = _registry([e for _, e in equations])
+    edges, recording = _blocks(equations, block_s)
+    first = width
+    nuisance: list[int] = []
+    places: dict[Place, list[tuple[int, Equation, list[int]]]] = {}
+    for r, equation in equations:
+        own = list(range(first, first + equation.nuisance.shape[2]))
+        first += len(own)
+        nuisance += own
+        places.setdefault(equation.place, []).append((r, equation, own))
+    gathered = tuple(
+        _of_place(place, parts, slices, edges, recording) for place, parts in places.items()
+    )
+    return Evidence(slices, first, np.array(nuisance, dtype=np.intp), gathered, edges, recording)
+
+
+def _registry(equations: Sequence[Equation]) -> tuple[dict[Candidate | Driver, slice], int]:
+    slices: dict[Candidate | Driver, slice] = {}
+    width = 0
+    for equation in equations:
+        for candidate, columns in equation.columns.items():
+            if candidate not in slices:
+                slices[candidate] = slice(width, width + columns.shape[2])
+                width += columns.shape[2]
+    return slices, width
+
+
+def _blocks(
+    equations: Sequence[tuple[int, Equation]], block_s: float
+) -> tuple[Array, NDArray[np.intp]]:
+    times, recording = [], []
+    for r in sorted({r for r, _ in equations}):
+        ends = [(e.times[0], e.times[-1]) for k, e in equations if k == r and len(e.times)]
+        start, end = min(a for a, _ in ends), max(b for _, b in ends)
+        count = max(1, round((end - start) / block_s))
+        times.append(start + (end - start) / count * np.arange(count))
+        recording.append(np.full(count, r, dtype=np.intp))
+    return np.concatenate(times), np.concatenate(recording)
+
+
+def _of_place(
+    place: Place,
+    parts: Sequence[tuple[int, Equation, list[int]]],
+    slices: dict[Candidate | Driver, slice],
+    edges: Array,
+    recording: NDArray[np.intp],
+) -> PlaceEvidence:
+    used: dict[int, int] = {}
+    for _, equation, own in parts:
+        for index in own:
+            used.setdefault(index, 0)
+        for candidate in equation.columns:
+            for index in range(*slices[candidate].indices(1 << 30)):
+                used.setdefault(index, 0)
+    columns = np.array(sorted(used), dtype=np.intp)
+    where = {int(index): k for k, index in enumerate(columns)}
+    grams = np.zeros((len(edges), len(columns) + 1, len(columns) + 1))
+    rows = np.zeros(len(edges))
+    for r, equation, own in parts:
+        table = _table(equation, own, slices, where)
+        blocks = np.flatnonzero(recording == r)
+        home = blocks[np.searchsorted(edges[blocks], equation.times, side="right") - 1]
+        for block in np.unique(home):
+            part = table[home == block].reshape(-1, table.shape[2])
+            grams[block] += part.T @ part
+            rows[block] += len(part)
+    return PlaceEvidence(place, columns, grams, grams.sum(axis=0), rows)
+
+
+def _table(
+    equation: Equation,
+    own: Sequence[int],
+    slices: dict[Candidate | Driver, slice],
+    where: dict[int, int],
+) -> Array:
+    """Return columns and y side by side, shape (rows, channels, m + 1)."""
+    table = np.zeros((*equation.target.shape, len(where) + 1))
+    table[:, :, -1] = equation.target
+    for k, index in enumerate(own):
+        table[:, :, where[index]] = equation.nuisance[:, :, k]
+    for candidate, columns in equation.columns.items():
+        first = where[slices[candidate].start]
+        table[:, :, first : first + columns.shape[2]] = columns
+    return table

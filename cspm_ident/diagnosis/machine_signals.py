@@ -1,0 +1,183 @@
+"""A machine's measured state on common steps, and what sensor faults change of it."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.interpolate import CubicSpline
+from scipy.spatial.transform import Rotation
+
+from cspm_sim.kernels.cable_law import law_tensions
+from cspm_sim.kernels.plant import PlantParameters
+
+Array = NDArray[np.float64]
+
+
+class BodyMotion(NamedTuple):
+    """A body's motion; poses x y z φ θ ψ in world_ned, all shape (k, 6).
+
+    Attributes:
+        poses: [m, rad].
+        rates: of the poses' coordinates.
+        accelerations: of the poses' coordinates.
+    """
+
+    poses: Array
+    rates: Array
+    accelerations: Array
+
+    def moved(self, change: Array, times: Array, step: float) -> BodyMotion:
+        """Return the motion with `step`·change (k, 6) added to its poses, derivatives alike."""
+        spline = CubicSpline(times, change)
+        return BodyMotion(
+            self.poses + step * change,
+            self.rates + step * spline(times, 1),
+            self.accelerations + step * spline(times, 2),
+        )
+
+
+@dataclass(frozen=True, eq=False)
+class MachineSignals:
+    """What was measured of a whole machine, at equal steps.
+
+    Attributes:
+        times: shape (k,) [s].
+        frame: the winch frame's motion.
+        bar: the bar's.
+        angles, speeds: of the motors, shape (k, n) [rad, rad/s].
+        tensions: shape (k, n) [N].
+    """
+
+    times: Array
+    frame: BodyMotion
+    bar: BodyMotion
+    angles: Array
+    speeds: Array
+    tensions: Array
+
+    @property
+    def step(self) -> float:
+        """The time between two steps [s]."""
+        return float(self.times[1] - self.times[0])
+
+    def with_pose_change(self, body: str, change: Array, step: float) -> MachineSignals:
+        """Return the signals with `step`·change (k, 6) added to the pose of `bar` or `frame`."""
+        moved = getattr(self, body).moved(change, self.times, step)
+        return replace(self, **{body: moved})
+
+
+class BodyState(NamedTuple):
+    """Kinematics of a body in world axes.
+
+    Attributes:
+        rotation: R_world_body, shape (k, 3, 3).
+        velocity: of its origin, (k, 3) [m/s].
+        omega: (k, 3) [rad/s].
+        acceleration: of its origin, (k, 3) [m/s²].
+        alpha: (k, 3) [rad/s²].
+    """
+
+    rotation: Array
+    velocity: Array
+    omega: Array
+    acceleration: Array
+    alpha: Array
+
+
+def body_state(motion: BodyMotion) -> BodyState:
+    """Return a body's kinematics from its Euler angles (2-3), (2-6) and their derivatives."""
+    angles, rates = motion.poses[:, 3:], motion.rates[:, 3:]
+    (_, cp, cy), (_, sp, sy) = np.cos(angles).T, np.sin(angles).T
+    zero, one = np.zeros(len(cp)), np.ones(len(cp))
+    carry = np.array([[cp * cy, -sy, zero], [cp * sy, cy, zero], [-sp, zero, one]])
+    pitch, yaw = rates[:, 1], rates[:, 2]
+    turning = np.array(
+        [
+            [-sp * pitch * cy - cp * sy * yaw, -cy * yaw, zero],
+            [-sp * pitch * sy + cp * cy * yaw, -sy * yaw, zero],
+            [-cp * pitch, zero, zero],
+        ]
+    )
+    accelerated = motion.accelerations[:, 3:]
+    return BodyState(
+        Rotation.from_euler("ZYX", angles[:, ::-1]).as_matrix(),
+        motion.rates[:, :3],
+        np.einsum("ijk,kj->ki", carry, rates),
+        motion.accelerations[:, :3],
+        np.einsum("ijk,kj->ki", carry, accelerated) + np.einsum("ijk,kj->ki", turning, rates),
+    )
+
+
+class CableSpans(NamedTuple):
+    """The cables between both bodies, world axes.
+
+    Attributes:
+        directions: from exit to attachment, (k, n, 3).
+        arms: from the bar's origin to the attachment, (k, n, 3) [m].
+        exits: from the frame's origin, in winch_frame_ned, (n, 3) [m].
+        velocities: of the attachment against the exit, (k, n, 3) [m/s].
+        lengths: (k, n) [m].
+        rates: (k, n) [m/s].
+    """
+
+    directions: Array
+    arms: Array
+    exits: Array
+    velocities: Array
+    lengths: Array
+    rates: Array
+
+
+def cable_spans(
+    signals: MachineSignals, bar: BodyState, frame: BodyState, exits: Array, attachments: Array
+) -> CableSpans:
+    """Return directions, lengths and rates, thesis (2-2), (2-5), (2-6).
+
+    Args:
+        signals: poses of both bodies.
+        bar: the bar's kinematics.
+        frame: the winch frame's.
+        exits: in winch_frame_ned, shape (n, 3) [m].
+        attachments: in bar_ned, shape (n, 3) [m].
+    """
+    arms = np.einsum("kij,nj->kni", bar.rotation, attachments)
+    roots = np.einsum("kij,nj->kni", frame.rotation, exits)
+    apart = (signals.bar.poses - signals.frame.poses)[:, None, :3] + arms - roots
+    lengths = np.linalg.norm(apart, axis=2)
+    directions = apart / lengths[:, :, None]
+    velocities = (
+        (bar.velocity - frame.velocity)[:, None]
+        + np.cross(bar.omega[:, None], arms)
+        - np.cross(frame.omega[:, None], roots)
+    )
+    rates = np.einsum("kni,kni->kn", directions, velocities)
+    return CableSpans(directions, arms, exits, velocities, lengths, rates)
+
+
+def law_at(parameters: PlantParameters, elongations: Array, elastic_lengths: Array) -> Array:
+    """Return elastic tension and tangent stiffness, shape (k, n, 2), thesis (3-7), (3-10)."""
+    out = np.empty((*elongations.shape, 2))
+    law_tensions(elongations, elastic_lengths, parameters.cables, parameters.tables, out)
+    return out
+
+
+def elongation_at(parameters: PlantParameters, tensions: Array, elastic_lengths: Array) -> Array:
+    """Return the elongation at which cables carry elastic tensions, (k, n) [m]; 0 where slack.
+
+    By Newton's method from a chord; the law is smooth and rises (3-7).
+    """
+    wanted = np.maximum(tensions, 0.0)
+    law = law_at(parameters, np.full(tensions.shape, _FIRST_M), elastic_lengths)
+    found = np.where(wanted > 0.0, _FIRST_M * wanted / law[:, :, 0], 0.0)
+    for _ in range(_ROUNDS):
+        law = law_at(parameters, found, elastic_lengths)
+        slope = np.where(law[:, :, 1] > 0.0, law[:, :, 1], np.inf)
+        found = np.maximum(found + (wanted - law[:, :, 0]) / slope, 0.0)
+    return found
+
+
+_FIRST_M = 1e-4
+_ROUNDS = 12

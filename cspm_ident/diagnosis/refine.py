@@ -1,0 +1,208 @@
+"""Parameters of what was named, model and readings corrected for it and looked at again.
+
+Columns hold to first order about the described machine, and shapes come from a coarse grid. Both
+are mended in a few rounds in which only the named effects are fitted.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import replace
+from itertools import product
+
+import numpy as np
+from numpy.typing import NDArray
+
+from cspm_ident.diagnosis.columns import Candidate, Place
+from cspm_ident.diagnosis.drivers import Driver
+from cspm_ident.diagnosis.equation import Equation
+from cspm_ident.diagnosis.evidence import Evidence, gather
+from cspm_ident.diagnosis.recorded import equations_of
+from cspm_ident.diagnosis.sums import Sums
+from cspm_ident.signals.measurement import BAR, FRAME, TENSION, WINCHES, Measurement
+from cspm_ident.signals.samples import Samples
+from cspm_sim.effect_entries import Action, altered_testbed
+from cspm_sim.effects import Effect
+from cspm_sim.effects.signals import PoseSignal, ReadingSignal
+
+Array = NDArray[np.float64]
+Index = NDArray[np.intp]
+Weights = dict[Candidate, tuple[Array, Array]]
+Cut = Callable[[Sequence[Sequence[Equation]]], Sequence[Sequence[Equation]]]
+
+_ROUNDS = 4
+# Grid steps are about a factor of three; each round halves the step in the logarithm.
+_FIRST_FACTOR = 1.7
+_FIXED_POINTS = 4
+
+
+def refine(
+    searched: Sequence[Measurement],
+    candidates: Sequence[Candidate],
+    noise: Mapping[Place, Array],
+    block_s: float,
+    cut: Cut,
+) -> Weights:
+    """Return weights, with half the widths of their 95 % intervals, of candidates of better shapes.
+
+    Args:
+        searched: the recordings.
+        candidates: what was named, element by element.
+        noise: of each residual, its unit.
+        block_s: length of the blocks [s].
+        cut: what of the equations was searched.
+    """
+    shapes = {c.effect_id: dict(c.shape) for c in candidates}
+    effects = {c.effect_id: c.effect for c in candidates}
+    totals = {(c.effect_id, c.element): np.zeros(0) for c in candidates}
+    factor = _FIRST_FACTOR
+    found: Weights = {}
+    for _ in range(_ROUNDS if candidates else 0):
+        near = [_near(effects[name], shape, factor) for name, shape in shapes.items()]
+        moved = [_corrected(m, effects, totals) for m in searched]
+        parts = cut([equations_of(m, near) for m in moved])
+        wanted = list(totals)
+        scaled = [[e.scaled(noise[e.place]) for e in p if e.place in noise] for p in parts]
+        evidence = gather([[_without_drivers(e, wanted) for e in p] for p in scaled], block_s)
+        shapes, found = _fitted(evidence, shapes, wanted)
+        for candidate, (weights, _) in found.items():
+            key = candidate.effect_id, candidate.element
+            if _is_applied(candidate.effect):
+                totals[key] = weights + (totals[key] if len(totals[key]) else 0.0)
+        factor = float(np.sqrt(factor))
+    return {
+        c: (totals[c.effect_id, c.element] if _is_applied(c.effect) else w, half)
+        for c, (w, half) in found.items()
+    }
+
+
+def _is_applied(effect: Effect) -> bool:
+    """Return whether machine or readings are corrected by it, so that what is fitted adds up."""
+    return effect.alter is not None or effect.sense is not None
+
+
+def _near(effect: Effect, shape: Mapping[str, float], factor: float) -> Effect:
+    """Return the effect with a grid around a shape, within its bounds."""
+    bounds = {p.name: (p.minimum, p.maximum) for p in effect.parameters}
+    grid = {
+        name: tuple(sorted({float(np.clip(value * f, *bounds[name])) for f in _steps(factor)}))
+        for name, value in shape.items()
+    }
+    return replace(effect, nonlinear=grid)
+
+
+def _steps(factor: float) -> tuple[float, ...]:
+    return (1.0 / factor, 1.0, factor)
+
+
+def _without_drivers(equation: Equation, wanted: Sequence[tuple[str, str]]) -> Equation:
+    columns: dict[Candidate | Driver, Array] = {
+        term: found
+        for term, found in equation.columns.items()
+        if isinstance(term, Candidate) and (term.effect_id, term.element) in wanted
+    }
+    return replace(equation, columns=columns)
+
+
+def _fitted(
+    evidence: Evidence, shapes: dict[str, dict[str, float]], wanted: Sequence[tuple[str, str]]
+) -> tuple[dict[str, dict[str, float]], Weights]:
+    """Return the best shapes and the weights there."""
+    sums = Sums(evidence)
+    grids = {name: _shapes(evidence, name) for name in shapes}
+    best: tuple[float, dict[str, tuple[tuple[str, float], ...]]] | None = None
+    for point in product(*grids.values()):
+        chosen = dict(zip(grids, point, strict=True))
+        left = sums.squares_of(_columns(evidence, _members(evidence, chosen, wanted)))
+        if best is None or left < best[0]:
+            best = left, chosen
+    assert best is not None
+    members = _members(evidence, best[1], wanted)
+    columns = _columns(evidence, members)
+    weights, widths = sums.weights(columns), sums.half_width(columns)
+    where = {int(index): k for k, index in enumerate(columns)}
+    found = {}
+    for candidate in members:
+        span = evidence.slices[candidate]
+        own = [where[i] for i in range(span.start, span.stop)]
+        found[candidate] = weights[own], widths[own]
+    return {name: dict(shape) for name, shape in best[1].items()}, found
+
+
+def _shapes(evidence: Evidence, name: str) -> list[tuple[tuple[str, float], ...]]:
+    candidates = (term for term in evidence.terms if isinstance(term, Candidate))
+    return sorted({c.shape for c in candidates if c.effect_id == name})
+
+
+def _members(
+    evidence: Evidence,
+    shapes: Mapping[str, tuple[tuple[str, float], ...]],
+    wanted: Sequence[tuple[str, str]],
+) -> list[Candidate]:
+    return [
+        term
+        for term in evidence.terms
+        if isinstance(term, Candidate)
+        and (term.effect_id, term.element) in wanted
+        and term.shape == shapes[term.effect_id]
+    ]
+
+
+def _columns(evidence: Evidence, members: Sequence[Candidate]) -> Index:
+    spans = [evidence.slices[c] for c in members]
+    own = [np.arange(span.start, span.stop) for span in spans]
+    return np.concatenate([evidence.nuisance, *own]).astype(np.intp)
+
+
+def _corrected(
+    measurement: Measurement,
+    effects: Mapping[str, Effect],
+    totals: Mapping[tuple[str, str], Array],
+) -> Measurement:
+    """Return the measurement without the sensor faults, of a machine altered as found."""
+    machine = measurement.machine
+    actions = []
+    for (name, element), weights in totals.items():
+        effect = effects[name]
+        if not len(weights):
+            continue
+        if effect.alter is not None:
+            values = effect.values(weights.tolist())
+            place = machine.cable_names.index(element) if element in machine.cable_names else 0
+            actions.append(Action(effect, place, element, values))
+        else:
+            measurement = _true_readings(measurement, effect, element, weights)
+    altered = altered_testbed(machine, actions)
+    return measurement.with_testbed(replace(measurement.testbed, testbed=altered))
+
+
+def _true_readings(
+    measurement: Measurement, effect: Effect, element: str, weights: Array
+) -> Measurement:
+    """Return what a sensor would have read without a fault, to which a fixed point leads."""
+    assert effect.sense is not None
+    topic = effect.sense.topics[0]
+    if topic in (TENSION, WINCHES):
+        kind = "tension" if topic == TENSION else "angle"
+        samples: Samples = getattr(measurement, kind)
+        i = measurement.machine.cable_names.index(element)
+        values = samples.values.copy()
+        rows = np.zeros((len(values), len(ReadingSignal)))
+        rows[:, ReadingSignal.TIME] = samples.times
+        for _ in range(_FIXED_POINTS):
+            rows[:, ReadingSignal.VALUE] = values[:, i]
+            values[:, i] = samples.values[:, i] - effect.regressors(rows)[:, 0] @ weights
+        return measurement.with_samples(kind, Samples(samples.times, values))
+    kind = {BAR: "bar_pose", FRAME: "frame_pose"}[f"/{element}/pose"]
+    samples = getattr(measurement, kind)
+    if effect.sense.lateness is not None:
+        parameters = np.array(list(effect.values(weights.tolist()).values()))
+        late = np.array([effect.sense.lateness(float(t), parameters) for t in samples.times])
+        return measurement.with_samples(kind, Samples(samples.times - late, samples.values))
+    rows = np.zeros((len(samples.times), int(PoseSignal.RATE) + 6))
+    rows[:, PoseSignal.TIME] = samples.times
+    values = samples.values
+    for _ in range(_FIXED_POINTS):
+        rows[:, PoseSignal.POSE : PoseSignal.POSE + 6] = values
+        values = samples.values - effect.regressors(rows) @ weights
+    return measurement.with_samples(kind, Samples(samples.times, values))

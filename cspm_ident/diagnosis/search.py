@@ -1,0 +1,338 @@
+"""Which effects explain the residuals, what else would, and what nothing in the catalogue does."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterable, Sequence
+from dataclasses import dataclass
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from cspm_ident.diagnosis.columns import Candidate
+from cspm_ident.diagnosis.drivers import Driver
+from cspm_ident.diagnosis.evidence import Evidence
+from cspm_ident.diagnosis.sums import Gain, Sums, gain_of
+from cspm_sim.effects import Effect
+
+Array = NDArray[np.float64]
+Index = NDArray[np.intp]
+
+# Less than this share of what is left of the residuals it acts on is not worth a word.
+MATERIAL_SHARE = 0.05
+UNKNOWN_SHARE = 0.15
+FALSE_ALARMS = 0.01
+MOST_EFFECTS = 3
+_SHORT_LIST = 12
+
+
+@dataclass(frozen=True)
+class Hypothesis:
+    """An effect on some elements.
+
+    Attributes:
+        effect: of the catalogue.
+        candidates: one per element, of the same nonlinear parameters.
+    """
+
+    effect: Effect
+    candidates: tuple[Candidate, ...]
+
+    @property
+    def elements(self) -> tuple[str, ...]:
+        """What it acts on."""
+        return tuple(candidate.element for candidate in self.candidates)
+
+
+class Named(NamedTuple):
+    """A hypothesis that was chosen.
+
+    Attributes:
+        hypothesis: what it says.
+        gain: of it in blocks that were not fitted, beyond all others that were chosen.
+        share: of the squared residual, in the places it acts on, that it takes away.
+        alternatives: what explains it as well, with how much worse (positive) per block set.
+        onset: block from which on it acts, 0 for all the time.
+    """
+
+    hypothesis: Hypothesis
+    gain: Gain
+    share: float
+    alternatives: tuple[tuple[Hypothesis, Gain], ...]
+    onset: int
+
+
+class Findings(NamedTuple):
+    """What a search found.
+
+    Attributes:
+        named: effects, the most important first.
+        unknown: free shapes that explain what no effect does, with their gain and share.
+        candidates: how many hypotheses were looked at.
+    """
+
+    named: tuple[Named, ...]
+    unknown: tuple[tuple[Driver, Gain, float], ...]
+    candidates: int
+
+
+class Search:
+    """Looks through a catalogue for what explains the residuals of some recordings."""
+
+    def __init__(
+        self, evidence: Evidence, progress: Callable[[str], None] = lambda _: None
+    ) -> None:
+        """Take the sums of all residuals."""
+        self.evidence = evidence
+        self.sums = Sums(evidence)
+        self._progress = progress
+        self._effects = [c for c in evidence.terms if isinstance(c, Candidate) and self._shows(c)]
+        self._drivers = [d for d in evidence.terms if isinstance(d, Driver)]
+
+    def run(self) -> Findings:
+        """Choose effects one by one, each with all elements on which it surely acts."""
+        chosen = self._chosen()
+        named = [self._judged(k, chosen) for k in range(len(chosen))]
+        named.sort(key=lambda each: -each.gain.total)
+        self._progress("what is left")
+        return Findings(tuple(named), self._unknown(chosen), len(self._effects))
+
+    @property
+    def heard(self) -> tuple[Candidate, ...]:
+        """Candidates whose columns are not zero."""
+        return tuple(self._effects)
+
+    def retuned(self) -> dict[Candidate, Array]:
+        """Return the weights of the file's own parameters, fitted where it helps, nothing added."""
+        everything = self._effects
+        self._effects = [c for c in everything if c.effect.alter is not None]
+        chosen = self._chosen()
+        self._effects = everything
+        columns = self.columns(chosen)
+        found = dict(zip(columns.tolist(), self.sums.weights(columns), strict=True))
+        own = [c for h in chosen for c in h.candidates]
+        return {c: np.array([found[i] for i in self._of(c)]) for c in own}
+
+    def columns(self, hypotheses: Iterable[Hypothesis]) -> Index:
+        """Return indices of the nuisance and of some hypotheses' columns."""
+        own = [self._of(c) for h in hypotheses for c in h.candidates]
+        return np.concatenate([self.evidence.nuisance, *own]).astype(np.intp)
+
+    def own_columns(self, hypothesis: Hypothesis) -> Index:
+        """Return indices of one hypothesis's columns."""
+        return np.concatenate([self._of(c) for c in hypothesis.candidates])
+
+    def share(self, base: Index, columns: Index) -> float:
+        """Return the largest share of a place's squares that columns take beyond a base."""
+        both = np.concatenate([base, columns])
+        before = self.evidence.left(base, self.sums.weights(base))
+        after = self.evidence.left(both, self.sums.weights(both))
+        return max(1.0 - after[place] / before[place] for place in before if before[place] > 0.0)
+
+    def _chosen(self) -> list[Hypothesis]:
+        chosen: list[Hypothesis] = []
+        while len(chosen) < MOST_EFFECTS:
+            self._progress(f"effect {len(chosen) + 1}")
+            found = self._best(chosen)
+            if found is None:
+                break
+            chosen.append(found)
+        return chosen
+
+    def _best(self, chosen: Sequence[Hypothesis]) -> Hypothesis | None:
+        base = self.columns(chosen)
+        taken = {(c.effect_id, c.element) for h in chosen for c in h.candidates}
+        free = [c for c in self._effects if (c.effect_id, c.element) not in taken]
+        gains = self.sums.gains_beyond(base, [self._of(c) for c in free])
+        held_out = self.sums.held_out(base)
+        best: tuple[float, Hypothesis] | None = None
+        for candidate in _short_list(free, gains):
+            for hypothesis in self._scopes(candidate, free, base):
+                if not self._is_plausible([*chosen, hypothesis]):
+                    continue
+                own = self.own_columns(hypothesis)
+                gain = gain_of(held_out - self.sums.held_out(np.concatenate([base, own])))
+                if not self._counts(base, own, gain):
+                    continue
+                # More elements have to be worth their columns.
+                if best is None or gain.total > best[0] + 3.0 * gain.error * _wider(
+                    hypothesis, best[1]
+                ):
+                    best = gain.total, hypothesis
+        if best is None:
+            return None
+        return self._pruned(self._simplest(best[1], free, base, chosen), base)
+
+    def _pruned(self, hypothesis: Hypothesis, base: Index) -> Hypothesis:
+        """Return the hypothesis without elements on which the effect may as well be absent."""
+        columns = np.concatenate([base, self.own_columns(hypothesis)])
+        sizes = np.abs(self.sums.weights(columns)) / self.sums.half_width(columns)
+        where = {int(index): k for k, index in enumerate(columns)}
+        kept = tuple(
+            c for c in hypothesis.candidates if max(sizes[where[i]] for i in self._of(c)) > 1.0
+        )
+        return Hypothesis(hypothesis.effect, kept) if kept else hypothesis
+
+    def _scopes(
+        self, candidate: Candidate, free: Sequence[Candidate], base: Index
+    ) -> list[Hypothesis]:
+        """Return the candidate's effect where it surely acts, and on all elements together.
+
+        What is too little to see in any one element may be plain in all of them.
+        """
+        alike = [
+            c for c in free if c.effect_id == candidate.effect_id and c.shape == candidate.shape
+        ]
+        whole = Hypothesis(candidate.effect, tuple(alike))
+        own = self._extended(candidate, alike, base)
+        return [own] if len(own.candidates) == len(alike) else [own, whole]
+
+    def _extended(
+        self, candidate: Candidate, alike: Sequence[Candidate], base: Index
+    ) -> Hypothesis:
+        """Return the candidate's effect on all elements where it surely acts."""
+        found = [candidate]
+        for other in alike:
+            if other.element == candidate.element:
+                continue
+            own = self._of(other)
+            if self._counts(base, own, self.sums.gain(base, own)):
+                found.append(other)
+        return Hypothesis(candidate.effect, tuple(found))
+
+    def _counts(self, base: Index, own: Index, gain: Gain) -> bool:
+        """Return whether columns are surely there and worth a word."""
+        return (
+            gain.is_sure
+            and self.sums.p_value(base, own) < FALSE_ALARMS / len(self._effects)
+            and self.share(base, own) >= MATERIAL_SHARE
+        )
+
+    def _simplest(
+        self,
+        best: Hypothesis,
+        free: Sequence[Candidate],
+        base: Index,
+        chosen: Sequence[Hypothesis],
+    ) -> Hypothesis:
+        """Return the hypothesis of fewest columns that is no worse than the best one."""
+        rivals = [h for h in self._rivals(best, free, base) if self._is_plausible([*chosen, h])]
+        reference = self.sums.held_out(np.concatenate([base, self.own_columns(best)]))
+        fewest = best
+        for rival in rivals:
+            if len(self.own_columns(rival)) >= len(self.own_columns(fewest)):
+                continue
+            worse = gain_of(
+                self.sums.held_out(np.concatenate([base, self.own_columns(rival)])) - reference
+            )
+            share = worse.total / max(1e-300, float(reference.sum()))
+            if worse.total <= 2.0 * worse.error or share < MATERIAL_SHARE:
+                fewest = rival
+        return fewest
+
+    def _rivals(
+        self, hypothesis: Hypothesis, free: Sequence[Candidate], base: Index
+    ) -> list[Hypothesis]:
+        """Return the best point of every other effect on the same elements, or on its one body."""
+        elements = set(hypothesis.elements)
+        groups: dict[tuple[str, tuple[tuple[str, float], ...]], list[Candidate]] = {}
+        for candidate in free:
+            groups.setdefault((candidate.effect_id, candidate.shape), []).append(candidate)
+        best: dict[str, tuple[float, Hypothesis]] = {}
+        for (name, _), members in groups.items():
+            same = tuple(c for c in members if c.element in elements) or tuple(members[:1])
+            if name == hypothesis.effect.id:
+                continue
+            rival = Hypothesis(members[0].effect, same)
+            gain = float(self.sums.gains_beyond(base, [self.own_columns(rival)])[0])
+            if name not in best or gain > best[name][0]:
+                best[name] = gain, rival
+        return [rival for _, rival in best.values()]
+
+    def _judged(self, k: int, chosen: Sequence[Hypothesis]) -> Named:
+        hypothesis, others = chosen[k], [h for i, h in enumerate(chosen) if i != k]
+        base, own = self.columns(others), self.own_columns(hypothesis)
+        gain = self.sums.gain(base, own)
+        return Named(
+            hypothesis,
+            gain,
+            self.share(base, own),
+            tuple(self._alternatives(hypothesis, others, base, own)),
+            self._onset(base, own),
+        )
+
+    def _alternatives(
+        self, hypothesis: Hypothesis, others: Sequence[Hypothesis], base: Index, own: Index
+    ) -> Iterable[tuple[Hypothesis, Gain]]:
+        """Yield what explains the same nearly as well, the chosen one taken out."""
+        taken = {(c.effect_id, c.element) for h in others for c in h.candidates}
+        free = [c for c in self._effects if (c.effect_id, c.element) not in taken]
+        reference = self.sums.held_out(np.concatenate([base, own]))
+        for rival in self._rivals(hypothesis, free, base):
+            columns = self.own_columns(rival)
+            if self._contains(base, columns, own) or not self._is_plausible([*others, rival]):
+                continue
+            worse = gain_of(self.sums.held_out(np.concatenate([base, columns])) - reference)
+            if worse.total <= 2.0 * worse.error:
+                yield rival, worse
+
+    def _contains(self, base: Index, wide: Index, narrow: Index) -> bool:
+        """Return whether `narrow` is a case of `wide`, as Coulomb's friction of Stribeck's."""
+        if len(wide) <= len(narrow):
+            return False
+        alone = self.sums.spanned(base, wide, narrow)
+        return bool(np.all(alone > 0.999))
+
+    def _is_plausible(self, hypotheses: Sequence[Hypothesis]) -> bool:
+        """Return whether all parameters lie within what the catalogue allows."""
+        columns = self.columns(hypotheses)
+        weights = dict(zip(columns.tolist(), self.sums.weights(columns).tolist(), strict=True))
+        for hypothesis in hypotheses:
+            for candidate in hypothesis.candidates:
+                own = [weights[i] for i in self._of(candidate)]
+                values = candidate.effect.values(own, **candidate.nonlinear)
+                if not candidate.effect.is_plausible(values):
+                    return False
+        return True
+
+    def _onset(self, base: Index, own: Index) -> int:
+        """Return the block from which on columns act, 0 unless a later one is surely better."""
+        whole = self.sums.left_from(base, own, 0)
+        left = [self.sums.left_from(base, own, b) for b in range(self.sums.blocks - 2)]
+        best = int(np.argmin(left))
+        gained = self.sums.squares_of(base) - whole
+        return best if left[best] < whole - MATERIAL_SHARE * max(gained, 0.0) else 0
+
+    def _unknown(self, chosen: Sequence[Hypothesis]) -> tuple[tuple[Driver, Gain, float], ...]:
+        base = self.columns(chosen)
+        found = []
+        for driver in self._drivers:
+            own = self._of(driver)
+            gain = self.sums.gain(base, own)
+            if gain.is_sure and self.sums.p_value(base, own) < FALSE_ALARMS / len(self._drivers):
+                share = self.share(base, own)
+                if share >= UNKNOWN_SHARE:
+                    found.append((driver, gain, share))
+        return tuple(sorted(found, key=lambda each: -each[1].total))
+
+    def _shows(self, candidate: Candidate) -> bool:
+        return bool(self.sums.excited[self._of(candidate)].all())
+
+    def _of(self, term: Candidate | Driver) -> Index:
+        span = self.evidence.slices[term]
+        return np.arange(span.start, span.stop)
+
+
+def _wider(one: Hypothesis, other: Hypothesis) -> bool:
+    """Return whether one is the other's effect on more elements."""
+    return one.effect.id == other.effect.id and len(one.candidates) > len(other.candidates)
+
+
+def _short_list(candidates: Sequence[Candidate], gains: Array) -> list[Candidate]:
+    """Return the best point and element of each effect, of the effects that gain most."""
+    best: dict[str, tuple[float, Candidate]] = {}
+    for candidate, gain in zip(candidates, gains, strict=True):
+        if candidate.effect_id not in best or gain > best[candidate.effect_id][0]:
+            best[candidate.effect_id] = float(gain), candidate
+    ranked = sorted(best.values(), key=lambda each: -each[0])
+    return [candidate for _, candidate in ranked[:_SHORT_LIST]]

@@ -1,0 +1,137 @@
+"""The winches' torque equation (2-21), driven by measured torque, tension and angle."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+
+import numpy as np
+from numpy.typing import NDArray
+
+from cspm_ident.diagnosis.columns import Candidate, Place, elements_of, shapes_of
+from cspm_ident.diagnosis.drivers import Driver, driver_columns
+from cspm_ident.diagnosis.equation import Equation
+from cspm_ident.signals.measurement import TENSION, WINCHES, Measurement
+from cspm_ident.signals.winch_motion import winch_motion
+from cspm_ident.winch.recording import signal_rows, winch_signals
+from cspm_ident.winch.weak_form import make_window, weigh
+from cspm_msgs_py.errors import InputError
+from cspm_sim.effect_entries import Action
+from cspm_sim.effects import Channel, Effect
+from cspm_sim.effects.signals import ReadingSignal, WinchSignal
+
+Array = NDArray[np.float64]
+
+HALF_WIDTH_S = 0.02
+# Of the usual speed: below it a dry friction may hold with any torque, and its sign is noise.
+STILL_SHARE = 0.05
+_DRIVERS = {
+    "speed [rad/s]": WinchSignal.SPEED,
+    "tension [N]": WinchSignal.TENSION,
+    "angle [rad]": WinchSignal.ANGLE,
+    "time [s]": WinchSignal.TIME,
+}
+
+
+def shaft_equations(
+    measurement: Measurement,
+    effects: Sequence[Effect],
+    known: Sequence[Action],
+    torque_age: float,
+) -> list[Equation]:
+    """Return the equation of every winch whose signals were recorded.
+
+    The residual is torque − J·q̈ − (r/n)·t less what the test-bed's own effects add, weighted with
+    windows, so that nothing noisy is differentiated.
+
+    Args:
+        measurement: what was recorded, with the machine as it is described.
+        effects: the catalogue.
+        known: effects that the test-bed file has.
+        torque_age: how long before its stamp a reported torque acted, on average [s].
+    """
+    found: list[Equation] = []
+    for i, cable in enumerate(measurement.machine.cables):
+        try:
+            signals = winch_signals(measurement, cable.name, torque_age)
+        except InputError:
+            continue
+        for times, rows in signal_rows(signals):
+            if measurement.speed is not None:
+                moved = winch_motion(signals.angle, measurement.speed.column(i), times)
+                rows[:, WinchSignal.ANGLE] = moved.angles[:, 0]
+                rows[:, WinchSignal.SPEED] = moved.speeds[:, 0]
+            half = max(2, round(HALF_WIDTH_S / signals.angle.interval))
+            if len(rows) < 2 * half + 1:
+                continue
+            table = _Shaft(rows, cable.rotor_inertia, cable.name, half, times)
+            found.append(table.equation(effects, [a for a in known if a.element == i]))
+    return found
+
+
+class _Shaft:
+    """One winch's rows and the window that weighs them."""
+
+    def __init__(self, rows: Array, inertia: float, name: str, half: int, times: Array) -> None:
+        self._rows, self._inertia, self._name = rows, inertia, name
+        step = float(times[1] - times[0])
+        self._window, self._stride = make_window(half, step), max(1, half // 2)
+        speed = np.abs(rows[:, WinchSignal.SPEED])
+        windows = np.lib.stride_tricks.sliding_window_view(speed, len(self._window.weights))
+        slowest = windows[:: self._stride].min(axis=1)
+        self._moving = slowest >= STILL_SHARE * np.sqrt(np.mean(speed**2))
+        self._times = self._weighed(times)
+
+    def equation(self, effects: Sequence[Effect], known: Sequence[Action]) -> Equation:
+        rows = self._rows
+        target = self._weighed(
+            rows[:, WinchSignal.TORQUE] - rows[:, WinchSignal.RADIUS] * rows[:, WinchSignal.TENSION]
+        ) - self._inertia * self._accelerated(rows[:, WinchSignal.ANGLE])
+        for action in known:
+            for known_columns, weights in self._known(action):
+                target = target - known_columns @ weights
+        columns: dict[Candidate | Driver, Array] = {
+            candidate: found[:, None, :]
+            for effect in effects
+            for candidate, found in self._columns(effect)
+        }
+        place = Place(Channel.SHAFT, self._name)
+        drivers = {name: self._weighed(rows[:, column]) for name, column in _DRIVERS.items()}
+        columns |= driver_columns(place, drivers)
+        torque = self._weighed(rows[:, WinchSignal.TORQUE])[:, None]
+        return Equation(place, self._times, target[:, None], columns, torque)
+
+    def _known(self, action: Action) -> Iterator[tuple[Array, Array]]:
+        effect = action.effect
+        if effect.alter is None and effect.regression.channel is Channel.SHAFT:
+            shape = {name: action.values[name] for name in effect.nonlinear}
+            yield self._regressed(effect, shape), effect.weights(action.values)
+
+    def _columns(self, effect: Effect) -> Iterator[tuple[Candidate, Array]]:
+        if self._name not in elements_of(effect, (self._name,), ()):
+            return
+        if effect.regression.channel is Channel.SHAFT:
+            for shape in shapes_of(effect):
+                yield Candidate(effect, self._name, shape), self._regressed(effect, dict(shape))
+        elif effect.sense is not None and effect.sense.topics[0] in (TENSION, WINCHES):
+            yield Candidate(effect, self._name), self._read(effect)
+
+    def _regressed(self, effect: Effect, shape: dict[str, float]) -> Array:
+        return self._weighed(effect.regressors(self._rows, **shape)[:, 0])
+
+    def _read(self, effect: Effect) -> Array:
+        """Return what a sensor's fault makes of the residual, by the reading's share in it."""
+        tension = effect.sense is not None and effect.sense.topics[0] == TENSION
+        reading = np.zeros((len(self._rows), len(ReadingSignal)))
+        reading[:, ReadingSignal.TIME] = self._rows[:, WinchSignal.TIME]
+        source = WinchSignal.TENSION if tension else WinchSignal.ANGLE
+        reading[:, ReadingSignal.VALUE] = self._rows[:, source]
+        change = effect.regressors(reading)[:, 0]
+        if tension:
+            return self._weighed(-self._rows[:, WinchSignal.RADIUS, None] * change)
+        return -self._inertia * self._accelerated(change)
+
+    def _weighed(self, values: Array) -> Array:
+        return np.asarray(weigh(self._window.weights, values, self._stride)[self._moving])
+
+    def _accelerated(self, values: Array) -> Array:
+        return np.asarray(weigh(self._window.second, values, self._stride)[self._moving])

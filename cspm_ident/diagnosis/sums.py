@@ -1,0 +1,187 @@
+"""Least squares, their errors under coloured residuals and their cross-validation, from sums."""
+
+from __future__ import annotations
+
+from functools import cached_property
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.stats import f as f_distribution
+from scipy.stats import t as t_distribution
+
+from cspm_ident.diagnosis.evidence import Evidence
+
+Array = NDArray[np.float64]
+Index = NDArray[np.intp]
+
+FOLDS = 6
+_RANK = 1e-9
+
+
+class Gain(NamedTuple):
+    """What columns take from the squared residual, in blocks that were not fitted.
+
+    Attributes:
+        total: over all blocks.
+        error: its standard error, from the scatter between blocks.
+    """
+
+    total: float
+    error: float
+
+    @property
+    def is_sure(self) -> bool:
+        """Whether it exceeds three standard errors."""
+        return self.total > 3.0 * self.error
+
+
+class Sums:
+    """All columns' products, scaled so that each column has length 1."""
+
+    def __init__(self, evidence: Evidence) -> None:
+        """Assemble the products of all residuals."""
+        width = evidence.width
+        grams = np.zeros((evidence.blocks, width + 1, width + 1))
+        for place in evidence.places:
+            own = np.append(place.columns, width)
+            grams[:, own[:, None], own] += place.grams
+        lengths = np.sqrt(np.einsum("bii->i", grams))
+        lengths[lengths == 0.0] = 1.0
+        lengths[-1] = 1.0
+        self._blocks = grams / (lengths[:, None] * lengths)
+        self._lengths = lengths[:-1]
+        self._whole = self._blocks.sum(axis=0)
+        self._folds = np.array_split(np.arange(evidence.blocks), min(FOLDS, evidence.blocks))
+
+    @property
+    def blocks(self) -> int:
+        """Number of blocks."""
+        return len(self._blocks)
+
+    @property
+    def squares(self) -> float:
+        """Σ y²."""
+        return float(self._whole[-1, -1])
+
+    @cached_property
+    def excited(self) -> NDArray[np.bool_]:
+        """Which columns are not zero throughout."""
+        return np.asarray(np.diag(self._whole)[:-1] > 0.0)
+
+    def weights(self, columns: Index) -> Array:
+        """Return the least-squares weights of columns."""
+        return np.asarray(self._weights(columns, self._whole) / self._lengths[columns])
+
+    def gains_beyond(self, base: Index, groups: list[Index]) -> Array:
+        """Return by how much each group of columns lowers Σ residual² beyond a base, (groups,)."""
+        inverse = _pseudo_inverse(self._whole[np.ix_(base, base)])
+        explained = inverse @ self._whole[base]
+        found = np.zeros(len(groups))
+        for k, group in enumerate(groups):
+            left = self._whole[np.ix_(group, group)] - (
+                self._whole[np.ix_(group, base)] @ explained[:, group]
+            )
+            cross = self._whole[group, -1] - self._whole[np.ix_(group, base)] @ explained[:, -1]
+            # What the base nearly spans leaves numbers of rounding only.
+            left[np.diag_indices(len(left))] += _RANK
+            found[k] = cross @ np.linalg.solve(left, cross)
+        return found
+
+    def held_out(self, columns: Index) -> Array:
+        """Return Σ residual² of each block, fitted to the others without its neighbours."""
+        out = np.zeros(self.blocks)
+        for fold, others in zip(self._folds, self._others, strict=True):
+            out[fold] = self._left(columns, self._weights(columns, others), fold)
+        return out
+
+    def gain(self, base: Index, columns: Index) -> Gain:
+        """Return what columns gain beyond a base, in blocks that were not fitted."""
+        better = self.held_out(base) - self.held_out(np.concatenate([base, columns]))
+        return gain_of(better)
+
+    def covariance(self, columns: Index) -> Array:
+        """Return the weights' covariance, with blocks as independent pieces (Liang, Zeger 1986)."""
+        weights = self._weights(columns, self._whole)
+        bread = _pseudo_inverse(self._whole[np.ix_(columns, columns)])
+        scores = self._blocks[:, columns, -1] - self._blocks[:, columns[:, None], columns] @ weights
+        meat = scores.T @ scores * self.blocks / max(1, self.blocks - len(columns))
+        scale = self._lengths[columns]
+        return np.asarray(bread @ meat @ bread / (scale[:, None] * scale))
+
+    def p_value(self, base: Index, columns: Index) -> float:
+        """Return the probability of so large weights by chance, by Wald's test over blocks."""
+        both = np.concatenate([base, columns])
+        weights = self.weights(both)[len(base) :]
+        covariance = self.covariance(both)[len(base) :, len(base) :]
+        count, free = len(columns), max(1, self.blocks - len(columns))
+        scale = np.sqrt(np.maximum(np.diag(covariance), 1e-300))
+        wald = (
+            (weights / scale)
+            @ np.linalg.pinv(covariance / np.outer(scale, scale))
+            @ (weights / scale)
+        )
+        return float(f_distribution.sf(wald / count, count, free))
+
+    def half_width(self, columns: Index) -> Array:
+        """Return half the widths of 95 % intervals of the weights."""
+        factor = t_distribution.ppf(0.975, max(1, self.blocks - 1))
+        return np.asarray(factor * np.sqrt(np.maximum(np.diag(self.covariance(columns)), 0.0)))
+
+    def squares_of(self, columns: Index) -> float:
+        """Return Σ residual² after a fit of columns."""
+        weights = self._weights(columns, self._whole)
+        return float(self.squares - self._whole[columns, -1] @ weights)
+
+    def spanned(self, base: Index, wide: Index, narrow: Index) -> Array:
+        """Return the share of each narrow column, beyond a base, that wide columns span."""
+        both = np.concatenate([base, wide])
+
+        def left(by: Index) -> Array:
+            inverse = _pseudo_inverse(self._whole[np.ix_(by, by)])
+            cross = self._whole[np.ix_(by, narrow)]
+            spanned = np.einsum("ij,ik,kj->j", cross, inverse, cross)
+            return np.asarray(np.diag(self._whole)[narrow] - spanned)
+
+        return np.asarray(1.0 - left(both) / np.maximum(left(base), _RANK))
+
+    def left_from(self, base: Index, columns: Index, block: int) -> float:
+        """Return Σ residual² where `columns` act from a block on only."""
+        both = np.concatenate([base, columns])
+        whole = self._whole[np.ix_(both, both)].copy()
+        target = self._whole[both, -1].copy()
+        own = np.arange(len(base), len(both))
+        early = self._blocks[:block].sum(axis=0)
+        whole[np.ix_(own, own)] -= early[np.ix_(columns, columns)]
+        whole[np.ix_(own, np.arange(len(base)))] -= early[np.ix_(columns, base)]
+        whole[np.ix_(np.arange(len(base)), own)] -= early[np.ix_(base, columns)]
+        target[own] -= early[columns, -1]
+        return float(self.squares - target @ _pseudo_inverse(whole) @ target)
+
+    @cached_property
+    def _others(self) -> list[Array]:
+        """Sums of all blocks but those of each fold and their neighbours."""
+        found = []
+        for fold in self._folds:
+            near = slice(max(0, fold[0] - 1), fold[-1] + 2)
+            found.append(self._whole - self._blocks[near].sum(axis=0))
+        return found
+
+    def _weights(self, columns: Index, gram: Array) -> Array:
+        return np.asarray(_pseudo_inverse(gram[np.ix_(columns, columns)]) @ gram[columns, -1])
+
+    def _left(self, columns: Index, weights: Array, blocks: Index) -> Array:
+        both = np.append(columns, -1)
+        part = self._blocks[np.ix_(blocks, both, both)]
+        vector = np.append(weights, -1.0)
+        return np.asarray(np.einsum("i,bij,j->b", vector, part, vector))
+
+
+def gain_of(better: Array) -> Gain:
+    """Return total and standard error of gains by block."""
+    spread = float(better.std(ddof=1)) if len(better) > 1 else float("inf")
+    return Gain(float(better.sum()), spread * float(np.sqrt(len(better))))
+
+
+def _pseudo_inverse(gram: Array) -> Array:
+    return np.asarray(np.linalg.pinv(gram, rcond=_RANK, hermitian=True))

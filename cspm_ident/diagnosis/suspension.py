@@ -1,0 +1,218 @@
+"""What measured poses, angles and tensions say of cables and bar, against the model of both."""
+
+from __future__ import annotations
+
+from functools import cached_property
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.ndimage import gaussian_filter1d
+
+from cspm_ident.diagnosis.machine_signals import (
+    BodyState,
+    CableSpans,
+    MachineSignals,
+    body_state,
+    cable_spans,
+    elongation_at,
+    law_at,
+)
+from cspm_ident.signals.elongation import damping_of
+from cspm_msgs_py.testbed import Testbed
+from cspm_sim.effects.bar_motion import carried
+from cspm_sim.effects.signals import BarSignal, CableSignal, FrameSignal
+from cspm_sim.equilibrium import unstretched_lengths
+from cspm_sim.kernels.cable import ATTACHMENT, EXIT, GEAR_RATIO, OFFSET_LENGTH, RADIUS
+from cspm_sim.kernels.plant import PlantParameters
+
+Array = NDArray[np.float64]
+
+_STEADY_S = 0.01
+
+
+class Suspension:
+    """Bar and cables along one stretch of measured signals.
+
+    Attributes:
+        signals: what was measured.
+        parameters: of the machine as it is described.
+        start: unstretched lengths at the beginning, (n,) [m].
+    """
+
+    def __init__(
+        self,
+        signals: MachineSignals,
+        testbed: Testbed,
+        parameters: PlantParameters,
+        start: Array | None = None,
+    ) -> None:
+        """Take a stretch without holes; `start` is found from the first tensions if not given."""
+        self.signals, self.parameters, self._testbed = signals, parameters, testbed
+        exits = parameters.cables[:, EXIT : EXIT + 3]
+        attachments = parameters.cables[:, ATTACHMENT : ATTACHMENT + 3]
+        self._bar, self._frame = body_state(signals.bar), body_state(signals.frame)
+        self._spans = cable_spans(signals, self._bar, self._frame, exits, attachments)
+        if start is None:
+            tensions = np.maximum(signals.tensions[0], 0.0)
+            start = unstretched_lengths(parameters, self._spans.lengths[0], tensions)
+        self.start = start
+
+    @property
+    def bar(self) -> BodyState:
+        """The bar's kinematics."""
+        return self._bar
+
+    @property
+    def spans(self) -> CableSpans:
+        """The cables' directions and lengths."""
+        return self._spans
+
+    @cached_property
+    def _wound(self) -> Array:
+        """Unstretched lengths by thesis (2-16..2-18), from the first tensions on, (k, n) [m]."""
+        lengths, cables = self._spans.lengths, self.parameters.cables
+        turned = np.diff(self.signals.angles, axis=0) * cables[:, RADIUS]
+        shrunk = np.cumsum(2.0 * turned / (lengths[1:] + lengths[:-1]), axis=0)
+        return np.asarray(self.start * np.exp(-np.vstack([np.zeros(shrunk.shape[1]), shrunk])))
+
+    @cached_property
+    def _elastic_lengths(self) -> Array:
+        return np.asarray(self._wound + self.parameters.cables[:, OFFSET_LENGTH])
+
+    @cached_property
+    def _rates(self) -> Array:
+        """Of the elongation, (k, n) [m/s]."""
+        wound = self._wound / self._spans.lengths * self.parameters.cables[:, RADIUS]
+        return np.asarray(self._spans.rates + wound * self.signals.speeds)
+
+    @cached_property
+    def _damper(self) -> Array:
+        return damping_of(self.parameters, self._wound) * self._rates
+
+    @cached_property
+    def _steady_damper(self) -> Array:
+        """The damper's force without the poses' noise, about which the law is taken."""
+        sigma = _STEADY_S / self.signals.step
+        return np.asarray(gaussian_filter1d(self._damper, sigma, axis=0, mode="nearest"))
+
+    @cached_property
+    def _carrying(self) -> Array:
+        """The elongation at which law and damper give the measured tension, (k, n) [m]."""
+        elastic = self.signals.tensions - self._steady_damper
+        return elongation_at(self.parameters, elastic, self._elastic_lengths)
+
+    @cached_property
+    def _law(self) -> Array:
+        """Elastic tension and stiffness at the measured tension, (k, n, 2)."""
+        return law_at(self.parameters, self._carrying, self._elastic_lengths)
+
+    @cached_property
+    def tension_residuals(self) -> Array:
+        """Measured tensions less those of law and damper, (k, n) [N], thesis (2-19).
+
+        To first order about the measured tension: errors and noise of poses enter in proportion,
+        however large they are.
+        """
+        stretched = self._spans.lengths - self._wound
+        linear = self._law[:, :, 1] * (self._carrying - stretched)
+        return np.asarray(linear - (self._damper - self._steady_damper))
+
+    @cached_property
+    def wrench_residuals(self) -> Array:
+        """Force and moment that the bar's equation (2-13) misses, world axes, (k, 6) [N, N·m].
+
+        Moments about the bar frame's origin.
+        """
+        bar = self._testbed.bar
+        assert bar is not None
+        state, gravity = self._bar, np.array([0.0, 0.0, self._testbed.gravity])
+        com = np.einsum("kij,j->ki", state.rotation, np.array(bar.com))
+        moved = state.acceleration + carried(state.omega, state.alpha, com)
+        turned = np.einsum("kij,jl,kml->kim", state.rotation, bar.inertia.matrix, state.rotation)
+        spin = np.einsum("kij,kj->ki", turned, state.omega)
+        moment = np.einsum("kij,kj->ki", turned, state.alpha) + np.cross(state.omega, spin)
+        inertial = bar.mass * (moved - gravity)
+        needed = np.hstack([inertial, moment + np.cross(com, inertial)])
+        return np.asarray(needed - self.cable_wrench)
+
+    @cached_property
+    def cable_wrench(self) -> Array:
+        """Force and moment of the measured tensions on the bar, −Jᵀt of (2-13), (k, 6)."""
+        pull = -self.signals.tensions[:, :, None] * self._spans.directions
+        moments = np.cross(self._spans.arms, pull)
+        return np.hstack([pull.sum(axis=1), moments.sum(axis=1)])
+
+    def start_column(self, i: int) -> Array:
+        """Return what a longer unstretched length at the start adds to the residual, (k,) [N/m]."""
+        return np.asarray(self._law[:, i, 1] * self._wound[:, i] / self._wound[0, i])
+
+    def cable_rows(self, i: int) -> Array:
+        """Return `CableSignal` columns of cable i."""
+        rows, cables = np.zeros((len(self.signals.times), len(CableSignal))), self.parameters.cables
+        lengths, wound = self._spans.lengths[:, i], self._wound[:, i]
+        step = 1e-5
+        elastic = self._elastic_lengths
+        longer = law_at(self.parameters, self._carrying, elastic + step)
+        directions = self._spans.directions[:, i]
+        for column, values in {
+            CableSignal.TIME: self.signals.times,
+            CableSignal.LENGTH: lengths,
+            CableSignal.ELONGATION: lengths - wound,
+            CableSignal.RATE: self._rates[:, i],
+            CableSignal.TENSION: self.signals.tensions[:, i],
+            CableSignal.STIFFNESS: self._law[:, i, 1],
+            CableSignal.LENGTH_SLOPE: (longer - self._law)[:, i, 0] / step,
+            CableSignal.DAMPER: self._damper[:, i],
+            CableSignal.WOUND: wound / lengths,
+            CableSignal.ANGLE: self.signals.angles[:, i],
+            CableSignal.SPEED: self.signals.speeds[:, i],
+            CableSignal.RADIUS: cables[i, RADIUS],
+            CableSignal.GEAR: cables[i, GEAR_RATIO],
+            CableSignal.HORIZONTAL: np.hypot(directions[:, 0], directions[:, 1]),
+            CableSignal.GRAVITY: self._testbed.gravity,
+        }.items():
+            rows[:, column] = values
+        return rows
+
+    def end_rows(self, i: int) -> Array:
+        """Return `EndSignal` columns of cable i."""
+        spans = self._spans
+        gravity = np.full((len(self.signals.times), 1), self._testbed.gravity)
+        return np.hstack(
+            [
+                spans.directions[:, i],
+                spans.velocities[:, i],
+                spans.arms[:, i],
+                spans.lengths[:, i, None],
+                gravity,
+            ]
+        )
+
+    def bar_rows(self) -> Array:
+        """Return `BarSignal` columns."""
+        bar, state = self._testbed.bar, self._bar
+        assert bar is not None
+        count = len(self.signals.times)
+        rows = np.zeros((count, int(BarSignal.TIME) + 1))
+        rows[:, :3], rows[:, 3:6] = state.velocity, state.omega
+        rows[:, 6:9], rows[:, 9:12] = state.acceleration, state.alpha
+        rows[:, BarSignal.ROTATION : BarSignal.ROTATION + 9] = state.rotation.reshape(count, 9)
+        rows[:, BarSignal.COM : BarSignal.COM + 3] = bar.com
+        rows[:, BarSignal.MASS] = bar.mass
+        rows[:, BarSignal.GRAVITY] = self._testbed.gravity
+        rows[:, BarSignal.TIME] = self.signals.times
+        return rows
+
+    def frame_rows(self, i: int) -> Array:
+        """Return `FrameSignal` columns of cable i."""
+        spans, count = self._spans, len(self.signals.times)
+        rows = np.zeros((count, int(FrameSignal.STIFFNESS) + 1))
+        rows[:, FrameSignal.TIME] = self.signals.times
+        rows[:, FrameSignal.DIRECTION : FrameSignal.DIRECTION + 3] = spans.directions[:, i]
+        rows[:, FrameSignal.EXIT : FrameSignal.EXIT + 3] = spans.exits[i]
+        turn = self._frame.rotation.reshape(count, 9)
+        rows[:, FrameSignal.ROTATION : FrameSignal.ROTATION + 9] = turn
+        force = (self.signals.tensions[:, :, None] * spans.directions).sum(axis=1)
+        rows[:, FrameSignal.FORCE : FrameSignal.FORCE + 3] = force
+        rows[:, FrameSignal.STIFFNESS] = self._law[:, i, 1]
+        return rows

@@ -1,0 +1,239 @@
+"""The cables' law and the bar's equation of motion, driven by measured signals."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from dataclasses import replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from cspm_ident.diagnosis.columns import Candidate, Place, elements_of, shapes_of
+from cspm_ident.diagnosis.drivers import Driver, driver_columns
+from cspm_ident.diagnosis.equation import Equation
+from cspm_ident.diagnosis.machine_signals import BodyMotion, MachineSignals
+from cspm_ident.diagnosis.suspension import Suspension
+from cspm_ident.signals.measurement import TENSION, WINCHES
+from cspm_ident.signals.timeline import Timeline, whole_stretches
+from cspm_ident.winch.weak_form import make_window, weigh
+from cspm_msgs_py.dofs import DOFS
+from cspm_msgs_py.testbed import Testbed
+from cspm_sim.effect_entries import Action
+from cspm_sim.effects import Channel, Effect, Elements
+from cspm_sim.effects.effect import Regression
+from cspm_sim.effects.signals import CableSignal, PoseSignal, ReadingSignal
+from cspm_sim.kernels.plant import PlantParameters
+from cspm_sim.parameters import nominal_parameters
+
+Array = NDArray[np.float64]
+
+PERIOD_NS = 5_000_000
+# Windows pass what lies well within the band of the smoothed poses.
+_HALF_WIDTHS = (0.04, 0.25)
+_SHORTEST_S = 2.0
+_DRIVERS = {
+    "tension [N]": CableSignal.TENSION,
+    "rate of elongation [m/s]": CableSignal.RATE,
+    "motor angle [rad]": CableSignal.ANGLE,
+    "time [s]": CableSignal.TIME,
+}
+BAR, FRAME = Elements.BAR.value, Elements.FRAME.value
+
+
+def suspension_equations(
+    timeline: Timeline, effects: Sequence[Effect], known: Sequence[Action]
+) -> list[Equation]:
+    """Return the equations of all cables and of the bar, one set for each stretch without hole.
+
+    Empty where poses of the bar, angles or tensions were not recorded.
+
+    Args:
+        timeline: of the recording.
+        effects: the catalogue.
+        known: effects that the test-bed file has.
+    """
+    signals = machine_signals(timeline)
+    machine = timeline.measurement.machine
+    return [
+        equation
+        for stretch in signals
+        for equation in _Stretch(stretch, machine, timeline.pose_band).equations(effects, known)
+    ]
+
+
+def machine_signals(timeline: Timeline) -> list[MachineSignals]:
+    """Return the measured signals at steps of 5 ms, one entry per stretch without hole."""
+    measured = timeline.measurement
+    if measured.bar_pose is None or measured.angle is None or measured.tension is None:
+        return []
+    slow = timeline.slowly(PERIOD_NS, timeline.pose_band)
+    frame, bar = slow.body_motion("frame"), slow.body_motion("bar")
+    columns = [frame[0], bar[0], slow.angles, slow.speeds, slow.smooth_tensions]
+    whole = [np.asarray(c) for c in columns]
+    shortest = round(_SHORTEST_S / slow.period)
+    return [
+        MachineSignals(
+            slow.times[a : b + 1],
+            BodyMotion(*(part[a : b + 1] for part in frame)),
+            BodyMotion(*(part[a : b + 1] for part in bar)),
+            *(each[a : b + 1] for each in whole[2:]),
+        )
+        for a, b in whole_stretches(whole, shortest)
+    ]
+
+
+class _Stretch:
+    """One stretch and the window that weighs it."""
+
+    def __init__(self, signals: MachineSignals, machine: Testbed, band: float) -> None:
+        self._signals, self._machine = signals, machine
+        self._parameters: PlantParameters = nominal_parameters(machine)
+        self._here = Suspension(signals, machine, self._parameters)
+        half_s = float(np.clip(1.0 / band, *_HALF_WIDTHS))
+        half = max(2, round(half_s / signals.step))
+        self._window, self._stride = make_window(half, signals.step).weights, max(1, half // 2)
+
+    def equations(self, effects: Sequence[Effect], known: Sequence[Action]) -> list[Equation]:
+        times = self._weighed(self._signals.times)
+        tensions, wrench = self._targets(known)
+        columns: dict[Place, dict[Candidate | Driver, Array]] = {}
+        for effect in effects:
+            for candidate, place, found in self._columns(effect):
+                columns.setdefault(place, {})[candidate] = self._weighed(found)
+        out = []
+        rows = [self._here.cable_rows(i) for i in range(len(self._machine.cables))]
+        for i, name in enumerate(self._machine.cable_names):
+            place = Place(Channel.TENSION, name)
+            start = self._weighed(self._here.start_column(i))[:, None, None]
+            target = self._weighed(tensions[:, i])[:, None]
+            drivers = {key: self._weighed(rows[i][:, column]) for key, column in _DRIVERS.items()}
+            own = columns.get(place, {}) | driver_columns(place, drivers)
+            measured = self._weighed(self._signals.tensions[:, i])[:, None]
+            out.append(Equation(place, times, target, own, measured, start))
+        place = Place(Channel.WRENCH, BAR)
+        own = columns.get(place, {}) | self._bar_drivers(place)
+        measured = self._weighed(self._here.cable_wrench)
+        out.append(Equation(place, times, self._weighed(wrench), own, measured))
+        return out
+
+    def _bar_drivers(self, place: Place) -> dict[Candidate | Driver, Array]:
+        state, poses = self._here.bar, self._signals.bar.poses
+        speeds = np.hstack([state.velocity, state.omega])
+        found: dict[Candidate | Driver, Array] = {}
+        for i, dof in enumerate(DOFS):
+            unit = "m" if i < 3 else "rad"
+            drivers = {
+                f"{dof} [{unit}]": poses[:, i],
+                f"{dof} speed [{unit}/s]": speeds[:, i],
+                f"time, in {dof} [s]": self._signals.times,
+            }
+            weighed = {name: self._weighed(values) for name, values in drivers.items()}
+            found |= driver_columns(place, weighed, i, len(DOFS))
+        return found
+
+    def _targets(self, known: Sequence[Action]) -> tuple[Array, Array]:
+        tensions, wrench = self._here.tension_residuals.copy(), self._here.wrench_residuals.copy()
+        for action in known:
+            effect = action.effect
+            if effect.alter is not None or effect.sense is not None:
+                continue
+            shape = {name: action.values[name] for name in effect.nonlinear}
+            weights = effect.weights(action.values)
+            for place, found in self._regressed(effect, action.element, shape):
+                if place.channel is Channel.TENSION:
+                    i = self._machine.cable_names.index(place.element)
+                    tensions[:, i] -= found[:, 0] @ weights
+                else:
+                    wrench -= found @ weights
+        return tensions, wrench
+
+    def _columns(self, effect: Effect) -> Iterator[tuple[Candidate, Place, Array]]:
+        for i, name in enumerate(elements_of(effect, self._machine.cable_names, (BAR, FRAME))):
+            if effect.sense is not None:
+                for place, found in self._read(effect, i, name):
+                    yield Candidate(effect, name), place, found
+                continue
+            for shape in shapes_of(effect):
+                for place, found in self._regressed(effect, i, dict(shape)):
+                    yield Candidate(effect, name, shape), place, found
+
+    def _regressed(
+        self, effect: Effect, i: int, shape: dict[str, float]
+    ) -> Iterator[tuple[Place, Array]]:
+        names = self._machine.cable_names
+        for regression in (effect.regression, *effect.partners):
+            if regression.channel is Channel.WRENCH:
+                of_cable = effect.acts_on is Elements.CABLES
+                rows = self._here.end_rows(i) if of_cable else self._here.bar_rows()
+                yield Place(Channel.WRENCH, BAR), _shaped(regression, rows, shape)
+            elif regression.channel is Channel.TENSION and effect.acts_on is Elements.FRAME:
+                for k, name in enumerate(names):
+                    rows = self._here.frame_rows(k)
+                    yield Place(Channel.TENSION, name), _shaped(regression, rows, shape)
+            elif regression.channel is Channel.TENSION:
+                rows = self._here.cable_rows(i)
+                yield Place(Channel.TENSION, names[i]), _shaped(regression, rows, shape)
+
+    def _read(self, effect: Effect, i: int, name: str) -> Iterator[tuple[Place, Array]]:
+        """Yield how a sensor's fault changes the residuals, by differences of the readings."""
+        changes = [self._changed(*faulty) for faulty in self._faulty(effect, i, name)]
+        tensions = np.stack([c[0] for c in changes], axis=2)
+        wrench = np.stack([c[1] for c in changes], axis=2)
+        for k, cable in enumerate(self._machine.cable_names):
+            if np.any(tensions[:, k]):
+                yield Place(Channel.TENSION, cable), tensions[:, k, None, :]
+        yield Place(Channel.WRENCH, BAR), wrench
+
+    def _changed(self, moved: MachineSignals, step: float) -> tuple[Array, Array]:
+        there = Suspension(moved, self._machine, self._parameters, self._here.start)
+        return (
+            (there.tension_residuals - self._here.tension_residuals) / step,
+            (there.wrench_residuals - self._here.wrench_residuals) / step,
+        )
+
+    def _faulty(self, effect: Effect, i: int, name: str) -> Iterator[tuple[MachineSignals, float]]:
+        """Yield the signals with a little of each of a sensor's faults, and how much."""
+        assert effect.sense is not None
+        topic = effect.sense.topics[0]
+        if topic in (TENSION, WINCHES):
+            yield self._faulty_joint(effect, i, topic)
+            return
+        body = "bar" if name == BAR else "frame"
+        motion: BodyMotion = getattr(self._signals, body)
+        rows = np.zeros((len(self._signals.times), int(PoseSignal.RATE) + 6))
+        rows[:, PoseSignal.TIME] = self._signals.times
+        rows[:, PoseSignal.POSE : PoseSignal.POSE + 6] = motion.poses
+        rows[:, PoseSignal.RATE : PoseSignal.RATE + 6] = motion.rates
+        for change in np.moveaxis(effect.regressors(rows), 2, 0):
+            step = _small(change)
+            yield self._signals.with_pose_change(body, change, step), step
+
+    def _faulty_joint(self, effect: Effect, i: int, topic: str) -> tuple[MachineSignals, float]:
+        signals = self._signals
+        readings = signals.tensions if topic == TENSION else signals.angles
+        rows = np.zeros((len(signals.times), len(ReadingSignal)))
+        rows[:, ReadingSignal.TIME] = signals.times
+        rows[:, ReadingSignal.VALUE] = readings[:, i]
+        changed = np.zeros(readings.shape)
+        changed[:, i] = effect.regressors(rows)[:, 0, 0]
+        step = _small(changed)
+        if topic == TENSION:
+            return replace(signals, tensions=readings + step * changed), step
+        rate = np.gradient(changed, signals.step, axis=0)
+        speeds = signals.speeds + step * rate
+        return replace(signals, angles=readings + step * changed, speeds=speeds), step
+
+    def _weighed(self, values: Array) -> Array:
+        return weigh(self._window, values, self._stride)
+
+
+_READING_STEP = 1e-6  # m, rad or N
+
+
+def _small(change: Array) -> float:
+    """Return by what to multiply a change, so that it stays within what is linear."""
+    return _READING_STEP / (float(np.max(np.abs(change))) + 1e-300)
+
+
+def _shaped(regression: Regression, rows: Array, shape: dict[str, float]) -> Array:
+    return regression.columns(rows, **shape)

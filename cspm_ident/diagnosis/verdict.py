@@ -1,0 +1,266 @@
+"""What a diagnosis says, in words and as `diagnosis.json`."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from enum import Enum
+from math import exp
+from typing import Any, NamedTuple
+
+from cspm_ident.diagnosis.columns import Candidate
+from cspm_ident.diagnosis.diagnose import Diagnosis, HeldOut
+from cspm_ident.diagnosis.drivers import Driver
+from cspm_ident.diagnosis.search import Hypothesis, Named
+from cspm_ident.diagnosis.sums import Gain
+from cspm_ident.signals.measurement import Measurement
+from cspm_sim.effects import Block, Channel, Effect
+
+SCHEMA = "cspm.diagnosis/1"
+IMPROVED = "testbed.improved.yaml"
+UNKNOWN = "unknown"
+
+
+class Verdict(Enum):
+    """What recordings say of a model, as the contract names it."""
+
+    CONSISTENT = "consistent"
+    EFFECT = "effect"
+    PARAMETER = "parameter"
+    TIE = "tie"
+    UNKNOWN = "unknown"
+    NOT_EXCITED = "not_excited"
+
+
+class Number(NamedTuple):
+    """A parameter of a finding.
+
+    Attributes:
+        name: public name.
+        value: in `unit`.
+        unit: SI.
+        low, high: ends of its 95 % interval; equal to the value where it was searched on a grid.
+    """
+
+    name: str
+    value: float
+    unit: str
+    low: float
+    high: float
+
+
+def verdict_of(diagnosis: Diagnosis) -> Verdict:
+    """Return the verdict in one word."""
+    named = diagnosis.findings.named
+    if not named:
+        if diagnosis.findings.unknown:
+            return Verdict.UNKNOWN
+        return Verdict.CONSISTENT if diagnosis.places else Verdict.NOT_EXCITED
+    if any(each.alternatives for each in named):
+        return Verdict.TIE
+    if all(each.hypothesis.effect.alter is not None for each in named):
+        return Verdict.PARAMETER
+    return Verdict.EFFECT
+
+
+def probability_of(named: Named) -> float:
+    """Return how probable a finding is among what explains the same.
+
+    A rival that is worse by so many standard errors counts as a normal deviate of that size.
+    """
+    return 1.0 / (1.0 + sum(_odds(worse) for _, worse in named.alternatives))
+
+
+def _odds(worse: Gain) -> float:
+    apart = max(0.0, worse.total) / worse.error if worse.error > 0.0 else 0.0
+    return exp(-0.5 * apart**2)
+
+
+def numbers_of(diagnosis: Diagnosis, candidate: Candidate) -> list[Number]:
+    """Return the parameters of an effect on one element."""
+    weights, widths = diagnosis.weights[candidate]
+    effect = candidate.effect
+    values = effect.values(weights.tolist(), **candidate.nonlinear)
+    low = effect.values((weights - widths).tolist(), **candidate.nonlinear)
+    high = effect.values((weights + widths).tolist(), **candidate.nonlinear)
+    return [
+        Number(
+            p.name,
+            values[p.name],
+            p.unit,
+            min(low[p.name], high[p.name]),
+            max(low[p.name], high[p.name]),
+        )
+        for p in effect.parameters
+    ]
+
+
+def statement_of(diagnosis: Diagnosis, named: Named) -> str:
+    """Return a finding as one sentence that a person can act on."""
+    effect = named.hypothesis.effect
+    members = members_of(diagnosis, named.hypothesis)
+    parts = []
+    for candidate in members:
+        numbers = [n for n in numbers_of(diagnosis, candidate) if n.low < n.high]
+        told = ", ".join(
+            f"{n.name} {n.value:.4g} ({n.low:.4g} to {n.high:.4g}) {n.unit}" for n in numbers
+        )
+        parts.append(f"{candidate.element}: {told}")
+    missing = (
+        "differs from the test-bed file" if effect.alter is not None else "is not in the model"
+    )
+    since = ""
+    if named.onset:
+        since = f", from {diagnosis.starts[named.onset]:.1f} s on"
+    best = max(_concerned(diagnosis, named), key=lambda fit: fit.before / max(fit.after, 1e-300))
+    return (
+        f"{_words(effect)} {missing}{since} ({'; '.join(parts)}). With it the held-out residual of"
+        f" {channel_of(best)} falls from {best.before:.3g} to {best.after:.3g}"
+        f" {unit_of(best)} (noise {best.noise:.2g})."
+    )
+
+
+def unknown_statement(driver: Driver, share: float) -> str:
+    """Return what is missing and cannot be named as one sentence."""
+    channel = _CHANNELS[driver.place.channel].format(driver.place.element)
+    return (
+        f"Something is missing in {channel} that nothing in the catalogue explains: a function of"
+        f" {driver.signal} takes {100 * share:.0f} % of its squared residual."
+    )
+
+
+def members_of(diagnosis: Diagnosis, hypothesis: Hypothesis) -> list[Candidate]:
+    """Return a finding's candidates with their final shapes."""
+    return [
+        c
+        for c in diagnosis.weights
+        if c.effect_id == hypothesis.effect.id and c.element in hypothesis.elements
+    ]
+
+
+def channel_of(fit: HeldOut) -> str:
+    """Return the public name of a residual's measured quantity."""
+    return _CHANNELS[fit.place.channel].format(fit.place.element)
+
+
+def unit_of(fit: HeldOut) -> str:
+    """Return the unit of a residual; none where channels of several units were put together."""
+    return {Channel.SHAFT: "N·m", Channel.TENSION: "N"}.get(fit.place.channel, "times its noise")
+
+
+_CHANNELS = {
+    Channel.SHAFT: "winches/torque/{}",
+    Channel.TENSION: "cables/tension/{}",
+    Channel.WRENCH: "{}/wrench",
+}
+_DRIVES = {Channel.SHAFT: "torque", Channel.TENSION: "winch", Channel.WRENCH: "tension"}
+
+
+def diagnosis_data(diagnosis: Diagnosis) -> dict[str, Any]:
+    """Return a diagnosis as `diagnosis.json` has it."""
+    first = diagnosis.searched[0]
+    roles = [("search", m) for m in diagnosis.searched]
+    roles += [("held_out", m) for m in diagnosis.held_out]
+    return {
+        "schema": SCHEMA,
+        "recordings": [_recording(role, m) for role, m in roles],
+        "testbed": {"path": _testbed_path(first), "sha256": first.testbed.sha256},
+        "verdict": verdict_of(diagnosis).value,
+        "findings": [_finding(diagnosis, each) for each in diagnosis.findings.named]
+        + [_unknown(*each) for each in diagnosis.findings.unknown],
+        "not_excited": [
+            {"effect": name, "elements": list(elements)} for name, elements in diagnosis.silent
+        ],
+        "fit": [_fit(each) for each in diagnosis.fit],
+        "model": IMPROVED if diagnosis.findings.named else None,
+    }
+
+
+def _recording(role: str, measurement: Measurement) -> dict[str, str]:
+    return {"path": str(measurement.path), "sha256": measurement.sha256, "role": role}
+
+
+def _testbed_path(measurement: Measurement) -> str:
+    return f"{measurement.path}: testbed.yaml"
+
+
+def _finding(diagnosis: Diagnosis, named: Named) -> dict[str, Any]:
+    hypothesis = named.hypothesis
+    probability = probability_of(named)
+    return {
+        "subsystem": hypothesis.effect.block.value,
+        "elements": list(hypothesis.elements),
+        "effect": hypothesis.effect.id,
+        "probability": probability,
+        "statement": statement_of(diagnosis, named),
+        "onset_s": float(diagnosis.starts[named.onset]) if named.onset else None,
+        "region": {},
+        "parameters": [
+            {
+                "element": candidate.element,
+                "name": n.name,
+                "value": n.value,
+                "unit": n.unit,
+                "ci95": [n.low, n.high] if n.low < n.high else None,
+            }
+            for candidate in members_of(diagnosis, hypothesis)
+            for n in numbers_of(diagnosis, candidate)
+        ],
+        "alternatives": [
+            {
+                "effect": rival.effect.id,
+                "elements": list(rival.elements),
+                "probability": probability * _odds(worse),
+                "separating_experiment": None,
+            }
+            for rival, worse in named.alternatives
+        ],
+    }
+
+
+def _unknown(driver: Driver, gain: Gain, share: float) -> dict[str, Any]:
+    blocks = {Channel.SHAFT: Block.WINCH, Channel.TENSION: Block.CABLE, Channel.WRENCH: Block.BAR}
+    return {
+        "subsystem": blocks[driver.place.channel].value,
+        "elements": [driver.place.element],
+        "effect": UNKNOWN,
+        "probability": None,
+        "statement": unknown_statement(driver, share),
+        "onset_s": None,
+        "region": {"driver": driver.signal},
+        "parameters": [],
+        "alternatives": [],
+    }
+
+
+def _fit(fit: HeldOut) -> dict[str, Any]:
+    spread = max(fit.measured, 1e-300)
+    before, after = fit.before / spread, fit.after / spread
+    return {
+        "channel": channel_of(fit),
+        "drive": _DRIVES[fit.place.channel],
+        "held_out": {
+            "vaf_before": 100.0 * max(0.0, 1.0 - before**2),
+            "vaf_after": 100.0 * max(0.0, 1.0 - after**2),
+            "nrmse_before": before,
+            "nrmse_after": after,
+            "nrmse_retuned_nominal": fit.retuned / spread,
+            "noise_floor": fit.noise / spread,
+        },
+    }
+
+
+def _concerned(diagnosis: Diagnosis, named: Named) -> Sequence[HeldOut]:
+    places = {
+        regression.channel
+        for regression in (named.hypothesis.effect.regression, *named.hypothesis.effect.partners)
+    }
+    own = [
+        f
+        for f in diagnosis.fit
+        if f.place.channel in places and f.place.element in (*named.hypothesis.elements, "bar")
+    ]
+    return own or list(diagnosis.fit)
+
+
+def _words(effect: Effect) -> str:
+    return effect.id.replace("_", " ").capitalize()

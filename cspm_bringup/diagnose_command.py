@@ -67,7 +67,7 @@ def diagnose_command(asked: DiagnoseRequest, json: Path | None) -> None:
     data = diagnosis_data(found)
     if asked.out is not None:
         _write(asked.out, found, data)
-        console.print(f"written {asked.out}", soft_wrap=True, highlight=False)
+        console.print(f"written {asked.out}", soft_wrap=True, highlight=False, markup=False)
     if json is not None:
         write_json(json, data)
 
@@ -93,27 +93,33 @@ def print_diagnosis(console: Console, found: Diagnosis) -> None:
     """Print verdict, findings and how the fit changes on data that was not searched."""
     console.print(f"verdict: [bold]{verdict_of(found).value}[/]")
     for named in found.findings.named:
-        console.print(f"• {statement_of(found, named)}", soft_wrap=True, highlight=False)
+        console.print(
+            f"• {statement_of(found, named)}", soft_wrap=True, highlight=False, markup=False
+        )
         for rival, _ in named.alternatives:
             console.print(
                 f"  as well explained by {rival.effect.id} on {', '.join(rival.elements)};"
                 f" to tell: {rival.effect.separating_experiment}",
                 soft_wrap=True,
                 highlight=False,
+                markup=False,
             )
     for driver, _, share in found.findings.unknown:
-        console.print(f"• {unknown_statement(driver, share)}", soft_wrap=True, highlight=False)
+        console.print(
+            f"• {unknown_statement(driver, share)}", soft_wrap=True, highlight=False, markup=False
+        )
     for named in found.rejected:
         console.print(
             f"not kept: {named.hypothesis.effect.id} on {', '.join(named.hypothesis.elements)}"
             " did not help on held-out data",
             soft_wrap=True,
             highlight=False,
+            markup=False,
         )
     console.print(_fit_table(found))
     silent = ", ".join(name for name, _ in found.silent)
     if silent:
-        console.print(f"not testable here: {silent}", soft_wrap=True, highlight=False)
+        console.print(f"not testable here: {silent}", soft_wrap=True, highlight=False, markup=False)
 
 
 def _fit_table(found: Diagnosis) -> Table:

@@ -21,6 +21,7 @@ from cspm_ident.diagnosis.recorded import equations_of
 from cspm_ident.diagnosis.sums import Sums
 from cspm_ident.signals.measurement import BAR, FRAME, TENSION, WINCHES, Measurement
 from cspm_ident.signals.samples import Samples
+from cspm_msgs_py.errors import InputError
 from cspm_sim.effect_entries import Action, altered_testbed
 from cspm_sim.effects import Effect
 from cspm_sim.effects.signals import PoseSignal, ReadingSignal
@@ -59,7 +60,11 @@ def refine(
     found: Weights = {}
     for _ in range(_ROUNDS if candidates else 0):
         near = [_near(effects[name], shape, factor) for name, shape in shapes.items()]
-        moved = [_corrected(m, effects, totals) for m in searched]
+        try:
+            moved = [_corrected(m, effects, totals) for m in searched]
+        except InputError:
+            # Such a machine cannot be; what was found before stays, with its interval.
+            break
         parts = cut([equations_of(m, near) for m in moved])
         wanted = list(totals)
         scaled = [[e.scaled(noise[e.place]) for e in p if e.place in noise] for p in parts]

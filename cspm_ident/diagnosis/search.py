@@ -19,7 +19,7 @@ Array = NDArray[np.float64]
 Index = NDArray[np.intp]
 
 # Less than this share of what is left of the residuals it acts on is not worth a word.
-MATERIAL_SHARE = 0.05
+MATERIAL_SHARE = 0.1
 UNKNOWN_SHARE = 0.15
 FALSE_ALARMS = 0.01
 MOST_EFFECTS = 3
@@ -218,6 +218,7 @@ class Search:
         """Return the hypothesis of fewest columns that is no worse than the best one."""
         rivals = [h for h in self._rivals(best, free, base) if self._is_plausible([*chosen, h])]
         reference = self.sums.held_out(np.concatenate([base, self.own_columns(best)]))
+        gained = gain_of(self.sums.held_out(base) - reference)
         fewest = best
         for rival in rivals:
             if len(self.own_columns(rival)) >= len(self.own_columns(fewest)):
@@ -225,8 +226,7 @@ class Search:
             worse = gain_of(
                 self.sums.held_out(np.concatenate([base, self.own_columns(rival)])) - reference
             )
-            share = worse.total / max(1e-300, float(reference.sum()))
-            if worse.total <= 2.0 * worse.error or share < MATERIAL_SHARE:
+            if worse.total <= 2.0 * gained.error and worse.total < MATERIAL_SHARE * gained.total:
                 fewest = rival
         return fewest
 

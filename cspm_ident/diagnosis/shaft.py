@@ -15,6 +15,7 @@ from cspm_ident.signals.winch_motion import winch_motion
 from cspm_ident.winch.recording import signal_rows, winch_signals
 from cspm_ident.winch.weak_form import make_window, weigh
 from cspm_msgs_py.errors import InputError
+from cspm_msgs_py.testbed import Cable
 from cspm_sim.effect_entries import Action
 from cspm_sim.effects import Channel, Effect
 from cspm_sim.effects.signals import ReadingSignal, WinchSignal
@@ -63,7 +64,8 @@ def shaft_equations(
             half = max(2, round(HALF_WIDTH_S / signals.angle.interval))
             if len(rows) < 2 * half + 1:
                 continue
-            table = _Shaft(rows, cable.rotor_inertia, cable.name, half, times)
+            sensors = (WINCHES,) if signals.tension is None else (WINCHES, TENSION)
+            table = _Shaft(rows, cable, half, times, sensors)
             found.append(table.equation(effects, [a for a in known if a.element == i]))
     return found
 
@@ -71,7 +73,10 @@ def shaft_equations(
 class _Shaft:
     """One winch's rows and the window that weighs them."""
 
-    def __init__(self, rows: Array, inertia: float, name: str, half: int, times: Array) -> None:
+    def __init__(
+        self, rows: Array, winch: Cable, half: int, times: Array, sensors: tuple[str, ...]
+    ) -> None:
+        self._sensors, inertia, name = sensors, winch.rotor_inertia, winch.name
         self._rows, self._inertia, self._name = rows, inertia, name
         step = float(times[1] - times[0])
         self._window, self._stride = make_window(half, step), max(1, half // 2)
@@ -112,7 +117,7 @@ class _Shaft:
         if effect.regression.channel is Channel.SHAFT:
             for shape in shapes_of(effect):
                 yield Candidate(effect, self._name, shape), self._regressed(effect, dict(shape))
-        elif effect.sense is not None and effect.sense.topics[0] in (TENSION, WINCHES):
+        elif effect.sense is not None and effect.sense.topics[0] in self._sensors:
             yield Candidate(effect, self._name), self._read(effect)
 
     def _regressed(self, effect: Effect, shape: dict[str, float]) -> Array:

@@ -89,7 +89,7 @@ class _Stretch:
         self._signals, self._machine = signals, machine
         self._parameters: PlantParameters = nominal_parameters(machine)
         self._here = Suspension(signals, machine, self._parameters)
-        half_s = float(np.clip(1.0 / band, *_HALF_WIDTHS))
+        half_s = float(np.clip(2.0 / band, *_HALF_WIDTHS))
         half = max(2, round(half_s / signals.step))
         self._window, self._stride = make_window(half, signals.step).weights, max(1, half // 2)
 

@@ -1,0 +1,126 @@
+"""Effects planted one at a time, and what `cspm diagnose` says of each: a table for development.
+
+Most recordings come from the plant whose equations the catalogue shares, so that the table shows
+what the method can see, not what it is worth on a real machine; those from MuJoCo are marked.
+"""
+
+from __future__ import annotations
+
+import argparse
+import tempfile
+import time
+from dataclasses import dataclass, field, replace
+from pathlib import Path
+
+from rich.box import SIMPLE_HEAD
+from rich.console import Console
+from rich.table import Table
+
+from bench.thesis_machine import SCENARIOS
+from cspm_bringup.assembly import resolve
+from cspm_bringup.bundle import make_bundle
+from cspm_bringup.run import run
+from cspm_ident.diagnosis.diagnose import diagnose
+from cspm_ident.diagnosis.verdict import members_of, numbers_of, verdict_of
+from cspm_ident.signals.measurement import read_measurement
+from cspm_msgs_py.scenario import load_scenario
+from cspm_msgs_py.testbed import EffectEntry, load_testbed
+
+DURATION_S = 60
+
+
+@dataclass(frozen=True)
+class Case:
+    """What is planted where, and how it is recorded."""
+
+    effect: str = ""
+    elements: tuple[str, ...] = ()
+    parameters: dict[str, float] = field(default_factory=dict)
+    plant: str = "sim"
+    capture: int = 1000
+
+
+CASES = (
+    Case(),
+    Case(capture=100),
+    Case(plant="mujoco"),
+    Case("winch_coulomb_friction", ("surge_2",), {"torque": 0.031}),
+    Case("winch_coulomb_friction", ("surge_2",), {"torque": 0.02}, capture=100),
+    Case("winch_coulomb_friction", ("sway_1",), {"torque": 0.01}, plant="mujoco"),
+    Case("winch_viscous_friction", ("hoist_2",), {"coefficient": 2e-5}, plant="mujoco"),
+    Case("winch_torque_gain", ("surge_1",), {"gain": 0.97}),
+    Case("winch_drum_eccentricity", ("sway_2",), {"eccentricity": 2e-4, "phase": 0.5}),
+    Case("tension_gain", ("sway_3",), {"gain": 1.03}),
+    Case("tension_bias", ("hoist_1",), {"bias": 0.3}),
+    Case("cable_stiffness", ("hoist_1",), {"scale": 0.8}),
+    Case("cable_hysteresis", ("surge_1",), {"force": 0.5, "displacement": 0.002}),
+    Case("cable_transverse_damping", (), {"coefficient": 0.5}),
+    Case("pose_delay", ("bar",), {"delay": 0.004}),
+    Case("bar_mass", (), {"mass": 0.1}),
+)
+
+
+def main() -> None:
+    """Run the command line."""
+    parser = argparse.ArgumentParser(prog="python -m bench.diagnosis", description=__doc__)
+    parser.add_argument("--only", metavar="EFFECT", help="cases of one effect alone")
+    only = parser.parse_args().only
+    cases = [case for case in CASES if only in (None, case.effect)]
+    console, table = Console(), Table(box=SIMPLE_HEAD)
+    for heading in ("planted", "plant, capture", "verdict", "found", "seconds"):
+        table.add_column(heading)
+    with tempfile.TemporaryDirectory() as folder:
+        for seed, case in enumerate(cases, start=100):
+            place = Path(folder) / str(seed)
+            with console.status(f"{case.effect or 'nothing'}: recording"):
+                record(case, seed, place)
+            with console.status(f"{case.effect or 'nothing'}: diagnosing"):
+                table.add_row(_planted(case), f"{case.plant}, {case.capture} Hz", *judge(place))
+    console.print(table)
+
+
+def record(case: Case, seed: int, folder: Path) -> None:
+    """Run the worst sea with an effect planted."""
+    path = SCENARIOS / "worst_case.yaml"
+    capture = f"rates.motion_capture={case.capture}"
+    scenario = load_scenario(path, [f"duration={DURATION_S}", f"seed={seed}", capture])
+    file = load_testbed(path.parent / scenario.testbed)
+    machine = file.testbed
+    if case.effect:
+        entry = EffectEntry(
+            effect=case.effect, elements=case.elements, parameters=dict(case.parameters)
+        )
+        machine = machine.model_copy(update={"effects": (*machine.effects, entry)})
+    described = replace(file, testbed=machine)
+    bundle = make_bundle(resolve(scenario, machine), described, path.parent)
+    run(replace(bundle, plant=case.plant), folder)
+
+
+def judge(folder: Path) -> tuple[str, str, str]:
+    """Return verdict, what was found, and how long it took, the file without the effect given."""
+    begun = time.perf_counter()
+    measurement = read_measurement(folder, SCENARIOS / "testbeds" / "thesis.yaml")
+    found = diagnose([measurement])
+    took = time.perf_counter() - begun
+    lines = []
+    for named in found.findings.named:
+        for candidate in members_of(found, named.hypothesis):
+            numbers = ", ".join(
+                f"{n.name} {n.value:.4g} ({n.low:.4g} to {n.high:.4g})"
+                for n in numbers_of(found, candidate)
+            )
+            lines.append(f"{candidate.effect_id} {candidate.element}: {numbers}")
+        lines += [f"  or {rival.effect.id}" for rival, _ in named.alternatives]
+    lines += [f"unknown, {d.place.element}: {d.signal}" for d, _, _ in found.findings.unknown]
+    return verdict_of(found).value, "\n".join(lines), f"{took:.0f}"
+
+
+def _planted(case: Case) -> str:
+    if not case.effect:
+        return "nothing"
+    values = ", ".join(f"{name} {value:g}" for name, value in case.parameters.items())
+    return f"{case.effect} {' '.join(case.elements) or 'all'}: {values}"
+
+
+if __name__ == "__main__":
+    main()

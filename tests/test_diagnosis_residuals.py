@@ -1,0 +1,134 @@
+"""Residuals driven by measured signals, and that effects' columns are what they leave over."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from run_samples import SCENARIOS, run_to
+
+from cspm_ident.diagnosis.columns import Place
+from cspm_ident.diagnosis.recorded import equations_of
+from cspm_ident.signals.measurement import read_measurement
+from cspm_msgs_py.testbed import load_testbed
+from cspm_sim.effect_entries import Action, altered_testbed
+from cspm_sim.effects import Channel, catalogue
+
+THESIS = load_testbed(SCENARIOS / "testbeds" / "thesis.yaml")
+
+
+@pytest.fixture(scope="module")
+def measurement(tmp_path_factory):
+    """Six seconds of the worst sea, read by ideal sensors."""
+    folder = tmp_path_factory.mktemp("residuals") / "bag"
+    run_to(folder, "worst_case", "duration=6", "sensors=ideal")
+    return read_measurement(folder)
+
+
+@pytest.fixture(scope="module")
+def equations(measurement):
+    return by_place(measurement)
+
+
+def by_place(measurement, effects=None):
+    found = equations_of(measurement, list(catalogue().values()) if effects is None else effects)
+    return {equation.place: equation for equation in found}
+
+
+def described(measurement, name, element, **values):
+    """The measurement, said to be of a machine with other parameters."""
+    effect = catalogue()[name]
+    machine = measurement.machine
+    index = machine.cable_names.index(element) if element in machine.cable_names else 0
+    other = altered_testbed(machine, [Action(effect, index, element, values)])
+    return measurement.with_testbed(replace(measurement.testbed, testbed=other))
+
+
+def without_start(equation, values):
+    """Return what one unknown length at the start, the same for all time, does not explain."""
+    if not equation.nuisance.size:
+        return values
+    start = equation.nuisance[:, 0]
+    return values - start @ np.linalg.lstsq(start, values, rcond=None)[0]
+
+
+def rms(values):
+    return np.sqrt(np.mean(np.square(values), axis=0))
+
+
+def test_there_is_one_residual_per_winch_cable_and_bar(equations):
+    cables = THESIS.testbed.cable_names
+    expected = {Place(c, n) for c in (Channel.SHAFT, Channel.TENSION) for n in cables}
+    assert set(equations) == expected | {Place(Channel.WRENCH, "bar")}
+
+
+def test_the_machine_itself_leaves_next_to_nothing(equations):
+    """Of what the residual is made of: ideal sensors, but smoothing and discrete derivatives."""
+    for place, equation in equations.items():
+        left = without_start(equation, equation.target)
+        assert np.all(rms(left) < 0.01 * rms(equation.measured - equation.measured.mean(0))), place
+
+
+@pytest.mark.parametrize(
+    ("name", "element", "value", "channel"),
+    [
+        ("winch_inertia", "sway_1", {"inertia": 2e-5}, Channel.SHAFT),
+        ("winch_drum_radius", "surge_2", {"radius": 1e-4}, Channel.SHAFT),
+        ("cable_axial_damping", "hoist_1", {"scale": 1.05}, Channel.TENSION),
+        ("cable_stiffness", "surge_1", {"scale": 1.01}, Channel.TENSION),
+        ("bar_mass", "bar", {"mass": 0.1}, Channel.WRENCH),
+        ("bar_com", "bar", {"x": 0.01, "y": 0.0, "z": 0.0}, Channel.WRENCH),
+        ("bar_inertia", "bar", {"ixx": 0.0, "iyy": 1e-3, "izz": 1e-3}, Channel.WRENCH),
+    ],
+)
+def test_a_wrong_number_of_the_file_leaves_its_column(
+    measurement, equations, name, element, value, channel
+):
+    """What the file has too much of is missing with the opposite sign."""
+    effect = catalogue()[name]
+    wrong = by_place(described(measurement, name, element, **value), [effect])
+    place = Place(channel, element)
+    here = equations[place]
+    change = without_start(here, wrong[place].target - here.target)
+    columns = next(
+        found
+        for term, found in here.columns.items()
+        if getattr(term, "effect_id", "") == name and term.element == element
+    )
+    full = {p.name: value.get(p.name, p.absent) for p in effect.parameters}
+    expected = without_start(here, columns @ effect.weights(full))
+    assert rms(change + expected).max() < 0.03 * rms(expected).max()
+    assert rms(change - expected).max() > rms(expected).max()
+
+
+@pytest.mark.parametrize("body", ["bar", "winch_frame"])
+def test_a_late_motion_capture_leaves_its_column(measurement, equations, body):
+    """Half a millisecond more of delay, as samples with stamps that are too late."""
+    late = 5e-4
+    kind = "bar_pose" if body == "bar" else "frame_pose"
+    shifted = measurement.with_samples(kind, getattr(measurement, kind).shifted(late))
+    found = by_place(shifted, [catalogue()["pose_delay"]])
+    for cable in ("hoist_1", "sway_3"):
+        place = Place(Channel.TENSION, cable)
+        columns = next(
+            c
+            for term, c in equations[place].columns.items()
+            if getattr(term, "effect_id", "") == "pose_delay" and term.element == body
+        )
+        before = equations[place]
+        times = found[place].times
+        expected = late * np.interp(times, before.times, columns[:, 0, 0])
+        change = found[place].target[:, 0] - np.interp(times, before.times, before.target[:, 0])
+        inner = slice(5, -5)
+        # The unknown length at the start moves with the first sample.
+        error = (change - expected)[inner]
+        assert rms(error - error.mean()) < 0.1 * rms(expected[inner])
+
+
+def test_without_load_cells_there_is_nothing_but_what_needs_none(measurement):
+    deaf = replace(measurement, tension=None)
+    assert by_place(deaf) == {}
+
+
+def test_without_motion_capture_the_winches_are_left(measurement):
+    blind = replace(measurement, bar_pose=None, frame_pose=None)
+    assert {place.channel for place in by_place(blind)} == {Channel.SHAFT}

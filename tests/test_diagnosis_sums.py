@@ -1,0 +1,130 @@
+"""Least squares from sums of products: the same as from the rows, and honest about chance."""
+
+import numpy as np
+import pytest
+
+from cspm_ident.diagnosis.columns import Candidate, Place
+from cspm_ident.diagnosis.equation import Equation
+from cspm_ident.diagnosis.evidence import gather
+from cspm_ident.diagnosis.sums import Sums
+from cspm_sim.effects import Channel, catalogue
+
+ROWS, STEP, BLOCK_S = 2400, 0.01, 1.0
+PLACE = Place(Channel.SHAFT, "only")
+NAMES = ("winch_coulomb_friction", "winch_viscous_friction", "winch_torque_offset")
+FIRST, SECOND, THIRD = (Candidate(catalogue()[name], "only") for name in NAMES)
+
+
+def made(seed=0, weights=(0.3, -2.0, 0.0), colour=0.9, start=0):
+    """An equation with three columns of different size and coloured noise; the rows with it."""
+    rng = np.random.default_rng(seed)
+    columns = rng.standard_normal((ROWS, 3)) * (1.0, 100.0, 1e-3)
+    noise = rng.standard_normal(ROWS)
+    for k in range(1, ROWS):
+        noise[k] += colour * noise[k - 1]
+    acting = np.arange(ROWS) >= start
+    target = (columns @ weights) * acting + noise
+    shaped = {c: columns[:, None, k : k + 1] for k, c in enumerate((FIRST, SECOND, THIRD))}
+    times = STEP * np.arange(ROWS)
+    equation = Equation(PLACE, times, target[:, None], shaped, target[:, None])
+    return equation, columns, target
+
+
+def sums_of(equation):
+    evidence = gather([[equation]], BLOCK_S)
+    return evidence, Sums(evidence)
+
+
+def test_weights_and_what_is_left_are_those_of_the_rows():
+    equation, columns, target = made()
+    evidence, sums = sums_of(equation)
+    expected, left = np.linalg.lstsq(columns, target, rcond=None)[:2]
+    own = np.arange(3)
+    np.testing.assert_allclose(sums.weights(own), expected, rtol=1e-9)
+    assert sums.squares_of(own) == pytest.approx(left[0], rel=1e-9)
+    assert sums.squares == pytest.approx(target @ target)
+    assert evidence.left(own, expected)[PLACE] == pytest.approx(left[0], rel=1e-9)
+    given = {FIRST: expected[:1], SECOND: expected[1:2], THIRD: expected[2:]}
+    assert evidence.left_with(given)[PLACE] == pytest.approx(left[0], rel=1e-9)
+
+
+def test_gains_beyond_a_base_are_differences_of_fits():
+    sums = sums_of(made()[0])[1]
+    base = np.array([0])
+    gains = sums.gains_beyond(base, [np.array([1]), np.array([1, 2])])
+    alone = sums.squares_of(base)
+    for gain, columns in zip(gains, ([0, 1], [0, 1, 2]), strict=True):
+        assert gain == pytest.approx(alone - sums.squares_of(np.array(columns)), rel=1e-6)
+
+
+def test_what_is_held_out_was_not_fitted():
+    """By hand: each sixth predicted from the rest without the neighbouring blocks."""
+    equation, columns, target = made()
+    sums = sums_of(equation)[1]
+    home = np.searchsorted(np.arange(sums.blocks), equation.times / BLOCK_S, side="right") - 1
+    found = sums.held_out(np.arange(3))
+    for fold in np.array_split(np.arange(sums.blocks), 6):
+        far = (home < fold[0] - 1) | (home > fold[-1] + 1)
+        fitted = np.linalg.lstsq(columns[far], target[far], rcond=None)[0]
+        for block in fold:
+            here = home == block
+            left = target[here] - columns[here] @ fitted
+            assert found[block] == pytest.approx(left @ left, rel=1e-6)
+
+
+def test_what_is_not_there_gains_nothing_and_what_is_there_does():
+    sums = sums_of(made()[0])[1]
+    assert sums.gain(np.array([0]), np.array([1])).is_sure
+    nothing = sums.gain(np.array([0, 1]), np.array([2]))
+    assert not nothing.is_sure
+    assert sums.p_value(np.array([0]), np.array([1])) < 1e-6
+
+
+@pytest.mark.parametrize("colour", [0.0, 0.95])
+def test_chance_is_told_as_often_as_promised(colour):
+    """Of 200 absent effects 5 % may look present at 5 %: at most 20, by the binomial at 1e-3."""
+    base, own = np.array([0, 1]), np.array([2])
+    false = [
+        sums_of(made(seed, colour=colour)[0])[1].p_value(base, own) < 0.05 for seed in range(200)
+    ]
+    assert sum(false) <= 20
+
+
+def test_intervals_hold_for_coloured_noise():
+    """95 % of 200; fewer than 178 would be a chance of 1e-4."""
+    inside = 0
+    for seed in range(200):
+        sums = sums_of(made(seed, colour=0.95)[0])[1]
+        own = np.arange(3)
+        apart = abs(sums.weights(own)[0] - 0.3)
+        inside += apart <= sums.half_width(own)[0]
+    assert 178 <= inside <= 200
+
+
+def test_an_onset_leaves_least_where_it_is():
+    equation = made(weights=(3.0, 0.0, 0.0), start=ROWS // 2)[0]
+    sums = sums_of(equation)[1]
+    left = [sums.left_from(np.array([1]), np.array([0]), b) for b in range(sums.blocks)]
+    assert int(np.argmin(left)) == sums.blocks // 2
+    assert left[0] == pytest.approx(sums.squares_of(np.array([0, 1])), rel=1e-9)
+
+
+def test_columns_that_others_span_are_known():
+    equation, columns, _ = made()
+    twin = dict(equation.columns) | {THIRD: 2.0 * equation.columns[FIRST]}
+    same = Equation(PLACE, equation.times, equation.target, twin, equation.measured)
+    sums = sums_of(same)[1]
+    assert sums.spanned(np.array([1]), np.array([2]), np.array([0]))[0] > 0.999
+    other = sums_of(equation)[1]
+    assert other.spanned(np.array([1]), np.array([2]), np.array([0]))[0] < 0.1
+
+
+def test_nuisance_is_fitted_wherever_a_model_is_judged():
+    equation, columns, target = made()
+    start = np.ones((ROWS, 1, 1))
+    shifted = Equation(
+        PLACE, equation.times, equation.target + 50.0, equation.columns, equation.measured, start
+    )
+    evidence = gather([[shifted]], BLOCK_S)
+    flat = target + 50.0
+    assert evidence.left_with({})[PLACE] == pytest.approx(np.sum((flat - flat.mean()) ** 2))

@@ -110,7 +110,7 @@ def test_an_onset_leaves_least_where_it_is():
 
 
 def test_columns_that_others_span_are_known():
-    equation, columns, _ = made()
+    equation = made()[0]
     twin = dict(equation.columns) | {THIRD: 2.0 * equation.columns[FIRST]}
     same = Equation(PLACE, equation.times, equation.target, twin, equation.measured)
     sums = sums_of(same)[1]
@@ -120,7 +120,7 @@ def test_columns_that_others_span_are_known():
 
 
 def test_nuisance_is_fitted_wherever_a_model_is_judged():
-    equation, columns, target = made()
+    equation, _, target = made()
     start = np.ones((ROWS, 1, 1))
     shifted = Equation(
         PLACE, equation.times, equation.target + 50.0, equation.columns, equation.measured, start

@@ -11,15 +11,15 @@ from numpy.typing import NDArray
 from cspm_ident.recording_hash import recording_sha256
 from cspm_ident.signals.samples import Samples, ordered
 from cspm_msgs_py.errors import InputError
+from cspm_msgs_py.recording.attached_testbed import attached_testbed
 from cspm_msgs_py.recording.reader import Recording
 from cspm_msgs_py.recording.rows import Rows
-from cspm_msgs_py.testbed import Testbed, TestbedFile, load_testbed, parse_testbed
+from cspm_msgs_py.testbed import Testbed, TestbedFile, load_testbed
 from cspm_msgs_py.topics import Topic
 from cspm_sim.kernels.rotation import euler_from_quaternion
 
 Array = NDArray[np.float64]
 
-TESTBED_ATTACHMENT = "testbed.yaml"
 FRAME, BAR, WINCHES, TENSION = (
     "/winch_frame/pose",
     "/bar/pose",
@@ -92,7 +92,11 @@ def read_measurement(path: Path, testbed: Path | None = None) -> Measurement:
         InputError: no recording, no test-bed, other cables than the test-bed's, or no samples.
     """
     with Recording(path) as recording:
-        machine = _testbed(recording, path, testbed)
+        machine = (
+            load_testbed(testbed)
+            if testbed is not None
+            else attached_testbed(recording.attachments, path)
+        )
         topics = machine.testbed.topics
         wanted = (FRAME, BAR, WINCHES, TENSION, COMMAND)
         names = [n for n in wanted if n in topics and _count(recording, n)]
@@ -106,15 +110,6 @@ def read_measurement(path: Path, testbed: Path | None = None) -> Measurement:
     for name in names:
         parts.update(_samples(name, found[name], rows[name], start, machine.testbed))
     return Measurement(path, recording_sha256(path), machine, **parts)
-
-
-def _testbed(recording: Recording, path: Path, testbed: Path | None) -> TestbedFile:
-    if testbed is not None:
-        return load_testbed(testbed)
-    attached = recording.attachments.get(TESTBED_ATTACHMENT)
-    if attached is None:
-        raise InputError(f"{path}: carries no {TESTBED_ATTACHMENT}, allowed: --testbed FILE")
-    return parse_testbed(attached.decode(errors="replace"), f"{path}: {TESTBED_ATTACHMENT}")
 
 
 def _count(recording: Recording, name: str) -> int:

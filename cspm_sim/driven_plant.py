@@ -7,7 +7,12 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from cspm_sim.kernels.driven import drive_by_tensions, drive_by_torques, drive_by_winches
+from cspm_sim.kernels.driven import (
+    drive_by_tensions,
+    drive_by_torques,
+    drive_by_winches,
+    drive_shafts,
+)
 from cspm_sim.kernels.plant import BAR_STATES, PlantParameters, make_scratch, state_count
 from cspm_sim.motion import Motion
 
@@ -89,18 +94,39 @@ class DrivenPlant:
         )
         return self._result(out, good)
 
-    def by_tensions(self, start: int, bar_state: Array, tensions: Array) -> Driven:
-        """Return the bar's motion under given tensions, (steps + 1, n) [N]; `bar_state` has 12."""
+    def by_tensions(self, start: int, state: Array, tensions: Array) -> Driven:
+        """Return the bar's motion under given tensions, (steps + 1, n) [N].
+
+        Of `state`, the plant's, the bar's 12 and the effects' memory are used.
+        """
         out = np.full((len(tensions), BAR_STATES), np.nan)
-        # Memory begins at zero.
-        state = np.zeros(self.size)
-        state[:BAR_STATES] = bar_state
         good = drive_by_tensions(
-            state,
+            state.copy(),
             np.ascontiguousarray(tensions),
             *self._motion(start),
             self.parameters,
             self._frames,
+            self._scratch,
+            out,
+        )
+        out[good:] = np.nan
+        return Driven(out, tensions, good)
+
+    def shafts(self, state: Array, torques: Array, tensions: Array) -> Driven:
+        """Return the winches' motion under torques and tensions, whatever bar and frame do.
+
+        Args:
+            state: the plant's, of which angles, speeds and the effects' memory are used.
+            torques: at the motor shafts, (steps, n) [N·m], each held.
+            tensions: (steps + 1, n) [N].
+        """
+        out = np.full((len(tensions), self.size), np.nan)
+        good = drive_shafts(
+            state.copy(),
+            np.ascontiguousarray(torques),
+            np.ascontiguousarray(tensions),
+            self.period,
+            self.parameters,
             self._scratch,
             out,
         )

@@ -88,6 +88,7 @@ def print_comparison(console: Console, found: Comparison) -> None:
         say(console, f"{delay.topic}: {text if delay.known else 'delay cannot be told'}")
     titles = {
         "whole": f"whole, driven by {found.drive.value}",
+        "winch": "winches alone, driven by measured torques and tensions",
         "cable": "cables alone, driven by measured winch and bar motion",
         "bar": "bar alone, driven by measured tensions",
     }
@@ -95,6 +96,8 @@ def print_comparison(console: Console, found: Comparison) -> None:
         channels = [channel for channel in found.channels if channel.block == block]
         if channels:
             console.print(_table(title, channels))
+    for block, reason in found.left_out.items():
+        say(console, f"{block}: left out, {reason}")
     if found.windows[1]:
         say(console, f"{found.windows[1]} of {found.windows[0]} windows diverged and are left out")
 

@@ -14,17 +14,24 @@ from cspm_ident.comparison.channel import Channel
 from cspm_ident.comparison.floor import NoiseSource, noise_of, propagated
 from cspm_ident.comparison.metrics import error_bins
 from cspm_ident.signals.delays import Delay, find_delays
-from cspm_ident.signals.measurement import BAR, TENSION, WINCHES, Measurement
+from cspm_ident.signals.measurement import BAR, SPEED, TENSION, WINCHES, Measurement
 from cspm_ident.signals.samples import Samples
 from cspm_ident.signals.timeline import Timeline
 from cspm_msgs_py.dofs import DOFS
 from cspm_msgs_py.errors import InputError
-from cspm_msgs_py.testbed import Testbed
 
 Array = NDArray[np.float64]
 Progress = Callable[[str], None]
 
-HORIZONS = {Drive.WINCH: None, Drive.CABLE: None, Drive.TORQUE: 0.5, Drive.TENSION: 0.5}
+# How long a drive's errors may grow [s].
+HORIZONS = {
+    Drive.WINCH: None,
+    Drive.CABLE: None,
+    Drive.TORQUE: 0.5,
+    Drive.TENSION: 0.5,
+    Drive.SHAFT: 0.5,
+}
+BLOCKS = {"winch": Drive.SHAFT, "cable": Drive.CABLE, "bar": Drive.TENSION}
 
 
 @dataclass(frozen=True, eq=False)
@@ -41,6 +48,7 @@ class Comparison:
         noise: where each sensor's noise comes from, by topic.
         windows: how many there were, and how many of them diverged.
         bands: what was kept of the smoothed inputs [Hz], by topic.
+        left_out: why a block, or the whole, is not among the channels.
     """
 
     measurement: Measurement
@@ -52,6 +60,7 @@ class Comparison:
     noise: dict[str, NoiseSource]
     windows: tuple[int, int]
     bands: dict[str, float]
+    left_out: dict[str, str]
 
     def data(self) -> dict[str, Any]:
         """Return the figures as plain data for JSON."""
@@ -66,8 +75,20 @@ class Comparison:
             "applied_delays_s": self.applied,
             "noise_from": {name: source.value for name, source in self.noise.items()},
             "bands_hz": {k: v if np.isfinite(v) else None for k, v in self.bands.items()},
+            "left_out": self.left_out,
             "channels": [channel.data() for channel in self.channels],
         }
+
+
+_STEMS = {
+    BAR: "bar/pose",
+    TENSION: "cables/tension",
+    WINCHES: "winches/angle",
+    SPEED: "winches/speed",
+}
+
+
+_NOTHING = {"winch": "all winches stand still: a brake or friction takes any torque"}
 
 
 class _Run(NamedTuple):
@@ -103,7 +124,7 @@ def compare(
     """
     machine = measurement.machine
     timeline = Timeline(measurement)
-    BlockSimulation(timeline, machine).check(drive)
+    blocks, left_out = _blocks(BlockSimulation(timeline, machine), drive)
     progress("delays of the sensors")
     found = find_delays(timeline, machine) if delays is None else []
     applied = {d.topic: d.seconds for d in found if d.matters} if delays is None else dict(delays)
@@ -113,10 +134,16 @@ def compare(
     horizon = HORIZONS[drive] if horizon is None else horizon
     channels: list[Channel] = []
     windows = (0, 0)
-    for block, each in _blocks(timeline, machine, drive):
+    simulation = BlockSimulation(timeline, machine)
+    for block, each in blocks.items():
         progress(f"{block}, driven by {each.value}")
-        run = _run(timeline, machine, each, horizon if block == "whole" else HORIZONS[each], noise)
-        channels += _channels(timeline, run, block, noise)
+        run = _run(simulation, each, horizon if block == "whole" else HORIZONS[each], noise)
+        some = _channels(timeline, run, block, noise)
+        if block == "winch":
+            some = _turning(some, measurement, noise)
+        if not some:
+            left_out[block] = _NOTHING.get(block, "nothing that it simulates was measured")
+        channels += some
         if block == "whole":
             windows = (len(run.windows), len(run.simulated.failed))
     if not channels:
@@ -125,38 +152,57 @@ def compare(
             " a recording with the drive's outputs"
         )
     return Comparison(
-        measurement, drive, horizon, channels, found, applied, sources, windows, timeline.bands
+        measurement,
+        drive,
+        horizon,
+        channels,
+        found,
+        applied,
+        sources,
+        windows,
+        timeline.bands,
+        left_out,
     )
 
 
-def _blocks(timeline: Timeline, machine: Testbed, drive: Drive) -> list[tuple[str, Drive]]:
-    """Return the whole, and each block whose sensors are there."""
-    found = [("whole", drive)]
-    simulation = BlockSimulation(timeline, machine)
-    if machine.bar is None:
-        return found
-    for block, each in (("cable", Drive.CABLE), ("bar", Drive.TENSION)):
-        if each is drive:
+def _blocks(simulation: BlockSimulation, drive: Drive) -> tuple[dict[str, Drive], dict[str, str]]:
+    """Return the whole and each block whose sensors are there; and why others are left out.
+
+    Raises:
+        InputError: a sensor that the whole's drive needs is missing.
+    """
+    simulation.check(drive)
+    found, left_out = {"whole": drive}, {}
+    for block, each in BLOCKS.items():
+        if each is drive or (simulation.testbed.bar is None and block != "winch"):
             continue
-        try:
-            simulation.check(each)
-        except InputError:
-            continue
-        found.append((block, each))
-    return found
+        missing = simulation.missing(each)
+        if missing:
+            left_out[block] = f"{', '.join(missing)} not recorded"
+        else:
+            found[block] = each
+    return found, left_out
 
 
 def _run(
-    timeline: Timeline,
-    machine: Testbed,
-    drive: Drive,
-    horizon: float | None,
-    noise: Mapping[str, Array],
+    simulation: BlockSimulation, drive: Drive, horizon: float | None, noise: Mapping[str, Array]
 ) -> _Run:
-    simulation = BlockSimulation(timeline, machine)
     windows = simulation.windows(drive, horizon)
     simulated = simulation.run(drive, windows)
-    return _Run(simulated, propagated(timeline, machine, drive, windows, noise), windows)
+    scatter = propagated(simulation.timeline, simulation.testbed, drive, windows, noise)
+    return _Run(simulated, scatter, windows)
+
+
+def _turning(
+    channels: list[Channel], measurement: Measurement, noise: Mapping[str, Array]
+) -> list[Channel]:
+    """Return the channels of winches that turn: at rest a brake may hold against any torque."""
+    if measurement.angle is None:
+        return channels
+    spread = measurement.angle.values.std(axis=0)
+    names = measurement.machine.cable_names
+    turns = [n for n, s, own in zip(names, spread, noise[WINCHES], strict=True) if s > 3.0 * own]
+    return [channel for channel in channels if channel.name.rsplit("/", 1)[-1] in turns]
 
 
 def _channels(
@@ -168,6 +214,7 @@ def _channels(
         (BAR, measurement.bar_pose, run.simulated.bars, run.scatter.bars, DOFS, "m"),
         (TENSION, measurement.tension, run.simulated.tensions, run.scatter.tensions, cables, "N"),
         (WINCHES, measurement.angle, run.simulated.angles, run.scatter.angles, cables, "rad"),
+        (SPEED, measurement.speed, run.simulated.speeds, run.scatter.speeds, cables, "rad/s"),
     ]
     found = []
     for topic, samples, simulated, scatter, names, unit in outputs:
@@ -175,12 +222,19 @@ def _channels(
             continue
         for i, name in enumerate(names):
             shown = "rad" if topic == BAR and i >= 3 else unit
-            stem = {BAR: "bar/pose", TENSION: "cables/tension", WINCHES: "winches/angle"}[topic]
             # The scatter's RMS is that of a difference between two draws of the noise.
             own = float(np.nan_to_num(np.sqrt(np.nanmean(scatter[:, i] ** 2))))
             floor = float(np.hypot(noise[topic][i], own))
             channel = _channel(
-                timeline, f"{stem}/{name}", shown, block, topic, samples, simulated, i, floor
+                timeline,
+                f"{_STEMS[topic]}/{name}",
+                shown,
+                block,
+                topic,
+                samples,
+                simulated,
+                i,
+                floor,
             )
             if channel is not None:
                 found.append(channel)

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from html import escape
-from itertools import pairwise
 from pathlib import Path
 
 import numpy as np
@@ -21,6 +20,7 @@ POINTS = 4000
 _ROW_PIXELS = 150
 _BLOCKS = {
     "whole": "The whole, driven by {drive}",
+    "winch": "Winches alone, driven by measured torques and tensions",
     "cable": "Cables alone, driven by measured winch and bar motion",
     "bar": "Bar alone, driven by measured tensions",
 }
@@ -76,6 +76,7 @@ def _about(comparison: Comparison) -> str:
     count, failed = comparison.windows
     horizon = f"{comparison.horizon:g} s each" if comparison.horizon else "as long as nothing lacks"
     lines.append(f"{count} windows, {horizon}; {failed} diverged")
+    lines += [f"{block}: left out, {reason}" for block, reason in comparison.left_out.items()]
     return "<ul>" + "".join(f"<li>{escape(line)}</li>" for line in lines) + "</ul>"
 
 
@@ -179,9 +180,10 @@ def thinned(times: Array, values: Array) -> tuple[Array, Array]:
     if len(values) <= POINTS:
         return times, values
     edges = np.linspace(0, len(values), POINTS // 2 + 1).astype(int)
-    chosen = [
-        index
-        for a, b in pairwise(edges.tolist())
-        for index in sorted({a + int(np.argmin(values[a:b])), a + int(np.argmax(values[a:b]))})
-    ]
+    # Rows of equal length, the shorter ones filled up with their own first value.
+    inside = np.arange(np.diff(edges).max()) < np.diff(edges)[:, None]
+    places = np.where(inside, edges[:-1, None] + np.arange(inside.shape[1]), edges[:-1, None])
+    rows = values[places]
+    pairs = np.sort([np.argmin(rows, axis=1), np.argmax(rows, axis=1)], axis=0)
+    chosen = np.unique(edges[:-1] + pairs)
     return times[chosen], values[chosen]

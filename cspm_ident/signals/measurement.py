@@ -16,7 +16,7 @@ from cspm_msgs_py.recording.reader import Recording
 from cspm_msgs_py.recording.rows import Rows
 from cspm_msgs_py.testbed import Testbed, TestbedFile, load_testbed
 from cspm_msgs_py.topics import Topic
-from cspm_sim.kernels.rotation import euler_from_quaternion
+from cspm_sim.kernels.trajectory import eulers_along
 
 Array = NDArray[np.float64]
 
@@ -27,6 +27,8 @@ FRAME, BAR, WINCHES, TENSION = (
     "/cables/tension",
 )
 COMMAND = "/winches/torque_command"
+# Further parts of `/winches/state`, which count as sensors of their own.
+SPEED, TORQUE = "/winches/state velocity", "/winches/state effort"
 
 
 @dataclass(frozen=True, eq=False)
@@ -75,6 +77,12 @@ class Measurement:
     def duration(self) -> float:
         """Time of the last sample of all sensors [s]."""
         return max((float(s.times[-1]) for s in self.sensors.values()), default=0.0)
+
+    def within(self, start: float, end: float) -> Measurement:
+        """Return what was measured from `start` to `end` [s]."""
+        names = ("frame_pose", "bar_pose", "angle", "speed", "torque", "tension", "command")
+        parts = {name: getattr(self, name) for name in names}
+        return replace(self, **{n: s.within(start, end) for n, s in parts.items() if s is not None})
 
     def with_testbed(self, testbed: TestbedFile) -> Measurement:
         """Return the same, said to be of another description of the machine."""
@@ -147,6 +155,5 @@ def _euler(rows: Array) -> Array:
     """Return x y z φ θ ψ, (n, 6), of pose rows (n, 7)."""
     out = np.empty((len(rows), 6))
     out[:, :3] = rows[:, :3]
-    for i, quaternion in enumerate(rows[:, 3:]):
-        out[i, 3:] = euler_from_quaternion(quaternion)
+    eulers_along(rows[:, 3:], out[:, 3:])
     return out

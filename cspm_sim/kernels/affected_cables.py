@@ -155,6 +155,7 @@ def _load_frame(
 def fill_cable_signals(
     i: int, state: Array, first: int, period: float, cables: Array, spans: Array, signals: Array
 ) -> None:
+    """Write what effects on cable i read, and zero to what they add to."""
     n = cables.shape[0]
     signals[SPAN_LENGTH] = spans[i, LENGTH]
     signals[SPAN_RATE] = spans[i, RATE]

@@ -280,9 +280,7 @@ def begin_stages(state: Array, total: Array, stage: Array) -> None:
 
 
 @njit(cache=True, error_model="numpy", inline="always")
-def add_stage(
-    s: int, period: float, state: Array, rate: Array, total: Array, stage: Array
-) -> None:
+def add_stage(s: int, period: float, state: Array, rate: Array, total: Array, stage: Array) -> None:
     """Add the rate at stage `s`, 0 to 3, to the total; leave the next stage's state in `stage`."""
     weight = 1.0 if s == 0 or s == 3 else 2.0
     reach = 0.5 * period if s < 2 else period

@@ -37,7 +37,8 @@ class DrivenPlant:
     """A machine on a moving winch frame, whose blocks are run window by window.
 
     Time is a count of steps from the frame motion's first knot. The states are the plant's:
-    bar (12), unstretched lengths, angles, speeds.
+    bar (12), unstretched lengths, angles, speeds. Nothing is kept between calls, and all may be
+    made from several threads at once.
     """
 
     def __init__(self, parameters: PlantParameters, frame_motion: Motion, period_ns: int) -> None:
@@ -48,9 +49,6 @@ class DrivenPlant:
         self.cables = len(parameters.cables)
         self.first = BAR_STATES if len(parameters.bar) else 0
         self.size = state_count(parameters)
-        self._scratch = make_scratch(self.size, self.cables)
-        self._frames = np.zeros((3, 18))
-        self._outputs = np.zeros((2, self.cables))
 
     def by_winches(
         self, start: float, state: Array, angles: Array, speeds: Array, bars: Array | None = None
@@ -72,9 +70,9 @@ class DrivenPlant:
             np.zeros((0, BAR_STATES)) if bars is None else np.ascontiguousarray(bars),
             *self._motion(start),
             self.parameters,
-            self._frames,
-            self._scratch,
-            self._outputs,
+            np.zeros((3, 18)),
+            make_scratch(self.size, self.cables),
+            np.zeros((2, self.cables)),
             out,
         )
         return self._result(out, good)
@@ -87,9 +85,9 @@ class DrivenPlant:
             np.ascontiguousarray(torques),
             *self._motion(start),
             self.parameters,
-            self._frames,
-            self._scratch,
-            self._outputs,
+            np.zeros((3, 18)),
+            make_scratch(self.size, self.cables),
+            np.zeros((2, self.cables)),
             out,
         )
         return self._result(out, good)
@@ -105,8 +103,8 @@ class DrivenPlant:
             np.ascontiguousarray(tensions),
             *self._motion(start),
             self.parameters,
-            self._frames,
-            self._scratch,
+            np.zeros((3, 18)),
+            make_scratch(self.size, self.cables),
             out,
         )
         out[good:] = np.nan
@@ -127,7 +125,7 @@ class DrivenPlant:
             np.ascontiguousarray(tensions),
             self.period,
             self.parameters,
-            self._scratch,
+            make_scratch(self.size, self.cables),
             out,
         )
         out[good:] = np.nan

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
+from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass, replace
 from typing import Any, NamedTuple
 
@@ -135,9 +136,10 @@ def compare(
     channels: list[Channel] = []
     windows = (0, 0)
     simulation = BlockSimulation(timeline, machine)
-    for block, each in blocks.items():
-        progress(f"{block}, driven by {each.value}")
-        run = _run(simulation, each, horizon if block == "whole" else HORIZONS[each], noise)
+    progress("simulation")
+    runs = _runs(simulation, blocks, {**HORIZONS, drive: horizon}, noise)
+    progress("errors")
+    for block, run in runs.items():
         some = _channels(timeline, run, block, noise)
         if block == "winch":
             some = _turning(some, measurement, noise)
@@ -182,6 +184,21 @@ def _blocks(simulation: BlockSimulation, drive: Drive) -> tuple[dict[str, Drive]
         else:
             found[block] = each
     return found, left_out
+
+
+def _runs(
+    simulation: BlockSimulation,
+    blocks: Mapping[str, Drive],
+    horizons: Mapping[Drive, float | None],
+    noise: Mapping[str, Array],
+) -> dict[str, _Run]:
+    """Return each block's run; the kernels let Python go on, so that they share processors."""
+    with ThreadPoolExecutor() as pool:
+        jobs = {
+            block: pool.submit(_run, simulation, drive, horizons[drive], noise)
+            for block, drive in blocks.items()
+        }
+        return {block: job.result() for block, job in jobs.items()}
 
 
 def _run(

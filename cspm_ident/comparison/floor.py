@@ -31,7 +31,7 @@ from cspm_msgs_py.testbed import Testbed
 
 Array = NDArray[np.float64]
 
-_LONGEST_S = 60.0
+_LONGEST_S = 30.0
 # More of the signals than is simulated, so that smoothing has both sides.
 _MARGIN_S = 3.0
 _SEED = 20260101
@@ -112,9 +112,9 @@ def propagated(
 ) -> Simulated:
     """Return how a simulation scatters when its inputs get as much noise as they have.
 
-    The difference of two simulations, of which one has the noise once more, over at most a minute.
+    The difference of two simulations, of which one has the noise once more, over half a minute.
     """
-    some = _minute(windows, timeline.period)
+    some = _first(windows, timeline.period)
     if not some:
         return _nothing(len(machine.cables))
     first, last = some[0][0], max(end for _, end in some)
@@ -152,8 +152,8 @@ def _nothing(cables: int) -> Simulated:
     return Simulated(bars, joints, joints, joints, [])
 
 
-def _minute(windows: list[Window], period: float) -> list[Window]:
-    """Return the first windows that make up a minute, the last of them cut."""
+def _first(windows: list[Window], period: float) -> list[Window]:
+    """Return the first windows that make up half a minute, the last of them cut."""
     left, found = round(_LONGEST_S / period), []
     for start, end in windows:
         if left < 2:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass, replace
 from pathlib import Path
 
@@ -99,7 +100,8 @@ def read_measurement(path: Path, testbed: Path | None = None) -> Measurement:
     Raises:
         InputError: no recording, no test-bed, other cables than the test-bed's, or no samples.
     """
-    with Recording(path) as recording:
+    with ThreadPoolExecutor(1) as pool, Recording(path) as recording:
+        digest = pool.submit(recording_sha256, path)
         machine = (
             load_testbed(testbed)
             if testbed is not None
@@ -117,7 +119,7 @@ def read_measurement(path: Path, testbed: Path | None = None) -> Measurement:
     parts: dict[str, Samples] = {}
     for name in names:
         parts.update(_samples(name, found[name], rows[name], start, machine.testbed))
-    return Measurement(path, recording_sha256(path), machine, **parts)
+    return Measurement(path, digest.result(), machine, **parts)
 
 
 def _count(recording: Recording, name: str) -> int:

@@ -98,7 +98,7 @@ def _note(
     return whole
 
 
-@njit(cache=True, error_model="numpy", _nrt=False)
+@njit(cache=True, error_model="numpy", nogil=True, _nrt=False)
 def drive_by_winches(
     state: Array,
     angles: Array,
@@ -157,7 +157,7 @@ def drive_by_winches(
     return steps + 1 if _note(state, frames[2], p, scratch, outputs, out[steps]) else steps
 
 
-@njit(cache=True, error_model="numpy", _nrt=False)
+@njit(cache=True, error_model="numpy", nogil=True, _nrt=False)
 def drive_by_torques(
     state: Array,
     torques: Array,
@@ -216,7 +216,7 @@ def _bar_rate_under(
     )
 
 
-@njit(cache=True, error_model="numpy", _nrt=False)
+@njit(cache=True, error_model="numpy", nogil=True, _nrt=False)
 def drive_by_tensions(
     state: Array,
     tensions: Array,
@@ -292,7 +292,7 @@ def _shaft_rates_under(
         )
 
 
-@njit(cache=True, error_model="numpy", _nrt=False)
+@njit(cache=True, error_model="numpy", nogil=True, _nrt=False)
 def drive_shafts(
     state: Array,
     torques: Array,

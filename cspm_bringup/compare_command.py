@@ -82,10 +82,7 @@ def _write(folder: Path, found: Comparison) -> Path:
 def print_comparison(console: Console, found: Comparison) -> None:
     """Print the sensors' delays and a table of channels for the whole and each block."""
     for delay in found.delays:
-        low, high = (1e3 * end for end in delay.interval)
-        use = "taken out" if delay.topic in found.applied else "left in"
-        text = f"{1e3 * delay.seconds:.2f} ms late (95 %: {low:.2f} to {high:.2f}), {use}"
-        say(console, f"{delay.topic}: {text if delay.known else 'delay cannot be told'}")
+        say(console, f"{delay.topic}: {delay.text}{found.use_of(delay)}")
     titles = {
         "whole": f"whole, driven by {found.drive.value}",
         "winch": "winches alone, driven by measured torques and tensions",

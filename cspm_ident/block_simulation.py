@@ -102,6 +102,11 @@ class BlockSimulation:
                 f" {', '.join(missing)}, allowed: a recording that has them"
             )
 
+    @property
+    def has_cables(self) -> bool:
+        """Whether any winch has a cable."""
+        return any(cable.has_cable for cable in self.testbed.cables)
+
     def missing(self, drive: Drive) -> list[str]:
         """Return the topics that a drive needs and the recording lacks."""
         return [name for name, signal in self._needs(drive).items() if signal is None]
@@ -259,7 +264,7 @@ class BlockSimulation:
     def _lengths_at(self, step: int) -> Array:
         """Return the unstretched lengths, (n,) [m]: from the tensions, or of rest without them."""
         line, parameters = self.timeline, self.parameters
-        if not any(cable.has_cable for cable in self.testbed.cables):
+        if not self.has_cables:
             return np.ones(len(self.testbed.cables))
         if line.smooth_tensions is None and self.testbed.bar is not None:
             return self._rest_at(step).unstretched_lengths
@@ -310,8 +315,8 @@ class BlockSimulation:
         if drive is Drive.TORQUE:
             return frame | bar | angle | torque
         if drive is Drive.SHAFT:
-            pulled = any(cable.has_cable for cable in self.testbed.cables)
-            return angle | torque | ({"/cables/tension": line.tensions} if pulled else {})
+            pull = {"/cables/tension": line.tensions} if self.has_cables else {}
+            return angle | torque | pull
         return frame | bar | angle
 
 

@@ -59,6 +59,9 @@ def test_the_machine_itself_is_at_the_noise_floor(comparison):
         assert channel.rms < 1.5 * channel.floor, (channel.block, channel.name)
     assert of(comparison, "bar/pose/surge").vaf > 99.9
     assert {c.block for c in comparison.channels} == {"whole", "cable", "bar"}
+    assert comparison.left_out == {
+        "winch": "all winches stand still: a brake or friction takes any torque"
+    }
 
 
 def test_another_mass_shows_where_tensions_drive_the_bar(measurement, comparison):
@@ -81,6 +84,7 @@ def test_a_late_camera_is_found(measurement, late):
     bar, frame = found["/bar/pose"], found["/winch_frame/pose"]
     assert bar.seconds - frame.seconds == pytest.approx(late, abs=RESOLUTION_S)
     assert bar.matters == (late > 0.0)
+    assert bar.interval[0] <= late <= bar.interval[1]
 
 
 def test_a_recording_without_cameras_says_what_is_missing(measurement):

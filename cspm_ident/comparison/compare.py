@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 
 from cspm_ident.block_simulation import BlockSimulation, Drive, Simulated, Window
 from cspm_ident.comparison.channel import Channel
-from cspm_ident.comparison.floor import NoiseSource, noise_of, propagated
+from cspm_ident.comparison.floor import NoiseSource, lasting_rms, noise_of, propagated
 from cspm_ident.comparison.metrics import error_bins
 from cspm_ident.signals.delays import Delay, find_delays
 from cspm_ident.signals.measurement import BAR, SPEED, TENSION, WINCHES, Measurement
@@ -62,6 +62,12 @@ class Comparison:
     windows: tuple[int, int]
     bands: dict[str, float]
     left_out: dict[str, str]
+
+    def use_of(self, delay: Delay) -> str:
+        """Return what was done about a delay, to be put behind its text."""
+        if delay.topic in self.applied:
+            return "; taken out"
+        return "; too small to matter, left in" if delay.known else ""
 
     def data(self) -> dict[str, Any]:
         """Return the figures as plain data for JSON."""
@@ -178,6 +184,8 @@ def _blocks(simulation: BlockSimulation, drive: Drive) -> tuple[dict[str, Drive]
     for block, each in BLOCKS.items():
         if each is drive or (simulation.testbed.bar is None and block != "winch"):
             continue
+        if each is Drive.SHAFT and drive is Drive.TORQUE and not simulation.has_cables:
+            continue
         missing = simulation.missing(each)
         if missing:
             left_out[block] = f"{', '.join(missing)} not recorded"
@@ -227,6 +235,7 @@ def _channels(
 ) -> list[Channel]:
     measurement = timeline.measurement
     cables = measurement.machine.cable_names
+    steps = sum(end - start for start, end in run.windows)
     outputs: list[tuple[str, Samples | None, Array, Array, tuple[str, ...], str]] = [
         (BAR, measurement.bar_pose, run.simulated.bars, run.scatter.bars, DOFS, "m"),
         (TENSION, measurement.tension, run.simulated.tensions, run.scatter.tensions, cables, "N"),
@@ -239,8 +248,7 @@ def _channels(
             continue
         for i, name in enumerate(names):
             shown = "rad" if topic == BAR and i >= 3 else unit
-            # The scatter's RMS is that of a difference between two draws of the noise.
-            own = float(np.nan_to_num(np.sqrt(np.nanmean(scatter[:, i] ** 2))))
+            own = lasting_rms(scatter[:, i], steps)
             floor = float(np.hypot(noise[topic][i], own))
             channel = _channel(
                 timeline,

@@ -40,7 +40,7 @@ _POSES = {FRAME: "frame_pose", BAR: "bar_pose"}
 _MOTION = {WINCHES: "angle", SPEED: "speed"}
 # What noise goes to, by drive and topic: attributes of the measurement.
 _INPUTS = {
-    Drive.WINCH: {FRAME: "frame_pose", **_MOTION},
+    Drive.WINCH: {**_POSES, **_MOTION},
     Drive.CABLE: {**_POSES, **_MOTION},
     Drive.TORQUE: {**_POSES, **_MOTION, TORQUE: "torque"},
     Drive.TENSION: {**_POSES, TENSION: "tension"},
@@ -130,6 +130,19 @@ def propagated(
         after.speeds - before.speeds,
         after.failed,
     )
+
+
+def lasting_rms(scatter: Array, steps: int) -> float:
+    """Return the RMS that a scatter (k,) has over so many steps, of which it shows the first.
+
+    What it does in its last third it goes on doing: a start from a noisy state has died out.
+    """
+    squares = scatter[np.isfinite(scatter)] ** 2
+    if not len(squares):
+        return 0.0
+    more = max(0, steps - len(squares))
+    total = squares.sum() + more * squares[-max(1, len(squares) // 3) :].mean()
+    return float(np.sqrt(total / (len(squares) + more)))
 
 
 def _noisier(timeline: Timeline, drive: Drive, noise: Mapping[str, Array]) -> Timeline:

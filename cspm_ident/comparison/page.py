@@ -63,11 +63,7 @@ def write_page(path: Path, comparison: Comparison) -> None:
 def _about(comparison: Comparison) -> str:
     lines = []
     for delay in comparison.delays:
-        ends = f"{1e3 * delay.interval[0]:.2f} to {1e3 * delay.interval[1]:.2f} ms"
-        use = "taken out" if delay.topic in comparison.applied else "too small to matter, left in"
-        told = f"{1e3 * delay.seconds:.2f} ms late (95 %: {ends}), {use}"
-        told = told if delay.known else "delay: this recording cannot tell"
-        lines.append(f"{delay.topic}: {told}")
+        lines.append(f"{delay.topic}: {delay.text}{comparison.use_of(delay)}")
     for topic, source in comparison.noise.items():
         lines.append(f"{topic}: noise from {source.value}")
     for topic, band in comparison.bands.items():

@@ -17,6 +17,8 @@ from scipy.signal import butter, sosfiltfilt
 from cspm_ident.estimation import Parameter, Record, fit_linear
 from cspm_ident.signals.elongation import cable_motion, damping_of, elongations
 from cspm_ident.signals.measurement import BAR, FRAME
+from cspm_ident.signals.noise import noise_above_band
+from cspm_ident.signals.samples import Samples
 from cspm_ident.signals.timeline import Timeline, whole_stretches
 from cspm_msgs_py.testbed import Testbed
 from cspm_sim.kernels.cable import RADIUS
@@ -46,6 +48,8 @@ _LEAST_WOUND_M = 5e-4
 _BAND_SHARE = 0.7
 _WIDEST_HZ = 20.0
 _NORMAL_95 = 1.96
+# Standard deviations of the noise that a pose must move by.
+_LEAST_MOTION = 20.0
 
 
 @dataclass(frozen=True)
@@ -115,11 +119,28 @@ def find_delays(timeline: Timeline, testbed: Testbed) -> list[Delay]:
     parameters = plant_parameters(testbed)
     timeline = timeline.within(*_liveliest(timeline))
     timeline = timeline.slowly(_PERIOD_NS, min(timeline.pose_band, _WIDEST_HZ))
-    wanted = [name for name in (BAR, FRAME) if name in timeline.measurement.sensors]
+    sensors = timeline.measurement.sensors
+    topics = [name for name in (BAR, FRAME) if name in sensors]
+    moving = [name for name in topics if _moves(sensors[name])]
+    found = {each.topic: each for each in _search(timeline, parameters, moving)}
+    window = float(timeline.times[0]), float(timeline.times[-1])
+    return [found.get(name, Delay(name, 0.0, (-np.inf, np.inf), window)) for name in topics]
+
+
+def _moves(samples: Samples) -> bool:
+    """Return whether a pose does so much more than its noise that noise cannot pass for motion.
+
+    Controllers answer the noise of motion capture with motion, which comes later than the noise.
+    """
+    noise = noise_above_band(samples)
+    return bool((samples.values.std(axis=0) > _LEAST_MOTION * noise).any())
+
+
+def _search(timeline: Timeline, parameters: PlantParameters, wanted: list[str]) -> list[Delay]:
     delays = dict.fromkeys(wanted, 0.0)
     records: list[Record] = []
     names = wanted
-    for _ in range(_ROUNDS):
+    for _ in range(_ROUNDS if wanted else 0):
         records, names = _records(timeline.delayed(delays), parameters, wanted)
         if not records:
             return []
@@ -127,7 +148,7 @@ def find_delays(timeline: Timeline, testbed: Testbed) -> list[Delay]:
         if np.abs(steps).max() < _STILL_S:
             break
         delays = {name: delays[name] + float(s) for name, s in zip(wanted, steps, strict=True)}
-    return _delays(timeline, records, names, delays)
+    return _delays(timeline, records, names, delays) if records else []
 
 
 def _liveliest(timeline: Timeline) -> tuple[int, int]:

@@ -112,6 +112,6 @@ def _table(title: str, channels: list[Channel]) -> Table:
             f"{c.rms:.3g}",
             f"{c.floor:.3g}",
             f"{c.bias:.2g}",
-            "" if c.lag is None else f"{1e3 * c.lag:.2f}",
+            "" if c.lag is None else f"{round(1e3 * c.lag, 2) + 0.0:.2f}",
         )
     return table

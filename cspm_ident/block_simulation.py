@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from enum import Enum
 from itertools import pairwise
+from threading import Lock
 from typing import NamedTuple
 
 import numpy as np
@@ -28,8 +29,8 @@ Window = tuple[int, int]
 _OFFSET_ROUNDS = 3
 _OFFSET_STEP_M = 1e-6
 _OFFSET_MOST_M = 5e-3
-# Steps at once where only a mean tension is wanted.
-_SKIP = 10
+# A minute tells the zero of the lengths well enough.
+_OFFSET_LONGEST_S = 60.0
 
 
 class Drive(Enum):
@@ -83,11 +84,9 @@ class BlockSimulation:
         self.parameters = plant_parameters(self.testbed)
         self._actions = read_actions(self.testbed)
         self._plant = DrivenPlant(self.parameters, timeline.motion, timeline.period_ns)
-        self._skip = 1 if any(action.effect.states for action in self._actions) else _SKIP
-        slow = timeline.period_ns * self._skip
-        self._coarse = DrivenPlant(self.parameters, timeline.motion, slow)
         self._states: dict[int, Array] = {}
         self._offsets: dict[Window, Array] = {}
+        self._lock = Lock()
 
     def check(self, drive: Drive) -> None:
         """Refuse a drive for which a sensor is missing.
@@ -172,46 +171,31 @@ class BlockSimulation:
 
         Encoders count from an arbitrary zero, so one length per cable is unknown. It is the one at
         which the cables under measured winch and bar motion carry the mean tension measured in the
-        window; a single noisy sample at its start would tell it badly. Zero for a drive that does
-        not simulate cables.
+        window, or in its first minute; a single noisy sample at its start would tell it badly. Zero
+        for a drive that does not simulate cables.
         """
         line, n = self.timeline, len(self.testbed.cables)
         if drive in _WITHOUT_CABLES or line.tensions is None or line.angles is None:
             return np.zeros(n)
-        if window not in self._offsets:
-            self._offsets[window] = self._find_offsets(window, line.tensions)
+        # Drives that are simulated side by side share what the first one found.
+        with self._lock:
+            if window not in self._offsets:
+                self._offsets[window] = self._find_offsets(window, line.tensions)
         return self._offsets[window]
 
     def _find_offsets(self, window: Window, tensions: Array) -> Array:
         start, end = window
+        end = min(end, start + round(_OFFSET_LONGEST_S / self.timeline.period))
         out = np.zeros(len(self.testbed.cables))
         measured = tensions[start : end + 1]
         for _ in range(_OFFSET_ROUNDS):
-            simulated = self._cable_tensions(start, end, out)
-            shifted = self._cable_tensions(start, end, out + _OFFSET_STEP_M)
+            simulated = self._drive(Drive.CABLE, start, end, out).tensions
+            shifted = self._drive(Drive.CABLE, start, end, out + _OFFSET_STEP_M).tensions
             slope = np.nanmean(shifted - simulated, axis=0) / _OFFSET_STEP_M
-            missing = np.nanmean(measured[: len(simulated)] - simulated, axis=0)
+            missing = np.nanmean(measured - simulated, axis=0)
             change = np.divide(missing, slope, out=np.zeros(len(out)), where=slope < 0.0)
             out += np.clip(change, -_OFFSET_MOST_M, _OFFSET_MOST_M)
         return out
-
-    def _cable_tensions(self, start: int, end: int, offsets: Array) -> Array:
-        """Return the tensions under measured winch and bar motion, at about every step, (k, n).
-
-        Cables without memory have no dynamics that would ask for every step.
-        """
-        skip = self._skip if end - start >= 2 * self._skip else 1
-        if skip == 1:
-            return self._drive(Drive.CABLE, start, end, offsets).tensions
-        line, rows = self.timeline, slice(start, end + 1, skip)
-        state = self._offset_state(start, offsets)
-        angles, speeds = np.asarray(line.angles)[rows], np.asarray(line.speeds)[rows]
-        bars = None if line.bars is None else line.bars[rows]
-        found = self._coarse.by_winches(start / skip, state, angles, speeds, bars).tensions
-        at = np.arange((len(found) - 1) * skip + 1) / skip
-        columns = [np.interp(at, np.arange(len(found)), column) for column in found.T]
-        joined: Array = np.stack(columns, axis=1)
-        return joined
 
     def state_at(self, step: int) -> Array:
         """Return the plant's state that was measured at a step, its effects settled."""

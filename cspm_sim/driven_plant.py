@@ -51,7 +51,7 @@ class DrivenPlant:
         self.size = state_count(parameters)
 
     def by_winches(
-        self, start: float, state: Array, angles: Array, speeds: Array, bars: Array | None = None
+        self, start: int, state: Array, angles: Array, speeds: Array, bars: Array | None = None
     ) -> Driven:
         """Return bar and tensions under given winch motion.
 
@@ -77,7 +77,7 @@ class DrivenPlant:
         )
         return self._result(out, good)
 
-    def by_torques(self, start: float, state: Array, torques: Array) -> Driven:
+    def by_torques(self, start: int, state: Array, torques: Array) -> Driven:
         """Return the whole plant's motion under given torques, (steps, n) [N·m], each held."""
         out = np.full((len(torques) + 1, self.size + self.cables), np.nan)
         good = drive_by_torques(
@@ -92,7 +92,7 @@ class DrivenPlant:
         )
         return self._result(out, good)
 
-    def by_tensions(self, start: float, state: Array, tensions: Array) -> Driven:
+    def by_tensions(self, start: int, state: Array, tensions: Array) -> Driven:
         """Return the bar's motion under given tensions, (steps + 1, n) [N].
 
         Of `state`, the plant's, the bar's 12 and the effects' memory are used.
@@ -131,8 +131,8 @@ class DrivenPlant:
         out[good:] = np.nan
         return Driven(out, tensions, good)
 
-    def _motion(self, start: float) -> tuple[Array, float, float, float]:
-        return self.frame_motion.knots, self.frame_motion.spacing, float(start), self.period
+    def _motion(self, start: int) -> tuple[Array, float, int, float]:
+        return self.frame_motion.knots, self.frame_motion.spacing, start, self.period
 
     def _result(self, out: Array, good: int) -> Driven:
         out[good:] = np.nan

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 from collections.abc import Callable, Mapping
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass, replace
@@ -95,7 +96,10 @@ _STEMS = {
 }
 
 
-_NOTHING = {"winch": "all winches stand still: a brake or friction takes any torque"}
+_NOTHING = {
+    **dict.fromkeys(("whole", "cable", "bar"), "nothing that it simulates was measured"),
+    "winch": "all winches stand still: a brake or friction takes any torque",
+}
 
 
 class _Run(NamedTuple):
@@ -139,22 +143,14 @@ def compare(
     progress("noise of the sensors")
     noise, sources = noise_of(measurement, repeat)
     horizon = HORIZONS[drive] if horizon is None else horizon
-    channels: list[Channel] = []
-    windows = (0, 0)
-    simulation = BlockSimulation(timeline, machine)
     progress("simulation")
+    simulation = BlockSimulation(timeline, machine)
     runs = _runs(simulation, blocks, {**HORIZONS, drive: horizon}, noise)
     progress("errors")
-    for block, run in runs.items():
-        some = _channels(timeline, run, block, noise)
-        if block == "winch":
-            some = _turning(some, measurement, noise)
-        if not some:
-            left_out[block] = _NOTHING.get(block, "nothing that it simulates was measured")
-        channels += some
-        if block == "whole":
-            windows = (len(run.windows), len(run.simulated.failed))
-    if not channels:
+    channels = {block: _channels(timeline, run, block, noise) for block, run in runs.items()}
+    channels["winch"] = _turning(channels.get("winch", []), measurement, noise)
+    left_out |= {block: _NOTHING[block] for block in blocks if not channels[block]}
+    if not any(channels.values()):
         raise InputError(
             f"{measurement.path}: --drive {drive.value} gives nothing that was measured, allowed:"
             " a recording with the drive's outputs"
@@ -163,11 +159,11 @@ def compare(
         measurement,
         drive,
         horizon,
-        channels,
+        [channel for block in blocks for channel in channels[block]],
         found,
         applied,
         sources,
-        windows,
+        (len(runs["whole"].windows), len(runs["whole"].simulated.failed)),
         timeline.bands,
         left_out,
     )
@@ -201,7 +197,7 @@ def _runs(
     noise: Mapping[str, Array],
 ) -> dict[str, _Run]:
     """Return each block's run; the kernels let Python go on, so that they share processors."""
-    with ThreadPoolExecutor() as pool:
+    with ThreadPoolExecutor(os.cpu_count()) as pool:
         jobs = {
             block: pool.submit(_run, simulation, drive, horizons[drive], noise)
             for block, drive in blocks.items()

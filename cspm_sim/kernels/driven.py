@@ -36,13 +36,13 @@ Array = NDArray[float64]
 
 
 @njit(cache=True, error_model="numpy", inline="always")
-def _begin_frames(start: float, period: float, knots: Array, spacing: float, frames: Array) -> None:
+def _begin_frames(start: int, period: float, knots: Array, spacing: float, frames: Array) -> None:
     """Put the winch frame at a window's start where the first step looks for it."""
     evaluate_motion(start * period, knots, spacing, False, frames[2])
 
 
 @njit(cache=True, error_model="numpy", inline="always")
-def _next_frames(step: float, period: float, knots: Array, spacing: float, frames: Array) -> None:
+def _next_frames(step: int, period: float, knots: Array, spacing: float, frames: Array) -> None:
     """Put the winch frame at begin, middle and end of a step; `frames[2]` has its begin."""
     for d in range(frames.shape[1]):
         frames[0, d] = frames[2, d]
@@ -106,7 +106,7 @@ def drive_by_winches(
     bars: Array,
     knots: Array,
     spacing: float,
-    start: float,
+    start: int,
     period: float,
     p: PlantParameters,
     frames: Array,
@@ -163,7 +163,7 @@ def drive_by_torques(
     torques: Array,
     knots: Array,
     spacing: float,
-    start: float,
+    start: int,
     period: float,
     p: PlantParameters,
     frames: Array,
@@ -222,7 +222,7 @@ def drive_by_tensions(
     tensions: Array,
     knots: Array,
     spacing: float,
-    start: float,
+    start: int,
     period: float,
     p: PlantParameters,
     frames: Array,

@@ -57,6 +57,7 @@ def test_a_drive_that_reports_its_torque_lags_no_second_time(simulation):
     ]
 
 
+@pytest.mark.slow
 def test_settled_memory_leaves_no_transient(measurement, simulation):
     found = compare(measurement)
     # Ten windows are too few to know the bar's floor.

@@ -47,7 +47,7 @@ def test_the_winch_itself_is_at_its_floor_and_another_is_not(single):
     own = speed_of(found)
     assert own.rms < 1.5 * own.floor
     assert own.vaf > 99.5
-    # Torque less pull is what inertia takes: a tenth more shows as a tenth of the motion.
+    # Torque less pull is what the inertia takes: with twice as much it turns half as fast.
     wrong = speed_of(compare(with_inertia(single, 2.0)))
     assert wrong.rms > 3.0 * own.rms
 

@@ -11,12 +11,12 @@ from pathlib import Path
 from cspm_bringup.plants import SIM
 from cspm_msgs_py.errors import InputError
 from cspm_msgs_py.motion_spec import FileMotion, VesselMotion
+from cspm_msgs_py.recording.attached_testbed import TESTBED, attached_testbed
 from cspm_msgs_py.scenario import Body, Scenario, parse_scenario
-from cspm_msgs_py.testbed import TestbedFile, parse_testbed
+from cspm_msgs_py.testbed import TestbedFile
 from cspm_msgs_py.yaml_file import dump_yaml
 
 SCENARIO = "scenario.yaml"
-TESTBED = "testbed.yaml"
 
 
 @dataclass(frozen=True)
@@ -83,11 +83,10 @@ def read_bundle(attachments: Mapping[str, bytes], source: str) -> Bundle:
         raise InputError(
             f"{source}: carries no {' and no '.join(missing)}, allowed: a recording made by cspm"
         )
-    texts = {name: attachments[name].decode(errors="replace") for name in (SCENARIO, TESTBED)}
     return Bundle(
-        parse_scenario(texts[SCENARIO], f"{source}: {SCENARIO}"),
-        parse_testbed(texts[TESTBED], f"{source}: {TESTBED}"),
-        {name: content for name, content in attachments.items() if name not in texts},
+        parse_scenario(attachments[SCENARIO].decode(errors="replace"), f"{source}: {SCENARIO}"),
+        attached_testbed(attachments, source),
+        {name: content for name, content in attachments.items() if name not in (SCENARIO, TESTBED)},
     )
 
 

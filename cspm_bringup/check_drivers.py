@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING, Any
 
 from rich.console import Console
 
+from cspm_bringup.console import say
 from cspm_bringup.driver_check import check_drivers
 from cspm_bringup.driver_observation import Finding, Observation
 from cspm_bringup.driver_report import (
@@ -160,7 +161,7 @@ def check_drivers_command(asked: Asked, json: Path | None = None) -> bool:
             pulls = guide.run(cables)
             found = Heard(found.topics, found.observations, pulls, pulls.complete)
     if not found.complete:
-        _say(console, "ended early")
+        say(console, "ended early")
     if json is not None:
         write_json(json, drivers_data(asked, found))
     return found.ok and found.complete
@@ -193,9 +194,9 @@ def _listen(asked: Asked, listener: DriverListener, console: Console) -> Heard:
     findings += listener.findings(commanded=machine.commanded, braked=machine.braked)
     found = Heard(by_topic(findings, MEASURED), observations, None, complete)
     console.print(topic_table(f"drivers of {machine.testbed.name}", found.topics))
-    _say(console, count_line(found.topics))
+    say(console, count_line(found.topics))
     if not _anything(found):
-        _say(console, _where())
+        say(console, _where())
     return found
 
 
@@ -226,8 +227,3 @@ def _keys() -> TerminalKeys:
     if not keys.usable:
         raise InputError("--pull: standard input is no terminal, allowed: one, for its Enter key")
     return keys
-
-
-def _say(console: Console, text: str) -> None:
-    """Print a line as it is: names are no markup, and nothing is broken at the width."""
-    console.print(text, markup=False, highlight=False, soft_wrap=True)

@@ -16,6 +16,7 @@ from rich.table import Table
 
 from cspm_bringup.assembly import resolve
 from cspm_bringup.bundle import Bundle, make_bundle
+from cspm_bringup.console import make_console, say
 from cspm_bringup.plants import EXTERNAL, SIM
 from cspm_bringup.resim import resimulate
 from cspm_bringup.ros_install import find_ros
@@ -23,13 +24,13 @@ from cspm_bringup.run import INPROCESS, RECORD_NAME, run
 from cspm_bringup.run_result import RunResult
 from cspm_bringup.summary import print_summary, summary_data, write_json
 from cspm_msgs_py.errors import CspmError, InputError
+from cspm_msgs_py.new_folder import refuse_existing
 from cspm_msgs_py.recording.overview import overview
 from cspm_msgs_py.recording.recover import recover
 from cspm_msgs_py.scenario import load_scenario
 from cspm_msgs_py.testbed import TestbedFile, load_testbed
 from cspm_sim.parameters import plant_parameters
 
-PIPE_WIDTH = 140
 REALTIME = "realtime"
 
 
@@ -65,8 +66,7 @@ def run_command(
     external = plant == EXTERNAL
     if external and mode != REALTIME:
         raise InputError(f"--plant {EXTERNAL} --mode {mode}: allowed: --mode {REALTIME}")
-    if folder is not None and folder.exists():
-        raise InputError(f"{folder}: exists, allowed: a new folder")
+    refuse_existing(folder)
     bundle = dataclasses.replace(bundle, plant=SIM if external else plant)
     result = _run_with_progress(bundle, folder, console, mode, external=external)
     requirement = scenario.requirement
@@ -81,13 +81,13 @@ def run_command(
         period = 1.0 / scenario.rates.plant
         names = testbed.testbed.cable_names
         draw_run(result.folder / "run.png", result, requirement, names, period)
-        _say(console, f"recording {result.folder}, picture {result.folder.name}/run.png")
+        say(console, f"recording {result.folder}, picture {result.folder.name}/run.png")
     if result.failure:
         diverged = result.failure.startswith("t = ")
         raise CspmError(f"diverged at {result.failure}" if diverged else result.failure)
     if result.interrupted:
         kept = "; the recording is complete so far" if result.folder else ""
-        _say(console, f"interrupted after {result.simulated:g} s{kept}")
+        say(console, f"interrupted after {result.simulated:g} s{kept}")
     return not result.interrupted
 
 
@@ -101,7 +101,7 @@ def _check_effects(testbed: TestbedFile, path: Path) -> None:
 
 def info_command(bag: Path, json: Path | None) -> None:
     """Show what a recording holds."""
-    console = Console() if Console().is_terminal else Console(width=PIPE_WIDTH)
+    console = make_console()
     found = overview(bag)
     table = Table(title=escape(str(found.path)), box=box.SIMPLE)
     table.add_column("topic", no_wrap=True)
@@ -119,7 +119,7 @@ def info_command(bag: Path, json: Path | None) -> None:
             "" if topic.gap_at_ns is None else f"{(topic.gap_at_ns - found.start_ns) * 1e-9:.3f}",
         )
     console.print(table)
-    _say(
+    say(
         console,
         f"{found.message_count} messages over {found.duration_s:.3f} s,"
         f" {found.size_bytes / 1e6:.1f} MB, {found.storage} {found.profile}, written by"
@@ -127,20 +127,20 @@ def info_command(bag: Path, json: Path | None) -> None:
     )
     record = found.metadata.get(RECORD_NAME, {})
     if "source" in record:
-        _say(
+        say(
             console,
             f"imported from {record['source']} (SHA-256 {record.get('source_sha256', 'unknown')}),"
             f" mapping {record.get('mapping', 'unknown')}, test-bed {found.testbed}",
         )
     elif found.scenario or found.testbed:
-        _say(
+        say(
             console,
             f"scenario {found.scenario}, seed {record.get('seed', 'unknown')}, test-bed"
             f" {found.testbed}, mode {record.get('mode', 'unknown')}, plant"
             f" {record.get('plant', SIM)}",
         )
     if not found.complete:
-        _say(console, f"cut short: `cspm recover {bag}` restores its index")
+        say(console, f"cut short: `cspm recover {bag}` restores its index")
     if json is not None:
         write_json(json, dataclasses.asdict(found) | {"path": str(found.path)})
 
@@ -150,9 +150,9 @@ def recover_command(bag: Path, out: Path | None, json: Path | None) -> None:
     console = Console()
     report = recover(bag, out)
     if not report.restored:
-        _say(console, f"{report.path}: complete, nothing to restore")
+        say(console, f"{report.path}: complete, nothing to restore")
     else:
-        _say(
+        say(
             console,
             f"{report.path}: {report.messages} messages up to {report.end_ns * 1e-9:.3f} s,"
             f" {report.lost_bytes} bytes at the end unusable, {report.damaged} damaged chunks left"
@@ -171,11 +171,11 @@ def resim_command(bag: Path, json: Path | None) -> bool:
         found = resimulate(bag, lambda now, total: _show(bar, task, now, total))
     if found.difference is None:
         end = "" if found.cut_ns is None else f", up to {found.cut_ns * 1e-9:g} s, where it was cut"
-        _say(console, f"identical: all {found.messages} messages, bit for bit{end}")
+        say(console, f"identical: all {found.messages} messages, bit for bit{end}")
     else:
-        _say(console, f"different: {found.difference}")
+        say(console, f"different: {found.difference}")
         if not found.same_version:
-            _say(console, f"the recording was made by version {found.recorded_version}")
+            say(console, f"the recording was made by version {found.recorded_version}")
     if json is not None:
         difference = dataclasses.asdict(found.difference) if found.difference else None
         identical = {"identical": difference is None, "first_difference": difference}
@@ -217,14 +217,9 @@ def _ros_runner(
     from cspm_bringup.process_run import run_processes
 
     def tell(waiting: str) -> None:
-        _say(console, waiting or "all is there")
+        say(console, waiting or "all is there")
 
     return partial(run_processes, mode=mode, external=external, tell=tell)
-
-
-def _say(console: Console, text: str) -> None:
-    """Print a line as it is: file names are no markup, and nothing is broken at the width."""
-    console.print(text, markup=False, highlight=False, soft_wrap=True)
 
 
 def _progress(console: Console) -> Progress:

@@ -10,12 +10,13 @@ from rich import box
 from rich.console import Console
 from rich.table import Table
 
+from cspm_bringup.console import make_console, say
 from cspm_bringup.summary import write_json
 from cspm_ident.block_simulation import Drive
 from cspm_ident.comparison.channel import Channel
 from cspm_ident.comparison.compare import Comparison, compare
 from cspm_ident.signals.measurement import read_measurement
-from cspm_msgs_py.errors import InputError
+from cspm_msgs_py.new_folder import refuse_existing
 
 
 @dataclass(frozen=True)
@@ -47,9 +48,8 @@ def compare_command(asked: CompareRequest, json: Path | None) -> None:
     Raises:
         InputError: naming what is wrong in recording, test-bed or options.
     """
-    console = Console()
-    if asked.out is not None and asked.out.exists():
-        raise InputError(f"{asked.out}: exists, allowed: a new folder")
+    console = make_console()
+    refuse_existing(asked.out)
     with console.status("reading") as status:
         measurement = read_measurement(asked.recording, asked.testbed)
         repeat = None if asked.repeat is None else read_measurement(asked.repeat, asked.testbed)
@@ -64,7 +64,7 @@ def compare_command(asked: CompareRequest, json: Path | None) -> None:
         written = None if asked.out is None else _write(asked.out, found)
     print_comparison(console, found)
     if written is not None:
-        _say(console, f"report {written}")
+        say(console, f"report {written}")
     if json is not None:
         write_json(json, found.data() | {"report": None if written is None else str(written)})
 
@@ -82,12 +82,10 @@ def _write(folder: Path, found: Comparison) -> Path:
 def print_comparison(console: Console, found: Comparison) -> None:
     """Print the sensors' delays and a table of channels for the whole and each block."""
     for delay in found.delays:
-        low, high = (1e3 * end for end in delay.interval)
-        use = "taken out" if delay.topic in found.applied else "left in"
-        text = f"{1e3 * delay.seconds:.2f} ms late (95 %: {low:.2f} to {high:.2f}), {use}"
-        _say(console, f"{delay.topic}: {text if delay.known else 'delay cannot be told'}")
+        say(console, f"{delay.topic}: {delay.text}{found.use_of(delay)}")
     titles = {
         "whole": f"whole, driven by {found.drive.value}",
+        "winch": "winches alone, driven by measured torques and tensions",
         "cable": "cables alone, driven by measured winch and bar motion",
         "bar": "bar alone, driven by measured tensions",
     }
@@ -95,8 +93,10 @@ def print_comparison(console: Console, found: Comparison) -> None:
         channels = [channel for channel in found.channels if channel.block == block]
         if channels:
             console.print(_table(title, channels))
+    for block, reason in found.left_out.items():
+        say(console, f"{block}: left out, {reason}")
     if found.windows[1]:
-        _say(console, f"{found.windows[1]} of {found.windows[0]} windows diverged and are left out")
+        say(console, f"{found.windows[1]} of {found.windows[0]} windows diverged and are left out")
 
 
 def _table(title: str, channels: list[Channel]) -> Table:
@@ -112,10 +112,6 @@ def _table(title: str, channels: list[Channel]) -> Table:
             f"{c.rms:.3g}",
             f"{c.floor:.3g}",
             f"{c.bias:.2g}",
-            "" if c.lag is None else f"{1e3 * c.lag:.2f}",
+            "" if c.lag is None else f"{round(1e3 * c.lag, 2) + 0.0:.2f}",
         )
     return table
-
-
-def _say(console: Console, text: str) -> None:
-    console.print(text, soft_wrap=True, markup=False, highlight=False)

@@ -6,8 +6,6 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
-from rich.console import Console
-
 from cspm_ident.fitted_testbed import FittedNumber, with_fitted
 from cspm_ident.rig.specimen import (
     Specimen,
@@ -15,10 +13,9 @@ from cspm_ident.rig.specimen import (
     recorded_testbed,
     with_stiffness,
 )
-from cspm_msgs_py.errors import InputError
+from cspm_msgs_py.new_folder import refuse_existing
 from cspm_msgs_py.testbed import TestbedFile, load_testbed
 
-PIPE_WIDTH = 160
 FITTED = "fitted_testbed.yaml"
 
 
@@ -54,8 +51,7 @@ class RigRequest:
         Raises:
             InputError: the folder to write to exists, or see `read_specimens`.
         """
-        if self.out is not None and self.out.exists():
-            raise InputError(f"{self.out}: exists, allowed: a new folder")
+        refuse_existing(self.out)
         given = load_testbed(self.testbed) if self.testbed else None
         found = read_specimens(self.recordings, given, self.cables)
         return with_stiffness(found, load_testbed(self.stiffness)) if self.stiffness else found
@@ -92,17 +88,7 @@ def provenance(specimens: Sequence[Specimen]) -> tuple[tuple[str, ...], tuple[fl
     return recordings, specimens[0].window if len(recordings) == 1 else None
 
 
-def make_console() -> Console:
-    """Return a console that does not fold tables where nobody looks."""
-    return Console() if Console().is_terminal else Console(width=PIPE_WIDTH)
-
-
 def interval_text(value: float, interval: tuple[float, float], digits: int = 6) -> str:
     """Return a number and its interval as a table writes them."""
     low, high = (f"{end:.{digits}g}" for end in interval)
     return f"{value:.{digits}g} ({low} … {high})"
-
-
-def say(console: Console, text: str) -> None:
-    """Print a line as it is."""
-    console.print(text, markup=False, highlight=False, soft_wrap=True)

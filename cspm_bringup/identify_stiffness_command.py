@@ -9,12 +9,11 @@ from rich.console import Console
 from rich.markup import escape
 from rich.table import Table
 
+from cspm_bringup.console import make_console, say
 from cspm_bringup.identify_rig import (
     RigRequest,
     interval_text,
-    make_console,
     provenance,
-    say,
 )
 from cspm_bringup.summary import write_json
 from cspm_ident.fitted_testbed import FittedNumber

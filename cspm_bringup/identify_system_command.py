@@ -12,7 +12,8 @@ from rich.console import Console
 from rich.markup import escape
 from rich.table import Table
 
-from cspm_bringup.identify_rig import FITTED, interval_text, make_console, say
+from cspm_bringup.console import make_console, say
+from cspm_bringup.identify_rig import FITTED, interval_text
 from cspm_bringup.summary import write_json
 from cspm_ident.estimation import Prior
 from cspm_ident.signals.measurement import Measurement, read_measurement
@@ -22,6 +23,7 @@ from cspm_ident.system.identification import HORIZON, SystemResult, identify_sys
 from cspm_ident.system.judgement import Judgement
 from cspm_msgs_py.dofs import DOFS
 from cspm_msgs_py.errors import InputError
+from cspm_msgs_py.new_folder import refuse_existing
 
 
 @dataclass(frozen=True)
@@ -58,8 +60,7 @@ def identify_system_command(asked: SystemRequest, json: Path | None) -> None:
         InputError: naming what is wrong in recordings, test-bed or options.
     """
     console = make_console()
-    if asked.out is not None and asked.out.exists():
-        raise InputError(f"{asked.out}: exists, allowed: a new folder")
+    refuse_existing(asked.out)
     searched, held_out = (_read(paths, asked) for paths in (asked.recordings, asked.held_out))
     chosen = choose(searched[0].machine, asked.names, asked.frozen, asked.priors)
     for name in asked.profiled:

@@ -11,7 +11,7 @@ from pathlib import Path
 from rich.console import Console
 from rich.progress import BarColumn, Progress, TaskProgressColumn, TextColumn, TimeRemainingColumn
 
-from cspm_bringup.bundle import TESTBED
+from cspm_bringup.console import make_console, say
 from cspm_bringup.import_tables import print_report
 from cspm_bringup.run import CONTRACT_VERSION
 from cspm_bringup.summary import write_json
@@ -19,11 +19,11 @@ from cspm_ident.importing.column_store import ColumnStore
 from cspm_ident.importing.mapping import MappingFile, load_mapping
 from cspm_ident.importing.preparation import Prepared, prepare
 from cspm_ident.importing.write import write_messages
-from cspm_msgs_py.errors import InputError
+from cspm_msgs_py.new_folder import refuse_existing
+from cspm_msgs_py.recording.attached_testbed import TESTBED
 from cspm_msgs_py.testbed import TestbedFile, load_testbed
 from cspm_msgs_py.yaml_file import dump_yaml
 
-PIPE_WIDTH = 160
 MAPPING, REPORT = "mapping.yaml", "import.yaml"
 MODE = "import"
 
@@ -44,9 +44,8 @@ def import_command(asked: Import, json: Path | None) -> None:
     Raises:
         InputError: naming what is wrong in the file, the mapping or the test-bed.
     """
-    console = Console() if Console().is_terminal else Console(width=PIPE_WIDTH)
-    if asked.out is not None and asked.out.exists():
-        raise InputError(f"{asked.out}: exists, allowed: a new folder")
+    console = make_console()
+    refuse_existing(asked.out)
     mapping, testbed = load_mapping(asked.mapping), load_testbed(asked.testbed)
     with ColumnStore() as store:
         with _progress(console, f"reading {asked.source.name}") as progress:
@@ -58,9 +57,9 @@ def import_command(asked: Import, json: Path | None) -> None:
         if asked.out is not None:
             with _progress(console, f"writing {asked.out.name}") as progress:
                 counts = _write(asked.out, prepared, mapping, testbed, progress)
-            _say(console, f"recording {asked.out}: {sum(counts.values())} messages")
+            say(console, f"recording {asked.out}: {sum(counts.values())} messages")
         else:
-            _say(console, "trial: nothing was written")
+            say(console, "trial: nothing was written")
     if json is not None:
         written = {"recording": str(asked.out) if asked.out else None, "messages": counts}
         write_json(json, prepared.report.data() | written)
@@ -85,10 +84,6 @@ def _write(
         **prepared.report.about,
     }
     return write_messages(folder, prepared.messages, attachments, about, progress)
-
-
-def _say(console: Console, text: str) -> None:
-    console.print(text, markup=False, highlight=False, soft_wrap=True)
 
 
 @contextmanager

@@ -7,6 +7,7 @@ from rich.console import Console
 from rich.markup import escape
 from rich.table import Table
 
+from cspm_bringup.console import say
 from cspm_ident.importing.report import FieldReport, ImportReport, TopicReport
 from cspm_ident.importing.suspicion import Suspicion
 from cspm_ident.importing.time_base import Pace
@@ -15,19 +16,19 @@ from cspm_ident.importing.time_base import Pace
 def print_report(console: Console, report: ImportReport) -> None:
     """Print each topic with its stamps, conversions and first rows, then what looks wrong."""
     about = report.about
-    _say(console, f"{about['source']}, {report.kind}, SHA-256 {about['source_sha256']}")
-    _say(console, f"mapping {about['mapping']}, test-bed {about['testbed']}")
-    _say(console, f"t = 0 at the first stamp, {report.origin_ns} ns")
+    say(console, f"{about['source']}, {report.kind}, SHA-256 {about['source_sha256']}")
+    say(console, f"mapping {about['mapping']}, test-bed {about['testbed']}")
+    say(console, f"t = 0 at the first stamp, {report.origin_ns} ns")
     for note in report.notes:
-        _say(console, f"note: {note}")
+        say(console, f"note: {note}")
     if report.unused:
-        _say(console, f"columns left out: {', '.join(report.unused)}")
+        say(console, f"columns left out: {', '.join(report.unused)}")
     for topic in report.topics:
         _print_topic(console, topic)
     if not report.suspicions:
-        _say(console, "suspicions: none")
+        say(console, "suspicions: none")
     for text, places in _by_text(report.suspicions).items():
-        _say(console, f"suspicion: {', '.join(places)}: {text}")
+        say(console, f"suspicion: {', '.join(places)}: {text}")
 
 
 def _by_text(suspicions: list[Suspicion]) -> dict[str, list[str]]:
@@ -39,8 +40,8 @@ def _by_text(suspicions: list[Suspicion]) -> dict[str, list[str]]:
 
 
 def _print_topic(console: Console, topic: TopicReport) -> None:
-    _say(console, "")
-    _say(console, f"{topic.topic}: {_pace(topic.pace)}")
+    say(console, "")
+    say(console, f"{topic.topic}: {_pace(topic.pace)}")
     left = topic.left_out
     reasons = {
         "without time": left.no_time,
@@ -51,7 +52,7 @@ def _print_topic(console: Console, topic: TopicReport) -> None:
     }
     told = [f"{count} {reason}" for reason, count in reasons.items() if count]
     if told:
-        _say(console, f"left out: {', '.join(told)}")
+        say(console, f"left out: {', '.join(told)}")
     console.print(_conversions(topic.fields))
     console.print(_first_rows(topic))
 
@@ -99,7 +100,3 @@ def _first_rows(topic: TopicReport) -> Table:
             table.add_row(escape(f"{field.source} raw"), *(f"{x:.9g}" for x in field.raw))
         table.add_row(escape(field.field + unit), *(f"{x:.6g}" for x in field.converted))
     return table
-
-
-def _say(console: Console, text: str) -> None:
-    console.print(text, markup=False, highlight=False, soft_wrap=True)

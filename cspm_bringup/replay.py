@@ -14,6 +14,7 @@ from rich.markup import escape
 from rich.progress import BarColumn, Progress, TextColumn
 
 from cspm_bringup.bag_selection import Selection
+from cspm_bringup.console import say
 from cspm_bringup.player import UNLIMITED, Player, neighbour_rate
 from cspm_bringup.ros_install import find_ros
 from cspm_bringup.summary import write_json
@@ -93,7 +94,7 @@ def replay_command(asked: Replay, json: Path | None = None) -> bool:
                     rate,
                     display.look,
                     paused=asked.paused,
-                    tell=lambda text: _say(console, text),
+                    tell=lambda text: say(console, text),
                 )
     _tell(console, found)
     if json is not None:
@@ -142,9 +143,9 @@ def replay_data(bag: Path, found: Replayed) -> dict[str, Any]:
 
 def _tell(console: Console, found: Replayed) -> None:
     for each in found.reproductions.values():
-        _say(console, str(each))
+        say(console, str(each))
     how = "interrupted after" if found.interrupted else "played"
-    _say(console, f"{how} {found.played_s:.3f} s, {found.messages} messages")
+    say(console, f"{how} {found.played_s:.3f} s, {found.messages} messages")
 
 
 class Display:
@@ -175,7 +176,7 @@ class Display:
     def __enter__(self) -> Display:
         self._keys.__enter__()
         if self._keys.usable and self._console.is_terminal:
-            _say(self._console, KEYS)
+            say(self._console, KEYS)
         self._bar.__enter__()
         return self
 
@@ -201,8 +202,3 @@ def obey(key: str, player: Player, now_s: float) -> None:
         player.set_rate(neighbour_rate(player.rate, faster=key == "+"), now_s)
     elif key == "q":
         player.end()
-
-
-def _say(console: Console, text: str) -> None:
-    """Print a line as it is: file names are no markup, and nothing is broken at the width."""
-    console.print(text, markup=False, highlight=False, soft_wrap=True)

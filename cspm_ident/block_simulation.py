@@ -4,20 +4,24 @@ from __future__ import annotations
 
 from enum import Enum
 from itertools import pairwise
+from threading import Lock
 from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
+from cspm_ident.signals.elongation import damping_of
 from cspm_ident.signals.timeline import Timeline, whole_stretches
 from cspm_msgs_py.errors import InputError
 from cspm_msgs_py.testbed import Testbed
 from cspm_sim.driven_plant import Driven, DrivenPlant
-from cspm_sim.equilibrium import find_equilibrium, unstretched_lengths
-from cspm_sim.kernels.cable import DAMPING_CONSTANT, DAMPING_SLOPE, OFFSET_LENGTH, RADIUS
-from cspm_sim.kernels.rotation import euler_rate_to_world_rate
-from cspm_sim.kinematics import geometry, rotation
+from cspm_sim.effect_entries import read_actions
+from cspm_sim.effects import Hook, catalogue
+from cspm_sim.equilibrium import Equilibrium, find_equilibrium, unstretched_lengths
+from cspm_sim.kernels.cable import RADIUS
+from cspm_sim.kinematics import geometry
 from cspm_sim.parameters import plant_parameters
+from cspm_sim.rest import memory_at_rest
 
 Array = NDArray[np.float64]
 Window = tuple[int, int]
@@ -25,6 +29,8 @@ Window = tuple[int, int]
 _OFFSET_ROUNDS = 3
 _OFFSET_STEP_M = 1e-6
 _OFFSET_MOST_M = 5e-3
+# A minute tells the zero of the lengths well enough.
+_OFFSET_LONGEST_S = 60.0
 
 
 class Drive(Enum):
@@ -32,13 +38,18 @@ class Drive(Enum):
 
     `winch`: motor angles and the frame's pose; bar and cables are simulated. `torque`: torques and
     the frame's pose; everything is. `tension`: tensions and the frame's pose; the bar is. `cable`:
-    motor angles and both poses; the cables alone are.
+    motor angles and both poses; the cables alone are. `shaft`: torques and tensions; the winches
+    alone are.
     """
 
     WINCH = "winch"
     TORQUE = "torque"
     TENSION = "tension"
     CABLE = "cable"
+    SHAFT = "shaft"
+
+
+_WITHOUT_CABLES = (Drive.TENSION, Drive.SHAFT)
 
 
 class Simulated(NamedTuple):
@@ -48,12 +59,14 @@ class Simulated(NamedTuple):
         bars: x y z φ θ ψ, shape (k, 6), empty (k, 0) where the bar is no output.
         tensions: shape (k, n) [N] or (k, 0).
         angles: at the motor shafts, shape (k, n) [rad] or (k, 0).
+        speeds: at the motor shafts, shape (k, n) [rad/s] or (k, 0).
         failed: windows in which the simulation diverged.
     """
 
     bars: Array
     tensions: Array
     angles: Array
+    speeds: Array
     failed: list[Window]
 
 
@@ -67,9 +80,13 @@ class BlockSimulation:
             InputError: an effect cannot be used.
         """
         self.timeline = timeline
-        self.testbed = testbed
-        self.parameters = plant_parameters(testbed)
+        self.testbed = _as_reported(testbed)
+        self.parameters = plant_parameters(self.testbed)
+        self._actions = read_actions(self.testbed)
         self._plant = DrivenPlant(self.parameters, timeline.motion, timeline.period_ns)
+        self._states: dict[int, Array] = {}
+        self._offsets: dict[Window, Array] = {}
+        self._lock = Lock()
 
     def check(self, drive: Drive) -> None:
         """Refuse a drive for which a sensor is missing.
@@ -77,12 +94,21 @@ class BlockSimulation:
         Raises:
             InputError: naming the topics that the recording lacks.
         """
-        missing = [name for name, signal in self._needs(drive).items() if signal is None]
+        missing = self.missing(drive)
         if missing:
             raise InputError(
                 f"{self.timeline.measurement.path}: --drive {drive.value} needs"
                 f" {', '.join(missing)}, allowed: a recording that has them"
             )
+
+    @property
+    def has_cables(self) -> bool:
+        """Whether any winch has a cable."""
+        return any(cable.has_cable for cable in self.testbed.cables)
+
+    def missing(self, drive: Drive) -> list[str]:
+        """Return the topics that a drive needs and the recording lacks."""
+        return [name for name, signal in self._needs(drive).items() if signal is None]
 
     def windows(self, drive: Drive, horizon: float | None) -> list[Window]:
         """Return first and last step of each window.
@@ -92,7 +118,9 @@ class BlockSimulation:
             horizon: longest window [s]; None for as long as nothing is missing.
         """
         columns = [signal for signal in self._needs(drive).values() if signal is not None]
-        stretches = whole_stretches([self.timeline.frame_poses, *columns], 2)
+        if drive is not Drive.SHAFT:
+            columns.append(self.timeline.frame_poses)
+        stretches = whole_stretches(columns, 2)
         if horizon is None:
             return stretches
         steps = max(2, round(horizon / self.timeline.period))
@@ -110,105 +138,147 @@ class BlockSimulation:
             windows: first and last steps.
             offsets: as from `offsets`, for all windows; absent: found for each.
         """
-        steps, n = len(self.timeline.times), len(self.testbed.cables)
-        # A drive's own inputs are no outputs.
-        has_bar = self.testbed.bar is not None and drive is not Drive.CABLE
-        bars = np.full((steps, 6 if has_bar else 0), np.nan)
-        tensions = np.full((steps, 0 if drive is Drive.TENSION else n), np.nan)
-        angles = np.full((steps, n if drive is Drive.TORQUE else 0), np.nan)
+        widths = self._widths(drive)
+        steps, first, n = len(self.timeline.times), self._plant.first, len(self.testbed.cables)
+        found = [np.full((steps, width), np.nan) for width in widths]
+        bars, tensions, angles, speeds = found
         failed = []
-        first = self._plant.first
         for start, end in windows:
-            if offsets is None:
-                shift = np.zeros(n) if drive is Drive.TENSION else self.offsets((start, end))
-            else:
-                shift = offsets
+            shift = self.offsets((start, end), drive) if offsets is None else offsets
             driven = self._drive(drive, start, end, shift)
             rows = slice(start, end + 1)
-            bars[rows] = driven.states[:, : bars.shape[1]]
-            tensions[rows] = driven.tensions[:, : tensions.shape[1]]
-            angles[rows] = driven.states[:, first + n : first + n + angles.shape[1]]
+            bars[rows] = driven.states[:, : widths[0]]
+            tensions[rows] = driven.tensions[:, : widths[1]]
+            angles[rows] = driven.states[:, first + n : first + n + widths[2]]
+            speeds[rows] = driven.states[:, first + 2 * n : first + 2 * n + widths[3]]
             if driven.good < end - start + 1:
                 failed.append((start, end))
-        return Simulated(bars, tensions, angles, failed)
+        return Simulated(bars, tensions, angles, speeds, failed)
 
-    def offsets(self, window: Window) -> Array:
+    def _widths(self, drive: Drive) -> tuple[int, int, int, int]:
+        """Return how many columns of bar, tensions, angles and speeds come out of a drive."""
+        n, bar = len(self.testbed.cables), 6 if self.testbed.bar is not None else 0
+        return {
+            Drive.WINCH: (bar, n, 0, 0),
+            Drive.TORQUE: (bar, n, n, 0),
+            Drive.TENSION: (bar, 0, 0, 0),
+            Drive.CABLE: (0, n, 0, 0),
+            Drive.SHAFT: (0, 0, n, n),
+        }[drive]
+
+    def offsets(self, window: Window, drive: Drive = Drive.WINCH) -> Array:
         """Return what to add to the unstretched lengths of `state_at`, (n,) [m], for a window.
 
         Encoders count from an arbitrary zero, so one length per cable is unknown. It is the one at
         which the cables under measured winch and bar motion carry the mean tension measured in the
-        window; a single noisy sample at its start would tell it badly.
+        window, or in its first minute; a single noisy sample at its start would tell it badly. Zero
+        for a drive that does not simulate cables.
         """
-        start, end = window
         line, n = self.timeline, len(self.testbed.cables)
-        out = np.zeros(n)
-        if line.tensions is None or line.angles is None:
-            return out
-        measured = line.tensions[start : end + 1]
+        if drive in _WITHOUT_CABLES or line.tensions is None or line.angles is None:
+            return np.zeros(n)
+        # Drives that are simulated side by side share what the first one found.
+        with self._lock:
+            if window not in self._offsets:
+                self._offsets[window] = self._find_offsets(window, line.tensions)
+        return self._offsets[window]
+
+    def _find_offsets(self, window: Window, tensions: Array) -> Array:
+        start, end = window
+        end = min(end, start + round(_OFFSET_LONGEST_S / self.timeline.period))
+        out = np.zeros(len(self.testbed.cables))
+        measured = tensions[start : end + 1]
         for _ in range(_OFFSET_ROUNDS):
             simulated = self._drive(Drive.CABLE, start, end, out).tensions
             shifted = self._drive(Drive.CABLE, start, end, out + _OFFSET_STEP_M).tensions
             slope = np.nanmean(shifted - simulated, axis=0) / _OFFSET_STEP_M
             missing = np.nanmean(measured - simulated, axis=0)
-            change = np.divide(missing, slope, out=np.zeros(n), where=slope < 0.0)
+            change = np.divide(missing, slope, out=np.zeros(len(out)), where=slope < 0.0)
             out += np.clip(change, -_OFFSET_MOST_M, _OFFSET_MOST_M)
         return out
 
     def state_at(self, step: int) -> Array:
-        """Return the plant's state that was measured at a step."""
+        """Return the plant's state that was measured at a step, its effects settled."""
+        if step not in self._states:
+            state = self._motion_at(step)
+            first, n = self._plant.first, len(self.testbed.cables)
+            state[first : first + n] = self._lengths_at(step)
+            self._states[step] = state
+        return np.array(self._states[step])
+
+    def _motion_at(self, step: int) -> Array:
+        """Return the state without the cables' lengths, which neither bar nor winches feel."""
         line, n, first = self.timeline, len(self.testbed.cables), self._plant.first
         state = np.zeros(self._plant.size)
         if line.bars is not None and first:
             state[:first] = line.bars[step]
+        state[first : first + n] = 1.0
         if line.angles is not None and line.speeds is not None:
             state[first + n : first + 2 * n] = line.angles[step]
             state[first + 2 * n : first + 3 * n] = line.speeds[step]
-        state[first : first + n] = self._unstretched(state, step)
+        if len(state) > first + 3 * n:
+            tensions, force = self._tensions_at(step)
+            state[first + 3 * n :] = memory_at_rest(self._actions, self.parameters, tensions, force)
         return state
 
-    def _unstretched(self, state: Array, step: int) -> Array:
-        """Return the unstretched lengths: from the tensions, or of rest where there are none."""
+    def _tensions_at(self, step: int) -> tuple[Array, Array]:
+        """Return tensions, (n,) [N], and their force on the winch frame, (3,); of rest if unknown.
+
+        Where poses are missing there is no force.
+        """
+        line = self.timeline
+        pose, frame = line.bar_poses[step], line.frame_poses[step]
+        seen = bool(np.isfinite(pose).all() and np.isfinite(frame).all())
+        if line.smooth_tensions is not None:
+            tensions = np.maximum(np.nan_to_num(line.smooth_tensions[step]), 0.0)
+        elif seen and self.testbed.bar is not None:
+            tensions = self._rest_at(step).tensions
+        else:
+            tensions = np.zeros(len(self.testbed.cables))
+        if not seen or not all(cable.has_cable for cable in self.testbed.cables):
+            return tensions, np.zeros(3)
+        spans = geometry(self.parameters.cables, pose, frame)
+        return tensions, -spans.frame[:, :3].T @ tensions
+
+    def _rest_at(self, step: int) -> Equilibrium:
+        limits = np.array([c.tension_limits for c in self.testbed.cables], dtype=float)
+        pose, frame = self.timeline.bar_poses[step], self.timeline.frame_poses[step]
+        return find_equilibrium(self.parameters, pose, frame, limits)
+
+    def _lengths_at(self, step: int) -> Array:
+        """Return the unstretched lengths, (n,) [m]: from the tensions, or of rest without them."""
         line, parameters = self.timeline, self.parameters
-        first, n = self._plant.first, len(self.testbed.cables)
-        frame = line.frame_poses[step]
-        if not any(cable.has_cable for cable in self.testbed.cables):
-            return np.ones(n)
-        pose = state[:6] if first else np.zeros(6)
+        if not self.has_cables:
+            return np.ones(len(self.testbed.cables))
+        if line.smooth_tensions is None and self.testbed.bar is not None:
+            return self._rest_at(step).unstretched_lengths
+        spans = geometry(parameters.cables, line.bar_poses[step], line.frame_poses[step])
         if line.smooth_tensions is None:
-            if not first:
-                return geometry(parameters.cables, pose, frame).lengths
-            limits = np.array([c.tension_limits for c in self.testbed.cables], dtype=float)
-            return find_equilibrium(parameters, pose, frame, limits).unstretched_lengths
-        spans = geometry(parameters.cables, pose, frame)
-        tensions = np.maximum(line.smooth_tensions[step], 0.0)
-        rate = spans.bar @ self._bar_twist(state) + spans.frame @ self._frame_twist(step)
-        rate += parameters.cables[:, RADIUS] * state[first + 2 * n : first + 3 * n]
-        elastic = spans.lengths + parameters.cables[:, OFFSET_LENGTH]
-        damping = parameters.cables[:, DAMPING_CONSTANT]
-        damping = np.maximum(damping - parameters.cables[:, DAMPING_SLOPE] * elastic, 0.0)
-        return unstretched_lengths(
-            parameters, spans.lengths, np.maximum(tensions - damping * rate, 0.0)
-        )
+            return spans.lengths
+        rate: Array = spans.bar @ line.bar_twists[step] + spans.frame @ line.frame_twists[step]
+        if line.speeds is not None:
+            rate += parameters.cables[:, RADIUS] * line.speeds[step]
+        tensions = np.maximum(np.nan_to_num(line.smooth_tensions[step]), 0.0)
+        elastic = np.maximum(tensions - damping_of(parameters, spans.lengths) * rate, 0.0)
+        return unstretched_lengths(parameters, spans.lengths, elastic)
 
-    def _bar_twist(self, state: Array) -> Array:
-        """Return v and ω of the bar in world axes, shape (6,)."""
-        if not self._plant.first:
-            return np.zeros(6)
-        return np.concatenate([state[6:9], rotation(state[:6]) @ state[9:12]])
-
-    def _frame_twist(self, step: int) -> Array:
-        """Return v and ω of the winch frame in world axes, shape (6,), at a step."""
-        frame = self.timeline.motion.at(step * self.timeline.period)
-        rate = euler_rate_to_world_rate(frame[4], frame[5], frame[9], frame[10], frame[11])
-        return np.concatenate([frame[6:9], rate])
+    def _offset_state(self, step: int, offsets: Array) -> Array:
+        first = self._plant.first
+        state = self.state_at(step)
+        state[first : first + len(offsets)] += offsets
+        return state
 
     def _drive(self, drive: Drive, start: int, end: int, offsets: Array) -> Driven:
-        line, state = self.timeline, self.state_at(start)
-        first, n = self._plant.first, len(self.testbed.cables)
-        state[first : first + n] += offsets
-        rows = slice(start, end + 1)
+        line, rows = self.timeline, slice(start, end + 1)
         if drive is Drive.TENSION:
-            return self._plant.by_tensions(start, state[:12], np.asarray(line.tensions)[rows])
+            state, tensions = self._motion_at(start), np.asarray(line.tensions)[rows]
+            return self._plant.by_tensions(start, state, tensions)
+        if drive is Drive.SHAFT:
+            torques = np.asarray(line.torques)[start:end]
+            none = np.zeros((end - start + 1, len(offsets)))
+            tensions = none if line.tensions is None else line.tensions[rows]
+            return self._plant.shafts(self._motion_at(start), torques, tensions)
+        state = self._offset_state(start, offsets)
         if drive is Drive.TORQUE:
             return self._plant.by_torques(start, state, np.asarray(line.torques)[start:end])
         bars = line.bars[rows] if drive is Drive.CABLE and line.bars is not None else None
@@ -223,8 +293,22 @@ class BlockSimulation:
             measured = line.measurement.frame_pose is not None
             frame = {"/winch_frame/pose": line.frame_poses if measured else None}
         angle = {"/winches/state position": line.angles}
+        torque = {"/winches/state effort": line.torques}
         if drive is Drive.TENSION:
             return frame | {"/bar/pose": line.bars, "/cables/tension": line.tensions}
         if drive is Drive.TORQUE:
-            return frame | bar | angle | {"/winches/state effort": line.torques}
+            return frame | bar | angle | torque
+        if drive is Drive.SHAFT:
+            pull = {"/cables/tension": line.tensions} if self.has_cables else {}
+            return angle | torque | pull
         return frame | bar | angle
+
+
+def _as_reported(testbed: Testbed) -> Testbed:
+    """Return the machine whose drives deliver what they are told: the torque that they reported."""
+    effects = [
+        entry
+        for entry in testbed.effects
+        if entry.effect not in catalogue() or set(catalogue()[entry.effect].kernels) != {Hook.DRIVE}
+    ]
+    return testbed.model_copy(update={"effects": tuple(effects)})

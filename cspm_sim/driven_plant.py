@@ -7,7 +7,12 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from cspm_sim.kernels.driven import drive_by_tensions, drive_by_torques, drive_by_winches
+from cspm_sim.kernels.driven import (
+    drive_by_tensions,
+    drive_by_torques,
+    drive_by_winches,
+    drive_shafts,
+)
 from cspm_sim.kernels.plant import BAR_STATES, PlantParameters, make_scratch, state_count
 from cspm_sim.motion import Motion
 
@@ -32,7 +37,8 @@ class DrivenPlant:
     """A machine on a moving winch frame, whose blocks are run window by window.
 
     Time is a count of steps from the frame motion's first knot. The states are the plant's:
-    bar (12), unstretched lengths, angles, speeds.
+    bar (12), unstretched lengths, angles, speeds. Nothing is kept between calls, and all may be
+    made from several threads at once.
     """
 
     def __init__(self, parameters: PlantParameters, frame_motion: Motion, period_ns: int) -> None:
@@ -43,9 +49,6 @@ class DrivenPlant:
         self.cables = len(parameters.cables)
         self.first = BAR_STATES if len(parameters.bar) else 0
         self.size = state_count(parameters)
-        self._scratch = make_scratch(self.size, self.cables)
-        self._frames = np.zeros((3, 18))
-        self._outputs = np.zeros((2, self.cables))
 
     def by_winches(
         self, start: int, state: Array, angles: Array, speeds: Array, bars: Array | None = None
@@ -67,9 +70,9 @@ class DrivenPlant:
             np.zeros((0, BAR_STATES)) if bars is None else np.ascontiguousarray(bars),
             *self._motion(start),
             self.parameters,
-            self._frames,
-            self._scratch,
-            self._outputs,
+            np.zeros((3, 18)),
+            make_scratch(self.size, self.cables),
+            np.zeros((2, self.cables)),
             out,
         )
         return self._result(out, good)
@@ -82,26 +85,47 @@ class DrivenPlant:
             np.ascontiguousarray(torques),
             *self._motion(start),
             self.parameters,
-            self._frames,
-            self._scratch,
-            self._outputs,
+            np.zeros((3, 18)),
+            make_scratch(self.size, self.cables),
+            np.zeros((2, self.cables)),
             out,
         )
         return self._result(out, good)
 
-    def by_tensions(self, start: int, bar_state: Array, tensions: Array) -> Driven:
-        """Return the bar's motion under given tensions, (steps + 1, n) [N]; `bar_state` has 12."""
+    def by_tensions(self, start: int, state: Array, tensions: Array) -> Driven:
+        """Return the bar's motion under given tensions, (steps + 1, n) [N].
+
+        Of `state`, the plant's, the bar's 12 and the effects' memory are used.
+        """
         out = np.full((len(tensions), BAR_STATES), np.nan)
-        # Memory begins at zero.
-        state = np.zeros(self.size)
-        state[:BAR_STATES] = bar_state
         good = drive_by_tensions(
-            state,
+            state.copy(),
             np.ascontiguousarray(tensions),
             *self._motion(start),
             self.parameters,
-            self._frames,
-            self._scratch,
+            np.zeros((3, 18)),
+            make_scratch(self.size, self.cables),
+            out,
+        )
+        out[good:] = np.nan
+        return Driven(out, tensions, good)
+
+    def shafts(self, state: Array, torques: Array, tensions: Array) -> Driven:
+        """Return the winches' motion under torques and tensions, whatever bar and frame do.
+
+        Args:
+            state: the plant's, of which angles, speeds and the effects' memory are used.
+            torques: at the motor shafts, (steps, n) [N·m], each held.
+            tensions: (steps + 1, n) [N].
+        """
+        out = np.full((len(tensions), self.size), np.nan)
+        good = drive_shafts(
+            state.copy(),
+            np.ascontiguousarray(torques),
+            np.ascontiguousarray(tensions),
+            self.period,
+            self.parameters,
+            make_scratch(self.size, self.cables),
             out,
         )
         out[good:] = np.nan

@@ -59,6 +59,9 @@ def test_the_machine_itself_is_at_the_noise_floor(comparison):
         assert channel.rms < 1.5 * channel.floor, (channel.block, channel.name)
     assert of(comparison, "bar/pose/surge").vaf > 99.9
     assert {c.block for c in comparison.channels} == {"whole", "cable", "bar"}
+    assert comparison.left_out == {
+        "winch": "all winches stand still: a brake or friction takes any torque"
+    }
 
 
 def test_another_mass_shows_where_tensions_drive_the_bar(measurement, comparison):
@@ -81,6 +84,7 @@ def test_a_late_camera_is_found(measurement, late):
     bar, frame = found["/bar/pose"], found["/winch_frame/pose"]
     assert bar.seconds - frame.seconds == pytest.approx(late, abs=RESOLUTION_S)
     assert bar.matters == (late > 0.0)
+    assert bar.interval[0] <= late <= bar.interval[1]
 
 
 def test_a_recording_without_cameras_says_what_is_missing(measurement):
@@ -101,6 +105,17 @@ def test_windows_begin_anew_and_leave_holes_out(measurement):
         times = line.times[[start, end]]
         assert times[1] <= 4.0 or times[0] >= 6.0
         assert end - start <= 1.5 * 500
+
+
+def test_metrics_of_a_long_record_are_those_of_all_of_it():
+    generator = np.random.default_rng(5)
+    times = np.arange(0, 400, 0.002)
+    common = np.convolve(generator.standard_normal(len(times)), np.ones(25) / 5, "same")
+    late = np.roll(common, 7) + 0.01 * generator.standard_normal(len(times))
+    assert best_lag(late, common, 0.002) == pytest.approx(0.014, abs=2e-4)
+    frequencies, found = coherence_of(common, 2.0 * common, 500.0)
+    assert found.min() > 0.999
+    assert frequencies[-1] > 240.0
 
 
 def test_metrics_of_a_delayed_and_scaled_signal():
@@ -156,12 +171,16 @@ def test_the_command_prints_writes_and_reports(command, folder, tmp_path):
     )
     assert code == 0
     assert "whole, driven by winch" in out
+    assert "winch: left out, all winches stand still" in out
+    assert "/bar/pose: " in out.splitlines()[0]
+    assert out.splitlines()[0].endswith("; too small to matter, left in")
     found = json.loads((tmp_path / "found.json").read_text())
     channels = {(c["block"], c["channel"]): c for c in found["channels"]}
     assert channels["whole", "bar/pose/surge"]["vaf"] > 99.9
     assert {"vaf", "nrmse", "lag_s", "noise_floor", "bias"} <= set(found["channels"][0])
     page = (tmp_path / "report" / "report.html").read_text()
     assert page.count("plotly-graph-div") >= 9
+    assert "winch: left out, all winches stand still" in page
     assert "http://" not in page.split("<body>")[1].split("<script")[0]
 
 
@@ -186,13 +205,14 @@ def test_a_browser_draws_the_page(command, folder, tmp_path):
     if browser is None:
         pytest.skip("no Chromium on this system")
     assert command("compare", folder, "--out", tmp_path / "report")[0] == 0
-    page = subprocess.run(
+    shown = subprocess.run(
         [
             browser,
             "--headless",
             "--no-sandbox",
             "--disable-gpu",
             "--virtual-time-budget=20000",
+            "--enable-logging=stderr",
             "--dump-dom",
             (tmp_path / "report" / "report.html").as_uri(),
         ],
@@ -200,7 +220,9 @@ def test_a_browser_draws_the_page(command, folder, tmp_path):
         text=True,
         timeout=120,
         check=True,
-    ).stdout
+    )
+    assert "CONSOLE" not in shown.stderr
+    page = shown.stdout
     # Lines that only the script draws.
     assert page.count("scatterlayer") > 20
     assert page.count('class="xtick"') > 20

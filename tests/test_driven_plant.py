@@ -4,7 +4,9 @@ from dataclasses import dataclass
 
 import numpy as np
 import pytest
+from conftest import build, general_content
 from run_samples import SCENARIOS
+from test_effect_parameters import entry
 
 from cspm_msgs_py.testbed import load_testbed
 from cspm_sim.driven_plant import DrivenPlant
@@ -98,15 +100,46 @@ def test_cables_alone_follow_winches_and_bar(simulated, driven):
 
 
 def test_driven_by_tensions_the_bar_moves_as_it_did(simulated, driven):
-    found = driven.by_tensions(0, simulated.states[0, :12], simulated.tensions)
+    found = driven.by_tensions(0, simulated.states[0], simulated.tensions)
     np.testing.assert_allclose(found.states[:, :12], simulated.states[:, :12], atol=1e-4)
 
 
 def test_without_tension_the_bar_falls(simulated, driven):
     none = np.zeros((501, len(simulated.tensions[0])))
-    found = driven.by_tensions(0, simulated.states[0, :12], none)
+    found = driven.by_tensions(0, simulated.states[0], none)
     fallen = found.states[-1, 2] - found.states[0, 2]
     assert fallen == pytest.approx(0.5 * 9.81 * 0.5**2, rel=1e-6)
+
+
+@pytest.mark.parametrize(
+    "effects",
+    [
+        [],
+        [
+            entry("winch_coulomb_friction", torque=0.03),
+            entry("winch_drum_eccentricity", eccentricity=1e-3, phase=0.4),
+        ],
+    ],
+    ids=["bare", "with friction and an eccentric drum"],
+)
+def test_winches_alone_turn_as_they_did(effects):
+    content = {**general_content(), "effects": effects}
+    plant = Plant(build(content), swaying_frame(), PERIOD_NS, bar_pose=[0, 0, 2, 0, 0, 0])
+    states, tensions, torques = [plant.state.copy()], [plant.tensions.copy()], []
+    balance = plant.tensions * plant.parameters.cables[:, RADIUS]
+    for k in range(400):
+        torques.append(balance + 0.05 * np.sin(2 * np.pi * 3 * k * 1e-3 + np.arange(8)))
+        plant.step(torques[-1])
+        states.append(plant.state.copy())
+        tensions.append(plant.tensions.copy())
+    driven = DrivenPlant(plant.parameters, plant.frame_motion, PERIOD_NS)
+    found = driven.shafts(states[0], np.array(torques), np.array(tensions)).states
+    turned = np.array(states)[:, 20:36]
+    moved = np.abs(turned - turned[0]).max(axis=0)
+    # Tensions are joined by straight lines, and sampled at the ends of each step.
+    assert (np.abs(found[:, 20:36] - turned).max(axis=0) < 0.01 * moved.max()).all()
+    other = driven.shafts(states[0], -np.array(torques), np.array(tensions)).states
+    assert np.abs(other[:, 20:36] - turned).max() > moved.max()
 
 
 def test_a_window_in_the_middle_sees_the_frame_where_it_is_then(simulated, driven):

@@ -2,10 +2,11 @@
 
 import numpy as np
 import pytest
+from scipy.interpolate import CubicSpline
 
 from cspm_ident.signals.noise import noise_above_band, noise_between
-from cspm_ident.signals.samples import Samples, ordered
-from cspm_ident.signals.smoothing import band_of, smooth
+from cspm_ident.signals.samples import Samples, ordered, stretches
+from cspm_ident.signals.smoothing import band_of, filtered, smooth
 from cspm_ident.signals.winch_motion import ENCODER_BAND_HZ, winch_motion
 
 RATE = 1000.0
@@ -49,6 +50,26 @@ def test_smoothing_knows_nothing_of_holes():
     found = smooth(Samples(times, wave(1.0, times)))
     assert np.isnan(found.at(np.array([6.5]))).all()
     assert np.isfinite(found.at(np.array([4.0, 9.0]))).all()
+
+
+def test_fewer_knots_do_not_show():
+    """At the band's edge, where a spline has the fewest knots per period."""
+    found = smooth(Samples(TIMES, wave(4.0)), band=5.0)
+    every = CubicSpline(TIMES, filtered(Samples(TIMES, wave(4.0)), band=5.0)[0])
+    inner = TIMES[2000:-2000]
+    assert len(found.pieces[0].x) < 0.25 * len(TIMES)
+    assert np.abs(found.at(inner) - every(inner)).max() < 1e-4
+    assert np.abs(found.at(inner, 1) - every(inner, 1)).max() < 1e-3 * 2 * np.pi * 4.0
+    assert found.spans.tolist() == [[TIMES[0], TIMES[-1]]]
+
+
+def test_long_records_are_represented_by_stretches_of_all_of_them():
+    values = np.arange(100_000)[:, None]
+    found = stretches(values, 1000, 10)
+    assert len(found) == 10_000
+    assert (found[0, 0], found[-1, 0]) == (0, 99_999)
+    assert (np.diff(found[:, 0]) == 1).sum() == 10_000 - 10
+    assert stretches(values, 1000, 100) is values
 
 
 @pytest.mark.parametrize("frequency", [2.0, 8.0, 30.0])

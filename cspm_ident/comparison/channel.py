@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, field
+from functools import cached_property
 from typing import Any
 
 import numpy as np
@@ -30,7 +31,7 @@ class Channel:
     Attributes:
         name: topic and column, such as `cables/tension/surge_2`.
         unit: of the values.
-        block: what was simulated to get it: `whole`, `cable` or `bar`.
+        block: what was simulated to get it: `whole`, `winch`, `cable` or `bar`.
         times: stamps [s], shape (n,).
         measured, simulated: shape (n,).
         floor: RMS that sensor noise and noise on the inputs leave of the error.
@@ -46,47 +47,47 @@ class Channel:
     floor: float
     bins: dict[str, list[Bin]] = field(default_factory=dict)
 
-    @property
+    @cached_property
     def error(self) -> Array:
         """Measured minus simulated."""
         return self.measured - self.simulated
 
-    @property
+    @cached_property
     def rms(self) -> float:
         """RMS of the error."""
         return float(np.sqrt(np.mean(self.error**2)))
 
-    @property
+    @cached_property
     def bias(self) -> float:
         """Mean of the error."""
         return float(self.error.mean())
 
-    @property
+    @cached_property
     def moves(self) -> bool:
         """Whether the measured signal does more than its noise."""
         return bool(np.std(self.measured) > _MOVES * self.floor and np.ptp(self.measured) > 0.0)
 
-    @property
+    @cached_property
     def vaf(self) -> float | None:
         """Variance accounted for [%]; None where nothing moves."""
         return vaf(self.measured, self.simulated) if self.moves else None
 
-    @property
+    @cached_property
     def nrmse(self) -> float | None:
         """RMS error over the signal's standard deviation; None where nothing moves."""
         return nrmse(self.measured, self.simulated) if self.moves else None
 
-    @property
+    @cached_property
     def interval(self) -> float:
         """The usual time between samples [s]."""
         return float(np.median(np.diff(self.times)))
 
-    @property
+    @cached_property
     def lag(self) -> float | None:
         """By how much the measured signal is later [s]; None where nothing moves."""
         return best_lag(self.measured, self.simulated, self.interval) if self.moves else None
 
-    @property
+    @cached_property
     def coherence(self) -> tuple[Array, Array]:
         """Frequencies [Hz] and coherence of both."""
         return coherence_of(self.measured, self.simulated, 1.0 / self.interval)

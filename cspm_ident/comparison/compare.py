@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+import os
 from collections.abc import Callable, Mapping
+from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass, replace
 from typing import Any, NamedTuple
 
@@ -11,20 +13,27 @@ from numpy.typing import NDArray
 
 from cspm_ident.block_simulation import BlockSimulation, Drive, Simulated, Window
 from cspm_ident.comparison.channel import Channel
-from cspm_ident.comparison.floor import NoiseSource, noise_of, propagated
+from cspm_ident.comparison.floor import NoiseSource, lasting_rms, noise_of, propagated
 from cspm_ident.comparison.metrics import error_bins
 from cspm_ident.signals.delays import Delay, find_delays
-from cspm_ident.signals.measurement import BAR, TENSION, WINCHES, Measurement
+from cspm_ident.signals.measurement import BAR, SPEED, TENSION, WINCHES, Measurement
 from cspm_ident.signals.samples import Samples
 from cspm_ident.signals.timeline import Timeline
 from cspm_msgs_py.dofs import DOFS
 from cspm_msgs_py.errors import InputError
-from cspm_msgs_py.testbed import Testbed
 
 Array = NDArray[np.float64]
 Progress = Callable[[str], None]
 
-HORIZONS = {Drive.WINCH: None, Drive.CABLE: None, Drive.TORQUE: 0.5, Drive.TENSION: 0.5}
+# How long a drive's errors may grow [s].
+HORIZONS = {
+    Drive.WINCH: None,
+    Drive.CABLE: None,
+    Drive.TORQUE: 0.5,
+    Drive.TENSION: 0.5,
+    Drive.SHAFT: 0.5,
+}
+BLOCKS = {"winch": Drive.SHAFT, "cable": Drive.CABLE, "bar": Drive.TENSION}
 
 
 @dataclass(frozen=True, eq=False)
@@ -41,6 +50,7 @@ class Comparison:
         noise: where each sensor's noise comes from, by topic.
         windows: how many there were, and how many of them diverged.
         bands: what was kept of the smoothed inputs [Hz], by topic.
+        left_out: why a block, or the whole, is not among the channels.
     """
 
     measurement: Measurement
@@ -52,6 +62,13 @@ class Comparison:
     noise: dict[str, NoiseSource]
     windows: tuple[int, int]
     bands: dict[str, float]
+    left_out: dict[str, str]
+
+    def use_of(self, delay: Delay) -> str:
+        """Return what was done about a delay, to be put behind its text."""
+        if delay.topic in self.applied:
+            return "; taken out"
+        return "; too small to matter, left in" if delay.known else ""
 
     def data(self) -> dict[str, Any]:
         """Return the figures as plain data for JSON."""
@@ -66,8 +83,23 @@ class Comparison:
             "applied_delays_s": self.applied,
             "noise_from": {name: source.value for name, source in self.noise.items()},
             "bands_hz": {k: v if np.isfinite(v) else None for k, v in self.bands.items()},
+            "left_out": self.left_out,
             "channels": [channel.data() for channel in self.channels],
         }
+
+
+_STEMS = {
+    BAR: "bar/pose",
+    TENSION: "cables/tension",
+    WINCHES: "winches/angle",
+    SPEED: "winches/speed",
+}
+
+
+_NOTHING = {
+    **dict.fromkeys(("whole", "cable", "bar"), "nothing that it simulates was measured"),
+    "winch": "all winches stand still: a brake or friction takes any torque",
+}
 
 
 class _Run(NamedTuple):
@@ -103,7 +135,7 @@ def compare(
     """
     machine = measurement.machine
     timeline = Timeline(measurement)
-    BlockSimulation(timeline, machine).check(drive)
+    blocks, left_out = _blocks(BlockSimulation(timeline, machine), drive)
     progress("delays of the sensors")
     found = find_delays(timeline, machine) if delays is None else []
     applied = {d.topic: d.seconds for d in found if d.matters} if delays is None else dict(delays)
@@ -111,52 +143,87 @@ def compare(
     progress("noise of the sensors")
     noise, sources = noise_of(measurement, repeat)
     horizon = HORIZONS[drive] if horizon is None else horizon
-    channels: list[Channel] = []
-    windows = (0, 0)
-    for block, each in _blocks(timeline, machine, drive):
-        progress(f"{block}, driven by {each.value}")
-        run = _run(timeline, machine, each, horizon if block == "whole" else HORIZONS[each], noise)
-        channels += _channels(timeline, run, block, noise)
-        if block == "whole":
-            windows = (len(run.windows), len(run.simulated.failed))
-    if not channels:
+    progress("simulation")
+    simulation = BlockSimulation(timeline, machine)
+    runs = _runs(simulation, blocks, {**HORIZONS, drive: horizon}, noise)
+    progress("errors")
+    channels = {block: _channels(timeline, run, block, noise) for block, run in runs.items()}
+    channels["winch"] = _turning(channels.get("winch", []), measurement, noise)
+    left_out |= {block: _NOTHING[block] for block in blocks if not channels[block]}
+    if not any(channels.values()):
         raise InputError(
             f"{measurement.path}: --drive {drive.value} gives nothing that was measured, allowed:"
             " a recording with the drive's outputs"
         )
     return Comparison(
-        measurement, drive, horizon, channels, found, applied, sources, windows, timeline.bands
+        measurement,
+        drive,
+        horizon,
+        [channel for block in blocks for channel in channels[block]],
+        found,
+        applied,
+        sources,
+        (len(runs["whole"].windows), len(runs["whole"].simulated.failed)),
+        timeline.bands,
+        left_out,
     )
 
 
-def _blocks(timeline: Timeline, machine: Testbed, drive: Drive) -> list[tuple[str, Drive]]:
-    """Return the whole, and each block whose sensors are there."""
-    found = [("whole", drive)]
-    simulation = BlockSimulation(timeline, machine)
-    if machine.bar is None:
-        return found
-    for block, each in (("cable", Drive.CABLE), ("bar", Drive.TENSION)):
-        if each is drive:
+def _blocks(simulation: BlockSimulation, drive: Drive) -> tuple[dict[str, Drive], dict[str, str]]:
+    """Return the whole and each block whose sensors are there; and why others are left out.
+
+    Raises:
+        InputError: a sensor that the whole's drive needs is missing.
+    """
+    simulation.check(drive)
+    found, left_out = {"whole": drive}, {}
+    for block, each in BLOCKS.items():
+        if each is drive or (simulation.testbed.bar is None and block != "winch"):
             continue
-        try:
-            simulation.check(each)
-        except InputError:
+        if each is Drive.SHAFT and drive is Drive.TORQUE and not simulation.has_cables:
             continue
-        found.append((block, each))
-    return found
+        missing = simulation.missing(each)
+        if missing:
+            left_out[block] = f"{', '.join(missing)} not recorded"
+        else:
+            found[block] = each
+    return found, left_out
+
+
+def _runs(
+    simulation: BlockSimulation,
+    blocks: Mapping[str, Drive],
+    horizons: Mapping[Drive, float | None],
+    noise: Mapping[str, Array],
+) -> dict[str, _Run]:
+    """Return each block's run; the kernels let Python go on, so that they share processors."""
+    with ThreadPoolExecutor(os.cpu_count()) as pool:
+        jobs = {
+            block: pool.submit(_run, simulation, drive, horizons[drive], noise)
+            for block, drive in blocks.items()
+        }
+        return {block: job.result() for block, job in jobs.items()}
 
 
 def _run(
-    timeline: Timeline,
-    machine: Testbed,
-    drive: Drive,
-    horizon: float | None,
-    noise: Mapping[str, Array],
+    simulation: BlockSimulation, drive: Drive, horizon: float | None, noise: Mapping[str, Array]
 ) -> _Run:
-    simulation = BlockSimulation(timeline, machine)
     windows = simulation.windows(drive, horizon)
     simulated = simulation.run(drive, windows)
-    return _Run(simulated, propagated(timeline, machine, drive, windows, noise), windows)
+    scatter = propagated(simulation.timeline, simulation.testbed, drive, windows, noise)
+    return _Run(simulated, scatter, windows)
+
+
+def _turning(
+    channels: list[Channel], measurement: Measurement, noise: Mapping[str, Array]
+) -> list[Channel]:
+    """Return the channels of winches that turn: at rest a brake may hold against any torque."""
+    if measurement.angle is None:
+        return channels
+    spread = measurement.angle.values.std(axis=0)
+    names = measurement.machine.cable_names
+    turns = [n for n, s, own in zip(names, spread, noise[WINCHES], strict=True) if s > 3.0 * own]
+    return [channel for channel in channels if channel.name.rsplit("/", 1)[-1] in turns]
 
 
 def _channels(
@@ -164,10 +231,12 @@ def _channels(
 ) -> list[Channel]:
     measurement = timeline.measurement
     cables = measurement.machine.cable_names
+    steps = sum(end - start for start, end in run.windows)
     outputs: list[tuple[str, Samples | None, Array, Array, tuple[str, ...], str]] = [
         (BAR, measurement.bar_pose, run.simulated.bars, run.scatter.bars, DOFS, "m"),
         (TENSION, measurement.tension, run.simulated.tensions, run.scatter.tensions, cables, "N"),
         (WINCHES, measurement.angle, run.simulated.angles, run.scatter.angles, cables, "rad"),
+        (SPEED, measurement.speed, run.simulated.speeds, run.scatter.speeds, cables, "rad/s"),
     ]
     found = []
     for topic, samples, simulated, scatter, names, unit in outputs:
@@ -175,12 +244,18 @@ def _channels(
             continue
         for i, name in enumerate(names):
             shown = "rad" if topic == BAR and i >= 3 else unit
-            stem = {BAR: "bar/pose", TENSION: "cables/tension", WINCHES: "winches/angle"}[topic]
-            # The scatter's RMS is that of a difference between two draws of the noise.
-            own = float(np.nan_to_num(np.sqrt(np.nanmean(scatter[:, i] ** 2))))
+            own = lasting_rms(scatter[:, i], steps)
             floor = float(np.hypot(noise[topic][i], own))
             channel = _channel(
-                timeline, f"{stem}/{name}", shown, block, topic, samples, simulated, i, floor
+                timeline,
+                f"{_STEMS[topic]}/{name}",
+                shown,
+                block,
+                topic,
+                samples,
+                simulated,
+                i,
+                floor,
             )
             if channel is not None:
                 found.append(channel)

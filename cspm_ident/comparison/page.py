@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from html import escape
-from itertools import pairwise
 from pathlib import Path
 
 import numpy as np
@@ -18,15 +17,26 @@ Array = NDArray[np.float64]
 
 # Points per line: with the extremes of what lies between them, no spike is lost.
 POINTS = 4000
-_ROW_PIXELS = 150
+_ROW_PIXELS = 130
+_ENTRY_PIXELS = 20
+_MODEBAR_PIXELS = 35
+_LAYOUT = {"template": "plotly_white", "margin": {"t": 80, "l": 70, "r": 10}}
+# Legends above or below, so that narrow screens have the width for the lines.
+_LEGEND = {"orientation": "h", "yref": "container"}
+_BELOW = {**_LAYOUT, "legend": {**_LEGEND, "y": 0.0, "yanchor": "bottom"}}
 _BLOCKS = {
     "whole": "The whole, driven by {drive}",
+    "winch": "Winches alone, driven by measured torques and tensions",
     "cable": "Cables alone, driven by measured winch and bar motion",
     "bar": "Bar alone, driven by measured tensions",
 }
 _STYLE = """<style>
-body {font-family: sans-serif; margin: 2em; color: #222}
-table {border-collapse: collapse; margin: 1em 0}
+body {font-family: sans-serif; margin: 2em auto; max-width: 1400px; padding: 0 1em; color: #222}
+h1 {font-size: 1.5em; overflow-wrap: anywhere}
+h2 {font-size: 1.2em; margin-top: 2em}
+ul {padding-left: 1.2em; line-height: 1.5}
+.wide {overflow-x: auto}
+table {border-collapse: collapse; margin: 1em 0; white-space: nowrap}
 td, th {padding: 0.2em 0.8em; text-align: right; border-bottom: 1px solid #ddd}
 td:first-child, th:first-child {text-align: left}
 </style>"""
@@ -40,7 +50,9 @@ def write_page(path: Path, comparison: Comparison) -> None:
     """
     title = f"{comparison.measurement.path.name}: measured and simulated"
     parts = [
-        f"<!doctype html><html lang=en><head><meta charset=utf-8><title>{escape(title)}</title>",
+        "<!doctype html><html lang=en><head><meta charset=utf-8>",
+        "<meta name=viewport content='width=device-width, initial-scale=1'>",
+        f"<title>{escape(title)}</title>",
         _STYLE,
         f"</head><body><h1>{escape(title)}</h1>",
         _about(comparison),
@@ -53,7 +65,9 @@ def write_page(path: Path, comparison: Comparison) -> None:
         heading = _BLOCKS[block].format(drive=comparison.drive.value)
         parts.append(f"<h2>{escape(heading)}</h2>{_table(channels)}")
         parts.append(_html(_lines(channels), script=first))
+        parts.append("<h3>Coherence of measured and simulated</h3>")
         parts.append(_html(_spectra(channels), script=False))
+        parts.append("<h3>Error against what may drive it</h3>")
         parts.append(_html(_bins(channels), script=False))
         first = False
     parts.append("</body></html>")
@@ -63,19 +77,17 @@ def write_page(path: Path, comparison: Comparison) -> None:
 def _about(comparison: Comparison) -> str:
     lines = []
     for delay in comparison.delays:
-        ends = f"{1e3 * delay.interval[0]:.2f} to {1e3 * delay.interval[1]:.2f} ms"
-        use = "taken out" if delay.topic in comparison.applied else "too small to matter, left in"
-        told = f"{1e3 * delay.seconds:.2f} ms late (95 %: {ends}), {use}"
-        told = told if delay.known else "delay: this recording cannot tell"
-        lines.append(f"{delay.topic}: {told}")
-    for topic, source in comparison.noise.items():
-        lines.append(f"{topic}: noise from {source.value}")
+        lines.append(f"{delay.topic}: {delay.text}{comparison.use_of(delay)}")
+    for source in dict.fromkeys(comparison.noise.values()):
+        topics = [topic for topic, each in comparison.noise.items() if each is source]
+        lines.append(f"noise from {source.value}: {', '.join(topics)}")
     for topic, band in comparison.bands.items():
         if np.isfinite(band):
             lines.append(f"{topic}: smoothed to {band:.3g} Hz as an input")
     count, failed = comparison.windows
     horizon = f"{comparison.horizon:g} s each" if comparison.horizon else "as long as nothing lacks"
-    lines.append(f"{count} windows, {horizon}; {failed} diverged")
+    lines.append(f"{count} window{'s' * (count != 1)}, {horizon}; {failed} diverged")
+    lines += [f"{block}: left out, {reason}" for block, reason in comparison.left_out.items()]
     return "<ul>" + "".join(f"<li>{escape(line)}</li>" for line in lines) + "</ul>"
 
 
@@ -90,21 +102,23 @@ def _table(channels: list[Channel]) -> str:
             f"{c.rms:.3g}",
             f"{c.floor:.3g}",
             f"{c.bias:.2g}",
-            "" if c.lag is None else f"{1e3 * c.lag:.2f}",
+            "" if c.lag is None else f"{round(1e3 * c.lag, 2) + 0.0:.2f}",
             c.unit,
         )
         rows.append("<tr>" + "".join(f"<td>{escape(cell)}</td>" for cell in cells) + "</tr>")
-    return f"<table>{''.join(rows)}</table>"
+    return f"<div class=wide><table>{''.join(rows)}</table></div>"
 
 
 def _html(figure: go.Figure, *, script: bool) -> str:
-    return str(figure.to_html(full_html=False, include_plotlyjs=script))
+    return str(
+        figure.to_html(full_html=False, include_plotlyjs=script, config={"responsive": True})
+    )
 
 
 def _lines(channels: list[Channel]) -> go.Figure:
     """Return two rows per channel, both signals and their difference, on one time axis."""
     figure = make_subplots(
-        rows=2 * len(channels), cols=1, shared_xaxes=True, vertical_spacing=0.2 / len(channels)
+        rows=2 * len(channels), cols=1, shared_xaxes=True, vertical_spacing=0.08 / len(channels)
     )
     for i, channel in enumerate(channels):
         for values, name, colour, row in (
@@ -125,32 +139,35 @@ def _lines(channels: list[Channel]) -> go.Figure:
             )
         label = f"{channel.name.split('/', 1)[-1]}<br>[{channel.unit}]"
         figure.update_yaxes(title_text=label, title_font_size=10, row=2 * i + 1, col=1)
-        figure.update_yaxes(title_text="error", title_font_size=10, row=2 * i + 2, col=1)
-    figure.update_xaxes(matches="x")
+        label = f"error<br>[{channel.unit}]"
+        figure.update_yaxes(title_text=label, title_font_size=10, row=2 * i + 2, col=1)
     figure.update_xaxes(title_text="time [s]", row=2 * len(channels), col=1)
     height = 2 * len(channels) * _ROW_PIXELS + 150
-    figure.update_layout(height=height, hovermode="x", margin={"t": 60}, template="plotly_white")
+    legend = {**_LEGEND, "y": 1.0 - _MODEBAR_PIXELS / height, "yanchor": "top"}
+    figure.update_layout(height=height, hovermode="x", legend=legend, **_LAYOUT)
     return figure
 
 
 def _spectra(channels: list[Channel]) -> go.Figure:
     figure = go.Figure()
-    for channel in channels:
+    for i, channel in enumerate(channels):
         frequencies, values = channel.coherence
         if channel.moves and len(frequencies):
-            figure.add_scatter(x=frequencies, y=values, name=channel.name, mode="lines")
+            line = {"color": _colour(i, len(channels)), "width": 1}
+            figure.add_scatter(x=frequencies, y=values, name=channel.name, mode="lines", line=line)
     figure.update_xaxes(type="log", title_text="frequency [Hz]")
     figure.update_yaxes(title_text="coherence, measured with simulated", range=[0, 1.02])
-    figure.update_layout(height=400, template="plotly_white", title="Coherence")
+    figure.update_layout(height=400 + _ENTRY_PIXELS * len(channels), **_BELOW)
     return figure
 
 
 def _bins(channels: list[Channel]) -> go.Figure:
     """Return bias and RMS of the error against each quantity, in multiples of the floor."""
     names = list(dict.fromkeys(name for channel in channels for name in channel.bins))
-    figure = make_subplots(rows=1, cols=max(1, len(names)), subplot_titles=names)
+    rows = max(1, len(names))
+    figure = make_subplots(rows=rows, cols=1, subplot_titles=names, vertical_spacing=0.2 / rows)
     for i, channel in enumerate(channels):
-        colour = f"hsl({360 * i // len(channels)}, 60%, 45%)"
+        colour = _colour(i, len(channels))
         for name, bins in channel.bins.items():
             scale = channel.floor or 1.0
             figure.add_scatter(
@@ -161,12 +178,16 @@ def _bins(channels: list[Channel]) -> go.Figure:
                 legendgroup=channel.name,
                 showlegend=name == names[0],
                 line={"color": colour},
-                row=1,
-                col=names.index(name) + 1,
+                row=names.index(name) + 1,
+                col=1,
             )
-    figure.update_yaxes(title_text="mean error / noise floor, bars: RMS", row=1, col=1)
-    figure.update_layout(height=450, template="plotly_white", title="Error against its drivers")
+    figure.update_yaxes(title_text="mean error / noise floor, bars: RMS", title_font_size=10)
+    figure.update_layout(height=400 * len(names) + _ENTRY_PIXELS * len(channels), **_BELOW)
     return figure
+
+
+def _colour(i: int, count: int) -> str:
+    return f"hsl({360 * i // count}, 60%, 45%)"
 
 
 def thinned(times: Array, values: Array) -> tuple[Array, Array]:
@@ -179,9 +200,10 @@ def thinned(times: Array, values: Array) -> tuple[Array, Array]:
     if len(values) <= POINTS:
         return times, values
     edges = np.linspace(0, len(values), POINTS // 2 + 1).astype(int)
-    chosen = [
-        index
-        for a, b in pairwise(edges.tolist())
-        for index in sorted({a + int(np.argmin(values[a:b])), a + int(np.argmax(values[a:b]))})
-    ]
+    # Rows of equal length, the shorter ones filled up with their own first value.
+    inside = np.arange(np.diff(edges).max()) < np.diff(edges)[:, None]
+    places = np.where(inside, edges[:-1, None] + np.arange(inside.shape[1]), edges[:-1, None])
+    rows = values[places]
+    pairs = np.sort([np.argmin(rows, axis=1), np.argmax(rows, axis=1)], axis=0)
+    chosen = np.unique(edges[:-1] + pairs)
     return times[chosen], values[chosen]

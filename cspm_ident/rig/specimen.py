@@ -11,13 +11,13 @@ from numpy.typing import NDArray
 
 from cspm_ident.recording_hash import recording_sha256
 from cspm_msgs_py.errors import InputError
+from cspm_msgs_py.recording.attached_testbed import attached_testbed
 from cspm_msgs_py.recording.reader import Recording
 from cspm_msgs_py.recording.rows import Rows
-from cspm_msgs_py.testbed import Cable, Testbed, TestbedFile, parse_testbed
+from cspm_msgs_py.testbed import Cable, Testbed, TestbedFile
 
 Array = NDArray[np.float64]
 
-TESTBED = "testbed.yaml"
 WINCHES, TENSION = "/winches/state", "/cables/tension"
 # A longer hole in the data than so many of its periods is no jitter.
 LONGEST_GAP = 5.0
@@ -120,10 +120,7 @@ def recorded_testbed(path: Path) -> TestbedFile:
         InputError: it carries none.
     """
     with Recording(path) as recording:
-        text = recording.attachments.get(TESTBED)
-    if text is None:
-        raise InputError(f"{path}: carries no {TESTBED}, allowed: with --testbed FILE")
-    return parse_testbed(text.decode(errors="replace"), f"{path}: {TESTBED}")
+        return attached_testbed(recording.attachments, path)
 
 
 def _of_recording(

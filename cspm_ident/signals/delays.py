@@ -17,7 +17,9 @@ from scipy.signal import butter, sosfiltfilt
 from cspm_ident.estimation import Parameter, Record, fit_linear
 from cspm_ident.signals.elongation import cable_motion, damping_of, elongations
 from cspm_ident.signals.measurement import BAR, FRAME
-from cspm_ident.signals.timeline import Timeline
+from cspm_ident.signals.noise import noise_above_band
+from cspm_ident.signals.samples import Samples
+from cspm_ident.signals.timeline import Timeline, whole_stretches
 from cspm_msgs_py.testbed import Testbed
 from cspm_sim.kernels.cable import RADIUS
 from cspm_sim.kernels.plant import PlantParameters
@@ -27,17 +29,27 @@ Array = NDArray[np.float64]
 
 # What smoothing and noise make up where there is no delay.
 RESOLUTION_S = 1.5e-3
+# With an interval that reaches farther to a side, a recording does not tell a delay.
+WIDEST_S = 5e-3
+# Error of the equation itself, as a standard deviation: what remains without noise.
+_EQUATION_S = 3e-4
 _SCALE_S = 0.02
 # Nothing here has dynamics that would ask for a shorter step.
 _PERIOD_NS = 5_000_000
-_ROUNDS = 6
+_ROUNDS = 8
 _STILL_S = 1e-5
+# A step longer than this would leave where the equation is linear.
+_LONGEST_STEP_S = 0.03
 _LONGEST_S = 60.0
+_SHORTEST_S = 2.0
 # With winches that wind less than this [m], damping and a delay of both poses are one and the same.
 _LEAST_WOUND_M = 5e-4
 # Poses are not seen above their band; the comparison stays well below it.
 _BAND_SHARE = 0.7
 _WIDEST_HZ = 20.0
+_NORMAL_95 = 1.96
+# Standard deviations of the noise that a pose must move by.
+_LEAST_MOTION = 20.0
 
 
 @dataclass(frozen=True)
@@ -48,16 +60,18 @@ class Delay:
         topic: the sensor.
         seconds: by how much its stamps are late [s].
         interval: of 95 % [s]; infinite where the recording cannot tell.
+        window: the time that was looked at, where most moves [s].
     """
 
     topic: str
     seconds: float
     interval: tuple[float, float]
+    window: tuple[float, float]
 
     @property
     def known(self) -> bool:
-        """Whether the recording tells the delay at all."""
-        return bool(np.isfinite(self.interval).all())
+        """Whether the recording tells the delay well enough to be of use."""
+        return self.interval[1] - self.interval[0] <= 2.0 * WIDEST_S
 
     @property
     def significant(self) -> bool:
@@ -69,35 +83,76 @@ class Delay:
         """Whether it is surely there, and more than smoothing and noise can make up."""
         return self.significant and abs(self.seconds) > RESOLUTION_S
 
+    @property
+    def text(self) -> str:
+        """What was found, in a few words."""
+        if not self.known:
+            return (
+                "delay not found: this recording moves too slowly for it; use a livelier one, or"
+                f" --delay {self.topic}=SECONDS"
+            )
+        low, high = (1e3 * end for end in self.interval)
+        return (
+            f"{1e3 * self.seconds:.2f} ms late (95 %: {low:.2f} to {high:.2f} ms; from"
+            f" {self.window[0]:.0f} to {self.window[1]:.0f} s)"
+        )
+
     def data(self) -> dict[str, Any]:
         """Return everything as plain data for JSON."""
-        ends = list(self.interval) if self.known else None
-        return {"topic": self.topic, "delay_s": self.seconds, "ci95_s": ends}
+        ends = list(self.interval) if np.isfinite(self.interval).all() else None
+        return {
+            "topic": self.topic,
+            "delay_s": self.seconds if self.known else None,
+            "ci95_s": ends,
+            "window_s": list(self.window),
+        }
 
 
 def find_delays(timeline: Timeline, testbed: Testbed) -> list[Delay]:
     """Return the delays of the motion capture of bar and winch frame.
 
-    Without bar, motor angles or tensions the list is empty.
+    From the minute in which winches and bar move most. Without bar, motor angles or tensions the
+    list is empty.
     """
     if timeline.bars is None or timeline.angles is None or timeline.tensions is None:
         return []
     parameters = plant_parameters(testbed)
-    timeline = timeline.slowly(_PERIOD_NS, min(timeline.pose_band, _WIDEST_HZ))
     timeline = timeline.within(*_liveliest(timeline))
-    wanted = [name for name in (BAR, FRAME) if name in timeline.measurement.sensors]
+    timeline = timeline.slowly(_PERIOD_NS, min(timeline.pose_band, _WIDEST_HZ))
+    sensors = timeline.measurement.sensors
+    topics = [name for name in (BAR, FRAME) if name in sensors]
+    moving = [name for name in topics if _moves(sensors[name])]
+    found = {each.topic: each for each in _search(timeline, parameters, moving)}
+    window = float(timeline.times[0]), float(timeline.times[-1])
+    return [found.get(name, Delay(name, 0.0, (-np.inf, np.inf), window)) for name in topics]
+
+
+def _moves(samples: Samples) -> bool:
+    """Return whether a pose does so much more than its noise that noise cannot pass for motion.
+
+    Controllers answer the noise of motion capture with motion, which comes later than the noise.
+    """
+    noise = noise_above_band(samples)
+    return bool((samples.values.std(axis=0) > _LEAST_MOTION * noise).any())
+
+
+def _search(timeline: Timeline, parameters: PlantParameters, wanted: list[str]) -> list[Delay]:
     delays = dict.fromkeys(wanted, 0.0)
-    for _ in range(_ROUNDS):
-        found = _step(timeline.delayed(delays), parameters, wanted)
-        change = max(abs(d.seconds - delays[d.topic]) for d in found)
-        delays = {d.topic: d.seconds if d.known else 0.0 for d in found}
-        if change < _STILL_S:
+    records: list[Record] = []
+    names = wanted
+    for _ in range(_ROUNDS if wanted else 0):
+        records, names = _records(timeline.delayed(delays), parameters, wanted)
+        if not records:
+            return []
+        steps = np.clip(_steps(records)[: len(wanted)], -_LONGEST_STEP_S, _LONGEST_STEP_S)
+        if np.abs(steps).max() < _STILL_S:
             break
-    return found
+        delays = {name: delays[name] + float(s) for name, s in zip(wanted, steps, strict=True)}
+    return _delays(timeline, records, names, delays) if records else []
 
 
 def _liveliest(timeline: Timeline) -> tuple[int, int]:
-    """Return first and last step of the stretch in which winches or bar move most."""
+    """Return first and last step of the stretch in which winches and bar move most."""
     steps = len(timeline.times)
     length = min(steps - 1, round(_LONGEST_S / timeline.period))
     if length == steps - 1 or timeline.speeds is None or timeline.bars is None:
@@ -110,37 +165,63 @@ def _liveliest(timeline: Timeline) -> tuple[int, int]:
     return first, first + length
 
 
-def _step(timeline: Timeline, parameters: PlantParameters, wanted: list[str]) -> list[Delay]:
-    """Return the delays that a linear step from those of the timeline leads to."""
+def _records(
+    timeline: Timeline, parameters: PlantParameters, wanted: list[str]
+) -> tuple[list[Record], list[str]]:
+    """Return the equation in the band that poses show, and the names of its unknowns."""
     target, columns = _equation(timeline, parameters)
     names = [*wanted, "compliance"]
     wound = np.asarray(timeline.angles) * parameters.cables[:, RADIUS]
     if (np.nanmax(wound, axis=0) - np.nanmin(wound, axis=0)).max() > _LEAST_WOUND_M:
         names.append("damping")
     regressors = np.stack([columns[name] for name in names], axis=2)
-    whole = np.asarray(
-        np.isfinite(target).all(axis=1) & np.isfinite(regressors).all(axis=(1, 2)), dtype=np.bool_
-    )
     band = min(_BAND_SHARE * timeline.pose_band, _WIDEST_HZ)
+    shortest = round(_SHORTEST_S / timeline.period)
     records = [
         Record(
-            _in_band(target[a:b], timeline.period, band),
-            _in_band(regressors[a:b], timeline.period, band),
+            _in_band(target[a : b + 1], timeline.period, band),
+            _in_band(regressors[a : b + 1], timeline.period, band),
         )
-        for a, b in _pieces(whole, round(2.0 / timeline.period))
+        for a, b in whole_stretches([target, regressors], shortest)
     ]
-    parameters_ = [Parameter(name, "s", scale=_SCALE_S) for name in wanted]
-    parameters_ += [Parameter(name, "1", scale=1.0) for name in names[len(wanted) :]]
-    estimate = fit_linear(records, parameters_).estimate
+    return records, names
+
+
+def _steps(records: list[Record]) -> Array:
+    """Return the least squares solution.
+
+    Not whitened: that would give weight to high frequencies, at which the regressors are noise, and
+    noise in regressors draws what is found towards zero.
+    """
+    width = records[0].regressors.shape[2]
+    rows = np.concatenate([record.regressors.reshape(-1, width) for record in records])
+    target = np.concatenate([record.target.ravel() for record in records])
+    return np.asarray(np.linalg.lstsq(rows, target, rcond=None)[0])
+
+
+def _delays(
+    timeline: Timeline, records: list[Record], names: list[str], delays: dict[str, float]
+) -> list[Delay]:
+    """Return the delays with intervals: of coloured noise, and of the equation's own error."""
+    parameters = [
+        Parameter(name, "s", scale=_SCALE_S) if name in delays else Parameter(name, "1", scale=1.0)
+        for name in names
+    ]
+    ends = fit_linear(records, parameters, whiten=False).estimate.ci95
+    window = float(timeline.times[0]), float(timeline.times[-1])
     found = []
-    for name, value, (low, high) in zip(wanted, estimate.values, estimate.ci95, strict=False):
-        at = timeline.delays[name]
-        found.append(Delay(name, float(value) + at, (float(low) + at, float(high) + at)))
+    for (topic, seconds), (low, high) in zip(delays.items(), ends, strict=False):
+        half = float(np.hypot(0.5 * (high - low), _NORMAL_95 * _EQUATION_S))
+        found.append(Delay(topic, seconds, (seconds - half, seconds + half), window))
     return found
 
 
 def _equation(timeline: Timeline, parameters: PlantParameters) -> tuple[Array, dict[str, Array]]:
-    """Return l + wound − ε(t) per cable, (k, n) [m], and how each unknown shows in it."""
+    """Return l − ε(t) − l0 per cable, (k, n) [m], and how each unknown shows in it.
+
+    The unstretched length l0 at the first step, unknown since encoders count from anywhere, is the
+    mean that the others say.
+    """
     motion = cable_motion(timeline, parameters)
     tensions = np.asarray(timeline.smooth_tensions)
     damping = damping_of(parameters, motion.lengths)
@@ -149,8 +230,9 @@ def _equation(timeline: Timeline, parameters: PlantParameters) -> tuple[Array, d
     stretch = elongations(parameters, tensions, motion.lengths)
     rates = np.gradient(stretch, timeline.period, axis=0)
     elastic = tensions - damping * rates
-    stretch = elongations(parameters, elastic, motion.lengths)
-    target = motion.lengths + motion.wound - stretch
+    stretch = elongations(parameters, elastic, motion.lengths - stretch)
+    target = motion.lengths - stretch
+    target -= np.nanmean(target / motion.left, axis=0) * motion.left
     softness = np.gradient(stretch, axis=0) / (np.gradient(elastic, axis=0) + 1e-12)
     softness = np.clip(softness, 0.0, 1e-2)
     return target, {
@@ -159,12 +241,6 @@ def _equation(timeline: Timeline, parameters: PlantParameters) -> tuple[Array, d
         "compliance": stretch,
         "damping": -softness * damping * rates,
     }
-
-
-def _pieces(whole: NDArray[np.bool_], shortest: int) -> list[tuple[int, int]]:
-    edges = np.flatnonzero(np.diff(np.concatenate([[False], whole, [False]]).astype(int)))
-    pairs = zip(edges[::2].tolist(), edges[1::2].tolist(), strict=True)
-    return [(a, b) for a, b in pairs if b - a > shortest]
 
 
 def _in_band(values: Array, period: float, band: float) -> Array:

@@ -14,11 +14,9 @@ from cspm_sim.kernels.cable import (
     DAMPING_SLOPE,
     OFFSET_LENGTH,
     RADIUS,
-    elastic_tension,
-    law_scale,
 )
 from cspm_sim.kernels.plant import PlantParameters
-from cspm_sim.kinematics import geometry
+from cspm_sim.kernels.trajectory import lengths_along, tensions_along
 
 Array = NDArray[np.float64]
 
@@ -33,42 +31,36 @@ class CableMotion(NamedTuple):
         lengths: stretched, from the poses [m].
         bar_rates: what the bar's motion adds to the length per second [m/s].
         frame_rates: what the winch frame's motion adds [m/s].
-        wound: −Δl0 from the first step on, from the motor angles [m].
-        wound_rates: its derivative [m/s].
+        left: share of the first step's unstretched length that is not wound in, from the angles.
     """
 
     lengths: Array
     bar_rates: Array
     frame_rates: Array
-    wound: Array
-    wound_rates: Array
+    left: Array
 
 
 def cable_motion(timeline: Timeline, parameters: PlantParameters) -> CableMotion:
     """Return what poses and angles say of the cables; l̇0 as in thesis (2-16..2-18)."""
     steps, n = len(timeline.times), len(parameters.cables)
-    lengths, bar_rates, frame_rates = (np.full((steps, n), np.nan) for _ in range(3))
-    frames, bars = timeline.frame_twists, timeline.bar_twists
-    for k in range(steps):
-        pose = timeline.bar_poses[k]
-        if not (np.isfinite(pose).all() and np.isfinite(timeline.frame_poses[k]).all()):
-            continue
-        spans = geometry(parameters.cables, pose, timeline.frame_poses[k])
-        lengths[k] = spans.lengths
-        bar_rates[k] = spans.bar @ bars[k]
-        frame_rates[k] = spans.frame @ frames[k]
+    lengths, bar_rates, frame_rates = (np.empty((steps, n)) for _ in range(3))
+    lengths_along(
+        parameters.cables,
+        np.ascontiguousarray(timeline.bar_poses),
+        timeline.frame_poses,
+        timeline.bar_twists,
+        timeline.frame_twists,
+        lengths,
+        bar_rates,
+        frame_rates,
+    )
     angles = np.zeros((steps, n)) if timeline.angles is None else timeline.angles
     radius = parameters.cables[:, RADIUS]
-    # To first order in the elongation, which is less than a hundredth of the length.
     turned = np.nan_to_num(np.diff(angles, axis=0)) * radius
     middle = 0.5 * (lengths[1:] + lengths[:-1])
-    first = lengths[np.isfinite(lengths).all(axis=1)][0]
+    # The winch winds stretched cable, thesis (2-16..2-18): l̇0/l0 = −r·q̇/l.
     shrink = np.vstack([np.zeros(n), np.cumsum(np.nan_to_num(turned / middle), axis=0)])
-    left = first * np.exp(-shrink)
-    speeds = np.zeros((steps, n)) if timeline.speeds is None else timeline.speeds
-    return CableMotion(
-        lengths, bar_rates, frame_rates, first - left, left / lengths * radius * speeds
-    )
+    return CableMotion(lengths, bar_rates, frame_rates, np.exp(-shrink))
 
 
 def elongations(parameters: PlantParameters, tensions: Array, lengths: Array) -> Array:
@@ -77,7 +69,7 @@ def elongations(parameters: PlantParameters, tensions: Array, lengths: Array) ->
     Args:
         parameters: of the machine.
         tensions: [N], shape (k, n); what is below zero counts as zero.
-        lengths: [m], shape (k, n); taken for the unstretched ones.
+        lengths: unstretched [m], shape (k, n).
     """
     out = np.full(tensions.shape, np.nan)
     for i in range(tensions.shape[1]):
@@ -103,16 +95,15 @@ def damping_of(parameters: PlantParameters, lengths: Array) -> Array:
 
 def _inverse(parameters: PlantParameters, i: int, length: float, levels: Array) -> Array:
     """Return the elongations at which cable i of one elastic length carries tension levels."""
-    scale = law_scale(length, parameters.cables, i)
+    parts = (length, parameters.cables, parameters.tables, i)
 
-    def tension(elongation: float) -> float:
-        found, _ = elastic_tension(
-            elongation, length, scale, parameters.cables, parameters.tables, i
-        )
-        return float(found)
+    def tensions(at: Array) -> Array:
+        out = np.empty(len(at))
+        tensions_along(at, *parts, out)
+        return out
 
     reach = 1e-3
-    while tension(reach) < levels[-1]:
+    while tensions(np.array([reach]))[0] < levels[-1]:
         reach *= 2.0
     points = np.linspace(0.0, 1.0, 4 * _POINTS) ** 2 * reach
-    return np.interp(levels, [tension(point) for point in points], points)
+    return np.interp(levels, tensions(points), points)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
@@ -12,15 +13,15 @@ from numpy.typing import NDArray
 from cspm_ident.recording_hash import recording_sha256
 from cspm_ident.signals.samples import Samples, ordered
 from cspm_msgs_py.errors import InputError
+from cspm_msgs_py.recording.attached_testbed import attached_testbed
 from cspm_msgs_py.recording.reader import Recording
 from cspm_msgs_py.recording.rows import Rows
-from cspm_msgs_py.testbed import Testbed, TestbedFile, load_testbed, parse_testbed
+from cspm_msgs_py.testbed import Testbed, TestbedFile, load_testbed
 from cspm_msgs_py.topics import Topic
-from cspm_sim.kernels.rotation import euler_from_quaternion
+from cspm_sim.kernels.trajectory import eulers_along
 
 Array = NDArray[np.float64]
 
-TESTBED_ATTACHMENT = "testbed.yaml"
 FRAME, BAR, WINCHES, TENSION = (
     "/winch_frame/pose",
     "/bar/pose",
@@ -28,6 +29,8 @@ FRAME, BAR, WINCHES, TENSION = (
     "/cables/tension",
 )
 COMMAND = "/winches/torque_command"
+# Further parts of `/winches/state`, which count as sensors of their own.
+SPEED, TORQUE = "/winches/state velocity", "/winches/state effort"
 
 
 @dataclass(frozen=True, eq=False)
@@ -82,6 +85,12 @@ class Measurement:
         changed: dict[str, Any] = {name: samples}
         return replace(self, **changed)
 
+    def within(self, start: float, end: float) -> Measurement:
+        """Return what was measured from `start` to `end` [s]."""
+        names = ("frame_pose", "bar_pose", "angle", "speed", "torque", "tension", "command")
+        parts = {name: getattr(self, name) for name in names}
+        return replace(self, **{n: s.within(start, end) for n, s in parts.items() if s is not None})
+
     def with_testbed(self, testbed: TestbedFile) -> Measurement:
         """Return the same, said to be of another description of the machine."""
         return replace(self, testbed=testbed)
@@ -97,8 +106,13 @@ def read_measurement(path: Path, testbed: Path | None = None) -> Measurement:
     Raises:
         InputError: no recording, no test-bed, other cables than the test-bed's, or no samples.
     """
-    with Recording(path) as recording:
-        machine = _testbed(recording, path, testbed)
+    with ThreadPoolExecutor(1) as pool, Recording(path) as recording:
+        digest = pool.submit(recording_sha256, path)
+        machine = (
+            load_testbed(testbed)
+            if testbed is not None
+            else attached_testbed(recording.attachments, path)
+        )
         topics = machine.testbed.topics
         wanted = (FRAME, BAR, WINCHES, TENSION, COMMAND)
         names = [n for n in wanted if n in topics and _count(recording, n)]
@@ -111,16 +125,7 @@ def read_measurement(path: Path, testbed: Path | None = None) -> Measurement:
     parts: dict[str, Samples] = {}
     for name in names:
         parts.update(_samples(name, found[name], rows[name], start, machine.testbed))
-    return Measurement(path, recording_sha256(path), machine, **parts)
-
-
-def _testbed(recording: Recording, path: Path, testbed: Path | None) -> TestbedFile:
-    if testbed is not None:
-        return load_testbed(testbed)
-    attached = recording.attachments.get(TESTBED_ATTACHMENT)
-    if attached is None:
-        raise InputError(f"{path}: carries no {TESTBED_ATTACHMENT}, allowed: --testbed FILE")
-    return parse_testbed(attached.decode(errors="replace"), f"{path}: {TESTBED_ATTACHMENT}")
+    return Measurement(path, digest.result(), machine, **parts)
 
 
 def _count(recording: Recording, name: str) -> int:
@@ -158,6 +163,5 @@ def _euler(rows: Array) -> Array:
     """Return x y z φ θ ψ, (n, 6), of pose rows (n, 7)."""
     out = np.empty((len(rows), 6))
     out[:, :3] = rows[:, :3]
-    for i, quaternion in enumerate(rows[:, 3:]):
-        out[i, 3:] = euler_from_quaternion(quaternion)
+    eulers_along(rows[:, 3:], out[:, 3:])
     return out

@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from cspm_ident.signals.measurement import Measurement
 from cspm_ident.signals.samples import Samples
-from cspm_ident.signals.smoothing import smooth
+from cspm_ident.signals.smoothing import filtered
 
 Array = NDArray[np.float64]
 
@@ -23,12 +23,11 @@ def noise_above_band(samples: Samples) -> Array:
 
     The share of white noise that lies within the band is added back.
     """
-    smoothed = smooth(samples)
-    if not np.isfinite(smoothed.band):
+    smoothed, band = filtered(samples)
+    if not np.isfinite(band):
         return _noise_of_differences(samples)
-    rest = samples.values - smoothed.at(samples.times)
-    seen = 1.0 - min(0.9, 2.0 * smoothed.band / samples.rate)
-    return np.asarray(np.nanstd(rest, axis=0) / np.sqrt(seen))
+    seen = 1.0 - min(0.9, 2.0 * band / samples.rate)
+    return np.asarray((samples.values - smoothed).std(axis=0) / np.sqrt(seen))
 
 
 def _noise_of_differences(samples: Samples) -> Array:

@@ -64,3 +64,16 @@ def ordered(times: Array, values: Array) -> Samples:
     t, v = times[whole][order], values[whole][order]
     new = np.concatenate([[True], np.diff(t) > 0]) if len(t) else np.zeros(0, dtype=bool)
     return Samples(t[new], v[new])
+
+
+def stretches(values: Array, length: int, most: int) -> Array:
+    """Return a long record, (n, …), as `most` stretches of `length` rows, spread evenly and joined.
+
+    A record that has no more of them is returned as it is.
+    """
+    count = len(values) // max(1, length)
+    if count <= most:
+        return values
+    chosen = np.linspace(0, count - 1, most).round().astype(int)
+    parts = values[: count * length].reshape(count, length, *values.shape[1:])
+    return np.asarray(parts[chosen].reshape(most * length, *values.shape[1:]))

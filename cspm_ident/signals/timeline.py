@@ -14,13 +14,15 @@ from cspm_ident.signals.samples import Samples
 from cspm_ident.signals.smoothing import Smooth, band_of, smooth
 from cspm_ident.signals.winch_motion import WinchMotion, winch_motion
 from cspm_msgs_py.errors import InputError
-from cspm_sim.kernels.rotation import euler_rate_to_world_rate, rotate_back, rotation_from_euler
+from cspm_sim.kernels.trajectory import body_rates_along, twists_along
 from cspm_sim.motion import Motion
 
 Array = NDArray[np.float64]
 
 PERIOD_NS = 1_000_000
 _KNOT_S = 0.005
+# More than is looked at, so that smoothing has both sides.
+_MARGIN_S = 3.0
 
 
 class Timeline:
@@ -73,17 +75,17 @@ class Timeline:
     def delayed(self, delays: Mapping[str, float]) -> Timeline:
         """Return the same signals with other delays [s], by topic, without smoothing them again."""
         other = Timeline(self.measurement, self.period_ns, delays)
-        other.__dict__.update(
-            {name: getattr(self, name) for name in ("_frame", "_bar", "_tension", "_winches")}
-        )
+        kept = ("_frame", "_bar", "_tension", "_winches", "pose_band")
+        other.__dict__.update({name: getattr(self, name) for name in kept})
         other.times = self.times
         return other
 
     def slowly(self, period_ns: int, band: float) -> Timeline:
         """Return the same signals at longer steps, tensions and angles smoothed to `band` [Hz]."""
-        other = Timeline(self.measurement, period_ns, self.delays)
-        other.__dict__.update({name: getattr(self, name) for name in ("_frame", "_bar")})
-        tension, angle = self.measurement.tension, self.measurement.angle
+        start, end = self.times[0] - _MARGIN_S, self.times[-1] + _MARGIN_S
+        other = Timeline(self.measurement.within(start, end), period_ns, self.delays)
+        other.__dict__.update({n: getattr(self, n) for n in ("_frame", "_bar", "pose_band")})
+        tension, angle = other.measurement.tension, other.measurement.angle
         other.__dict__["_tension"] = None if tension is None else smooth(tension, band)
         if angle is not None:
             slow = smooth(angle, band)
@@ -143,9 +145,7 @@ class Timeline:
         if self._bar is None:
             return None
         out = np.hstack([self._bar.at(self.times + self._late("/bar/pose")), self.bar_twists])
-        for row in out:
-            turn = rotation_from_euler(row[3], row[4], row[5])
-            row[9:] = rotate_back(turn, row[9], row[10], row[11])
+        body_rates_along(out[:, :6], self.bar_twists[:, 3:], out[:, 9:])
         return out
 
     @cached_property
@@ -266,9 +266,8 @@ def whole_stretches(columns: list[Array], shortest: int) -> list[tuple[int, int]
 
 def _twists(poses: Array, rates: Array) -> Array:
     """Return v and ω in world axes, (k, 6), of poses x y z φ θ ψ and their rates."""
-    out: Array = rates.copy()
-    for row, pose in zip(out, poses, strict=True):
-        row[3:] = euler_rate_to_world_rate(pose[4], pose[5], row[3], row[4], row[5])
+    out: Array = np.empty_like(rates)
+    twists_along(poses, rates, out)
     return out
 
 

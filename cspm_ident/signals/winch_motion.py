@@ -41,10 +41,9 @@ def winch_motion(angle: Samples, speed: Samples | None, times: Array) -> WinchMo
     summed up, which the encoder does not. So each gives the band in which it is better, where both
     agree in the band that they share.
     """
-    alone = smooth(angle, ENCODER_BAND_HZ)
-    angles, speeds = alone.at(times), alone.at(times, 1)
     if speed is None or not _agree(angle, speed):
-        return WinchMotion(angles, speeds, alone.band)
+        alone = smooth(angle, ENCODER_BAND_HZ)
+        return WinchMotion(alone.at(times), alone.at(times, 1), alone.band)
     fast = np.stack([np.interp(times, speed.times, c) for c in speed.values.T], axis=1)
     summed = _integral(speed)
     rest = Samples(angle.times, angle.values - summed_at(summed, angle.times))

@@ -15,6 +15,7 @@ import zstandard
 from mcap.records import Channel, Chunk, Header, Schema
 
 from cspm_msgs_py.errors import CspmError, InputError
+from cspm_msgs_py.new_folder import refuse_existing
 from cspm_msgs_py.recording.block import compress
 from cspm_msgs_py.recording.chunk import (
     ChunkHead,
@@ -138,8 +139,7 @@ def _has_metadata(folder: Path) -> bool:
 
 
 def _restore_to(files: list[Path], out: Path) -> RecoveryReport:
-    if out.exists():
-        raise InputError(f"{out}: exists, allowed: a new folder")
+    refuse_existing(out)
     out.mkdir(parents=True)
     targets, damaged, lost = [], 0, 0
     for i, file in enumerate(files):

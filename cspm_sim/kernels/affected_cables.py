@@ -152,9 +152,10 @@ def _load_frame(
 
 
 @njit(cache=True, error_model="numpy", _nrt=False)
-def _fill_cable_signals(
+def fill_cable_signals(
     i: int, state: Array, first: int, period: float, cables: Array, spans: Array, signals: Array
 ) -> None:
+    """Write what effects on cable i read, and zero to what they add to."""
     n = cables.shape[0]
     signals[SPAN_LENGTH] = spans[i, LENGTH]
     signals[SPAN_RATE] = spans[i, RATE]
@@ -237,7 +238,7 @@ def affected_cables(
     at_cable, at_loaded = first_effect(CABLE, effects), first_effect(LOADED_CABLE, effects)
     at_drive, at_winch = first_effect(DRIVE, effects), first_effect(WINCH, effects)
     for i in range(n):
-        _fill_cable_signals(i, state, first, period, cables, spans, signals)
+        fill_cable_signals(i, state, first, period, cables, spans, signals)
         at_cable = run_effects(CABLE, i, at_cable, effects, effect_parameters, signals, state, out)
         out[first + i] = _load_cable(i, state, first, cables, tables, spans, signals)
         at_loaded = run_effects(

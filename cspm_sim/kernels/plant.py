@@ -271,6 +271,35 @@ def plant_tensions(
         out[1, i] = spans[i, LENGTH]
 
 
+@njit(cache=True, error_model="numpy", inline="always")
+def begin_stages(state: Array, total: Array, stage: Array) -> None:
+    """Begin a classical Runge-Kutta step at `state`."""
+    for j in range(state.shape[0]):
+        stage[j] = state[j]
+        total[j] = 0.0
+
+
+@njit(cache=True, error_model="numpy", inline="always")
+def add_stage(s: int, period: float, state: Array, rate: Array, total: Array, stage: Array) -> None:
+    """Add the rate at stage `s`, 0 to 3, to the total; leave the next stage's state in `stage`."""
+    weight = 1.0 if s == 0 or s == 3 else 2.0
+    reach = 0.5 * period if s < 2 else period
+    for j in range(state.shape[0]):
+        total[j] += weight * rate[j]
+        stage[j] = state[j] + reach * rate[j]
+
+
+@njit(cache=True, error_model="numpy", inline="always")
+def end_stages(period: float, total: Array, state: Array) -> int:
+    """Advance `state` by the step; return the first state that is not finite, or -1."""
+    bad = -1
+    for j in range(state.shape[0]):
+        state[j] += period / 6.0 * total[j]
+        if bad < 0 and not isfinite(state[j]):
+            bad = j
+    return bad
+
+
 @njit(cache=True, error_model="numpy", _nrt=False)
 def plant_step(
     state: Array,
@@ -285,13 +314,10 @@ def plant_step(
 
     `torque` is held over the step; `frames` has the winch frame at its start, middle and end.
     """
-    n = state.shape[0]
     bar, cables, tables, effects = p.bar, p.cables, p.tables, p.effects
     effect_parameters, spans, signals = p.effect_parameters, scratch.spans, scratch.signals
     stage, rate, total = scratch.stages[0], scratch.stages[1], scratch.stages[2]
-    for j in range(n):
-        stage[j] = state[j]
-        total[j] = 0.0
+    begin_stages(state, total, stage)
     frame = frame_placement(frames[0])
     for s in range(4):
         if s == 1 or s == 3:
@@ -311,17 +337,8 @@ def plant_step(
             signals,
             rate,
         )
-        weight = 1.0 if s == 0 or s == 3 else 2.0
-        reach = 0.5 * period if s < 2 else period
-        for j in range(n):
-            total[j] += weight * rate[j]
-            stage[j] = state[j] + reach * rate[j]
-    bad = -1
-    for j in range(n):
-        state[j] += period / 6.0 * total[j]
-        if bad < 0 and not isfinite(state[j]):
-            bad = j
-    return bad
+        add_stage(s, period, state, rate, total, stage)
+    return end_stages(period, total, state)
 
 
 @njit(cache=True, error_model="numpy", _nrt=False)

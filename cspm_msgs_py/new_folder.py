@@ -1,0 +1,17 @@
+"""Folders that a command makes and fills."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+from cspm_msgs_py.errors import InputError
+
+
+def refuse_existing(folder: Path | None) -> None:
+    """Refuse to write into what is there already; None, for no folder, is fine.
+
+    Raises:
+        InputError: the folder exists.
+    """
+    if folder is not None and folder.exists():
+        raise InputError(f"{folder}: exists, allowed: a new folder")

@@ -1,4 +1,4 @@
-"""Commands that identify parameters from recordings: identify stiffness, damping, system."""
+"""Commands that identify parameters: identify stiffness, damping, winch, system."""
 
 from __future__ import annotations
 
@@ -77,6 +77,10 @@ IntoCables = Annotated[
         metavar="NAME,NAME",
         help="The cables there that get the law; otherwise those identified.",
     ),
+]
+HeldOut = Annotated[
+    list[Path] | None,
+    typer.Option("--held-out", metavar="BAG", help="Judges without being fitted; repeatable."),
 ]
 Cutoff = Annotated[
     float | None,
@@ -180,6 +184,84 @@ def damping(asked: RigRequest, json: Path | None) -> None:
 @identify.command(
     epilog="""Examples:
 
+cspm import DATA_EMPS.mat --mapping scenarios/mappings/emps.yaml --testbed
+scenarios/testbeds/emps.yaml --out emps
+
+cspm identify winch emps --held-out emps_pulses --out fitted
+
+cspm identify winch bag --winches surge_1,surge_2 --effects winch_viscous_friction
+
+cspm run one_winch --testbed fitted/fitted_testbed.yaml"""
+)
+def winch(
+    recordings: Annotated[
+        list[Path],
+        typer.Argument(
+            metavar="BAG…",
+            help="Recordings of motor angle and torque, and of the tension where the winch pulls a"
+            " cable; with a bar or without.",
+        ),
+    ],
+    testbed: MachineFile = None,
+    winches: Annotated[
+        str | None,
+        typer.Option(metavar="NAME,NAME", help="Names of their cables, otherwise all."),
+    ] = None,
+    effects: Annotated[
+        str | None,
+        typer.Option(
+            metavar="ID,ID",
+            help="What to fit beside the inertia: effects that are linear at the motor shaft; a"
+            " wrong id lists them. Usually viscous friction, Coulomb friction and an offset.",
+        ),
+    ] = None,
+    held_out: HeldOut = None,
+    torque_age: Annotated[
+        float | None,
+        typer.Option(
+            metavar="S",
+            help="How long before its stamp a reported torque acted; otherwise half a period for"
+            " recordings of `cspm run`, whose drives hold it, and 0 for others.",
+        ),
+    ] = None,
+    without_reversals: Annotated[
+        bool,
+        typer.Option(
+            "--without-reversals",
+            help="Leave out the windows in which the shaft turns round, where dry friction sticks:"
+            " for fast reversals under friction.",
+        ),
+    ] = False,
+    band: Annotated[
+        float | None,
+        typer.Option(metavar="HZ", help="Torque errors are counted below, otherwise 40 Hz."),
+    ] = None,
+    out: Out = None,
+    json: Json = None,
+) -> None:
+    """Identify inertia and friction of winches from their own angle, torque and tension.
+
+    Each winch by itself, in weak form: nothing is differentiated that carries noise.
+    """
+    from cspm_bringup.identify_winch_command import WinchRequest, identify_winch_command
+
+    asked = WinchRequest(
+        recordings=tuple(recordings),
+        held_out=tuple(held_out or ()),
+        testbed=testbed,
+        winches=_names("--winches", winches),
+        effects=_names("--effects", effects),
+        torque_age=torque_age,
+        reversals=not without_reversals,
+        band=band,
+        out=out,
+    )
+    identify_winch_command(asked, json)
+
+
+@identify.command(
+    epilog="""Examples:
+
 cspm run factor_six_mid --out mid
 
 cspm identify system mid --fit bar.mass,axial_damping,bar_damping.surge --out fitted
@@ -222,10 +304,7 @@ def system(
         float | None,
         typer.Option(metavar="S", help="Length of the windows, otherwise 4 s."),
     ] = None,
-    held_out: Annotated[
-        list[Path] | None,
-        typer.Option("--held-out", metavar="BAG", help="Judges without being fitted; repeatable."),
-    ] = None,
+    held_out: HeldOut = None,
     profile: Annotated[
         list[str] | None,
         typer.Option(

@@ -14,6 +14,7 @@ from cspm_ident.estimation import Profile, Solution, find_profile, fit
 from cspm_ident.estimation.estimate import Interval
 from cspm_ident.estimation.parameter import free_indices, prior_rows, scales
 from cspm_ident.estimation.problem import Problem
+from cspm_ident.recording_roles import check_roles
 from cspm_ident.signals.measurement import Measurement
 from cspm_ident.system.choice import Chosen
 from cspm_ident.system.judgement import Judgement, judge
@@ -114,7 +115,9 @@ def identify_system(
         InputError: no recording, a sensor or a long enough window is missing, nothing is free, or
             a recording is both searched and held out.
     """
-    _check(searched, held_out, horizon)
+    check_roles(searched, held_out)
+    if not 0.1 <= horizon <= 60.0:
+        raise InputError(f"--horizon {horizon:g}: allowed: 0.1 to 60 s")
     machine = searched[0].machine
     progress("signals")
     shootings = [make_shooting(each, horizon, most_windows) for each in searched]
@@ -235,24 +238,3 @@ def make_problem(
         for kind in shooting.kinds
     ]
     return Problem(residual, [each.parameter for each in chosen], groups, step=_STEP)
-
-
-def _check(
-    searched: Sequence[Measurement], held_out: Sequence[Measurement], horizon: float
-) -> None:
-    if not searched:
-        raise InputError("identify system: no recording, allowed: one or more")
-    if not 0.1 <= horizon <= 60.0:
-        raise InputError(f"--horizon {horizon:g}: allowed: 0.1 to 60 s")
-    first = searched[0].machine
-    for each in [*searched[1:], *held_out]:
-        if each.machine != first:
-            raise InputError(
-                f"{each.path}: another test-bed than {searched[0].path}, allowed: recordings of"
-                " one machine, or --testbed FILE for all"
-            )
-    for each in held_out:
-        if each.sha256 in {other.sha256 for other in searched}:
-            raise InputError(
-                f"--held-out {each.path}: is fitted to as well, allowed: a recording that is not"
-            )

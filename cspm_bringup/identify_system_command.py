@@ -103,6 +103,10 @@ def print_system(console: Console, result: SystemResult) -> None:
     for profile in result.profiles:
         low, high = profile.ci95
         say(console, f"profile of {profile.name}: {low:.5g} … {high:.5g} {profile.unit}")
+    for judgement in result.judgements:
+        for topic, seconds in judgement.delays.items():
+            name = judgement.measurement.path.name
+            say(console, f"{name}: {topic} {1e3 * seconds:.1f} ms late, taken out")
     console.print(judgement_table(result.judgements))
 
 

@@ -106,18 +106,18 @@ def test_recordings_are_not_both_searched_and_held_out(recordings):
 def test_a_late_motion_capture_is_found_and_taken_out(recordings):
     """Bar poses stamped 20 ms late, and early; left in, the damping is far off."""
     searched, _ = recordings
-    chosen = choose(MACHINE, ["axial_damping", "bar_damping.surge"])
+    chosen = choose(MACHINE, list(TRUE))
     for late in (0.02, -0.02):
         shifted = dataclasses.replace(searched, bar_pose=searched.bar_pose.shifted(late))
-        found = solve([shifted], chosen, most_windows=1)
+        found = solve([shifted], chosen, most_windows=2)
         delays = found.shootings[0].timeline.delays
         assert delays == {"/bar/pose": pytest.approx(late, abs=1.5e-3)}
-        left_in = solve([shifted], chosen, most_windows=1, delays={})
+        left_in = solve([shifted], chosen, most_windows=2, delays={})
         for name in ("axial_damping", "bar_damping.surge"):
             errors = [
                 abs(each.solution.estimate.value(name) - TRUE[name]) for each in (found, left_in)
             ]
-            assert errors[0] < 0.1 * TRUE[name] < errors[1], name
+            assert errors[0] < 0.03 * TRUE[name] < 0.05 * TRUE[name] < errors[1], name
 
 
 @pytest.mark.slow

@@ -151,8 +151,7 @@ def make_shooting(
             enough.
     """
     line = Timeline(measurement)
-    simulation = BlockSimulation(line, measurement.machine)
-    simulation.check(Drive.WINCH)
+    BlockSimulation(line, measurement.machine).check(Drive.WINCH)
     noise, _ = noise_of(measurement, None)
     duration = float(line.times[-1] - line.times[0])
     _check_band(line, noise, duration)
@@ -160,7 +159,7 @@ def make_shooting(
         delays = delays_to_remove(line, measurement.machine)
     line = line.delayed(delays)
     least = 0.5 * horizon / line.period
-    windows = simulation.windows(Drive.WINCH, horizon)
+    windows = BlockSimulation(line, measurement.machine).windows(Drive.WINCH, horizon)
     windows = [w for w in windows if w[1] - w[0] >= least]
     if not windows:
         raise InputError(

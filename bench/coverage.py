@@ -3,14 +3,15 @@
 Two experiments with noise that no autoregression of finite order describes (a slow first-order
 process with white noise on top): a winch's friction by linear regression, and a mass on a spring
 that is simulated and fitted. Each is estimated as `cspm_ident.estimation` does it by default, with
-the other kinds of interval, and by plain least squares that takes the residual for white.
+the other kinds of interval, and by plain least squares that takes the residual for white. A third,
+`--system`, is a whole machine that another plant recorded.
 """
 
 from __future__ import annotations
 
 import argparse
 from collections.abc import Callable, Iterator
-from typing import NamedTuple
+from typing import NamedTuple, Protocol
 
 import numpy as np
 from rich.console import Console
@@ -31,6 +32,16 @@ from cspm_ident.estimation import (
 PLAIN = "plain least squares"
 DEFAULT = "whitened likelihood"
 COLOUR_TIME = 0.1  # s, of the slow part of the noise
+
+
+class Experiment(Protocol):
+    """Something that can be repeated with other noise and estimated."""
+
+    names: tuple[str, ...]
+    truth: np.ndarray
+
+    def intervals(self, rng: np.random.Generator) -> Iterator[tuple[str, np.ndarray]]:
+        """Estimate one experiment in every way; intervals of shape (parameters, 2)."""
 
 
 class Count(NamedTuple):
@@ -191,7 +202,7 @@ def _white_interval(values: np.ndarray, residual: np.ndarray, jacobian: np.ndarr
 
 
 def measure_coverage(
-    experiment: Winch | Spring, runs: int, seed: int, advance: Callable[[], None] = lambda: None
+    experiment: Experiment, runs: int, seed: int, advance: Callable[[], None] = lambda: None
 ) -> list[Count]:
     """Simulate and estimate `runs` times; run k uses the random numbers of (seed, k)."""
     inside: dict[str, np.ndarray] = {}
@@ -214,10 +225,19 @@ def main() -> None:
     parser.add_argument(
         "--seconds", type=float, default=15.0, metavar="S", help="length of a winch's records"
     )
+    parser.add_argument(
+        "--system", action="store_true", help="`cspm identify system` instead: 30 s a run"
+    )
     parser.add_argument("--seed", type=int, default=20261121)
     arguments = parser.parse_args()
     console = Console()
-    for experiment in (Winch(arguments.seconds), Spring()):
+    experiments: tuple[Experiment, ...] = (Winch(arguments.seconds), Spring())
+    if arguments.system:
+        # It needs MuJoCo.
+        from bench.system_coverage import System
+
+        experiments = (System(),)
+    for experiment in experiments:
         table = Table("intervals", *experiment.names, title=experiment.__class__.__doc__)
         counts = measure_coverage(experiment, arguments.runs, arguments.seed)
         for method in dict.fromkeys(count.method for count in counts):

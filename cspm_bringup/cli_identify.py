@@ -1,9 +1,11 @@
-"""Commands that identify parameters from recordings: identify stiffness, damping, system."""
+"""Commands that identify parameters: identify stiffness, damping, winch, system."""
 
 from __future__ import annotations
 
+from collections.abc import Callable
+from inspect import Parameter, Signature, signature
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated
+from typing import TYPE_CHECKING, Annotated, Any, TypeAlias
 
 import typer
 
@@ -13,6 +15,8 @@ from cspm_msgs_py.errors import InputError
 if TYPE_CHECKING:
     from cspm_bringup.identify_rig import RigRequest
     from cspm_ident.estimation import Prior
+
+RigCommand: TypeAlias = "Callable[[RigRequest, Path | None], None]"
 
 identify = typer.Typer(
     no_args_is_help=True,
@@ -74,6 +78,10 @@ IntoCables = Annotated[
         help="The cables there that get the law; otherwise those identified.",
     ),
 ]
+HeldOut = Annotated[
+    list[Path] | None,
+    typer.Option("--held-out", metavar="BAG", help="Judges without being fitted; repeatable."),
+]
 Cutoff = Annotated[
     float | None,
     typer.Option(metavar="HZ", help="Cut-off of the filter without phase."),
@@ -84,16 +92,16 @@ Out = Annotated[
 ]
 
 
-def _request(
-    recordings: list[Path],
-    testbed: Path | None,
-    cables: str | None,
-    verify: list[str] | None,
-    into: Path | None,
-    into_cables: str | None,
-    cutoff: float | None,
-    out: Path | None,
-    stiffness: Path | None = None,
+def _rig_request(
+    recordings: Recordings,
+    stiffness: StiffnessFile = None,
+    testbed: MachineFile = None,
+    cables: Cables = None,
+    verify: Verify = None,
+    into: Into = None,
+    into_cables: IntoCables = None,
+    cutoff: Cutoff = None,
+    out: Out = None,
 ) -> RigRequest:
     from cspm_bringup.identify_rig import RigRequest
 
@@ -119,64 +127,136 @@ def _names(option: str, text: str | None) -> tuple[str, ...]:
     return names
 
 
-@identify.command(
-    epilog="""Example:
+def _rig_command(epilog: str, *without: str) -> Callable[[RigCommand], RigCommand]:
+    """Register a command with the options of `_rig_request`, those named left out, and --json."""
+    taken = signature(_rig_request, locals={"RigRequest": object}, eval_str=True).parameters
+    options = [option for name, option in taken.items() if name not in without]
+    json = Parameter("json", Parameter.KEYWORD_ONLY, default=None, annotation=Json)
+
+    def register(does: RigCommand) -> RigCommand:
+        def command(json: Path | None, **given: Any) -> None:  # noqa: ANN401 - as `_rig_request`
+            does(_rig_request(**given), json)
+
+        command.__signature__ = Signature([*options, json])  # type: ignore[attr-defined]
+        command.__doc__ = does.__doc__
+        identify.command(does.__name__, epilog=epilog)(command)
+        return does
+
+    return register
+
+
+@_rig_command(
+    """Example:
 
 cspm run rig_stiffness_hoist --out ramps
 
 cspm identify stiffness ramps --verify hoist_180 --out hoist_stiffness""",
+    "stiffness",
 )
-def stiffness(
-    recordings: Recordings,
-    testbed: MachineFile = None,
-    cables: Cables = None,
-    verify: Verify = None,
-    into: Into = None,
-    into_cables: IntoCables = None,
-    cutoff: Cutoff = None,
-    out: Out = None,
-    json: Json = None,
-) -> None:
+def stiffness(asked: RigRequest, json: Path | None) -> None:
     """Identify the stiffness law of one kind of cable from slow ramps at several lengths.
 
     Stretching and releasing are kept apart, and the hysteresis between them is told.
     """
     from cspm_bringup.identify_stiffness_command import identify_stiffness_command
 
-    asked = _request(recordings, testbed, cables, verify, into, into_cables, cutoff, out)
     identify_stiffness_command(asked, json)
 
 
-@identify.command(
-    epilog="""Example:
+@_rig_command(
+    """Example:
 
 cspm run rig_damping_hoist --out sines
 
 cspm identify damping sines --stiffness hoist_stiffness/fitted_testbed.yaml --verify hoist_180
---out hoist_damping""",
+--out hoist_damping"""
 )
-def damping(
-    recordings: Recordings,
-    stiffness_file: StiffnessFile = None,
-    testbed: MachineFile = None,
-    cables: Cables = None,
-    verify: Verify = None,
-    into: Into = None,
-    into_cables: IntoCables = None,
-    cutoff: Cutoff = None,
-    out: Out = None,
-    json: Json = None,
-) -> None:
+def damping(asked: RigRequest, json: Path | None) -> None:
     """Identify the damping of one kind of cable from multi-sines at several lengths.
 
     Identify the stiffness first, and give its fitted test-bed file by --stiffness.
     """
     from cspm_bringup.identify_damping_command import identify_damping_command
 
-    asked = _request(
-        recordings, testbed, cables, verify, into, into_cables, cutoff, out, stiffness_file
-    )
     identify_damping_command(asked, json)
+
+
+@identify.command(
+    epilog="""Examples:
+
+cspm import DATA_EMPS.mat --mapping scenarios/mappings/emps.yaml --testbed
+scenarios/testbeds/emps.yaml --out emps
+
+cspm identify winch emps --held-out emps_pulses --out fitted
+
+cspm identify winch bag --winches surge_1,surge_2 --effects winch_viscous_friction
+
+cspm run one_winch --testbed fitted/fitted_testbed.yaml"""
+)
+def winch(
+    recordings: Annotated[
+        list[Path],
+        typer.Argument(
+            metavar="BAG…",
+            help="Recordings of motor angle and torque, and of the tension where the winch pulls a"
+            " cable; with a bar or without.",
+        ),
+    ],
+    testbed: MachineFile = None,
+    winches: Annotated[
+        str | None,
+        typer.Option(metavar="NAME,NAME", help="Names of their cables, otherwise all."),
+    ] = None,
+    effects: Annotated[
+        str | None,
+        typer.Option(
+            metavar="ID,ID",
+            help="What to fit beside the inertia: effects that are linear at the motor shaft; a"
+            " wrong id lists them. Usually viscous friction, Coulomb friction and an offset.",
+        ),
+    ] = None,
+    held_out: HeldOut = None,
+    torque_age: Annotated[
+        float | None,
+        typer.Option(
+            metavar="S",
+            help="How long before its stamp a reported torque acted; otherwise half a period for"
+            " recordings of `cspm run`, whose drives hold it, and 0 for others.",
+        ),
+    ] = None,
+    without_reversals: Annotated[
+        bool,
+        typer.Option(
+            "--without-reversals",
+            help="Leave out the windows in which the shaft turns round, where dry friction sticks:"
+            " for fast reversals under friction.",
+        ),
+    ] = False,
+    band: Annotated[
+        float | None,
+        typer.Option(metavar="HZ", help="Torque errors are counted below, otherwise 40 Hz."),
+    ] = None,
+    out: Out = None,
+    json: Json = None,
+) -> None:
+    """Identify inertia and friction of winches from their own angle, torque and tension.
+
+    Each winch by itself, in weak form: nothing is differentiated that carries noise.
+    """
+    from cspm_bringup.identify_winch_command import WinchRequest, identify_winch_command
+
+    asked = WinchRequest(
+        recordings=tuple(recordings),
+        held_out=tuple(held_out or ()),
+        testbed=testbed,
+        winches=_names("--winches", winches),
+        effects=_names("--effects", effects),
+        torque_age=torque_age,
+        reversals=not without_reversals,
+        band=band,
+        out=out,
+    )
+    identify_winch_command(asked, json)
 
 
 @identify.command(
@@ -224,10 +304,7 @@ def system(
         float | None,
         typer.Option(metavar="S", help="Length of the windows, otherwise 4 s."),
     ] = None,
-    held_out: Annotated[
-        list[Path] | None,
-        typer.Option("--held-out", metavar="BAG", help="Judges without being fitted; repeatable."),
-    ] = None,
+    held_out: HeldOut = None,
     profile: Annotated[
         list[str] | None,
         typer.Option(

@@ -10,6 +10,7 @@ from rich import box
 from rich.console import Console
 from rich.table import Table
 
+from cspm_bringup.console import make_console, say
 from cspm_bringup.summary import write_json
 from cspm_ident.diagnosis.diagnose import Diagnosis, diagnose
 from cspm_ident.diagnosis.improved_file import improved_testbed
@@ -24,6 +25,7 @@ from cspm_ident.diagnosis.verdict import (
 )
 from cspm_ident.signals.measurement import read_measurement
 from cspm_msgs_py.errors import InputError
+from cspm_msgs_py.new_folder import refuse_existing
 
 REPORT = "diagnosis.json"
 
@@ -51,9 +53,9 @@ def diagnose_command(asked: DiagnoseRequest, json: Path | None) -> None:
     Raises:
         InputError: naming what is wrong in recordings, test-bed or options.
     """
-    console = Console()
-    if asked.out is not None and asked.out.exists():
-        raise InputError(f"{asked.out}: exists, allowed: a new folder")
+    console = make_console()
+    if asked.out is not None:
+        refuse_existing(asked.out)
     twice = set(asked.recordings) & set(asked.held_out)
     if twice:
         raise InputError(
@@ -67,7 +69,7 @@ def diagnose_command(asked: DiagnoseRequest, json: Path | None) -> None:
     data = diagnosis_data(found)
     if asked.out is not None:
         _write(asked.out, found, data)
-        console.print(f"written {asked.out}", soft_wrap=True, highlight=False, markup=False)
+        say(console, f"written {asked.out}")
     if json is not None:
         write_json(json, data)
 
@@ -93,33 +95,25 @@ def print_diagnosis(console: Console, found: Diagnosis) -> None:
     """Print verdict, findings and how the fit changes on data that was not searched."""
     console.print(f"verdict: [bold]{verdict_of(found).value}[/]")
     for named in found.findings.named:
-        console.print(
-            f"• {statement_of(found, named)}", soft_wrap=True, highlight=False, markup=False
-        )
+        say(console, f"• {statement_of(found, named)}")
         for rival, _ in named.alternatives:
-            console.print(
+            say(
+                console,
                 f"  as well explained by {rival.effect.id} on {', '.join(rival.elements)};"
                 f" to tell: {rival.effect.separating_experiment}",
-                soft_wrap=True,
-                highlight=False,
-                markup=False,
             )
     for driver, _, share in found.findings.unknown:
-        console.print(
-            f"• {unknown_statement(driver, share)}", soft_wrap=True, highlight=False, markup=False
-        )
+        say(console, f"• {unknown_statement(driver, share)}")
     for named in found.rejected:
-        console.print(
+        say(
+            console,
             f"not kept: {named.hypothesis.effect.id} on {', '.join(named.hypothesis.elements)}"
             " did not help on held-out data",
-            soft_wrap=True,
-            highlight=False,
-            markup=False,
         )
     console.print(_fit_table(found))
     silent = ", ".join(name for name, _ in found.silent)
     if silent:
-        console.print(f"not testable here: {silent}", soft_wrap=True, highlight=False, markup=False)
+        say(console, f"not testable here: {silent}")
 
 
 def _fit_table(found: Diagnosis) -> Table:

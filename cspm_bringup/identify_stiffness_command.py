@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from functools import partial
 from pathlib import Path
 
 from rich import box
@@ -9,13 +10,9 @@ from rich.console import Console
 from rich.markup import escape
 from rich.table import Table
 
-from cspm_bringup.console import make_console, say
-from cspm_bringup.identify_rig import (
-    RigRequest,
-    interval_text,
-    provenance,
-)
-from cspm_bringup.summary import write_json
+from cspm_bringup.console import say
+from cspm_bringup.identify_outcome import hand_out
+from cspm_bringup.identify_rig import RigRequest, interval_text, provenance
 from cspm_ident.fitted_testbed import FittedNumber
 from cspm_ident.rig.flanks import DOWN, UP
 from cspm_ident.rig.stiffness import CUTOFF, MEAN, StiffnessResult, identify_stiffness
@@ -30,16 +27,8 @@ def identify_stiffness_command(asked: RigRequest, json: Path | None) -> None:
     Raises:
         InputError: naming what is wrong in recordings, test-bed or options.
     """
-    console = make_console()
-    specimens = asked.specimens()
-    result = identify_stiffness(specimens, asked.verify, asked.cutoff or CUTOFF)
-    print_stiffness(console, result)
-    written: dict[str, str] = {}
-    if asked.out is not None:
-        written = _write(asked, asked.out, result)
-        say(console, f"written: {', '.join(written.values())}")
-    if json is not None:
-        write_json(json, result.data() | {"written": written})
+    result = identify_stiffness(asked.specimens(), asked.verify, asked.cutoff or CUTOFF)
+    hand_out(result, print_stiffness, partial(_write, asked), asked.out, json)
 
 
 def print_stiffness(console: Console, result: StiffnessResult) -> None:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from functools import partial
 from math import isfinite
 from pathlib import Path
 
@@ -13,8 +14,8 @@ from rich.markup import escape
 from rich.table import Table
 
 from cspm_bringup.console import make_console, say
+from cspm_bringup.identify_outcome import hand_out
 from cspm_bringup.identify_rig import FITTED, interval_text
-from cspm_bringup.summary import write_json
 from cspm_ident.estimation import Prior
 from cspm_ident.signals.measurement import Measurement, read_measurement
 from cspm_ident.system.choice import choose
@@ -75,13 +76,7 @@ def identify_system_command(asked: SystemRequest, json: Path | None) -> None:
             horizon=HORIZON if asked.horizon is None else asked.horizon,
             progress=lambda text: status.update(escape(text)),
         )
-    print_system(console, result)
-    written = {}
-    if asked.out is not None:
-        written = _write(asked.out, result, asked.testbed)
-        say(console, f"written: {', '.join(written.values())}")
-    if json is not None:
-        write_json(json, result.data() | {"written": written})
+    hand_out(result, print_system, partial(_write, asked.testbed), asked.out, json)
 
 
 def print_system(console: Console, result: SystemResult) -> None:
@@ -109,6 +104,10 @@ def print_system(console: Console, result: SystemResult) -> None:
     for profile in result.profiles:
         low, high = profile.ci95
         say(console, f"profile of {profile.name}: {low:.5g} … {high:.5g} {profile.unit}")
+    for judgement in result.judgements:
+        for topic, seconds in judgement.delays.items():
+            name = judgement.measurement.path.name
+            say(console, f"{name}: {topic} {1e3 * seconds:.1f} ms late, taken out")
     console.print(judgement_table(result.judgements))
 
 
@@ -131,7 +130,7 @@ def _read(paths: Sequence[Path], asked: SystemRequest) -> list[Measurement]:
     return [read_measurement(path, asked.testbed) for path in paths]
 
 
-def _write(folder: Path, result: SystemResult, testbed: Path | None) -> dict[str, str]:
+def _write(testbed: Path | None, folder: Path, result: SystemResult) -> dict[str, str]:
     from cspm_bringup.system_figure import draw_system
 
     file = result.searched[0].testbed

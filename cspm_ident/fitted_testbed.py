@@ -17,7 +17,7 @@ from cspm_msgs_py.testbed import TestbedFile, parse_testbed
 
 DIGITS = 8
 WIDEST = 10_000
-BLOCKS = ("stiffness", "damping")
+BLOCKS = ("stiffness", "damping", "rotor_inertia")
 
 
 @dataclass(frozen=True)
@@ -58,7 +58,17 @@ class FittedNumber:
         return line
 
 
-Changes = Mapping[str, Mapping[str, Mapping[str, "FittedNumber | float | str"]]]
+Numbers = Mapping[str, "FittedNumber | float | str"]
+Changes = Mapping[str, Mapping[str, "Numbers | FittedNumber"]]
+
+
+def round_trip() -> YAML:
+    """Return what reads and writes a file so that comments, anchors and quotes stay."""
+    yaml = YAML()
+    yaml.preserve_quotes = True
+    yaml.width = WIDEST
+    yaml.indent(mapping=2, sequence=4, offset=2)
+    return yaml
 
 
 def with_fitted(text: str, source: str, changes: Changes) -> TestbedFile:
@@ -70,15 +80,12 @@ def with_fitted(text: str, source: str, changes: Changes) -> TestbedFile:
     Args:
         text: the file's.
         source: names it in errors.
-        changes: by cable, by block (`stiffness`, `damping`), by key.
+        changes: by cable, by block (`stiffness`, `damping`), by key; `rotor_inertia` has no keys.
 
     Raises:
         InputError: no such cable, or a result that is no test-bed file.
     """
-    yaml = YAML()
-    yaml.preserve_quotes = True
-    yaml.width = WIDEST
-    yaml.indent(mapping=2, sequence=4, offset=2)
+    yaml = round_trip()
     content = yaml.load(text)
     names = [str(cable["name"]) for cable in content["cables"]]
     for name in changes:
@@ -99,7 +106,7 @@ def with_fitted(text: str, source: str, changes: Changes) -> TestbedFile:
     return parse_testbed(text, source)
 
 
-def _wanted(cables: list[CommentedMap], changes: Changes) -> dict[str, dict[str, CommentedMap]]:
+def _wanted(cables: list[CommentedMap], changes: Changes) -> dict[str, dict[str, Any]]:
     """Return what each block of each cable is to be."""
     return {
         str(cable["name"]): {
@@ -111,9 +118,9 @@ def _wanted(cables: list[CommentedMap], changes: Changes) -> dict[str, dict[str,
     }
 
 
-def _changed(
-    block: CommentedMap, numbers: Mapping[str, FittedNumber | float | str]
-) -> CommentedMap:
+def _changed(block: Any, numbers: Numbers | FittedNumber) -> Any:  # noqa: ANN401 - any YAML
+    if isinstance(numbers, FittedNumber):
+        return numbers.content()
     copy = deepcopy(block)
     for key, number in numbers.items():
         copy[key] = number.content() if isinstance(number, FittedNumber) else number

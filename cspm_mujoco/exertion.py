@@ -69,6 +69,7 @@ def exert(
     speeds: Array,
     rows: Array,
     drag: Array,
+    across: Array,
     tensions: Array,
     winding: Array,
     wrench: Array,
@@ -86,12 +87,13 @@ def exert(
         speeds: motor speeds, (n,) [rad/s].
         rows: the cables, see `cable_row`.
         drag: damping of the bar per world axis, about its origin, (6,) [N·s/m, N·m·s/rad].
+        across: damping of each attachment's motion across its cable, (n,) [N·s/m].
         tensions: receives the tensions, (n,) [N].
         winding: receives the rates of the unstretched lengths, (n,) [m/s].
         wrench: receives force, and moment about the centre of mass, in world axes, (6,).
     """
     n, lost = rows.shape[0], -1
-    force = np.zeros(3)
+    force, apart = np.zeros(3), np.zeros(3)
     for axis in range(3):
         wrench[axis] = -drag[axis] * body[3 + axis]
         wrench[3 + axis] = -drag[3 + axis] * body[6 + axis]
@@ -107,15 +109,17 @@ def exert(
         length = length**0.5
         for axis in range(3):
             force[axis] = (start[axis] - end[axis]) / length
-            speed = _point_velocity(end, body, axis) - _point_velocity(start, frame, axis)
-            rate -= force[axis] * speed
+            apart[axis] = _point_velocity(end, body, axis) - _point_velocity(start, frame, axis)
+            rate -= force[axis] * apart[axis]
         winding[i] = -unstretched[i] / length * rows[i, RADIUS] * speeds[i]
         tensions[i] = _tension(length, rate, unstretched[i], winding[i], rows[i])
         # Written so that NaN counts as well.
         if lost < 0 and not tensions[i] < RUNAWAY:
             lost = i
+        # `force` is the unit vector towards the exit, so the cable stretches at −force · apart.
         for axis in range(3):
-            force[axis] *= tensions[i]
+            sideways = apart[axis] + rate * force[axis]
+            force[axis] = tensions[i] * force[axis] - across[i] * sideways
             wrench[axis] += force[axis]
         _add_moment(end, centre, force, wrench)
     return lost

@@ -15,6 +15,7 @@ Array = NDArray[np.float64]
 
 _PARAMETERS = {
     "bar_linear_damping": DOFS,
+    "cable_transverse_damping": ("coefficient",),
     "winch_viscous_friction": ("coefficient",),
     "winch_coulomb_friction": ("torque",),
 }
@@ -25,11 +26,13 @@ class Extras(NamedTuple):
 
     Attributes:
         drag: on the bar per world axis, about its origin, (6,) [N·s/m, N·m·s/rad].
+        across: damping of each attachment's motion across its cable, (n,) [N·s/m].
         damping: of the winches, (n,) [N·m·s/rad].
         friction: dry friction of the winches, (n,) [N·m].
     """
 
     drag: Array
+    across: Array
     damping: Array
     friction: Array
 
@@ -41,7 +44,12 @@ def find_extras(testbed: Testbed) -> Extras:
         InputError: an effect that this plant does not have, or a wrong element or parameter.
     """
     n = len(testbed.cables)
-    extras = Extras(np.zeros(6), np.zeros(n), np.zeros(n))
+    extras = Extras(np.zeros(6), np.zeros(n), np.zeros(n), np.zeros(n))
+    of_cables = {
+        "cable_transverse_damping": extras.across,
+        "winch_viscous_friction": extras.damping,
+        "winch_coulomb_friction": extras.friction,
+    }
     for entry in testbed.effects:
         values = _values(entry)
         if entry.effect == "bar_linear_damping":
@@ -52,8 +60,7 @@ def find_extras(testbed: Testbed) -> Extras:
                 )
             extras.drag[:] += values
             continue
-        target = extras.damping if entry.effect == "winch_viscous_friction" else extras.friction
-        target[_winches(entry, testbed)] += values[0]
+        of_cables[entry.effect][_cables(entry, testbed)] += values[0]
     return extras
 
 
@@ -73,7 +80,7 @@ def _values(entry: EffectEntry) -> list[float]:
     return [entry.parameters[name] for name in names]
 
 
-def _winches(entry: EffectEntry, testbed: Testbed) -> list[int]:
+def _cables(entry: EffectEntry, testbed: Testbed) -> list[int]:
     names = testbed.cable_names
     unknown = [element for element in entry.elements if element not in names]
     if unknown:

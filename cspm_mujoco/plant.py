@@ -69,7 +69,7 @@ class MujocoPlant:
         extras = find_extras(testbed)
         self._rows = np.array([cable_row(cable) for cable in testbed.cables])
         self._radii = self._rows[:, RADIUS].copy()
-        self._drag = extras.drag
+        self._drag, self._across = extras.drag, extras.across
         self._limits = np.array([cable.torque_limit for cable in testbed.cables])
         timestep = period_ns * 1e-9 / substeps
         self._model = build_model(testbed, extras, timestep)
@@ -192,6 +192,7 @@ class MujocoPlant:
             self.speeds,
             self._rows,
             self._drag,
+            self._across,
             self.tensions,
             self._winding,
             self._wrench,

@@ -1,3 +1,4 @@
+import dataclasses
 import io
 import json
 import sys
@@ -14,7 +15,7 @@ from cspm_bringup.system_figure import draw_system
 from cspm_ident.estimation import Prior
 from cspm_ident.system.choice import DEFAULT, choose
 from cspm_ident.system.fitted_file import fitted_testbed
-from cspm_ident.system.identification import identify_system
+from cspm_ident.system.identification import identify_system, solve
 from cspm_ident.system.machine import machine_with
 from cspm_msgs_py.errors import InputError
 from cspm_msgs_py.recording import Recording
@@ -99,6 +100,45 @@ def test_recordings_are_not_both_searched_and_held_out(recordings):
         identify_system([searched], choose(MACHINE), held_out=[searched])
     with pytest.raises(InputError, match=r"^--horizon 0: allowed: 0.1 to 60 s$"):
         identify_system([searched], choose(MACHINE), horizon=0.0)
+
+
+@pytest.mark.slow
+def test_a_late_motion_capture_is_found_and_taken_out(recordings):
+    """Bar poses stamped 20 ms late, and early; left in, the damping is far off."""
+    searched, _ = recordings
+    chosen = choose(MACHINE, list(TRUE))
+    for late in (0.02, -0.02):
+        shifted = dataclasses.replace(searched, bar_pose=searched.bar_pose.shifted(late))
+        found = solve([shifted], chosen, most_windows=2)
+        delays = found.shootings[0].timeline.delays
+        assert delays == {"/bar/pose": pytest.approx(late, abs=1.5e-3)}
+        left_in = solve([shifted], chosen, most_windows=2, delays={})
+        for name in ("axial_damping", "bar_damping.surge"):
+            errors = [
+                abs(each.solution.estimate.value(name) - TRUE[name]) for each in (found, left_in)
+            ]
+            assert errors[0] < 0.03 * TRUE[name] < 0.05 * TRUE[name] < errors[1], name
+
+
+@pytest.mark.slow
+def test_a_prior_holds_and_a_profile_agrees_with_the_interval(cspm, recordings, tmp_path):
+    """Through the command: a scale that says 4.2 kg ± 1 g outweighs what the motion says."""
+    searched, _ = recordings
+    words = ["--testbed", THESIS, "--fit", "bar.mass,bar_damping.surge", "--horizon", "6"]
+    known = ["--prior", "bar.mass=4.2±0.00001", "--profile", "bar_damping.surge"]
+    code, err = cspm("identify", "system", searched.path, *words, *known, "--json", "found.json")
+    assert (code, err) == (0, "")
+    data = json.loads((tmp_path / "found.json").read_text())
+    mass, surge = data["estimate"]["parameters"]
+    assert mass["value"] == pytest.approx(4.2, abs=1e-3)
+    assert mass["value"] != pytest.approx(TRUE["bar.mass"], abs=0.01)
+    (profile,) = data["profiles"]
+    low, high = profile["ci95"]
+    assert profile["name"] == "bar_damping.surge"
+    assert low < surge["value"] < high
+    assert min(profile["deviance"]) == 0.0
+    width = surge["ci95"][1] - surge["ci95"][0]
+    assert 0.3 * width < high - low < 3.0 * width
 
 
 def test_values_go_where_the_names_say():

@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
 from enum import Enum
 from math import isfinite
 from typing import Any
@@ -10,7 +11,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from cspm_ident.estimation.identifiability import Direction
+from cspm_ident.estimation.identifiability import LARGEST_SD, Direction
+from cspm_ident.estimation.parameter import Parameter
 
 Array = NDArray[np.float64]
 
@@ -89,6 +91,37 @@ class Estimate:
             "at_bound": name in self.at_bound,
             "excited": bool(frozen or isfinite(self.sd[i])),
         }
+
+
+def without_unknown(estimate: Estimate, parameters: Sequence[Parameter]) -> Estimate:
+    """Return the estimate with parameters that it knows no better than one scale as not excited.
+
+    The linearisation judges excitation by the size of the noise; an interval that also sees the
+    noise's colour may know less.
+
+    Args:
+        estimate: of all parameters.
+        parameters: the same, in order.
+    """
+    size = estimate.sd / np.array([parameter.scale for parameter in parameters])
+    lost = np.isfinite(size) & (size > LARGEST_SD)
+    if not lost.any():
+        return estimate
+    directions = [
+        Direction(name, ((name, 1.0),), float(sd))
+        for name, sd, unseen in zip(estimate.names, size, lost, strict=True)
+        if unseen
+    ]
+    ends, correlation = estimate.ci95.copy(), estimate.correlation.copy()
+    ends[lost] = (-np.inf, np.inf)
+    correlation[lost], correlation[:, lost] = np.nan, np.nan
+    return replace(
+        estimate,
+        sd=np.where(lost, np.inf, estimate.sd),
+        ci95=ends,
+        correlation=correlation,
+        unexcited=(*estimate.unexcited, *directions),
+    )
 
 
 def _finite(value: float) -> float | None:

@@ -12,7 +12,7 @@ from scipy.stats import t as student
 from cspm_ident.estimation.block_length import block_length
 from cspm_ident.estimation.bootstrap import bootstrap_covariance
 from cspm_ident.estimation.covariance import long_run_sum
-from cspm_ident.estimation.estimate import Estimate, Interval
+from cspm_ident.estimation.estimate import Estimate, Interval, without_unknown
 from cspm_ident.estimation.identifiability import Excitation, find_excitation
 from cspm_ident.estimation.parameter import Parameter, free_indices, prior_rows, scales
 
@@ -69,7 +69,8 @@ def make_estimate(
     inflation = 1.0 if model.white else _inflation(model)
     excitation = find_excitation(stacked, chosen, model.rounding, inflation)
     spread = _spread(model, excitation, chosen, interval, seed)
-    return _assemble(parameters, values, excitation, spread, model, f"{method}, {interval.value}")
+    found = _assemble(parameters, values, excitation, spread, model, f"{method}, {interval.value}")
+    return without_unknown(found, parameters)
 
 
 def _inflation(model: Linearisation) -> float:

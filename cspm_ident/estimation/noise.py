@@ -30,6 +30,18 @@ class GroupNoise(NamedTuple):
 Noise = Mapping[str, GroupNoise]
 
 
+def unit_noise(residuals: Sequence[Array], groups: Sequence[str]) -> Noise:
+    """Return white noise of variance 1 in all channels, none correlated with another.
+
+    Args:
+        residuals: per record, shape (n, channels).
+        groups: the group of each record.
+    """
+    white = Autoregression(np.zeros(0), 1.0)
+    widths = {group: part.shape[1] for part, group in zip(residuals, groups, strict=True)}
+    return {group: GroupNoise((white,) * m, np.eye(m)) for group, m in widths.items()}
+
+
 def fit_noise(
     residuals: Sequence[Array],
     groups: Sequence[str],

@@ -39,6 +39,7 @@ def fit(
     max_order: int | None = None,
     iterations: int = 10,
     seed: int = 0,
+    noise: Noise | None = None,
 ) -> Solution:
     """Estimate the parameters of a model that is simulated.
 
@@ -54,29 +55,30 @@ def fit(
         iterations: at most so many rounds of noise model and solution, with white and with
             coloured noise.
         seed: of the bootstrap.
+        noise: of each group, where it is known; nothing of it is then taken from the residuals, and
+            `whiten` says only whether it has their colour.
 
     Raises:
         InputError: start, residuals or groups do not fit, or nothing is free.
     """
     theta = check_start(problem.parameters, start)
-    free = free_indices(problem.parameters)
     residuals = problem.residuals(theta)
     groups = _check_groups(problem, residuals)
     interval = check_interval(interval, whiten, max(part.shape[1] for part in residuals))
     floors = rounding_floors(residuals, groups)
-    unit = scales(problem.parameters)
-    # First the sizes alone: colour fitted to what a wrong start leaves would hide it for good.
-    for order in (0, max_order) if whiten else (0,):
-        for _ in range(
-            iterations if order != 0 or _sizes_matter(problem, residuals, groups) else 1
-        ):
-            noise = fit_noise(residuals, groups, order, floors, len(free))
-            before = theta
-            theta = _solve(problem, theta, noise, groups)
-            residuals = problem.residuals(theta)
-            if np.all(np.abs(theta - before) <= _STILL * unit):
-                break
-    noise = fit_noise(residuals, groups, order, floors, len(free))
+    if noise is None:
+        theta, residuals, noise = _alternate(
+            problem,
+            theta,
+            residuals,
+            groups,
+            floors,
+            (0, max_order) if whiten else (0,),
+            iterations,
+        )
+    else:
+        theta = _solve(problem, theta, noise, groups)
+        residuals = problem.residuals(theta)
     model = _linearise(problem, theta, residuals, noise, groups, whiten, max_order, floors)
     method = "whitened output error" if whiten else "output error"
     estimate = make_estimate(problem.parameters, theta, model, interval, method, seed)
@@ -84,6 +86,30 @@ def fit(
 
 
 _STILL = 1e-4  # scales
+
+
+def _alternate(
+    problem: Problem,
+    theta: Array,
+    residuals: list[Array],
+    groups: tuple[str, ...],
+    floors: Mapping[str, float],
+    orders: Sequence[int | None],
+    iterations: int,
+) -> tuple[Array, list[Array], Noise]:
+    """Return where solution and noise model stand still in turn, for one order after the other."""
+    unit, free = scales(problem.parameters), free_indices(problem.parameters)
+    # First the sizes alone: colour fitted to what a wrong start leaves would hide it for good.
+    for order in orders:
+        rounds = iterations if order != 0 or _sizes_matter(problem, residuals, groups) else 1
+        for _ in range(rounds):
+            noise = fit_noise(residuals, groups, order, floors, len(free))
+            before = theta
+            theta = _solve(problem, theta, noise, groups)
+            residuals = problem.residuals(theta)
+            if np.all(np.abs(theta - before) <= _STILL * unit):
+                break
+    return theta, residuals, fit_noise(residuals, groups, order, floors, len(free))
 
 
 def _sizes_matter(problem: Problem, residuals: Sequence[Array], groups: Sequence[str]) -> bool:

@@ -12,6 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.interpolate import CubicSpline
 from scipy.signal import butter, sosfiltfilt, welch
+from scipy.stats import chi2
 
 from cspm_ident.signals.samples import Samples, stretches
 
@@ -21,6 +22,8 @@ ORDER = 4
 # Below a fifth of all samples, the upper end of the spectrum is taken for noise.
 _NOISE_SHARE = 0.2
 _ABOVE_NOISE = 4.0
+# How often noise alone may stand out at a frequency; a thousand of them are looked at.
+_BY_CHANCE = 1e-6
 _MARGIN = 2.0
 _HIGHEST = 0.4
 _SEGMENT_S = 4.0
@@ -112,11 +115,23 @@ def band_of(samples: Samples) -> float:
     power, frequencies = power[1:] / gain[:, None], frequencies[1:]
     top = round((1.0 - _NOISE_SHARE) * len(frequencies))
     noise = np.median(power[top:], axis=0)
-    standing_out = (power[:top] > _ABOVE_NOISE * noise) & (noise > 0.0)
+    above = _above_noise(len(values) - 1, length)
+    standing_out = (power[:top] > above * noise) & (noise > 0.0)
     if not standing_out.any():
         return float(frequencies[0] * _MARGIN) if (noise > 0.0).any() else float("inf")
     last = int(np.flatnonzero(_lasting(standing_out).any(axis=1)).max(initial=0))
     return float(frequencies[last] * _MARGIN)
+
+
+def _above_noise(samples: int, segment: int) -> float:
+    """Return how far above its median noise must lie to be none, by the spectrum's averages.
+
+    A mean over segments with half overlap scatters as χ² (Welch 1967), so that few segments let
+    noise stand out by chance.
+    """
+    count = max(1, (samples - segment // 2) // (segment - segment // 2))
+    freedom = 2.0 if count == 1 else 36.0 * count**2 / (19.0 * count - 1.0)
+    return max(_ABOVE_NOISE, float(chi2.isf(_BY_CHANCE, freedom) / chi2.median(freedom)))
 
 
 def _lasting(standing_out: NDArray[np.bool_]) -> NDArray[np.bool_]:

@@ -6,10 +6,9 @@ import io
 from math import isfinite
 from typing import Any
 
-from ruamel.yaml import YAML
 from ruamel.yaml.comments import CommentedMap, CommentedSeq
 
-from cspm_ident.fitted_testbed import WIDEST, FittedNumber
+from cspm_ident.fitted_testbed import FittedNumber, round_trip
 from cspm_ident.system.choice import (
     AXES,
     BarPlace,
@@ -39,10 +38,7 @@ def fitted_testbed(result: SystemResult, file: TestbedFile, source: str) -> Test
     Raises:
         InputError: the numbers are no machine's, such as a tensor of inertia that no body has.
     """
-    yaml = YAML()
-    yaml.preserve_quotes = True
-    yaml.width = WIDEST
-    yaml.indent(mapping=2, sequence=4, offset=2)
+    yaml = round_trip()
     content: Content = yaml.load(file.text)
     estimate = result.solution.estimate
     for each in result.chosen:

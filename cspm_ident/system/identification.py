@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -12,12 +12,20 @@ from scipy.optimize import least_squares
 
 from cspm_ident.estimation import Profile, Solution, find_profile, fit
 from cspm_ident.estimation.estimate import Interval
+from cspm_ident.estimation.noise import unit_noise
 from cspm_ident.estimation.parameter import free_indices, prior_rows, scales
 from cspm_ident.estimation.problem import Problem
+from cspm_ident.recording_roles import check_roles
 from cspm_ident.signals.measurement import Measurement
 from cspm_ident.system.choice import Chosen
 from cspm_ident.system.judgement import Judgement, judge
 from cspm_ident.system.machine import machine_with
+from cspm_ident.system.noise_scatter import (
+    DRAWS,
+    noise_changes,
+    noise_scatter,
+    widened,
+)
 from cspm_ident.system.shooting import Shooting, make_shooting
 from cspm_msgs_py.errors import InputError
 from cspm_msgs_py.testbed import Testbed
@@ -31,7 +39,6 @@ MOST_WINDOWS = 12
 _MOST_PASSES = 8
 _EVALUATIONS = 3  # of a pass
 _STILL = 1e-3  # scales
-_ROUNDS = 1
 # Of a scale: below it rounding of the simulation shows in the differences.
 _STEP = 1e-4
 
@@ -93,6 +100,7 @@ def identify_system(
     profiled: Sequence[str] = (),
     horizon: float = HORIZON,
     most_windows: int = MOST_WINDOWS,
+    delays: Mapping[str, float] | None = None,
     progress: Progress = lambda _: None,
 ) -> SystemResult:
     """Fit a machine's numbers to recordings and judge what was found.
@@ -108,23 +116,20 @@ def identify_system(
         profiled: parameters whose profile likelihood is wanted.
         horizon: length of a window [s].
         most_windows: of each recording, evenly spread.
+        delays: of the sensors, by topic [s], the same in all recordings; None: those found in each,
+            see `delays_to_remove`.
         progress: called with what is being done.
 
     Raises:
         InputError: no recording, a sensor or a long enough window is missing, nothing is free, or
             a recording is both searched and held out.
     """
-    _check(searched, held_out, horizon)
+    check_roles(searched, held_out)
+    if not 0.1 <= horizon <= 60.0:
+        raise InputError(f"--horizon {horizon:g}: allowed: 0.1 to 60 s")
     machine = searched[0].machine
-    progress("signals")
-    shootings = [make_shooting(each, horizon, most_windows) for each in searched]
-    theta = np.array([each.nominal for each in chosen])
-    problem = make_problem(machine, chosen, shootings)
-    theta, settled = _search(problem, machine, chosen, shootings, theta, progress)
-    progress("intervals")
-    # Whitened, what the noise on the frame's pose does to the tensions would outweigh the rest.
-    solution = fit(
-        problem, list(theta), whiten=False, interval=Interval.SANDWICH, iterations=_ROUNDS
+    problem, solution, shootings, settled = solve(
+        searched, chosen, horizon, most_windows, delays, progress
     )
     profiles = []
     for name in profiled:
@@ -138,22 +143,82 @@ def identify_system(
         horizon,
         tuple(len(shooting.windows) for shooting in shootings),
         tuple(searched),
-        _judged(searched, held_out, {"nominal": machine, "fitted": found}, progress),
+        _judged(shootings, held_out, {"nominal": machine, "fitted": found}, delays, progress),
         tuple(profiles),
         settled,
     )
 
 
-def _judged(
+class Solved(NamedTuple):
+    """What the fit alone gives: the problem, its solution, the windows, whether it settled."""
+
+    problem: Problem
+    solution: Solution
+    shootings: list[Shooting]
+    settled: bool
+
+
+def solve(
     searched: Sequence[Measurement],
+    chosen: Sequence[Chosen],
+    horizon: float = HORIZON,
+    most_windows: int = MOST_WINDOWS,
+    delays: Mapping[str, float] | None = None,
+    progress: Progress = lambda _: None,
+    seed: int = 0,
+) -> Solved:
+    """Fit alone, without judging what was found; see `identify_system`.
+
+    `seed` is that of the noise that is drawn for the intervals.
+    """
+    machine = searched[0].machine
+    progress("signals")
+    shootings = [make_shooting(each, horizon, most_windows, delays) for each in searched]
+    theta = np.array([each.nominal for each in chosen])
+    problem = make_problem(machine, chosen, shootings)
+    theta, settled = _search(problem, machine, chosen, shootings, theta, progress)
+    progress("noise, drawn anew")
+    redrawn = [
+        make_problem(machine, chosen, [s.redrawn([seed, d, i]) for i, s in enumerate(shootings)])
+        for d in range(DRAWS)
+    ]
+    changes = noise_changes(problem, redrawn, theta)
+    progress("intervals")
+    # Weighted by the sensors' own noise. Whitened, or decorrelated, the channels in which the noise
+    # on the frame's pose cancels would outweigh the rest, and there it biases most.
+    solution = fit(
+        problem,
+        list(theta),
+        whiten=False,
+        interval=Interval.SANDWICH,
+        noise=unit_noise(changes[0], tuple(problem.groups or ())),
+    )
+    scatter = noise_scatter(problem, solution, changes, _window_numbers(shootings))
+    estimate = widened(problem, solution.estimate, scatter)
+    return Solved(problem, solution._replace(estimate=estimate), shootings, settled)
+
+
+def _window_numbers(shootings: Sequence[Shooting]) -> list[int]:
+    """Return the number of each residual's window, counted through all recordings."""
+    kinds = [len(shooting.kinds) for shooting in shootings for _ in shooting.windows]
+    return [number for number, count in enumerate(kinds) for _ in range(count)]
+
+
+def _judged(
+    shootings: Sequence[Shooting],
     held_out: Sequence[Measurement],
     machines: Mapping[str, Testbed],
+    delays: Mapping[str, float] | None,
     progress: Progress,
 ) -> tuple[Judgement, ...]:
     found = []
-    for i, each in enumerate([*searched, *held_out]):
+    for shooting in shootings:
+        measurement = shooting.timeline.measurement
+        progress(f"prediction of {measurement.path.name}")
+        found.append(judge(measurement, machines, False, shooting.timeline.delays))
+    for each in held_out:
         progress(f"prediction of {each.path.name}")
-        found.append(judge(each, machines, i >= len(searched)))
+        found.append(judge(each, machines, True, delays))
     return tuple(found)
 
 
@@ -235,24 +300,3 @@ def make_problem(
         for kind in shooting.kinds
     ]
     return Problem(residual, [each.parameter for each in chosen], groups, step=_STEP)
-
-
-def _check(
-    searched: Sequence[Measurement], held_out: Sequence[Measurement], horizon: float
-) -> None:
-    if not searched:
-        raise InputError("identify system: no recording, allowed: one or more")
-    if not 0.1 <= horizon <= 60.0:
-        raise InputError(f"--horizon {horizon:g}: allowed: 0.1 to 60 s")
-    first = searched[0].machine
-    for each in [*searched[1:], *held_out]:
-        if each.machine != first:
-            raise InputError(
-                f"{each.path}: another test-bed than {searched[0].path}, allowed: recordings of"
-                " one machine, or --testbed FILE for all"
-            )
-    for each in held_out:
-        if each.sha256 in {other.sha256 for other in searched}:
-            raise InputError(
-                f"--held-out {each.path}: is fitted to as well, allowed: a recording that is not"
-            )

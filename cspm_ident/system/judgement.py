@@ -13,6 +13,7 @@ from cspm_ident.block_simulation import BlockSimulation, Drive
 from cspm_ident.comparison.floor import noise_of
 from cspm_ident.signals.measurement import BAR, Measurement
 from cspm_ident.signals.timeline import Timeline
+from cspm_ident.system.lateness import delays_to_remove
 from cspm_ident.vaf import vaf
 from cspm_msgs_py.dofs import DOFS
 from cspm_msgs_py.testbed import Testbed
@@ -30,10 +31,11 @@ class Judgement:
     Attributes:
         measurement: the recording.
         held_out: whether nothing was fitted to it.
-        times: of the bar's samples [s], shape (k,).
+        times: of the bar's samples, delays taken out [s], shape (k,).
         measured: the bar's pose there x y z φ θ ψ, shape (k, 6).
         simulated: by machine, the same; NaN where its simulation diverged.
         vaf: by machine, per degree of freedom [%]; None where the bar does not move in it.
+        delays: of the sensors, by topic, that were taken out [s].
     """
 
     measurement: Measurement
@@ -42,15 +44,20 @@ class Judgement:
     measured: Array
     simulated: dict[str, Array]
     vaf: dict[str, dict[str, float | None]]
+    delays: dict[str, float]
 
     def data(self) -> dict[str, Any]:
         """Return the figures as plain data for JSON."""
         path = str(self.measurement.path)
-        return {"recording": path, "held_out": self.held_out, "vaf_percent": self.vaf}
+        found = {"vaf_percent": self.vaf, "delays_s": self.delays}
+        return {"recording": path, "held_out": self.held_out, **found}
 
 
 def judge(
-    measurement: Measurement, machines: Mapping[str, Testbed], held_out: bool = False
+    measurement: Measurement,
+    machines: Mapping[str, Testbed],
+    held_out: bool = False,
+    delays: Mapping[str, float] | None = None,
 ) -> Judgement:
     """Return how well machines predict the bar's pose from the first sample to the last.
 
@@ -61,14 +68,19 @@ def judge(
         measurement: the recording.
         machines: by label.
         held_out: whether nothing was fitted to it.
+        delays: of the sensors, by topic [s]; None: those found with the first machine.
 
     Raises:
         InputError: a sensor is missing.
     """
     line = Timeline(measurement)
+    if delays is None:
+        delays = delays_to_remove(line, next(iter(machines.values())))
+    line = line.delayed(delays)
     noise = noise_of(measurement, None)[0][BAR]
     bar = measurement.bar_pose
-    chosen = bar.within(line.times[0], line.times[-1]) if bar is not None else None
+    late = line.delays.get(BAR, 0.0)
+    chosen = bar.shifted(-late).within(line.times[0], line.times[-1]) if bar is not None else None
     times = chosen.times if chosen is not None else np.zeros(0)
     measured = chosen.values if chosen is not None else np.zeros((0, 6))
     simulated, shares = {}, {}
@@ -79,7 +91,7 @@ def judge(
         columns = [np.interp(times, line.times, column) for column in bars.T]
         simulated[label] = np.stack(columns, axis=1)
         shares[label] = _shares(measured, simulated[label], noise)
-    return Judgement(measurement, held_out, times, measured, simulated, shares)
+    return Judgement(measurement, held_out, times, measured, simulated, shares, dict(delays))
 
 
 def _shares(measured: Array, simulated: Array, noise: Array) -> dict[str, float | None]:

@@ -2,15 +2,18 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 from numpy.typing import NDArray
 
 from cspm_ident.block_simulation import BlockSimulation, Drive, Window
 from cspm_ident.comparison.floor import noise_of
-from cspm_ident.signals.measurement import BAR, TENSION, Measurement
+from cspm_ident.signals.measurement import BAR, FRAME, TENSION, WINCHES, Measurement
+from cspm_ident.signals.noise import noise_above_band, with_more_noise
 from cspm_ident.signals.timeline import Timeline
+from cspm_ident.system.lateness import delays_to_remove
 from cspm_msgs_py.errors import InputError
 from cspm_msgs_py.testbed import Testbed
 from cspm_sim.driven_plant import DrivenPlant
@@ -22,8 +25,8 @@ _BLOCK = 10
 # Of the initial states: position, angles, velocity, ω, unstretched lengths.
 _STEPS = np.array([1e-6] * 6 + [1e-5] * 6)
 _LENGTH_STEP = 1e-8
-# With fewer segments of a spectrum noise passes for motion, and dampers of the cables see it.
-_SHORTEST = 12.0  # s
+# Below it a band that is not found may be noise that passes for motion, which dampers see.
+_LONG_ENOUGH = 12.0  # s
 # A residual where the simulation diverged, in standard deviations of the sensor.
 _DIVERGED = 1e4
 # Directions of the initial state that the window sees less than this share of the best.
@@ -41,12 +44,14 @@ class Shooting:
             lengths, shape (windows, 12 + n).
         spans: per window, an orthonormal basis of what changes of its start do to all residuals.
         weights: by kind, one over the standard deviation of each channel.
+        noise: by attribute of the measurement, the standard deviation of each of its columns.
     """
 
     timeline: Timeline
     windows: list[Window]
     starts: Array
     weights: dict[str, Array]
+    noise: dict[str, Array]
     spans: list[Array] = field(default_factory=list)
 
     @property
@@ -72,6 +77,17 @@ class Shooting:
             self._window(plant, window, _started(simulation, window[0], start))
             for window, start in zip(self.windows, self.starts, strict=True)
         ]
+
+    def redrawn(self, seed: Sequence[int]) -> Shooting:
+        """Return the same windows with one more draw of noise on all measured signals."""
+        line = self.timeline
+        number = int(np.random.SeedSequence(seed).generate_state(1)[0])
+        noisy = with_more_noise(line.measurement, self.noise, number)
+        timeline = Timeline(noisy, line.period_ns, line.delays)
+        timeline.times = line.times
+        # The same smoothing, so that the difference is that of the noise alone.
+        timeline.__dict__["pose_band"] = line.pose_band
+        return replace(self, timeline=timeline)
 
     def relinearise(self, machine: Testbed) -> None:
         """Move the initial states to their best for a machine, and free the residuals of them."""
@@ -116,40 +132,71 @@ class Shooting:
         return found
 
 
-def make_shooting(measurement: Measurement, horizon: float, most_windows: int) -> Shooting:
+def make_shooting(
+    measurement: Measurement,
+    horizon: float,
+    most_windows: int,
+    delays: Mapping[str, float] | None = None,
+) -> Shooting:
     """Return a recording cut into windows, before any sensitivity.
 
     Args:
         measurement: what was recorded, with the machine as described.
         horizon: length of the windows [s].
         most_windows: so many, spread evenly, where there are more.
+        delays: of the sensors, by topic [s]; None: those found, see `delays_to_remove`.
 
     Raises:
-        InputError: a sensor is missing, the recording is short, or no window is long enough.
+        InputError: a sensor is missing, motion cannot be told from noise, or no window is long
+            enough.
     """
     line = Timeline(measurement)
-    if line.times[-1] - line.times[0] < _SHORTEST:
-        raise InputError(
-            f"{measurement.path}: {line.times[-1] - line.times[0]:.1f} s, allowed: at least"
-            f" {_SHORTEST:g} s, from which motion can be told from the noise of its sensors"
-        )
-    simulation = BlockSimulation(line, measurement.machine)
-    simulation.check(Drive.WINCH)
+    BlockSimulation(line, measurement.machine).check(Drive.WINCH)
+    noise, _ = noise_of(measurement, None)
+    duration = float(line.times[-1] - line.times[0])
+    _check_band(line, noise, duration)
+    if delays is None:
+        delays = delays_to_remove(line, measurement.machine)
+    line = line.delayed(delays)
     least = 0.5 * horizon / line.period
-    windows = [w for w in simulation.windows(Drive.WINCH, horizon) if w[1] - w[0] >= least]
+    windows = BlockSimulation(line, measurement.machine).windows(Drive.WINCH, horizon)
+    windows = [w for w in windows if w[1] - w[0] >= least]
     if not windows:
         raise InputError(
-            f"{measurement.path}: no stretch of {0.5 * horizon:g} s without a hole, allowed: a"
-            " shorter --horizon"
+            f"{measurement.path}: of {duration:.1f} s no stretch of {0.5 * horizon:g} s is without"
+            " a hole, allowed: a longer recording or a shorter --horizon"
         )
     if len(windows) > most_windows:
         kept = np.linspace(0, len(windows) - 1, most_windows).round().astype(int)
         windows = [windows[i] for i in kept]
-    noise, _ = noise_of(measurement, None)
     kinds = [BAR] + [TENSION] * (line.tensions is not None)
     weights = {kind: 1.0 / _positive(noise[kind]) for kind in kinds}
     width = len(_STEPS) + len(measurement.machine.cables)
-    return Shooting(line, windows, np.zeros((len(windows), width)), weights)
+    by_signal = _noise_of_signals(measurement, noise)
+    return Shooting(line, windows, np.zeros((len(windows), width)), weights, by_signal)
+
+
+def _noise_of_signals(measurement: Measurement, noise: Mapping[str, Array]) -> dict[str, Array]:
+    """Return the noise by attribute of the measurement; `noise` has it by topic."""
+    names = {FRAME: "frame_pose", BAR: "bar_pose", WINCHES: "angle", TENSION: "tension"}
+    found = {
+        name: noise[topic]
+        for topic, name in names.items()
+        if topic in noise and getattr(measurement, name) is not None
+    }
+    if measurement.speed is not None:
+        found["speed"] = noise_above_band(measurement.speed)
+    return found
+
+
+def _check_band(line: Timeline, noise: Mapping[str, Array], duration: float) -> None:
+    """Refuse poses of which nothing tells the motion from the noise."""
+    if duration < _LONG_ENOUGH and not np.isfinite(line.pose_band) and noise[BAR].any():
+        raise InputError(
+            f"{line.measurement.path}: {duration:.1f} s, the motion of its poses does not stand out"
+            f" of their noise; allowed: a recording of at least {_LONG_ENOUGH:g} s, or motion"
+            " capture at a higher rate"
+        )
 
 
 def _started(simulation: BlockSimulation, step: int, change: Array) -> Array:
@@ -164,7 +211,8 @@ def _pose_error(line: Timeline, window: Window, simulated: Array) -> Array:
     times = line.times[window[0] : window[1] + 1]
     if samples is None:
         return np.zeros((0, 6))
-    chosen = samples.within(times[0], times[-1])
+    # On the clock of the simulation.
+    chosen = samples.shifted(-line.delays.get(BAR, 0.0)).within(times[0], times[-1])
     skip = max(1, round(_BLOCK * line.period / max(samples.interval, 1e-9)))
     at, values = chosen.times[::skip], chosen.values[::skip]
     model = [np.interp(at, times, column) for column in simulated.T]

@@ -53,6 +53,7 @@ def identify_winch(
     instruments: Sequence[WinchSignals] | None = None,
     half_width: float = HALF_WIDTH_S,
     band: float | None = None,
+    reversals: bool = True,
     whiten: bool = False,
     interval: Interval = Interval.BOOTSTRAP,
     seed: int = 0,
@@ -70,6 +71,8 @@ def identify_winch(
             measured signals carry noise that the controller feeds back.
         half_width: of the windows [s].
         band: kept of the angle for the speed [Hz]; by default what stands out of its noise.
+        reversals: whether windows count in which the shaft turns round. Dry friction holds it there
+            for a while, and is then whatever holds, which no regressor of the speed's sign says.
         whiten: see `fit_linear`; not used with instruments.
         interval: see `fit_linear`.
         seed: of the bootstrap.
@@ -80,7 +83,7 @@ def identify_winch(
     """
     chosen = [_linear_effect(name) for name in effects]
     parameters = _parameters(chosen)
-    records = winch_records(signals, chosen, half_width, band, instruments)
+    records = winch_records(signals, chosen, half_width, band, instruments, reversals=reversals)
     exogeneity = None
     if instruments is None:
         solution = fit_linear(records, parameters, whiten=whiten, interval=interval, seed=seed)
@@ -97,8 +100,13 @@ def winch_records(
     half_width: float,
     band: float | None = None,
     instruments: Sequence[WinchSignals] | None = None,
+    *,
+    reversals: bool = True,
 ) -> list[Record]:
     """Return the weak form of the winch equation: inertia first, then the effects' parameters.
+
+    See `identify_winch` for the arguments. Without reversals each stretch between two of them is a
+    record of its own.
 
     Raises:
         InputError: no stretch is as long as a window, or instruments are not as many as signals.
@@ -109,15 +117,20 @@ def winch_records(
         )
     records: list[Record] = []
     for i, each in enumerate(signals):
-        pieces = [_weak(rows, each, effects, half_width) for _, rows in signal_rows(each, band)]
-        if instruments is None:
-            records += [Record(y, phi) for y, phi in pieces if len(y)]
-        else:
-            records += _with_instruments(pieces, instruments[i], effects, half_width, band)
+        pieces = _pieces(each, effects, half_width, band)
+        others: list[Array | None] = [None] * len(pieces)
+        if instruments is not None:
+            others = [*_instrument_columns(pieces, instruments[i], effects, half_width, band)]
+        for (target, columns, turns), other in zip(pieces, others, strict=True):
+            for part in _kept(turns) if not reversals else [slice(0, len(target))]:
+                if len(target[part]):
+                    chosen = None if other is None else other[part]
+                    records.append(Record(target[part], columns[part], instruments=chosen))
     if not records:
+        turned = "" if reversals else " without a reversal"
         raise InputError(
-            f"no stretch of angle and torque is as long as a window, {2.0 * half_width:g} s; "
-            "allowed: longer stretches"
+            f"no stretch of angle and torque is as long as a window, {2.0 * half_width:g} s"
+            f"{turned}; allowed: longer stretches"
         )
     return records
 
@@ -129,42 +142,61 @@ def relative_error(records: Sequence[Record], values: Array) -> float:
     return float(100.0 * np.linalg.norm(left) / np.linalg.norm(target))
 
 
+class _Weak(NamedTuple):
+    """One stretch in weak form: target, columns, and whether the shaft turns round, by window."""
+
+    target: Array
+    columns: Array
+    turns: NDArray[np.bool_]
+
+
+def _pieces(
+    signals: WinchSignals, effects: Sequence[Effect], half_width: float, band: float | None
+) -> list[_Weak]:
+    return [_weak(rows, signals, effects, half_width) for _, rows in signal_rows(signals, band)]
+
+
 def _weak(
     rows: Array, signals: WinchSignals, effects: Sequence[Effect], half_width: float
-) -> tuple[Array, Array]:
+) -> _Weak:
     step = signals.angle.interval
     half = max(2, round(half_width / step))
     columns = 1 + sum(effect.regressors(rows[:1]).shape[2] for effect in effects)
     if len(rows) < 2 * half + 1:
-        return np.zeros(0), np.zeros((0, columns))
+        return _Weak(np.zeros(0), np.zeros((0, columns)), np.zeros(0, dtype=np.bool_))
     window, stride = make_window(half, step), max(1, half // 2)
     load = rows[:, WinchSignal.TORQUE] - signals.radius * rows[:, WinchSignal.TENSION]
     inertia = weigh(window.second, rows[:, WinchSignal.ANGLE], stride)
     added = np.concatenate([effect.regressors(rows)[:, 0] for effect in effects], axis=1)
     target = weigh(window.weights, load, stride)
-    return target, np.column_stack([inertia, weigh(window.weights, added, stride)])
+    # The mean of the signs is ±1 where the shaft turns one way throughout.
+    signs = np.sign(rows[:, WinchSignal.SPEED])
+    one_way = weigh(np.full(len(window.weights), 1.0 / len(window.weights)), signs, stride)
+    turns = np.abs(one_way) < 1.0 - 0.5 / len(window.weights)
+    added = weigh(window.weights, added, stride)
+    return _Weak(target, np.column_stack([inertia, added]), turns)
 
 
-def _with_instruments(
-    pieces: Sequence[tuple[Array, Array]],
+def _kept(turns: NDArray[np.bool_]) -> list[slice]:
+    """Return the stretches of windows without reversal."""
+    edges = np.flatnonzero(np.diff(np.concatenate([[True], turns, [True]]).astype(int)))
+    return [slice(a, b) for a, b in zip(edges[::2], edges[1::2], strict=True)]
+
+
+def _instrument_columns(
+    pieces: Sequence[_Weak],
     simulated: WinchSignals,
     effects: Sequence[Effect],
     half_width: float,
     band: float | None,
-) -> list[Record]:
-    found = [
-        _weak(rows, simulated, effects, half_width) for _, rows in signal_rows(simulated, band)
-    ]
-    if [len(y) for y, _ in found] != [len(y) for y, _ in pieces]:
+) -> list[Array]:
+    found = _pieces(simulated, effects, half_width, band)
+    if [len(each.target) for each in found] != [len(each.target) for each in pieces]:
         raise InputError(
             "instruments have other stretches than the recording; "
             "allowed: signals at the recording's times"
         )
-    return [
-        Record(y, phi, instruments=z)
-        for (y, phi), (_, z) in zip(pieces, found, strict=True)
-        if len(y)
-    ]
+    return [each.columns for each in found]
 
 
 def _linear_effect(name: str) -> Effect:

@@ -24,12 +24,14 @@ class TorqueError(NamedTuple):
         times: [s], shape (n,).
         measured: [N·m], shape (n,).
         predicted: [N·m], shape (n,).
+        speeds: of the motor shaft, not in that band [rad/s], shape (n,).
         percent: 100·|measured − predicted|/|measured|.
     """
 
     times: Array
     measured: Array
     predicted: Array
+    speeds: Array
     percent: float
 
 
@@ -58,11 +60,13 @@ def torque_error(
         inner = slice(skip, max(skip, len(times) - skip))
         predicted = _predict(rows, signals, inertia, effects)
         both = Samples(times, np.column_stack([rows[:, WinchSignal.TORQUE], predicted]))
-        parts.append(np.column_stack([times, smooth(both, band).at(times)])[inner])
+        columns = [times, smooth(both, band).at(times), rows[:, WinchSignal.SPEED]]
+        parts.append(np.column_stack(columns)[inner])
     table = np.concatenate(parts)
     left = np.linalg.norm(table[:, 1] - table[:, 2])
     percent = 100.0 * left / np.linalg.norm(table[:, 1])
-    return TorqueError(table[:, 0], table[:, 1], table[:, 2], float(percent))
+    times, measured, predicted, speeds = table.T
+    return TorqueError(times, measured, predicted, speeds, float(percent))
 
 
 def _predict(

@@ -6,6 +6,9 @@ PIP := $(BIN)/python -m pip install --quiet --disable-pip-version-check
 SCENARIO ?= worst_case
 # One worker per processor; a file's tests stay together, since they share what they set up.
 SPREAD := -n logical --dist loadfile
+# What goes by the wall clock fails where other programs take the processor in between; a defect
+# fails every time.
+RERUNS := 2
 
 # ROS 2 Jazzy comes as wheels, unless a native one is sourced. Both at once would mix their libraries.
 ROS := wheels
@@ -14,7 +17,7 @@ ifneq ($(wildcard $(addsuffix /rclpy/_rclpy_pybind11*.so,$(subst :, ,$(PYTHONPAT
 ROS := native
 # Its plugins for pytest are written for the pytest of its own distribution.
 export PYTEST_DISABLE_PLUGIN_AUTOLOAD := 1
-export PYTEST_ADDOPTS := -p pytest_cov -p xdist
+export PYTEST_ADDOPTS := -p pytest_cov -p xdist -p pytest_rerunfailures
 endif
 endif
 
@@ -27,8 +30,8 @@ run: $(VENV)/$(ROS).stamp ## build what a run needs and simulate the worst-case 
 	@$(BIN)/cspm run $(SCENARIO)
 
 test: lint ## build what the tests need; then style, types and all tests
+	$(BIN)/python -m pytest -m alone --reruns $(RERUNS)
 	$(BIN)/python -m pytest $(SPREAD) -m "not alone"
-	$(BIN)/python -m pytest -m alone
 
 test-fast: $(VENV)/test.stamp ## the tests without the slow ones
 	$(BIN)/python -m pytest $(SPREAD) -m "not slow"

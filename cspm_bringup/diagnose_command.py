@@ -54,8 +54,7 @@ def diagnose_command(asked: DiagnoseRequest, json: Path | None) -> None:
         InputError: naming what is wrong in recordings, test-bed or options.
     """
     console = make_console()
-    if asked.out is not None:
-        refuse_existing(asked.out)
+    refuse_existing(asked.out)
     twice = set(asked.recordings) & set(asked.held_out)
     if twice:
         raise InputError(

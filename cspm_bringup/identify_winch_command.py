@@ -66,8 +66,7 @@ def identify_winch_command(asked: WinchRequest, json: Path | None) -> None:
     Raises:
         InputError: naming what is wrong in recordings, test-bed or options.
     """
-    if asked.out is not None:
-        refuse_existing(asked.out)
+    refuse_existing(asked.out)
     searched = [read_measurement(path, asked.testbed) for path in asked.recordings]
     held_out = [read_measurement(path, asked.testbed) for path in asked.held_out]
     age = torque_age(searched[0]) if asked.torque_age is None else asked.torque_age

@@ -96,6 +96,7 @@ def test_the_test_for_bias_errs_as_often_as_it_says():
     assert inside >= binom.ppf(1e-3, 60, 0.9)
 
 
+@pytest.mark.slow
 def test_output_error_of_the_closed_loop_is_unbiased():
     """The loop is simulated with its controller, so that noise has no way into the regressors."""
     made = closed_loop(WINCH, 3000, noise=5.0 * NOISE, seed=3)

@@ -102,6 +102,7 @@ def deliver(intake, sent, seed):
             intake.take(queue, payload)
 
 
+@pytest.mark.slow
 @settings(max_examples=6)
 @given(seed=SEEDS)
 def test_any_delivery_makes_the_same_file(case, tmp_path_factory, seed):
@@ -118,6 +119,7 @@ def test_any_delivery_makes_the_same_file(case, tmp_path_factory, seed):
     assert intake.told == sorted(intake.told)
 
 
+@pytest.mark.slow
 @settings(max_examples=5)
 @given(seed=SEEDS)
 def test_recorded_while_it_runs(case, tmp_path_factory, seed):

@@ -210,6 +210,7 @@ def listening(ros_type, topic, **policies):
     return lambda node: node.create_subscription(ros_type, topic, lambda _: None, qos)
 
 
+@pytest.mark.slow
 def test_listeners_that_cannot_be_served_do_not_keep_a_run_from_starting(tmp_path):
     from rclpy.qos import DurabilityPolicy, ReliabilityPolicy
 
@@ -247,6 +248,7 @@ def test_two_runs_in_one_domain_do_not_mix(tmp_path, name, topic):
     assert "\n" not in str(caught.value)
 
 
+@pytest.mark.slow
 def test_who_ends_another_run_does_not_end_this_one(tmp_path):
     """The ends of other runs come all the time, before the start and after it."""
     domain = new_domain()
@@ -271,6 +273,7 @@ def test_who_ends_another_run_does_not_end_this_one(tmp_path):
 # The command line
 
 
+@pytest.mark.slow
 def test_the_command_line_runs_a_graph(tmp_path):
     folder = tmp_path / "bag"
     code, out, err = done(

@@ -242,6 +242,7 @@ def test_wrong_options_are_one_line(cspm, words, text):
     assert cspm("identify", "system", "nothing", *words) == (2, f"cspm: {text}\n")
 
 
+@pytest.mark.slow
 def test_a_scenario_runs_on_another_machine(cspm, tmp_path):
     text = FILE.text.replace("mass: {value: 4.06,", "mass: {value: 4.35,")
     (tmp_path / "heavy.yaml").write_text(text, encoding="utf-8")

@@ -35,6 +35,7 @@ def test_units_of_time(unit, value):
     assert stamps([0, value], column="t", unit=unit) == [0, 1_000_000]
 
 
+@pytest.mark.slow
 def test_a_rate_counts_rows_without_drift():
     assert stamps(None, rate=1000 / 3) == [0, 3_000_000, 6_000_000, 9_000_000]
     one_day = times_of(None, 86_400_001, Clock(rate=1000.0), "").stamp_ns[-1]

@@ -48,6 +48,7 @@ def test_with_known_colour_it_is_generalised_least_squares():
     np.testing.assert_allclose(found.correlation, expected, atol=0.1)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("whiten", "interval"),
     [

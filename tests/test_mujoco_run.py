@@ -94,6 +94,7 @@ def test_an_old_mujoco_is_one_line(monkeypatch):
         assemble(bundle.scenario, bundle.testbed.testbed, Path(), "mujoco")
 
 
+@pytest.mark.slow
 @pytest.mark.compiled
 def test_both_plants_agree_in_closed_loop():
     case = Case("worst_case", "", ("duration=6", "sensors=ideal", "target.motion.ramp=2"))
@@ -103,6 +104,7 @@ def test_both_plants_agree_in_closed_loop():
     assert found.tension < 1e-5
 
 
+@pytest.mark.slow
 @pytest.mark.compiled
 def test_rounding_sensors_set_them_apart_within_the_sensors_resolution():
     found = compare(Case("worst_case", "", ("duration=3",)))
@@ -110,6 +112,7 @@ def test_rounding_sensors_set_them_apart_within_the_sensors_resolution():
     assert 1e-6 < found.tension < 0.01
 
 
+@pytest.mark.slow
 @pytest.mark.compiled
 def test_noise_without_rounding_does_not_set_them_apart(monkeypatch):
     def unrounded(path):

@@ -61,6 +61,7 @@ def ask(session, node, service, ros_type, request):
     return answer.result()
 
 
+@pytest.mark.slow
 def test_nodes_by_hand_in_any_order_with_a_topic_of_another_name(tmp_path):
     """The plant comes first, shows its parameters, and runs once the others are there."""
     domain = new_domain()

@@ -130,6 +130,7 @@ def test_energy_changes_by_the_work_that_is_done(machines, name):
     assert works["dampers"] < 0.0
 
 
+@pytest.mark.slow
 def test_energy_is_booked_where_cables_slacken_and_catch(machines):
     plant = make_plant(machines["general"], random_motion(seed=8), period_ns=50_000)
     plant.bar_state[6:] = [0.3, -0.2, 0.5, 1.0, -0.8, 0.6]

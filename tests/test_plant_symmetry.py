@@ -25,6 +25,7 @@ def start(testbed, motion, pose=POSE, twist=(0.02, -0.03, 0.01, 0.05, -0.04, 0.0
     return plant
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", MIRRORS)
 def test_the_mirror_image_of_the_thesis_machine_moves_like_its_mirror_image(thesis, name):
     signs, swap = MIRRORS[name]

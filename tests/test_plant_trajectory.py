@@ -127,6 +127,7 @@ def test_trajectories_converge_to_those_of_a_high_order_integrator_with_order_fo
     assert errors[2] < 1e-8
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", ["thesis", "rig", "general"])
 def test_trajectories_agree_where_cables_slacken_and_catch(machines, name):
     testbed, motion = machines[name], random_motion(seed=8)

@@ -67,6 +67,7 @@ def places(content, count, seed):
     return sorted({*edges, *rng.sample(range(len(content)), count)})
 
 
+@pytest.mark.slow
 def test_a_cut_anywhere_leaves_what_stands_before_it(tmp_path, sample):
     content, rows = sample
     path, whole = tmp_path / "cut.mcap", tmp_path / "whole.mcap"
@@ -83,6 +84,7 @@ def test_a_cut_anywhere_leaves_what_stands_before_it(tmp_path, sample):
     assert counts[0] is None
 
 
+@pytest.mark.slow
 def test_a_flipped_byte_anywhere_gives_a_line_or_the_right_rows(tmp_path, sample):
     content, rows = sample
     path, whole = tmp_path / "flipped.mcap", tmp_path / "whole.mcap"

@@ -177,6 +177,7 @@ def prefix(folder, target, last):
     return rewrite(folder, target, shorten)
 
 
+@pytest.mark.slow
 def test_every_place_inside_an_instant_is_recognised(folder, tmp_path):
     for last in (1, 6, 15):
         found = again(prefix(folder, tmp_path / f"cut{last}", last))

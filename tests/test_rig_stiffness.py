@@ -33,6 +33,7 @@ def loose():
     return identify_stiffness(specimens(TRUTH._replace(dahl_force=0.4)))
 
 
+@pytest.mark.slow
 def test_the_truth_is_within_the_intervals(clean):
     # Five intervals of 95 %; wide enough to hold and narrow enough to say something.
     truth = dict(a=TRUTH.a, b=TRUTH.b, c=TRUTH.c, d=TRUTH.d, rigidity=TRUTH.rigidity)

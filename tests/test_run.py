@@ -67,6 +67,7 @@ def test_every_topic_of_the_machines_parts_is_there_and_no_other(tmp_path, scena
             assert info.ros_type == expected
 
 
+@pytest.mark.slow
 def test_other_tools_read_the_same_numbers(folder, heard):
     """Every message by its own class, read by rosbags, against what the loop sent."""
     seen = dict.fromkeys(heard.messages, 0)

@@ -195,6 +195,7 @@ def draw(path, result, cables):
     return imread(path)
 
 
+@pytest.mark.slow
 def test_the_figure_shows_every_signal(measured, tmp_path):
     result, _ = measured
     picture = draw(tmp_path / "run.png", result, THESIS_CABLES)

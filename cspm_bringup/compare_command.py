@@ -92,18 +92,19 @@ def print_comparison(console: Console, found: Comparison) -> None:
     for block, title in titles.items():
         channels = [channel for channel in found.channels if channel.block == block]
         if channels:
-            console.print(_table(title, channels))
+            say(console, f"\n{title}")
+            console.print(_table(channels))
     for block, reason in found.left_out.items():
         say(console, f"{block}: left out, {reason}")
     if found.windows[1]:
         say(console, f"{found.windows[1]} of {found.windows[0]} windows diverged and are left out")
 
 
-def _table(title: str, channels: list[Channel]) -> Table:
-    table = Table(title=title, box=box.SIMPLE, title_justify="left", padding=(0, 1, 0, 0))
+def _table(channels: list[Channel]) -> Table:
+    table = Table(box=box.SIMPLE_HEAD, show_edge=False, padding=(0, 1, 0, 0))
     table.add_column("channel", no_wrap=True)
-    for column in ("VAF %", "NRMSE", "RMS error", "noise floor", "bias", "lag ms"):
-        table.add_column(column, justify="right", no_wrap=column != "noise floor")
+    for column in ("VAF %", "NRMSE", "RMS error", "floor", "bias", "lag ms"):
+        table.add_column(column, justify="right", no_wrap=True)
     for c in channels:
         table.add_row(
             f"{c.name} {c.unit}",

@@ -13,10 +13,11 @@ from numpy.typing import NDArray
 
 from cspm_ident.block_simulation import BlockSimulation, Drive, Simulated, Window
 from cspm_ident.comparison.channel import Channel
-from cspm_ident.comparison.floor import NoiseSource, lasting_rms, noise_of, propagated
+from cspm_ident.comparison.floor import lasting_rms, propagated
 from cspm_ident.comparison.metrics import error_bins
 from cspm_ident.signals.delays import Delay, find_delays
 from cspm_ident.signals.measurement import BAR, SPEED, TENSION, WINCHES, Measurement
+from cspm_ident.signals.noise_source import NoiseSource, noise_of
 from cspm_ident.signals.samples import Samples
 from cspm_ident.signals.timeline import Timeline
 from cspm_msgs_py.dofs import DOFS

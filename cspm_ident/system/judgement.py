@@ -10,8 +10,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from cspm_ident.block_simulation import BlockSimulation, Drive
-from cspm_ident.comparison.floor import noise_of
 from cspm_ident.signals.measurement import BAR, Measurement
+from cspm_ident.signals.noise_source import noise_of
 from cspm_ident.signals.timeline import Timeline
 from cspm_ident.system.lateness import delays_to_remove
 from cspm_ident.vaf import vaf

@@ -9,9 +9,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from cspm_ident.block_simulation import BlockSimulation, Drive, Window
-from cspm_ident.comparison.floor import noise_of
 from cspm_ident.signals.measurement import BAR, FRAME, TENSION, WINCHES, Measurement
 from cspm_ident.signals.noise import noise_above_band, with_more_noise
+from cspm_ident.signals.noise_source import noise_of
 from cspm_ident.signals.timeline import Timeline
 from cspm_ident.system.lateness import delays_to_remove
 from cspm_msgs_py.errors import InputError

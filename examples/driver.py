@@ -1,11 +1,12 @@
 """Drives, load cells and motion capture: a driver to fill in, explained in docs/drivers.md."""
 
+import signal
+import sys
 import time
-from contextlib import suppress
+from operator import le
 
 import rclpy
-from geometry_msgs.msg import Point, Pose, PoseStamped, Quaternion
-from rclpy.executors import ExternalShutdownException
+from geometry_msgs.msg import Point, Pose, PoseStamped
 from rclpy.node import Node
 from sensor_msgs.msg import JointState
 from std_msgs.msg import Bool, Header
@@ -13,7 +14,7 @@ from std_msgs.msg import Bool, Header
 CABLES = ["hoist_1", "hoist_2", "surge_1", "surge_2", "sway_1", "sway_2", "sway_3", "sway_4"]
 RADII = [0.0025] * 2 + [0.025] * 6  # drum radius over gear ratio [m]
 LIMITS = [0.5] * 2 + [2.0] * 2 + [1.0] * 4  # largest torques [N·m]
-POSES = {"/winch_frame/pose": Point(), "/bar/pose": Point(z=2.0)}  # z down [m]
+POSES = {"/winch_frame/pose": Pose(), "/bar/pose": Pose(position=Point(z=2.0))}  # z down [m]
 
 
 class Hardware:
@@ -37,8 +38,8 @@ class Driver(Node):
 
     def __init__(self) -> None:
         super().__init__("driver")
-        self.hardware, self.braked, self.tripped = Hardware(), False, False
-        self.commanded = float("inf")  # when the last command came; none came yet
+        self.hardware, self.commanded = Hardware(), float("inf")  # when the last command came
+        self.braked = self.tripped = False
         self.watchdog = self.declare_parameter("watchdog", 0.05).value  # s
         self.winches = self.create_publisher(JointState, "/winches/state", 10)
         self.cells = self.create_publisher(JointState, "/cables/tension", 10)
@@ -57,15 +58,13 @@ class Driver(Node):
             told = {"position": angles, "velocity": speeds, "effort": torques}
             self.winches.publish(JointState(header=header, name=CABLES, **told))
         self.cells.publish(JointState(header=header, name=CABLES, effort=tensions))
-        for name, place in POSES.items():
-            pose = Pose(position=place, orientation=Quaternion(w=1.0))
+        for name, pose in POSES.items():
             self.poses[name].publish(PoseStamped(header=header, pose=pose))
 
     def _command(self, message: JointState) -> None:
         self.commanded, torques = time.monotonic(), list(message.effort)
-        good = list(message.name) == CABLES and len(torques) == len(CABLES)
-        good = good and all(abs(t) <= most for t, most in zip(torques, LIMITS, strict=True))
-        self.tripped |= not good
+        named = list(message.name) == CABLES and len(torques) == len(CABLES)
+        self.tripped |= not (named and all(map(le, map(abs, torques), LIMITS)))
         if not self.tripped:
             self.hardware.write(torques, self.braked)
 
@@ -74,6 +73,7 @@ class Driver(Node):
 
 
 if __name__ == "__main__":
-    rclpy.init()
-    with suppress(KeyboardInterrupt, ExternalShutdownException):
-        rclpy.spin(Driver())
+    rclpy.init(signal_handler_options=rclpy.signals.SignalHandlerOptions.NO)  # none ends a call
+    for number in (signal.SIGINT, signal.SIGTERM):
+        signal.signal(number, lambda *_: sys.exit())
+    rclpy.spin(Driver())

@@ -77,7 +77,7 @@ def test_its_machine_is_the_thesiss(module, bundle):
     assert tuple(module.CABLES) == bundle.testbed.testbed.cable_names
     assert [cable.drum_radius / cable.gear_ratio for cable in cables] == pytest.approx(module.RADII)
     assert [cable.torque_limit for cable in cables] == module.LIMITS
-    assert module.POSES[BAR_POSE].z == bundle.scenario.bar_mean_pose[2]
+    assert module.POSES[BAR_POSE].position.z == bundle.scenario.bar_mean_pose[2]
 
 
 def test_its_scenario_can_be_run_in_real_time():

@@ -12,10 +12,6 @@ import time
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 
-from rich.box import SIMPLE_HEAD
-from rich.console import Console
-from rich.table import Table
-
 from bench.thesis_machine import SCENARIOS
 from cspm_bringup.assembly import resolve
 from cspm_bringup.bundle import make_bundle
@@ -27,6 +23,7 @@ from cspm_msgs_py.scenario import load_scenario
 from cspm_msgs_py.testbed import EffectEntry, load_testbed
 
 DURATION_S = 60
+FIRST_SEED = 100
 
 
 @dataclass(frozen=True)
@@ -66,17 +63,14 @@ def main() -> None:
     parser.add_argument("--only", metavar="EFFECT", help="cases of one effect alone")
     only = parser.parse_args().only
     cases = [case for case in CASES if only in (None, case.effect)]
-    console, table = Console(), Table(box=SIMPLE_HEAD)
-    for heading in ("planted", "plant, capture", "verdict", "found", "seconds"):
-        table.add_column(heading)
+    print("| planted | plant, capture | verdict | found | seconds |\n|---|---|---|---|---:|")
     with tempfile.TemporaryDirectory() as folder:
-        for seed, case in enumerate(cases, start=100):
+        for case in cases:
+            seed = FIRST_SEED + CASES.index(case)
             place = Path(folder) / str(seed)
-            with console.status(f"{case.effect or 'nothing'}: recording"):
-                record(case, seed, place)
-            with console.status(f"{case.effect or 'nothing'}: diagnosing"):
-                table.add_row(_planted(case), f"{case.plant}, {case.capture} Hz", *judge(place))
-    console.print(table)
+            record(case, seed, place)
+            row = (_planted(case), f"{case.plant}, {case.capture} Hz", *judge(place))
+            print(f"| {' | '.join(row)} |", flush=True)
 
 
 def record(case: Case, seed: int, folder: Path) -> None:
@@ -110,9 +104,9 @@ def judge(folder: Path) -> tuple[str, str, str]:
                 for n in numbers_of(found, candidate)
             )
             lines.append(f"{candidate.effect_id} {candidate.element}: {numbers}")
-        lines += [f"  or {rival.effect.id}" for rival, _ in named.alternatives]
+        lines += [f"or {rival.effect.id}" for rival, _ in named.alternatives]
     lines += [f"unknown, {d.place.element}: {d.signal}" for d, _, _ in found.findings.unknown]
-    return verdict_of(found).value, "\n".join(lines), f"{took:.0f}"
+    return verdict_of(found).value, "<br>".join(lines), f"{took:.0f}"
 
 
 def _planted(case: Case) -> str:

@@ -49,7 +49,8 @@ def diagnose(
     out: Annotated[
         Path | None,
         typer.Option(
-            metavar="FOLDER", help="A new folder for diagnosis.json and testbed.improved.yaml."
+            metavar="FOLDER",
+            help="A new folder for diagnosis.json, its picture and testbed.improved.yaml.",
         ),
     ] = None,
     json: Json = None,

@@ -88,6 +88,7 @@ def test_friction_of_one_winch_is_found_named_and_modelled(cspm, capsys):
         capsys, "run", "rest", "--testbed", "verdict/testbed.improved.yaml", "--no-record"
     )
     assert code == 0
+    assert (cspm.folder / "verdict" / "diagnosis.png").read_bytes().startswith(b"\x89PNG")
 
 
 @pytest.mark.slow

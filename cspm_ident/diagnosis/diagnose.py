@@ -12,7 +12,7 @@ from cspm_ident.diagnosis.columns import Candidate, Place
 from cspm_ident.diagnosis.equation import Equation
 from cspm_ident.diagnosis.evidence import Evidence, gather
 from cspm_ident.diagnosis.recorded import equations_of
-from cspm_ident.diagnosis.refine import refine
+from cspm_ident.diagnosis.refine import Cut, needs_refining, refine
 from cspm_ident.diagnosis.search import Findings, Named, Search
 from cspm_ident.signals.measurement import Measurement
 from cspm_msgs_py.errors import InputError
@@ -109,7 +109,10 @@ def diagnose(
     kept, rejected = _confirmed(search, judge, found)
     progress("parameters")
     candidates = [c for each in kept for c in each.hypothesis.candidates]
-    weights = refine(searched, candidates, noise, block, lambda p: p if held_out else _first(p))
+    weights = _weights(search, kept)
+    if any(needs_refining(candidate.effect) for candidate in candidates):
+        searched_part: Cut = _whole if held_out else _first
+        weights = refine(searched, candidates, noise, block, searched_part)
     fit = _fit(search, kept, judge, _scaled(judge_parts, noise), noise)
     return Diagnosis(
         searched,
@@ -140,6 +143,11 @@ def _parts(
     if held_out:
         return found, [equations_of(m, effects, progress) for m in held_out]
     return _first(found), _last(found)
+
+
+def _whole(parts: Parts) -> Parts:
+    """Return what is searched where other recordings are held out."""
+    return parts
 
 
 def _first(parts: Sequence[Sequence[Equation]]) -> list[list[Equation]]:

@@ -81,6 +81,11 @@ def refine(
     }
 
 
+def needs_refining(effect: Effect) -> bool:
+    """Return whether an effect's columns depend on its parameters, or on what is corrected."""
+    return _is_applied(effect) or bool(effect.nonlinear)
+
+
 def _is_applied(effect: Effect) -> bool:
     """Return whether machine or readings are corrected by it, so that what is fitted adds up."""
     return effect.alter is not None or effect.sense is not None

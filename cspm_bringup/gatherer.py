@@ -158,7 +158,8 @@ class Gatherer:
             expected = self._next_status[node] * self._schedule.period_ns
         except (InputError, ValueError, KeyError):
             self._refuse(
-                DIAGNOSTICS.name, f"{DIAGNOSTICS.name}: not one status of a node of this run"
+                DIAGNOSTICS.name,
+                f"{DIAGNOSTICS.name}: not one status of a node of this run, allowed: one",
             )
             return
         if stamp != expected:

@@ -18,7 +18,7 @@ hypothesis.settings.load_profile("cspm")
 
 THESIS = Path(__file__).resolve().parents[1] / "scenarios" / "testbeds" / "thesis.yaml"
 
-LEFT_TO_OTHERS_S = 330.0
+LEFT_TO_OTHERS_S = 540.0
 
 EXPONENTIAL = {
     "law": "exponential",
@@ -166,7 +166,7 @@ def pytest_runtest_setup(item):
     until = os.environ.get("CSPM_SLOW_TESTS_BEGIN_UNTIL")
     if not until or not item.get_closest_marker("slow"):
         return
-    # What runs alone comes first and uses one processor: it leaves half of the time to the rest.
+    # What runs alone comes first and uses one processor: it leaves most of the time to the rest.
     left = float(until) - time.time()
     if left < (LEFT_TO_OTHERS_S if item.get_closest_marker("alone") else 0.0):
         pytest.skip("this machine is too slow for all slow tests: `make test` has no such limit")

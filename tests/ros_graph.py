@@ -88,7 +88,8 @@ def content(folder):
 
 def assert_same(folder, other):
     """Hold two recordings to be the same, bit for bit in every field of every topic."""
-    assert difference(folder, other) is None
+    found = difference(folder, other)
+    assert found is None, found
     assert hashes(folder) == hashes(other)
 
 

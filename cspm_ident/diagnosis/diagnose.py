@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from cspm_ident.diagnosis.columns import Candidate, Place
-from cspm_ident.diagnosis.equation import Equation
+from cspm_ident.diagnosis.equation import Equation, in_noise
 from cspm_ident.diagnosis.evidence import Evidence, gather
 from cspm_ident.diagnosis.recorded import equations_of
 from cspm_ident.diagnosis.refine import Cut, needs_refining, refine
@@ -101,11 +101,11 @@ def diagnose(
     noise = _noise(search_parts)
     spans = [_span(part) for part in search_parts]
     block = max(SHORTEST_BLOCK_S, sum(b - a for a, b in spans) / BLOCKS)
-    evidence = gather(_scaled(search_parts, noise), block)
+    evidence = gather(in_noise(search_parts, noise), block)
     search = Search(evidence, progress)
     found = search.run()
     progress("held-out data")
-    judge = gather(_scaled(judge_parts, noise), block)
+    judge = gather(in_noise(judge_parts, noise), block)
     kept, rejected = _confirmed(search, judge, found)
     progress("parameters")
     candidates = [c for each in kept for c in each.hypothesis.candidates]
@@ -113,7 +113,7 @@ def diagnose(
     if any(needs_refining(candidate.effect) for candidate in candidates):
         searched_part: Cut = _whole if held_out else _first
         weights = refine(searched, candidates, noise, block, searched_part)
-    fit = _fit(search, kept, judge, _scaled(judge_parts, noise), noise)
+    fit = _fit(search, kept, judge, in_noise(judge_parts, noise), noise)
     return Diagnosis(
         searched,
         held_out,
@@ -180,10 +180,6 @@ def _noise(parts: Sequence[Sequence[Equation]]) -> dict[Place, Array]:
     return {place: np.median(noises, axis=0) for place, noises in found.items()}
 
 
-def _scaled(parts: Sequence[Sequence[Equation]], noise: dict[Place, Array]) -> list[list[Equation]]:
-    return [[e.scaled(noise[e.place]) for e in part if e.place in noise] for part in parts]
-
-
 def _confirmed(
     search: Search, judge: Evidence, found: Findings
 ) -> tuple[tuple[Named, ...], tuple[Named, ...]]:
@@ -204,16 +200,11 @@ def _confirmed(
 
 
 def _weights(search: Search, named: Sequence[Named]) -> dict[Candidate, tuple[Array, Array]]:
-    hypotheses = [each.hypothesis for each in named]
-    columns = search.columns(hypotheses)
-    values, widths = search.sums.weights(columns), search.sums.half_width(columns)
-    where = {int(index): k for k, index in enumerate(columns)}
-    found = {}
-    for hypothesis in hypotheses:
-        for candidate in hypothesis.candidates:
-            own = [where[i] for i in range(*search.evidence.slices[candidate].indices(1 << 30))]
-            found[candidate] = values[own], widths[own]
-    return found
+    candidates = [c for each in named for c in each.hypothesis.candidates]
+    columns = search.evidence.with_nuisance(candidates)
+    values = search.evidence.parted(candidates, search.sums.weights(columns))
+    widths = search.evidence.parted(candidates, search.sums.half_width(columns))
+    return {c: (values[c], widths[c]) for c in candidates}
 
 
 def _fit(

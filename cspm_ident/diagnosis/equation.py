@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 
 import numpy as np
@@ -59,3 +59,10 @@ class Equation:
         nuisance = self.nuisance[rows] if self.nuisance.size else self.nuisance
         target, measured = self.target[rows], self.measured[rows]
         return Equation(self.place, self.times[rows], target, columns, measured, nuisance)
+
+
+def in_noise(
+    parts: Sequence[Sequence[Equation]], noise: Mapping[Place, Array]
+) -> list[list[Equation]]:
+    """Return equations in units of their noise, without those whose noise is not known."""
+    return [[e.scaled(noise[e.place]) for e in part if e.place in noise] for part in parts]

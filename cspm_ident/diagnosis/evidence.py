@@ -6,7 +6,7 @@ them, so that hundreds of hypotheses cost no second look at the signals.
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from typing import NamedTuple
 
@@ -49,7 +49,6 @@ class Evidence:
         nuisance: indices of the columns that are always fitted.
         places: the residuals.
         times: of the blocks' beginnings [s], shape (blocks,).
-        recording: index of each block's recording, shape (blocks,).
     """
 
     slices: dict[Candidate | Driver, slice]
@@ -57,12 +56,28 @@ class Evidence:
     nuisance: Index
     places: tuple[PlaceEvidence, ...]
     times: Array
-    recording: NDArray[np.intp]
 
     @property
     def terms(self) -> tuple[Candidate | Driver, ...]:
         """Everything that has columns."""
         return tuple(self.slices)
+
+    def columns_of(self, terms: Iterable[Candidate | Driver]) -> Index:
+        """Return the indices of some terms' columns, one term after the other."""
+        spans = [self.slices[term] for term in terms]
+        own = [np.arange(span.start, span.stop) for span in spans]
+        return np.concatenate([np.zeros(0, dtype=np.intp), *own])
+
+    def with_nuisance(self, terms: Iterable[Candidate | Driver]) -> Index:
+        """Return the indices of the nuisance's columns, then those of some terms."""
+        return np.concatenate([self.nuisance, self.columns_of(terms)])
+
+    def parted(self, terms: Sequence[Candidate], values: Array) -> dict[Candidate, Array]:
+        """Return values in the order of `columns_of`, term by term; what precedes is left out."""
+        widths = [self.slices[term].stop - self.slices[term].start for term in terms]
+        own = values[len(values) - sum(widths) :]
+        parts = np.split(own, np.cumsum(widths, dtype=np.intp))
+        return dict(zip(terms, parts[:-1], strict=True))
 
     def left(self, columns: Index, weights: Array) -> dict[Place, float]:
         """Return Σ residual² of each place for some columns' weights."""
@@ -120,7 +135,7 @@ def gather(recordings: Sequence[Sequence[Equation]], block_s: float) -> Evidence
     gathered = tuple(
         _of_place(place, parts, slices, edges, recording) for place, parts in places.items()
     )
-    return Evidence(slices, first, np.array(nuisance, dtype=np.intp), gathered, edges, recording)
+    return Evidence(slices, first, np.array(nuisance, dtype=np.intp), gathered, edges)
 
 
 def _registry(equations: Sequence[Equation]) -> tuple[dict[Candidate | Driver, slice], int]:
@@ -154,13 +169,11 @@ def _of_place(
     edges: Array,
     recording: NDArray[np.intp],
 ) -> PlaceEvidence:
-    used: dict[int, int] = {}
+    used: set[int] = set()
     for _, equation, own in parts:
-        for index in own:
-            used.setdefault(index, 0)
-        for candidate in equation.columns:
-            for index in range(*slices[candidate].indices(1 << 30)):
-                used.setdefault(index, 0)
+        used.update(own)
+        for term in equation.columns:
+            used.update(range(slices[term].start, slices[term].stop))
     columns = np.array(sorted(used), dtype=np.intp)
     where = {int(index): k for k, index in enumerate(columns)}
     grams = np.zeros((len(edges), len(columns) + 1, len(columns) + 1))

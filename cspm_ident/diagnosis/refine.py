@@ -15,8 +15,9 @@ from numpy.typing import NDArray
 
 from cspm_ident.diagnosis.columns import Candidate, Place
 from cspm_ident.diagnosis.drivers import Driver
-from cspm_ident.diagnosis.equation import Equation
+from cspm_ident.diagnosis.equation import Equation, in_noise
 from cspm_ident.diagnosis.evidence import Evidence, gather
+from cspm_ident.diagnosis.readings import pose_rows, reading_rows
 from cspm_ident.diagnosis.recorded import equations_of
 from cspm_ident.diagnosis.sums import Sums
 from cspm_ident.signals.measurement import BAR, FRAME, TENSION, WINCHES, Measurement
@@ -24,10 +25,8 @@ from cspm_ident.signals.samples import Samples
 from cspm_msgs_py.errors import InputError
 from cspm_sim.effect_entries import Action, altered_testbed
 from cspm_sim.effects import Effect
-from cspm_sim.effects.signals import PoseSignal, ReadingSignal
 
 Array = NDArray[np.float64]
-Index = NDArray[np.intp]
 Weights = dict[Candidate, tuple[Array, Array]]
 Cut = Callable[[Sequence[Sequence[Equation]]], Sequence[Sequence[Equation]]]
 
@@ -67,7 +66,7 @@ def refine(
             break
         parts = cut([equations_of(m, near) for m in moved])
         wanted = list(totals)
-        scaled = [[e.scaled(noise[e.place]) for e in p if e.place in noise] for p in parts]
+        scaled = in_noise(parts, noise)
         evidence = gather([[_without_drivers(e, wanted) for e in p] for p in scaled], block_s)
         shapes, found = _fitted(evidence, shapes, wanted)
         for candidate, (weights, _) in found.items():
@@ -123,19 +122,15 @@ def _fitted(
     best: tuple[float, dict[str, tuple[tuple[str, float], ...]]] | None = None
     for point in product(*grids.values()):
         chosen = dict(zip(grids, point, strict=True))
-        left = sums.squares_of(_columns(evidence, _members(evidence, chosen, wanted)))
+        left = sums.squares_of(evidence.with_nuisance(_members(evidence, chosen, wanted)))
         if best is None or left < best[0]:
             best = left, chosen
     assert best is not None
     members = _members(evidence, best[1], wanted)
-    columns = _columns(evidence, members)
-    weights, widths = sums.weights(columns), sums.half_width(columns)
-    where = {int(index): k for k, index in enumerate(columns)}
-    found = {}
-    for candidate in members:
-        span = evidence.slices[candidate]
-        own = [where[i] for i in range(span.start, span.stop)]
-        found[candidate] = weights[own], widths[own]
+    columns = evidence.with_nuisance(members)
+    weights = evidence.parted(members, sums.weights(columns))
+    widths = evidence.parted(members, sums.half_width(columns))
+    found = {c: (weights[c], widths[c]) for c in members}
     return {name: dict(shape) for name, shape in best[1].items()}, found
 
 
@@ -156,12 +151,6 @@ def _members(
         and (term.effect_id, term.element) in wanted
         and term.shape == shapes[term.effect_id]
     ]
-
-
-def _columns(evidence: Evidence, members: Sequence[Candidate]) -> Index:
-    spans = [evidence.slices[c] for c in members]
-    own = [np.arange(span.start, span.stop) for span in spans]
-    return np.concatenate([evidence.nuisance, *own]).astype(np.intp)
 
 
 def _corrected(
@@ -197,10 +186,8 @@ def _true_readings(
         samples: Samples = getattr(measurement, kind)
         i = measurement.machine.cable_names.index(element)
         values = samples.values.copy()
-        rows = np.zeros((len(values), len(ReadingSignal)))
-        rows[:, ReadingSignal.TIME] = samples.times
         for _ in range(_FIXED_POINTS):
-            rows[:, ReadingSignal.VALUE] = values[:, i]
+            rows = reading_rows(samples.times, values[:, i])
             values[:, i] = samples.values[:, i] - effect.regressors(rows)[:, 0] @ weights
         return measurement.with_samples(kind, Samples(samples.times, values))
     kind = {BAR: "bar_pose", FRAME: "frame_pose"}[f"/{element}/pose"]
@@ -209,10 +196,8 @@ def _true_readings(
         parameters = np.array(list(effect.values(weights.tolist()).values()))
         late = np.array([effect.sense.lateness(float(t), parameters) for t in samples.times])
         return measurement.with_samples(kind, Samples(samples.times - late, samples.values))
-    rows = np.zeros((len(samples.times), int(PoseSignal.RATE) + 6))
-    rows[:, PoseSignal.TIME] = samples.times
     values = samples.values
     for _ in range(_FIXED_POINTS):
-        rows[:, PoseSignal.POSE : PoseSignal.POSE + 6] = values
+        rows = pose_rows(samples.times, values, np.zeros_like(values))
         values = samples.values - effect.regressors(rows) @ weights
     return measurement.with_samples(kind, Samples(samples.times, values))

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Sequence
+from copy import copy
 from dataclasses import dataclass
 from typing import NamedTuple
 
@@ -104,23 +105,18 @@ class Search:
 
     def retuned(self) -> dict[Candidate, Array]:
         """Return the weights of the file's own parameters, fitted where it helps, nothing added."""
-        everything = self._effects
-        self._effects = [c for c in everything if c.effect.alter is not None]
-        chosen = self._chosen()
-        self._effects = everything
-        columns = self.columns(chosen)
-        found = dict(zip(columns.tolist(), self.sums.weights(columns), strict=True))
-        own = [c for h in chosen for c in h.candidates]
-        return {c: np.array([found[i] for i in self._of(c)]) for c in own}
+        narrow = copy(self)
+        narrow._effects = [c for c in self._effects if c.effect.alter is not None]
+        own = [c for h in narrow._chosen() for c in h.candidates]
+        return self.evidence.parted(own, self.sums.weights(self.evidence.with_nuisance(own)))
 
     def columns(self, hypotheses: Iterable[Hypothesis]) -> Index:
         """Return indices of the nuisance and of some hypotheses' columns."""
-        own = [self._of(c) for h in hypotheses for c in h.candidates]
-        return np.concatenate([self.evidence.nuisance, *own]).astype(np.intp)
+        return self.evidence.with_nuisance(c for h in hypotheses for c in h.candidates)
 
     def own_columns(self, hypothesis: Hypothesis) -> Index:
         """Return indices of one hypothesis's columns."""
-        return np.concatenate([self._of(c) for c in hypothesis.candidates])
+        return self.evidence.columns_of(hypothesis.candidates)
 
     def share(self, base: Index, columns: Index) -> float:
         """Return the largest share of a place's squares that columns take beyond a base."""
@@ -167,10 +163,8 @@ class Search:
         """Return the hypothesis without elements on which the effect may as well be absent."""
         columns = np.concatenate([base, self.own_columns(hypothesis)])
         sizes = np.abs(self.sums.weights(columns)) / self.sums.half_width(columns)
-        where = {int(index): k for k, index in enumerate(columns)}
-        kept = tuple(
-            c for c in hypothesis.candidates if max(sizes[where[i]] for i in self._of(c)) > 1.0
-        )
+        own = self.evidence.parted(hypothesis.candidates, sizes)
+        kept = tuple(c for c in hypothesis.candidates if own[c].max() > 1.0)
         return Hypothesis(hypothesis.effect, kept) if kept else hypothesis
 
     def _scopes(
@@ -285,15 +279,12 @@ class Search:
 
     def _is_plausible(self, hypotheses: Sequence[Hypothesis]) -> bool:
         """Return whether all parameters lie within what the catalogue allows."""
-        columns = self.columns(hypotheses)
-        weights = dict(zip(columns.tolist(), self.sums.weights(columns).tolist(), strict=True))
-        for hypothesis in hypotheses:
-            for candidate in hypothesis.candidates:
-                own = [weights[i] for i in self._of(candidate)]
-                values = candidate.effect.values(own, **candidate.nonlinear)
-                if not candidate.effect.is_plausible(values):
-                    return False
-        return True
+        candidates = [c for h in hypotheses for c in h.candidates]
+        weights = self.sums.weights(self.evidence.with_nuisance(candidates))
+        return all(
+            c.effect.is_plausible(c.effect.values(own.tolist(), **c.nonlinear))
+            for c, own in self.evidence.parted(candidates, weights).items()
+        )
 
     def _onset(self, base: Index, own: Index) -> int:
         """Return the block from which on columns act, 0 unless a later one is surely better."""
@@ -319,8 +310,7 @@ class Search:
         return bool(self.sums.excited[self._of(candidate)].all())
 
     def _of(self, term: Candidate | Driver) -> Index:
-        span = self.evidence.slices[term]
-        return np.arange(span.start, span.stop)
+        return self.evidence.columns_of([term])
 
 
 def _wider(one: Hypothesis, other: Hypothesis) -> bool:

@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 from cspm_ident.diagnosis.columns import Candidate, Place, elements_of, shapes_of
 from cspm_ident.diagnosis.drivers import Driver, driver_columns
 from cspm_ident.diagnosis.equation import Equation
+from cspm_ident.diagnosis.readings import reading_rows
 from cspm_ident.signals.measurement import TENSION, WINCHES, Measurement
 from cspm_ident.signals.winch_motion import winch_motion
 from cspm_ident.winch.recording import signal_rows, winch_signals
@@ -18,7 +19,7 @@ from cspm_msgs_py.errors import InputError
 from cspm_msgs_py.testbed import Cable
 from cspm_sim.effect_entries import Action
 from cspm_sim.effects import Channel, Effect
-from cspm_sim.effects.signals import ReadingSignal, WinchSignal
+from cspm_sim.effects.signals import WinchSignal
 
 Array = NDArray[np.float64]
 
@@ -92,8 +93,10 @@ class _Shaft:
             rows[:, WinchSignal.TORQUE] - rows[:, WinchSignal.RADIUS] * rows[:, WinchSignal.TENSION]
         ) - self._inertia * self._accelerated(rows[:, WinchSignal.ANGLE])
         for action in known:
-            for known_columns, weights in self._known(action):
-                target = target - known_columns @ weights
+            effect = action.effect
+            if effect.alter is None and effect.regression.channel is Channel.SHAFT:
+                shape = {name: action.values[name] for name in effect.nonlinear}
+                target = target - self._regressed(effect, shape) @ effect.weights(action.values)
         columns: dict[Candidate | Driver, Array] = {
             candidate: found[:, None, :]
             for effect in effects
@@ -104,12 +107,6 @@ class _Shaft:
         columns |= driver_columns(place, drivers)
         torque = self._weighed(rows[:, WinchSignal.TORQUE])[:, None]
         return Equation(place, self._times, target[:, None], columns, torque)
-
-    def _known(self, action: Action) -> Iterator[tuple[Array, Array]]:
-        effect = action.effect
-        if effect.alter is None and effect.regression.channel is Channel.SHAFT:
-            shape = {name: action.values[name] for name in effect.nonlinear}
-            yield self._regressed(effect, shape), effect.weights(action.values)
 
     def _columns(self, effect: Effect) -> Iterator[tuple[Candidate, Array]]:
         if self._name not in elements_of(effect, (self._name,), ()):
@@ -126,10 +123,8 @@ class _Shaft:
     def _read(self, effect: Effect) -> Array:
         """Return what a sensor's fault makes of the residual, by the reading's share in it."""
         tension = effect.sense is not None and effect.sense.topics[0] == TENSION
-        reading = np.zeros((len(self._rows), len(ReadingSignal)))
-        reading[:, ReadingSignal.TIME] = self._rows[:, WinchSignal.TIME]
         source = WinchSignal.TENSION if tension else WinchSignal.ANGLE
-        reading[:, ReadingSignal.VALUE] = self._rows[:, source]
+        reading = reading_rows(self._rows[:, WinchSignal.TIME], self._rows[:, source])
         change = effect.regressors(reading)[:, 0]
         if tension:
             return self._weighed(-self._rows[:, WinchSignal.RADIUS, None] * change)

@@ -9,8 +9,6 @@ from numpy.typing import NDArray
 from scipy.ndimage import gaussian_filter1d
 
 from cspm_ident.diagnosis.machine_signals import (
-    BodyState,
-    CableSpans,
     MachineSignals,
     body_state,
     cable_spans,
@@ -20,7 +18,7 @@ from cspm_ident.diagnosis.machine_signals import (
 from cspm_ident.signals.elongation import damping_of
 from cspm_msgs_py.testbed import Testbed
 from cspm_sim.effects.bar_motion import carried
-from cspm_sim.effects.signals import BarSignal, CableSignal, FrameSignal
+from cspm_sim.effects.signals import BarSignal, CableSignal
 from cspm_sim.equilibrium import unstretched_lengths
 from cspm_sim.kernels.cable import ATTACHMENT, EXIT, GEAR_RATIO, OFFSET_LENGTH, RADIUS
 from cspm_sim.kernels.plant import PlantParameters
@@ -37,6 +35,7 @@ class Suspension:
         signals: what was measured.
         parameters: of the machine as it is described.
         start: unstretched lengths at the beginning, (n,) [m].
+        bar: the bar's kinematics.
     """
 
     def __init__(
@@ -50,22 +49,12 @@ class Suspension:
         self.signals, self.parameters, self._testbed = signals, parameters, testbed
         exits = parameters.cables[:, EXIT : EXIT + 3]
         attachments = parameters.cables[:, ATTACHMENT : ATTACHMENT + 3]
-        self._bar, self._frame = body_state(signals.bar), body_state(signals.frame)
-        self._spans = cable_spans(signals, self._bar, self._frame, exits, attachments)
+        self.bar, self._frame = body_state(signals.bar), body_state(signals.frame)
+        self._spans = cable_spans(signals, self.bar, self._frame, exits, attachments)
         if start is None:
             tensions = np.maximum(signals.tensions[0], 0.0)
             start = unstretched_lengths(parameters, self._spans.lengths[0], tensions)
         self.start = start
-
-    @property
-    def bar(self) -> BodyState:
-        """The bar's kinematics."""
-        return self._bar
-
-    @property
-    def spans(self) -> CableSpans:
-        """The cables' directions and lengths."""
-        return self._spans
 
     @cached_property
     def _wound(self) -> Array:
@@ -125,7 +114,7 @@ class Suspension:
         """
         bar = self._testbed.bar
         assert bar is not None
-        state, gravity = self._bar, np.array([0.0, 0.0, self._testbed.gravity])
+        state, gravity = self.bar, np.array([0.0, 0.0, self._testbed.gravity])
         com = np.einsum("kij,j->ki", state.rotation, np.array(bar.com))
         moved = state.acceleration + carried(state.omega, state.alpha, com)
         turned = np.einsum("kij,jl,kml->kim", state.rotation, bar.inertia.matrix, state.rotation)
@@ -146,13 +135,17 @@ class Suspension:
         """Return what a longer unstretched length at the start adds to the residual, (k,) [N/m]."""
         return np.asarray(self._law[:, i, 1] * self._wound[:, i] / self._wound[0, i])
 
-    def cable_rows(self, i: int) -> Array:
-        """Return `CableSignal` columns of cable i."""
+    @cached_property
+    def cable_rows(self) -> list[Array]:
+        """`CableSignal` columns of each cable."""
+        step = 1e-5
+        longer = law_at(self.parameters, self._carrying, self._elastic_lengths + step)
+        slopes = (longer - self._law)[:, :, 0] / step
+        return [self._cable_rows(i, slopes[:, i]) for i in range(len(self.parameters.cables))]
+
+    def _cable_rows(self, i: int, slope: Array) -> Array:
         rows, cables = np.zeros((len(self.signals.times), len(CableSignal))), self.parameters.cables
         lengths, wound = self._spans.lengths[:, i], self._wound[:, i]
-        step = 1e-5
-        elastic = self._elastic_lengths
-        longer = law_at(self.parameters, self._carrying, elastic + step)
         directions = self._spans.directions[:, i]
         for column, values in {
             CableSignal.TIME: self.signals.times,
@@ -161,7 +154,7 @@ class Suspension:
             CableSignal.RATE: self._rates[:, i],
             CableSignal.TENSION: self.signals.tensions[:, i],
             CableSignal.STIFFNESS: self._law[:, i, 1],
-            CableSignal.LENGTH_SLOPE: (longer - self._law)[:, i, 0] / step,
+            CableSignal.LENGTH_SLOPE: slope,
             CableSignal.DAMPER: self._damper[:, i],
             CableSignal.WOUND: wound / lengths,
             CableSignal.ANGLE: self.signals.angles[:, i],
@@ -174,23 +167,21 @@ class Suspension:
             rows[:, column] = values
         return rows
 
-    def end_rows(self, i: int) -> Array:
-        """Return `EndSignal` columns of cable i."""
+    @cached_property
+    def end_rows(self) -> list[Array]:
+        """`EndSignal` columns of each cable."""
         spans = self._spans
-        gravity = np.full((len(self.signals.times), 1), self._testbed.gravity)
-        return np.hstack(
-            [
-                spans.directions[:, i],
-                spans.velocities[:, i],
-                spans.arms[:, i],
-                spans.lengths[:, i, None],
-                gravity,
-            ]
-        )
+        gravity = np.full(len(self.signals.times), self._testbed.gravity)
+        parts = (spans.directions, spans.velocities, spans.arms, spans.lengths)
+        return [
+            np.column_stack([*(part[:, i] for part in parts), gravity])
+            for i in range(len(self.parameters.cables))
+        ]
 
+    @cached_property
     def bar_rows(self) -> Array:
-        """Return `BarSignal` columns."""
-        bar, state = self._testbed.bar, self._bar
+        """`BarSignal` columns."""
+        bar, state = self._testbed.bar, self.bar
         assert bar is not None
         count = len(self.signals.times)
         rows = np.zeros((count, int(BarSignal.TIME) + 1))
@@ -203,16 +194,21 @@ class Suspension:
         rows[:, BarSignal.TIME] = self.signals.times
         return rows
 
-    def frame_rows(self, i: int) -> Array:
-        """Return `FrameSignal` columns of cable i."""
-        spans, count = self._spans, len(self.signals.times)
-        rows = np.zeros((count, int(FrameSignal.STIFFNESS) + 1))
-        rows[:, FrameSignal.TIME] = self.signals.times
-        rows[:, FrameSignal.DIRECTION : FrameSignal.DIRECTION + 3] = spans.directions[:, i]
-        rows[:, FrameSignal.EXIT : FrameSignal.EXIT + 3] = spans.exits[i]
+    @cached_property
+    def frame_rows(self) -> list[Array]:
+        """`FrameSignal` columns of each cable."""
+        count, force = len(self.signals.times), -self.cable_wrench[:, :3]
         turn = self._frame.rotation.reshape(count, 9)
-        rows[:, FrameSignal.ROTATION : FrameSignal.ROTATION + 9] = turn
-        force = (self.signals.tensions[:, :, None] * spans.directions).sum(axis=1)
-        rows[:, FrameSignal.FORCE : FrameSignal.FORCE + 3] = force
-        rows[:, FrameSignal.STIFFNESS] = self._law[:, i, 1]
-        return rows
+        return [
+            np.column_stack(
+                [
+                    self.signals.times,
+                    self._spans.directions[:, i],
+                    np.broadcast_to(self._spans.exits[i], (count, 3)),
+                    turn,
+                    force,
+                    self._law[:, i, 1],
+                ]
+            )
+            for i in range(len(self.parameters.cables))
+        ]

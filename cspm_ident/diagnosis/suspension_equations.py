@@ -12,6 +12,7 @@ from cspm_ident.diagnosis.columns import Candidate, Place, elements_of, shapes_o
 from cspm_ident.diagnosis.drivers import Driver, driver_columns
 from cspm_ident.diagnosis.equation import Equation
 from cspm_ident.diagnosis.machine_signals import BodyMotion, MachineSignals
+from cspm_ident.diagnosis.readings import pose_rows, reading_rows
 from cspm_ident.diagnosis.suspension import Suspension
 from cspm_ident.signals.measurement import TENSION, WINCHES
 from cspm_ident.signals.timeline import Timeline, whole_stretches
@@ -20,8 +21,7 @@ from cspm_msgs_py.dofs import DOFS
 from cspm_msgs_py.testbed import Testbed
 from cspm_sim.effect_entries import Action
 from cspm_sim.effects import Channel, Effect, Elements
-from cspm_sim.effects.effect import Regression
-from cspm_sim.effects.signals import CableSignal, PoseSignal, ReadingSignal
+from cspm_sim.effects.signals import CableSignal
 from cspm_sim.kernels.plant import PlantParameters
 from cspm_sim.parameters import nominal_parameters
 
@@ -101,12 +101,12 @@ class _Stretch:
             for candidate, place, found in self._columns(effect):
                 columns.setdefault(place, {})[candidate] = self._weighed(found)
         out = []
-        rows = [self._here.cable_rows(i) for i in range(len(self._machine.cables))]
         for i, name in enumerate(self._machine.cable_names):
+            rows = self._here.cable_rows[i]
             place = Place(Channel.TENSION, name)
             start = self._weighed(self._here.start_column(i))[:, None, None]
             target = self._weighed(tensions[:, i])[:, None]
-            drivers = {key: self._weighed(rows[i][:, column]) for key, column in _DRIVERS.items()}
+            drivers = {key: self._weighed(rows[:, column]) for key, column in _DRIVERS.items()}
             own = columns.get(place, {}) | driver_columns(place, drivers)
             measured = self._weighed(self._signals.tensions[:, i])[:, None]
             out.append(Equation(place, times, target, own, measured, start))
@@ -164,15 +164,14 @@ class _Stretch:
         for regression in (effect.regression, *effect.partners):
             if regression.channel is Channel.WRENCH:
                 of_cable = effect.acts_on is Elements.CABLES
-                rows = self._here.end_rows(i) if of_cable else self._here.bar_rows()
-                yield Place(Channel.WRENCH, BAR), _shaped(regression, rows, shape)
+                rows = self._here.end_rows[i] if of_cable else self._here.bar_rows
+                yield Place(Channel.WRENCH, BAR), regression.columns(rows, **shape)
             elif regression.channel is Channel.TENSION and effect.acts_on is Elements.FRAME:
-                for k, name in enumerate(names):
-                    rows = self._here.frame_rows(k)
-                    yield Place(Channel.TENSION, name), _shaped(regression, rows, shape)
+                for name, rows in zip(names, self._here.frame_rows, strict=True):
+                    yield Place(Channel.TENSION, name), regression.columns(rows, **shape)
             elif regression.channel is Channel.TENSION:
-                rows = self._here.cable_rows(i)
-                yield Place(Channel.TENSION, names[i]), _shaped(regression, rows, shape)
+                rows = self._here.cable_rows[i]
+                yield Place(Channel.TENSION, names[i]), regression.columns(rows, **shape)
 
     def _read(self, effect: Effect, i: int, name: str) -> Iterator[tuple[Place, Array]]:
         """Yield how a sensor's fault changes the residuals, by differences of the readings."""
@@ -200,10 +199,7 @@ class _Stretch:
             return
         body = "bar" if name == BAR else "frame"
         motion: BodyMotion = getattr(self._signals, body)
-        rows = np.zeros((len(self._signals.times), int(PoseSignal.RATE) + 6))
-        rows[:, PoseSignal.TIME] = self._signals.times
-        rows[:, PoseSignal.POSE : PoseSignal.POSE + 6] = motion.poses
-        rows[:, PoseSignal.RATE : PoseSignal.RATE + 6] = motion.rates
+        rows = pose_rows(self._signals.times, motion.poses, motion.rates)
         for change in np.moveaxis(effect.regressors(rows), 2, 0):
             step = _small(change)
             yield self._signals.with_pose_change(body, change, step), step
@@ -211,11 +207,8 @@ class _Stretch:
     def _faulty_joint(self, effect: Effect, i: int, topic: str) -> tuple[MachineSignals, float]:
         signals = self._signals
         readings = signals.tensions if topic == TENSION else signals.angles
-        rows = np.zeros((len(signals.times), len(ReadingSignal)))
-        rows[:, ReadingSignal.TIME] = signals.times
-        rows[:, ReadingSignal.VALUE] = readings[:, i]
         changed = np.zeros(readings.shape)
-        changed[:, i] = effect.regressors(rows)[:, 0, 0]
+        changed[:, i] = effect.regressors(reading_rows(signals.times, readings[:, i]))[:, 0, 0]
         step = _small(changed)
         if topic == TENSION:
             return replace(signals, tensions=readings + step * changed), step
@@ -233,7 +226,3 @@ _READING_STEP = 1e-6  # m, rad or N
 def _small(change: Array) -> float:
     """Return by what to multiply a change, so that it stays within what is linear."""
     return _READING_STEP / (float(np.max(np.abs(change))) + 1e-300)
-
-
-def _shaped(regression: Regression, rows: Array, shape: dict[str, float]) -> Array:
-    return regression.columns(rows, **shape)

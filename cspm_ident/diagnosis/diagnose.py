@@ -13,7 +13,7 @@ from cspm_ident.diagnosis.drivers import Driver, Knots
 from cspm_ident.diagnosis.equation import Equation, in_noise, steady
 from cspm_ident.diagnosis.evidence import Evidence, gather
 from cspm_ident.diagnosis.judgement import HeldOut, free_functions, judged
-from cspm_ident.diagnosis.parameters import weights_of, with_turns
+from cspm_ident.diagnosis.parameters import of_drives, of_shafts, weights_of
 from cspm_ident.diagnosis.recorded import equations_of
 from cspm_ident.diagnosis.refine import Cut, Weights, needs_refining, refine
 from cspm_ident.diagnosis.search import Findings, Hypothesis, Named, Search
@@ -114,6 +114,7 @@ def diagnose(
     rows = in_noise(search_parts, noise)
     weights = _parameters(search, kept, searched, cut, rows, noise, block)
     starts = [_span(part)[0] for part in judge_parts]
+    weights = of_drives(weights, 2.0 * searched[0].torque_age)
     judges = held_out or [m.within(s, np.inf) for m, s in zip(searched, starts, strict=True)]
     retuned, values = search.retuned(), {c: w for c, (w, _) in weights.items()}
     progress("simulation of held-out data")
@@ -182,7 +183,7 @@ def _parameters(
     candidates = [c for each in kept for c in each.hypothesis.candidates]
     if any(needs_refining(candidate.effect) for candidate in candidates):
         return refine(searched, candidates, noise, block, cut)
-    return with_turns(weights_of(search.evidence, search.sums, candidates), rows, block)
+    return of_shafts(weights_of(search.evidence, search.sums, candidates), rows, block)
 
 
 def _whole(parts: Parts) -> Parts:

@@ -26,6 +26,24 @@ _DRIVERS = {
 }
 
 
+def sampled_constant(constant: Array, period: float) -> Array:
+    """Return by how much reports rise behind a held command, in rates of the torque [s].
+
+    A first-order lag of time constant T sampled with period h leaves command − report =
+    h/(exp(h/T) − 1) · (report − report before)/h; about T − h/2 where T is longer than h.
+    """
+    if period <= 0.0:
+        return constant
+    return np.asarray(period / np.expm1(period / np.maximum(constant, 1e-5)))
+
+
+def time_constant(sampled: Array, period: float) -> Array:
+    """Return the time constant of which `sampled_constant` is that of the samples [s]."""
+    if period <= 0.0:
+        return sampled
+    return np.asarray(period / np.log1p(period / np.maximum(sampled, 1e-9)))
+
+
 def drive_equations(
     measurement: Measurement,
     effects: Sequence[Effect],
@@ -46,19 +64,19 @@ def drive_equations(
     command, torque = measurement.command, measurement.torque
     if command is None or torque is None:
         return []
-    told_at = torque.times - 2.0 * measurement.torque_age
+    held = 2.0 * measurement.torque_age
     found = []
     for i, cable in enumerate(measurement.machine.cables):
         rows = np.zeros((len(torque.times), len(WinchSignal)))
         rows[:, WinchSignal.TIME] = torque.times
         rows[:, WinchSignal.TORQUE] = torque.values[:, i]
-        rows[:, WinchSignal.TORQUE_RATE] = np.gradient(torque.values[:, i], torque.times)
-        told = joined(command.column(i), told_at)[:, 0]
+        rows[1:, WinchSignal.TORQUE_RATE] = np.diff(torque.values[:, i]) / np.diff(torque.times)
+        told = joined(command.column(i), torque.times - held)[:, 0]
         # No drive delivers more than its limit.
         told[np.abs(told) >= cable.torque_limit] = np.nan
         own = [a for a in known if a.element == i and a.effect.regression.channel is Channel.DRIVE]
         equation = _equation(
-            cable.name, told - rows[:, WinchSignal.TORQUE], rows, effects, own, knots
+            cable.name, told - rows[:, WinchSignal.TORQUE], rows, effects, own, held, knots
         )
         if equation is not None:
             found.append(equation)
@@ -71,6 +89,7 @@ def _equation(
     rows: Array,
     effects: Sequence[Effect],
     known: Sequence[Action],
+    held: float,
     knots: Knots | None,
 ) -> Equation | None:
     whole = np.isfinite(missing)
@@ -83,7 +102,7 @@ def _equation(
     for action in known:
         shape = {n: action.values[n] for n in action.effect.nonlinear}
         columns = action.effect.regressors(rows, **shape)[:, 0]
-        missing = missing - columns @ action.effect.weights(action.values)
+        missing = missing - columns @ sampled_constant(action.effect.weights(action.values), held)
     place = Place(Channel.DRIVE, name)
     found: dict[Candidate | Driver, Array] = {
         Candidate(effect, name, shape): weigh(

@@ -64,6 +64,13 @@ class Equation:
         """Return the rows from `start` to before `end` [s]."""
         return self._only((self.times >= start) & (self.times < end))
 
+    def weighted(self, weights: Array) -> Equation:
+        """Return the equation with each row times a weight, shape (k,)."""
+        rows = weights[:, None]
+        columns = {term: found * rows[:, :, None] for term, found in self.columns.items()}
+        nuisance = self.nuisance * rows[:, :, None] if self.nuisance.size else self.nuisance
+        return replace(self, target=self.target * rows, columns=columns, nuisance=nuisance)
+
     def only(self, terms: Container[Candidate | Driver]) -> Equation:
         """Return the equation without the columns of all other terms."""
         columns = {term: found for term, found in self.columns.items() if term in terms}

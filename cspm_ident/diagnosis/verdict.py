@@ -279,7 +279,9 @@ def _unknown(shape: Shape, share: float) -> dict[str, Any]:
 def _equation_fit(fit: HeldOut) -> dict[str, Any]:
     numbers = fit.before, fit.after, fit.retuned, fit.noise
     drive = _DRIVES[fit.place.channel]
-    return _fit(channel_of(fit), drive, fit.measured, *numbers) | {"black_box": fit.ceiling}
+    found = _fit(channel_of(fit), drive, fit.measured, *numbers)
+    found["held_out"]["nrmse_black_box"] = fit.ceiling / max(fit.measured, 1e-300)
+    return found
 
 
 def _simulated_fit(fit: SimulatedFit) -> dict[str, Any]:

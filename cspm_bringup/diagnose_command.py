@@ -103,8 +103,8 @@ def print_diagnosis(console: Console, found: Diagnosis) -> None:
                 f"  as well explained by {rival.effect.id} on {', '.join(rival.elements)};"
                 f" to tell: {rival.effect.separating_experiment}",
             )
-    for shape, (_, _, share) in zip(found.shapes, found.findings.unknown, strict=True):
-        say(console, f"• {unknown_statement(shape, share)}")
+    for k in range(len(found.shapes)):
+        say(console, f"• {unknown_statement(found, k)}")
     for named in found.rejected:
         say(
             console,

@@ -2,7 +2,6 @@
 
 import dataclasses
 import json
-import sys
 
 import numpy as np
 import pytest
@@ -12,7 +11,6 @@ from run_samples import SCENARIOS, bundle_of
 from test_emps_import import DATA, ESTIMATION, MAPPING, PUBLISHED, PULSES, TESTBED, recorded
 from winch_samples import EFFECTS, Winch, closed_loop
 
-from cspm_bringup import cli
 from cspm_bringup.run import run
 from cspm_ident.signals.measurement import Measurement, read_measurement
 from cspm_ident.winch import identify_winch
@@ -89,22 +87,6 @@ def test_the_torque_is_older_than_its_stamp(measured):
     wrong = identify_winches([measured], torque_age=-measured.torque_age, reversals=False)
     viscous = wrong.winches[0].fit.estimate.interval("winch_viscous_friction coefficient")
     assert viscous[1] < TRUTH[1]
-
-
-@pytest.fixture
-def cspm(monkeypatch, capsys, tmp_path):
-    """Run a command line in an empty folder; return exit code, stdout and stderr."""
-    monkeypatch.chdir(tmp_path)
-    monkeypatch.setenv("COLUMNS", "200")
-
-    def call(*arguments):
-        monkeypatch.setattr(sys, "argv", ["cspm", *map(str, arguments)])
-        with pytest.raises(SystemExit) as caught:
-            cli.main()
-        out, err = capsys.readouterr()
-        return caught.value.code or 0, out, err
-
-    return call
 
 
 @pytest.mark.slow

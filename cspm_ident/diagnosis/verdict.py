@@ -7,6 +7,8 @@ from enum import Enum
 from math import exp
 from typing import Any, NamedTuple
 
+import numpy as np
+
 from cspm_ident.block_simulation import Drive
 from cspm_ident.diagnosis.columns import Candidate
 from cspm_ident.diagnosis.diagnose import Diagnosis, Shape, members_of
@@ -140,16 +142,23 @@ def _simulated_worth(diagnosis: Diagnosis, named: Named) -> str:
     )
 
 
-def unknown_statement(shape: Shape, share: float) -> str:
-    """Return what is missing and cannot be named as one sentence."""
-    driver = shape.driver
+def unknown_statement(diagnosis: Diagnosis, k: int) -> str:
+    """Return the k-th thing that is missing and cannot be named as one sentence."""
+    shape, (driver, _, share) = diagnosis.shapes[k], diagnosis.findings.unknown[k]
     formula = _formula(shape)
     hint = f"; as a hint, it runs like {formula}" if formula else ""
+    size = "".join(
+        f", {100.0 * np.sqrt(share) * fit.after / max(fit.measured, 1e-300):.2g} % of what was"
+        " measured"
+        for fit in diagnosis.fit
+        if fit.place == driver.place
+    )
     return (
         f"Something is missing in {_CHANNELS[driver.place.channel].format(driver.place.element)}"
-        f" that nothing in the catalogue explains: a function of {driver.signal} takes"
-        f" {100 * share:.0f} % of its squared residual, from {shape.values.min():.3g} to"
-        f" {shape.values.max():.3g} {_UNITS.get(driver.place.channel, '')}{hint}."
+        f" that nothing in the catalogue explains: a function of {driver.signal}, from"
+        f" {shape.values.min():.3g} to {shape.values.max():.3g}"
+        f" {_UNITS.get(driver.place.channel, '')}, takes {100 * share:.0f} % of the squared"
+        f" residual{size}{hint}."
     )
 
 
@@ -193,12 +202,7 @@ def diagnosis_data(diagnosis: Diagnosis) -> dict[str, Any]:
         "testbed": {"path": _testbed_path(first), "sha256": first.testbed.sha256},
         "verdict": verdict_of(diagnosis).value,
         "findings": [_finding(diagnosis, each) for each in diagnosis.findings.named]
-        + [
-            _unknown(shape, share)
-            for shape, (_, _, share) in zip(
-                diagnosis.shapes, diagnosis.findings.unknown, strict=True
-            )
-        ],
+        + [_unknown(diagnosis, k) for k in range(len(diagnosis.shapes))],
         "not_excited": [
             {"effect": name, "elements": list(elements)} for name, elements in diagnosis.silent
         ],
@@ -250,20 +254,21 @@ def _finding(diagnosis: Diagnosis, named: Named) -> dict[str, Any]:
     }
 
 
-def _unknown(shape: Shape, share: float) -> dict[str, Any]:
+def _unknown(diagnosis: Diagnosis, k: int) -> dict[str, Any]:
     blocks = {
         Channel.DRIVE: Block.WINCH,
         Channel.SHAFT: Block.WINCH,
         Channel.TENSION: Block.CABLE,
         Channel.WRENCH: Block.BAR,
     }
+    shape = diagnosis.shapes[k]
     driver = shape.driver
     return {
         "subsystem": blocks[driver.place.channel].value,
         "elements": [driver.place.element],
         "effect": UNKNOWN,
         "probability": None,
-        "statement": unknown_statement(shape, share),
+        "statement": unknown_statement(diagnosis, k),
         "onset_s": None,
         "region": {
             "driver": driver.signal,

@@ -13,6 +13,7 @@ from cspm_ident.diagnosis.drivers import Driver, Knots
 from cspm_ident.diagnosis.equation import Equation, in_noise, steady
 from cspm_ident.diagnosis.evidence import Evidence, gather
 from cspm_ident.diagnosis.judgement import HeldOut, free_functions, judged
+from cspm_ident.diagnosis.onset import Onset, onset_of
 from cspm_ident.diagnosis.parameters import of_drives, of_shafts, weights_of
 from cspm_ident.diagnosis.recorded import equations_of
 from cspm_ident.diagnosis.refine import Cut, Weights, needs_refining, refine
@@ -64,6 +65,7 @@ class Diagnosis:
         simulated: quantity by quantity, by simulation.
         worth: of each finding in these simulations; None where they cannot tell.
         shapes: of the unknown, in the order of `findings.unknown`.
+        onsets: when each finding began; None where it acts all the time.
         silent: effects and elements that these recordings cannot show.
         places: the residuals that there are.
         starts: of the blocks [s], shape (blocks,).
@@ -78,6 +80,7 @@ class Diagnosis:
     simulated: tuple[SimulatedFit, ...]
     worth: tuple[Worth | None, ...]
     shapes: tuple[Shape, ...]
+    onsets: tuple[Onset | None, ...]
     silent: tuple[tuple[str, tuple[str, ...]], ...]
     places: tuple[Place, ...]
     starts: Array
@@ -110,9 +113,16 @@ def diagnose(
     judge = _judge(in_noise(judge_parts, noise), found, block)
     kept, rejected = _confirmed(search, judge, found)
     progress("parameters")
-    cut: Cut = _whole if held_out else _first
+    searched_part: Cut = _whole if held_out else _first
     rows = in_noise(search_parts, noise)
-    weights = _parameters(search, kept, searched, cut, rows, noise, block)
+    onsets = _onsets(kept, steady(rows), evidence.times)
+    since = max((onset.time for onset in onsets if onset is not None), default=-np.inf)
+
+    def cut(parts: Parts) -> Parts:
+        return [[e.within(since, np.inf) for e in part] for part in searched_part(parts)]
+
+    since_then = [[e.within(since, np.inf) for e in part] for part in rows]
+    weights = _parameters(search, kept, searched, cut, since_then, noise, block)
     starts = [_span(part)[0] for part in judge_parts]
     weights = of_drives(weights, 2.0 * searched[0].torque_age)
     judges = held_out or [m.within(s, np.inf) for m, s in zip(searched, starts, strict=True)]
@@ -132,6 +142,7 @@ def diagnose(
         simulated,
         worth,
         _shapes(search, kept, knots, [each[0] for each in found.unknown]),
+        onsets,
         _silent(search, effects),
         tuple(place.place for place in evidence.places),
         evidence.times,
@@ -184,6 +195,25 @@ def _parameters(
     if any(needs_refining(candidate.effect) for candidate in candidates):
         return refine(searched, candidates, noise, block, cut)
     return of_shafts(weights_of(search.evidence, search.sums, candidates), rows, block)
+
+
+def _onsets(kept: Sequence[Named], rows: Parts, starts: Array) -> tuple[Onset | None, ...]:
+    """Return when each finding began; None where it acts all the time, or in which recording."""
+    times = {
+        c: float(starts[each.hypothesis.onset]) if each.hypothesis.onset else -np.inf
+        for each in kept
+        for c in each.hypothesis.candidates
+    }
+    found: list[Onset | None] = []
+    for each in kept:
+        block, own = each.hypothesis.onset, each.hypothesis.candidates
+        if not block or len(rows) > 1:
+            found.append(None)
+            continue
+        others = {c: time for c, time in times.items() if c not in own}
+        low, high = starts[block - 1], starts[min(block + 1, len(starts) - 1)]
+        found.append(onset_of(rows[0], own, others, float(low), float(high)))
+    return tuple(found)
 
 
 def _whole(parts: Parts) -> Parts:

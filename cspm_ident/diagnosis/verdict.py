@@ -13,6 +13,7 @@ from cspm_ident.block_simulation import Drive
 from cspm_ident.diagnosis.columns import Candidate
 from cspm_ident.diagnosis.diagnose import Diagnosis, Shape, members_of
 from cspm_ident.diagnosis.judgement import HeldOut
+from cspm_ident.diagnosis.onset import Onset
 from cspm_ident.diagnosis.search import Named
 from cspm_ident.diagnosis.simulation import SimulatedFit
 from cspm_ident.diagnosis.sketch import sketch
@@ -114,8 +115,11 @@ def statement_of(diagnosis: Diagnosis, named: Named) -> str:
         "differs from the test-bed file" if effect.alter is not None else "is not in the model"
     )
     since = ""
-    if named.onset:
-        since = f", from {diagnosis.starts[named.onset]:.1f} s on"
+    onset = _onset_of(diagnosis, named)
+    if onset is not None:
+        since = f", from {onset.time:.1f} s on ({onset.low:.1f} to {onset.high:.1f} s)"
+    elif named.hypothesis.onset:
+        since = f", from block {named.hypothesis.onset} of the recordings on"
     best = max(_concerned(diagnosis, named), key=lambda fit: fit.before / max(fit.after, 1e-300))
     return (
         f"{_words(effect)} {missing}{since} ({'; '.join(parts)}). With it the held-out residual of"
@@ -123,6 +127,10 @@ def statement_of(diagnosis: Diagnosis, named: Named) -> str:
         f" {_amount(best, best.after)}, where noise is {_amount(best, best.noise)};"
         f" {_simulated_worth(diagnosis, named)}."
     )
+
+
+def _onset_of(diagnosis: Diagnosis, named: Named) -> Onset | None:
+    return diagnosis.onsets[diagnosis.findings.named.index(named)]
 
 
 def _amount(fit: HeldOut, value: float) -> str:
@@ -223,13 +231,15 @@ def _testbed_path(measurement: Measurement) -> str:
 def _finding(diagnosis: Diagnosis, named: Named) -> dict[str, Any]:
     hypothesis = named.hypothesis
     probability = probability_of(named)
+    onset = _onset_of(diagnosis, named)
     return {
         "subsystem": hypothesis.effect.block.value,
         "elements": list(hypothesis.elements),
         "effect": hypothesis.effect.id,
         "probability": probability,
         "statement": statement_of(diagnosis, named),
-        "onset_s": float(diagnosis.starts[named.onset]) if named.onset else None,
+        "onset_s": onset.time if onset is not None else None,
+        "onset_ci95_s": [onset.low, onset.high] if onset is not None else None,
         "region": {},
         "parameters": [
             {

@@ -117,6 +117,13 @@ def print_diagnosis(console: Console, found: Diagnosis) -> None:
     silent = ", ".join(name for name, _ in found.silent)
     if silent:
         say(console, f"not testable here: {silent}")
+    told = sorted({limit.effect for limit in found.limits if limit.possible})
+    if told:
+        say(
+            console,
+            f"{len(told)} effects would have been told from some size on, which diagnosis.json has"
+            " by element under detection_limits",
+        )
 
 
 def _residual_table(found: Diagnosis) -> Table:

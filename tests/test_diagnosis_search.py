@@ -8,6 +8,7 @@ from cspm_ident.diagnosis.drivers import KNOTS, Driver, Knots
 from cspm_ident.diagnosis.equation import Equation
 from cspm_ident.diagnosis.evidence import gather
 from cspm_ident.diagnosis.judgement import free_functions, rms, without_nuisance
+from cspm_ident.diagnosis.limits import detection_limits
 from cspm_ident.diagnosis.onset import onset_of
 from cspm_ident.diagnosis.parameters import of_shafts, weights_of
 from cspm_ident.diagnosis.search import Search
@@ -114,6 +115,21 @@ def test_knots_are_those_of_the_first_recording():
     np.testing.assert_allclose(columns[:, 0] @ at, np.clip(narrow, -1.0, 1.0), atol=1e-12)
     assert len(at) == KNOTS
     assert knots.columns(PLACE, {"still": np.zeros(50)}) == {}
+
+
+def test_an_effect_below_its_limit_is_not_told_and_one_above_it_is():
+    """The limit is that of the search itself, told from a recording without the effect."""
+    quiet = turning(missing=lambda speed: -TORQUE * np.sign(speed))
+    search = Search(gather([[quiet]], BLOCK_S))
+    limits = {limit.effect: limit for limit in detection_limits(search, ())}
+    limit = limits["winch_coulomb_friction"]
+    assert (limit.element, limit.parameter, limit.unit) == ("only", "torque", "N·m")
+    assert limit.possible
+    assert set(limits) == {"winch_coulomb_friction", "winch_viscous_friction"}
+    for factor, told in ((0.5, False), (2.0, True)):
+        less = factor * limit.least - TORQUE
+        found_here = found(turning(missing=lambda speed, less=less: less * np.sign(speed)))
+        assert bool(found_here.named) is told
 
 
 def test_what_is_never_told_is_fitted_before_a_residual_counts():

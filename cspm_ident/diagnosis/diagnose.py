@@ -13,6 +13,7 @@ from cspm_ident.diagnosis.drivers import Driver, Knots
 from cspm_ident.diagnosis.equation import Equation, in_noise, steady
 from cspm_ident.diagnosis.evidence import Evidence, gather
 from cspm_ident.diagnosis.judgement import HeldOut, free_functions, judged
+from cspm_ident.diagnosis.limits import Limit, detection_limits
 from cspm_ident.diagnosis.onset import Onset, onset_of
 from cspm_ident.diagnosis.parameters import of_drives, of_shafts, weights_of
 from cspm_ident.diagnosis.recorded import equations_of
@@ -66,6 +67,7 @@ class Diagnosis:
         worth: of each finding in these simulations; None where they cannot tell.
         shapes: of the unknown, in the order of `findings.unknown`.
         onsets: when each finding began; None where it acts all the time.
+        limits: from which size on effects would have been told.
         silent: effects and elements that these recordings cannot show.
         places: the residuals that there are.
         starts: of the blocks [s], shape (blocks,).
@@ -81,6 +83,7 @@ class Diagnosis:
     worth: tuple[Worth | None, ...]
     shapes: tuple[Shape, ...]
     onsets: tuple[Onset | None, ...]
+    limits: tuple[Limit, ...]
     silent: tuple[tuple[str, tuple[str, ...]], ...]
     places: tuple[Place, ...]
     starts: Array
@@ -143,6 +146,7 @@ def diagnose(
         worth,
         _shapes(search, kept, knots, [each[0] for each in found.unknown]),
         onsets,
+        detection_limits(search, kept),
         _silent(search, effects),
         tuple(place.place for place in evidence.places),
         evidence.times,

@@ -214,6 +214,7 @@ def diagnosis_data(diagnosis: Diagnosis) -> dict[str, Any]:
         "not_excited": [
             {"effect": name, "elements": list(elements)} for name, elements in diagnosis.silent
         ],
+        "detection_limits": [limit._asdict() for limit in diagnosis.limits],
         "fit": [_simulated_fit(each) for each in diagnosis.simulated],
         "residuals": [_equation_fit(each) for each in diagnosis.fit],
         "model": IMPROVED if diagnosis.findings.named else None,

@@ -53,6 +53,10 @@ def diagnose(
             help="A new folder for diagnosis.json, its picture and testbed.improved.yaml.",
         ),
     ] = None,
+    closed_loop: Annotated[
+        bool,
+        typer.Option(help="Simulate the recorded closed loop again with what was found."),
+    ] = True,
     json: Json = None,
 ) -> None:
     """Locate the mismatch of recording and model, name what is missing, and show the fit improve.
@@ -67,4 +71,4 @@ def diagnose(
         return
     if not recordings:
         raise InputError("diagnose: no recording, allowed: one or more, or --explain EFFECT")
-    diagnose_command(DiagnoseRequest(recordings, held_out or [], testbed, out), json)
+    diagnose_command(DiagnoseRequest(recordings, held_out or [], testbed, out, closed_loop), json)

@@ -10,15 +10,16 @@ from rich import box
 from rich.console import Console
 from rich.table import Table
 
+from cspm_bringup.closed_loop import ClosedLoopFit, simulate_closed_loop
 from cspm_bringup.console import make_console, say
 from cspm_bringup.summary import write_json
-from cspm_ident.block_simulation import Drive
 from cspm_ident.diagnosis.diagnose import Diagnosis, diagnose
 from cspm_ident.diagnosis.improved_file import improved_testbed
 from cspm_ident.diagnosis.verdict import (
     IMPROVED,
     channel_of,
     diagnosis_data,
+    drive_of,
     statement_of,
     unit_of,
     unknown_statement,
@@ -41,12 +42,14 @@ class DiagnoseRequest:
         held_out: on which to judge; none: the last part of each recording.
         testbed: the machine as it is believed to be, instead of the recorded one.
         out: a new folder for what is written; None: nothing is.
+        closed_loop: simulate the closed loop again with what was found.
     """
 
     recordings: Sequence[Path]
     held_out: Sequence[Path]
     testbed: Path | None
     out: Path | None
+    closed_loop: bool = True
 
 
 def diagnose_command(asked: DiagnoseRequest, json: Path | None) -> None:
@@ -66,8 +69,14 @@ def diagnose_command(asked: DiagnoseRequest, json: Path | None) -> None:
         searched = [read_measurement(path, asked.testbed) for path in asked.recordings]
         held_out = [read_measurement(path, asked.testbed) for path in asked.held_out]
         found = diagnose(searched, held_out, status.update)
+        loop: tuple[ClosedLoopFit, ...] = ()
+        if asked.closed_loop and found.findings.named:
+            improved = improved_testbed(found, IMPROVED)
+            loop = simulate_closed_loop((held_out or searched)[0], improved, status.update)
     print_diagnosis(console, found)
-    data = diagnosis_data(found)
+    if loop:
+        console.print(_loop_table(loop))
+    data = diagnosis_data(found) | {"closed_loop": [each._asdict() for each in loop]}
     if asked.out is not None:
         _write(asked.out, found, data)
         say(console, f"written {asked.out}")
@@ -111,9 +120,7 @@ def print_diagnosis(console: Console, found: Diagnosis) -> None:
             f"not kept: {named.hypothesis.effect.id} on {', '.join(named.hypothesis.elements)}"
             " did not help on held-out data",
         )
-    console.print(_residual_table(found))
-    if found.simulated:
-        console.print(_simulation_table(found))
+    _print_fits(console, found)
     silent = ", ".join(name for name, _ in found.silent)
     if silent:
         say(console, f"not testable here: {silent}")
@@ -126,33 +133,62 @@ def print_diagnosis(console: Console, found: Diagnosis) -> None:
         )
 
 
-def _residual_table(found: Diagnosis) -> Table:
-    table = _table(f"residuals of the equations, {_judged(found)}", "black box", "noise")
-    for fit in found.fit:
-        numbers = (fit.before, fit.retuned, fit.after, fit.ceiling, fit.noise)
-        table.add_row(channel_of(fit), *(f"{number:.3g}" for number in numbers), unit_of(fit))
-    return table
+def _print_fits(console: Console, found: Diagnosis) -> None:
+    """Print what changed, or is well above its noise; all else is a count."""
+    judged = "held-out recordings" if found.held_out else "the last part, not searched"
+    rows: list[tuple[str, tuple[float, ...], str]] = [
+        (channel_of(f), (f.before, f.retuned, f.after, f.ceiling, f.noise), unit_of(f))
+        for f in found.fit
+    ]
+    _print_table(console, f"residuals of the equations, {judged}", ("black box", "noise"), rows)
+    rows = [
+        (
+            f"{f.output.name}, driven by {drive_of(f)}",
+            (f.before, f.retuned, f.after, f.floor),
+            f.output.unit,
+        )
+        for f in found.simulated
+    ]
+    if rows:
+        _print_table(console, f"errors of simulations, {judged}", ("noise",), rows)
 
 
-def _simulation_table(found: Diagnosis) -> Table:
-    table = _table(f"errors of simulations, {_judged(found)}", "noise")
-    for fit in found.simulated:
-        numbers = (fit.before, fit.retuned, fit.after, fit.floor)
-        drive = "torque" if fit.output.drive is Drive.SHAFT else fit.output.drive.value
-        name = f"{fit.output.name}, driven by {drive}"
-        table.add_row(name, *(f"{number:.3g}" for number in numbers), fit.output.unit)
-    return table
-
-
-def _table(title: str, *last: str) -> Table:
+def _print_table(
+    console: Console,
+    title: str,
+    last: Sequence[str],
+    rows: Sequence[tuple[str, tuple[float, ...], str]],
+) -> None:
+    shown = [row for row in rows if _is_worth_showing(row[1])]
     table = Table(title=f"{title}: root mean square", box=box.SIMPLE_HEAD)
     for heading in ("", "before", "re-tuned", "after", *last, "unit"):
         table.add_column(heading, justify="left" if heading in ("", "unit") else "right")
+    for name, numbers, unit in shown:
+        table.add_row(name, *(f"{number:.3g}" for number in numbers), unit)
+    if shown:
+        console.print(table)
+    others = len(rows) - len(shown)
+    say(console, f"{title}: {others} of {len(rows)} at their noise, before and after")
+
+
+def _is_worth_showing(numbers: tuple[float, ...]) -> bool:
+    before, retuned, after, noise = *numbers[:3], numbers[-1]
+    changed = max(before, retuned, after) > _CHANGED * min(before, retuned, after)
+    return changed or after > _ABOVE * noise
+
+
+# Smaller changes of a root mean square, and less above the noise, are left out of what is printed.
+_CHANGED = 1.05
+_ABOVE = 3.0
+
+
+def _loop_table(loop: Sequence[ClosedLoopFit]) -> Table:
+    table = Table(title="closed loop simulated again: RMS difference", box=box.SIMPLE_HEAD)
+    for heading in ("", "before", "after", "unit"):
+        table.add_column(heading, justify="left" if heading in ("", "unit") else "right")
+    for fit in loop:
+        table.add_row(fit.name, f"{fit.before:.3g}", f"{fit.after:.3g}", fit.unit)
     return table
-
-
-def _judged(found: Diagnosis) -> str:
-    return "held-out recordings" if found.held_out else "the last part, not searched"
 
 
 def _write(folder: Path, found: Diagnosis, data: dict[str, object]) -> None:

@@ -131,6 +131,28 @@ class Suspension:
         moments = np.cross(self._spans.arms, pull)
         return np.hstack([pull.sum(axis=1), moments.sum(axis=1)])
 
+    @cached_property
+    def _told_acceleration(self) -> tuple[Array, Array]:
+        """Acceleration of the bar's origin and α by (2-13) from the measured tensions, (k, 3) each.
+
+        For the columns of effects: the poses' own noise, twice differentiated, stands in the residual
+        already, and in both it would look like a wrong mass.
+        """
+        bar, state = self._testbed.bar, self.bar
+        assert bar is not None
+        count = len(state.rotation)
+        com = np.einsum("kij,j->ki", state.rotation, np.array(bar.com))
+        turned = np.einsum("kij,jl,kml->kim", state.rotation, bar.inertia.matrix, state.rotation)
+        spin = np.cross(state.omega, np.einsum("kij,kj->ki", turned, state.omega))
+        carried_com = np.cross(state.omega, np.cross(state.omega, com))
+        weight = bar.mass * np.array([0.0, 0.0, self._testbed.gravity])
+        force = self.cable_wrench[:, :3] + weight
+        about_com = self.cable_wrench[:, 3:] - np.cross(com, self.cable_wrench[:, :3])
+        alpha = np.linalg.solve(turned, (about_com - spin)[:, :, None])[:, :, 0]
+        acceleration = force / bar.mass - np.cross(alpha, com) - carried_com
+        assert acceleration.shape == (count, 3)
+        return acceleration, alpha
+
     def start_column(self, i: int) -> Array:
         """Return what a longer unstretched length at the start adds to the residual, (k,) [N/m]."""
         return np.asarray(self._law[:, i, 1] * self._wound[:, i] / self._wound[0, i])
@@ -186,7 +208,7 @@ class Suspension:
         count = len(self.signals.times)
         rows = np.zeros((count, int(BarSignal.TIME) + 1))
         rows[:, :3], rows[:, 3:6] = state.velocity, state.omega
-        rows[:, 6:9], rows[:, 9:12] = state.acceleration, state.alpha
+        rows[:, 6:9], rows[:, 9:12] = self._told_acceleration
         rows[:, BarSignal.ROTATION : BarSignal.ROTATION + 9] = state.rotation.reshape(count, 9)
         rows[:, BarSignal.COM : BarSignal.COM + 3] = bar.com
         rows[:, BarSignal.MASS] = bar.mass

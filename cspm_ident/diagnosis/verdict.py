@@ -179,6 +179,11 @@ def channel_of(fit: HeldOut) -> str:
     return _CHANNELS[fit.place.channel].format(fit.place.element)
 
 
+def drive_of(fit: SimulatedFit) -> str:
+    """Return the public name of what drove a simulation."""
+    return "torque" if fit.output.drive is Drive.SHAFT else fit.output.drive.value
+
+
 def unit_of(fit: HeldOut) -> str:
     """Return the unit of a residual; none where channels of several units were put together."""
     return _UNITS.get(fit.place.channel, "times its noise")
@@ -302,8 +307,7 @@ def _equation_fit(fit: HeldOut) -> dict[str, Any]:
 
 def _simulated_fit(fit: SimulatedFit) -> dict[str, Any]:
     numbers = fit.before, fit.after, fit.retuned, fit.floor
-    drive = "torque" if fit.output.drive is Drive.SHAFT else fit.output.drive.value
-    return _fit(fit.output.name, drive, fit.measured, *numbers)
+    return _fit(fit.output.name, drive_of(fit), fit.measured, *numbers)
 
 
 def _fit(

@@ -39,13 +39,8 @@ class Equation:
 
     @property
     def noise(self) -> Array:
-        """What differs from row to row without connection, one sd per channel.
-
-        By third differences, whose binomial coefficients squared sum to 20; 1.4826 times the median
-        is robust to steps.
-        """
-        apart = np.abs(np.diff(self.target, 3, axis=0))
-        return np.asarray(1.4826 * np.median(apart, axis=0) / np.sqrt(20.0))
+        """What differs from row to row without connection, one sd per channel."""
+        return difference_noise(self.target)
 
     def scaled(self, noise: Array) -> Equation:
         """Return the equation in units of a noise, (channels,)."""
@@ -91,6 +86,16 @@ class Equation:
             self.nuisance[rows] if self.nuisance.size else self.nuisance,
             self.turning[rows] if self.turning.size else self.turning,
         )
+
+
+def difference_noise(rows: Array) -> Array:
+    """Return what differs from row to row without connection, one sd per column of (k, channels).
+
+    By third differences, whose binomial coefficients squared sum to 20; 1.4826 times the median is
+    robust to steps.
+    """
+    apart = np.abs(np.diff(rows, 3, axis=0))
+    return np.asarray(1.4826 * np.median(apart, axis=0) / np.sqrt(20.0))
 
 
 def steady(parts: Sequence[Sequence[Equation]]) -> list[list[Equation]]:

@@ -135,8 +135,8 @@ class Suspension:
     def _told_acceleration(self) -> tuple[Array, Array]:
         """Acceleration of the bar's origin and α by (2-13) from the measured tensions, (k, 3) each.
 
-        For the columns of effects: the poses' own noise, twice differentiated, stands in the residual
-        already, and in both it would look like a wrong mass.
+        For the columns of effects: the poses' own noise, twice differentiated, stands in the
+        residual already, and in both it would look like a wrong mass.
         """
         bar, state = self._testbed.bar, self.bar
         assert bar is not None

@@ -4,13 +4,14 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
 from dataclasses import replace
+from functools import partial
 
 import numpy as np
 from numpy.typing import NDArray
 
 from cspm_ident.diagnosis.columns import Candidate, Place, elements_of, shapes_of
 from cspm_ident.diagnosis.drivers import Driver, Knots
-from cspm_ident.diagnosis.equation import Equation
+from cspm_ident.diagnosis.equation import Equation, difference_noise
 from cspm_ident.diagnosis.machine_signals import BodyMotion, MachineSignals
 from cspm_ident.diagnosis.readings import pose_rows, reading_rows
 from cspm_ident.diagnosis.suspension import Suspension
@@ -28,8 +29,10 @@ from cspm_sim.parameters import nominal_parameters
 Array = NDArray[np.float64]
 
 PERIOD_NS = 5_000_000
-# Windows pass what lies well within the band of the smoothed poses.
-_HALF_WIDTHS = (0.04, 0.25)
+# Windows pass what lies well within the band of the smoothed poses, and they are doubled while that
+# takes more noise than of white one: then most lies above what they pass.
+_HALF_WIDTHS = (0.04, 0.32)
+_WHITE = 1.7
 _SHORTEST_S = 2.0
 _DRIVERS = {
     "tension [N]": CableSignal.TENSION,
@@ -95,38 +98,79 @@ class _Stretch:
         self._signals, self._machine = signals, machine
         self._parameters: PlantParameters = nominal_parameters(machine)
         self._here = Suspension(signals, machine, self._parameters)
-        half_s = float(np.clip(2.0 / band, *_HALF_WIDTHS))
-        half = max(2, round(half_s / signals.step))
-        self._window, self._stride = make_window(half, signals.step).weights, max(1, half // 2)
+        self._windows = {
+            Channel.TENSION: self._window_for(self._here.tension_residuals, band),
+            Channel.WRENCH: self._window_for(self._here.wrench_residuals, band),
+        }
+
+    def _window_for(self, residuals: Array, band: float) -> tuple[Array, int]:
+        """Return a window's weights and the rows between two windows."""
+        half_s, most = float(np.clip(2.0 / band, *_HALF_WIDTHS)), _HALF_WIDTHS[1]
+        found = self._window_of(half_s)
+        noise = difference_noise(weigh(found[0], residuals, found[1]))
+        while 2.0 * half_s <= most:
+            wider = self._window_of(2.0 * half_s)
+            less = difference_noise(weigh(wider[0], residuals, wider[1]))
+            if np.median(noise / np.maximum(less, 1e-300)) <= _WHITE:
+                break
+            half_s, found, noise = 2.0 * half_s, wider, less
+        return found
+
+    def _window_of(self, half_s: float) -> tuple[Array, int]:
+        half = max(2, round(half_s / self._signals.step))
+        return make_window(half, self._signals.step).weights, max(1, half // 2)
 
     def equations(
         self, effects: Sequence[Effect], known: Sequence[Action], knots: Knots | None
     ) -> list[Equation]:
-        times = self._weighed(self._signals.times)
         tensions, wrench = self._targets(known)
         columns: dict[Place, dict[Candidate | Driver, Array]] = {}
         for effect in effects:
             for candidate, place, found in self._columns(effect):
-                columns.setdefault(place, {})[candidate] = self._weighed(found)
-        out = []
-        for i, name in enumerate(self._machine.cable_names):
-            rows = self._here.cable_rows[i]
-            place = Place(Channel.TENSION, name)
-            start = self._weighed(self._here.start_column(i))[:, None, None]
-            target = self._weighed(tensions[:, i])[:, None]
-            own = columns.get(place, {})
-            if knots is not None:
-                drivers = {key: self._weighed(rows[:, column]) for key, column in _DRIVERS.items()}
-                own |= knots.columns(place, drivers)
-            measured = self._weighed(self._signals.tensions[:, i])[:, None]
-            out.append(Equation(place, times, target, own, measured, start))
-        place = Place(Channel.WRENCH, BAR)
-        own = columns.get(place, {})
+                weighed = self._weighed(found, place.channel)
+                columns.setdefault(place, {})[candidate] = weighed
+        out = [
+            self._cable_equation(
+                i, tensions[:, i], columns.get(Place(Channel.TENSION, name), {}), knots
+            )
+            for i, name in enumerate(self._machine.cable_names)
+        ]
+        return [
+            *out,
+            self._bar_equation(wrench, columns.get(Place(Channel.WRENCH, BAR), {}), knots),
+        ]
+
+    def _cable_equation(
+        self,
+        i: int,
+        missing: Array,
+        columns: dict[Candidate | Driver, Array],
+        knots: Knots | None,
+    ) -> Equation:
+        weighed = partial(self._weighed, channel=Channel.TENSION)
+        place = Place(Channel.TENSION, self._machine.cable_names[i])
         if knots is not None:
-            own |= self._bar_drivers(place, knots)
-        measured = self._weighed(self._here.cable_wrench)
-        out.append(Equation(place, times, self._weighed(wrench), own, measured))
-        return out
+            rows = self._here.cable_rows[i]
+            drivers = {key: weighed(rows[:, column]) for key, column in _DRIVERS.items()}
+            columns = columns | knots.columns(place, drivers)
+        return Equation(
+            place,
+            weighed(self._signals.times),
+            weighed(missing)[:, None],
+            columns,
+            weighed(self._signals.tensions[:, i])[:, None],
+            weighed(self._here.start_column(i))[:, None, None],
+        )
+
+    def _bar_equation(
+        self, missing: Array, columns: dict[Candidate | Driver, Array], knots: Knots | None
+    ) -> Equation:
+        weighed = partial(self._weighed, channel=Channel.WRENCH)
+        place = Place(Channel.WRENCH, BAR)
+        if knots is not None:
+            columns = columns | self._bar_drivers(place, knots)
+        times, measured = weighed(self._signals.times), weighed(self._here.cable_wrench)
+        return Equation(place, times, weighed(missing), columns, measured)
 
     def _bar_drivers(self, place: Place, knots: Knots) -> dict[Candidate | Driver, Array]:
         state, poses = self._here.bar, self._signals.bar.poses
@@ -139,7 +183,9 @@ class _Stretch:
                 f"{dof} speed [{unit}/s]": speeds[:, i],
                 f"time, in {dof} [s]": self._signals.times,
             }
-            weighed = {name: self._weighed(values) for name, values in drivers.items()}
+            weighed = {
+                name: self._weighed(values, Channel.WRENCH) for name, values in drivers.items()
+            }
             found |= knots.columns(place, weighed, i, len(DOFS))
         return found
 
@@ -228,8 +274,9 @@ class _Stretch:
         speeds = signals.speeds + step * rate
         return replace(signals, angles=readings + step * changed, speeds=speeds), step
 
-    def _weighed(self, values: Array) -> Array:
-        return weigh(self._window, values, self._stride)
+    def _weighed(self, values: Array, channel: Channel) -> Array:
+        window, stride = self._windows[channel]
+        return weigh(window, values, stride)
 
 
 _READING_STEP = 1e-6  # m, rad or N

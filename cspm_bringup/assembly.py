@@ -120,7 +120,7 @@ def assemble(scenario: Scenario, testbed: Testbed, folder: Path, plant: str = SI
         ConvergenceError: the bar cannot hang at its first reference pose.
     """
     schedule = schedule_of(scenario, testbed)
-    motions = _motions(scenario, testbed, folder)
+    motions = motions_of(scenario, testbed, folder)
     references = {
         name: WaveTrajectory(motions[name]) for name in schedule.topics if name in motions
     }
@@ -144,7 +144,7 @@ def assemble_simulator(
     scenario: Scenario, testbed: Testbed, folder: Path, plant: str
 ) -> tuple[AnyPlant, dict[str, SensorModel]]:
     """Build a resolved scenario's plant and its sensors; arguments and errors as `assemble`."""
-    motions = _motions(scenario, testbed, folder)
+    motions = motions_of(scenario, testbed, folder)
     return _plant(scenario, testbed, motions, plant), _sensors(scenario, testbed)
 
 
@@ -152,7 +152,7 @@ def assemble_stage(node: str, scenario: Scenario, testbed: Testbed, folder: Path
     """Build one stage of a resolved scenario; arguments and errors as `assemble`."""
     if node != WAVE_TRAJECTORY:
         return make_controller(node, scenario, testbed)
-    motions = _motions(scenario, testbed, folder)
+    motions = motions_of(scenario, testbed, folder)
     names = schedule_of(scenario, testbed).nodes[node].outputs
     return WaveStage({name: WaveTrajectory(motions[name]) for name in names})
 
@@ -187,7 +187,7 @@ def _start_tensions(testbed: Testbed, control: Control) -> Array | None:
     return tensions
 
 
-def _motions(scenario: Scenario, testbed: Testbed, folder: Path) -> dict[str, Motion]:
+def motions_of(scenario: Scenario, testbed: Testbed, folder: Path) -> dict[str, Motion]:
     """Return the motions of winch frame, moving or not, and bar, by reference topic."""
     target = scenario.target.model_copy(update={"mean_pose": scenario.bar_mean_pose})
     bodies = {"/winch_frame/reference": scenario.winch_frame}

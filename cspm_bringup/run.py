@@ -52,9 +52,9 @@ def run(
     scenario = bundle.scenario
     steps = steps or round(scenario.duration * scenario.rates.plant)
     if folder is None:
-        return _simulate(parts, None, progress, steps)
+        return simulate(parts, None, progress, steps)
     with new_recording(bundle, folder, INPROCESS) as writer:
-        return _simulate(parts, writer, progress, steps)
+        return simulate(parts, writer, progress, steps)
 
 
 def new_recording(bundle: Bundle, folder: Path, mode: str) -> RecordingWriter:
@@ -99,7 +99,7 @@ def metadata(bundle: Bundle, mode: str) -> dict[str, str]:
     }
 
 
-def _simulate(
+def simulate(
     parts: Assembly,
     writer: RecordingWriter | None,
     progress: Callable[[float], None],

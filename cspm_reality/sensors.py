@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import zlib
 from collections.abc import Callable, Sequence
+from statistics import NormalDist
 
 import mujoco
 import numpy as np
@@ -18,11 +19,12 @@ Fault = Callable[[Array, float], Array]
 
 COLOURED_SHARE = 0.3  # of the noise's power
 COLOUR_TIME = 0.02  # [s]
-DROPOUT = 5e-4
+DROPOUT = 2e-4  # share of readings that are lost
 JITTER = 1e-5  # of the stamps [s]
 CLOCK_OFFSET = 5e-5  # between sensors, one standard deviation [s]
 CLOCK_DRIFT = 2e-6
 _DRAWN_AT_ONCE = 1000
+_LOST = NormalDist().inv_cdf(1.0 - DROPOUT)
 
 
 class RealSensor:
@@ -73,7 +75,7 @@ class RealSensor:
         drawn = self._noise[index]
         reading = self._noisy(values, drawn)
         # The first reading is what controllers begin from.
-        if step and drawn[-1] > _QUANTILE:
+        if step and drawn[-1] > _LOST:
             return None
         late = self._offset + self._drift * time + JITTER * float(np.clip(drawn[-2], -3.0, 3.0))
         return now_ns + round(late * 1e9) * (step > 0), self._row(reading)
@@ -96,5 +98,3 @@ class RealSensor:
         mujoco.mju_euler2Quat(quaternion, reading[5:2:-1].copy(), "zyx")
         return np.concatenate([reading[:3], quaternion[1:], quaternion[:1]])
 
-
-_QUANTILE = 3.29  # a normal number is above it in one case of 2000

@@ -6,8 +6,8 @@ MISTUNED = Stratum(
     "mistuned",
     1.0,
     (
-        Case(("internal friction",), (4.0, 8.0), MOVING, absorbed_by="damper"),
-        Case(("slow elongation",), (4.0, 8.0), MOVING, absorbed_by="stiffness"),
-        Case(("drive scale",), (4.0, 8.0), MOVING, absorbed_by="radius"),
+        Case(("internal friction",), (2.0, 4.0), MOVING, absorbed_by="damper"),
+        Case(("slow elongation",), (2.0, 4.0), MOVING, absorbed_by="stiffness"),
+        Case(("drive scale",), (2.0, 4.0), MOVING, absorbed_by="radius"),
     ),
 )

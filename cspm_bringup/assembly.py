@@ -38,7 +38,7 @@ from cspm_sim.any_plant import AnyPlant
 from cspm_sim.motion import Motion
 from cspm_sim.parameters import nominal_parameters
 from cspm_sim.sensor_fault import sensor_faults
-from cspm_sim.sensors import SensorModel
+from cspm_sim.sensors import AnySensor, SensorModel
 
 Array = NDArray[np.float64]
 
@@ -56,7 +56,7 @@ class Assembly:
     testbed: Testbed
     schedule: Schedule
     plant: AnyPlant
-    sensors: dict[str, SensorModel]
+    sensors: dict[str, AnySensor]
     references: dict[str, WaveTrajectory]
     stages: list[Stage]
 
@@ -142,7 +142,7 @@ def assemble(scenario: Scenario, testbed: Testbed, folder: Path, plant: str = SI
 
 def assemble_simulator(
     scenario: Scenario, testbed: Testbed, folder: Path, plant: str
-) -> tuple[AnyPlant, dict[str, SensorModel]]:
+) -> tuple[AnyPlant, dict[str, AnySensor]]:
     """Build a resolved scenario's plant and its sensors; arguments and errors as `assemble`."""
     motions = motions_of(scenario, testbed, folder)
     return _plant(scenario, testbed, motions, plant), _sensors(scenario, testbed)
@@ -209,7 +209,7 @@ def motions_of(scenario: Scenario, testbed: Testbed, folder: Path) -> dict[str, 
     return motions
 
 
-def _sensors(scenario: Scenario, testbed: Testbed) -> dict[str, SensorModel]:
+def _sensors(scenario: Scenario, testbed: Testbed) -> dict[str, AnySensor]:
     return {
         name: SensorModel(
             testbed.topics[name],

@@ -105,6 +105,14 @@ def simulate(
     progress: Callable[[float], None],
     steps: int,
 ) -> RunResult:
+    """Step assembled parts to the end, and say what it amounted to; see `run`.
+
+    Args:
+        parts: what to step.
+        writer: of a recording that has the topics of the parts' schedule; None records nothing.
+        progress: called now and then with the time simulated so far [s].
+        steps: of the plant.
+    """
     scenario, plant = parts.scenario, parts.plant
     tally = Tally(steps, len(plant.tensions))
     publish: Mapping[str, Publish] = {}

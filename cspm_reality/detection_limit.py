@@ -187,10 +187,10 @@ def dampers(machine: Testbed, scenes: Sequence[Scene]) -> Array:
     rates = np.gradient(np.array([elongations(scene) for scene in scenes]), times, axis=0)
     lengths = np.mean([scene.unstretched for scene in scenes], axis=0)
     coefficients = [
-        c.damping.factor * max(0.0, c.damping.constant - c.damping.slope * (l + c.offset_length))
+        c.damping.factor * max(0.0, c.damping.constant - c.damping.slope * (length + c.offset_length))
         if c.damping
         else 0.0
-        for c, l in zip(machine.cables, lengths, strict=True)
+        for c, length in zip(machine.cables, lengths, strict=True)
     ]
     return np.asarray(rates * np.array(coefficients))
 
@@ -215,7 +215,7 @@ def _inertia(scenes: Sequence[Scene], machine: Testbed, slopes: Array, noise: No
 def _radius(scenes: Sequence[Scene], machine: Testbed, slopes: Array, noise: Noise) -> Array:
     ratios = np.array([cable.gear_ratio for cable in machine.cables])
     torque = rms(_tensions(scenes)) / ratios / noise.shaft
-    return np.maximum(torque, slopes * rms(_turns(scenes)) / ratios / noise.tension)
+    return np.asarray(np.maximum(torque, slopes * rms(_turns(scenes)) / ratios / noise.tension))
 
 
 def _turns(scenes: Sequence[Scene]) -> Array:

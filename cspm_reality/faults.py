@@ -57,7 +57,7 @@ class EncoderCounts:
 
     def __call__(self, values: Array, time: float) -> Array:
         """Return the readings."""
-        return values * self._factor
+        return np.asarray(values * self._factor)
 
 
 class FilteredDelay:
@@ -85,7 +85,7 @@ class FilteredDelay:
     def _between(self, wanted: float) -> Array:
         begin, first = self._past[0]
         if wanted <= begin or len(self._past) == 1:
-            return first
+            return np.asarray(first)
         end, second = self._past[1]
         return np.asarray(first + (wanted - begin) / (end - begin) * (second - first))
 

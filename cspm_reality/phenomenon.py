@@ -1,4 +1,4 @@
-"""What may be concealed in a recording: physics, a sensor's fault, or another number of the file."""
+"""What a recording may conceal: physics, a sensor's fault, or another number than the file's."""
 
 from __future__ import annotations
 

@@ -46,9 +46,7 @@ class MaxwellSlip:
         now = elongations(scene)
         if self._elongation is not None:
             grown = (now - self._elongation)[:, None]
-            self._forces = np.clip(
-                self._forces + self._stiffness * grown, -self._most, self._most
-            )
+            self._forces = np.clip(self._forces + self._stiffness * grown, -self._most, self._most)
         self._elongation = now
 
 

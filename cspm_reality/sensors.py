@@ -31,7 +31,8 @@ class RealSensor:
     """One sensor of a machine, with the face of the simulator's.
 
     The test-bed's noise is that of one reading. Part of it is coloured: white noise through a
-    low-pass of first order. Its clock runs beside the machine's, and now and then a reading is lost.
+    low-pass of first order. Its clock runs beside the machine's, and now and then a reading is
+    lost.
     """
 
     def __init__(
@@ -86,7 +87,7 @@ class RealSensor:
         self._colour = self._kept * self._colour + fresh
         white = np.sqrt(1.0 - COLOURED_SHARE) * drawn[:width]
         noise = white + np.sqrt(COLOURED_SHARE) * self._colour
-        reading = values + self._deviation * noise
+        reading: Array = values + self._deviation * noise
         coarse = self._step > 0.0
         reading[coarse] = self._step[coarse] * np.round(reading[coarse] / self._step[coarse])
         return reading
@@ -97,4 +98,3 @@ class RealSensor:
         quaternion = np.zeros(4)
         mujoco.mju_euler2Quat(quaternion, reading[5:2:-1].copy(), "zyx")
         return np.concatenate([reading[:3], quaternion[1:], quaternion[:1]])
-

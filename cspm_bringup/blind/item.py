@@ -117,7 +117,9 @@ def _dealt(strata: Sequence[Stratum], count: int) -> list[Stratum]:
     return out
 
 
-def truth_of(item: Item, amounts: Mapping[str, Sequence[float]], machine: Testbed) -> dict[str, Any]:
+def truth_of(
+    item: Item, amounts: Mapping[str, Sequence[float]], machine: Testbed
+) -> dict[str, Any]:
     """Return what the truth file says of a recording; `amounts` as `amounts_of` gives them."""
     return {
         "name": item.name,
@@ -148,6 +150,7 @@ def _told(each: Concealed, amounts: Sequence[float], machine: Testbed) -> dict[s
         "elements": elements,
         "multiple": abs(each.multiple),
         "parameter": phenomenon.parameter,
+        "base": phenomenon.base,
         "values": {
             element: phenomenon.base + float(amount)
             for element, amount in zip(elements, used, strict=True)

@@ -7,8 +7,9 @@ import json
 import os
 import shutil
 from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass
 from pathlib import Path
-from typing import Any, NamedTuple
+from typing import Any
 
 from cspm_bringup.blind.concealed_run import believed, record_concealed, watch
 from cspm_bringup.blind.item import Item, amounts_of, draw_items, truth_of
@@ -32,7 +33,8 @@ Limits = Mapping[str, Mapping[str, Sequence[float]]]
 Tell = Callable[[str, int, int], None]
 
 
-class Request(NamedTuple):
+@dataclass(frozen=True)
+class Request:
     """What was asked for.
 
     Attributes:
@@ -167,7 +169,9 @@ def _absorbed(
         return {}
     (name,) = amounts
     machine = believed(item.scenario, SHORTEST, _BLANK_SEED).testbed.testbed
-    sizes = [c.drum_radius if number == "radius" else PHENOMENA[number].base for c in machine.cables]
+    sizes = [
+        c.drum_radius if number == "radius" else PHENOMENA[number].base for c in machine.cables
+    ]
     found = []
     for amount, share, size in zip(
         amounts[name], shares[item.scenario, name, number], sizes, strict=True
@@ -214,4 +218,3 @@ def read_truth(path: Path) -> dict[str, Any]:
     if not isinstance(content, dict) or content.get("schema") != SCHEMA:
         raise InputError(f"{path}: allowed: a truth file of schema {SCHEMA}")
     return content
-

@@ -187,7 +187,8 @@ def dampers(machine: Testbed, scenes: Sequence[Scene]) -> Array:
     rates = np.gradient(np.array([elongations(scene) for scene in scenes]), times, axis=0)
     lengths = np.mean([scene.unstretched for scene in scenes], axis=0)
     coefficients = [
-        c.damping.factor * max(0.0, c.damping.constant - c.damping.slope * (length + c.offset_length))
+        c.damping.factor
+        * max(0.0, c.damping.constant - c.damping.slope * (length + c.offset_length))
         if c.damping
         else 0.0
         for c, length in zip(machine.cables, lengths, strict=True)

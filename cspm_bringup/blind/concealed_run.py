@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import replace
+from functools import cache
 from pathlib import Path
 
 from cspm_bringup.assembly import Assembly, assemble, motions_of, resolve
@@ -15,11 +16,11 @@ from cspm_msgs_py.errors import DivergenceError
 from cspm_msgs_py.recording.writer import RecordingWriter
 from cspm_msgs_py.scenario import LockedWinches, load_scenario
 from cspm_msgs_py.schedule import RATE_OF_SENSOR
-from cspm_msgs_py.testbed import load_testbed
+from cspm_msgs_py.testbed import Testbed, load_testbed
 from cspm_msgs_py.topics import DIAGNOSTICS
+from cspm_mujoco.influence import Scene
 from cspm_mujoco.plant import MujocoPlant
 from cspm_reality.detection_limit import copied
-from cspm_mujoco.influence import Scene
 from cspm_reality.reality import Reality
 from cspm_reality.sensors import RealSensor
 
@@ -38,6 +39,17 @@ def believed(scenario: str, duration: float, seed: int) -> Bundle:
     loaded = load_scenario(path, [f"duration={duration}", f"seed={seed}"])
     file = load_testbed(path.parent / loaded.testbed)
     return make_bundle(resolve(loaded, file.testbed), file, path.parent)
+
+
+@cache
+def machine_of(scenario: str) -> Testbed:
+    """Return the machine of a scenario as it is believed to be.
+
+    Raises:
+        InputError: no such scenario.
+    """
+    path = find_scenario(scenario)
+    return load_testbed(path.parent / load_scenario(path).testbed).testbed
 
 
 def assemble_concealed(bundle: Bundle, reality: Reality) -> Assembly:

@@ -11,7 +11,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-from cspm_bringup.blind.concealed_run import believed, record_concealed, watch
+from cspm_bringup.blind.concealed_run import believed, machine_of, record_concealed, watch
 from cspm_bringup.blind.item import Item, amounts_of, draw_items, truth_of
 from cspm_bringup.blind.strata import STRATA
 from cspm_msgs_py.errors import DivergenceError, InputError
@@ -110,7 +110,7 @@ def _check(request: Request) -> None:
 
 
 def _items(request: Request) -> list[Item]:
-    machine = believed("calm", request.duration, _BLANK_SEED).testbed.testbed
+    machine = machine_of("calm")
     seed = request.seed * len(SPLITS) + SPLITS.index(request.split)
     strata = [STRATA[name] for name in request.strata]
     return draw_items(strata, request.count, seed, request.duration, machine)
@@ -122,7 +122,7 @@ def _write_truth(request: Request, tell: Tell) -> None:
     limits, shares = _blank_runs(items, request.duration, tell)
     told = []
     for item in items:
-        machine = believed(item.scenario, request.duration, item.seed).testbed.testbed
+        machine = machine_of(item.scenario)
         amounts = amounts_of(item, limits[item.scenario], len(machine.cables))
         amounts |= _absorbed(item, amounts, shares)
         told.append({**truth_of(item, amounts, machine), "amounts": amounts})
@@ -168,7 +168,7 @@ def _absorbed(
     if number is None:
         return {}
     (name,) = amounts
-    machine = believed(item.scenario, SHORTEST, _BLANK_SEED).testbed.testbed
+    machine = machine_of(item.scenario)
     sizes = [
         c.drum_radius if number == "radius" else PHENOMENA[number].base for c in machine.cables
     ]

@@ -7,7 +7,6 @@ from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
-from cspm_bringup.blind.make import RECORDINGS
 from cspm_bringup.blind.run import DIAGNOSIS, RESULTS, TIMES
 from cspm_msgs_py.errors import InputError
 
@@ -25,13 +24,10 @@ def read_results(folder: Path, names: Sequence[str]) -> Mapping[str, Mapping[str
     strange = sorted(set(found) - set(names))
     if strange:
         raise InputError(f"{place}: {strange[0]} is not in the truth, allowed: its own recordings")
-    return {
-        name: _read(folder, name) for name in found if any((folder / RECORDINGS / name).iterdir())
-    }
+    return {name: _read(place / name) for name in found}
 
 
-def _read(folder: Path, name: str) -> dict[str, Any]:
-    place = folder / RESULTS / name
+def _read(place: Path) -> dict[str, Any]:
     times = json.loads((place / TIMES).read_text(encoding="utf-8"))
     report = place / DIAGNOSIS
     diagnosis = json.loads(report.read_text(encoding="utf-8")) if report.exists() else None

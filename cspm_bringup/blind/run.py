@@ -37,7 +37,9 @@ def run(folder: Path, tell: Tell = lambda text, done, total: None) -> dict[str, 
         InputError: no recordings there.
     """
     recordings = folder / RECORDINGS
-    names = sorted(p.name for p in recordings.iterdir()) if recordings.is_dir() else []
+    places = sorted(recordings.iterdir()) if recordings.is_dir() else []
+    # A folder is empty where the controllers lost the bar.
+    names = [place.name for place in places if any(place.iterdir())]
     if not names:
         raise InputError(f"{folder}: no {RECORDINGS}, allowed: a folder of `cspm blind make`")
     failed = {}

@@ -13,9 +13,10 @@ pytest.importorskip("mujoco", minversion="4.0", reason="the MuJoCo plant needs M
 from cspm_bringup.blind import make as making
 from cspm_bringup.blind.commands import score_command
 from cspm_bringup.blind.concealed_run import NOTES
-from cspm_bringup.blind.make import Request, make, truth_sha256
+from cspm_bringup.blind.make import Request, make
 from cspm_bringup.blind.run import environment, run
 from cspm_bringup.blind.stratum import Case, Stratum
+from cspm_bringup.blind.truth import truth_sha256
 from cspm_msgs_py.errors import DivergenceError, InputError
 from cspm_msgs_py.recording.reader import Recording
 from cspm_reality.phenomena import PHENOMENA
@@ -93,7 +94,7 @@ def test_an_interrupted_make_goes_on_where_it_was(tmp_path, monkeypatch):
     made = []
 
     def record(bundle, reality, folder, **_):
-        if len(made) == 2:
+        if len(made) == 1:
             made.append("interrupted")
             raise KeyboardInterrupt
         folder.mkdir(parents=True)
@@ -103,14 +104,14 @@ def test_an_interrupted_make_goes_on_where_it_was(tmp_path, monkeypatch):
     monkeypatch.setattr(making, "record_concealed", record)
     monkeypatch.setattr(making, "_blank_runs", lambda *_: ({"worst_case": {}}, {}))
     monkeypatch.setattr(making, "STRATA", {"nothing": NOTHING})
-    asked = Request(tmp_path / "bench", tmp_path / "t.json", 3, 5, "dev", ("nothing",), 15.0)
+    asked = Request(tmp_path / "bench", tmp_path / "t.json", 3, 3, "dev", ("nothing",), 15.0)
     with pytest.raises(KeyboardInterrupt):
         make(asked)
     digest = truth_sha256(asked.truth)
-    assert len(recordings(asked)) == 2
+    assert len(recordings(asked)) == 1
     assert make(asked) == digest
-    assert [p.name for p in recordings(asked)] == [made[0], made[1], *made[3:]]
-    assert len(set(made)) == 6
+    assert [p.name for p in recordings(asked)] == [made[0], *made[2:]]
+    assert len(set(made)) == 4
 
 
 def test_what_diverges_is_an_empty_folder_and_is_not_tried_again(tmp_path, monkeypatch):
@@ -123,11 +124,11 @@ def test_what_diverges_is_an_empty_folder_and_is_not_tried_again(tmp_path, monke
     monkeypatch.setattr(making, "record_concealed", record)
     monkeypatch.setattr(making, "_blank_runs", lambda *_: ({"worst_case": {}}, {}))
     monkeypatch.setattr(making, "STRATA", {"nothing": NOTHING})
-    asked = Request(tmp_path / "bench", tmp_path / "t.json", 3, 2, "dev", ("nothing",), 15.0)
+    asked = Request(tmp_path / "bench", tmp_path / "t.json", 3, 1, "dev", ("nothing",), 15.0)
     make(asked)
     make(asked)
-    assert len(tried) == 2
-    assert [list(p.iterdir()) for p in recordings(asked)] == [[], []]
+    assert len(tried) == 1
+    assert [list(p.iterdir()) for p in recordings(asked)] == [[]]
 
 
 @pytest.mark.slow

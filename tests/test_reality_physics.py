@@ -173,3 +173,15 @@ def test_shifted_markers_turn_with_the_bar():
     assert yawed[:3] == pytest.approx([-0.01, 0.0, 0.0])
     rolled = shift(np.array([0, 0, 0, np.pi / 2, 0, 0]), 0.0)
     assert rolled[:3] == pytest.approx([0.0, 0.0, 0.01])
+
+
+def test_drag_on_a_rope_has_the_moment_of_its_force():
+    """A turning bar with the attachment off its origin, by vector products."""
+    drag = rope.SegmentDrag(np.array([0.4]))
+    rate, origin = np.array([0.3, -0.2, 0.5]), np.array([0.2, -0.4, 1.9])
+    wrench = acted(drag, scene(body=[*origin, 0.1, 0.2, 0.3, *rate])).wrench
+    arm = END[0] - origin
+    end = np.array([0.1, 0.2, 0.3]) + np.cross(rate, arm)
+    force = -0.4 * np.array([end[0], end[1], 0.0])
+    assert wrench[:3] == pytest.approx(force)
+    assert wrench[3:] == pytest.approx(np.cross(arm, force))

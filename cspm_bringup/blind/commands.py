@@ -11,11 +11,11 @@ from rich.console import Console
 from rich.markup import escape
 from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeRemainingColumn
 
-from cspm_bringup.blind.make import Request, make, read_truth, truth_sha256
 from cspm_bringup.blind.results import read_results
 from cspm_bringup.blind.run import run
-from cspm_bringup.blind.strata import STRATA
+from cspm_bringup.blind.truth import read_truth, truth_sha256
 from cspm_bringup.console import make_console, say
+from cspm_bringup.plants import require_mujoco
 from cspm_bringup.summary import write_json
 from cspm_ident.blind.page import scorecard_page
 from cspm_ident.blind.scorecard import scorecard
@@ -31,7 +31,15 @@ def make_command(
     strata: tuple[str, ...],
     duration: float,
 ) -> None:
-    """Make a benchmark; see `make`."""
+    """Make a benchmark; see `make`.
+
+    Raises:
+        InputError: MuJoCo, which makes the recordings, is not installed.
+    """
+    require_mujoco("blind make")
+    from cspm_bringup.blind.make import Request, make
+    from cspm_bringup.blind.strata import STRATA
+
     console = make_console()
     asked = Request(folder, truth, seed, count, split, strata or tuple(STRATA), duration)
     with _bar(console) as show:

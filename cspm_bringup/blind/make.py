@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import hashlib
 import json
 import os
 import shutil
@@ -14,14 +13,12 @@ from typing import Any
 from cspm_bringup.blind.concealed_run import believed, machine_of, record_concealed, watch
 from cspm_bringup.blind.item import Item, amounts_of, draw_items, truth_of
 from cspm_bringup.blind.strata import STRATA
+from cspm_bringup.blind.truth import RECORDINGS, SCHEMA, SPLITS, truth_sha256
 from cspm_msgs_py.errors import DivergenceError, InputError
 from cspm_reality.detection_limit import absorbed_share, detection_limits
 from cspm_reality.phenomena import PHENOMENA
 from cspm_reality.reality import conceal
 
-SCHEMA = "cspm.blind-truth/1"
-SPLITS = ("dev", "tune", "sealed")
-RECORDINGS = "recordings"
 SHORTEST, LONGEST = 15.0, 200.0  # [s]
 SEARCHED_SHARE = 0.7  # of a recording; the rest is held out by the diagnosis
 # Of a number of the file, more is not taken over by an effect: it stays positive.
@@ -88,11 +85,6 @@ def make(request: Request, tell: Tell = lambda text, done, total: None) -> str:
     shutil.rmtree(request.folder / ".part", ignore_errors=True)
     tell("recordings made", request.count, request.count)
     return digest
-
-
-def truth_sha256(path: Path) -> str:
-    """Return the SHA-256 of a truth file, hexadecimal."""
-    return hashlib.sha256(path.read_bytes()).hexdigest()
 
 
 def _check(request: Request) -> None:
@@ -203,18 +195,3 @@ def _record(request: Request, item: Item, amounts: Mapping[str, Sequence[float]]
         os.utime(path, (_ONE_DATE, _ONE_DATE))
     part.rename(folder)
     os.utime(folder, (_ONE_DATE, _ONE_DATE))
-
-
-def read_truth(path: Path) -> dict[str, Any]:
-    """Read a truth file.
-
-    Raises:
-        InputError: there is none, or it is something else.
-    """
-    try:
-        content = json.loads(path.read_text(encoding="utf-8"))
-    except (OSError, ValueError) as err:
-        raise InputError(f"{path}: not readable ({err}), allowed: a truth file") from None
-    if not isinstance(content, dict) or content.get("schema") != SCHEMA:
-        raise InputError(f"{path}: allowed: a truth file of schema {SCHEMA}")
-    return content

@@ -7,7 +7,8 @@ from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
-from cspm_bringup.blind.run import DIAGNOSIS, RESULTS, TIMES
+from cspm_bringup.blind.run import DIAGNOSIS, TIMES
+from cspm_bringup.blind.truth import RESULTS
 from cspm_msgs_py.errors import InputError
 
 

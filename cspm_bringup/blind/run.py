@@ -13,10 +13,9 @@ import time
 from collections.abc import Callable
 from pathlib import Path
 
-from cspm_bringup.blind.make import RECORDINGS
+from cspm_bringup.blind.truth import RECORDINGS, RESULTS
 from cspm_msgs_py.errors import InputError
 
-RESULTS = "results"
 DIAGNOSIS, TIMES, FAILURE = "diagnosis.json", "times.json", "failure.txt"
 _KEPT = ("PATH", "LANG", "LD_LIBRARY_PATH", "VIRTUAL_ENV")
 _THREADS = ("NUMBA_NUM_THREADS", "OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS")

@@ -1,6 +1,7 @@
 """What benchmarks draw, before anything is recorded."""
 
 import math
+import sys
 from collections import Counter
 from itertools import pairwise
 from pathlib import Path
@@ -11,6 +12,7 @@ from cspm_msgs_py.errors import InputError
 from cspm_msgs_py.testbed import load_testbed
 
 pytest.importorskip("mujoco", minversion="4.0", reason="the MuJoCo plant needs MuJoCo 4")
+from cspm_bringup import cli
 from cspm_bringup.blind.item import amounts_of, draw_items, truth_of
 from cspm_bringup.blind.make import Request, make
 from cspm_bringup.blind.strata import STRATA
@@ -103,6 +105,22 @@ def test_wrong_requests_are_refused(tmp_path, changed, text):
     with pytest.raises(InputError, match=text):
         make(request(tmp_path, **changed))
     assert not list(tmp_path.iterdir())
+
+
+def test_the_command_line_refuses_in_one_line(monkeypatch, capsys, tmp_path):
+    out = str(tmp_path / "bench")
+    words = ["cspm", "blind", "make", "--seed", "1", "--out", out, "--split", "all"]
+    monkeypatch.setattr(sys, "argv", words)
+    with pytest.raises(SystemExit) as caught:
+        cli.main()
+    assert caught.value.code == 2
+    assert capsys.readouterr().err == "cspm: --split all: allowed: dev, tune, sealed\n"
+    monkeypatch.setattr(sys, "argv", ["cspm", "blind", "run", out])
+    with pytest.raises(SystemExit) as caught:
+        cli.main()
+    assert caught.value.code == 2
+    line = f"cspm: {out}: no recordings, allowed: a folder of `cspm blind make`\n"
+    assert capsys.readouterr().err == line
 
 
 def test_a_truth_among_the_recordings_and_one_of_another_benchmark_are_refused(tmp_path):

@@ -192,8 +192,9 @@ def test_a_scorecard_counts():
 
 
 def test_the_page_says_what_split_it_is_of_and_tells_every_miss():
-    text = scorecard_page(card(), "ab" * 32)
+    text = scorecard_page(card(), "ab" * 32, "today on two processors")
     assert "6 of 7 recordings of 30 s, split dev, seed 1" in text
+    assert "Scored today on two processors. This is the development split" in text
     assert "under development" in text
     assert "| d | nothing |  | 0 | effect | winch_coulomb_friction: surge_1 |" in text
     assert "| alarm where there is nothing | 50 % (1 of 2; 1 to 99) | ≤ 3 % |" in text

@@ -3,8 +3,12 @@
 from __future__ import annotations
 
 import json as json_format
+import os
+import platform
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
+from datetime import date
+from importlib.metadata import version
 from pathlib import Path
 
 from rich.console import Console
@@ -69,7 +73,11 @@ def score_command(
     if sha256 is not None and sha256.lower() != found:
         raise InputError(f"{truth}: SHA-256 {found}, allowed: that of --sha256, {sha256}")
     card = scorecard(content, read_results(folder, [item["name"] for item in content["items"]]))
-    text = scorecard_page(card, found)
+    machine = (
+        f"{date.today()} on {os.cpu_count()} processors ({platform.machine()}), cspm"
+        f" {version('cspm')}"
+    )
+    text = scorecard_page(card, found, machine)
     say(console, text)
     if page is not None:
         page.write_text(text, encoding="utf-8")

@@ -29,11 +29,17 @@ _STANDING = {
 Data = Mapping[str, Any]
 
 
-def scorecard_page(card: Data, sha256: str) -> str:
-    """Return the scorecard as Markdown; `sha256` is that of the truth file."""
+def scorecard_page(card: Data, sha256: str, machine: str) -> str:
+    """Return the scorecard as Markdown.
+
+    Args:
+        card: the scorecard.
+        sha256: of the truth file.
+        machine: what scored it, and when.
+    """
     parts = [
         "# Blind results",
-        _about(card, sha256),
+        _about(card, sha256, machine),
         "## Against the targets",
         "Known effects and numbers at 2 detection limits and more; intervals of 95 % after Clopper"
         " and Pearson.",
@@ -74,11 +80,12 @@ def scorecard_page(card: Data, sha256: str) -> str:
     return "\n\n".join(parts) + "\n"
 
 
-def _about(card: Data, sha256: str) -> str:
+def _about(card: Data, sha256: str, machine: str) -> str:
     asked = card["asked"]
     return (
         f"{card['scored']} of {card['drawn']} recordings of {asked['duration']:g} s, split"
         f" {asked['split']}, seed {asked['seed']}; truth file SHA-256 `{sha256}`."
+        f" Scored {machine}."
         f" {_STANDING[asked['split']]} How it is made and what the words mean:"
         " [blind.md](blind.md). Written by `cspm blind score DIR --page docs/blind-results.md`."
     )

@@ -23,6 +23,7 @@ from cspm_mujoco.plant import MujocoPlant
 from cspm_reality.detection_limit import copied
 from cspm_reality.reality import Reality
 from cspm_reality.sensors import RealSensor
+from cspm_sim.sensors import AnySensor
 
 TRUTH = "/truth"
 NOTES = "notes.txt"
@@ -67,7 +68,7 @@ def assemble_concealed(bundle: Bundle, reality: Reality) -> Assembly:
         influences=reality.influences,
     )
     believed_machine = bundle.testbed.testbed
-    sensors = {
+    sensors: dict[str, AnySensor] = {
         name: RealSensor(
             believed_machine.topics[name],
             sensor,

@@ -20,9 +20,19 @@ _SYSTEM = ("/usr", "/lib", "/lib64", "/etc", "/proc", "/sys", "/dev")
 def readable(room: Path) -> tuple[str, ...]:
     """Return the folders that may be read: the room, the code and what it stands on."""
     code = Path(__file__).resolve().parents[2]
-    own = [str(folder) for folder in code.glob("cspm*")] + [str(code / "scenarios")]
-    python = [sys.prefix, sys.base_prefix, *sysconfig.get_paths().values(), *site.getsitepackages()]
-    return tuple(os.path.realpath(path) for path in (room, *own, *python, *_SYSTEM) if path)
+    packages = [f for f in code.glob("cspm*") if f.suffix == ".egg-info" or _is_package(f)]
+    own = [str(folder) for folder in (*packages, code / "scenarios")]
+    python: list[str] = [
+        sys.prefix,
+        sys.base_prefix,
+        *sysconfig.get_paths().values(),
+        *site.getsitepackages(),
+    ]
+    return tuple(os.path.realpath(path) for path in (str(room), *own, *python, *_SYSTEM) if path)
+
+
+def _is_package(folder: Path) -> bool:
+    return (folder / "__init__.py").exists()
 
 
 def confine(room: Path) -> None:

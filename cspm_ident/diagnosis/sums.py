@@ -73,6 +73,13 @@ class Sums:
         """Return the least-squares weights of columns."""
         return np.asarray(self._weights(columns, self._whole) / self._lengths[columns])
 
+    def weights_beyond(self, base: Index, columns: Index) -> Array:
+        """Return the weights of columns fitted to what a base leaves, its own weights held."""
+        both = self._whole[np.ix_(columns, base)]
+        left = self._whole[columns, -1] - both @ self._weights(base, self._whole)
+        inverse = _pseudo_inverse(self._whole[np.ix_(columns, columns)])
+        return np.asarray(inverse @ left / self._lengths[columns])
+
     def gains_beyond(self, base: Index, groups: list[Index]) -> Array:
         """Return by how much each group of columns lowers Σ residual² beyond a base, (groups,)."""
         inverse = _pseudo_inverse(self._whole[np.ix_(base, base)])

@@ -44,12 +44,21 @@ def make(
     duration: Annotated[
         float, typer.Option(metavar="SECONDS", help="Of each recording, 15 to 200.")
     ] = 60.0,
+    sensors: Annotated[
+        str,
+        typer.Option(
+            metavar="KIND",
+            help="real, or plain: white noise alone, to see what the sensors themselves cost.",
+        ),
+    ] = "real",
     truth: Truth = None,
 ) -> None:
     """Record machines that conceal something, and write the truth apart."""
     from cspm_bringup.blind.commands import make_command
 
-    make_command(out, _truth(out, truth), seed, count, split, tuple(strata or ()), duration)
+    make_command(
+        out, _truth(out, truth), seed, count, split, tuple(strata or ()), duration, sensors
+    )
 
 
 @blind.command()

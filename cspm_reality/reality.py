@@ -12,7 +12,7 @@ from cspm_msgs_py.testbed import Testbed
 from cspm_mujoco.influence import Influence
 from cspm_reality.late import Late, LateFault
 from cspm_reality.phenomena import PHENOMENA
-from cspm_reality.sensors import Fault
+from cspm_reality.sensors import QUALITIES, REAL, Fault, Quality
 
 Array = NDArray[np.float64]
 
@@ -24,15 +24,21 @@ class Reality(NamedTuple):
         testbed: with the numbers that it has.
         influences: physics beside the test-bed's.
         faults: of its sensors, by topic.
+        quality: of its sensors.
     """
 
     testbed: Testbed
     influences: tuple[Influence, ...]
     faults: Mapping[str, tuple[Fault, ...]]
+    quality: Quality
 
 
 def conceal(
-    testbed: Testbed, amounts: Mapping[str, Sequence[float]], onset: float, seed: int
+    testbed: Testbed,
+    amounts: Mapping[str, Sequence[float]],
+    onset: float,
+    seed: int,
+    sensors: str = REAL,
 ) -> Reality:
     """Return the machine in which phenomena act.
 
@@ -41,6 +47,7 @@ def conceal(
         amounts: by phenomenon, per cable (n,), or the one for the bar.
         onset: when physics and faults begin [s]; numbers of the machine have no onset.
         seed: of phases and gusts.
+        sensors: one of `QUALITIES`.
     """
     generator = np.random.default_rng([seed, 3])
     influences: list[Influence] = []
@@ -56,4 +63,4 @@ def conceal(
             for topic, fault in phenomenon.faults(amount).items():
                 added = LateFault(fault, onset) if onset else fault
                 faults[topic] = (*faults.get(topic, ()), added)
-    return Reality(testbed, tuple(influences), faults)
+    return Reality(testbed, tuple(influences), faults, QUALITIES[sensors])

@@ -3,8 +3,9 @@
 from __future__ import annotations
 
 import zlib
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from statistics import NormalDist
+from typing import NamedTuple
 
 import mujoco
 import numpy as np
@@ -17,14 +18,34 @@ Array = NDArray[np.float64]
 # From true values and time [s] to what the sensor takes in.
 Fault = Callable[[Array, float], Array]
 
-COLOURED_SHARE = 0.3  # of the noise's power
 COLOUR_TIME = 0.02  # [s]
-DROPOUT = 2e-4  # share of readings that are lost
-JITTER = 1e-5  # of the stamps [s]
-CLOCK_OFFSET = 5e-5  # between sensors, one standard deviation [s]
-CLOCK_DRIFT = 2e-6
 _DRAWN_AT_ONCE = 1000
-_LOST = NormalDist().inv_cdf(1.0 - DROPOUT)
+
+
+class Quality(NamedTuple):
+    """What a sensor does beside noise and resolution.
+
+    Attributes:
+        coloured_share: of the noise's power.
+        dropout: share of readings that are lost.
+        jitter: of the stamps, one standard deviation [s].
+        clock_offset: between sensors, one standard deviation [s].
+        clock_drift: of each clock, one standard deviation.
+    """
+
+    coloured_share: float
+    dropout: float
+    jitter: float
+    clock_offset: float
+    clock_drift: float
+
+
+REAL, PLAIN = "real", "plain"
+# `PLAIN` shows by comparison what the sensors themselves cost a diagnosis.
+QUALITIES: Mapping[str, Quality] = {
+    REAL: Quality(0.3, 2e-4, 1e-5, 5e-5, 2e-6),
+    PLAIN: Quality(0.0, 0.0, 0.0, 0.0, 0.0),
+}
 
 
 class RealSensor:
@@ -43,6 +64,7 @@ class RealSensor:
         rate: int,
         period_ns: int,
         seed: int,
+        quality: Quality = QUALITIES[REAL],
         faults: Sequence[Fault] = (),
     ) -> None:
         """Make the sensor of `topic` at `rate` [Hz] on a plant of period `period_ns` [ns]."""
@@ -56,8 +78,10 @@ class RealSensor:
         self._colour = np.zeros(width)
         self._faults = tuple(faults)
         self._generator = np.random.default_rng([seed, zlib.crc32(topic.name.encode()), 1])
-        self._offset = float(self._generator.normal(0.0, CLOCK_OFFSET))
-        self._drift = float(self._generator.normal(0.0, CLOCK_DRIFT))
+        self._quality = quality
+        self._lost = NormalDist().inv_cdf(1.0 - quality.dropout) if quality.dropout else np.inf
+        self._offset = float(self._generator.normal(0.0, quality.clock_offset))
+        self._drift = float(self._generator.normal(0.0, quality.clock_drift))
         self._taken = 0
         self._noise: Array = np.zeros((0, 2 * width + 2))
 
@@ -76,17 +100,18 @@ class RealSensor:
         drawn = self._noise[index]
         reading = self._noisy(values, drawn)
         # The first reading is what controllers begin from.
-        if step and drawn[-1] > _LOST:
+        if step and drawn[-1] > self._lost:
             return None
-        late = self._offset + self._drift * time + JITTER * float(np.clip(drawn[-2], -3.0, 3.0))
+        jitter = self._quality.jitter * float(np.clip(drawn[-2], -3.0, 3.0))
+        late = self._offset + self._drift * time + jitter
         return now_ns + round(late * 1e9) * (step > 0), self._row(reading)
 
     def _noisy(self, values: Array, drawn: Array) -> Array:
         width = len(values)
         fresh = np.sqrt(1.0 - self._kept**2) * drawn[width : 2 * width]
         self._colour = self._kept * self._colour + fresh
-        white = np.sqrt(1.0 - COLOURED_SHARE) * drawn[:width]
-        noise = white + np.sqrt(COLOURED_SHARE) * self._colour
+        share = self._quality.coloured_share
+        noise = np.sqrt(1.0 - share) * drawn[:width] + np.sqrt(share) * self._colour
         reading: Array = values + self._deviation * noise
         coarse = self._step > 0.0
         reading[coarse] = self._step[coarse] * np.round(reading[coarse] / self._step[coarse])

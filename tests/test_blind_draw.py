@@ -97,6 +97,7 @@ def request(folder, **changed):
     [
         ({"strata": ("fog",)}, r"^--strata fog: allowed: nothing, parameter, noise"),
         ({"split": "all"}, r"^--split all: allowed: dev, tune, sealed$"),
+        ({"sensors": "bad"}, r"^--sensors bad: allowed: real, plain$"),
         ({"count": 0}, r"^--count 0: allowed: 1 or more$"),
         ({"duration": 3.0}, r"^--duration 3: allowed: 15 to 200 s$"),
     ],

@@ -141,7 +141,14 @@ def test_shares_carry_the_intervals_of_clopper_and_pearson():
 
 def card():
     truth = {
-        "asked": {"seed": 1, "count": 6, "split": "dev", "duration": 30.0, "strata": ["noise"]},
+        "asked": {
+            "seed": 1,
+            "count": 6,
+            "split": "dev",
+            "duration": 30.0,
+            "sensors": "real",
+            "strata": ["noise"],
+        },
         "items": [
             item("a", concealed()),
             item("b", concealed(multiple=0.5)),
@@ -193,7 +200,10 @@ def test_a_scorecard_counts():
 
 def test_the_page_says_what_split_it_is_of_and_tells_every_miss():
     text = scorecard_page(card(), "ab" * 32, "today on two processors")
-    assert "6 of 7 recordings of 30 s, split dev, seed 1" in text
+    assert (
+        "6 of 7 recordings; drawn with seed 1, count 6, split dev, duration 30.0, sensors real"
+        in text
+    )
     assert "Scored today on two processors. This is the development split" in text
     assert "under development" in text
     assert "| d | nothing |  | 0 | effect | winch_coulomb_friction: surge_1 |" in text

@@ -34,6 +34,7 @@ def make_command(
     split: str,
     strata: tuple[str, ...],
     duration: float,
+    sensors: str,
 ) -> None:
     """Make a benchmark; see `make`.
 
@@ -45,7 +46,7 @@ def make_command(
     from cspm_bringup.blind.strata import STRATA
 
     console = make_console()
-    asked = Request(folder, truth, seed, count, split, strata or tuple(STRATA), duration)
+    asked = Request(folder, truth, seed, count, split, strata or tuple(STRATA), duration, sensors)
     with _bar(console) as show:
         make(asked, show)
 

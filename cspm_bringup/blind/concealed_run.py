@@ -75,6 +75,7 @@ def assemble_concealed(bundle: Bundle, reality: Reality) -> Assembly:
             rate=getattr(scenario.rates, RATE_OF_SENSOR[name]),
             period_ns=parts.period_ns,
             seed=scenario.seed,
+            quality=reality.quality,
             faults=reality.faults.get(name, ()),
         )
         for name, sensor in believed_machine.sensors.items()

@@ -18,12 +18,14 @@ from cspm_msgs_py.errors import DivergenceError, InputError
 from cspm_reality.detection_limit import absorbed_share, detection_limits
 from cspm_reality.phenomena import PHENOMENA
 from cspm_reality.reality import conceal
+from cspm_reality.sensors import QUALITIES, REAL
 
 SHORTEST, LONGEST = 15.0, 200.0  # [s]
 SEARCHED_SHARE = 0.7  # of a recording; the rest is held out by the diagnosis
 # Of a number of the file, more is not taken over by an effect: it stays positive.
 MOST_ABSORBED = 0.8
 _BLANK_SEED = 1
+_TOLD = ("seed", "count", "split", "duration", "sensors")
 _ONE_DATE = 1_000_000_000  # of all files, so that it tells no order [s]
 
 Limits = Mapping[str, Mapping[str, Sequence[float]]]
@@ -42,6 +44,7 @@ class Request:
         split: one of `SPLITS`, which have nothing in common.
         strata: names, of which the recordings are.
         duration: of each recording [s].
+        sensors: one of `QUALITIES`.
     """
 
     folder: Path
@@ -51,10 +54,11 @@ class Request:
     split: str
     strata: tuple[str, ...]
     duration: float
+    sensors: str = REAL
 
     def told(self) -> dict[str, Any]:
         """Return what the truth file keeps of it."""
-        asked = {key: getattr(self, key) for key in ("seed", "count", "split", "duration")}
+        asked = {key: getattr(self, key) for key in _TOLD}
         return {**asked, "strata": list(self.strata)}
 
 
@@ -95,6 +99,8 @@ def _check(request: Request) -> None:
         raise InputError(f"--split {request.split}: allowed: {', '.join(SPLITS)}")
     if request.count < 1:
         raise InputError(f"--count {request.count}: allowed: 1 or more")
+    if request.sensors not in QUALITIES:
+        raise InputError(f"--sensors {request.sensors}: allowed: {', '.join(QUALITIES)}")
     if not SHORTEST <= request.duration <= LONGEST:
         raise InputError(f"--duration {request.duration:g}: allowed: {SHORTEST:g} to {LONGEST:g} s")
     if request.folder.resolve() in request.truth.resolve().parents:
@@ -181,7 +187,7 @@ def _record(request: Request, item: Item, amounts: Mapping[str, Sequence[float]]
     part = request.folder / ".part" / item.name
     shutil.rmtree(part, ignore_errors=True)
     bundle = believed(item.scenario, request.duration, item.seed)
-    reality = conceal(bundle.testbed.testbed, amounts, item.onset, item.seed)
+    reality = conceal(bundle.testbed.testbed, amounts, item.onset, item.seed, request.sensors)
     note = f"The operator suspects {item.note}.\n".ljust(80)
     folder.parent.mkdir(parents=True, exist_ok=True)
     try:

@@ -82,9 +82,10 @@ def scorecard_page(card: Data, sha256: str, machine: str) -> str:
 
 def _about(card: Data, sha256: str, machine: str) -> str:
     asked = card["asked"]
+    options = ", ".join(f"{key} {value}" for key, value in asked.items() if key != "strata")
     return (
-        f"{card['scored']} of {card['drawn']} recordings of {asked['duration']:g} s, split"
-        f" {asked['split']}, seed {asked['seed']}; truth file SHA-256 `{sha256}`."
+        f"{card['scored']} of {card['drawn']} recordings; drawn with {options}; truth file SHA-256"
+        f" `{sha256}`."
         f" Scored {machine}."
         f" {_STANDING[asked['split']]} How it is made and what the words mean:"
         " [blind.md](blind.md). Written by `cspm blind score DIR --page docs/blind-results.md`."

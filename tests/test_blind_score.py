@@ -157,6 +157,7 @@ def card():
             item("e", concealed(effect=None, kind="unknown", multiple=4.0), stratum="outside"),
             item("f", concealed(kind="parameter", multiple=4.0), stratum="parameter"),
             item("g", concealed()),
+            item("h", stratum="nothing"),
         ],
     }
     results = {
@@ -166,13 +167,14 @@ def card():
         "d": result("effect", finding(FRICTION)),
         "e": result("consistent"),
         "f": result("effect", finding("tension_gain")),
+        "h": {"diagnosis": None, "times": {"wall_s": 1.0, "cpu_s": 1.0}},
     }
     return scorecard(truth, results)
 
 
 def test_a_scorecard_counts():
     found = card()
-    assert (found["drawn"], found["scored"]) == (7, 6)
+    assert (found["drawn"], found["scored"]) == (8, 7)
     shares = {key: value[:2] for key, value in found["shares"].items() if isinstance(value, tuple)}
     assert shares == {
         "detected": (2, 2),
@@ -185,14 +187,15 @@ def test_a_scorecard_counts():
         "false_alarm": (1, 2),
         "parameter_called_effect": (1, 1),
         "unknown_recognised": (0, 1),
-        "false_unknown": (0, 5),
+        "false_unknown": (0, 6),
+        "failed": (1, 7),
     }
     assert [(r["multiple"], r["detected"][:2]) for r in found["by_multiple"]] == [
         (0.5, (0, 1)),
         (2.0, (1, 1)),
         (4.0, (1, 1)),
     ]
-    assert found["confusion"]["nothing"] == {"consistent": 1, "effect": 1}
+    assert found["confusion"]["nothing"] == {"consistent": 1, "effect": 1, "failed": 1}
     assert found["fit"]["below_retuned"][:2] == (1, 1)
     # Of the findings told with 0.9, one is right.
     assert [row["right"][:2] for row in found["calibration"]] == [(0, 0), (0, 0), (1, 3), (0, 0)]
@@ -201,7 +204,7 @@ def test_a_scorecard_counts():
 def test_the_page_says_what_split_it_is_of_and_tells_every_miss():
     text = scorecard_page(card(), "ab" * 32, "today on two processors")
     assert (
-        "6 of 7 recordings; drawn with seed 1, count 6, split dev, duration 30.0, sensors real"
+        "7 of 8 recordings; drawn with seed 1, count 6, split dev, duration 30.0, sensors real"
         in text
     )
     assert "Scored today on two processors. This is the development split" in text

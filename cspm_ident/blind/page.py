@@ -17,6 +17,7 @@ _TARGETS = (
     ("parameter_called_effect", "wrong number called an effect", ""),
     ("unknown_recognised", "unknown recognised", "≥ 75 %"),
     ("false_unknown", "unknown where the catalogue has it", "≤ 8 %"),
+    ("failed", "diagnosis failed", ""),
 )
 _VERDICTS = ("consistent", "parameter", "effect", "tie", "unknown", "not_excited", "failed")
 _STANDING = {

@@ -9,7 +9,16 @@ from itertools import pairwise
 from statistics import median
 from typing import Any
 
-from cspm_ident.blind.outcome import EFFECT, KINDS, NOTHING, OUTSIDE, PARAMETER, Outcome, judge
+from cspm_ident.blind.outcome import (
+    EFFECT,
+    FAILED,
+    KINDS,
+    NOTHING,
+    OUTSIDE,
+    PARAMETER,
+    Outcome,
+    judge,
+)
 from cspm_ident.blind.share import share, upper_bound
 
 SCHEMA = "cspm.blind-score/1"
@@ -47,7 +56,8 @@ def scorecard(truth: Mapping[str, Any], results: Mapping[str, Mapping[str, Any]]
 
 
 def _shares(outcomes: Sequence[Outcome], clear: Sequence[Outcome]) -> dict[str, Any]:
-    blank = [o for o in outcomes if o.kind == NOTHING]
+    # No diagnosis is no silence.
+    blank = [o for o in outcomes if o.kind == NOTHING and o.verdict != FAILED]
     numbers = [o for o in outcomes if o.kind == PARAMETER]
     outside = [o for o in outcomes if o.kind == OUTSIDE]
     inside = [o for o in outcomes if o.kind != OUTSIDE]
@@ -65,6 +75,7 @@ def _shares(outcomes: Sequence[Outcome], clear: Sequence[Outcome]) -> dict[str, 
         "parameter_called_effect": share(o.verdict == EFFECT for o in numbers),
         "unknown_recognised": share(o.unknown for o in outside),
         "false_unknown": share(o.unknown for o in inside),
+        "failed": share(o.verdict == FAILED for o in outcomes),
         "mean_tie_size": _mean([float(s) for o in clear for s in o.tie_sizes]),
     }
 
@@ -99,7 +110,7 @@ def _by_stratum(outcomes: Sequence[Outcome]) -> list[dict[str, Any]]:
                 "tied": sum(o.tied for o in these),
                 "named": sum(o.named for o in these),
                 "wrong": sum(o.wrong for o in these),
-                "failed": sum(o.verdict == "failed" for o in these),
+                "failed": sum(o.verdict == FAILED for o in these),
             }
         )
     return rows

@@ -5,6 +5,7 @@ import os
 import subprocess
 import sys
 from itertools import combinations
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -14,6 +15,7 @@ from cspm_bringup.blind import make as making
 from cspm_bringup.blind.commands import score_command
 from cspm_bringup.blind.concealed_run import NOTES
 from cspm_bringup.blind.make import Request, make
+from cspm_bringup.blind.results import read_results
 from cspm_bringup.blind.run import environment, run
 from cspm_bringup.blind.stratum import Case, Stratum
 from cspm_bringup.blind.truth import truth_sha256
@@ -152,6 +154,28 @@ def test_a_slice_is_diagnosed_and_scored(bench, tmp_path):
     assert {p: os.stat(p).st_ino for p in (asked.folder / "results").iterdir()} == done
     with pytest.raises(InputError, match=r"SHA-256 .*, allowed: that of --sha256, 00$"):
         score_command(asked.folder, asked.truth, "00", None, None)
+
+
+def test_a_diagnosis_that_fails_says_why_and_the_others_go_on(tmp_path, monkeypatch):
+    for name in ("a", "b", "empty"):
+        (tmp_path / "recordings" / name).mkdir(parents=True)
+    for name in ("a", "b"):
+        (tmp_path / "recordings" / name / "x.mcap").write_text("no recording")
+
+    def diagnose(words, *, cwd, **_):
+        if words[-2] == "a":
+            return subprocess.CompletedProcess(words, 1, "", "Traceback\nValueError: lost\n")
+        (Path(cwd) / words[-1]).write_text('{"verdict": "consistent"}')
+        return subprocess.CompletedProcess(words, 0, "", "")
+
+    monkeypatch.setattr("cspm_bringup.blind.run.subprocess.run", diagnose)
+    assert run(tmp_path) == {"a": "ValueError: lost"}
+    found = read_results(tmp_path, ["a", "b", "empty"])
+    assert found["a"]["diagnosis"] is None
+    assert found["b"]["diagnosis"] == {"verdict": "consistent"}
+    assert sorted(found) == ["a", "b"]
+    with pytest.raises(InputError, match=r"a is not in the truth, allowed: its own recordings$"):
+        read_results(tmp_path, ["b"])
 
 
 def confined(code, room):

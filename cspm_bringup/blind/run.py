@@ -48,7 +48,7 @@ def run(folder: Path, tell: Tell = lambda text, done, total: None) -> dict[str, 
         if not place.exists():
             _diagnose(recordings / name, place)
         if (place / FAILURE).exists():
-            failed[name] = (place / FAILURE).read_text(encoding="utf-8").strip()
+            failed[name] = (place / FAILURE).read_text(encoding="utf-8").splitlines()[-1]
     tell("diagnosed", len(names), len(names))
     return failed
 
@@ -77,9 +77,8 @@ def _diagnose(recording: Path, place: Path) -> None:
         if done.returncode == 0 and found.exists():
             shutil.copy(found, part / DIAGNOSIS)
         else:
-            said = done.stderr.strip().splitlines() or ["nothing said"]
-            text = f"exit {done.returncode}: {said[-1]}\n"
-            (part / FAILURE).write_text(text, encoding="utf-8")
+            said = done.stderr.strip() or f"exit {done.returncode}, nothing said"
+            (part / FAILURE).write_text(f"{said}\n", encoding="utf-8")
     (part / TIMES).write_text(json.dumps({"wall_s": wall, "cpu_s": cpu}), encoding="utf-8")
     part.rename(place)
 

@@ -65,6 +65,7 @@ def test_a_diagnosis_that_is_right_in_everything():
     assert outcome.detected
     assert outcome.block
     assert outcome.element
+    assert outcome.first
     assert outcome.named
     assert outcome.tied
     assert outcome.tie_sizes == (1,)
@@ -99,6 +100,7 @@ def test_a_finding_that_holds_no_truth_is_wrong():
     told = result("effect", finding("tension_gain"), finding(FRICTION))
     outcome = judge(item("a", concealed()), told)
     assert outcome.named
+    assert not outcome.first
     assert outcome.wrong == 1
 
 
@@ -180,6 +182,7 @@ def test_a_scorecard_counts():
         "detected": (2, 2),
         "block": (2, 2),
         "element": (2, 2),
+        "first": (1, 2),
         "named": (1, 2),
         "effect_only": (1, 2),
         "tied": (1, 2),

@@ -48,7 +48,8 @@ class Outcome:
         detected: whether anything was found.
         block: whether a finding is in a block of the truth.
         element: whether a finding is on just the elements of a truth.
-        named: whether all concealed effects are named first, each on its elements.
+        first: whether the first finding names something concealed on its elements.
+        named: whether all concealed effects are named, not as alternatives, each on its elements.
         effect_only: whether they are, on whatever elements.
         tied: whether each is in some finding's tie set, by effect.
         tie_sizes: of the sets that hold a truth.
@@ -71,6 +72,7 @@ class Outcome:
     detected: bool
     block: bool
     element: bool
+    first: bool
     named: bool
     effect_only: bool
     tied: bool
@@ -109,6 +111,7 @@ def judge(item: Data, result: Data) -> Outcome:
         detected=bool(findings),
         block=any(f["subsystem"] in {c["block"] for c in concealed} for f in findings[:1]),
         element=any(_same_elements(f, c) for f in findings[:1] for c in concealed),
+        first=any(_is_named(c, findings[:1]) for c in concealed),
         named=bool(concealed) and all(_is_named(c, findings) for c in concealed),
         effect_only=bool(concealed)
         and all(any(f["effect"] == (c["effect"] or UNKNOWN) for f in findings) for c in concealed),

@@ -11,6 +11,7 @@ import numpy as np
 import pytest
 
 pytest.importorskip("mujoco", minversion="4.0", reason="the MuJoCo plant needs MuJoCo 4")
+from cspm_bringup import cli
 from cspm_bringup.blind import make as making
 from cspm_bringup.blind.commands import score_command
 from cspm_bringup.blind.concealed_run import NOTES
@@ -114,6 +115,27 @@ def test_an_interrupted_make_goes_on_where_it_was(tmp_path, monkeypatch):
     assert make(asked) == digest
     assert [p.name for p in recordings(asked)] == [made[0], *made[2:]]
     assert len(set(made)) == 4
+
+
+def test_the_command_line_tells_the_hash_and_keeps_the_truth_beside(tmp_path, monkeypatch, capsys):
+    def record(bundle, reality, folder, **_):
+        folder.mkdir(parents=True)
+        (folder / "x.mcap").write_text(str(bundle.scenario.seed))
+
+    monkeypatch.setattr(making, "record_concealed", record)
+    monkeypatch.setattr(making, "_blank_runs", lambda *_: ({"worst_case": {}}, {}))
+    monkeypatch.setattr(making, "STRATA", {"nothing": NOTHING})
+    out = tmp_path / "bench"
+    words = f"cspm blind make --seed 3 --count 1 --duration 15 --strata nothing --out {out}"
+    monkeypatch.setattr(sys, "argv", words.split())
+    with pytest.raises(SystemExit) as caught:
+        cli.main()
+    assert not caught.value.code
+    truth = tmp_path / "bench.truth.json"
+    told = capsys.readouterr().out
+    assert f"truth {truth}, SHA-256 {truth_sha256(truth)}" in told
+    assert told.index("SHA-256") < told.index("recording ")
+    assert len(list((out / "recordings").iterdir())) == 1
 
 
 def test_what_diverges_is_an_empty_folder_and_is_not_tried_again(tmp_path, monkeypatch):

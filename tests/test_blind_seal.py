@@ -2,6 +2,7 @@
 
 import json
 import os
+import signal
 import subprocess
 import sys
 from itertools import combinations
@@ -14,7 +15,7 @@ pytest.importorskip("mujoco", minversion="4.0", reason="the MuJoCo plant needs M
 from cspm_bringup import cli
 from cspm_bringup.blind import make as making
 from cspm_bringup.blind.commands import score_command
-from cspm_bringup.blind.concealed_run import NOTES
+from cspm_bringup.blind.concealed_run import NOTES, believed, record_concealed
 from cspm_bringup.blind.make import Request, make
 from cspm_bringup.blind.results import read_results
 from cspm_bringup.blind.run import environment, run
@@ -23,6 +24,7 @@ from cspm_bringup.blind.truth import truth_sha256
 from cspm_msgs_py.errors import DivergenceError, InputError
 from cspm_msgs_py.recording.reader import Recording
 from cspm_reality.phenomena import PHENOMENA
+from cspm_reality.reality import conceal
 
 NOTHING = Stratum("nothing", 1.0, (Case(scenarios=("worst_case",)),))
 LOUD = Stratum("noise", 1.0, (Case(("bristles",), (16.0,), ("worst_case",)),))
@@ -115,6 +117,21 @@ def test_an_interrupted_make_goes_on_where_it_was(tmp_path, monkeypatch):
     assert make(asked) == digest
     assert [p.name for p in recordings(asked)] == [made[0], *made[2:]]
     assert len(set(made)) == 4
+
+
+@pytest.mark.compiled
+def test_a_recording_that_is_cut_short_is_not_taken_for_whole(tmp_path):
+    bundle = believed("worst_case", 15.0, 1)
+    reality = conceal(bundle.testbed.testbed, {}, 0.0, 1)
+    with pytest.raises(KeyboardInterrupt):
+        record_concealed(
+            bundle,
+            reality,
+            tmp_path / "cut",
+            note="",
+            without=(),
+            progress=lambda now: os.kill(os.getpid(), signal.SIGINT),
+        )
 
 
 def test_the_command_line_tells_the_hash_and_keeps_the_truth_beside(tmp_path, monkeypatch, capsys):

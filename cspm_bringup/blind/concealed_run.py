@@ -104,6 +104,7 @@ def record_concealed(
 
     Raises:
         DivergenceError: the controllers lost the bar.
+        KeyboardInterrupt: the run was ended early; what was recorded is not whole.
     """
     parts = assemble_concealed(bundle, reality)
     published = {
@@ -123,6 +124,8 @@ def record_concealed(
     about = metadata(bundle, INPROCESS)
     with RecordingWriter(folder, topics, attachments=attachments, metadata=about) as writer:
         result = simulate(parts, writer, progress, steps)
+    if result.interrupted:
+        raise KeyboardInterrupt
     if result.failure:
         raise DivergenceError(result.failure)
 

@@ -38,7 +38,7 @@ from cspm_sim.any_plant import AnyPlant
 from cspm_sim.motion import Motion
 from cspm_sim.parameters import nominal_parameters
 from cspm_sim.sensor_fault import sensor_faults
-from cspm_sim.sensors import SensorModel
+from cspm_sim.sensors import AnySensor, SensorModel
 
 Array = NDArray[np.float64]
 
@@ -56,7 +56,7 @@ class Assembly:
     testbed: Testbed
     schedule: Schedule
     plant: AnyPlant
-    sensors: dict[str, SensorModel]
+    sensors: dict[str, AnySensor]
     references: dict[str, WaveTrajectory]
     stages: list[Stage]
 
@@ -120,7 +120,7 @@ def assemble(scenario: Scenario, testbed: Testbed, folder: Path, plant: str = SI
         ConvergenceError: the bar cannot hang at its first reference pose.
     """
     schedule = schedule_of(scenario, testbed)
-    motions = _motions(scenario, testbed, folder)
+    motions = motions_of(scenario, testbed, folder)
     references = {
         name: WaveTrajectory(motions[name]) for name in schedule.topics if name in motions
     }
@@ -142,9 +142,9 @@ def assemble(scenario: Scenario, testbed: Testbed, folder: Path, plant: str = SI
 
 def assemble_simulator(
     scenario: Scenario, testbed: Testbed, folder: Path, plant: str
-) -> tuple[AnyPlant, dict[str, SensorModel]]:
+) -> tuple[AnyPlant, dict[str, AnySensor]]:
     """Build a resolved scenario's plant and its sensors; arguments and errors as `assemble`."""
-    motions = _motions(scenario, testbed, folder)
+    motions = motions_of(scenario, testbed, folder)
     return _plant(scenario, testbed, motions, plant), _sensors(scenario, testbed)
 
 
@@ -152,7 +152,7 @@ def assemble_stage(node: str, scenario: Scenario, testbed: Testbed, folder: Path
     """Build one stage of a resolved scenario; arguments and errors as `assemble`."""
     if node != WAVE_TRAJECTORY:
         return make_controller(node, scenario, testbed)
-    motions = _motions(scenario, testbed, folder)
+    motions = motions_of(scenario, testbed, folder)
     names = schedule_of(scenario, testbed).nodes[node].outputs
     return WaveStage({name: WaveTrajectory(motions[name]) for name in names})
 
@@ -187,7 +187,7 @@ def _start_tensions(testbed: Testbed, control: Control) -> Array | None:
     return tensions
 
 
-def _motions(scenario: Scenario, testbed: Testbed, folder: Path) -> dict[str, Motion]:
+def motions_of(scenario: Scenario, testbed: Testbed, folder: Path) -> dict[str, Motion]:
     """Return the motions of winch frame, moving or not, and bar, by reference topic."""
     target = scenario.target.model_copy(update={"mean_pose": scenario.bar_mean_pose})
     bodies = {"/winch_frame/reference": scenario.winch_frame}
@@ -209,7 +209,7 @@ def _motions(scenario: Scenario, testbed: Testbed, folder: Path) -> dict[str, Mo
     return motions
 
 
-def _sensors(scenario: Scenario, testbed: Testbed) -> dict[str, SensorModel]:
+def _sensors(scenario: Scenario, testbed: Testbed) -> dict[str, AnySensor]:
     return {
         name: SensorModel(
             testbed.topics[name],

@@ -26,6 +26,7 @@ def main() -> None:
     import_module("cspm_bringup.cli_recordings")
     import_module("cspm_bringup.cli_compare")
     import_module("cspm_bringup.cli_diagnose")
+    import_module("cspm_bringup.cli_blind")
     import_module("cspm_bringup.cli_identify")
     import_module("cspm_bringup.cli_ros")
     try:

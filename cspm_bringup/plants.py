@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from importlib import import_module
 from importlib.metadata import version as metadata_version
 
 import numpy as np
@@ -45,19 +46,30 @@ def make_plant(
         )
     if name != MUJOCO:
         raise InputError(f"plant {name}: allowed: {', '.join(PLANTS)}")
-    try:
-        from cspm_mujoco.plant import MujocoPlant
-    except ModuleNotFoundError as err:
-        raise InputError(
-            f"plant {name}: {err.name} is not installed, allowed: after `pip install cspm[mujoco]`"
-        ) from None
-    found = metadata_version("mujoco")
-    if int(found.split(".")[0]) < OLDEST_MUJOCO:
-        raise InputError(
-            f"plant {name}: MuJoCo {found} is installed, allowed: {OLDEST_MUJOCO}.0 or newer, which"
-            " needs Python 3.11 or newer"
-        )
+    require_mujoco(f"plant {name}")
+    from cspm_mujoco.plant import MujocoPlant
+
     motion = frame_motion.at
     return MujocoPlant(
         testbed, motion, period_ns, bar_pose=bar_pose, tensions=tensions, locked=locked
     )
+
+
+def require_mujoco(what: str) -> None:
+    """Refuse `what` where MuJoCo is absent or too old.
+
+    Raises:
+        InputError: it is.
+    """
+    try:
+        import_module("mujoco")
+    except ModuleNotFoundError as err:
+        raise InputError(
+            f"{what}: {err.name} is not installed, allowed: after `pip install cspm[mujoco]`"
+        ) from None
+    found = metadata_version("mujoco")
+    if int(found.split(".")[0]) < OLDEST_MUJOCO:
+        raise InputError(
+            f"{what}: MuJoCo {found} is installed, allowed: {OLDEST_MUJOCO}.0 or newer, which"
+            " needs Python 3.11 or newer"
+        )

@@ -51,9 +51,9 @@ def run(
     scenario = bundle.scenario
     steps = steps or round(scenario.duration * scenario.rates.plant)
     if folder is None:
-        return _simulate(parts, None, progress, steps)
+        return simulate(parts, None, progress, steps)
     with new_recording(bundle, folder, INPROCESS) as writer:
-        return _simulate(parts, writer, progress, steps)
+        return simulate(parts, writer, progress, steps)
 
 
 def new_recording(bundle: Bundle, folder: Path, mode: str) -> RecordingWriter:
@@ -98,12 +98,20 @@ def metadata(bundle: Bundle, mode: str) -> dict[str, str]:
     }
 
 
-def _simulate(
+def simulate(
     parts: Assembly,
     writer: RecordingWriter | None,
     progress: Callable[[float], None],
     steps: int,
 ) -> RunResult:
+    """Step assembled parts to the end, and say what it amounted to; see `run`.
+
+    Args:
+        parts: what to step.
+        writer: of a recording that has the topics of the parts' schedule; None records nothing.
+        progress: called now and then with the time simulated so far [s].
+        steps: of the plant.
+    """
     scenario, plant = parts.scenario, parts.plant
     tally = Tally(steps, len(plant.tensions))
     publish: Mapping[str, Publish] = {}

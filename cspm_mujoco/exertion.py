@@ -70,6 +70,9 @@ def exert(
     rows: Array,
     drag: Array,
     across: Array,
+    radii: Array,
+    given: Array,
+    held: Array,
     tensions: Array,
     winding: Array,
     wrench: Array,
@@ -88,6 +91,9 @@ def exert(
         rows: the cables, see `cable_row`.
         drag: damping of the bar per world axis, about its origin, (6,) [N·s/m, N·m·s/rad].
         across: damping of each attachment's motion across its cable, (n,) [N·s/m].
+        radii: length wound per motor angle, (n,) [m/rad].
+        given: length that each cable has gained beside its winding, (n,) [m].
+        held: tension beside that of law and damper, (n,) [N].
         tensions: receives the tensions, (n,) [N].
         winding: receives the rates of the unstretched lengths, (n,) [m/s].
         wrench: receives force, and moment about the centre of mass, in world axes, (6,).
@@ -111,8 +117,9 @@ def exert(
             force[axis] = (start[axis] - end[axis]) / length
             apart[axis] = _point_velocity(end, body, axis) - _point_velocity(start, frame, axis)
             rate -= force[axis] * apart[axis]
-        winding[i] = -unstretched[i] / length * rows[i, RADIUS] * speeds[i]
-        tensions[i] = _tension(length, rate, unstretched[i], winding[i], rows[i])
+        winding[i] = -unstretched[i] / length * radii[i] * speeds[i]
+        longer = unstretched[i] + given[i]
+        tensions[i] = max(0.0, _tension(length, rate, longer, winding[i], rows[i]) + held[i])
         # Written so that NaN counts as well.
         if lost < 0 and not tensions[i] < RUNAWAY:
             lost = i

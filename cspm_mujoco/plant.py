@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 
 import mujoco
 import numpy as np
@@ -12,6 +12,7 @@ from cspm_msgs_py.errors import DivergenceError, InputError
 from cspm_msgs_py.testbed import Testbed
 from cspm_mujoco.exertion import RADIUS, cable_row, exert, turning
 from cspm_mujoco.extras import find_extras
+from cspm_mujoco.influence import Acting, Influence, Scene
 from cspm_mujoco.machine import BAR_BODY, build_model
 from cspm_mujoco.rest import hanging_roll, holding_tensions, pulls, resting_lengths
 
@@ -41,6 +42,7 @@ class MujocoPlant:
         tensions: ArrayLike | None = None,
         locked: bool = False,
         substeps: int = 1,
+        influences: Sequence[Influence] = (),
     ) -> None:
         """Put the machine at rest in equilibrium.
 
@@ -53,6 +55,7 @@ class MujocoPlant:
                 absent: nothing.
             locked: hold all motors still.
             substeps: MuJoCo's steps per period.
+            influences: physics beside the test-bed's; none of them acts at rest.
 
         Raises:
             InputError: the test-bed has a bar and no pose for it, an effect that this plant does
@@ -70,6 +73,9 @@ class MujocoPlant:
         self._rows = np.array([cable_row(cable) for cable in testbed.cables])
         self._radii = self._rows[:, RADIUS].copy()
         self._drag, self._across = extras.drag, extras.across
+        self._influences = tuple(influences)
+        self._acting = Acting(n)
+        self._acting.radius[:] = self._radii
         self._limits = np.array([cable.torque_limit for cable in testbed.cables])
         timestep = period_ns * 1e-9 / substeps
         self._model = build_model(testbed, extras, timestep)
@@ -152,6 +158,8 @@ class MujocoPlant:
         self.frame[:] = self._motion(self.time)
         self._check_finite()
         self._observe()
+        for influence in self._influences:
+            influence.advance(self.scene(self.time), self.period_ns * 1e-9)
 
     def applied_torque(self, torque: Array) -> Array:
         """Return what the drives deliver for a torque command, (n,) [N·m]: the limits applied."""
@@ -162,7 +170,7 @@ class MujocoPlant:
         if self._failure is not None:
             return
         try:
-            self._evaluate(self._motion(self._data.time))
+            self._evaluate(self._motion(self._data.time), self._data.time)
         except DivergenceError as err:
             # Not every version of MuJoCo lets an exception pass; `step` raises it.
             self._failure = err
@@ -171,11 +179,26 @@ class MujocoPlant:
             return
         self._bar_wrench[:] = self._wrench
         if not self._locked:
-            np.multiply(self._radii, self.tensions, out=self._load)
-            np.negative(self._load, out=self._load)
+            np.multiply(self._acting.radius, self.tensions, out=self._load)
+            np.subtract(self._acting.torque, self._load, out=self._load)
             self._length_rates[:] = self._winding
 
-    def _evaluate(self, frame: Array) -> None:
+    def scene(self, time: float) -> Scene:
+        """Return what influences see of MuJoCo's current state, the tensions those last found."""
+        return Scene(
+            time,
+            self.angles,
+            self.speeds,
+            self._torque,
+            self.tensions,
+            self.unstretched_lengths,
+            self._ends,
+            self._frame_body,
+            self._body,
+            self._rotation,
+        )
+
+    def _evaluate(self, frame: Array, time: float) -> None:
         """Work out tensions and wrench at MuJoCo's current state with the winch frame there."""
         self._move_frame(frame)
         body = self._body
@@ -183,6 +206,12 @@ class MujocoPlant:
             body[:3] = self._origin
             body[3:6] = self._bar_velocity[:3]
             body[6:] = self._rotation @ self._bar_velocity[3:]
+        acting = self._acting
+        if self._influences:
+            acting.clear(self._radii)
+            scene = self.scene(time)
+            for influence in self._influences:
+                influence.act(scene, acting)
         lost = exert(
             self._ends,
             self._frame_body,
@@ -193,10 +222,17 @@ class MujocoPlant:
             self._rows,
             self._drag,
             self._across,
+            acting.radius,
+            acting.length,
+            acting.tension,
             self.tensions,
             self._winding,
             self._wrench,
         )
+        if self._influences:
+            self._wrench[:3] += acting.wrench[:3]
+            self._wrench[3:] += acting.wrench[3:]
+            self._wrench[3:] += np.cross(self._origin - self._centre, acting.wrench[:3])
         if lost >= 0:
             # Left to itself, MuJoCo would write a warning to a file of its own.
             raise DivergenceError(
@@ -214,7 +250,7 @@ class MujocoPlant:
 
     def _observe(self) -> None:
         """Bring tensions and the bar's state up to MuJoCo's."""
-        self._evaluate(self.frame)
+        self._evaluate(self.frame, self.time)
         if not self.testbed.bar:
             return
         angles = _euler_angles(self._rotation)

@@ -20,7 +20,7 @@ from cspm_msgs_py.schedule import PLANT, TORQUE_COMMAND, Schedule
 from cspm_msgs_py.topics import BRAKE, DIAGNOSTICS
 from cspm_sim.any_plant import AnyPlant
 from cspm_sim.lockstep_plant import LockstepPlant
-from cspm_sim.sensors import SensorModel
+from cspm_sim.sensors import AnySensor
 from cspm_sim.simulator import Simulator
 
 Array = NDArray[np.float64]
@@ -41,7 +41,7 @@ class PlantNode:
         self,
         node: ContractNode,
         plant: AnyPlant,
-        sensors: Mapping[str, SensorModel],
+        sensors: Mapping[str, AnySensor],
         schedule: Schedule,
         steps: int,
         edges: Mapping[str, Edges],

@@ -15,7 +15,7 @@ from cspm_msgs_py.schedule import CLOCK, PLANT, TORQUE_COMMAND, Schedule
 from cspm_msgs_py.topics import BRAKE, DIAGNOSTICS, Topic
 from cspm_sim.any_plant import AnyPlant
 from cspm_sim.realtime_plant import RealtimePlant
-from cspm_sim.sensors import SensorModel
+from cspm_sim.sensors import AnySensor
 from cspm_sim.simulator import Publish, Simulator
 from cspm_sim.watchdog import Watchdog
 
@@ -30,7 +30,7 @@ class RealtimePlantNode:
         self,
         node: ContractNode,
         plant: AnyPlant,
-        sensors: Mapping[str, SensorModel],
+        sensors: Mapping[str, AnySensor],
         schedule: Schedule,
         steps: int,
         edges: Mapping[str, Edges],

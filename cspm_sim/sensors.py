@@ -5,6 +5,7 @@ from __future__ import annotations
 import zlib
 from collections import deque
 from collections.abc import Sequence
+from typing import Protocol
 
 import numpy as np
 from numpy.typing import NDArray
@@ -18,6 +19,13 @@ from cspm_sim.sensor_fault import Past, SensorFault
 Array = NDArray[np.float64]
 
 _DRAWN_AT_ONCE = 1000
+
+
+class AnySensor(Protocol):
+    """What a run needs of a sensor, whoever implements it."""
+
+    def observe(self, step: int, now_ns: int, values: Array) -> tuple[int, Array] | None:
+        """Take a sample if one is due; return stamp [ns] and row of one that arrives, if any."""
 
 
 class SensorModel:

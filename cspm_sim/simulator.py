@@ -12,7 +12,7 @@ from cspm_msgs_py.diagnostics import Level, Status
 from cspm_msgs_py.errors import DivergenceError
 from cspm_msgs_py.schedule import CLOCK
 from cspm_sim.any_plant import AnyPlant
-from cspm_sim.sensors import SensorModel
+from cspm_sim.sensors import AnySensor
 from cspm_sim.truth import Quantity, Truth
 
 Array = NDArray[np.float64]
@@ -27,7 +27,7 @@ class _Tap(NamedTuple):
 
     quantity: Quantity
     publish_truth: Publish | None
-    sensor: SensorModel | None
+    sensor: AnySensor | None
     publish_measured: Publish | None
 
 
@@ -43,7 +43,7 @@ class Simulator:
     def __init__(
         self,
         plant: AnyPlant,
-        sensors: Mapping[str, SensorModel],
+        sensors: Mapping[str, AnySensor],
         publish: Mapping[str, Publish],
         *,
         period_ns: int,

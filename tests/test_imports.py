@@ -14,6 +14,7 @@ ROOT = Path(__file__).resolve().parents[1]
 ORDER = (
     "cspm_msgs_py",
     "cspm_mujoco",
+    "cspm_reality",
     "cspm_sim",
     "cspm_control",
     "cspm_ident",

@@ -1,0 +1,1 @@
+"""The blind benchmark: recordings that conceal what acts in them, diagnosed and scored."""

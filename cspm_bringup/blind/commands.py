@@ -1,0 +1,107 @@
+"""What the commands of the blind benchmark do, behind the command line."""
+
+from __future__ import annotations
+
+import json as json_format
+import os
+import platform
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from datetime import date
+from importlib.metadata import version
+from pathlib import Path
+
+from rich.console import Console
+from rich.markup import escape
+from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeRemainingColumn
+
+from cspm_bringup.blind.results import read_results
+from cspm_bringup.blind.run import run
+from cspm_bringup.blind.truth import read_truth, truth_sha256
+from cspm_bringup.console import make_console, say
+from cspm_bringup.plants import require_mujoco
+from cspm_bringup.summary import write_json
+from cspm_ident.blind.page import scorecard_page
+from cspm_ident.blind.scorecard import scorecard
+from cspm_msgs_py.errors import InputError
+
+
+def make_command(
+    folder: Path,
+    truth: Path,
+    seed: int,
+    count: int,
+    split: str,
+    strata: tuple[str, ...],
+    duration: float,
+    sensors: str,
+) -> None:
+    """Make a benchmark; see `make`.
+
+    Raises:
+        InputError: MuJoCo, which makes the recordings, is not installed.
+    """
+    require_mujoco("blind make")
+    from cspm_bringup.blind.make import Request, make
+    from cspm_bringup.blind.strata import STRATA
+
+    console = make_console()
+    asked = Request(folder, truth, seed, count, split, strata or tuple(STRATA), duration, sensors)
+    with _bar(console) as show:
+        make(asked, show)
+
+
+def run_command(folder: Path) -> None:
+    """Diagnose a benchmark's recordings; see `run`."""
+    console = make_console()
+    with _bar(console) as show:
+        failed = run(folder, show)
+    for name, reason in failed.items():
+        say(console, f"{name}: {reason}")
+
+
+def score_command(
+    folder: Path, truth: Path, sha256: str | None, page: Path | None, json: Path | None
+) -> None:
+    """Open the truth, check that it is the sealed one, and score.
+
+    Raises:
+        InputError: no truth, or another than that of the hash.
+    """
+    console = make_console()
+    content = read_truth(truth)
+    found = truth_sha256(truth)
+    if sha256 is not None and sha256.lower() != found:
+        raise InputError(f"{truth}: SHA-256 {found}, allowed: that of --sha256, {sha256}")
+    card = scorecard(content, read_results(folder, [item["name"] for item in content["items"]]))
+    machine = (
+        f"{date.today()} on {os.cpu_count()} processors ({platform.machine()}), cspm"
+        f" {version('cspm')}"
+    )
+    text = scorecard_page(card, found, machine)
+    say(console, text)
+    if page is not None:
+        page.write_text(text, encoding="utf-8")
+    if json is not None:
+        write_json(json, json_format.loads(json_format.dumps(card)) | {"truth_sha256": found})
+
+
+@contextmanager
+def _bar(console: Console) -> Iterator[Callable[[str, int, int], None]]:
+    """Give what shows progress with the time left; where nobody looks, one line per change."""
+    with Progress(
+        TextColumn("{task.description}"),
+        BarColumn(),
+        MofNCompleteColumn(),
+        TimeRemainingColumn(),
+        console=console,
+        disable=not console.is_terminal,
+    ) as bar:
+        task = bar.add_task("", total=None)
+
+        def show(text: str, done: int, total: int) -> None:
+            bar.update(task, description=escape(text), completed=done, total=total)
+            if not console.is_terminal or "SHA-256" in text:
+                say(console, f"{done} of {total}: {text}")
+
+        yield show

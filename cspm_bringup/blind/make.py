@@ -1,0 +1,203 @@
+"""Make the recordings of a blind benchmark, and its truth apart from them."""
+
+from __future__ import annotations
+
+import json
+import os
+import shutil
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+from cspm_bringup.blind.concealed_run import believed, machine_of, record_concealed, watch
+from cspm_bringup.blind.item import Item, amounts_of, draw_items, truth_of
+from cspm_bringup.blind.strata import STRATA
+from cspm_bringup.blind.truth import RECORDINGS, SCHEMA, SPLITS, truth_sha256
+from cspm_msgs_py.errors import DivergenceError, InputError
+from cspm_reality.detection_limit import absorbed_share, detection_limits
+from cspm_reality.phenomena import PHENOMENA
+from cspm_reality.reality import conceal
+from cspm_reality.sensors import QUALITIES, REAL
+
+SHORTEST, LONGEST = 15.0, 200.0  # [s]
+SEARCHED_SHARE = 0.7  # of a recording; the rest is held out by the diagnosis
+# Of a number of the file, more is not taken over by an effect: it stays positive.
+MOST_ABSORBED = 0.8
+_BLANK_SEED = 1
+_TOLD = ("seed", "count", "split", "duration", "sensors")
+_ONE_DATE = 1_000_000_000  # of all files, so that it tells no order [s]
+
+Limits = Mapping[str, Mapping[str, Sequence[float]]]
+Tell = Callable[[str, int, int], None]
+
+
+@dataclass(frozen=True)
+class Request:
+    """What was asked for.
+
+    Attributes:
+        folder: for the recordings.
+        truth: the file of the truth.
+        seed: of everything that is drawn; with it the truth can be drawn again.
+        count: of recordings.
+        split: one of `SPLITS`, which have nothing in common.
+        strata: names, of which the recordings are.
+        duration: of each recording [s].
+        sensors: one of `QUALITIES`.
+    """
+
+    folder: Path
+    truth: Path
+    seed: int
+    count: int
+    split: str
+    strata: tuple[str, ...]
+    duration: float
+    sensors: str = REAL
+
+    def told(self) -> dict[str, Any]:
+        """Return what the truth file keeps of it."""
+        asked = {key: getattr(self, key) for key in _TOLD}
+        return {**asked, "strata": list(self.strata)}
+
+
+def make(request: Request, tell: Tell = lambda text, done, total: None) -> str:
+    """Make what is not there yet, and return the truth file's SHA-256.
+
+    Args:
+        request: what to make.
+        tell: called with what is being done, how much of it is done, and how much there is.
+
+    Raises:
+        InputError: the truth lies among the recordings, or is that of another benchmark.
+    """
+    _check(request)
+    if not request.truth.exists():
+        _write_truth(request, tell)
+    truth = json.loads(request.truth.read_text(encoding="utf-8"))
+    if truth.get("asked") != request.told():
+        raise InputError(
+            f"{request.truth}: of another benchmark ({truth.get('asked')}), allowed: the same"
+            " options, to go on with it, or a new file"
+        )
+    digest = truth_sha256(request.truth)
+    tell(f"truth {request.truth}, SHA-256 {digest}", 0, request.count)
+    for done, (item, told) in enumerate(zip(_items(request), truth["items"], strict=True)):
+        tell(f"recording {item.name}", done, request.count)
+        _record(request, item, told["amounts"])
+    shutil.rmtree(request.folder / ".part", ignore_errors=True)
+    tell("recordings made", request.count, request.count)
+    return digest
+
+
+def _check(request: Request) -> None:
+    for name in request.strata:
+        if name not in STRATA:
+            raise InputError(f"--strata {name}: allowed: {', '.join(STRATA)}")
+    if request.split not in SPLITS:
+        raise InputError(f"--split {request.split}: allowed: {', '.join(SPLITS)}")
+    if request.count < 1:
+        raise InputError(f"--count {request.count}: allowed: 1 or more")
+    if request.sensors not in QUALITIES:
+        raise InputError(f"--sensors {request.sensors}: allowed: {', '.join(QUALITIES)}")
+    if not SHORTEST <= request.duration <= LONGEST:
+        raise InputError(f"--duration {request.duration:g}: allowed: {SHORTEST:g} to {LONGEST:g} s")
+    if request.folder.resolve() in request.truth.resolve().parents:
+        raise InputError(f"--truth {request.truth}: allowed: a file outside {request.folder}")
+
+
+def _items(request: Request) -> list[Item]:
+    machine = machine_of("calm")
+    seed = request.seed * len(SPLITS) + SPLITS.index(request.split)
+    strata = [STRATA[name] for name in request.strata]
+    return draw_items(strata, request.count, seed, request.duration, machine)
+
+
+def _write_truth(request: Request, tell: Tell) -> None:
+    """Fix the limits and the truth before anything is recorded."""
+    items = _items(request)
+    limits, shares = _blank_runs(items, request.duration, tell)
+    told = []
+    for item in items:
+        machine = machine_of(item.scenario)
+        amounts = amounts_of(item, limits[item.scenario], len(machine.cables))
+        amounts |= _absorbed(item, amounts, shares)
+        told.append({**truth_of(item, amounts, machine), "amounts": amounts})
+    content = {"schema": SCHEMA, "asked": request.told(), "limits": limits, "items": told}
+    request.truth.parent.mkdir(parents=True, exist_ok=True)
+    part = request.truth.with_suffix(".part")
+    part.write_text(json.dumps(content, indent=1, ensure_ascii=False), encoding="utf-8")
+    part.replace(request.truth)
+
+
+def _blank_runs(
+    items: Sequence[Item], duration: float, tell: Tell
+) -> tuple[Limits, Mapping[tuple[str, str, str], list[float]]]:
+    """Return detection limits by scenario, and what numbers absorb by scenario and both names."""
+    scenarios = sorted({item.scenario for item in items})
+    pairs = {
+        (item.scenario, each.phenomenon, item.case.absorbed_by)
+        for item in items
+        for each in item.concealed
+        if item.case.absorbed_by
+    }
+    limits, shares = {}, {}
+    for done, scenario in enumerate(scenarios):
+        tell(f"detection limits in {scenario}", done, len(scenarios))
+        bundle = believed(scenario, duration, _BLANK_SEED)
+        machine = bundle.testbed.testbed
+        scenes = watch(bundle, conceal(machine, {}, 0.0, _BLANK_SEED), SEARCHED_SHARE * duration)
+        limits[scenario] = detection_limits(scenes, machine)
+        for name, phenomenon, number in pairs:
+            if name == scenario:
+                key = (name, phenomenon, number)
+                shares[key] = absorbed_share(phenomenon, number, scenes, machine)
+    return limits, shares
+
+
+def _absorbed(
+    item: Item,
+    amounts: Mapping[str, Sequence[float]],
+    shares: Mapping[tuple[str, str, str], Sequence[float]],
+) -> dict[str, list[float]]:
+    """Return by how much the machine's number lies beside that of the file, fitted too much."""
+    number = item.case.absorbed_by
+    if number is None:
+        return {}
+    (name,) = amounts
+    machine = machine_of(item.scenario)
+    sizes = [
+        c.drum_radius if number == "radius" else PHENOMENA[number].base for c in machine.cables
+    ]
+    found = []
+    for amount, share, size in zip(
+        amounts[name], shares[item.scenario, name, number], sizes, strict=True
+    ):
+        most = MOST_ABSORBED * size
+        found.append(-min(most, max(-most, amount * share)))
+    return {number: found}
+
+
+def _record(request: Request, item: Item, amounts: Mapping[str, Sequence[float]]) -> None:
+    """Record an item unless it is there; what diverges leaves an empty folder of that name."""
+    folder = request.folder / RECORDINGS / item.name
+    if folder.exists():
+        return
+    part = request.folder / ".part" / item.name
+    shutil.rmtree(part, ignore_errors=True)
+    bundle = believed(item.scenario, request.duration, item.seed)
+    reality = conceal(bundle.testbed.testbed, amounts, item.onset, item.seed, request.sensors)
+    note = f"The operator suspects {item.note}.\n".ljust(80)
+    folder.parent.mkdir(parents=True, exist_ok=True)
+    try:
+        record_concealed(
+            bundle, reality, part, note=note, without=item.case.without, progress=lambda now: None
+        )
+    except DivergenceError:
+        shutil.rmtree(part, ignore_errors=True)
+        part.mkdir(parents=True)
+    for path in (*part.iterdir(), part):
+        os.utime(path, (_ONE_DATE, _ONE_DATE))
+    part.rename(folder)
+    os.utime(folder, (_ONE_DATE, _ONE_DATE))

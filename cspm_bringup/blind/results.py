@@ -1,0 +1,35 @@
+"""What diagnoses of a benchmark said."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Mapping, Sequence
+from pathlib import Path
+from typing import Any
+
+from cspm_bringup.blind.run import DIAGNOSIS, TIMES
+from cspm_bringup.blind.truth import RESULTS
+from cspm_msgs_py.errors import InputError
+
+
+def read_results(folder: Path, names: Sequence[str]) -> Mapping[str, Mapping[str, Any]]:
+    """Return, by recording, `diagnosis` (None: it failed) and `times`; only what was diagnosed.
+
+    Raises:
+        InputError: there are no results, or they are of another benchmark.
+    """
+    place = folder / RESULTS
+    found = sorted(p.name for p in place.iterdir() if p.name[0] != ".") if place.is_dir() else []
+    if not found:
+        raise InputError(f"{folder}: no {RESULTS}, allowed: a folder after `cspm blind run`")
+    strange = sorted(set(found) - set(names))
+    if strange:
+        raise InputError(f"{place}: {strange[0]} is not in the truth, allowed: its own recordings")
+    return {name: _read(place / name) for name in found}
+
+
+def _read(place: Path) -> dict[str, Any]:
+    times = json.loads((place / TIMES).read_text(encoding="utf-8"))
+    report = place / DIAGNOSIS
+    diagnosis = json.loads(report.read_text(encoding="utf-8")) if report.exists() else None
+    return {"diagnosis": diagnosis, "times": times}

@@ -1,0 +1,12 @@
+"""By being the same on all eight cables, where nothing stands out."""
+
+from cspm_bringup.blind.stratum import MOVING, Case, Stratum
+
+EVERYWHERE = Stratum(
+    "everywhere",
+    1.0,
+    tuple(
+        Case((name,), (2.0, 4.0), MOVING, everywhere=True)
+        for name in ("bristles", "grease", "drag on ropes", "internal friction", "capstan")
+    ),
+)

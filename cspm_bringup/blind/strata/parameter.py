@@ -1,0 +1,15 @@
+"""By a number of the file that is wrong while no physics is missing."""
+
+from cspm_bringup.blind.stratum import ANY, MOVING, Case, Stratum
+
+PARAMETER = Stratum(
+    "parameter",
+    3.0,
+    (
+        Case(("mass",), (2.0, 4.0), ANY),
+        Case(("stiffness",), (2.0, 4.0), ANY),
+        Case(("damper",), (2.0, 4.0), MOVING),
+        Case(("inertia",), (2.0, 4.0), MOVING),
+        Case(("radius",), (2.0, 4.0), MOVING),
+    ),
+)

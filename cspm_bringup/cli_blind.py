@@ -1,0 +1,92 @@
+"""The commands of the blind benchmark: blind make, run and score."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from cspm_bringup.cli_app import Json, app
+
+blind = typer.Typer(
+    name="blind",
+    no_args_is_help=True,
+    help="Recordings that conceal what acts in them, diagnosed and scored: make, run, score.",
+)
+app.add_typer(blind)
+
+Folder = Annotated[Path, typer.Argument(metavar="DIR", help="The benchmark's folder.")]
+Truth = Annotated[
+    Path | None,
+    typer.Option(metavar="FILE", help="The truth file; otherwise DIR.truth.json beside DIR."),
+]
+
+
+@blind.command(
+    epilog="""Example: cspm blind make --seed 7 --count 40 --out bench7
+
+Exit code: 0 done, 2 unusable input. Interrupted, the same command goes on where it was."""
+)
+def make(
+    seed: Annotated[
+        int, typer.Option(metavar="NUMBER", min=0, help="Of everything drawn; it gives all away.")
+    ],
+    out: Annotated[Path, typer.Option(metavar="DIR", help="For the recordings.")],
+    count: Annotated[int, typer.Option(metavar="NUMBER", help="Of recordings.")] = 400,
+    split: Annotated[
+        str, typer.Option(metavar="SPLIT", help="dev, tune or sealed: nothing in common.")
+    ] = "dev",
+    strata: Annotated[
+        list[str] | None,
+        typer.Option(metavar="NAME", help="Ways of concealing, repeated; otherwise all."),
+    ] = None,
+    duration: Annotated[
+        float, typer.Option(metavar="SECONDS", help="Of each recording, 15 to 200.")
+    ] = 60.0,
+    sensors: Annotated[
+        str,
+        typer.Option(
+            metavar="KIND",
+            help="real, or plain: white noise alone, to see what the sensors themselves cost.",
+        ),
+    ] = "real",
+    truth: Truth = None,
+) -> None:
+    """Record machines that conceal something, and write the truth apart."""
+    from cspm_bringup.blind.commands import make_command
+
+    make_command(
+        out, _truth(out, truth), seed, count, split, tuple(strata or ()), duration, sensors
+    )
+
+
+@blind.command()
+def run(folder: Folder) -> None:
+    """Diagnose recordings that have not been yet, in processes that can read nothing else."""
+    from cspm_bringup.blind.commands import run_command
+
+    run_command(folder)
+
+
+@blind.command()
+def score(
+    folder: Folder,
+    truth: Truth = None,
+    sha256: Annotated[
+        str | None,
+        typer.Option(metavar="HASH", help="That which `blind make` printed, to be checked."),
+    ] = None,
+    page: Annotated[
+        Path | None, typer.Option(metavar="FILE", help="Also write the scorecard as Markdown.")
+    ] = None,
+    json: Json = None,
+) -> None:
+    """Open the truth and score what was found."""
+    from cspm_bringup.blind.commands import score_command
+
+    score_command(folder, _truth(folder, truth), sha256, page, json)
+
+
+def _truth(folder: Path, given: Path | None) -> Path:
+    return given if given is not None else folder.with_name(f"{folder.name}.truth.json")

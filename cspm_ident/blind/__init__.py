@@ -1,0 +1,1 @@
+"""Scoring of diagnoses against a truth that they did not know."""

@@ -1,0 +1,188 @@
+"""One diagnosis against the truth of its recording."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from typing import Any
+
+NOTHING, PARAMETER, EFFECT, OUTSIDE = "nothing", "parameter", "effect", "outside"
+KINDS = (NOTHING, PARAMETER, EFFECT, OUTSIDE)
+UNKNOWN = "unknown"
+FAILED = "failed"
+# Numbers that an absorbed effect has made wrong, by the truth's name, as effects of the catalogue.
+ABSORBING = {
+    "damper": "cable_axial_damping",
+    "stiffness": "cable_stiffness",
+    "radius": "winch_drum_radius",
+}
+
+Data = Mapping[str, Any]
+
+
+@dataclass(frozen=True)
+class Estimate:
+    """A parameter that was found, against what it is.
+
+    Attributes:
+        error: relative to what the value differs by from a machine without it.
+        covered: whether its 95 % interval holds the truth; None without an interval.
+    """
+
+    error: float
+    covered: bool | None
+
+
+@dataclass(frozen=True)
+class Outcome:
+    """How one diagnosis did.
+
+    Attributes:
+        name: the recording's.
+        stratum: its way of concealing.
+        kind: one of `KINDS`.
+        multiple: of the detection limit; 0 where nothing is concealed.
+        truth: what is concealed, effect and elements; the phenomenon's name where there is no id.
+        verdict: in one word; `FAILED` where there is none.
+        found: the findings' effects and elements, the first first.
+        detected: whether anything was found.
+        block: whether a finding is in a block of the truth.
+        element: whether a finding is on just the elements of a truth.
+        first: whether the first finding names something concealed on its elements.
+        named: whether all concealed effects are named, not as alternatives, each on its elements.
+        effect_only: whether they are, on whatever elements.
+        tied: whether each is in some finding's tie set, by effect.
+        tie_sizes: of the sets that hold a truth.
+        wrong: number of findings whose tie set holds no truth.
+        unknown: whether something unknown was reported.
+        estimates: of the parameters named.
+        probabilities: of the findings named, with whether they are right.
+        fit: held-out errors in units of the noise floor: before, re-tuned, after, of the residual
+            that was worst before; None without residuals.
+        seconds: processor time.
+    """
+
+    name: str
+    stratum: str
+    kind: str
+    multiple: float
+    truth: tuple[tuple[str, tuple[str, ...]], ...]
+    verdict: str
+    found: tuple[tuple[str, tuple[str, ...]], ...]
+    detected: bool
+    block: bool
+    element: bool
+    first: bool
+    named: bool
+    effect_only: bool
+    tied: bool
+    tie_sizes: tuple[int, ...]
+    wrong: int
+    unknown: bool
+    estimates: tuple[Estimate, ...]
+    probabilities: tuple[tuple[float, bool], ...]
+    fit: tuple[float, float, float] | None
+    seconds: float
+
+
+def judge(item: Data, result: Data) -> Outcome:
+    """Return how a diagnosis did.
+
+    Args:
+        item: of the truth file.
+        result: `diagnosis`, as `diagnosis.json` has it or None, and `times`.
+    """
+    diagnosis: Data = result["diagnosis"] or {"verdict": FAILED, "findings": [], "fit": []}
+    findings: Sequence[Data] = diagnosis["findings"]
+    concealed: Sequence[Data] = item["concealed"]
+    kind = kind_of(item)
+    right = {each["effect"] or UNKNOWN for each in concealed}
+    if item["absorbed_by"]:
+        right.add(ABSORBING[item["absorbed_by"]])
+    holding = [f for f in findings if right & set(tie_set(f))]
+    return Outcome(
+        name=item["name"],
+        stratum=item["stratum"],
+        kind=kind,
+        multiple=max((each["multiple"] for each in concealed), default=0.0),
+        truth=tuple((c["effect"] or c["phenomenon"], tuple(c["elements"])) for c in concealed),
+        verdict=diagnosis["verdict"],
+        found=tuple((f["effect"], tuple(f["elements"])) for f in findings),
+        detected=bool(findings),
+        block=any(f["subsystem"] in {c["block"] for c in concealed} for f in findings[:1]),
+        element=any(_same_elements(f, c) for f in findings[:1] for c in concealed),
+        first=any(_is_named(c, findings[:1]) for c in concealed),
+        named=bool(concealed) and all(_is_named(c, findings) for c in concealed),
+        effect_only=bool(concealed)
+        and all(any(f["effect"] == (c["effect"] or UNKNOWN) for f in findings) for c in concealed),
+        tied=bool(concealed)
+        and all(any((c["effect"] or UNKNOWN) in tie_set(f) for f in findings) for c in concealed),
+        tie_sizes=tuple(len(tie_set(f)) for f in holding),
+        wrong=len(findings) - len(holding),
+        unknown=any(f["effect"] == UNKNOWN for f in findings),
+        estimates=tuple(e for c in concealed for e in _estimates(c, findings)),
+        probabilities=tuple(
+            (f["probability"], f["effect"] in right)
+            for f in findings
+            if f["probability"] is not None
+        ),
+        fit=_fit(diagnosis["fit"]),
+        seconds=float(result["times"]["cpu_s"]),
+    )
+
+
+def kind_of(item: Data) -> str:
+    """Return what a recording conceals at most: nothing, a parameter, an effect, one outside."""
+    kinds = {each["kind"] for each in item["concealed"]}
+    if UNKNOWN in kinds:
+        return OUTSIDE
+    if EFFECT in kinds:
+        return EFFECT
+    return PARAMETER if kinds else NOTHING
+
+
+def tie_set(finding: Data) -> list[str]:
+    """Return the effects of a finding, named and alternative, each once."""
+    return list(dict.fromkeys([finding["effect"], *(a["effect"] for a in finding["alternatives"])]))
+
+
+def _same_elements(finding: Data, concealed: Data) -> bool:
+    return set(finding["elements"]) == set(concealed["elements"])
+
+
+def _is_named(concealed: Data, findings: Sequence[Data]) -> bool:
+    wanted = concealed["effect"] or UNKNOWN
+    return any(f["effect"] == wanted and _same_elements(f, concealed) for f in findings)
+
+
+def _estimates(concealed: Data, findings: Sequence[Data]) -> list[Estimate]:
+    """Return estimates of the concealed parameter on the elements where it was found."""
+    name, amounts = concealed["parameter"], concealed["values"]
+    base = concealed["base"]
+    found = []
+    for finding in findings:
+        if name is None or finding["effect"] != concealed["effect"]:
+            continue
+        for parameter in finding["parameters"]:
+            element = parameter["element"]
+            if parameter["name"] != name or element not in amounts:
+                continue
+            true, interval = amounts[element], parameter["ci95"]
+            error = (parameter["value"] - true) / (true - base)
+            covered = None if interval is None else interval[0] <= true <= interval[1]
+            found.append(Estimate(error, covered))
+    return found
+
+
+def _fit(residuals: Sequence[Data]) -> tuple[float, float, float] | None:
+    best = None
+    for each in residuals:
+        held_out = each["held_out"]
+        floor = held_out["noise_floor"]
+        if floor <= 0.0:
+            continue
+        keys = ("nrmse_before", "nrmse_retuned_nominal", "nrmse_after")
+        before, retuned, after = (held_out[key] / floor for key in keys)
+        if best is None or before > best[0]:
+            best = (before, retuned, after)
+    return best

@@ -1,0 +1,177 @@
+"""The scorecard as a page."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Mapping, Sequence
+from typing import Any
+
+_TARGETS = (
+    ("block", "block found", "≥ 97 %"),
+    ("element", "element found", "≥ 93 %"),
+    ("first", "effect and elements named first", "≥ 85 %"),
+    ("named", "all named by some finding", ""),
+    ("effect_only", "all named, on whatever elements", ""),
+    ("tied", "truth among the ties", "≥ 97 %"),
+    ("detected", "anything found", ""),
+    ("nothing_wrong_beside", "all named, and nothing wrong beside", ""),
+    ("false_alarm", "alarm where there is nothing", "≤ 3 %"),
+    ("parameter_called_effect", "wrong number called an effect", ""),
+    ("unknown_recognised", "unknown recognised", "≥ 75 %"),
+    ("false_unknown", "unknown where the catalogue has it", "≤ 8 %"),
+    ("failed", "diagnosis failed", ""),
+)
+_VERDICTS = ("consistent", "parameter", "effect", "tie", "unknown", "not_excited", "failed")
+_STANDING = {
+    "dev": "This is the development split, on which the diagnosis is being worked at: it proves"
+    " nothing about other machines, and the diagnosis is under development.",
+    "tune": "This is the split on which thresholds are tuned.",
+    "sealed": "This is the sealed split.",
+}
+
+Data = Mapping[str, Any]
+
+
+def scorecard_page(card: Data, sha256: str, machine: str) -> str:
+    """Return the scorecard as Markdown.
+
+    Args:
+        card: the scorecard.
+        sha256: of the truth file.
+        machine: what scored it, and when.
+    """
+    parts = [
+        "# Blind results",
+        _about(card, sha256, machine),
+        "## Against the targets",
+        "Known effects and numbers at 2 detection limits and more; intervals of 95 % after Clopper"
+        " and Pearson.",
+        _targets(card),
+        "## By amount",
+        _table(
+            ("detection limits", "cases", "detected", "among the ties", "named"),
+            (
+                (
+                    f"{row['multiple']:g}",
+                    str(row["detected"][1]),
+                    *(_percent(row[key]) for key in ("detected", "tied", "named")),
+                )
+                for row in card["by_multiple"]
+            ),
+        ),
+        "## By stratum",
+        _strata(card["by_stratum"]),
+        "## Verdicts",
+        _table(
+            ("concealed", *_VERDICTS),
+            (
+                (kind, *(str(row.get(verdict, 0)) for verdict in _VERDICTS))
+                for kind, row in card["confusion"].items()
+            ),
+        ),
+        "## What was said first",
+        _table(
+            ("concealed", "said first", "cases"),
+            ((row["concealed"], row["named_first"], str(row["cases"])) for row in card["effects"]),
+        ),
+        "## Parameters, fit, probabilities, time",
+        _numbers(card),
+        _calibration(card["calibration"]),
+        "## Every recording",
+        _recordings(card["outcomes"]),
+    ]
+    return "\n\n".join(parts) + "\n"
+
+
+def _about(card: Data, sha256: str, machine: str) -> str:
+    asked = card["asked"]
+    options = ", ".join(f"{key} {value}" for key, value in asked.items() if key != "strata")
+    return (
+        f"{card['scored']} of {card['drawn']} recordings; drawn with {options}; truth file SHA-256"
+        f" `{sha256}`."
+        f" Scored {machine}."
+        f" {_STANDING[asked['split']]} How it is made and what the words mean:"
+        " [blind.md](blind.md). Written by `cspm blind score DIR --page docs/blind-results.md`."
+    )
+
+
+def _targets(card: Data) -> str:
+    rows = [(name, _percent(card["shares"][key]), goal) for key, name, goal in _TARGETS]
+    upper = f"{100 * card['shares']['false_alarm_upper']:.0f} %"
+    rows.append(("one-sided upper bound of alarms", upper, "≤ 6 %"))
+    rows.append(("mean size of the ties", _number(card["shares"]["mean_tie_size"]), "≤ 1.5"))
+    covered = _percent(card["parameters"]["covered"])
+    rows.append(("intervals that hold the truth", covered, "90 to 97 %"))
+    fit = card["fit"]
+    rows.append(("held-out error within 1.5 × floor", _percent(fit["near_floor"]), ""))
+    rows.append(("held-out error below re-tuned", _percent(fit["below_retuned"]), "≥ 95 %"))
+    return _table(("", "found", "target"), rows)
+
+
+def _strata(rows: Sequence[Data]) -> str:
+    keys = ("cases", "detected", "block", "element", "tied", "named", "wrong", "failed")
+    heads = ("stratum", *keys[:-2], "wrong findings", "failed")
+    return _table(heads, ((row["stratum"], *(str(row[key]) for key in keys)) for row in rows))
+
+
+def _numbers(card: Data) -> str:
+    parameters, fit, seconds = card["parameters"], card["fit"], card["seconds"]
+    error = parameters["median_error"]
+    return (
+        f"{parameters['estimates']} parameters were estimated, with a median relative error of"
+        f" {'—' if error is None else f'{100 * error:.1f} %'};"
+        f" {_percent(parameters['within_a_tenth'])} within a tenth. Held-out error of the worst"
+        f" residual in units of its noise, median of {fit['cases']} named: {_number(fit['before'])}"
+        f" before, {_number(fit['retuned'])} re-tuned, {_number(fit['after'])} after. Processor"
+        f" time of a diagnosis: {_number(seconds['median'])} s median, {_number(seconds['max'])} s"
+        " at most."
+    )
+
+
+def _calibration(rows: Sequence[Data]) -> str:
+    told = (
+        (f"{row['from']:g} to {row['to']:g}", _number(row["said"]), _percent(row["right"]))
+        for row in rows
+    )
+    return _table(("probability told", "mean", "effect right"), told)
+
+
+def _recordings(outcomes: Sequence[Data]) -> str:
+    heads = ("recording", "stratum", "concealed", "limits", "verdict", "found")
+    rows = (
+        (
+            o["name"],
+            o["stratum"],
+            _listed(o["truth"]),
+            f"{o['multiple']:g}",
+            o["verdict"],
+            _listed(o["found"]),
+        )
+        for o in sorted(outcomes, key=lambda o: (o["stratum"], o["name"]))
+    )
+    return _table(heads, rows)
+
+
+def _listed(pairs: Sequence[tuple[str, Sequence[str]]]) -> str:
+    told = []
+    for effect, elements in pairs:
+        many = len(elements) > 3
+        told.append(f"{effect}: {f'{len(elements)} elements' if many else ', '.join(elements)}")
+    return "<br>".join(told)
+
+
+def _table(heads: Sequence[str], rows: Iterable[Sequence[str]]) -> str:
+    lines = [heads, ["---"] * len(heads), *rows]
+    return "\n".join(f"| {' | '.join(line)} |" for line in lines)
+
+
+def _percent(found: Sequence[float]) -> str:
+    hits, cases, low, high = found
+    if not cases:
+        return "no cases"
+    return (
+        f"{100 * hits / cases:.0f} % ({hits:g} of {cases:g}; {100 * low:.0f} to {100 * high:.0f})"
+    )
+
+
+def _number(value: float | None) -> str:
+    return "—" if value is None else f"{value:.2g}"

@@ -1,0 +1,58 @@
+"""What a recording may conceal: physics, a sensor's fault, or another number than the file's."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from cspm_msgs_py.testbed import Testbed
+from cspm_mujoco.influence import Influence
+from cspm_reality.sensors import Fault
+
+Array = NDArray[np.float64]
+
+CABLES, BAR, FRAME = "cables", "bar", "winch_frame"
+
+
+@dataclass(frozen=True)
+class Phenomenon:
+    """One thing that a recording may conceal, in an amount per cable, or one for the bar.
+
+    Exactly one of `influence`, `faults`, `alter` is there.
+
+    Attributes:
+        name: of its own.
+        effect: the catalogue's id for it; None: the catalogue does not have it.
+        block: where it is.
+        parameter: the catalogue's parameter that the amount is; None where the forms differ too
+            much for a comparison.
+        at: what the amount is per, `CABLES` or `BAR`.
+        unit: an amount of usual size, for what is not quite in proportion to it.
+        influence: from amounts (n,) or (1,), machine and noise to the physics.
+        faults: from amounts to what it does to sensors, by topic.
+        alter: from test-bed and amounts to the machine as it is.
+        base: the parameter's value where the amount is 0.
+        signed: whether the amount may be negative as well.
+    """
+
+    name: str
+    effect: str | None
+    block: str
+    parameter: str | None
+    at: str = CABLES
+    unit: float = 1.0
+    influence: Callable[[Array, Testbed, np.random.Generator], Influence] | None = None
+    faults: Callable[[Array], Mapping[str, Fault]] | None = None
+    alter: Callable[[Testbed, Array], Testbed] | None = None
+    base: float = 0.0
+    signed: bool = False
+
+    @property
+    def kind(self) -> str:
+        """What a diagnosis should call it: `parameter`, `effect` or `unknown`."""
+        if self.effect is None:
+            return "unknown"
+        return "parameter" if self.alter is not None else "effect"

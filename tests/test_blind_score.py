@@ -1,0 +1,216 @@
+"""The scorecard of made-up diagnoses, counted by hand."""
+
+import pytest
+
+from cspm_ident.blind.outcome import judge, kind_of
+from cspm_ident.blind.page import scorecard_page
+from cspm_ident.blind.scorecard import scorecard
+from cspm_ident.blind.share import share, upper_bound
+
+
+def concealed(effect="winch_coulomb_friction", element="surge_1", kind="effect", multiple=2.0):
+    return {
+        "phenomenon": "bristles",
+        "kind": kind,
+        "effect": effect,
+        "block": "winch",
+        "elements": [element],
+        "multiple": multiple,
+        "parameter": "torque",
+        "base": 0.0,
+        "values": {element: 0.02},
+    }
+
+
+def item(name, *hidden, stratum="noise", absorbed_by=None):
+    return {
+        "name": name,
+        "stratum": stratum,
+        "absorbed_by": absorbed_by,
+        "concealed": list(hidden),
+    }
+
+
+def finding(effect, element="surge_1", alternatives=(), value=0.021, probability=0.9):
+    return {
+        "subsystem": "winch",
+        "elements": [element],
+        "effect": effect,
+        "probability": probability,
+        "parameters": [
+            {"element": element, "name": "torque", "value": value, "ci95": [0.0195, 0.0225]}
+        ],
+        "alternatives": [{"effect": a, "elements": [element]} for a in alternatives],
+    }
+
+
+FIT = {"nrmse_before": 0.1, "nrmse_retuned_nominal": 0.08, "nrmse_after": 0.012}
+
+
+def result(verdict, *findings):
+    fit = [
+        {"held_out": FIT | {"noise_floor": 0.01}},
+        {"held_out": FIT | {"nrmse_before": 0.01, "noise_floor": 0.01}},
+    ]
+    diagnosis = {"verdict": verdict, "findings": list(findings), "fit": fit}
+    return {"diagnosis": diagnosis, "times": {"wall_s": 9.0, "cpu_s": 4.0}}
+
+
+FRICTION = "winch_coulomb_friction"
+
+
+def test_a_diagnosis_that_is_right_in_everything():
+    outcome = judge(item("a", concealed()), result("effect", finding(FRICTION)))
+    assert (outcome.kind, outcome.verdict, outcome.multiple) == ("effect", "effect", 2.0)
+    assert outcome.detected
+    assert outcome.block
+    assert outcome.element
+    assert outcome.first
+    assert outcome.named
+    assert outcome.tied
+    assert outcome.tie_sizes == (1,)
+    assert outcome.wrong == 0
+    assert not outcome.unknown
+    (estimate,) = outcome.estimates
+    assert estimate.error == pytest.approx(0.05)
+    assert estimate.covered
+    assert outcome.probabilities == ((0.9, True),)
+    assert outcome.fit == pytest.approx((10.0, 8.0, 1.2))
+
+
+def test_the_right_effect_on_another_element_is_not_named():
+    outcome = judge(item("a", concealed()), result("effect", finding(FRICTION, "surge_2")))
+    assert outcome.effect_only
+    assert not outcome.named
+    assert not outcome.element
+    assert outcome.estimates == ()
+
+
+def test_a_truth_among_the_alternatives_is_tied_and_not_named():
+    told = finding("winch_load_friction", alternatives=(FRICTION, "pulley_friction"))
+    outcome = judge(item("a", concealed()), result("tie", told))
+    assert outcome.tied
+    assert not outcome.named
+    assert outcome.tie_sizes == (3,)
+    assert outcome.wrong == 0
+    assert outcome.probabilities == ((0.9, False),)
+
+
+def test_a_finding_that_holds_no_truth_is_wrong():
+    told = result("effect", finding("tension_gain"), finding(FRICTION))
+    outcome = judge(item("a", concealed()), told)
+    assert outcome.named
+    assert not outcome.first
+    assert outcome.wrong == 1
+
+
+def test_company_is_named_when_all_of_it_is():
+    pair = item("a", concealed(), concealed("winch_viscous_friction", "sway_1"))
+    half = judge(pair, result("effect", finding(FRICTION)))
+    assert not half.named
+    assert not half.tied
+    told = result("effect", finding(FRICTION), finding("winch_viscous_friction", "sway_1"))
+    both = judge(pair, told)
+    assert both.named
+
+
+def test_the_number_that_took_an_effect_over_is_no_wrong_finding():
+    told = result("effect", finding(FRICTION), finding("winch_drum_radius"))
+    assert judge(item("a", concealed(), absorbed_by="radius"), told).wrong == 0
+    assert judge(item("a", concealed()), told).wrong == 1
+
+
+def test_what_the_catalogue_lacks_is_named_unknown():
+    hidden = item("a", concealed(effect=None, kind="unknown"))
+    assert kind_of(hidden) == "outside"
+    assert judge(hidden, result("unknown", finding("unknown", probability=None))).named
+    assert not judge(hidden, result("effect", finding(FRICTION))).named
+
+
+def test_a_diagnosis_that_failed_found_nothing():
+    outcome = judge(item("a"), {"diagnosis": None, "times": {"cpu_s": 1.0}})
+    assert (outcome.verdict, outcome.detected, outcome.fit) == ("failed", False, None)
+
+
+def test_shares_carry_the_intervals_of_clopper_and_pearson():
+    # None of 60: the textbook's 1 − 0.025^(1/60) and, one-sided, 1 − 0.05^(1/60).
+    assert share([False] * 60)[:3] == (0, 60, 0.0)
+    assert share([False] * 60).high == pytest.approx(1 - 0.025 ** (1 / 60))
+    assert upper_bound(0, 60) == pytest.approx(1 - 0.05 ** (1 / 60))
+    assert share([]) == (0, 0, 0.0, 1.0)
+    assert upper_bound(0, 0) == 1.0
+
+
+def card():
+    truth = {
+        "asked": {
+            "seed": 1,
+            "count": 6,
+            "split": "dev",
+            "duration": 30.0,
+            "sensors": "real",
+            "strata": ["noise"],
+        },
+        "items": [
+            item("a", concealed()),
+            item("b", concealed(multiple=0.5)),
+            item("c", stratum="nothing"),
+            item("d", stratum="nothing"),
+            item("e", concealed(effect=None, kind="unknown", multiple=4.0), stratum="outside"),
+            item("f", concealed(kind="parameter", multiple=4.0), stratum="parameter"),
+            item("g", concealed()),
+            item("h", stratum="nothing"),
+        ],
+    }
+    results = {
+        "a": result("effect", finding(FRICTION)),
+        "b": result("consistent"),
+        "c": result("consistent"),
+        "d": result("effect", finding(FRICTION)),
+        "e": result("consistent"),
+        "f": result("effect", finding("tension_gain")),
+        "h": {"diagnosis": None, "times": {"wall_s": 1.0, "cpu_s": 1.0}},
+    }
+    return scorecard(truth, results)
+
+
+def test_a_scorecard_counts():
+    found = card()
+    assert (found["drawn"], found["scored"]) == (8, 7)
+    shares = {key: value[:2] for key, value in found["shares"].items() if isinstance(value, tuple)}
+    assert shares == {
+        "detected": (2, 2),
+        "block": (2, 2),
+        "element": (2, 2),
+        "first": (1, 2),
+        "named": (1, 2),
+        "effect_only": (1, 2),
+        "tied": (1, 2),
+        "nothing_wrong_beside": (1, 2),
+        "false_alarm": (1, 2),
+        "parameter_called_effect": (1, 1),
+        "unknown_recognised": (0, 1),
+        "false_unknown": (0, 6),
+        "failed": (1, 7),
+    }
+    assert [(r["multiple"], r["detected"][:2]) for r in found["by_multiple"]] == [
+        (0.5, (0, 1)),
+        (2.0, (1, 1)),
+        (4.0, (1, 1)),
+    ]
+    assert found["confusion"]["nothing"] == {"consistent": 1, "effect": 1, "failed": 1}
+    assert found["fit"]["below_retuned"][:2] == (1, 1)
+    # Of the findings told with 0.9, one is right.
+    assert [row["right"][:2] for row in found["calibration"]] == [(0, 0), (0, 0), (1, 3), (0, 0)]
+
+
+def test_the_page_says_what_split_it_is_of_and_tells_every_miss():
+    text = scorecard_page(card(), "ab" * 32, "today on two processors")
+    assert (
+        "7 of 8 recordings; drawn with seed 1, count 6, split dev, duration 30.0, sensors real"
+        in text
+    )
+    assert "Scored today on two processors. This is the development split" in text
+    assert "under development" in text
+    assert "| d | nothing |  | 0 | effect | winch_coulomb_friction: surge_1 |" in text
+    assert "| alarm where there is nothing | 50 % (1 of 2; 1 to 99) | ≤ 3 % |" in text

@@ -149,7 +149,7 @@ def linear_model(
     speeds = slice(BAR_STATES + n, BAR_STATES + 2 * n)
     a = np.zeros((BAR_STATES + 2 * n, BAR_STATES + 2 * n))
     a[0:6, 6:12] = np.eye(6)
-    a[6:12] = np.linalg.solve(_mass_matrix(parameters, point), forces)
+    a[6:12] = np.linalg.solve(mass_matrix(parameters, point), forces)
     a[turns, speeds] = np.eye(n)
     a[speeds] = -(inverse_inertia * radii)[:, None] * tensions
     b = np.zeros((len(a), n))
@@ -250,7 +250,7 @@ def _tension_rows(point: OperatingPoint, radii: Array, *, exact: bool) -> Array:
     )
 
 
-def _mass_matrix(parameters: PlantParameters, point: OperatingPoint) -> Array:
+def mass_matrix(parameters: PlantParameters, point: OperatingPoint) -> Array:
     """Return M of (2-12) about the bar frame's origin in world axes, shape (6, 6)."""
     bar = parameters.bar
     to_world = rotation(point.bar_pose)

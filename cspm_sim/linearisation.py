@@ -149,7 +149,7 @@ def linear_model(
     speeds = slice(BAR_STATES + n, BAR_STATES + 2 * n)
     a = np.zeros((BAR_STATES + 2 * n, BAR_STATES + 2 * n))
     a[0:6, 6:12] = np.eye(6)
-    a[6:12] = np.linalg.solve(mass_matrix(parameters, point), forces)
+    a[6:12] = np.linalg.solve(mass_matrix(parameters, point.bar_pose), forces)
     a[turns, speeds] = np.eye(n)
     a[speeds] = -(inverse_inertia * radii)[:, None] * tensions
     b = np.zeros((len(a), n))
@@ -250,10 +250,10 @@ def _tension_rows(point: OperatingPoint, radii: Array, *, exact: bool) -> Array:
     )
 
 
-def mass_matrix(parameters: PlantParameters, point: OperatingPoint) -> Array:
-    """Return M of (2-12) about the bar frame's origin in world axes, shape (6, 6)."""
+def mass_matrix(parameters: PlantParameters, bar_pose: ArrayLike) -> Array:
+    """Return M of (2-12) about the bar frame's origin in world axes, shape (6, 6) [kg, kg·m²]."""
     bar = parameters.bar
-    to_world = rotation(point.bar_pose)
+    to_world = rotation(bar_pose)
     com = to_world @ bar[bar_kernel.COM : bar_kernel.COM + 3]
     inertia = bar[bar_kernel.INERTIA : bar_kernel.INERTIA + 9].reshape(3, 3)
     coupling = bar[bar_kernel.MASS] * _cross_matrix(com)

@@ -54,7 +54,7 @@ def modes(
         cables: their names.
     """
     poles, vectors = np.linalg.eig(model.A)
-    mass = mass_matrix(parameters, point)
+    mass = mass_matrix(parameters, point.bar_pose)
     found = []
     for pole, vector in zip(poles, vectors.T, strict=True):
         if abs(pole) < SLOWEST or pole.imag < 0.0:

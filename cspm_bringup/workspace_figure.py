@@ -49,14 +49,15 @@ def draw_maps(path: Path, found: WorkspaceResult) -> None:
     figure = Figure(figsize=(14, 10), layout="constrained")
     FigureCanvasAgg(figure)
     columns = (
-        ("κ of the structure matrix", lambda each: each.condition),
-        ("manipulability √det(S·Sᵀ)", lambda each: each.measure),
-        ("required acceleration, times", lambda each: each.factor),
+        ("κ of the structure matrix", "condition"),
+        ("manipulability √det(S·Sᵀ)", "measure"),
+        ("required acceleration, times", "factor"),
     )
     axes = figure.subplots(len(found.maps), len(columns), squeeze=False)
     for row, each in zip(axes, found.maps.values(), strict=True):
-        for place, (title, values) in zip(row, columns, strict=True):
-            _map(place, each, np.where(each.static["general"], values(each), np.nan), title)
+        for place, (title, name) in zip(row, columns, strict=True):
+            held = np.where(each.static["general"], getattr(each, name), np.nan)
+            _map(place, each, held, title)
     figure.savefig(path, dpi=DPI)
 
 

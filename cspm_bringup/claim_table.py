@@ -9,6 +9,14 @@ from rich.table import Table
 
 from cspm_control.analysis.claim import Claim
 
+# Round-off, where nothing is meant.
+NOTHING = 1e-9
+
+
+def shown(value: float) -> str:
+    """Return a number to four digits; what is round-off only, as 0."""
+    return "0" if abs(value) < NOTHING else f"{value:.4g}"
+
 
 def claim_table(title: str, claims: Sequence[Claim], headings: dict[str, str]) -> Table:
     """Return a table: figure, published, and for each way, by its heading, ours and if it holds."""
@@ -23,7 +31,7 @@ def claim_table(title: str, claims: Sequence[Claim], headings: dict[str, str]) -
             cell
             for way in headings
             for cell in (
-                f"{claim.found[way]:.4g}",
+                shown(claim.found[way]),
                 "[green]yes[/]" if claim.holds(way) else "[red]no[/]",
             )
         ]

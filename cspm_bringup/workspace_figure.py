@@ -66,11 +66,17 @@ def _space(
     grid: Grid,
     held: dict[str, NDArray[np.bool_]],
 ) -> None:
-    edges = np.meshgrid(*(_edges(values) for values in (grid.x, grid.y, grid.z)), indexing="ij")
     shape = tuple(len(values) for values in (grid.x, grid.y, grid.z))
-    for name, alpha in (("pseudo_inverse", 0.9), ("general", 0.18)):
-        mask = held[name].reshape(shape)
-        axes.voxels(*edges, mask, facecolor=COLOURS[name], edgecolor=None, alpha=alpha)
+    # The deepest first, since what is drawn later lies on top.
+    for depth, z in reversed(list(enumerate(grid.z))):
+        for name, alpha in (("general", 0.25), ("pseudo_inverse", 0.8)):
+            layer = held[name].reshape(shape)[:, :, depth].T.astype(float)
+            if layer.any():
+                style = {"levels": [0.5, 1.5], "colors": [COLOURS[name]], "alpha": alpha}
+                axes.contourf(grid.x, grid.y, layer, zdir="z", offset=z, **style)
+    axes.set_xlim(grid.x[0], grid.x[-1])
+    axes.set_ylim(grid.y[0], grid.y[-1])
+    axes.set_zlim(grid.z[0], grid.z[-1])
     axes.invert_zaxis()
     axes.set_xlabel("surge [m]")
     axes.set_ylabel("sway [m]")
@@ -121,9 +127,3 @@ def _label(axes: Axes, across: int, up: int) -> None:
     axes.set_ylabel(f"{names[up]} [{UNITS[names[up]]}]")
     if names[up] == "heave":
         axes.invert_yaxis()
-
-
-def _edges(values: Array) -> Array:
-    """Return the edges of cells around values, at half the way to their neighbours."""
-    half = 0.5 * np.diff(values)
-    return np.concatenate([[values[0] - half[0]], values[:-1] + half, [values[-1] + half[-1]]])

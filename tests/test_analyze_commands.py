@@ -94,6 +94,7 @@ def test_bad_input_of_design_is_one_line(refused, arguments, text):  # noqa: F81
     assert refused("analyze", "design", *arguments).startswith(text)
 
 
+@pytest.mark.slow
 def test_manipulability_prints_draws_and_writes(cspm, tmp_path):  # noqa: F811
     code, out, err = cspm("analyze", "manipulability", "--out", "found", "--json", "found.json")
     assert (code, err) == (0, "")

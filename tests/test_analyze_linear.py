@@ -157,6 +157,7 @@ def test_a_machine_of_no_symmetry_spans_all_directions():
     assert found.exact.motion.low.gains.min() > 0.0
 
 
+@pytest.mark.slow
 def test_command_prints_draws_and_writes(cspm, tmp_path):  # noqa: F811
     code, out, err = cspm("analyze", "linear", "--out", "found", "--json", "found.json")
     assert (code, err) == (0, "")

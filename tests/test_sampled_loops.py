@@ -187,6 +187,7 @@ def analysis():
     return analyse_loops(THESIS, CONTROL, replace(PROMPT, torque_delay=1))
 
 
+@pytest.mark.slow
 def test_designed_loops_are_those_of_the_design(analysis):
     surge = analysis.motion[DESIGNED]["surge"].margins
     assert surge.crossover == pytest.approx(12.0)
@@ -195,6 +196,7 @@ def test_designed_loops_are_those_of_the_design(analysis):
         assert view.margins.bandwidth == pytest.approx(800.0, rel=1e-3)
 
 
+@pytest.mark.slow
 def test_sampling_takes_phase_and_computing_more(analysis):
     for cable, designed in analysis.force[DESIGNED].items():
         phases = [
@@ -208,6 +210,7 @@ def test_sampling_takes_phase_and_computing_more(analysis):
         assert analysis.force[LATE][cable].margins.gain_margin < 3.0
 
 
+@pytest.mark.slow
 def test_force_loops_take_the_winches_inertia_out_of_heave_and_pitch(analysis):
     """The bar alone is lighter than with its winches, by which the crossover rises."""
     ratio = {
@@ -219,6 +222,7 @@ def test_force_loops_take_the_winches_inertia_out_of_heave_and_pitch(analysis):
     assert_allclose([ratio["surge"], ratio["sway"], ratio["yaw"]], 1.0, atol=0.05)
 
 
+@pytest.mark.slow
 def test_roll_creeps_up_and_all_else_settles(analysis):
     for growth, frequency in analysis.growth.values():
         assert growth == pytest.approx(0.0059, abs=2e-4)
@@ -227,6 +231,7 @@ def test_roll_creeps_up_and_all_else_settles(analysis):
         assert 0.3 < view.settling_time < 1.0
 
 
+@pytest.mark.slow
 def test_cascade_with_the_loop_opened_and_closed_again_is_the_whole(analysis):
     point = operating_point(THESIS, PARAMETERS, CENTRE)
     model = linear_model(THESIS, PARAMETERS, point, exact=True)

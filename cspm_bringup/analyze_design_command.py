@@ -88,10 +88,11 @@ def _closed_loop(
         raise InputError(
             f"scenario {scenario.name}: control.mode {scenario.control.mode}, allowed: closed_loop"
         )
-    motion = scenario.control.motion.model_copy(update={"design_pose": machine.pose})
-    asked = scenario.control.model_copy(update={"motion": motion})
-    control = resolve(scenario.model_copy(update={"control": asked}), machine.testbed).control
-    assert isinstance(control, ClosedLoop)
+    designed = resolve(scenario, machine.testbed).control
+    assert isinstance(designed, ClosedLoop)
+    # The gains are those of the design pose; how they do is asked here.
+    motion = designed.motion.model_copy(update={"design_pose": machine.pose})
+    control = designed.model_copy(update={"motion": motion})
     ideal = scenario.sensors == "ideal"
     delays = {} if ideal else {name: each.delay for name, each in machine.testbed.sensors.items()}
     late = 1.0 / scenario.rates.force_controller if computing is None else computing

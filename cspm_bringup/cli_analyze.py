@@ -148,9 +148,9 @@ def manipulability(
 
 cspm analyze design --out design
 
-cspm analyze design calm --computing 0.0005 --json design.json
+cspm analyze design calm --computing 0.002 --json design.json
 
-cspm analyze design my_scenario.yaml --pose 0,0,3,0,0,0
+cspm analyze design my_scenario.yaml --pose 0,0,4,0,0,0
 
 Exit code: 0 done, 1 the bar cannot hang there, 2 unusable input."""
 )
@@ -164,8 +164,8 @@ def design(
             metavar="SECONDS",
             min=0.0,
             max=1.0,
-            help="From a measurement to its torque; otherwise one period of the force"
-            " controllers, as in real time.",
+            help="From a measurement to its torque, a whole number of the plant's periods;"
+            " otherwise one period of the force controllers, as in real time.",
         ),
     ] = None,
     out: Folder = None,
@@ -173,7 +173,8 @@ def design(
 ) -> None:
     """Look at a scenario's control loops: margins as designed, as sampled, and as they cascade.
 
-    Gains that the scenario does not give are designed first, at the pose.
+    Gains that the scenario does not give are designed first, at its design pose; the loops are
+    looked at where --pose says.
     """
     from cspm_bringup.analyze_design_command import analyze_design_command
     from cspm_bringup.analyzed_machine import read_machine

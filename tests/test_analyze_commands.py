@@ -87,6 +87,10 @@ def test_design_prints_draws_and_writes(cspm, tmp_path):  # noqa: F811
             ["verification_mid"],
             "scenario verification_mid: control.mode locked_winches, allowed: closed_loop",
         ),
+        (
+            ["--computing", "0.0005"],
+            "computing: 0.0005 s, allowed: a whole number of the plant's periods of 0.001 s",
+        ),
         (["--computing", "-1"], "Invalid value for '--computing'"),
     ],
 )

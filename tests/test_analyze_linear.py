@@ -140,6 +140,24 @@ def test_what_holds_of_chapter_6(found):
     assert {"motion, largest σ", "tension, condition", "slowest oscillation, rad/s"} < lost
 
 
+def test_the_pages_table_is_what_the_code_finds(found):
+    page = (TESTBEDS.parents[1] / "docs" / "analyze.md").read_text(encoding="utf-8")
+    rows = [line.strip("| ").split(" | ") for line in page.splitlines()]
+    told = {row[0]: row[1:] for row in rows if len(row) == 4}
+    for claim in linear_claims(found, THESIS.cable_names):
+        published, *cells = told[claim.what]
+        assert published == claim.published
+        for way, cell in zip((FROZEN, EXACT), cells, strict=True):
+            number, _, cross = cell.replace("−", "-").partition(" ")
+            assert float(number) == pytest.approx(claim.found[way], rel=1e-3, abs=2e-5)
+            assert (cross == "✗") is not claim.holds(way)
+
+
+def test_claims_are_valid_json(found):
+    for claim in linear_claims(found, THESIS.cable_names):
+        json.dumps(claim.data(), allow_nan=False)
+
+
 def test_a_claim_holds_within_its_rounding_only():
     low, high = rounded("0.74")
     for value, wanted in ((0.7349, False), (0.735, True), (0.745, True), (0.7451, False)):

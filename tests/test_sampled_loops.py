@@ -177,6 +177,12 @@ def test_gain_and_phase_margins_are_how_far_instability_is():
         kp = gains.kp * 10 ** (found.gain_margin / 20.0) * share
         louder = pi_system(PiGains(kp=kp, integral_frequency=20.0), PERIOD)
         assert (closed(plant, louder).largest_pole < 1.0) is stable
+    loop = series(pi_system(gains, PERIOD), plant)
+    theirs = control.margin(control.ss(loop.A, loop.B, loop.C, loop.D, PERIOD))
+    assert_allclose(
+        theirs[:2], [10 ** (found.gain_margin / 20.0), np.degrees(found.phase_margin)], rtol=1e-6
+    )
+    assert theirs[3] == pytest.approx(found.crossover)
     late = sampled_view(plant.late(1, [0]), pi_system(gains, PERIOD), 0.05).margins
     lost = found.phase_margin - late.phase_margin
     assert lost == pytest.approx(found.crossover * PERIOD)

@@ -59,7 +59,7 @@ class LoopAnalysis:
 
 
 def analyse_loops(testbed: Testbed, control: ClosedLoop, timing: LoopTiming) -> LoopAnalysis:
-    """Return the loops of a resolved scenario at its design pose.
+    """Return the loops of a resolved scenario at `control.motion.design_pose`.
 
     `designed` is the thesis's way: continuous, each loop alone on the model with cable directions
     held. `sampled` is the same with samples and delays of sensors. `cascade` closes everything on

@@ -31,6 +31,8 @@ POSE = slice(0, 6)
 AXES = list(CONTROLLED_AXES)
 # Step of the pose in differencing the tension distribution [m, rad].
 POSE_STEP = 1e-6
+# How far from a whole number of periods a time may be, for round-off.
+WHOLE = 1e-6
 
 
 @dataclass(frozen=True)
@@ -63,8 +65,13 @@ def loop_timing(rates: Rates, delays: Mapping[str, float], computing: float) -> 
         computing: time from the measurement to the torque [s].
 
     Raises:
-        InputError: the rates are none that this analysis can follow.
+        InputError: the rates or the time are none that this analysis can follow.
     """
+    if abs(computing * rates.plant - round(computing * rates.plant)) > WHOLE:
+        raise InputError(
+            f"computing: {computing:g} s, allowed: a whole number of the plant's periods of"
+            f" {1.0 / rates.plant:g} s"
+        )
     if rates.tension_distribution != rates.motion_controller:
         raise InputError(
             f"rates.tension_distribution: {rates.tension_distribution} Hz, allowed here: that of"

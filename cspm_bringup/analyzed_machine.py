@@ -65,7 +65,7 @@ def read_machine(scenario: str, testbed: Path | None, pose: str | None) -> Analy
     if isinstance(control, ClosedLoop):
         wanted = control.motion.design_pose
     if pose is not None:
-        wanted = _six(pose, "--pose")
+        wanted = _six(pose, "--pose", "m, rad")
     return AnalyzedMachine(machine, described, path.parent, wanted)
 
 
@@ -75,20 +75,20 @@ def read_acceleration(text: str) -> Pose:
     Raises:
         InputError: it is not six numbers that are not negative.
     """
-    found = _six(text, "--acceleration")
+    found = _six(text, "--acceleration", "m/s², rad/s²")
     if min(found) < 0.0:
         raise InputError(f"--acceleration {text}: allowed: six numbers that are not negative")
     return found
 
 
-def _six(text: str, option: str) -> Pose:
+def _six(text: str, option: str, units: str) -> Pose:
     try:
         numbers: Sequence[float] = [float(part) for part in text.split(",")]
     except ValueError:
         numbers = []
     if len(numbers) != len(ORIGIN) or not np.isfinite(numbers).all():
         raise InputError(
-            f"{option} {text}: allowed: six numbers with commas, {', '.join(DOFS)} [m, rad], such"
+            f"{option} {text}: allowed: six numbers with commas, {', '.join(DOFS)} [{units}], such"
             " as 0,0,2,0,0,0"
         )
     a, b, c, d, e, f = numbers

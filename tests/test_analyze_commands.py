@@ -52,7 +52,11 @@ def test_the_required_acceleration_is_what_the_scenarios_reference_has():
     ("arguments", "text"),
     [
         (["--coarse", "0"], "Invalid value for '--coarse'"),
-        (["--acceleration", "1,2"], "--acceleration 1,2: allowed: six numbers with commas"),
+        (
+            ["--acceleration", "1,2"],
+            "--acceleration 1,2: allowed: six numbers with commas, surge, sway, heave, roll, pitch,"
+            " yaw [m/s², rad/s²], such",
+        ),
         (
             ["--acceleration=-1,0,0,0,0,0"],
             "--acceleration -1,0,0,0,0,0: allowed: six numbers that are not negative",

@@ -17,6 +17,7 @@ from cspm_control.analysis.gain import condition, directions, relative_gains, si
 from cspm_control.analysis.linear import FREQUENCIES, LOW, analyse_linear
 from cspm_control.analysis.published_linear import EXACT, FROZEN, linear_claims
 from cspm_sim.kernels.cable import RADIUS
+from cspm_sim.linearisation import linear_model
 from cspm_sim.parameters import nominal_parameters
 
 
@@ -93,6 +94,18 @@ def test_drifting_poles_are_those_that_nothing_pulls_back(found):
     assert len(found.frozen.model.A) - found.frozen.drifting == sum(
         2 if mode.pole.imag > 0 else 1 for mode in found.frozen.modes
     )
+
+
+def test_slow_modes_grow_because_a_longer_cable_is_softer(found):
+    parameters, point = nominal_parameters(THESIS), found.point
+
+    def growth(changed):
+        poles = np.linalg.eigvals(linear_model(THESIS, parameters, changed, exact=True).A)
+        return poles.real[(np.abs(poles) < 30.0) & (poles.imag > 0.1)]
+
+    assert (growth(point) > 1e-7).sum() == 5
+    assert (growth(point._replace(unstretched_lengths=point.lengths)) > 1e-7).sum() == 5
+    assert growth(point._replace(length_stiffness=point.stiffness)).max() < 0.0
 
 
 def test_relative_gains_are_ratios_of_open_to_closed_gains():

@@ -113,6 +113,20 @@ def test_algorithm_2_tries_all_bases_and_wrench_sets_all_tensions(name):
     assert (counts < 64).all()
 
 
+@pytest.mark.slow
+def test_on_the_thesis_slices_bases_find_all_that_any_tensions_hold():
+    machine, fine = cable_structure(THESIS, CENTRE), GRIDS["general"]
+    zero, depth = np.zeros(1), np.array([2.0])
+    slices = (fine._replace(pitch=zero, yaw=zero), fine._replace(x=zero, y=zero, z=depth))
+    assert sum(grid.size for grid in slices) == 5628
+    for grid in slices:
+        wanted = np.tile(wanted_at_rest(machine, grid), (len(grid.positions), 1))
+        sets = wrench_set(structures(machine, grid), machine.limits * [0.0, 1.0], wanted)
+        held = static_workspace(machine, grid, "general").ravel()
+        np.testing.assert_array_equal(held, sets.holds)
+        assert 0 < held.sum() < len(held)
+
+
 def test_reach_and_factor_are_what_linear_programs_find():
     machine = cable_structure(THESIS, CENTRE)
     grid = Grid(*(np.array([v]) for v in (0.02, -0.05, 1.7, 0.1, -0.08)))

@@ -12,7 +12,7 @@ from cspm_control.analysis.loop_view import LoopView, continuous_view, sampled_v
 from cspm_control.analysis.sampled_loops import (
     LoopTiming,
     cascade_plant,
-    force_loops,
+    force_plant_sampled,
     motion_controllers,
     motion_plant_sampled,
     pi_system,
@@ -134,7 +134,7 @@ def _sampled_force(
 ) -> dict[str, LoopView]:
     continuous = tension_plant(testbed, nominal_parameters(testbed), control.motion.design_pose)
     gains = control.force.gains or {}
-    plant, _ = force_loops(continuous, timing, gains)
+    plant = force_plant_sampled(continuous, timing)
     found = {}
     for i, name in enumerate(testbed.cable_names):
         one = slice(i, i + 1)

@@ -72,6 +72,18 @@ def loop_timing(rates: Rates, delays: Mapping[str, float], computing: float) -> 
             f"computing: {computing:g} s, allowed: a whole number of the plant's periods of"
             f" {1.0 / rates.plant:g} s"
         )
+    _check_rates(rates)
+    return LoopTiming(
+        period=1.0 / rates.plant,
+        force=rates.plant // rates.force_controller,
+        motion=rates.plant // rates.motion_controller,
+        tension_delay=round(delays.get("/cables/tension", 0.0) * rates.plant),
+        pose_delay=round(delays.get("/bar/pose", 0.0) * rates.plant),
+        torque_delay=round(computing * rates.plant),
+    )
+
+
+def _check_rates(rates: Rates) -> None:
     if rates.tension_distribution != rates.motion_controller:
         raise InputError(
             f"rates.tension_distribution: {rates.tension_distribution} Hz, allowed here: that of"
@@ -89,14 +101,6 @@ def loop_timing(rates: Rates, delays: Mapping[str, float], computing: float) -> 
                 f"rates.{key}: {getattr(rates, key)} Hz, allowed here: a multiple of the"
                 f" {needed} Hz of what reads it"
             )
-    return LoopTiming(
-        period=1.0 / rates.plant,
-        force=rates.plant // rates.force_controller,
-        motion=rates.plant // rates.motion_controller,
-        tension_delay=round(delays.get("/cables/tension", 0.0) * rates.plant),
-        pose_delay=round(delays.get("/bar/pose", 0.0) * rates.plant),
-        torque_delay=round(computing * rates.plant),
-    )
 
 
 def pi_system(gains: PiGains, period: float) -> SampledSystem:
@@ -119,20 +123,11 @@ def pid_system(gains: PidGains, pole: float, period: float) -> SampledSystem:
     return SampledSystem(a, b, c, d, period)
 
 
-def force_loops(
-    plant: StateSpace, timing: LoopTiming, force: Mapping[str, PiGains]
-) -> tuple[SampledSystem, SampledSystem]:
-    """Return torques to tensions as the force controllers see it, and the controllers.
-
-    Args:
-        plant: the tension sub-system.
-        timing: of the loops.
-        force: gains per cable, in the plant's order.
-    """
+def force_plant_sampled(plant: StateSpace, timing: LoopTiming) -> SampledSystem:
+    """Return the tension sub-system (6-6) as sampled force controllers see it."""
     late = np.full(len(plant.C), timing.tension_delay)
     sampled = sample(plant.A, plant.B, plant.C, timing.period).late(timing.torque_delay, late)
-    seen = sampled.every(timing.force)
-    return seen, diagonal([pi_system(gains, seen.period) for gains in force.values()])
+    return sampled.every(timing.force)
 
 
 def motion_plant_sampled(plant: StateSpace, timing: LoopTiming) -> SampledSystem:

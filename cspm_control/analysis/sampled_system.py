@@ -69,11 +69,6 @@ class SampledSystem:
             state = self.A @ state + self.B @ row
         return np.array(found)
 
-    @property
-    def largest_pole(self) -> float:
-        """The largest magnitude of an eigenvalue of A; below 1: stable."""
-        return float(np.abs(np.linalg.eigvals(self.A)).max(initial=0.0))
-
 
 def sample(a: Array, b: Array, c: Array, period: float) -> SampledSystem:
     """Return ẋ = A·x + B·u, y = C·x sampled with held inputs."""

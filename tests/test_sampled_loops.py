@@ -12,6 +12,7 @@ from test_linearisation import CENTRE, THESIS
 
 from cspm_bringup.assembly import resolve
 from cspm_bringup.run import run
+from cspm_control.analysis import sampled_loops
 from cspm_control.analysis.loop_view import LoopView, sampled_view
 from cspm_control.analysis.loops import CASCADE, DESIGNED, LATE, SAMPLED, analyse_loops
 from cspm_control.analysis.sampled_loops import (
@@ -27,13 +28,18 @@ from cspm_control.analysis.sampled_system import closed, diagonal, sample, serie
 from cspm_control.design import margins
 from cspm_control.force_controller import ForceController
 from cspm_control.motion_controller import MotionController
-from cspm_control.tension_distribution import PseudoInverse
+from cspm_control.tension_distribution import CONTROLLED_AXES, PseudoInverse
 from cspm_msgs_py.dofs import DOFS
 from cspm_msgs_py.errors import InputError
 from cspm_msgs_py.scenario import ClosedLoop, PidGains, PiGains, Rates, parse_scenario
 from cspm_sim.equilibrium import gravity_wrench
 from cspm_sim.kernels.rotation import quaternion_from_euler
-from cspm_sim.linearisation import linear_model, motion_subsystem, operating_point
+from cspm_sim.linearisation import (
+    linear_model,
+    mass_matrix,
+    motion_subsystem,
+    operating_point,
+)
 from cspm_sim.parameters import nominal_parameters
 
 PERIOD = 1e-3
@@ -165,6 +171,28 @@ def test_poles_of_the_cascade_are_those_of_its_own_bookkeeping(every):
     for pole in other.sampled(every):
         if abs(pole) < 100.0 and abs(pole) > 1e-3:
             assert np.abs(ours - pole).min() < 1e-3 * abs(pole), pole
+
+
+def test_the_motion_controller_meets_a_free_bar_as_the_distribution_follows_it(
+    monkeypatch,
+):
+    """Neither the winches' inertia nor the pendulum's stiffness is left of the exact model."""
+    point = operating_point(THESIS, PARAMETERS, CENTRE)
+    model = linear_model(THESIS, PARAMETERS, point, exact=True)
+    rows = motion_subsystem(model, PARAMETERS, point).C
+    frequencies = np.array([0.5, 2.0, 5.0])
+    axes = list(CONTROLLED_AXES)
+    mass = np.diag(mass_matrix(PARAMETERS, point.bar_pose))[axes]
+
+    def inertia_found():
+        plant = cascade_plant(model, PARAMETERS, point, rows, PROMPT, CONTROL.force.gains)
+        own = np.abs(np.diagonal(plant.response(frequencies)[:, axes], axis1=1, axis2=2))
+        return 1.0 / (own * frequencies[:, None] ** 2)
+
+    assert_allclose(inertia_found() / mass, 1.0, atol=0.01)
+    still = distribution_slopes(PARAMETERS, point)[0], np.zeros((8, 6))
+    monkeypatch.setattr(sampled_loops, "distribution_slopes", lambda *_: still)
+    assert (np.abs(inertia_found() / mass - 1.0).max(axis=0) > 0.3).all()
 
 
 def test_gain_and_phase_margins_are_how_far_instability_is():

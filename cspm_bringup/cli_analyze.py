@@ -165,7 +165,8 @@ def design(
             min=0.0,
             max=1.0,
             help="From a measurement to its torque, a whole number of the plant's periods;"
-            " otherwise one period of the force controllers, as in real time.",
+            " otherwise one period of the force controllers, as of drives that act in their next"
+            " cycle.",
         ),
     ] = None,
     out: Folder = None,

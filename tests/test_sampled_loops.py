@@ -211,6 +211,10 @@ def test_gain_and_phase_margins_are_how_far_instability_is():
     theirs = control.margin(control.ss(loop.A, loop.B, loop.C, loop.D, PERIOD))
     assert theirs[1] == pytest.approx(np.degrees(found.phase_margin))
     assert theirs[3] == pytest.approx(found.crossover)
+    fast = pi_system(PiGains(kp=0.03, integral_frequency=20.0), PERIOD)
+    beyond = sampled_view(plant.late(2, [0]), fast, 0.05).margins
+    assert beyond.phase_margin < 0.0
+    assert beyond.gain_margin == np.inf
     late = sampled_view(plant.late(1, [0]), pi_system(gains, PERIOD), 0.05).margins
     lost = found.phase_margin - late.phase_margin
     assert lost == pytest.approx(found.crossover * PERIOD)
@@ -263,6 +267,20 @@ def test_roll_creeps_up_and_all_else_settles(analysis):
         assert frequency == pytest.approx(26.7, abs=0.1)
     for view in analysis.motion[CASCADE].values():
         assert 0.3 < view.settling_time < 1.0
+
+
+def test_two_periods_of_computing_are_one_too_many():
+    growth = {}
+    for late in (1, 2):
+        point = operating_point(THESIS, PARAMETERS, CENTRE)
+        model = linear_model(THESIS, PARAMETERS, point, exact=True)
+        rows = motion_subsystem(model, PARAMETERS, point).C
+        timing = replace(PROMPT, torque_delay=late)
+        plant = cascade_plant(model, PARAMETERS, point, rows, timing, CONTROL.force.gains)
+        poles = np.linalg.eigvals(closed(plant, motion_controllers(CONTROL.motion, PERIOD)).A)
+        growth[late] = np.log(np.abs(poles).max()) / PERIOD
+    assert growth[1] < 0.01
+    assert growth[2] == pytest.approx(90.4, abs=0.1)
 
 
 @pytest.mark.slow

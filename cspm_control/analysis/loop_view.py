@@ -91,7 +91,7 @@ def sampled_view(
 def _with_highest(found: Margins, loop: SampledSystem) -> Margins:
     """Return margins that count the −180° of half the sampling rate, where samples alternate."""
     at = float(loop.response(np.pi / loop.period)[0, 0, 0].real)
-    if not -1.0 < at < 0.0:
+    if not -1.0 < at < 0.0 or found.phase_margin < 0.0:
         return found
     return found._replace(gain_margin=min(found.gain_margin, -20.0 * float(np.log10(-at))))
 

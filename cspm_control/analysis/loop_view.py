@@ -14,7 +14,7 @@ Array = NDArray[np.float64]
 ComplexArray = NDArray[np.complex128]
 
 LOWEST_FREQUENCY = 0.05  # rad/s
-POINTS = 400
+POINTS = 200
 # A response has settled once it stays this close to where it goes.
 SETTLED = 0.02
 

@@ -25,6 +25,7 @@ def main() -> None:
     # They add their commands when they are loaded.
     import_module("cspm_bringup.cli_recordings")
     import_module("cspm_bringup.cli_compare")
+    import_module("cspm_bringup.cli_analyze")
     import_module("cspm_bringup.cli_diagnose")
     import_module("cspm_bringup.cli_blind")
     import_module("cspm_bringup.cli_identify")

@@ -20,6 +20,7 @@ class _Listed(typer.core.TyperGroup):
 
     order = (
         *("run", "info", "recover", "resim", "import", "compare", "identify"),
+        *("diagnose", "analyze"),
         *("replay", "check-drivers", "node"),
     )
 

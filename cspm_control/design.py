@@ -126,16 +126,16 @@ def design_motion_gains(
         ConvergenceError: the bar cannot hang at the design pose.
     """
     _check_dofs(crossover)
-    plant = _motion_plant(testbed, parameters, design_pose)
+    plant = motion_plant(testbed, parameters, design_pose)
     gains = {}
     for dof, frequency in crossover.items():
         low, high = INTEGRAL_ZERO * frequency, DERIVATIVE_ZERO * frequency
         shape = PidGains(kp=low + high, ki=low * high, kd=1.0)
-        at_crossover = _motion_loop(plant, dof, shape)(np.array([frequency]))
+        at_crossover = motion_loop(plant, dof, shape)(np.array([frequency]))
         kd = 1.0 / float(np.abs(at_crossover[0]))
         gains[dof] = PidGains(kp=kd * shape.kp, ki=kd * shape.ki, kd=kd)
-        loop = _motion_loop(plant, dof, gains[dof])
-        _check_motion(dof, frequency, margins(loop, _grid(plant, frequency)))
+        loop = motion_loop(plant, dof, gains[dof])
+        _check_motion(dof, frequency, margins(loop, loop_frequencies(plant, frequency)))
     return gains
 
 
@@ -153,9 +153,9 @@ def motion_margins(
         ConvergenceError: the bar cannot hang at the design pose.
     """
     _check_dofs(gains)
-    plant = _motion_plant(testbed, parameters, design_pose)
-    frequencies = _grid(plant, MOTION_BANDWIDTH)
-    return {dof: margins(_motion_loop(plant, dof, g), frequencies) for dof, g in gains.items()}
+    plant = motion_plant(testbed, parameters, design_pose)
+    frequencies = loop_frequencies(plant, MOTION_BANDWIDTH)
+    return {dof: margins(motion_loop(plant, dof, g), frequencies) for dof, g in gains.items()}
 
 
 def design_force_gains(
@@ -173,8 +173,8 @@ def design_force_gains(
             f"control.force.bandwidth: {bandwidth:g} rad/s, allowed: above 0 and at most"
             f" {LARGEST_FORCE_BANDWIDTH:g} rad/s"
         )
-    plant = _tension_plant(testbed, parameters, design_pose)
-    frequencies = _grid(plant, bandwidth)
+    plant = tension_plant(testbed, parameters, design_pose)
+    frequencies = loop_frequencies(plant, bandwidth)
     responses = plant.response(frequencies)
     at_bandwidth = plant.response(bandwidth)[0]
     gains = {}
@@ -184,7 +184,7 @@ def design_force_gains(
         # The root Kp > 0 of 2·|Kp·g|² = |1 + Kp·g|².
         kp = (shape.real + np.hypot(shape.real, np.abs(shape))) / np.abs(shape) ** 2
         gains[name] = PiGains(kp=float(kp), integral_frequency=integral)
-        _check_force(name, bandwidth, margins(_force_loop(plant, i, gains[name]), frequencies))
+        _check_force(name, bandwidth, margins(force_loop(plant, i, gains[name]), frequencies))
     return gains
 
 
@@ -204,10 +204,10 @@ def force_margins(
     unknown = [name for name in gains if name not in names]
     if unknown:
         raise InputError(f"control.force.gains: {unknown[0]}, allowed: {', '.join(names)}")
-    plant = _tension_plant(testbed, parameters, design_pose)
-    frequencies = _grid(plant, LARGEST_FORCE_BANDWIDTH)
+    plant = tension_plant(testbed, parameters, design_pose)
+    frequencies = loop_frequencies(plant, LARGEST_FORCE_BANDWIDTH)
     return {
-        name: margins(_force_loop(plant, names.index(name), gain), frequencies)
+        name: margins(force_loop(plant, names.index(name), gain), frequencies)
         for name, gain in gains.items()
     }
 
@@ -240,23 +240,36 @@ def _refine(
     return float(brentq(at, low, high, xtol=1e-10 * low))
 
 
-def _motion_plant(
+def motion_plant(
     testbed: Testbed, parameters: PlantParameters, design_pose: ArrayLike
 ) -> StateSpace:
+    """Return the motion sub-system (6-2) that the motion controller is designed on.
+
+    Raises:
+        InputError: the machine has no bar or cannot exert all controlled forces.
+        ConvergenceError: the bar cannot hang at the design pose.
+    """
     point = operating_point(testbed, parameters, design_pose)
     _check_rank(point)
     model = linear_model(testbed, parameters, point)
     return motion_subsystem(model, parameters, point, CONTROLLED_AXES)
 
 
-def _tension_plant(
+def tension_plant(
     testbed: Testbed, parameters: PlantParameters, design_pose: ArrayLike
 ) -> StateSpace:
+    """Return the tension sub-system (6-6) that the force controllers are designed on.
+
+    Raises:
+        InputError: the machine has no bar.
+        ConvergenceError: the bar cannot hang at the design pose.
+    """
     point = operating_point(testbed, parameters, design_pose)
     return tension_subsystem(linear_model(testbed, parameters, point))
 
 
-def _motion_loop(plant: StateSpace, dof: str, gains: PidGains) -> Response:
+def motion_loop(plant: StateSpace, dof: str, gains: PidGains) -> Response:
+    """Return one DOF's open loop, PID without derivative filter on the motion sub-system."""
     output, column = DOFS.index(dof), CONTROLLED_DOFS.index(dof)
 
     def loop(frequencies: Array) -> ComplexArray:
@@ -267,7 +280,9 @@ def _motion_loop(plant: StateSpace, dof: str, gains: PidGains) -> Response:
     return loop
 
 
-def _force_loop(plant: StateSpace, i: int, gains: PiGains) -> Response:
+def force_loop(plant: StateSpace, i: int, gains: PiGains) -> Response:
+    """Return cable i's open loop, PI on the tension sub-system, the other torques held."""
+
     def loop(frequencies: Array) -> ComplexArray:
         controller = gains.kp * (1.0 + gains.integral_frequency / (1j * frequencies))
         return np.asarray(controller * plant.response(frequencies)[:, i, i])
@@ -275,7 +290,7 @@ def _force_loop(plant: StateSpace, i: int, gains: PiGains) -> Response:
     return loop
 
 
-def _grid(plant: StateSpace, frequency: float) -> Array:
+def loop_frequencies(plant: StateSpace, frequency: float) -> Array:
     """Return three decades around `frequency`, and every resonance, which may be sharp."""
     even = np.geomspace(1e-3 * frequency, 1e3 * frequency, 6 * POINTS_PER_DECADE)
     resonances = np.abs(np.linalg.eigvals(plant.A))

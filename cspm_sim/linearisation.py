@@ -16,6 +16,7 @@ from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
+from scipy.optimize import brentq
 
 from cspm_msgs_py.dofs import DOFS
 from cspm_msgs_py.errors import InputError
@@ -24,7 +25,7 @@ from cspm_msgs_py.testbed import Testbed
 from cspm_sim.equilibrium import find_equilibrium, gravity_wrench
 from cspm_sim.kernels import bar as bar_kernel
 from cspm_sim.kernels import cable as cable_kernel
-from cspm_sim.kernels.cable import elastic_tension, law_scale
+from cspm_sim.kernels.cable import elastic_tension, law_curve, law_scale
 from cspm_sim.kernels.plant import BAR_STATES, PlantParameters
 from cspm_sim.kinematics import RANK_TOLERANCE, euler_rates, geometry, rotation
 
@@ -32,8 +33,6 @@ Array = NDArray[np.float64]
 ComplexArray = NDArray[np.complex128]
 
 ALL_AXES = (0, 1, 2, 3, 4, 5)
-# Share of a cable's elastic length over which its tension is differenced.
-LENGTH_STEP = 1e-6
 
 
 @dataclass(frozen=True, eq=False)
@@ -149,7 +148,7 @@ def linear_model(
     speeds = slice(BAR_STATES + n, BAR_STATES + 2 * n)
     a = np.zeros((BAR_STATES + 2 * n, BAR_STATES + 2 * n))
     a[0:6, 6:12] = np.eye(6)
-    a[6:12] = np.linalg.solve(_mass_matrix(parameters, point), forces)
+    a[6:12] = np.linalg.solve(mass_matrix(parameters, point.bar_pose), forces)
     a[turns, speeds] = np.eye(n)
     a[speeds] = -(inverse_inertia * radii)[:, None] * tensions
     b = np.zeros((len(a), n))
@@ -223,17 +222,33 @@ def _cable_slopes(
     """Return ∂t/∂l, −∂t/∂l0 and ∂t/∂l̇ of a cable at rest."""
     cables, tables = parameters.cables, parameters.tables
     elastic = unstretched + cables[i, cable_kernel.OFFSET_LENGTH]
-
-    def tension_at(length: float) -> tuple[float, float]:
-        return elastic_tension(elongation, length, law_scale(length, cables, i), cables, tables, i)
-
-    tension, stiffness = tension_at(elastic)
-    step = LENGTH_STEP * elastic
-    softening = (tension_at(elastic - step)[0] - tension_at(elastic + step)[0]) / (2.0 * step)
+    scale = law_scale(elastic, cables, i)
+    tension, stiffness = elastic_tension(elongation, elastic, scale, cables, tables, i)
+    free = _elongation_below_cap(parameters, i, elongation, elastic)
+    # a/l^b of (3-7) falls as −b/l, E·A/l of (3-10) and of the linear law as −1/l.
+    softer = cables[i, cable_kernel.LAW_EXPONENT] * free + (elongation - free)
+    softening = stiffness * softer / elastic
     constant, slope = cables[i, cable_kernel.DAMPING_CONSTANT : cable_kernel.DAMPING_SLOPE + 1]
     # Below its floor tension the damper of `kernels.cable.cable_tensions` fades.
     share = min(1.0, tension / cables[i, cable_kernel.FLOOR_TENSION])
     return stiffness, stiffness + softening, share * max(0.0, constant - slope * elastic)
+
+
+def _elongation_below_cap(
+    parameters: PlantParameters, i: int, elongation: float, elastic: float
+) -> float:
+    """Return how much of cable i's elongation follows (3-7) and not the asymptote (3-10) [m]."""
+    cables, tables = parameters.cables, parameters.tables
+    scale, cap = law_scale(elastic, cables, i), cables[i, cable_kernel.AXIAL_RIGIDITY] / elastic
+    if scale == 0.0:
+        return 0.0
+
+    def excess(part: float) -> float:
+        return float(scale * law_curve(scale * part, cables, tables, i)[1] - cap)
+
+    if excess(elongation) <= 0.0:
+        return elongation
+    return float(brentq(excess, 0.0, elongation, xtol=1e-15))
 
 
 def _tension_rows(point: OperatingPoint, radii: Array, *, exact: bool) -> Array:
@@ -250,10 +265,10 @@ def _tension_rows(point: OperatingPoint, radii: Array, *, exact: bool) -> Array:
     )
 
 
-def _mass_matrix(parameters: PlantParameters, point: OperatingPoint) -> Array:
-    """Return M of (2-12) about the bar frame's origin in world axes, shape (6, 6)."""
+def mass_matrix(parameters: PlantParameters, bar_pose: ArrayLike) -> Array:
+    """Return M of (2-12) about the bar frame's origin in world axes, shape (6, 6) [kg, kg·m²]."""
     bar = parameters.bar
-    to_world = rotation(point.bar_pose)
+    to_world = rotation(bar_pose)
     com = to_world @ bar[bar_kernel.COM : bar_kernel.COM + 3]
     inertia = bar[bar_kernel.INERTIA : bar_kernel.INERTIA + 9].reshape(3, 3)
     coupling = bar[bar_kernel.MASS] * _cross_matrix(com)

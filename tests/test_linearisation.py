@@ -9,7 +9,7 @@ from conftest import build, general_content
 
 from cspm_msgs_py.errors import InputError
 from cspm_msgs_py.testbed import LinearStiffness, Testbed, load_testbed
-from cspm_sim.kernels.cable import RADIUS
+from cspm_sim.kernels.cable import OFFSET_LENGTH, RADIUS, elastic_tension, law_scale
 from cspm_sim.kernels.plant import frame_placement, make_scratch, plant_rate
 from cspm_sim.kinematics import euler_rate_map, rotation
 from cspm_sim.linearisation import (
@@ -270,3 +270,24 @@ def test_a_machine_without_bar_is_refused():
     bare = THESIS.model_copy(update={"bar": None})
     with pytest.raises(InputError, match="linear model: this test-bed has no bar, allowed: a test"):
         operating_point(bare, plant_parameters(bare), CENTRE)
+
+
+@pytest.mark.parametrize("machine", ["thesis", "linear_law", "beyond_the_cap"])
+def test_a_longer_cable_is_softer_by_as_much_as_the_law_says(machine):
+    """By central differences of the law in the length, whose error falls with the step squared."""
+    testbed = MACHINES[machine]
+    parameters = plant_parameters(testbed)
+    point = operating_point(testbed, parameters, CENTRE)
+    cables, tables = parameters.cables, parameters.tables
+    for i in range(8):
+        elongation = point.lengths[i] - point.unstretched_lengths[i]
+        elastic = point.unstretched_lengths[i] + cables[i, OFFSET_LENGTH]
+
+        def tension(length, i=i, elongation=elongation):
+            scale = law_scale(length, cables, i)
+            return elastic_tension(elongation, length, scale, cables, tables, i)[0]
+
+        step = 1e-4 * elastic
+        wanted = (tension(elastic - step) - tension(elastic + step)) / (2.0 * step)
+        assert point.length_stiffness[i] - point.stiffness[i] == pytest.approx(wanted, rel=1e-6)
+        assert wanted > 0.0

@@ -12,6 +12,7 @@ from cspm_ident.diagnosis.drivers import Driver, Knots
 from cspm_ident.diagnosis.equation import Equation
 from cspm_ident.diagnosis.readings import reading_rows
 from cspm_ident.signals.measurement import TENSION, WINCHES, Measurement
+from cspm_ident.signals.samples import Samples
 from cspm_ident.signals.winch_motion import winch_motion
 from cspm_ident.winch.recording import signal_rows, winch_signals
 from cspm_ident.winch.weak_form import make_window, weigh
@@ -26,6 +27,10 @@ Array = NDArray[np.float64]
 HALF_WIDTH_S = 0.02
 # Of the usual speed: below it a shaft may stick, and its direction is noise.
 STILL_SHARE = 0.05
+# Of the usual interval: readings farther apart have lost one between them.
+_GAP = 1.5
+_MOVES = 3.0
+_STEP_RAD = 1e-6
 _DRIVERS = {
     "speed [rad/s]": WinchSignal.SPEED,
     "tension [N]": WinchSignal.TENSION,
@@ -63,29 +68,55 @@ def shaft_equations(
                 rows[:, WinchSignal.ANGLE] = moved.angles[:, 0]
                 rows[:, WinchSignal.SPEED] = moved.speeds[:, 0]
             half = max(2, round(HALF_WIDTH_S / signals.angle.interval))
-            if len(rows) < 2 * half + 1:
+            if len(rows) < 2 * half + 1 or not _turns(rows[:, WinchSignal.ANGLE], signals.angle):
                 continue
             sensors = (WINCHES,) if signals.tension is None else (WINCHES, TENSION)
-            table = _Shaft(rows, cable, half, times, sensors)
+            lost = _lost(signals.torque.times - measurement.torque_age, times)
+            table = _Shaft(rows, cable, half, times, lost, sensors)
             found.append(table.equation(effects, [a for a in known if a.element == i], knots))
     return found
+
+
+def _turns(angles: Array, samples: Samples) -> bool:
+    """Return whether a shaft moves by more than its encoder's noise; a brake takes any torque."""
+    noise = float(np.std(samples.values[:, 0] - np.interp(samples.times, *_halves(samples))))
+    return bool(np.std(angles) > _MOVES * max(noise, _STEP_RAD))
+
+
+def _halves(samples: Samples) -> tuple[Array, Array]:
+    """Return every other sample, between which straight lines leave little but noise."""
+    return samples.times[::2], samples.values[::2, 0]
+
+
+def _lost(stamps: Array, times: Array) -> NDArray[np.bool_]:
+    """Return at which times a reading is missing, so that a torque that chatters is not known."""
+    apart = np.diff(stamps)
+    after = np.clip(np.searchsorted(stamps, times) - 1, 0, len(apart) - 1)
+    return np.asarray(apart[after] > _GAP * np.median(apart))
 
 
 class _Shaft:
     """One winch's rows and the window that weighs them."""
 
     def __init__(
-        self, rows: Array, winch: Cable, half: int, times: Array, sensors: tuple[str, ...]
+        self,
+        rows: Array,
+        winch: Cable,
+        half: int,
+        times: Array,
+        lost: NDArray[np.bool_],
+        sensors: tuple[str, ...],
     ) -> None:
         self._sensors, inertia, name = sensors, winch.rotor_inertia, winch.name
         self._rows, self._inertia, self._name = rows, inertia, name
         step = float(times[1] - times[0])
         self._window, self._stride = make_window(half, step), max(1, half // 2)
         speed = np.abs(rows[:, WinchSignal.SPEED])
-        windows = np.lib.stride_tricks.sliding_window_view(speed, len(self._window.weights))
-        windows = windows[:: self._stride]
+        view, width = np.lib.stride_tricks.sliding_window_view, len(self._window.weights)
+        windows = view(speed, width)[:: self._stride]
         slow = STILL_SHARE * np.sqrt(np.mean(speed**2))
-        self._moving = windows.max(axis=1) >= slow
+        whole = ~view(lost, width)[:: self._stride].any(axis=1)
+        self._moving = (windows.max(axis=1) >= slow) & whole
         self._turning = windows.min(axis=1)[self._moving] < slow
         self._times = self._weighed(times)
 

@@ -214,6 +214,8 @@ def _outputs(
         if samples is None or not values.size:
             continue
         for i, name in enumerate(names):
+            if not np.ptp(samples.values[:, i]) > 0.0:
+                continue
             element = "bar" if kind is Channel.WRENCH else name
             output = Output(drive, f"{stem}/{name}", _unit(stem, i), element, kind)
             found.append((output, samples, values[:, i], i))

@@ -319,21 +319,29 @@ def _fit(
     retuned: float,
     floor: float,
 ) -> dict[str, Any]:
-    """Return one entry; all RMS, told as shares of the measured quantity's spread."""
-    spread = max(measured, 1e-300)
+    """Return one entry; all RMS, told as shares of the measured quantity's spread.
+
+    Of a quantity that stands still, as shares of its noise.
+    """
+    spread = max(measured, floor, 1e-300)
     before, after, retuned, floor = (each / spread for each in (before, after, retuned, floor))
     return {
         "channel": channel,
         "drive": drive,
         "held_out": {
-            "vaf_before": 100.0 * max(0.0, 1.0 - before**2),
-            "vaf_after": 100.0 * max(0.0, 1.0 - after**2),
+            "vaf_before": _vaf(before),
+            "vaf_after": _vaf(after),
             "nrmse_before": before,
             "nrmse_after": after,
             "nrmse_retuned_nominal": retuned,
             "noise_floor": floor,
         },
     }
+
+
+def _vaf(share: float) -> float:
+    """Return the variance accounted for [%] of an error that is a share of the spread."""
+    return 100.0 * (1.0 - min(1.0, share) ** 2)
 
 
 def _concerned(diagnosis: Diagnosis, named: Named) -> Sequence[HeldOut]:

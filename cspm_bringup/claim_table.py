@@ -1,0 +1,39 @@
+"""The table that holds the thesis's figures against ours."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+from rich import box
+from rich.table import Table
+
+from cspm_control.analysis.claim import Claim
+
+# Round-off, where nothing is meant.
+NOTHING = 1e-9
+
+
+def shown(value: float) -> str:
+    """Return a number to four digits; what is round-off only, as 0."""
+    return "0" if abs(value) < NOTHING else f"{value:.4g}"
+
+
+def claim_table(title: str, claims: Sequence[Claim], headings: dict[str, str]) -> Table:
+    """Return a table: figure, published, and for each way, by its heading, ours and if it holds."""
+    table = Table(title=title, box=box.SIMPLE_HEAD)
+    table.add_column("figure")
+    table.add_column("thesis", justify="right")
+    for heading in headings.values():
+        table.add_column(heading, justify="right")
+        table.add_column("holds?")
+    for claim in claims:
+        cells = [
+            cell
+            for way in headings
+            for cell in (
+                shown(claim.found[way]),
+                "[green]yes[/]" if claim.holds(way) else "[red]no[/]",
+            )
+        ]
+        table.add_row(claim.what, claim.published, *cells)
+    return table

@@ -1,0 +1,1 @@
+"""What a machine and its controllers can do: linear analysis, workspace, manipulability, loops."""

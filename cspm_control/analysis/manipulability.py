@@ -1,0 +1,122 @@
+"""Manipulability of the bar by its cables: one number, ellipsoids, and what gravity leaves of it.
+
+Source: Yoshikawa, "Manipulability of Robotic Mechanisms", Int. J. Robotics Research 4 (1985), and
+"Dynamic Manipulability of Robot Manipulators", J. Robotic Systems 2 (1985).
+"""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from cspm_control.analysis.cable_structure import CableStructure, structures, wanted_at_rest
+from cspm_control.analysis.pose_grid import Grid
+from cspm_control.analysis.wrench_set import wrench_set
+from cspm_msgs_py.dofs import DOFS
+from cspm_sim.kernels import bar as bar_kernel
+from cspm_sim.kernels.plant import PlantParameters
+from cspm_sim.linearisation import mass_matrix
+
+Array = NDArray[np.float64]
+
+
+class Ellipsoid(NamedTuple):
+    """What |t| ≤ 1 N gives in one kind of DOF.
+
+    Attributes:
+        dofs: the kind's DOFs.
+        axes: directions, a column per half axis, longest first.
+        lengths: of the half axes.
+    """
+
+    dofs: tuple[str, ...]
+    axes: Array
+    lengths: Array
+
+
+class Manipulability(NamedTuple):
+    """At one pose, at rest.
+
+    Attributes:
+        measure: √det(S·Sᵀ) for moments in units of force × radius of gyration.
+        condition: κ of S, thesis (6-11), and of the same scaled S.
+        scaled_condition: the latter.
+        force: ellipsoids of force [N per N] and moment [N·m per N].
+        acceleration: of linear [m/s² per N] and angular acceleration [rad/s² per N].
+        available: largest acceleration per controlled DOF, against and along its axis, from rest
+            with tensions within their limits [m/s², rad/s²]; NaN where the bar cannot rest.
+    """
+
+    measure: float
+    condition: float
+    scaled_condition: float
+    force: tuple[Ellipsoid, Ellipsoid]
+    acceleration: tuple[Ellipsoid, Ellipsoid]
+    available: dict[str, tuple[float, float]]
+
+
+def gyration_radius(parameters: PlantParameters) -> float:
+    """Return √(tr(I)/2m) of the bar [m], which makes moments comparable to forces."""
+    bar = parameters.bar
+    inertia = bar[bar_kernel.INERTIA : bar_kernel.INERTIA + 9].reshape(3, 3)
+    return float(np.sqrt(np.trace(inertia) / (2.0 * bar[bar_kernel.MASS])))
+
+
+def measures(machine: CableStructure, structure: Array, radius: float) -> Array:
+    """Return √det(S·Sᵀ), (P,), of structure matrices (P, m, n), moments over `radius`."""
+    scaled = _scaled(machine, structure, radius)
+    return np.sqrt(np.maximum(np.linalg.det(scaled @ np.swapaxes(scaled, -1, -2)), 0.0))
+
+
+def conditions(structure: Array) -> Array:
+    """Return κ of (6-11), (P,), of structure matrices (P, m, n)."""
+    values = np.linalg.svd(structure, compute_uv=False)
+    with np.errstate(divide="ignore"):
+        return np.asarray(values[:, 0] / values[:, -1])
+
+
+def mass_columns(machine: CableStructure, parameters: PlantParameters, grid: Grid) -> Array:
+    """Return the wrench rows (P·Q, m, m) that unit accelerations of the same DOFs need [kg, …]."""
+    rows = list(machine.axes)
+    angles = [(pitch, yaw) for pitch in grid.pitch for yaw in grid.yaw]
+    each = [mass_matrix(parameters, [0.0, 0.0, 0.0, 0.0, *pair]) for pair in angles]
+    return np.tile(np.array(each)[:, rows][:, :, rows], (len(grid.positions), 1, 1))
+
+
+def manipulability(
+    machine: CableStructure, parameters: PlantParameters, pose: tuple[float, ...]
+) -> Manipulability:
+    """Return the manipulability at a pose x y z φ θ ψ, its roll taken as 0."""
+    grid = Grid(*(np.array([pose[axis]]) for axis in (0, 1, 2, 4, 5)))
+    structure = structures(machine, grid)
+    mass = mass_columns(machine, parameters, grid)
+    wrenches = wrench_set(structure, machine.limits, wanted_at_rest(machine, grid))
+    radius = gyration_radius(parameters)
+    dofs = [DOFS[axis] for axis in machine.axes]
+    available = {
+        dof: tuple(float(wrenches.reach(sign * mass[:, :, i])[0]) for sign in (-1.0, 1.0))
+        for i, dof in enumerate(dofs)
+    }
+    return Manipulability(
+        measure=float(measures(machine, structure, radius)[0]),
+        condition=float(conditions(structure)[0]),
+        scaled_condition=float(conditions(_scaled(machine, structure, radius))[0]),
+        force=_ellipsoids(structure[0], dofs),
+        acceleration=_ellipsoids(np.linalg.solve(mass[0], structure[0]), dofs),
+        available={dof: (low, high) for dof, (low, high) in available.items()},
+    )
+
+
+def _scaled(machine: CableStructure, structure: Array, radius: float) -> Array:
+    scale = np.array([1.0 if axis < 3 else 1.0 / radius for axis in machine.axes])
+    return np.asarray(scale[:, None] * structure)
+
+
+def _ellipsoids(gains: Array, dofs: list[str]) -> tuple[Ellipsoid, Ellipsoid]:
+    def of(rows: Array, names: list[str]) -> Ellipsoid:
+        left, lengths, _ = np.linalg.svd(rows, full_matrices=False)
+        return Ellipsoid(tuple(names), left, lengths)
+
+    return of(gains[:3], dofs[:3]), of(gains[3:], dofs[3:])

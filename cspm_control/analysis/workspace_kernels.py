@@ -1,0 +1,178 @@
+"""The thesis's workspace algorithms 1 and 2, pose by pose.
+
+They run over millions of poses; compiled, and without a lock, so that threads share the work.
+Poses are the product of positions and orientations, orientations fastest.
+"""
+
+from __future__ import annotations
+
+from math import sqrt
+
+import numpy as np
+from numba import njit
+from numpy.typing import NDArray
+
+Array = NDArray[np.float64]
+Integers = NDArray[np.int64]
+Mask = NDArray[np.bool_]
+
+# A pivot below this share of the largest entry: the columns are no basis.
+SMALLEST_PIVOT = 1e-9
+# Share of the wanted wrench that a tension may be beyond its limit, for round-off.
+ROUND_OFF = 1e-9
+
+
+@njit(cache=True, error_model="numpy", nogil=True)
+def structure(position: Array, arms: Array, exits: Array, axes: Integers, out: Array) -> None:
+    """Write −Jᵀ of (2-13), rows `axes` of force and moment in world axes, to `out` (m, n).
+
+    `arms` (n, 3) run from the bar's origin to the attachments, world axes.
+    """
+    for i in range(arms.shape[0]):
+        bx, by, bz = arms[i, 0], arms[i, 1], arms[i, 2]
+        x = position[0] + bx - exits[i, 0]
+        y = position[1] + by - exits[i, 1]
+        z = position[2] + bz - exits[i, 2]
+        inverse = -1.0 / sqrt(x * x + y * y + z * z)
+        x, y, z = x * inverse, y * inverse, z * inverse
+        column = (x, y, z, by * z - bz * y, bz * x - bx * z, bx * y - by * x)
+        for row in range(axes.shape[0]):
+            out[row, i] = column[axes[row]]
+
+
+@njit(cache=True, error_model="numpy", nogil=True)
+def solve(system: Array) -> bool:
+    """Solve A·x = b in `system` = [A | b] (m, m + 1), which is destroyed; x replaces b.
+
+    Gauss's elimination with partial pivoting; False, with no x, where A is singular. A library's
+    solver takes ten times as long for so small a system.
+    """
+    m = system.shape[0]
+    largest = 0.0
+    for i in range(m):
+        for j in range(m):
+            largest = max(largest, abs(system[i, j]))
+    for k in range(m):
+        pivot = k
+        for i in range(k + 1, m):
+            if abs(system[i, k]) > abs(system[pivot, k]):
+                pivot = i
+        if abs(system[pivot, k]) <= SMALLEST_PIVOT * largest:
+            return False
+        for j in range(k, m + 1):
+            system[k, j], system[pivot, j] = system[pivot, j], system[k, j]
+        inverse = 1.0 / system[k, k]
+        for i in range(k + 1, m):
+            factor = system[i, k] * inverse
+            for j in range(k + 1, m + 1):
+                system[i, j] -= factor * system[k, j]
+    for i in range(m - 1, -1, -1):
+        rest = system[i, m]
+        for j in range(i + 1, m):
+            rest -= system[i, j] * system[j, m]
+        system[i, m] = rest / system[i, i]
+    return True
+
+
+@njit(cache=True, error_model="numpy", nogil=True)
+def pseudo_inverse_holds(
+    first: int,
+    last: int,
+    positions: Array,
+    arms: Array,
+    exits: Array,
+    axes: Integers,
+    wrenches: Array,
+    most: Array,
+    out: Mask,
+) -> None:
+    """Write whether the pseudo-inverse's tensions lie in [0, most], Algorithm 1, to `out`.
+
+    Args:
+        first: the first pose of all.
+        last: the one after the last.
+        positions: (P, 3) [m].
+        arms: (Q, n, 3) [m], one set per orientation.
+        exits: (n, 3) [m].
+        axes: rows of the wrench that are to be met, (m,).
+        wrenches: wanted of the cables, (Q, m) [N, N·m].
+        most: highest tensions (n,) [N].
+        out: (P·Q,).
+    """
+    n, m, count = arms.shape[1], axes.shape[0], arms.shape[0]
+    rows, system = np.empty((m, n)), np.empty((m, m + 1))
+    for pose in range(first, last):
+        wrench = wrenches[pose % count]
+        structure(positions[pose // count], arms[pose % count], exits, axes, rows)
+        size = 0.0
+        for i in range(m):
+            size = max(size, abs(wrench[i]))
+            for j in range(i + 1):
+                total = 0.0
+                for cable in range(n):
+                    total += rows[i, cable] * rows[j, cable]
+                system[i, j] = total
+                system[j, i] = total
+            system[i, m] = wrench[i]
+        held = solve(system)
+        for cable in range(n):
+            tension = 0.0
+            for i in range(m):
+                tension += rows[i, cable] * system[i, m]
+            slack = ROUND_OFF * size
+            held = held and -slack <= tension <= most[cable] + slack
+        out[pose] = held
+
+
+@njit(cache=True, error_model="numpy", nogil=True)
+def general_holds(
+    first: int,
+    last: int,
+    positions: Array,
+    arms: Array,
+    exits: Array,
+    axes: Integers,
+    wrenches: Array,
+    most: Array,
+    bases: Integers,
+    out: Mask,
+) -> None:
+    """Write whether any basis of cables holds the wrench with tensions in [0, most], Algorithm 2.
+
+    Args:
+        first: the first pose of all.
+        last: the one after the last.
+        positions: (P, 3) [m].
+        arms: (Q, n, 3) [m], one set per orientation.
+        exits: (n, 3) [m].
+        axes: rows of the wrench that are to be met, (m,).
+        wrenches: wanted of the cables, (Q, m) [N, N·m].
+        most: highest tensions (n,) [N].
+        bases: which m cables, each not removed, (K, m).
+        out: (P·Q,).
+    """
+    n, m, count = arms.shape[1], axes.shape[0], arms.shape[0]
+    rows, system = np.empty((m, n)), np.empty((m, m + 1))
+    # The basis that held the last pose likely holds its neighbour.
+    start = 0
+    for pose in range(first, last):
+        wrench = wrenches[pose % count]
+        structure(positions[pose // count], arms[pose % count], exits, axes, rows)
+        size = 0.0
+        for i in range(m):
+            size = max(size, abs(wrench[i]))
+        held = False
+        for k in range(bases.shape[0]):
+            basis = bases[(start + k) % bases.shape[0]]
+            for i in range(m):
+                for j in range(m):
+                    system[i, j] = rows[i, basis[j]]
+                system[i, m] = wrench[i]
+            held = solve(system)
+            slack = ROUND_OFF * size
+            for j in range(m):
+                held = held and -slack <= system[j, m] <= most[basis[j]] + slack
+            if held:
+                start = (start + k) % bases.shape[0]
+                break
+        out[pose] = held

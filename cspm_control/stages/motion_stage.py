@@ -7,6 +7,7 @@ from collections.abc import Mapping
 import numpy as np
 from numpy.typing import NDArray
 
+from cspm_control.computed_wrench import ComputedWrench
 from cspm_control.motion_controller import MotionController
 from cspm_msgs_py.diagnostics import Level, Status
 from cspm_msgs_py.schedule import BAR_POSE, BAR_REFERENCE, MOTION_CONTROLLER, WRENCH
@@ -20,7 +21,7 @@ class MotionStage:
 
     node = MOTION_CONTROLLER
 
-    def __init__(self, controller: MotionController) -> None:
+    def __init__(self, controller: MotionController | ComputedWrench) -> None:
         self._controller = controller
         self._suspended = False
 

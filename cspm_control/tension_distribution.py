@@ -74,7 +74,7 @@ class TensionDistribution:
             axes: world axes (0 to 5) in which the wrench is to be met.
         """
         how = how or HowDistributed()
-        self._cables = cables
+        self.cables = cables
         self._limits = limits
         self._axes = np.array(axes)
         self._weights = np.array(how.wrench_weights)[self._axes] ** 2
@@ -90,9 +90,9 @@ class TensionDistribution:
         Raises:
             SingularityError: at these poses no tensions give some wrench.
         """
-        _fill_structure(bar_pose, frame_pose, self._cables, self._axes, self._structure)
+        fill_structure(bar_pose, frame_pose, self.cables, self._axes, self._structure)
         self._wanted[:] = wrench[self._axes]
-        tensions = np.empty(len(self._cables))
+        tensions = np.empty(len(self.cables))
         saturated = self._method(
             self._structure, self._wanted, self._limits, self._weights, tensions
         )
@@ -108,10 +108,10 @@ class TensionDistribution:
 
 
 @njit(cache=True, error_model="numpy")
-def _fill_structure(
+def fill_structure(
     bar_pose: Array, frame_pose: Array, cables: Array, axes: NDArray[np.int64], out: Array
 ) -> None:
-    """Write the rows of −Jᵀ in the controlled axes, shape (m, n), at pose rows (7,)."""
+    """Write the rows of −Jᵀ in some world axes, shape (m, n), at pose rows (7,)."""
     n = cables.shape[0]
     bar, frame = np.empty(6), np.empty(6)
     bar[:3] = bar_pose[:3]

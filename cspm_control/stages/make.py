@@ -72,6 +72,7 @@ def motion_stage(control: ClosedLoop, scenario: Scenario, testbed: Testbed) -> M
             ComputedWrench(
                 motion.bandwidth,
                 testbed,
+                tension_distribution(control, testbed),
                 observer_bandwidth=motion.observer_bandwidth,
                 roll_damping=motion.roll_damping,
                 period=period,
@@ -93,13 +94,16 @@ def distribution_stage(
     control: ClosedLoop, scenario: Scenario, testbed: Testbed
 ) -> DistributionStage:
     """Return the tension distribution."""
-    return DistributionStage(
-        TensionDistribution(
-            nominal_parameters(testbed).cables,
-            wanted_tension_limits(control, testbed),
-            control.tension_distribution,
-            controlled_axes(control),
-        )
+    return DistributionStage(tension_distribution(control, testbed))
+
+
+def tension_distribution(control: ClosedLoop, testbed: Testbed) -> TensionDistribution:
+    """Return what turns a wrench into tensions."""
+    return TensionDistribution(
+        nominal_parameters(testbed).cables,
+        wanted_tension_limits(control, testbed),
+        control.tension_distribution,
+        controlled_axes(control),
     )
 
 

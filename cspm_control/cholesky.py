@@ -23,7 +23,9 @@ def factorise(matrix: Array) -> bool:
     """
     for i in range(matrix.shape[0]):
         for j in range(i + 1):
-            rest = matrix[i, j] - (matrix[i, :j] * matrix[j, :j]).sum()
+            rest = matrix[i, j]
+            for k in range(j):
+                rest -= matrix[i, k] * matrix[j, k]
             if i == j:
                 if not rest > SMALLEST_PIVOT * matrix[i, i]:
                     return False
@@ -38,9 +40,13 @@ def substitute(factor: Array, values: Array) -> None:
     """Solve L·Lᵀ·y = b in place for the factor L in the lower triangle."""
     m = values.shape[0]
     for i in range(m):
-        values[i] = (values[i] - (factor[i, :i] * values[:i]).sum()) / factor[i, i]
+        for k in range(i):
+            values[i] -= factor[i, k] * values[k]
+        values[i] /= factor[i, i]
     for i in range(m - 1, -1, -1):
-        values[i] = (values[i] - (factor[i + 1 :, i] * values[i + 1 :]).sum()) / factor[i, i]
+        for k in range(i + 1, m):
+            values[i] -= factor[k, i] * values[k]
+        values[i] /= factor[i, i]
 
 
 @njit(cache=True, error_model="numpy")
@@ -53,7 +59,9 @@ def solve_gram(rows: Array, wanted: Array) -> bool:
     gram = np.empty((m, m))
     for i in range(m):
         for j in range(i + 1):
-            gram[i, j] = (rows[i] * rows[j]).sum()
+            gram[i, j] = 0.0
+            for k in range(rows.shape[1]):
+                gram[i, j] += rows[i, k] * rows[j, k]
     if not factorise(gram):
         return False
     substitute(gram, wanted)

@@ -30,9 +30,10 @@ class ComputedWrench:
     each controlled coordinate of x y z φ θ ψ: e is the error, δ the acceleration by which it drifts
     for reasons unknown. A critically damped observer of third order tells all three from the pose
     alone (extended state observer, Han 2009; as a filter of samples the fading-memory filter of
-    degree 2, Brookner 1998). δ stands where a PID has its integral term. The observer is told the
-    acceleration that the tension distribution can give, not the one wanted, so that a wrench that
-    cannot be met leaves nothing behind in it.
+    degree 2, Brookner 1998), and goes on by the model between poses that come more seldom than it
+    computes. δ stands where a PID has its integral term. The observer is told the acceleration that
+    the tension distribution can give, not the one wanted, so that a wrench that cannot be met
+    leaves nothing behind in it.
 
     Where roll is not controlled, the sway force damps it: the bar is a pendulum about the cables'
     attachments.
@@ -47,6 +48,7 @@ class ComputedWrench:
         observer_bandwidth: float,
         roll_damping: float,
         period: float,
+        steps_per_pose: int,
     ) -> None:
         """Make the controller for a test-bed with a bar.
 
@@ -57,6 +59,7 @@ class ComputedWrench:
             observer_bandwidth: of the observer [rad/s].
             roll_damping: of the bar's roll where it is not controlled, as a share of critical.
             period: time between steps [s].
+            steps_per_pose: steps from one pose to the next, ≥ 1.
         """
         assert testbed.bar is not None
         self._gains = np.zeros((6, 2))
@@ -65,15 +68,10 @@ class ComputedWrench:
         self._roll_force = 0.0 if "roll" in bandwidth else _roll_force(testbed, roll_damping)
         self._bar = bar_parameters(testbed.bar, testbed.gravity)
         self._distribution = distribution
-        fade = exp(-observer_bandwidth * period)
-        self._observer = np.array(
-            [
-                1.0 - fade**3,
-                1.5 * (1.0 - fade) ** 2 * (1.0 + fade) / period,
-                (1.0 - fade) ** 3 / period**2,
-            ]
-        )
+        self._observer = _observer_gains(observer_bandwidth, period * steps_per_pose)
         self._period = period
+        self._last_pose = np.full(7, np.nan)
+        self._steps_per_pose, self._age = steps_per_pose, 0
         self._memory = np.zeros((4, 6))
         self._started = False
 
@@ -83,9 +81,16 @@ class ComputedWrench:
 
     def step(self, bar_pose: Array, frame_pose: Array, reference: Array) -> Array:
         """Return the wrench (6,) for measured pose rows (7,) and a reference row (19,)."""
+        # A pose that stays the same for longer than its period is a new one all the same.
+        self._age += 1
+        fresh = self._age >= self._steps_per_pose or not np.array_equal(bar_pose, self._last_pose)
+        if fresh:
+            self._last_pose[:] = bar_pose
+            self._age = 0
         wrench = np.empty(6)
         _wanted_wrench(
             bar_pose,
+            fresh,
             reference,
             self._bar,
             self._gains,
@@ -110,6 +115,18 @@ class ComputedWrench:
         return wrench
 
 
+def _observer_gains(bandwidth: float, period: float) -> Array:
+    """Return what error, rate and acceleration take of a surprise: three poles at the bandwidth."""
+    fade = exp(-bandwidth * period)
+    return np.array(
+        [
+            1.0 - fade**3,
+            1.5 * (1.0 - fade) ** 2 * (1.0 + fade) / period,
+            (1.0 - fade) ** 3 / period**2,
+        ]
+    )
+
+
 def _roll_force(testbed: Testbed, damping: float) -> float:
     """Return the sway force per roll rate [N·s] that damps the roll, 0 where none can.
 
@@ -127,6 +144,7 @@ def _roll_force(testbed: Testbed, damping: float) -> float:
 @njit(cache=True, error_model="numpy")
 def _wanted_wrench(
     pose_row: Array,
+    fresh: bool,
     reference: Array,
     bar: Array,
     gains: Array,
@@ -152,9 +170,12 @@ def _wanted_wrench(
         if started:
             acceleration = unexplained[d] + memory[3, d]
             ahead = error[d] + period * (rate[d] + 0.5 * period * acceleration)
-            error[d] = ahead + observer[0] * (found - ahead)
-            rate[d] += period * acceleration + observer[1] * (found - ahead)
-            unexplained[d] += observer[2] * (found - ahead)
+            surprise = found - ahead if fresh else 0.0
+            error[d] = ahead + observer[0] * surprise
+            rate[d] += period * acceleration + observer[1] * surprise
+            unexplained[d] += observer[2] * surprise
+            if not fresh:
+                pose[d] = wanted[0, d] - ahead
         else:
             # So that there is no feedback at first.
             error[d], rate[d], unexplained[d] = found, 0.0, -gains[d, 0] * found

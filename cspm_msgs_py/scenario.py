@@ -8,11 +8,13 @@ from pathlib import Path
 from typing import Annotated, Any, Literal
 
 from pydantic import (
+    Discriminator,
     Field,
     NonNegativeFloat,
     NonNegativeInt,
     PositiveFloat,
     PositiveInt,
+    Tag,
     model_validator,
 )
 from typing_extensions import Self
@@ -122,7 +124,7 @@ class ComputedWrenchControl(StrictModel):
         "pitch": 20.0,
         "yaw": 20.0,
     }
-    observer_bandwidth: PositiveFloat = 80.0
+    observer_bandwidth: PositiveFloat = 40.0
     roll_damping: NonNegativeFloat = 0.1
     design_pose: Pose = (0.0, 0.0, 2.0, 0.0, 0.0, 0.0)
 
@@ -155,10 +157,21 @@ class TensionDistribution(StrictModel):
     method: DistributionMethod = "pseudo_inverse"
     lower_limit: NonNegativeFloat | None = None
     preferred_tension: PositiveFloat = 5.0
-    wrench_weights: WrenchWeights = (1.0, 1.0, 1.0, 3.0, 3.0, 3.0)
+    wrench_weights: WrenchWeights = (1.0, 1.0, 1.0, 6.0, 6.0, 6.0)
 
 
-MotionLaw = Annotated[MotionControl | ComputedWrenchControl, Field(discriminator="law")]
+def law(motion: object) -> object:
+    """Return a motion controller's law: the thesis's where none is said."""
+    if isinstance(motion, dict):
+        return motion.get("law", "pid")
+    return getattr(motion, "law", "pid")
+
+
+MotionLaw = Annotated[
+    Annotated[MotionControl, Tag("pid")]
+    | Annotated[ComputedWrenchControl, Tag("computed_wrench")],
+    Discriminator(law),
+]
 
 
 class ClosedLoop(StrictModel):
@@ -168,14 +181,6 @@ class ClosedLoop(StrictModel):
     motion: MotionLaw = MotionControl()
     tension_distribution: TensionDistribution = TensionDistribution()
     force: ForceControl = ForceControl()
-
-    @model_validator(mode="before")
-    @classmethod
-    def _pid_unless_said(cls, content: object) -> object:
-        motion = content.get("motion") if isinstance(content, dict) else None
-        if isinstance(content, dict) and isinstance(motion, dict) and "law" not in motion:
-            return content | {"motion": motion | {"law": "pid"}}
-        return content
 
 
 class LockedWinches(StrictModel):

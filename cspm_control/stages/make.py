@@ -76,6 +76,9 @@ def motion_stage(control: ClosedLoop, scenario: Scenario, testbed: Testbed) -> M
                 observer_bandwidth=motion.observer_bandwidth,
                 roll_damping=motion.roll_damping,
                 period=period,
+                steps_per_pose=max(
+                    1, scenario.rates.motion_controller // scenario.rates.motion_capture
+                ),
             )
         )
     return MotionStage(

@@ -135,7 +135,9 @@ def _roll_force(testbed: Testbed, damping: float) -> float:
     """
     assert testbed.bar is not None
     bar = testbed.bar
-    height = bar.com[2] - float(np.mean([(cable.attachment or bar.com)[2] for cable in testbed.cables]))
+    height = bar.com[2] - float(
+        np.mean([(cable.attachment or bar.com)[2] for cable in testbed.cables])
+    )
     if height <= 0.0:
         return 0.0
     return 2.0 * damping * sqrt(bar.mass * testbed.gravity * height * bar.inertia.ixx) / height

@@ -82,7 +82,7 @@ class PiGains(StrictModel):
 
 
 class MotionControl(StrictModel):
-    """The thesis's motion controller: crossover [rad/s] per controlled DOF, or the gains themselves.
+    """The thesis's controller: crossover [rad/s] per controlled DOF, or the gains themselves.
 
     Gains that are absent are designed at `design_pose` for the crossover frequencies. The
     derivative term has a pole at `derivative_filter` [rad/s]; integral terms stop at
@@ -168,8 +168,7 @@ def law(motion: object) -> object:
 
 
 MotionLaw = Annotated[
-    Annotated[MotionControl, Tag("pid")]
-    | Annotated[ComputedWrenchControl, Tag("computed_wrench")],
+    Annotated[MotionControl, Tag("pid")] | Annotated[ComputedWrenchControl, Tag("computed_wrench")],
     Discriminator(law),
 ]
 

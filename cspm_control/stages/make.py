@@ -125,7 +125,9 @@ def wanted_tension_limits(control: ClosedLoop, testbed: Testbed) -> NDArray[np.f
     lower = control.tension_distribution.lower_limit
     if lower is not None:
         limits[:, 0] = lower
-    closed = [cable.name for cable, (low, high) in zip(testbed.cables, limits, strict=True) if low >= high]
+    closed = [
+        cable.name for cable, (low, high) in zip(testbed.cables, limits, strict=True) if low >= high
+    ]
     if closed:
         raise InputError(
             f"control.tension_distribution.lower_limit: {lower:g} N, allowed: below the upper"

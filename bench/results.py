@@ -39,7 +39,7 @@ THESIS_TABLES: dict[str, tuple[tuple[float | None, ...], tuple[float | None, ...
     ),
 }
 LIMITS = (0.0, 0.3, 1.0, 2.0)
-LIMIT_PERIOD = 0.05
+LIMIT_PERIOD = 0.1
 ROBUST_S = 60.0
 
 Measure = Callable[[], Any]
@@ -87,13 +87,13 @@ def main() -> None:
         "distribution": table(
             HEADINGS, store.get("distribution", lambda: distribution_rows(20000, 60.0))
         ),
-        "past": past_block(store, asked.seeds),
         "beyond": tracking_block(store.tracks("beyond", BEYOND)),
         "limit": limit_block(store),
         "robust": tracking_block(store.tracks("robust", changed(PAST, ROBUST_S))),
         "robust_thesis": tracking_block(
             store.tracks("robust thesis", changed("worst_case", ROBUST_S))
         ),
+        "past": past_block(store, asked.seeds),
     }
     drawn = {
         "the thesis's controllers": store.get("bands thesis", lambda: bands(Case("worst_case"))),

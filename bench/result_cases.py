@@ -17,7 +17,7 @@ PAST_ON_CALM = (
     " tension_distribution: {method: analytic_centre, lower_limit: 0.3}}"
 )
 FOUR_METRES = "target.mean_pose=[0.0, 0.0, 4.0, 0.0, 0.0, 0.0]"
-CENTRE = "control.tension_distribution.method=analytic_centre"
+CENTRE = ("control.mode=closed_loop", "control.tension_distribution.method=analytic_centre")
 ONE_NEWTON = "control.tension_distribution.lower_limit=1.0"
 LOWER = "control.tension_distribution.lower_limit=0.3"
 
@@ -31,8 +31,8 @@ SHORT = "duration=100"
 SWITCHED = {
     "as in the thesis": Case("worst_case", (SHORT,)),
     "ideal sensors": Case("worst_case", (SHORT, "sensors=ideal")),
-    "analytic centre": Case("worst_case", (SHORT, CENTRE)),
-    "analytic centre, wanted tensions down to 0.3 N": Case("worst_case", (SHORT, CENTRE, LOWER)),
+    "analytic centre": Case("worst_case", (SHORT, *CENTRE)),
+    "analytic centre, wanted tensions down to 0.3 N": Case("worst_case", (SHORT, *CENTRE, LOWER)),
     "half the waves": Case(
         "worst_case",
         (

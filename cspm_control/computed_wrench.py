@@ -72,7 +72,7 @@ class ComputedWrench:
         self._period = period
         self._last_pose = np.full(7, np.nan)
         self._steps_per_pose, self._age = steps_per_pose, 0
-        self._memory = np.zeros((4, 6))
+        self._memory = np.zeros((5, 6))
         self._started = False
 
     def restart(self) -> None:
@@ -159,7 +159,8 @@ def _wanted_wrench(
 ) -> None:
     """Write the wrench to `out`.
 
-    `memory` holds the error, its rate, its unexplained and its expected acceleration, (4, 6).
+    `memory` (5, 6) holds the error, its rate, its unexplained and its expected acceleration, and
+    what is left of the first error's feedback.
     """
     wanted, pose = np.empty((3, 6)), np.empty(6)
     wanted_motion(reference, wanted)
@@ -179,12 +180,15 @@ def _wanted_wrench(
             if not fresh:
                 pose[d] = wanted[0, d] - ahead
         else:
-            # So that there is no feedback at first.
-            error[d], rate[d], unexplained[d] = found, 0.0, -gains[d, 0] * found
+            error[d], rate[d], unexplained[d] = found, 0.0, 0.0
+            memory[4, d] = gains[d, 0] * found
     acceleration = wanted[2].copy()
     for d in range(6):
         if gains[d, 0] > 0.0:
             acceleration[d] += gains[d, 0] * error[d] + gains[d, 1] * rate[d] + unexplained[d]
+            # What stands at the start is taken back gently.
+            acceleration[d] -= memory[4, d]
+            memory[4, d] *= 1.0 - 0.5 * gains[d, 1] * period
     wrench_for(pose, wanted[1] - rate, acceleration, bar, out)
     sideways = roll_force * (wanted[1, 3] - rate[3])
     out[0] += np.sin(pose[5]) * sideways

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from math import exp, floor, pi, sqrt
+from math import exp, floor, pi
 
 import numpy as np
 from numba import njit
@@ -34,9 +34,6 @@ class ComputedWrench:
     computes. δ stands where a PID has its integral term. The observer is told the acceleration that
     the tension distribution can give, not the one wanted, so that a wrench that cannot be met
     leaves nothing behind in it.
-
-    Where roll is not controlled, the sway force damps it: the bar is a pendulum about the cables'
-    attachments.
     """
 
     def __init__(
@@ -46,7 +43,6 @@ class ComputedWrench:
         distribution: TensionDistribution,
         *,
         observer_bandwidth: float,
-        roll_damping: float,
         period: float,
         steps_per_pose: int,
     ) -> None:
@@ -57,7 +53,6 @@ class ComputedWrench:
             testbed: the nominal machine.
             distribution: how the wrench becomes tensions.
             observer_bandwidth: of the observer [rad/s].
-            roll_damping: of the bar's roll where it is not controlled, as a share of critical.
             period: time between steps [s].
             steps_per_pose: steps from one pose to the next, ≥ 1.
         """
@@ -65,7 +60,6 @@ class ComputedWrench:
         self._gains = np.zeros((6, 2))
         for name, frequency in bandwidth.items():
             self._gains[DOFS.index(name)] = frequency**2, 2.0 * frequency
-        self._roll_force = 0.0 if "roll" in bandwidth else _roll_force(testbed, roll_damping)
         self._bar = bar_parameters(testbed.bar, testbed.gravity)
         self._distribution = distribution
         self._observer = _observer_gains(observer_bandwidth, period * steps_per_pose)
@@ -94,7 +88,6 @@ class ComputedWrench:
             reference,
             self._bar,
             self._gains,
-            self._roll_force,
             self._observer,
             self._period,
             self._started,
@@ -127,22 +120,6 @@ def _observer_gains(bandwidth: float, period: float) -> Array:
     )
 
 
-def _roll_force(testbed: Testbed, damping: float) -> float:
-    """Return the sway force per roll rate [N·s] that damps the roll, 0 where none can.
-
-    The cables hold the bar at a height h above its centre of mass: it swings with ω² = m·g·h/Ixx,
-    and a sway force F turns it by F·h.
-    """
-    assert testbed.bar is not None
-    bar = testbed.bar
-    height = bar.com[2] - float(
-        np.mean([(cable.attachment or bar.com)[2] for cable in testbed.cables])
-    )
-    if height <= 0.0:
-        return 0.0
-    return 2.0 * damping * sqrt(bar.mass * testbed.gravity * height * bar.inertia.ixx) / height
-
-
 @njit(cache=True, error_model="numpy")
 def _wanted_wrench(
     pose_row: Array,
@@ -150,7 +127,6 @@ def _wanted_wrench(
     reference: Array,
     bar: Array,
     gains: Array,
-    roll_force: float,
     observer: Array,
     period: float,
     started: bool,
@@ -190,9 +166,6 @@ def _wanted_wrench(
             acceleration[d] -= memory[4, d]
             memory[4, d] *= 1.0 - 0.5 * gains[d, 1] * period
     wrench_for(pose, wanted[1] - rate, acceleration, bar, out)
-    sideways = roll_force * (wanted[1, 3] - rate[3])
-    out[0] += np.sin(pose[5]) * sideways
-    out[1] -= np.cos(pose[5]) * sideways
 
 
 @njit(cache=True, error_model="numpy")

@@ -112,8 +112,7 @@ class ComputedWrenchControl(StrictModel):
     """Inverse dynamics of the bar with an observer of its pose error.
 
     `bandwidth` [rad/s] is that of the error's dynamics per controlled DOF, `observer_bandwidth`
-    [rad/s] that of the observer. `roll_damping` is given to the roll where it is not controlled, as
-    a share of critical. The force controllers are designed at `design_pose`.
+    [rad/s] that of the observer. The force controllers are designed at `design_pose`.
     """
 
     law: Literal["computed_wrench"]
@@ -125,7 +124,6 @@ class ComputedWrenchControl(StrictModel):
         "yaw": 20.0,
     }
     observer_bandwidth: PositiveFloat = 40.0
-    roll_damping: NonNegativeFloat = 0.1
     design_pose: Pose = (0.0, 0.0, 2.0, 0.0, 0.0, 0.0)
 
     @property

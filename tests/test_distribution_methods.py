@@ -171,7 +171,7 @@ def test_tensions_do_not_jump_where_wrenches_cease_to_be_met(method, thesis):
 
 
 def test_removed_cables_stay_at_their_lower_limit(thesis):
-    pose = HOME + [0.12, 0.0, 0.0, 0.0, 0.0, 0.0]
+    pose = np.array([0.12, 0.0, 2.0, 0.0, 0.0, 0.0])
     rows = structure(thesis, pose, STILL)[AXES]
     plain = np.linalg.pinv(rows) @ HOLD[AXES]
     assert (plain < 2.0).any()
@@ -187,7 +187,7 @@ def test_removed_cables_stay_at_their_lower_limit(thesis):
 @pytest.mark.parametrize("method", COMPLETE)
 def test_with_roll_all_six_are_met(method, six_dof):
     solver = solver_of(six_dof, method, axes=range(6))
-    wrench = HOLD + [0.5, 0.5, 0.0, 0.05, 0.1, 0.1]
+    wrench = HOLD + np.array([0.5, 0.5, 0.0, 0.05, 0.1, 0.1])
     found = solver.step(wrench, row(HOME), row(STILL))
     assert found.feasible
     np.testing.assert_allclose(structure(six_dof, HOME, STILL) @ found.tensions, wrench, atol=1e-4)
@@ -204,7 +204,7 @@ def test_a_geometry_that_cannot_give_a_moment_gives_the_nearest_wrench(method):
     """Three cables that meet in a point: the moment is missed, the force is not."""
     testbed = build(point_content())
     solver = solver_of(testbed, method)
-    found = solver.step(HOLD + [0.0, 0.0, 0.0, 0.0, 1.0, 0.0], row(HOME), row(STILL))
+    found = solver.step(HOLD + np.array([0.0, 0.0, 0.0, 0.0, 1.0, 0.0]), row(HOME), row(STILL))
     assert not found.feasible
     force = structure(testbed, HOME, STILL)[:3] @ found.tensions
     np.testing.assert_allclose(force, HOLD[:3], atol=1e-3)

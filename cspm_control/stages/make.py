@@ -74,7 +74,6 @@ def motion_stage(control: ClosedLoop, scenario: Scenario, testbed: Testbed) -> M
                 testbed,
                 tension_distribution(control, testbed),
                 observer_bandwidth=motion.observer_bandwidth,
-                roll_damping=motion.roll_damping,
                 period=period,
                 steps_per_pose=max(
                     1, scenario.rates.motion_controller // scenario.rates.motion_capture

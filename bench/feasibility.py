@@ -18,8 +18,8 @@ from cspm_sim.parameters import nominal_parameters
 Array = NDArray[np.float64]
 
 
-def least_tensions(bundle: Bundle, period: float) -> Array:
-    """Return the highest lower tension limit that allows the reference, at each instant [N].
+def least_tensions(bundle: Bundle, times: Array) -> Array:
+    """Return the highest lower tension limit that allows the reference, at each of these times [s], in N.
 
     −inf where even pushing cables would not; below 0 no set of pulling cables gives the bar its
     reference's acceleration with the bar on the reference (2-12); a linear programme each. The
@@ -27,7 +27,7 @@ def least_tensions(bundle: Bundle, period: float) -> Array:
 
     Args:
         bundle: a closed loop.
-        period: time between instants [s].
+        times: any (n,) [s].
     """
     assert isinstance(bundle.scenario.control, ClosedLoop)
     testbed = bundle.testbed.testbed
@@ -36,7 +36,7 @@ def least_tensions(bundle: Bundle, period: float) -> Array:
     upper = np.array([cable.tension_limits for cable in testbed.cables], dtype=float)[:, 1]
     cables = nominal_parameters(testbed).cables
     found = []
-    for time in np.arange(0.0, bundle.scenario.duration, period):
+    for time in times:
         stamp = round(time * 1e9)
         wrench, pose = _wanted(references["/bar/reference"].step(stamp), testbed)
         frame = references["/winch_frame/reference"]

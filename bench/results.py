@@ -13,6 +13,7 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 from rich.console import Console
 
 from bench.feasibility import least_tensions
@@ -209,7 +210,7 @@ PAST_FIGURES = {
 def _past(case: Case) -> dict[str, Any]:
     bundle = case.bundle()
     errors, tensions, missed, failure = follow(bundle)
-    least = least_tensions(bundle, LIMIT_PERIOD)
+    least = least_tensions(bundle, _limit_times(case))
     stride = round(LIMIT_PERIOD * bundle.scenario.rates.plant)
     within = within_requirement(bundle, errors)
     sampled = within[::stride]
@@ -236,10 +237,16 @@ def limit_block(store: Store) -> str:
     return table(["", *(f"t_min = {limit:g} N" for limit in LIMITS)], rows)
 
 
+def _limit_times(case: Case) -> NDArray[np.float64]:
+    return np.arange(0.0, case.bundle().scenario.duration, LIMIT_PERIOD)
+
+
 def _least(store: Store, name: str) -> list[float]:
     def measure() -> list[float]:
         # JSON knows no infinity.
-        least = np.maximum(least_tensions(LIMITED[name].bundle(), LIMIT_PERIOD), -1e9)
+        least = np.maximum(
+            least_tensions(LIMITED[name].bundle(), _limit_times(LIMITED[name])), -1e9
+        )
         return [float(value) for value in least]
 
     return [float(value) for value in store.get(f"limit {name}", measure)]

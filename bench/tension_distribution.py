@@ -37,8 +37,10 @@ CENTRE = np.array([0.0, 0.0, 2.0, 0.0, 0.0, 0.0])
 REACH = np.array([0.15, 0.15, 1.0, 0.1, 0.3, 0.2])
 # How the drawn tensions crowd at the lower limits, where a suspended bar's are.
 CROWD = 3.0
-# Solvable instants apart by one step only are no jump of the wrench.
 STEP_S = 1e-3
+# A linear programme every so many steps, and at every step where the border is this near [N].
+COARSE = 20
+NEAR_BORDER = 0.2
 
 
 class Wrenches(NamedTuple):
@@ -100,10 +102,18 @@ def reference_wrenches(bundle: Bundle) -> Wrenches:
         bars[k], frames[k] = row[:7], references["/winch_frame/reference"].step(stamp)[:7]
         wanted_motion(row, motion)
         wrench_for(*motion, bar, wrenches[k])
-    coarse = 20
-    least = least_tensions(bundle, coarse * STEP_S) - tension_limits(testbed)[0, 0]
-    solvable = np.interp(np.arange(count) / coarse, np.arange(len(least)), least) > 0.0
-    return Wrenches(wrenches, bars, frames, solvable)
+    return Wrenches(wrenches, bars, frames, _solvable(bundle, STEP_S * np.arange(count)))
+
+
+def _solvable(bundle: Bundle, times: Array) -> NDArray[np.bool_]:
+    """Return when a linear programme finds tensions for the reference, (n,)."""
+    coarse = times[::COARSE]
+    least = np.interp(times, coarse, least_tensions(bundle, coarse))
+    room = least - tension_limits(bundle.testbed.testbed)[0, 0]
+    near = np.abs(room) < NEAR_BORDER
+    exact = least_tensions(bundle, times[near])
+    room[near] = exact - tension_limits(bundle.testbed.testbed)[0, 0]
+    return np.asarray(room > 0.0)
 
 
 def score(testbed: Testbed, method: DistributionMethod, given: Wrenches) -> Score:

@@ -19,7 +19,7 @@ Array = NDArray[np.float64]
 
 
 def least_tensions(bundle: Bundle, times: Array) -> Array:
-    """Return the highest lower tension limit that allows the reference, at each of these times [s], in N.
+    """Return the highest lower tension limit that allows the reference at each of these times [N].
 
     −inf where even pushing cables would not; below 0 no set of pulling cables gives the bar its
     reference's acceleration with the bar on the reference (2-12); a linear programme each. The

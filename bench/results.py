@@ -56,7 +56,8 @@ class Store:
 
     def get(self, name: str, measure: Measure) -> Any:
         """Return what is there by this name, or measure it."""
-        file = re.sub(r"\W+", "_", name) + ".json"
+        signed = name.replace("+", "plus ").replace("−", "minus ")
+        file = re.sub(r"\W+", "_", signed) + ".json"
         place = self._folder / file if self._folder else None
         if place and place.exists():
             return json.loads(place.read_text(encoding="utf-8"))

@@ -82,6 +82,7 @@ def test_what_was_measured_is_kept(tmp_path):
     store = Store(tmp_path, Console(quiet=True))
     assert store.get("a, b", lambda: {"x": 1}) == {"x": 1}
     assert store.get("a, b", lambda: pytest.fail("measured twice")) == {"x": 1}
+    assert [store.get(f"stiffness {sign}20 %", lambda s=sign: s) for sign in "+−"] == ["+", "−"]
 
 
 def test_the_page_has_a_place_for_every_block_and_tables_in_them():

@@ -86,6 +86,7 @@ def draw_limit(path: Path, least: Array, period: float, past: Mapping[str, Any])
         times,
         0,
         edge,
+        step="mid",
         transform=bottom.get_xaxis_transform(),
         color="tab:orange",
         alpha=0.3,

@@ -190,10 +190,17 @@ def past_block(store: Store, seeds: int) -> str:
     for key, what in PAST_FIGURES.items():
         values = np.array([each[key] for each in found.values()])
         worst = values.max() if key in ("slack", "not_met") else values.min()
-        unit = "{:.2f} N" if key == "least" else "{:.2%}"
+        unit = "{:.2f} N" if key == "least" else "{:.3%}"
         more.append([what, unit.format(np.median(values)), unit.format(worst)])
     failed = [name for name, each in found.items() if each["failure"]]
-    said = f"Runs that ended early: {', '.join(failed) if failed else 'none'}."
+    reached = (rms[:, [0, 1, 2]] <= 2.0).all(axis=1) & (rms[:, [4, 5]] <= 4.0).all(axis=1)
+    within = np.array([each["within_feasible"] >= 0.99 for each in found.values()])
+    taut = np.array([each["slack"] == 0.0 for each in found.values()])
+    said = (
+        f"Of {seeds} seeds {reached.sum()} reach every RMS, {within.sum()} the 99 % of the time in"
+        f" which tensions ≥ 0 exist, {taut.sum()} have no cable slack at any instant. "
+    )
+    said += f"Runs that ended early: {', '.join(failed) if failed else 'none'}."
     return f"{table(heads, rows)}\n\n{table(['', 'median', 'worst seed'], more)}\n\n{said}"
 
 

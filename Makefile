@@ -21,7 +21,7 @@ export PYTEST_ADDOPTS := -p pytest_cov -p xdist -p pytest_rerunfailures
 endif
 endif
 
-.PHONY: help run test test-fast lint bench coverage clean
+.PHONY: help run test test-fast lint bench results coverage clean
 
 help: ## show this list
 	@grep -hE '^[a-z-]+:.*## ' Makefile | sed -E 's/:.*## /\t/' | expand -t 12
@@ -46,6 +46,9 @@ coverage: $(VENV)/test.stamp ## line coverage with the kernels uncompiled
 
 bench: $(VENV)/test.stamp ## measure speed, start-up and memory; prints a table
 	$(BIN)/python -m bench
+
+results: $(VENV)/test.stamp ## measure anew every number and picture of docs/results.md, about an hour
+	$(BIN)/python -m bench.results
 
 clean: ## remove the environment and caches
 	rm -rf $(VENV) build install log *.egg-info .pytest_cache .mypy_cache .ruff_cache .hypothesis htmlcov .coverage

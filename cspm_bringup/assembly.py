@@ -28,6 +28,7 @@ from cspm_msgs_py.scenario import (
     ClosedLoop,
     Control,
     LockedWinches,
+    MotionControl,
     Scenario,
     TorqueProfile,
 )
@@ -87,14 +88,16 @@ def resolve(scenario: Scenario, testbed: Testbed) -> Scenario:
     parameters = nominal_parameters(testbed)
     motion, force = control.motion, control.force
     pose = motion.design_pose
-    designed = motion.gains is None and force.gains is None
-    motion_gains = motion.gains or design_motion_gains(testbed, parameters, pose, motion.crossover)
     force_gains = force.gains or design_force_gains(testbed, parameters, pose, force.bandwidth)
-    if designed:
-        check_separation(
-            motion_margins(testbed, parameters, pose, motion_gains),
-            force_margins(testbed, parameters, pose, force_gains),
-        )
+    if isinstance(motion, MotionControl):
+        designed = motion.gains is None and force.gains is None
+        gains = motion.gains or design_motion_gains(testbed, parameters, pose, motion.crossover)
+        if designed:
+            check_separation(
+                motion_margins(testbed, parameters, pose, gains),
+                force_margins(testbed, parameters, pose, force_gains),
+            )
+        motion = motion.model_copy(update={"gains": gains})
     missing = set(testbed.cable_names) ^ set(force_gains)
     if missing:
         raise InputError(
@@ -103,7 +106,7 @@ def resolve(scenario: Scenario, testbed: Testbed) -> Scenario:
         )
     control = control.model_copy(
         update={
-            "motion": motion.model_copy(update={"gains": motion_gains}),
+            "motion": motion,
             "force": force.model_copy(update={"gains": force_gains}),
         }
     )

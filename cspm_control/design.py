@@ -12,8 +12,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 from scipy.optimize import brentq
 
-from cspm_control.tension_distribution import CONTROLLED_AXES
-from cspm_msgs_py.dofs import DOFS
+from cspm_msgs_py.dofs import CONTROLLED_AXES, DOFS
 from cspm_msgs_py.errors import InputError
 from cspm_msgs_py.scenario import PidGains, PiGains
 from cspm_msgs_py.testbed import Testbed

@@ -1,25 +1,38 @@
-"""From a wanted wrench to cable tensions: pseudo-inverse with saturation, thesis (5-1) and 7."""
+"""From a wanted wrench to cable tensions that judge themselves; the methods stand beside it."""
 
 from __future__ import annotations
 
+from collections.abc import Callable, Sequence
 from typing import NamedTuple
 
 import numpy as np
 from numba import njit
 from numpy.typing import NDArray
 
+from cspm_control.analytic_centre import analytic_centre
+from cspm_control.closed_form import closed_form, improved_closed_form, pseudo_inverse, removal
+from cspm_control.preferred_tension import PreferredTension
+from cspm_msgs_py.dofs import CONTROLLED_AXES
 from cspm_msgs_py.errors import SingularityError
+from cspm_msgs_py.scenario import DistributionMethod
+from cspm_msgs_py.scenario import TensionDistribution as HowDistributed
 from cspm_sim.kernels.kinematics import cable_geometry
 from cspm_sim.kernels.rotation import euler_from_quaternion
 
 Array = NDArray[np.float64]
+# (structure (m, n), wrench (m,), limits (n, 2), weights (m,), tensions out (n,)) → how many
+# tensions stand at a limit, −1 where no tensions give some wrench.
+Method = Callable[[Array, Array, Array, Array, Array], int]
 
-# The world axes in which the wrench is met: all but the roll moment.
-CONTROLLED_AXES = (0, 1, 2, 4, 5)
 # A wrench counts as met when what is missing is below this share of it.
 RESIDUAL_TOLERANCE = 1e-6
-# A pivot below this share of its diagonal is round-off: the rows do not have full rank.
-SMALLEST_PIVOT = 1e-12
+KERNELS: dict[DistributionMethod, Method] = {
+    "pseudo_inverse": pseudo_inverse,
+    "removal": removal,
+    "closed_form": closed_form,
+    "improved_closed_form": improved_closed_form,
+    "analytic_centre": analytic_centre,
+}
 
 
 class Distribution(NamedTuple):
@@ -38,16 +51,38 @@ class Distribution(NamedTuple):
     feasible: bool
 
 
-class PseudoInverse:
-    """t = −(Jᵀ)†w with the roll row dropped, each tension then limited to its range."""
+class TensionDistribution:
+    """t with −Jᵀt = w in the controlled axes and every tension within its limits, if there is one.
 
-    def __init__(self, cables: Array, limits: Array) -> None:
-        """Take the plant's cable rows and the tension limits (n, 2) [N]."""
-        n = len(cables)
-        self._cables = cables
+    Where there is none, `analytic_centre` and `qp` give the nearest wrench by weights; the others
+    limit each tension by itself.
+    """
+
+    def __init__(
+        self,
+        cables: Array,
+        limits: Array,
+        how: HowDistributed | None = None,
+        axes: Sequence[int] = CONTROLLED_AXES,
+    ) -> None:
+        """Choose machine and method.
+
+        Args:
+            cables: the plant's cable rows.
+            limits: tension limits (n, 2) [N].
+            how: method and its settings; absent: the pseudo-inverse.
+            axes: world axes (0 to 5) in which the wrench is to be met.
+        """
+        how = how or HowDistributed()
+        self.cables = cables
         self._limits = limits
-        self._jacobians = np.zeros((2, n, 6))
-        self._lengths = np.zeros(n)
+        self._axes = np.array(axes)
+        self._weights = np.array(how.wrench_weights)[self._axes] ** 2
+        self._method: Method = (
+            PreferredTension(how.preferred_tension) if how.method == "qp" else KERNELS[how.method]
+        )
+        self._structure = np.zeros((len(self._axes), len(cables)))
+        self._wanted = np.zeros(len(self._axes))
 
     def step(self, wrench: Array, bar_pose: Array, frame_pose: Array) -> Distribution:
         """Return tensions for a wrench row (6,) at measured pose rows (7,) of bar and frame.
@@ -55,90 +90,46 @@ class PseudoInverse:
         Raises:
             SingularityError: at these poses no tensions give some wrench.
         """
-        tensions = np.empty(len(self._cables))
-        residual, saturated = _pseudo_inverse(
-            wrench,
-            bar_pose,
-            frame_pose,
-            self._cables,
-            self._limits,
-            self._lengths,
-            self._jacobians,
-            tensions,
+        fill_structure(bar_pose, frame_pose, self.cables, self._axes, self._structure)
+        self._wanted[:] = wrench[self._axes]
+        tensions = np.empty(len(self.cables))
+        saturated = self._method(
+            self._structure, self._wanted, self._limits, self._weights, tensions
         )
         if saturated < 0:
             place = ", ".join(f"{value:.4g}" for value in bar_pose)
             raise SingularityError(
                 f"tension distribution: with the bar measured at [{place}] (m, quaternion) the"
-                " cables cannot give every force and every moment but roll"
+                " cables cannot give every force and every moment"
+                + ("" if 3 in self._axes else " but roll")
             )
+        residual = _residual(self._structure, self._wanted, tensions)
         return Distribution(tensions, residual, saturated, residual <= RESIDUAL_TOLERANCE)
 
 
 @njit(cache=True, error_model="numpy")
-def _solve_gram(rows: Array, wanted: Array) -> bool:
-    """Solve (A·Aᵀ)·y = w by Cholesky's method for A = `rows` (m, n), y left in `wanted`.
-
-    Returns False, with nothing solved, where A has no full row rank. A library's solver would do
-    the same; compiling the call to it takes seconds of every first run.
-    """
-    m = rows.shape[0]
-    factor = np.zeros((m, m))
-    for i in range(m):
-        for j in range(i + 1):
-            diagonal = (rows[i] * rows[j]).sum()
-            rest = diagonal - (factor[i, :j] * factor[j, :j]).sum()
-            if i == j:
-                if not rest > SMALLEST_PIVOT * diagonal:
-                    return False
-                factor[i, i] = np.sqrt(rest)
-            else:
-                factor[i, j] = rest / factor[j, j]
-    for i in range(m):
-        wanted[i] = (wanted[i] - (factor[i, :i] * wanted[:i]).sum()) / factor[i, i]
-    for i in range(m - 1, -1, -1):
-        wanted[i] = (wanted[i] - (factor[i + 1 :, i] * wanted[i + 1 :]).sum()) / factor[i, i]
-    return True
-
-
-@njit(cache=True, error_model="numpy")
-def _pseudo_inverse(
-    wrench: Array,
-    bar_pose: Array,
-    frame_pose: Array,
-    cables: Array,
-    limits: Array,
-    lengths: Array,
-    jacobians: Array,
-    out: Array,
-) -> tuple[float, int]:
-    """Write limited tensions to `out`; return relative residual and how many are limited.
-
-    How many is −1, and nothing is written, where no tensions give some wrench.
-    """
-    n, m = cables.shape[0], len(CONTROLLED_AXES)
+def fill_structure(
+    bar_pose: Array, frame_pose: Array, cables: Array, axes: NDArray[np.int64], out: Array
+) -> None:
+    """Write the rows of −Jᵀ in some world axes, shape (m, n), at pose rows (7,)."""
+    n = cables.shape[0]
     bar, frame = np.empty(6), np.empty(6)
     bar[:3] = bar_pose[:3]
     bar[3], bar[4], bar[5] = euler_from_quaternion(bar_pose[3:7])
     frame[:3] = frame_pose[:3]
     frame[3], frame[4], frame[5] = euler_from_quaternion(frame_pose[3:7])
+    lengths, jacobians = np.empty(n), np.empty((2, n, 6))
     cable_geometry(cables, bar, frame, lengths, jacobians[0], jacobians[1])
-    structure, wanted = np.empty((m, n)), np.empty(m)
-    for row in range(m):
-        axis = CONTROLLED_AXES[row]
-        wanted[row] = wrench[axis]
+    for row in range(axes.shape[0]):
         for i in range(n):
-            structure[row, i] = -jacobians[0, i, axis]
-    multipliers = wanted.copy()
-    if not _solve_gram(structure, multipliers):
-        return 0.0, -1
-    saturated = 0
-    for i in range(n):
-        tension = (structure[:, i] * multipliers).sum()
-        out[i] = min(limits[i, 1], max(limits[i, 0], tension))
-        saturated += out[i] != tension
+            out[row, i] = -jacobians[0, i, axes[row]]
+
+
+@njit(cache=True, error_model="numpy")
+def _residual(structure: Array, wanted: Array, tensions: Array) -> float:
+    """Return |A·t − w| as a share of |w|."""
     missing = asked = 0.0
-    for row in range(m):
-        missing += ((structure[row] * out).sum() - wanted[row]) ** 2
+    for row in range(wanted.shape[0]):
+        missing += ((structure[row] * tensions).sum() - wanted[row]) ** 2
         asked += wanted[row] ** 2
-    return np.sqrt(missing / max(asked, 1e-24)), saturated
+    return np.sqrt(missing / max(asked, 1e-24))

@@ -82,7 +82,7 @@ def _text(fault: ErrorDetails, model: type[BaseModel]) -> str:
 
 
 def _tag_text(spot: _Spot, context: Mapping[str, Any]) -> str:
-    key = str(context["discriminator"]).strip("'")
+    key = str(context["discriminator"]).strip("'").removesuffix("()")
     tags = [f"'{tag}'" for model in _models(spot) for tag in _literals(model, key)]
     given = f"'{context['tag']}'" if "tag" in context else "missing"
     return f"{_join(spot.path, key)}: {given}, allowed: {', '.join(tags[:-1])} or {tags[-1]}"

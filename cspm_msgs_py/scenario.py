@@ -8,22 +8,27 @@ from pathlib import Path
 from typing import Annotated, Any, Literal
 
 from pydantic import (
+    Discriminator,
     Field,
     NonNegativeFloat,
     NonNegativeInt,
     PositiveFloat,
     PositiveInt,
+    Tag,
     model_validator,
 )
 from typing_extensions import Self
 
-from cspm_msgs_py.dofs import ControlledDof
+from cspm_msgs_py.dofs import ControlledDof, Dof
 from cspm_msgs_py.errors import InputError
 from cspm_msgs_py.motion_spec import MotionSpec, StillMotion
 from cspm_msgs_py.safety_spec import Safety
 from cspm_msgs_py.yaml_file import StrictModel, parse_yaml, read_yaml, validate
 
 Pose = tuple[float, float, float, float, float, float]
+WrenchWeights = tuple[
+    PositiveFloat, PositiveFloat, PositiveFloat, PositiveFloat, PositiveFloat, PositiveFloat
+]
 ORIGIN: Pose = (0.0, 0.0, 0.0, 0.0, 0.0, 0.0)
 
 
@@ -77,13 +82,14 @@ class PiGains(StrictModel):
 
 
 class MotionControl(StrictModel):
-    """Motion controller: crossover [rad/s] per controlled DOF, or the gains themselves.
+    """The thesis's controller: crossover [rad/s] per controlled DOF, or the gains themselves.
 
     Gains that are absent are designed at `design_pose` for the crossover frequencies. The
     derivative term has a pole at `derivative_filter` [rad/s]; integral terms stop at
     `integral_limits` [N, N·m].
     """
 
+    law: Literal["pid"] = "pid"
     crossover: dict[ControlledDof, PositiveFloat] = {
         "surge": 12.0,
         "sway": 10.0,
@@ -96,6 +102,35 @@ class MotionControl(StrictModel):
     integral_limits: tuple[PositiveFloat, PositiveFloat] = (20.0, 5.0)
     gains: dict[ControlledDof, PidGains] | None = None
 
+    @property
+    def dofs(self) -> tuple[ControlledDof, ...]:
+        """The controlled DOFs."""
+        return tuple(self.crossover if self.gains is None else self.gains)
+
+
+class ComputedWrenchControl(StrictModel):
+    """Inverse dynamics of the bar with an observer of its pose error.
+
+    `bandwidth` [rad/s] is that of the error's dynamics per controlled DOF, `observer_bandwidth`
+    [rad/s] that of the observer. The force controllers are designed at `design_pose`.
+    """
+
+    law: Literal["computed_wrench"]
+    bandwidth: dict[Dof, PositiveFloat] = {
+        "surge": 20.0,
+        "sway": 20.0,
+        "heave": 20.0,
+        "pitch": 20.0,
+        "yaw": 20.0,
+    }
+    observer_bandwidth: PositiveFloat = 40.0
+    design_pose: Pose = (0.0, 0.0, 2.0, 0.0, 0.0, 0.0)
+
+    @property
+    def dofs(self) -> tuple[Dof, ...]:
+        """The controlled DOFs."""
+        return tuple(self.bandwidth)
+
 
 class ForceControl(StrictModel):
     """Force controllers: closed-loop bandwidth [rad/s] to design for, or the gains per cable."""
@@ -104,17 +139,43 @@ class ForceControl(StrictModel):
     gains: dict[str, PiGains] | None = None
 
 
-class TensionDistribution(StrictModel):
-    """How a wanted wrench becomes tensions."""
+DistributionMethod = Literal[
+    "pseudo_inverse", "removal", "closed_form", "improved_closed_form", "qp", "analytic_centre"
+]
 
-    method: Literal["pseudo_inverse"] = "pseudo_inverse"
+
+class TensionDistribution(StrictModel):
+    """How a wanted wrench becomes tensions.
+
+    `lower_limit` [N] takes the place of the test-bed's lower tension limits. `preferred_tension`
+    [N] is what the method `qp` stays near. `wrench_weights` say what a missed N or N·m counts, per
+    DOF, where the methods `qp` and `analytic_centre` look for the nearest wrench.
+    """
+
+    method: DistributionMethod = "pseudo_inverse"
+    lower_limit: NonNegativeFloat | None = None
+    preferred_tension: PositiveFloat = 5.0
+    wrench_weights: WrenchWeights = (1.0, 1.0, 1.0, 6.0, 6.0, 6.0)
+
+
+def law(motion: object) -> object:
+    """Return a motion controller's law: the thesis's where none is said."""
+    if isinstance(motion, dict):
+        return motion.get("law", "pid")
+    return getattr(motion, "law", "pid")
+
+
+MotionLaw = Annotated[
+    Annotated[MotionControl, Tag("pid")] | Annotated[ComputedWrenchControl, Tag("computed_wrench")],
+    Discriminator(law),
+]
 
 
 class ClosedLoop(StrictModel):
-    """Motion controller, tension distribution and force controllers of the thesis (chapter 7)."""
+    """Motion controller, tension distribution and force controllers (chapter 7)."""
 
     mode: Literal["closed_loop"] = "closed_loop"
-    motion: MotionControl = MotionControl()
+    motion: MotionLaw = MotionControl()
     tension_distribution: TensionDistribution = TensionDistribution()
     force: ForceControl = ForceControl()
 

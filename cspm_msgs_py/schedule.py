@@ -13,7 +13,13 @@ from dataclasses import dataclass
 from typing import NamedTuple
 
 from cspm_msgs_py.errors import InputError
-from cspm_msgs_py.scenario import AngleProfile, ClosedLoop, Scenario, TorqueProfile
+from cspm_msgs_py.scenario import (
+    AngleProfile,
+    ClosedLoop,
+    ComputedWrenchControl,
+    Scenario,
+    TorqueProfile,
+)
 from cspm_msgs_py.testbed import Testbed
 
 DIAGNOSTICS_RATE = 10
@@ -138,10 +144,16 @@ def schedule_of(scenario: Scenario, testbed: Testbed) -> Schedule:
     nodes: dict[str, NodePlan] = {}
     references = tuple(name for name in names if name.endswith("/reference"))
 
-    def add(node: str, rate: int, inputs: tuple[str, ...], outputs: tuple[str, ...]) -> None:
+    def add(
+        node: str,
+        rate: int,
+        inputs: tuple[str, ...],
+        outputs: tuple[str, ...],
+        more: tuple[str, ...] = (),
+    ) -> None:
         divider = rates.plant // rate
         first = -(-max(timings[name].first for name in inputs) // divider) * divider
-        held = tuple(n for n in HELD.get(node, ()) if n in timings and n not in inputs)
+        held = tuple(n for n in (*HELD.get(node, ()), *more) if n in timings and n not in inputs)
         paced = [timings[name] for name in (*inputs, *held) if timings[name].first <= first]
         if divider < min(each.divider for each in paced):
             # Else it would compute from one message all that is due until the next one.
@@ -153,7 +165,11 @@ def schedule_of(scenario: Scenario, testbed: Testbed) -> Schedule:
     if references:
         add(WAVE_TRAJECTORY, rates.wave_trajectory, (CLOCK,), references)
     if isinstance(scenario.control, ClosedLoop):
-        add(MOTION_CONTROLLER, rates.motion_controller, (BAR_POSE, BAR_REFERENCE), (WRENCH,))
+        # The computed wrench looks at what the tensions can give, as the distribution does.
+        computed = isinstance(scenario.control.motion, ComputedWrenchControl)
+        frame = (FRAME_POSE,) if computed else ()
+        motion = (BAR_POSE, BAR_REFERENCE), (WRENCH,)
+        add(MOTION_CONTROLLER, rates.motion_controller, *motion, frame)
         distribution = (WRENCH, BAR_POSE), (TENSION_COMMAND,)
         add(TENSION_DISTRIBUTION, rates.tension_distribution, *distribution)
         force = (TENSION_COMMAND, TENSION), (TORQUE_COMMAND,)

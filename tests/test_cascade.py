@@ -7,7 +7,7 @@ import pytest
 from scipy.linalg import expm
 
 from cspm_control.design import CONTROLLED_DOFS, design_force_gains, design_motion_gains
-from cspm_control.tension_distribution import CONTROLLED_AXES
+from cspm_msgs_py.dofs import CONTROLLED_AXES
 from cspm_msgs_py.scenario import ForceControl, MotionControl, PidGains, PiGains
 from cspm_msgs_py.testbed import load_testbed
 from cspm_sim.equilibrium import gravity_wrench

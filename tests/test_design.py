@@ -18,7 +18,7 @@ from cspm_control.design import (
     margins,
     motion_margins,
 )
-from cspm_control.tension_distribution import CONTROLLED_AXES
+from cspm_msgs_py.dofs import CONTROLLED_AXES
 from cspm_msgs_py.errors import InputError
 from cspm_msgs_py.scenario import ForceControl, MotionControl, PidGains, PiGains
 from cspm_msgs_py.testbed import Testbed, load_testbed

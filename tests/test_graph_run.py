@@ -41,6 +41,7 @@ FAST_CONTROL = ("motion_controller=1000", "tension_distribution=1000")
 RUNS = {
     "calm": (bundle_of("calm"), 600),
     "worst case": (bundle_of("worst_case"), 600),
+    "past the thesis": (bundle_of("worst_case_past_thesis"), 300),
     "torques, no bar": (bundle_of("one_winch"), 250),
     "angles, no bar": (bundle_of("rig_stiffness_sway"), 250),
     "late sensors": (late(bundle_of("rest"), **LATE), 200),

@@ -3,7 +3,8 @@ import pytest
 from conftest import build, general_content, point_content, random_poses
 from scipy.spatial.transform import Rotation
 
-from cspm_control.tension_distribution import CONTROLLED_AXES, PseudoInverse
+from cspm_control.tension_distribution import TensionDistribution
+from cspm_msgs_py.dofs import CONTROLLED_AXES
 from cspm_msgs_py.errors import SingularityError
 from cspm_sim.kernels.rows import pose_row
 from cspm_sim.parameters import plant_parameters
@@ -37,7 +38,7 @@ def structure(testbed, bar_pose, frame_pose):
 def distribution(testbed, limits=None):
     given = [cable.tension_limits for cable in testbed.cables]
     chosen = np.array(given if limits is None else [limits] * len(given), dtype=float)
-    return PseudoInverse(plant_parameters(testbed).cables, chosen)
+    return TensionDistribution(plant_parameters(testbed).cables, chosen)
 
 
 @pytest.mark.parametrize("machine", ["thesis", "general"])
@@ -117,10 +118,10 @@ def test_a_tension_exactly_at_its_limit_is_not_saturated(thesis):
     free = distribution(thesis, WIDE).step(HOLD, row(HOME), row(np.zeros(6))).tensions
     cables = plant_parameters(thesis).cables
     limits = np.column_stack([free, free + 1.0])
-    exact = PseudoInverse(cables, limits).step(HOLD, row(HOME), row(np.zeros(6)))
+    exact = TensionDistribution(cables, limits).step(HOLD, row(HOME), row(np.zeros(6)))
     assert exact.feasible
     assert exact.saturated == 0
-    above = PseudoInverse(cables, limits + 1e-3).step(HOLD, row(HOME), row(np.zeros(6)))
+    above = TensionDistribution(cables, limits + 1e-3).step(HOLD, row(HOME), row(np.zeros(6)))
     assert not above.feasible
     assert above.saturated == 8
 

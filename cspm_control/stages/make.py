@@ -8,6 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from cspm_control.angle_servo import AngleGenerator, AngleServo
+from cspm_control.computed_wrench import ComputedWrench
 from cspm_control.force_controller import ForceController
 from cspm_control.motion_controller import MotionController
 from cspm_control.stages.angle_stage import AngleStage
@@ -15,10 +16,17 @@ from cspm_control.stages.distribution_stage import DistributionStage
 from cspm_control.stages.force_stage import ForceLimits, ForceStage
 from cspm_control.stages.motion_stage import MotionStage
 from cspm_control.stages.torque_stage import TorqueStage
-from cspm_control.tension_distribution import PseudoInverse
+from cspm_control.tension_distribution import TensionDistribution
 from cspm_control.torque_profile import TorqueGenerator
+from cspm_msgs_py.dofs import CONTROLLED_AXES
 from cspm_msgs_py.errors import InputError
-from cspm_msgs_py.scenario import AngleProfile, ClosedLoop, Scenario, TorqueProfile
+from cspm_msgs_py.scenario import (
+    AngleProfile,
+    ClosedLoop,
+    ComputedWrenchControl,
+    Scenario,
+    TorqueProfile,
+)
 from cspm_msgs_py.schedule import FORCE_CONTROLLER, MOTION_CONTROLLER, TENSION_DISTRIBUTION
 from cspm_msgs_py.stage import Stage
 from cspm_msgs_py.testbed import Testbed
@@ -58,12 +66,26 @@ def motion_stage(control: ClosedLoop, scenario: Scenario, testbed: Testbed) -> M
         raise InputError(
             "control.mode: closed_loop without a bar, allowed: torque, angle, locked_winches"
         )
+    period = 1.0 / scenario.rates.motion_controller
+    if isinstance(motion, ComputedWrenchControl):
+        return MotionStage(
+            ComputedWrench(
+                motion.bandwidth,
+                testbed,
+                tension_distribution(control, testbed),
+                observer_bandwidth=motion.observer_bandwidth,
+                period=period,
+                steps_per_pose=max(
+                    1, scenario.rates.motion_controller // scenario.rates.motion_capture
+                ),
+            )
+        )
     return MotionStage(
         MotionController(
             motion.gains or {},
             testbed.bar,
             testbed.gravity,
-            period=1.0 / scenario.rates.motion_controller,
+            period=period,
             derivative_filter=motion.derivative_filter,
             integral_limits=motion.integral_limits,
         )
@@ -74,14 +96,49 @@ def distribution_stage(
     control: ClosedLoop, scenario: Scenario, testbed: Testbed
 ) -> DistributionStage:
     """Return the tension distribution."""
+    return DistributionStage(tension_distribution(control, testbed))
+
+
+def tension_distribution(control: ClosedLoop, testbed: Testbed) -> TensionDistribution:
+    """Return what turns a wrench into tensions."""
+    return TensionDistribution(
+        nominal_parameters(testbed).cables,
+        wanted_tension_limits(control, testbed),
+        control.tension_distribution,
+        controlled_axes(control),
+    )
+
+
+def controlled_axes(control: ClosedLoop) -> tuple[int, ...]:
+    """Return the world axes in which the wrench is to be met: roll only where it is controlled."""
+    return tuple(range(6)) if "roll" in control.motion.dofs else CONTROLLED_AXES
+
+
+def wanted_tension_limits(control: ClosedLoop, testbed: Testbed) -> NDArray[np.float64]:
+    """Return between what wanted tensions stay, (n, 2) [N].
+
+    Raises:
+        InputError: the scenario's lower limit is not below an upper one.
+    """
     limits = np.array([cable.tension_limits for cable in testbed.cables], dtype=float)
-    return DistributionStage(PseudoInverse(nominal_parameters(testbed).cables, limits))
+    lower = control.tension_distribution.lower_limit
+    if lower is not None:
+        limits[:, 0] = lower
+    closed = [
+        cable.name for cable, (low, high) in zip(testbed.cables, limits, strict=True) if low >= high
+    ]
+    if closed:
+        raise InputError(
+            f"control.tension_distribution.lower_limit: {lower:g} N, allowed: below the upper"
+            f" limit of {closed[0]}"
+        )
+    return limits
 
 
 def force_stage(control: ClosedLoop, scenario: Scenario, testbed: Testbed) -> ForceStage:
     """Return the force controllers."""
     gains, rate = control.force.gains or {}, scenario.rates.force_controller
-    tensions = np.array([cable.tension_limits for cable in testbed.cables], dtype=float)
+    tensions = wanted_tension_limits(control, testbed)
     safety = scenario.safety
     limits = ForceLimits(
         tensions,

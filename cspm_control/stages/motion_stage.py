@@ -7,12 +7,21 @@ from collections.abc import Mapping
 import numpy as np
 from numpy.typing import NDArray
 
+from cspm_control.computed_wrench import ComputedWrench
 from cspm_control.motion_controller import MotionController
 from cspm_msgs_py.diagnostics import Level, Status
-from cspm_msgs_py.schedule import BAR_POSE, BAR_REFERENCE, MOTION_CONTROLLER, WRENCH
+from cspm_msgs_py.schedule import (
+    BAR_POSE,
+    BAR_REFERENCE,
+    FRAME_POSE,
+    MOTION_CONTROLLER,
+    WRENCH,
+)
 from cspm_msgs_py.stage import Send
 
 Array = NDArray[np.float64]
+
+UNMOVED = np.array([0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 1.0])
 
 
 class MotionStage:
@@ -20,7 +29,7 @@ class MotionStage:
 
     node = MOTION_CONTROLLER
 
-    def __init__(self, controller: MotionController) -> None:
+    def __init__(self, controller: MotionController | ComputedWrench) -> None:
         self._controller = controller
         self._suspended = False
 
@@ -32,7 +41,12 @@ class MotionStage:
         """Send the wrench for the latest pose and reference."""
         if self._suspended:
             self._controller.restart()
-        send(WRENCH, self._controller.step(inputs[BAR_POSE], inputs[BAR_REFERENCE]))
+        pose, reference = inputs[BAR_POSE], inputs[BAR_REFERENCE]
+        if isinstance(self._controller, MotionController):
+            send(WRENCH, self._controller.step(pose, reference))
+        else:
+            frame = inputs.get(FRAME_POSE, UNMOVED)
+            send(WRENCH, self._controller.step(pose, frame, reference))
 
     def status(self) -> Status:
         """Return that all is well: the motion controller has no limit of its own to meet."""

@@ -1,0 +1,69 @@
+"""The physical limit: when does any tension set give the bar the motion that is wanted?"""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.optimize import linprog
+
+from bench.tracking import assembled
+from cspm_bringup.bundle import Bundle
+from cspm_control.bar_dynamics import bar_parameters, wanted_motion, wrench_for
+from cspm_control.stages.make import controlled_axes
+from cspm_msgs_py.scenario import ClosedLoop
+from cspm_msgs_py.testbed import Testbed
+from cspm_sim.kinematics import geometry
+from cspm_sim.parameters import nominal_parameters
+
+Array = NDArray[np.float64]
+
+
+def least_tensions(bundle: Bundle, times: Array) -> Array:
+    """Return the highest lower tension limit that allows the reference at each of these times [N].
+
+    −inf where even pushing cables would not; below 0 no set of pulling cables gives the bar its
+    reference's acceleration with the bar on the reference (2-12); a linear programme each. The
+    upper limits are the test-bed's, cables are rigid, winches as strong as it takes.
+
+    Args:
+        bundle: a closed loop.
+        times: any (n,) [s].
+    """
+    assert isinstance(bundle.scenario.control, ClosedLoop)
+    testbed = bundle.testbed.testbed
+    axes = list(controlled_axes(bundle.scenario.control))
+    references = assembled(bundle).references
+    upper = np.array([cable.tension_limits for cable in testbed.cables], dtype=float)[:, 1]
+    cables = nominal_parameters(testbed).cables
+    found = []
+    for time in times:
+        stamp = round(time * 1e9)
+        wrench, pose = _wanted(references["/bar/reference"].step(stamp), testbed)
+        frame = references["/winch_frame/reference"]
+        frame.step(stamp)
+        structure = -geometry(cables, pose, frame.values[:6].copy()).bar.T[axes]
+        found.append(_least(structure, wrench[axes], upper))
+    return np.array(found)
+
+
+def _wanted(row: Array, testbed: Testbed) -> tuple[Array, Array]:
+    """Return the wrench on the bar that follows a reference row, and the pose x y z φ θ ψ."""
+    assert testbed.bar is not None
+    motion, wrench = np.empty((3, 6)), np.empty(6)
+    wanted_motion(row, motion)
+    wrench_for(*motion, bar_parameters(testbed.bar, testbed.gravity), wrench)
+    return wrench, motion[0]
+
+
+def _least(structure: Array, wrench: Array, upper: Array) -> float:
+    """Return the largest s for which t ≥ s, t ≤ upper and A·t = w hold for some t."""
+    m, n = structure.shape
+    solution = linprog(
+        np.append(np.zeros(n), -1.0),
+        A_eq=np.column_stack([structure, np.zeros(m)]),
+        b_eq=wrench,
+        A_ub=np.column_stack([-np.eye(n), np.ones(n)]),
+        b_ub=np.zeros(n),
+        bounds=[(None, limit) for limit in upper] + [(None, None)],
+    )
+    return float(-solution.fun) if solution.status == 0 else -np.inf

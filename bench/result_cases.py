@@ -1,0 +1,91 @@
+"""The runs behind docs/results.md."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+
+from bench.tracking import Case
+
+PAST = "worst_case_past_thesis"
+CAMERA_100_HZ = (
+    "rates.motion_capture=100",
+    "rates.motion_controller=100",
+    "rates.tension_distribution=100",
+)
+PAST_ON_CALM = (
+    "control={mode: closed_loop, motion: {law: computed_wrench},"
+    " tension_distribution: {method: analytic_centre, lower_limit: 0.3}}"
+)
+FOUR_METRES = "target.mean_pose=[0.0, 0.0, 4.0, 0.0, 0.0, 0.0]"
+CENTRE = ("control.mode=closed_loop", "control.tension_distribution.method=analytic_centre")
+ONE_NEWTON = "control.tension_distribution.lower_limit=1.0"
+LOWER = "control.tension_distribution.lower_limit=0.3"
+
+THESIS = {
+    "calm": Case("calm", ("duration=200",)),
+    "worst case": Case("worst_case"),
+    "worst case, 4 m": Case("worst_case_4m"),
+}
+HALF = "duration=100"
+SHORT = "duration=40"
+# The thesis's worst case with one thing changed.
+SWITCHED = {
+    "as in the thesis": Case("worst_case", (HALF,)),
+    "ideal sensors": Case("worst_case", (HALF, "sensors=ideal")),
+    "analytic centre": Case("worst_case", (HALF, *CENTRE)),
+    "analytic centre, wanted tensions down to 0.3 N": Case("worst_case", (HALF, *CENTRE, LOWER)),
+    "half the waves": Case(
+        "worst_case",
+        (
+            HALF,
+            "target.motion.amplitudes=[0.055, 0.043, 0.159, 0.0135, 0.108, 0.053]",
+            "winch_frame.motion.amplitudes=[0.0094, 0.0044, 0.0124, 0.0034, 0.0033, 0.0017]",
+        ),
+    ),
+}
+BEYOND = {
+    "worst case, poses at 100 Hz": Case(PAST, (*CAMERA_100_HZ, SHORT)),
+    "worst case, wanted tensions down to 1 N": Case(PAST, (SHORT, ONE_NEWTON)),
+    "calm": Case("calm", (SHORT, PAST_ON_CALM)),
+    "worst case, 4 m": Case(PAST, (SHORT, FOUR_METRES)),
+    "all six coordinates": Case("worst_case_six_dof", (SHORT,)),
+    "on the MuJoCo plant": Case(PAST, ("duration=12",), plant="mujoco"),
+}
+LIMITED = {
+    "worst case": Case("worst_case"),
+    "worst case, all six coordinates": Case("worst_case_six_dof"),
+    "worst case, 4 m": Case("worst_case_4m"),
+    "worst case, read literally": Case("worst_case_literal"),
+    "calm": Case("calm", ("duration=200",)),
+}
+
+Effects = tuple[tuple[str, tuple[str, ...], Mapping[str, float]], ...]
+WIND = {"surge": 1.0, "sway": 2.0, "heave": 0.0, "roll": 0.0, "pitch": 0.0, "yaw": 0.0}
+CHANGES: dict[str, Effects] = {
+    "nothing": (),
+    "cable stiffness +20 %": (("cable_stiffness", (), {"scale": 1.2}),),
+    "cable stiffness −20 %": (("cable_stiffness", (), {"scale": 0.8}),),
+    "cable damping +20 %": (("cable_axial_damping", (), {"scale": 1.2}),),
+    "cable damping −20 %": (("cable_axial_damping", (), {"scale": 0.8}),),
+    "bar's mass +20 %": (("bar_mass", (), {"mass": 0.812}),),
+    "bar's mass −20 %": (("bar_mass", (), {"mass": -0.812}),),
+    "dry friction 2 mN·m at every motor": (("winch_coulomb_friction", (), {"torque": 0.002}),),
+    "poses 5 ms late": (("pose_delay", (), {"delay": 0.005}),),
+    "load cell of surge_1 +0.2 N": (("tension_bias", ("surge_1",), {"bias": 0.2}),),
+    "load cell of surge_1 +1 N": (("tension_bias", ("surge_1",), {"bias": 1.0}),),
+    "hoist_1's drive at half torque": (("winch_torque_gain", ("hoist_1",), {"gain": 0.5}),),
+    "wind of 2 N in sway and 1 N in surge": (("bar_constant_wrench", (), WIND),),
+}
+
+
+def seeded(seeds: int) -> dict[str, Case]:
+    """Return the worst case past the thesis with each of so many seeds."""
+    return {f"seed {seed}": Case(PAST, (f"seed={seed}",)) for seed in range(1, seeds + 1)}
+
+
+def changed(scenario: str, duration: float) -> dict[str, Case]:
+    """Return a scenario on machines that are not what the controllers think."""
+    return {
+        name: Case(scenario, (f"duration={duration}",), effects)
+        for name, effects in CHANGES.items()
+    }

@@ -1,0 +1,279 @@
+"""The numbers and pictures of docs/results.md: `python -m bench.results`, or `make results`.
+
+With --keep DIR what was measured stays there, and a later call measures only what is missing.
+"""
+
+from __future__ import annotations
+
+import argparse
+import json
+import re
+from collections.abc import Callable, Mapping, Sequence
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+from rich.console import Console
+
+from bench.feasibility import least_tensions
+from bench.machine import describe_machine
+from bench.result_cases import BEYOND, LIMITED, PAST, SWITCHED, THESIS, changed, seeded
+from bench.result_figures import bands, draw_comparison, draw_limit
+from bench.tension_distribution import HEADINGS, distribution_rows
+from bench.tracking import Case, follow, track, within_requirement
+from cspm_msgs_py.dofs import DOFS
+
+ROOT = Path(__file__).resolve().parents[1]
+PAGE = ROOT / "docs" / "results.md"
+FIGURES = ROOT / "docs" / "figures"
+BLOCK = re.compile(r"<!-- results: (\w+) -->\n.*?<!-- end -->", re.DOTALL)
+# Tables 8-1 and 8-2: largest and RMS error in mm and rad; None where the text is lost.
+THESIS_TABLES: dict[str, tuple[tuple[float | None, ...], tuple[float | None, ...]]] = {
+    "calm": (
+        (1.414, 0.06335, 0.397, 0.0682, 3.14e-5, 4.822e-5),
+        (0.158, 0.020845, 0.0535, 0.022815, 4.323e-6, 1.54e-5),
+    ),
+    "worst case": (
+        (None, None, None, 0.645, 0.0804, 0.0814),
+        (8.58, 0.74, 5.73, 0.02545, 0.00306, 0.0038),
+    ),
+}
+LIMITS = (0.0, 0.3, 1.0, 2.0)
+LIMIT_PERIOD = 0.2
+ROBUST_S = 20.0
+
+Measure = Callable[[], Any]
+
+
+class Store:
+    """What was measured, by name, in a folder that may already hold some of it."""
+
+    def __init__(self, folder: Path | None, console: Console) -> None:
+        self._folder, self._console = folder, console
+        if folder:
+            folder.mkdir(parents=True, exist_ok=True)
+
+    def get(self, name: str, measure: Measure) -> Any:
+        """Return what is there by this name, or measure it."""
+        signed = name.replace("+", "plus ").replace("−", "minus ")
+        file = re.sub(r"\W+", "_", signed) + ".json"
+        place = self._folder / file if self._folder else None
+        if place and place.exists():
+            return json.loads(place.read_text(encoding="utf-8"))
+        self._console.print(name)
+        found = measure()
+        if place:
+            place.write_text(json.dumps(found), encoding="utf-8")
+        return found
+
+    def tracks(self, group: str, cases: Mapping[str, Case]) -> dict[str, dict[str, Any]]:
+        """Return the tracking of each case."""
+        return {
+            name: self.get(f"{group} {name}", lambda case=case: track(case).data())
+            for name, case in cases.items()
+        }
+
+
+def main() -> None:
+    """Run the command line."""
+    parser = argparse.ArgumentParser(prog="python -m bench.results", description=__doc__)
+    parser.add_argument("--seeds", type=int, default=20, help="of the worst case past the thesis")
+    parser.add_argument("--keep", type=Path, metavar="DIR", help="for what was measured")
+    asked = parser.parse_args()
+    store = Store(asked.keep, Console())
+    blocks = {
+        "machine": _machine_block(asked.seeds),
+        "thesis": thesis_block(store.tracks("thesis", THESIS)),
+        "switched": tracking_block(store.tracks("switched", SWITCHED)),
+        "distribution": table(
+            HEADINGS, store.get("distribution", lambda: distribution_rows(20000, 60.0))
+        ),
+        "beyond": tracking_block(store.tracks("beyond", BEYOND)),
+        "limit": limit_block(store),
+        "past": past_block(store, asked.seeds),
+        "robust": tracking_block(store.tracks("robust", changed(PAST, ROBUST_S))),
+        "robust_thesis": tracking_block(
+            store.tracks("robust thesis", changed("worst_case", ROBUST_S))
+        ),
+    }
+    drawn = {
+        "the thesis's controllers": store.get("bands thesis", lambda: bands(Case("worst_case"))),
+        "past the thesis": store.get("bands past", lambda: bands(Case(PAST))),
+    }
+    draw_comparison(FIGURES / "past_thesis.png", drawn)
+    least = np.array(_least(store, "worst case"))
+    draw_limit(FIGURES / "tension_limit.png", least, LIMIT_PERIOD, drawn["past the thesis"])
+    _into_page(blocks)
+
+
+def _machine_block(seeds: int) -> str:
+    machine = describe_machine()
+    return (
+        f"Measured {machine['date']}, {machine['processor']}, {machine['software']}; {seeds} seeds."
+    )
+
+
+def thesis_block(found: Mapping[str, Mapping[str, Any]]) -> str:
+    """Return tables 8-1 and 8-2, the thesis's figures beside ours."""
+    parts = []
+    for name, (largest, rms) in THESIS_TABLES.items():
+        ours = found[name]
+        rows = []
+        for i, dof in enumerate(DOFS):
+            unit = 1e3 if i < 3 else 1.0
+            values = largest[i], ours["largest"][i] * unit, rms[i], ours["rms"][i] * unit
+            rows.append([f"{dof} [{'mm' if i < 3 else 'rad'}]", *(_number(v) for v in values)])
+        heads = ["", "largest: thesis", "ours", "RMS: thesis", "ours"]
+        parts.append(f"**{name}**, {_rest(ours)}\n\n{table(heads, rows)}")
+    deep = found["worst case, 4 m"]
+    end = f"ends at {deep['duration']:.1f} s: {deep['failure']}" if deep["failure"] else "holds"
+    parts.append(f"With the target 4 m below the frame the run {end}.")
+    return "\n\n".join(parts)
+
+
+def _number(value: float | None) -> str:
+    return "lost" if value is None else f"{value:.3g}"
+
+
+def _rest(found: Mapping[str, Any]) -> str:
+    low, high = found["tensions"]
+    return (
+        f"{found['duration']:.0f} s, tensions {low:.2f} to {high:.1f} N, wanted wrench not met"
+        f" {found['not_met']:.1%} of the time"
+    )
+
+
+def tracking_block(found: Mapping[str, Mapping[str, Any]]) -> str:
+    """Return a row per run."""
+    heads = [
+        "",
+        "time [s]",
+        "RMS surge, sway, heave [mm]",
+        "roll, pitch, yaw [mrad]",
+        "within ± 2 mm, ± 4 mrad",
+    ]
+    heads += ["least tension [N]", "any slack", "wrench not met", ""]
+    rows = []
+    for name, each in found.items():
+        rms = [1e3 * value for value in each["rms"]]
+        rows.append(
+            [
+                name,
+                f"{each['duration']:.0f}",
+                ", ".join(f"{value:.2f}" for value in rms[:3]),
+                ", ".join(f"{value:.2f}" for value in rms[3:]),
+                f"{each['within']:.1%}",
+                f"{each['tensions'][0]:.2f}",
+                f"{each['slack']:.2%}",
+                f"{each['not_met']:.1%}",
+                "ends there" if each["failure"] else "",
+            ]
+        )
+    return table(heads, rows)
+
+
+def past_block(store: Store, seeds: int) -> str:
+    """Return the worst case past the thesis over seeds, against the reach."""
+    found = {
+        name: store.get(f"past {name}", lambda case=case: _past(case))
+        for name, case in seeded(seeds).items()
+    }
+    heads = ["", *(f"RMS {dof} [{'mm' if i < 3 else 'mrad'}]" for i, dof in enumerate(DOFS))]
+    rms = 1e3 * np.array([each["rms"] for each in found.values()])
+    rows = [
+        ["median", *(f"{value:.2f}" for value in np.median(rms, axis=0))],
+        ["worst seed", *(f"{value:.2f}" for value in rms.max(axis=0))],
+        ["to reach", "≤ 2", "≤ 2", "≤ 2", "", "≤ 4", "≤ 4"],
+    ]
+    more = []
+    for key, what in PAST_FIGURES.items():
+        values = np.array([each[key] for each in found.values()])
+        worst = values.max() if key in ("slack", "not_met") else values.min()
+        unit = "{:.2f} N" if key == "least" else "{:.3%}"
+        more.append([what, unit.format(np.median(values)), unit.format(worst)])
+    failed = [name for name, each in found.items() if each["failure"]]
+    reached = (rms[:, [0, 1, 2]] <= 2.0).all(axis=1) & (rms[:, [4, 5]] <= 4.0).all(axis=1)
+    within = np.array([each["within_feasible"] >= 0.99 for each in found.values()])
+    taut = np.array([each["slack"] == 0.0 for each in found.values()])
+    said = (
+        f"Of {seeds} seeds {reached.sum()} reach every RMS, {within.sum()} the 99 % of the time in"
+        f" which tensions ≥ 0 exist, {taut.sum()} have no cable slack at any instant. "
+    )
+    said += f"Runs that ended early: {', '.join(failed) if failed else 'none'}."
+    return f"{table(heads, rows)}\n\n{table(['', 'median', 'worst seed'], more)}\n\n{said}"
+
+
+PAST_FIGURES = {
+    "within": "within ± 2 mm and ± 4 mrad, of all time",
+    "within_feasible": "of the time in which tensions ≥ 0 exist",
+    "within_met": "of the time in which tensions ≥ 0.3 N exist",
+    "available": "time in which tensions ≥ 0 exist",
+    "least": "least tension",
+    "slack": "any cable slack",
+    "not_met": "wanted wrench not met",
+}
+
+
+def _past(case: Case) -> dict[str, Any]:
+    bundle = case.bundle()
+    errors, tensions, missed, failure = follow(bundle)
+    least = least_tensions(bundle, _limit_times(case))
+    stride = round(LIMIT_PERIOD * bundle.scenario.rates.plant)
+    within = within_requirement(bundle, errors)
+    sampled = within[::stride]
+    least = least[: len(sampled)]
+    return {
+        "rms": np.sqrt((errors**2).mean(axis=0)).tolist(),
+        "within": float(within.mean()),
+        "within_feasible": float(sampled[least >= 0.0].mean()),
+        "within_met": float(sampled[least >= 0.3].mean()),
+        "available": float((least >= 0.0).mean()),
+        "least": float(tensions.min()),
+        "slack": float((tensions <= 0.0).any(axis=1).mean()),
+        "not_met": float(missed.mean()),
+        "failure": failure,
+    }
+
+
+def limit_block(store: Store) -> str:
+    """Return the share of time in which any tension set exists, by scenario and lower limit."""
+    rows = []
+    for name in LIMITED:
+        least = np.array(_least(store, name))
+        rows.append([name, *(f"{(least >= limit).mean():.1%}" for limit in LIMITS)])
+    return table(["", *(f"t_min = {limit:g} N" for limit in LIMITS)], rows)
+
+
+def _limit_times(case: Case) -> NDArray[np.float64]:
+    return np.arange(0.0, case.bundle().scenario.duration, LIMIT_PERIOD)
+
+
+def _least(store: Store, name: str) -> list[float]:
+    def measure() -> list[float]:
+        # JSON knows no infinity.
+        least = np.maximum(
+            least_tensions(LIMITED[name].bundle(), _limit_times(LIMITED[name])), -1e9
+        )
+        return [float(value) for value in least]
+
+    return [float(value) for value in store.get(f"limit {name}", measure)]
+
+
+def table(heads: Sequence[str], rows: Sequence[Sequence[str]]) -> str:
+    """Return a table in Markdown."""
+    lines = [heads, ["---"] * len(heads), *rows]
+    return "\n".join(f"| {' | '.join(line)} |" for line in lines)
+
+
+def _into_page(blocks: Mapping[str, str]) -> None:
+    page = PAGE.read_text(encoding="utf-8")
+
+    def renewed(match: re.Match[str]) -> str:
+        return f"<!-- results: {match[1]} -->\n{blocks[match[1]]}\n<!-- end -->"
+
+    PAGE.write_text(BLOCK.sub(renewed, page), encoding="utf-8")
+
+
+if __name__ == "__main__":
+    main()

@@ -1,0 +1,98 @@
+"""What the page of results is made from."""
+
+import re
+
+import numpy as np
+import pytest
+from run_samples import bundle_of
+
+from bench.feasibility import least_tensions
+from bench.result_cases import BEYOND, LIMITED, PAST, SWITCHED, THESIS, changed, seeded
+from bench.results import BLOCK, PAGE, Store, table, tracking_block
+from bench.tension_distribution import drawn_wrenches, score
+from bench.tracking import Case, follow, track
+from cspm_bringup.run import run
+from cspm_msgs_py.errors import InputError
+
+pytestmark = pytest.mark.compiled
+
+
+@pytest.mark.slow
+def test_every_case_is_a_run_that_can_be_made():
+    groups = (THESIS, SWITCHED, BEYOND, LIMITED, changed(PAST, 1.0), seeded(2))
+    for case in {case.scenario: case for group in groups for case in group.values()}.values():
+        assert case.bundle().testbed.testbed.bar is not None
+    with pytest.raises(InputError, match=r"^effects: bar_mass: parameters \['weight'\], allowed"):
+        track(Case("rest", ("duration=0.01",), (("bar_mass", (), {"weight": 1.0}),)))
+
+
+def test_following_finds_what_a_run_finds():
+    case = Case("worst_case", ("duration=0.5",))
+    errors, tensions, missed, failure = follow(case.bundle())
+    tally = run(case.bundle(), None).tally
+    np.testing.assert_allclose(np.sqrt((errors**2).mean(axis=0)), tally.rms_error, rtol=1e-9)
+    assert (tensions.min(), tensions.max()) == tally.tension_range
+    assert missed.mean() == pytest.approx(tally.infeasible_share)
+    assert failure == ""
+
+
+@pytest.mark.slow
+def test_the_plant_has_the_effects_of_a_case_and_the_controllers_do_not():
+    plain = Case("rest", ("duration=0.1", "sensors=ideal"))
+    heavy = Case("rest", plain.overrides, (("bar_mass", (), {"mass": 0.5}),))
+    assert track(plain).largest[2] < 1e-6
+    assert track(heavy).tensions[1] > track(plain).tensions[1] * 1.02
+    gains = [case.bundle().scenario.control.motion.gains for case in (plain, heavy)]
+    assert gains[0] == gains[1]
+
+
+def test_the_limit_at_rest_is_the_share_of_the_weight_that_symmetry_leaves():
+    """Hoist, surge and sway cables are pairs and a four: the least tension is that of them all."""
+    bundle = bundle_of("rest", "duration=1.0")
+    least = least_tensions(bundle, np.array([0.0, 0.5]))
+    assert least == pytest.approx([least[0]] * 2, rel=1e-9)
+    exits = np.array([cable.exit for cable in bundle.testbed.testbed.cables])
+    ends = np.array([cable.attachment for cable in bundle.testbed.testbed.cables]) + np.array(
+        [0, 0, 2.0]
+    )
+    upward = (ends - exits)[:, 2] / np.linalg.norm(ends - exits, axis=1)
+    # With all eight alike nothing but the weight is left to hold.
+    assert least[0] == pytest.approx(4.06 * 9.81 / upward.sum(), rel=1e-6)
+
+
+@pytest.mark.slow
+def test_more_is_asked_than_pulling_cables_can_give():
+    """The bar accelerates downward at up to g; the literal reading asks for more."""
+    least = least_tensions(
+        bundle_of("worst_case_literal", "duration=20.0"), np.arange(0.0, 20.0, 0.1)
+    )
+    assert (least < 0.0).mean() > 0.1
+
+
+def test_the_score_of_a_method_is_that_of_its_wrenches():
+    testbed = Case("worst_case").bundle().testbed.testbed
+    drawn = drawn_wrenches(testbed, 200, seed=4)
+    found = {name: score(testbed, name, drawn) for name in ("pseudo_inverse", "analytic_centre")}
+    assert found["analytic_centre"].met == 1.0
+    assert found["analytic_centre"].residual <= 1e-6
+    assert 0.0 < found["pseudo_inverse"].met < 0.9
+    assert all(each.wrong == 0 for each in found.values())
+
+
+def test_what_was_measured_is_kept(tmp_path):
+    from rich.console import Console
+
+    store = Store(tmp_path, Console(quiet=True))
+    assert store.get("a, b", lambda: {"x": 1}) == {"x": 1}
+    assert store.get("a, b", lambda: pytest.fail("measured twice")) == {"x": 1}
+    assert [store.get(f"stiffness {sign}20 %", lambda s=sign: s) for sign in "+−"] == ["+", "−"]
+
+
+def test_the_page_has_a_place_for_every_block_and_tables_in_them():
+    page = PAGE.read_text(encoding="utf-8")
+    names = [match[1] for match in BLOCK.finditer(page)]
+    assert len(names) == len(set(names)) == page.count("<!-- results: ")
+    assert table(["a", "b"], [["1", "2"]]) == "| a | b |\n| --- | --- |\n| 1 | 2 |"
+    data = track(Case("rest", ("duration=0.02",))).data()
+    lines = tracking_block({"rest": data}).splitlines()
+    assert len({re.sub(r"[^|]", "", line) for line in lines}) == 1

@@ -29,6 +29,7 @@ from cspm_msgs_py.new_folder import refuse_existing
 
 REPORT = "diagnosis.json"
 PICTURE = "diagnosis.png"
+PAGE = "diagnosis.html"
 
 
 @dataclass(frozen=True)
@@ -130,10 +131,12 @@ def _fit_table(found: Diagnosis) -> Table:
 def _write(folder: Path, found: Diagnosis, data: dict[str, object]) -> None:
     # Drawing takes a second to load that a verdict alone need not wait for.
     from cspm_bringup.diagnosis_figure import draw_diagnosis
+    from cspm_ident.diagnosis.page import write_diagnosis_page
 
     folder.mkdir(parents=True)
     write_json(folder / REPORT, data)
     draw_diagnosis(folder / PICTURE, found)
+    write_diagnosis_page(folder / PAGE, found, data)
     if found.findings.named:
         improved = improved_testbed(found, str(folder / IMPROVED))
         (folder / IMPROVED).write_text(improved.text, encoding="utf-8")

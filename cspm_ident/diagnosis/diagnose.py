@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from cspm_ident.diagnosis.columns import Candidate, Place
+from cspm_ident.diagnosis.curves import Curve, held_out_curves
 from cspm_ident.diagnosis.equation import Equation, in_noise
 from cspm_ident.diagnosis.evidence import Evidence, gather
 from cspm_ident.diagnosis.recorded import equations_of
@@ -68,6 +69,7 @@ class Diagnosis:
         silent: effects and elements that these recordings cannot show.
         places: the residuals that there are.
         starts: of the blocks [s], shape (blocks,).
+        curves: the residuals on what was not searched, over time.
     """
 
     searched: Sequence[Measurement]
@@ -79,6 +81,7 @@ class Diagnosis:
     silent: tuple[tuple[str, tuple[str, ...]], ...]
     places: tuple[Place, ...]
     starts: Array
+    curves: tuple[Curve, ...]
 
 
 def diagnose(
@@ -124,6 +127,7 @@ def diagnose(
         _silent(search, effects),
         tuple(place.place for place in evidence.places),
         evidence.times,
+        held_out_curves(judge_parts, {c: w for c, (w, _) in _weights(search, kept).items()}),
     )
 
 

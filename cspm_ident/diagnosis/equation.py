@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -25,6 +25,7 @@ class Equation:
         columns: by candidate or driver, what one unit of each weight adds, (k, channels, weights).
         measured: the measured quantity that the residual is part of, shape of `target`.
         nuisance: what no recording tells, such as the length wound at its start, (k, channels, m).
+        signals: measured signals that it may depend on, by name and unit, each of shape (k,).
     """
 
     place: Place
@@ -33,6 +34,7 @@ class Equation:
     columns: Mapping[Candidate | Driver, Array]
     measured: Array
     nuisance: Array = field(default_factory=lambda: np.zeros((0, 0, 0)))
+    signals: Mapping[str, Array] = field(default_factory=dict)
 
     @property
     def noise(self) -> Array:
@@ -50,7 +52,7 @@ class Equation:
         columns = {term: found / unit[:, None] for term, found in self.columns.items()}
         nuisance = self.nuisance / unit[:, None] if self.nuisance.size else self.nuisance
         target, measured = self.target / unit, self.measured / unit
-        return Equation(self.place, self.times, target, columns, measured, nuisance)
+        return replace(self, target=target, columns=columns, measured=measured, nuisance=nuisance)
 
     def within(self, start: float, end: float) -> Equation:
         """Return the rows from `start` to before `end` [s]."""
@@ -58,7 +60,8 @@ class Equation:
         columns = {term: found[rows] for term, found in self.columns.items()}
         nuisance = self.nuisance[rows] if self.nuisance.size else self.nuisance
         target, measured = self.target[rows], self.measured[rows]
-        return Equation(self.place, self.times[rows], target, columns, measured, nuisance)
+        signals = {name: found[rows] for name, found in self.signals.items()}
+        return Equation(self.place, self.times[rows], target, columns, measured, nuisance, signals)
 
 
 def in_noise(

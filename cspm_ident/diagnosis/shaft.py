@@ -106,7 +106,7 @@ class _Shaft:
         drivers = {name: self._weighed(rows[:, column]) for name, column in _DRIVERS.items()}
         columns |= driver_columns(place, drivers)
         torque = self._weighed(rows[:, WinchSignal.TORQUE])[:, None]
-        return Equation(place, self._times, target[:, None], columns, torque)
+        return Equation(place, self._times, target[:, None], columns, torque, signals=drivers)
 
     def _columns(self, effect: Effect) -> Iterator[tuple[Candidate, Array]]:
         if self._name not in elements_of(effect, (self._name,), ()):

@@ -109,17 +109,23 @@ class _Stretch:
             drivers = {key: self._weighed(rows[:, column]) for key, column in _DRIVERS.items()}
             own = columns.get(place, {}) | driver_columns(place, drivers)
             measured = self._weighed(self._signals.tensions[:, i])[:, None]
-            out.append(Equation(place, times, target, own, measured, start))
+            out.append(Equation(place, times, target, own, measured, start, drivers))
         place = Place(Channel.WRENCH, BAR)
-        own = columns.get(place, {}) | self._bar_drivers(place)
+        moved = self._bar_signals()
+        own = columns.get(place, {})
+        for i, drivers in enumerate(moved):
+            own = own | driver_columns(place, drivers, i, len(DOFS))
+        signals = {name: values for drivers in moved for name, values in drivers.items()}
         measured = self._weighed(self._here.cable_wrench)
-        out.append(Equation(place, times, self._weighed(wrench), own, measured))
+        wrench = self._weighed(wrench)
+        out.append(Equation(place, times, wrench, own, measured, signals=signals))
         return out
 
-    def _bar_drivers(self, place: Place) -> dict[Candidate | Driver, Array]:
+    def _bar_signals(self) -> list[dict[str, Array]]:
+        """Return what each of the bar's six components may depend on, by name and unit."""
         state, poses = self._here.bar, self._signals.bar.poses
         speeds = np.hstack([state.velocity, state.omega])
-        found: dict[Candidate | Driver, Array] = {}
+        found = []
         for i, dof in enumerate(DOFS):
             unit = "m" if i < 3 else "rad"
             drivers = {
@@ -127,8 +133,7 @@ class _Stretch:
                 f"{dof} speed [{unit}/s]": speeds[:, i],
                 f"time, in {dof} [s]": self._signals.times,
             }
-            weighed = {name: self._weighed(values) for name, values in drivers.items()}
-            found |= driver_columns(place, weighed, i, len(DOFS))
+            found.append({name: self._weighed(values) for name, values in drivers.items()})
         return found
 
     def _targets(self, known: Sequence[Action]) -> tuple[Array, Array]:

@@ -11,6 +11,7 @@ from rich.console import Console
 from rich.table import Table
 
 from cspm_bringup.console import make_console, say
+from cspm_bringup.experiment_files import write_experiments
 from cspm_bringup.summary import write_json
 from cspm_ident.diagnosis.diagnose import Diagnosis, diagnose
 from cspm_ident.diagnosis.improved_file import improved_testbed
@@ -66,10 +67,13 @@ def diagnose_command(asked: DiagnoseRequest, json: Path | None) -> None:
         searched = [read_measurement(path, asked.testbed) for path in asked.recordings]
         held_out = [read_measurement(path, asked.testbed) for path in asked.held_out]
         found = diagnose(searched, held_out, status.update)
+        data = diagnosis_data(found)
+        if asked.out is not None:
+            asked.out.mkdir(parents=True)
+            write_experiments(asked.out, found, data, status.update)
+            _write(asked.out, found, data)
     print_diagnosis(console, found)
-    data = diagnosis_data(found)
     if asked.out is not None:
-        _write(asked.out, found, data)
         say(console, f"written {asked.out}")
     if json is not None:
         write_json(json, data)
@@ -133,7 +137,6 @@ def _write(folder: Path, found: Diagnosis, data: dict[str, object]) -> None:
     from cspm_bringup.diagnosis_figure import draw_diagnosis
     from cspm_ident.diagnosis.page import write_diagnosis_page
 
-    folder.mkdir(parents=True)
     write_json(folder / REPORT, data)
     draw_diagnosis(folder / PICTURE, found)
     write_diagnosis_page(folder / PAGE, found, data)

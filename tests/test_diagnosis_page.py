@@ -66,12 +66,15 @@ def diagnosis(named=True, alternatives=(), unknown=(), rejected=()):
         (PLACE,),
         np.zeros(1),
         held_out_curves([[part]], {c: w for c, (w, _) in weights.items()}),
+        {PLACE: np.array([NOISE])},
     )
 
 
 def page_of(tmp_path, found):
     path = tmp_path / "diagnosis.html"
-    write_diagnosis_page(path, found, diagnosis_data(found))
+    data = diagnosis_data(found)
+    data["not_excited"][0]["separating_experiment"] = "experiment.yaml"
+    write_diagnosis_page(path, found, data)
     return path.read_text(encoding="utf-8")
 
 
@@ -163,6 +166,7 @@ def test_the_page_says_all_that_was_found(tmp_path):
     assert "90.0" in ranking
     assert "winch_backlash" in section(page, "silent")
     assert "from winch_load_friction" in section(page, "next")
+    assert "<a href='experiment.yaml'>" in section(page, "next")
     assert section(page, "evidence").count("plotly-graph-div") == 2
     assert "ab" * 32 in section(page, "sources")
     assert "<script src" not in page

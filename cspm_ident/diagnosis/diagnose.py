@@ -70,6 +70,7 @@ class Diagnosis:
         places: the residuals that there are.
         starts: of the blocks [s], shape (blocks,).
         curves: the residuals on what was not searched, over time.
+        noise: of each residual, what differs from row to row, one number per channel.
     """
 
     searched: Sequence[Measurement]
@@ -82,6 +83,7 @@ class Diagnosis:
     places: tuple[Place, ...]
     starts: Array
     curves: tuple[Curve, ...]
+    noise: dict[Place, Array]
 
 
 def diagnose(
@@ -128,6 +130,7 @@ def diagnose(
         tuple(place.place for place in evidence.places),
         evidence.times,
         held_out_curves(judge_parts, {c: w for c, (w, _) in _weights(search, kept).items()}),
+        noise,
     )
 
 

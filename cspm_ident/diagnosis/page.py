@@ -250,17 +250,31 @@ def _next(found: Diagnosis, data: dict[str, Any]) -> str:
             f"<code>cspm run SCENARIO --testbed {IMPROVED}</code> simulates the machine with what"
             " was found."
         )
-    for named in found.findings.named:
-        for rival, _ in named.alternatives:
-            pair = f"{named.hypothesis.effect.id} from {rival.effect.id}"
-            steps.append(
-                escape(f"To tell {pair}: {named.hypothesis.effect.separating_experiment}.")
-            )
+    for finding in data["findings"]:
+        for rival in finding["alternatives"]:
+            pair = f"To tell {finding['effect']} from {rival['effect']}"
+            advice = catalogue()[finding["effect"]].separating_experiment
+            steps.append(_experiment(pair, rival["separating_experiment"], advice))
+    shown: dict[str, list[str]] = {}
+    for each in data["not_excited"]:
+        if each.get("separating_experiment"):
+            shown.setdefault(each["separating_experiment"], []).append(each["effect"])
+    for name, effects in shown.items():
+        steps.append(_experiment(f"To make {', '.join(effects)} testable", name, ""))
     if found.findings.unknown:
         steps.append("Describe what was found as unknown as an effect of your own.")
     if not steps:
         steps.append("Nothing has to be done. What was not testable needs other recordings.")
     return f"<ul>{''.join(f'<li>{step}</li>' for step in steps)}</ul>"
+
+
+def _experiment(purpose: str, file: str | None, advice: str) -> str:
+    """Return one line of HTML: which scenario to run, or what to do where there is none."""
+    if file is None:
+        reason = "no motion that the recordings show to be safe tells more than they do"
+        return escape(f"{purpose}: {advice} ({reason}).")
+    said = escape(f"{purpose}, record ")
+    return f"{said}<a href='{escape(file)}'><code>cspm run {escape(file)}</code></a>."
 
 
 def _sources(data: dict[str, Any]) -> str:

@@ -53,10 +53,12 @@ def plans(sea):
     return safe_plans(sea, "testbed.yaml")
 
 
-def test_a_plan_leaves_no_residual_but_the_dampers(sea):
+def test_a_plan_leaves_no_residual_but_the_dampers():
     """The planned signals obey all equations, but for the dampers, which the plan leaves out."""
     damping = catalogue()["cable_axial_damping"]
-    for equation in equations_of(sea, [damping]):
+    calm = planned(load_scenario(SCENARIOS / "calm.yaml", ["duration=12"]), THESIS)
+    assert np.mean(calm.missed > 0.05) < 0.02
+    for equation in equations_of(calm.measurement, [damping]):
         columns = equation.columns.get(Candidate(damping, equation.place.element))
         left = equation.target
         if columns is not None:
@@ -65,9 +67,12 @@ def test_a_plan_leaves_no_residual_but_the_dampers(sea):
             # One less than the file's own damping: none.
             assert weights[0] == pytest.approx(-1.0, abs=0.1)
             left = left - (free @ weights)[:, None]
-        shares = np.std(left, axis=0) / np.std(equation.measured, axis=0)
-        # Cables at their least tension miss some of the wanted wrench, and roll is not controlled.
-        assert np.median(shares) < 0.05, equation.place
+        scale = np.std(equation.measured, axis=0)
+        if equation.place.element == "bar":
+            weight = THESIS.testbed.bar.mass * THESIS.testbed.gravity
+            # Roll is not controlled, and what the least tensions miss is left.
+            scale = weight * np.array([1.0, 1.0, 1.0, np.inf, 0.5, 0.5])
+        assert np.all(np.std(left, axis=0) < 0.02 * scale), equation.place
 
 
 @pytest.mark.slow
@@ -142,33 +147,32 @@ def test_a_rig_without_a_bar_is_turned_up_and_down():
         assert parse_scenario(dump_yaml(scenario.model_dump(mode="json")), "x") == scenario
 
 
+@pytest.fixture(scope="module")
+def gentle(tmp_path_factory):
+    """Five seconds of a calm sea on the second plant, with its sensors' noise, and what is safe."""
+    pytest.importorskip("mujoco", minversion="4.0", reason="the MuJoCo plant needs MuJoCo 4")
+    calm = load_scenario(SCENARIOS / "calm.yaml", ["duration=5"])
+    recorded = recorded_on("mujoco", tmp_path_factory.mktemp("gentle") / "calm", calm)
+    return recorded, safe_plans(recorded, "testbeds/thesis.yaml")
+
+
 @pytest.mark.slow
 @pytest.mark.compiled
-@pytest.mark.parametrize("twins", TWINS)
-def test_the_experiment_separates_twins_better_than_the_recording(tmp_path, twins):
-    """Both run on the second plant, with its sensors' noise."""
-    pytest.importorskip("mujoco", minversion="4.0", reason="the MuJoCo plant needs MuJoCo 4")
-    recorded = on_mujoco(tmp_path / "calm", load_scenario(SCENARIOS / "calm.yaml", ["duration=8"]))
+@pytest.mark.parametrize(("twins", "plant"), [("friction", "mujoco"), ("bias", "sim")])
+def test_the_experiment_separates_twins_better_than_the_recording(tmp_path, gentle, twins, plant):
+    """The experiment is run; the choice knew the recording and the plans alone."""
+    recorded, plans = gentle
     question = TWINS[twins]
-    equations = equations_of(recorded, question.effects)
-    noise = {e.place: e.noise for e in equations}
-    answer = best_answer([recorded], noise, question, safe_plans(recorded, "testbeds/thesis.yaml"))
-    experiment = on_mujoco(
-        tmp_path / "better", answer.scenario.model_copy(update={"duration": 16.0})
-    )
-    apart = []
-    for measured in (recorded, experiment):
-        whole = separation(
-            equations_of(measured, question.effects), noise, question.truth, question.rivals
-        )
-        apart.append(whole / np.sqrt(measured.duration))
-    assert apart[1] > 1.1 * apart[0]
-    assert answer.recorded == pytest.approx(apart[0], rel=1e-6)
+    noise = {e.place: e.noise for e in equations_of(recorded, [])}
+    answer = best_answer([recorded], noise, question, plans)
+    shorter = answer.scenario.model_copy(update={"duration": 8.0})
+    experiment = recorded_on(plant, tmp_path / "better", shorter)
+    equations = equations_of(experiment, question.effects)
+    whole = separation(equations, noise, question.truth, question.rivals)
+    assert whole / np.sqrt(experiment.duration) > 1.1 * answer.recorded
 
 
-def on_mujoco(folder, scenario):
+def recorded_on(plant, folder, scenario):
     bundle = make_bundle(resolve(scenario, THESIS.testbed), THESIS, SCENARIOS)
-    result = run(replace(bundle, plant="mujoco"), folder)
-    assert result.failure is None
-    assert result.tally is not None
+    assert run(replace(bundle, plant=plant), folder).failure is None
     return read_measurement(folder)

@@ -23,6 +23,7 @@ Array = NDArray[np.float64]
 # Of a tension, for derivatives by differences.
 _STEP_N = 1e-4
 _ROUNDING = 1e-9
+_CANCELLED = 1e-3
 
 
 class Sensors(Enum):
@@ -118,9 +119,14 @@ def _seen_at_drum(
         added = {e.place: e.target for e in equations_of(there, [])}
         for equation in equations:
             changes[equation.place].append((added[equation.place] - equation.target) / step)
-    return {
-        place: columns.get(place, 0.0) + np.stack(each, axis=2) for place, each in changes.items()
-    }
+    found = {}
+    for place, each in changes.items():
+        added_here, own = np.stack(each, axis=2), columns.get(place)
+        whole = added_here if own is None else added_here + own
+        # What cancels but for the joining of samples is nothing.
+        if own is None or np.linalg.norm(whole) > _CANCELLED * np.linalg.norm(own):
+            found[place] = whole
+    return found
 
 
 def _tension_lost(measurement: Measurement, effect: Effect, i: int) -> Array:

@@ -80,7 +80,7 @@ class _Files:
 
 def _scenario_text(scenario: Scenario) -> str:
     """Return a scenario as YAML, without the keys whose values are those that they have anyway."""
-    usual = Scenario(name="usual", testbed=TESTBED, duration=1.0).model_dump(mode="json")
+    usual = Scenario(name="", testbed="", duration=1.0).model_dump(mode="json")
     content = scenario.model_dump(mode="json")
     return dump_yaml({key: value for key, value in content.items() if value != usual[key]})
 

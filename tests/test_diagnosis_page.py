@@ -170,6 +170,7 @@ def test_the_page_says_all_that_was_found(tmp_path):
     assert section(page, "evidence").count("plotly-graph-div") == 2
     assert "ab" * 32 in section(page, "sources")
     assert "<script src" not in page
+    assert '"name":"after"' in page
 
 
 def test_a_page_without_findings_says_so(tmp_path):
@@ -178,6 +179,9 @@ def test_a_page_without_findings_says_so(tmp_path):
     assert "None of 485 stood" in section(page, "hypotheses")
     assert 'id="parameters"' not in page
     assert "no part" in section(page, "where")
+    # What was not found changes nothing: there is no after to be drawn.
+    assert '"name":"before"' in page
+    assert '"name":"after"' not in page
 
 
 def test_an_unknown_shape_marks_the_part_of_its_residual(tmp_path):

@@ -6,11 +6,16 @@ import numpy as np
 import pytest
 from run_samples import SCENARIOS
 
+from cspm_bringup import experiment_files
 from cspm_bringup.assembly import resolve
 from cspm_bringup.bundle import make_bundle
 from cspm_bringup.run import run
-from cspm_ident.diagnosis.columns import Candidate
+from cspm_ident.diagnosis.columns import Candidate, Place
+from cspm_ident.diagnosis.diagnose import Diagnosis, HeldOut
 from cspm_ident.diagnosis.recorded import equations_of
+from cspm_ident.diagnosis.search import Findings, Hypothesis, Named
+from cspm_ident.diagnosis.sums import Gain
+from cspm_ident.diagnosis.verdict import diagnosis_data
 from cspm_ident.experiment.choice import Question, best_answer, is_safe, most_showing, safe_plans
 from cspm_ident.experiment.envelope import reach_of
 from cspm_ident.experiment.excitations import DURATION_S, excitations
@@ -21,7 +26,7 @@ from cspm_ident.signals.samples import Samples
 from cspm_msgs_py.scenario import load_scenario, parse_scenario
 from cspm_msgs_py.testbed import load_testbed
 from cspm_msgs_py.yaml_file import dump_yaml
-from cspm_sim.effects import catalogue
+from cspm_sim.effects import Channel, catalogue
 
 THESIS = load_testbed(SCENARIOS / "testbeds" / "thesis.yaml")
 ONE_WINCH = load_testbed(SCENARIOS / "testbeds" / "one_winch.yaml")
@@ -50,7 +55,9 @@ def sea():
 
 @pytest.fixture(scope="module")
 def plans(sea):
-    return safe_plans(sea, "testbed.yaml")
+    wanted = ("slow_sea", "postures")
+    scenarios = [s for s in excitations(sea, "testbed.yaml") if s.name in wanted]
+    return [(scenario, planned(scenario, THESIS)) for scenario in scenarios]
 
 
 def test_a_plan_leaves_no_residual_but_the_dampers():
@@ -88,9 +95,8 @@ def test_excitations_stay_within_what_was_recorded(sea):
             assert np.all(again.speed[moving] <= 1.4 * np.maximum(seen.speed, 0.02)[moving])
 
 
-def test_plans_that_would_overload_are_refused(sea, plans):
+def test_plans_that_would_overload_are_refused(plans):
     machine = THESIS.testbed
-    assert {s.name for s, _ in plans} >= {"slow_sea", "postures", "heights"}
     for _, plan in plans:
         assert is_safe(plan, machine)
         tension = plan.measurement.tension
@@ -117,12 +123,13 @@ def test_a_separation_is_what_the_rival_cannot_imitate(sea):
 
 
 def test_what_cannot_show_safely_is_not_promised(plans):
-    few = plans[:2]
+    few = plans[:1]
     scenario, shown = most_showing([RUBBING.effect, catalogue()["winch_backlash"]], few)
     # Backlash shows where a cable is slack, which no safe motion makes it.
     assert shown == {"winch_coulomb_friction"}
     assert scenario.duration == DURATION_S
     assert most_showing([catalogue()["winch_backlash"]], few) is None
+    assert most_showing([RUBBING.effect], []) is None
 
 
 def test_a_rig_without_a_bar_is_turned_up_and_down():
@@ -147,6 +154,47 @@ def test_a_rig_without_a_bar_is_turned_up_and_down():
         assert parse_scenario(dump_yaml(scenario.model_dump(mode="json")), "x") == scenario
 
 
+@pytest.mark.slow
+@pytest.mark.compiled
+def test_ties_and_what_was_not_testable_become_scenarios_that_run(
+    sea, plans, tmp_path, monkeypatch
+):
+    monkeypatch.setattr(experiment_files, "safe_plans", lambda *_: plans)
+    found = tied(sea)
+    data = diagnosis_data(found)
+    # The same motion shows it and separates the twins, or there are two files.
+    data["not_excited"] = [
+        {"effect": name, "elements": []} for name in ("winch_viscous_friction", "winch_backlash")
+    ]
+    data["model"] = None
+    experiment_files.write_experiments(tmp_path, found, data)
+    (alternative,) = data["findings"][0]["alternatives"]
+    assert alternative["separating_experiment"] == "experiment.yaml"
+    shown = {e["effect"]: e["separating_experiment"] for e in data["not_excited"]}
+    assert shown["winch_backlash"] is None
+    assert shown["winch_viscous_friction"] in ("experiment.yaml", "experiment_2.yaml")
+    scenario = load_scenario(tmp_path / "experiment.yaml", ["duration=0.5"])
+    assert "winch_coulomb_friction on surge_2 from winch_load_friction" in scenario.description
+    testbed = load_testbed(tmp_path / scenario.testbed)
+    assert testbed.testbed == THESIS.testbed
+    bundle = make_bundle(resolve(scenario, testbed.testbed), testbed, tmp_path)
+    assert run(bundle, None).failure is None
+
+
+def tied(measurement):
+    """A diagnosis that found dry friction on one winch, and friction by load as likely."""
+    noise = {e.place: np.full(e.target.shape[1], 1e-3) for e in equations_of(measurement, [])}
+    # So little was recorded that any motion tells more.
+    short = measurement.within(0.0, 2.5)
+    rival = (Hypothesis(LOADED.effect, (LOADED,)), Gain(1.0, 10.0))
+    named = Named(Hypothesis(RUBBING.effect, (RUBBING,)), Gain(9.0, 1.0), 0.9, (rival,), 0)
+    weights = {RUBBING: (np.array([0.03]), np.array([0.001]))}
+    fit = HeldOut(Place(Channel.SHAFT, "surge_2"), 0.1, 0.03, 0.03, 0.001, 0.001)
+    findings = Findings((named,), (), 1)
+    starts = np.zeros(1)
+    return Diagnosis((short,), (), findings, (), weights, (fit,), (), (), starts, (), noise)
+
+
 @pytest.fixture(scope="module")
 def gentle(tmp_path_factory):
     """Five seconds of a calm sea on the second plant, with its sensors' noise, and what is safe."""
@@ -162,6 +210,7 @@ def gentle(tmp_path_factory):
 def test_the_experiment_separates_twins_better_than_the_recording(tmp_path, gentle, twins, plant):
     """The experiment is run; the choice knew the recording and the plans alone."""
     recorded, plans = gentle
+    assert {scenario.name for scenario, _ in plans} >= {"slow_sea", "postures", "heights"}
     question = TWINS[twins]
     noise = {e.place: e.noise for e in equations_of(recorded, [])}
     answer = best_answer([recorded], noise, question, plans)

@@ -24,7 +24,8 @@ _DIGITS = 5
 def driver_figure(curve: Curve) -> go.Figure:
     """Return the residual before and after against the signal that explains most of it.
 
-    Dots are samples, lines the means over bins that hold equally many.
+    Dots are samples, lines the means over bins that hold equally many. Where nothing that was
+    found acts on it there is no after.
     """
     figure = go.Figure()
     name = curve.main_signal
@@ -32,10 +33,9 @@ def driver_figure(curve: Curve) -> go.Figure:
     step = max(1, len(signal) // _POINTS)
     edges, home = bins_of(signal)
     centres = _means(signal, home, len(edges) - 1)
-    stages = (
-        (curve.before, "before", _BEFORE, "circle"),
-        (curve.after, "after", _AFTER, "diamond"),
-    )
+    stages = [(curve.before, "before", _BEFORE, "circle")]
+    if curve.touched:
+        stages.append((curve.after, "after", _AFTER, "diamond"))
     for values, stage, colour, symbol in stages:
         marker = {"color": colour, "size": 4, "symbol": symbol}
         shown = _short(signal[::step]), _short(values[::step])
@@ -59,13 +59,14 @@ def overlay_figure(curve: Curve) -> go.Figure:
     """Return what was measured with what the model says of it, and the residuals, over time."""
     figure = make_subplots(rows=2, cols=1, shared_xaxes=True, vertical_spacing=0.06)
     model, improved = curve.measured - curve.before, curve.measured - curve.after
-    for values, name, colour, row in (
+    lines = [
         (curve.measured, "measured", _MEASURED, 1),
         (model, "before", _BEFORE, 1),
-        (improved, "after", _AFTER, 1),
         (curve.before, "before", _BEFORE, 2),
-        (curve.after, "after", _AFTER, 2),
-    ):
+    ]
+    if curve.touched:
+        lines += [(improved, "after", _AFTER, 1), (curve.after, "after", _AFTER, 2)]
+    for values, name, colour, row in lines:
         times, shown = _line(curve.times, values)
         # What was measured lies below and is wider, so that it shows where the model agrees.
         width = 4.0 if name == "measured" else 1.2

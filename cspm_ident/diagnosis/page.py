@@ -163,9 +163,10 @@ def _size(curve: Curve) -> float:
 def _caption(curve: Curve) -> str:
     of = f", {curve.component}" if curve.component else ""
     before, after = (float(np.sqrt(np.mean(v**2))) for v in (curve.before, curve.after))
+    then = f" before and {after:.3g} {curve.unit} after" if curve.touched else ""
     return (
         f"{part_behind(curve.place).words}{of}: the residual is measured less modelled; its root"
-        f" mean square is {before:.3g} {curve.unit} before and {after:.3g} {curve.unit} after."
+        f" mean square is {before:.3g} {curve.unit}{then}."
     )
 
 

@@ -55,15 +55,15 @@ def _bar_excitations(
         ("even", 1.0, pace),
         ("quick", 0.5, 2.0 * pace),
     ):
-        sea = _sea(size * reach, frequency)
-        yield _scenario(f"{name}_sea", testbed, home.model_copy(update={"motion": sea}))
+        sea = home.model_copy(update={"motion": _sea(size * reach, frequency)})
+        yield _scenario(f"{name}_sea", testbed, sea)
     for name, moves in (
         ("one_axis_after_the_other", _axis_moves(reach, speed)),
         ("postures", _postures(reach, speed)),
         ("heights", _ladder(reach, speed)),
     ):
-        motion = MovesMotion(moves=tuple(moves))
-        yield _scenario(name, testbed, home.model_copy(update={"motion": motion}))
+        path = home.model_copy(update={"motion": MovesMotion(moves=tuple(moves))})
+        yield _scenario(name, testbed, path)
     if frame is not None:
         pace = float(np.max(frame.speed) / (2.0 * pi * np.max(frame.excursion)))
         motion = _sea(share * frame.excursion, pace)

@@ -38,7 +38,7 @@ from cspm_sim.parameters import nominal_parameters
 Array = NDArray[np.float64]
 
 STEP_S = 0.005
-_ROUNDS = 3
+_ROUNDS = 2
 
 
 class Plan(NamedTuple):

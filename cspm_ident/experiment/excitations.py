@@ -61,6 +61,7 @@ def _bar_excitations(
         ("one_axis_after_the_other", _axis_moves(reach, speed)),
         ("postures", _postures(reach, speed)),
         ("heights", _ladder(reach, speed)),
+        ("reversals_at_levels", _reversals(reach, speed)),
     ):
         path = home.model_copy(update={"motion": MovesMotion(moves=tuple(moves))})
         yield _scenario(name, testbed, path)
@@ -142,6 +143,19 @@ def _ladder(reach: Array, speed: Array) -> Iterator[Move]:
             move = _move(time, by, pace * speed)
             time = move.end + _REST_S
             yield move
+
+
+def _reversals(reach: Array, speed: Array) -> Iterator[Move]:
+    """Yield moves up and down at places to the side, where the cables' tensions differ."""
+    time, here = 1.0, np.zeros(6)
+    for level in (0.5, 1.0, 0.5, 0.0, -0.5, -1.0, -0.5, 0.0):
+        there = level * reach * np.array([1.0, 1.0, 0.0, 0.0, 1.0, 1.0])
+        path = [there - here, *(np.array([0.0, 0.0, s * reach[2], 0, 0, 0]) for s in (1, -2, 1))]
+        for by in path:
+            move = _move(time, by, speed)
+            time = move.end
+            yield move
+        here = there
 
 
 def _move(time: float, by: Array, speed: Array) -> Move:

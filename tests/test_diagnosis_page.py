@@ -148,6 +148,11 @@ def test_the_drawing_has_every_part_at_its_place():
     top, bottom = (float(re.search(rf'y{k}="([^"]*)"', line)[1]) for k in (1, 2))
     # z is down in the world and on the screen.
     assert top < bottom
+    low, high = (
+        float(re.search(r'viewBox="0 0 \S+ (\S+)"', drawing(machine.testbed, pose, None, []))[1])
+        for machine, pose in ((ONE_WINCH, None), (THESIS, BAR_POSE))
+    )
+    assert low < 0.3 * high
     rig = drawing(ONE_WINCH.testbed, None, None, [Part(Kind.CABLE, "surge")])
     assert rig.count("<title>") == 3
 
@@ -189,6 +194,9 @@ def test_an_unknown_shape_marks_the_part_of_its_residual(tmp_path):
     page = page_of(tmp_path, diagnosis(named=False, unknown=[driver]))
     assert "Diagnosis of today: unknown" in page
     assert "winch surge" in section(page, "where")
+    # Against the signal that was named, though another one explains more.
+    assert '"text":"tension [N]"' in section(page, "evidence")
+    assert '"text":"speed [rad\\u002fs]"' not in section(page, "evidence")
     assert "40 %" in section(page, "hypotheses")
 
 

@@ -53,7 +53,7 @@ def drawing(
     bodies = _bodies(machine, bar_pose, frame_pose)
     ends = _ends(machine, bar_pose, frame_pose)
     corners = [point for _, box in bodies for point in box]
-    place = _placing(np.array([*corners, *(end for pair in ends for end in pair)]))
+    place, height = _placing(np.array([*corners, *(end for pair in ends for end in pair)]))
     shapes: list[tuple[Part, str, Point]] = []
     for name, box in bodies:
         shapes += _body(name, [place(corner) for corner in box], Part(Kind.BODY, name) in marked)
@@ -61,7 +61,7 @@ def drawing(
         shapes += _cable(cable.name, place(top), place(bottom), cable.has_cable, marked)
     label = "test-bed" + "".join(f", {part.words} marked" for part in marked)
     return (
-        f'<svg viewBox="0 0 {_WIDTH:g} {_HEIGHT:g}" role=img aria-label="{escape(label)}"'
+        f'<svg viewBox="0 0 {_WIDTH:g} {height:.0f}" role=img aria-label="{escape(label)}"'
         ' style="width:100%;max-width:600px;height:auto">'
         f"{''.join(_grouped(part, shape, part in marked) for part, shape, _ in shapes)}"
         f"{''.join(_names(shapes, marked))}</svg>"
@@ -105,19 +105,22 @@ def _ends(
     return found
 
 
-def _placing(points: Array) -> Placed:
-    """Return the way from the world [m] to the picture [px] that shows all points."""
+def _placing(points: Array) -> tuple[Placed, float]:
+    """Return the way from the world [m] to the picture [px] that shows all points, and its height.
+
+    No machine is drawn larger than fits; a flat one has a low picture.
+    """
     flat = np.array([_flat(point) for point in points])
     low, size = flat.min(axis=0), np.ptp(flat, axis=0)
     room = np.array([_WIDTH, _HEIGHT]) - 2.0 * _EDGE
     scale = float(np.min(room / np.maximum(size, 1e-6)))
-    shift = _EDGE + 0.5 * (room - scale * size)
+    shift = np.array([_EDGE + 0.5 * (room[0] - scale * size[0]), _EDGE])
 
     def place(point: Array) -> Point:
         x, y = shift + scale * (_flat(point) - low)
         return float(x), float(y)
 
-    return place
+    return place, float(scale * size[1] + 2.0 * _EDGE)
 
 
 def _flat(point: Array) -> Array:

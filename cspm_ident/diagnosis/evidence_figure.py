@@ -21,14 +21,13 @@ _DOTS = {"mode": "markers", "opacity": 0.35}
 _DIGITS = 5
 
 
-def driver_figure(curve: Curve) -> go.Figure:
-    """Return the residual before and after against the signal that explains most of it.
+def driver_figure(curve: Curve, name: str) -> go.Figure:
+    """Return the residual before and after against one of its signals.
 
     Dots are samples, lines the means over bins that hold equally many. Where nothing that was
     found acts on it there is no after.
     """
     figure = go.Figure()
-    name = curve.main_signal
     signal = curve.signals[name]
     step = max(1, len(signal) // _POINTS)
     edges, home = bins_of(signal)

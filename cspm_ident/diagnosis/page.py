@@ -20,7 +20,6 @@ from cspm_ident.diagnosis.verdict import (
     IMPROVED,
     Verdict,
     channel_of,
-    probability_of,
     unit_of,
     verdict_of,
 )
@@ -75,7 +74,7 @@ def write_diagnosis_page(path: Path, found: Diagnosis, data: dict[str, Any]) -> 
         "where": _where(found),
         "evidence": _evidence(found),
         "parameters": _parameters(data),
-        "hypotheses": _hypotheses(found),
+        "hypotheses": _hypotheses(found, data),
         "fit": _fit(found),
         "silent": _silent(data),
         "next": _next(found, data),
@@ -124,29 +123,35 @@ def _evidence(found: Diagnosis) -> str:
     """Return the figures of each finding, or of the largest residual where nothing was found."""
     texts = []
     script = True
-    for heading, curves in _subjects(found):
+    for heading, curves, driver in _subjects(found):
         texts.append(f"<h3>{escape(heading)}</h3>")
         for curve in curves:
             texts.append(f"<p>{escape(_caption(curve))}</p>")
-            if curve.main_signal:
-                texts.append(figure_html(driver_figure(curve), script=script))
+            signal = driver or curve.main_signal
+            if signal:
+                texts.append(figure_html(driver_figure(curve, signal), script=script))
                 script = False
             texts.append(figure_html(overlay_figure(curve), script=script))
             script = False
     return "".join(texts)
 
 
-def _subjects(found: Diagnosis) -> Iterable[tuple[str, Sequence[Curve]]]:
+def _subjects(found: Diagnosis) -> Iterable[tuple[str, Sequence[Curve], str]]:
+    """Yield headings, what to draw, and against which signal; empty: that which explains most."""
     for named in found.findings.named:
         own = [c for c in found.curves if _touches(named.hypothesis, c)]
         own.sort(key=lambda curve: -curve.gained)
-        yield _words(named.hypothesis), own[:_MOST_CURVES]
+        yield _words(named.hypothesis), own[:_MOST_CURVES], ""
     for driver, _, _ in found.findings.unknown:
         own = [c for c in found.curves if c.place == driver.place and driver.signal in c.signals]
-        yield f"unknown, a function of {driver.signal} of {driver.place.element}", own[:1]
+        yield (
+            f"unknown, a function of {driver.signal} of {driver.place.element}",
+            own[:1],
+            driver.signal,
+        )
     if not found.findings.named and not found.findings.unknown and found.curves:
         largest = max(found.curves, key=_size)
-        yield "nothing found; the residual that is largest against what was measured", [largest]
+        yield "nothing found; the residual that is largest against what was measured", [largest], ""
 
 
 def _touches(hypothesis: Hypothesis, curve: Curve) -> bool:
@@ -184,10 +189,10 @@ def _parameters(data: dict[str, Any]) -> str:
     return table_html(heads, rows, "parameters") if rows else ""
 
 
-def _hypotheses(found: Diagnosis) -> str:
+def _hypotheses(found: Diagnosis, data: dict[str, Any]) -> str:
     rows: list[tuple[str, ...]] = []
-    for named in found.findings.named:
-        rows += _ranked(named)
+    for named, finding in zip(found.findings.named, data["findings"], strict=False):
+        rows += _ranked(named, finding)
     for named in found.rejected:
         size = _in_errors(named.gain.total, named.gain.error)
         rows.append((_words(named.hypothesis), "not kept", "", size, "no help on held-out data"))
@@ -202,14 +207,16 @@ def _hypotheses(found: Diagnosis) -> str:
     return count + table_html(heads, rows, "hypotheses and their evidence")
 
 
-def _ranked(named: Named) -> Iterable[tuple[str, ...]]:
-    own = probability_of(named)
+def _ranked(named: Named, finding: dict[str, Any]) -> Iterable[tuple[str, ...]]:
+    """Yield a finding's row and those of its alternatives, the best first."""
     verdict = "tied" if named.alternatives else "found"
     size = _in_errors(named.gain.total, named.gain.error)
-    yield _words(named.hypothesis), verdict, f"{own:.2f}", size, f"{100 * named.share:.0f} %"
-    for rival, worse in sorted(named.alternatives, key=lambda each: each[1].total):
-        behind = _in_errors(worse.total, worse.error)
-        yield _words(rival), "explains it as well", "", f"{behind} behind", ""
+    likely, taken = f"{finding['probability']:.2f}", f"{100 * named.share:.0f} %"
+    yield _words(named.hypothesis), verdict, likely, size, taken
+    rivals = zip(named.alternatives, finding["alternatives"], strict=True)
+    for (rival, worse), entry in sorted(rivals, key=lambda each: each[0][1].total):
+        behind = f"{_in_errors(worse.total, worse.error)} behind"
+        yield _words(rival), "explains it as well", f"{entry['probability']:.2f}", behind, ""
 
 
 def _in_errors(total: float, error: float) -> str:

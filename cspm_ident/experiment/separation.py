@@ -39,15 +39,33 @@ def separation(
         rivals: candidates whose weights are free.
     """
     (known,) = in_noise([equations], noise)
-    starts = np.cumsum([0, *(each.nuisance.shape[2] for each in known)])
-    widths = [_width(known, rival) for rival in rivals]
-    acting, rows = [], []
-    for equation, first in zip(known, starts[:-1], strict=True):
+    if not known:
+        return 0.0
+    target = np.concatenate([_acting(each, truth).reshape(-1) for each in known])
+    table = _free(known, rivals)
+    sizes = np.linalg.norm(table, axis=0)
+    table = table[:, sizes > 0.0] / sizes[sizes > 0.0]
+    if table.shape[1]:
+        target = target - table @ np.linalg.lstsq(table, target, rcond=None)[0]
+    return float(np.linalg.norm(target))
+
+
+def _acting(equation: Equation, truth: Mapping[Candidate, Array]) -> Array:
+    """Return what candidates with given weights add to a residual, (k, channels)."""
+    out = np.zeros(equation.target.shape)
+    for candidate, weights in truth.items():
+        if candidate in equation.columns:
+            out += equation.columns[candidate] @ weights
+    return out
+
+
+def _free(equations: Sequence[Equation], rivals: Sequence[Candidate]) -> Array:
+    """Return the columns of the rivals and of each equation's own nuisance, one row per number."""
+    starts = np.cumsum([0, *(each.nuisance.shape[2] for each in equations)])
+    widths = [_width(equations, rival) for rival in rivals]
+    rows = []
+    for equation, first in zip(equations, starts[:-1], strict=True):
         shape = equation.target.shape
-        effect = np.zeros(shape)
-        for candidate, weights in truth.items():
-            if candidate in equation.columns:
-                effect += equation.columns[candidate] @ weights
         parts = [
             equation.columns.get(rival, np.zeros((*shape, width)))
             for rival, width in zip(rivals, widths, strict=True)
@@ -56,16 +74,8 @@ def separation(
         if equation.nuisance.size:
             own[:, :, first : first + equation.nuisance.shape[2]] = equation.nuisance
         table = np.concatenate([*parts, own], axis=2)
-        acting.append(effect.reshape(-1))
         rows.append(table.reshape(-1, table.shape[2]))
-    if not acting:
-        return 0.0
-    target, table = np.concatenate(acting), np.concatenate(rows)
-    sizes = np.linalg.norm(table, axis=0)
-    table = table[:, sizes > 0.0] / sizes[sizes > 0.0]
-    if not table.shape[1]:
-        return float(np.linalg.norm(target))
-    return float(np.linalg.norm(target - table @ np.linalg.lstsq(table, target, rcond=None)[0]))
+    return np.concatenate(rows)
 
 
 def _width(equations: Sequence[Equation], candidate: Candidate) -> int:

@@ -16,8 +16,8 @@ from bench.thesis_machine import SCENARIOS
 from cspm_bringup.assembly import resolve
 from cspm_bringup.bundle import make_bundle
 from cspm_bringup.run import run
-from cspm_ident.diagnosis.diagnose import diagnose
-from cspm_ident.diagnosis.verdict import members_of, numbers_of, verdict_of
+from cspm_ident.diagnosis.diagnose import diagnose, members_of
+from cspm_ident.diagnosis.verdict import numbers_of, verdict_of
 from cspm_ident.signals.measurement import read_measurement
 from cspm_msgs_py.scenario import load_scenario
 from cspm_msgs_py.testbed import EffectEntry, load_testbed
@@ -98,7 +98,7 @@ def judge(folder: Path) -> tuple[str, str, str]:
     took = time.perf_counter() - begun
     lines = []
     for named in found.findings.named:
-        for candidate in members_of(found, named.hypothesis):
+        for candidate in members_of(found.weights, named.hypothesis):
             numbers = ", ".join(
                 f"{n.name} {n.value:.4g} ({n.low:.4g} to {n.high:.4g})"
                 for n in numbers_of(found, candidate)

@@ -143,7 +143,8 @@ def run(
     if mode not in MODES:
         raise InputError(f"--mode {mode}: allowed: {', '.join(MODES)}")
     from cspm_bringup.commands import run_command
-    from cspm_bringup.plants import EXTERNAL, PLANTS
+    from cspm_bringup.plants import PLANTS
+    from cspm_msgs_py.recording.run_record import EXTERNAL
 
     if plant not in (*PLANTS, EXTERNAL):
         raise InputError(f"--plant {plant}: allowed: {', '.join((*PLANTS, EXTERNAL))}")

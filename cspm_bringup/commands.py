@@ -17,16 +17,17 @@ from rich.table import Table
 from cspm_bringup.assembly import resolve
 from cspm_bringup.bundle import Bundle, make_bundle
 from cspm_bringup.console import make_console, say
-from cspm_bringup.plants import EXTERNAL, SIM
+from cspm_bringup.plants import SIM
 from cspm_bringup.resim import resimulate
 from cspm_bringup.ros_install import find_ros
-from cspm_bringup.run import INPROCESS, RECORD_NAME, run
+from cspm_bringup.run import INPROCESS, run
 from cspm_bringup.run_result import RunResult
 from cspm_bringup.summary import print_summary, summary_data, write_json
 from cspm_msgs_py.errors import CspmError, InputError
 from cspm_msgs_py.new_folder import refuse_existing
 from cspm_msgs_py.recording.overview import overview
 from cspm_msgs_py.recording.recover import recover
+from cspm_msgs_py.recording.run_record import EXTERNAL, RECORD_NAME
 from cspm_msgs_py.scenario import load_scenario
 from cspm_msgs_py.testbed import TestbedFile, load_testbed
 from cspm_sim.parameters import plant_parameters

@@ -13,6 +13,7 @@ from rich.table import Table
 from cspm_bringup.console import make_console, say
 from cspm_bringup.experiment_files import write_experiments
 from cspm_bringup.summary import write_json
+from cspm_ident.block_simulation import Drive
 from cspm_ident.diagnosis.diagnose import Diagnosis, diagnose
 from cspm_ident.diagnosis.improved_file import improved_testbed
 from cspm_ident.diagnosis.verdict import (
@@ -107,29 +108,56 @@ def print_diagnosis(console: Console, found: Diagnosis) -> None:
                 f"  as well explained by {rival.effect.id} on {', '.join(rival.elements)};"
                 f" to tell: {rival.effect.separating_experiment}",
             )
-    for driver, _, share in found.findings.unknown:
-        say(console, f"• {unknown_statement(driver, share)}")
+    for k in range(len(found.shapes)):
+        say(console, f"• {unknown_statement(found, k)}")
     for named in found.rejected:
         say(
             console,
             f"not kept: {named.hypothesis.effect.id} on {', '.join(named.hypothesis.elements)}"
             " did not help on held-out data",
         )
-    console.print(_fit_table(found))
+    console.print(_residual_table(found))
+    if found.simulated:
+        console.print(_simulation_table(found))
     silent = ", ".join(name for name, _ in found.silent)
     if silent:
         say(console, f"not testable here: {silent}")
+    told = sorted({limit.effect for limit in found.limits if limit.possible})
+    if told:
+        say(
+            console,
+            f"{len(told)} effects would have been told from some size on, which diagnosis.json has"
+            " by element under detection_limits",
+        )
 
 
-def _fit_table(found: Diagnosis) -> Table:
-    judged = "held-out recordings" if found.held_out else "the last part, not searched"
-    table = Table(title=f"root mean square residual, {judged}", box=box.SIMPLE_HEAD)
-    for heading in ("residual", "before", "re-tuned", "after", "noise", "unit"):
-        table.add_column(heading, justify="left" if heading in ("residual", "unit") else "right")
+def _residual_table(found: Diagnosis) -> Table:
+    table = _table(f"residuals of the equations, {_judged(found)}", "black box", "noise")
     for fit in found.fit:
-        numbers = (fit.before, fit.retuned, fit.after, fit.noise)
+        numbers = (fit.before, fit.retuned, fit.after, fit.ceiling, fit.noise)
         table.add_row(channel_of(fit), *(f"{number:.3g}" for number in numbers), unit_of(fit))
     return table
+
+
+def _simulation_table(found: Diagnosis) -> Table:
+    table = _table(f"errors of simulations, {_judged(found)}", "noise")
+    for fit in found.simulated:
+        numbers = (fit.before, fit.retuned, fit.after, fit.floor)
+        drive = "torque" if fit.output.drive is Drive.SHAFT else fit.output.drive.value
+        name = f"{fit.output.name}, driven by {drive}"
+        table.add_row(name, *(f"{number:.3g}" for number in numbers), fit.output.unit)
+    return table
+
+
+def _table(title: str, *last: str) -> Table:
+    table = Table(title=f"{title}: root mean square", box=box.SIMPLE_HEAD)
+    for heading in ("", "before", "re-tuned", "after", *last, "unit"):
+        table.add_column(heading, justify="left" if heading in ("", "unit") else "right")
+    return table
+
+
+def _judged(found: Diagnosis) -> str:
+    return "held-out recordings" if found.held_out else "the last part, not searched"
 
 
 def _write(folder: Path, found: Diagnosis, data: dict[str, object]) -> None:

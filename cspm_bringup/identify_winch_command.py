@@ -15,9 +15,7 @@ from rich.table import Table
 from cspm_bringup.console import make_console, say
 from cspm_bringup.identify_outcome import hand_out
 from cspm_bringup.identify_rig import FITTED, interval_text
-from cspm_bringup.plants import PLANTS
-from cspm_bringup.run import RECORD_NAME
-from cspm_ident.signals.measurement import Measurement, read_measurement
+from cspm_ident.signals.measurement import read_measurement
 from cspm_ident.winch.fitted_file import fitted_testbed
 from cspm_ident.winch.identify_winches import (
     BAND_HZ,
@@ -27,7 +25,6 @@ from cspm_ident.winch.identify_winches import (
     identify_winches,
 )
 from cspm_msgs_py.new_folder import refuse_existing
-from cspm_msgs_py.recording.reader import Recording
 
 # From a parameter's unit at the shaft to that at the drum's rim, and the power of the radius.
 _AT_RIM = {"kg·m²": ("kg", 2), "N·m·s/rad": ("N·s/m", 2), "N·m": ("N", 1)}
@@ -69,7 +66,7 @@ def identify_winch_command(asked: WinchRequest, json: Path | None) -> None:
     refuse_existing(asked.out)
     searched = [read_measurement(path, asked.testbed) for path in asked.recordings]
     held_out = [read_measurement(path, asked.testbed) for path in asked.held_out]
-    age = torque_age(searched[0]) if asked.torque_age is None else asked.torque_age
+    age = searched[0].torque_age if asked.torque_age is None else asked.torque_age
     with make_console().status("") as status:
         result = identify_winches(
             searched,
@@ -82,18 +79,6 @@ def identify_winch_command(asked: WinchRequest, json: Path | None) -> None:
             progress=lambda text: status.update(escape(text)),
         )
     hand_out(result, print_winches, partial(_write, asked.testbed), asked.out, json)
-
-
-def torque_age(measurement: Measurement) -> float:
-    """Return how long before its stamp a recording's torque acted [s].
-
-    A simulated drive reports at each stamp the torque that it held since the one before, on average
-    half a period earlier; of other drives nothing is known, and 0 is returned.
-    """
-    with Recording(measurement.path) as recording:
-        simulated = recording.metadata.get(RECORD_NAME, {}).get("plant") in PLANTS
-    torque = measurement.torque
-    return 0.5 * torque.interval if simulated and torque is not None else 0.0
 
 
 def print_winches(console: Console, result: WinchesResult) -> None:

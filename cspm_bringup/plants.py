@@ -17,8 +17,6 @@ Array = NDArray[np.float64]
 SIM = "sim"
 MUJOCO = "mujoco"
 PLANTS = (SIM, MUJOCO)
-# Not simulated: somebody's drivers are in the plant's place.
-EXTERNAL = "external"
 # Earlier ones end the process when a control callback fails, and integrate damping otherwise.
 OLDEST_MUJOCO = 4
 

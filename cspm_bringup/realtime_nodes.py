@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 
 from cspm_bringup.assembly import assemble_simulator, assemble_stage
@@ -16,6 +16,7 @@ from cspm_control.stages.motion_stage import MotionStage
 from cspm_control.stages.torque_stage import TorqueStage
 from cspm_msgs_py.errors import InputError
 from cspm_msgs_py.graph import RECORDER, graph_of
+from cspm_msgs_py.recording.run_record import EXTERNAL
 from cspm_msgs_py.recording.writer import RecordingWriter
 from cspm_msgs_py.ros.contract_node import ContractNode
 from cspm_msgs_py.ros.leader import Leader
@@ -125,7 +126,9 @@ class RealtimeRun:
         Raises:
             InputError: the folder exists or cannot be created.
         """
-        return recording_of(self.bundle, folder, mode, self.topics())
+        simulated = PLANT in self.members
+        bundle = self.bundle if simulated else replace(self.bundle, plant=EXTERNAL)
+        return recording_of(bundle, folder, mode, self.topics())
 
     def recorder(
         self, node: ContractNode, writer: RecordingWriter, steps: int

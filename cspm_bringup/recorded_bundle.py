@@ -9,8 +9,8 @@ from pathlib import Path
 from cspm_bringup.assembly import resolve
 from cspm_bringup.bundle import SCENARIO, Bundle, read_bundle
 from cspm_bringup.plants import SIM
-from cspm_bringup.run import RECORD_NAME
 from cspm_msgs_py.recording.reader import Recording
+from cspm_msgs_py.recording.run_record import simulated_plant
 from cspm_msgs_py.scenario import parse_scenario
 
 
@@ -26,8 +26,8 @@ def recorded_bundle(path: Path, overrides: Sequence[str] = ()) -> Bundle:
     """
     with Recording(path) as recording:
         attachments = recording.attachments
-        record = recording.metadata.get(RECORD_NAME, {})
-    bundle = replace(read_bundle(attachments, str(path)), plant=record.get("plant", SIM))
+        plant = simulated_plant(recording) or SIM
+    bundle = replace(read_bundle(attachments, str(path)), plant=plant)
     if not overrides:
         return bundle
     text = attachments[SCENARIO].decode(errors="replace")

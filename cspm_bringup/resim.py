@@ -10,10 +10,11 @@ from pathlib import Path
 
 from cspm_bringup.bundle import read_bundle
 from cspm_bringup.plants import SIM
-from cspm_bringup.run import RECORD_NAME, run
+from cspm_bringup.run import run
 from cspm_msgs_py.errors import InputError
 from cspm_msgs_py.recording.difference import Difference, first_difference
 from cspm_msgs_py.recording.reader import Recording
+from cspm_msgs_py.recording.run_record import RECORD_NAME, simulated_plant
 
 
 @dataclass(frozen=True)
@@ -56,7 +57,8 @@ def _repeat(
     recording: Recording, path: Path, progress: Callable[[float, float], None]
 ) -> Resimulation:
     record = recording.metadata.get(RECORD_NAME, {})
-    bundle = replace(read_bundle(recording.attachments, str(path)), plant=record.get("plant", SIM))
+    plant = simulated_plant(recording) or SIM
+    bundle = replace(read_bundle(recording.attachments, str(path)), plant=plant)
     clock = recording.topics.get("/clock")
     if clock is None or not clock.count:
         raise InputError(f"{path}: has no /clock messages, allowed: a simulated recording")

@@ -25,7 +25,6 @@ from cspm_sim.simulator import Publish
 CONTRACT_VERSION = "1"
 PROGRESS_STEPS = 50
 INPROCESS = "inprocess"
-RECORD_NAME = "cspm"
 
 
 def run(

@@ -2,6 +2,7 @@
 
 import copy
 import os
+import sys
 import time
 from pathlib import Path
 
@@ -9,6 +10,7 @@ import hypothesis
 import numpy as np
 import pytest
 
+from cspm_bringup import cli
 from cspm_msgs_py.testbed import Testbed, load_testbed
 from cspm_msgs_py.yaml_file import validate
 
@@ -195,3 +197,31 @@ def _crowded():
     while time.perf_counter() < begun + 0.2:
         pass
     return time.process_time() - used < 0.98 * 0.2
+
+
+@pytest.fixture
+def captured(capsys):
+    """What catches the output of `cspm`; for a file to override."""
+    return capsys
+
+
+@pytest.fixture
+def columns():
+    """How wide the terminal of `cspm` is; for a file to override."""
+    return 200
+
+
+@pytest.fixture
+def cspm(monkeypatch, captured, columns, tmp_path):
+    """Run a command line in an empty folder; return exit code, stdout and stderr."""
+    monkeypatch.chdir(tmp_path)
+    monkeypatch.setenv("COLUMNS", str(columns))
+
+    def call(*arguments):
+        monkeypatch.setattr(sys, "argv", ["cspm", *map(str, arguments)])
+        with pytest.raises(SystemExit) as caught:
+            cli.main()
+        out, err = captured.readouterr()
+        return caught.value.code or 0, out, err
+
+    return call

@@ -11,10 +11,11 @@ from run_samples import SCENARIOS
 
 from cspm_ident.diagnosis.columns import Candidate, Place
 from cspm_ident.diagnosis.curves import explained_by, held_out_curves
-from cspm_ident.diagnosis.diagnose import Diagnosis, HeldOut
+from cspm_ident.diagnosis.diagnose import Diagnosis, Shape
 from cspm_ident.diagnosis.drawing import drawing
 from cspm_ident.diagnosis.drivers import Driver
 from cspm_ident.diagnosis.equation import Equation
+from cspm_ident.diagnosis.judgement import HeldOut
 from cspm_ident.diagnosis.page import write_diagnosis_page
 from cspm_ident.diagnosis.part import Kind, Part, part_of
 from cspm_ident.diagnosis.search import Findings, Hypothesis, Named
@@ -54,14 +55,19 @@ def diagnosis(named=True, alternatives=(), unknown=(), rejected=()):
     measured = Measurement(SCENARIOS / "today", "ab" * 32, THESIS, bar_pose=poses)
     weights = {RUBBING: (np.array([TORQUE]), np.array([0.001]))} if named else {}
     hypothesis = Hypothesis(RUBBING.effect, (RUBBING,))
-    found = (Named(hypothesis, Gain(900.0, 10.0), 0.99, tuple(alternatives), 0),) if named else ()
+    found = (Named(hypothesis, Gain(900.0, 10.0), 0.99, tuple(alternatives)),) if named else ()
     return Diagnosis(
         (measured,),
         (),
         Findings(found, tuple(unknown), 485),
         tuple(rejected),
         weights,
-        (HeldOut(PLACE, 0.15, TORQUE, TORQUE, NOISE, NOISE),),
+        (HeldOut(PLACE, 0.15, TORQUE, TORQUE, NOISE, NOISE, NOISE),),
+        (),
+        (None,) * len(found),
+        tuple(Shape(d, np.linspace(0.0, 1.0, 7), np.arange(7.0) - 3.0) for d, _, _ in unknown),
+        (None,) * len(found),
+        (),
         (("winch_backlash", ("sway_1",)),),
         (PLACE,),
         np.zeros(1),

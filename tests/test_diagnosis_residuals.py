@@ -4,12 +4,15 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from run_samples import SCENARIOS, run_to
+from run_samples import SCENARIOS, bundle_of, run_to
 
-from cspm_ident.diagnosis.columns import Place
+from cspm_bringup.run import run
+from cspm_ident.diagnosis.columns import Candidate, Place
+from cspm_ident.diagnosis.drive import sampled_constant, time_constant
 from cspm_ident.diagnosis.recorded import equations_of
+from cspm_ident.diagnosis.supposed import with_found
 from cspm_ident.signals.measurement import read_measurement
-from cspm_msgs_py.testbed import load_testbed
+from cspm_msgs_py.testbed import EffectEntry, load_testbed
 from cspm_sim.effect_entries import Action, altered_testbed
 from cspm_sim.effects import Channel, catalogue
 
@@ -57,7 +60,8 @@ def rms(values):
 
 def test_there_is_one_residual_per_winch_cable_and_bar(equations):
     cables = THESIS.testbed.cable_names
-    expected = {Place(c, n) for c in (Channel.SHAFT, Channel.TENSION) for n in cables}
+    kinds = (Channel.DRIVE, Channel.SHAFT, Channel.TENSION)
+    expected = {Place(kind, name) for kind in kinds for name in cables}
     assert set(equations) == expected | {Place(Channel.WRENCH, "bar")}
 
 
@@ -126,9 +130,52 @@ def test_a_late_motion_capture_leaves_its_column(measurement, equations, body):
 
 def test_without_load_cells_there_is_nothing_but_what_needs_none(measurement):
     deaf = replace(measurement, tension=None)
-    assert by_place(deaf) == {}
+    assert {place.channel for place in by_place(deaf)} == {Channel.DRIVE}
+    assert by_place(replace(deaf, command=None)) == {}
 
 
 def test_without_motion_capture_the_winches_are_left(measurement):
     blind = replace(measurement, bar_pose=None, frame_pose=None)
-    assert {place.channel for place in by_place(blind)} == {Channel.SHAFT}
+    assert {place.channel for place in by_place(blind)} == {Channel.DRIVE, Channel.SHAFT}
+
+
+def test_a_drive_that_lags_leaves_its_column(tmp_path):
+    lag = EffectEntry(
+        effect="winch_torque_lag", elements=("sway_1",), parameters={"time_constant": 0.004}
+    )
+    slow = THESIS.testbed.model_copy(update={"effects": (*THESIS.testbed.effects, lag)})
+    bundle = bundle_of("worst_case", "duration=4", "sensors=ideal")
+    run(replace(bundle, testbed=replace(bundle.testbed, testbed=slow)), tmp_path / "bag")
+    plain = read_measurement(tmp_path / "bag")
+    effect = catalogue()["winch_torque_lag"]
+    for cable, expected in (("sway_1", 0.004), ("sway_2", 0.0)):
+        equation = by_place(plain, [effect])[Place(Channel.DRIVE, cable)]
+        (columns,) = equation.columns.values()
+        (found,) = np.linalg.lstsq(columns[:, 0], equation.target[:, 0], rcond=None)[0]
+        assert time_constant(found, 1e-3) == pytest.approx(expected, abs=1e-4)
+        assert sampled_constant(time_constant(found, 1e-3), 1e-3) == pytest.approx(found, abs=1e-6)
+    known = with_found(plain, {Candidate(effect, "sway_1"): np.array([0.004])})
+    told = by_place(known, [])[Place(Channel.DRIVE, "sway_1")]
+    untold = by_place(plain, [])[Place(Channel.DRIVE, "sway_1")]
+    assert rms(told.target)[0] < 0.1 * rms(untold.target)[0]
+
+
+@pytest.mark.parametrize(
+    ("name", "element", "value", "channel"),
+    [
+        ("winch_inertia", "sway_1", {"inertia": 2e-5}, Channel.SHAFT),
+        ("cable_stiffness", "surge_1", {"scale": 1.01}, Channel.TENSION),
+        ("tension_bias", "sway_2", {"bias": 0.5}, Channel.SHAFT),
+    ],
+)
+def test_effects_of_the_file_count(measurement, equations, name, element, value, channel):
+    """An effect under `effects` changes the residual by its columns, as a finding would."""
+    effect = catalogue()[name]
+    candidate = Candidate(effect, element)
+    full = {p.name: value.get(p.name, p.absent) for p in effect.parameters}
+    weights = effect.weights(full)
+    place = Place(channel, element)
+    known = by_place(with_found(measurement, {candidate: weights}), [])[place]
+    change = without_start(equations[place], known.target - equations[place].target)
+    expected = without_start(equations[place], -equations[place].columns[candidate] @ weights)
+    assert rms(change - expected).max() < 0.03 * rms(expected).max()

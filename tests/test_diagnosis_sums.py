@@ -109,6 +109,33 @@ def test_an_onset_leaves_least_where_it_is():
     assert left[0] == pytest.approx(sums.squares_of(np.array([0, 1])), rel=1e-9)
 
 
+def test_columns_act_from_a_block_on_while_they_are_delayed():
+    evidence, sums = sums_of(made(weights=(3.0, 0.0, 0.0), start=ROWS // 2)[0])
+    base, own, block = np.array([1]), np.array([0]), sums.blocks // 2
+    both = np.concatenate([base, own])
+    whole, held_out = sums.squares_of(both), sums.held_out(both).sum()
+    fitted = sums.weights(both)
+    left = evidence.left(both, fitted)[PLACE]
+    with sums.delayed(own, block), evidence.delayed(own, block):
+        assert sums.squares_of(both) == pytest.approx(sums.left_from(base, own, block))
+        assert sums.squares_of(both) < whole
+        assert sums.held_out(both).sum() < held_out
+        late = evidence.left(both, sums.weights(both))[PLACE]
+        assert late == pytest.approx(sums.squares_of(both))
+    assert sums.squares_of(both) == pytest.approx(whole)
+    assert sums.held_out(both).sum() == pytest.approx(held_out)
+    assert evidence.left(both, fitted)[PLACE] == pytest.approx(left)
+
+
+def test_weights_beyond_a_base_leave_the_base_as_it_is():
+    _, columns, target = made()
+    sums = sums_of(made()[0])[1]
+    first = np.linalg.lstsq(columns[:, :1], target, rcond=None)[0]
+    expected = np.linalg.lstsq(columns[:, 1:], target - columns[:, :1] @ first, rcond=None)[0]
+    found = sums.weights_beyond(np.array([0]), np.array([1, 2]))
+    np.testing.assert_allclose(found, expected, rtol=1e-8)
+
+
 def test_columns_that_others_span_are_known():
     equation = made()[0]
     twin = dict(equation.columns) | {THIRD: 2.0 * equation.columns[FIRST]}

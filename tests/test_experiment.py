@@ -11,7 +11,8 @@ from cspm_bringup.assembly import resolve
 from cspm_bringup.bundle import make_bundle
 from cspm_bringup.run import run
 from cspm_ident.diagnosis.columns import Candidate, Place
-from cspm_ident.diagnosis.diagnose import Diagnosis, HeldOut
+from cspm_ident.diagnosis.diagnose import Diagnosis
+from cspm_ident.diagnosis.judgement import HeldOut
 from cspm_ident.diagnosis.recorded import equations_of
 from cspm_ident.diagnosis.search import Findings, Hypothesis, Named
 from cspm_ident.diagnosis.sums import Gain
@@ -187,12 +188,13 @@ def tied(measurement):
     # So little was recorded that any motion tells more.
     short = measurement.within(0.0, 2.5)
     rival = (Hypothesis(LOADED.effect, (LOADED,)), Gain(1.0, 10.0))
-    named = Named(Hypothesis(RUBBING.effect, (RUBBING,)), Gain(9.0, 1.0), 0.9, (rival,), 0)
+    named = Named(Hypothesis(RUBBING.effect, (RUBBING,)), Gain(9.0, 1.0), 0.9, (rival,))
     weights = {RUBBING: (np.array([0.03]), np.array([0.001]))}
-    fit = HeldOut(Place(Channel.SHAFT, "surge_2"), 0.1, 0.03, 0.03, 0.001, 0.001)
+    fit = HeldOut(Place(Channel.SHAFT, "surge_2"), 0.1, 0.03, 0.03, 0.001, 0.001, 0.001)
     findings = Findings((named,), (), 1)
     starts = np.zeros(1)
-    return Diagnosis((short,), (), findings, (), weights, (fit,), (), (), starts, (), noise)
+    rest = (), (None,), (), (None,), (), (), (), starts, (), noise
+    return Diagnosis((short,), (), findings, (), weights, (fit,), *rest)
 
 
 @pytest.fixture(scope="module")

@@ -1,14 +1,12 @@
 """`cspm identify` on recordings that the project's plant did not make, one for each length."""
 
 import json
-import sys
 
 import pytest
 from conftest import THESIS
 from matplotlib.image import imread
 from rig_samples import Truth, multisine, ramps, record
 
-from cspm_bringup import cli
 from cspm_ident.recording_hash import recording_sha256
 from cspm_msgs_py.testbed import load_testbed
 
@@ -27,22 +25,6 @@ def bags(tmp_path_factory):
             one = make(TRUTH, length, seed=2, label="cable", **options)
             found[kind, name] = record(place / f"{name}_{kind}", [one])
     return found
-
-
-@pytest.fixture
-def cspm(monkeypatch, capsys, tmp_path):
-    """Run a command line in an empty folder; return exit code, stdout and stderr."""
-    monkeypatch.chdir(tmp_path)
-    monkeypatch.setenv("COLUMNS", "200")
-
-    def call(*arguments):
-        monkeypatch.setattr(sys, "argv", ["cspm", *map(str, arguments)])
-        with pytest.raises(SystemExit) as caught:
-            cli.main()
-        out, err = capsys.readouterr()
-        return caught.value.code or 0, out, err
-
-    return call
 
 
 @pytest.fixture

@@ -1,7 +1,6 @@
 import dataclasses
 import io
 import json
-import sys
 
 import numpy as np
 import pytest
@@ -9,7 +8,6 @@ from conftest import THESIS
 from rich.console import Console
 from system_samples import TRUE, record_other
 
-from cspm_bringup import cli
 from cspm_bringup.identify_system_command import print_system
 from cspm_bringup.system_figure import draw_system
 from cspm_ident.estimation import Prior
@@ -126,7 +124,7 @@ def test_a_prior_holds_and_a_profile_agrees_with_the_interval(cspm, recordings, 
     searched, _ = recordings
     words = ["--testbed", THESIS, "--fit", "bar.mass,bar_damping.surge", "--horizon", "6"]
     known = ["--prior", "bar.mass=4.2±0.00001", "--profile", "bar_damping.surge"]
-    code, err = cspm("identify", "system", searched.path, *words, *known, "--json", "found.json")
+    code, _, err = cspm("identify", "system", searched.path, *words, *known, "--json", "found.json")
     assert (code, err) == (0, "")
     data = json.loads((tmp_path / "found.json").read_text())
     mass, surge = data["estimate"]["parameters"]
@@ -216,20 +214,6 @@ def test_the_command_prints_what_was_found(result, tmp_path):
     assert (tmp_path / "system.png").read_bytes().startswith(b"\x89PNG")
 
 
-@pytest.fixture
-def cspm(monkeypatch, capsys, tmp_path):
-    """Run a command line in an empty folder; return exit code and stderr."""
-    monkeypatch.chdir(tmp_path)
-
-    def call(*arguments):
-        monkeypatch.setattr(sys, "argv", ["cspm", *map(str, arguments)])
-        with pytest.raises(SystemExit) as caught:
-            cli.main()
-        return caught.value.code or 0, capsys.readouterr().err
-
-    return call
-
-
 @pytest.mark.parametrize(
     ("words", "text"),
     [
@@ -239,7 +223,7 @@ def cspm(monkeypatch, capsys, tmp_path):
     ],
 )
 def test_wrong_options_are_one_line(cspm, words, text):
-    assert cspm("identify", "system", "nothing", *words) == (2, f"cspm: {text}\n")
+    assert cspm("identify", "system", "nothing", *words) == (2, "", f"cspm: {text}\n")
 
 
 @pytest.mark.slow
@@ -247,10 +231,11 @@ def test_a_scenario_runs_on_another_machine(cspm, tmp_path):
     text = FILE.text.replace("mass: {value: 4.06,", "mass: {value: 4.35,")
     (tmp_path / "heavy.yaml").write_text(text, encoding="utf-8")
     words = ["run", "rest", "--duration", "0.1", "--out", "bag", "--testbed"]
-    assert cspm(*words, "heavy.yaml") == (0, "")
+    code, _, line = cspm(*words, "heavy.yaml")
+    assert (code, line) == (0, "")
     with Recording(tmp_path / "bag") as recording:
         assert recording.attachments["testbed.yaml"].decode() == text
-    code, line = cspm("run", "rest", "--no-record", "--testbed", "missing.yaml")
+    code, _, line = cspm("run", "rest", "--no-record", "--testbed", "missing.yaml")
     assert code == 2
     assert line.startswith("cspm: missing.yaml: ")
     assert line.count("\n") == 1

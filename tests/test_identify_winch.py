@@ -2,7 +2,6 @@
 
 import dataclasses
 import json
-import sys
 
 import numpy as np
 import pytest
@@ -12,8 +11,6 @@ from run_samples import SCENARIOS, bundle_of
 from test_emps_import import DATA, ESTIMATION, MAPPING, PUBLISHED, PULSES, TESTBED, recorded
 from winch_samples import EFFECTS, Winch, closed_loop
 
-from cspm_bringup import cli
-from cspm_bringup.identify_winch_command import torque_age
 from cspm_bringup.run import run
 from cspm_ident.signals.measurement import Measurement, read_measurement
 from cspm_ident.winch import identify_winch
@@ -64,7 +61,7 @@ def inside(estimate):
 
 @pytest.mark.slow
 def test_another_plants_winch_lies_within_the_intervals(measured):
-    age = torque_age(measured)
+    age = measured.torque_age
     assert age == pytest.approx(0.5e-3)
     found = identify_winches([measured], torque_age=age, reversals=False).winches[0]
     estimate = found.fit.estimate
@@ -77,7 +74,7 @@ def test_another_plants_winch_lies_within_the_intervals(measured):
 
 @pytest.mark.slow
 def test_where_friction_sticks_the_windows_disagree_and_it_is_told(measured):
-    with_them = identify_winches([measured], torque_age=torque_age(measured)).winches[0]
+    with_them = identify_winches([measured], torque_age=measured.torque_age).winches[0]
     assert not inside(with_them.fit.estimate)[0]
     assert "inertia" in with_them.torn
     smooth = identify_winches([measured], ["surge"], ["winch_viscous_friction"], torque_age=5e-4)
@@ -87,25 +84,9 @@ def test_where_friction_sticks_the_windows_disagree_and_it_is_told(measured):
 @pytest.mark.slow
 def test_the_torque_is_older_than_its_stamp(measured):
     """With the age's sign turned the shaft seems to brake less than it does."""
-    wrong = identify_winches([measured], torque_age=-torque_age(measured), reversals=False)
+    wrong = identify_winches([measured], torque_age=-measured.torque_age, reversals=False)
     viscous = wrong.winches[0].fit.estimate.interval("winch_viscous_friction coefficient")
     assert viscous[1] < TRUTH[1]
-
-
-@pytest.fixture
-def cspm(monkeypatch, capsys, tmp_path):
-    """Run a command line in an empty folder; return exit code, stdout and stderr."""
-    monkeypatch.chdir(tmp_path)
-    monkeypatch.setenv("COLUMNS", "200")
-
-    def call(*arguments):
-        monkeypatch.setattr(sys, "argv", ["cspm", *map(str, arguments)])
-        with pytest.raises(SystemExit) as caught:
-            cli.main()
-        out, err = capsys.readouterr()
-        return caught.value.code or 0, out, err
-
-    return call
 
 
 @pytest.mark.slow

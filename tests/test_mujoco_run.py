@@ -14,10 +14,10 @@ from cspm_bringup.agreement import CASES, Agreement, Case, agreement_page, compa
 from cspm_bringup.assembly import assemble
 from cspm_bringup.plants import PLANTS
 from cspm_bringup.resim import resimulate
-from cspm_bringup.run import RECORD_NAME
 from cspm_msgs_py.dofs import DOFS
 from cspm_msgs_py.errors import InputError
 from cspm_msgs_py.recording import Recording
+from cspm_msgs_py.recording.run_record import RECORD_NAME
 from cspm_msgs_py.testbed import load_testbed
 
 pytest.importorskip("mujoco", minversion="4.0", reason="the MuJoCo plant needs MuJoCo 4")

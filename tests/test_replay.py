@@ -29,7 +29,6 @@ from run_samples import SCENARIOS, bundle_of
 
 load_ros()
 
-from cspm_bringup import cli  # noqa: E402 - ROS is there
 from cspm_bringup.bag_selection import Selection  # noqa: E402
 from cspm_bringup.discovery import Discovery  # noqa: E402
 from cspm_bringup.node_main import start_node  # noqa: E402
@@ -68,19 +67,9 @@ def recording(tmp_path_factory):
 
 
 @pytest.fixture
-def cspm(monkeypatch, capfd, tmp_path):
-    """Run a command line in an empty folder; return exit code, stdout and stderr."""
-    # rclpy's executor wants a file for stderr.
-    monkeypatch.chdir(tmp_path)
-
-    def call(*arguments):
-        monkeypatch.setattr(sys, "argv", ["cspm", *map(str, arguments)])
-        with pytest.raises(SystemExit) as caught:
-            cli.main()
-        out, err = capfd.readouterr()
-        return caught.value.code or 0, out, err
-
-    return call
+def captured(capfd):
+    """rclpy's executor wants a file for stderr."""
+    return capfd
 
 
 class Listener:

@@ -46,7 +46,7 @@ class Curve:
     def unit(self) -> str:
         """Of residual and measured quantity."""
         moments = DOFS[3:]
-        torque = self.place.channel is Channel.SHAFT or self.component in moments
+        torque = self.place.channel in (Channel.DRIVE, Channel.SHAFT) or self.component in moments
         return "N·m" if torque else "N"
 
     @property

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -10,11 +10,17 @@ from numpy.typing import NDArray
 
 from cspm_ident.diagnosis.columns import Candidate, Place
 from cspm_ident.diagnosis.curves import Curve, held_out_curves
-from cspm_ident.diagnosis.equation import Equation, in_noise
+from cspm_ident.diagnosis.drivers import Driver, Knots
+from cspm_ident.diagnosis.equation import Equation, in_noise, steady
 from cspm_ident.diagnosis.evidence import Evidence, gather
+from cspm_ident.diagnosis.judgement import HeldOut, free_functions, judged
+from cspm_ident.diagnosis.limits import Limit, detection_limits
+from cspm_ident.diagnosis.onset import Onset, onset_of
+from cspm_ident.diagnosis.parameters import of_drives, of_shafts, weights_of
 from cspm_ident.diagnosis.recorded import equations_of
-from cspm_ident.diagnosis.refine import Cut, needs_refining, refine
-from cspm_ident.diagnosis.search import Findings, Named, Search
+from cspm_ident.diagnosis.refine import Cut, Weights, needs_refining, refine
+from cspm_ident.diagnosis.search import Findings, Hypothesis, Named, Search
+from cspm_ident.diagnosis.simulation import SimulatedFit, Worth, simulate_held_out, worth_of
 from cspm_ident.signals.measurement import Measurement
 from cspm_msgs_py.errors import InputError
 from cspm_sim.effects import Effect, catalogue
@@ -32,27 +38,19 @@ GAP_SHARE = 0.02
 CONFIRMED_SHARE = 0.03
 
 
-@dataclass(frozen=True)
-class HeldOut:
-    """One residual on data that was not searched.
-
-    Root mean squares in its unit; of the bar's six channels together, in units of their noise.
+@dataclass(frozen=True, eq=False)
+class Shape:
+    """A free function that explains what no effect does.
 
     Attributes:
-        place: which residual.
-        measured: standard deviation of the measured quantity.
-        before: with the file's model.
-        retuned: with the file's parameters fitted to the searched data, nothing added.
-        after: with what was found.
-        noise: what differs from row to row.
+        driver: of what, in which residual.
+        knots: in the signal's unit, shape (k,).
+        values: what it adds there, less their mean, in the residual's unit, (k,).
     """
 
-    place: Place
-    measured: float
-    before: float
-    retuned: float
-    after: float
-    noise: float
+    driver: Driver
+    knots: Array
+    values: Array
 
 
 @dataclass(frozen=True, eq=False)
@@ -66,6 +64,11 @@ class Diagnosis:
         rejected: what did not.
         weights: of each candidate found, with half the width of its 95 % interval.
         fit: residual by residual.
+        simulated: quantity by quantity, by simulation.
+        worth: of each finding in these simulations; None where they cannot tell.
+        shapes: of the unknown, in the order of `findings.unknown`.
+        onsets: when each finding began; None where it acts all the time.
+        limits: from which size on effects would have been told.
         silent: effects and elements that these recordings cannot show.
         places: the residuals that there are.
         starts: of the blocks [s], shape (blocks,).
@@ -77,8 +80,13 @@ class Diagnosis:
     held_out: Sequence[Measurement]
     findings: Findings
     rejected: tuple[Named, ...]
-    weights: dict[Candidate, tuple[Array, Array]]
+    weights: Weights
     fit: tuple[HeldOut, ...]
+    simulated: tuple[SimulatedFit, ...]
+    worth: tuple[Worth | None, ...]
+    shapes: tuple[Shape, ...]
+    onsets: tuple[Onset | None, ...]
+    limits: tuple[Limit, ...]
     silent: tuple[tuple[str, tuple[str, ...]], ...]
     places: tuple[Place, ...]
     starts: Array
@@ -101,46 +109,77 @@ def diagnose(
     Raises:
         InputError: the recordings have no residual that could be looked at.
     """
-    effects = list(catalogue().values())
-    search_parts, judge_parts = _parts(searched, held_out, effects, progress)
-    noise = _noise(search_parts)
+    effects, knots = list(catalogue().values()), Knots()
+    search_parts, judge_parts = _parts(searched, held_out, effects, knots, progress)
+    noise = _noise(steady(search_parts))
     spans = [_span(part) for part in search_parts]
     block = max(SHORTEST_BLOCK_S, sum(b - a for a, b in spans) / BLOCKS)
-    evidence = gather(in_noise(search_parts, noise), block)
+    evidence = gather(in_noise(steady(search_parts), noise), block)
     search = Search(evidence, progress)
     found = search.run()
     progress("held-out data")
-    judge = gather(in_noise(judge_parts, noise), block)
+    judge = _judge(in_noise(judge_parts, noise), found, block)
     kept, rejected = _confirmed(search, judge, found)
     progress("parameters")
-    candidates = [c for each in kept for c in each.hypothesis.candidates]
-    weights = _weights(search, kept)
-    if any(needs_refining(candidate.effect) for candidate in candidates):
-        searched_part: Cut = _whole if held_out else _first
-        weights = refine(searched, candidates, noise, block, searched_part)
-    fit = _fit(search, kept, judge, in_noise(judge_parts, noise), noise)
+    searched_part: Cut = _whole if held_out else _first
+    rows = in_noise(search_parts, noise)
+    onsets = _onsets(kept, steady(rows), evidence.times)
+    since = max((onset.time for onset in onsets if onset is not None), default=-np.inf)
+
+    def cut(parts: Parts) -> Parts:
+        return [[e.within(since, np.inf) for e in part] for part in searched_part(parts)]
+
+    since_then = [[e.within(since, np.inf) for e in part] for part in rows]
+    weights = _parameters(search, kept, searched, cut, since_then, noise, block)
+    starts = [_span(part)[0] for part in judge_parts]
+    weights = of_drives(weights, 2.0 * searched[0].torque_age)
+    judges = held_out or [m.within(s, np.inf) for m, s in zip(searched, starts, strict=True)]
+    retuned, values = search.retuned(), {c: w for c, (w, _) in weights.items()}
+    progress("simulation of held-out data")
+    simulated = simulate_held_out(judges, retuned, values)
+    worth = tuple(
+        worth_of(judges, simulated, values, members_of(values, n.hypothesis)) for n in kept
+    )
     return Diagnosis(
         searched,
         held_out,
         Findings(kept, found.unknown, found.candidates),
         rejected,
         weights,
-        fit,
+        judged(judges, retuned, values, noise, free_functions(evidence, judge)),
+        simulated,
+        worth,
+        _shapes(search, kept, knots, [each[0] for each in found.unknown]),
+        onsets,
+        detection_limits(search, kept),
         _silent(search, effects),
         tuple(place.place for place in evidence.places),
         evidence.times,
-        held_out_curves(judge_parts, {c: w for c, (w, _) in _weights(search, kept).items()}),
+        held_out_curves(steady(judge_parts), _first_weights(search, kept)),
         noise,
     )
+
+
+def _first_weights(search: Search, kept: Sequence[Named]) -> dict[Candidate, Array]:
+    """Return the weights of what was kept with the shapes that were searched."""
+    own = [c for each in kept for c in each.hypothesis.candidates]
+    return {c: w for c, (w, _) in weights_of(search.evidence, search.sums, own).items()}
+
+
+def members_of(candidates: Iterable[Candidate], hypothesis: Hypothesis) -> list[Candidate]:
+    """Return a finding's candidates with their final shapes."""
+    own = hypothesis.effect.id, hypothesis.elements
+    return [c for c in candidates if c.effect_id == own[0] and c.element in own[1]]
 
 
 def _parts(
     searched: Sequence[Measurement],
     held_out: Sequence[Measurement],
     effects: Sequence[Effect],
+    knots: Knots,
     progress: Progress,
 ) -> tuple[Parts, Parts]:
-    found = [equations_of(m, effects, progress) for m in searched]
+    found = [equations_of(m, effects, knots, progress) for m in searched]
     for measurement, equations in zip(searched, found, strict=True):
         if not equations:
             raise InputError(
@@ -148,8 +187,50 @@ def _parts(
                 " and torque, and with /cables/tension where there are cables"
             )
     if held_out:
-        return found, [equations_of(m, effects, progress) for m in held_out]
+        return found, [equations_of(m, effects, knots, progress) for m in held_out]
     return _first(found), _last(found)
+
+
+def _judge(parts: Parts, found: Findings, block: float) -> Evidence:
+    """Return the sums of held-out residuals beside what was found and all free functions."""
+    named = {c for each in found.named for c in each.hypothesis.candidates}
+    terms = named | {t for part in parts for e in part for t in e.columns if isinstance(t, Driver)}
+    return gather([[e.only(terms) for e in part] for part in parts], block)
+
+
+def _parameters(
+    search: Search,
+    kept: Sequence[Named],
+    searched: Sequence[Measurement],
+    cut: Cut,
+    rows: Parts,
+    noise: dict[Place, Array],
+    block: float,
+) -> Weights:
+    """Return the weights of what was kept, refined where columns depend on them."""
+    candidates = [c for each in kept for c in each.hypothesis.candidates]
+    if any(needs_refining(candidate.effect) for candidate in candidates):
+        return refine(searched, candidates, noise, block, cut)
+    return of_shafts(weights_of(search.evidence, search.sums, candidates), rows, block)
+
+
+def _onsets(kept: Sequence[Named], rows: Parts, starts: Array) -> tuple[Onset | None, ...]:
+    """Return when each finding began; None where it acts all the time, or in which recording."""
+    times = {
+        c: float(starts[each.hypothesis.onset]) if each.hypothesis.onset else -np.inf
+        for each in kept
+        for c in each.hypothesis.candidates
+    }
+    found: list[Onset | None] = []
+    for each in kept:
+        block, own = each.hypothesis.onset, each.hypothesis.candidates
+        if not block or len(rows) > 1:
+            found.append(None)
+            continue
+        others = {c: time for c, time in times.items() if c not in own}
+        low, high = starts[block - 1], starts[min(block + 1, len(starts) - 1)]
+        found.append(onset_of(rows[0], own, others, float(low), float(high)))
+    return tuple(found)
 
 
 def _whole(parts: Parts) -> Parts:
@@ -194,7 +275,8 @@ def _confirmed(
     kept = list(found.named)
     rejected: list[Named] = []
     for each in found.named:
-        whole = _weights(search, kept)
+        candidates = [c for other in kept for c in other.hypothesis.candidates]
+        whole = weights_of(search.evidence, search.sums, candidates)
         own = set(each.hypothesis.candidates)
         fewer = {c: w for c, w in whole.items() if c not in own}
         with_it = judge.left_with({c: w for c, (w, _) in whole.items()})
@@ -206,35 +288,16 @@ def _confirmed(
     return tuple(kept), tuple(rejected)
 
 
-def _weights(search: Search, named: Sequence[Named]) -> dict[Candidate, tuple[Array, Array]]:
-    candidates = [c for each in named for c in each.hypothesis.candidates]
-    columns = search.evidence.with_nuisance(candidates)
-    values = search.evidence.parted(candidates, search.sums.weights(columns))
-    widths = search.evidence.parted(candidates, search.sums.half_width(columns))
-    return {c: (values[c], widths[c]) for c in candidates}
-
-
-def _fit(
-    search: Search,
-    kept: Sequence[Named],
-    judge: Evidence,
-    equations: Sequence[Sequence[Equation]],
-    noise: dict[Place, Array],
-) -> tuple[HeldOut, ...]:
-    after = {c: w for c, (w, _) in _weights(search, kept).items()}
-    retuned = search.retuned()
-    left = [judge.left_with(weights) for weights in ({}, retuned, after)]
-    rows = {place.place: float(place.rows.sum()) for place in judge.places}
-    out = []
-    for place, count in rows.items():
-        measured = np.concatenate(
-            [e.measured for part in equations for e in part if e.place == place]
-        )
-        unit = float(noise[place][0]) if len(noise[place]) == 1 else 1.0
-        before, tuned, now = (unit * float(np.sqrt(e[place] / max(count, 1.0))) for e in left)
-        spread = unit * float(np.sqrt(np.mean((measured - measured.mean(axis=0)) ** 2)))
-        out.append(HeldOut(place, spread, before, tuned, now, unit))
-    return tuple(out)
+def _shapes(
+    search: Search, kept: Sequence[Named], knots: Knots, drivers: Sequence[Driver]
+) -> tuple[Shape, ...]:
+    """Return the free functions, each fitted to what is left by what was kept."""
+    base = search.columns(each.hypothesis for each in kept)
+    found = []
+    for driver in drivers:
+        values = search.sums.weights_beyond(base, search.evidence.columns_of([driver]))
+        found.append(Shape(driver, knots.of(driver), values - values.mean()))
+    return tuple(found)
 
 
 def _silent(search: Search, effects: Sequence[Effect]) -> tuple[tuple[str, tuple[str, ...]], ...]:

@@ -27,29 +27,49 @@ class Driver(NamedTuple):
     signal: str
 
 
-def driver_columns(
-    place: Place, signals: Mapping[str, Array], channel: int = 0, channels: int = 1
-) -> dict[Candidate | Driver, Array]:
-    """Return hat functions of each signal, so that their weights are the shape at the knots.
+class Knots:
+    """Where each driver's free function has its values, alike in all recordings."""
 
-    Knots lie at equal shares of the samples. Signals that stand still are left out.
+    def __init__(self) -> None:
+        """Know of none yet."""
+        self._found: dict[Driver, Array] = {}
 
-    Args:
-        place: the residual.
-        signals: by name and unit, each of shape (k,).
-        channel: in which of the residual's channels they act.
-        channels: how many it has.
+    def of(self, driver: Driver) -> Array:
+        """Return a driver's knots in its signal's unit, shape (KNOTS,)."""
+        return self._found[driver]
 
-    Returns:
-        Columns of shape (k, channels, KNOTS).
-    """
-    found: dict[Candidate | Driver, Array] = {}
-    for name, values in signals.items():
-        knots = np.unique(np.quantile(values, np.linspace(0.0, 1.0, KNOTS)))
-        if len(knots) < KNOTS:
-            continue
-        hats = np.stack([np.interp(values, knots, unit) for unit in np.eye(KNOTS)], axis=1)
-        columns = np.zeros((len(values), channels, KNOTS))
-        columns[:, channel] = hats
-        found[Driver(place, name)] = columns
-    return found
+    def columns(
+        self,
+        place: Place,
+        signals: Mapping[str, Array],
+        channel: int = 0,
+        channels: int = 1,
+    ) -> dict[Candidate | Driver, Array]:
+        """Return hat functions of each signal; their weights are the shape at the knots.
+
+        Knots lie at equal shares of the samples of the first recording that has the signal.
+        Signals that stand still there are left out.
+
+        Args:
+            place: the residual.
+            signals: by name and unit, each of shape (k,).
+            channel: in which of the residual's channels they act.
+            channels: how many it has.
+
+        Returns:
+            Columns of shape (k, channels, KNOTS).
+        """
+        found: dict[Candidate | Driver, Array] = {}
+        for name, values in signals.items():
+            driver = Driver(place, name)
+            if driver not in self._found:
+                quantiles = np.quantile(values, np.linspace(0.0, 1.0, KNOTS))
+                self._found[driver] = np.unique(quantiles)
+            knots = self._found[driver]
+            if len(knots) < KNOTS:
+                continue
+            hats = np.stack([np.interp(values, knots, unit) for unit in np.eye(KNOTS)], axis=1)
+            columns = np.zeros((len(values), channels, KNOTS))
+            columns[:, channel] = hats
+            found[driver] = columns
+        return found

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Container, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 
 import numpy as np
@@ -25,6 +25,8 @@ class Equation:
         columns: by candidate or driver, what one unit of each weight adds, (k, channels, weights).
         measured: the measured quantity that the residual is part of, shape of `target`.
         nuisance: what no recording tells, such as the length wound at its start, (k, channels, m).
+        turning: rows in which a shaft turns round, (k,), or none: it may stick there, and dry
+            friction then holds with any torque.
         signals: measured signals that it may depend on, by name and unit, each of shape (k,).
     """
 
@@ -34,6 +36,7 @@ class Equation:
     columns: Mapping[Candidate | Driver, Array]
     measured: Array
     nuisance: Array = field(default_factory=lambda: np.zeros((0, 0, 0)))
+    turning: NDArray[np.bool_] = field(default_factory=lambda: np.zeros(0, dtype=np.bool_))
     signals: Mapping[str, Array] = field(default_factory=dict)
 
     @property
@@ -51,17 +54,51 @@ class Equation:
         unit = np.where(noise > 0.0, noise, 1.0)
         columns = {term: found / unit[:, None] for term, found in self.columns.items()}
         nuisance = self.nuisance / unit[:, None] if self.nuisance.size else self.nuisance
-        target, measured = self.target / unit, self.measured / unit
-        return replace(self, target=target, columns=columns, measured=measured, nuisance=nuisance)
+        return replace(
+            self,
+            target=self.target / unit,
+            columns=columns,
+            measured=self.measured / unit,
+            nuisance=nuisance,
+        )
 
     def within(self, start: float, end: float) -> Equation:
         """Return the rows from `start` to before `end` [s]."""
-        rows = (self.times >= start) & (self.times < end)
-        columns = {term: found[rows] for term, found in self.columns.items()}
-        nuisance = self.nuisance[rows] if self.nuisance.size else self.nuisance
-        target, measured = self.target[rows], self.measured[rows]
-        signals = {name: found[rows] for name, found in self.signals.items()}
-        return Equation(self.place, self.times[rows], target, columns, measured, nuisance, signals)
+        return self._only((self.times >= start) & (self.times < end))
+
+    def weighted(self, weights: Array) -> Equation:
+        """Return the equation with each row times a weight, shape (k,)."""
+        rows = weights[:, None]
+        columns = {term: found * rows[:, :, None] for term, found in self.columns.items()}
+        nuisance = self.nuisance * rows[:, :, None] if self.nuisance.size else self.nuisance
+        return replace(self, target=self.target * rows, columns=columns, nuisance=nuisance)
+
+    def only(self, terms: Container[Candidate | Driver]) -> Equation:
+        """Return the equation without the columns of all other terms."""
+        columns = {term: found for term, found in self.columns.items() if term in terms}
+        return replace(self, columns=columns)
+
+    @property
+    def steady(self) -> Equation:
+        """The rows in which no shaft turns round."""
+        return self._only(~self.turning) if self.turning.any() else self
+
+    def _only(self, rows: NDArray[np.bool_]) -> Equation:
+        return Equation(
+            self.place,
+            self.times[rows],
+            self.target[rows],
+            {term: found[rows] for term, found in self.columns.items()},
+            self.measured[rows],
+            self.nuisance[rows] if self.nuisance.size else self.nuisance,
+            self.turning[rows] if self.turning.size else self.turning,
+            {name: found[rows] for name, found in self.signals.items()},
+        )
+
+
+def steady(parts: Sequence[Sequence[Equation]]) -> list[list[Equation]]:
+    """Return equations without the rows in which a shaft turns round."""
+    return [[equation.steady for equation in part] for part in parts]
 
 
 def in_noise(

@@ -6,7 +6,8 @@ them, so that hundreds of hypotheses cost no second look at the signals.
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
+from contextlib import contextmanager
 from dataclasses import dataclass
 from typing import NamedTuple
 
@@ -89,7 +90,7 @@ class Evidence:
             found[place.place] = float(vector @ place.whole @ vector)
         return found
 
-    def left_with(self, weights: Mapping[Candidate, Array]) -> dict[Place, float]:
+    def left_with(self, weights: Mapping[Candidate | Driver, Array]) -> dict[Place, float]:
         """Return Σ residual² of each place for given weights, its own nuisance fitted."""
         found = {}
         full = np.zeros(self.width)
@@ -108,10 +109,41 @@ class Evidence:
             found[place.place] = left
         return found
 
+    def delay(self, columns: Index, block: int) -> None:
+        """Let columns act from a block on only."""
+        for place in self.places:
+            own = np.flatnonzero(np.isin(place.columns, columns))
+            silence(place.grams, own, block)
+            place.whole[own] = place.grams[:, own].sum(axis=0)
+            place.whole[:, own] = place.grams[:, :, own].sum(axis=0)
+
+    @contextmanager
+    def delayed(self, columns: Index, block: int) -> Iterator[None]:
+        """Let columns act from a block on only, for a while."""
+        kept = [
+            (place, own, place.grams[:block, own, :].copy(), place.grams[:block, :, own].copy())
+            for place in self.places
+            if len(own := np.flatnonzero(np.isin(place.columns, columns)))
+        ]
+        self.delay(columns, block)
+        try:
+            yield
+        finally:
+            for place, own, rows, sides in kept:
+                place.grams[:block, own, :] = rows
+                place.grams[:block, :, own] = sides
+            self.delay(columns, 0)
+
     @property
     def blocks(self) -> int:
         """Number of blocks."""
         return len(self.times)
+
+
+def silence(grams: Array, columns: Index, block: int) -> None:
+    """Set columns to zero in the sums (blocks, m, m) of the blocks before `block`."""
+    grams[:block, columns, :] = 0.0
+    grams[:block, :, columns] = 0.0
 
 
 def gather(recordings: Sequence[Sequence[Equation]], block_s: float) -> Evidence:

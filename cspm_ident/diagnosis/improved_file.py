@@ -7,8 +7,8 @@ import io
 from ruamel.yaml import YAML
 from ruamel.yaml.comments import CommentedMap, CommentedSeq
 
-from cspm_ident.diagnosis.diagnose import Diagnosis
-from cspm_ident.diagnosis.verdict import members_of, numbers_of
+from cspm_ident.diagnosis.diagnose import Diagnosis, members_of
+from cspm_ident.diagnosis.verdict import numbers_of
 from cspm_ident.fitted_testbed import WIDEST, FittedNumber
 from cspm_msgs_py.testbed import TestbedFile, parse_testbed
 
@@ -33,7 +33,7 @@ def improved_testbed(diagnosis: Diagnosis, source: str) -> TestbedFile:
     entries = content.setdefault("effects", CommentedSeq())
     hashes = tuple(measurement.sha256 for measurement in diagnosis.searched)
     for named in diagnosis.findings.named:
-        for candidate in members_of(diagnosis, named.hypothesis):
+        for candidate in members_of(diagnosis.weights, named.hypothesis):
             entry = CommentedMap({"effect": candidate.effect_id, "elements": [candidate.element]})
             entry["parameters"] = CommentedMap(
                 {

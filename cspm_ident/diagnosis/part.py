@@ -39,7 +39,11 @@ class Part(NamedTuple):
 
 
 _BLOCKS = {Block.WINCH: Kind.WINCH, Block.CABLE: Kind.CABLE}
-_CHANNELS = {Channel.SHAFT: Kind.WINCH, Channel.TENSION: Kind.CABLE}
+_CHANNELS = {
+    Channel.DRIVE: Kind.WINCH,
+    Channel.SHAFT: Kind.WINCH,
+    Channel.TENSION: Kind.CABLE,
+}
 _SENSORS = {WINCHES: Kind.WINCH, TENSION: Kind.LOAD_CELL}
 
 

@@ -4,8 +4,11 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 
+from cspm_ident.diagnosis.drive import drive_equations
+from cspm_ident.diagnosis.drivers import Knots
 from cspm_ident.diagnosis.equation import Equation
 from cspm_ident.diagnosis.shaft import shaft_equations
+from cspm_ident.diagnosis.supposed import settled
 from cspm_ident.diagnosis.suspension_equations import suspension_equations
 from cspm_ident.signals.measurement import Measurement
 from cspm_ident.signals.timeline import Timeline
@@ -16,25 +19,26 @@ from cspm_sim.effects import Effect
 def equations_of(
     measurement: Measurement,
     effects: Sequence[Effect],
+    knots: Knots | None = None,
     progress: Callable[[str], None] = lambda _: None,
 ) -> list[Equation]:
-    """Return every residual that the recording's sensors allow.
+    """Return every residual that the sensors allow, less what the machine's effects add.
 
     Args:
         measurement: what was recorded, with the machine as it is described.
-        effects: the catalogue.
+        effects: whose columns are wanted, such as the whole catalogue.
+        knots: of the free functions; None: without these.
         progress: called with what is being done.
+
+    Raises:
+        InputError: the machine's effects cannot be used.
     """
+    measurement = settled(measurement)
     known = read_actions(measurement.machine)
     progress("torque equations of the winches")
-    found = shaft_equations(measurement, effects, known, _torque_age(measurement))
+    found = drive_equations(measurement, effects, known, knots)
+    found += shaft_equations(measurement, effects, known, knots)
     if measurement.machine.bar is not None:
         progress("cables and bar")
-        found += suspension_equations(Timeline(measurement), effects, known)
+        found += suspension_equations(Timeline(measurement), effects, known, knots)
     return found
-
-
-def _torque_age(measurement: Measurement) -> float:
-    """Half a period: a drive reports the torque that it applied up to the stamp."""
-    torque = measurement.torque
-    return 0.0 if torque is None else 0.5 * torque.interval

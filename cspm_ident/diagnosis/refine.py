@@ -14,16 +14,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from cspm_ident.diagnosis.columns import Candidate, Place
-from cspm_ident.diagnosis.drivers import Driver
-from cspm_ident.diagnosis.equation import Equation, in_noise
+from cspm_ident.diagnosis.equation import Equation, in_noise, steady
 from cspm_ident.diagnosis.evidence import Evidence, gather
-from cspm_ident.diagnosis.readings import pose_rows, reading_rows
 from cspm_ident.diagnosis.recorded import equations_of
 from cspm_ident.diagnosis.sums import Sums
-from cspm_ident.signals.measurement import BAR, FRAME, TENSION, WINCHES, Measurement
-from cspm_ident.signals.samples import Samples
+from cspm_ident.diagnosis.supposed import settled, with_found
+from cspm_ident.signals.measurement import Measurement
 from cspm_msgs_py.errors import InputError
-from cspm_sim.effect_entries import Action, altered_testbed
 from cspm_sim.effects import Effect
 
 Array = NDArray[np.float64]
@@ -33,7 +30,6 @@ Cut = Callable[[Sequence[Sequence[Equation]]], Sequence[Sequence[Equation]]]
 _ROUNDS = 4
 # Grid steps are about a factor of three; each round halves the step in the logarithm.
 _FIRST_FACTOR = 1.7
-_FIXED_POINTS = 4
 
 
 def refine(
@@ -54,30 +50,25 @@ def refine(
     """
     shapes = {c.effect_id: dict(c.shape) for c in candidates}
     effects = {c.effect_id: c.effect for c in candidates}
-    totals = {(c.effect_id, c.element): np.zeros(0) for c in candidates}
+    wanted = [(c.effect_id, c.element) for c in candidates]
+    applied: dict[Candidate, Array] = {}
     factor = _FIRST_FACTOR
     found: Weights = {}
     for _ in range(_ROUNDS if candidates else 0):
         near = [_near(effects[name], shape, factor) for name, shape in shapes.items()]
         try:
-            moved = [_corrected(m, effects, totals) for m in searched]
+            moved = [settled(with_found(m, applied)) for m in searched]
         except InputError:
             # Such a machine cannot be; what was found before stays, with its interval.
             break
         parts = cut([equations_of(m, near) for m in moved])
-        wanted = list(totals)
-        scaled = in_noise(parts, noise)
-        evidence = gather([[_without_drivers(e, wanted) for e in p] for p in scaled], block_s)
+        evidence = gather(in_noise(steady(parts), noise), block_s)
         shapes, found = _fitted(evidence, shapes, wanted)
         for candidate, (weights, _) in found.items():
-            key = candidate.effect_id, candidate.element
             if _is_applied(candidate.effect):
-                totals[key] = weights + (totals[key] if len(totals[key]) else 0.0)
+                applied[candidate] = weights + applied.get(candidate, 0.0)
         factor = float(np.sqrt(factor))
-    return {
-        c: (totals[c.effect_id, c.element] if _is_applied(c.effect) else w, half)
-        for c, (w, half) in found.items()
-    }
+    return {c: (applied[c] if _is_applied(c.effect) else w, half) for c, (w, half) in found.items()}
 
 
 def needs_refining(effect: Effect) -> bool:
@@ -102,15 +93,6 @@ def _near(effect: Effect, shape: Mapping[str, float], factor: float) -> Effect:
 
 def _steps(factor: float) -> tuple[float, ...]:
     return (1.0 / factor, 1.0, factor)
-
-
-def _without_drivers(equation: Equation, wanted: Sequence[tuple[str, str]]) -> Equation:
-    columns: dict[Candidate | Driver, Array] = {
-        term: found
-        for term, found in equation.columns.items()
-        if isinstance(term, Candidate) and (term.effect_id, term.element) in wanted
-    }
-    return replace(equation, columns=columns)
 
 
 def _fitted(
@@ -151,53 +133,3 @@ def _members(
         and (term.effect_id, term.element) in wanted
         and term.shape == shapes[term.effect_id]
     ]
-
-
-def _corrected(
-    measurement: Measurement,
-    effects: Mapping[str, Effect],
-    totals: Mapping[tuple[str, str], Array],
-) -> Measurement:
-    """Return the measurement without the sensor faults, of a machine altered as found."""
-    machine = measurement.machine
-    actions = []
-    for (name, element), weights in totals.items():
-        effect = effects[name]
-        if not len(weights):
-            continue
-        if effect.alter is not None:
-            values = effect.values(weights.tolist())
-            place = machine.cable_names.index(element) if element in machine.cable_names else 0
-            actions.append(Action(effect, place, element, values))
-        else:
-            measurement = _true_readings(measurement, effect, element, weights)
-    altered = altered_testbed(machine, actions)
-    return measurement.with_testbed(replace(measurement.testbed, testbed=altered))
-
-
-def _true_readings(
-    measurement: Measurement, effect: Effect, element: str, weights: Array
-) -> Measurement:
-    """Return what a sensor would have read without a fault, to which a fixed point leads."""
-    assert effect.sense is not None
-    topic = effect.sense.topics[0]
-    if topic in (TENSION, WINCHES):
-        kind = "tension" if topic == TENSION else "angle"
-        samples: Samples = getattr(measurement, kind)
-        i = measurement.machine.cable_names.index(element)
-        values = samples.values.copy()
-        for _ in range(_FIXED_POINTS):
-            rows = reading_rows(samples.times, values[:, i])
-            values[:, i] = samples.values[:, i] - effect.regressors(rows)[:, 0] @ weights
-        return measurement.with_samples(kind, Samples(samples.times, values))
-    kind = {BAR: "bar_pose", FRAME: "frame_pose"}[f"/{element}/pose"]
-    samples = getattr(measurement, kind)
-    if effect.sense.lateness is not None:
-        parameters = np.array(list(effect.values(weights.tolist()).values()))
-        late = np.array([effect.sense.lateness(float(t), parameters) for t in samples.times])
-        return measurement.with_samples(kind, Samples(samples.times - late, samples.values))
-    values = samples.values
-    for _ in range(_FIXED_POINTS):
-        rows = pose_rows(samples.times, values, np.zeros_like(values))
-        values = samples.values - effect.regressors(rows) @ weights
-    return measurement.with_samples(kind, Samples(samples.times, values))

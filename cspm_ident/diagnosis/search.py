@@ -2,9 +2,10 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Sequence
+from collections.abc import Callable, Iterable, Iterator, Sequence
+from contextlib import contextmanager
 from copy import copy
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import NamedTuple
 
 import numpy as np
@@ -25,6 +26,8 @@ UNKNOWN_SHARE = 0.15
 FALSE_ALARMS = 0.01
 MOST_EFFECTS = 3
 _SHORT_LIST = 12
+# In which an effect has to act to be told.
+_FEWEST_BLOCKS = 5
 
 
 @dataclass(frozen=True)
@@ -34,10 +37,12 @@ class Hypothesis:
     Attributes:
         effect: of the catalogue.
         candidates: one per element, of the same nonlinear parameters.
+        onset: block from which on it acts, 0 for all the time.
     """
 
     effect: Effect
     candidates: tuple[Candidate, ...]
+    onset: int = 0
 
     @property
     def elements(self) -> tuple[str, ...]:
@@ -53,14 +58,12 @@ class Named(NamedTuple):
         gain: of it in blocks that were not fitted, beyond all others that were chosen.
         share: of the squared residual, in the places it acts on, that it takes away.
         alternatives: what explains it as well, with how much worse (positive) per block set.
-        onset: block from which on it acts, 0 for all the time.
     """
 
     hypothesis: Hypothesis
     gain: Gain
     share: float
     alternatives: tuple[tuple[Hypothesis, Gain], ...]
-    onset: int
 
 
 class Findings(NamedTuple):
@@ -107,7 +110,7 @@ class Search:
         """Return the weights of the file's own parameters, fitted where it helps, nothing added."""
         narrow = copy(self)
         narrow._effects = [c for c in self._effects if c.effect.alter is not None]
-        own = [c for h in narrow._chosen() for c in h.candidates]
+        own = [c for h in narrow._chosen(onsets=False) for c in h.candidates]
         return self.evidence.parted(own, self.sums.weights(self.evidence.with_nuisance(own)))
 
     def columns(self, hypotheses: Iterable[Hypothesis]) -> Index:
@@ -125,15 +128,24 @@ class Search:
         after = self.evidence.left(both, self.sums.weights(both))
         return max(1.0 - after[place] / before[place] for place in before if before[place] > 0.0)
 
-    def _chosen(self) -> list[Hypothesis]:
+    def _chosen(self, *, onsets: bool = True) -> list[Hypothesis]:
         chosen: list[Hypothesis] = []
         while len(chosen) < MOST_EFFECTS:
             self._progress(f"effect {len(chosen) + 1}")
             found = self._best(chosen)
             if found is None:
                 break
-            chosen.append(found)
+            chosen.append(self._begun(found, chosen) if onsets else found)
         return chosen
+
+    def _begun(self, hypothesis: Hypothesis, chosen: Sequence[Hypothesis]) -> Hypothesis:
+        """Return the hypothesis with its onset, from which on its columns act henceforth."""
+        own = self.own_columns(hypothesis)
+        onset = hypothesis.onset or self._onset(self.columns(chosen), own)
+        if onset:
+            self.evidence.delay(own, onset)
+            self.sums.delay(own, onset)
+        return replace(hypothesis, onset=onset)
 
     def _best(self, chosen: Sequence[Hypothesis]) -> Hypothesis | None:
         base = self.columns(chosen)
@@ -144,20 +156,51 @@ class Search:
         best: tuple[float, Hypothesis] | None = None
         for candidate in _short_list(free, gains):
             for hypothesis in self._scopes(candidate, free, base):
-                if not self._is_plausible([*chosen, hypothesis]):
-                    continue
-                own = self.own_columns(hypothesis)
-                gain = gain_of(held_out - self.sums.held_out(np.concatenate([base, own])))
-                if not self._counts(base, own, gain):
-                    continue
-                # More elements have to be worth their columns.
-                if best is None or gain.total > best[0] + 3.0 * gain.error * _wider(
-                    hypothesis, best[1]
-                ):
-                    best = gain.total, hypothesis
+                for dated in self._dated(hypothesis, base):
+                    with self._delayed(dated):
+                        gain = self._sure_gain(dated, chosen, base, held_out)
+                    # More elements, or a beginning, have to be worth it.
+                    if gain is not None and (
+                        best is None
+                        or gain.total > best[0] + 3.0 * gain.error * _wider(dated, best[1])
+                    ):
+                        best = gain.total, dated
         if best is None:
             return None
-        return self._pruned(self._simplest(best[1], free, base, chosen), base)
+        with self._delayed(best[1]):
+            found = self._simplest(best[1], free, base, chosen)
+        with self._delayed(found):
+            return self._pruned(found, base)
+
+    def _dated(self, hypothesis: Hypothesis, base: Index) -> Iterable[Hypothesis]:
+        """Yield the hypothesis for all the time, and from its onset on if it seems to have one."""
+        yield hypothesis
+        onset = self._onset(base, self.own_columns(hypothesis))
+        if 0 < onset <= self.sums.blocks - _FEWEST_BLOCKS:
+            yield replace(hypothesis, onset=onset)
+
+    def _sure_gain(
+        self, hypothesis: Hypothesis, chosen: Sequence[Hypothesis], base: Index, before: Array
+    ) -> Gain | None:
+        """Return what a hypothesis gains in blocks that were not fitted, if it surely does."""
+        if not self._is_plausible([*chosen, hypothesis]):
+            return None
+        own = self.own_columns(hypothesis)
+        gain = gain_of(before - self.sums.held_out(np.concatenate([base, own])))
+        return gain if self._counts(base, own, gain, hypothesis.onset) else None
+
+    @contextmanager
+    def _delayed(self, hypothesis: Hypothesis) -> Iterator[None]:
+        """Let a hypothesis act from its onset on, for a while."""
+        if not hypothesis.onset:
+            yield
+            return
+        own = self.own_columns(hypothesis)
+        with (
+            self.sums.delayed(own, hypothesis.onset),
+            self.evidence.delayed(own, hypothesis.onset),
+        ):
+            yield
 
     def _pruned(self, hypothesis: Hypothesis, base: Index) -> Hypothesis:
         """Return the hypothesis without elements on which the effect may as well be absent."""
@@ -165,7 +208,7 @@ class Search:
         sizes = np.abs(self.sums.weights(columns)) / self.sums.half_width(columns)
         own = self.evidence.parted(hypothesis.candidates, sizes)
         kept = tuple(c for c in hypothesis.candidates if own[c].max() > 1.0)
-        return Hypothesis(hypothesis.effect, kept) if kept else hypothesis
+        return replace(hypothesis, candidates=kept) if kept else hypothesis
 
     def _scopes(
         self, candidate: Candidate, free: Sequence[Candidate], base: Index
@@ -194,11 +237,12 @@ class Search:
                 found.append(other)
         return Hypothesis(candidate.effect, tuple(found))
 
-    def _counts(self, base: Index, own: Index, gain: Gain) -> bool:
+    def _counts(self, base: Index, own: Index, gain: Gain, onset: int = 0) -> bool:
         """Return whether columns are surely there and worth a word."""
+        tried = len(self._effects) * (self.sums.blocks if onset else 1)
         return (
             gain.is_sure
-            and self.sums.p_value(base, own) < FALSE_ALARMS / len(self._effects)
+            and self.sums.p_value(base, own, onset) < FALSE_ALARMS / tried
             and self.share(base, own) >= MATERIAL_SHARE
         )
 
@@ -217,11 +261,11 @@ class Search:
         for rival in rivals:
             if len(self.own_columns(rival)) >= len(self.own_columns(fewest)):
                 continue
-            worse = gain_of(
-                self.sums.held_out(np.concatenate([base, self.own_columns(rival)])) - reference
-            )
+            own = self.own_columns(rival)
+            with self.sums.delayed(own, best.onset):
+                worse = gain_of(self.sums.held_out(np.concatenate([base, own])) - reference)
             if worse.total <= 2.0 * gained.error and worse.total < MATERIAL_SHARE * gained.total:
-                fewest = rival
+                fewest = replace(rival, onset=best.onset)
         return fewest
 
     def _rivals(
@@ -252,7 +296,6 @@ class Search:
             gain,
             self.share(base, own),
             tuple(self._alternatives(hypothesis, others, base, own)),
-            self._onset(base, own),
         )
 
     def _alternatives(
@@ -266,7 +309,8 @@ class Search:
             columns = self.own_columns(rival)
             if self._contains(base, columns, own) or not self._is_plausible([*others, rival]):
                 continue
-            worse = gain_of(self.sums.held_out(np.concatenate([base, columns])) - reference)
+            with self.sums.delayed(np.setdiff1d(columns, own), hypothesis.onset):
+                worse = gain_of(self.sums.held_out(np.concatenate([base, columns])) - reference)
             if worse.total <= 2.0 * worse.error:
                 yield rival, worse
 

@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from cspm_ident.diagnosis.columns import Candidate, Place, elements_of, shapes_of
-from cspm_ident.diagnosis.drivers import Driver, driver_columns
+from cspm_ident.diagnosis.drivers import Driver, Knots
 from cspm_ident.diagnosis.equation import Equation
 from cspm_ident.diagnosis.readings import reading_rows
 from cspm_ident.signals.measurement import TENSION, WINCHES, Measurement
@@ -24,7 +24,7 @@ from cspm_sim.effects.signals import WinchSignal
 Array = NDArray[np.float64]
 
 HALF_WIDTH_S = 0.02
-# Of the usual speed: below it a dry friction may hold with any torque, and its sign is noise.
+# Of the usual speed: below it a shaft may stick, and its direction is noise.
 STILL_SHARE = 0.05
 _DRIVERS = {
     "speed [rad/s]": WinchSignal.SPEED,
@@ -38,7 +38,7 @@ def shaft_equations(
     measurement: Measurement,
     effects: Sequence[Effect],
     known: Sequence[Action],
-    torque_age: float,
+    knots: Knots | None = None,
 ) -> list[Equation]:
     """Return the equation of every winch whose signals were recorded.
 
@@ -49,12 +49,12 @@ def shaft_equations(
         measurement: what was recorded, with the machine as it is described.
         effects: the catalogue.
         known: effects that the test-bed file has.
-        torque_age: how long before its stamp a reported torque acted, on average [s].
+        knots: of the free functions; None: without these.
     """
     found: list[Equation] = []
     for i, cable in enumerate(measurement.machine.cables):
         try:
-            signals = winch_signals(measurement, cable.name, torque_age)
+            signals = winch_signals(measurement, cable.name, measurement.torque_age)
         except InputError:
             continue
         for times, rows in signal_rows(signals):
@@ -67,7 +67,7 @@ def shaft_equations(
                 continue
             sensors = (WINCHES,) if signals.tension is None else (WINCHES, TENSION)
             table = _Shaft(rows, cable, half, times, sensors)
-            found.append(table.equation(effects, [a for a in known if a.element == i]))
+            found.append(table.equation(effects, [a for a in known if a.element == i], knots))
     return found
 
 
@@ -83,11 +83,15 @@ class _Shaft:
         self._window, self._stride = make_window(half, step), max(1, half // 2)
         speed = np.abs(rows[:, WinchSignal.SPEED])
         windows = np.lib.stride_tricks.sliding_window_view(speed, len(self._window.weights))
-        slowest = windows[:: self._stride].min(axis=1)
-        self._moving = slowest >= STILL_SHARE * np.sqrt(np.mean(speed**2))
+        windows = windows[:: self._stride]
+        slow = STILL_SHARE * np.sqrt(np.mean(speed**2))
+        self._moving = windows.max(axis=1) >= slow
+        self._turning = windows.min(axis=1)[self._moving] < slow
         self._times = self._weighed(times)
 
-    def equation(self, effects: Sequence[Effect], known: Sequence[Action]) -> Equation:
+    def equation(
+        self, effects: Sequence[Effect], known: Sequence[Action], knots: Knots | None
+    ) -> Equation:
         rows = self._rows
         target = self._weighed(
             rows[:, WinchSignal.TORQUE] - rows[:, WinchSignal.RADIUS] * rows[:, WinchSignal.TENSION]
@@ -104,9 +108,18 @@ class _Shaft:
         }
         place = Place(Channel.SHAFT, self._name)
         drivers = {name: self._weighed(rows[:, column]) for name, column in _DRIVERS.items()}
-        columns |= driver_columns(place, drivers)
+        if knots is not None:
+            columns |= knots.columns(place, drivers)
         torque = self._weighed(rows[:, WinchSignal.TORQUE])[:, None]
-        return Equation(place, self._times, target[:, None], columns, torque, signals=drivers)
+        return Equation(
+            place,
+            self._times,
+            target[:, None],
+            columns,
+            torque,
+            turning=self._turning,
+            signals=drivers,
+        )
 
     def _columns(self, effect: Effect) -> Iterator[tuple[Candidate, Array]]:
         if self._name not in elements_of(effect, (self._name,), ()):

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
+from contextlib import contextmanager
 from functools import cached_property
 from typing import NamedTuple
 
@@ -10,7 +12,7 @@ from numpy.typing import NDArray
 from scipy.stats import f as f_distribution
 from scipy.stats import t as t_distribution
 
-from cspm_ident.diagnosis.evidence import Evidence
+from cspm_ident.diagnosis.evidence import Evidence, silence
 
 Array = NDArray[np.float64]
 Index = NDArray[np.intp]
@@ -54,6 +56,38 @@ class Sums:
         self._whole = self._blocks.sum(axis=0)
         self._folds = np.array_split(np.arange(evidence.blocks), min(FOLDS, evidence.blocks))
 
+    def delay(self, columns: Index, block: int) -> None:
+        """Let columns act from a block on only."""
+        silence(self._blocks, columns, block)
+        self._sum_again(columns)
+
+    @contextmanager
+    def delayed(self, columns: Index, block: int) -> Iterator[None]:
+        """Let columns act from a block on only, for a while."""
+        rows = self._blocks[:block, columns, :].copy()
+        sides = self._blocks[:block, :, columns].copy()
+        self.delay(columns, block)
+        try:
+            yield
+        finally:
+            self._blocks[:block, columns, :] = rows
+            self._blocks[:block, :, columns] = sides
+            self._sum_again(columns)
+
+    def _sum_again(self, columns: Index) -> None:
+        tables = [(self._whole, np.ones(self.blocks, dtype=bool))]
+        for others, fold in zip(self._others, self._folds, strict=True):
+            tables.append((others, ~self._near(fold)))
+        own, sides = self._blocks[:, columns], self._blocks[:, :, columns]
+        for table, blocks in tables:
+            table[columns] = own[blocks].sum(axis=0)
+            table[:, columns] = sides[blocks].sum(axis=0)
+
+    def _near(self, fold: Index) -> NDArray[np.bool_]:
+        """Return which blocks are those of a fold or their neighbours."""
+        blocks = np.arange(self.blocks)
+        return np.asarray((blocks >= fold[0] - 1) & (blocks <= fold[-1] + 1))
+
     @property
     def blocks(self) -> int:
         """Number of blocks."""
@@ -72,6 +106,13 @@ class Sums:
     def weights(self, columns: Index) -> Array:
         """Return the least-squares weights of columns."""
         return np.asarray(self._weights(columns, self._whole) / self._lengths[columns])
+
+    def weights_beyond(self, base: Index, columns: Index) -> Array:
+        """Return the weights of columns fitted to what a base leaves, its own weights held."""
+        both = self._whole[np.ix_(columns, base)]
+        left = self._whole[columns, -1] - both @ self._weights(base, self._whole)
+        inverse = _pseudo_inverse(self._whole[np.ix_(columns, columns)])
+        return np.asarray(inverse @ left / self._lengths[columns])
 
     def gains_beyond(self, base: Index, groups: list[Index]) -> Array:
         """Return by how much each group of columns lowers Σ residual² beyond a base, (groups,)."""
@@ -109,12 +150,18 @@ class Sums:
         scale = self._lengths[columns]
         return np.asarray(bread @ meat @ bread / (scale[:, None] * scale))
 
-    def p_value(self, base: Index, columns: Index) -> float:
-        """Return the probability of so large weights by chance, by Wald's test over blocks."""
+    def p_value(self, base: Index, columns: Index, onset: int = 0) -> float:
+        """Return the probability of so large weights by chance, by Wald's test over blocks.
+
+        Args:
+            base: columns beside them.
+            columns: those tested.
+            onset: block from which on these act; earlier ones say nothing of them.
+        """
         both = np.concatenate([base, columns])
         weights = self.weights(both)[len(base) :]
         covariance = self.covariance(both)[len(base) :, len(base) :]
-        count, free = len(columns), max(1, self.blocks - len(columns))
+        count, free = len(columns), max(1, self.blocks - onset - len(columns))
         scale = np.sqrt(np.maximum(np.diag(covariance), 1e-300))
         wald = (
             (weights / scale)
@@ -148,24 +195,19 @@ class Sums:
     def left_from(self, base: Index, columns: Index, block: int) -> float:
         """Return Σ residual² where `columns` act from a block on only."""
         both = np.concatenate([base, columns])
-        whole = self._whole[np.ix_(both, both)].copy()
-        target = self._whole[both, -1].copy()
-        own = np.arange(len(base), len(both))
-        early = self._blocks[:block].sum(axis=0)
-        whole[np.ix_(own, own)] -= early[np.ix_(columns, columns)]
-        whole[np.ix_(own, np.arange(len(base)))] -= early[np.ix_(columns, base)]
-        whole[np.ix_(np.arange(len(base)), own)] -= early[np.ix_(base, columns)]
-        target[own] -= early[columns, -1]
+        table = np.append(both, -1)
+        whole = self._whole[np.ix_(table, table)]
+        early = self._blocks[:block][:, table[:, None], table].sum(axis=0)
+        # What the columns themselves took before, their products with the base and the target.
+        early[: len(base), : len(base)] = 0.0
+        early[: len(base), -1] = 0.0
+        whole, target = (whole - early)[:-1, :-1], (whole - early)[:-1, -1]
         return float(self.squares - target @ _pseudo_inverse(whole) @ target)
 
     @cached_property
     def _others(self) -> list[Array]:
         """Sums of all blocks but those of each fold and their neighbours."""
-        found = []
-        for fold in self._folds:
-            near = slice(max(0, fold[0] - 1), fold[-1] + 2)
-            found.append(self._whole - self._blocks[near].sum(axis=0))
-        return found
+        return [self._blocks[~self._near(fold)].sum(axis=0) for fold in self._folds]
 
     def _weights(self, columns: Index, gram: Array) -> Array:
         return np.asarray(_pseudo_inverse(gram[np.ix_(columns, columns)]) @ gram[columns, -1])

@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from cspm_ident.diagnosis.columns import Candidate, Place, elements_of, shapes_of
-from cspm_ident.diagnosis.drivers import Driver, driver_columns
+from cspm_ident.diagnosis.drivers import Driver, Knots
 from cspm_ident.diagnosis.equation import Equation
 from cspm_ident.diagnosis.machine_signals import BodyMotion, MachineSignals
 from cspm_ident.diagnosis.readings import pose_rows, reading_rows
@@ -41,7 +41,10 @@ BAR, FRAME = Elements.BAR.value, Elements.FRAME.value
 
 
 def suspension_equations(
-    timeline: Timeline, effects: Sequence[Effect], known: Sequence[Action]
+    timeline: Timeline,
+    effects: Sequence[Effect],
+    known: Sequence[Action],
+    knots: Knots | None = None,
 ) -> list[Equation]:
     """Return the equations of all cables and of the bar, one set for each stretch without hole.
 
@@ -51,13 +54,16 @@ def suspension_equations(
         timeline: of the recording.
         effects: the catalogue.
         known: effects that the test-bed file has.
+        knots: of the free functions; None: without these.
     """
     signals = machine_signals(timeline)
     machine = timeline.measurement.machine
     return [
         equation
         for stretch in signals
-        for equation in _Stretch(stretch, machine, timeline.pose_band).equations(effects, known)
+        for equation in _Stretch(stretch, machine, timeline.pose_band).equations(
+            effects, known, knots
+        )
     ]
 
 
@@ -93,7 +99,9 @@ class _Stretch:
         half = max(2, round(half_s / signals.step))
         self._window, self._stride = make_window(half, signals.step).weights, max(1, half // 2)
 
-    def equations(self, effects: Sequence[Effect], known: Sequence[Action]) -> list[Equation]:
+    def equations(
+        self, effects: Sequence[Effect], known: Sequence[Action], knots: Knots | None
+    ) -> list[Equation]:
         times = self._weighed(self._signals.times)
         tensions, wrench = self._targets(known)
         columns: dict[Place, dict[Candidate | Driver, Array]] = {}
@@ -106,15 +114,18 @@ class _Stretch:
             place = Place(Channel.TENSION, name)
             start = self._weighed(self._here.start_column(i))[:, None, None]
             target = self._weighed(tensions[:, i])[:, None]
+            own = columns.get(place, {})
             drivers = {key: self._weighed(rows[:, column]) for key, column in _DRIVERS.items()}
-            own = columns.get(place, {}) | driver_columns(place, drivers)
+            if knots is not None:
+                own |= knots.columns(place, drivers)
             measured = self._weighed(self._signals.tensions[:, i])[:, None]
-            out.append(Equation(place, times, target, own, measured, start, drivers))
+            out.append(Equation(place, times, target, own, measured, start, signals=drivers))
         place = Place(Channel.WRENCH, BAR)
         moved = self._bar_signals()
         own = columns.get(place, {})
-        for i, drivers in enumerate(moved):
-            own = own | driver_columns(place, drivers, i, len(DOFS))
+        if knots is not None:
+            for i, drivers in enumerate(moved):
+                own |= knots.columns(place, drivers, i, len(DOFS))
         signals = {name: values for drivers in moved for name, values in drivers.items()}
         measured = self._weighed(self._here.cable_wrench)
         wrench = self._weighed(wrench)

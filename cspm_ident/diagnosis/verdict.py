@@ -7,10 +7,16 @@ from enum import Enum
 from math import exp
 from typing import Any, NamedTuple
 
+import numpy as np
+
+from cspm_ident.block_simulation import Drive
 from cspm_ident.diagnosis.columns import Candidate
-from cspm_ident.diagnosis.diagnose import Diagnosis, HeldOut
-from cspm_ident.diagnosis.drivers import Driver
-from cspm_ident.diagnosis.search import Hypothesis, Named
+from cspm_ident.diagnosis.diagnose import Diagnosis, Shape, members_of
+from cspm_ident.diagnosis.judgement import HeldOut
+from cspm_ident.diagnosis.onset import Onset
+from cspm_ident.diagnosis.search import Named
+from cspm_ident.diagnosis.simulation import SimulatedFit
+from cspm_ident.diagnosis.sketch import sketch
 from cspm_ident.diagnosis.sums import Gain
 from cspm_ident.signals.measurement import Measurement
 from cspm_sim.effects import Block, Channel, Effect
@@ -97,7 +103,7 @@ def numbers_of(diagnosis: Diagnosis, candidate: Candidate) -> list[Number]:
 def statement_of(diagnosis: Diagnosis, named: Named) -> str:
     """Return a finding as one sentence that a person can act on."""
     effect = named.hypothesis.effect
-    members = members_of(diagnosis, named.hypothesis)
+    members = members_of(diagnosis.weights, named.hypothesis)
     parts = []
     for candidate in members:
         numbers = [n for n in numbers_of(diagnosis, candidate) if n.low < n.high]
@@ -109,32 +115,63 @@ def statement_of(diagnosis: Diagnosis, named: Named) -> str:
         "differs from the test-bed file" if effect.alter is not None else "is not in the model"
     )
     since = ""
-    if named.onset:
-        since = f", from {diagnosis.starts[named.onset]:.1f} s on"
+    onset = _onset_of(diagnosis, named)
+    if onset is not None:
+        since = f", from {onset.time:.1f} s on ({onset.low:.1f} to {onset.high:.1f} s)"
+    elif named.hypothesis.onset:
+        since = f", from block {named.hypothesis.onset} of the recordings on"
     best = max(_concerned(diagnosis, named), key=lambda fit: fit.before / max(fit.after, 1e-300))
     return (
         f"{_words(effect)} {missing}{since} ({'; '.join(parts)}). With it the held-out residual of"
-        f" {channel_of(best)} falls from {best.before:.3g} to {best.after:.3g}"
-        f" {unit_of(best)} (noise {best.noise:.2g})."
+        f" {channel_of(best)} falls from {_amount(best, best.before)} to"
+        f" {_amount(best, best.after)}, where noise is {_amount(best, best.noise)};"
+        f" {_simulated_worth(diagnosis, named)}."
     )
 
 
-def unknown_statement(driver: Driver, share: float) -> str:
-    """Return what is missing and cannot be named as one sentence."""
-    channel = _CHANNELS[driver.place.channel].format(driver.place.element)
+def _onset_of(diagnosis: Diagnosis, named: Named) -> Onset | None:
+    return diagnosis.onsets[diagnosis.findings.named.index(named)]
+
+
+def _amount(fit: HeldOut, value: float) -> str:
+    """Return a residual in its unit, and as a share of what was measured."""
+    return f"{value:.3g} {unit_of(fit)} ({100.0 * value / max(fit.measured, 1e-300):.2g} %)"
+
+
+def _simulated_worth(diagnosis: Diagnosis, named: Named) -> str:
+    worth = diagnosis.worth[diagnosis.findings.named.index(named)]
+    if worth is None:
+        return "what was recorded does not allow to simulate it"
+    if worth.with_it >= worth.without:
+        return "simulations of the held-out data do not improve with it"
     return (
-        f"Something is missing in {channel} that nothing in the catalogue explains: a function of"
-        f" {driver.signal} takes {100 * share:.0f} % of its squared residual."
+        f"simulated, the error of {worth.output.name} falls from {worth.without:.3g} to"
+        f" {worth.with_it:.3g} {worth.output.unit}"
     )
 
 
-def members_of(diagnosis: Diagnosis, hypothesis: Hypothesis) -> list[Candidate]:
-    """Return a finding's candidates with their final shapes."""
-    return [
-        c
-        for c in diagnosis.weights
-        if c.effect_id == hypothesis.effect.id and c.element in hypothesis.elements
-    ]
+def unknown_statement(diagnosis: Diagnosis, k: int) -> str:
+    """Return the k-th thing that is missing and cannot be named as one sentence."""
+    shape, (driver, _, share) = diagnosis.shapes[k], diagnosis.findings.unknown[k]
+    formula = _formula(shape)
+    hint = f"; as a hint, it runs like {formula}" if formula else ""
+    size = "".join(
+        f", {100.0 * np.sqrt(share) * fit.after / max(fit.measured, 1e-300):.2g} % of what was"
+        " measured"
+        for fit in diagnosis.fit
+        if fit.place == driver.place
+    )
+    return (
+        f"Something is missing in {_CHANNELS[driver.place.channel].format(driver.place.element)}"
+        f" that nothing in the catalogue explains: a function of {driver.signal}, from"
+        f" {shape.values.min():.3g} to {shape.values.max():.3g}"
+        f" {_UNITS.get(driver.place.channel, '')}, takes {100 * share:.0f} % of the squared"
+        f" residual{size}{hint}."
+    )
+
+
+def _formula(shape: Shape) -> str | None:
+    return sketch(shape.knots, shape.values, shape.driver.signal.split(" [")[0])
 
 
 def channel_of(fit: HeldOut) -> str:
@@ -144,15 +181,22 @@ def channel_of(fit: HeldOut) -> str:
 
 def unit_of(fit: HeldOut) -> str:
     """Return the unit of a residual; none where channels of several units were put together."""
-    return {Channel.SHAFT: "N·m", Channel.TENSION: "N"}.get(fit.place.channel, "times its noise")
+    return _UNITS.get(fit.place.channel, "times its noise")
 
 
 _CHANNELS = {
+    Channel.DRIVE: "winches/torque_command/{}",
     Channel.SHAFT: "winches/torque/{}",
     Channel.TENSION: "cables/tension/{}",
     Channel.WRENCH: "{}/wrench",
 }
-_DRIVES = {Channel.SHAFT: "torque", Channel.TENSION: "winch", Channel.WRENCH: "tension"}
+_UNITS = {Channel.DRIVE: "N·m", Channel.SHAFT: "N·m", Channel.TENSION: "N"}
+_DRIVES = {
+    Channel.DRIVE: "torque",
+    Channel.SHAFT: "torque",
+    Channel.TENSION: "winch",
+    Channel.WRENCH: "tension",
+}
 
 
 def diagnosis_data(diagnosis: Diagnosis) -> dict[str, Any]:
@@ -166,11 +210,13 @@ def diagnosis_data(diagnosis: Diagnosis) -> dict[str, Any]:
         "testbed": {"path": _testbed_path(first), "sha256": first.testbed.sha256},
         "verdict": verdict_of(diagnosis).value,
         "findings": [_finding(diagnosis, each) for each in diagnosis.findings.named]
-        + [_unknown(*each) for each in diagnosis.findings.unknown],
+        + [_unknown(diagnosis, k) for k in range(len(diagnosis.shapes))],
         "not_excited": [
             {"effect": name, "elements": list(elements)} for name, elements in diagnosis.silent
         ],
-        "fit": [_fit(each) for each in diagnosis.fit],
+        "detection_limits": [limit._asdict() for limit in diagnosis.limits],
+        "fit": [_simulated_fit(each) for each in diagnosis.simulated],
+        "residuals": [_equation_fit(each) for each in diagnosis.fit],
         "model": IMPROVED if diagnosis.findings.named else None,
     }
 
@@ -186,13 +232,15 @@ def _testbed_path(measurement: Measurement) -> str:
 def _finding(diagnosis: Diagnosis, named: Named) -> dict[str, Any]:
     hypothesis = named.hypothesis
     probability = probability_of(named)
+    onset = _onset_of(diagnosis, named)
     return {
         "subsystem": hypothesis.effect.block.value,
         "elements": list(hypothesis.elements),
         "effect": hypothesis.effect.id,
         "probability": probability,
         "statement": statement_of(diagnosis, named),
-        "onset_s": float(diagnosis.starts[named.onset]) if named.onset else None,
+        "onset_s": onset.time if onset is not None else None,
+        "onset_ci95_s": [onset.low, onset.high] if onset is not None else None,
         "region": {},
         "parameters": [
             {
@@ -202,7 +250,7 @@ def _finding(diagnosis: Diagnosis, named: Named) -> dict[str, Any]:
                 "unit": n.unit,
                 "ci95": [n.low, n.high] if n.low < n.high else None,
             }
-            for candidate in members_of(diagnosis, hypothesis)
+            for candidate in members_of(diagnosis.weights, hypothesis)
             for n in numbers_of(diagnosis, candidate)
         ],
         "alternatives": [
@@ -217,34 +265,69 @@ def _finding(diagnosis: Diagnosis, named: Named) -> dict[str, Any]:
     }
 
 
-def _unknown(driver: Driver, gain: Gain, share: float) -> dict[str, Any]:
-    blocks = {Channel.SHAFT: Block.WINCH, Channel.TENSION: Block.CABLE, Channel.WRENCH: Block.BAR}
+def _unknown(diagnosis: Diagnosis, k: int) -> dict[str, Any]:
+    blocks = {
+        Channel.DRIVE: Block.WINCH,
+        Channel.SHAFT: Block.WINCH,
+        Channel.TENSION: Block.CABLE,
+        Channel.WRENCH: Block.BAR,
+    }
+    shape = diagnosis.shapes[k]
+    driver = shape.driver
     return {
         "subsystem": blocks[driver.place.channel].value,
         "elements": [driver.place.element],
         "effect": UNKNOWN,
         "probability": None,
-        "statement": unknown_statement(driver, share),
+        "statement": unknown_statement(diagnosis, k),
         "onset_s": None,
-        "region": {"driver": driver.signal},
+        "region": {
+            "driver": driver.signal,
+            "at": shape.knots.tolist(),
+            "adds": shape.values.tolist(),
+            "hint": _formula(shape),
+        },
         "parameters": [],
         "alternatives": [],
     }
 
 
-def _fit(fit: HeldOut) -> dict[str, Any]:
-    spread = max(fit.measured, 1e-300)
-    before, after = fit.before / spread, fit.after / spread
+def _equation_fit(fit: HeldOut) -> dict[str, Any]:
+    numbers = fit.before, fit.after, fit.retuned, fit.noise
+    drive = _DRIVES[fit.place.channel]
+    found = _fit(channel_of(fit), drive, fit.measured, *numbers)
+    found["held_out"]["nrmse_black_box"] = fit.ceiling / max(fit.measured, 1e-300)
+    return found
+
+
+def _simulated_fit(fit: SimulatedFit) -> dict[str, Any]:
+    numbers = fit.before, fit.after, fit.retuned, fit.floor
+    drive = "torque" if fit.output.drive is Drive.SHAFT else fit.output.drive.value
+    return _fit(fit.output.name, drive, fit.measured, *numbers)
+
+
+def _fit(
+    channel: str,
+    drive: str,
+    measured: float,
+    before: float,
+    after: float,
+    retuned: float,
+    floor: float,
+) -> dict[str, Any]:
+    """Return one entry; all RMS, told as shares of the measured quantity's spread."""
+    spread = max(measured, 1e-300)
+    before, after, retuned, floor = (each / spread for each in (before, after, retuned, floor))
     return {
-        "channel": channel_of(fit),
-        "drive": _DRIVES[fit.place.channel],
+        "channel": channel,
+        "drive": drive,
         "held_out": {
             "vaf_before": 100.0 * max(0.0, 1.0 - before**2),
             "vaf_after": 100.0 * max(0.0, 1.0 - after**2),
             "nrmse_before": before,
             "nrmse_after": after,
-            "nrmse_retuned_nominal": fit.retuned / spread,
-            "noise_floor": fit.noise / spread,
+            "nrmse_retuned_nominal": retuned,
+            "noise_floor": floor,
         },
     }
 

@@ -27,7 +27,12 @@ Table = Mapping[Sensors, Mapping[Pair, float | None]]
 CABLE = "sway_1"
 DURATION_S = 30.0
 # What the thesis's sensors leave in residuals of a nominal machine [N·m, N, N and N·m].
-NOISE = {Channel.SHAFT: 1e-4, Channel.TENSION: 0.02, Channel.WRENCH: 0.05}
+NOISE = {
+    Channel.DRIVE: 1e-4,
+    Channel.SHAFT: 1e-4,
+    Channel.TENSION: 0.02,
+    Channel.WRENCH: 0.05,
+}
 # Below this angle a pair is listed, twins or not.
 NARROW_DEG = 15.0
 _SCENARIOS = Path(__file__).resolve().parents[2] / "scenarios"
@@ -86,9 +91,7 @@ def angle_table(
 
 def isolability_page(effects: Mapping[str, Effect], table: Table) -> str:
     """Return the page in Markdown."""
-    noise = ", ".join(
-        f"{value:g} {unit}" for value, unit in zip(NOISE.values(), _UNITS, strict=True)
-    )
+    noise = ", ".join(f"{NOISE[channel]:g} {unit}" for channel, unit in _UNITS.items())
     head = _HEAD.format(motion=f"{DURATION_S:g} s", cable=CABLE, noise=noise, narrow=NARROW_DEG)
     best = table[Sensors.BAR_AND_CAPTURE]
     pairs = [pair for pair in best if _is_listed(pair, effects, table)]
@@ -98,7 +101,11 @@ def isolability_page(effects: Mapping[str, Effect], table: Table) -> str:
     return head + "\n".join(rows) + "\n" + _SHOWN_HEAD + "\n".join(shown) + "\n"
 
 
-_UNITS = ("N·m of torque", "N of tension", "N or N·m of the bar's wrench")
+_UNITS = {
+    Channel.SHAFT: "N·m of torque",
+    Channel.TENSION: "N of tension",
+    Channel.WRENCH: "N or N·m of the bar's wrench",
+}
 
 
 def _is_listed(pair: Pair, effects: Mapping[str, Effect], table: Table) -> bool:

@@ -171,5 +171,6 @@ def _measured(
         speed=Samples(times, speeds),
         torque=Samples(times, torques),
         tension=Samples(times, tensions) if has_cable else None,
-        **poses,
+        bar_pose=poses.get("bar_pose"),
+        frame_pose=poses.get("frame_pose"),
     )

@@ -16,6 +16,7 @@ from cspm_msgs_py.errors import InputError
 from cspm_msgs_py.recording.attached_testbed import attached_testbed
 from cspm_msgs_py.recording.reader import Recording
 from cspm_msgs_py.recording.rows import Rows
+from cspm_msgs_py.recording.run_record import simulated_plant
 from cspm_msgs_py.testbed import Testbed, TestbedFile, load_testbed
 from cspm_msgs_py.topics import Topic
 from cspm_sim.kernels.trajectory import eulers_along
@@ -45,6 +46,9 @@ class Measurement:
         angle, speed, torque: at the motor shafts [rad, rad/s, N·m], one column per cable.
         tension: [N], one column per cable.
         command: commanded torque [N·m].
+        torque_age: how long before its stamp the reported torque acted, on average [s]. A simulated
+            drive reports what it held since the stamp before: half a period. Of others nothing is
+            known, and 0 is taken.
     """
 
     path: Path
@@ -57,6 +61,7 @@ class Measurement:
     torque: Samples | None = None
     tension: Samples | None = None
     command: Samples | None = None
+    torque_age: float = 0.0
 
     @property
     def machine(self) -> Testbed:
@@ -118,6 +123,7 @@ def read_measurement(path: Path, testbed: Path | None = None) -> Measurement:
         names = [n for n in wanted if n in topics and _count(recording, n)]
         rows = recording.rows_of(names)
         found = {name: recording.topic(name) for name in names}
+        simulated = simulated_plant(recording) is not None
     if not names:
         raise InputError(f"{path}: no measured topic, allowed: at least one of {', '.join(wanted)}")
     _check_cables(found, machine.testbed, path)
@@ -125,7 +131,9 @@ def read_measurement(path: Path, testbed: Path | None = None) -> Measurement:
     parts: dict[str, Samples] = {}
     for name in names:
         parts.update(_samples(name, found[name], rows[name], start, machine.testbed))
-    return Measurement(path, digest.result(), machine, **parts)
+    torque = parts.get("torque")
+    age = 0.5 * torque.interval if simulated and torque is not None else 0.0
+    return Measurement(path, digest.result(), machine, **parts, torque_age=age)
 
 
 def _count(recording: Recording, name: str) -> int:

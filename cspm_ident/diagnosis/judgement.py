@@ -1,0 +1,134 @@
+"""What was found, judged by residuals that were not searched."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from cspm_ident.diagnosis.columns import Candidate, Place
+from cspm_ident.diagnosis.drivers import Driver
+from cspm_ident.diagnosis.equation import Equation, in_noise
+from cspm_ident.diagnosis.evidence import Evidence
+from cspm_ident.diagnosis.recorded import equations_of
+from cspm_ident.diagnosis.supposed import with_found
+from cspm_ident.signals.measurement import Measurement
+from cspm_msgs_py.errors import InputError
+
+Array = NDArray[np.float64]
+
+
+@dataclass(frozen=True)
+class HeldOut:
+    """One residual on data that was not searched.
+
+    Root mean squares in its unit; of the bar's six channels together, in units of their noise.
+
+    Attributes:
+        place: which residual.
+        measured: standard deviation of the measured quantity.
+        before: with the file's model.
+        retuned: with the file's parameters fitted to the searched data, nothing added.
+        after: with what was found.
+        ceiling: with free functions of every driver fitted to the searched data: what a model
+            without physics gets.
+        noise: what differs from row to row.
+    """
+
+    place: Place
+    measured: float
+    before: float
+    retuned: float
+    after: float
+    ceiling: float
+    noise: float
+
+
+def judged(
+    measurements: Sequence[Measurement],
+    retuned: Mapping[Candidate, Array],
+    found: Mapping[Candidate, Array],
+    noise: Mapping[Place, Array],
+    free: Mapping[Place, float],
+) -> tuple[HeldOut, ...]:
+    """Return every residual of recordings as described, re-tuned and with what was found.
+
+    Args:
+        measurements: not searched.
+        retuned: weights of the file's own parameters.
+        found: weights of what was found.
+        noise: of each residual, its unit.
+        free: what free functions leave, root mean square in units of the noise.
+    """
+    described = _residuals(measurements, {}, noise)
+    tuned = _residuals(measurements, retuned, noise) if retuned else described
+    after = _residuals(measurements, found, noise) if found else described
+    out = []
+    for place, equations in described.items():
+        unit = float(noise[place][0]) if len(noise[place]) == 1 else 1.0
+        measured = np.concatenate([e.measured for e in equations])
+        spread = float(np.sqrt(np.mean((measured - measured.mean(axis=0)) ** 2)))
+        stages = (rms(each.get(place, ())) for each in (described, tuned, after))
+        before, then, now = (unit * stage for stage in stages)
+        ceiling = unit * free.get(place, float("nan"))
+        out.append(HeldOut(place, unit * spread, before, then, now, ceiling, unit))
+    return tuple(out)
+
+
+def free_functions(searched: Evidence, judge: Evidence) -> dict[Place, float]:
+    """Return what free functions of all drivers, fitted to what was searched, leave elsewhere.
+
+    Root mean squares in units of the noise. They stand for a black box: what a model gets that
+    knows what may matter, but no physics.
+    """
+    weights: dict[Candidate | Driver, Array] = {}
+    for place in searched.places:
+        own = [t for t in searched.terms if isinstance(t, Driver) and t.place == place.place]
+        columns = np.intersect1d(place.columns, searched.with_nuisance(own))
+        at = np.searchsorted(place.columns, columns)
+        gram, target = place.whole[np.ix_(at, at)], place.whole[at, -1]
+        fitted = np.linalg.pinv(gram, hermitian=True, rcond=1e-9) @ target
+        full = np.zeros(searched.width)
+        full[columns] = fitted
+        weights |= {term: full[searched.slices[term]] for term in own}
+    left = judge.left_with(weights)
+    rows = {place.place: max(1.0, float(place.rows.sum())) for place in judge.places}
+    return {place: float(np.sqrt(max(0.0, left[place]) / count)) for place, count in rows.items()}
+
+
+def rms(equations: Sequence[Equation]) -> float:
+    """Return the root mean square of residuals, what is never told fitted to each."""
+    squares, count = 0.0, 0
+    for equation in equations:
+        left = without_nuisance(equation)
+        squares, count = squares + float(np.sum(left**2)), count + left.size
+    return float(np.sqrt(squares / max(count, 1)))
+
+
+def without_nuisance(equation: Equation) -> Array:
+    """Return the residual less what no recording tells, shape (k, channels)."""
+    if not equation.nuisance.size:
+        return equation.target
+    columns = equation.nuisance.reshape(equation.target.size, -1)
+    target = equation.target.reshape(-1)
+    left = target - columns @ np.linalg.lstsq(columns, target, rcond=None)[0]
+    return np.asarray(left.reshape(equation.target.shape))
+
+
+def _residuals(
+    measurements: Sequence[Measurement],
+    weights: Mapping[Candidate, Array],
+    noise: Mapping[Place, Array],
+) -> dict[Place, list[Equation]]:
+    try:
+        parts = [equations_of(with_found(m, weights), ()) for m in measurements]
+    except InputError:
+        # No machine has such numbers; what was to be corrected stays as described.
+        parts = [equations_of(m, ()) for m in measurements]
+    found: dict[Place, list[Equation]] = {}
+    for part in in_noise(parts, noise):
+        for equation in part:
+            found.setdefault(equation.place, []).append(equation)
+    return found

@@ -1,0 +1,65 @@
+"""When an effect began, more closely than the blocks of the search tell."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from typing import NamedTuple
+
+import numpy as np
+
+from cspm_ident.diagnosis.columns import Candidate
+from cspm_ident.diagnosis.equation import Equation
+from cspm_ident.diagnosis.evidence import gather
+from cspm_ident.diagnosis.sums import Sums
+
+FINE_S = 0.1
+# Of the scatter between fine blocks: so much more is left at times that are none.
+_SIGMAS = 3.0
+
+
+class Onset(NamedTuple):
+    """When an effect began [s], and from when to when it may have."""
+
+    time: float
+    low: float
+    high: float
+
+
+def onset_of(
+    equations: Sequence[Equation],
+    own: Sequence[Candidate],
+    others: Mapping[Candidate, float],
+    low: float,
+    high: float,
+) -> Onset:
+    """Return when an effect began.
+
+    The squared residual is looked at for every fine block that it may begin with; times at which it
+    exceeds the least by no more than it scatters are possible as well.
+
+    Args:
+        equations: one recording's, in units of their noise.
+        own: the effect on its elements.
+        others: everything else that was found, with when it began [s].
+        low: earliest time to look at [s].
+        high: latest.
+    """
+    terms = [*own, *others]
+    places = {term: [e for e in equations if term in e.columns] for term in own}
+    concerned = {e.place for found in places.values() for e in found}
+    rows = [e.only(terms) for e in equations if e.place in concerned]
+    evidence = gather([rows], FINE_S)
+    sums, edges = Sums(evidence), evidence.times
+    for term, time in others.items():
+        sums.delay(evidence.columns_of([term]), int(np.searchsorted(edges, time)))
+    base, columns = evidence.with_nuisance(others), evidence.columns_of(own)
+    first, last = np.searchsorted(edges, [low, high])
+    blocks = np.arange(max(first, 1), max(min(last, len(edges) - 2), first + 2))
+    left = np.array([sums.left_from(base, columns, int(b)) for b in blocks])
+    best = int(np.argmin(left))
+    sums.delay(columns, int(blocks[best]))
+    both = np.concatenate([base, columns])
+    scatter = float(np.std(sums.held_out(both)))
+    possible = edges[blocks[left <= left[best] + _SIGMAS * scatter]]
+    step = edges[1] - edges[0]
+    return Onset(float(edges[blocks[best]]), float(possible[0] - step), float(possible[-1] + step))

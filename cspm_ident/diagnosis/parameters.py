@@ -1,0 +1,104 @@
+"""Parameters of what was named, with intervals."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+
+from cspm_ident.diagnosis.columns import Candidate, Place
+from cspm_ident.diagnosis.drive import time_constant
+from cspm_ident.diagnosis.equation import Equation, steady
+from cspm_ident.diagnosis.evidence import Evidence, gather
+from cspm_ident.diagnosis.refine import Weights
+from cspm_ident.diagnosis.sums import Sums
+from cspm_sim.effects import Channel
+
+Parts = Sequence[Sequence[Equation]]
+
+
+def weights_of(evidence: Evidence, sums: Sums, candidates: Sequence[Candidate]) -> Weights:
+    """Return each candidate's weights with half the width of their 95 % intervals."""
+    columns = evidence.with_nuisance(candidates)
+    values = evidence.parted(candidates, sums.weights(columns))
+    widths = evidence.parted(candidates, sums.half_width(columns))
+    return {c: (values[c], widths[c]) for c in candidates}
+
+
+def of_shafts(weights: Weights, parts: Parts, block_s: float) -> Weights:
+    """Return the weights with those of winches' effects fitted to suit their rows.
+
+    Near a reversal a shaft may stick, which no regressor of its speed says. Rows in which it turns
+    round are left out and others that stand out count less (Huber, Ann. Math. Stat. 35(1), 1964).
+    Where least squares over all rows leave no weight's interval, they are taken instead: what is
+    efficient, unless what is safe contradicts (Hausman, Econometrica 46(6), 1978).
+
+    Args:
+        weights: as found.
+        parts: all rows, in units of their noise.
+        block_s: length of the blocks [s].
+    """
+    found = dict(weights)
+    for winch in {e.place.element for part in parts for e in part if e.turning.any()}:
+        place = Place(Channel.SHAFT, winch)
+        own = [c for c in weights if (c.effect.regression.channel, c.element) == place]
+        if not own:
+            continue
+        rows = [[e.only(own) for e in part if e.place == place] for part in parts]
+        plain = _fitted(steady(rows), own, block_s)
+        calm = _fitted(_calmed(steady(rows), own), own, block_s)
+        # Rows that stand out are no noise: what they move is uncertain as well.
+        safe = {c: (w, np.hypot(half, w - plain[c][0])) for c, (w, half) in calm.items()}
+        whole = _fitted(rows, own, block_s)
+        agree = all(np.all(np.abs(whole[c][0] - safe[c][0]) <= safe[c][1]) for c in own)
+        found |= whole if agree else safe
+    return found
+
+
+def of_drives(weights: Weights, period: float) -> Weights:
+    """Return the weights with those of drives as of continuous time, by how their samples arise.
+
+    Args:
+        weights: as found.
+        period: for which a command is held [s].
+    """
+    found = dict(weights)
+    for candidate, (values, half) in weights.items():
+        if candidate.effect.regression.channel is Channel.DRIVE:
+            low, middle, high = (
+                time_constant(each, period) for each in (values - half, values, values + half)
+            )
+            found[candidate] = middle, np.maximum(high - middle, middle - low)
+    return found
+
+
+def _fitted(parts: Parts, candidates: Sequence[Candidate], block_s: float) -> Weights:
+    evidence = gather(parts, block_s)
+    return weights_of(evidence, Sums(evidence), candidates)
+
+
+def _calmed(parts: Parts, candidates: Sequence[Candidate]) -> Parts:
+    """Return rows scaled so that least squares are Huber's estimate."""
+    target = np.concatenate([e.target[:, 0] for part in parts for e in part])
+    columns = np.concatenate(
+        [
+            np.concatenate([e.columns[c][:, 0] for c in candidates], axis=1)
+            for part in parts
+            for e in part
+        ]
+    )
+    counts = np.ones(len(target))
+    for _ in range(_ROUNDS):
+        root = np.sqrt(counts)
+        weights = np.linalg.lstsq(columns * root[:, None], target * root, rcond=None)[0]
+        left = np.abs(target - columns @ weights)
+        scale = max(1.4826 * float(np.median(left)), 1e-300)
+        counts = np.minimum(1.0, _HUBER * scale / np.maximum(left, 1e-300))
+    edges = np.cumsum([len(e.times) for part in parts for e in part])[:-1]
+    roots = iter(np.split(np.sqrt(counts), edges))
+    return [[e.weighted(next(roots)) for e in part] for part in parts]
+
+
+# Of the scale: what lies farther counts less.
+_HUBER = 3.0
+_ROUNDS = 20

@@ -1,0 +1,43 @@
+"""A free shape put into a formula, as a hint and no more."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+
+import numpy as np
+from numpy.typing import NDArray
+
+Array = NDArray[np.float64]
+
+# A formula has to account for so much of the shape.
+_ENOUGH = 0.9
+_FORMS: dict[str, Callable[[Array], Array]] = {
+    "{x}": lambda x: x,
+    "|{x}|": np.abs,
+    "sign({x})": np.sign,
+    "({x})²": np.square,
+    "{x}·|{x}|": lambda x: x * np.abs(x),
+    "({x})³": lambda x: x**3,
+    "√|{x}|": lambda x: np.sqrt(np.abs(x)),
+}
+
+
+def sketch(knots: Array, values: Array, name: str) -> str | None:
+    """Return the simplest formula that a shape follows, a constant beside it; None if none does.
+
+    Args:
+        knots: of the signal, shape (k,).
+        values: of the shape there, (k,).
+        name: of the signal, without unit.
+    """
+    spread = float(np.sum((values - values.mean()) ** 2))
+    if spread <= 0.0:
+        return None
+    best: tuple[float, str] | None = None
+    for form, function in _FORMS.items():
+        table = np.column_stack([function(knots), np.ones(len(knots))])
+        found = np.linalg.lstsq(table, values, rcond=None)[0]
+        share = 1.0 - float(np.sum((values - table @ found) ** 2)) / spread
+        if share >= _ENOUGH and (best is None or share > best[0]):
+            best = share, f"{found[0]:.3g}·{form.format(x=name)}"
+    return None if best is None else best[1]

@@ -1,0 +1,99 @@
+"""A recording as it would be, were a machine as supposed and its sensors without their faults."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from cspm_ident.diagnosis.columns import Candidate
+from cspm_ident.diagnosis.readings import pose_rows, reading_rows
+from cspm_ident.signals.measurement import BAR, FRAME, TENSION, WINCHES, Measurement
+from cspm_ident.signals.samples import Samples
+from cspm_msgs_py.testbed import EffectEntry
+from cspm_sim.effect_entries import Action, altered_testbed, read_actions
+
+Array = NDArray[np.float64]
+
+_FIXED_POINTS = 4
+
+
+def with_found(measurement: Measurement, weights: Mapping[Candidate, Array]) -> Measurement:
+    """Return the measurement of a machine whose description has further effects.
+
+    Args:
+        measurement: what was recorded.
+        weights: of the effects' columns, by element.
+    """
+    entries = [
+        EffectEntry(
+            effect=candidate.effect_id,
+            elements=(candidate.element,),
+            parameters=dict(candidate.effect.values(own.tolist(), **candidate.nonlinear)),
+        )
+        for candidate, own in weights.items()
+    ]
+    machine = measurement.machine
+    machine = machine.model_copy(update={"effects": (*machine.effects, *entries)})
+    return measurement.with_testbed(replace(measurement.testbed, testbed=machine))
+
+
+def settled(measurement: Measurement) -> Measurement:
+    """Return the measurement with readings and numbers as the described effects make them.
+
+    Sensors' faults are taken out of the readings, changes of the file's numbers are made in it;
+    missing physics stays among the machine's effects.
+
+    Raises:
+        InputError: an effect cannot be used, or no machine has such numbers.
+    """
+    machine, actions = measurement.machine, read_actions(measurement.machine)
+    if not any(action.effect.alter or action.effect.sense for action in actions):
+        return measurement
+    for action in actions:
+        if action.effect.sense is not None:
+            measurement = _true_readings(measurement, action)
+    numbers = altered_testbed(machine, actions)
+    kept = tuple(
+        EffectEntry(effect=a.effect.id, elements=(a.name,), parameters=dict(a.values))
+        for a in actions
+        if a.effect.alter is None and a.effect.sense is None
+    )
+    left = numbers.model_copy(update={"effects": kept})
+    return measurement.with_testbed(replace(measurement.testbed, testbed=left))
+
+
+def _true_readings(measurement: Measurement, action: Action) -> Measurement:
+    """Return what a sensor would have read without a fault, to which a fixed point leads."""
+    effect = action.effect
+    assert effect.sense is not None
+    topic = effect.sense.topics[0]
+    if topic in (TENSION, WINCHES):
+        return _true_joint(measurement, action, "tension" if topic == TENSION else "angle")
+    kind = {BAR: "bar_pose", FRAME: "frame_pose"}[f"/{action.name}/pose"]
+    samples: Samples | None = getattr(measurement, kind)
+    if samples is None:
+        return measurement
+    if effect.sense.lateness is not None:
+        parameters = np.array(list(action.values.values()))
+        late = np.array([effect.sense.lateness(float(t), parameters) for t in samples.times])
+        return measurement.with_samples(kind, Samples(samples.times - late, samples.values))
+    values, weights = samples.values, effect.weights(action.values)
+    for _ in range(_FIXED_POINTS):
+        rows = pose_rows(samples.times, values, np.zeros_like(values))
+        values = samples.values - effect.regressors(rows) @ weights
+    return measurement.with_samples(kind, Samples(samples.times, values))
+
+
+def _true_joint(measurement: Measurement, action: Action, kind: str) -> Measurement:
+    samples: Samples | None = getattr(measurement, kind)
+    if samples is None:
+        return measurement
+    i, weights = action.element, action.effect.weights(action.values)
+    values = samples.values.copy()
+    for _ in range(_FIXED_POINTS):
+        rows = reading_rows(samples.times, values[:, i])
+        values[:, i] = samples.values[:, i] - action.effect.regressors(rows)[:, 0] @ weights
+    return measurement.with_samples(kind, Samples(samples.times, values))

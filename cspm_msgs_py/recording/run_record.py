@@ -1,0 +1,15 @@
+"""What a recording says of the run that made it, in its metadata."""
+
+from __future__ import annotations
+
+from cspm_msgs_py.recording.reader import Recording
+
+RECORD_NAME = "cspm"
+# In the plant's place: somebody's drivers, not a simulation.
+EXTERNAL = "external"
+
+
+def simulated_plant(recording: Recording) -> str | None:
+    """Return which of this project's plants was recorded; None of hardware and imported data."""
+    plant = recording.metadata.get(RECORD_NAME, {}).get("plant")
+    return None if plant == EXTERNAL else plant

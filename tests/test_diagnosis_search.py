@@ -1,0 +1,163 @@
+"""What is chosen, from when on, how surely, and what is left for no effect."""
+
+import numpy as np
+import pytest
+
+from cspm_ident.diagnosis.columns import Candidate, Place
+from cspm_ident.diagnosis.drivers import KNOTS, Driver, Knots
+from cspm_ident.diagnosis.equation import Equation
+from cspm_ident.diagnosis.evidence import gather
+from cspm_ident.diagnosis.judgement import free_functions, rms, without_nuisance
+from cspm_ident.diagnosis.limits import detection_limits
+from cspm_ident.diagnosis.onset import onset_of
+from cspm_ident.diagnosis.parameters import of_shafts, weights_of
+from cspm_ident.diagnosis.search import Search
+from cspm_ident.diagnosis.sketch import sketch
+from cspm_ident.diagnosis.sums import Sums
+from cspm_sim.effects import Channel, catalogue
+
+ROWS, STEP, BLOCK_S = 4800, 0.01, 2.0
+PLACE = Place(Channel.SHAFT, "only")
+COULOMB, VISCOUS = (
+    Candidate(catalogue()[name], "only")
+    for name in ("winch_coulomb_friction", "winch_viscous_friction")
+)
+TORQUE = 0.3
+
+
+def turning(seed=0, start=0, missing=None, sticks=False):
+    """A shaft swinging against dry friction in noise, and rows in which it turns round."""
+    rng = np.random.default_rng(seed)
+    times = STEP * np.arange(ROWS)
+    speed = np.sin(2.1 * times) + 0.6 * np.sin(0.83 * times + seed)
+    acting = times >= STEP * start
+    slow = np.abs(speed) < 0.1
+    friction = TORQUE * np.sign(speed) * acting
+    if sticks:
+        friction = np.where(slow, 0.2 * friction, friction)
+    target = friction + 0.05 * rng.standard_normal(ROWS)
+    if missing is not None:
+        target = target + missing(speed)
+    columns = {COULOMB: np.sign(speed), VISCOUS: speed}
+    shaped = {term: values[:, None, None] for term, values in columns.items()}
+    shaped |= Knots().columns(PLACE, {"speed [rad/s]": speed, "time [s]": times})
+    return Equation(PLACE, times, target[:, None], shaped, target[:, None], turning=slow)
+
+
+def found(equation):
+    return Search(gather([[equation]], BLOCK_S)).run()
+
+
+def test_an_effect_is_named_with_what_it_is_worth():
+    (named,) = found(turning()).named
+    assert (named.hypothesis.effect.id, named.hypothesis.elements) == (
+        "winch_coulomb_friction",
+        ("only",),
+    )
+    assert named.hypothesis.onset == 0
+    assert named.share > 0.9
+    assert found(turning()).unknown == ()
+
+
+def test_an_effect_that_begins_late_is_named_with_when_it_began():
+    equation = turning(start=3000)
+    (named,) = found(equation).named
+    assert named.hypothesis.effect.id == "winch_coulomb_friction"
+    assert named.hypothesis.onset == round(3000 * STEP / BLOCK_S)
+    onset = onset_of([equation], [COULOMB], {}, 28.0, 32.0)
+    assert onset.low < 3000 * STEP < onset.high
+    assert onset.high - onset.low < 1.0
+    assert onset.time == pytest.approx(3000 * STEP, abs=0.2)
+
+
+def test_what_shows_at_the_very_end_only_is_not_told():
+    assert found(turning(start=ROWS - 500)).named == ()
+
+
+def test_nothing_is_named_in_noise():
+    noise = np.random.default_rng(5).standard_normal((ROWS, 1))
+    assert found(Equation(PLACE, turning().times, noise, turning().columns, noise)).named == ()
+
+
+def test_what_no_effect_does_is_a_free_function_of_its_driver():
+    result = found(turning(missing=lambda speed: 0.1 * speed**2))
+    assert [named.hypothesis.effect.id for named in result.named] == ["winch_coulomb_friction"]
+    driver, _, share = result.unknown[0]
+    assert driver == Driver(PLACE, "speed [rad/s]")
+    assert share > 0.5
+
+
+def test_rows_that_stick_do_not_mislead_and_others_are_all_used():
+    for sticks in (False, True):
+        equation = turning(sticks=sticks)
+        steady = gather([[equation.steady]], BLOCK_S)
+        first = weights_of(steady, Sums(steady), [COULOMB])
+        (value,), (half,) = of_shafts(first, [[equation]], BLOCK_S)[COULOMB]
+        assert abs(value - TORQUE) < half
+    whole = gather([[turning(sticks=True)]], BLOCK_S)
+    ((misled,), (half,)) = weights_of(whole, Sums(whole), [COULOMB])[COULOMB]
+    assert abs(misled - TORQUE) > half
+
+
+def test_free_functions_leave_what_is_no_function_of_a_driver():
+    first, second = turning(seed=1), turning(seed=2)
+    evidence, judge = (gather([[each]], BLOCK_S) for each in (first, second))
+    left = free_functions(evidence, judge)[PLACE]
+    assert 0.05 < left < 0.5 * rms([second])
+
+
+def test_knots_are_those_of_the_first_recording():
+    knots = Knots()
+    wide, narrow = np.linspace(-1.0, 1.0, 50), np.linspace(-0.2, 3.0, 50)
+    knots.columns(PLACE, {"speed": wide})
+    (columns,) = knots.columns(PLACE, {"speed": narrow}).values()
+    at = knots.of(Driver(PLACE, "speed"))
+    np.testing.assert_allclose(columns[:, 0] @ at, np.clip(narrow, -1.0, 1.0), atol=1e-12)
+    assert len(at) == KNOTS
+    assert knots.columns(PLACE, {"still": np.zeros(50)}) == {}
+
+
+def test_an_effect_below_its_limit_is_not_told_and_one_above_it_is():
+    """The limit is that of the search itself, told from a recording without the effect."""
+    quiet = turning(missing=lambda speed: -TORQUE * np.sign(speed))
+    search = Search(gather([[quiet]], BLOCK_S))
+    limits = {limit.effect: limit for limit in detection_limits(search, ())}
+    limit = limits["winch_coulomb_friction"]
+    assert (limit.element, limit.parameter, limit.unit) == ("only", "torque", "N·m")
+    assert limit.possible
+    assert set(limits) == {"winch_coulomb_friction", "winch_viscous_friction"}
+    for factor, told in ((0.5, False), (2.0, True)):
+        less = factor * limit.least - TORQUE
+        found_here = found(turning(missing=lambda speed, less=less: less * np.sign(speed)))
+        assert bool(found_here.named) is told
+
+
+def test_what_is_never_told_is_fitted_before_a_residual_counts():
+    equation = turning()
+    start = np.linspace(1.0, 2.0, ROWS)[:, None, None]
+    shifted = Equation(
+        PLACE,
+        equation.times,
+        equation.target + 7.0 * start[:, :, 0],
+        equation.columns,
+        equation.measured,
+        nuisance=start,
+    )
+    left = without_nuisance(shifted)
+    assert abs(float(left[:, 0] @ start[:, 0, 0])) < 1e-6 * ROWS
+    assert rms([shifted]) <= rms([equation]) * (1.0 + 1e-9)
+
+
+@pytest.mark.parametrize(
+    ("shape", "expected"),
+    [
+        (lambda x: 2.0 * np.abs(x) - 0.3, "2·|speed|"),
+        (lambda x: -0.5 * x**2, "-0.5·(speed)²"),
+        (lambda x: 3.0 * x * np.abs(x), "3·speed·|speed|"),
+        (lambda x: np.cos(3.0 * x), None),
+        (lambda x: 0.0 * x, None),
+    ],
+)
+def test_a_shape_is_put_into_a_formula_where_it_follows_one(shape, expected):
+    knots = np.linspace(-2.0, 2.0, KNOTS)
+    assert sketch(knots, shape(knots), "speed") == expected

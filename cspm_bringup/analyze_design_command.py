@@ -23,6 +23,7 @@ from cspm_control.analysis.loops import (
     SAMPLED,
     LoopAnalysis,
     analyse_loops,
+    pid_law,
 )
 from cspm_control.analysis.sampled_loops import LoopTiming, loop_timing
 from cspm_control.design import GAIN_MARGIN, LOW_FREQUENCY_GAIN, MOTION_BANDWIDTH, PHASE_MARGIN
@@ -90,6 +91,7 @@ def _closed_loop(
         )
     designed = resolve(scenario, machine.testbed).control
     assert isinstance(designed, ClosedLoop)
+    pid_law(designed)
     # The gains are those of the design pose; how they do is asked here.
     motion = designed.motion.model_copy(update={"design_pose": machine.pose})
     control = designed.model_copy(update={"motion": motion})
@@ -134,7 +136,7 @@ def _gain_table(control: ClosedLoop, groups: dict[str, str]) -> Table:
     table = Table(title="gains", box=box.SIMPLE_HEAD)
     for heading in ("loop", "Kp", "Ki", "Kd", "integral rad/s"):
         table.add_column(heading, justify="left" if heading == "loop" else "right")
-    for dof, pid in (control.motion.gains or {}).items():
+    for dof, pid in (pid_law(control).gains or {}).items():
         table.add_row(dof, f"{pid.kp:.4g}", f"{pid.ki:.4g}", f"{pid.kd:.4g}", "")
     for name, first in groups.items():
         pi = (control.force.gains or {})[first]
@@ -211,7 +213,7 @@ def _data(
         "pose": list(machine.pose),
         "timing": vars(timing),
         "gains": {
-            "motion": {d: g.model_dump() for d, g in (control.motion.gains or {}).items()},
+            "motion": {d: g.model_dump() for d, g in (pid_law(control).gains or {}).items()},
             "force": {n: g.model_dump() for n, g in (control.force.gains or {}).items()},
         },
         "motion": {way: _views_data(views) for way, views in found.motion.items()},

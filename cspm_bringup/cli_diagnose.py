@@ -50,7 +50,7 @@ def diagnose(
         Path | None,
         typer.Option(
             metavar="FOLDER",
-            help="A new folder for diagnosis.json, its picture and testbed.improved.yaml.",
+            help="A new folder for diagnosis.html, .json and .png and testbed.improved.yaml.",
         ),
     ] = None,
     closed_loop: Annotated[

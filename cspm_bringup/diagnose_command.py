@@ -12,6 +12,7 @@ from rich.table import Table
 
 from cspm_bringup.closed_loop import ClosedLoopFit, simulate_closed_loop
 from cspm_bringup.console import make_console, say
+from cspm_bringup.experiment_files import write_experiments
 from cspm_bringup.summary import write_json
 from cspm_ident.diagnosis.diagnose import Diagnosis, diagnose
 from cspm_ident.diagnosis.improved_file import improved_testbed
@@ -31,6 +32,7 @@ from cspm_msgs_py.new_folder import refuse_existing
 
 REPORT = "diagnosis.json"
 PICTURE = "diagnosis.png"
+PAGE = "diagnosis.html"
 
 
 @dataclass(frozen=True)
@@ -73,12 +75,15 @@ def diagnose_command(asked: DiagnoseRequest, json: Path | None) -> None:
         if asked.closed_loop and found.findings.named:
             improved = improved_testbed(found, IMPROVED)
             loop = simulate_closed_loop((held_out or searched)[0], improved, status.update)
+        data = diagnosis_data(found) | {"closed_loop": [each._asdict() for each in loop]}
+        if asked.out is not None:
+            asked.out.mkdir(parents=True)
+            write_experiments(asked.out, found, data, status.update)
+            _write(asked.out, found, data)
     print_diagnosis(console, found)
     if loop:
         console.print(_loop_table(loop))
-    data = diagnosis_data(found) | {"closed_loop": [each._asdict() for each in loop]}
     if asked.out is not None:
-        _write(asked.out, found, data)
         say(console, f"written {asked.out}")
     if json is not None:
         write_json(json, data)
@@ -194,10 +199,11 @@ def _loop_table(loop: Sequence[ClosedLoopFit]) -> Table:
 def _write(folder: Path, found: Diagnosis, data: dict[str, object]) -> None:
     # Drawing takes a second to load that a verdict alone need not wait for.
     from cspm_bringup.diagnosis_figure import draw_diagnosis
+    from cspm_ident.diagnosis.page import write_diagnosis_page
 
-    folder.mkdir(parents=True)
     write_json(folder / REPORT, data)
     draw_diagnosis(folder / PICTURE, found)
+    write_diagnosis_page(folder / PAGE, found, data)
     if found.findings.named:
         improved = improved_testbed(found, str(folder / IMPROVED))
         (folder / IMPROVED).write_text(improved.text, encoding="utf-8")

@@ -6,6 +6,7 @@ from collections.abc import Iterable, Iterator, Sequence
 from typing import NamedTuple
 
 import numpy as np
+from numba.core.errors import NumbaError
 from numpy.typing import NDArray
 
 from cspm_msgs_py.errors import InputError
@@ -92,10 +93,21 @@ def hook_rows(actions: Sequence[Action], n_states: int) -> tuple[NDArray[np.int6
     parameters = np.zeros((len(calls), width))
     for row, (hook, element, k) in enumerate(calls):
         effect, values = actions[k].effect, list(actions[k].values.values())
-        address = kernel_address(effect.kernels[Hook(hook)], effect.states > 0)
+        address = _address(effect, Hook(hook))
         effects[row] = hook, element, address, first[k], effect.states
         parameters[row, : len(values)] = values
     return effects, parameters
+
+
+def _address(effect: Effect, hook: Hook) -> int:
+    try:
+        return kernel_address(effect.kernels[hook], effect.states > 0)
+    except NumbaError as err:
+        reason = str(err).strip().splitlines()[-1]
+        raise InputError(
+            f"effects: {effect.id}: its kernel at {hook.name} does not compile ({reason}), allowed:"
+            " arithmetic on its arguments, functions of math, branches and loops"
+        ) from err
 
 
 def _of_entry(entry: EffectEntry, testbed: Testbed) -> Iterator[Action]:

@@ -14,7 +14,7 @@ from cspm_bringup import cli
 from cspm_ident.block_simulation import BlockSimulation, Drive
 from cspm_ident.comparison.compare import compare
 from cspm_ident.comparison.metrics import best_lag, coherence_of, error_bins, nrmse
-from cspm_ident.comparison.page import POINTS, thinned
+from cspm_ident.offline_page import POINTS, thinned
 from cspm_ident.signals.delays import RESOLUTION_S, find_delays
 from cspm_ident.signals.measurement import read_measurement
 from cspm_ident.signals.timeline import Timeline

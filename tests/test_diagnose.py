@@ -102,6 +102,8 @@ def test_friction_of_one_winch_is_found_named_and_modelled(cspm, capsys):
     )
     assert code == 0
     assert (cspm.folder / "verdict" / "diagnosis.png").read_bytes().startswith(b"\x89PNG")
+    page = (cspm.folder / "verdict" / "diagnosis.html").read_text(encoding="utf-8")
+    assert "Marked: winch sway 1." in page
 
 
 @pytest.mark.slow

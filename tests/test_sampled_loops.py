@@ -28,8 +28,8 @@ from cspm_control.analysis.sampled_system import closed, diagonal, sample, serie
 from cspm_control.design import margins
 from cspm_control.force_controller import ForceController
 from cspm_control.motion_controller import MotionController
-from cspm_control.tension_distribution import CONTROLLED_AXES, PseudoInverse
-from cspm_msgs_py.dofs import DOFS
+from cspm_control.tension_distribution import TensionDistribution
+from cspm_msgs_py.dofs import CONTROLLED_AXES, DOFS
 from cspm_msgs_py.errors import InputError
 from cspm_msgs_py.scenario import ClosedLoop, PidGains, PiGains, Rates, parse_scenario
 from cspm_sim.equilibrium import gravity_wrench
@@ -138,7 +138,7 @@ def test_pi_is_the_force_controller():
 
 def test_slopes_of_the_distribution_are_those_of_the_one_that_runs():
     point = operating_point(THESIS, PARAMETERS, CENTRE)
-    real = PseudoInverse(PARAMETERS.cables, np.tile([-1e9, 1e9], (8, 1)))
+    real = TensionDistribution(PARAMETERS.cables, np.tile([-1e9, 1e9], (8, 1)))
     frame = np.array([0.0, 0, 0, 0, 0, 0, 1])
 
     def tensions(pose, wrench):

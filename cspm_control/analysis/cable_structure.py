@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from cspm_control.analysis.pose_grid import Grid
-from cspm_control.tension_distribution import CONTROLLED_AXES
+from cspm_msgs_py.dofs import CONTROLLED_AXES
 from cspm_msgs_py.errors import InputError
 from cspm_msgs_py.testbed import Testbed
 from cspm_sim.kernels import bar as bar_kernel

@@ -30,6 +30,7 @@ from cspm_control.design import (
     tension_plant,
 )
 from cspm_msgs_py.dofs import DOFS
+from cspm_msgs_py.errors import InputError
 from cspm_msgs_py.scenario import ClosedLoop, MotionControl
 from cspm_msgs_py.testbed import Testbed
 from cspm_sim.linearisation import StateSpace, linear_model, motion_subsystem, operating_point
@@ -71,13 +72,15 @@ def analyse_loops(testbed: Testbed, control: ClosedLoop, timing: LoopTiming) -> 
         timing: of the loops, torques as late as computing makes them.
 
     Raises:
-        InputError: the machine cannot exert all controlled forces.
+        InputError: the machine cannot exert all controlled forces, or its bar is not controlled by
+            one loop per DOF.
         ConvergenceError: the bar cannot hang at the design pose.
     """
     prompt = replace(timing, torque_delay=0)
     cascades = {CASCADE: prompt, LATE: timing}
-    motion = _designed_motion(testbed, control.motion)
-    motion[SAMPLED] = _sampled_motion(testbed, control.motion, prompt)
+    law = pid_law(control)
+    motion = _designed_motion(testbed, law)
+    motion[SAMPLED] = _sampled_motion(testbed, law, prompt)
     growth = {}
     for way, clock in cascades.items():
         motion[way], growth[way] = _cascaded_motion(testbed, control, clock)
@@ -85,6 +88,17 @@ def analyse_loops(testbed: Testbed, control: ClosedLoop, timing: LoopTiming) -> 
     for way, clock in ((SAMPLED, prompt), (LATE, timing)):
         force[way] = _sampled_force(testbed, control, clock)
     return LoopAnalysis(motion, force, growth)
+
+
+def pid_law(control: ClosedLoop) -> MotionControl:
+    """Return the motion controller that has a loop of its own for each DOF.
+
+    Raises:
+        InputError: there is none.
+    """
+    if not isinstance(control.motion, MotionControl):
+        raise InputError(f"control.motion.law: {control.motion.law} has no loops, allowed: pid")
+    return control.motion
 
 
 def _designed_motion(testbed: Testbed, motion: MotionControl) -> dict[str, dict[str, LoopView]]:
@@ -146,7 +160,7 @@ def _sampled_force(
 def _cascaded_motion(
     testbed: Testbed, control: ClosedLoop, timing: LoopTiming
 ) -> tuple[dict[str, LoopView], tuple[float, float]]:
-    parameters, motion = nominal_parameters(testbed), control.motion
+    parameters, motion = nominal_parameters(testbed), pid_law(control)
     point = operating_point(testbed, parameters, motion.design_pose)
     model = linear_model(testbed, parameters, point, exact=True)
     rows = motion_subsystem(model, parameters, point).C

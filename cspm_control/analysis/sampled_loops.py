@@ -16,8 +16,7 @@ from cspm_control.analysis.sampled_system import (
     series,
 )
 from cspm_control.design import CONTROLLED_DOFS
-from cspm_control.tension_distribution import CONTROLLED_AXES
-from cspm_msgs_py.dofs import DOFS
+from cspm_msgs_py.dofs import CONTROLLED_AXES, DOFS
 from cspm_msgs_py.errors import InputError
 from cspm_msgs_py.scenario import MotionControl, PidGains, PiGains, Rates
 from cspm_sim.equilibrium import gravity_wrench

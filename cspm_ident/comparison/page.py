@@ -12,34 +12,27 @@ from plotly.subplots import make_subplots
 
 from cspm_ident.comparison.channel import Channel
 from cspm_ident.comparison.compare import Comparison
+from cspm_ident.offline_page import (
+    BELOW,
+    LAYOUT,
+    LEGEND,
+    figure_html,
+    table_html,
+    thinned,
+    write_offline_page,
+)
 
 Array = NDArray[np.float64]
 
-# Points per line: with the extremes of what lies between them, no spike is lost.
-POINTS = 4000
 _ROW_PIXELS = 130
 _ENTRY_PIXELS = 20
 _MODEBAR_PIXELS = 35
-_LAYOUT = {"template": "plotly_white", "margin": {"t": 80, "l": 70, "r": 10}}
-# Legends above or below, so that narrow screens have the width for the lines.
-_LEGEND = {"orientation": "h", "yref": "container"}
-_BELOW = {**_LAYOUT, "legend": {**_LEGEND, "y": 0.0, "yanchor": "bottom"}}
 _BLOCKS = {
     "whole": "The whole, driven by {drive}",
     "winch": "Winches alone, driven by measured torques and tensions",
     "cable": "Cables alone, driven by measured winch and bar motion",
     "bar": "Bar alone, driven by measured tensions",
 }
-_STYLE = """<style>
-body {font-family: sans-serif; margin: 2em auto; max-width: 1400px; padding: 0 1em; color: #222}
-h1 {font-size: 1.5em; overflow-wrap: anywhere}
-h2 {font-size: 1.2em; margin-top: 2em}
-ul {padding-left: 1.2em; line-height: 1.5}
-.wide {overflow-x: auto}
-table {border-collapse: collapse; margin: 1em 0; white-space: nowrap}
-td, th {padding: 0.2em 0.8em; text-align: right; border-bottom: 1px solid #ddd}
-td:first-child, th:first-child {text-align: left}
-</style>"""
 
 
 def write_page(path: Path, comparison: Comparison) -> None:
@@ -49,14 +42,7 @@ def write_page(path: Path, comparison: Comparison) -> None:
         OSError: the file cannot be written.
     """
     title = f"{comparison.measurement.path.name}: measured and simulated"
-    parts = [
-        "<!doctype html><html lang=en><head><meta charset=utf-8>",
-        "<meta name=viewport content='width=device-width, initial-scale=1'>",
-        f"<title>{escape(title)}</title>",
-        _STYLE,
-        f"</head><body><h1>{escape(title)}</h1>",
-        _about(comparison),
-    ]
+    parts = [_about(comparison)]
     first = True
     for block in _BLOCKS:
         channels = [channel for channel in comparison.channels if channel.block == block]
@@ -64,14 +50,13 @@ def write_page(path: Path, comparison: Comparison) -> None:
             continue
         heading = _BLOCKS[block].format(drive=comparison.drive.value)
         parts.append(f"<h2>{escape(heading)}</h2>{_table(channels)}")
-        parts.append(_html(_lines(channels), script=first))
+        parts.append(figure_html(_lines(channels), script=first))
         parts.append("<h3>Coherence of measured and simulated</h3>")
-        parts.append(_html(_spectra(channels), script=False))
+        parts.append(figure_html(_spectra(channels), script=False))
         parts.append("<h3>Error against what may drive it</h3>")
-        parts.append(_html(_bins(channels), script=False))
+        parts.append(figure_html(_bins(channels), script=False))
         first = False
-    parts.append("</body></html>")
-    path.write_text("\n".join(parts), encoding="utf-8")
+    write_offline_page(path, title, parts)
 
 
 def _about(comparison: Comparison) -> str:
@@ -93,7 +78,7 @@ def _about(comparison: Comparison) -> str:
 
 def _table(channels: list[Channel]) -> str:
     heads = ("channel", "VAF %", "NRMSE", "RMS error", "noise floor", "bias", "lag ms", "unit")
-    rows = ["<tr>" + "".join(f"<th>{head}</th>" for head in heads) + "</tr>"]
+    rows = []
     for c in channels:
         cells = (
             c.name,
@@ -105,14 +90,8 @@ def _table(channels: list[Channel]) -> str:
             "" if c.lag is None else f"{round(1e3 * c.lag, 2) + 0.0:.2f}",
             c.unit,
         )
-        rows.append("<tr>" + "".join(f"<td>{escape(cell)}</td>" for cell in cells) + "</tr>")
-    return f"<div class=wide><table>{''.join(rows)}</table></div>"
-
-
-def _html(figure: go.Figure, *, script: bool) -> str:
-    return str(
-        figure.to_html(full_html=False, include_plotlyjs=script, config={"responsive": True})
-    )
+        rows.append(cells)
+    return table_html(heads, rows, "accuracy by channel")
 
 
 def _lines(channels: list[Channel]) -> go.Figure:
@@ -143,8 +122,8 @@ def _lines(channels: list[Channel]) -> go.Figure:
         figure.update_yaxes(title_text=label, title_font_size=10, row=2 * i + 2, col=1)
     figure.update_xaxes(title_text="time [s]", row=2 * len(channels), col=1)
     height = 2 * len(channels) * _ROW_PIXELS + 150
-    legend = {**_LEGEND, "y": 1.0 - _MODEBAR_PIXELS / height, "yanchor": "top"}
-    figure.update_layout(height=height, hovermode="x", legend=legend, **_LAYOUT)
+    legend = {**LEGEND, "y": 1.0 - _MODEBAR_PIXELS / height, "yanchor": "top"}
+    figure.update_layout(height=height, hovermode="x", legend=legend, **LAYOUT)
     return figure
 
 
@@ -157,7 +136,7 @@ def _spectra(channels: list[Channel]) -> go.Figure:
             figure.add_scatter(x=frequencies, y=values, name=channel.name, mode="lines", line=line)
     figure.update_xaxes(type="log", title_text="frequency [Hz]")
     figure.update_yaxes(title_text="coherence, measured with simulated", range=[0, 1.02])
-    figure.update_layout(height=400 + _ENTRY_PIXELS * len(channels), **_BELOW)
+    figure.update_layout(height=400 + _ENTRY_PIXELS * len(channels), **BELOW)
     return figure
 
 
@@ -182,28 +161,9 @@ def _bins(channels: list[Channel]) -> go.Figure:
                 col=1,
             )
     figure.update_yaxes(title_text="mean error / noise floor, bars: RMS", title_font_size=10)
-    figure.update_layout(height=400 * len(names) + _ENTRY_PIXELS * len(channels), **_BELOW)
+    figure.update_layout(height=400 * len(names) + _ENTRY_PIXELS * len(channels), **BELOW)
     return figure
 
 
 def _colour(i: int, count: int) -> str:
     return f"hsl({360 * i // count}, 60%, 45%)"
-
-
-def thinned(times: Array, values: Array) -> tuple[Array, Array]:
-    """Return at most about `POINTS` points that keep each stretch's least and greatest value.
-
-    Args:
-        times: shape (n,) [s].
-        values: shape (n,).
-    """
-    if len(values) <= POINTS:
-        return times, values
-    edges = np.linspace(0, len(values), POINTS // 2 + 1).astype(int)
-    # Rows of equal length, the shorter ones filled up with their own first value.
-    inside = np.arange(np.diff(edges).max()) < np.diff(edges)[:, None]
-    places = np.where(inside, edges[:-1, None] + np.arange(inside.shape[1]), edges[:-1, None])
-    rows = values[places]
-    pairs = np.sort([np.argmin(rows, axis=1), np.argmax(rows, axis=1)], axis=0)
-    chosen = np.unique(edges[:-1] + pairs)
-    return times[chosen], values[chosen]

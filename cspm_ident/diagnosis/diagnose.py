@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from cspm_ident.diagnosis.columns import Candidate, Place
+from cspm_ident.diagnosis.curves import Curve, held_out_curves
 from cspm_ident.diagnosis.drivers import Driver, Knots
 from cspm_ident.diagnosis.equation import Equation, in_noise, steady
 from cspm_ident.diagnosis.evidence import Evidence, gather
@@ -71,6 +72,8 @@ class Diagnosis:
         silent: effects and elements that these recordings cannot show.
         places: the residuals that there are.
         starts: of the blocks [s], shape (blocks,).
+        curves: the residuals on what was not searched, over time.
+        noise: of each residual, what differs from row to row, one number per channel.
     """
 
     searched: Sequence[Measurement]
@@ -87,6 +90,8 @@ class Diagnosis:
     silent: tuple[tuple[str, tuple[str, ...]], ...]
     places: tuple[Place, ...]
     starts: Array
+    curves: tuple[Curve, ...]
+    noise: dict[Place, Array]
 
 
 def diagnose(
@@ -150,7 +155,15 @@ def diagnose(
         _silent(search, effects),
         tuple(place.place for place in evidence.places),
         evidence.times,
+        held_out_curves(steady(judge_parts), _first_weights(search, kept)),
+        noise,
     )
+
+
+def _first_weights(search: Search, kept: Sequence[Named]) -> dict[Candidate, Array]:
+    """Return the weights of what was kept with the shapes that were searched."""
+    own = [c for each in kept for c in each.hypothesis.candidates]
+    return {c: w for c, (w, _) in weights_of(search.evidence, search.sums, own).items()}
 
 
 def members_of(candidates: Iterable[Candidate], hypothesis: Hypothesis) -> list[Candidate]:

@@ -112,10 +112,10 @@ def _equation(
         if effect.regression.channel is Channel.DRIVE
         for shape in shapes_of(effect)
     }
+    signals = {key: weigh(window, rows[:, c], stride) for key, c in _DRIVERS.items()}
     if knots is not None:
-        found |= knots.columns(
-            place, {key: weigh(window, rows[:, c], stride) for key, c in _DRIVERS.items()}
-        )
+        found |= knots.columns(place, signals)
     torque = weigh(window, rows[:, WinchSignal.TORQUE], stride)[:, None]
     times = weigh(window, rows[:, WinchSignal.TIME], stride)
-    return Equation(place, times, weigh(window, missing, stride)[:, None], found, torque)
+    missing = weigh(window, missing, stride)[:, None]
+    return Equation(place, times, missing, found, torque, signals=signals)

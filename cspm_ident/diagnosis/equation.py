@@ -27,6 +27,7 @@ class Equation:
         nuisance: what no recording tells, such as the length wound at its start, (k, channels, m).
         turning: rows in which a shaft turns round, (k,), or none: it may stick there, and dry
             friction then holds with any torque.
+        signals: measured signals that it may depend on, by name and unit, each of shape (k,).
     """
 
     place: Place
@@ -36,6 +37,7 @@ class Equation:
     measured: Array
     nuisance: Array = field(default_factory=lambda: np.zeros((0, 0, 0)))
     turning: NDArray[np.bool_] = field(default_factory=lambda: np.zeros(0, dtype=np.bool_))
+    signals: Mapping[str, Array] = field(default_factory=dict)
 
     @property
     def noise(self) -> Array:
@@ -85,6 +87,7 @@ class Equation:
             self.measured[rows],
             self.nuisance[rows] if self.nuisance.size else self.nuisance,
             self.turning[rows] if self.turning.size else self.turning,
+            {name: found[rows] for name, found in self.signals.items()},
         )
 
 

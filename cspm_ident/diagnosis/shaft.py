@@ -138,11 +138,19 @@ class _Shaft:
             for candidate, found in self._columns(effect)
         }
         place = Place(Channel.SHAFT, self._name)
+        drivers = {name: self._weighed(rows[:, column]) for name, column in _DRIVERS.items()}
         if knots is not None:
-            drivers = {name: self._weighed(rows[:, column]) for name, column in _DRIVERS.items()}
             columns |= knots.columns(place, drivers)
         torque = self._weighed(rows[:, WinchSignal.TORQUE])[:, None]
-        return Equation(place, self._times, target[:, None], columns, torque, turning=self._turning)
+        return Equation(
+            place,
+            self._times,
+            target[:, None],
+            columns,
+            torque,
+            turning=self._turning,
+            signals=drivers,
+        )
 
     def _columns(self, effect: Effect) -> Iterator[tuple[Candidate, Array]]:
         if self._name not in elements_of(effect, (self._name,), ()):

@@ -149,9 +149,9 @@ class _Stretch:
     ) -> Equation:
         weighed = partial(self._weighed, channel=Channel.TENSION)
         place = Place(Channel.TENSION, self._machine.cable_names[i])
+        rows = self._here.cable_rows[i]
+        drivers = {key: weighed(rows[:, column]) for key, column in _DRIVERS.items()}
         if knots is not None:
-            rows = self._here.cable_rows[i]
-            drivers = {key: weighed(rows[:, column]) for key, column in _DRIVERS.items()}
             columns = columns | knots.columns(place, drivers)
         return Equation(
             place,
@@ -160,6 +160,7 @@ class _Stretch:
             columns,
             weighed(self._signals.tensions[:, i])[:, None],
             weighed(self._here.start_column(i))[:, None, None],
+            signals=drivers,
         )
 
     def _bar_equation(
@@ -167,15 +168,19 @@ class _Stretch:
     ) -> Equation:
         weighed = partial(self._weighed, channel=Channel.WRENCH)
         place = Place(Channel.WRENCH, BAR)
+        moved = self._bar_signals()
         if knots is not None:
-            columns = columns | self._bar_drivers(place, knots)
+            for i, drivers in enumerate(moved):
+                columns = columns | knots.columns(place, drivers, i, len(DOFS))
+        signals = {name: values for drivers in moved for name, values in drivers.items()}
         times, measured = weighed(self._signals.times), weighed(self._here.cable_wrench)
-        return Equation(place, times, weighed(missing), columns, measured)
+        return Equation(place, times, weighed(missing), columns, measured, signals=signals)
 
-    def _bar_drivers(self, place: Place, knots: Knots) -> dict[Candidate | Driver, Array]:
+    def _bar_signals(self) -> list[dict[str, Array]]:
+        """Return what each of the bar's six components may depend on, by name and unit."""
         state, poses = self._here.bar, self._signals.bar.poses
         speeds = np.hstack([state.velocity, state.omega])
-        found: dict[Candidate | Driver, Array] = {}
+        found = []
         for i, dof in enumerate(DOFS):
             unit = "m" if i < 3 else "rad"
             drivers = {
@@ -186,7 +191,7 @@ class _Stretch:
             weighed = {
                 name: self._weighed(values, Channel.WRENCH) for name, values in drivers.items()
             }
-            found |= knots.columns(place, weighed, i, len(DOFS))
+            found.append(weighed)
         return found
 
     def _targets(self, known: Sequence[Action]) -> tuple[Array, Array]:

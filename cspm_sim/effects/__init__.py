@@ -1,4 +1,4 @@
-"""The effects catalogue: every module of this package that declares an `EFFECT`."""
+"""The effects catalogue: every module of this package that declares an `EFFECT`, and one's own."""
 
 from __future__ import annotations
 
@@ -6,6 +6,7 @@ from functools import cache
 from importlib import import_module
 from pkgutil import iter_modules
 
+from cspm_msgs_py.errors import InputError
 from cspm_sim.effects.effect import (
     Block,
     Channel,
@@ -16,6 +17,7 @@ from cspm_sim.effects.effect import (
     Regression,
     Sense,
 )
+from cspm_sim.effects.own_files import VARIABLE, own_effects
 
 __all__ = [
     "Block",
@@ -32,7 +34,15 @@ __all__ = [
 
 @cache
 def catalogue() -> dict[str, Effect]:
-    """Return all effects by id, in alphabetical order."""
+    """Return all effects by id, in alphabetical order, one's own among them.
+
+    Raises:
+        InputError: a file of `CSPM_EFFECTS` is unusable, or its effect's id is taken.
+    """
     modules = (import_module(f"{__name__}.{info.name}") for info in iter_modules(__path__))
-    effects = (module.EFFECT for module in modules if hasattr(module, "EFFECT"))
-    return {effect.id: effect for effect in sorted(effects, key=lambda effect: effect.id)}
+    effects = {module.EFFECT.id: module.EFFECT for module in modules if hasattr(module, "EFFECT")}
+    for effect in own_effects():
+        if effect.id in effects:
+            raise InputError(f"{VARIABLE}: {effect.id} is there already, allowed: another id")
+        effects[effect.id] = effect
+    return dict(sorted(effects.items()))

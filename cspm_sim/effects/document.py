@@ -24,8 +24,25 @@ is measured and nothing else. *Searched over* lists the values at which a diagno
 parameter that does not enter the residual as a factor. Controllers and their design know the
 test-bed without its effects.
 
-This page is generated: `python -m cspm_sim.effects.document > docs/effects.md`.
+This page is generated: `python -m cspm_sim.effects.document > docs/effects.md`. Which sensors tell
+which effects apart is in [isolability.md](isolability.md), how to add one of your own in
+[add-an-effect.md](add-an-effect.md).
 """
+
+_PICTURES = """
+## Signatures
+
+What a little of each effect adds to the residual in which it stands out most, against the measured
+signal that explains most of it, along the worst case; the largest value is 1. Drawn by
+`python docs/figures/draw_signatures.py`.
+
+![Signatures of effects on winches](figures/signatures_winch.png)
+
+![Signatures of effects on cables](figures/signatures_cable.png)
+
+![Signatures of effects on the bar](figures/signatures_bar.png)
+
+![Signatures of effects on winch frame and sensors](figures/signatures_frame_and_sensor.png)"""
 
 _ELEMENTS = {
     Elements.CABLES: "named cables, all where none is named",
@@ -39,6 +56,7 @@ def effects_page(effects: Mapping[str, Effect]) -> str:
     """Return the page in Markdown, one section per effect in the order given."""
     lines = [_HEAD, "| id | block | parameters |", "|---|---|---|"]
     lines += [_summary(effect) for effect in effects.values()]
+    lines.append(_PICTURES)
     return "\n".join([*lines, *(effect_section(effect) for effect in effects.values())]) + "\n"
 
 

@@ -1,0 +1,291 @@
+"""The report page of a diagnosis: verdict first, then where, why, how surely and what next."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Sequence
+from html import escape
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from cspm_ident.diagnosis.curves import Curve
+from cspm_ident.diagnosis.diagnose import Diagnosis
+from cspm_ident.diagnosis.drawing import drawing
+from cspm_ident.diagnosis.evidence_figure import driver_figure, overlay_figure
+from cspm_ident.diagnosis.part import Part, part_behind, part_of
+from cspm_ident.diagnosis.search import Hypothesis, Named
+from cspm_ident.diagnosis.verdict import (
+    IMPROVED,
+    Verdict,
+    channel_of,
+    unit_of,
+    verdict_of,
+)
+from cspm_ident.offline_page import figure_html, table_html, write_offline_page
+from cspm_ident.signals.samples import Samples
+from cspm_sim.effects import catalogue
+
+Array = NDArray[np.float64]
+
+# Curves per finding: one effect on all of eight cables is seen in some of them.
+_MOST_CURVES = 3
+_SENTENCES = {
+    Verdict.CONSISTENT: "The recordings agree with the model. Nothing in the catalogue, and no free"
+    " function of the measured signals, is surely missing and worth a word.",
+    Verdict.EFFECT: "Physics is missing in the model.",
+    Verdict.PARAMETER: "A number of the test-bed file is wrong; no physics is missing.",
+    Verdict.TIE: "Something is missing, and these recordings cannot tell which of several.",
+    Verdict.UNKNOWN: "Something is missing that the catalogue does not have.",
+    Verdict.NOT_EXCITED: "These recordings cannot tell.",
+}
+_STYLE = """<style>
+.verdict {font-size: 1.15em; line-height: 1.5; border-left: 6px solid #c62828; padding: 0.2em 1em}
+.consistent {border-color: #1b7f3b}
+nav a {display: inline-block; margin: 0.2em 1em 0.2em 0; padding: 0.3em 0}
+</style>"""
+_SECTIONS = {
+    "where": "Where",
+    "evidence": "Evidence on held-out data",
+    "parameters": "Parameters",
+    "hypotheses": "Hypotheses",
+    "fit": "Every residual",
+    "silent": "Not testable here",
+    "next": "What to do next",
+    "sources": "Recordings and files",
+}
+
+
+def write_diagnosis_page(path: Path, found: Diagnosis, data: dict[str, Any]) -> None:
+    """Write one HTML file that needs no network.
+
+    Args:
+        path: of the file.
+        found: the diagnosis.
+        data: the same as `diagnosis.json` has it.
+
+    Raises:
+        OSError: the file cannot be written.
+    """
+    verdict = verdict_of(found)
+    title = f"Diagnosis of {', '.join(m.path.name for m in found.searched)}: {verdict.value}"
+    bodies = {
+        "where": _where(found),
+        "evidence": _evidence(found),
+        "parameters": _parameters(data),
+        "hypotheses": _hypotheses(found, data),
+        "fit": _fit(found),
+        "silent": _silent(data),
+        "next": _next(found, data),
+        "sources": _sources(data),
+    }
+    shown = {name: body for name, body in bodies.items() if body}
+    links = "".join(f"<a href='#{name}'>{escape(_SECTIONS[name])}</a>" for name in shown)
+    sections = (
+        f"<section id={name}><h2>{escape(_SECTIONS[name])}</h2>{body}</section>"
+        for name, body in shown.items()
+    )
+    top = [_STYLE, _verdict(verdict, data), f"<nav aria-label=sections>{links}</nav>"]
+    write_offline_page(path, title, [*top, *sections])
+
+
+def _verdict(verdict: Verdict, data: dict[str, Any]) -> str:
+    sentences = [_SENTENCES[verdict], *(f["statement"] for f in data["findings"])]
+    kind = " consistent" if verdict is Verdict.CONSISTENT else ""
+    text = "<br>".join(escape(sentence) for sentence in sentences)
+    return f'<p class="verdict{kind}">{text}</p>'
+
+
+def _where(found: Diagnosis) -> str:
+    first = found.searched[0]
+    parts = list(dict.fromkeys(_parts(found)))
+    picture = drawing(
+        first.machine, _mean_pose(first.bar_pose), _mean_pose(first.frame_pose), parts
+    )
+    named = ", ".join(part.words for part in parts) or "no part"
+    return f"<p>Marked: {escape(named)}.</p>{picture}"
+
+
+def _parts(found: Diagnosis) -> Iterable[Part]:
+    for named in found.findings.named:
+        for element in named.hypothesis.elements:
+            yield part_of(named.hypothesis.effect, element)
+    for driver, _, _ in found.findings.unknown:
+        yield part_behind(driver.place)
+
+
+def _mean_pose(samples: Samples | None) -> Array | None:
+    return None if samples is None else np.asarray(samples.values.mean(axis=0))
+
+
+def _evidence(found: Diagnosis) -> str:
+    """Return the figures of each finding, or of the largest residual where nothing was found."""
+    texts = []
+    script = True
+    for heading, curves, driver in _subjects(found):
+        texts.append(f"<h3>{escape(heading)}</h3>")
+        for curve in curves:
+            texts.append(f"<p>{escape(_caption(curve))}</p>")
+            signal = driver or curve.main_signal
+            if signal:
+                texts.append(figure_html(driver_figure(curve, signal), script=script))
+                script = False
+            texts.append(figure_html(overlay_figure(curve), script=script))
+            script = False
+    return "".join(texts)
+
+
+def _subjects(found: Diagnosis) -> Iterable[tuple[str, Sequence[Curve], str]]:
+    """Yield headings, what to draw, and against which signal; empty: that which explains most."""
+    for named in found.findings.named:
+        own = [c for c in found.curves if _touches(named.hypothesis, c)]
+        own.sort(key=lambda curve: -curve.gained)
+        yield _words(named.hypothesis), own[:_MOST_CURVES], ""
+    for driver, _, _ in found.findings.unknown:
+        own = [c for c in found.curves if c.place == driver.place and driver.signal in c.signals]
+        yield (
+            f"unknown, a function of {driver.signal} of {driver.place.element}",
+            own[:1],
+            driver.signal,
+        )
+    if not found.findings.named and not found.findings.unknown and found.curves:
+        largest = max(found.curves, key=_size)
+        yield "nothing found; the residual that is largest against what was measured", [largest], ""
+
+
+def _touches(hypothesis: Hypothesis, curve: Curve) -> bool:
+    return any(
+        c.effect_id == hypothesis.effect.id and c.element in hypothesis.elements
+        for c in curve.touched
+    )
+
+
+def _size(curve: Curve) -> float:
+    return float(np.std(curve.before) / max(np.std(curve.measured), 1e-300))
+
+
+def _caption(curve: Curve) -> str:
+    of = f", {curve.component}" if curve.component else ""
+    before, after = (float(np.sqrt(np.mean(v**2))) for v in (curve.before, curve.after))
+    then = f" before and {after:.3g} {curve.unit} after" if curve.touched else ""
+    return (
+        f"{part_behind(curve.place).words}{of}: the residual is measured less modelled; its root"
+        f" mean square is {before:.3g} {curve.unit}{then}."
+    )
+
+
+def _parameters(data: dict[str, Any]) -> str:
+    rows = []
+    for finding in data["findings"]:
+        for each in finding["parameters"]:
+            ends = each["ci95"]
+            interval = f"{ends[0]:.4g} to {ends[1]:.4g}" if ends else "searched on a grid"
+            value = f"{each['value']:.4g}"
+            rows.append(
+                (finding["effect"], each["element"], each["name"], value, interval, each["unit"])
+            )
+    heads = ("effect", "element", "parameter", "value", "95 % interval", "unit")
+    return table_html(heads, rows, "parameters") if rows else ""
+
+
+def _hypotheses(found: Diagnosis, data: dict[str, Any]) -> str:
+    rows: list[tuple[str, ...]] = []
+    for named, finding in zip(found.findings.named, data["findings"], strict=False):
+        rows += _ranked(named, finding)
+    for named in found.rejected:
+        size = _in_errors(named.gain.total, named.gain.error)
+        rows.append((_words(named.hypothesis), "not kept", "", size, "no help on held-out data"))
+    for driver, gain, share in found.findings.unknown:
+        name = f"a function of {driver.signal}, {driver.place.element}"
+        size = _in_errors(gain.total, gain.error)
+        rows.append((name, "unknown", "", size, f"{100 * share:.0f} %"))
+    if not rows:
+        return f"<p>None of {found.findings.candidates} stood.</p>"
+    heads = ("hypothesis", "verdict", "probability", "gain in standard errors", "residual taken")
+    count = f"<p>{found.findings.candidates} hypotheses were looked at.</p>"
+    return count + table_html(heads, rows, "hypotheses and their evidence")
+
+
+def _ranked(named: Named, finding: dict[str, Any]) -> Iterable[tuple[str, ...]]:
+    """Yield a finding's row and those of its alternatives, the best first."""
+    verdict = "tied" if named.alternatives else "found"
+    size = _in_errors(named.gain.total, named.gain.error)
+    likely, taken = f"{finding['probability']:.2f}", f"{100 * named.share:.0f} %"
+    yield _words(named.hypothesis), verdict, likely, size, taken
+    rivals = zip(named.alternatives, finding["alternatives"], strict=True)
+    for (rival, worse), entry in sorted(rivals, key=lambda each: each[0][1].total):
+        behind = f"{_in_errors(worse.total, worse.error)} behind"
+        yield _words(rival), "explains it as well", f"{entry['probability']:.2f}", behind, ""
+
+
+def _in_errors(total: float, error: float) -> str:
+    return f"{total / error:.1f}" if error > 0.0 else "∞"
+
+
+def _words(hypothesis: Hypothesis) -> str:
+    return f"{hypothesis.effect.id} on {', '.join(hypothesis.elements)}"
+
+
+def _fit(found: Diagnosis) -> str:
+    judged = "recordings held out" if found.held_out else "the last part, which was not searched"
+    heads = ("residual", "before", "re-tuned", "after", "noise", "unit")
+    rows = []
+    for fit in found.fit:
+        numbers = (fit.before, fit.retuned, fit.after, fit.noise)
+        rows.append((channel_of(fit), *(f"{n:.3g}" for n in numbers), unit_of(fit)))
+    text = (
+        f"<p>Root mean square on {judged}. <i>Re-tuned</i> is the file with its own numbers fitted"
+        " and nothing added; <i>noise</i> is what differs from row to row.</p>"
+    )
+    return text + table_html(heads, rows, "root mean square of every residual")
+
+
+def _silent(data: dict[str, Any]) -> str:
+    rows = []
+    known = catalogue()
+    for each in data["not_excited"]:
+        where = ", ".join(each["elements"]) or "everywhere"
+        rows.append((each["effect"], where, known[each["effect"]].separating_experiment))
+    heads = ("effect", "on", "what would show it")
+    return table_html(heads, rows, "effects that these recordings cannot show") if rows else ""
+
+
+def _next(found: Diagnosis, data: dict[str, Any]) -> str:
+    steps = []
+    if data["model"]:
+        steps.append(
+            f"<code>cspm run SCENARIO --testbed {IMPROVED}</code> simulates the machine with what"
+            " was found."
+        )
+    for finding in data["findings"]:
+        for rival in finding["alternatives"]:
+            pair = f"To tell {finding['effect']} from {rival['effect']}"
+            advice = catalogue()[finding["effect"]].separating_experiment
+            steps.append(_experiment(pair, rival["separating_experiment"], advice))
+    shown: dict[str, list[str]] = {}
+    for each in data["not_excited"]:
+        if each.get("separating_experiment"):
+            shown.setdefault(each["separating_experiment"], []).append(each["effect"])
+    for name, effects in shown.items():
+        steps.append(_experiment(f"To make {', '.join(effects)} testable", name, ""))
+    if found.findings.unknown:
+        steps.append("Describe what was found as unknown as an effect of your own.")
+    if not steps:
+        steps.append("Nothing has to be done. What was not testable needs other recordings.")
+    return f"<ul>{''.join(f'<li>{step}</li>' for step in steps)}</ul>"
+
+
+def _experiment(purpose: str, file: str | None, advice: str) -> str:
+    """Return one line of HTML: which scenario to run, or what to do where there is none."""
+    if file is None:
+        reason = "no motion that the recordings show to be safe tells more than they do"
+        return escape(f"{purpose}: {advice} ({reason}).")
+    said = escape(f"{purpose}, record ")
+    return f"{said}<a href='{escape(file)}'><code>cspm run {escape(file)}</code></a>."
+
+
+def _sources(data: dict[str, Any]) -> str:
+    rows = [(r["path"], r["role"].replace("_", " "), r["sha256"]) for r in data["recordings"]]
+    rows.append((data["testbed"]["path"], "test-bed", data["testbed"]["sha256"]))
+    return table_html(("file", "role", "SHA-256"), rows, "recordings and files")

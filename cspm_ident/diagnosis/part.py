@@ -1,0 +1,59 @@
+"""The parts of a test-bed that a finding may be about."""
+
+from __future__ import annotations
+
+from enum import Enum
+from typing import NamedTuple
+
+from cspm_ident.diagnosis.columns import Place
+from cspm_ident.signals.measurement import TENSION, WINCHES
+from cspm_sim.effects import Block, Channel, Effect
+
+
+class Kind(Enum):
+    """What a part is, as a person calls it."""
+
+    WINCH = "winch"
+    CABLE = "cable"
+    LOAD_CELL = "load cell"
+    BODY = "body"
+    MARKERS = "motion capture of"
+
+
+class Part(NamedTuple):
+    """One part.
+
+    Attributes:
+        kind: what it is.
+        element: name of the cable that it belongs to, or of the body.
+    """
+
+    kind: Kind
+    element: str
+
+    @property
+    def words(self) -> str:
+        """Its name for a person."""
+        body = self.element.replace("_", " ")
+        return body if self.kind is Kind.BODY else f"{self.kind.value} {body}"
+
+
+_BLOCKS = {Block.WINCH: Kind.WINCH, Block.CABLE: Kind.CABLE}
+_CHANNELS = {
+    Channel.DRIVE: Kind.WINCH,
+    Channel.SHAFT: Kind.WINCH,
+    Channel.TENSION: Kind.CABLE,
+}
+_SENSORS = {WINCHES: Kind.WINCH, TENSION: Kind.LOAD_CELL}
+
+
+def part_of(effect: Effect, element: str) -> Part:
+    """Return the part in which an effect on an element sits."""
+    if effect.sense is not None:
+        return Part(_SENSORS.get(effect.sense.topics[0], Kind.MARKERS), element)
+    return Part(_BLOCKS.get(effect.block, Kind.BODY), element)
+
+
+def part_behind(place: Place) -> Part:
+    """Return the part whose equation a residual belongs to."""
+    return Part(_CHANNELS.get(place.channel, Kind.BODY), place.element)

@@ -1,0 +1,1 @@
+"""Experiments that tell apart what recordings so far cannot."""

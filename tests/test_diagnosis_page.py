@@ -1,0 +1,269 @@
+"""The report page of a diagnosis: what it says, what it draws, and that a browser shows it."""
+
+import json
+import re
+import shutil
+import subprocess
+
+import numpy as np
+import pytest
+from run_samples import SCENARIOS
+
+from cspm_ident.diagnosis.columns import Candidate, Place
+from cspm_ident.diagnosis.curves import explained_by, held_out_curves
+from cspm_ident.diagnosis.diagnose import Diagnosis, Shape
+from cspm_ident.diagnosis.drawing import drawing
+from cspm_ident.diagnosis.drivers import Driver
+from cspm_ident.diagnosis.equation import Equation
+from cspm_ident.diagnosis.judgement import HeldOut
+from cspm_ident.diagnosis.page import write_diagnosis_page
+from cspm_ident.diagnosis.part import Kind, Part, part_of
+from cspm_ident.diagnosis.search import Findings, Hypothesis, Named
+from cspm_ident.diagnosis.sums import Gain
+from cspm_ident.diagnosis.verdict import diagnosis_data
+from cspm_ident.signals.measurement import Measurement
+from cspm_ident.signals.samples import Samples
+from cspm_msgs_py.testbed import load_testbed
+from cspm_sim.effects import Channel, catalogue
+
+THESIS = load_testbed(SCENARIOS / "testbeds" / "thesis.yaml")
+ONE_WINCH = load_testbed(SCENARIOS / "testbeds" / "one_winch.yaml")
+TORQUE, NOISE = 0.03, 0.001
+PLACE = Place(Channel.SHAFT, "surge_2")
+RUBBING = Candidate(catalogue()["winch_coulomb_friction"], "surge_2")
+LOADED = Candidate(catalogue()["winch_load_friction"], "surge_2")
+BAR_POSE = np.array([0.0, 0.0, 1.8, 0.0, 0.0, 0.0])
+
+
+def equation(seed=1):
+    """A winch's equation with dry friction in it, and a signal that has nothing to do with it."""
+    rng = np.random.default_rng(seed)
+    times = 0.01 * np.arange(3000)
+    speed, other = np.cos(2.0 * times), rng.standard_normal(3000)
+    column = np.sign(speed)[:, None, None]
+    target = TORQUE * np.sign(speed) + NOISE * rng.standard_normal(3000)
+    measured = 0.2 * np.sin(times) + target
+    signals = {"tension [N]": other, "speed [rad/s]": speed}
+    return Equation(
+        PLACE, times, target[:, None], {RUBBING: column}, measured[:, None], signals=signals
+    )
+
+
+def diagnosis(named=True, alternatives=(), unknown=(), rejected=()):
+    part = equation()
+    poses = Samples(np.array([0.0, 1.0]), np.array([BAR_POSE, BAR_POSE]))
+    measured = Measurement(SCENARIOS / "today", "ab" * 32, THESIS, bar_pose=poses)
+    weights = {RUBBING: (np.array([TORQUE]), np.array([0.001]))} if named else {}
+    hypothesis = Hypothesis(RUBBING.effect, (RUBBING,))
+    found = (Named(hypothesis, Gain(900.0, 10.0), 0.99, tuple(alternatives)),) if named else ()
+    return Diagnosis(
+        (measured,),
+        (),
+        Findings(found, tuple(unknown), 485),
+        tuple(rejected),
+        weights,
+        (HeldOut(PLACE, 0.15, TORQUE, TORQUE, NOISE, NOISE, NOISE),),
+        (),
+        (None,) * len(found),
+        tuple(Shape(d, np.linspace(0.0, 1.0, 7), np.arange(7.0) - 3.0) for d, _, _ in unknown),
+        (None,) * len(found),
+        (),
+        (("winch_backlash", ("sway_1",)),),
+        (PLACE,),
+        np.zeros(1),
+        held_out_curves([[part]], {c: w for c, (w, _) in weights.items()}),
+        {PLACE: np.array([NOISE])},
+    )
+
+
+def page_of(tmp_path, found):
+    path = tmp_path / "diagnosis.html"
+    data = diagnosis_data(found)
+    data["not_excited"][0]["separating_experiment"] = "experiment.yaml"
+    write_diagnosis_page(path, found, data)
+    return path.read_text(encoding="utf-8")
+
+
+def section(page, name):
+    return re.search(rf"<section id={name}>.*?</section>", page, re.DOTALL).group()
+
+
+def test_a_curve_is_what_the_found_columns_leave():
+    (curve,) = held_out_curves([[equation()]], {RUBBING: np.array([TORQUE])})
+    part = equation()
+    assert np.array_equal(curve.before, part.target[:, 0])
+    expected = part.target[:, 0] - TORQUE * part.columns[RUBBING][:, 0, 0]
+    np.testing.assert_allclose(curve.after, expected)
+    assert curve.gained > 0.99
+    assert (curve.unit, curve.touched, curve.main_signal) == ("N·m", (RUBBING,), "speed [rad/s]")
+    (wrong,) = held_out_curves([[equation()]], {RUBBING: np.array([-TORQUE])})
+    assert wrong.gained < -2.0
+
+
+def test_what_no_recording_tells_is_fitted_on_both_sides():
+    part = equation()
+    start = np.linspace(1.0, 2.0, len(part.times))
+    shifted = Equation(
+        part.place,
+        part.times,
+        part.target + 5.0 * start[:, None],
+        part.columns,
+        part.measured,
+        start[:, None, None],
+        part.signals,
+    )
+    (curve,) = held_out_curves([[shifted]], {RUBBING: np.array([TORQUE])})
+    assert np.std(curve.after) < 2.0 * NOISE
+
+
+def test_a_signal_explains_what_is_a_function_of_it():
+    rng = np.random.default_rng(0)
+    signal = rng.uniform(-1.0, 1.0, 5000)
+    assert explained_by(signal, signal**2) > 0.95
+    assert explained_by(signal, rng.standard_normal(5000)) < 0.02
+    assert explained_by(np.zeros(10), np.arange(10.0)) == 0.0
+
+
+@pytest.mark.parametrize(
+    ("name", "element", "words"),
+    [
+        ("winch_coulomb_friction", "surge_2", "winch surge_2"),
+        ("cable_stiffness", "hoist_1", "cable hoist_1"),
+        ("tension_gain", "sway_3", "load cell sway_3"),
+        ("encoder_scale", "sway_3", "winch sway_3"),
+        ("bar_mass", "bar", "bar"),
+        ("frame_flexibility", "winch_frame", "winch frame"),
+        ("pose_delay", "bar", "motion capture of bar"),
+    ],
+)
+def test_an_effect_sits_in_a_part_that_the_drawing_marks(name, element, words):
+    part = part_of(catalogue()[name], element)
+    assert part.words.replace("_", " ") == words.replace("_", " ")
+    picture = drawing(THESIS.testbed, BAR_POSE, None, [part])
+    (guilty,) = re.findall(r"<g class=guilty.*?</g>", picture)
+    assert f"<title>{part.words}</title>" in guilty
+    assert "class=guilty" not in drawing(THESIS.testbed, BAR_POSE, None, [])
+
+
+def test_the_drawing_has_every_part_at_its_place():
+    picture = drawing(THESIS.testbed, BAR_POSE, None, [])
+    for cable in THESIS.testbed.cable_names:
+        for kind in (Kind.WINCH, Kind.CABLE, Kind.LOAD_CELL):
+            assert f"<title>{Part(kind, cable).words}</title>" in picture
+    line = re.search(r"<title>cable hoist 1</title><line [^>]*", picture).group()
+    top, bottom = (float(re.search(rf'y{k}="([^"]*)"', line)[1]) for k in (1, 2))
+    # z is down in the world and on the screen.
+    assert top < bottom
+    low, high = (
+        float(re.search(r'viewBox="0 0 \S+ (\S+)"', drawing(machine.testbed, pose, None, []))[1])
+        for machine, pose in ((ONE_WINCH, None), (THESIS, BAR_POSE))
+    )
+    assert low < 0.3 * high
+    rig = drawing(ONE_WINCH.testbed, None, None, [Part(Kind.CABLE, "surge")])
+    assert rig.count("<title>") == 3
+
+
+def test_the_page_says_all_that_was_found(tmp_path):
+    rival = (Hypothesis(LOADED.effect, (LOADED,)), Gain(1.0, 10.0))
+    page = page_of(tmp_path, diagnosis(alternatives=[rival]))
+    assert "Diagnosis of today: tie" in page
+    top = page.index('class="verdict"')
+    assert top < page.index("<section")
+    assert "Marked: winch surge_2" in section(page, "where").replace("surge 2", "surge_2")
+    assert "0.029 to 0.031" in section(page, "parameters")
+    ranking = section(page, "hypotheses")
+    assert ranking.index("winch_coulomb_friction") < ranking.index("winch_load_friction")
+    assert "485 hypotheses" in ranking
+    assert "90.0" in ranking
+    assert "winch_backlash" in section(page, "silent")
+    assert "from winch_load_friction" in section(page, "next")
+    assert "<a href='experiment.yaml'>" in section(page, "next")
+    assert section(page, "evidence").count("plotly-graph-div") == 2
+    assert "ab" * 32 in section(page, "sources")
+    assert "<script src" not in page
+    assert '"name":"after"' in page
+
+
+def test_a_page_without_findings_says_so(tmp_path):
+    page = page_of(tmp_path, diagnosis(named=False))
+    assert "The recordings agree with the model" in page
+    assert "None of 485 stood" in section(page, "hypotheses")
+    assert 'id="parameters"' not in page
+    assert "no part" in section(page, "where")
+    # What was not found changes nothing: there is no after to be drawn.
+    assert '"name":"before"' in page
+    assert '"name":"after"' not in page
+
+
+def test_an_unknown_shape_marks_the_part_of_its_residual(tmp_path):
+    driver = (Driver(PLACE, "tension [N]"), Gain(50.0, 5.0), 0.4)
+    page = page_of(tmp_path, diagnosis(named=False, unknown=[driver]))
+    assert "Diagnosis of today: unknown" in page
+    assert "winch surge" in section(page, "where")
+    # Against the signal that was named, though another one explains more.
+    assert '"text":"tension [N]"' in section(page, "evidence")
+    assert '"text":"speed [rad\\u002fs]"' not in section(page, "evidence")
+    assert "40 %" in section(page, "hypotheses")
+
+
+def test_the_page_is_small_beside_its_script(tmp_path):
+    page = page_of(tmp_path, diagnosis())
+    script = max(len(each) for each in re.findall(r"<script.*?</script>", page, re.DOTALL))
+    assert len(page) - script < 1_000_000
+
+
+_PROBE = """<body><iframe id=f width=%d height=900 src="diagnosis.html"></iframe><script>
+const errors = [];
+const frame = document.getElementById('f');
+frame.onload = () => {
+  const inner = frame.contentWindow, page = frame.contentDocument;
+  inner.addEventListener('error', e => errors.push(e.message));
+  setTimeout(() => {
+    const reached = [];
+    for (const e of page.querySelectorAll('a[href], [tabindex="0"]')) {
+      e.focus();
+      if (page.activeElement === e) reached.push(e.textContent.slice(0, 20));
+    }
+    const found = {
+      errors, wide: page.documentElement.scrollWidth, seen: page.documentElement.clientWidth,
+      reached: reached.length, reachable: page.querySelectorAll('a[href], .wide').length,
+      plots: page.querySelectorAll('.scatterlayer .trace').length,
+      text: Math.min(...[...page.querySelectorAll('p, td, li')].map(
+        e => parseFloat(inner.getComputedStyle(e).fontSize))),
+      targets: [...page.querySelectorAll('nav a')].every(
+        a => page.querySelector(a.getAttribute('href')) !== null)};
+    const out = document.createElement('pre');
+    out.id = 'found'; out.textContent = JSON.stringify(found);
+    document.body.append(out);
+  }, 3000);
+};
+</script></body>"""
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("width", [1280, 400])
+def test_a_browser_shows_the_page_at_any_width(tmp_path, width):
+    browser = shutil.which("chromium") or shutil.which("google-chrome")
+    if browser is None:
+        pytest.skip("no Chromium on this system")
+    rival = (Hypothesis(LOADED.effect, (LOADED,)), Gain(1.0, 10.0))
+    page_of(tmp_path, diagnosis(alternatives=[rival]))
+    (tmp_path / "probe.html").write_text(_PROBE % width, encoding="utf-8")
+    options = ["--headless", "--no-sandbox", "--disable-gpu", "--allow-file-access-from-files"]
+    options += ["--virtual-time-budget=20000", "--enable-logging=stderr", "--dump-dom"]
+    shown = subprocess.run(
+        [browser, *options, (tmp_path / "probe.html").as_uri()],
+        capture_output=True,
+        text=True,
+        timeout=120,
+        check=True,
+    )
+    assert "CONSOLE" not in shown.stderr
+    found = json.loads(re.search(r'<pre id="found">(.*?)</pre>', shown.stdout)[1])
+    assert found["errors"] == []
+    # No part of the page but tables, which scroll by themselves, is wider than the screen.
+    assert found["wide"] <= found["seen"] <= width
+    assert found["plots"] == 9
+    assert found["text"] >= 14
+    assert found["reached"] == found["reachable"] > 8
+    assert found["targets"]

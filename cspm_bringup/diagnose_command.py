@@ -111,7 +111,7 @@ def print_diagnosis(console: Console, found: Diagnosis) -> None:
     console.print(f"verdict: [bold]{verdict_of(found).value}[/]")
     for named in found.findings.named:
         say(console, f"• {statement_of(found, named)}")
-        for rival, _ in named.alternatives:
+        for rival in (each.hypothesis for each in named.alternatives):
             say(
                 console,
                 f"  as well explained by {rival.effect.id} on {', '.join(rival.elements)};"
@@ -124,6 +124,12 @@ def print_diagnosis(console: Console, found: Diagnosis) -> None:
             console,
             f"not kept: {named.hypothesis.effect.id} on {', '.join(named.hypothesis.elements)}"
             " did not help on held-out data",
+        )
+    for named in found.negligible:
+        say(
+            console,
+            f"taken into account, too small to matter: {named.hypothesis.effect.id} on"
+            f" {', '.join(named.hypothesis.elements)}",
         )
     _print_fits(console, found)
     silent = ", ".join(name for name, _ in found.silent)

@@ -90,9 +90,9 @@ def _ties(found: Diagnosis, data: dict[str, Any]) -> Iterator[tuple[dict[str, An
     for named, finding in zip(found.findings.named, data["findings"], strict=False):
         members = members_of(found.weights, named.hypothesis)
         truth = {candidate: found.weights[candidate][0] for candidate in members}
-        for (rival, _), entry in zip(named.alternatives, finding["alternatives"], strict=True):
-            title = f"Tells {_words(named.hypothesis)} from {_words(rival)}"
-            yield entry, Question(truth, rival.candidates), title
+        for rival, entry in zip(named.alternatives, finding["alternatives"], strict=True):
+            title = f"Tells {_words(named.hypothesis)} from {_words(rival.hypothesis)}"
+            yield entry, Question(truth, rival.hypothesis.candidates), title
 
 
 def _words(hypothesis: Hypothesis) -> str:

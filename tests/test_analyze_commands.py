@@ -3,7 +3,6 @@
 import json
 
 import pytest
-from test_cli import cspm, refused  # noqa: F401 - fixtures
 
 from cspm_bringup import analyze_workspace_command as workspace_command
 from cspm_bringup.analyzed_machine import read_machine
@@ -13,7 +12,7 @@ LIMITED = {"surge", "sway", "pitch", "yaw"}
 
 
 @pytest.mark.slow
-def test_workspace_prints_draws_and_writes(cspm, tmp_path):  # noqa: F811
+def test_workspace_prints_draws_and_writes(cspm, tmp_path):
     code, out, err = cspm(
         *("analyze", "workspace", "--coarse", "14", "--out", "found", "--json", "found.json"),
         *("--acceleration", "0.2,0.2,0.5,0,0.2,0.2"),
@@ -32,7 +31,7 @@ def test_workspace_prints_draws_and_writes(cspm, tmp_path):  # noqa: F811
         assert (tmp_path / "found" / name).stat().st_size > 30_000
 
 
-def test_an_interrupted_workspace_writes_nothing(cspm, tmp_path, monkeypatch):  # noqa: F811
+def test_an_interrupted_workspace_writes_nothing(cspm, tmp_path, monkeypatch):
     monkeypatch.setattr(workspace_command, "analyse_workspace", lambda *_: None)
     code, out, _ = cspm("analyze", "workspace", "--out", "found", "--json", "found.json")
     assert (code, out) == (130, "")
@@ -65,12 +64,12 @@ def test_the_required_acceleration_is_what_the_scenarios_reference_has():
         (["--testbed", "none.yaml"], "none.yaml: "),
     ],
 )
-def test_bad_input_of_workspace_is_one_line(refused, arguments, text):  # noqa: F811
+def test_bad_input_of_workspace_is_one_line(refused, arguments, text):
     assert refused("analyze", "workspace", *arguments).startswith(text)
 
 
 @pytest.mark.slow
-def test_design_prints_draws_and_writes(cspm, tmp_path):  # noqa: F811
+def test_design_prints_draws_and_writes(cspm, tmp_path):
     code, out, err = cspm("analyze", "design", "--out", "found", "--json", "found.json")
     assert (code, err) == (0, "")
     data = json.loads((tmp_path / "found.json").read_text())
@@ -98,12 +97,12 @@ def test_design_prints_draws_and_writes(cspm, tmp_path):  # noqa: F811
         (["--computing", "-1"], "Invalid value for '--computing'"),
     ],
 )
-def test_bad_input_of_design_is_one_line(refused, arguments, text):  # noqa: F811
+def test_bad_input_of_design_is_one_line(refused, arguments, text):
     assert refused("analyze", "design", *arguments).startswith(text)
 
 
 @pytest.mark.slow
-def test_manipulability_prints_draws_and_writes(cspm, tmp_path):  # noqa: F811
+def test_manipulability_prints_draws_and_writes(cspm, tmp_path):
     code, out, err = cspm("analyze", "manipulability", "--out", "found", "--json", "found.json")
     assert (code, err) == (0, "")
     data = json.loads((tmp_path / "found.json").read_text())
@@ -113,7 +112,7 @@ def test_manipulability_prints_draws_and_writes(cspm, tmp_path):  # noqa: F811
     assert (tmp_path / "found" / "manipulability.png").stat().st_size > 30_000
 
 
-def test_where_the_bar_cannot_rest_no_acceleration_is_told(cspm, tmp_path):  # noqa: F811
+def test_where_the_bar_cannot_rest_no_acceleration_is_told(cspm, tmp_path):
     code, out, _ = cspm(
         *("analyze", "manipulability", "--pose", "0.34,0,2,0,0,0", "--json", "found.json")
     )
@@ -125,7 +124,7 @@ def test_where_the_bar_cannot_rest_no_acceleration_is_told(cspm, tmp_path):  # n
     assert "none" in out
 
 
-def test_commands_of_analyze_are_listed(cspm):  # noqa: F811
+def test_commands_of_analyze_are_listed(cspm):
     code, out, _ = cspm("analyze", "--help")
     assert code == 0
     for name in ("linear", "workspace", "design", "manipulability"):

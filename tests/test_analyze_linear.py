@@ -7,7 +7,6 @@ import numpy as np
 import pytest
 from conftest import build, general_content
 from numpy.testing import assert_allclose
-from test_cli import cspm, refused  # noqa: F401 - fixtures
 from test_linearisation import CENTRE, TESTBEDS, THESIS
 
 from cspm_control.analysis.cable_groups import cable_groups
@@ -189,7 +188,7 @@ def test_a_machine_of_no_symmetry_spans_all_directions():
 
 
 @pytest.mark.slow
-def test_command_prints_draws_and_writes(cspm, tmp_path):  # noqa: F811
+def test_command_prints_draws_and_writes(cspm, tmp_path):
     code, out, err = cspm("analyze", "linear", "--out", "found", "--json", "found.json")
     assert (code, err) == (0, "")
     assert "rank of Jᵀ 5" in out
@@ -205,7 +204,7 @@ def test_command_prints_draws_and_writes(cspm, tmp_path):  # noqa: F811
     assert (tmp_path / "found" / "linear.png").stat().st_size > 20_000
 
 
-def test_elsewhere_the_thesis_says_nothing(cspm, tmp_path):  # noqa: F811
+def test_elsewhere_the_thesis_says_nothing(cspm, tmp_path):
     code, out, err = cspm("analyze", "linear", "--pose", "0,0,1.5,0,0,0", "--json", "found.json")
     assert (code, err) == (0, "")
     assert "chapter 6" not in out
@@ -230,10 +229,10 @@ def test_elsewhere_the_thesis_says_nothing(cspm, tmp_path):  # noqa: F811
         (["nowhere"], "nowhere: no such scenario, allowed: "),
     ],
 )
-def test_bad_input_is_one_line(refused, arguments, text):  # noqa: F811
+def test_bad_input_is_one_line(refused, arguments, text):
     assert refused("analyze", "linear", *arguments).startswith(text)
 
 
-def test_a_pose_at_which_nothing_holds_the_bar_is_refused(refused):  # noqa: F811
+def test_a_pose_at_which_nothing_holds_the_bar_is_refused(refused):
     line = refused("analyze", "linear", "--pose", "3,0,1,0,0,0", code=1)
     assert "no tensions" in line

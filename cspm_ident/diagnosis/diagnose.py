@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -62,7 +62,8 @@ class Diagnosis:
         held_out: those on which it was judged; empty where the end of each searched one was.
         findings: what was found, without what did not stand on held-out data.
         rejected: what did not.
-        weights: of each candidate found, with half the width of its 95 % interval.
+        negligible: what is there, but no more than in a sound machine; taken into account.
+        weights: of each candidate found or negligible, with half the width of its 95 % interval.
         fit: residual by residual.
         simulated: quantity by quantity, by simulation.
         worth: of each finding in these simulations; None where they cannot tell.
@@ -80,6 +81,7 @@ class Diagnosis:
     held_out: Sequence[Measurement]
     findings: Findings
     rejected: tuple[Named, ...]
+    negligible: tuple[Named, ...]
     weights: Weights
     fit: tuple[HeldOut, ...]
     simulated: tuple[SimulatedFit, ...]
@@ -137,20 +139,22 @@ def diagnose(
     retuned, values = search.retuned(), {c: w for c, (w, _) in weights.items()}
     progress("simulation of held-out data")
     simulated = simulate_held_out(judges, retuned, values)
+    told = [k for k, each in enumerate(kept) if not _is_negligible(each, values)]
     worth = tuple(
-        worth_of(judges, simulated, values, members_of(values, n.hypothesis)) for n in kept
+        worth_of(judges, simulated, values, members_of(values, kept[k].hypothesis)) for k in told
     )
     return Diagnosis(
         searched,
         held_out,
-        Findings(kept, found.unknown, found.candidates),
+        Findings(tuple(kept[k] for k in told), found.unknown, found.candidates),
         rejected,
+        tuple(each for each in kept if _is_negligible(each, values)),
         weights,
         judged(judges, retuned, values, noise, free_functions(evidence, judge)),
         simulated,
         worth,
         _shapes(search, kept, knots, [each[0] for each in found.unknown]),
-        onsets,
+        tuple(onsets[k] for k in told),
         detection_limits(search, kept),
         _silent(search, effects),
         tuple(place.place for place in evidence.places),
@@ -164,6 +168,14 @@ def _first_weights(search: Search, kept: Sequence[Named]) -> dict[Candidate, Arr
     """Return the weights of what was kept with the shapes that were searched."""
     own = [c for each in kept for c in each.hypothesis.candidates]
     return {c: w for c, (w, _) in weights_of(search.evidence, search.sums, own).items()}
+
+
+def _is_negligible(named: Named, weights: Mapping[Candidate, Array]) -> bool:
+    effect = named.hypothesis.effect
+    return all(
+        effect.is_negligible(effect.values(weights[c].tolist(), **c.nonlinear))
+        for c in members_of(weights, named.hypothesis)
+    )
 
 
 def members_of(candidates: Iterable[Candidate], hypothesis: Hypothesis) -> list[Candidate]:

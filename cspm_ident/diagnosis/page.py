@@ -214,9 +214,15 @@ def _ranked(named: Named, finding: dict[str, Any]) -> Iterable[tuple[str, ...]]:
     likely, taken = f"{finding['probability']:.2f}", f"{100 * named.share:.0f} %"
     yield _words(named.hypothesis), verdict, likely, size, taken
     rivals = zip(named.alternatives, finding["alternatives"], strict=True)
-    for (rival, worse), entry in sorted(rivals, key=lambda each: each[0][1].total):
-        behind = f"{_in_errors(worse.total, worse.error)} behind"
-        yield _words(rival), "explains it as well", f"{entry['probability']:.2f}", behind, ""
+    for rival, entry in sorted(rivals, key=lambda each: each[0].behind):
+        behind = f"{rival.behind:.1f} behind"
+        yield (
+            _words(rival.hypothesis),
+            "explains it as well",
+            f"{entry['probability']:.2f}",
+            behind,
+            "",
+        )
 
 
 def _in_errors(total: float, error: float) -> str:

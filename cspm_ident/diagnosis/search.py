@@ -10,6 +10,7 @@ from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.stats import norm, wilcoxon
 
 from cspm_ident.diagnosis.columns import Candidate
 from cspm_ident.diagnosis.drivers import Driver
@@ -26,6 +27,10 @@ UNKNOWN_SHARE = 0.15
 FALSE_ALARMS = 0.01
 MOST_EFFECTS = 3
 _SHORT_LIST = 12
+# Standard deviations: what is no farther behind explains as well.
+_TIED = 2.0
+# Of the gain: no model is so true that a smaller difference decides.
+_TIED_SHARE = 0.02
 # In which an effect has to act to be told.
 _FEWEST_BLOCKS = 5
 
@@ -50,6 +55,19 @@ class Hypothesis:
         return tuple(candidate.element for candidate in self.candidates)
 
 
+class Rival(NamedTuple):
+    """A hypothesis that explains nearly as much as one that was chosen.
+
+    Attributes:
+        hypothesis: what it says.
+        behind: by how many standard deviations of a normal it is worse, over the blocks that were
+            not fitted; negative where it is better.
+    """
+
+    hypothesis: Hypothesis
+    behind: float
+
+
 class Named(NamedTuple):
     """A hypothesis that was chosen.
 
@@ -57,13 +75,13 @@ class Named(NamedTuple):
         hypothesis: what it says.
         gain: of it in blocks that were not fitted, beyond all others that were chosen.
         share: of the squared residual, in the places it acts on, that it takes away.
-        alternatives: what explains it as well, with how much worse (positive) per block set.
+        alternatives: what explains it nearly as well.
     """
 
     hypothesis: Hypothesis
     gain: Gain
     share: float
-    alternatives: tuple[tuple[Hypothesis, Gain], ...]
+    alternatives: tuple[Rival, ...]
 
 
 class Findings(NamedTuple):
@@ -130,13 +148,23 @@ class Search:
 
     def _chosen(self, *, onsets: bool = True) -> list[Hypothesis]:
         chosen: list[Hypothesis] = []
-        while len(chosen) < MOST_EFFECTS:
+        while sum(not self._is_negligible(h, chosen) for h in chosen) < MOST_EFFECTS:
             self._progress(f"effect {len(chosen) + 1}")
             found = self._best(chosen)
             if found is None:
                 break
             chosen.append(self._begun(found, chosen) if onsets else found)
         return chosen
+
+    def _is_negligible(self, hypothesis: Hypothesis, chosen: Sequence[Hypothesis]) -> bool:
+        """Return whether a sound machine has as much of it, so that it counts for no effect."""
+        candidates = [c for h in chosen for c in h.candidates]
+        weights = self.sums.weights(self.evidence.with_nuisance(candidates))
+        own = self.evidence.parted(candidates, weights)
+        return all(
+            c.effect.is_negligible(c.effect.values(own[c].tolist(), **c.nonlinear))
+            for c in hypothesis.candidates
+        )
 
     def _begun(self, hypothesis: Hypothesis, chosen: Sequence[Hypothesis]) -> Hypothesis:
         """Return the hypothesis with its onset, from which on its columns act henceforth."""
@@ -300,24 +328,27 @@ class Search:
 
     def _alternatives(
         self, hypothesis: Hypothesis, others: Sequence[Hypothesis], base: Index, own: Index
-    ) -> Iterable[tuple[Hypothesis, Gain]]:
+    ) -> Iterable[Rival]:
         """Yield what explains the same nearly as well, the chosen one taken out."""
         taken = {(c.effect_id, c.element) for h in others for c in h.candidates}
         free = [c for c in self._effects if (c.effect_id, c.element) not in taken]
         reference = self.sums.held_out(np.concatenate([base, own]))
+        gained = float(np.sum(self.sums.held_out(base) - reference))
         for rival in self._rivals(hypothesis, free, base):
             columns = self.own_columns(rival)
-            if self._contains(base, columns, own) or not self._is_plausible([*others, rival]):
+            wider = _freedom(rival) > _freedom(hypothesis)
+            if (wider and self._contains(base, columns, own)) or not self._is_plausible(
+                [*others, rival]
+            ):
                 continue
             with self.sums.delayed(np.setdiff1d(columns, own), hypothesis.onset):
-                worse = gain_of(self.sums.held_out(np.concatenate([base, columns])) - reference)
-            if worse.total <= 2.0 * worse.error:
-                yield rival, worse
+                worse = self.sums.held_out(np.concatenate([base, columns])) - reference
+            behind = _behind(worse)
+            if behind <= _TIED or worse.sum() <= _TIED_SHARE * gained:
+                yield Rival(rival, min(behind, _TIED))
 
     def _contains(self, base: Index, wide: Index, narrow: Index) -> bool:
         """Return whether `narrow` is a case of `wide`, as Coulomb's friction of Stribeck's."""
-        if len(wide) <= len(narrow):
-            return False
         alone = self.sums.spanned(base, wide, narrow)
         return bool(np.all(alone > 0.999))
 
@@ -355,6 +386,22 @@ class Search:
 
     def _of(self, term: Candidate | Driver) -> Index:
         return self.evidence.columns_of([term])
+
+
+def _freedom(hypothesis: Hypothesis) -> int:
+    """Return how many parameters a hypothesis has that are not of a grid."""
+    effect = hypothesis.effect
+    return len(hypothesis.candidates) * (len(effect.parameters) - len(effect.nonlinear))
+
+
+def _behind(worse: Array) -> float:
+    """Return by how many standard deviations blocks are worse, whatever the size of a single one.
+
+    By Wilcoxon's signed ranks, which no outlying block decides.
+    """
+    if not np.any(worse):
+        return 0.0
+    return float(norm.isf(wilcoxon(worse, alternative="greater").pvalue))
 
 
 def _wider(one: Hypothesis, other: Hypothesis) -> bool:

@@ -25,7 +25,8 @@ from cspm_sim.kernels.plant import PlantParameters
 
 Array = NDArray[np.float64]
 
-_STEADY_S = 0.01
+
+_STEADY_S, _CALM_S = 0.01, 0.05
 
 
 class Suspension:
@@ -80,9 +81,31 @@ class Suspension:
 
     @cached_property
     def _steady_damper(self) -> Array:
-        """The damper's force without the poses' noise, about which the law is taken."""
+        """The damper's force with less of the poses' noise, about which the law is taken."""
         sigma = _STEADY_S / self.signals.step
         return np.asarray(gaussian_filter1d(self._damper, sigma, axis=0, mode="nearest"))
+
+    @cached_property
+    def _told_rates(self) -> Array:
+        """Of the elongation by law and measured tension alone, (k, n) [m/s].
+
+        For the columns of effects: a stiff cable's tension tells them far better than poses do,
+        whose noise stands in the residual already; in both it would look like a wrong damper. The
+        damper's part of the tension is taken out once, which is enough where it is small.
+        """
+        elastic, damping = self.signals.tensions, damping_of(self.parameters, self._wound)
+        for _ in range(2):
+            told = elongation_at(self.parameters, elastic, self._elastic_lengths)
+            rates = np.gradient(told, self.signals.step, axis=0)
+            elastic = self.signals.tensions - damping * rates
+        return np.asarray(rates)
+
+    @cached_property
+    def _calm_elongations(self) -> Array:
+        """Measured elongations without reversals that are none but noise, (k, n) [m]."""
+        sigma = _CALM_S / self.signals.step
+        stretched = self._spans.lengths - self._wound
+        return np.asarray(gaussian_filter1d(stretched, sigma, axis=0, mode="nearest"))
 
     @cached_property
     def _carrying(self) -> Array:
@@ -169,15 +192,16 @@ class Suspension:
         rows, cables = np.zeros((len(self.signals.times), len(CableSignal))), self.parameters.cables
         lengths, wound = self._spans.lengths[:, i], self._wound[:, i]
         directions = self._spans.directions[:, i]
+        damper = (damping_of(self.parameters, self._wound) * self._told_rates)[:, i]
         for column, values in {
             CableSignal.TIME: self.signals.times,
             CableSignal.LENGTH: lengths,
-            CableSignal.ELONGATION: lengths - wound,
-            CableSignal.RATE: self._rates[:, i],
+            CableSignal.ELONGATION: self._calm_elongations[:, i],
+            CableSignal.RATE: self._told_rates[:, i],
             CableSignal.TENSION: self.signals.tensions[:, i],
             CableSignal.STIFFNESS: self._law[:, i, 1],
             CableSignal.LENGTH_SLOPE: slope,
-            CableSignal.DAMPER: self._damper[:, i],
+            CableSignal.DAMPER: damper,
             CableSignal.WOUND: wound / lengths,
             CableSignal.ANGLE: self.signals.angles[:, i],
             CableSignal.SPEED: self.signals.speeds[:, i],

@@ -14,10 +14,9 @@ from cspm_ident.diagnosis.columns import Candidate
 from cspm_ident.diagnosis.diagnose import Diagnosis, Shape, members_of
 from cspm_ident.diagnosis.judgement import HeldOut
 from cspm_ident.diagnosis.onset import Onset
-from cspm_ident.diagnosis.search import Named
+from cspm_ident.diagnosis.search import Named, Rival
 from cspm_ident.diagnosis.simulation import SimulatedFit
 from cspm_ident.diagnosis.sketch import sketch
-from cspm_ident.diagnosis.sums import Gain
 from cspm_ident.signals.measurement import Measurement
 from cspm_sim.effects import Block, Channel, Effect
 
@@ -71,14 +70,13 @@ def verdict_of(diagnosis: Diagnosis) -> Verdict:
 def probability_of(named: Named) -> float:
     """Return how probable a finding is among what explains the same.
 
-    A rival that is worse by so many standard errors counts as a normal deviate of that size.
+    A rival's odds are those of a normal deviate of as many standard deviations as it lies behind.
     """
-    return 1.0 / (1.0 + sum(_odds(worse) for _, worse in named.alternatives))
+    return 1.0 / (1.0 + sum(_odds(rival) for rival in named.alternatives))
 
 
-def _odds(worse: Gain) -> float:
-    apart = max(0.0, worse.total) / worse.error if worse.error > 0.0 else 0.0
-    return exp(-0.5 * apart**2)
+def _odds(rival: Rival) -> float:
+    return exp(-0.5 * max(0.0, rival.behind) ** 2)
 
 
 def numbers_of(diagnosis: Diagnosis, candidate: Candidate) -> list[Number]:
@@ -260,12 +258,12 @@ def _finding(diagnosis: Diagnosis, named: Named) -> dict[str, Any]:
         ],
         "alternatives": [
             {
-                "effect": rival.effect.id,
-                "elements": list(rival.elements),
-                "probability": probability * _odds(worse),
+                "effect": rival.hypothesis.effect.id,
+                "elements": list(rival.hypothesis.elements),
+                "probability": probability * _odds(rival),
                 "separating_experiment": None,
             }
-            for rival, worse in named.alternatives
+            for rival in named.alternatives
         ],
     }
 

@@ -35,6 +35,8 @@ EFFECT = Effect(
     sense=Sense(("/{}/pose", "/{}/twist"), lateness=_lateness),
     elements=Elements.BODIES,
     regression=Regression(Channel.READING, _columns),
+    # What two free clocks do.
+    negligible={"skew": 2e-5},
     equation="pose and twist stamped τ = those at τ/(1 + skew), τ from the run's start",
     shows="pose lags behind the winches' motion, the more the longer the recording lasts",
     twins=("pose_delay",),

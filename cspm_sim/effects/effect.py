@@ -128,6 +128,8 @@ class Effect:
             that is no more than that.
         sense: what it does to a sensor's readings.
         elements: what it can act on; None: that which its block says.
+        negligible: how far parameters, by name, may lie from where the effect is absent in a sound
+            machine; less is taken into account and not told.
         plausible: whether parameters within their bounds go together; None: always.
     """
 
@@ -150,6 +152,7 @@ class Effect:
     alter: Callable[[Testbed, int, Values], Testbed] | None = None
     sense: Sense | None = None
     elements: Elements | None = None
+    negligible: Mapping[str, float] = field(default_factory=dict)
     plausible: Callable[[Values], bool] | None = None
 
     @property
@@ -181,6 +184,14 @@ class Effect:
         """Return whether values are such as the catalogue allows."""
         within = all(p.minimum <= values[p.name] <= p.maximum for p in self.parameters)
         return within and (self.plausible is None or self.plausible(values))
+
+    def is_negligible(self, values: Values) -> bool:
+        """Return whether values are such as a sound machine has as well."""
+        return bool(self.negligible) and all(
+            abs(values[p.name] - (p.absent or 0.0)) <= self.negligible[p.name]
+            for p in self.parameters
+            if p.name in self.negligible
+        )
 
     def is_absent(self, values: Values) -> bool:
         """Return whether the effect does nothing with these parameters."""

@@ -30,6 +30,8 @@ EFFECT = Effect(
     sense=Sense(("/{}/pose", "/{}/twist"), lateness=_lateness),
     elements=Elements.BODIES,
     regression=Regression(Channel.READING, _columns),
+    # As well as clocks are set to each other.
+    negligible={"delay": 2e-4},
     equation="pose and twist stamped τ = those at τ − delay",
     shows="tension residuals as of a damper stiffness·delay; pose lags behind the winches' motion",
     twins=("cable_axial_damping", "winch_torque_lag", "clock_skew"),

@@ -11,7 +11,6 @@ from cspm_ident.diagnosis.columns import Candidate, Place, shapes_of
 from cspm_ident.diagnosis.drivers import Driver, Knots
 from cspm_ident.diagnosis.equation import Equation
 from cspm_ident.signals.measurement import Measurement
-from cspm_ident.signals.timeline import joined
 from cspm_ident.winch.weak_form import make_window, weigh
 from cspm_sim.effect_entries import Action
 from cspm_sim.effects import Channel, Effect
@@ -65,15 +64,18 @@ def drive_equations(
     if command is None or torque is None:
         return []
     held = 2.0 * measurement.torque_age
+    # The command that held up to a stamp, whose scatter is less than half of a period.
+    last = np.searchsorted(command.times, torque.times - 0.5 * held, side="right") - 1
+    known_from = last >= 0
     found = []
     for i, cable in enumerate(measurement.machine.cables):
         rows = np.zeros((len(torque.times), len(WinchSignal)))
         rows[:, WinchSignal.TIME] = torque.times
         rows[:, WinchSignal.TORQUE] = torque.values[:, i]
         rows[1:, WinchSignal.TORQUE_RATE] = np.diff(torque.values[:, i]) / np.diff(torque.times)
-        told = joined(command.column(i), torque.times - held)[:, 0]
+        told = command.values[np.maximum(last, 0), i]
         # No drive delivers more than its limit.
-        told[np.abs(told) >= cable.torque_limit] = np.nan
+        told[(np.abs(told) >= cable.torque_limit) | ~known_from] = np.nan
         own = [a for a in known if a.element == i and a.effect.regression.channel is Channel.DRIVE]
         equation = _equation(
             cable.name, told - rows[:, WinchSignal.TORQUE], rows, effects, own, held, knots

@@ -31,6 +31,8 @@ _SHORT_LIST = 12
 _TIED = 2.0
 # Of the gain: no model is so true that a smaller difference decides.
 _TIED_SHARE = 0.02
+# Of the gain: what loses more is no rival, however the rest scatters.
+_RIVAL_SHARE = 0.5
 # In which an effect has to act to be told.
 _FEWEST_BLOCKS = 5
 
@@ -153,7 +155,7 @@ class Search:
             found = self._best(chosen)
             if found is None:
                 break
-            chosen.append(self._begun(found, chosen) if onsets else found)
+            chosen = _joined(chosen, self._begun(found, chosen) if onsets else found)
         return chosen
 
     def _is_negligible(self, hypothesis: Hypothesis, chosen: Sequence[Hypothesis]) -> bool:
@@ -343,6 +345,8 @@ class Search:
                 continue
             with self.sums.delayed(np.setdiff1d(columns, own), hypothesis.onset):
                 worse = self.sums.held_out(np.concatenate([base, columns])) - reference
+            if worse.sum() > _RIVAL_SHARE * gained:
+                continue
             behind = _behind(worse)
             if behind <= _TIED or worse.sum() <= _TIED_SHARE * gained:
                 yield Rival(rival, min(behind, _TIED))
@@ -356,9 +360,13 @@ class Search:
         """Return whether all parameters lie within what the catalogue allows."""
         candidates = [c for h in hypotheses for c in h.candidates]
         weights = self.sums.weights(self.evidence.with_nuisance(candidates))
-        return all(
-            c.effect.is_plausible(c.effect.values(own.tolist(), **c.nonlinear))
+        found = {
+            c: c.effect.values(own.tolist(), **c.nonlinear)
             for c, own in self.evidence.parted(candidates, weights).items()
+        }
+        return all(
+            c.effect.is_plausible(values) and not c.effect.is_absent(values)
+            for c, values in found.items()
         )
 
     def _onset(self, base: Index, own: Index) -> int:
@@ -386,6 +394,18 @@ class Search:
 
     def _of(self, term: Candidate | Driver) -> Index:
         return self.evidence.columns_of([term])
+
+
+def _joined(chosen: Sequence[Hypothesis], found: Hypothesis) -> list[Hypothesis]:
+    """Return hypotheses with a further one; the same effect on more elements is still one."""
+    shape, out = found.candidates[0].shape, []
+    for other in chosen:
+        alike = other.effect.id == found.effect.id and other.candidates[0].shape == shape
+        if alike and other.onset == found.onset:
+            found = replace(other, candidates=(*other.candidates, *found.candidates))
+        else:
+            out.append(other)
+    return [*out, found]
 
 
 def _freedom(hypothesis: Hypothesis) -> int:

@@ -26,7 +26,7 @@ from cspm_sim.kernels.plant import PlantParameters
 Array = NDArray[np.float64]
 
 
-_STEADY_S, _CALM_S = 0.01, 0.05
+_STEADY_S, _CALM_S, _START_S = 0.01, 0.03, 0.5
 
 
 class Suspension:
@@ -90,14 +90,19 @@ class Suspension:
         """Of the elongation by law and measured tension alone, (k, n) [m/s].
 
         For the columns of effects: a stiff cable's tension tells them far better than poses do,
-        whose noise stands in the residual already; in both it would look like a wrong damper. The
-        damper's part of the tension is taken out once, which is enough where it is small.
+        whose noise stands in the residual already; in both it would look like a wrong damper. Law
+        and damper share a tension as spring and dashpot do, solved by Euler's implicit steps.
         """
-        elastic, damping = self.signals.tensions, damping_of(self.parameters, self._wound)
-        for _ in range(2):
-            told = elongation_at(self.parameters, elastic, self._elastic_lengths)
-            rates = np.gradient(told, self.signals.step, axis=0)
-            elastic = self.signals.tensions - damping * rates
+        alone = elongation_at(self.parameters, self.signals.tensions, self._elastic_lengths)
+        stiffness = law_at(self.parameters, alone, self._elastic_lengths)[:, :, 1]
+        inert = damping_of(self.parameters, self._wound) / self.signals.step
+        told, whole = alone.copy(), np.maximum(stiffness + inert, 1e-300)
+        for k in range(1, len(told)):
+            told[k] = (stiffness[k] * alone[k] + inert[k] * told[k - 1]) / whole[k]
+        rates = np.gradient(told, self.signals.step, axis=0)
+        # What the dashpot had before the first sample is not told.
+        start, sigma = round(_START_S / self.signals.step), _STEADY_S / self.signals.step
+        rates[:start] = gaussian_filter1d(self._rates, sigma, axis=0, mode="nearest")[:start]
         return np.asarray(rates)
 
     @cached_property

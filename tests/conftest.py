@@ -225,3 +225,16 @@ def cspm(monkeypatch, captured, columns, tmp_path):
         return caught.value.code or 0, out, err
 
     return call
+
+
+@pytest.fixture
+def refused(cspm):
+    """Run a command line that must fail with one line on stderr; return the line."""
+
+    def call(*arguments, code=2):
+        found, _, err = cspm(*arguments)
+        assert (found, err.count("\n")) == (code, 1), err
+        assert err.startswith("cspm: ")
+        return err.removeprefix("cspm: ").removesuffix("\n")
+
+    return call

@@ -21,19 +21,6 @@ def columns():
     return 100
 
 
-@pytest.fixture
-def refused(cspm):
-    """Run a command line that must fail with one line on stderr; return the line."""
-
-    def call(*arguments, code=2):
-        found, _, err = cspm(*arguments)
-        assert (found, err.count("\n")) == (code, 1), err
-        assert err.startswith("cspm: ")
-        return err.removeprefix("cspm: ").removesuffix("\n")
-
-    return call
-
-
 def squeezed(text):
     """Text without line breaks, frames and repeated blanks."""
     return " ".join(text.replace("│", " ").split())

@@ -18,7 +18,7 @@ from cspm_ident.diagnosis.equation import Equation
 from cspm_ident.diagnosis.judgement import HeldOut
 from cspm_ident.diagnosis.page import write_diagnosis_page
 from cspm_ident.diagnosis.part import Kind, Part, part_of
-from cspm_ident.diagnosis.search import Findings, Hypothesis, Named
+from cspm_ident.diagnosis.search import Findings, Hypothesis, Named, Rival
 from cspm_ident.diagnosis.sums import Gain
 from cspm_ident.diagnosis.verdict import diagnosis_data
 from cspm_ident.signals.measurement import Measurement
@@ -61,6 +61,7 @@ def diagnosis(named=True, alternatives=(), unknown=(), rejected=()):
         (),
         Findings(found, tuple(unknown), 485),
         tuple(rejected),
+        (),
         weights,
         (HeldOut(PLACE, 0.15, TORQUE, TORQUE, NOISE, NOISE, NOISE),),
         (),
@@ -164,7 +165,7 @@ def test_the_drawing_has_every_part_at_its_place():
 
 
 def test_the_page_says_all_that_was_found(tmp_path):
-    rival = (Hypothesis(LOADED.effect, (LOADED,)), Gain(1.0, 10.0))
+    rival = Rival(Hypothesis(LOADED.effect, (LOADED,)), 0.1)
     page = page_of(tmp_path, diagnosis(alternatives=[rival]))
     assert "Diagnosis of today: tie" in page
     top = page.index('class="verdict"')
@@ -246,7 +247,7 @@ def test_a_browser_shows_the_page_at_any_width(tmp_path, width):
     browser = shutil.which("chromium") or shutil.which("google-chrome")
     if browser is None:
         pytest.skip("no Chromium on this system")
-    rival = (Hypothesis(LOADED.effect, (LOADED,)), Gain(1.0, 10.0))
+    rival = Rival(Hypothesis(LOADED.effect, (LOADED,)), 0.1)
     page_of(tmp_path, diagnosis(alternatives=[rival]))
     (tmp_path / "probe.html").write_text(_PROBE % width, encoding="utf-8")
     options = ["--headless", "--no-sandbox", "--disable-gpu", "--allow-file-access-from-files"]

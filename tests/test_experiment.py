@@ -14,7 +14,7 @@ from cspm_ident.diagnosis.columns import Candidate, Place
 from cspm_ident.diagnosis.diagnose import Diagnosis
 from cspm_ident.diagnosis.judgement import HeldOut
 from cspm_ident.diagnosis.recorded import equations_of
-from cspm_ident.diagnosis.search import Findings, Hypothesis, Named
+from cspm_ident.diagnosis.search import Findings, Hypothesis, Named, Rival
 from cspm_ident.diagnosis.sums import Gain
 from cspm_ident.diagnosis.verdict import diagnosis_data
 from cspm_ident.experiment.choice import Question, best_answer, is_safe, most_showing, safe_plans
@@ -80,7 +80,8 @@ def test_a_plan_leaves_no_residual_but_the_dampers():
             weight = THESIS.testbed.bar.mass * THESIS.testbed.gravity
             # Roll is not controlled, and what the least tensions miss is left.
             scale = weight * np.array([1.0, 1.0, 1.0, np.inf, 0.5, 0.5])
-        assert np.all(np.std(left, axis=0) < 0.02 * scale), equation.place
+        # Rates are told by tensions as if the cables were damped.
+        assert np.all(np.std(left, axis=0) < 0.04 * scale), equation.place
 
 
 @pytest.mark.slow
@@ -187,14 +188,14 @@ def tied(measurement):
     noise = {e.place: np.full(e.target.shape[1], 1e-3) for e in equations_of(measurement, [])}
     # So little was recorded that any motion tells more.
     short = measurement.within(0.0, 2.5)
-    rival = (Hypothesis(LOADED.effect, (LOADED,)), Gain(1.0, 10.0))
+    rival = Rival(Hypothesis(LOADED.effect, (LOADED,)), 0.1)
     named = Named(Hypothesis(RUBBING.effect, (RUBBING,)), Gain(9.0, 1.0), 0.9, (rival,))
     weights = {RUBBING: (np.array([0.03]), np.array([0.001]))}
     fit = HeldOut(Place(Channel.SHAFT, "surge_2"), 0.1, 0.03, 0.03, 0.001, 0.001, 0.001)
     findings = Findings((named,), (), 1)
     starts = np.zeros(1)
     rest = (), (None,), (), (None,), (), (), (), starts, (), noise
-    return Diagnosis((short,), (), findings, (), weights, (fit,), *rest)
+    return Diagnosis((short,), (), findings, (), (), weights, (fit,), *rest)
 
 
 @pytest.fixture(scope="module")

@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from cspm_ident.diagnosis.columns import Candidate, Place, shapes_of
-from cspm_ident.diagnosis.equation import Equation
+from cspm_ident.diagnosis.equation import Equation, steady
 from cspm_ident.diagnosis.recorded import equations_of
 from cspm_ident.experiment.excitations import excitations
 from cspm_ident.experiment.plan import Plan, planned
@@ -113,11 +113,11 @@ def best_answer(
         plans: what may be run.
     """
     effects = question.effects
-    parts = [equations_of(measurement, effects) for measurement in recorded]
+    parts = steady([equations_of(measurement, effects) for measurement in recorded])
     so_far = _rate([e for part in parts for e in part], noise, question, recorded)
     answers = []
     for scenario, plan in plans:
-        equations = equations_of(plan.measurement, effects)
+        (equations,) = steady([equations_of(plan.measurement, effects)])
         rate = _rate(equations, noise, question, [plan.measurement])
         answers.append(Answer(scenario, rate, so_far))
     best = max(answers, key=lambda answer: answer.separation, default=None)

@@ -15,10 +15,10 @@ from cspm_ident.diagnosis.diagnose import Diagnosis, Shape
 from cspm_ident.diagnosis.drawing import drawing
 from cspm_ident.diagnosis.drivers import Driver
 from cspm_ident.diagnosis.equation import Equation
+from cspm_ident.diagnosis.hypothesis import Findings, Hypothesis, Named, Rival
 from cspm_ident.diagnosis.judgement import HeldOut
 from cspm_ident.diagnosis.page import write_diagnosis_page
 from cspm_ident.diagnosis.part import Kind, Part, part_of
-from cspm_ident.diagnosis.search import Findings, Hypothesis, Named, Rival
 from cspm_ident.diagnosis.sums import Gain
 from cspm_ident.diagnosis.verdict import diagnosis_data
 from cspm_ident.signals.measurement import Measurement

@@ -12,9 +12,9 @@ from cspm_bringup.bundle import make_bundle
 from cspm_bringup.run import run
 from cspm_ident.diagnosis.columns import Candidate, Place
 from cspm_ident.diagnosis.diagnose import Diagnosis
+from cspm_ident.diagnosis.hypothesis import Findings, Hypothesis, Named, Rival
 from cspm_ident.diagnosis.judgement import HeldOut
 from cspm_ident.diagnosis.recorded import equations_of
-from cspm_ident.diagnosis.search import Findings, Hypothesis, Named, Rival
 from cspm_ident.diagnosis.sums import Gain
 from cspm_ident.diagnosis.verdict import diagnosis_data
 from cspm_ident.experiment.choice import Question, best_answer, is_safe, most_showing, safe_plans

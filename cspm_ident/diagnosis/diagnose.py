@@ -13,13 +13,14 @@ from cspm_ident.diagnosis.curves import Curve, held_out_curves
 from cspm_ident.diagnosis.drivers import Driver, Knots
 from cspm_ident.diagnosis.equation import Equation, in_noise, steady
 from cspm_ident.diagnosis.evidence import Evidence, gather
+from cspm_ident.diagnosis.hypothesis import Findings, Hypothesis, Named
 from cspm_ident.diagnosis.judgement import HeldOut, free_functions, judged
 from cspm_ident.diagnosis.limits import Limit, detection_limits
 from cspm_ident.diagnosis.onset import Onset, onset_of
 from cspm_ident.diagnosis.parameters import of_drives, of_shafts, weights_of
 from cspm_ident.diagnosis.recorded import equations_of
 from cspm_ident.diagnosis.refine import Cut, Weights, needs_refining, refine
-from cspm_ident.diagnosis.search import Findings, Hypothesis, Named, Search
+from cspm_ident.diagnosis.search import Search
 from cspm_ident.diagnosis.simulation import SimulatedFit, Worth, simulate_held_out, worth_of
 from cspm_ident.signals.measurement import Measurement
 from cspm_msgs_py.errors import InputError

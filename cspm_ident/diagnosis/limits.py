@@ -11,7 +11,8 @@ from scipy.stats import t as t_distribution
 
 from cspm_ident.diagnosis.columns import Candidate
 from cspm_ident.diagnosis.evidence import Evidence
-from cspm_ident.diagnosis.search import FALSE_ALARMS, MATERIAL_SHARE, Named, Search
+from cspm_ident.diagnosis.hypothesis import Named
+from cspm_ident.diagnosis.search import FALSE_ALARMS, MATERIAL_SHARE, Search
 
 Array = NDArray[np.float64]
 

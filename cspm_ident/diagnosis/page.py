@@ -14,8 +14,8 @@ from cspm_ident.diagnosis.curves import Curve
 from cspm_ident.diagnosis.diagnose import Diagnosis
 from cspm_ident.diagnosis.drawing import drawing
 from cspm_ident.diagnosis.evidence_figure import driver_figure, overlay_figure
+from cspm_ident.diagnosis.hypothesis import Hypothesis, Named
 from cspm_ident.diagnosis.part import Part, part_behind, part_of
-from cspm_ident.diagnosis.search import Hypothesis, Named
 from cspm_ident.diagnosis.verdict import (
     IMPROVED,
     Verdict,

@@ -5,8 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from contextlib import contextmanager
 from copy import copy
-from dataclasses import dataclass, replace
-from typing import NamedTuple
+from dataclasses import replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -15,8 +14,16 @@ from scipy.stats import norm, wilcoxon
 from cspm_ident.diagnosis.columns import Candidate
 from cspm_ident.diagnosis.drivers import Driver
 from cspm_ident.diagnosis.evidence import Evidence
+from cspm_ident.diagnosis.hypothesis import (
+    Findings,
+    Hypothesis,
+    Named,
+    Rival,
+    freedom,
+    is_wider,
+    joined,
+)
 from cspm_ident.diagnosis.sums import Gain, Sums, gain_of
-from cspm_sim.effects import Effect
 
 Array = NDArray[np.float64]
 Index = NDArray[np.intp]
@@ -35,69 +42,6 @@ _TIED_SHARE = 0.02
 _RIVAL_SHARE = 0.5
 # In which an effect has to act to be told.
 _FEWEST_BLOCKS = 5
-
-
-@dataclass(frozen=True)
-class Hypothesis:
-    """An effect on some elements.
-
-    Attributes:
-        effect: of the catalogue.
-        candidates: one per element, of the same nonlinear parameters.
-        onset: block from which on it acts, 0 for all the time.
-    """
-
-    effect: Effect
-    candidates: tuple[Candidate, ...]
-    onset: int = 0
-
-    @property
-    def elements(self) -> tuple[str, ...]:
-        """What it acts on."""
-        return tuple(candidate.element for candidate in self.candidates)
-
-
-class Rival(NamedTuple):
-    """A hypothesis that explains nearly as much as one that was chosen.
-
-    Attributes:
-        hypothesis: what it says.
-        behind: by how many standard deviations of a normal it is worse, over the blocks that were
-            not fitted; negative where it is better.
-    """
-
-    hypothesis: Hypothesis
-    behind: float
-
-
-class Named(NamedTuple):
-    """A hypothesis that was chosen.
-
-    Attributes:
-        hypothesis: what it says.
-        gain: of it in blocks that were not fitted, beyond all others that were chosen.
-        share: of the squared residual, in the places it acts on, that it takes away.
-        alternatives: what explains it nearly as well.
-    """
-
-    hypothesis: Hypothesis
-    gain: Gain
-    share: float
-    alternatives: tuple[Rival, ...]
-
-
-class Findings(NamedTuple):
-    """What a search found.
-
-    Attributes:
-        named: effects, the most important first.
-        unknown: free shapes that explain what no effect does, with their gain and share.
-        candidates: how many hypotheses were looked at.
-    """
-
-    named: tuple[Named, ...]
-    unknown: tuple[tuple[Driver, Gain, float], ...]
-    candidates: int
 
 
 class Search:
@@ -155,7 +99,7 @@ class Search:
             found = self._best(chosen)
             if found is None:
                 break
-            chosen = _joined(chosen, self._begun(found, chosen) if onsets else found)
+            chosen = joined(chosen, self._begun(found, chosen) if onsets else found)
         return chosen
 
     def _is_negligible(self, hypothesis: Hypothesis, chosen: Sequence[Hypothesis]) -> bool:
@@ -192,7 +136,7 @@ class Search:
                     # More elements, or a beginning, have to be worth it.
                     if gain is not None and (
                         best is None
-                        or gain.total > best[0] + 3.0 * gain.error * _wider(dated, best[1])
+                        or gain.total > best[0] + 3.0 * gain.error * is_wider(dated, best[1])
                     ):
                         best = gain.total, dated
         if best is None:
@@ -338,7 +282,7 @@ class Search:
         gained = float(np.sum(self.sums.held_out(base) - reference))
         for rival in self._rivals(hypothesis, free, base):
             columns = self.own_columns(rival)
-            wider = _freedom(rival) > _freedom(hypothesis)
+            wider = freedom(rival) > freedom(hypothesis)
             if (wider and self._contains(base, columns, own)) or not self._is_plausible(
                 [*others, rival]
             ):
@@ -396,24 +340,6 @@ class Search:
         return self.evidence.columns_of([term])
 
 
-def _joined(chosen: Sequence[Hypothesis], found: Hypothesis) -> list[Hypothesis]:
-    """Return hypotheses with a further one; the same effect on more elements is still one."""
-    shape, out = found.candidates[0].shape, []
-    for other in chosen:
-        alike = other.effect.id == found.effect.id and other.candidates[0].shape == shape
-        if alike and other.onset == found.onset:
-            found = replace(other, candidates=(*other.candidates, *found.candidates))
-        else:
-            out.append(other)
-    return [*out, found]
-
-
-def _freedom(hypothesis: Hypothesis) -> int:
-    """Return how many parameters a hypothesis has that are not of a grid."""
-    effect = hypothesis.effect
-    return len(hypothesis.candidates) * (len(effect.parameters) - len(effect.nonlinear))
-
-
 def _behind(worse: Array) -> float:
     """Return by how many standard deviations blocks are worse, whatever the size of a single one.
 
@@ -422,11 +348,6 @@ def _behind(worse: Array) -> float:
     if not np.any(worse):
         return 0.0
     return float(norm.isf(wilcoxon(worse, alternative="greater").pvalue))
-
-
-def _wider(one: Hypothesis, other: Hypothesis) -> bool:
-    """Return whether one is the other's effect on more elements."""
-    return one.effect.id == other.effect.id and len(one.candidates) > len(other.candidates)
 
 
 def _short_list(candidates: Sequence[Candidate], gains: Array) -> list[Candidate]:

@@ -12,9 +12,9 @@ import numpy as np
 from cspm_ident.block_simulation import Drive
 from cspm_ident.diagnosis.columns import Candidate
 from cspm_ident.diagnosis.diagnose import Diagnosis, Shape, members_of
+from cspm_ident.diagnosis.hypothesis import Named, Rival
 from cspm_ident.diagnosis.judgement import HeldOut
 from cspm_ident.diagnosis.onset import Onset
-from cspm_ident.diagnosis.search import Named, Rival
 from cspm_ident.diagnosis.simulation import SimulatedFit
 from cspm_ident.diagnosis.sketch import sketch
 from cspm_ident.signals.measurement import Measurement

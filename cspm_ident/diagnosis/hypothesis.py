@@ -1,0 +1,98 @@
+"""What a search says: hypotheses, how they stand, and what nothing explains."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from typing import NamedTuple
+
+from cspm_ident.diagnosis.columns import Candidate
+from cspm_ident.diagnosis.drivers import Driver
+from cspm_ident.diagnosis.sums import Gain
+from cspm_sim.effects import Effect
+
+
+@dataclass(frozen=True)
+class Hypothesis:
+    """An effect on some elements.
+
+    Attributes:
+        effect: of the catalogue.
+        candidates: one per element, of the same nonlinear parameters.
+        onset: block from which on it acts, 0 for all the time.
+    """
+
+    effect: Effect
+    candidates: tuple[Candidate, ...]
+    onset: int = 0
+
+    @property
+    def elements(self) -> tuple[str, ...]:
+        """What it acts on."""
+        return tuple(candidate.element for candidate in self.candidates)
+
+
+class Rival(NamedTuple):
+    """A hypothesis that explains nearly as much as one that was chosen.
+
+    Attributes:
+        hypothesis: what it says.
+        behind: by how many standard deviations of a normal it is worse, over the blocks that were
+            not fitted; negative where it is better.
+    """
+
+    hypothesis: Hypothesis
+    behind: float
+
+
+class Named(NamedTuple):
+    """A hypothesis that was chosen.
+
+    Attributes:
+        hypothesis: what it says.
+        gain: of it in blocks that were not fitted, beyond all others that were chosen.
+        share: of the squared residual, in the places it acts on, that it takes away.
+        alternatives: what explains it nearly as well.
+    """
+
+    hypothesis: Hypothesis
+    gain: Gain
+    share: float
+    alternatives: tuple[Rival, ...]
+
+
+class Findings(NamedTuple):
+    """What a search found.
+
+    Attributes:
+        named: effects, the most important first.
+        unknown: free shapes that explain what no effect does, with their gain and share.
+        candidates: how many hypotheses were looked at.
+    """
+
+    named: tuple[Named, ...]
+    unknown: tuple[tuple[Driver, Gain, float], ...]
+    candidates: int
+
+
+def joined(chosen: Sequence[Hypothesis], found: Hypothesis) -> list[Hypothesis]:
+    """Return hypotheses with a further one; the same effect on more elements is still one."""
+    shape, out = found.candidates[0].shape, []
+    for other in chosen:
+        alike = other.effect.id == found.effect.id and other.candidates[0].shape == shape
+        if alike and other.onset == found.onset:
+            found = replace(other, candidates=(*other.candidates, *found.candidates))
+        else:
+            out.append(other)
+    return [*out, found]
+
+
+def freedom(hypothesis: Hypothesis) -> int:
+    """Return how many parameters a hypothesis has that are not of a grid."""
+    effect = hypothesis.effect
+    return len(hypothesis.candidates) * (len(effect.parameters) - len(effect.nonlinear))
+
+
+def is_wider(one: Hypothesis, other: Hypothesis) -> bool:
+    """Return whether one is the other's effect on more elements."""
+    return one.effect.id == other.effect.id and len(one.candidates) > len(other.candidates)

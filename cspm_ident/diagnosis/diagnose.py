@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -37,6 +38,8 @@ SEARCHED_SHARE = 0.7
 GAP_SHARE = 0.02
 # A finding must take this share of a held-out squared residual, or it does not stand.
 CONFIRMED_SHARE = 0.03
+# Nor if no simulated error falls below this share of what it is without the finding.
+WORTH_IT = 0.99
 
 
 @dataclass(frozen=True, eq=False)
@@ -123,39 +126,31 @@ def diagnose(
     progress("held-out data")
     judge = _judge(in_noise(judge_parts, noise), found, block)
     kept, rejected = _confirmed(search, judge, found)
-    progress("parameters")
-    searched_part: Cut = _whole if held_out else _first
-    rows = in_noise(search_parts, noise)
-    onsets = _onsets(kept, steady(rows), evidence.times)
-    since = max((onset.time for onset in onsets if onset is not None), default=-np.inf)
-
-    def cut(parts: Parts) -> Parts:
-        return [[e.within(since, np.inf) for e in part] for part in searched_part(parts)]
-
-    since_then = [[e.within(since, np.inf) for e in part] for part in rows]
-    weights = _parameters(search, kept, searched, cut, since_then, noise, block)
     starts = [_span(part)[0] for part in judge_parts]
-    weights = of_drives(weights, 2.0 * searched[0].torque_age)
     judges = held_out or [m.within(s, np.inf) for m, s in zip(searched, starts, strict=True)]
-    retuned, values = search.retuned(), {c: w for c, (w, _) in weights.items()}
-    progress("simulation of held-out data")
-    simulated = simulate_held_out(judges, retuned, values)
+    retuned = search.retuned()
+    searched_part: Cut = _whole if held_out else _first
+    data = _Data(searched, searched_part, judges, in_noise(search_parts, noise), noise, block)
+    progress("parameters, and simulation of held-out data")
+    model = _modelled(search, kept, data, retuned)
+    while model.useless:
+        rejected += tuple(kept[k] for k in model.useless)
+        kept = tuple(each for k, each in enumerate(kept) if k not in model.useless)
+        model = _modelled(search, kept, data, retuned)
+    values = {c: w for c, (w, _) in model.weights.items()}
     told = [k for k, each in enumerate(kept) if not _is_negligible(each, values)]
-    worth = tuple(
-        worth_of(judges, simulated, values, members_of(values, kept[k].hypothesis)) for k in told
-    )
     return Diagnosis(
         searched,
         held_out,
         Findings(tuple(kept[k] for k in told), found.unknown, found.candidates),
         rejected,
         tuple(each for each in kept if _is_negligible(each, values)),
-        weights,
+        model.weights,
         judged(judges, retuned, values, noise, free_functions(evidence, judge)),
-        simulated,
-        worth,
+        model.simulated,
+        tuple(model.worth[k] for k in told),
         _shapes(search, kept, knots, [each[0] for each in found.unknown]),
-        tuple(onsets[k] for k in told),
+        tuple(model.onsets[k] for k in told),
         detection_limits(search, kept),
         _silent(search, effects),
         tuple(place.place for place in evidence.places),
@@ -163,6 +158,65 @@ def diagnose(
         held_out_curves(steady(judge_parts), _first_weights(search, kept)),
         noise,
     )
+
+
+class _Data(NamedTuple):
+    """What a model is fitted to and judged by.
+
+    Attributes:
+        searched: the recordings, of which `searched_part` was searched.
+        searched_part: cuts their equations.
+        judges: what was not searched.
+        rows: of what was searched, in units of their noise.
+        noise: of each residual.
+        block: length of the blocks [s].
+    """
+
+    searched: Sequence[Measurement]
+    searched_part: Cut
+    judges: Sequence[Measurement]
+    rows: Parts
+    noise: dict[Place, Array]
+    block: float
+
+
+class _Model(NamedTuple):
+    """What was found as a model: parameters, beginnings, simulations and what each is worth."""
+
+    weights: Weights
+    onsets: tuple[Onset | None, ...]
+    simulated: tuple[SimulatedFit, ...]
+    worth: tuple[Worth | None, ...]
+
+    @property
+    def useless(self) -> list[int]:
+        """Findings with which no simulation of held-out data comes nearer to what was measured."""
+        return [
+            k
+            for k, worth in enumerate(self.worth)
+            if worth is not None and worth.with_it > WORTH_IT * worth.without
+        ]
+
+
+def _modelled(
+    search: Search, kept: Sequence[Named], data: _Data, retuned: Mapping[Candidate, Array]
+) -> _Model:
+    onsets = _onsets(kept, steady(data.rows), search.evidence.times)
+    since = max((onset.time for onset in onsets if onset is not None), default=-np.inf)
+
+    def cut(parts: Parts) -> Parts:
+        return [[e.within(since, np.inf) for e in part] for part in data.searched_part(parts)]
+
+    rows = [[e.within(since, np.inf) for e in part] for part in data.rows]
+    weights = _parameters(search, kept, data.searched, cut, rows, data.noise, data.block)
+    weights = of_drives(weights, 2.0 * data.searched[0].torque_age)
+    values = {c: w for c, (w, _) in weights.items()}
+    simulated = simulate_held_out(data.judges, retuned, values)
+    worth = tuple(
+        worth_of(data.judges, simulated, values, members_of(values, each.hypothesis))
+        for each in kept
+    )
+    return _Model(weights, onsets, simulated, worth)
 
 
 def _first_weights(search: Search, kept: Sequence[Named]) -> dict[Candidate, Array]:

@@ -9,6 +9,7 @@ import numpy as np
 import pytest
 from run_samples import SCENARIOS
 
+from cspm_ident.block_simulation import Drive
 from cspm_ident.diagnosis.columns import Candidate, Place
 from cspm_ident.diagnosis.curves import explained_by, held_out_curves
 from cspm_ident.diagnosis.diagnose import Diagnosis, Shape
@@ -17,8 +18,10 @@ from cspm_ident.diagnosis.drivers import Driver
 from cspm_ident.diagnosis.equation import Equation
 from cspm_ident.diagnosis.hypothesis import Findings, Hypothesis, Named, Rival
 from cspm_ident.diagnosis.judgement import HeldOut
+from cspm_ident.diagnosis.limits import Limit
 from cspm_ident.diagnosis.page import write_diagnosis_page
 from cspm_ident.diagnosis.part import Kind, Part, part_of
+from cspm_ident.diagnosis.simulation import Output, SimulatedFit, Worth
 from cspm_ident.diagnosis.sums import Gain
 from cspm_ident.diagnosis.verdict import diagnosis_data
 from cspm_ident.signals.measurement import Measurement
@@ -49,6 +52,9 @@ def equation(seed=1):
     )
 
 
+OUTPUT = Output(Drive.SHAFT, "winches/angle/surge_2", "rad", "surge_2", Channel.SHAFT)
+
+
 def diagnosis(named=True, alternatives=(), unknown=(), rejected=()):
     part = equation()
     poses = Samples(np.array([0.0, 1.0]), np.array([BAR_POSE, BAR_POSE]))
@@ -64,11 +70,11 @@ def diagnosis(named=True, alternatives=(), unknown=(), rejected=()):
         (),
         weights,
         (HeldOut(PLACE, 0.15, TORQUE, TORQUE, NOISE, NOISE, NOISE),),
-        (),
-        (None,) * len(found),
+        (SimulatedFit(OUTPUT, 3.5, 1.46, 1.45, 0.0071, 0.0049),),
+        (Worth(OUTPUT, 1.46, 0.0071),) * len(found),
         tuple(Shape(d, np.linspace(0.0, 1.0, 7), np.arange(7.0) - 3.0) for d, _, _ in unknown),
         (None,) * len(found),
-        (),
+        (Limit("winch_viscous_friction", "sway_1", "coefficient", 2.1e-6, "N·m·s/rad", True),),
         (("winch_backlash", ("sway_1",)),),
         (PLACE,),
         np.zeros(1),
@@ -170,6 +176,12 @@ def test_the_page_says_all_that_was_found(tmp_path):
     assert "Diagnosis of today: tie" in page
     top = page.index('class="verdict"')
     assert top < page.index("<section")
+    simulated = section(page, "simulated")
+    for told in ("winches/angle/surge_2", "torque", "1.46", "0.0071", "0.0049"):
+        assert f">{told}<" in simulated
+    limits = section(page, "limits")
+    assert ">winch_viscous_friction<" in limits
+    assert ">2.1e-06<" in limits
     assert "Marked: winch surge_2" in section(page, "where").replace("surge 2", "surge_2")
     assert "0.029 to 0.031" in section(page, "parameters")
     ranking = section(page, "hypotheses")

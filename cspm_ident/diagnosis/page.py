@@ -20,6 +20,7 @@ from cspm_ident.diagnosis.verdict import (
     IMPROVED,
     Verdict,
     channel_of,
+    drive_of,
     unit_of,
     verdict_of,
 )
@@ -51,6 +52,8 @@ _SECTIONS = {
     "parameters": "Parameters",
     "hypotheses": "Hypotheses",
     "fit": "Every residual",
+    "simulated": "Simulated again",
+    "limits": "What would have shown",
     "silent": "Not testable here",
     "next": "What to do next",
     "sources": "Recordings and files",
@@ -76,6 +79,8 @@ def write_diagnosis_page(path: Path, found: Diagnosis, data: dict[str, Any]) -> 
         "parameters": _parameters(data),
         "hypotheses": _hypotheses(found, data),
         "fit": _fit(found),
+        "simulated": _simulated(found, data),
+        "limits": _limits(found),
         "silent": _silent(data),
         "next": _next(found, data),
         "sources": _sources(data),
@@ -235,16 +240,60 @@ def _words(hypothesis: Hypothesis) -> str:
 
 def _fit(found: Diagnosis) -> str:
     judged = "recordings held out" if found.held_out else "the last part, which was not searched"
-    heads = ("residual", "before", "re-tuned", "after", "noise", "unit")
+    heads = ("residual", "before", "re-tuned", "after", "black box", "noise", "unit")
     rows = []
     for fit in found.fit:
-        numbers = (fit.before, fit.retuned, fit.after, fit.noise)
+        numbers = (fit.before, fit.retuned, fit.after, fit.ceiling, fit.noise)
         rows.append((channel_of(fit), *(f"{n:.3g}" for n in numbers), unit_of(fit)))
     text = (
         f"<p>Root mean square on {judged}. <i>Re-tuned</i> is the file with its own numbers fitted"
-        " and nothing added; <i>noise</i> is what differs from row to row.</p>"
+        " and nothing added; <i>black box</i> is free functions of every signal instead of"
+        " physics; <i>noise</i> is what differs from row to row.</p>"
     )
     return text + table_html(heads, rows, "root mean square of every residual")
+
+
+def _simulated(found: Diagnosis, data: dict[str, Any]) -> str:
+    """Return errors of simulations of held-out data, and of the closed loop where it was run."""
+    if not found.simulated:
+        return ""
+    heads = ("quantity", "driven by", "before", "re-tuned", "after", "noise", "unit")
+    rows = []
+    for fit in found.simulated:
+        numbers = (fit.before, fit.retuned, fit.after, fit.floor)
+        told = (f"{n:.3g}" for n in numbers)
+        rows.append((fit.output.name, drive_of(fit), *told, fit.output.unit))
+    text = (
+        "<p>Root mean square errors of held-out data, each part simulated from measured signals:"
+        " winches and bar in windows of half a second, cables and bar from motor angles"
+        " throughout.</p>"
+    )
+    whole = text + table_html(heads, rows, "root mean square errors of simulations")
+    loop = [
+        (each["name"], f"{each['before']:.3g}", f"{each['after']:.3g}", each["unit"])
+        for each in data.get("closed_loop", ())
+    ]
+    if not loop:
+        return whole
+    columns = ("quantity", "before", "after", "unit")
+    text = "<p>The recorded scenario run again in closed loop: difference to the recording.</p>"
+    return whole + text + table_html(columns, loop, "root mean square differences in closed loop")
+
+
+def _limits(found: Diagnosis) -> str:
+    """Return from which size on effects would have been told, over their elements."""
+    sizes: dict[tuple[str, str, str], list[float]] = {}
+    for limit in found.limits:
+        if limit.possible:
+            key = limit.effect, limit.parameter, limit.unit
+            sizes.setdefault(key, []).append(limit.least)
+    rows = [
+        (effect, parameter, f"{min(least):.2g}", f"{max(least):.2g}", unit)
+        for (effect, parameter, unit), least in sizes.items()
+    ]
+    heads = ("effect", "parameter", "on the clearest element", "on the least clear", "unit")
+    text = "<p>More of an effect than this would have been told, beside what was found.</p>"
+    return text + table_html(heads, rows, "limits of detection") if rows else ""
 
 
 def _silent(data: dict[str, Any]) -> str:

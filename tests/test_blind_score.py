@@ -52,7 +52,7 @@ def result(verdict, *findings):
         {"held_out": FIT | {"noise_floor": 0.01}},
         {"held_out": FIT | {"nrmse_before": 0.01, "noise_floor": 0.01}},
     ]
-    diagnosis = {"verdict": verdict, "findings": list(findings), "fit": fit}
+    diagnosis = {"verdict": verdict, "findings": list(findings), "residuals": fit}
     return {"diagnosis": diagnosis, "times": {"wall_s": 9.0, "cpu_s": 4.0}}
 
 

@@ -92,7 +92,7 @@ def judge(item: Data, result: Data) -> Outcome:
         item: of the truth file.
         result: `diagnosis`, as `diagnosis.json` has it or None, and `times`.
     """
-    diagnosis: Data = result["diagnosis"] or {"verdict": FAILED, "findings": [], "fit": []}
+    diagnosis: Data = result["diagnosis"] or {"verdict": FAILED, "findings": [], "residuals": []}
     findings: Sequence[Data] = diagnosis["findings"]
     concealed: Sequence[Data] = item["concealed"]
     kind = kind_of(item)
@@ -126,7 +126,7 @@ def judge(item: Data, result: Data) -> Outcome:
             for f in findings
             if f["probability"] is not None
         ),
-        fit=_fit(diagnosis["fit"]),
+        fit=_fit(diagnosis["residuals"]),
         seconds=float(result["times"]["cpu_s"]),
     )
 

@@ -14,7 +14,7 @@ from cspm_ident.diagnosis.curves import Curve, held_out_curves
 from cspm_ident.diagnosis.drivers import Driver, Knots
 from cspm_ident.diagnosis.equation import Equation, in_noise, steady
 from cspm_ident.diagnosis.evidence import Evidence, gather
-from cspm_ident.diagnosis.hypothesis import Findings, Hypothesis, Named
+from cspm_ident.diagnosis.hypothesis import Findings, Hypothesis, Named, is_negligible
 from cspm_ident.diagnosis.judgement import HeldOut, free_functions, judged
 from cspm_ident.diagnosis.limits import Limit, detection_limits
 from cspm_ident.diagnosis.onset import Onset, onset_of
@@ -226,11 +226,7 @@ def _first_weights(search: Search, kept: Sequence[Named]) -> dict[Candidate, Arr
 
 
 def _is_negligible(named: Named, weights: Mapping[Candidate, Array]) -> bool:
-    effect = named.hypothesis.effect
-    return all(
-        effect.is_negligible(effect.values(weights[c].tolist(), **c.nonlinear))
-        for c in members_of(weights, named.hypothesis)
-    )
+    return is_negligible({c: weights[c] for c in members_of(weights, named.hypothesis)})
 
 
 def members_of(candidates: Iterable[Candidate], hypothesis: Hypothesis) -> list[Candidate]:

@@ -11,14 +11,13 @@ from cspm_ident.diagnosis.columns import Candidate, Place, shapes_of
 from cspm_ident.diagnosis.drivers import Driver, Knots
 from cspm_ident.diagnosis.equation import Equation
 from cspm_ident.signals.measurement import Measurement
-from cspm_ident.winch.weak_form import make_window, weigh
+from cspm_ident.winch.weak_form import HALF_WIDTH_S, make_window, weigh
 from cspm_sim.effect_entries import Action
 from cspm_sim.effects import Channel, Effect
 from cspm_sim.effects.signals import WinchSignal
 
 Array = NDArray[np.float64]
 
-HALF_WIDTH_S = 0.02
 _DRIVERS = {
     "reported torque [N·m]": WinchSignal.TORQUE,
     "time [s]": WinchSignal.TIME,

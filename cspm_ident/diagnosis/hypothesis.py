@@ -2,14 +2,19 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
 
 from cspm_ident.diagnosis.columns import Candidate
 from cspm_ident.diagnosis.drivers import Driver
 from cspm_ident.diagnosis.sums import Gain
 from cspm_sim.effects import Effect
+
+Array = NDArray[np.float64]
 
 
 @dataclass(frozen=True)
@@ -73,6 +78,14 @@ class Findings(NamedTuple):
     named: tuple[Named, ...]
     unknown: tuple[tuple[Driver, Gain, float], ...]
     candidates: int
+
+
+def is_negligible(members: Mapping[Candidate, Array]) -> bool:
+    """Return whether weights of an effect on its elements are such as a sound machine has."""
+    return all(
+        c.effect.is_negligible(c.effect.values(own.tolist(), **c.nonlinear))
+        for c, own in members.items()
+    )
 
 
 def joined(chosen: Sequence[Hypothesis], found: Hypothesis) -> list[Hypothesis]:

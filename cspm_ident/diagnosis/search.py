@@ -20,6 +20,7 @@ from cspm_ident.diagnosis.hypothesis import (
     Named,
     Rival,
     freedom,
+    is_negligible,
     is_wider,
     joined,
 )
@@ -107,10 +108,7 @@ class Search:
         candidates = [c for h in chosen for c in h.candidates]
         weights = self.sums.weights(self.evidence.with_nuisance(candidates))
         own = self.evidence.parted(candidates, weights)
-        return all(
-            c.effect.is_negligible(c.effect.values(own[c].tolist(), **c.nonlinear))
-            for c in hypothesis.candidates
-        )
+        return is_negligible({c: own[c] for c in hypothesis.candidates})
 
     def _begun(self, hypothesis: Hypothesis, chosen: Sequence[Hypothesis]) -> Hypothesis:
         """Return the hypothesis with its onset, from which on its columns act henceforth."""

@@ -15,7 +15,7 @@ from cspm_ident.signals.measurement import TENSION, WINCHES, Measurement
 from cspm_ident.signals.samples import Samples
 from cspm_ident.signals.winch_motion import winch_motion
 from cspm_ident.winch.recording import signal_rows, winch_signals
-from cspm_ident.winch.weak_form import make_window, weigh
+from cspm_ident.winch.weak_form import HALF_WIDTH_S, make_window, weigh
 from cspm_msgs_py.errors import InputError
 from cspm_msgs_py.testbed import Cable
 from cspm_sim.effect_entries import Action
@@ -24,7 +24,6 @@ from cspm_sim.effects.signals import WinchSignal
 
 Array = NDArray[np.float64]
 
-HALF_WIDTH_S = 0.02
 # Of the usual speed: below it a shaft may stick, and its direction is noise.
 STILL_SHARE = 0.05
 # Of the usual interval: readings farther apart have lost one between them.

@@ -79,7 +79,7 @@ def simulate_held_out(
         retuned: weights of the file's own parameters.
         found: weights of what was found.
     """
-    parts = [m.within(_start(m), _start(m) + LONGEST_S) for m in measurements]
+    parts = _beginnings(measurements)
     errors = [
         _errors(parts, weights) if weights or not k else None
         for k, weights in enumerate(({}, retuned, found))
@@ -124,7 +124,7 @@ def worth_of(
     kinds = {r.channel for c in own for r in (c.effect.regression, *c.effect.partners)}
     sensed = any(c.effect.sense is not None for c in own)
     fewer = {c: weights for c, weights in found.items() if c not in own}
-    parts = [m.within(_start(m), _start(m) + LONGEST_S) for m in measurements]
+    parts = _beginnings(measurements)
     before = _errors(parts, fewer) if fewer else {f.output: (0.0, f.before) for f in fits}
     shown = [
         Worth(fit.output, before[fit.output][1], fit.after)
@@ -135,8 +135,10 @@ def worth_of(
     return min(shown, key=lambda worth: worth.with_it / worth.without, default=None)
 
 
-def _start(measurement: Measurement) -> float:
-    return min(float(samples.times[0]) for samples in measurement.sensors.values())
+def _beginnings(measurements: Sequence[Measurement]) -> list[Measurement]:
+    """Return as much of each measurement as is simulated."""
+    starts = [min(float(s.times[0]) for s in m.sensors.values()) for m in measurements]
+    return [m.within(at, at + LONGEST_S) for m, at in zip(measurements, starts, strict=True)]
 
 
 def _errors(parts: Sequence[Measurement], weights: Weights) -> dict[Output, tuple[float, float]]:

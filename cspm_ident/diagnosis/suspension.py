@@ -76,8 +76,17 @@ class Suspension:
         return np.asarray(self._spans.rates + wound * self.signals.speeds)
 
     @cached_property
+    def _damping(self) -> Array:
+        return damping_of(self.parameters, self._wound)
+
+    @cached_property
+    def _stretched(self) -> Array:
+        """Measured elongations, (k, n) [m]."""
+        return np.asarray(self._spans.lengths - self._wound)
+
+    @cached_property
     def _damper(self) -> Array:
-        return damping_of(self.parameters, self._wound) * self._rates
+        return self._damping * self._rates
 
     @cached_property
     def _steady_damper(self) -> Array:
@@ -95,7 +104,7 @@ class Suspension:
         """
         alone = elongation_at(self.parameters, self.signals.tensions, self._elastic_lengths)
         stiffness = law_at(self.parameters, alone, self._elastic_lengths)[:, :, 1]
-        inert = damping_of(self.parameters, self._wound) / self.signals.step
+        inert = self._damping / self.signals.step
         told, whole = alone.copy(), np.maximum(stiffness + inert, 1e-300)
         for k in range(1, len(told)):
             told[k] = (stiffness[k] * alone[k] + inert[k] * told[k - 1]) / whole[k]
@@ -109,8 +118,7 @@ class Suspension:
     def _calm_elongations(self) -> Array:
         """Measured elongations without reversals that are none but noise, (k, n) [m]."""
         sigma = _CALM_S / self.signals.step
-        stretched = self._spans.lengths - self._wound
-        return np.asarray(gaussian_filter1d(stretched, sigma, axis=0, mode="nearest"))
+        return np.asarray(gaussian_filter1d(self._stretched, sigma, axis=0, mode="nearest"))
 
     @cached_property
     def _carrying(self) -> Array:
@@ -130,9 +138,21 @@ class Suspension:
         To first order about the measured tension: errors and noise of poses enter in proportion,
         however large they are.
         """
-        stretched = self._spans.lengths - self._wound
-        linear = self._law[:, :, 1] * (self._carrying - stretched)
+        linear = self._law[:, :, 1] * (self._carrying - self._stretched)
         return np.asarray(linear - (self._damper - self._steady_damper))
+
+    @cached_property
+    def _mass_in_world(self) -> tuple[Array, Array, Array]:
+        """Centre of mass from the origin, inertia about it, and ω × Iω, in world axes.
+
+        Shapes (k, 3) [m], (k, 3, 3) [kg·m²], (k, 3) [N·m].
+        """
+        bar, state = self._testbed.bar, self.bar
+        assert bar is not None
+        com = np.einsum("kij,j->ki", state.rotation, np.array(bar.com))
+        turned = np.einsum("kij,jl,kml->kim", state.rotation, bar.inertia.matrix, state.rotation)
+        spin = np.cross(state.omega, np.einsum("kij,kj->ki", turned, state.omega))
+        return com, turned, spin
 
     @cached_property
     def wrench_residuals(self) -> Array:
@@ -143,11 +163,9 @@ class Suspension:
         bar = self._testbed.bar
         assert bar is not None
         state, gravity = self.bar, np.array([0.0, 0.0, self._testbed.gravity])
-        com = np.einsum("kij,j->ki", state.rotation, np.array(bar.com))
+        com, turned, spin = self._mass_in_world
         moved = state.acceleration + carried(state.omega, state.alpha, com)
-        turned = np.einsum("kij,jl,kml->kim", state.rotation, bar.inertia.matrix, state.rotation)
-        spin = np.einsum("kij,kj->ki", turned, state.omega)
-        moment = np.einsum("kij,kj->ki", turned, state.alpha) + np.cross(state.omega, spin)
+        moment = np.einsum("kij,kj->ki", turned, state.alpha) + spin
         inertial = bar.mass * (moved - gravity)
         needed = np.hstack([inertial, moment + np.cross(com, inertial)])
         return np.asarray(needed - self.cable_wrench)
@@ -168,18 +186,14 @@ class Suspension:
         """
         bar, state = self._testbed.bar, self.bar
         assert bar is not None
-        count = len(state.rotation)
-        com = np.einsum("kij,j->ki", state.rotation, np.array(bar.com))
-        turned = np.einsum("kij,jl,kml->kim", state.rotation, bar.inertia.matrix, state.rotation)
-        spin = np.cross(state.omega, np.einsum("kij,kj->ki", turned, state.omega))
+        com, turned, spin = self._mass_in_world
         carried_com = np.cross(state.omega, np.cross(state.omega, com))
         weight = bar.mass * np.array([0.0, 0.0, self._testbed.gravity])
         force = self.cable_wrench[:, :3] + weight
         about_com = self.cable_wrench[:, 3:] - np.cross(com, self.cable_wrench[:, :3])
         alpha = np.linalg.solve(turned, (about_com - spin)[:, :, None])[:, :, 0]
         acceleration = force / bar.mass - np.cross(alpha, com) - carried_com
-        assert acceleration.shape == (count, 3)
-        return acceleration, alpha
+        return np.asarray(acceleration), np.asarray(alpha)
 
     def start_column(self, i: int) -> Array:
         """Return what a longer unstretched length at the start adds to the residual, (k,) [N/m]."""
@@ -197,7 +211,7 @@ class Suspension:
         rows, cables = np.zeros((len(self.signals.times), len(CableSignal))), self.parameters.cables
         lengths, wound = self._spans.lengths[:, i], self._wound[:, i]
         directions = self._spans.directions[:, i]
-        damper = (damping_of(self.parameters, self._wound) * self._told_rates)[:, i]
+        damper = self._damping[:, i] * self._told_rates[:, i]
         for column, values in {
             CableSignal.TIME: self.signals.times,
             CableSignal.LENGTH: lengths,

@@ -19,7 +19,7 @@ from cspm_ident.estimation import (
     fit_linear,
 )
 from cspm_ident.winch.recording import WinchSignals, signal_rows
-from cspm_ident.winch.weak_form import make_window, weigh
+from cspm_ident.winch.weak_form import HALF_WIDTH_S, make_window, weigh
 from cspm_msgs_py.errors import InputError
 from cspm_sim.effects import Effect, catalogue
 from cspm_sim.effects.effect import Channel
@@ -28,7 +28,6 @@ from cspm_sim.effects.signals import WinchSignal
 Array = NDArray[np.float64]
 
 INERTIA = "inertia"
-HALF_WIDTH_S = 0.02
 _INERTIA_SCALE = 1.0  # kg·m², as far as an inertia may lie off
 
 

@@ -10,6 +10,8 @@ from numpy.typing import NDArray
 Array = NDArray[np.float64]
 
 _POWER = 4
+# Of windows along a winch's signals.
+HALF_WIDTH_S = 0.02
 
 
 class Window(NamedTuple):

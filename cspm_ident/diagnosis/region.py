@@ -19,6 +19,8 @@ HELD = 0.9
 _WIDEST = 0.5
 # Of a signal's values, each of equally many.
 _BINS = 50
+# Of the gain: where bins lose more than that, chance decides which ones gain.
+_LOST = 0.1
 
 
 class Region(NamedTuple):
@@ -85,8 +87,9 @@ def _taken(
 def _narrowest(driver: str, values: Array, gains: Array) -> Region | None:
     """Return the fewest neighbouring bins of a signal that hold most of the gain."""
     order = np.array_split(np.argsort(values), _BINS)
-    held = np.concatenate([[0.0], np.cumsum([gains[rows].sum() for rows in order])])
-    if held[-1] <= 0.0:
+    sums = np.array([gains[rows].sum() for rows in order])
+    held = np.concatenate([[0.0], np.cumsum(sums)])
+    if -sums[sums < 0.0].sum() >= _LOST * held[-1]:
         return None
     between = (held[None, :] - held[:, None]) / held[-1]
     starts, ends = np.nonzero(np.triu(between >= HELD))

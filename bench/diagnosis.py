@@ -16,7 +16,8 @@ from bench.thesis_machine import SCENARIOS
 from cspm_bringup.assembly import resolve
 from cspm_bringup.bundle import make_bundle
 from cspm_bringup.run import run
-from cspm_ident.diagnosis.diagnose import diagnose, members_of
+from cspm_ident.diagnosis.diagnose import diagnose
+from cspm_ident.diagnosis.hypothesis import members_of
 from cspm_ident.diagnosis.statement import numbers_of
 from cspm_ident.diagnosis.verdict import verdict_of
 from cspm_ident.signals.measurement import read_measurement

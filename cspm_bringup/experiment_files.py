@@ -6,8 +6,8 @@ from collections.abc import Callable, Iterator
 from pathlib import Path
 from typing import Any
 
-from cspm_ident.diagnosis.diagnose import Diagnosis, members_of
-from cspm_ident.diagnosis.hypothesis import Hypothesis
+from cspm_ident.diagnosis.diagnose import Diagnosis
+from cspm_ident.diagnosis.hypothesis import Hypothesis, members_of
 from cspm_ident.diagnosis.verdict import IMPROVED
 from cspm_ident.experiment.choice import Question, best_answer, most_showing, safe_plans
 from cspm_msgs_py.scenario import Scenario

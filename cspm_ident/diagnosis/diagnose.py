@@ -2,9 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
-from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -15,17 +14,18 @@ from cspm_ident.diagnosis.cuts import first_part, last_part, span_of, whole_part
 from cspm_ident.diagnosis.drivers import Driver, Knots
 from cspm_ident.diagnosis.equation import Equation, in_noise, steady
 from cspm_ident.diagnosis.evidence import Evidence, gather
-from cspm_ident.diagnosis.hypothesis import Findings, Hypothesis, Named, is_negligible
+from cspm_ident.diagnosis.hypothesis import Findings, Named, is_negligible, members_of
 from cspm_ident.diagnosis.judgement import HeldOut, free_functions, judged
 from cspm_ident.diagnosis.limits import Limit, detection_limits
 from cspm_ident.diagnosis.lines import Line, lines_of, with_lines
-from cspm_ident.diagnosis.onset import Onset, onset_of
-from cspm_ident.diagnosis.parameters import of_drives, of_shafts, weights_of
+from cspm_ident.diagnosis.model import Data, modelled
+from cspm_ident.diagnosis.onset import Onset
+from cspm_ident.diagnosis.parameters import weights_of
 from cspm_ident.diagnosis.recorded import equations_of
-from cspm_ident.diagnosis.refine import Cut, Weights, needs_refining, refine
+from cspm_ident.diagnosis.refine import Cut, Weights
 from cspm_ident.diagnosis.region import Region, region_of
 from cspm_ident.diagnosis.search import Search
-from cspm_ident.diagnosis.simulation import SimulatedFit, Worth, simulate_held_out, worth_of
+from cspm_ident.diagnosis.simulation import SimulatedFit, Worth
 from cspm_ident.signals.measurement import Measurement
 from cspm_msgs_py.errors import InputError
 from cspm_sim.effects import Effect, catalogue
@@ -38,8 +38,6 @@ BLOCKS = 24
 SHORTEST_BLOCK_S = 1.0
 # A finding must take this share of a held-out squared residual, or it does not stand.
 CONFIRMED_SHARE = 0.03
-# Nor if no simulated error falls below this share of what it is without the finding.
-WORTH_IT = 0.99
 
 
 @dataclass(frozen=True, eq=False)
@@ -138,13 +136,13 @@ def diagnose(
     judges = held_out or [m.within(s, np.inf) for m, s in zip(searched, starts, strict=True)]
     retuned = search.retuned()
     searched_part: Cut = whole_part if held_out else first_part
-    data = _Data(searched, searched_part, judges, in_noise(search_parts, noise), noise, block)
+    data = Data(searched, searched_part, judges, in_noise(search_parts, noise), noise, block)
     progress("parameters, and simulation of held-out data")
-    model = _modelled(search, kept, data, retuned)
+    model = modelled(search, kept, data, retuned)
     while model.useless:
         rejected += tuple(kept[k] for k in model.useless)
         kept = tuple(each for k, each in enumerate(kept) if k not in model.useless)
-        model = _modelled(search, kept, data, retuned)
+        model = modelled(search, kept, data, retuned)
     values = {c: w for c, (w, _) in model.weights.items()}
     told = [k for k, each in enumerate(kept) if not _is_negligible(each, values)]
     return Diagnosis(
@@ -202,65 +200,6 @@ def _lasting(
     return tuple(found)
 
 
-class _Data(NamedTuple):
-    """What a model is fitted to and judged by.
-
-    Attributes:
-        searched: the recordings, of which `searched_part` was searched.
-        searched_part: cuts their equations.
-        judges: what was not searched.
-        rows: of what was searched, in units of their noise.
-        noise: of each residual.
-        block: length of the blocks [s].
-    """
-
-    searched: Sequence[Measurement]
-    searched_part: Cut
-    judges: Sequence[Measurement]
-    rows: Parts
-    noise: dict[Place, Array]
-    block: float
-
-
-class _Model(NamedTuple):
-    """What was found as a model: parameters, beginnings, simulations and what each is worth."""
-
-    weights: Weights
-    onsets: tuple[Onset | None, ...]
-    simulated: tuple[SimulatedFit, ...]
-    worth: tuple[Worth | None, ...]
-
-    @property
-    def useless(self) -> list[int]:
-        """Findings with which no simulation of held-out data comes nearer to what was measured."""
-        return [
-            k
-            for k, worth in enumerate(self.worth)
-            if worth is not None and worth.with_it > WORTH_IT * worth.without
-        ]
-
-
-def _modelled(
-    search: Search, kept: Sequence[Named], data: _Data, retuned: Mapping[Candidate, Array]
-) -> _Model:
-    onsets = _onsets(kept, steady(data.rows), search.evidence.times)
-    since = max((onset.time for onset in onsets if onset is not None), default=-np.inf)
-
-    def cut(parts: Parts) -> Parts:
-        return [[e.within(since, np.inf) for e in part] for part in data.searched_part(parts)]
-
-    rows = [[e.within(since, np.inf) for e in part] for part in data.rows]
-    weights = _parameters(search, kept, data.searched, cut, rows, data.noise, data.block)
-    weights = of_drives(weights, 2.0 * data.searched[0].torque_age)
-    values = {c: w for c, (w, _) in weights.items()}
-    simulated = simulate_held_out(data.judges, retuned, values)
-    worth = tuple(
-        worth_of(data.judges, simulated, values, members_of(values, each.hypothesis))
-        for each in kept
-    )
-    return _Model(weights, onsets, simulated, worth)
-
-
 def _first_weights(search: Search, kept: Sequence[Named]) -> dict[Candidate, Array]:
     """Return the weights of what was kept with the shapes that were searched."""
     own = [c for each in kept for c in each.hypothesis.candidates]
@@ -269,12 +208,6 @@ def _first_weights(search: Search, kept: Sequence[Named]) -> dict[Candidate, Arr
 
 def _is_negligible(named: Named, weights: Mapping[Candidate, Array]) -> bool:
     return is_negligible({c: weights[c] for c in members_of(weights, named.hypothesis)})
-
-
-def members_of(candidates: Iterable[Candidate], hypothesis: Hypothesis) -> list[Candidate]:
-    """Return a finding's candidates with their final shapes."""
-    own = hypothesis.effect.id, hypothesis.elements
-    return [c for c in candidates if c.effect_id == own[0] and c.element in own[1]]
 
 
 def _parts(
@@ -301,41 +234,6 @@ def _judge(parts: Parts, found: Findings, block: float) -> Evidence:
     named = {c for each in found.named for c in each.hypothesis.candidates}
     terms = named | {t for part in parts for e in part for t in e.columns if isinstance(t, Driver)}
     return gather([[e.only(terms) for e in part] for part in parts], block)
-
-
-def _parameters(
-    search: Search,
-    kept: Sequence[Named],
-    searched: Sequence[Measurement],
-    cut: Cut,
-    rows: Parts,
-    noise: dict[Place, Array],
-    block: float,
-) -> Weights:
-    """Return the weights of what was kept, refined where columns depend on them."""
-    candidates = [c for each in kept for c in each.hypothesis.candidates]
-    if any(needs_refining(candidate.effect) for candidate in candidates):
-        return refine(searched, candidates, noise, block, cut)
-    return of_shafts(weights_of(search.evidence, search.sums, candidates), rows, block)
-
-
-def _onsets(kept: Sequence[Named], rows: Parts, starts: Array) -> tuple[Onset | None, ...]:
-    """Return when each finding began; None where it acts all the time, or in which recording."""
-    times = {
-        c: float(starts[each.hypothesis.onset]) if each.hypothesis.onset else -np.inf
-        for each in kept
-        for c in each.hypothesis.candidates
-    }
-    found: list[Onset | None] = []
-    for each in kept:
-        block, own = each.hypothesis.onset, each.hypothesis.candidates
-        if not block or len(rows) > 1:
-            found.append(None)
-            continue
-        others = {c: time for c, time in times.items() if c not in own}
-        low, high = starts[block - 1], starts[min(block + 1, len(starts) - 1)]
-        found.append(onset_of(rows[0], own, others, float(low), float(high)))
-    return tuple(found)
 
 
 def _noise(parts: Sequence[Sequence[Equation]]) -> dict[Place, Array]:

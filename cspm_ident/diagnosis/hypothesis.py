@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from typing import NamedTuple
 
@@ -109,3 +109,9 @@ def freedom(hypothesis: Hypothesis) -> int:
 def is_wider(one: Hypothesis, other: Hypothesis) -> bool:
     """Return whether one is the other's effect on more elements."""
     return one.effect.id == other.effect.id and len(one.candidates) > len(other.candidates)
+
+
+def members_of(candidates: Iterable[Candidate], hypothesis: Hypothesis) -> list[Candidate]:
+    """Return a finding's candidates with their final shapes."""
+    own = hypothesis.effect.id, hypothesis.elements
+    return [c for c in candidates if c.effect_id == own[0] and c.element in own[1]]

@@ -250,21 +250,37 @@ class Search:
     def _rivals(
         self, hypothesis: Hypothesis, free: Sequence[Candidate], base: Index
     ) -> list[Hypothesis]:
-        """Return the best point of every other effect on the same elements, or on its one body."""
+        """Return the best point of every other effect that explains the same.
+
+        On the same elements, or on its one body; and the same effect on another single element.
+        """
         elements = set(hypothesis.elements)
         groups: dict[tuple[str, tuple[tuple[str, float], ...]], list[Candidate]] = {}
         for candidate in free:
             groups.setdefault((candidate.effect_id, candidate.shape), []).append(candidate)
         best: dict[str, tuple[float, Hypothesis]] = {}
         for (name, _), members in groups.items():
-            same = tuple(c for c in members if c.element in elements) or tuple(members[:1])
             if name == hypothesis.effect.id:
                 continue
+            same = tuple(c for c in members if c.element in elements) or tuple(members[:1])
             rival = Hypothesis(members[0].effect, same)
             gain = float(self.sums.gains_beyond(base, [self.own_columns(rival)])[0])
             if name not in best or gain > best[name][0]:
                 best[name] = gain, rival
-        return [rival for _, rival in best.values()]
+        rivals = [rival for _, rival in best.values()]
+        if len(elements) == 1:
+            own = hypothesis.effect.id, hypothesis.candidates[0].shape
+            alike = (c for c in groups.get(own, ()) if c.element not in elements)
+            rivals += [Hypothesis(hypothesis.effect, (c,)) for c in alike]
+        columns = self.own_columns(hypothesis)
+        return [r for r in rivals if self._overlap(base, columns, self.own_columns(r))]
+
+    def _overlap(self, base: Index, own: Index, other: Index) -> bool:
+        """Return whether columns explain the same, rather than as much of something else."""
+        parts = (own, other, np.union1d(own, other))
+        without = self.sums.squares_of(base)
+        gains = [without - self.sums.squares_of(np.concatenate([base, part])) for part in parts]
+        return gains[0] + gains[1] - gains[2] >= _RIVAL_SHARE * gains[0]
 
     def _judged(self, k: int, chosen: Sequence[Hypothesis]) -> Named:
         hypothesis, others = chosen[k], [h for i, h in enumerate(chosen) if i != k]

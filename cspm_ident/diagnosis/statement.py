@@ -9,8 +9,8 @@ import numpy as np
 
 from cspm_ident.block_simulation import Drive
 from cspm_ident.diagnosis.columns import Candidate
-from cspm_ident.diagnosis.diagnose import Diagnosis, Shape, members_of
-from cspm_ident.diagnosis.hypothesis import Named
+from cspm_ident.diagnosis.diagnose import Diagnosis, Shape
+from cspm_ident.diagnosis.hypothesis import Named, members_of
 from cspm_ident.diagnosis.judgement import HeldOut
 from cspm_ident.diagnosis.lines import Line
 from cspm_ident.diagnosis.region import Region

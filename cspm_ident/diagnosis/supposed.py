@@ -12,6 +12,7 @@ from cspm_ident.diagnosis.columns import Candidate
 from cspm_ident.diagnosis.readings import pose_rows, reading_rows
 from cspm_ident.signals.measurement import BAR, FRAME, TENSION, WINCHES, Measurement
 from cspm_ident.signals.samples import Samples
+from cspm_msgs_py.errors import InputError
 from cspm_msgs_py.testbed import EffectEntry
 from cspm_sim.effect_entries import Action, altered_testbed, read_actions
 
@@ -63,6 +64,15 @@ def settled(measurement: Measurement) -> Measurement:
     )
     left = numbers.model_copy(update={"effects": kept})
     return measurement.with_testbed(replace(measurement.testbed, testbed=left))
+
+
+def is_possible(measurement: Measurement, weights: Mapping[Candidate, Array]) -> bool:
+    """Return whether the measured machine can have further effects of such weights."""
+    try:
+        settled(with_found(measurement, weights))
+    except InputError:
+        return False
+    return True
 
 
 def _true_readings(measurement: Measurement, action: Action) -> Measurement:

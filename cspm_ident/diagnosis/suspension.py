@@ -110,9 +110,13 @@ class Suspension:
 
     @cached_property
     def _steady_damper(self) -> Array:
-        """The damper's force with less of the poses' noise, about which the law is taken."""
-        sigma = _STEADY_S / self.signals.step
-        return np.asarray(gaussian_filter1d(self._damper, sigma, axis=0, mode="nearest"))
+        """The damper's force without the poses' noise, about which the law is taken.
+
+        In the stiffness that noise would meet itself in the residual: stiffness less its mean would
+        explain it.
+        """
+        sigma, damper = _STEADY_S / self.signals.step, self._damping * self._told_rates
+        return np.asarray(gaussian_filter1d(damper, sigma, axis=0, mode="nearest"))
 
     @cached_property
     def _told_rates(self) -> Array:

@@ -34,8 +34,9 @@ PERIOD_NS = 5_000_000
 _HALF_WIDTHS = (0.04, 0.32)
 _WHITE = 1.7
 _SHORTEST_S = 2.0
+_TENSION = "tension [N]"
 _DRIVERS = {
-    "tension [N]": CableSignal.TENSION,
+    _TENSION: CableSignal.TENSION,
     "rate of elongation [m/s]": CableSignal.RATE,
     "motor angle [rad]": CableSignal.ANGLE,
     "time [s]": CableSignal.TIME,
@@ -158,6 +159,8 @@ class _Stretch:
         place = Place(Channel.TENSION, self._machine.cable_names[i])
         rows = self._here.cable_rows[i]
         drivers = {key: weighed(rows[:, column]) for key, column in _DRIVERS.items()}
+        # The residual has the tension's own noise, of which it must not look like a function.
+        drivers[_TENSION] = around(drivers[_TENSION], self._apart(Channel.TENSION))
         if knots is not None:
             columns = columns | knots.columns(place, drivers)
         return Equation(
@@ -289,6 +292,17 @@ class _Stretch:
     def _weighed(self, values: Array, channel: Channel) -> Array:
         window, stride = self._windows[channel]
         return weigh(window, values, stride)
+
+    def _apart(self, channel: Channel) -> int:
+        """Return how many rows lie between two windows that share no sample."""
+        window, stride = self._windows[channel]
+        return -(-len(window) // stride)
+
+
+def around(values: Array, apart: int) -> Array:
+    """Return the mean of what is measured `apart` rows before and after each row, (k,)."""
+    padded = np.pad(values, apart, mode="edge")
+    return 0.5 * (padded[: len(values)] + padded[2 * apart :])
 
 
 _READING_STEP = 1e-6  # m, rad or N

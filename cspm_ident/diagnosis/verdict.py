@@ -6,8 +6,8 @@ from enum import Enum
 from math import exp
 from typing import Any
 
-from cspm_ident.diagnosis.diagnose import Diagnosis, members_of
-from cspm_ident.diagnosis.hypothesis import Named, Rival
+from cspm_ident.diagnosis.diagnose import Diagnosis
+from cspm_ident.diagnosis.hypothesis import Named, Rival, members_of
 from cspm_ident.diagnosis.judgement import HeldOut
 from cspm_ident.diagnosis.lines import Line
 from cspm_ident.diagnosis.region import Region

@@ -1,6 +1,6 @@
 """A process that diagnoses the recording it is given and may open nothing but that and code.
 
-    python -m cspm_bringup.blind.confined RECORDING JSON
+    python -m cspm_bringup.blind.confined METHOD RECORDING JSON
 
 The recording lies in the present folder, where the result goes. Files elsewhere are refused by an
 audit hook, which guards against mistakes of ours, not against hostile code.
@@ -54,13 +54,17 @@ def confine(room: Path) -> None:
 
 
 def main() -> None:
-    """Diagnose the recording named first, and write its diagnosis to the file named second."""
-    recording, report = sys.argv[1:]
+    """Diagnose by the method named first the recording named next; write to the file named last."""
+    method, recording, report = sys.argv[1:]
     confine(Path.cwd())
-    from cspm_bringup.cli import main as command_line
+    from cspm_bringup.summary import write_json
+    from cspm_ident.blind.method import diagnosis_by
+    from cspm_msgs_py.errors import InputError
 
-    sys.argv = ["cspm", "diagnose", recording, "--json", report]
-    command_line()
+    try:
+        write_json(Path(report), diagnosis_by(method, Path(recording)))
+    except InputError as err:
+        sys.exit(f"cspm: {err}")
 
 
 if __name__ == "__main__":

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -58,15 +58,16 @@ def draw_items(
 ) -> list[Item]:
     """Draw recordings, in the order of their names, which is none.
 
-    Strata get numbers in proportion to their shares; the rest is drawn.
+    Strata get numbers in proportion to their shares, cases of a stratum and amounts of a case equal
+    ones as far as that goes; the rest is drawn.
     """
     generator = np.random.default_rng([seed, 7])
     names = _names(generator, count)
     effects = sorted({p.effect for p in PHENOMENA.values() if p.effect})
     items = []
+    decks = {stratum.name: _deck(stratum, generator) for stratum in strata}
     for name, stratum in zip(names, _dealt(strata, count), strict=True):
-        case = stratum.cases[int(generator.integers(len(stratum.cases)))]
-        multiple = float(generator.choice(case.multiples))
+        case, multiple = next(decks[stratum.name])
         cable = int(generator.integers(len(machine.cables)))
         signs = generator.choice((-1.0, 1.0), len(case.phenomena))
         concealed = tuple(
@@ -86,6 +87,18 @@ def draw_items(
             )
         )
     return sorted(items)
+
+
+def _deck(stratum: Stratum, generator: np.random.Generator) -> Iterator[tuple[Case, float]]:
+    """Yield cases, each once before any comes again, and of each its amounts in the same way."""
+    amounts = [_shuffled(case.multiples, generator) for case in stratum.cases]
+    for k in _shuffled(range(len(stratum.cases)), generator):
+        yield stratum.cases[int(k)], float(next(amounts[int(k)]))
+
+
+def _shuffled(values: Sequence[float], generator: np.random.Generator) -> Iterator[float]:
+    while True:
+        yield from generator.permutation(np.asarray(values)).tolist()
 
 
 def _conceal(
@@ -150,6 +163,7 @@ def _told(each: Concealed, amounts: Sequence[float], machine: Testbed) -> dict[s
         "elements": elements,
         "multiple": abs(each.multiple),
         "parameter": phenomenon.parameter,
+        "driver": phenomenon.driver,
         "base": phenomenon.base,
         "values": {
             element: phenomenon.base + float(amount)

@@ -13,7 +13,8 @@ import time
 from collections.abc import Callable
 from pathlib import Path
 
-from cspm_bringup.blind.truth import RECORDINGS, RESULTS
+from cspm_bringup.blind.truth import RECORDINGS, results_of
+from cspm_ident.blind.method import CSPM, require_method
 from cspm_msgs_py.errors import InputError
 
 DIAGNOSIS, TIMES, FAILURE = "diagnosis.json", "times.json", "failure.txt"
@@ -23,7 +24,9 @@ _THREADS = ("NUMBA_NUM_THREADS", "OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS")
 Tell = Callable[[str, int, int], None]
 
 
-def run(folder: Path, tell: Tell = lambda text, done, total: None) -> dict[str, str]:
+def run(
+    folder: Path, tell: Tell = lambda text, done, total: None, method: str = CSPM
+) -> dict[str, str]:
     """Diagnose every recording without a result; return what failed, with the reason.
 
     Each result is there whole or not at all, so that an interrupted run goes on where it was.
@@ -31,10 +34,12 @@ def run(folder: Path, tell: Tell = lambda text, done, total: None) -> dict[str, 
     Args:
         folder: the benchmark's.
         tell: called with what is being done, how much of it is done, and how much there is.
+        method: one of `METHODS`.
 
     Raises:
-        InputError: no recordings there.
+        InputError: no recordings there, no such method, or one whose packages are not there.
     """
+    require_method(method)
     recordings = folder / RECORDINGS
     places = sorted(recordings.iterdir()) if recordings.is_dir() else []
     # A folder is empty where the controllers lost the bar.
@@ -44,16 +49,16 @@ def run(folder: Path, tell: Tell = lambda text, done, total: None) -> dict[str, 
     failed = {}
     for done, name in enumerate(names):
         tell(f"diagnosing {name}", done, len(names))
-        place = folder / RESULTS / name
+        place = results_of(folder, method) / name
         if not place.exists():
-            _diagnose(recordings / name, place)
+            _diagnose(method, recordings / name, place)
         if (place / FAILURE).exists():
             failed[name] = (place / FAILURE).read_text(encoding="utf-8").splitlines()[-1]
     tell("diagnosed", len(names), len(names))
     return failed
 
 
-def _diagnose(recording: Path, place: Path) -> None:
+def _diagnose(method: str, recording: Path, place: Path) -> None:
     part = place.with_name(f".part-{place.name}")
     shutil.rmtree(part, ignore_errors=True)
     part.mkdir(parents=True)
@@ -63,7 +68,7 @@ def _diagnose(recording: Path, place: Path) -> None:
         before = resource.getrusage(resource.RUSAGE_CHILDREN)
         begun = time.perf_counter()
         done = subprocess.run(
-            [sys.executable, "-m", "cspm_bringup.blind.confined", copy.name, DIAGNOSIS],
+            [sys.executable, "-m", "cspm_bringup.blind.confined", method, copy.name, DIAGNOSIS],
             cwd=room,
             env=environment(Path(room)),
             capture_output=True,

@@ -21,11 +21,12 @@ from cspm_ident.diagnosis.onset import Onset, onset_of
 from cspm_ident.diagnosis.parameters import of_drives, of_shafts, weights_of
 from cspm_ident.diagnosis.recorded import equations_of
 from cspm_ident.diagnosis.refine import Cut, Weights, needs_refining, refine
+from cspm_ident.diagnosis.safeguards import ALL_SAFEGUARDS, Safeguards
 from cspm_ident.diagnosis.search import Search
 from cspm_ident.diagnosis.simulation import SimulatedFit, Worth, simulate_held_out, worth_of
 from cspm_ident.signals.measurement import Measurement
 from cspm_msgs_py.errors import InputError
-from cspm_sim.effects import Effect, catalogue
+from cspm_sim.effects import Effect
 
 Array = NDArray[np.float64]
 Progress = Callable[[str], None]
@@ -104,6 +105,7 @@ def diagnose(
     searched: Sequence[Measurement],
     held_out: Sequence[Measurement] = (),
     progress: Progress = lambda _: None,
+    safeguards: Safeguards = ALL_SAFEGUARDS,
 ) -> Diagnosis:
     """Look for what the described machine lacks.
 
@@ -111,21 +113,22 @@ def diagnose(
         searched: recordings in which to look; all of one machine.
         held_out: others on which to judge what was found; none: the last part of each searched one.
         progress: called with what is being done.
+        safeguards: all of them, but for comparisons.
 
     Raises:
         InputError: the recordings have no residual that could be looked at.
     """
-    effects, knots = list(catalogue().values()), Knots()
+    effects, knots = safeguards.effects, Knots()
     search_parts, judge_parts = _parts(searched, held_out, effects, knots, progress)
     noise = _noise(steady(search_parts))
     spans = [_span(part) for part in search_parts]
     block = max(SHORTEST_BLOCK_S, sum(b - a for a, b in spans) / BLOCKS)
     evidence = gather(in_noise(steady(search_parts), noise), block)
-    search = Search(evidence, progress)
+    search = Search(evidence, progress, safeguards.sums)
     found = search.run()
     progress("held-out data")
     judge = _judge(in_noise(judge_parts, noise), found, block)
-    kept, rejected = _confirmed(search, judge, found)
+    kept, rejected = _confirmed(search, judge, found) if safeguards.held_out else (found.named, ())
     starts = [_span(part)[0] for part in judge_parts]
     judges = held_out or [m.within(s, np.inf) for m, s in zip(searched, starts, strict=True)]
     retuned = search.retuned()
@@ -133,7 +136,7 @@ def diagnose(
     data = _Data(searched, searched_part, judges, in_noise(search_parts, noise), noise, block)
     progress("parameters, and simulation of held-out data")
     model = _modelled(search, kept, data, retuned)
-    while model.useless:
+    while safeguards.held_out and model.useless:
         rejected += tuple(kept[k] for k in model.useless)
         kept = tuple(each for k, each in enumerate(kept) if k not in model.useless)
         model = _modelled(search, kept, data, retuned)

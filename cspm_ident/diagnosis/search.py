@@ -24,7 +24,7 @@ from cspm_ident.diagnosis.hypothesis import (
     is_wider,
     joined,
 )
-from cspm_ident.diagnosis.sums import Gain, Sums, gain_of
+from cspm_ident.diagnosis.sums import Gain, Sums
 
 Array = NDArray[np.float64]
 Index = NDArray[np.intp]
@@ -49,11 +49,14 @@ class Search:
     """Looks through a catalogue for what explains the residuals of some recordings."""
 
     def __init__(
-        self, evidence: Evidence, progress: Callable[[str], None] = lambda _: None
+        self,
+        evidence: Evidence,
+        progress: Callable[[str], None] = lambda _: None,
+        sums: Callable[[Evidence], Sums] = Sums,
     ) -> None:
-        """Take the sums of all residuals."""
+        """Take the sums of all residuals, of which `sums` tells what is sure."""
         self.evidence = evidence
-        self.sums = Sums(evidence)
+        self.sums = sums(evidence)
         self._progress = progress
         self._effects = [c for c in evidence.terms if isinstance(c, Candidate) and self._shows(c)]
         self._drivers = [d for d in evidence.terms if isinstance(d, Driver)]
@@ -158,7 +161,7 @@ class Search:
         if not self._is_plausible([*chosen, hypothesis]):
             return None
         own = self.own_columns(hypothesis)
-        gain = gain_of(before - self.sums.held_out(np.concatenate([base, own])))
+        gain = self.sums.gain_of(before - self.sums.held_out(np.concatenate([base, own])))
         return gain if self._counts(base, own, gain, hypothesis.onset) else None
 
     @contextmanager
@@ -228,14 +231,16 @@ class Search:
         """Return the hypothesis of fewest columns that is no worse than the best one."""
         rivals = [h for h in self._rivals(best, free, base) if self._is_plausible([*chosen, h])]
         reference = self.sums.held_out(np.concatenate([base, self.own_columns(best)]))
-        gained = gain_of(self.sums.held_out(base) - reference)
+        gained = self.sums.gain_of(self.sums.held_out(base) - reference)
         fewest = best
         for rival in rivals:
             if len(self.own_columns(rival)) >= len(self.own_columns(fewest)):
                 continue
             own = self.own_columns(rival)
             with self.sums.delayed(own, best.onset):
-                worse = gain_of(self.sums.held_out(np.concatenate([base, own])) - reference)
+                worse = self.sums.gain_of(
+                    self.sums.held_out(np.concatenate([base, own])) - reference
+                )
             if worse.total <= 2.0 * gained.error and worse.total < MATERIAL_SHARE * gained.total:
                 fewest = replace(rival, onset=best.onset)
         return fewest

@@ -139,7 +139,12 @@ class Sums:
     def gain(self, base: Index, columns: Index) -> Gain:
         """Return what columns gain beyond a base, in blocks that were not fitted."""
         better = self.held_out(base) - self.held_out(np.concatenate([base, columns]))
-        return gain_of(better)
+        return self.gain_of(better)
+
+    def gain_of(self, better: Array) -> Gain:
+        """Return total and standard error of gains by block, (blocks,), from their scatter."""
+        spread = float(better.std(ddof=1)) if len(better) > 1 else float("inf")
+        return Gain(float(better.sum()), spread * float(np.sqrt(len(better))))
 
     def covariance(self, columns: Index) -> Array:
         """Return the weights' covariance, with blocks as independent pieces (Liang, Zeger 1986)."""
@@ -217,12 +222,6 @@ class Sums:
         part = self._blocks[np.ix_(blocks, both, both)]
         vector = np.append(weights, -1.0)
         return np.asarray(np.einsum("i,bij,j->b", vector, part, vector))
-
-
-def gain_of(better: Array) -> Gain:
-    """Return total and standard error of gains by block."""
-    spread = float(better.std(ddof=1)) if len(better) > 1 else float("inf")
-    return Gain(float(better.sum()), spread * float(np.sqrt(len(better))))
 
 
 def _pseudo_inverse(gram: Array) -> Array:

@@ -49,6 +49,8 @@ class Measurement:
         torque_age: how long before its stamp the reported torque acted, on average [s]. A simulated
             drive reports what it held since the stamp before: half a period. Of others nothing is
             known, and 0 is taken.
+        pointwise: whether equations hold at single samples instead of under windows, for
+            comparison.
     """
 
     path: Path
@@ -62,6 +64,7 @@ class Measurement:
     tension: Samples | None = None
     command: Samples | None = None
     torque_age: float = 0.0
+    pointwise: bool = False
 
     @property
     def machine(self) -> Testbed:

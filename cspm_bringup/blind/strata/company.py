@@ -4,7 +4,7 @@ from cspm_bringup.blind.stratum import MOVING, Case, Stratum
 
 COMPANY = Stratum(
     "company",
-    1.0,
+    2.0,
     tuple(
         Case(pair, (2.0, 4.0), MOVING)
         for pair in (

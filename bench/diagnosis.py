@@ -17,7 +17,8 @@ from cspm_bringup.assembly import resolve
 from cspm_bringup.bundle import make_bundle
 from cspm_bringup.run import run
 from cspm_ident.diagnosis.diagnose import diagnose, members_of
-from cspm_ident.diagnosis.verdict import numbers_of, verdict_of
+from cspm_ident.diagnosis.statement import numbers_of
+from cspm_ident.diagnosis.verdict import verdict_of
 from cspm_ident.signals.measurement import read_measurement
 from cspm_msgs_py.scenario import load_scenario
 from cspm_msgs_py.testbed import EffectEntry, load_testbed

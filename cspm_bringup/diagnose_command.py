@@ -16,16 +16,15 @@ from cspm_bringup.experiment_files import write_experiments
 from cspm_bringup.summary import write_json
 from cspm_ident.diagnosis.diagnose import Diagnosis, diagnose
 from cspm_ident.diagnosis.improved_file import improved_testbed
-from cspm_ident.diagnosis.verdict import (
-    IMPROVED,
+from cspm_ident.diagnosis.statement import (
     channel_of,
-    diagnosis_data,
     drive_of,
+    line_statement,
     statement_of,
     unit_of,
     unknown_statement,
-    verdict_of,
 )
+from cspm_ident.diagnosis.verdict import IMPROVED, diagnosis_data, verdict_of
 from cspm_ident.signals.measurement import read_measurement
 from cspm_msgs_py.errors import InputError
 from cspm_msgs_py.new_folder import refuse_existing
@@ -109,8 +108,8 @@ def explain_command(name: str) -> None:
 def print_diagnosis(console: Console, found: Diagnosis) -> None:
     """Print verdict, findings and how the fit changes on data that was not searched."""
     console.print(f"verdict: [bold]{verdict_of(found).value}[/]")
-    for named in found.findings.named:
-        say(console, f"• {statement_of(found, named)}")
+    for k, named in enumerate(found.findings.named):
+        say(console, f"• {statement_of(found, k)}")
         for rival in (each.hypothesis for each in named.alternatives):
             say(
                 console,
@@ -119,6 +118,8 @@ def print_diagnosis(console: Console, found: Diagnosis) -> None:
             )
     for k in range(len(found.shapes)):
         say(console, f"• {unknown_statement(found, k)}")
+    for line in found.lines:
+        say(console, f"• {line_statement(line)}")
     for named in found.rejected:
         say(
             console,

@@ -9,7 +9,8 @@ from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.figure import Figure
 
 from cspm_ident.diagnosis.diagnose import Diagnosis
-from cspm_ident.diagnosis.verdict import channel_of, verdict_of
+from cspm_ident.diagnosis.statement import channel_of
+from cspm_ident.diagnosis.verdict import verdict_of
 
 DPI = 90
 _STAGES = (

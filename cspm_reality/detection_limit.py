@@ -94,7 +94,7 @@ def noise_of(machine: Testbed, slopes: Array) -> Noise:
     cell = machine.sensors["/cables/tension"].noise[0]
     radii = shaft_radii(machine)
     torque = np.hypot(winches.noise[2], winches.resolution[2] / np.sqrt(12.0))
-    arms = np.linalg.norm([cable.attachment for cable in machine.cables])
+    arms = np.linalg.norm([cable.attachment or (0.0, 0.0, 0.0) for cable in machine.cables])
     shaft = np.hypot(torque, radii * cell)
     tension = np.hypot(cell, slopes * position)
     force = cell * float(np.sqrt(len(radii)))

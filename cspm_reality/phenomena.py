@@ -126,7 +126,7 @@ _BAR = (
     ),
     Phenomenon(
         "vibration", None, "bar", None, at=BAR, unit=0.1,
-        influence=lambda a, m, g: air.OutsideVibration(float(a[0])),
+        influence=lambda a, m, g: air.OutsideVibration(float(a[0])), driver="frequency",
     ),
     Phenomenon(
         "strapped load", "payload_swing", "bar", "mass", at=BAR, unit=0.1,

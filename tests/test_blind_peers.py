@@ -38,9 +38,7 @@ def equation(seed, weights, colour=0.0):
     for k in range(1, ROWS):
         noise[k] = colour * noise[k - 1] + np.sqrt(1.0 - colour**2) * noise[k]
     target = columns @ np.array(weights) + noise
-    shaped = {
-        c: columns[:, None, k : k + 1] for k, c in enumerate((COULOMB, VISCOUS, INERTIA))
-    }
+    shaped = {c: columns[:, None, k : k + 1] for k, c in enumerate((COULOMB, VISCOUS, INERTIA))}
     never = np.ones((ROWS, 1, 1))
     signals = {"speed [rad/s]": speed, "time [s]": times}
     return Equation(PLACE, times, target[:, None], shaped, target[:, None], never, signals=signals)
@@ -79,7 +77,7 @@ def test_sparse_regressions_find_the_largest_term_first_and_its_size(name):
     assert held_out["nrmse_after"] < held_out["nrmse_retuned_nominal"]
 
 
-@pytest.mark.parametrize("name", ("retuned", *SPARSE))
+@pytest.mark.parametrize("name", ["retuned", *SPARSE])
 def test_white_noise_alone_is_mostly_nothing_to_them(name):
     told = peer(name)(library((0.0, 0.0, 0.0)))
     # What suits the last quarter by chance is kept by SINDy, which tests nothing.
@@ -169,7 +167,7 @@ def test_a_black_box_says_where_and_not_what():
 
 
 def test_methods_are_named_and_others_refused(monkeypatch):
-    assert METHODS == (CSPM, *ABLATED, *PEERS)
+    assert (CSPM, *ABLATED, *PEERS) == METHODS
     for name in (CSPM, *ABLATED, "retuned"):
         require_method(name)
     with pytest.raises(InputError, match=r"^--method magic: allowed: cspm, cspm-without-measured-"):

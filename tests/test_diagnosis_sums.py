@@ -1,5 +1,7 @@
 """Least squares from sums of products: the same as from the rows, and honest about chance."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
@@ -74,10 +76,34 @@ def test_what_is_held_out_was_not_fitted():
 
 def test_what_is_not_there_gains_nothing_and_what_is_there_does():
     sums = sums_of(made()[0])[1]
-    assert sums.gain(np.array([0]), np.array([1])).is_sure
-    nothing = sums.gain(np.array([0, 1]), np.array([2]))
-    assert not nothing.is_sure
+    assert sums.gain(np.array([0]), np.array([1])).total > 0.0
+    assert sums.gain(np.array([0, 1]), np.array([2])).total < 0.0
     assert sums.p_value(np.array([0]), np.array([1])) < 1e-6
+    assert sums.p_value(np.array([0, 1]), np.array([2])) > 1e-3
+
+
+def in_few_blocks(blocks, seed=0, weight=0.0):
+    """A column that acts in some blocks only, beside one that acts always."""
+    equation, columns, _ = made(seed, (0.3, 0.0, weight))
+    home = (equation.times / BLOCK_S).astype(int)
+    few = columns[:, 2] * np.isin(home, blocks)
+    target = equation.target[:, 0] - weight * (columns[:, 2] - few)
+    shaped = equation.columns | {THIRD: few[:, None, None]}
+    return sums_of(replace(equation, target=target[:, None], columns=shaped))[1]
+
+
+def test_a_few_blocks_that_agree_are_enough_and_a_single_one_is_not():
+    base, own = np.array([0]), np.array([2])
+    assert in_few_blocks([3, 9, 15, 21], weight=3e5).p_value(base, own) < 1e-4
+    assert in_few_blocks([9], weight=3e5).p_value(base, own) > 0.5
+
+
+@pytest.mark.parametrize("blocks", [[3, 9], [3, 9, 15, 21]])
+def test_chance_is_told_as_promised_for_what_acts_in_few_blocks(blocks):
+    """Of 200 absent effects at most 20 may look present at 5 %, by the binomial at 1e-3."""
+    base, own = np.array([0]), np.array([2])
+    false = [in_few_blocks(blocks, seed).p_value(base, own) < 0.05 for seed in range(200)]
+    assert sum(false) <= 20
 
 
 @pytest.mark.parametrize("colour", [0.0, 0.95])

@@ -11,16 +11,19 @@ from numpy.typing import NDArray
 
 from cspm_ident.diagnosis.columns import Candidate, Place
 from cspm_ident.diagnosis.curves import Curve, held_out_curves
+from cspm_ident.diagnosis.cuts import first_part, last_part, span_of, whole_part
 from cspm_ident.diagnosis.drivers import Driver, Knots
 from cspm_ident.diagnosis.equation import Equation, in_noise, steady
 from cspm_ident.diagnosis.evidence import Evidence, gather
 from cspm_ident.diagnosis.hypothesis import Findings, Hypothesis, Named, is_negligible
 from cspm_ident.diagnosis.judgement import HeldOut, free_functions, judged
 from cspm_ident.diagnosis.limits import Limit, detection_limits
+from cspm_ident.diagnosis.lines import Line, lines_of, with_lines
 from cspm_ident.diagnosis.onset import Onset, onset_of
 from cspm_ident.diagnosis.parameters import of_drives, of_shafts, weights_of
 from cspm_ident.diagnosis.recorded import equations_of
 from cspm_ident.diagnosis.refine import Cut, Weights, needs_refining, refine
+from cspm_ident.diagnosis.region import Region, region_of
 from cspm_ident.diagnosis.safeguards import ALL_SAFEGUARDS, Safeguards
 from cspm_ident.diagnosis.search import Search
 from cspm_ident.diagnosis.simulation import SimulatedFit, Worth, simulate_held_out, worth_of
@@ -34,9 +37,6 @@ Parts = Sequence[Sequence[Equation]]
 
 BLOCKS = 24
 SHORTEST_BLOCK_S = 1.0
-# Of a recording that has to serve as its own held-out data.
-SEARCHED_SHARE = 0.7
-GAP_SHARE = 0.02
 # A finding must take this share of a held-out squared residual, or it does not stand.
 CONFIRMED_SHARE = 0.03
 # Nor if no simulated error falls below this share of what it is without the finding.
@@ -73,7 +73,9 @@ class Diagnosis:
         simulated: quantity by quantity, by simulation.
         worth: of each finding in these simulations; None where they cannot tell.
         shapes: of the unknown, in the order of `findings.unknown`.
+        lines: periodic forces from outside.
         onsets: when each finding began; None where it acts all the time.
+        regions: where each finding shows; None where it does everywhere.
         limits: from which size on effects would have been told.
         silent: effects and elements that these recordings cannot show.
         places: the residuals that there are.
@@ -92,7 +94,9 @@ class Diagnosis:
     simulated: tuple[SimulatedFit, ...]
     worth: tuple[Worth | None, ...]
     shapes: tuple[Shape, ...]
+    lines: tuple[Line, ...]
     onsets: tuple[Onset | None, ...]
+    regions: tuple[Region | None, ...]
     limits: tuple[Limit, ...]
     silent: tuple[tuple[str, tuple[str, ...]], ...]
     places: tuple[Place, ...]
@@ -120,8 +124,12 @@ def diagnose(
     """
     effects, knots = safeguards.effects, Knots()
     search_parts, judge_parts = _parts(searched, held_out, effects, knots, progress)
-    noise = _noise(steady(search_parts))
-    spans = [_span(part) for part in search_parts]
+    hums = [_hums(m, part, {}) for m, part in zip(searched, search_parts, strict=True)]
+    search_parts = _beside(search_parts, hums)
+    if not held_out:
+        judge_parts = _beside(judge_parts, hums)
+    noise = noise_of(steady(search_parts))
+    spans = [span_of(part) for part in search_parts]
     block = max(SHORTEST_BLOCK_S, sum(b - a for a, b in spans) / BLOCKS)
     evidence = gather(in_noise(steady(search_parts), noise), block)
     search = Search(evidence, progress, safeguards.sums)
@@ -129,10 +137,10 @@ def diagnose(
     progress("held-out data")
     judge = _judge(in_noise(judge_parts, noise), found, block)
     kept, rejected = _confirmed(search, judge, found) if safeguards.held_out else (found.named, ())
-    starts = [_span(part)[0] for part in judge_parts]
+    starts = [span_of(part)[0] for part in judge_parts]
     judges = held_out or [m.within(s, np.inf) for m, s in zip(searched, starts, strict=True)]
     retuned = search.retuned()
-    searched_part: Cut = _whole if held_out else _first
+    searched_part: Cut = whole_part if held_out else first_part
     data = _Data(searched, searched_part, judges, in_noise(search_parts, noise), noise, block)
     progress("parameters, and simulation of held-out data")
     model = _modelled(search, kept, data, retuned)
@@ -153,7 +161,12 @@ def diagnose(
         model.simulated,
         tuple(model.worth[k] for k in told),
         _shapes(search, kept, knots, [each[0] for each in found.unknown]),
+        _lasting(hums, searched, search_parts, values),
         tuple(model.onsets[k] for k in told),
+        tuple(
+            region_of(data.rows, kept[k].hypothesis.candidates, _first_weights(search, kept))
+            for k in told
+        ),
         detection_limits(search, kept),
         _silent(search, effects),
         tuple(place.place for place in evidence.places),
@@ -161,6 +174,35 @@ def diagnose(
         held_out_curves(steady(judge_parts), _first_weights(search, kept)),
         noise,
     )
+
+
+def _hums(
+    measurement: Measurement, part: Sequence[Equation], weights: Mapping[Candidate, Array]
+) -> tuple[Line, ...]:
+    """Return the lines in what was searched of a recording, beyond what was found."""
+    if measurement.machine.bar is None:
+        return ()
+    start, end = span_of(part)
+    return lines_of(measurement.within(start, end), weights)
+
+
+def _beside(parts: Parts, lines: Sequence[Sequence[Line]]) -> Parts:
+    """Return equations in which each recording's lines are fitted always."""
+    return [with_lines(part, own) for part, own in zip(parts, lines, strict=True)]
+
+
+def _lasting(
+    lines: Sequence[Sequence[Line]],
+    searched: Sequence[Measurement],
+    parts: Parts,
+    weights: Mapping[Candidate, Array],
+) -> tuple[Line, ...]:
+    """Return the lines that are there still, now that all else is known."""
+    found = []
+    for own, measurement, part in zip(lines, searched, parts, strict=True):
+        now = _hums(measurement, part, weights) if own else ()
+        found += [line for line in now if any(line.is_same(before) for before in own)]
+    return tuple(found)
 
 
 class _Data(NamedTuple):
@@ -254,7 +296,7 @@ def _parts(
             )
     if held_out:
         return found, [equations_of(m, effects, knots, progress) for m in held_out]
-    return _first(found), _last(found)
+    return first_part(found), last_part(found)
 
 
 def _judge(parts: Parts, found: Findings, block: float) -> Evidence:
@@ -299,32 +341,7 @@ def _onsets(kept: Sequence[Named], rows: Parts, starts: Array) -> tuple[Onset | 
     return tuple(found)
 
 
-def _whole(parts: Parts) -> Parts:
-    """Return what is searched where other recordings are held out."""
-    return parts
-
-
-def _first(parts: Sequence[Sequence[Equation]]) -> list[list[Equation]]:
-    """Return what is searched where nothing else is held out."""
-    return [[e.within(-np.inf, _cut(part, 0.0)) for e in part] for part in parts]
-
-
-def _last(parts: Sequence[Sequence[Equation]]) -> list[list[Equation]]:
-    """Return the rest, after a gap."""
-    return [[e.within(_cut(part, GAP_SHARE), np.inf) for e in part] for part in parts]
-
-
-def _cut(equations: Sequence[Equation], beyond: float) -> float:
-    start, end = _span(equations)
-    return start + (SEARCHED_SHARE + beyond) * (end - start)
-
-
-def _span(equations: Sequence[Equation]) -> tuple[float, float]:
-    times = [e.times for e in equations if len(e.times)]
-    return min(float(t[0]) for t in times), max(float(t[-1]) for t in times)
-
-
-def _noise(parts: Sequence[Sequence[Equation]]) -> dict[Place, Array]:
+def noise_of(parts: Sequence[Sequence[Equation]]) -> dict[Place, Array]:
     """Return the noise of every residual, the median over recordings and stretches."""
     found: dict[Place, list[Array]] = {}
     for equations in parts:

@@ -8,7 +8,7 @@ from ruamel.yaml import YAML
 from ruamel.yaml.comments import CommentedMap, CommentedSeq
 
 from cspm_ident.diagnosis.diagnose import Diagnosis, members_of
-from cspm_ident.diagnosis.verdict import numbers_of
+from cspm_ident.diagnosis.statement import numbers_of
 from cspm_ident.fitted_testbed import WIDEST, FittedNumber
 from cspm_msgs_py.testbed import TestbedFile, parse_testbed
 

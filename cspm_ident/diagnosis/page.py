@@ -16,14 +16,8 @@ from cspm_ident.diagnosis.drawing import drawing
 from cspm_ident.diagnosis.evidence_figure import driver_figure, overlay_figure
 from cspm_ident.diagnosis.hypothesis import Hypothesis, Named
 from cspm_ident.diagnosis.part import Part, part_behind, part_of
-from cspm_ident.diagnosis.verdict import (
-    IMPROVED,
-    Verdict,
-    channel_of,
-    drive_of,
-    unit_of,
-    verdict_of,
-)
+from cspm_ident.diagnosis.statement import channel_of, drive_of, unit_of
+from cspm_ident.diagnosis.verdict import IMPROVED, Verdict, verdict_of
 from cspm_ident.offline_page import figure_html, table_html, write_offline_page
 from cspm_ident.signals.samples import Samples
 from cspm_sim.effects import catalogue
@@ -118,6 +112,8 @@ def _parts(found: Diagnosis) -> Iterable[Part]:
             yield part_of(named.hypothesis.effect, element)
     for driver, _, _ in found.findings.unknown:
         yield part_behind(driver.place)
+    for line in found.lines:
+        yield part_behind(line.place)
 
 
 def _mean_pose(samples: Samples | None) -> Array | None:
@@ -205,6 +201,9 @@ def _hypotheses(found: Diagnosis, data: dict[str, Any]) -> str:
         name = f"a function of {driver.signal}, {driver.place.element}"
         size = _in_errors(gain.total, gain.error)
         rows.append((name, "unknown", "", size, f"{100 * share:.0f} %"))
+    for line in found.lines:
+        name = f"periodic, {line.frequency:.2f} Hz, {line.place.element}"
+        rows.append((name, "unknown", "", f"by chance {line.chance:.1g}", ""))
     if not rows:
         return f"<p>None of {found.findings.candidates} stood.</p>"
     heads = ("hypothesis", "verdict", "probability", "gain in standard errors", "residual taken")

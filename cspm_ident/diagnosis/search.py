@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Iterator, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from copy import copy
 from dataclasses import replace
@@ -24,7 +24,7 @@ from cspm_ident.diagnosis.hypothesis import (
     is_wider,
     joined,
 )
-from cspm_ident.diagnosis.sums import Gain, Sums
+from cspm_ident.diagnosis.sums import Gain, Sums, gain_of
 
 Array = NDArray[np.float64]
 Index = NDArray[np.intp]
@@ -161,7 +161,7 @@ class Search:
         if not self._is_plausible([*chosen, hypothesis]):
             return None
         own = self.own_columns(hypothesis)
-        gain = self.sums.gain_of(before - self.sums.held_out(np.concatenate([base, own])))
+        gain = gain_of(before - self.sums.held_out(np.concatenate([base, own])))
         return gain if self._counts(base, own, gain, hypothesis.onset) else None
 
     @contextmanager
@@ -216,8 +216,8 @@ class Search:
         """Return whether columns are surely there and worth a word."""
         tried = len(self._effects) * (self.sums.blocks if onset else 1)
         return (
-            gain.is_sure
-            and self.sums.p_value(base, own, onset) < FALSE_ALARMS / tried
+            gain.total > 0.0
+            and self.sums.p_value(base, own) < FALSE_ALARMS / tried
             and self.share(base, own) >= MATERIAL_SHARE
         )
 
@@ -231,16 +231,14 @@ class Search:
         """Return the hypothesis of fewest columns that is no worse than the best one."""
         rivals = [h for h in self._rivals(best, free, base) if self._is_plausible([*chosen, h])]
         reference = self.sums.held_out(np.concatenate([base, self.own_columns(best)]))
-        gained = self.sums.gain_of(self.sums.held_out(base) - reference)
+        gained = gain_of(self.sums.held_out(base) - reference)
         fewest = best
         for rival in rivals:
             if len(self.own_columns(rival)) >= len(self.own_columns(fewest)):
                 continue
             own = self.own_columns(rival)
             with self.sums.delayed(own, best.onset):
-                worse = self.sums.gain_of(
-                    self.sums.held_out(np.concatenate([base, own])) - reference
-                )
+                worse = gain_of(self.sums.held_out(np.concatenate([base, own])) - reference)
             if worse.total <= 2.0 * gained.error and worse.total < MATERIAL_SHARE * gained.total:
                 fewest = replace(rival, onset=best.onset)
         return fewest
@@ -306,15 +304,30 @@ class Search:
     def _is_plausible(self, hypotheses: Sequence[Hypothesis]) -> bool:
         """Return whether all parameters lie within what the catalogue allows."""
         candidates = [c for h in hypotheses for c in h.candidates]
-        weights = self.sums.weights(self.evidence.with_nuisance(candidates))
-        found = {
-            c: c.effect.values(own.tolist(), **c.nonlinear)
-            for c, own in self.evidence.parted(candidates, weights).items()
-        }
-        return all(
-            c.effect.is_plausible(values) and not c.effect.is_absent(values)
-            for c, values in found.items()
-        )
+        columns = self.evidence.with_nuisance(candidates)
+        weights = self.evidence.parted(candidates, self.sums.weights(columns))
+        for candidate, own in weights.items():
+            effect = candidate.effect
+            values = effect.values(own.tolist(), **candidate.nonlinear)
+            if not effect.is_plausible(values) or effect.is_absent(values):
+                return False
+        tied = [c for c in candidates if c.effect.tied]
+        return not tied or self._are_parameters(tied, weights, candidates)
+
+    def _are_parameters(
+        self,
+        tied: Iterable[Candidate],
+        weights: Mapping[Candidate, Array],
+        candidates: Sequence[Candidate],
+    ) -> bool:
+        """Return whether weights that depend on one another are those of some parameters."""
+        columns = self.evidence.with_nuisance(candidates)
+        widths = self.evidence.parted(candidates, self.sums.half_width(columns))
+        for each in tied:
+            values = each.effect.values(weights[each].tolist(), **each.nonlinear)
+            if np.any(np.abs(each.effect.weights(values) - weights[each]) > widths[each]):
+                return False
+        return True
 
     def _onset(self, base: Index, own: Index) -> int:
         """Return the block from which on columns act, 0 unless a later one is surely better."""
@@ -329,8 +342,8 @@ class Search:
         found = []
         for driver in self._drivers:
             own = self._of(driver)
-            gain = self.sums.gain(base, own)
-            if gain.is_sure and self.sums.p_value(base, own) < FALSE_ALARMS / len(self._drivers):
+            gain, chance = self.sums.gain(base, own), self.sums.p_value(base, own)
+            if gain.total > 0.0 and chance < FALSE_ALARMS / len(self._drivers):
                 share = self.share(base, own)
                 if share >= UNKNOWN_SHARE:
                     found.append((driver, gain, share))

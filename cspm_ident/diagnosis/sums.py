@@ -32,11 +32,6 @@ class Gain(NamedTuple):
     total: float
     error: float
 
-    @property
-    def is_sure(self) -> bool:
-        """Whether it exceeds three standard errors."""
-        return self.total > 3.0 * self.error
-
 
 class Sums:
     """All columns' products, scaled so that each column has length 1."""
@@ -139,12 +134,7 @@ class Sums:
     def gain(self, base: Index, columns: Index) -> Gain:
         """Return what columns gain beyond a base, in blocks that were not fitted."""
         better = self.held_out(base) - self.held_out(np.concatenate([base, columns]))
-        return self.gain_of(better)
-
-    def gain_of(self, better: Array) -> Gain:
-        """Return total and standard error of gains by block, (blocks,), from their scatter."""
-        spread = float(better.std(ddof=1)) if len(better) > 1 else float("inf")
-        return Gain(float(better.sum()), spread * float(np.sqrt(len(better))))
+        return gain_of(better)
 
     def covariance(self, columns: Index) -> Array:
         """Return the weights' covariance, with blocks as independent pieces (Liang, Zeger 1986)."""
@@ -155,25 +145,50 @@ class Sums:
         scale = self._lengths[columns]
         return np.asarray(bread @ meat @ bread / (scale[:, None] * scale))
 
-    def p_value(self, base: Index, columns: Index, onset: int = 0) -> float:
-        """Return the probability of so large weights by chance, by Wald's test over blocks.
+    def p_value(self, base: Index, columns: Index) -> float:
+        """Return the probability of so large weights by chance.
+
+        By Wald's test with the covariance that leaving out one block at a time gives (Bell and
+        McCaffrey, Surv. Methodol. 28(2), 2002), so that what a single block says counts for
+        nothing, while a few that agree may be enough. Blocks count by what they tell of the
+        columns: the weights of the base are held.
 
         Args:
             base: columns beside them.
             columns: those tested.
-            onset: block from which on these act; earlier ones say nothing of them.
         """
-        both = np.concatenate([base, columns])
-        weights = self.weights(both)[len(base) :]
-        covariance = self.covariance(both)[len(base) :, len(base) :]
-        count, free = len(columns), max(1, self.blocks - onset - len(columns))
+        parts = self._beyond(base, columns)
+        whole, count = parts.sum(axis=0), len(columns)
+        inverse = _pseudo_inverse(whole[:-1, :-1])
+        told = np.einsum("ij,bji->b", inverse, parts[:, :-1, :-1]) / count
+        blocks, effective = int(np.count_nonzero(told > _RANK)), 1.0 / float(np.sum(told**2))
+        if effective <= count:
+            return 1.0
+        weights = inverse @ whole[:-1, -1]
+        others = whole - parts[told > _RANK]
+        without = np.einsum(
+            "bij,bj->bi",
+            np.linalg.pinv(others[:, :-1, :-1], rcond=_RANK, hermitian=True),
+            others[:, :-1, -1],
+        )
+        apart = without - weights
+        covariance = (blocks - 1) / blocks * apart.T @ apart
         scale = np.sqrt(np.maximum(np.diag(covariance), 1e-300))
         wald = (
             (weights / scale)
             @ np.linalg.pinv(covariance / np.outer(scale, scale))
             @ (weights / scale)
         )
-        return float(f_distribution.sf(wald / count, count, free))
+        return float(f_distribution.sf(wald / count, count, effective - count))
+
+    def _beyond(self, base: Index, columns: Index) -> Array:
+        """Return each block's products of columns and target less what a base spans of them."""
+        table = np.append(columns, len(self._whole) - 1)
+        inverse = _pseudo_inverse(self._whole[np.ix_(base, base)])
+        spanned = inverse @ self._whole[np.ix_(base, table)]
+        both = np.concatenate([base, table])
+        turn = np.vstack([-spanned, np.eye(len(table))])
+        return np.asarray(turn.T @ self._blocks[:, both[:, None], both] @ turn)
 
     def half_width(self, columns: Index) -> Array:
         """Return half the widths of 95 % intervals of the weights."""
@@ -222,6 +237,12 @@ class Sums:
         part = self._blocks[np.ix_(blocks, both, both)]
         vector = np.append(weights, -1.0)
         return np.asarray(np.einsum("i,bij,j->b", vector, part, vector))
+
+
+def gain_of(better: Array) -> Gain:
+    """Return total and standard error of gains by block."""
+    spread = float(better.std(ddof=1)) if len(better) > 1 else float("inf")
+    return Gain(float(better.sum()), spread * float(np.sqrt(len(better))))
 
 
 def _pseudo_inverse(gram: Array) -> Array:

@@ -48,6 +48,8 @@ def suspension_equations(
     effects: Sequence[Effect],
     known: Sequence[Action],
     knots: Knots | None = None,
+    *,
+    fine: bool = False,
 ) -> list[Equation]:
     """Return the equations of all cables and of the bar, one set for each stretch without hole.
 
@@ -58,13 +60,14 @@ def suspension_equations(
         effects: the catalogue.
         known: effects that the test-bed file has.
         knots: of the free functions; None: without these.
+        fine: under the shortest windows, whatever the noise.
     """
     signals = machine_signals(timeline)
     machine, make = timeline.measurement.machine, maker(timeline.measurement.pointwise)
     return [
         equation
         for stretch in signals
-        for equation in _Stretch(stretch, machine, timeline.pose_band, make).equations(
+        for equation in _Stretch(stretch, machine, timeline.pose_band, fine, make).equations(
             effects, known, knots
         )
     ]
@@ -95,14 +98,18 @@ class _Stretch:
     """One stretch and the window that weighs it."""
 
     def __init__(
-        self, signals: MachineSignals, machine: Testbed, band: float, make: Make
+        self, signals: MachineSignals, machine: Testbed, band: float, fine: bool, make: Make
     ) -> None:
         self._signals, self._machine, self._make = signals, machine, make
         self._parameters: PlantParameters = nominal_parameters(machine)
         self._here = Suspension(signals, machine, self._parameters)
+        missing = {
+            Channel.TENSION: self._here.tension_residuals,
+            Channel.WRENCH: self._here.wrench_residuals,
+        }
         self._windows = {
-            Channel.TENSION: self._window_for(self._here.tension_residuals, band),
-            Channel.WRENCH: self._window_for(self._here.wrench_residuals, band),
+            channel: self._window_of(_HALF_WIDTHS[0]) if fine else self._window_for(values, band)
+            for channel, values in missing.items()
         }
 
     def _window_for(self, residuals: Array, band: float) -> tuple[Array, int]:

@@ -1,24 +1,28 @@
-"""What a diagnosis says, in words and as `diagnosis.json`."""
+"""What a diagnosis says in one word, and as `diagnosis.json`."""
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from enum import Enum
 from math import exp
-from typing import Any, NamedTuple
+from typing import Any
 
-import numpy as np
-
-from cspm_ident.block_simulation import Drive
-from cspm_ident.diagnosis.columns import Candidate
-from cspm_ident.diagnosis.diagnose import Diagnosis, Shape, members_of
+from cspm_ident.diagnosis.diagnose import Diagnosis, members_of
 from cspm_ident.diagnosis.hypothesis import Named, Rival
 from cspm_ident.diagnosis.judgement import HeldOut
-from cspm_ident.diagnosis.onset import Onset
+from cspm_ident.diagnosis.lines import Line
+from cspm_ident.diagnosis.region import Region
 from cspm_ident.diagnosis.simulation import SimulatedFit
-from cspm_ident.diagnosis.sketch import sketch
+from cspm_ident.diagnosis.statement import (
+    channel_of,
+    drive_of,
+    formula_of,
+    line_statement,
+    numbers_of,
+    statement_of,
+    unknown_statement,
+)
 from cspm_ident.signals.measurement import Measurement
-from cspm_sim.effects import Block, Channel, Effect
+from cspm_sim.effects import Block, Channel
 
 SCHEMA = "cspm.diagnosis/1"
 IMPROVED = "testbed.improved.yaml"
@@ -36,28 +40,11 @@ class Verdict(Enum):
     NOT_EXCITED = "not_excited"
 
 
-class Number(NamedTuple):
-    """A parameter of a finding.
-
-    Attributes:
-        name: public name.
-        value: in `unit`.
-        unit: SI.
-        low, high: ends of its 95 % interval; equal to the value where it was searched on a grid.
-    """
-
-    name: str
-    value: float
-    unit: str
-    low: float
-    high: float
-
-
 def verdict_of(diagnosis: Diagnosis) -> Verdict:
     """Return the verdict in one word."""
     named = diagnosis.findings.named
     if not named:
-        if diagnosis.findings.unknown:
+        if diagnosis.findings.unknown or diagnosis.lines:
             return Verdict.UNKNOWN
         return Verdict.CONSISTENT if diagnosis.places else Verdict.NOT_EXCITED
     if any(each.alternatives for each in named):
@@ -79,121 +66,12 @@ def _odds(rival: Rival) -> float:
     return exp(-0.5 * max(0.0, rival.behind) ** 2)
 
 
-def numbers_of(diagnosis: Diagnosis, candidate: Candidate) -> list[Number]:
-    """Return the parameters of an effect on one element."""
-    weights, widths = diagnosis.weights[candidate]
-    effect = candidate.effect
-    values = effect.values(weights.tolist(), **candidate.nonlinear)
-    low = effect.values((weights - widths).tolist(), **candidate.nonlinear)
-    high = effect.values((weights + widths).tolist(), **candidate.nonlinear)
-    return [
-        Number(
-            p.name,
-            values[p.name],
-            p.unit,
-            min(low[p.name], high[p.name]),
-            max(low[p.name], high[p.name]),
-        )
-        for p in effect.parameters
-    ]
-
-
-def statement_of(diagnosis: Diagnosis, named: Named) -> str:
-    """Return a finding as one sentence that a person can act on."""
-    effect = named.hypothesis.effect
-    members = members_of(diagnosis.weights, named.hypothesis)
-    parts = []
-    for candidate in members:
-        numbers = [n for n in numbers_of(diagnosis, candidate) if n.low < n.high]
-        told = ", ".join(
-            f"{n.name} {n.value:.4g} ({n.low:.4g} to {n.high:.4g}) {n.unit}" for n in numbers
-        )
-        parts.append(f"{candidate.element}: {told}")
-    missing = (
-        "differs from the test-bed file" if effect.alter is not None else "is not in the model"
-    )
-    since = ""
-    onset = _onset_of(diagnosis, named)
-    if onset is not None:
-        since = f", from {onset.time:.1f} s on ({onset.low:.1f} to {onset.high:.1f} s)"
-    elif named.hypothesis.onset:
-        since = f", from block {named.hypothesis.onset} of the recordings on"
-    best = max(_concerned(diagnosis, named), key=lambda fit: fit.before / max(fit.after, 1e-300))
-    return (
-        f"{_words(effect)} {missing}{since} ({'; '.join(parts)}). With it the held-out residual of"
-        f" {channel_of(best)} falls from {_amount(best, best.before)} to"
-        f" {_amount(best, best.after)}, where noise is {_amount(best, best.noise)};"
-        f" {_simulated_worth(diagnosis, named)}."
-    )
-
-
-def _onset_of(diagnosis: Diagnosis, named: Named) -> Onset | None:
-    return diagnosis.onsets[diagnosis.findings.named.index(named)]
-
-
-def _amount(fit: HeldOut, value: float) -> str:
-    """Return a residual in its unit, and as a share of what was measured."""
-    return f"{value:.3g} {unit_of(fit)} ({100.0 * value / max(fit.measured, 1e-300):.2g} %)"
-
-
-def _simulated_worth(diagnosis: Diagnosis, named: Named) -> str:
-    worth = diagnosis.worth[diagnosis.findings.named.index(named)]
-    if worth is None:
-        return "what was recorded does not allow to simulate it"
-    if worth.with_it >= worth.without:
-        return "simulations of the held-out data do not improve with it"
-    return (
-        f"simulated, the error of {worth.output.name} falls from {worth.without:.3g} to"
-        f" {worth.with_it:.3g} {worth.output.unit}"
-    )
-
-
-def unknown_statement(diagnosis: Diagnosis, k: int) -> str:
-    """Return the k-th thing that is missing and cannot be named as one sentence."""
-    shape, (driver, _, share) = diagnosis.shapes[k], diagnosis.findings.unknown[k]
-    formula = _formula(shape)
-    hint = f"; as a hint, it runs like {formula}" if formula else ""
-    size = "".join(
-        f", {100.0 * np.sqrt(share) * fit.after / max(fit.measured, 1e-300):.2g} % of what was"
-        " measured"
-        for fit in diagnosis.fit
-        if fit.place == driver.place
-    )
-    return (
-        f"Something is missing in {_CHANNELS[driver.place.channel].format(driver.place.element)}"
-        f" that nothing in the catalogue explains: a function of {driver.signal}, from"
-        f" {shape.values.min():.3g} to {shape.values.max():.3g}"
-        f" {_UNITS.get(driver.place.channel, '')}, takes {100 * share:.0f} % of the squared"
-        f" residual{size}{hint}."
-    )
-
-
-def _formula(shape: Shape) -> str | None:
-    return sketch(shape.knots, shape.values, shape.driver.signal.split(" [")[0])
-
-
-def channel_of(fit: HeldOut) -> str:
-    """Return the public name of a residual's measured quantity."""
-    return _CHANNELS[fit.place.channel].format(fit.place.element)
-
-
-def drive_of(fit: SimulatedFit) -> str:
-    """Return the public name of what drove a simulation."""
-    return "torque" if fit.output.drive is Drive.SHAFT else fit.output.drive.value
-
-
-def unit_of(fit: HeldOut) -> str:
-    """Return the unit of a residual; none where channels of several units were put together."""
-    return _UNITS.get(fit.place.channel, "times its noise")
-
-
-_CHANNELS = {
-    Channel.DRIVE: "winches/torque_command/{}",
-    Channel.SHAFT: "winches/torque/{}",
-    Channel.TENSION: "cables/tension/{}",
-    Channel.WRENCH: "{}/wrench",
+_BLOCKS = {
+    Channel.DRIVE: Block.WINCH,
+    Channel.SHAFT: Block.WINCH,
+    Channel.TENSION: Block.CABLE,
+    Channel.WRENCH: Block.BAR,
 }
-_UNITS = {Channel.DRIVE: "N·m", Channel.SHAFT: "N·m", Channel.TENSION: "N"}
 _DRIVES = {
     Channel.DRIVE: "torque",
     Channel.SHAFT: "torque",
@@ -212,8 +90,9 @@ def diagnosis_data(diagnosis: Diagnosis) -> dict[str, Any]:
         "recordings": [_recording(role, m) for role, m in roles],
         "testbed": {"path": _testbed_path(first), "sha256": first.testbed.sha256},
         "verdict": verdict_of(diagnosis).value,
-        "findings": [_finding(diagnosis, each) for each in diagnosis.findings.named]
-        + [_unknown(diagnosis, k) for k in range(len(diagnosis.shapes))],
+        "findings": [_finding(diagnosis, k) for k in range(len(diagnosis.findings.named))]
+        + [_unknown(diagnosis, k) for k in range(len(diagnosis.shapes))]
+        + [_line(line) for line in diagnosis.lines],
         "not_excited": [
             {"effect": name, "elements": list(elements)} for name, elements in diagnosis.silent
         ],
@@ -232,19 +111,18 @@ def _testbed_path(measurement: Measurement) -> str:
     return f"{measurement.path}: testbed.yaml"
 
 
-def _finding(diagnosis: Diagnosis, named: Named) -> dict[str, Any]:
-    hypothesis = named.hypothesis
-    probability = probability_of(named)
-    onset = _onset_of(diagnosis, named)
+def _finding(diagnosis: Diagnosis, k: int) -> dict[str, Any]:
+    named, onset = diagnosis.findings.named[k], diagnosis.onsets[k]
+    hypothesis, probability = named.hypothesis, probability_of(named)
     return {
         "subsystem": hypothesis.effect.block.value,
         "elements": list(hypothesis.elements),
         "effect": hypothesis.effect.id,
         "probability": probability,
-        "statement": statement_of(diagnosis, named),
+        "statement": statement_of(diagnosis, k),
         "onset_s": onset.time if onset is not None else None,
         "onset_ci95_s": [onset.low, onset.high] if onset is not None else None,
-        "region": {},
+        "region": _region(diagnosis.regions[k]),
         "parameters": [
             {
                 "element": candidate.element,
@@ -268,17 +146,34 @@ def _finding(diagnosis: Diagnosis, named: Named) -> dict[str, Any]:
     }
 
 
-def _unknown(diagnosis: Diagnosis, k: int) -> dict[str, Any]:
-    blocks = {
-        Channel.DRIVE: Block.WINCH,
-        Channel.SHAFT: Block.WINCH,
-        Channel.TENSION: Block.CABLE,
-        Channel.WRENCH: Block.BAR,
+def _region(region: Region | None) -> dict[str, Any]:
+    return {} if region is None else region._asdict()
+
+
+def _line(line: Line) -> dict[str, Any]:
+    return {
+        "subsystem": _BLOCKS[line.place.channel].value,
+        "elements": [line.place.element],
+        "effect": UNKNOWN,
+        "probability": None,
+        "statement": line_statement(line),
+        "onset_s": None,
+        "region": {
+            "driver": "frequency [Hz]",
+            "at": [line.frequency],
+            "adds": [line.amplitude],
+            "hint": None,
+        },
+        "parameters": [],
+        "alternatives": [],
     }
+
+
+def _unknown(diagnosis: Diagnosis, k: int) -> dict[str, Any]:
     shape = diagnosis.shapes[k]
     driver = shape.driver
     return {
-        "subsystem": blocks[driver.place.channel].value,
+        "subsystem": _BLOCKS[driver.place.channel].value,
         "elements": [driver.place.element],
         "effect": UNKNOWN,
         "probability": None,
@@ -288,7 +183,7 @@ def _unknown(diagnosis: Diagnosis, k: int) -> dict[str, Any]:
             "driver": driver.signal,
             "at": shape.knots.tolist(),
             "adds": shape.values.tolist(),
-            "hint": _formula(shape),
+            "hint": formula_of(shape),
         },
         "parameters": [],
         "alternatives": [],
@@ -340,20 +235,3 @@ def _fit(
 def _vaf(share: float) -> float:
     """Return the variance accounted for [%] of an error that is a share of the spread."""
     return 100.0 * (1.0 - min(1.0, share) ** 2)
-
-
-def _concerned(diagnosis: Diagnosis, named: Named) -> Sequence[HeldOut]:
-    places = {
-        regression.channel
-        for regression in (named.hypothesis.effect.regression, *named.hypothesis.effect.partners)
-    }
-    own = [
-        f
-        for f in diagnosis.fit
-        if f.place.channel in places and f.place.element in (*named.hypothesis.elements, "bar")
-    ]
-    return own or list(diagnosis.fit)
-
-
-def _words(effect: Effect) -> str:
-    return effect.id.replace("_", " ").capitalize()

@@ -8,7 +8,7 @@ from scipy.stats import f as f_distribution
 from scipy.stats import t as t_distribution
 
 from cspm_ident.diagnosis.evidence import Evidence
-from cspm_ident.diagnosis.sums import Gain, Sums
+from cspm_ident.diagnosis.sums import Sums
 
 Array = NDArray[np.float64]
 Index = NDArray[np.intp]
@@ -29,7 +29,7 @@ class WhiteSums(Sums):
         variance = self.squares_of(columns) / self._free(columns)
         return np.asarray(variance * bread / (scale[:, None] * scale))
 
-    def p_value(self, base: Index, columns: Index, onset: int = 0) -> float:
+    def p_value(self, base: Index, columns: Index) -> float:
         """Return the probability of so large a gain by chance, by the F test over rows."""
         both = np.concatenate([base, columns])
         after, free = self.squares_of(both), self._free(both)
@@ -40,10 +40,6 @@ class WhiteSums(Sums):
         """Return half the widths of 95 % intervals of the weights."""
         factor = t_distribution.ppf(0.975, self._free(columns))
         return np.asarray(factor * np.sqrt(np.maximum(np.diag(self.covariance(columns)), 0.0)))
-
-    def gain_of(self, better: Array) -> Gain:
-        """Return the total, whose scatter between blocks is not looked at."""
-        return Gain(float(better.sum()), 0.0)
 
     def _free(self, columns: Index) -> int:
         return max(1, self._rows - len(columns))

@@ -136,7 +136,7 @@ def read_measurement(path: Path, testbed: Path | None = None) -> Measurement:
         parts.update(_samples(name, found[name], rows[name], start, machine.testbed))
     torque = parts.get("torque")
     age = 0.5 * torque.interval if simulated and torque is not None else 0.0
-    return Measurement(path, digest.result(), machine, **parts, torque_age=age)
+    return Measurement(path, digest.result(), machine, **parts, torque_age=age, pointwise=False)
 
 
 def _count(recording: Recording, name: str) -> int:

@@ -42,6 +42,7 @@ class Timeline:
         measurement: Measurement,
         period_ns: int = PERIOD_NS,
         delays: Mapping[str, float] = MappingProxyType({}),
+        pose_band: float | None = None,
     ) -> None:
         """Lay the steps over the time in which all sensors deliver.
 
@@ -49,6 +50,7 @@ class Timeline:
             measurement: what was recorded.
             period_ns: the step [ns].
             delays: by topic, by how much its stamps are late [s].
+            pose_band: to which poses are smoothed [Hz]; None: while they rise above their noise.
 
         Raises:
             InputError: the sensors never deliver together.
@@ -56,6 +58,8 @@ class Timeline:
         self.measurement = measurement
         self.period_ns = period_ns
         self.delays = dict(delays)
+        if pose_band is not None:
+            self.__dict__["pose_band"] = pose_band
         sensors = measurement.sensors.values()
         start = max(float(s.times[0]) for s in sensors)
         end = min(float(s.times[-1]) for s in sensors)

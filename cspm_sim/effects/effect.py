@@ -131,6 +131,8 @@ class Effect:
         negligible: how far parameters, by name, may lie from where the effect is absent in a sound
             machine; less is taken into account and not told.
         plausible: whether parameters within their bounds go together; None: always.
+        tied: whether its columns' weights depend on one another, so that weights that were fitted
+            freely need not be those of any parameters.
     """
 
     id: str
@@ -154,6 +156,7 @@ class Effect:
     elements: Elements | None = None
     negligible: Mapping[str, float] = field(default_factory=dict)
     plausible: Callable[[Values], bool] | None = None
+    tied: bool = False
 
     @property
     def acts_on(self) -> Elements:

@@ -61,6 +61,7 @@ EFFECT = Effect(
     nonlinear={"wrap": (0.5 * pi,)},
     coefficients=_weights,
     from_coefficients=_values,
+    tied=True,
     equation="tension on the winch's side = t·exp(coefficient·wrap·sign(q̇)); at rest between both",
     shows="winch torque residual steps at each reversal, in proportion to the tension there",
     twins=("winch_load_friction", "winch_coulomb_friction"),

@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 
 from cspm_ident.blind.peers.library import Library
 from cspm_ident.diagnosis.columns import Candidate, Place
+from cspm_ident.diagnosis.drivers import Driver
 from cspm_ident.diagnosis.verdict import UNKNOWN, Verdict
 
 Array = NDArray[np.float64]
@@ -52,7 +53,9 @@ def left_with(library: Library, weights: Weights) -> dict[Place, float]:
     """Return the root mean square of each residual that was not searched, over its noise."""
     judge = library.judge_evidence
     rows = {place.place: max(1.0, float(place.rows.sum())) for place in judge.places}
-    left = judge.left_with(dict(weights))
+    given: dict[Candidate | Driver, Array] = {}
+    given.update(weights.items())
+    left = judge.left_with(given)
     return {place: float(np.sqrt(max(0.0, each) / rows[place])) for place, each in left.items()}
 
 

@@ -76,8 +76,7 @@ def run(
     """Diagnose recordings that have not been yet, in processes that can read nothing else."""
     from cspm_bringup.blind.commands import run_command
 
-    for name in method or ("cspm",):
-        run_command(folder, name)
+    run_command(folder, method or ["cspm"])
 
 
 @blind.command()

@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-from math import ceil
-
 import numpy as np
 from numpy.typing import NDArray
 
@@ -43,7 +41,7 @@ class StrappedLoad:
             self._place = scene.body[:3] + np.array([0.0, 0.0, sunk])
             self._velocity = scene.body[3:6].copy()
             return
-        steps = max(1, ceil(period / _STEP))
+        steps = max(1, int(np.ceil(period / _STEP)))
         for _ in range(steps):
             acceleration = self._gravity + self._pull(self._place, self._velocity, scene)
             self._velocity = self._velocity + acceleration * (period / steps)

@@ -171,7 +171,7 @@ def card():
         "f": result("effect", finding("tension_gain")),
         "h": {"diagnosis": None, "times": {"wall_s": 1.0, "cpu_s": 1.0}},
     }
-    return scorecard(truth, results)
+    return scorecard(truth, results) | {"peers": [], "ablations": []}
 
 
 def test_a_scorecard_counts():

@@ -65,6 +65,9 @@ def detection_limits(scenes: Sequence[Scene], machine: Testbed) -> dict[str, lis
     noise = noise_of(machine, slopes)
     found = {}
     for name, phenomenon in PHENOMENA.items():
+        if machine.bar is None and phenomenon.at != CABLES:
+            found[name] = [float("inf")]
+            continue
         shown = _shown(phenomenon, scenes, machine, slopes, noise)
         with np.errstate(divide="ignore"):
             limits = np.where(shown > _STILL, 1.0 / shown, np.inf)
@@ -88,8 +91,11 @@ def stiffnesses(scenes: Sequence[Scene], machine: Testbed) -> Array:
 
 
 def noise_of(machine: Testbed, slopes: Array) -> Noise:
-    """Return the noise of one reading, from the sensors that the test-bed describes."""
-    position = machine.sensors["/bar/pose"].noise[0]
+    """Return the noise of one reading, from the sensors that the test-bed describes.
+
+    Where there is no bar, cables end where the file says, without noise.
+    """
+    position = machine.sensors["/bar/pose"].noise[0] if machine.bar is not None else 0.0
     winches = machine.sensors["/winches/state"]
     cell = machine.sensors["/cables/tension"].noise[0]
     radii = shaft_radii(machine)

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -54,12 +54,16 @@ class Item(NamedTuple):
 
 
 def draw_items(
-    strata: Sequence[Stratum], count: int, seed: int, duration: float, machine: Testbed
+    strata: Sequence[Stratum],
+    count: int,
+    seed: int,
+    duration: float,
+    machine_of: Callable[[str], Testbed],
 ) -> list[Item]:
     """Draw recordings, in the order of their names, which is none.
 
     Strata get numbers in proportion to their shares, cases of a stratum and amounts of a case equal
-    ones as far as that goes; the rest is drawn.
+    ones as far as that goes; the rest is drawn. `machine_of` returns the machine of a scenario.
     """
     generator = np.random.default_rng([seed, 7])
     names = _names(generator, count)
@@ -68,6 +72,8 @@ def draw_items(
     decks = {stratum.name: _deck(stratum, generator) for stratum in strata}
     for name, stratum in zip(names, _dealt(strata, count), strict=True):
         case, multiple = next(decks[stratum.name])
+        scenario = str(generator.choice(case.scenarios))
+        machine = machine_of(scenario)
         cable = int(generator.integers(len(machine.cables)))
         signs = generator.choice((-1.0, 1.0), len(case.phenomena))
         concealed = tuple(
@@ -79,7 +85,7 @@ def draw_items(
                 name,
                 stratum.name,
                 case,
-                str(generator.choice(case.scenarios)),
+                scenario,
                 int(generator.integers(1, 2**31)),
                 concealed,
                 round(case.onset_share * duration, 3),

@@ -114,10 +114,9 @@ def _check(request: Request) -> None:
 
 
 def _items(request: Request) -> list[Item]:
-    machine = machine_of("calm")
     seed = request.seed * len(SPLITS) + SPLITS.index(request.split)
     strata = [STRATA[name] for name in request.strata]
-    return draw_items(strata, request.count, seed, request.duration, machine)
+    return draw_items(strata, request.count, seed, request.duration, machine_of)
 
 
 def _write_truth(request: Request, tell: Tell) -> None:

@@ -1,6 +1,7 @@
 """What benchmarks draw, before anything is recorded."""
 
 import math
+import re
 import sys
 from collections import Counter
 from itertools import combinations, pairwise
@@ -41,6 +42,9 @@ def test_strata_have_their_shares_and_enough_has_nothing_to_find():
     assert all(abs(counted[n] - 400 * s.share / whole) <= 1 for n, s in STRATA.items())
     assert counted["nothing"] >= 60
     assert counted["parameter"] >= 60
+    page = (SCENARIOS.parent / "docs/blind.md").read_text(encoding="utf-8")
+    rows = re.findall(r"^\| (\w+) \| .* \| (\d+) \|$", page, re.MULTILINE)
+    assert {name: int(count) for name, count in rows} == counted
 
 
 def test_the_order_of_names_tells_nothing_of_the_stratum():
@@ -164,3 +168,13 @@ def test_a_truth_among_the_recordings_and_one_of_another_benchmark_are_refused(t
     (tmp_path / "truth.json").write_text('{"asked": {"seed": 2}}')
     with pytest.raises(InputError, match=r"of another benchmark \(\{'seed': 2\}\), allowed"):
         make(request(tmp_path))
+
+
+def test_what_cannot_show_is_refused_before_anything_is_recorded():
+    item = next(i for i in draw() if i.concealed and i.concealed[0].cables == (3,))
+    limits = {name: [math.inf] * 8 for name in PHENOMENA}
+    with pytest.raises(InputError, match=r"^--duration: .* does not show in .*, allowed: a longer"):
+        amounts_of(item, limits, 8)
+    name = item.concealed[0].phenomenon
+    limits[name] = [math.inf] * 3 + [0.5] + [math.inf] * 4
+    assert amounts_of(item, {n: limits[name] for n in limits}, 8)[name][3] != 0.0

@@ -8,6 +8,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from cspm_bringup.blind.stratum import Case, Stratum
+from cspm_msgs_py.errors import InputError
 from cspm_msgs_py.testbed import Testbed
 from cspm_reality.phenomena import PHENOMENA
 from cspm_reality.phenomenon import BAR, CABLES, FRAME
@@ -181,10 +182,19 @@ def _told(each: Concealed, amounts: Sequence[float], machine: Testbed) -> dict[s
 def amounts_of(
     item: Item, limits: Mapping[str, Sequence[float]], cables: int
 ) -> dict[str, list[float]]:
-    """Return each phenomenon's amounts per cable, or the one for bar or frame."""
+    """Return each phenomenon's amounts per cable, or the one for bar or frame.
+
+    Raises:
+        InputError: something does not show in so short a recording.
+    """
     out = {}
     for each in item.concealed:
         limit = limits[each.phenomenon]
+        if not all(np.isfinite(limit[i]) for i in each.cables or (0,)):
+            raise InputError(
+                f"--duration: {each.phenomenon} does not show in {item.scenario}, allowed: a longer"
+                " one, or other --strata"
+            )
         if PHENOMENA[each.phenomenon].at != CABLES:
             out[each.phenomenon] = [each.multiple * limit[0]]
             continue

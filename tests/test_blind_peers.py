@@ -177,3 +177,21 @@ def test_methods_are_named_and_others_refused(monkeypatch):
         InputError, match=r"^--method sindy: pysindy is not .* after pip install cspm\[blind\]$"
     ):
         require_method("sindy")
+
+
+def test_what_a_sound_machine_has_as_well_is_not_told():
+    told = report_of(skewed(5e-6), np.array([0]), intervals=False)
+    assert (told["verdict"], told["findings"]) == ("consistent", [])
+    (finding,) = report_of(skewed(5e-4), np.array([0]), intervals=False)["findings"]
+    assert finding["effect"] == "clock_skew"
+
+
+def skewed(skew):
+    """A residual that is a clock's skew alone, of a size that the catalogue calls none or some."""
+    effect = catalogue()["clock_skew"]
+    candidate, times = Candidate(effect, "bar"), STEP * np.arange(ROWS)
+    column = np.sin(times)
+    target = skew * column[:, None]
+    row = Equation(PLACE, times, target, {candidate: column[:, None, None]}, target)
+    evidence = gather([[row]], BLOCK_S)
+    return Library([row], [row], evidence, WhiteSums(evidence), evidence)

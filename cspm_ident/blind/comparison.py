@@ -11,7 +11,10 @@ from cspm_ident.blind.scorecard import CLEAR, scorecard
 
 Data = Mapping[str, Any]
 
-_SHARES = ("block", "element", "first", "named", "tied", "false_alarm", "unknown_recognised")
+_SHARES = (
+    *("block", "element", "first", "tied", "nothing_wrong_beside"),
+    *("false_alarm", "unknown_recognised", "failed"),
+)
 
 
 def comparison(truth: Data, results: Mapping[str, Mapping[str, Data]]) -> list[dict[str, Any]]:
@@ -37,7 +40,6 @@ def comparison(truth: Data, results: Mapping[str, Mapping[str, Data]]) -> list[d
                 **{key: card["shares"][key] for key in _SHARES},
                 "mean_tie_size": card["shares"]["mean_tie_size"],
                 "wrong_per_recording": sum(o["wrong"] for o in outcomes) / max(1, len(outcomes)),
-                "failed": card["shares"]["failed"],
                 "covered": card["parameters"]["covered"],
                 "before": median(f[0] for f in fits) if fits else None,
                 "after": median(f[2] for f in fits) if fits else None,

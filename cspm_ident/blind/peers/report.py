@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 from cspm_ident.blind.peers.library import Library
 from cspm_ident.diagnosis.columns import Candidate, Place
 from cspm_ident.diagnosis.drivers import Driver
+from cspm_ident.diagnosis.hypothesis import is_negligible
 from cspm_ident.diagnosis.verdict import UNKNOWN, Verdict
 
 Array = NDArray[np.float64]
@@ -20,7 +21,8 @@ Weights = Mapping[Candidate, Array]
 def report_of(library: Library, support: NDArray[np.intp], intervals: bool) -> dict[str, Any]:
     """Return what a regression found that kept some columns.
 
-    Weights are those of least squares on these columns alone.
+    Weights are those of least squares on these columns alone. What a sound machine has as well is
+    taken into account and not told, as the diagnosis does.
 
     Args:
         library: residuals and columns.
@@ -37,9 +39,10 @@ def report_of(library: Library, support: NDArray[np.intp], intervals: bool) -> d
     groups: dict[str, list[Candidate]] = {}
     for candidate in kept:
         groups.setdefault(candidate.effect_id, []).append(candidate)
-    ranked = sorted(groups.values(), key=lambda group: -_worth(library, columns, group))
+    told = [g for g in groups.values() if not is_negligible({c: weights[c] for c in g})]
+    ranked = sorted(told, key=lambda group: -_worth(library, columns, group))
     findings = [_finding(group, weights, widths) for group in ranked]
-    return report(_verdict(kept), findings, fits(library, left_with(library, weights)))
+    return report(_verdict(ranked), findings, fits(library, left_with(library, weights)))
 
 
 def report(
@@ -138,8 +141,8 @@ def _parameters(candidate: Candidate, weights: Array, half: Array | None) -> lis
     ]
 
 
-def _verdict(kept: Sequence[Candidate]) -> Verdict:
-    if not kept:
+def _verdict(told: Sequence[Sequence[Candidate]]) -> Verdict:
+    if not told:
         return Verdict.CONSISTENT
-    numbers = all(candidate.effect.alter is not None for candidate in kept)
+    numbers = all(group[0].effect.alter is not None for group in told)
     return Verdict.PARAMETER if numbers else Verdict.EFFECT

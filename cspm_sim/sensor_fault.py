@@ -8,6 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from cspm_msgs_py.errors import InputError
 from cspm_msgs_py.testbed import Testbed
 from cspm_sim.effect_entries import Action, read_actions
 
@@ -75,11 +76,17 @@ def sensor_faults(testbed: Testbed, topic: str) -> list[SensorFault]:
     """Return what a test-bed's effects do to the sensor of a topic.
 
     Raises:
-        InputError: an effect, one of its elements or parameters is unknown or out of bounds.
+        InputError: an effect, one of its elements or parameters is unknown or out of bounds, or
+            readings would have to be newer than the present.
     """
     faults = []
     for action in read_actions(testbed):
         sense = action.effect.sense
         if sense and topic in (name.format(action.name) for name in sense.topics):
             faults.append(SensorFault(action))
+            if faults[-1].lateness(1.0) < 0.0:
+                raise InputError(
+                    f"{action.where}: readings newer than their stamps cannot be simulated, allowed"
+                    " in a simulation: no number below 0"
+                )
     return faults

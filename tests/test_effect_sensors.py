@@ -185,8 +185,18 @@ def test_the_past_forgets_what_is_asked_for_no_more():
             "effects: tension_bias: no element 'bar', allowed: c0, c1, c2, c3, c4, c5, c6, c7",
         ),
         (
-            [entry("clock_skew", skew=-1e-4)],
-            "effects: clock_skew: skew = -0.0001 1, allowed: 0 to 0.01",
+            [entry("clock_skew", skew=-0.02)],
+            "effects: clock_skew: skew = -0.02 1, allowed: -0.01 to 0.01",
+        ),
+        (
+            [entry("pose_delay", ["bar"], delay=-0.0002)],
+            "effects: pose_delay: readings newer than their stamps cannot be simulated, allowed in"
+            " a simulation: no number below 0",
+        ),
+        (
+            [entry("clock_skew", ["bar"], skew=-1e-5)],
+            "effects: clock_skew: readings newer than their stamps cannot be simulated, allowed in"
+            " a simulation: no number below 0",
         ),
     ],
 )

@@ -17,8 +17,9 @@ from scipy.signal import periodogram
 
 from cspm_ident.diagnosis.columns import Candidate, Place
 from cspm_ident.diagnosis.equation import Equation
+from cspm_ident.diagnosis.machine_signals import MachineSignals
 from cspm_ident.diagnosis.supposed import settled, with_found
-from cspm_ident.diagnosis.suspension_equations import suspension_equations
+from cspm_ident.diagnosis.suspension_equations import machine_signals, suspension_equations
 from cspm_ident.signals.measurement import Measurement
 from cspm_ident.signals.timeline import Timeline
 from cspm_sim.effect_entries import read_actions
@@ -26,14 +27,16 @@ from cspm_sim.effect_entries import read_actions
 Array = NDArray[np.float64]
 
 HIGHEST_HZ = 10.0
-# Of the angles' squares: above the frequency under which so much lies nothing is driven.
-_DRIVEN_SHARE = 0.9999
+# Of the squares of angles and poses: what lies above so much is not driven.
+_DRIVEN_SHARE = 0.99
+# Times the median of a spectrum: below that is noise.
+_ABOVE_NOISE = 10.0
 _FALSE_ALARMS = 1e-3
 # Of frequencies beside a line, whose median is what noise has there.
 _BESIDE = 101
 # In which a force from outside keeps phase and size; what rings down does not.
 _PIECES = 8
-_COHERENCE = 0.6
+_COHERENCE = 0.8
 # Lines closer to one another are one.
 _ONE_HZ = 0.1
 
@@ -71,7 +74,7 @@ def lines_of(measurement: Measurement, weights: Mapping[Candidate, Array]) -> tu
     timeline = Timeline(fitted, pose_band=HIGHEST_HZ)
     known = read_actions(fitted.machine)
     equations = suspension_equations(timeline, (), known, fine=True)
-    lowest = _driven_up_to(timeline)
+    lowest = _driven_up_to(machine_signals(timeline))
     series = [(e.place, c, e.times, e.target[:, c]) for e in equations for c in _channels(e)]
     found = [
         line for each in series if (line := highest_line(*each, lowest, len(series))) is not None
@@ -83,20 +86,16 @@ def _channels(equation: Equation) -> range:
     return range(equation.target.shape[1])
 
 
-def _driven_up_to(timeline: Timeline) -> float:
+def _driven_up_to(stretches: Sequence[MachineSignals]) -> float:
     """Return the frequency above which neither winches nor frame are moved [Hz]."""
-    moved = [timeline.frame_poses - timeline.frame_poses[0]]
-    if timeline.angles is not None:
-        moved.append(timeline.angles)
     highest = 0.0
-    for values in moved:
-        whole = values[np.isfinite(values).all(axis=1)]
-        frequencies, power = periodogram(whole, 1.0 / timeline.period, "hann", axis=0)
-        summed = np.cumsum(power.sum(axis=1))
-        if summed[-1] > 0.0:
-            highest = max(
-                highest, float(frequencies[np.searchsorted(summed, _DRIVEN_SHARE * summed[-1])])
-            )
+    for signals in stretches:
+        for moved in (signals.frame.poses, signals.angles):
+            frequencies, power = periodogram(moved, 1.0 / signals.step, "hann", axis=0)
+            power[power < _ABOVE_NOISE * np.median(power, axis=0)] = 0.0
+            summed = np.cumsum(power.sum(axis=1))
+            edge = np.searchsorted(summed, _DRIVEN_SHARE * summed[-1])
+            highest = max(highest, float(frequencies[edge]))
     return highest
 
 

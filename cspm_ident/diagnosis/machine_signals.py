@@ -175,9 +175,13 @@ def elongation_at(parameters: PlantParameters, tensions: Array, elastic_lengths:
     for _ in range(_ROUNDS):
         law = law_at(parameters, found, elastic_lengths)
         slope = np.where(law[:, :, 1] > 0.0, law[:, :, 1], np.inf)
-        found = np.maximum(found + (wanted - law[:, :, 0]) / slope, 0.0)
+        before, found = found, np.maximum(found + (wanted - law[:, :, 0]) / slope, 0.0)
+        if np.max(np.abs(found - before), initial=0.0) < _EXACT_M:
+            break
     return found
 
 
 _FIRST_M = 1e-4
 _ROUNDS = 12
+# Newton's next step would be the square of this.
+_EXACT_M = 1e-10

@@ -50,6 +50,7 @@ def onset_of(
     rows = [e.only(terms) for e in equations if e.place in concerned]
     evidence = gather([rows], FINE_S)
     sums, edges = Sums(evidence), evidence.times
+    others = {term: time for term, time in others.items() if term in evidence.slices}
     for term, time in others.items():
         sums.delay(evidence.columns_of([term]), int(np.searchsorted(edges, time)))
     base, columns = evidence.with_nuisance(others), evidence.columns_of(own)

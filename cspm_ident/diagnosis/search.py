@@ -202,15 +202,16 @@ class Search:
     def _extended(
         self, candidate: Candidate, alike: Sequence[Candidate], base: Index
     ) -> Hypothesis:
-        """Return the candidate's effect on all elements where it surely acts."""
+        """Return the candidate's effect on all elements where it surely acts beside the others."""
         found = [candidate]
-        for other in alike:
-            if other.element == candidate.element:
-                continue
-            own = self._of(other)
-            if self._counts(base, own, self.sums.gain(base, own)):
-                found.append(other)
-        return Hypothesis(candidate.effect, tuple(found))
+        others = [c for c in alike if c.element != candidate.element]
+        gains = self.sums.gains_beyond(base, [self._of(c) for c in others])
+        for k in np.argsort(-gains):
+            beside = np.concatenate([base, self.evidence.columns_of(found)])
+            own = self._of(others[k])
+            if self._counts(beside, own, self.sums.gain(beside, own)):
+                found.append(others[k])
+        return Hypothesis(candidate.effect, tuple(c for c in alike if c in found))
 
     def _counts(self, base: Index, own: Index, gain: Gain, onset: int = 0) -> bool:
         """Return whether columns are surely there and worth a word."""
@@ -228,18 +229,24 @@ class Search:
         base: Index,
         chosen: Sequence[Hypothesis],
     ) -> Hypothesis:
-        """Return the hypothesis of fewest columns that is no worse than the best one."""
+        """Return the hypothesis of fewest columns that is no worse than the best one.
+
+        One that explains more in most blocks is taken instead, though it be less sure by itself.
+        """
         rivals = [h for h in self._rivals(best, free, base) if self._is_plausible([*chosen, h])]
         reference = self.sums.held_out(np.concatenate([base, self.own_columns(best)]))
         gained = gain_of(self.sums.held_out(base) - reference)
-        fewest = best
+        fewest, least = best, 0.0
         for rival in rivals:
-            if len(self.own_columns(rival)) >= len(self.own_columns(fewest)):
-                continue
             own = self.own_columns(rival)
             with self.sums.delayed(own, best.onset):
-                worse = gain_of(self.sums.held_out(np.concatenate([base, own])) - reference)
-            if worse.total <= 2.0 * gained.error and worse.total < MATERIAL_SHARE * gained.total:
+                apart = self.sums.held_out(np.concatenate([base, own])) - reference
+            worse, wider = gain_of(apart), len(own) - len(self.own_columns(fewest))
+            if wider <= 0 and worse.total < least and _behind(apart) <= -_TIED:
+                fewest, least = replace(rival, onset=best.onset), worse.total
+            elif wider < 0 and worse.total <= min(
+                2.0 * gained.error, MATERIAL_SHARE * gained.total
+            ):
                 fewest = replace(rival, onset=best.onset)
         return fewest
 

@@ -9,6 +9,8 @@ from numpy.typing import NDArray
 from scipy.ndimage import gaussian_filter1d
 
 from cspm_ident.diagnosis.machine_signals import (
+    BodyState,
+    CableSpans,
     MachineSignals,
     body_state,
     cable_spans,
@@ -36,7 +38,6 @@ class Suspension:
         signals: what was measured.
         parameters: of the machine as it is described.
         start: unstretched lengths at the beginning, (n,) [m].
-        bar: the bar's kinematics.
     """
 
     def __init__(
@@ -48,14 +49,33 @@ class Suspension:
     ) -> None:
         """Take a stretch without holes; `start` is found from the first tensions if not given."""
         self.signals, self.parameters, self._testbed = signals, parameters, testbed
-        exits = parameters.cables[:, EXIT : EXIT + 3]
-        attachments = parameters.cables[:, ATTACHMENT : ATTACHMENT + 3]
-        self.bar, self._frame = body_state(signals.bar), body_state(signals.frame)
-        self._spans = cable_spans(signals, self.bar, self._frame, exits, attachments)
         if start is None:
             tensions = np.maximum(signals.tensions[0], 0.0)
             start = unstretched_lengths(parameters, self._spans.lengths[0], tensions)
         self.start = start
+
+    def with_signals(self, signals: MachineSignals) -> Suspension:
+        """Return the same stretch with other signals, begun from the same lengths."""
+        other = Suspension(signals, self._testbed, self.parameters, self.start)
+        bar, frame = signals.bar is self.signals.bar, signals.frame is self.signals.frame
+        kept = {"bar": bar, "_frame": frame, "_spans": bar and frame}
+        other.__dict__.update({name: getattr(self, name) for name, same in kept.items() if same})
+        return other
+
+    @cached_property
+    def bar(self) -> BodyState:
+        """The bar's kinematics."""
+        return body_state(self.signals.bar)
+
+    @cached_property
+    def _frame(self) -> BodyState:
+        return body_state(self.signals.frame)
+
+    @cached_property
+    def _spans(self) -> CableSpans:
+        exits = self.parameters.cables[:, EXIT : EXIT + 3]
+        attachments = self.parameters.cables[:, ATTACHMENT : ATTACHMENT + 3]
+        return cable_spans(self.signals, self.bar, self._frame, exits, attachments)
 
     @cached_property
     def _wound(self) -> Array:

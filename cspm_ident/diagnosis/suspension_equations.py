@@ -256,7 +256,7 @@ class _Stretch:
         yield Place(Channel.WRENCH, BAR), wrench
 
     def _changed(self, moved: MachineSignals, step: float) -> tuple[Array, Array]:
-        there = Suspension(moved, self._machine, self._parameters, self._here.start)
+        there = self._here.with_signals(moved)
         return (
             (there.tension_residuals - self._here.tension_residuals) / step,
             (there.wrench_residuals - self._here.wrench_residuals) / step,

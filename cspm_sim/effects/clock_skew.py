@@ -31,7 +31,7 @@ def _columns(signals: Array) -> Array:
 EFFECT = Effect(
     id="clock_skew",
     block=Block.SENSOR,
-    parameters=(EffectParameter("skew", "1", 0.0, 0.01, meaning="stretch of the stamps less one"),),
+    parameters=(EffectParameter("skew", "1", -0.01, 0.01, meaning="of the stamps, less one"),),
     sense=Sense(("/{}/pose", "/{}/twist"), lateness=_lateness),
     elements=Elements.BODIES,
     regression=Regression(Channel.READING, _columns),

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from functools import lru_cache
 
 import numpy as np
 
@@ -20,15 +21,25 @@ def linear_response(
         time: equal steps, shape (samples,) [s].
         driven: one input per column, shape (samples, inputs).
     """
-    from scipy.signal import cont2discrete, lfilter
+    from scipy.signal import lfilter
 
     step = float(time[-1] - time[0]) / max(1, len(time) - 1)
-    system = (list(numerator), list(denominator))
-    ramps, poles, _ = cont2discrete(system, step, method="foh")
-    jump, _, _ = cont2discrete(system, step, method="zoh")
+    ramps, jump, poles = _sampled(tuple(numerator), tuple(denominator), step)
     # From rest: what is there from the first sample on is a step, not the end of a ramp to it.
     constant = np.broadcast_to(driven[0], driven.shape)
     return np.asarray(
-        lfilter(np.ravel(ramps), poles, driven - constant, axis=0)
-        + lfilter(np.ravel(jump), poles, constant, axis=0)
+        lfilter(ramps, poles, driven - constant, axis=0) + lfilter(jump, poles, constant, axis=0)
     )
+
+
+@lru_cache(maxsize=256)
+def _sampled(
+    numerator: tuple[float, ...], denominator: tuple[float, ...], step: float
+) -> tuple[Array, Array, Array]:
+    """Return numerators for inputs of straight lines and of steps, and their denominator."""
+    from scipy.signal import cont2discrete
+
+    system = (list(numerator), list(denominator))
+    ramps, poles, _ = cont2discrete(system, step, method="foh")
+    jump, _, _ = cont2discrete(system, step, method="zoh")
+    return np.ravel(ramps), np.ravel(jump), poles

@@ -1,4 +1,4 @@
-"""A motion capture whose readings are older than their stamps say."""
+"""A motion capture whose readings are older than their stamps say, or newer where clocks differ."""
 
 import numpy as np
 
@@ -26,7 +26,7 @@ def _columns(signals: Array) -> Array:
 EFFECT = Effect(
     id="pose_delay",
     block=Block.SENSOR,
-    parameters=(EffectParameter("delay", "s", 0.0, 1.0),),
+    parameters=(EffectParameter("delay", "s", -0.01, 1.0, meaning="below 0: too new"),),
     sense=Sense(("/{}/pose", "/{}/twist"), lateness=_lateness),
     elements=Elements.BODIES,
     regression=Regression(Channel.READING, _columns),

@@ -61,12 +61,22 @@ def make(
     )
 
 
-@blind.command()
-def run(folder: Folder) -> None:
+@blind.command(
+    epilog="""Methods: cspm, the diagnosis; cspm-without-measured-interfaces, -weak-form,
+-joint-refit, -block-null, -held-out, which each leave one safeguard out; peers: retuned, stepwise,
+lasso, sindy, black-box. The last four need pip install cspm[blind]."""
+)
+def run(
+    folder: Folder,
+    method: Annotated[
+        list[str] | None,
+        typer.Option(metavar="NAME", help="What diagnoses, repeated; otherwise cspm."),
+    ] = None,
+) -> None:
     """Diagnose recordings that have not been yet, in processes that can read nothing else."""
     from cspm_bringup.blind.commands import run_command
 
-    run_command(folder)
+    run_command(folder, method or ["cspm"])
 
 
 @blind.command()

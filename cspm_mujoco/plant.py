@@ -83,7 +83,7 @@ class MujocoPlant:
         self._take_views(n)
         self.locked = locked
         self.tensions: Array = np.zeros(n)
-        self._winding, self._wrench = np.zeros(n), np.zeros(6)
+        self._winding, self._wrench, self._moment = np.zeros(n), np.zeros(6), np.zeros(3)
         self._frame_body, self._body = np.zeros(9), np.zeros(9)
         self.frame: Array = np.array(frame_motion(0.0), dtype=float)
         self._place(bar_pose, tensions)
@@ -232,7 +232,8 @@ class MujocoPlant:
         if self._influences:
             self._wrench[:3] += acting.wrench[:3]
             self._wrench[3:] += acting.wrench[3:]
-            self._wrench[3:] += np.cross(self._origin - self._centre, acting.wrench[:3])
+            mujoco.mju_cross(self._moment, self._origin - self._centre, acting.wrench[:3])
+            self._wrench[3:] += self._moment
         if lost >= 0:
             # Left to itself, MuJoCo would write a warning to a file of its own.
             raise DivergenceError(

@@ -20,6 +20,25 @@ def heavier(testbed: Testbed, mass: Array) -> Testbed:
     return testbed.model_copy(update={"bar": bar})
 
 
+def harder_to_turn(testbed: Testbed, inertia: Array) -> Testbed:
+    """Return a machine whose bar has more inertia about both axes across it [kg·m²]."""
+    if testbed.bar is None:
+        return testbed
+    tensor, more = testbed.bar.inertia, float(inertia[0])
+    changed = tensor.model_copy(update={"iyy": tensor.iyy + more, "izz": tensor.izz + more})
+    bar = testbed.bar.model_copy(update={"inertia": changed})
+    return testbed.model_copy(update={"bar": bar})
+
+
+def off_centre(testbed: Testbed, shift: Array) -> Testbed:
+    """Return a machine whose bar has its centre of mass farther along it [m]."""
+    if testbed.bar is None:
+        return testbed
+    x, y, z = testbed.bar.com
+    bar = testbed.bar.model_copy(update={"com": (x + float(shift[0]), y, z)})
+    return testbed.model_copy(update={"bar": bar})
+
+
 def stiffer(testbed: Testbed, excess: Array) -> Testbed:
     """Return a machine of stiffer cables, by shares (n,)."""
 

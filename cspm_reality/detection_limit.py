@@ -35,6 +35,7 @@ class Noise(NamedTuple):
         tension: of measured tension less that of the cable's law, (n,) [N].
         cell: of a load cell as torque and radius show it, (n,) [N].
         force: of the sum of all tensions [N].
+        moment: of all tensions about the bar's origin [N·m].
         position: of a body [m].
     """
 
@@ -42,6 +43,7 @@ class Noise(NamedTuple):
     tension: Array
     cell: Array
     force: float
+    moment: float
     position: float
 
 
@@ -63,6 +65,9 @@ def detection_limits(scenes: Sequence[Scene], machine: Testbed) -> dict[str, lis
     noise = noise_of(machine, slopes)
     found = {}
     for name, phenomenon in PHENOMENA.items():
+        if machine.bar is None and phenomenon.at != CABLES:
+            found[name] = [float("inf")]
+            continue
         shown = _shown(phenomenon, scenes, machine, slopes, noise)
         with np.errstate(divide="ignore"):
             limits = np.where(shown > _STILL, 1.0 / shown, np.inf)
@@ -86,15 +91,20 @@ def stiffnesses(scenes: Sequence[Scene], machine: Testbed) -> Array:
 
 
 def noise_of(machine: Testbed, slopes: Array) -> Noise:
-    """Return the noise of one reading, from the sensors that the test-bed describes."""
-    position = machine.sensors["/bar/pose"].noise[0]
+    """Return the noise of one reading, from the sensors that the test-bed describes.
+
+    Where there is no bar, cables end where the file says, without noise.
+    """
+    position = machine.sensors["/bar/pose"].noise[0] if machine.bar is not None else 0.0
     winches = machine.sensors["/winches/state"]
     cell = machine.sensors["/cables/tension"].noise[0]
     radii = shaft_radii(machine)
     torque = np.hypot(winches.noise[2], winches.resolution[2] / np.sqrt(12.0))
+    arms = np.linalg.norm([cable.attachment or (0.0, 0.0, 0.0) for cable in machine.cables])
     shaft = np.hypot(torque, radii * cell)
     tension = np.hypot(cell, slopes * position)
-    return Noise(shaft, tension, shaft / radii, cell * float(np.sqrt(len(radii))), position)
+    force = cell * float(np.sqrt(len(radii)))
+    return Noise(shaft, tension, shaft / radii, force, cell * float(arms), position)
 
 
 def rms(values: Array) -> Array:
@@ -200,6 +210,17 @@ def _mass(scenes: Sequence[Scene], machine: Testbed, slopes: Array, noise: Noise
     return np.asarray(machine.gravity / noise.force)
 
 
+def _bar_inertia(scenes: Sequence[Scene], machine: Testbed, slopes: Array, noise: Noise) -> Array:
+    times = np.array([scene.time for scene in scenes])
+    across = np.array([scene.body[7:9] for scene in scenes])
+    return np.asarray(np.linalg.norm(rms(np.gradient(across, times, axis=0))) / noise.moment)
+
+
+def _bar_com(scenes: Sequence[Scene], machine: Testbed, slopes: Array, noise: Noise) -> Array:
+    assert machine.bar is not None
+    return np.asarray(machine.bar.mass * machine.gravity / noise.moment)
+
+
 def _stiffness(scenes: Sequence[Scene], machine: Testbed, slopes: Array, noise: Noise) -> Array:
     return rms(_tensions(scenes)) / noise.tension
 
@@ -247,6 +268,8 @@ def _shifted(scenes: Sequence[Scene], machine: Testbed, slopes: Array, noise: No
 
 _NUMBERS = {
     "mass": _mass,
+    "inertia of the bar": _bar_inertia,
+    "centre of mass": _bar_com,
     "stiffness": _stiffness,
     "damper": _damper,
     "inertia": _inertia,

@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 
 from cspm_msgs_py.testbed import Testbed
 from cspm_mujoco.influence import Influence
-from cspm_reality import air, alterations, faults, friction, rope, shaft
+from cspm_reality import air, alterations, faults, friction, payload, rope, shaft
 from cspm_reality.phenomenon import BAR, FRAME, Phenomenon
 from cspm_reality.sensors import Fault
 
@@ -82,7 +82,7 @@ _WINCHES = (
     ),
     Phenomenon(
         "eddy currents", None, "winch", None, unit=1e-3,
-        influence=_plain(shaft.EddyCurrentDrag),
+        influence=_plain(shaft.EddyCurrentDrag), driver="speed",
     ),
 )  # fmt: skip
 
@@ -105,11 +105,11 @@ _CABLES = (
     ),
     Phenomenon(
         "slip on the drum", None, "winch", None,
-        unit=1e-3, influence=_on_radii(rope.DrumSlip),
+        unit=1e-3, influence=_on_radii(rope.DrumSlip), driver="time",
     ),
     Phenomenon(
         "loosening anchor", None, "cable", None, unit=1e-3,
-        influence=lambda a, m, g: rope.LooseningAnchor(a, LOOSENING_ONSET),
+        influence=lambda a, m, g: rope.LooseningAnchor(a, LOOSENING_ONSET), driver="time",
     ),
 )  # fmt: skip
 
@@ -126,7 +126,11 @@ _BAR = (
     ),
     Phenomenon(
         "vibration", None, "bar", None, at=BAR, unit=0.1,
-        influence=lambda a, m, g: air.OutsideVibration(float(a[0])),
+        influence=lambda a, m, g: air.OutsideVibration(float(a[0])), driver="frequency",
+    ),
+    Phenomenon(
+        "strapped load", "payload_swing", "bar", "mass", at=BAR, unit=0.1,
+        influence=lambda a, m, g: payload.StrappedLoad(float(a[0]), m.gravity),
     ),
 )  # fmt: skip
 
@@ -139,7 +143,10 @@ _SENSORS = (
         "cell scale", "tension_gain", "sensor", "gain",
         unit=1e-2, faults=_cell(faults.CellGain), base=1.0, signed=True,
     ),
-    Phenomenon("warming cell", None, "sensor", None, unit=0.1, faults=_cell(faults.CellWarming)),
+    Phenomenon(
+        "warming cell", None, "sensor", None,
+        unit=0.1, faults=_cell(faults.CellWarming), driver="time",
+    ),
     Phenomenon(
         "encoder counts", "encoder_scale", "sensor", "scale", unit=1e-3, base=1.0, signed=True,
         faults=lambda a: {"/winches/state": faults.EncoderCounts(a)},
@@ -158,6 +165,14 @@ _NUMBERS = (
     Phenomenon(
         "mass", "bar_mass", "bar", "mass", at=BAR, unit=0.1,
         alter=alterations.heavier, signed=True,
+    ),
+    Phenomenon(
+        "inertia of the bar", "bar_inertia", "bar", "iyy", at=BAR, unit=0.01,
+        alter=alterations.harder_to_turn,
+    ),
+    Phenomenon(
+        "centre of mass", "bar_com", "bar", "x", at=BAR, unit=1e-3,
+        alter=alterations.off_centre, signed=True,
     ),
     Phenomenon(
         "stiffness", "cable_stiffness", "cable", "scale", unit=0.1, base=1.0,

@@ -36,6 +36,8 @@ class Phenomenon:
         alter: from test-bed and amounts to the machine as it is.
         base: the parameter's value where the amount is 0.
         signed: whether the amount may be negative as well.
+        driver: of what signal it is a function, as a diagnosis calls it, where the catalogue does
+            not have it and one signal tells it; None: no such thing.
     """
 
     name: str
@@ -49,6 +51,7 @@ class Phenomenon:
     alter: Callable[[Testbed, Array], Testbed] | None = None
     base: float = 0.0
     signed: bool = False
+    driver: str | None = None
 
     @property
     def kind(self) -> str:

@@ -1,9 +1,10 @@
 """What benchmarks draw, before anything is recorded."""
 
 import math
+import re
 import sys
 from collections import Counter
-from itertools import pairwise
+from itertools import combinations, pairwise
 from pathlib import Path
 
 import pytest
@@ -13,17 +14,21 @@ from cspm_msgs_py.testbed import load_testbed
 
 pytest.importorskip("mujoco", minversion="4.0", reason="the MuJoCo plant needs MuJoCo 4")
 from cspm_bringup import cli
+from cspm_bringup.blind import make as making
+from cspm_bringup.blind.concealed_run import machine_of
 from cspm_bringup.blind.item import amounts_of, draw_items, truth_of
 from cspm_bringup.blind.make import Request, make
 from cspm_bringup.blind.strata import STRATA
+from cspm_bringup.blind.truth import SPLITS
 from cspm_reality.phenomena import PHENOMENA
+from cspm_sim.effects import catalogue
 
 SCENARIOS = Path(__file__).resolve().parents[1] / "scenarios"
 MACHINE = load_testbed(SCENARIOS / "testbeds/thesis.yaml").testbed
 
 
 def draw(count=400, seed=5, strata=None):
-    return draw_items(strata or list(STRATA.values()), count, seed, 60.0, MACHINE)
+    return draw_items(strata or list(STRATA.values()), count, seed, 60.0, machine_of)
 
 
 def test_one_seed_draws_one_benchmark_and_another_another():
@@ -37,6 +42,9 @@ def test_strata_have_their_shares_and_enough_has_nothing_to_find():
     assert all(abs(counted[n] - 400 * s.share / whole) <= 1 for n, s in STRATA.items())
     assert counted["nothing"] >= 60
     assert counted["parameter"] >= 60
+    page = (SCENARIOS.parent / "docs/blind.md").read_text(encoding="utf-8")
+    rows = re.findall(r"^\| (\w+) \| .* \| (\d+) \|$", page, re.MULTILINE)
+    assert {name: int(count) for name, count in rows} == counted
 
 
 def test_the_order_of_names_tells_nothing_of_the_stratum():
@@ -63,6 +71,36 @@ def test_all_that_strata_name_is_there():
             assert case.absorbed_by is None or case.absorbed_by in PHENOMENA
     used = {n for s in STRATA.values() for c in s.cases for n in c.phenomena}
     assert used == set(PHENOMENA)
+
+
+def test_every_case_is_drawn_as_often_as_any_other_of_its_stratum():
+    counted = Counter((item.stratum, item.case) for item in draw())
+    for stratum in STRATA.values():
+        times = [counted[stratum.name, case] for case in stratum.cases]
+        assert min(times) >= 1
+        assert max(times) - min(times) <= 1
+    multiples = Counter(i.concealed[0].multiple for i in draw(4000) if i.stratum == "noise")
+    assert {abs(m) for m in multiples} == {0.5, 1.0, 2.0, 4.0}
+
+
+def test_all_that_the_catalogue_calls_twins_keep_company():
+    names = {p.effect: p.name for p in PHENOMENA.values() if p.effect}
+    twins = {
+        frozenset((names[effect.id], names[twin]))
+        for effect in catalogue().values()
+        for twin in effect.twins
+        if effect.id in names and twin in names
+    }
+    assert len(twins) >= 25
+    drawn = {frozenset(i.case.phenomena) for i in draw() if i.stratum == "company"}
+    assert twins <= drawn
+
+
+def test_splits_of_one_seed_have_nothing_in_common(tmp_path):
+    drawn = [making._items(request(tmp_path, split=split, count=50)) for split in SPLITS]
+    for one, other in combinations(drawn, 2):
+        assert not {i.name for i in one} & {i.name for i in other}
+        assert not {i.seed for i in one} & {i.seed for i in other}
 
 
 def test_amounts_are_the_multiple_of_each_cables_limit():
@@ -130,3 +168,13 @@ def test_a_truth_among_the_recordings_and_one_of_another_benchmark_are_refused(t
     (tmp_path / "truth.json").write_text('{"asked": {"seed": 2}}')
     with pytest.raises(InputError, match=r"of another benchmark \(\{'seed': 2\}\), allowed"):
         make(request(tmp_path))
+
+
+def test_what_cannot_show_is_refused_before_anything_is_recorded():
+    item = next(i for i in draw() if i.concealed and i.concealed[0].cables == (3,))
+    limits = {name: [math.inf] * 8 for name in PHENOMENA}
+    with pytest.raises(InputError, match=r"^--duration: .* does not show in .*, allowed: a longer"):
+        amounts_of(item, limits, 8)
+    name = item.concealed[0].phenomenon
+    limits[name] = [math.inf] * 3 + [0.5] + [math.inf] * 4
+    assert amounts_of(item, {n: limits[name] for n in limits}, 8)[name][3] != 0.0

@@ -1,8 +1,11 @@
 """The scorecard of made-up diagnoses, counted by hand."""
 
+import numpy as np
 import pytest
+from scipy.stats import binom
 
-from cspm_ident.blind.outcome import judge, kind_of
+from cspm_ident.blind.comparison import comparison
+from cspm_ident.blind.outcome import Beginning, judge, kind_of
 from cspm_ident.blind.page import scorecard_page
 from cspm_ident.blind.scorecard import scorecard
 from cspm_ident.blind.share import share, upper_bound
@@ -141,6 +144,21 @@ def test_shares_carry_the_intervals_of_clopper_and_pearson():
     assert upper_bound(0, 0) == 1.0
 
 
+@pytest.mark.parametrize("cases", [2, 7, 60])
+def test_intervals_hold_the_truth_as_often_as_they_promise(cases):
+    """Exactly, by summing over all outcomes; the narrowest that do so are not much wider."""
+    shares = [share([True] * hits + [False] * (cases - hits)) for hits in range(cases + 1)]
+    bounds = [upper_bound(hits, cases) for hits in range(cases + 1)]
+    least = {"interval": 1.0, "bound": 1.0}
+    for true in np.linspace(0.002, 0.998, 250):
+        chances = binom.pmf(np.arange(cases + 1), cases, true)
+        held = sum(c for c, s in zip(chances, shares, strict=True) if s.low <= true <= s.high)
+        below = sum(c for c, bound in zip(chances, bounds, strict=True) if true <= bound)
+        least = {"interval": min(least["interval"], held), "bound": min(least["bound"], below)}
+    assert 0.95 <= least["interval"] < 0.985
+    assert 0.95 <= least["bound"] < 0.96
+
+
 def card():
     truth = {
         "asked": {
@@ -171,7 +189,7 @@ def card():
         "f": result("effect", finding("tension_gain")),
         "h": {"diagnosis": None, "times": {"wall_s": 1.0, "cpu_s": 1.0}},
     }
-    return scorecard(truth, results)
+    return scorecard(truth, results) | {"peers": [], "ablations": []}
 
 
 def test_a_scorecard_counts():
@@ -190,6 +208,7 @@ def test_a_scorecard_counts():
         "false_alarm": (1, 2),
         "parameter_called_effect": (1, 1),
         "unknown_recognised": (0, 1),
+        "driver": (0, 0),
         "false_unknown": (0, 6),
         "failed": (1, 7),
     }
@@ -214,3 +233,71 @@ def test_the_page_says_what_split_it_is_of_and_tells_every_miss():
     assert "under development" in text
     assert "| d | nothing |  | 0 | effect | winch_coulomb_friction: surge_1 |" in text
     assert "| alarm where there is nothing | 50 % (1 of 2; 1 to 99) | ≤ 3 % |" in text
+
+
+def begun(onset, told, interval):
+    hidden = item("a", concealed()) | {"onset_s": onset}
+    said = finding(FRICTION) | {"onset_s": told, "onset_ci95_s": interval}
+    (found,) = judge(hidden, result("effect", said)).beginnings
+    return found
+
+
+def test_a_beginning_is_held_against_the_truth():
+    assert begun(12.0, 12.5, [11.0, 13.0]) == Beginning(12.0, 12.5, True)
+    assert begun(12.0, 12.5, [12.2, 13.0]) == Beginning(12.0, 12.5, False)
+    assert begun(12.0, None, None) == Beginning(12.0, None, None)
+    hidden = item("a", concealed()) | {"onset_s": 12.0}
+    assert judge(hidden, result("effect", finding("tension_gain"))).beginnings == ()
+
+
+def test_onsets_are_counted_late_and_false():
+    truth = {
+        "asked": {},
+        "items": [
+            item(name, concealed()) | {"onset_s": onset}
+            for name, onset in (("a", 12.0), ("b", 12.0), ("c", 0.0), ("d", 0.0))
+        ],
+    }
+    said = {"a": (12.5, [12.0, 13.0]), "b": (None, None), "c": (None, None), "d": (4.0, [3.0, 5.0])}
+    results = {
+        name: result("effect", finding(FRICTION) | {"onset_s": at, "onset_ci95_s": interval})
+        for name, (at, interval) in said.items()
+    }
+    onsets = scorecard(truth, results)["onsets"]
+    assert onsets["told"][:2] == (1, 2)
+    assert onsets["held"][:2] == (1, 1)
+    assert onsets["median_error_s"] == pytest.approx(0.5)
+    assert onsets["false"][:2] == (1, 2)
+
+
+def test_the_signal_of_the_unknown_has_to_be_the_right_one_on_the_right_element():
+    hidden = item("a", concealed(effect=None, kind="unknown") | {"driver": "speed"})
+
+    def told(driver, element="surge_1"):
+        said = finding("unknown", element, probability=None) | {"region": {"driver": driver}}
+        return judge(hidden, result("unknown", said)).driver
+
+    assert told("speed [rad/s]") is True
+    assert told("time [s]") is False
+    assert told("speed [rad/s]", "sway_1") is False
+    assert judge(hidden, result("consistent")).driver is None
+    assert judge(item("a", concealed()), result("unknown", finding("unknown"))).driver is None
+
+
+def test_methods_are_compared_on_the_recordings_that_all_have():
+    truth = {"asked": {}, "items": [item("a", concealed()), item("b", concealed()), item("c")]}
+    right = result("effect", finding(FRICTION))
+    wrong = result("effect", finding("tension_gain"), finding("bar_mass"))
+    rows = comparison(
+        truth,
+        {"cspm": {"a": right, "b": right, "c": right}, "lasso": {"a": wrong, "c": wrong}},
+    )
+    assert [(row["method"], row["scored"]) for row in rows] == [("cspm", 2), ("lasso", 2)]
+    assert [row["first"][:2] for row in rows] == [(1, 1), (0, 1)]
+    assert [row["false_alarm"][:2] for row in rows] == [(1, 1), (1, 1)]
+    assert [row["wrong_per_recording"] for row in rows] == [0.5, 2.0]
+    assert (rows[0]["before"], rows[0]["after"]) == pytest.approx((10.0, 1.2))
+    text = scorecard_page(card() | {"peers": rows}, "ab" * 32, "today")
+    assert "2 recordings, the same for all" in text
+    assert "| lasso | 1 of 1 | 1 of 1 | 0 of 1 | 0 of 1 |" in text
+    assert "## Without one safeguard" not in text

@@ -17,7 +17,7 @@ from cspm_bringup.blind import make as making
 from cspm_bringup.blind.commands import score_command
 from cspm_bringup.blind.concealed_run import NOTES, believed, record_concealed
 from cspm_bringup.blind.make import Request, make
-from cspm_bringup.blind.results import read_results
+from cspm_bringup.blind.results import read_results, tried
 from cspm_bringup.blind.run import environment, run
 from cspm_bringup.blind.stratum import Case, Stratum
 from cspm_bringup.blind.truth import truth_sha256
@@ -202,19 +202,28 @@ def test_a_diagnosis_that_fails_says_why_and_the_others_go_on(tmp_path, monkeypa
         (tmp_path / "recordings" / name / "x.mcap").write_text("no recording")
 
     def diagnose(words, *, cwd, **_):
-        if words[-2] == "a":
+        recording, *methods = words[3:]
+        if recording == "a":
             return subprocess.CompletedProcess(words, 1, "", "Traceback\nValueError: lost\n")
-        (Path(cwd) / words[-1]).write_text('{"verdict": "consistent"}')
+        for name in methods:
+            report = {"diagnosis": {"verdict": name}, "cpu_s": 1.0}
+            (Path(cwd) / f"{name}.json").write_text(json.dumps(report))
         return subprocess.CompletedProcess(words, 0, "", "")
 
     monkeypatch.setattr("cspm_bringup.blind.run.subprocess.run", diagnose)
     assert run(tmp_path) == {"a": "ValueError: lost"}
     found = read_results(tmp_path, ["a", "b", "empty"])
     assert found["a"]["diagnosis"] is None
-    assert found["b"]["diagnosis"] == {"verdict": "consistent"}
+    assert found["b"]["diagnosis"] == {"verdict": "cspm"}
     assert sorted(found) == ["a", "b"]
     with pytest.raises(InputError, match=r"a is not in the truth, allowed: its own recordings$"):
         read_results(tmp_path, ["b"])
+    assert run(tmp_path, methods=("cspm", "retuned")) == {
+        "a": "ValueError: lost",
+        "a, retuned": "ValueError: lost",
+    }
+    assert read_results(tmp_path, ["a", "b"], "retuned")["b"]["diagnosis"]["verdict"] == "retuned"
+    assert tried(tmp_path, ("retuned", "lasso")) == ["retuned"]
 
 
 def confined(code, room):

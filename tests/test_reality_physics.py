@@ -1,14 +1,18 @@
 """Each piece of concealed physics against what defines it."""
 
+from pathlib import Path
+
 import numpy as np
 import pytest
 
 pytest.importorskip("mujoco", minversion="4.0", reason="the MuJoCo plant needs MuJoCo 4")
+from cspm_msgs_py.testbed import load_testbed
 from cspm_mujoco.influence import Acting, Scene
-from cspm_reality import air, faults, friction, rope, shaft
+from cspm_reality import air, alterations, faults, friction, payload, rope, shaft
 from cspm_reality.late import Late, LateFault
 
 MS = 1e-3
+THESIS = Path(__file__).resolve().parents[1] / "scenarios/testbeds/thesis.yaml"
 EXIT, END = np.array([[0.0, 0.0, 0.0]]), np.array([[0.0, 0.0, 2.0]])
 
 
@@ -185,3 +189,43 @@ def test_drag_on_a_rope_has_the_moment_of_its_force():
     force = -0.4 * np.array([end[0], end[1], 0.0])
     assert wrench[:3] == pytest.approx(force)
     assert wrench[3:] == pytest.approx(np.cross(arm, force))
+
+
+def test_a_strapped_load_hangs_by_its_weight_and_swings_as_a_pendulum():
+    load = payload.StrappedLoad(0.2, 9.81)
+    still = scene(body=np.zeros(9))
+    for _ in range(2000):
+        load.advance(still, MS)
+    weight = acted(load, still).wrench
+    assert weight[:3] == pytest.approx([0.0, 0.0, 0.2 * 9.81], abs=1e-3)
+    assert weight[3:] == pytest.approx(np.zeros(3))
+    # The bar is put beside its load, which swings across from there on.
+    beside = scene(body=[0.02, *np.zeros(8)])
+    pulls = []
+    for _ in range(6000):
+        load.advance(beside, MS)
+        pulls.append(acted(load, beside).wrench[0])
+    crossings = np.flatnonzero(np.diff(np.sign(pulls)) > 0) * MS
+    period = np.mean(np.diff(crossings))
+    assert pulls[0] < 0.0
+    assert period == pytest.approx(2.0 * np.pi * np.sqrt(payload.STRAP / 9.81), rel=0.02)
+
+
+def test_a_strap_does_not_push():
+    load = payload.StrappedLoad(0.2, 9.81)
+    load.advance(scene(body=np.zeros(9)), MS)
+    fallen = scene(body=[0.0, 0.0, 0.3, *np.zeros(6)])
+    assert acted(load, fallen).wrench == pytest.approx(np.zeros(6))
+
+
+def test_a_bar_is_changed_in_the_numbers_that_are_meant():
+    machine = load_testbed(THESIS).testbed
+    turned = alterations.harder_to_turn(machine, np.array([0.3])).bar
+    assert turned.inertia.iyy - machine.bar.inertia.iyy == pytest.approx(0.3)
+    assert turned.inertia.izz - machine.bar.inertia.izz == pytest.approx(0.3)
+    assert turned.inertia.ixx == machine.bar.inertia.ixx
+    moved = alterations.off_centre(machine, np.array([-0.01])).bar
+    assert np.subtract(moved.com, machine.bar.com) == pytest.approx([-0.01, 0.0, 0.0])
+    rig = load_testbed(THESIS.with_name("one_winch.yaml")).testbed
+    assert alterations.harder_to_turn(rig, np.ones(1)) is rig
+    assert alterations.off_centre(rig, np.ones(1)) is rig

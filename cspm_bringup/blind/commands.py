@@ -5,22 +5,26 @@ from __future__ import annotations
 import json as json_format
 import os
 import platform
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from datetime import date
 from importlib.metadata import version
 from pathlib import Path
+from typing import Any
 
 from rich.console import Console
 from rich.markup import escape
 from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeRemainingColumn
 
-from cspm_bringup.blind.results import read_results
+from cspm_bringup.blind.results import read_results, tried
 from cspm_bringup.blind.run import run
-from cspm_bringup.blind.truth import read_truth, truth_sha256
+from cspm_bringup.blind.scorings import enter_scoring
+from cspm_bringup.blind.truth import SEALED, read_truth, truth_sha256
 from cspm_bringup.console import make_console, say
 from cspm_bringup.plants import require_mujoco
 from cspm_bringup.summary import write_json
+from cspm_ident.blind.comparison import comparison
+from cspm_ident.blind.method import ABLATED, CSPM, PEERS
 from cspm_ident.blind.page import scorecard_page
 from cspm_ident.blind.scorecard import scorecard
 from cspm_msgs_py.errors import InputError
@@ -51,11 +55,11 @@ def make_command(
         make(asked, show)
 
 
-def run_command(folder: Path) -> None:
+def run_command(folder: Path, methods: Sequence[str]) -> None:
     """Diagnose a benchmark's recordings; see `run`."""
     console = make_console()
     with _bar(console) as show:
-        failed = run(folder, show)
+        failed = run(folder, show, methods)
     for name, reason in failed.items():
         say(console, f"{name}: {reason}")
 
@@ -66,14 +70,24 @@ def score_command(
     """Open the truth, check that it is the sealed one, and score.
 
     Raises:
-        InputError: no truth, or another than that of the hash.
+        InputError: no truth, another than that of the hash, or a sealed one that was opened before.
     """
     console = make_console()
     content = read_truth(truth)
     found = truth_sha256(truth)
     if sha256 is not None and sha256.lower() != found:
         raise InputError(f"{truth}: SHA-256 {found}, allowed: that of --sha256, {sha256}")
-    card = scorecard(content, read_results(folder, [item["name"] for item in content["items"]]))
+    names = [item["name"] for item in content["items"]]
+    results = {
+        method: read_results(folder, names, method)
+        for method in (CSPM, *tried(folder, (*PEERS, *ABLATED)))
+    }
+    if content["asked"]["split"] == SEALED:
+        enter_scoring(truth, found, results, date.today())
+    card = scorecard(content, results[CSPM]) | {
+        "peers": _compared(content, results, PEERS),
+        "ablations": _compared(content, results, ABLATED),
+    }
     machine = (
         f"{date.today()} on {os.cpu_count()} processors ({platform.machine()}), cspm"
         f" {version('cspm')}"
@@ -84,6 +98,16 @@ def score_command(
         page.write_text(text, encoding="utf-8")
     if json is not None:
         write_json(json, json_format.loads(json_format.dumps(card)) | {"truth_sha256": found})
+
+
+def _compared(
+    truth: Mapping[str, Any],
+    results: Mapping[str, Mapping[str, Mapping[str, Any]]],
+    methods: Sequence[str],
+) -> list[dict[str, Any]]:
+    """Return the rows of the diagnosis and of those methods that were tried, none of it alone."""
+    those = {name: results[name] for name in (CSPM, *methods) if name in results}
+    return comparison(truth, those) if len(those) > 1 else []
 
 
 @contextmanager

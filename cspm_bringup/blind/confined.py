@@ -1,17 +1,19 @@
 """A process that diagnoses the recording it is given and may open nothing but that and code.
 
-    python -m cspm_bringup.blind.confined RECORDING JSON
+    python -m cspm_bringup.blind.confined RECORDING METHOD...
 
-The recording lies in the present folder, where the result goes. Files elsewhere are refused by an
+The recording lies in the present folder, where the results go. Files elsewhere are refused by an
 audit hook, which guards against mistakes of ours, not against hostile code.
 """
 
 from __future__ import annotations
 
+import json
 import os
 import site
 import sys
 import sysconfig
+import traceback
 from pathlib import Path
 
 _SYSTEM = ("/usr", "/lib", "/lib64", "/etc", "/proc", "/sys", "/dev")
@@ -54,13 +56,24 @@ def confine(room: Path) -> None:
 
 
 def main() -> None:
-    """Diagnose the recording named first, and write its diagnosis to the file named second."""
-    recording, report = sys.argv[1:]
-    confine(Path.cwd())
-    from cspm_bringup.cli import main as command_line
+    """Diagnose the recording named first by the methods named after it.
 
-    sys.argv = ["cspm", "diagnose", recording, "--json", report]
-    command_line()
+    Of each, its diagnosis and its processor time [s], or why there are none.
+    """
+    recording, *methods = sys.argv[1:]
+    confine(Path.cwd())
+    from cspm_ident.blind.method import Methods
+
+    bench = Methods(Path(recording))
+    for name in methods:
+        try:
+            told, seconds = bench.diagnosis_by(name)
+        except Exception:
+            # Other methods go on.
+            Path(f"{name}.txt").write_text(traceback.format_exc(), encoding="utf-8")
+            continue
+        content = json.dumps({"diagnosis": told, "cpu_s": seconds})
+        Path(f"{name}.json").write_text(content, encoding="utf-8")
 
 
 if __name__ == "__main__":

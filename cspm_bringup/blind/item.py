@@ -2,12 +2,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from typing import Any, NamedTuple
 
 import numpy as np
 
 from cspm_bringup.blind.stratum import Case, Stratum
+from cspm_msgs_py.errors import InputError
 from cspm_msgs_py.testbed import Testbed
 from cspm_reality.phenomena import PHENOMENA
 from cspm_reality.phenomenon import BAR, CABLES, FRAME
@@ -54,19 +55,26 @@ class Item(NamedTuple):
 
 
 def draw_items(
-    strata: Sequence[Stratum], count: int, seed: int, duration: float, machine: Testbed
+    strata: Sequence[Stratum],
+    count: int,
+    seed: int,
+    duration: float,
+    machine_of: Callable[[str], Testbed],
 ) -> list[Item]:
     """Draw recordings, in the order of their names, which is none.
 
-    Strata get numbers in proportion to their shares; the rest is drawn.
+    Strata get numbers in proportion to their shares, cases of a stratum and amounts of a case equal
+    ones as far as that goes; the rest is drawn. `machine_of` returns the machine of a scenario.
     """
     generator = np.random.default_rng([seed, 7])
     names = _names(generator, count)
     effects = sorted({p.effect for p in PHENOMENA.values() if p.effect})
     items = []
+    decks = {stratum.name: _deck(stratum, generator) for stratum in strata}
     for name, stratum in zip(names, _dealt(strata, count), strict=True):
-        case = stratum.cases[int(generator.integers(len(stratum.cases)))]
-        multiple = float(generator.choice(case.multiples))
+        case, multiple = next(decks[stratum.name])
+        scenario = str(generator.choice(case.scenarios))
+        machine = machine_of(scenario)
         cable = int(generator.integers(len(machine.cables)))
         signs = generator.choice((-1.0, 1.0), len(case.phenomena))
         concealed = tuple(
@@ -78,7 +86,7 @@ def draw_items(
                 name,
                 stratum.name,
                 case,
-                str(generator.choice(case.scenarios)),
+                scenario,
                 int(generator.integers(1, 2**31)),
                 concealed,
                 round(case.onset_share * duration, 3),
@@ -86,6 +94,18 @@ def draw_items(
             )
         )
     return sorted(items)
+
+
+def _deck(stratum: Stratum, generator: np.random.Generator) -> Iterator[tuple[Case, float]]:
+    """Yield cases, each once before any comes again, and of each its amounts in the same way."""
+    amounts = [_shuffled(case.multiples, generator) for case in stratum.cases]
+    for k in _shuffled(range(len(stratum.cases)), generator):
+        yield stratum.cases[int(k)], float(next(amounts[int(k)]))
+
+
+def _shuffled(values: Sequence[float], generator: np.random.Generator) -> Iterator[float]:
+    while True:
+        yield from generator.permutation(np.asarray(values)).tolist()
 
 
 def _conceal(
@@ -150,6 +170,7 @@ def _told(each: Concealed, amounts: Sequence[float], machine: Testbed) -> dict[s
         "elements": elements,
         "multiple": abs(each.multiple),
         "parameter": phenomenon.parameter,
+        "driver": phenomenon.driver,
         "base": phenomenon.base,
         "values": {
             element: phenomenon.base + float(amount)
@@ -161,10 +182,19 @@ def _told(each: Concealed, amounts: Sequence[float], machine: Testbed) -> dict[s
 def amounts_of(
     item: Item, limits: Mapping[str, Sequence[float]], cables: int
 ) -> dict[str, list[float]]:
-    """Return each phenomenon's amounts per cable, or the one for bar or frame."""
+    """Return each phenomenon's amounts per cable, or the one for bar or frame.
+
+    Raises:
+        InputError: something does not show in so short a recording.
+    """
     out = {}
     for each in item.concealed:
         limit = limits[each.phenomenon]
+        if not all(np.isfinite(limit[i]) for i in each.cables or (0,)):
+            raise InputError(
+                f"--duration: {each.phenomenon} does not show in {item.scenario}, allowed: a longer"
+                " one, or other --strata"
+            )
         if PHENOMENA[each.phenomenon].at != CABLES:
             out[each.phenomenon] = [each.multiple * limit[0]]
             continue

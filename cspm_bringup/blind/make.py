@@ -83,7 +83,13 @@ def make(request: Request, tell: Tell = lambda text, done, total: None) -> str:
         )
     digest = truth_sha256(request.truth)
     tell(f"truth {request.truth}, SHA-256 {digest}", 0, request.count)
-    for done, (item, told) in enumerate(zip(_items(request), truth["items"], strict=True)):
+    items = _items(request)
+    if [item.name for item in items] != [told["name"] for told in truth["items"]]:
+        raise InputError(
+            f"{request.truth}: drawn by another version of cspm, allowed: to be gone on with by"
+            " that, or a new file"
+        )
+    for done, (item, told) in enumerate(zip(items, truth["items"], strict=True)):
         tell(f"recording {item.name}", done, request.count)
         _record(request, item, told["amounts"])
     shutil.rmtree(request.folder / ".part", ignore_errors=True)
@@ -108,10 +114,9 @@ def _check(request: Request) -> None:
 
 
 def _items(request: Request) -> list[Item]:
-    machine = machine_of("calm")
     seed = request.seed * len(SPLITS) + SPLITS.index(request.split)
     strata = [STRATA[name] for name in request.strata]
-    return draw_items(strata, request.count, seed, request.duration, machine)
+    return draw_items(strata, request.count, seed, request.duration, machine_of)
 
 
 def _write_truth(request: Request, tell: Tell) -> None:

@@ -8,20 +8,28 @@ from pathlib import Path
 from typing import Any
 
 from cspm_bringup.blind.run import DIAGNOSIS, TIMES
-from cspm_bringup.blind.truth import RESULTS
+from cspm_bringup.blind.truth import results_of
+from cspm_ident.blind.method import CSPM
 from cspm_msgs_py.errors import InputError
 
 
-def read_results(folder: Path, names: Sequence[str]) -> Mapping[str, Mapping[str, Any]]:
+def tried(folder: Path, methods: Sequence[str]) -> list[str]:
+    """Return those methods that have results of a benchmark."""
+    return [method for method in methods if results_of(folder, method).is_dir()]
+
+
+def read_results(
+    folder: Path, names: Sequence[str], method: str = CSPM
+) -> Mapping[str, Mapping[str, Any]]:
     """Return, by recording, `diagnosis` (None: it failed) and `times`; only what was diagnosed.
 
     Raises:
         InputError: there are no results, or they are of another benchmark.
     """
-    place = folder / RESULTS
+    place = results_of(folder, method)
     found = sorted(p.name for p in place.iterdir() if p.name[0] != ".") if place.is_dir() else []
     if not found:
-        raise InputError(f"{folder}: no {RESULTS}, allowed: a folder after `cspm blind run`")
+        raise InputError(f"{folder}: no {place.name}, allowed: a folder after `cspm blind run`")
     strange = sorted(set(found) - set(names))
     if strange:
         raise InputError(f"{place}: {strange[0]} is not in the truth, allowed: its own recordings")

@@ -6,7 +6,8 @@ from dataclasses import dataclass
 
 MOVING = ("calm", "worst_case")
 # Winches locked: what needs turning motors does not show in it.
-ANY = (*MOVING, "verification_mid")
+LOCKED = ("verification_mid", "factor_six_mid")
+ANY = (*MOVING, *LOCKED)
 
 
 @dataclass(frozen=True)

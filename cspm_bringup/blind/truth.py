@@ -7,11 +7,19 @@ import json
 from pathlib import Path
 from typing import Any
 
+from cspm_ident.blind.method import CSPM
 from cspm_msgs_py.errors import InputError
 
 SCHEMA = "cspm.blind-truth/1"
-SPLITS = ("dev", "tune", "sealed")
-RECORDINGS, RESULTS = "recordings", "results"
+SEALED = "sealed"
+SPLITS = ("dev", "tune", SEALED)
+RECORDINGS = "recordings"
+_RESULTS = "results"
+
+
+def results_of(folder: Path, method: str) -> Path:
+    """Return where a method's results of a benchmark lie."""
+    return folder / (_RESULTS if method == CSPM else f"{_RESULTS}-{method}")
 
 
 def truth_sha256(path: Path) -> str:

@@ -34,6 +34,21 @@ class Estimate:
 
 
 @dataclass(frozen=True)
+class Beginning:
+    """When something that was named began.
+
+    Attributes:
+        true: [s]; 0: it was there from the start.
+        told: [s]; None: as of something that acts all the time.
+        held: whether the 95 % interval told holds the truth; None without one.
+    """
+
+    true: float
+    told: float | None
+    held: bool | None
+
+
+@dataclass(frozen=True)
 class Outcome:
     """How one diagnosis did.
 
@@ -55,6 +70,9 @@ class Outcome:
         tie_sizes: of the sets that hold a truth.
         wrong: number of findings whose tie set holds no truth.
         unknown: whether something unknown was reported.
+        driver: whether what the catalogue lacks was said to be a function of the right signal, on
+            its elements; None where none is right, or nothing unknown was reported.
+        beginnings: of what was named.
         estimates: of the parameters named.
         probabilities: of the findings named, with whether they are right.
         fit: held-out errors in units of the noise floor: before, re-tuned, after, of the residual
@@ -79,6 +97,8 @@ class Outcome:
     tie_sizes: tuple[int, ...]
     wrong: int
     unknown: bool
+    driver: bool | None
+    beginnings: tuple[Beginning, ...]
     estimates: tuple[Estimate, ...]
     probabilities: tuple[tuple[float, bool], ...]
     fit: tuple[float, float, float] | None
@@ -120,6 +140,8 @@ def judge(item: Data, result: Data) -> Outcome:
         tie_sizes=tuple(len(tie_set(f)) for f in holding),
         wrong=len(findings) - len(holding),
         unknown=any(f["effect"] == UNKNOWN for f in findings),
+        driver=_driver(concealed, findings),
+        beginnings=tuple(b for c in concealed for b in _beginnings(item, c, findings)),
         estimates=tuple(e for c in concealed for e in _estimates(c, findings)),
         probabilities=tuple(
             (f["probability"], f["effect"] in right)
@@ -153,6 +175,29 @@ def _same_elements(finding: Data, concealed: Data) -> bool:
 def _is_named(concealed: Data, findings: Sequence[Data]) -> bool:
     wanted = concealed["effect"] or UNKNOWN
     return any(f["effect"] == wanted and _same_elements(f, concealed) for f in findings)
+
+
+def _driver(concealed: Sequence[Data], findings: Sequence[Data]) -> bool | None:
+    unknown = [f for f in findings if f["effect"] == UNKNOWN]
+    drivers = [(c["driver"], c) for c in concealed if c.get("driver")]
+    if not unknown or not drivers:
+        return None
+    return any(
+        str(f["region"].get("driver", "")).startswith(driver) and _same_elements(f, c)
+        for f in unknown
+        for driver, c in drivers
+    )
+
+
+def _beginnings(item: Data, concealed: Data, findings: Sequence[Data]) -> list[Beginning]:
+    """Return when a concealed effect was said to begin, where it was named."""
+    true, found = float(item.get("onset_s", 0.0)), []
+    for finding in findings:
+        if finding["effect"] == concealed["effect"] and _same_elements(finding, concealed):
+            told, interval = finding.get("onset_s"), finding.get("onset_ci95_s")
+            held = None if interval is None else interval[0] <= true <= interval[1]
+            found.append(Beginning(true, told, held))
+    return found
 
 
 def _estimates(concealed: Data, findings: Sequence[Data]) -> list[Estimate]:

@@ -35,7 +35,7 @@ def scorecard_page(card: Data, sha256: str, machine: str) -> str:
     """Return the scorecard as Markdown.
 
     Args:
-        card: the scorecard.
+        card: the scorecard, with the rows of `peers` and `ablations` beside it (`comparison`).
         sha256: of the truth file.
         machine: what scored it, and when.
     """
@@ -46,6 +46,8 @@ def scorecard_page(card: Data, sha256: str, machine: str) -> str:
         "Known effects and numbers at 2 detection limits and more; intervals of 95 % after Clopper"
         " and Pearson.",
         _targets(card),
+        *_methods("## Peers", _PEERS, card["peers"]),
+        *_methods("## Without one safeguard", _ABLATIONS, card["ablations"]),
         "## By amount",
         _table(
             ("detection limits", "cases", "detected", "among the ties", "named"),
@@ -76,6 +78,7 @@ def scorecard_page(card: Data, sha256: str, machine: str) -> str:
         "## Parameters, fit, probabilities, time",
         _numbers(card),
         _calibration(card["calibration"]),
+        _onsets(card["onsets"], card["shares"]["driver"]),
         "## Every recording",
         _recordings(card["outcomes"]),
     ]
@@ -105,6 +108,64 @@ def _targets(card: Data) -> str:
     rows.append(("held-out error within 1.5 × floor", _percent(fit["near_floor"]), ""))
     rows.append(("held-out error below re-tuned", _percent(fit["below_retuned"]), "≥ 95 %"))
     return _table(("", "found", "target"), rows)
+
+
+def _methods(title: str, words: str, rows: Sequence[Data]) -> list[str]:
+    if not rows:
+        return []
+    heads = (
+        *("method", "block", "element", "named first", "among the ties", "ties"),
+        *(
+            "named, nothing wrong beside",
+            "alarm",
+            "wrong findings",
+            "unknown",
+            "intervals",
+            "held-out",
+            "CPU s",
+        ),
+    )
+    table = _table(heads, (_method(row) for row in rows))
+    return [title, f"{words} {rows[0]['scored']} recordings, the same for all. {_COLUMNS}", table]
+
+
+def _method(row: Data) -> tuple[str, ...]:
+    shares = (_short(row[key]) for key in ("block", "element", "first", "tied"))
+    return (
+        row["method"],
+        *shares,
+        _number(row["mean_tie_size"]),
+        _short(row["nothing_wrong_beside"]),
+        _short(row["false_alarm"]),
+        f"{row['wrong_per_recording']:.1f}",
+        _short(row["unknown_recognised"]),
+        _short(row["covered"]),
+        f"{_number(row['before'])} → {_number(row['after'])}",
+        _number(row["seconds"]),
+    )
+
+
+_PEERS = (
+    "Others' ways on the same residuals, see [blind.md](blind.md#peers); `retuned` is what a"
+    " laboratory does today."
+)
+_ABLATIONS = "What each safeguard is worth, see [blind.md](blind.md#without-one-safeguard)."
+_COLUMNS = (
+    "Hits and cases are those of the targets; wrong findings are per recording; held-out is the"
+    " worst residual in units of its noise, before and after, median of known effects and numbers"
+    " at 2 limits and more, named or not."
+)
+
+
+def _onsets(found: Data, driver: Sequence[float]) -> str:
+    error = found["median_error_s"]
+    return (
+        f"Of what was named and began late, a beginning was told for {_percent(found['told'])},"
+        f" with a median error of {'—' if error is None else f'{error:.1f} s'}, and its interval"
+        f" held the truth for {_percent(found['held'])}; of what was there from the start, one was"
+        f" told for {_percent(found['false'])}. Of the unknown that was recognised, the signal that"
+        f" it depends on was right, on its elements, for {_percent(driver)}."
+    )
 
 
 def _strata(rows: Sequence[Data]) -> str:
@@ -171,6 +232,11 @@ def _percent(found: Sequence[float]) -> str:
     return (
         f"{100 * hits / cases:.0f} % ({hits:g} of {cases:g}; {100 * low:.0f} to {100 * high:.0f})"
     )
+
+
+def _short(found: Sequence[float]) -> str:
+    hits, cases, *_ = found
+    return f"{hits:g} of {cases:g}" if cases else "—"
 
 
 def _number(value: float | None) -> str:

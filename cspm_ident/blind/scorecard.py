@@ -48,6 +48,7 @@ def scorecard(truth: Mapping[str, Any], results: Mapping[str, Mapping[str, Any]]
         "confusion": _confusion(outcomes),
         "effects": _effects(outcomes),
         "parameters": _parameters(outcomes),
+        "onsets": _onsets(outcomes),
         "fit": _fit(outcomes),
         "calibration": _calibration(outcomes),
         "seconds": _seconds(outcomes),
@@ -75,6 +76,7 @@ def _shares(outcomes: Sequence[Outcome], clear: Sequence[Outcome]) -> dict[str, 
         "false_alarm_upper": upper_bound(alarms, len(blank)),
         "parameter_called_effect": share(o.verdict == EFFECT for o in numbers),
         "unknown_recognised": share(o.unknown for o in outside),
+        "driver": share(o.driver for o in outside if o.driver is not None),
         "false_unknown": share(o.unknown for o in inside),
         "failed": share(o.verdict == FAILED for o in outcomes),
         "mean_tie_size": _mean([float(s) for o in clear for s in o.tie_sizes]),
@@ -142,6 +144,18 @@ def _parameters(outcomes: Sequence[Outcome]) -> dict[str, Any]:
         "median_error": median(errors) if errors else None,
         "within_a_tenth": share(error <= 0.1 for error in errors),
         "covered": share(e.covered for e in estimates if e.covered is not None),
+    }
+
+
+def _onsets(outcomes: Sequence[Outcome]) -> dict[str, Any]:
+    told = [b for o in outcomes for b in o.beginnings]
+    late = [b for b in told if b.true > 0.0]
+    errors = [abs(b.told - b.true) for b in late if b.told is not None]
+    return {
+        "told": share(b.told is not None for b in late),
+        "held": share(b.held for b in late if b.held is not None),
+        "median_error_s": median(errors) if errors else None,
+        "false": share(b.told is not None for b in told if b.true == 0.0),
     }
 
 

@@ -24,11 +24,12 @@ from cspm_ident.diagnosis.parameters import weights_of
 from cspm_ident.diagnosis.recorded import equations_of
 from cspm_ident.diagnosis.refine import Cut, Weights
 from cspm_ident.diagnosis.region import Region, region_of
+from cspm_ident.diagnosis.safeguards import ALL_SAFEGUARDS, Safeguards
 from cspm_ident.diagnosis.search import Search
 from cspm_ident.diagnosis.simulation import SimulatedFit, Worth
 from cspm_ident.signals.measurement import Measurement
 from cspm_msgs_py.errors import InputError
-from cspm_sim.effects import Effect, catalogue
+from cspm_sim.effects import Effect
 
 Array = NDArray[np.float64]
 Progress = Callable[[str], None]
@@ -106,6 +107,7 @@ def diagnose(
     searched: Sequence[Measurement],
     held_out: Sequence[Measurement] = (),
     progress: Progress = lambda _: None,
+    safeguards: Safeguards = ALL_SAFEGUARDS,
 ) -> Diagnosis:
     """Look for what the described machine lacks.
 
@@ -113,25 +115,26 @@ def diagnose(
         searched: recordings in which to look; all of one machine.
         held_out: others on which to judge what was found; none: the last part of each searched one.
         progress: called with what is being done.
+        safeguards: all of them, but for comparisons.
 
     Raises:
         InputError: the recordings have no residual that could be looked at.
     """
-    effects, knots = list(catalogue().values()), Knots()
+    effects, knots = safeguards.effects, Knots()
     search_parts, judge_parts = _parts(searched, held_out, effects, knots, progress)
     hums = [_hums(m, part, {}) for m, part in zip(searched, search_parts, strict=True)]
     search_parts = _beside(search_parts, hums)
     if not held_out:
         judge_parts = _beside(judge_parts, hums)
-    noise = _noise(steady(search_parts))
+    noise = noise_of(steady(search_parts))
     spans = [span_of(part) for part in search_parts]
     block = max(SHORTEST_BLOCK_S, sum(b - a for a, b in spans) / BLOCKS)
     evidence = gather(in_noise(steady(search_parts), noise), block)
-    search = Search(evidence, progress)
+    search = Search(evidence, progress, safeguards.sums)
     found = search.run()
     progress("held-out data")
     judge = _judge(in_noise(judge_parts, noise), found, block)
-    kept, rejected = _confirmed(search, judge, found)
+    kept, rejected = _confirmed(search, judge, found) if safeguards.held_out else (found.named, ())
     starts = [span_of(part)[0] for part in judge_parts]
     judges = held_out or [m.within(s, np.inf) for m, s in zip(searched, starts, strict=True)]
     retuned = search.retuned()
@@ -139,7 +142,7 @@ def diagnose(
     data = Data(searched, searched_part, judges, in_noise(search_parts, noise), noise, block)
     progress("parameters, and simulation of held-out data")
     model = modelled(search, kept, data, retuned)
-    while model.useless:
+    while safeguards.held_out and model.useless:
         rejected += tuple(kept[k] for k in model.useless)
         kept = tuple(each for k, each in enumerate(kept) if k not in model.useless)
         model = modelled(search, kept, data, retuned)
@@ -236,7 +239,7 @@ def _judge(parts: Parts, found: Findings, block: float) -> Evidence:
     return gather([[e.only(terms) for e in part] for part in parts], block)
 
 
-def _noise(parts: Sequence[Sequence[Equation]]) -> dict[Place, Array]:
+def noise_of(parts: Sequence[Sequence[Equation]]) -> dict[Place, Array]:
     """Return the noise of every residual, the median over recordings and stretches."""
     found: dict[Place, list[Array]] = {}
     for equations in parts:

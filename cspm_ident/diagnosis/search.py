@@ -49,11 +49,14 @@ class Search:
     """Looks through a catalogue for what explains the residuals of some recordings."""
 
     def __init__(
-        self, evidence: Evidence, progress: Callable[[str], None] = lambda _: None
+        self,
+        evidence: Evidence,
+        progress: Callable[[str], None] = lambda _: None,
+        sums: Callable[[Evidence], Sums] = Sums,
     ) -> None:
-        """Take the sums of all residuals."""
+        """Take the sums of all residuals, of which `sums` tells what is sure."""
         self.evidence = evidence
-        self.sums = Sums(evidence)
+        self.sums = sums(evidence)
         self._progress = progress
         self._effects = [c for c in evidence.terms if isinstance(c, Candidate) and self._shows(c)]
         self._drivers = [d for d in evidence.terms if isinstance(d, Driver)]

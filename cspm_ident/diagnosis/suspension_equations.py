@@ -17,7 +17,7 @@ from cspm_ident.diagnosis.readings import pose_rows, reading_rows
 from cspm_ident.diagnosis.suspension import Suspension
 from cspm_ident.signals.measurement import TENSION, WINCHES
 from cspm_ident.signals.timeline import Timeline, whole_stretches
-from cspm_ident.winch.weak_form import make_window, weigh
+from cspm_ident.winch.weak_form import Make, maker, weigh
 from cspm_msgs_py.dofs import DOFS
 from cspm_msgs_py.testbed import Testbed
 from cspm_sim.effect_entries import Action
@@ -64,11 +64,11 @@ def suspension_equations(
         fine: under the shortest windows, whatever the noise.
     """
     signals = machine_signals(timeline)
-    machine = timeline.measurement.machine
+    machine, make = timeline.measurement.machine, maker(timeline.measurement.pointwise)
     return [
         equation
         for stretch in signals
-        for equation in _Stretch(stretch, machine, timeline.pose_band, fine).equations(
+        for equation in _Stretch(stretch, machine, timeline.pose_band, fine, make).equations(
             effects, known, knots
         )
     ]
@@ -98,8 +98,10 @@ def machine_signals(timeline: Timeline) -> list[MachineSignals]:
 class _Stretch:
     """One stretch and the window that weighs it."""
 
-    def __init__(self, signals: MachineSignals, machine: Testbed, band: float, fine: bool) -> None:
-        self._signals, self._machine = signals, machine
+    def __init__(
+        self, signals: MachineSignals, machine: Testbed, band: float, fine: bool, make: Make
+    ) -> None:
+        self._signals, self._machine, self._make = signals, machine, make
         self._parameters: PlantParameters = nominal_parameters(machine)
         self._here = Suspension(signals, machine, self._parameters)
         missing = {
@@ -126,7 +128,7 @@ class _Stretch:
 
     def _window_of(self, half_s: float) -> tuple[Array, int]:
         half = max(2, round(half_s / self._signals.step))
-        return make_window(half, self._signals.step).weights, max(1, half // 2)
+        return self._make(half, self._signals.step).weights, max(1, half // 2)
 
     def equations(
         self, effects: Sequence[Effect], known: Sequence[Action], knots: Knots | None

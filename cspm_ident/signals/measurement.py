@@ -49,6 +49,8 @@ class Measurement:
         torque_age: how long before its stamp the reported torque acted, on average [s]. A simulated
             drive reports what it held since the stamp before: half a period. Of others nothing is
             known, and 0 is taken.
+        pointwise: whether equations hold at single samples instead of under windows, for
+            comparison.
     """
 
     path: Path
@@ -62,6 +64,7 @@ class Measurement:
     tension: Samples | None = None
     command: Samples | None = None
     torque_age: float = 0.0
+    pointwise: bool = False
 
     @property
     def machine(self) -> Testbed:
@@ -133,7 +136,7 @@ def read_measurement(path: Path, testbed: Path | None = None) -> Measurement:
         parts.update(_samples(name, found[name], rows[name], start, machine.testbed))
     torque = parts.get("torque")
     age = 0.5 * torque.interval if simulated and torque is not None else 0.0
-    return Measurement(path, digest.result(), machine, **parts, torque_age=age)
+    return Measurement(path, digest.result(), machine, **parts, torque_age=age, pointwise=False)
 
 
 def _count(recording: Recording, name: str) -> int:

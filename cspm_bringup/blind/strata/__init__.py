@@ -12,10 +12,11 @@ from cspm_bringup.blind.strata.nothing import NOTHING
 from cspm_bringup.blind.strata.onset import ONSET
 from cspm_bringup.blind.strata.outside import OUTSIDE
 from cspm_bringup.blind.strata.parameter import PARAMETER
+from cspm_bringup.blind.strata.rig import RIG
 from cspm_bringup.blind.stratum import Stratum
 
 _ALL = (
     *(NOTHING, PARAMETER, NOISE, FEEDBACK, MISTUNED),
-    *(COMPANY, ABSENCE, ONSET, EVERYWHERE, OUTSIDE),
+    *(COMPANY, ABSENCE, ONSET, EVERYWHERE, OUTSIDE, RIG),
 )
 STRATA: Mapping[str, Stratum] = {each.name: each for each in _ALL}

@@ -9,12 +9,12 @@ _ON_MOVING = (
 )
 _ON_ANY = (
     *("internal friction", "slow elongation", "drag on ropes", "air", "wind", "cell zero"),
-    *("cell scale", "late tracker", "shifted markers"),
+    *("cell scale", "late tracker", "shifted markers", "strapped load"),
 )
 
 NOISE = Stratum(
     "noise",
-    6.0,
+    7.0,
     tuple(Case((name,), _MULTIPLES, MOVING) for name in _ON_MOVING)
     + tuple(Case((name,), _MULTIPLES, ANY) for name in _ON_ANY),
 )

@@ -4,9 +4,11 @@ from cspm_bringup.blind.stratum import ANY, MOVING, Case, Stratum
 
 PARAMETER = Stratum(
     "parameter",
-    3.0,
+    4.0,
     (
         Case(("mass",), (2.0, 4.0), ANY),
+        Case(("centre of mass",), (2.0, 4.0), ANY),
+        Case(("inertia of the bar",), (2.0, 4.0), ("worst_case",)),
         Case(("stiffness",), (2.0, 4.0), ANY),
         Case(("damper",), (2.0, 4.0), MOVING),
         Case(("inertia",), (2.0, 4.0), MOVING),

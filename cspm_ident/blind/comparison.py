@@ -1,0 +1,49 @@
+"""Several methods on the same recordings, side by side."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from statistics import median
+from typing import Any
+
+from cspm_ident.blind.outcome import EFFECT, PARAMETER
+from cspm_ident.blind.scorecard import CLEAR, scorecard
+
+Data = Mapping[str, Any]
+
+_SHARES = (
+    *("block", "element", "first", "tied", "nothing_wrong_beside"),
+    *("false_alarm", "unknown_recognised", "failed"),
+)
+
+
+def comparison(truth: Data, results: Mapping[str, Mapping[str, Data]]) -> list[dict[str, Any]]:
+    """Return one row of scores per method, in the order given.
+
+    Only recordings that all of them were given are counted.
+
+    Args:
+        truth: as the truth file has it.
+        results: by method and recording, see `judge`.
+    """
+    common = set.intersection(*(set(found) for found in results.values()))
+    rows = []
+    for method, found in results.items():
+        card = scorecard(truth, {name: found[name] for name in found if name in common})
+        outcomes = card["outcomes"]
+        clear = [o for o in outcomes if o["kind"] in (EFFECT, PARAMETER) and o["multiple"] >= CLEAR]
+        fits = [o["fit"] for o in clear if o["fit"] is not None]
+        rows.append(
+            {
+                "method": method,
+                "scored": card["scored"],
+                **{key: card["shares"][key] for key in _SHARES},
+                "mean_tie_size": card["shares"]["mean_tie_size"],
+                "wrong_per_recording": sum(o["wrong"] for o in outcomes) / max(1, len(outcomes)),
+                "covered": card["parameters"]["covered"],
+                "before": median(f[0] for f in fits) if fits else None,
+                "after": median(f[2] for f in fits) if fits else None,
+                "seconds": card["seconds"]["median"],
+            }
+        )
+    return rows

@@ -1,0 +1,1 @@
+"""Other people's ways of finding what a model lacks, on the same residuals."""

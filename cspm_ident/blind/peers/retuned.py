@@ -1,0 +1,31 @@
+"""What a laboratory does today: all numbers of the file fitted by least squares, nothing added."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+from scipy.stats import norm
+
+from cspm_ident.blind.peers.library import Library
+from cspm_ident.blind.peers.report import fits, left_with, report_of, retuned_weights
+
+_CHANCE = 0.01
+
+
+def diagnosis_of(library: Library) -> dict[str, Any]:
+    """Return the numbers that least squares say are wrong, by white errors and Bonferroni.
+
+    The fit is that of all numbers, told or not.
+    """
+    own = [c for c in library.candidates if c.effect.alter is not None]
+    columns = library.evidence.with_nuisance(own)
+    numbers = library.evidence.columns_of(own)
+    start = len(columns) - len(numbers)
+    weights = library.sums.weights(columns)[start:]
+    # Half the width of a 95 % interval is 1.96 standard errors.
+    errors = library.sums.half_width(columns)[start:] / norm.isf(0.025)
+    sure = norm.isf(0.5 * _CHANCE / max(1, len(numbers)))
+    told = report_of(library, numbers[np.abs(weights) > sure * errors], intervals=True)
+    after = left_with(library, retuned_weights(library))
+    return told | {"residuals": fits(library, after)}

@@ -1,0 +1,141 @@
+"""What was found as a model: its parameters, its beginnings, and what simulation says of it."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from cspm_ident.diagnosis.columns import Candidate, Place
+from cspm_ident.diagnosis.equation import Equation, steady
+from cspm_ident.diagnosis.hypothesis import Named, members_of
+from cspm_ident.diagnosis.onset import Onset, onset_of
+from cspm_ident.diagnosis.parameters import of_drives, of_shafts, weights_of
+from cspm_ident.diagnosis.refine import Cut, Weights, needs_refining, refine
+from cspm_ident.diagnosis.search import Search
+from cspm_ident.diagnosis.simulation import SimulatedFit, Worth, simulate_held_out, worth_of
+from cspm_ident.diagnosis.supposed import is_possible
+from cspm_ident.signals.measurement import Measurement
+
+Array = NDArray[np.float64]
+Parts = Sequence[Sequence[Equation]]
+
+# A finding stands if a simulated error falls below this share of what it is without the finding.
+WORTH_IT = 0.99
+
+
+class Data(NamedTuple):
+    """What a model is fitted to and judged by.
+
+    Attributes:
+        searched: the recordings, of which `searched_part` was searched.
+        searched_part: cuts their equations.
+        judges: what was not searched.
+        rows: of what was searched, in units of their noise.
+        noise: of each residual.
+        block: length of the blocks [s].
+    """
+
+    searched: Sequence[Measurement]
+    searched_part: Cut
+    judges: Sequence[Measurement]
+    rows: Parts
+    noise: dict[Place, Array]
+    block: float
+
+
+class Model(NamedTuple):
+    """What was found as a model: parameters, beginnings, simulations, what each is worth.
+
+    Attributes:
+        weights: as of a diagnosis.
+        onsets: likewise.
+        simulated: likewise.
+        worth: of each finding.
+        possible: whether a machine can have each.
+    """
+
+    weights: Weights
+    onsets: tuple[Onset | None, ...]
+    simulated: tuple[SimulatedFit, ...]
+    worth: tuple[Worth | None, ...]
+    possible: tuple[bool, ...]
+
+    @property
+    def useless(self) -> list[int]:
+        """Findings that have to go: what no machine can have, else the worst of no use.
+
+        Of no use is with what no simulation of held-out data comes nearer to what was measured.
+        """
+        if not all(self.possible):
+            return [k for k, possible in enumerate(self.possible) if not possible]
+        shares = {k: worth.with_it / worth.without for k, worth in enumerate(self.worth) if worth}
+        worst = max(shares, key=lambda k: shares[k], default=None)
+        return [worst] if worst is not None and shares[worst] > WORTH_IT else []
+
+
+def modelled(
+    search: Search, kept: Sequence[Named], data: Data, retuned: Mapping[Candidate, Array]
+) -> Model:
+    """Return the model that findings make.
+
+    Args:
+        search: in which they were found.
+        kept: the findings.
+        data: to which parameters are fitted and by which the model is judged.
+        retuned: weights of the file's own parameters alone, to compare with.
+    """
+    onsets = _onsets(kept, steady(data.rows), search.evidence.times)
+    since = max((onset.time for onset in onsets if onset is not None), default=-np.inf)
+
+    def cut(parts: Parts) -> Parts:
+        return [[e.within(since, np.inf) for e in part] for part in data.searched_part(parts)]
+
+    rows = [[e.within(since, np.inf) for e in part] for part in data.rows]
+    weights = _parameters(search, kept, data.searched, cut, rows, data.noise, data.block)
+    weights = of_drives(weights, 2.0 * data.searched[0].torque_age)
+    values = {c: w for c, (w, _) in weights.items()}
+    members = [{c: values[c] for c in members_of(values, each.hypothesis)} for each in kept]
+    possible = tuple(is_possible(data.searched[0], own) for own in members)
+    if not all(possible):
+        return Model(weights, onsets, (), (), possible)
+    simulated = simulate_held_out(data.judges, retuned, values)
+    worth = tuple(worth_of(data.judges, simulated, values, own) for own in members)
+    return Model(weights, onsets, simulated, worth, possible)
+
+
+def _parameters(
+    search: Search,
+    kept: Sequence[Named],
+    searched: Sequence[Measurement],
+    cut: Cut,
+    rows: Parts,
+    noise: dict[Place, Array],
+    block: float,
+) -> Weights:
+    """Return the weights of what was kept, refined where columns depend on them."""
+    candidates = [c for each in kept for c in each.hypothesis.candidates]
+    if any(needs_refining(candidate.effect) for candidate in candidates):
+        return refine(searched, candidates, noise, block, cut)
+    return of_shafts(weights_of(search.evidence, search.sums, candidates), rows, block)
+
+
+def _onsets(kept: Sequence[Named], rows: Parts, starts: Array) -> tuple[Onset | None, ...]:
+    """Return when each finding began; None where it acts all the time, or in which recording."""
+    times = {
+        c: float(starts[each.hypothesis.onset]) if each.hypothesis.onset else -np.inf
+        for each in kept
+        for c in each.hypothesis.candidates
+    }
+    found: list[Onset | None] = []
+    for each in kept:
+        block, own = each.hypothesis.onset, each.hypothesis.candidates
+        if not block or len(rows) > 1:
+            found.append(None)
+            continue
+        others = {c: time for c, time in times.items() if c not in own}
+        low, high = starts[block - 1], starts[min(block + 1, len(starts) - 1)]
+        found.append(onset_of(rows[0], own, others, float(low), float(high)))
+    return tuple(found)

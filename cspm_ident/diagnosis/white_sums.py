@@ -1,0 +1,45 @@
+"""Least squares whose errors are those of white residuals, as textbooks have them."""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.stats import f as f_distribution
+from scipy.stats import t as t_distribution
+
+from cspm_ident.diagnosis.evidence import Evidence
+from cspm_ident.diagnosis.sums import Sums
+
+Array = NDArray[np.float64]
+Index = NDArray[np.intp]
+
+
+class WhiteSums(Sums):
+    """Sums that take each row for independent of all others, to show what blocks are good for."""
+
+    def __init__(self, evidence: Evidence) -> None:
+        """Assemble the products, and count the rows."""
+        super().__init__(evidence)
+        self._rows = int(sum(place.rows.sum() for place in evidence.places))
+
+    def covariance(self, columns: Index) -> Array:
+        """Return σ²·(XᵀX)⁻¹."""
+        bread = np.linalg.pinv(self._whole[np.ix_(columns, columns)], rcond=1e-9, hermitian=True)
+        scale = self._lengths[columns]
+        variance = self.squares_of(columns) / self._free(columns)
+        return np.asarray(variance * bread / (scale[:, None] * scale))
+
+    def p_value(self, base: Index, columns: Index) -> float:
+        """Return the probability of so large a gain by chance, by the F test over rows."""
+        both = np.concatenate([base, columns])
+        after, free = self.squares_of(both), self._free(both)
+        gained = (self.squares_of(base) - after) / len(columns)
+        return float(f_distribution.sf(gained / (after / free), len(columns), free))
+
+    def half_width(self, columns: Index) -> Array:
+        """Return half the widths of 95 % intervals of the weights."""
+        factor = t_distribution.ppf(0.975, self._free(columns))
+        return np.asarray(factor * np.sqrt(np.maximum(np.diag(self.covariance(columns)), 0.0)))
+
+    def _free(self, columns: Index) -> int:
+        return max(1, self._rows - len(columns))

@@ -12,8 +12,9 @@ CAMERA_100_HZ = (
     "rates.motion_controller=100",
     "rates.tension_distribution=100",
 )
+PROFILES: dict[str, tuple[str, ...]] = {"1000 Hz": (), "100 Hz": CAMERA_100_HZ}
 PAST_ON_CALM = (
-    "control={mode: closed_loop, motion: {law: computed_wrench},"
+    "control={mode: closed_loop, motion: {law: computed_wrench, governor: {}},"
     " tension_distribution: {method: analytic_centre, lower_limit: 0.3}}"
 )
 FOUR_METRES = "target.mean_pose=[0.0, 0.0, 4.0, 0.0, 0.0, 0.0]"
@@ -78,9 +79,9 @@ CHANGES: dict[str, Effects] = {
 }
 
 
-def seeded(seeds: int) -> dict[str, Case]:
-    """Return the worst case past the thesis with each of so many seeds."""
-    return {f"seed {seed}": Case(PAST, (f"seed={seed}",)) for seed in range(1, seeds + 1)}
+def seeded(seeds: int, profile: tuple[str, ...]) -> dict[str, Case]:
+    """Return the worst case past the thesis with each of so many seeds and one motion capture."""
+    return {f"seed {seed}": Case(PAST, (f"seed={seed}", *profile)) for seed in range(1, seeds + 1)}
 
 
 def changed(scenario: str, duration: float) -> dict[str, Case]:

@@ -20,10 +20,14 @@ from bench.feasibility import least_errors, least_tensions
 from bench.machine import describe_machine
 from bench.result_cases import (
     BEYOND,
+    CAUSES,
+    CORNERS,
     LIMITED,
     PAST,
     PROFILES,
+    SIX_SEEDS,
     SWITCHED,
+    SWITCHED_4M,
     THESIS,
     changed,
     seeded,
@@ -51,6 +55,7 @@ THESIS_TABLES: dict[str, tuple[tuple[float | None, ...], tuple[float | None, ...
 LIMITS = (0.0, 0.3, 1.0, 2.0)
 LIMIT_PERIOD = 0.2
 ROBUST_S = 20.0
+PICTURES = "pictures"
 
 Measure = Callable[[], Any]
 
@@ -89,25 +94,42 @@ def main() -> None:
     parser = argparse.ArgumentParser(prog="python -m bench.results", description=__doc__)
     parser.add_argument("--seeds", type=int, default=20, help="of the worst case past the thesis")
     parser.add_argument("--keep", type=Path, metavar="DIR", help="for what was measured")
+    parser.add_argument("--only", nargs="+", default=[], metavar="BLOCK", help="renew only these")
     asked = parser.parse_args()
-    store = Store(asked.keep, Console())
-    blocks = {
-        "machine": _machine_block(asked.seeds),
-        "thesis": thesis_block(store.tracks("thesis", THESIS)),
-        "switched": tracking_block(store.tracks("switched", SWITCHED)),
-        "distribution": table(
+    store, seeds = Store(asked.keep, Console()), asked.seeds
+    blocks: dict[str, Callable[[], str]] = {
+        "machine": lambda: _machine_block(seeds),
+        "thesis": lambda: thesis_block(store.tracks("thesis", THESIS)),
+        "switched": lambda: tracking_block(store.tracks("switched", SWITCHED)),
+        "switched_4m": lambda: tracking_block(store.tracks("switched 4 m", SWITCHED_4M)),
+        "distribution": lambda: table(
             HEADINGS, store.get("distribution", lambda: distribution_rows(20000, 60.0))
         ),
-        "beyond": tracking_block(store.tracks("beyond", BEYOND)),
-        "limit": limit_block(store),
-        "past": past_block(store, "1000 Hz", asked.seeds),
-        "past_100": past_block(store, "100 Hz", asked.seeds),
-        "possible": possible_block(store, asked.seeds),
-        "robust": tracking_block(store.tracks("robust", changed(PAST, ROBUST_S))),
-        "robust_thesis": tracking_block(
+        "past": lambda: past_block(store, "1000 Hz", seeds),
+        "past_100": lambda: past_block(store, "100 Hz", seeds),
+        "causes": lambda: tracking_block(store.tracks("causes", CAUSES)),
+        "beyond": lambda: tracking_block(store.tracks("beyond", BEYOND)),
+        "six_dof": lambda: tracking_block(store.tracks("six", SIX_SEEDS)),
+        "corners": lambda: tracking_block(store.tracks("corners", CORNERS)),
+        "limit": lambda: limit_block(store),
+        "possible": lambda: possible_block(store, seeds),
+        "robust": lambda: tracking_block(store.tracks("robust", changed(PAST, ROBUST_S))),
+        "robust_thesis": lambda: tracking_block(
             store.tracks("robust thesis", changed("worst_case", ROBUST_S))
         ),
     }
+    chosen = asked.only or [*blocks, PICTURES]
+    unknown = [name for name in chosen if name not in (*blocks, PICTURES)]
+    if unknown:
+        parser.error(f"--only: {', '.join(unknown)}, allowed: {', '.join(blocks)}, {PICTURES}")
+    for name, block in blocks.items():
+        if name in chosen:
+            _into_page(name, block())
+    if PICTURES in chosen:
+        _draw(store)
+
+
+def _draw(store: Store) -> None:
     drawn = {
         "the thesis's controllers": store.get("bands thesis", lambda: bands(Case("worst_case"))),
         "past the thesis": store.get("bands past", lambda: bands(Case(PAST))),
@@ -115,7 +137,6 @@ def main() -> None:
     draw_comparison(FIGURES / "past_thesis.png", drawn)
     least = np.array(_least(store, "worst case", LIMITED["worst case"]))
     draw_limit(FIGURES / "tension_limit.png", least, LIMIT_PERIOD, drawn["past the thesis"])
-    _into_page(blocks)
 
 
 def _machine_block(seeds: int) -> str:
@@ -185,7 +206,7 @@ def tracking_block(found: Mapping[str, Mapping[str, Any]]) -> str:
 
 
 def past_block(store: Store, profile: str, seeds: int) -> str:
-    """Return the worst case past the thesis with one motion capture, per seed, against the reach."""
+    """Return the worst case past the thesis per seed, with one motion capture, and the reach."""
     found = {
         name: store.get(
             f"past {profile} {name}",
@@ -291,11 +312,12 @@ def table(heads: Sequence[str], rows: Sequence[Sequence[str]]) -> str:
     return "\n".join(f"| {' | '.join(line)} |" for line in lines)
 
 
-def _into_page(blocks: Mapping[str, str]) -> None:
+def _into_page(name: str, block: str) -> None:
     page = PAGE.read_text(encoding="utf-8")
 
     def renewed(match: re.Match[str]) -> str:
-        return f"<!-- results: {match[1]} -->\n{blocks[match[1]]}\n<!-- end -->"
+        is_meant = match[1] == name
+        return f"<!-- results: {name} -->\n{block}\n<!-- end -->" if is_meant else match[0]
 
     PAGE.write_text(BLOCK.sub(renewed, page), encoding="utf-8")
 

@@ -1,9 +1,10 @@
 """A reference governor with preview: how a bar is to leave a reference that no tensions can give.
 
 A bar on cables that only pull cannot be given every acceleration at every place. If it follows its
-reference until there, it falls behind; if it is known beforehand, the bar takes a run-up. The least deviation of all is a quadratic programme over time with the
-tensions as inputs (a model predictive control of the nominal bar, as in Bemporad, Casavola,
-Mosca, 1997).
+reference until there, it falls behind; if it is known beforehand, the bar takes a run-up. The least
+deviation is a quadratic programme over time with the tensions as inputs: the model predictive form
+of a reference governor (Garone, Di Cairano, Kolmanovsky, Automatica 75, 2017), solved by an
+interior-point method (Clarabel).
 """
 
 from __future__ import annotations
@@ -16,7 +17,7 @@ from numpy.typing import NDArray
 from scipy import sparse
 
 from cspm_control.bar_dynamics import wrench_for
-from cspm_control.tension_distribution import RESIDUAL_TOLERANCE, KERNELS
+from cspm_control.tension_distribution import KERNELS, RESIDUAL_TOLERANCE
 from cspm_msgs_py.errors import ConvergenceError
 from cspm_sim.kernels.kinematics import cable_geometry
 from cspm_sim.motion import Motion

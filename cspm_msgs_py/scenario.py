@@ -109,7 +109,7 @@ class MotionControl(StrictModel):
 
 
 class Governor(StrictModel):
-    """How far the reference is known ahead [s], and how far above the lower limit plans stay [N]."""
+    """How far ahead the reference is known [s], and what plans keep above the lower limit [N]."""
 
     preview: PositiveFloat = 0.5
     reserve: NonNegativeFloat = 0.2

@@ -54,7 +54,7 @@ def aside():
     return moved([0.05, 0.06, 0.1, 0.0, 0.05, 0.02], within=0.24)
 
 
-def room(thesis, machine, row, frame=np.zeros(6)):
+def room(thesis, machine, row, frame=HOME * 0.0):
     """Return the highest least tension [N] that gives a motion row (18,) its acceleration."""
     pose, rate, acceleration = row.reshape(3, 6)
     wrench, n = np.empty(6), len(machine.cables)
@@ -123,7 +123,7 @@ def upward(machine, pose):
 
 
 def bounded(limit):
-    """Return the least squares of places, and of changes of acceleration, below a `limit` [m/s²]."""
+    """Return the places of least squares of places and acceleration changes, below a `limit`."""
     n, h, tolerance = len(limit), SPACING, 0.002
     place, rate = np.zeros((n, n)), np.zeros((n, n))
     for k in range(n - 1):

@@ -7,7 +7,20 @@ import pytest
 from run_samples import bundle_of
 
 from bench.feasibility import least_tensions
-from bench.result_cases import BEYOND, LIMITED, PAST, SWITCHED, THESIS, changed, seeded
+from bench.result_cases import (
+    BEYOND,
+    CAMERA_100_HZ,
+    CAUSES,
+    CORNERS,
+    LIMITED,
+    PAST,
+    SIX_SEEDS,
+    SWITCHED,
+    SWITCHED_4M,
+    THESIS,
+    changed,
+    seeded,
+)
 from bench.results import BLOCK, PAGE, Store, table, tracking_block
 from bench.tension_distribution import drawn_wrenches, score
 from bench.tracking import Case, follow, track
@@ -19,7 +32,8 @@ pytestmark = pytest.mark.compiled
 
 @pytest.mark.slow
 def test_every_case_is_a_run_that_can_be_made():
-    groups = (THESIS, SWITCHED, BEYOND, LIMITED, changed(PAST, 1.0), seeded(2))
+    groups = (THESIS, SWITCHED, SWITCHED_4M, CAUSES, BEYOND, CORNERS, SIX_SEEDS, LIMITED)
+    groups += (changed(PAST, 1.0), seeded(2, CAMERA_100_HZ))
     for case in {case.scenario: case for group in groups for case in group.values()}.values():
         assert case.bundle().testbed.testbed.bar is not None
     with pytest.raises(InputError, match=r"^effects: bar_mass: parameters \['weight'\], allowed"):

@@ -41,12 +41,14 @@ SWITCHED = {
     "analytic centre, wanted tensions down to 0.3 N": Case("worst_case", (HALF, *CENTRE, LOWER)),
     "half the waves": Case("worst_case", (HALF, *HALF_WAVES)),
 }
+# At 4 m the thesis's margins leave sway and yaw no more than 9 rad/s.
+DESIGNED_AT_FOUR = (
+    "control={mode: closed_loop, motion: {design_pose: [0, 0, 4, 0, 0, 0],"
+    " crossover: {surge: 12, sway: 9, heave: 12, pitch: 12, yaw: 9}}}"
+)
 SWITCHED_4M = {
     "as in the thesis": Case("worst_case_4m", (SHORT,)),
-    "gains designed at 4 m": Case(
-        "worst_case_4m",
-        (SHORT, "control={mode: closed_loop, motion: {design_pose: [0, 0, 4, 0, 0, 0]}}"),
-    ),
+    "gains designed at 4 m": Case("worst_case_4m", (SHORT, DESIGNED_AT_FOUR)),
     "ideal sensors": Case("worst_case_4m", (SHORT, "sensors=ideal")),
     "half the waves": Case("worst_case_4m", (SHORT, *HALF_WAVES)),
     "analytic centre": Case("worst_case_4m", (SHORT, *CENTRE)),
@@ -82,7 +84,7 @@ BEYOND = {
 SIX_SEEDS = {f"seed {seed}": Case(SIX, (f"seed={seed}",)) for seed in (1, 9)}
 # In the calm sea, about mean places x y z φ θ ψ of the target [m, rad].
 CORNERS = {
-    name: Case("calm", (SHORT, PAST_ON_CALM, f"target.mean_pose={place}"))
+    name: Case("calm", ("duration=20", PAST_ON_CALM, f"target.mean_pose={place}"))
     for name, place in {
         "up, z = 1 m": [0.0, 0.0, 1.0, 0.0, 0.0, 0.0],
         "down, z = 4 m": [0.0, 0.0, 4.0, 0.0, 0.0, 0.0],

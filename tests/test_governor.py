@@ -179,7 +179,7 @@ def test_reserve_is_added_to_the_lower_limit_of_the_scenario():
 
 
 @pytest.mark.slow
-def test_a_drop_faster_than_gravity_is_met_better_by_half_on_either_plant():
+def test_a_drop_faster_than_gravity_is_met_better_by_a_third_on_either_plant():
     drop = (
         "duration=3.0",
         "winch_frame.motion={type: still}",

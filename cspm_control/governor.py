@@ -16,8 +16,9 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy import sparse
 
+from cspm_control.analytic_centre import analytic_centre
 from cspm_control.bar_dynamics import wrench_for
-from cspm_control.tension_distribution import KERNELS, RESIDUAL_TOLERANCE
+from cspm_control.tension_distribution import RESIDUAL_TOLERANCE
 from cspm_msgs_py.errors import ConvergenceError
 from cspm_sim.kernels.kinematics import cable_geometry
 from cspm_sim.motion import Motion
@@ -67,7 +68,7 @@ def plan_deviation(
     """Return by how much the bar is to be where its reference is not, x y z φ θ ψ over time.
 
     It is zero but from `preview` before to `preview` after each instant at which no tensions within
-    the limits give the reference's acceleration.
+    the limits give the reference's acceleration. Stretches that touch are planned as one.
 
     Args:
         machine: what is planned for.
@@ -100,7 +101,7 @@ def _blocked(machine: Governed, wanted: Array, frames: Array) -> NDArray[np.bool
     weights, tensions = np.ones(len(machine.axes)), np.empty(len(machine.cables))
     blocked = np.empty(len(wanted), dtype=bool)
     for k, (structure, wrench) in enumerate(zip(demand.structure, demand.wrench, strict=True)):
-        KERNELS["analytic_centre"](structure, wrench, machine.limits, weights, tensions)
+        analytic_centre(structure, wrench, machine.limits, weights, tensions)
         missing = np.linalg.norm(structure @ tensions - wrench)
         blocked[k] = missing > RESIDUAL_TOLERANCE * np.linalg.norm(wrench)
     return blocked
@@ -108,7 +109,7 @@ def _blocked(machine: Governed, wanted: Array, frames: Array) -> NDArray[np.bool
 
 def _windows(blocked: NDArray[np.bool_], reach: int) -> list[slice]:
     """Return the stretches within `reach` knots of a blocked one."""
-    near = np.convolve(blocked, np.ones(2 * reach + 1), "same") > 0.5
+    near = np.convolve(blocked, np.ones(2 * reach + 1))[reach : reach + len(blocked)] > 0.5
     edges = np.flatnonzero(np.diff(near.astype(int), prepend=0, append=0))
     return [slice(int(a), int(b)) for a, b in edges.reshape(-1, 2)]
 

@@ -37,6 +37,9 @@ def test_every_case_is_a_run_that_can_be_made():
     groups += (changed(PAST, 1.0), seeded(2, CAMERA_100_HZ))
     for case in {case.scenario: case for group in groups for case in group.values()}.values():
         assert case.bundle().testbed.testbed.bar is not None
+    for case in SWITCHED_4M.values():
+        # Gains that are designed at 4 m have to have the thesis's margins there.
+        assert case.bundle().scenario.control.motion.gains
     with pytest.raises(InputError, match=r"^effects: bar_mass: parameters \['weight'\], allowed"):
         track(Case("rest", ("duration=0.01",), (("bar_mass", (), {"weight": 1.0}),)))
 

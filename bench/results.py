@@ -25,7 +25,6 @@ from bench.result_cases import (
     LIMITED,
     PAST,
     PROFILES,
-    SIX_SEEDS,
     SWITCHED,
     SWITCHED_4M,
     THESIS,
@@ -54,6 +53,7 @@ THESIS_TABLES: dict[str, tuple[tuple[float | None, ...], tuple[float | None, ...
 }
 LIMITS = (0.0, 0.3, 1.0, 2.0)
 LIMIT_PERIOD = 0.2
+POSSIBLE = ("worst case", "worst case, all six coordinates", "worst case, 4 m")
 ROBUST_S = 20.0
 PICTURES = "pictures"
 
@@ -109,10 +109,9 @@ def main() -> None:
         "past_100": lambda: past_block(store, "100 Hz", seeds),
         "causes": lambda: tracking_block(store.tracks("causes", CAUSES)),
         "beyond": lambda: tracking_block(store.tracks("beyond", BEYOND)),
-        "six_dof": lambda: tracking_block(store.tracks("six", SIX_SEEDS)),
         "corners": lambda: tracking_block(store.tracks("corners", CORNERS)),
         "limit": lambda: limit_block(store),
-        "possible": lambda: possible_block(store, seeds),
+        "possible": lambda: possible_block(store),
         "robust": lambda: tracking_block(store.tracks("robust", changed(PAST, ROBUST_S))),
         "robust_thesis": lambda: tracking_block(
             store.tracks("robust thesis", changed("worst_case", ROBUST_S))
@@ -254,12 +253,11 @@ PAST_FORMATS = {
 }
 
 
-def possible_block(store: Store, seeds: int) -> str:
-    """Return what is the least error that any controller could have, by seed and by scenario."""
-    cases = {f"worst case, {name}": case for name, case in seeded(seeds, ()).items()}
-    cases |= {name: LIMITED[name] for name in LIMITED if name not in ("worst case", "calm")}
+def possible_block(store: Store) -> str:
+    """Return the least error that any controller could have, by scenario."""
     rows = []
-    for name, case in cases.items():
+    for name in POSSIBLE:
+        case = LIMITED[name]
         rms = store.get(f"possible {name}", lambda case=case: least_errors(case.bundle()).tolist())
         rows.append(
             [name, _listed([1e3 * v for v in rms[:3]]), _listed([1e3 * v for v in rms[3:]])]

@@ -15,7 +15,6 @@ from bench.result_cases import (
     CORNERS,
     LIMITED,
     PAST,
-    SIX_SEEDS,
     SWITCHED,
     SWITCHED_4M,
     THESIS,
@@ -33,7 +32,7 @@ pytestmark = pytest.mark.compiled
 
 @pytest.mark.slow
 def test_every_case_is_a_run_that_can_be_made():
-    groups = (THESIS, SWITCHED, SWITCHED_4M, CAUSES, BEYOND, CORNERS, SIX_SEEDS, LIMITED)
+    groups = (THESIS, SWITCHED, SWITCHED_4M, CAUSES, BEYOND, CORNERS, LIMITED)
     groups += (changed(PAST, 1.0), seeded(2, CAMERA_100_HZ))
     for case in {case.scenario: case for group in groups for case in group.values()}.values():
         assert case.bundle().testbed.testbed.bar is not None

@@ -55,7 +55,8 @@ def least_errors(bundle: Bundle, lower: float = 0.0) -> Array:
     """Return the least RMS error [m, rad] (6,) with tensions ≥ `lower` [N] at any instant.
 
     Of the nominal bar in the controlled coordinates, by any controller that knows the reference
-    `FORESEEN` ahead; least in the sum of squared shares of the requirement.
+    `FORESEEN` [s] ahead; least in the sum of squared shares of the requirement, but for the
+    governor's preference for smooth accelerations.
     """
     scenario, testbed = bundle.scenario, bundle.testbed.testbed
     limits = np.array([cable.tension_limits for cable in testbed.cables], dtype=float)

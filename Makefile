@@ -47,7 +47,7 @@ coverage: $(VENV)/test.stamp ## line coverage with the kernels uncompiled
 bench: $(VENV)/test.stamp ## measure speed, start-up and memory; prints a table
 	$(BIN)/python -m bench
 
-results: $(VENV)/test.stamp ## measure anew every number and picture of docs/results.md, about an hour
+results: $(VENV)/test.stamp ## measure anew every number and picture of docs/results.md, about two hours
 	$(BIN)/python -m bench.results
 
 clean: ## remove the environment and caches

@@ -6,16 +6,21 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.optimize import linprog
 
-from bench.tracking import assembled
+from bench.tracking import motions_of_bundle
 from cspm_bringup.bundle import Bundle
 from cspm_control.bar_dynamics import bar_parameters, wanted_motion, wrench_for
-from cspm_control.stages.make import controlled_axes
+from cspm_control.governor import plan_deviation
+from cspm_control.stages.make import controlled_axes, governed
+from cspm_control.wave_trajectory import WaveTrajectory
 from cspm_msgs_py.scenario import ClosedLoop
 from cspm_msgs_py.testbed import Testbed
 from cspm_sim.kinematics import geometry
 from cspm_sim.parameters import nominal_parameters
 
 Array = NDArray[np.float64]
+
+FORESEEN = 2.0
+REFERENCES = ("/bar/reference", "/winch_frame/reference")
 
 
 def least_tensions(bundle: Bundle, times: Array) -> Array:
@@ -32,18 +37,35 @@ def least_tensions(bundle: Bundle, times: Array) -> Array:
     assert isinstance(bundle.scenario.control, ClosedLoop)
     testbed = bundle.testbed.testbed
     axes = list(controlled_axes(bundle.scenario.control))
-    references = assembled(bundle).references
+    motions = motions_of_bundle(bundle)
+    bar, frame = (WaveTrajectory(motions[name]) for name in REFERENCES)
     upper = np.array([cable.tension_limits for cable in testbed.cables], dtype=float)[:, 1]
     cables = nominal_parameters(testbed).cables
     found = []
     for time in times:
         stamp = round(time * 1e9)
-        wrench, pose = _wanted(references["/bar/reference"].step(stamp), testbed)
-        frame = references["/winch_frame/reference"]
+        wrench, pose = _wanted(bar.step(stamp), testbed)
         frame.step(stamp)
         structure = -geometry(cables, pose, frame.values[:6].copy()).bar.T[axes]
         found.append(_least(structure, wrench[axes], upper))
     return np.array(found)
+
+
+def least_errors(bundle: Bundle, lower: float = 0.0) -> Array:
+    """Return the least RMS error [m, rad] (6,) with tensions ≥ `lower` [N] at any instant.
+
+    Of the nominal bar in the controlled coordinates, by any controller that knows the reference
+    `FORESEEN` [s] ahead; least in the sum of squared shares of the requirement, but for the
+    governor's preference for smooth accelerations.
+    """
+    scenario, testbed = bundle.scenario, bundle.testbed.testbed
+    limits = np.array([cable.tension_limits for cable in testbed.cables], dtype=float)
+    limits[:, 0] = lower
+    motions = motions_of_bundle(bundle)
+    bar, frame = (motions[name] for name in REFERENCES)
+    machine = governed(scenario, testbed, limits)
+    plan = plan_deviation(machine, bar, frame, scenario.duration, FORESEEN)
+    return np.sqrt((plan.knots[:, :6] ** 2).mean(axis=0))
 
 
 def _wanted(row: Array, testbed: Testbed) -> tuple[Array, Array]:

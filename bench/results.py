@@ -16,9 +16,21 @@ import numpy as np
 from numpy.typing import NDArray
 from rich.console import Console
 
-from bench.feasibility import least_tensions
+from bench.feasibility import least_errors, least_tensions
 from bench.machine import describe_machine
-from bench.result_cases import BEYOND, LIMITED, PAST, SWITCHED, THESIS, changed, seeded
+from bench.result_cases import (
+    BEYOND,
+    CAUSES,
+    CORNERS,
+    LIMITED,
+    PAST,
+    PROFILES,
+    SWITCHED,
+    SWITCHED_4M,
+    THESIS,
+    changed,
+    seeded,
+)
 from bench.result_figures import bands, draw_comparison, draw_limit
 from bench.tension_distribution import HEADINGS, distribution_rows
 from bench.tracking import Case, follow, track, within_requirement
@@ -41,7 +53,9 @@ THESIS_TABLES: dict[str, tuple[tuple[float | None, ...], tuple[float | None, ...
 }
 LIMITS = (0.0, 0.3, 1.0, 2.0)
 LIMIT_PERIOD = 0.2
+POSSIBLE = ("worst case", "worst case, all six coordinates", "worst case, 4 m")
 ROBUST_S = 20.0
+PICTURES = "pictures"
 
 Measure = Callable[[], Any]
 
@@ -80,31 +94,48 @@ def main() -> None:
     parser = argparse.ArgumentParser(prog="python -m bench.results", description=__doc__)
     parser.add_argument("--seeds", type=int, default=20, help="of the worst case past the thesis")
     parser.add_argument("--keep", type=Path, metavar="DIR", help="for what was measured")
+    parser.add_argument("--only", nargs="+", default=[], metavar="BLOCK", help="renew only these")
     asked = parser.parse_args()
-    store = Store(asked.keep, Console())
-    blocks = {
-        "machine": _machine_block(asked.seeds),
-        "thesis": thesis_block(store.tracks("thesis", THESIS)),
-        "switched": tracking_block(store.tracks("switched", SWITCHED)),
-        "distribution": table(
+    store, seeds = Store(asked.keep, Console()), asked.seeds
+    blocks: dict[str, Callable[[], str]] = {
+        "machine": lambda: _machine_block(seeds),
+        "thesis": lambda: thesis_block(store.tracks("thesis", THESIS)),
+        "switched": lambda: tracking_block(store.tracks("switched", SWITCHED)),
+        "switched_4m": lambda: tracking_block(store.tracks("switched 4 m", SWITCHED_4M)),
+        "distribution": lambda: table(
             HEADINGS, store.get("distribution", lambda: distribution_rows(20000, 60.0))
         ),
-        "beyond": tracking_block(store.tracks("beyond", BEYOND)),
-        "limit": limit_block(store),
-        "past": past_block(store, asked.seeds),
-        "robust": tracking_block(store.tracks("robust", changed(PAST, ROBUST_S))),
-        "robust_thesis": tracking_block(
+        "past": lambda: past_block(store, "1000 Hz", seeds),
+        "past_100": lambda: past_block(store, "100 Hz", seeds),
+        "causes": lambda: tracking_block(store.tracks("causes", CAUSES)),
+        "beyond": lambda: tracking_block(store.tracks("beyond", BEYOND)),
+        "corners": lambda: tracking_block(store.tracks("corners", CORNERS)),
+        "limit": lambda: limit_block(store),
+        "possible": lambda: possible_block(store),
+        "robust": lambda: tracking_block(store.tracks("robust", changed(PAST, ROBUST_S))),
+        "robust_thesis": lambda: tracking_block(
             store.tracks("robust thesis", changed("worst_case", ROBUST_S))
         ),
     }
+    chosen = asked.only or [*blocks, PICTURES]
+    unknown = [name for name in chosen if name not in (*blocks, PICTURES)]
+    if unknown:
+        parser.error(f"--only: {', '.join(unknown)}, allowed: {', '.join(blocks)}, {PICTURES}")
+    for name, block in blocks.items():
+        if name in chosen:
+            _into_page(name, block())
+    if PICTURES in chosen:
+        _draw(store)
+
+
+def _draw(store: Store) -> None:
     drawn = {
         "the thesis's controllers": store.get("bands thesis", lambda: bands(Case("worst_case"))),
         "past the thesis": store.get("bands past", lambda: bands(Case(PAST))),
     }
     draw_comparison(FIGURES / "past_thesis.png", drawn)
-    least = np.array(_least(store, "worst case"))
+    least = np.array(_least(store, "worst case", LIMITED["worst case"]))
     draw_limit(FIGURES / "tension_limit.png", least, LIMIT_PERIOD, drawn["past the thesis"])
-    _into_page(blocks)
 
 
 def _machine_block(seeds: int) -> str:
@@ -173,61 +204,76 @@ def tracking_block(found: Mapping[str, Mapping[str, Any]]) -> str:
     return table(heads, rows)
 
 
-def past_block(store: Store, seeds: int) -> str:
-    """Return the worst case past the thesis over seeds, against the reach."""
+def past_block(store: Store, profile: str, seeds: int) -> str:
+    """Return the worst case past the thesis per seed, with one motion capture, and the reach."""
     found = {
-        name: store.get(f"past {name}", lambda case=case: _past(case))
-        for name, case in seeded(seeds).items()
+        name: store.get(
+            f"past {profile} {name}",
+            lambda name=name, case=case: _past(case, np.array(_least(store, name, case))),
+        )
+        for name, case in seeded(seeds, PROFILES[profile]).items()
     }
-    heads = ["", *(f"RMS {dof} [{'mm' if i < 3 else 'mrad'}]" for i, dof in enumerate(DOFS))]
+    heads = ["", "RMS surge, sway, heave [mm]", "pitch, yaw [mrad]", *PAST_FIGURES.values()]
+    rows = []
+    for name, each in found.items():
+        rms = [1e3 * value for value in each["rms"]]
+        figures = [PAST_FORMATS[key].format(each[key]) for key in PAST_FIGURES]
+        rows.append([name, _listed(rms[:3]), _listed(rms[4:]), *figures])
+    rows.append(["to reach", "≤ 2 each", "≤ 4 each", "≥ 99%", "", "> 0", "0%", ""])
     rms = 1e3 * np.array([each["rms"] for each in found.values()])
-    rows = [
-        ["median", *(f"{value:.2f}" for value in np.median(rms, axis=0))],
-        ["worst seed", *(f"{value:.2f}" for value in rms.max(axis=0))],
-        ["to reach", "≤ 2", "≤ 2", "≤ 2", "", "≤ 4", "≤ 4"],
-    ]
-    more = []
-    for key, what in PAST_FIGURES.items():
-        values = np.array([each[key] for each in found.values()])
-        worst = values.max() if key in ("slack", "not_met") else values.min()
-        unit = "{:.2f} N" if key == "least" else "{:.3%}"
-        more.append([what, unit.format(np.median(values)), unit.format(worst)])
-    failed = [name for name, each in found.items() if each["failure"]]
     reached = (rms[:, [0, 1, 2]] <= 2.0).all(axis=1) & (rms[:, [4, 5]] <= 4.0).all(axis=1)
-    within = np.array([each["within_feasible"] >= 0.99 for each in found.values()])
-    taut = np.array([each["slack"] == 0.0 for each in found.values()])
+    within = sum(each["within_feasible"] >= 0.99 for each in found.values())
+    taut = sum(each["slack"] == 0.0 for each in found.values())
+    failed = [name for name, each in found.items() if each["failure"]]
     said = (
-        f"Of {seeds} seeds {reached.sum()} reach every RMS, {within.sum()} the 99 % of the time in"
-        f" which tensions ≥ 0 exist, {taut.sum()} have no cable slack at any instant. "
+        f"Of {seeds} seeds {reached.sum()} reach every RMS, {within} the 99 % of the time in which"
+        f" tensions ≥ 0 exist, {taut} have no cable slack at any instant. Runs that ended early:"
+        f" {', '.join(failed) if failed else 'none'}."
     )
-    said += f"Runs that ended early: {', '.join(failed) if failed else 'none'}."
-    return f"{table(heads, rows)}\n\n{table(['', 'median', 'worst seed'], more)}\n\n{said}"
+    return f"{table(heads, rows)}\n\n{said}"
+
+
+def _listed(values: Sequence[float]) -> str:
+    return ", ".join(f"{value:.2f}" for value in values)
 
 
 PAST_FIGURES = {
-    "within": "within ± 2 mm and ± 4 mrad, of all time",
-    "within_feasible": "of the time in which tensions ≥ 0 exist",
-    "within_met": "of the time in which tensions ≥ 0.3 N exist",
-    "available": "time in which tensions ≥ 0 exist",
-    "least": "least tension",
-    "slack": "any cable slack",
-    "not_met": "wanted wrench not met",
+    "within_feasible": "within ± 2 mm, ± 4 mrad, of the time in which tensions ≥ 0 exist",
+    "available": "that time",
+    "least": "least tension [N]",
+    "slack": "any slack",
+    "not_met": "wrench not met",
+}
+PAST_FORMATS = {
+    "within_feasible": "{:.2%}",
+    "available": "{:.1%}",
+    "least": "{:.2f}",
+    "slack": "{:.3%}",
+    "not_met": "{:.1%}",
 }
 
 
-def _past(case: Case) -> dict[str, Any]:
+def possible_block(store: Store) -> str:
+    """Return the least error that any controller could have, by scenario."""
+    rows = []
+    for name in POSSIBLE:
+        case = LIMITED[name]
+        rms = store.get(f"possible {name}", lambda case=case: least_errors(case.bundle()).tolist())
+        rows.append(
+            [name, _listed([1e3 * v for v in rms[:3]]), _listed([1e3 * v for v in rms[3:]])]
+        )
+    return table(["", "surge, sway, heave [mm]", "roll, pitch, yaw [mrad]"], rows)
+
+
+def _past(case: Case, least: NDArray[np.float64]) -> dict[str, Any]:
     bundle = case.bundle()
     errors, tensions, missed, failure = follow(bundle)
-    least = least_tensions(bundle, _limit_times(case))
     stride = round(LIMIT_PERIOD * bundle.scenario.rates.plant)
-    within = within_requirement(bundle, errors)
-    sampled = within[::stride]
+    sampled = within_requirement(bundle, errors)[::stride]
     least = least[: len(sampled)]
     return {
         "rms": np.sqrt((errors**2).mean(axis=0)).tolist(),
-        "within": float(within.mean()),
         "within_feasible": float(sampled[least >= 0.0].mean()),
-        "within_met": float(sampled[least >= 0.3].mean()),
         "available": float((least >= 0.0).mean()),
         "least": float(tensions.min()),
         "slack": float((tensions <= 0.0).any(axis=1).mean()),
@@ -239,8 +285,8 @@ def _past(case: Case) -> dict[str, Any]:
 def limit_block(store: Store) -> str:
     """Return the share of time in which any tension set exists, by scenario and lower limit."""
     rows = []
-    for name in LIMITED:
-        least = np.array(_least(store, name))
+    for name, case in LIMITED.items():
+        least = np.array(_least(store, name, case))
         rows.append([name, *(f"{(least >= limit).mean():.1%}" for limit in LIMITS)])
     return table(["", *(f"t_min = {limit:g} N" for limit in LIMITS)], rows)
 
@@ -249,12 +295,10 @@ def _limit_times(case: Case) -> NDArray[np.float64]:
     return np.arange(0.0, case.bundle().scenario.duration, LIMIT_PERIOD)
 
 
-def _least(store: Store, name: str) -> list[float]:
+def _least(store: Store, name: str, case: Case) -> list[float]:
     def measure() -> list[float]:
         # JSON knows no infinity.
-        least = np.maximum(
-            least_tensions(LIMITED[name].bundle(), _limit_times(LIMITED[name])), -1e9
-        )
+        least = np.maximum(least_tensions(case.bundle(), _limit_times(case)), -1e9)
         return [float(value) for value in least]
 
     return [float(value) for value in store.get(f"limit {name}", measure)]
@@ -266,11 +310,12 @@ def table(heads: Sequence[str], rows: Sequence[Sequence[str]]) -> str:
     return "\n".join(f"| {' | '.join(line)} |" for line in lines)
 
 
-def _into_page(blocks: Mapping[str, str]) -> None:
+def _into_page(name: str, block: str) -> None:
     page = PAGE.read_text(encoding="utf-8")
 
     def renewed(match: re.Match[str]) -> str:
-        return f"<!-- results: {match[1]} -->\n{blocks[match[1]]}\n<!-- end -->"
+        is_meant = match[1] == name
+        return f"<!-- results: {name} -->\n{block}\n<!-- end -->" if is_meant else match[0]
 
     PAGE.write_text(BLOCK.sub(renewed, page), encoding="utf-8")
 

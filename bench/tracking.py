@@ -9,12 +9,13 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
-from cspm_bringup.assembly import Assembly, assemble, resolve
+from cspm_bringup.assembly import Assembly, assemble, motions_of, resolve
 from cspm_bringup.bundle import Bundle, make_bundle
 from cspm_bringup.loop import Loop
 from cspm_msgs_py.errors import DivergenceError
 from cspm_msgs_py.scenario import load_scenario
 from cspm_msgs_py.testbed import EffectEntry, load_testbed
+from cspm_sim.motion import Motion
 
 Array = NDArray[np.float64]
 SCENARIOS = Path(__file__).resolve().parents[1] / "scenarios"
@@ -29,12 +30,14 @@ class Case:
         overrides: as for `--set`.
         effects: (effect, elements, parameters) that the plant has and the controllers do not know.
         plant: by name.
+        pose_delay: of the motion capture [s], which the test-bed's file says.
     """
 
     scenario: str
     overrides: tuple[str, ...] = ()
     effects: tuple[tuple[str, tuple[str, ...], Mapping[str, float]], ...] = ()
     plant: str = "sim"
+    pose_delay: float = 0.0
 
     def bundle(self) -> Bundle:
         """Return what is run."""
@@ -45,7 +48,15 @@ class Case:
             EffectEntry(effect=effect, elements=elements, parameters=dict(parameters))
             for effect, elements, parameters in self.effects
         )
-        machine = file.testbed.model_copy(update={"effects": (*file.testbed.effects, *entries)})
+        changes: dict[str, object] = {"effects": (*file.testbed.effects, *entries)}
+        if self.pose_delay:
+            changes["sensors"] = {
+                name: sensor.model_copy(
+                    update={"delay": self.pose_delay} if name.endswith("/pose") else {}
+                )
+                for name, sensor in file.testbed.sensors.items()
+            }
+        machine = file.testbed.model_copy(update=changes)
         described = replace(file, testbed=machine)
         bundle = make_bundle(resolve(scenario, machine), described, path.parent)
         return replace(bundle, plant=self.plant)
@@ -84,6 +95,12 @@ def assembled(bundle: Bundle) -> Assembly:
     """Return the parts of a run."""
     with bundle.unpacked() as place:
         return assemble(bundle.scenario, bundle.testbed.testbed, place, bundle.plant)
+
+
+def motions_of_bundle(bundle: Bundle) -> dict[str, Motion]:
+    """Return the prescribed motions of a run by reference topic."""
+    with bundle.unpacked() as place:
+        return motions_of(bundle.scenario, bundle.testbed.testbed, place)
 
 
 def follow(bundle: Bundle) -> tuple[Array, Array, Array, str]:

@@ -32,7 +32,13 @@ from cspm_msgs_py.scenario import (
     Scenario,
     TorqueProfile,
 )
-from cspm_msgs_py.schedule import RATE_OF_SENSOR, WAVE_TRAJECTORY, Schedule, schedule_of
+from cspm_msgs_py.schedule import (
+    MOTION_CONTROLLER,
+    RATE_OF_SENSOR,
+    WAVE_TRAJECTORY,
+    Schedule,
+    schedule_of,
+)
 from cspm_msgs_py.stage import Stage
 from cspm_msgs_py.testbed import Testbed
 from cspm_sim.any_plant import AnyPlant
@@ -42,6 +48,9 @@ from cspm_sim.sensor_fault import sensor_faults
 from cspm_sim.sensors import AnySensor, SensorModel
 
 Array = NDArray[np.float64]
+
+# Nodes that know the motions that are to come.
+PLANNERS = (WAVE_TRAJECTORY, MOTION_CONTROLLER)
 
 
 @dataclass(frozen=True)
@@ -137,7 +146,7 @@ def assemble(scenario: Scenario, testbed: Testbed, folder: Path, plant: str = SI
         stages=[
             WaveStage(references)
             if node == WAVE_TRAJECTORY
-            else make_controller(node, scenario, testbed)
+            else make_controller(node, scenario, testbed, motions)
             for node in schedule.nodes
         ],
     )
@@ -153,9 +162,9 @@ def assemble_simulator(
 
 def assemble_stage(node: str, scenario: Scenario, testbed: Testbed, folder: Path) -> Stage:
     """Build one stage of a resolved scenario; arguments and errors as `assemble`."""
-    if node != WAVE_TRAJECTORY:
-        return make_controller(node, scenario, testbed)
-    motions = motions_of(scenario, testbed, folder)
+    motions = motions_of(scenario, testbed, folder) if node in PLANNERS else None
+    if motions is None or node != WAVE_TRAJECTORY:
+        return make_controller(node, scenario, testbed, motions)
     names = schedule_of(scenario, testbed).nodes[node].outputs
     return WaveStage({name: WaveTrajectory(motions[name]) for name in names})
 

@@ -108,6 +108,7 @@ class RealtimeRun:
         if node.name == WAVE_TRAJECTORY:
             return RealtimeWaveNode(node, stage, schedule, topics, edges)
         guard = stage if isinstance(stage, GuardedStage) else None
+        timed = TorqueStage | AngleStage | MotionStage
         return RealtimeNode(
             node,
             stage,
@@ -116,7 +117,7 @@ class RealtimeRun:
             topics,
             edges,
             safety.stale_after,
-            on_start=stage.start if isinstance(stage, TorqueStage | AngleStage) else None,
+            on_start=stage.start if isinstance(stage, timed) else None,
             on_safe=stage.suspend if isinstance(stage, MotionStage) else None,
         )
 

@@ -45,6 +45,7 @@ class ComputedWrench:
         observer_bandwidth: float,
         period: float,
         steps_per_pose: int,
+        pose_age: float = 0.0,
     ) -> None:
         """Make the controller for a test-bed with a bar.
 
@@ -55,6 +56,7 @@ class ComputedWrench:
             observer_bandwidth: of the observer [rad/s].
             period: time between steps [s].
             steps_per_pose: steps from one pose to the next, ≥ 1.
+            pose_age: how old a pose is when it is new here [s].
         """
         assert testbed.bar is not None
         self._gains = np.zeros((6, 2))
@@ -62,19 +64,32 @@ class ComputedWrench:
             self._gains[DOFS.index(name)] = frequency**2, 2.0 * frequency
         self._bar = bar_parameters(testbed.bar, testbed.gravity)
         self._distribution = distribution
-        self._observer = _observer_gains(observer_bandwidth, period * steps_per_pose)
-        self._period = period
+        self._observer = _observer_gains(observer_bandwidth, period * steps_per_pose, pose_age)
+        self._period, self._pose_age = period, pose_age
         self._last_pose = np.full(7, np.nan)
         self._steps_per_pose, self._age = steps_per_pose, 0
-        self._memory = np.zeros((5, 6))
+        self._memory, self._wanted = np.zeros((5, 6)), np.empty((3, 6))
         self._started = False
 
     def restart(self) -> None:
         """Let the next wrench be the one that follows the reference, whatever the error."""
         self._started = False
 
-    def step(self, bar_pose: Array, frame_pose: Array, reference: Array) -> Array:
-        """Return the wrench (6,) for measured pose rows (7,) and a reference row (19,)."""
+    def step(
+        self,
+        bar_pose: Array,
+        frame_pose: Array,
+        reference: Array,
+        deviation: Array | None = None,
+    ) -> Array:
+        """Return the wrench (6,) for measured pose rows (7,) and a reference row (19,).
+
+        `deviation` (18,) is by how much the bar is to be elsewhere: x y z φ θ ψ, first and second
+        derivatives.
+        """
+        wanted_motion(reference, self._wanted)
+        if deviation is not None:
+            self._wanted += deviation.reshape(3, 6)
         # A pose that stays the same for longer than its period is a new one all the same.
         self._age += 1
         fresh = self._age >= self._steps_per_pose or not np.array_equal(bar_pose, self._last_pose)
@@ -85,11 +100,12 @@ class ComputedWrench:
         _wanted_wrench(
             bar_pose,
             fresh,
-            reference,
+            self._wanted,
             self._bar,
             self._gains,
             self._observer,
             self._period,
+            self._pose_age,
             self._started,
             self._memory,
             wrench,
@@ -99,7 +115,7 @@ class ComputedWrench:
         _expect(
             bar_pose,
             frame_pose,
-            reference,
+            self._wanted,
             tensions,
             self._distribution.cables,
             self._bar,
@@ -108,27 +124,31 @@ class ComputedWrench:
         return wrench
 
 
-def _observer_gains(bandwidth: float, period: float) -> Array:
-    """Return what error, rate and acceleration take of a surprise: three poles at the bandwidth."""
+def _observer_gains(bandwidth: float, period: float, age: float) -> Array:
+    """Return what error, rate and acceleration take of a surprise: three poles at the bandwidth.
+
+    A surprise that is `age` old told of the state then; what it changes is carried on until now.
+    """
     fade = exp(-bandwidth * period)
-    return np.array(
-        [
-            1.0 - fade**3,
-            1.5 * (1.0 - fade) ** 2 * (1.0 + fade) / period,
-            (1.0 - fade) ** 3 / period**2,
-        ]
-    )
+    then = [
+        1.0 - fade**3,
+        1.5 * (1.0 - fade) ** 2 * (1.0 + fade) / period,
+        (1.0 - fade) ** 3 / period**2,
+    ]
+    onward = [[1.0, age, 0.5 * age**2], [0.0, 1.0, age], [0.0, 0.0, 1.0]]
+    return np.array(onward) @ then
 
 
 @njit(cache=True, error_model="numpy")
 def _wanted_wrench(
     pose_row: Array,
     fresh: bool,
-    reference: Array,
+    wanted: Array,
     bar: Array,
     gains: Array,
     observer: Array,
     period: float,
+    age: float,
     started: bool,
     memory: Array,
     out: Array,
@@ -138,23 +158,23 @@ def _wanted_wrench(
     `memory` (5, 6) holds the error, its rate, its unexplained and its expected acceleration, and
     what is left of the first error's feedback.
     """
-    wanted, pose = np.empty((3, 6)), np.empty(6)
-    wanted_motion(reference, wanted)
+    pose = np.empty(6)
     _pose(pose_row, pose)
     error, rate, unexplained = memory[0], memory[1], memory[2]
     for d in range(6):
-        found = wanted[0, d] - pose[d]
+        found = _earlier(wanted[0, d], wanted[1, d], wanted[2, d], age) - pose[d]
         if d >= 3:
             found -= 2.0 * pi * floor(found / (2.0 * pi) + 0.5)
         if started:
             acceleration = unexplained[d] + memory[3, d]
             ahead = error[d] + period * (rate[d] + 0.5 * period * acceleration)
-            surprise = found - ahead if fresh else 0.0
+            rate[d] += period * acceleration
+            surprise = found - _earlier(ahead, rate[d], acceleration, age) if fresh else 0.0
             error[d] = ahead + observer[0] * surprise
-            rate[d] += period * acceleration + observer[1] * surprise
+            rate[d] += observer[1] * surprise
             unexplained[d] += observer[2] * surprise
-            if not fresh:
-                pose[d] = wanted[0, d] - ahead
+            if not fresh or age > 0.0:
+                pose[d] = wanted[0, d] - error[d]
         else:
             error[d], rate[d], unexplained[d] = found, 0.0, 0.0
             memory[4, d] = gains[d, 0] * found
@@ -172,15 +192,14 @@ def _wanted_wrench(
 def _expect(
     bar_row: Array,
     frame_row: Array,
-    reference: Array,
+    wanted: Array,
     tensions: Array,
     cables: Array,
     bar: Array,
     memory: Array,
 ) -> None:
     """Write the acceleration of the error that the tensions are to give into `memory`."""
-    wanted, pose, given = np.empty((3, 6)), np.empty(6), np.empty(6)
-    wanted_motion(reference, wanted)
+    pose, given = np.empty(6), np.empty(6)
     _pose(bar_row, pose)
     structure, wrench = np.empty((6, len(tensions))), np.empty(6)
     fill_structure(bar_row, frame_row, cables, np.arange(6), structure)
@@ -188,6 +207,12 @@ def _expect(
         wrench[row] = (structure[row] * tensions).sum()
     acceleration_from(pose, wanted[1] - memory[1], wrench, bar, given)
     memory[3] = wanted[2] - given
+
+
+@njit(cache=True, error_model="numpy", forceinline=True)
+def _earlier(place: float, rate: float, acceleration: float, age: float) -> float:
+    """Return where something was."""
+    return place - age * rate + 0.5 * age**2 * acceleration
 
 
 @njit(cache=True, error_model="numpy")

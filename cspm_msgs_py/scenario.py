@@ -108,11 +108,20 @@ class MotionControl(StrictModel):
         return tuple(self.crossover if self.gains is None else self.gains)
 
 
+class Governor(StrictModel):
+    """How far ahead the reference is known [s], and what plans keep above the lower limit [N]."""
+
+    preview: PositiveFloat = 0.5
+    reserve: NonNegativeFloat = 0.2
+
+
 class ComputedWrenchControl(StrictModel):
     """Inverse dynamics of the bar with an observer of its pose error.
 
     `bandwidth` [rad/s] is that of the error's dynamics per controlled DOF, `observer_bandwidth`
-    [rad/s] that of the observer. The force controllers are designed at `design_pose`.
+    [rad/s] that of the observer. With a `governor` the bar leaves its reference, ahead of time and
+    as little as can be, where no tensions can give it. The force controllers are designed at
+    `design_pose`.
     """
 
     law: Literal["computed_wrench"]
@@ -124,6 +133,7 @@ class ComputedWrenchControl(StrictModel):
         "yaw": 20.0,
     }
     observer_bandwidth: PositiveFloat = 40.0
+    governor: Governor | None = None
     design_pose: Pose = (0.0, 0.0, 2.0, 0.0, 0.0, 0.0)
 
     @property

@@ -32,18 +32,19 @@ def pose_of(values):
     return np.concatenate([values[:3], Rotation.from_euler("ZYX", values[:2:-1]).as_quat()])
 
 
-def controller(testbed, *, lower=0.0, bandwidth=20.0, steps_per_pose=1, period=PERIOD):
+def controller(testbed, *, lower=0.0, steps_per_pose=1, pose_age=0.0):
     limits = np.array([(lower, cable.tension_limits[1]) for cable in testbed.cables])
     distribution = TensionDistribution(
         nominal_parameters(testbed).cables, limits, HowDistributed(method="analytic_centre")
     )
     return ComputedWrench(
-        dict.fromkeys(DOFS, bandwidth),
+        dict.fromkeys(DOFS, 20.0),
         testbed,
         distribution,
         observer_bandwidth=40.0,
-        period=period,
+        period=PERIOD,
         steps_per_pose=steps_per_pose,
+        pose_age=pose_age,
     )
 
 
@@ -118,6 +119,39 @@ def test_a_force_that_it_does_not_know_leaves_no_error(thesis, every):
         largest = max(largest, np.abs(body.place - HOME[:3]).max())
     assert np.abs(body.place - HOME[:3]).max() < 1e-5
     assert 1e-4 < largest < 5e-3
+
+
+def swung(thesis, told, *, late=8):
+    """Return the largest error [m] along a sine with poses that come `late` steps late."""
+    body, law, largest = Particle([0.0, 0.0, 0.0]), controller(thesis, pose_age=told), 0.0
+    seen = [pose_of(HOME)] * (late + 1)
+    for k in range(1500):
+        phase = 6.0 * k * PERIOD
+        wanted = HOME + 0.03 * np.array([1.0 - np.cos(phase), 0.0, 0.0, 0.0, 0.0, 0.0])
+        rate, rush = np.zeros(6), np.zeros(6)
+        rate[0], rush[0] = 0.18 * np.sin(phase), 1.08 * np.cos(phase)
+        wrench = law.step(seen[-1 - late], UNMOVED, reference(wanted, rate, rush))
+        if k > 500:
+            largest = max(largest, abs(wanted[0] - body.place[0]))
+        seen.append(body.advance(wrench))
+    return largest
+
+
+def test_a_pose_whose_age_is_known_costs_next_to_nothing(thesis):
+    assert swung(thesis, 0.0) > 1e-3
+    assert swung(thesis, 0.008) < 5e-5
+    # Told the wrong way round it would be twice as bad.
+    assert swung(thesis, -0.008) > 1.5 * swung(thesis, 0.0)
+
+
+def test_what_it_is_told_to_deviate_is_where_it_goes(thesis):
+    body, law = Particle([0.0, 0.0, 0.0]), controller(thesis)
+    aside = np.zeros(18)
+    aside[1] = 0.003
+    pose = pose_of(HOME)
+    for _ in range(1500):
+        pose = body.advance(law.step(pose, UNMOVED, reference(), aside))
+    np.testing.assert_allclose(body.place - HOME[:3], [0.0, 0.003, 0.0], atol=1e-5)
 
 
 def test_what_cannot_be_met_leaves_nothing_behind(thesis):

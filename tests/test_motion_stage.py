@@ -5,7 +5,9 @@ import pytest
 from run_samples import bundle_of
 
 from cspm_control.stages.make import make_controller
+from cspm_control.stages.motion_stage import MotionStage
 from cspm_msgs_py.schedule import BAR_POSE, BAR_REFERENCE, MOTION_CONTROLLER, WRENCH
+from cspm_sim.motion import Motion
 
 WEIGHT = 4.06 * 9.81
 
@@ -64,3 +66,23 @@ def test_not_suspended_it_winds_up_all_it_may(bundle):
         wrench = bench.step(0.02)
     limit = bundle.scenario.control.motion.integral_limits[0]
     assert wrench[2] < -WEIGHT - limit
+
+
+class Told:
+    """A controller that keeps by how much it is told to deviate."""
+
+    def step(self, bar_pose, frame_pose, reference, deviation):
+        self.deviation = deviation
+        return np.zeros(6)
+
+
+def test_a_plan_begins_when_the_run_does():
+    knots = np.zeros((3, 18))
+    knots[:, 0], knots[:, 6] = [0.0, 0.1, 0.2], 0.1
+    told, rows = Told(), {BAR_POSE: np.zeros(7), BAR_REFERENCE: np.zeros(19)}
+    stage = MotionStage(told, Motion(knots, 1.0))
+    for start, now in ((0, 500_000_000), (7_000_000_000, 7_500_000_000)):
+        stage.start(start)
+        stage.step(now, rows, lambda _topic, _row: None)
+        assert told.deviation[0] == pytest.approx(0.05)
+        assert told.deviation[6] == pytest.approx(0.1)

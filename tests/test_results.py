@@ -1,14 +1,27 @@
 """What the page of results is made from."""
 
 import re
+import sys
 
 import numpy as np
 import pytest
 from run_samples import bundle_of
 
-from bench.feasibility import least_tensions
-from bench.result_cases import BEYOND, LIMITED, PAST, SWITCHED, THESIS, changed, seeded
-from bench.results import BLOCK, PAGE, Store, table, tracking_block
+from bench.feasibility import least_errors, least_tensions
+from bench.result_cases import (
+    BEYOND,
+    CAMERA_100_HZ,
+    CAUSES,
+    CORNERS,
+    LIMITED,
+    PAST,
+    SWITCHED,
+    SWITCHED_4M,
+    THESIS,
+    changed,
+    seeded,
+)
+from bench.results import BLOCK, PAGE, Store, main, table, tracking_block
 from bench.tension_distribution import drawn_wrenches, score
 from bench.tracking import Case, follow, track
 from cspm_bringup.run import run
@@ -19,9 +32,13 @@ pytestmark = pytest.mark.compiled
 
 @pytest.mark.slow
 def test_every_case_is_a_run_that_can_be_made():
-    groups = (THESIS, SWITCHED, BEYOND, LIMITED, changed(PAST, 1.0), seeded(2))
+    groups = (THESIS, SWITCHED, SWITCHED_4M, CAUSES, BEYOND, CORNERS, LIMITED)
+    groups += (changed(PAST, 1.0), seeded(2, CAMERA_100_HZ))
     for case in {case.scenario: case for group in groups for case in group.values()}.values():
         assert case.bundle().testbed.testbed.bar is not None
+    for case in SWITCHED_4M.values():
+        # Gains that are designed at 4 m have to have the thesis's margins there.
+        assert case.bundle().scenario.control.motion.gains
     with pytest.raises(InputError, match=r"^effects: bar_mass: parameters \['weight'\], allowed"):
         track(Case("rest", ("duration=0.01",), (("bar_mass", (), {"weight": 1.0}),)))
 
@@ -86,6 +103,29 @@ def test_what_was_measured_is_kept(tmp_path):
     assert store.get("a, b", lambda: {"x": 1}) == {"x": 1}
     assert store.get("a, b", lambda: pytest.fail("measured twice")) == {"x": 1}
     assert [store.get(f"stiffness {sign}20 %", lambda s=sign: s) for sign in "+−"] == ["+", "−"]
+
+
+def test_one_block_is_renewed_alone(tmp_path, monkeypatch, capsys):
+    page = tmp_path / "page.md"
+    blocks = "<!-- results: machine -->\nold\n<!-- end -->\n"
+    page.write_text(blocks + blocks.replace("machine", "past"))
+    monkeypatch.setattr("bench.results.PAGE", page)
+    monkeypatch.setattr(sys, "argv", ["results", "--seeds", "3", "--only", "machine"])
+    main()
+    renewed, kept = page.read_text().split("<!-- end -->\n")[:2]
+    assert renewed.endswith("3 seeds.\n")
+    assert kept == "<!-- results: past -->\nold\n"
+    monkeypatch.setattr(sys, "argv", ["results", "--only", "machines"])
+    with pytest.raises(SystemExit, match="2"):
+        main()
+    assert "error: --only: machines, allowed: machine, thesis," in capsys.readouterr().err
+
+
+def test_an_error_that_nobody_can_avoid_is_where_no_tensions_are_left():
+    drop = "target.motion={type: moves, moves: [{at: 0.5, duration: 0.4, by: [0,0,0.5,0,0,0]}]}"
+    assert not least_errors(bundle_of("rest", "duration=1.5")).any()
+    errors = [least_errors(bundle_of("rest", "duration=1.5", drop), t)[2] for t in (0.0, 1.0)]
+    assert 1e-3 < errors[0] < errors[1]
 
 
 def test_the_page_has_a_place_for_every_block_and_tables_in_them():

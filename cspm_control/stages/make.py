@@ -2,14 +2,16 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 
 import numpy as np
 from numpy.typing import NDArray
 
 from cspm_control.angle_servo import AngleGenerator, AngleServo
+from cspm_control.bar_dynamics import bar_parameters
 from cspm_control.computed_wrench import ComputedWrench
 from cspm_control.force_controller import ForceController
+from cspm_control.governor import Governed, plan_deviation
 from cspm_control.motion_controller import MotionController
 from cspm_control.stages.angle_stage import AngleStage
 from cspm_control.stages.distribution_stage import DistributionStage
@@ -24,33 +26,49 @@ from cspm_msgs_py.scenario import (
     AngleProfile,
     ClosedLoop,
     ComputedWrenchControl,
+    Governor,
     Scenario,
     TorqueProfile,
 )
-from cspm_msgs_py.schedule import FORCE_CONTROLLER, MOTION_CONTROLLER, TENSION_DISTRIBUTION
+from cspm_msgs_py.schedule import (
+    BAR_POSE,
+    BAR_REFERENCE,
+    FORCE_CONTROLLER,
+    MOTION_CONTROLLER,
+    TENSION_DISTRIBUTION,
+    schedule_of,
+)
 from cspm_msgs_py.stage import Stage
 from cspm_msgs_py.testbed import Testbed
 from cspm_sim.kernels.cable import RADIUS
+from cspm_sim.motion import Motion
 from cspm_sim.parameters import nominal_parameters
 from cspm_sim.safe_state import make_safe_state
 
+FRAME_REFERENCE = "/winch_frame/reference"
 # A measured tension beyond this many times a cable's upper limit trips, unless the scenario says.
 TRIP_FACTOR = 2.0
 
 
-def make_controller(node: str, scenario: Scenario, testbed: Testbed) -> Stage:
+def make_controller(
+    node: str, scenario: Scenario, testbed: Testbed, motions: Mapping[str, Motion] | None = None
+) -> Stage:
     """Return the controller that `node` runs in a resolved scenario.
+
+    `motions` are those of bar and winch frame, by reference topic; a governor plans with them.
 
     Raises:
         InputError: this scenario has no such controller.
+        ConvergenceError: a governor finds no plan.
     """
     control = scenario.control
     if isinstance(control, TorqueProfile) and node == FORCE_CONTROLLER:
         return torque_stage(control, scenario, testbed)
     if isinstance(control, AngleProfile) and node == FORCE_CONTROLLER:
         return angle_stage(control, scenario, testbed)
+    if isinstance(control, ClosedLoop) and node == MOTION_CONTROLLER:
+        return motion_stage(control, scenario, testbed, motions)
     makers: dict[str, Callable[[ClosedLoop, Scenario, Testbed], Stage]] = {
-        MOTION_CONTROLLER: motion_stage,
         TENSION_DISTRIBUTION: distribution_stage,
         FORCE_CONTROLLER: force_stage,
     }
@@ -59,8 +77,13 @@ def make_controller(node: str, scenario: Scenario, testbed: Testbed) -> Stage:
     return makers[node](control, scenario, testbed)
 
 
-def motion_stage(control: ClosedLoop, scenario: Scenario, testbed: Testbed) -> MotionStage:
-    """Return the motion controller; the test-bed has a bar, see `schedule_of`."""
+def motion_stage(
+    control: ClosedLoop,
+    scenario: Scenario,
+    testbed: Testbed,
+    motions: Mapping[str, Motion] | None = None,
+) -> MotionStage:
+    """Return the motion controller, which without `motions` has no governor."""
     motion = control.motion
     if testbed.bar is None:
         raise InputError(
@@ -68,18 +91,18 @@ def motion_stage(control: ClosedLoop, scenario: Scenario, testbed: Testbed) -> M
         )
     period = 1.0 / scenario.rates.motion_controller
     if isinstance(motion, ComputedWrenchControl):
-        return MotionStage(
-            ComputedWrench(
-                motion.bandwidth,
-                testbed,
-                tension_distribution(control, testbed),
-                observer_bandwidth=motion.observer_bandwidth,
-                period=period,
-                steps_per_pose=max(
-                    1, scenario.rates.motion_controller // scenario.rates.motion_capture
-                ),
-            )
+        computed = ComputedWrench(
+            motion.bandwidth,
+            testbed,
+            tension_distribution(control, testbed),
+            observer_bandwidth=motion.observer_bandwidth,
+            period=period,
+            steps_per_pose=max(
+                1, scenario.rates.motion_controller // scenario.rates.motion_capture
+            ),
+            pose_age=_pose_age(scenario, testbed),
         )
+        return MotionStage(computed, _planned(motion.governor, scenario, testbed, motions))
     return MotionStage(
         MotionController(
             motion.gains or {},
@@ -90,6 +113,67 @@ def motion_stage(control: ClosedLoop, scenario: Scenario, testbed: Testbed) -> M
             integral_limits=motion.integral_limits,
         )
     )
+
+
+def _pose_age(scenario: Scenario, testbed: Testbed) -> float:
+    """Return how old the bar's pose is when the motion controller first computes with it [s]."""
+    schedule = schedule_of(scenario, testbed)
+    first = schedule.nodes[MOTION_CONTROLLER].first
+    stamped = schedule.topics[BAR_POSE].latest(first)
+    return 0.0 if stamped is None else 1e-9 * schedule.period_ns * (first - stamped)
+
+
+def _planned(
+    governor: Governor | None,
+    scenario: Scenario,
+    testbed: Testbed,
+    motions: Mapping[str, Motion] | None,
+) -> Motion | None:
+    control = scenario.control
+    if governor is None or motions is None:
+        return None
+    assert isinstance(control, ClosedLoop)
+    limits = planned_tension_limits(control, governor, testbed)
+    return plan_deviation(
+        governed(scenario, testbed, limits),
+        motions[BAR_REFERENCE],
+        motions[FRAME_REFERENCE],
+        scenario.duration,
+        governor.preview,
+    )
+
+
+def governed(scenario: Scenario, testbed: Testbed, limits: NDArray[np.float64]) -> Governed:
+    """Return what a governor plans for, with planned tensions within limits (n, 2) [N]."""
+    assert isinstance(scenario.control, ClosedLoop)
+    assert testbed.bar is not None
+    requirement = scenario.requirement
+    return Governed(
+        nominal_parameters(testbed).cables,
+        bar_parameters(testbed.bar, testbed.gravity),
+        limits,
+        controlled_axes(scenario.control),
+        np.array([requirement.position] * 3 + [requirement.angle] * 3),
+    )
+
+
+def planned_tension_limits(
+    control: ClosedLoop, governor: Governor, testbed: Testbed
+) -> NDArray[np.float64]:
+    """Return between what planned tensions stay, (n, 2) [N].
+
+    Raises:
+        InputError: the reserve leaves nothing between a cable's limits.
+    """
+    limits = wanted_tension_limits(control, testbed)
+    limits[:, 0] += governor.reserve
+    closed = np.flatnonzero(limits[:, 0] >= limits[:, 1])
+    if len(closed):
+        raise InputError(
+            f"control.motion.governor.reserve: {governor.reserve:g} N, allowed: less than what is"
+            f" between the tension limits of {testbed.cable_names[closed[0]]}"
+        )
+    return limits
 
 
 def distribution_stage(

@@ -18,6 +18,7 @@ from cspm_msgs_py.schedule import (
     WRENCH,
 )
 from cspm_msgs_py.stage import Send
+from cspm_sim.motion import Motion
 
 Array = NDArray[np.float64]
 
@@ -29,9 +30,17 @@ class MotionStage:
 
     node = MOTION_CONTROLLER
 
-    def __init__(self, controller: MotionController | ComputedWrench) -> None:
-        self._controller = controller
+    def __init__(
+        self, controller: MotionController | ComputedWrench, deviation: Motion | None = None
+    ) -> None:
+        """Take the controller, and by how much the bar is to be where its reference is not."""
+        self._controller, self._deviation = controller, deviation
         self._suspended = False
+        self._start_ns = 0
+
+    def start(self, start_ns: int) -> None:
+        """Let the planned deviation begin at an instant [ns]; untold it begins at 0."""
+        self._start_ns = start_ns
 
     def suspend(self, suspended: bool) -> None:
         """Begin anew with every step while nobody follows the wrench; go on from there."""
@@ -46,7 +55,9 @@ class MotionStage:
             send(WRENCH, self._controller.step(pose, reference))
         else:
             frame = inputs.get(FRAME_POSE, UNMOVED)
-            send(WRENCH, self._controller.step(pose, frame, reference))
+            plan, time = self._deviation, 1e-9 * (now_ns - self._start_ns)
+            deviation = None if plan is None else plan.at(time)
+            send(WRENCH, self._controller.step(pose, frame, reference, deviation))
 
     def status(self) -> Status:
         """Return that all is well: the motion controller has no limit of its own to meet."""

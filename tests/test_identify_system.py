@@ -193,6 +193,21 @@ def test_a_prior_needs_a_parameter():
         choose(MACHINE, ["bar.mass"], {}, {"stiffness": Prior(1.0, 0.1)})
 
 
+def test_bounds_are_kept_within_the_usual_ones():
+    names = ["bar.mass", "stiffness"]
+    mass, stiffness = choose(MACHINE, names, bounds={"bar.mass": (4.0, 4.3)})
+    assert (mass.parameter.lower, mass.parameter.upper) == (4.0, 4.3)
+    assert (stiffness.parameter.lower, stiffness.parameter.upper) == (0.2, 5.0)
+    for bounds, text in (
+        ({"bar.mass": (4.3, 4.0)}, r"^--bound bar.mass=4.3:4: allowed: rising, 0.406 to 40.6 kg$"),
+        ({"bar.mass": (0.0, 5.0)}, r"^--bound bar.mass=0:5: allowed: rising, 0.406 to 40.6 kg$"),
+        ({"bar.mass": (4.2, 5.0)}, r"^bar.mass: 4.06 kg, allowed: 4.2 to 5$"),
+        ({"bar.com.x": (0, 1)}, r"^--bound bar.com.x: is not fitted, allowed: bar.mass, stiffness"),
+    ):
+        with pytest.raises(InputError, match=text):
+            choose(MACHINE, names, bounds=bounds)
+
+
 def test_a_rig_without_bar_is_refused():
     rig = load_testbed(THESIS.parent / "rig_hoist.yaml").testbed
     with pytest.raises(InputError, match=r"has no bar or no winch frame, allowed: a machine"):
@@ -219,6 +234,7 @@ def test_the_command_prints_what_was_found(result, tmp_path):
     [
         (["--prior", "bar.mass=4"], "--prior bar.mass=4: allowed: NAME=MEAN±SD"),
         (["--freeze", "bar.mass=x"], "--freeze bar.mass=x: allowed: NAME or NAME=VALUE"),
+        (["--bound", "bar.mass=4"], "--bound bar.mass=4: allowed: NAME=LOW:HIGH"),
         (["--out", "."], ".: exists, allowed: a new folder"),
     ],
 )

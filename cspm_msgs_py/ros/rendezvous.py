@@ -14,7 +14,6 @@ from collections.abc import Callable, Collection
 
 from cspm_msgs_py.errors import InputError
 from cspm_msgs_py.ros.contract_node import ContractNode, ros_class
-from cspm_msgs_py.ros.intake import DEPTH
 from cspm_msgs_py.ros.qos import contract_qos
 
 PROGRESS, START, END = "/run/progress", "/run/start", "/run/end"
@@ -55,8 +54,8 @@ class FollowerSide:
         self._header = ros_class(_HEADER)
         self._publisher = node.node.create_publisher(self._header, PROGRESS, contract_qos())
         self._on_start = on_start
-        node.node.create_subscription(self._header, START, self._start, contract_qos(DEPTH))
-        node.node.create_subscription(self._header, END, self._end, contract_qos(DEPTH))
+        node.node.create_subscription(self._header, START, self._start, contract_qos(None))
+        node.node.create_subscription(self._header, END, self._end, contract_qos(None))
         self._timer = node.every(_LOOK_EVERY_S, self._announce)
         self.end_ns: int | None = None
 
@@ -117,7 +116,7 @@ class PlantSide:
         self._publisher = node.node.create_publisher(self._header, END, contract_qos())
         self._starter = node.node.create_publisher(self._header, START, contract_qos())
         self._progress = node.node.create_subscription(
-            self._header, PROGRESS, self._take, contract_qos(DEPTH)
+            self._header, PROGRESS, self._take, contract_qos(None)
         )
         self._settled = time.monotonic() + _SETTLE_S
         self.absent = set(others)

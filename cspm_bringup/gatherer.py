@@ -155,11 +155,11 @@ class Gatherer:
         """Take a message of `/diagnostics`; `number` is its sender's, None where not known."""
         if number is not None and self._numbered and number - 1 not in self._reports.values():
             # Told before it is decoded: whoever floods the topic sends more than can be decoded.
-            expected = sorted({each + 1 for each in self._reports.values()})
+            due = sorted({each + 1 for each in self._reports.values()})
             self._refuse(
                 DIAGNOSTICS.name,
                 f"{DIAGNOSTICS.name}: its sender's message {number}, allowed:"
-                f" {', '.join(map(str, expected))}; a second sender",
+                f" {', '.join(map(str, due))}; a second sender",
             )
             return
         try:

@@ -146,7 +146,7 @@ def without_bias(problem: Problem, estimate: Estimate, bias: Bias) -> Estimate:
     What was frozen, is not excited or lies on a bound stays as it is.
     """
     moves = np.isfinite(estimate.ci95).all(axis=1)
-    moves &= [name not in estimate.at_bound for name in estimate.names]
+    moves &= np.array([name not in estimate.at_bound for name in estimate.names])
     limits = np.array([(p.lower, p.upper) for p in problem.parameters])
     values = np.clip(estimate.values - bias.values, limits[:, 0], limits[:, 1])
     values = np.where(moves, values, estimate.values)

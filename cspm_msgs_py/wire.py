@@ -208,6 +208,7 @@ class _Form:
         self._mask = int.from_bytes(mask.tobytes(), "little")
         self._constant = int.from_bytes((layout.template & mask).tobytes(), "little")
         self._first, self._count, self._places = _grid(layout, topic.fields)
+        self._sliced = isinstance(self._places, slice)
 
     def fits(self, payload: bytes) -> bool:
         """Return whether these bytes are a message of this form."""
@@ -219,10 +220,11 @@ class _Form:
 
     def row(self, payload: bytes) -> Array:
         """Return the topic's numbers, shape (width,), of bytes that fit."""
-        return np.frombuffer(payload, "<f8", self._count, self._first)[self._places]
+        found: Array = np.frombuffer(payload, "<f8", self._count, self._first)[self._places]
+        return found.copy() if self._sliced else found
 
 
-def _grid(layout: Layout, fields: Sequence[str]) -> tuple[int, int, NDArray[np.intp]]:
+def _grid(layout: Layout, fields: Sequence[str]) -> tuple[int, int, NDArray[np.intp] | slice]:
     """Return where `fields` stand when the message is seen as an array of float64.
 
     CDR aligns every float64 to 8 bytes, so they all stand on one grid.
@@ -234,7 +236,11 @@ def _grid(layout: Layout, fields: Sequence[str]) -> tuple[int, int, NDArray[np.i
     wanted = [offsets[layout.topic.fields.index(field)] for field in fields]
     first = offsets[0] % 8 if offsets else 0
     places = (np.array(wanted, dtype=np.intp) - first) // 8
-    return first, (layout.size - first) // 8, places
+    count = (layout.size - first) // 8
+    if len(places) and (np.diff(places) == 1).all():
+        # A slice takes half the time of an index.
+        return first, count, slice(int(places[0]), int(places[-1]) + 1)
+    return first, count, places
 
 
 def _as_contract(message: Any, topic: Topic, sender: Topic) -> Any:  # noqa: ANN401 - generated

@@ -124,7 +124,8 @@ def test_a_prior_holds_and_a_profile_agrees_with_the_interval(cspm, recordings, 
     searched, _ = recordings
     words = ["--testbed", THESIS, "--fit", "bar.mass,bar_damping.surge", "--horizon", "6"]
     known = ["--prior", "bar.mass=4.2±0.00001", "--profile", "bar_damping.surge"]
-    code, _, err = cspm("identify", "system", searched.path, *words, *known, "--json", "found.json")
+    written = ["--json", "found.json", "--out", "fitted"]
+    code, _, err = cspm("identify", "system", searched.path, *words, *known, *written)
     assert (code, err) == (0, "")
     data = json.loads((tmp_path / "found.json").read_text())
     mass, surge = data["estimate"]["parameters"]
@@ -137,6 +138,13 @@ def test_a_prior_holds_and_a_profile_agrees_with_the_interval(cspm, recordings, 
     assert min(profile["deviance"]) == 0.0
     width = surge["ci95"][1] - surge["ci95"][0]
     assert 0.3 * width < high - low < 3.0 * width
+    # The fitted file runs as it is.
+    words = ["run", "rest", "--duration", "0.1", "--out", "again", "--testbed"]
+    assert cspm(*words, "fitted/fitted_testbed.yaml")[::2] == (0, "")
+    with Recording(tmp_path / "again") as recording:
+        file = parse_testbed(recording.attachments["testbed.yaml"].decode(), "again")
+    assert file.testbed.bar.mass == pytest.approx(mass["value"], rel=1e-7)
+    assert file.provenance["bar.mass"].recording == searched.sha256
 
 
 def test_values_go_where_the_names_say():

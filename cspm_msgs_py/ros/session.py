@@ -2,11 +2,10 @@
 
 from __future__ import annotations
 
-import gc
 import os
 import time
-from collections.abc import Callable, Iterator, Sequence
-from contextlib import ExitStack, contextmanager
+from collections.abc import Callable, Sequence
+from contextlib import ExitStack
 from pathlib import Path
 
 import rclpy
@@ -29,8 +28,6 @@ _LOOK_EVERY_S = 0.02
 _LONG_S = 1e6
 # In a polled session: how often the executor has its turn, and how long it waits when all is quiet.
 _TURN_S, _IDLE_S = 0.01, 0.001
-# New objects between looks for garbage: a step of a node leaves some tens.
-_COLLECT_AFTER = 50_000
 
 
 class Session:
@@ -102,13 +99,11 @@ class Session:
 
         timer = self._nodes[0].every(_LOOK_EVERY_S, look)
         try:
-            with _seldom_collected():
-                if self._polled:
-                    self._poll_until(over.done, timeout_s)
-                elif not done():
-                    # Without a timeout rclpy 7.1 does not see that the future is complete.
-                    seconds = timeout_s or _LONG_S
-                    self._executor.spin_until_future_complete(over, timeout_sec=seconds)
+            if self._polled:
+                self._poll_until(over.done, timeout_s)
+            elif not done():
+                # Without a timeout rclpy 7.1 does not see that the future is complete.
+                self._executor.spin_until_future_complete(over, timeout_sec=timeout_s or _LONG_S)
         except ExternalShutdownException:
             self._left = True
         finally:
@@ -172,19 +167,6 @@ class Session:
     def stop(self) -> None:
         """Ask for the end."""
         self._left = True
-
-
-@contextmanager
-def _seldom_collected() -> Iterator[None]:
-    """Look for garbage seldom, and not at what lives as long as the run."""
-    young, *older = gc.get_threshold()
-    gc.freeze()
-    gc.set_threshold(_COLLECT_AFTER, *older)
-    try:
-        yield
-    finally:
-        gc.set_threshold(young, *older)
-        gc.unfreeze()
 
 
 def _init(context: Context, args: list[str], domain_id: int | None) -> None:

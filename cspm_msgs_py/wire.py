@@ -208,7 +208,6 @@ class _Form:
         self._mask = int.from_bytes(mask.tobytes(), "little")
         self._constant = int.from_bytes((layout.template & mask).tobytes(), "little")
         self._first, self._count, self._places = _grid(layout, topic.fields)
-        self._sliced = isinstance(self._places, slice)
 
     def fits(self, payload: bytes) -> bool:
         """Return whether these bytes are a message of this form."""
@@ -220,11 +219,10 @@ class _Form:
 
     def row(self, payload: bytes) -> Array:
         """Return the topic's numbers, shape (width,), of bytes that fit."""
-        found: Array = np.frombuffer(payload, "<f8", self._count, self._first)[self._places]
-        return found.copy() if self._sliced else found
+        return np.frombuffer(payload, "<f8", self._count, self._first)[self._places]
 
 
-def _grid(layout: Layout, fields: Sequence[str]) -> tuple[int, int, NDArray[np.intp] | slice]:
+def _grid(layout: Layout, fields: Sequence[str]) -> tuple[int, int, NDArray[np.intp]]:
     """Return where `fields` stand when the message is seen as an array of float64.
 
     CDR aligns every float64 to 8 bytes, so they all stand on one grid.
@@ -236,11 +234,7 @@ def _grid(layout: Layout, fields: Sequence[str]) -> tuple[int, int, NDArray[np.i
     wanted = [offsets[layout.topic.fields.index(field)] for field in fields]
     first = offsets[0] % 8 if offsets else 0
     places = (np.array(wanted, dtype=np.intp) - first) // 8
-    count = (layout.size - first) // 8
-    if len(places) and (np.diff(places) == 1).all():
-        # A slice takes half the time of an index.
-        return first, count, slice(int(places[0]), int(places[-1]) + 1)
-    return first, count, places
+    return first, (layout.size - first) // 8, places
 
 
 def _as_contract(message: Any, topic: Topic, sender: Topic) -> Any:  # noqa: ANN401 - generated

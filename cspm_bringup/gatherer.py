@@ -8,7 +8,6 @@ one of its topic, or not one at all, is refused and counted.
 from __future__ import annotations
 
 from bisect import bisect_left
-from collections import deque
 from collections.abc import Callable, Collection
 
 import numpy as np
@@ -35,9 +34,9 @@ class _Inlet:
         self._delay_ns = schedule.topics[topic.name].delay * schedule.period_ns
         reader = WireReader(topic)
         self._decode, self._decode_block = reader.decode, reader.decode_block
-        self._extend = channel.extend
-        # Log times, stamps and rows of what came together.
-        self._blocks: deque[tuple[list[int], list[int], Array]] = deque()
+        self._append = channel.append
+        self._logs: list[int] = []
+        self._messages: list[tuple[int, Array]] = []
 
     def take(self, payload: bytes, number: int | None) -> None:
         """Keep a message.
@@ -49,26 +48,24 @@ class _Inlet:
         # What is unusable must not take the place of the message that it pretends to be.
         stamp, row = self._decode(payload)
         self.sequence.take(stamp, number)
-        self._blocks.append(([stamp + self._delay_ns], [stamp], row[np.newaxis]))
+        self._logs.append(stamp + self._delay_ns)
+        self._messages.append((stamp, row))
 
     def take_block(self, payloads: list[bytes], numbers: list[int | None]) -> bool:
         """Keep messages if each is sound and the next one; else keep none and return False."""
         decoded = self._decode_block(payloads)
         if decoded is None or not self.sequence.take_block(decoded[0], numbers):
             return False
-        stamps, rows = decoded
-        self._blocks.append(([stamp + self._delay_ns for stamp in stamps], stamps, rows))
+        self._logs += [stamp + self._delay_ns for stamp in decoded[0]]
+        self._messages += zip(*decoded, strict=True)
         return True
 
     def write(self, end_ns: int) -> None:
         """Write what came before `end_ns`."""
-        blocks = self._blocks
-        while blocks and blocks[0][0][0] < end_ns:
-            logs, stamps, rows = blocks.popleft()
-            count = bisect_left(logs, end_ns)
-            self._extend(logs[:count], stamps[:count], rows[:count])
-            if count < len(logs):
-                blocks.appendleft((logs[count:], stamps[count:], rows[count:]))
+        count = bisect_left(self._logs, end_ns)
+        for log, (stamp, row) in zip(self._logs[:count], self._messages, strict=False):
+            self._append(log, stamp, row)
+        del self._logs[:count], self._messages[:count]
 
 
 class Gatherer:

@@ -17,7 +17,6 @@ from cspm_msgs_py.errors import CspmError, InputError
 from cspm_msgs_py.layout import layout_of
 from cspm_msgs_py.recording import Recording, RecordingWriter, recover
 from cspm_msgs_py.recording.sink import McapSink
-from cspm_msgs_py.recording.writer import BLOCK_NS
 from cspm_msgs_py.topics import Topic
 from cspm_msgs_py.yaml_file import read_yaml
 
@@ -153,21 +152,6 @@ def test_the_file_does_not_depend_on_the_order_of_topics_within_a_step(tmp_path)
                     channels[name].append(step * STEP_NS, step, row)
         contents.append(writer.path.read_bytes())
     assert contents[0] == contents[1]
-
-
-def test_messages_recorded_together_are_those_recorded_one_by_one(tmp_path):
-    rows = np.random.default_rng(1).standard_normal((120, 6))
-    logs, stamps = [i * STEP_NS for i in range(120)], list(range(120))
-    with new_writer(tmp_path / "single") as single:
-        for log, stamp, row in zip(logs, stamps, rows, strict=True):
-            single.channel("/bar/twist").append(log, stamp, row)
-    block = BLOCK_NS // STEP_NS
-    with new_writer(tmp_path / "together") as together:
-        for first in range(0, 120, block):
-            part = slice(first, min(first + block, 120))
-            together.channel("/bar/twist").extend(logs[part], stamps[part], rows[part])
-    assert single.counts == together.counts
-    assert single.path.read_bytes() == together.path.read_bytes()
 
 
 def test_late_and_repeated_log_times_are_kept(tmp_path):

@@ -55,20 +55,6 @@ class Channel:
         self._stamps.append(stamp_ns)
         self._logs.append(log_ns)
 
-    def extend(self, logs_ns: list[int], stamps_ns: list[int], rows: NDArray[np.float64]) -> None:
-        """Record several messages of one block of log time, as `append` does one.
-
-        Args:
-            logs_ns: when they were recorded [ns], at least one.
-            stamps_ns: when their values are valid [ns].
-            rows: their numbers, shape (n, width), float64; copied.
-        """
-        if logs_ns[0] >= self._end:
-            self._turn(logs_ns[0])
-        self._contents.append(rows.tobytes())
-        self._stamps += stamps_ns
-        self._logs += logs_ns
-
     def append_payload(self, log_ns: int, payload: bytes) -> None:
         """Record a message whose bytes are given."""
         if log_ns >= self._end:

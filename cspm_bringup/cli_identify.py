@@ -300,6 +300,12 @@ def system(
             " deviation; MEAN+-SD works as well; repeatable.",
         ),
     ] = None,
+    bound: Annotated[
+        list[str] | None,
+        typer.Option(
+            metavar="NAME=LOW:HIGH", help="Keeps it between these, both included; repeatable."
+        ),
+    ] = None,
     horizon: Annotated[
         float | None,
         typer.Option(metavar="S", help="Length of the windows, otherwise 4 s."),
@@ -331,6 +337,7 @@ def system(
         names=_names("--fit", fit),
         frozen=dict(_frozen(text) for text in freeze or ()),
         priors=dict(_prior(text) for text in prior or ()),
+        bounds=dict(_bounds(text) for text in bound or ()),
         profiled=tuple(profile or ()),
         horizon=horizon,
         out=out,
@@ -351,9 +358,21 @@ def _prior(text: str) -> tuple[str, Prior]:
     return name, Prior(_number("--prior", text, mean), _number("--prior", text, deviation))
 
 
+def _bounds(text: str) -> tuple[str, tuple[float, float]]:
+    name, _, rest = text.partition("=")
+    low, _, high = rest.partition(":")
+    return name, (_number("--bound", text, low), _number("--bound", text, high))
+
+
+_FORMS = {
+    "--prior": "NAME=MEAN±SD",
+    "--freeze": "NAME or NAME=VALUE",
+    "--bound": "NAME=LOW:HIGH",
+}
+
+
 def _number(option: str, text: str, part: str) -> float:
     try:
         return float(part)
     except ValueError:
-        form = "NAME=MEAN±SD" if option == "--prior" else "NAME or NAME=VALUE"
-        raise InputError(f"{option} {text}: allowed: {form}") from None
+        raise InputError(f"{option} {text}: allowed: {_FORMS[option]}") from None

@@ -103,6 +103,7 @@ class Gatherer:
             for node, plan in schedule.nodes.items()
         }
         self._reports = dict.fromkeys(reporting, 0)
+        self._numbered = self._reports.keys() >= self._next_status.keys()
         self._statuses: list[tuple[int, int, bytes]] = []
         self._write_every = max(RECORDED_EVERY, WRITE_EVERY_NS // schedule.period_ns)
         self._written = 0
@@ -152,6 +153,15 @@ class Gatherer:
 
     def receive_diagnostics(self, payload: bytes, _: int, number: int | None = None) -> None:
         """Take a message of `/diagnostics`; `number` is its sender's, None where not known."""
+        if number is not None and self._numbered and number - 1 not in self._reports.values():
+            # Told before it is decoded: whoever floods the topic sends more than can be decoded.
+            due = sorted({each + 1 for each in self._reports.values()})
+            self._refuse(
+                DIAGNOSTICS.name,
+                f"{DIAGNOSTICS.name}: its sender's message {number}, allowed:"
+                f" {', '.join(map(str, due))}; a second sender",
+            )
+            return
         try:
             stamp, [status] = decode_diagnostics(payload)
             node = status.name

@@ -87,10 +87,10 @@ def fitted_numbers(
     result: DampingResult, law: LinearDamping
 ) -> dict[str, FittedNumber | float | str]:
     """Return the block `damping` of a test-bed file; what was fitted needs no factor."""
-    recordings, window = provenance([one.specimen for one in result.specimens if one.fitted])
+    recordings, windows = provenance([one.specimen for one in result.specimens if one.fitted])
     return {
         "law": "linear_in_length",
-        "constant": FittedNumber(law.constant, law.constant_interval, recordings, window),
-        "slope": FittedNumber(law.slope, law.slope_interval, recordings, window),
+        "constant": FittedNumber(law.constant, law.constant_interval, recordings, windows),
+        "slope": FittedNumber(law.slope, law.slope_interval, recordings, windows),
         "factor": 1.0,
     }

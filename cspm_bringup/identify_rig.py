@@ -82,10 +82,12 @@ class RigRequest:
         return path
 
 
-def provenance(specimens: Sequence[Specimen]) -> tuple[tuple[str, ...], tuple[float, float] | None]:
-    """Return the recordings' SHA-256 and the window of time used, where there is one recording."""
-    recordings = tuple(dict.fromkeys(one.sha256 for one in specimens))
-    return recordings, specimens[0].window if len(recordings) == 1 else None
+def provenance(
+    specimens: Sequence[Specimen],
+) -> tuple[tuple[str, ...], tuple[tuple[float, float], ...]]:
+    """Return the recordings' SHA-256, and the window of time used of each."""
+    windows = {one.sha256: one.window for one in specimens}
+    return tuple(windows), tuple(windows.values())
 
 
 def interval_text(value: float, interval: tuple[float, float], digits: int = 6) -> str:

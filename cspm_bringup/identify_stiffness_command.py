@@ -139,7 +139,7 @@ def _write(asked: RigRequest, folder: Path, result: StiffnessResult) -> dict[str
 
 def fitted_numbers(result: StiffnessResult) -> dict[str, FittedNumber | float | str]:
     """Return the block `stiffness` of a test-bed file as far as it was fitted."""
-    recordings, window = provenance([one.specimen for one in result.specimens if one.fitted])
+    recordings, windows = provenance([one.specimen for one in result.specimens if one.fitted])
     estimate = result.both.estimate
     found: dict[str, FittedNumber | float | str] = {"law": "exponential"}
     for name in NAMES[:-1]:
@@ -147,11 +147,11 @@ def fitted_numbers(result: StiffnessResult) -> dict[str, FittedNumber | float | 
             found[name] = estimate.value(name)
             continue
         interval = estimate.interval(name)
-        found[name] = FittedNumber(estimate.value(name), interval, recordings, window)
+        found[name] = FittedNumber(estimate.value(name), interval, recordings, windows)
     if result.both.asymptote:
         low, high = (end / result.area for end in estimate.interval("rigidity"))
         modulus = estimate.value("rigidity") / result.area
         found["youngs_modulus"] = FittedNumber(
-            modulus, (low, high), recordings, window, "k l/A on the asymptote"
+            modulus, (low, high), recordings, windows, "k l/A on the asymptote"
         )
     return found

@@ -38,6 +38,7 @@ class SystemRequest:
         names: parameters to fit; none for the usual ones.
         frozen: names with the value that they keep, or None for the machine's.
         priors: by name.
+        bounds: lowest and highest value, by name.
         profiled: parameters whose profile likelihood is wanted.
         horizon: of the windows [s]; None for the usual one.
         out: a new folder for picture and fitted test-bed; None writes nothing.
@@ -49,6 +50,7 @@ class SystemRequest:
     names: tuple[str, ...]
     frozen: dict[str, float | None]
     priors: dict[str, Prior]
+    bounds: dict[str, tuple[float, float]]
     profiled: tuple[str, ...]
     horizon: float | None
     out: Path | None
@@ -63,7 +65,7 @@ def identify_system_command(asked: SystemRequest, json: Path | None) -> None:
     console = make_console()
     refuse_existing(asked.out)
     searched, held_out = (_read(paths, asked) for paths in (asked.recordings, asked.held_out))
-    chosen = choose(searched[0].machine, asked.names, asked.frozen, asked.priors)
+    chosen = choose(searched[0].machine, asked.names, asked.frozen, asked.priors, asked.bounds)
     for name in asked.profiled:
         if name not in {each.name for each in chosen if not each.parameter.frozen}:
             raise InputError(f"--profile {name}: is not fitted, allowed: a name that is")

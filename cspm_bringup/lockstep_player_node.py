@@ -20,7 +20,6 @@ from cspm_msgs_py.diagnostics import decode_diagnostics
 from cspm_msgs_py.graph import PLAYER, RECORDER, graph_of
 from cspm_msgs_py.lockstep import RECORDER_WINDOW, WINDOW, Sequence
 from cspm_msgs_py.ros.contract_node import ContractNode
-from cspm_msgs_py.ros.intake import DEPTH
 from cspm_msgs_py.ros.rendezvous import PlantSide
 from cspm_msgs_py.topics import DIAGNOSTICS
 from cspm_msgs_py.wire import WireReader
@@ -79,7 +78,7 @@ class LockstepPlayerNode:
         self._decode = {name: WireReader(topics[name]).decode for name in read}
         for name in read:
             node.subscribe_numbered_rows(
-                topics[name], partial(self._take, name), partial(self._refuse, name), DEPTH
+                topics[name], partial(self._take, name), partial(self._refuse, name)
             )
         others = [name for name in run.members if name != PLAYER]
         self._others = PlantSide(node, self._schedule.period_ns, others, self._note_progress)

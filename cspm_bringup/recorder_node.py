@@ -46,6 +46,7 @@ class RecorderNode:
             ros_class(DIAGNOSTICS.ros_type),
             self._gatherer.receive_diagnostics,
             numbered=False,
+            depth=None,
         )
         self._receive_clock = self._gatherer.receive_block(CLOCK)
         self._ticks: list[bytes] = []

@@ -171,21 +171,41 @@ class BlockSimulation:
 
         Encoders count from an arbitrary zero, so one length per cable is unknown. It is the one at
         which the cables under measured winch and bar motion carry the mean tension measured in the
-        window, or in its first minute; a single noisy sample at its start would tell it badly. Zero
-        for a drive that does not simulate cables.
+        window, or in its first minute; a single noisy sample at its start would tell it badly.
+        Without load cells it is the one at which the bar under measured winch motion is on average
+        where it was measured. Zero for a drive that does not simulate cables.
         """
         line, n = self.timeline, len(self.testbed.cables)
-        if drive in _WITHOUT_CABLES or line.tensions is None or line.angles is None:
+        if drive in _WITHOUT_CABLES or line.angles is None:
+            return np.zeros(n)
+        if line.tensions is None and (drive is not Drive.WINCH or line.bars is None):
             return np.zeros(n)
         # Drives that are simulated side by side share what the first one found.
         with self._lock:
             if window not in self._offsets:
-                self._offsets[window] = self._find_offsets(window, line.tensions)
+                self._offsets[window] = (
+                    self._offsets_by_pose(window, line.bars[:, :6])
+                    if line.tensions is None and line.bars is not None
+                    else self._find_offsets(window, np.asarray(line.tensions))
+                )
         return self._offsets[window]
 
+    def _offsets_by_pose(self, window: Window, poses: Array) -> Array:
+        start, end = self._told(window)
+        measured = poses[start : end + 1]
+        frame = np.nanmean(self.timeline.frame_poses[start : end + 1], axis=0)
+        lengthening = geometry(self.parameters.cables, np.nanmean(measured, axis=0), frame).bar
+        out = np.zeros(len(self.testbed.cables))
+        for _ in range(_OFFSET_ROUNDS):
+            simulated = self._drive(Drive.WINCH, start, end, out).states[:, :6]
+            whole = np.isfinite(simulated).all(axis=1)
+            if whole.any():
+                missing = (measured - simulated)[whole].mean(axis=0)
+                out += np.clip(lengthening @ missing, -_OFFSET_MOST_M, _OFFSET_MOST_M)
+        return out
+
     def _find_offsets(self, window: Window, tensions: Array) -> Array:
-        start, end = window
-        end = min(end, start + round(_OFFSET_LONGEST_S / self.timeline.period))
+        start, end = self._told(window)
         out = np.zeros(len(self.testbed.cables))
         measured = tensions[start : end + 1]
         for _ in range(_OFFSET_ROUNDS):
@@ -196,6 +216,11 @@ class BlockSimulation:
             change = np.divide(missing, slope, out=np.zeros(len(out)), where=slope < 0.0)
             out += np.clip(change, -_OFFSET_MOST_M, _OFFSET_MOST_M)
         return out
+
+    def _told(self, window: Window) -> Window:
+        """Return the part of a window that tells the zero of the lengths."""
+        start, end = window
+        return start, min(end, start + round(_OFFSET_LONGEST_S / self.timeline.period))
 
     def state_at(self, step: int) -> Array:
         """Return the plant's state that was measured at a step, its effects settled."""

@@ -28,14 +28,14 @@ class FittedNumber:
         value: in the file's unit.
         interval: 95 %; infinite ends where nothing bounds it.
         recordings: SHA-256 of each, at least one.
-        window: first and last instant used [s], where there is one recording.
+        windows: first and last instant used [s], of each recording, or none.
         note: a remark.
     """
 
     value: float
     interval: tuple[float, float]
     recordings: tuple[str, ...]
-    window: tuple[float, float] | None = None
+    windows: tuple[tuple[float, float], ...] = ()
     note: str = ""
 
     def content(self) -> CommentedMap:
@@ -49,8 +49,11 @@ class FittedNumber:
         }
         if others:
             found["further_recordings"] = others
-        if self.window is not None and not others:
-            found["window"] = [_rounded(end) for end in self.window]
+        if self.windows:
+            window, *further = [[_rounded(end) for end in window] for window in self.windows]
+            found["window"] = window
+            if further:
+                found["further_windows"] = further
         if self.note:
             found["note"] = self.note
         line = CommentedMap(found)

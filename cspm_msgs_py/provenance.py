@@ -22,8 +22,9 @@ class Provenance(StrictModel):
     `thesis`: published in the thesis; `reconstructed`: chosen so that the published results hold,
     or assumed where nothing fixes it; `fitted`: identified from the recording with SHA-256
     `recording` and those in `further_recordings`; `measured`, `datasheet`: as the words say.
-    `window` is the time [s] of the recording that was used, `interval` holds the value with 95 %
-    probability; an end that nothing bounds is None.
+    `window` is the time [s] of the recording that was used, `further_windows` those of the further
+    recordings; `interval` holds the value with 95 % probability, an end that nothing bounds is
+    None.
     """
 
     provenance: Literal["thesis", "reconstructed", "fitted", "measured", "datasheet"]
@@ -31,6 +32,7 @@ class Provenance(StrictModel):
     note: str = ""
     further_recordings: tuple[Sha256, ...] = ()
     window: tuple[float, float] | None = None
+    further_windows: tuple[tuple[float, float], ...] = ()
     interval: tuple[float | None, float | None] | None = None
 
     @model_validator(mode="after")

@@ -13,7 +13,6 @@ from cspm_msgs_py.errors import InputError
 from cspm_msgs_py.graph import Edges, followers
 from cspm_msgs_py.lockstep import WINDOW
 from cspm_msgs_py.ros.contract_node import ContractNode, ros_class
-from cspm_msgs_py.ros.intake import DEPTH
 from cspm_msgs_py.ros.qos import contract_qos
 from cspm_msgs_py.ros.rendezvous import PROGRESS, PlantSide
 from cspm_msgs_py.schedule import PLANT, TORQUE_COMMAND, Schedule
@@ -78,7 +77,7 @@ class PlantNode:
         self._others = PlantSide(node, schedule.period_ns, others, self._progress)
         if TORQUE_COMMAND in schedule.topics:
             refuse = partial(self._refuse, TORQUE_COMMAND)
-            node.subscribe_numbered_rows(topics[TORQUE_COMMAND], self._torque, refuse, DEPTH)
+            node.subscribe_numbered_rows(topics[TORQUE_COMMAND], self._torque, refuse)
         node.node.create_subscription(
             ros_class(BRAKE.ros_type), BRAKE.name, self._brake, contract_qos()
         )

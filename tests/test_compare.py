@@ -1,6 +1,7 @@
 """A recording held against its simulation from measured inputs."""
 
 import json
+import re
 import shutil
 import subprocess
 import sys
@@ -8,6 +9,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from conftest import THESIS
 from run_samples import run_to
 
 from cspm_bringup import cli
@@ -21,6 +23,19 @@ from cspm_ident.signals.timeline import Timeline
 from cspm_msgs_py.errors import InputError
 
 DURATION = 14.0
+PULLED = """
+name: pulled
+testbed: fixed_frame.yaml
+duration: 8.0
+rates: {motion_capture: 1000, motion_controller: 1000, tension_distribution: 1000}
+target:
+  mean_pose: [0.0, 0.0, 2.0, 0.0, 0.0, 0.0]
+  motion:
+    type: moves
+    moves:
+      - {at: 1.0, duration: 1.5, by: [0.08, 0.0, -0.05, 0.0, 0.02, 0.0]}
+      - {at: 5.0, duration: 1.5, by: [-0.08, 0.04, 0.05, 0.0, 0.0, 0.02]}
+"""
 
 
 @pytest.fixture(scope="module")
@@ -91,6 +106,45 @@ def test_a_recording_without_cameras_says_what_is_missing(measurement):
     blind = replace(measurement, bar_pose=None)
     with pytest.raises(InputError, match=r"--drive tension needs /bar/pose, allowed: a recording"):
         compare(blind, Drive.TENSION)
+
+
+def test_without_load_cells_the_bar_is_simulated_all_the_same(measurement, comparison):
+    """The zero of the lengths is then where the bar hangs on average as it was measured."""
+    found = compare(replace(measurement, tension=None))
+    assert {c.block for c in found.channels} == {"whole"}
+    assert found.left_out == {
+        "winch": "/cables/tension not recorded",
+        "cable": "nothing that it simulates was measured",
+        "bar": "/cables/tension not recorded",
+    }
+    with_cells, without = (of(c, "bar/pose/surge") for c in (comparison, found))
+    assert without.vaf > 99.9
+    assert without.rms < 2.0 * with_cells.rms
+
+
+def test_without_drives_speeds_and_torques_the_angles_drive_alone(measurement, comparison):
+    found = compare(replace(measurement, speed=None, torque=None), delays={})
+    assert found.left_out == {"winch": "/winches/state effort not recorded"}
+    for name in ("bar/pose/surge", "bar/pose/heave"):
+        assert of(found, name).rms < 1.5 * of(comparison, name).rms
+
+
+@pytest.mark.slow
+def test_a_bar_under_a_fixed_frame_needs_no_camera_on_it(tmp_path):
+    """Exits in the world's axes; the winches pull the bar about."""
+    text = THESIS.read_text(encoding="utf-8")
+    frame = re.search(r"^winch_frame:\n  .*\n", text, re.MULTILINE)[0]
+    text = text.replace(frame, "").replace("  /winch_frame/pose:", "  /bar/pose:")
+    text = text.replace("  /bar/pose: *motion_capture\n", "")
+    (tmp_path / "fixed_frame.yaml").write_text(text, encoding="utf-8")
+    (tmp_path / "pulled.yaml").write_text(PULLED, encoding="utf-8")
+    run_to(tmp_path / "bag", tmp_path / "pulled.yaml")
+    found = compare(read_measurement(tmp_path / "bag"), delays={})
+    assert found.left_out == {}
+    assert {c.block for c in found.channels} == {"whole", "winch", "cable", "bar"}
+    # Each block at its floor, with what a bad draw of it makes.
+    assert max(c.rms / c.floor for c in found.channels) < 3.0
+    assert of(found, "bar/pose/surge").vaf > 99.9
 
 
 def test_windows_begin_anew_and_leave_holes_out(measurement):

@@ -10,7 +10,7 @@ from cspm_msgs_py.testbed import load_testbed
 
 SHA, OTHER = "ab" * 32, "cd" * 32
 TEXT = THESIS.read_text(encoding="utf-8")
-NUMBER = FittedNumber(12000.123456, (11990.0, np.inf), (SHA,), (1.0, 93.0), "ramps")
+NUMBER = FittedNumber(12000.123456, (11990.0, np.inf), (SHA,), ((1.0, 93.0),), "ramps")
 
 
 def stiffness(cables, number=NUMBER):
@@ -61,13 +61,13 @@ def test_the_number_says_where_it_comes_from():
     assert about.note == "ramps"
     assert about.further_recordings == ()
     assert load_testbed(THESIS).provenance["cables[0].stiffness.b"].provenance == "reconstructed"
-    several = FittedNumber(1.0, (0.5, 2.0), (SHA, OTHER), (1.0, 93.0))
+    several = FittedNumber(1.0, (0.5, 2.0), (SHA, OTHER), ((1.0, 93.0), (0.5, 40.0)))
     about = with_fitted(TEXT, "t.yaml", stiffness(["hoist_1"], several)).provenance[
         "cables[0].stiffness.a"
     ]
     assert about.further_recordings == (OTHER,)
-    # A window is one recording's.
-    assert about.window is None
+    assert about.window == (1.0, 93.0)
+    assert about.further_windows == ((0.5, 40.0),)
 
 
 def test_plain_numbers_go_in_as_they_are():

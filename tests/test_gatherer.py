@@ -356,6 +356,26 @@ def test_a_status_is_known_by_its_senders_number(tmp_path):
         assert intake.gatherer.refused[0] == 2
 
 
+def test_a_number_that_no_node_has_next_is_refused_unread(tmp_path, monkeypatch):
+    """Whoever floods the topic sends more than can be decoded."""
+    everybody = ["plant", *schedule_of(REST.scenario, REST.testbed.testbed).nodes]
+    intake = Intake(REST, tmp_path / "bag", reporting=everybody)
+    with intake.writer:
+        take = intake.gatherer.receive_diagnostics
+        take(encode_diagnostics(0, [(0, "plant", "ok", {})]), 0, 1)
+        decoded = []
+        monkeypatch.setattr("cspm_bringup.gatherer.decode_diagnostics", decoded.append)
+        take(b"anything", 0, 9)
+        assert decoded == []
+        assert intake.gatherer.refused == (
+            1,
+            "/diagnostics: its sender's message 9, allowed: 1, 2; a second sender",
+        )
+        monkeypatch.undo()
+        take(encode_diagnostics(100 * MS, [(0, "plant", "ok", {})]), 0, 2)
+        assert intake.gatherer.refused[0] == 1
+
+
 def test_two_senders_of_a_topic_are_an_error(fresh):
     encode = WireWriter(REST.testbed.testbed.topics["/cables/tension"]).encode
     take = fresh.gatherer.receive("/cables/tension")

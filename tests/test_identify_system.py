@@ -124,7 +124,8 @@ def test_a_prior_holds_and_a_profile_agrees_with_the_interval(cspm, recordings, 
     searched, _ = recordings
     words = ["--testbed", THESIS, "--fit", "bar.mass,bar_damping.surge", "--horizon", "6"]
     known = ["--prior", "bar.mass=4.2±0.00001", "--profile", "bar_damping.surge"]
-    code, _, err = cspm("identify", "system", searched.path, *words, *known, "--json", "found.json")
+    written = ["--json", "found.json", "--out", "fitted"]
+    code, _, err = cspm("identify", "system", searched.path, *words, *known, *written)
     assert (code, err) == (0, "")
     data = json.loads((tmp_path / "found.json").read_text())
     mass, surge = data["estimate"]["parameters"]
@@ -137,6 +138,13 @@ def test_a_prior_holds_and_a_profile_agrees_with_the_interval(cspm, recordings, 
     assert min(profile["deviance"]) == 0.0
     width = surge["ci95"][1] - surge["ci95"][0]
     assert 0.3 * width < high - low < 3.0 * width
+    # The fitted file runs as it is.
+    words = ["run", "rest", "--duration", "0.1", "--out", "again", "--testbed"]
+    assert cspm(*words, "fitted/fitted_testbed.yaml")[::2] == (0, "")
+    with Recording(tmp_path / "again") as recording:
+        file = parse_testbed(recording.attachments["testbed.yaml"].decode(), "again")
+    assert file.testbed.bar.mass == pytest.approx(mass["value"], rel=1e-7)
+    assert file.provenance["bar.mass"].recording == searched.sha256
 
 
 def test_values_go_where_the_names_say():
@@ -193,6 +201,21 @@ def test_a_prior_needs_a_parameter():
         choose(MACHINE, ["bar.mass"], {}, {"stiffness": Prior(1.0, 0.1)})
 
 
+def test_bounds_are_kept_within_the_usual_ones():
+    names = ["bar.mass", "stiffness"]
+    mass, stiffness = choose(MACHINE, names, bounds={"bar.mass": (4.0, 4.3)})
+    assert (mass.parameter.lower, mass.parameter.upper) == (4.0, 4.3)
+    assert (stiffness.parameter.lower, stiffness.parameter.upper) == (0.2, 5.0)
+    for bounds, text in (
+        ({"bar.mass": (4.3, 4.0)}, r"^--bound bar.mass=4.3:4: allowed: rising, 0.406 to 40.6 kg$"),
+        ({"bar.mass": (0.0, 5.0)}, r"^--bound bar.mass=0:5: allowed: rising, 0.406 to 40.6 kg$"),
+        ({"bar.mass": (4.2, 5.0)}, r"^bar.mass: 4.06 kg, allowed: 4.2 to 5$"),
+        ({"bar.com.x": (0, 1)}, r"^--bound bar.com.x: is not fitted, allowed: bar.mass, stiffness"),
+    ):
+        with pytest.raises(InputError, match=text):
+            choose(MACHINE, names, bounds=bounds)
+
+
 def test_a_rig_without_bar_is_refused():
     rig = load_testbed(THESIS.parent / "rig_hoist.yaml").testbed
     with pytest.raises(InputError, match=r"has no bar or no winch frame, allowed: a machine"):
@@ -219,6 +242,7 @@ def test_the_command_prints_what_was_found(result, tmp_path):
     [
         (["--prior", "bar.mass=4"], "--prior bar.mass=4: allowed: NAME=MEAN±SD"),
         (["--freeze", "bar.mass=x"], "--freeze bar.mass=x: allowed: NAME or NAME=VALUE"),
+        (["--bound", "bar.mass=4"], "--bound bar.mass=4: allowed: NAME=LOW:HIGH"),
         (["--out", "."], ".: exists, allowed: a new folder"),
     ],
 )

@@ -7,12 +7,13 @@ from ros_graph import load_ros, new_domain
 load_ros()
 
 from cspm_msgs_py.ros.contract_node import ros_class  # noqa: E402 - after ROS is known to be there
-from cspm_msgs_py.ros.intake import Intake  # noqa: E402
+from cspm_msgs_py.ros.intake import DEPTH, Intake  # noqa: E402
 from cspm_msgs_py.ros.session import Session  # noqa: E402
 from cspm_msgs_py.topics import contract_topics  # noqa: E402
 from cspm_msgs_py.wire import WireReader  # noqa: E402
 
 PATIENCE_S = 20.0
+FLOOD = 6000  # more than Fast DDS lets wait
 TOPICS = contract_topics(["a", "b"], has_bar=False, has_winch_frame=False)
 TENSION, COMMAND = TOPICS["/cables/tension"], TOPICS["/tension_command"]
 
@@ -97,6 +98,36 @@ def test_what_did_not_wait_is_lost_and_counted(session):
     stamps = taken(session, reader, TENSION, 11)
     assert stamps == [0, *range(191, 201)]
     assert reader.intake.lost == {TENSION.name: 190, COMMAND.name: 0}
+
+
+@pytest.mark.parametrize(("depth", "arrives"), [(DEPTH, False), (None, True)])
+def test_a_flood_pushes_nothing_out_where_all_waits(session, depth, arrives):
+    """Neither what waits already, nor what comes when no more fits."""
+    reader = Reader(session, depth=depth, numbered=False)
+    send = sender_of(session, session._nodes[0], TENSION)
+    stranger = sender_of(session, session.node("stranger"), TENSION)
+    send(1)
+    for _ in range(FLOOD):
+        stranger(0)
+    send(2)
+
+    def there():
+        reader.intake.take()
+        return 2 in reader.stamps(TENSION)
+
+    assert session.spin_until(there, PATIENCE_S)
+    assert (1 in reader.stamps(TENSION)) == arrives
+
+
+def test_one_look_ends_while_a_flood_goes_on(session):
+    class Endless:  # a subscription whose messages never end
+        def take_message(self, *_):
+            return b"", {"publication_sequence_number": None, "received_timestamp": 0}
+
+    reader = Reader(session)
+    reader.intake._inlets[0].handle = Endless()
+    reader.intake.take()
+    assert 0 < len(reader.taken[TENSION.name]) <= DEPTH
 
 
 def test_a_strangers_numbers_are_no_losses(session):

@@ -83,6 +83,7 @@ def choose(
     names: Sequence[str] = (),
     frozen: Mapping[str, float | None] | None = None,
     priors: Mapping[str, Prior] | None = None,
+    bounds: Mapping[str, tuple[float, float]] | None = None,
 ) -> tuple[Chosen, ...]:
     """Return what is to be fitted.
 
@@ -91,12 +92,13 @@ def choose(
         names: see `allowed_names`; none for `DEFAULT`.
         frozen: names that keep a value, or the machine's where it is None.
         priors: by name, in the parameter's unit.
+        bounds: lowest and highest value by name, in the parameter's unit, within the usual ones.
 
     Raises:
-        InputError: a name that there is not or that stands twice, a prior of none that is fitted, a
-            value out of bounds, or a machine without bar.
+        InputError: a name that there is not or that stands twice, a prior or bounds of none that is
+            fitted, a value out of bounds, or a machine without bar.
     """
-    frozen, priors = frozen or {}, priors or {}
+    frozen, priors, bounds = frozen or {}, priors or {}, bounds or {}
     if testbed.bar is None or testbed.winch_frame is None:
         raise InputError(
             f"identify system: test-bed {testbed.name} has no bar or no winch frame, allowed: a"
@@ -106,11 +108,13 @@ def choose(
     for i, name in enumerate(wanted):
         if name in wanted[:i]:
             raise InputError(f"--fit {name}: stands twice, allowed: each name once")
-    for name in priors:
-        if name not in wanted:
-            raise InputError(f"--prior {name}: is not fitted, allowed: {', '.join(wanted)}")
+    for option, known in (("--prior", priors), ("--bound", bounds)):
+        for name in known:
+            if name not in wanted:
+                raise InputError(f"{option} {name}: is not fitted, allowed: {', '.join(wanted)}")
     found = [_chosen(testbed, name) for name in wanted]
-    return tuple(_with_knowledge(each, frozen, priors) for each in found)
+    bounded = [_within(each, bounds[each.name]) if each.name in bounds else each for each in found]
+    return tuple(_with_knowledge(each, frozen, priors) for each in bounded)
 
 
 def allowed_names(testbed: Testbed) -> list[str]:
@@ -210,6 +214,16 @@ def absent_values(effect: str) -> dict[str, float]:
 
 def _kinds(testbed: Testbed) -> list[str]:
     return list(dict.fromkeys(name.rpartition("_")[0] or name for name in testbed.cable_names))
+
+
+def _within(chosen: Chosen, bounds: tuple[float, float]) -> Chosen:
+    limits, (low, high) = chosen.parameter, bounds
+    if not limits.lower <= low < high <= limits.upper:
+        raise InputError(
+            f"--bound {chosen.name}={low:g}:{high:g}: allowed: rising, {limits.lower:g} to"
+            f" {limits.upper:g} {limits.unit}"
+        )
+    return replace(chosen, parameter=replace(limits, lower=low, upper=high))
 
 
 def _with_knowledge(

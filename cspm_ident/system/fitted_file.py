@@ -64,9 +64,10 @@ def _number(result: SystemResult, each: Chosen) -> FittedNumber:
     hashes = tuple(measurement.sha256 for measurement in searched)
     if each.parameter.frozen:
         return FittedNumber(value, (value, value), hashes, note="held at this value")
-    note = "on its bound, the interval is not valid" if each.name in estimate.at_bound else ""
-    window = (0.0, searched[0].duration) if len(searched) == 1 else None
-    return FittedNumber(value, interval, hashes, window, note)
+    note = "" if result.settled else "the search did not settle, the interval may not hold"
+    note = "on its bound, the interval is not valid" if each.name in estimate.at_bound else note
+    windows = tuple((0.0, measurement.duration) for measurement in searched)
+    return FittedNumber(value, interval, hashes, windows, note)
 
 
 def _now(testbed: Testbed, each: Chosen) -> float:
@@ -95,7 +96,7 @@ def _put_bar(content: Content, bar: Bar, place: BarPlace, number: FittedNumber) 
     for key, value in bar_values(place, number.value, bar).items():
         head, _, part = key.partition(".")
         interval = (ends[0][key], ends[1][key])
-        wanted = FittedNumber(value, interval, number.recordings, number.window, number.note)
+        wanted = FittedNumber(value, interval, number.recordings, number.windows, number.note)
         if head == "com":
             if not isinstance(content.get("com"), CommentedSeq):
                 content["com"] = _line(list(bar.com))

@@ -22,9 +22,13 @@ from cspm_ident.system.judgement import Judgement, judge
 from cspm_ident.system.machine import machine_with
 from cspm_ident.system.noise_scatter import (
     DRAWS,
+    PAIRS,
+    Bias,
+    noise_bias,
     noise_changes,
     noise_scatter,
     widened,
+    without_bias,
 )
 from cspm_ident.system.shooting import Shooting, make_shooting
 from cspm_msgs_py.errors import InputError
@@ -50,6 +54,7 @@ class SystemResult:
     Attributes:
         chosen: what was fitted.
         solution: values, intervals, directions that were not excited.
+        bias: what noise on the signals that drive the model does to the values; taken out.
         machine: the one that was found.
         horizon: of the windows [s].
         windows: how many of each recording were used.
@@ -61,6 +66,7 @@ class SystemResult:
 
     chosen: tuple[Chosen, ...]
     solution: Solution
+    bias: Bias
     machine: Testbed
     horizon: float
     windows: tuple[int, ...]
@@ -78,6 +84,10 @@ class SystemResult:
             "settled": self.settled,
             "nominal": {each.name: each.nominal for each in self.chosen},
             "estimate": self.solution.estimate.data(),
+            "bias_taken_out": {
+                each.name: float(bias)
+                for each, bias in zip(self.chosen, self.bias.values, strict=True)
+            },
             "judgements": [each.data() for each in self.judgements],
             "profiles": [
                 {
@@ -128,32 +138,43 @@ def identify_system(
     if not 0.1 <= horizon <= 60.0:
         raise InputError(f"--horizon {horizon:g}: allowed: 0.1 to 60 s")
     machine = searched[0].machine
-    problem, solution, shootings, settled = solve(
-        searched, chosen, horizon, most_windows, delays, progress
-    )
+    solved = solve(searched, chosen, horizon, most_windows, delays, progress)
+    estimate, shootings = solved.solution.estimate, solved.shootings
     profiles = []
     for name in profiled:
         progress(f"profile of {name}")
-        profiles.append(find_profile(problem, solution, name))
-    found = machine_with(machine, chosen, solution.estimate.values)
+        profiles.append(_profile(solved, name))
+    found = machine_with(machine, chosen, estimate.values)
     return SystemResult(
         tuple(chosen),
-        solution,
+        solved.solution,
+        solved.bias,
         found,
         horizon,
         tuple(len(shooting.windows) for shooting in shootings),
         tuple(searched),
         _judged(shootings, held_out, {"nominal": machine, "fitted": found}, delays, progress),
         tuple(profiles),
-        settled,
+        solved.settled,
     )
 
 
 class Solved(NamedTuple):
-    """What the fit alone gives: the problem, its solution, the windows, whether it settled."""
+    """What the fit alone gives.
+
+    Attributes:
+        problem: what was solved.
+        optimum: of it.
+        solution: the same less its bias.
+        bias: that was taken out.
+        shootings: the windows of each recording.
+        settled: whether parameters and initial states came to stand still.
+    """
 
     problem: Problem
+    optimum: Solution
     solution: Solution
+    bias: Bias
     shootings: list[Shooting]
     settled: bool
 
@@ -178,11 +199,13 @@ def solve(
     problem = make_problem(machine, chosen, shootings)
     theta, settled = _search(problem, machine, chosen, shootings, theta, progress)
     progress("noise, drawn anew")
-    redrawn = [
-        make_problem(machine, chosen, [s.redrawn([seed, d, i]) for i, s in enumerate(shootings)])
-        for d in range(DRAWS)
-    ]
-    changes = noise_changes(problem, redrawn, theta)
+
+    def redrawn(draw: int, sign: float = 1.0) -> Problem:
+        noisy = [s.redrawn([seed, draw, i], sign) for i, s in enumerate(shootings)]
+        return make_problem(machine, chosen, noisy)
+
+    draws = [redrawn(draw) for draw in range(DRAWS)]
+    changes = noise_changes(problem, draws, theta)
     progress("intervals")
     # Weighted by the sensors' own noise. Whitened, or decorrelated, the channels in which the noise
     # on the frame's pose cancels would outweigh the rest, and there it biases most.
@@ -194,8 +217,19 @@ def solve(
         noise=unit_noise(changes[0], tuple(problem.groups or ())),
     )
     scatter = noise_scatter(problem, solution, changes, _window_numbers(shootings))
-    estimate = widened(problem, solution.estimate, scatter)
-    return Solved(problem, solution._replace(estimate=estimate), shootings, settled)
+    optimum = solution._replace(estimate=widened(problem, solution.estimate, scatter))
+    progress("bias of noise")
+    bias = noise_bias(problem, optimum, [(draws[i], redrawn(i, -1.0)) for i in range(PAIRS)])
+    unbiased = optimum._replace(estimate=without_bias(problem, optimum.estimate, bias))
+    return Solved(problem, optimum, unbiased, bias, shootings, settled)
+
+
+def _profile(solved: Solved, name: str) -> Profile:
+    """Return a parameter's profile about its optimum, moved by the bias that was taken out."""
+    found = find_profile(solved.problem, solved.optimum, name)
+    shift = solved.solution.estimate.value(name) - solved.optimum.estimate.value(name)
+    low, high = found.ci95
+    return found._replace(values=found.values + shift, ci95=(low + shift, high + shift))
 
 
 def _window_numbers(shootings: Sequence[Shooting]) -> list[int]:

@@ -78,11 +78,15 @@ class Shooting:
             for window, start in zip(self.windows, self.starts, strict=True)
         ]
 
-    def redrawn(self, seed: Sequence[int]) -> Shooting:
-        """Return the same windows with one more draw of noise on all measured signals."""
+    def redrawn(self, seed: Sequence[int], sign: float = 1.0) -> Shooting:
+        """Return the same windows with one more draw of noise on all measured signals.
+
+        With `sign` −1 it is the opposite of that draw.
+        """
         line = self.timeline
         number = int(np.random.SeedSequence(seed).generate_state(1)[0])
-        noisy = with_more_noise(line.measurement, self.noise, number)
+        noise = {name: sign * own for name, own in self.noise.items()}
+        noisy = with_more_noise(line.measurement, noise, number)
         timeline = Timeline(noisy, line.period_ns, line.delays)
         timeline.times = line.times
         # The same smoothing, so that the difference is that of the noise alone.

@@ -66,10 +66,10 @@ def fitted_testbed(result: WinchesResult, file: TestbedFile, source: str) -> Tes
 def _numbers(result: WinchesResult, winch: IdentifiedWinch) -> Fitted:
     """Return what was excited, by the estimate's names."""
     hashes = tuple(measurement.sha256 for measurement in result.searched)
-    window = (0.0, result.searched[0].duration) if len(hashes) == 1 else None
+    windows = tuple((0.0, measurement.duration) for measurement in result.searched)
     estimate = winch.fit.estimate
     return {
-        name: FittedNumber(estimate.value(name), estimate.interval(name), hashes, window)
+        name: FittedNumber(estimate.value(name), estimate.interval(name), hashes, windows)
         for name in estimate.names
         if all(isfinite(end) for end in estimate.interval(name))
     }

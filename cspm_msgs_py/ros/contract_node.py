@@ -100,13 +100,14 @@ class ContractNode:
             depth=depth,
         )
 
-    def subscribe_numbered(
-        self, topic: Topic, take: Callable[[bytes, int | None], None], depth: int = QOS_DEPTH
-    ) -> None:
-        """As `subscribe`, with the number that its sender gave each message, None if unknown."""
+    def subscribe_numbered(self, topic: Topic, take: Callable[[bytes, int | None], None]) -> None:
+        """As `subscribe`, with the number that its sender gave each message, None if unknown.
+
+        All messages wait.
+        """
         message_class = ros_class(topic.ros_type)
         if self.intake is None:
-            numbered, qos = _Numbered(take), contract_qos(depth)
+            numbered, qos = _Numbered(take), contract_qos(None)
             self.node.create_subscription(message_class, topic.name, numbered, qos, raw=True)
             return
         self.intake.subscribe(
@@ -114,7 +115,7 @@ class ContractNode:
             message_class,
             lambda payload, _, number: take(payload, number),
             numbered=False,
-            depth=depth,
+            depth=None,
         )
 
     def subscribe_rows(
@@ -143,12 +144,11 @@ class ContractNode:
         topic: Topic,
         receive: Callable[[int, Array, int | None], None],
         refuse: Callable[[str], None],
-        depth: int,
     ) -> None:
         """As `subscribe_rows`, with the number that its sender gave each message, None if unknown.
 
-        Any other `CspmError` that `receive` raises is the node's failure. Who needs every message
-        lets many wait, `depth` of them: strangers' push out genuine ones.
+        Any other `CspmError` that `receive` raises is the node's failure. All messages wait, or
+        strangers' would push out genuine ones.
         """
         decode = WireReader(topic).decode
 
@@ -160,7 +160,7 @@ class ContractNode:
             except CspmError as err:
                 self.fail(str(err))
 
-        self.subscribe_numbered(topic, take, depth)
+        self.subscribe_numbered(topic, take)
 
     def unmatched(self) -> list[str]:
         """Return `topic (reader)` for each reader that is not connected to our publisher yet."""

@@ -19,6 +19,8 @@ from cspm_msgs_py.topics import QOS_RELIABILITY, Topic
 
 # Long enough for a reader that is held up for a second.
 DEPTH = 2000
+# In one look, so that a flood does not keep its reader from all else.
+_AT_ONCE = 2000
 
 
 class Intake:
@@ -45,13 +47,13 @@ class Intake:
         *,
         numbered: bool = True,
         reliability: str = QOS_RELIABILITY,
-        depth: int = DEPTH,
+        depth: int | None = DEPTH,
     ) -> None:
         """Have `receive` called with each message's CDR bytes, time of reception [ns], and number.
 
         The number is its sender's, None where the middleware tells none. `numbered` says whether
         the numbers are to show losses: of one sender, and of others that may come and go.
-        `reliability` is asked of them, `depth` messages wait.
+        `reliability` is asked of them, the last `depth` messages wait, or all if None.
         """
         handle = self._handle(topic, message_class, reliability, depth)
         self._inlets.append(_Inlet(topic.name, handle, message_class, receive, numbered))
@@ -62,12 +64,15 @@ class Intake:
         message_class: type,
         receive: Callable[[list[bytes], list[int | None]], None],
     ) -> None:
-        """Have `receive` called with the CDR bytes and numbers of all that came between looks."""
-        handle = self._handle(topic, message_class, QOS_RELIABILITY, DEPTH)
+        """Have `receive` called with the CDR bytes and numbers of all that came between looks.
+
+        All messages wait.
+        """
+        handle = self._handle(topic, message_class, QOS_RELIABILITY, None)
         self._inlets.append(_BlockInlet(topic.name, handle, message_class, receive))
 
     def _handle(
-        self, topic: Topic, message_class: type, reliability: str, depth: int
+        self, topic: Topic, message_class: type, reliability: str, depth: int | None
     ) -> rclpy_implementation.Subscription:
         node = self._node
         check_for_type_support(message_class)
@@ -80,7 +85,7 @@ class Intake:
             )
 
     def take(self) -> None:
-        """Hand on everything that has come."""
+        """Hand on what has come, of a flood its beginning."""
         for inlet in self._inlets:
             inlet.take()
 
@@ -127,7 +132,9 @@ class _Inlet:
 
     def take(self) -> None:
         take, message_class = self.handle.take_message, self._class
-        while (taken := take(message_class, True)) is not None:
+        for _ in range(_AT_ONCE):
+            if (taken := take(message_class, True)) is None:
+                return
             self._hand_on(*taken)
 
     def _hand_on(self, payload: bytes, info: dict[str, Any]) -> None:
@@ -160,8 +167,7 @@ class _BlockInlet:
         return self._take(1)
 
     def take(self) -> None:
-        # A flood does not keep its reader from all else.
-        self._take(DEPTH)
+        self._take(_AT_ONCE)
 
     def _take(self, most: int) -> bool:
         take, message_class = self.handle.take_message, self._class

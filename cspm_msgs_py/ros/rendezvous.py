@@ -14,7 +14,6 @@ from collections.abc import Callable, Collection
 
 from cspm_msgs_py.errors import InputError
 from cspm_msgs_py.ros.contract_node import ContractNode, ros_class
-from cspm_msgs_py.ros.intake import DEPTH
 from cspm_msgs_py.ros.qos import contract_qos
 
 PROGRESS, START, END = "/run/progress", "/run/start", "/run/end"
@@ -40,7 +39,9 @@ class FollowerSide:
         on_end: Callable[[int], None] = lambda _: None,
         on_start: Callable[[int], None] = lambda _: None,
     ) -> None:
-        """Announce the node as soon as all its readers are connected.
+        """Announce the node as soon as all its readers are connected, again and again.
+
+        Neither start nor end prove that the leader has heard of it: anybody can send those.
 
         Args:
             node: the node.
@@ -55,8 +56,9 @@ class FollowerSide:
         self._header = ros_class(_HEADER)
         self._publisher = node.node.create_publisher(self._header, PROGRESS, contract_qos())
         self._on_start = on_start
-        node.node.create_subscription(self._header, START, self._start, contract_qos(DEPTH))
-        node.node.create_subscription(self._header, END, self._end, contract_qos(DEPTH))
+        node.node.create_subscription(self._header, START, self._start, contract_qos(None))
+        node.node.create_subscription(self._header, END, self._end, contract_qos(None))
+        self._connected = False
         self._timer = node.every(_LOOK_EVERY_S, self._announce)
         self.end_ns: int | None = None
 
@@ -71,7 +73,10 @@ class FollowerSide:
         self._send(step * self._period_ns)
 
     def _announce(self) -> None:
-        if self._publisher.get_subscription_count() and not self._node.unmatched():
+        if not self._connected:
+            heard = bool(self._publisher.get_subscription_count())
+            self._connected = heard and not self._node.unmatched()
+        if self._connected:
             self._send(_READY * _NANOSECONDS)
 
     def _send(self, stamp_ns: int) -> None:
@@ -87,10 +92,8 @@ class FollowerSide:
             self._node.complain(END, f"{END}: {err}")
             return
         self.end_ns = end_ns
-        self._timer.cancel()
 
     def _start(self, message: object) -> None:
-        self._timer.cancel()
         self._on_start(_stamp_of(message))
 
 
@@ -117,7 +120,7 @@ class PlantSide:
         self._publisher = node.node.create_publisher(self._header, END, contract_qos())
         self._starter = node.node.create_publisher(self._header, START, contract_qos())
         self._progress = node.node.create_subscription(
-            self._header, PROGRESS, self._take, contract_qos(DEPTH)
+            self._header, PROGRESS, self._take, contract_qos(None)
         )
         self._settled = time.monotonic() + _SETTLE_S
         self.absent = set(others)

@@ -12,7 +12,6 @@ from cspm_msgs_py.graph import Edges
 from cspm_msgs_py.lockstep import Acknowledgement, Follower
 from cspm_msgs_py.ros.contract_node import ContractNode
 from cspm_msgs_py.ros.guard_ports import GuardPorts
-from cspm_msgs_py.ros.intake import DEPTH
 from cspm_msgs_py.ros.rendezvous import FollowerSide
 from cspm_msgs_py.schedule import Schedule
 from cspm_msgs_py.stage import Guard, Stage
@@ -60,7 +59,7 @@ class StageNode:
         receive = self._receive_and_tell if tells_progress else self._follower.receive
         for name in (*plan.inputs, *plan.held):
             refuse = partial(self._refuse, name)
-            node.subscribe_numbered_rows(topics[name], partial(receive, name), refuse, DEPTH)
+            node.subscribe_numbered_rows(topics[name], partial(receive, name), refuse)
         if guard is not None:
             GuardPorts(node, guard, self._now_ns)
         self.refused = (0, "")

@@ -1,0 +1,35 @@
+"""Nodes of a run find each other over the real middleware, whatever strangers say."""
+
+import pytest
+from ros_graph import load_ros, new_domain
+
+load_ros()
+
+from cspm_msgs_py.ros.contract_node import ros_class  # noqa: E402 - after ROS is known to be there
+from cspm_msgs_py.ros.qos import contract_qos  # noqa: E402
+from cspm_msgs_py.ros.rendezvous import END, START, FollowerSide, PlantSide  # noqa: E402
+from cspm_msgs_py.ros.session import Session  # noqa: E402
+
+PERIOD_NS = 1_000_000
+PATIENCE_S = 20.0
+
+
+@pytest.mark.parametrize("topic", [START, END])
+def test_a_node_announces_itself_whoever_says_that_the_run_began_or_ended(topic):
+    """The plant, which comes later, hears of it all the same."""
+    with Session(domain_id=new_domain()) as session:
+        heard = []
+        follower = FollowerSide(
+            session.node("recorder"), PERIOD_NS, on_start=lambda stamp: heard.append(stamp)
+        )
+        stranger = session.node("stranger")
+        header = ros_class("std_msgs/msg/Header")
+        said = stranger.node.create_publisher(header, topic, contract_qos())
+
+        def told():
+            said.publish(header())
+            return bool(heard) if topic == START else follower.end_ns == 0
+
+        assert session.spin_until(told, PATIENCE_S)
+        plant = PlantSide(session.node("plant"), PERIOD_NS, ["recorder"], lambda *_: None)
+        assert session.spin_until(lambda: not plant.absent, PATIENCE_S), plant.absent

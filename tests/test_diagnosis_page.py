@@ -19,11 +19,13 @@ from cspm_ident.diagnosis.equation import Equation
 from cspm_ident.diagnosis.hypothesis import Findings, Hypothesis, Named, Rival
 from cspm_ident.diagnosis.judgement import HeldOut
 from cspm_ident.diagnosis.limits import Limit
+from cspm_ident.diagnosis.lines import Line
 from cspm_ident.diagnosis.page import write_diagnosis_page
 from cspm_ident.diagnosis.part import Kind, Part, part_of
+from cspm_ident.diagnosis.region import Region
 from cspm_ident.diagnosis.simulation import Output, SimulatedFit, Worth
 from cspm_ident.diagnosis.sums import Gain
-from cspm_ident.diagnosis.verdict import diagnosis_data
+from cspm_ident.diagnosis.verdict import Verdict, diagnosis_data, verdict_of
 from cspm_ident.signals.measurement import Measurement
 from cspm_ident.signals.samples import Samples
 from cspm_msgs_py.testbed import load_testbed
@@ -55,7 +57,11 @@ def equation(seed=1):
 OUTPUT = Output(Drive.SHAFT, "winches/angle/surge_2", "rad", "surge_2", Channel.SHAFT)
 
 
-def diagnosis(named=True, alternatives=(), unknown=(), rejected=()):
+HUM = Line(Place(Channel.WRENCH, "bar"), 1, 2.7, 0.314, 1e-9)
+FAST = Region("speed [rad/s]", 0.5, 2.0, 0.25, 0.93)
+
+
+def diagnosis(named=True, alternatives=(), unknown=(), rejected=(), lines=(), region=None):
     part = equation()
     poses = Samples(np.array([0.0, 1.0]), np.array([BAR_POSE, BAR_POSE]))
     measured = Measurement(SCENARIOS / "today", "ab" * 32, THESIS, bar_pose=poses)
@@ -73,7 +79,9 @@ def diagnosis(named=True, alternatives=(), unknown=(), rejected=()):
         (SimulatedFit(OUTPUT, 3.5, 1.46, 1.45, 0.0071, 0.0049),),
         (Worth(OUTPUT, 1.46, 0.0071),) * len(found),
         tuple(Shape(d, np.linspace(0.0, 1.0, 7), np.arange(7.0) - 3.0) for d, _, _ in unknown),
+        tuple(lines),
         (None,) * len(found),
+        (region,) * len(found),
         (Limit("winch_viscous_friction", "sway_1", "coefficient", 2.1e-6, "N·m·s/rad", True),),
         (("winch_backlash", ("sway_1",)),),
         (PLACE,),
@@ -206,6 +214,36 @@ def test_a_page_without_findings_says_so(tmp_path):
     # What was not found changes nothing: there is no after to be drawn.
     assert '"name":"before"' in page
     assert '"name":"after"' not in page
+
+
+def test_a_periodic_force_from_outside_is_unknown(tmp_path):
+    found = diagnosis(named=False, lines=(HUM,))
+    assert verdict_of(found) is Verdict.UNKNOWN
+    (finding,) = diagnosis_data(found)["findings"]
+    assert (finding["subsystem"], finding["elements"], finding["effect"]) == (
+        "bar",
+        ["bar"],
+        "unknown",
+    )
+    assert finding["region"] == {
+        "driver": "frequency [Hz]",
+        "at": [2.7],
+        "adds": [0.314],
+        "hint": None,
+    }
+    assert "bar/wrench in sway: 0.314 N at 2.70 Hz" in finding["statement"]
+    assert "162 rounds a minute" in finding["statement"]
+    assert "periodic, 2.70 Hz, bar" in page_of(tmp_path, found)
+    assert verdict_of(diagnosis(named=False)) is Verdict.CONSISTENT
+
+
+def test_where_a_finding_shows_is_told():
+    (finding,) = diagnosis_data(diagnosis(region=FAST))["findings"]
+    assert finding["region"] == FAST._asdict()
+    assert "It shows where speed is 0.5 to 2 rad/s: 93 %" in finding["statement"]
+    (finding,) = diagnosis_data(diagnosis())["findings"]
+    assert finding["region"] == {}
+    assert "It shows where" not in finding["statement"]
 
 
 def test_an_unknown_shape_marks_the_part_of_its_residual(tmp_path):

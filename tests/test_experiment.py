@@ -194,7 +194,7 @@ def tied(measurement):
     fit = HeldOut(Place(Channel.SHAFT, "surge_2"), 0.1, 0.03, 0.03, 0.001, 0.001, 0.001)
     findings = Findings((named,), (), 1)
     starts = np.zeros(1)
-    rest = (), (None,), (), (None,), (), (), (), starts, (), noise
+    rest = (), (None,), (), (), (None,), (None,), (), (), (), starts, (), noise
     return Diagnosis((short,), (), findings, (), (), weights, (fit,), *rest)
 
 

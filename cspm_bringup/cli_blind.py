@@ -64,7 +64,7 @@ def make(
 @blind.command(
     epilog="""Methods: cspm, the diagnosis; cspm-without-measured-interfaces, -weak-form,
 -joint-refit, -block-null, -held-out, which each leave one safeguard out; peers: retuned, stepwise,
-lasso, sindy, black-box. The last four need pip install cspm[blind]."""
+lasso, sindy, black-box. The last four need pip install cspm\\[blind]."""
 )
 def run(
     folder: Folder,

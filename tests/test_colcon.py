@@ -29,6 +29,7 @@ ROOMS = (
     "cspm_msgs_py",
     "cspm_sim",
     "cspm_mujoco",
+    "cspm_reality",
     "cspm_control",
     "cspm_ident",
     "cspm_bringup",

@@ -32,20 +32,26 @@ ROOT = Path(__file__).resolve().parents[1]
 PAGE, FIGURES = ROOT / "docs" / "gallery.md", ROOT / "docs" / "figures"
 STRATA = ("feedback", "company", "outside")
 SEED, DURATION_S = 3, 30.0
-_DPI = 80
+_DPI = 90
 _DOTS = {"linestyle": "", "marker": ".", "markersize": 3, "alpha": 0.4}
-_STAGES = (("before", "tab:red"), ("retuned", "tab:orange"), ("after", "tab:green"))
+# What is drawn later is smaller, so that equal values are seen.
+_STAGES = (
+    ("before", "as described", "o", 10, "tab:red"),
+    ("retuned", "re-tuned", "s", 7, "tab:orange"),
+    ("after", "with what was found", "D", 4, "tab:green"),
+)
 
 
 def main() -> None:
     """Record, diagnose and draw."""
     parser = argparse.ArgumentParser(description="Draw three concealed machines.")
     parser.add_argument("--seed", type=int, default=SEED, help="of what is drawn")
-    seed = parser.parse_args().seed
-    console, parts = Console(), []
+    parser.add_argument("--keep", type=Path, help="folder in which the recordings stay")
+    arguments = parser.parse_args()
+    seed, console, parts = arguments.seed, Console(), []
     with tempfile.TemporaryDirectory(prefix="cspm-gallery-") as place:
         for k, stratum in enumerate(STRATA, start=1):
-            folder = Path(place) / stratum
+            folder = (arguments.keep or Path(place)) / stratum
             truth = folder.with_suffix(".json")
             with console.status(f"{stratum}: recording"):
                 make(Request(folder, truth, seed, 1, "dev", (stratum,), DURATION_S))
@@ -87,7 +93,7 @@ def _draw_tracking(axes: Axes, recording: Path) -> None:
     for k, name in enumerate(("surge", "sway", "heave")):
         at = np.interp(pose.stamp_ns, wanted.stamp_ns, wanted.rows[:, k])
         axes.plot(times, 1e3 * (pose.rows[:, k] - at), linewidth=0.7, label=name)
-    axes.set(title="What the engineer sees: error of the bar", xlabel="time [s]", ylabel="[mm]")
+    axes.set(title="What the engineer sees: tracking", xlabel="time [s]", ylabel="[mm]")
     axes.legend(fontsize="small", ncols=3)
 
 
@@ -101,11 +107,11 @@ def _draw_residual(axes: Axes, found: Diagnosis) -> None:
         axes.plot(signal, curve.after, color="tab:green", label="with what was found", **_DOTS)
     place = f"{curve.place.element} {curve.component}".strip()
     axes.set(
-        title=f"What it looks at: residual of {place}",
+        title=f"What it looks at: residual, {place}",
         xlabel=name or "time [s]",
         ylabel=f"[{curve.unit}]",
     )
-    axes.legend(fontsize="small")
+    axes.legend(fontsize="small", loc="upper right")
 
 
 def _size(curve: Curve) -> float:
@@ -116,15 +122,15 @@ def _draw_fit(axes: Axes, found: Diagnosis) -> None:
     """Draw simulated errors on held-out data over what noise leaves, the four that gain most."""
     fits = sorted(found.simulated, key=lambda f: f.after / max(f.before, 1e-300))[:4]
     height = np.arange(len(fits))
-    for name, colour in _STAGES:
+    for name, label, marker, size, colour in _STAGES:
         shares = [getattr(f, name) / max(f.floor, 1e-300) for f in fits]
-        axes.plot(shares, height, "o", color=colour, label=name.replace("retuned", "re-tuned"))
+        axes.plot(shares, height, marker, markersize=size, color=colour, label=label)
     axes.axvline(1.0, color="black", linewidth=0.8, label="noise")
     axes.set_yticks(height, [f.output.name for f in fits])
     axes.invert_yaxis()
     axes.set_xscale("log")
-    axes.set(title="What the fit does: simulated error, held out", xlabel="over what noise leaves")
-    axes.legend(fontsize="small")
+    axes.set(title="What the fit does, held out", xlabel="simulated error over noise")
+    axes.legend(fontsize="small", loc="upper right")
 
 
 def _text(k: int, stratum: str, item: Mapping[str, Any], found: Diagnosis) -> str:

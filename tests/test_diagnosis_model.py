@@ -1,0 +1,57 @@
+"""Which findings stay in a model, and what it is fitted with."""
+
+import numpy as np
+import pytest
+from run_samples import SCENARIOS
+
+from cspm_ident.block_simulation import Drive
+from cspm_ident.diagnosis.columns import Candidate
+from cspm_ident.diagnosis.model import Model
+from cspm_ident.diagnosis.simulation import Output, Worth
+from cspm_ident.diagnosis.supposed import is_possible
+from cspm_ident.diagnosis.suspension_equations import around
+from cspm_ident.signals.measurement import Measurement
+from cspm_msgs_py.testbed import load_testbed
+from cspm_sim.effects import Channel, catalogue
+
+THESIS = load_testbed(SCENARIOS / "testbeds" / "thesis.yaml")
+OUTPUT = Output(Drive.SHAFT, "winches/angle/surge_2", "rad", "surge_2", Channel.SHAFT)
+
+
+def model(shares, possible=None):
+    worth = tuple(None if share is None else Worth(OUTPUT, 2.0, 2.0 * share) for share in shares)
+    return Model({}, (), (), worth, possible or (True,) * len(worth))
+
+
+@pytest.mark.parametrize(
+    ("shares", "gone"),
+    [
+        ((0.5, 0.98), []),
+        ((0.5, 0.995), [1]),
+        # One that harms may be why another seems of no use: that one is judged again without it.
+        ((0.995, 1.2), [1]),
+        ((None, 0.5), []),
+        ((), []),
+    ],
+)
+def test_the_worst_of_no_use_goes(shares, gone):
+    assert model(shares).useless == gone
+
+
+def test_what_no_machine_can_have_goes_before_anything_is_judged():
+    assert model((1.2, 0.5), (True, False)).useless == [1]
+
+
+def test_a_machine_has_no_inertia_that_no_body_has():
+    measured = Measurement(SCENARIOS / "today", "ab" * 32, THESIS)
+    inertia = Candidate(catalogue()["bar_inertia"], "bar")
+    assert is_possible(measured, {inertia: np.array([0.0, 0.01, 0.01])})
+    assert not is_possible(measured, {inertia: np.array([0.0, 0.3, 0.0])})
+
+
+def test_what_lies_around_a_row_has_none_of_its_noise():
+    noise = np.random.default_rng(3).standard_normal(20_000)
+    assert abs(np.corrcoef(noise, around(noise, 4))[0, 1]) < 0.03
+    assert abs(np.corrcoef(noise, around(noise, 0))[0, 1]) > 0.99
+    line = np.arange(100.0)
+    np.testing.assert_allclose(around(line, 4)[4:-4], line[4:-4])

@@ -1,0 +1,90 @@
+"""What counts as explaining the same: other elements, other effects, and what does not."""
+
+import numpy as np
+
+from cspm_ident.diagnosis.columns import Candidate, Place
+from cspm_ident.diagnosis.equation import Equation
+from cspm_ident.diagnosis.evidence import gather
+from cspm_ident.diagnosis.search import Search
+from cspm_sim.effects import Channel, catalogue
+
+ROWS, STEP, BLOCK_S = 4800, 0.01, 2.0
+TIMES = STEP * np.arange(ROWS)
+LOAD = 3.0 + np.sin(2.1 * TIMES)
+SIDE = np.sign(np.sin(0.83 * TIMES))
+# A torque holds the load, and a little more: enough not to be a case of the pulley's columns.
+HELD = LOAD + 0.2 * np.sin(5.0 * TIMES)
+GAIN, PULLEY = (
+    Candidate(catalogue()[name], "only", shape)
+    for name, shape in (
+        ("winch_torque_gain", ()),
+        ("pulley_friction", (("wrap", 0.5 * np.pi),)),
+    )
+)
+
+
+def equation(place, target, columns, noise=0.05):
+    noise = noise * np.random.default_rng(1).standard_normal(ROWS)
+    shaped = {term: np.atleast_3d(c.T).transpose(1, 2, 0) for term, c in columns.items()}
+    measured = (target + noise)[:, None]
+    return Equation(place, TIMES, measured, shaped, measured)
+
+
+def named_in(*equations):
+    return Search(gather([list(equations)], BLOCK_S)).run().named
+
+
+def winch(target, noise=0.05):
+    columns = {GAIN: -HELD[:, None], PULLEY: np.column_stack([LOAD * SIDE, LOAD])}
+    return equation(Place(Channel.SHAFT, "only"), target, columns, noise)
+
+
+def test_weights_that_one_coefficient_cannot_have_are_no_rival():
+    """A torque gain is a load alone; a pulley's share of load is second order in its friction."""
+    (named,) = named_in(winch(0.05 * HELD))
+    assert named.hypothesis.effect.id == "winch_torque_gain"
+    assert named.alternatives == ()
+
+
+def test_weights_that_one_coefficient_has_are_found():
+    x = 0.1
+    (named,) = named_in(winch(LOAD * (np.sinh(x) * SIDE + np.cosh(x) - 1.0)))
+    assert named.hypothesis.effect.id == "pulley_friction"
+
+
+DRAG = catalogue()["cable_transverse_damping"]
+BAR = Place(Channel.WRENCH, "bar")
+
+
+def swinging(apart, drag=0.8):
+    """A bar dragged by the first of two cables, whose columns differ by `apart`."""
+    rng = np.random.default_rng(7)
+    speed, other = np.sin(1.7 * TIMES), rng.standard_normal(ROWS)
+    columns = {
+        Candidate(DRAG, "a"): -speed[:, None],
+        Candidate(DRAG, "b"): -(speed + apart * other)[:, None],
+    }
+    return equation(BAR, -drag * speed, columns)
+
+
+def test_an_effect_on_another_element_is_a_tie_where_it_explains_the_same():
+    (named,) = named_in(swinging(0.0))
+    assert len(named.hypothesis.elements) == 1
+    (rival,) = named.alternatives
+    assert rival.hypothesis.effect.id == "cable_transverse_damping"
+    assert {*named.hypothesis.elements, *rival.hypothesis.elements} == {"a", "b"}
+
+
+def test_an_effect_on_another_element_is_no_tie_where_data_tell_it():
+    (named,) = named_in(swinging(1.0))
+    assert named.hypothesis.elements == ("a",)
+    assert named.alternatives == ()
+
+
+def test_as_much_of_something_else_is_no_rival():
+    """Drag takes as much from the bar's residual as the gain from the winch's, but not worth it."""
+    gain, noise = 0.002, 0.0065
+    drag = 1.2 * gain * np.sqrt(2.0 * np.mean(HELD**2))
+    (named,) = named_in(winch(gain * HELD, noise), swinging(1.0, drag))
+    assert named.hypothesis.effect.id == "winch_torque_gain"
+    assert named.alternatives == ()

@@ -76,12 +76,13 @@ clocks of their own. Made by `python -m bench.gallery`.
 
 def draw_case(path: Path, recording: Path, found: Diagnosis) -> None:
     """Draw what an engineer sees, what the diagnosis sees, and what the model then does."""
-    figure = Figure(figsize=(12, 3.4), layout="constrained")
+    figure = Figure(figsize=(12, 3.8), layout="constrained")
     FigureCanvasAgg(figure)
     seen, told, fit = figure.subplots(1, 3)
     _draw_tracking(seen, recording)
     _draw_residual(told, found)
     _draw_fit(fit, found)
+    figure.legend(*fit.get_legend_handles_labels(), loc="outside lower center", ncols=4)
     figure.savefig(path, dpi=_DPI)
 
 
@@ -102,16 +103,15 @@ def _draw_residual(axes: Axes, found: Diagnosis) -> None:
     curve = max(found.curves, key=lambda c: c.gained if c.touched else -1.0 / (1.0 + _size(c)))
     name = curve.main_signal
     signal = curve.signals.get(name, curve.times)
-    axes.plot(signal, curve.before, color="tab:red", label="as described", **_DOTS)
+    axes.plot(signal, curve.before, color="tab:red", **_DOTS)
     if curve.touched:
-        axes.plot(signal, curve.after, color="tab:green", label="with what was found", **_DOTS)
+        axes.plot(signal, curve.after, color="tab:green", **_DOTS)
     place = f"{curve.place.element} {curve.component}".strip()
     axes.set(
         title=f"What it looks at: residual, {place}",
         xlabel=name or "time [s]",
         ylabel=f"[{curve.unit}]",
     )
-    axes.legend(fontsize="small", loc="upper right")
 
 
 def _size(curve: Curve) -> float:
@@ -130,7 +130,6 @@ def _draw_fit(axes: Axes, found: Diagnosis) -> None:
     axes.invert_yaxis()
     axes.set_xscale("log")
     axes.set(title="What the fit does, held out", xlabel="simulated error over noise")
-    axes.legend(fontsize="small", loc="upper right")
 
 
 def _text(k: int, stratum: str, item: Mapping[str, Any], found: Diagnosis) -> str:
@@ -140,6 +139,12 @@ def _text(k: int, stratum: str, item: Mapping[str, Any], found: Diagnosis) -> st
         for c in item["concealed"]
     )
     told = [statement_of(found, i) for i in range(len(found.findings.named))]
+    told += [
+        f"as well explained by {rival.hypothesis.effect.id}"
+        f" on {', '.join(rival.hypothesis.elements)}"
+        for named in found.findings.named
+        for rival in named.alternatives
+    ]
     told += [unknown_statement(found, i) for i in range(len(found.shapes))]
     told += [line_statement(line) for line in found.lines]
     lines = "\n".join(f"- {sentence}" for sentence in told) or "- nothing"

@@ -20,7 +20,7 @@ hypothesis.settings.load_profile("cspm")
 
 THESIS = Path(__file__).resolve().parents[1] / "scenarios" / "testbeds" / "thesis.yaml"
 
-LEFT_TO_OTHERS_S = 540.0
+LEFT_TO_OTHERS_S = 420.0
 
 EXPONENTIAL = {
     "law": "exponential",

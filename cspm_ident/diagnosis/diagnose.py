@@ -147,6 +147,7 @@ def diagnose(
         kept = tuple(each for k, each in enumerate(kept) if k not in model.useless)
         model = modelled(search, kept, data, retuned)
     values = {c: w for c, (w, _) in model.weights.items()}
+    first = _first_weights(search, kept)
     told = [k for k, each in enumerate(kept) if not _is_negligible(each, values)]
     return Diagnosis(
         searched,
@@ -161,15 +162,12 @@ def diagnose(
         _shapes(search, kept, knots, [each[0] for each in found.unknown]),
         _lasting(hums, searched, search_parts, values),
         tuple(model.onsets[k] for k in told),
-        tuple(
-            region_of(data.rows, kept[k].hypothesis.candidates, _first_weights(search, kept))
-            for k in told
-        ),
+        tuple(region_of(data.rows, kept[k].hypothesis.candidates, first) for k in told),
         detection_limits(search, kept),
         _silent(search, effects),
         tuple(place.place for place in evidence.places),
         evidence.times,
-        held_out_curves(steady(judge_parts), _first_weights(search, kept)),
+        held_out_curves(steady(judge_parts), first),
         noise,
     )
 

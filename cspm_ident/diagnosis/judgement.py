@@ -13,9 +13,8 @@ from cspm_ident.diagnosis.drivers import Driver
 from cspm_ident.diagnosis.equation import Equation, in_noise
 from cspm_ident.diagnosis.evidence import Evidence
 from cspm_ident.diagnosis.recorded import equations_of
-from cspm_ident.diagnosis.supposed import with_found
+from cspm_ident.diagnosis.supposed import as_found
 from cspm_ident.signals.measurement import Measurement
-from cspm_msgs_py.errors import InputError
 
 Array = NDArray[np.float64]
 
@@ -122,11 +121,7 @@ def _residuals(
     weights: Mapping[Candidate, Array],
     noise: Mapping[Place, Array],
 ) -> dict[Place, list[Equation]]:
-    try:
-        parts = [equations_of(with_found(m, weights), ()) for m in measurements]
-    except InputError:
-        # No machine has such numbers; what was to be corrected stays as described.
-        parts = [equations_of(m, ()) for m in measurements]
+    parts = [equations_of(as_found(m, weights), ()) for m in measurements]
     found: dict[Place, list[Equation]] = {}
     for part in in_noise(parts, noise):
         for equation in part:

@@ -18,8 +18,8 @@ from scipy.signal import periodogram
 from cspm_ident.diagnosis.columns import Candidate, Place
 from cspm_ident.diagnosis.equation import Equation
 from cspm_ident.diagnosis.machine_signals import MachineSignals
-from cspm_ident.diagnosis.supposed import settled, with_found
-from cspm_ident.diagnosis.suspension_equations import machine_signals, suspension_equations
+from cspm_ident.diagnosis.supposed import as_found
+from cspm_ident.diagnosis.suspension_equations import fine_equations, machine_signals
 from cspm_ident.signals.measurement import Measurement
 from cspm_ident.signals.timeline import Timeline
 from cspm_sim.effect_entries import read_actions
@@ -70,11 +70,10 @@ def lines_of(measurement: Measurement, weights: Mapping[Candidate, Array]) -> tu
         measurement: what was recorded.
         weights: of what was found.
     """
-    fitted = settled(with_found(measurement, weights))
-    timeline = Timeline(fitted, pose_band=HIGHEST_HZ)
-    known = read_actions(fitted.machine)
-    equations = suspension_equations(timeline, (), known, fine=True)
-    lowest = _driven_up_to(machine_signals(timeline))
+    fitted = as_found(measurement, weights)
+    stretches = machine_signals(Timeline(fitted, pose_band=HIGHEST_HZ))
+    equations = fine_equations(stretches, fitted, read_actions(fitted.machine))
+    lowest = _driven_up_to(stretches)
     series = [(e.place, c, e.times, e.target[:, c]) for e in equations for c in _channels(e)]
     found = [
         line for each in series if (line := highest_line(*each, lowest, len(series))) is not None

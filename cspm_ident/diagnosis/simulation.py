@@ -11,13 +11,12 @@ from numpy.typing import NDArray
 from cspm_ident.block_simulation import BlockSimulation, Drive, Simulated
 from cspm_ident.comparison.floor import lasting_rms, propagated
 from cspm_ident.diagnosis.columns import Candidate
-from cspm_ident.diagnosis.supposed import settled, with_found
+from cspm_ident.diagnosis.supposed import as_found
 from cspm_ident.signals.measurement import BAR, TENSION, WINCHES, Measurement
 from cspm_ident.signals.noise_source import noise_of
 from cspm_ident.signals.samples import Samples
 from cspm_ident.signals.timeline import Timeline
 from cspm_msgs_py.dofs import DOFS
-from cspm_msgs_py.errors import InputError
 from cspm_sim.effects import Channel
 
 Array = NDArray[np.float64]
@@ -145,7 +144,7 @@ def _errors(parts: Sequence[Measurement], weights: Weights) -> dict[Output, tupl
     """Return spread and RMS error by output, over all recordings."""
     found: dict[Output, list[tuple[Array, Array]]] = {}
     for part in parts:
-        measurement = _as_found(part, weights)
+        measurement = as_found(part, weights)
         timeline = Timeline(measurement)
         simulation = BlockSimulation(timeline, measurement.machine)
         for drive in _drives(simulation):
@@ -166,14 +165,6 @@ def _errors(parts: Sequence[Measurement], weights: Weights) -> dict[Output, tupl
     }
 
 
-def _as_found(measurement: Measurement, weights: Weights) -> Measurement:
-    try:
-        return settled(with_found(measurement, weights))
-    except InputError:
-        # No machine has such numbers; what was to be corrected stays as described.
-        return settled(measurement)
-
-
 def _drives(simulation: BlockSimulation) -> list[Drive]:
     bar = simulation.testbed.bar is not None
     return [
@@ -185,7 +176,7 @@ def _drives(simulation: BlockSimulation) -> list[Drive]:
 
 def _floors(parts: Sequence[Measurement], weights: Weights) -> dict[Output, float]:
     """Return what noise leaves, from the first recording."""
-    measurement = _as_found(parts[0], weights)
+    measurement = as_found(parts[0], weights)
     noise, _ = noise_of(measurement, None)
     timeline = Timeline(measurement)
     simulation = BlockSimulation(timeline, measurement.machine)

@@ -66,6 +66,17 @@ def settled(measurement: Measurement) -> Measurement:
     return measurement.with_testbed(replace(measurement.testbed, testbed=left))
 
 
+def as_found(measurement: Measurement, weights: Mapping[Candidate, Array]) -> Measurement:
+    """Return the settled measurement of a machine that has what was found.
+
+    Where no machine has such numbers, what was to be corrected stays as described.
+    """
+    try:
+        return settled(with_found(measurement, weights))
+    except InputError:
+        return settled(measurement)
+
+
 def is_possible(measurement: Measurement, weights: Mapping[Candidate, Array]) -> bool:
     """Return whether the measured machine can have further effects of such weights."""
     try:

@@ -15,7 +15,7 @@ from cspm_ident.diagnosis.equation import Equation, difference_noise
 from cspm_ident.diagnosis.machine_signals import BodyMotion, MachineSignals
 from cspm_ident.diagnosis.readings import pose_rows, reading_rows
 from cspm_ident.diagnosis.suspension import Suspension
-from cspm_ident.signals.measurement import TENSION, WINCHES
+from cspm_ident.signals.measurement import TENSION, WINCHES, Measurement
 from cspm_ident.signals.timeline import Timeline, whole_stretches
 from cspm_ident.winch.weak_form import Make, maker, weigh
 from cspm_msgs_py.dofs import DOFS
@@ -49,8 +49,6 @@ def suspension_equations(
     effects: Sequence[Effect],
     known: Sequence[Action],
     knots: Knots | None = None,
-    *,
-    fine: bool = False,
 ) -> list[Equation]:
     """Return the equations of all cables and of the bar, one set for each stretch without hole.
 
@@ -61,15 +59,33 @@ def suspension_equations(
         effects: the catalogue.
         known: effects that the test-bed file has.
         knots: of the free functions; None: without these.
-        fine: under the shortest windows, whatever the noise.
     """
-    signals = machine_signals(timeline)
     machine, make = timeline.measurement.machine, maker(timeline.measurement.pointwise)
     return [
         equation
-        for stretch in signals
-        for equation in _Stretch(stretch, machine, timeline.pose_band, fine, make).equations(
+        for stretch in machine_signals(timeline)
+        for equation in _Stretch(stretch, machine, timeline.pose_band, make).equations(
             effects, known, knots
+        )
+    ]
+
+
+def fine_equations(
+    stretches: Sequence[MachineSignals], measurement: Measurement, known: Sequence[Action]
+) -> list[Equation]:
+    """Return the equations under the shortest windows, whatever the noise, without columns.
+
+    Args:
+        stretches: signals without hole.
+        measurement: which they are of.
+        known: effects that the test-bed file has.
+    """
+    make = maker(measurement.pointwise)
+    return [
+        equation
+        for stretch in stretches
+        for equation in _Stretch(stretch, measurement.machine, None, make).equations(
+            (), known, None
         )
     ]
 
@@ -99,8 +115,9 @@ class _Stretch:
     """One stretch and the window that weighs it."""
 
     def __init__(
-        self, signals: MachineSignals, machine: Testbed, band: float, fine: bool, make: Make
+        self, signals: MachineSignals, machine: Testbed, band: float | None, make: Make
     ) -> None:
+        """Take what the poses were smoothed to [Hz]; None asks for the shortest windows."""
         self._signals, self._machine, self._make = signals, machine, make
         self._parameters: PlantParameters = nominal_parameters(machine)
         self._here = Suspension(signals, machine, self._parameters)
@@ -109,7 +126,9 @@ class _Stretch:
             Channel.WRENCH: self._here.wrench_residuals,
         }
         self._windows = {
-            channel: self._window_of(_HALF_WIDTHS[0]) if fine else self._window_for(values, band)
+            channel: (
+                self._window_of(_HALF_WIDTHS[0]) if band is None else self._window_for(values, band)
+            )
             for channel, values in missing.items()
         }
 

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Container, Mapping, Sequence
+from collections.abc import Callable, Container, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 
 import numpy as np
@@ -12,6 +12,35 @@ from cspm_ident.diagnosis.columns import Candidate, Place
 from cspm_ident.diagnosis.drivers import Driver
 
 Array = NDArray[np.float64]
+Term = Candidate | Driver
+Rows = slice | NDArray[np.bool_]
+
+
+class Made(Mapping[Term, Array]):
+    """Columns that are made of others when they are asked for, so that all are held once only.
+
+    In a long recording they are most of what there is.
+    """
+
+    def __init__(self, source: Mapping[Term, Array], make: Callable[[Array], Array]) -> None:
+        """Take what they are made of, and how."""
+        self._source, self._make = source, make
+
+    def __getitem__(self, term: Term) -> Array:
+        """Return a term's columns."""
+        return self._make(self._source[term])
+
+    def __contains__(self, term: object) -> bool:
+        """Return whether a term has columns."""
+        return term in self._source
+
+    def __iter__(self) -> Iterator[Term]:
+        """Yield the terms."""
+        return iter(self._source)
+
+    def __len__(self) -> int:
+        """Return how many terms there are."""
+        return len(self._source)
 
 
 @dataclass(frozen=True, eq=False)
@@ -20,7 +49,7 @@ class Equation:
 
     Attributes:
         place: which residual.
-        times: of the rows, shape (k,) [s].
+        times: of the rows, ascending, shape (k,) [s].
         target: y, shape (k, channels).
         columns: by candidate or driver, what one unit of each weight adds, (k, channels, weights).
         measured: the measured quantity that the residual is part of, shape of `target`.
@@ -33,7 +62,7 @@ class Equation:
     place: Place
     times: Array
     target: Array
-    columns: Mapping[Candidate | Driver, Array]
+    columns: Mapping[Term, Array]
     measured: Array
     nuisance: Array = field(default_factory=lambda: np.zeros((0, 0, 0)))
     turning: NDArray[np.bool_] = field(default_factory=lambda: np.zeros(0, dtype=np.bool_))
@@ -47,7 +76,7 @@ class Equation:
     def scaled(self, noise: Array) -> Equation:
         """Return the equation in units of a noise, (channels,)."""
         unit = np.where(noise > 0.0, noise, 1.0)
-        columns = {term: found / unit[:, None] for term, found in self.columns.items()}
+        columns = Made(self.columns, lambda found: found / unit[:, None])
         nuisance = self.nuisance / unit[:, None] if self.nuisance.size else self.nuisance
         return replace(
             self,
@@ -59,18 +88,19 @@ class Equation:
 
     def within(self, start: float, end: float) -> Equation:
         """Return the rows from `start` to before `end` [s]."""
-        return self._only((self.times >= start) & (self.times < end))
+        first, last = np.searchsorted(self.times, [start, end])
+        return self._only(slice(first, last))
 
     def weighted(self, weights: Array) -> Equation:
         """Return the equation with each row times a weight, shape (k,)."""
         rows = weights[:, None]
-        columns = {term: found * rows[:, :, None] for term, found in self.columns.items()}
+        columns = Made(self.columns, lambda found: found * rows[:, :, None])
         nuisance = self.nuisance * rows[:, :, None] if self.nuisance.size else self.nuisance
         return replace(self, target=self.target * rows, columns=columns, nuisance=nuisance)
 
-    def only(self, terms: Container[Candidate | Driver]) -> Equation:
+    def only(self, terms: Container[Term]) -> Equation:
         """Return the equation without the columns of all other terms."""
-        columns = {term: found for term, found in self.columns.items() if term in terms}
+        columns = {term: self.columns[term] for term in self.columns if term in terms}
         return replace(self, columns=columns)
 
     @property
@@ -78,12 +108,12 @@ class Equation:
         """The rows in which no shaft turns round."""
         return self._only(~self.turning) if self.turning.any() else self
 
-    def _only(self, rows: NDArray[np.bool_]) -> Equation:
+    def _only(self, rows: Rows) -> Equation:
         return Equation(
             self.place,
             self.times[rows],
             self.target[rows],
-            {term: found[rows] for term, found in self.columns.items()},
+            Made(self.columns, lambda found: found[rows]),
             self.measured[rows],
             self.nuisance[rows] if self.nuisance.size else self.nuisance,
             self.turning[rows] if self.turning.size else self.turning,

@@ -8,10 +8,11 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 from scipy.interpolate import CubicSpline
-from scipy.spatial.transform import Rotation
 
+from cspm_sim.kernels.cable import ARM, DIRECTION, LENGTH, RATE, SPAN_COLUMNS
 from cspm_sim.kernels.cable_law import law_tensions
 from cspm_sim.kernels.plant import PlantParameters
+from cspm_sim.kernels.trajectory import Motions, spans_along
 
 Array = NDArray[np.float64]
 
@@ -102,8 +103,16 @@ def body_state(motion: BodyMotion) -> BodyState:
         ]
     )
     accelerated = motion.accelerations[:, 3:]
+    cr, sr = np.cos(angles[:, 0]), np.sin(angles[:, 0])
+    rotation = np.array(
+        [
+            [cy * cp, cy * sp * sr - sy * cr, cy * sp * cr + sy * sr],
+            [sy * cp, sy * sp * sr + cy * cr, sy * sp * cr - cy * sr],
+            [-sp, cp * sr, cp * cr],
+        ]
+    )
     return BodyState(
-        Rotation.from_euler("ZYX", angles[:, ::-1]).as_matrix(),
+        np.ascontiguousarray(np.moveaxis(rotation, 2, 0)),
         motion.rates[:, :3],
         np.einsum("ijk,kj->ki", carry, rates),
         motion.accelerations[:, :3],
@@ -117,22 +126,22 @@ class CableSpans(NamedTuple):
     Attributes:
         directions: from exit to attachment, (k, n, 3).
         arms: from the bar's origin to the attachment, (k, n, 3) [m].
-        exits: from the frame's origin, in winch_frame_ned, (n, 3) [m].
-        velocities: of the attachment against the exit, (k, n, 3) [m/s].
         lengths: (k, n) [m].
         rates: (k, n) [m/s].
     """
 
     directions: Array
     arms: Array
-    exits: Array
-    velocities: Array
     lengths: Array
     rates: Array
 
+    def only(self, i: int) -> CableSpans:
+        """Return cable i's alone, n = 1."""
+        return CableSpans(*(part[:, i : i + 1] for part in self))
+
 
 def cable_spans(
-    signals: MachineSignals, bar: BodyState, frame: BodyState, exits: Array, attachments: Array
+    signals: MachineSignals, bar: BodyState, frame: BodyState, cables: Array
 ) -> CableSpans:
     """Return directions, lengths and rates, thesis (2-2), (2-5), (2-6).
 
@@ -140,21 +149,32 @@ def cable_spans(
         signals: poses of both bodies.
         bar: the bar's kinematics.
         frame: the winch frame's.
-        exits: in winch_frame_ned, shape (n, 3) [m].
-        attachments: in bar_ned, shape (n, 3) [m].
+        cables: parameter rows, see `cspm_sim.kernels.cable`.
     """
-    arms = np.einsum("kij,nj->kni", bar.rotation, attachments)
+    out = np.empty((len(signals.times), len(cables), SPAN_COLUMNS))
+    spans_along(cables, _motions(signals.frame, frame), _motions(signals.bar, bar), out)
+    columns = (slice(DIRECTION, ARM), slice(ARM, LENGTH), LENGTH, RATE)
+    return CableSpans(*(np.ascontiguousarray(out[:, :, column]) for column in columns))
+
+
+def _motions(motion: BodyMotion, state: BodyState) -> Motions:
+    poses, rotation = np.ascontiguousarray(motion.poses), np.ascontiguousarray(state.rotation)
+    velocity, omega = np.ascontiguousarray(state.velocity), np.ascontiguousarray(state.omega)
+    return poses, rotation, velocity, omega
+
+
+def end_velocities(spans: CableSpans, bar: BodyState, frame: BodyState, exits: Array) -> Array:
+    """Return the attachments' velocities against the exits', (k, n, 3) [m/s].
+
+    Args:
+        spans: the cables.
+        bar: the bar's kinematics.
+        frame: the winch frame's.
+        exits: in winch_frame_ned, shape (n, 3) [m].
+    """
     roots = np.einsum("kij,nj->kni", frame.rotation, exits)
-    apart = (signals.bar.poses - signals.frame.poses)[:, None, :3] + arms - roots
-    lengths = np.linalg.norm(apart, axis=2)
-    directions = apart / lengths[:, :, None]
-    velocities = (
-        (bar.velocity - frame.velocity)[:, None]
-        + np.cross(bar.omega[:, None], arms)
-        - np.cross(frame.omega[:, None], roots)
-    )
-    rates = np.einsum("kni,kni->kn", directions, velocities)
-    return CableSpans(directions, arms, exits, velocities, lengths, rates)
+    turned = np.cross(bar.omega[:, None], spans.arms) - np.cross(frame.omega[:, None], roots)
+    return np.asarray((bar.velocity - frame.velocity)[:, None] + turned)
 
 
 def law_at(parameters: PlantParameters, elongations: Array, elastic_lengths: Array) -> Array:
@@ -164,14 +184,21 @@ def law_at(parameters: PlantParameters, elongations: Array, elastic_lengths: Arr
     return out
 
 
-def elongation_at(parameters: PlantParameters, tensions: Array, elastic_lengths: Array) -> Array:
+def elongation_at(
+    parameters: PlantParameters,
+    tensions: Array,
+    elastic_lengths: Array,
+    near: Array | None = None,
+) -> Array:
     """Return the elongation at which cables carry elastic tensions, (k, n) [m]; 0 where slack.
 
-    By Newton's method from a chord; the law is smooth and rises (3-7).
+    By Newton's method, from what is `near` or from a chord; the law is smooth and rises (3-7).
     """
     wanted = np.maximum(tensions, 0.0)
-    law = law_at(parameters, np.full(tensions.shape, _FIRST_M), elastic_lengths)
-    found = np.where(wanted > 0.0, _FIRST_M * wanted / law[:, :, 0], 0.0)
+    if near is None or np.any((near <= 0.0) & (wanted > 0.0)):
+        law = law_at(parameters, np.full(tensions.shape, _FIRST_M), elastic_lengths)
+        near = _FIRST_M * wanted / law[:, :, 0]
+    found = np.where(wanted > 0.0, near, 0.0)
     for _ in range(_ROUNDS):
         law = law_at(parameters, found, elastic_lengths)
         slope = np.where(law[:, :, 1] > 0.0, law[:, :, 1], np.inf)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from functools import cached_property
 
 import numpy as np
@@ -15,6 +16,7 @@ from cspm_ident.diagnosis.machine_signals import (
     body_state,
     cable_spans,
     elongation_at,
+    end_velocities,
     law_at,
 )
 from cspm_ident.signals.elongation import damping_of
@@ -22,7 +24,8 @@ from cspm_msgs_py.testbed import Testbed
 from cspm_sim.effects.bar_motion import carried
 from cspm_sim.effects.signals import BarSignal, CableSignal
 from cspm_sim.equilibrium import unstretched_lengths
-from cspm_sim.kernels.cable import ATTACHMENT, EXIT, GEAR_RATIO, OFFSET_LENGTH, RADIUS
+from cspm_sim.kernels.cable import EXIT, GEAR_RATIO, OFFSET_LENGTH, RADIUS
+from cspm_sim.kernels.memory import relaxed
 from cspm_sim.kernels.plant import PlantParameters
 
 Array = NDArray[np.float64]
@@ -54,12 +57,28 @@ class Suspension:
             start = unstretched_lengths(parameters, self._spans.lengths[0], tensions)
         self.start = start
 
-    def with_signals(self, signals: MachineSignals) -> Suspension:
-        """Return the same stretch with other signals, begun from the same lengths."""
+    def with_poses(self, signals: MachineSignals) -> Suspension:
+        """Return the same stretch with a little other poses, begun from the same lengths.
+
+        What tensions tell of the rates is kept: of the poses it has the length of the cables alone.
+        """
         other = Suspension(signals, self._testbed, self.parameters, self.start)
         bar, frame = signals.bar is self.signals.bar, signals.frame is self.signals.frame
-        kept = {"bar": bar, "_frame": frame, "_spans": bar and frame}
+        kept = {"bar": bar, "_needed": bar, "_frame": frame, "_steady_damper": True}
         other.__dict__.update({name: getattr(self, name) for name, same in kept.items() if same})
+        other.__dict__["_near"] = self._carrying
+        return other
+
+    def of_cable(self, i: int, signals: MachineSignals) -> Suspension:
+        """Return cable i alone, with other angles, speeds and tensions, begun from its length."""
+        own = slice(i, i + 1)
+        joints = ("angles", "speeds", "tensions")
+        alone = replace(signals, **{name: getattr(signals, name)[:, own] for name in joints})
+        parts = self.parameters._replace(
+            cables=self.parameters.cables[own], tables=self.parameters.tables[own]
+        )
+        other = Suspension(alone, self._testbed, parts, self.start[own])
+        other.__dict__.update(_spans=self._spans.only(i), _near=self._carrying[:, own])
         return other
 
     @cached_property
@@ -73,9 +92,7 @@ class Suspension:
 
     @cached_property
     def _spans(self) -> CableSpans:
-        exits = self.parameters.cables[:, EXIT : EXIT + 3]
-        attachments = self.parameters.cables[:, ATTACHMENT : ATTACHMENT + 3]
-        return cable_spans(self.signals, self.bar, self._frame, exits, attachments)
+        return cable_spans(self.signals, self.bar, self._frame, self.parameters.cables)
 
     @cached_property
     def _wound(self) -> Array:
@@ -119,20 +136,25 @@ class Suspension:
         return np.asarray(gaussian_filter1d(damper, sigma, axis=0, mode="nearest"))
 
     @cached_property
-    def _told_rates(self) -> Array:
-        """Of the elongation by law and measured tension alone, (k, n) [m/s].
+    def _told(self) -> Array:
+        """Elongations by law and measured tension alone, (k, n) [m].
 
         For the columns of effects: a stiff cable's tension tells them far better than poses do,
         whose noise stands in the residual already; in both it would look like a wrong damper. Law
         and damper share a tension as spring and dashpot do, solved by Euler's implicit steps.
         """
-        alone = elongation_at(self.parameters, self.signals.tensions, self._elastic_lengths)
-        stiffness = law_at(self.parameters, alone, self._elastic_lengths)[:, :, 1]
+        tensions, lengths = self.signals.tensions, self._elastic_lengths
+        alone = elongation_at(self.parameters, tensions, lengths, self._near)
+        stiffness = law_at(self.parameters, alone, lengths)[:, :, 1]
         inert = self._damping / self.signals.step
-        told, whole = alone.copy(), np.maximum(stiffness + inert, 1e-300)
-        for k in range(1, len(told)):
-            told[k] = (stiffness[k] * alone[k] + inert[k] * told[k - 1]) / whole[k]
-        rates = np.gradient(told, self.signals.step, axis=0)
+        told = alone.copy()
+        relaxed(alone, inert / np.maximum(stiffness + inert, 1e-300), told)
+        return told
+
+    @cached_property
+    def _told_rates(self) -> Array:
+        """Of the elongation by law and measured tension alone, (k, n) [m/s]."""
+        rates = np.gradient(self._told, self.signals.step, axis=0)
         # What the dashpot had before the first sample is not told.
         start, sigma = round(_START_S / self.signals.step), _STEADY_S / self.signals.step
         rates[:start] = gaussian_filter1d(self._rates, sigma, axis=0, mode="nearest")[:start]
@@ -145,10 +167,15 @@ class Suspension:
         return np.asarray(gaussian_filter1d(self._stretched, sigma, axis=0, mode="nearest"))
 
     @cached_property
+    def _near(self) -> Array | None:
+        """Elongations that are nearly those of `_carrying`, where they are known, (k, n) [m]."""
+        return None
+
+    @cached_property
     def _carrying(self) -> Array:
         """The elongation at which law and damper give the measured tension, (k, n) [m]."""
         elastic = self.signals.tensions - self._steady_damper
-        return elongation_at(self.parameters, elastic, self._elastic_lengths)
+        return elongation_at(self.parameters, elastic, self._elastic_lengths, self._near)
 
     @cached_property
     def _law(self) -> Array:
@@ -179,11 +206,8 @@ class Suspension:
         return com, turned, spin
 
     @cached_property
-    def wrench_residuals(self) -> Array:
-        """Force and moment that the bar's equation (2-13) misses, world axes, (k, 6) [N, N·m].
-
-        Moments about the bar frame's origin.
-        """
+    def _needed(self) -> Array:
+        """Force and moment that the bar's motion needs beside its weight, (k, 6) [N, N·m]."""
         bar = self._testbed.bar
         assert bar is not None
         state, gravity = self.bar, np.array([0.0, 0.0, self._testbed.gravity])
@@ -191,15 +215,26 @@ class Suspension:
         moved = state.acceleration + carried(state.omega, state.alpha, com)
         moment = np.einsum("kij,kj->ki", turned, state.alpha) + spin
         inertial = bar.mass * (moved - gravity)
-        needed = np.hstack([inertial, moment + np.cross(com, inertial)])
-        return np.asarray(needed - self.cable_wrench)
+        return np.hstack([inertial, moment + np.cross(com, inertial)])
+
+    @cached_property
+    def wrench_residuals(self) -> Array:
+        """Force and moment that the bar's equation (2-13) misses, world axes, (k, 6) [N, N·m].
+
+        Moments about the bar frame's origin.
+        """
+        return np.asarray(self._needed - self.cable_wrench)
+
+    def pulled(self, i: int, tensions: Array) -> Array:
+        """Return force and moment of cable i's tensions, (k,) [N], on the bar, (k, 6)."""
+        pull = -tensions[:, None] * self._spans.directions[:, i]
+        return np.hstack([pull, np.cross(self._spans.arms[:, i], pull)])
 
     @cached_property
     def cable_wrench(self) -> Array:
         """Force and moment of the measured tensions on the bar, −Jᵀt of (2-13), (k, 6)."""
-        pull = -self.signals.tensions[:, :, None] * self._spans.directions
-        moments = np.cross(self._spans.arms, pull)
-        return np.hstack([pull.sum(axis=1), moments.sum(axis=1)])
+        tensions = self.signals.tensions
+        return np.asarray(sum(self.pulled(i, tensions[:, i]) for i in range(tensions.shape[1])))
 
     @cached_property
     def _told_acceleration(self) -> tuple[Array, Array]:
@@ -224,14 +259,14 @@ class Suspension:
         return np.asarray(self._law[:, i, 1] * self._wound[:, i] / self._wound[0, i])
 
     @cached_property
-    def cable_rows(self) -> list[Array]:
-        """`CableSignal` columns of each cable."""
+    def _length_slopes(self) -> Array:
+        """Of the elastic tension by the elastic length, (k, n) [N/m]."""
         step = 1e-5
         longer = law_at(self.parameters, self._carrying, self._elastic_lengths + step)
-        slopes = (longer - self._law)[:, :, 0] / step
-        return [self._cable_rows(i, slopes[:, i]) for i in range(len(self.parameters.cables))]
+        return np.asarray((longer - self._law)[:, :, 0] / step)
 
-    def _cable_rows(self, i: int, slope: Array) -> Array:
+    def cable_rows(self, i: int) -> Array:
+        """Return `CableSignal` columns of cable i."""
         rows, cables = np.zeros((len(self.signals.times), len(CableSignal))), self.parameters.cables
         lengths, wound = self._spans.lengths[:, i], self._wound[:, i]
         directions = self._spans.directions[:, i]
@@ -243,7 +278,7 @@ class Suspension:
             CableSignal.RATE: self._told_rates[:, i],
             CableSignal.TENSION: self.signals.tensions[:, i],
             CableSignal.STIFFNESS: self._law[:, i, 1],
-            CableSignal.LENGTH_SLOPE: slope,
+            CableSignal.LENGTH_SLOPE: self._length_slopes[:, i],
             CableSignal.DAMPER: damper,
             CableSignal.WOUND: wound / lengths,
             CableSignal.ANGLE: self.signals.angles[:, i],
@@ -257,15 +292,17 @@ class Suspension:
         return rows
 
     @cached_property
-    def end_rows(self) -> list[Array]:
-        """`EndSignal` columns of each cable."""
+    def _velocities(self) -> Array:
+        """Of the attachments against the exits, (k, n, 3) [m/s]."""
+        exits = self.parameters.cables[:, EXIT : EXIT + 3]
+        return end_velocities(self._spans, self.bar, self._frame, exits)
+
+    def end_rows(self, i: int) -> Array:
+        """Return `EndSignal` columns of cable i."""
         spans = self._spans
+        parts = (spans.directions, self._velocities, spans.arms, spans.lengths)
         gravity = np.full(len(self.signals.times), self._testbed.gravity)
-        parts = (spans.directions, spans.velocities, spans.arms, spans.lengths)
-        return [
-            np.column_stack([*(part[:, i] for part in parts), gravity])
-            for i in range(len(self.parameters.cables))
-        ]
+        return np.column_stack([*(part[:, i] for part in parts), gravity])
 
     @cached_property
     def bar_rows(self) -> Array:
@@ -283,21 +320,17 @@ class Suspension:
         rows[:, BarSignal.TIME] = self.signals.times
         return rows
 
-    @cached_property
-    def frame_rows(self) -> list[Array]:
-        """`FrameSignal` columns of each cable."""
-        count, force = len(self.signals.times), -self.cable_wrench[:, :3]
-        turn = self._frame.rotation.reshape(count, 9)
-        return [
-            np.column_stack(
-                [
-                    self.signals.times,
-                    self._spans.directions[:, i],
-                    np.broadcast_to(self._spans.exits[i], (count, 3)),
-                    turn,
-                    force,
-                    self._law[:, i, 1],
-                ]
-            )
-            for i in range(len(self.parameters.cables))
-        ]
+    def frame_rows(self, i: int) -> Array:
+        """Return `FrameSignal` columns of cable i."""
+        count = len(self.signals.times)
+        exits = self.parameters.cables[i, EXIT : EXIT + 3]
+        return np.column_stack(
+            [
+                self.signals.times,
+                self._spans.directions[:, i],
+                np.broadcast_to(exits, (count, 3)),
+                self._frame.rotation.reshape(count, 9),
+                -self.cable_wrench[:, :3],
+                self._law[:, i, 1],
+            ]
+        )

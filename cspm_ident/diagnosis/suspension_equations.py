@@ -178,7 +178,7 @@ class _Stretch:
     ) -> Equation:
         weighed = partial(self._weighed, channel=Channel.TENSION)
         place = Place(Channel.TENSION, self._machine.cable_names[i])
-        rows = self._here.cable_rows[i]
+        rows = self._here.cable_rows(i)
         drivers = {key: weighed(rows[:, column]) for key, column in _DRIVERS.items()}
         # The residual has the tension's own noise, of which it must not look like a function.
         drivers[_TENSION] = around(drivers[_TENSION], self._apart(Channel.TENSION))
@@ -233,7 +233,7 @@ class _Stretch:
                 continue
             shape = {name: action.values[name] for name in effect.nonlinear}
             weights = effect.weights(action.values)
-            for place, found in self._regressed(effect, action.element, shape):
+            for _, place, found in self._regressed(effect, action.element, [shape]):
                 if place.channel is Channel.TENSION:
                     i = self._machine.cable_names.index(place.element)
                     tensions[:, i] -= found[:, 0] @ weights
@@ -247,50 +247,53 @@ class _Stretch:
                 for place, found in self._read(effect, i, name):
                     yield Candidate(effect, name), place, found
                 continue
-            for shape in shapes_of(effect):
-                for place, found in self._regressed(effect, i, dict(shape)):
-                    yield Candidate(effect, name, shape), place, found
+            shapes = [dict(shape) for shape in shapes_of(effect)]
+            for shape, place, found in self._regressed(effect, i, shapes):
+                yield Candidate(effect, name, tuple(shape.items())), place, found
 
     def _regressed(
-        self, effect: Effect, i: int, shape: dict[str, float]
-    ) -> Iterator[tuple[Place, Array]]:
-        names = self._machine.cable_names
+        self, effect: Effect, i: int, shapes: Sequence[dict[str, float]]
+    ) -> Iterator[tuple[dict[str, float], Place, Array]]:
         for regression in (effect.regression, *effect.partners):
-            if regression.channel is Channel.WRENCH:
-                of_cable = effect.acts_on is Elements.CABLES
-                rows = self._here.end_rows[i] if of_cable else self._here.bar_rows
-                yield Place(Channel.WRENCH, BAR), regression.columns(rows, **shape)
-            elif regression.channel is Channel.TENSION and effect.acts_on is Elements.FRAME:
-                for name, rows in zip(names, self._here.frame_rows, strict=True):
-                    yield Place(Channel.TENSION, name), regression.columns(rows, **shape)
-            elif regression.channel is Channel.TENSION:
-                rows = self._here.cable_rows[i]
-                yield Place(Channel.TENSION, names[i]), regression.columns(rows, **shape)
+            for place, rows in self._rows_of(effect, regression.channel, i):
+                for shape in shapes:
+                    yield shape, place, regression.columns(rows, **shape)
+
+    def _rows_of(self, effect: Effect, channel: Channel, i: int) -> Iterator[tuple[Place, Array]]:
+        """Yield the residuals in which an effect on element i shows, with what it is told by."""
+        names, here = self._machine.cable_names, self._here
+        if channel is Channel.WRENCH:
+            of_cable = effect.acts_on is Elements.CABLES
+            yield Place(channel, BAR), here.end_rows(i) if of_cable else here.bar_rows
+        elif channel is Channel.TENSION and effect.acts_on is Elements.FRAME:
+            for k, name in enumerate(names):
+                yield Place(channel, name), here.frame_rows(k)
+        elif channel is Channel.TENSION:
+            yield Place(channel, names[i]), here.cable_rows(i)
 
     def _read(self, effect: Effect, i: int, name: str) -> Iterator[tuple[Place, Array]]:
         """Yield how a sensor's fault changes the residuals, by differences of the readings."""
-        changes = [self._changed(*faulty) for faulty in self._faulty(effect, i, name)]
+        assert effect.sense is not None
+        topic = effect.sense.topics[0]
+        if topic in (TENSION, WINCHES):
+            yield from self._read_joint(effect, i, topic)
+            return
+        changes = [self._changed(*faulty) for faulty in self._misplaced(effect, name)]
         tensions = np.stack([c[0] for c in changes], axis=2)
-        wrench = np.stack([c[1] for c in changes], axis=2)
         for k, cable in enumerate(self._machine.cable_names):
             if np.any(tensions[:, k]):
                 yield Place(Channel.TENSION, cable), tensions[:, k, None, :]
-        yield Place(Channel.WRENCH, BAR), wrench
+        yield Place(Channel.WRENCH, BAR), np.stack([c[1] for c in changes], axis=2)
 
     def _changed(self, moved: MachineSignals, step: float) -> tuple[Array, Array]:
-        there = self._here.with_signals(moved)
+        there = self._here.with_poses(moved)
         return (
             (there.tension_residuals - self._here.tension_residuals) / step,
             (there.wrench_residuals - self._here.wrench_residuals) / step,
         )
 
-    def _faulty(self, effect: Effect, i: int, name: str) -> Iterator[tuple[MachineSignals, float]]:
-        """Yield the signals with a little of each of a sensor's faults, and how much."""
-        assert effect.sense is not None
-        topic = effect.sense.topics[0]
-        if topic in (TENSION, WINCHES):
-            yield self._faulty_joint(effect, i, topic)
-            return
+    def _misplaced(self, effect: Effect, name: str) -> Iterator[tuple[MachineSignals, float]]:
+        """Yield the signals with a little of each of a pose's faults, and how much."""
         body = "bar" if name == BAR else "frame"
         motion: BodyMotion = getattr(self._signals, body)
         rows = pose_rows(self._signals.times, motion.poses, motion.rates)
@@ -298,17 +301,24 @@ class _Stretch:
             step = _small(change)
             yield self._signals.with_pose_change(body, change, step), step
 
-    def _faulty_joint(self, effect: Effect, i: int, topic: str) -> tuple[MachineSignals, float]:
+    def _read_joint(self, effect: Effect, i: int, topic: str) -> Iterator[tuple[Place, Array]]:
+        """Yield how a fault of a tension or angle changes the residuals of its cable and bar."""
         signals = self._signals
         readings = signals.tensions if topic == TENSION else signals.angles
-        changed = np.zeros(readings.shape)
-        changed[:, i] = effect.regressors(reading_rows(signals.times, readings[:, i]))[:, 0, 0]
-        step = _small(changed)
+        change = effect.regressors(reading_rows(signals.times, readings[:, i]))[:, 0, 0]
+        step = _small(change)
+        changed = readings.copy()
+        changed[:, i] += step * change
         if topic == TENSION:
-            return replace(signals, tensions=readings + step * changed), step
-        rate = np.gradient(changed, signals.step, axis=0)
-        speeds = signals.speeds + step * rate
-        return replace(signals, angles=readings + step * changed, speeds=speeds), step
+            moved = replace(signals, tensions=changed)
+            yield Place(Channel.WRENCH, BAR), -self._here.pulled(i, change)[:, :, None]
+        else:
+            speeds = signals.speeds.copy()
+            speeds[:, i] += step * np.gradient(change, signals.step)
+            moved = replace(signals, angles=changed, speeds=speeds)
+        there = self._here.of_cable(i, moved).tension_residuals[:, 0]
+        column = (there - self._here.tension_residuals[:, i]) / step
+        yield Place(Channel.TENSION, self._machine.cable_names[i]), column[:, None, None]
 
     def _weighed(self, values: Array, channel: Channel) -> Array:
         window, stride = self._windows[channel]

@@ -74,9 +74,7 @@ def planned(scenario: Scenario, testbed: TestbedFile) -> Plan:
     still = MachineSignals(times, frame, bar, zero, zero, zero)
     needed = Suspension(still, machine, parameters, np.ones(zero.shape[1])).wrench_residuals
     tensions, missed = _distributed(machine, parameters, needed, bar.poses, frame.poses)
-    cables = parameters.cables
-    ends = cables[:, EXIT : EXIT + 3], cables[:, ATTACHMENT : ATTACHMENT + 3]
-    lengths = cable_spans(still, body_state(bar), body_state(frame), *ends).lengths
+    lengths = cable_spans(still, body_state(bar), body_state(frame), parameters.cables).lengths
     angles = _wound_angles(parameters, lengths, tensions)
     poses = {"frame_pose": Samples(times, frame.poses), "bar_pose": Samples(times, bar.poses)}
     if machine.winch_frame is None:

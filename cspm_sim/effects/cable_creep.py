@@ -1,7 +1,6 @@
 """A cable that goes on stretching under load, and recovers."""
 
 from collections.abc import Sequence
-from math import exp
 
 import numpy as np
 
@@ -16,6 +15,7 @@ from cspm_sim.effects.effect import (
 )
 from cspm_sim.effects.signals import CableSignal
 from cspm_sim.kernels.affected_cables import ELASTIC_TENSION, ELONGATION_ADDED
+from cspm_sim.kernels.memory import relaxed
 
 
 def _stretch(parameters: Array, signals: Array, states: Array, rates: Array) -> None:
@@ -34,11 +34,12 @@ def _columns(signals: Array, time_constant: float) -> Array:
     """Return what creep adds that was at rest under the first sample's tension."""
     time = signals[:, CableSignal.TIME]
     tension = signals[:, CableSignal.TENSION] - signals[:, CableSignal.DAMPER]
-    crept = np.full(len(time), tension[0])
-    for k in range(1, len(time)):
-        fading = exp(-(time[k] - time[k - 1]) / time_constant)
-        mean = 0.5 * (tension[k] + tension[k - 1])
-        crept[k] = mean + (crept[k - 1] - mean) * fading
+    means = tension[:, None].copy()
+    means[1:, 0] = 0.5 * (tension[1:] + tension[:-1])
+    kept = np.exp(-np.diff(time, prepend=time[0]) / time_constant)[:, None]
+    crept = means.copy()
+    relaxed(means, kept, crept)
+    crept = crept[:, 0]
     return np.asarray((-signals[:, CableSignal.STIFFNESS] * (crept - crept[0]))[:, None, None])
 
 

@@ -1,7 +1,5 @@
 """Sliding between a cable's strands: a force of elongation and its reversals, not of its rate."""
 
-from math import exp
-
 import numpy as np
 
 from cspm_sim.effects.effect import (
@@ -15,6 +13,7 @@ from cspm_sim.effects.effect import (
 )
 from cspm_sim.effects.signals import CableSignal
 from cspm_sim.kernels.affected_cables import ELONGATION_RATE, FORCE_ADDED
+from cspm_sim.kernels.memory import relaxed
 
 
 def _force(parameters: Array, signals: Array, states: Array, rates: Array) -> None:
@@ -30,12 +29,10 @@ def _columns(signals: Array, displacement: float) -> Array:
     stretched = np.diff(
         signals[:, CableSignal.ELONGATION], prepend=signals[0, CableSignal.ELONGATION]
     )
-    share = np.zeros(len(signals))
-    for k in range(1, len(share)):
-        side = np.sign(stretched[k])
-        fading = exp(-abs(stretched[k]) / displacement)
-        share[k] = side - (side - share[k - 1]) * fading
-    return np.asarray(share[:, None, None])
+    share = np.zeros((len(signals), 1))
+    kept = np.exp(-np.abs(stretched) / displacement)
+    relaxed(np.sign(stretched)[:, None], kept[:, None], share)
+    return share[:, :, None]
 
 
 EFFECT = Effect(

@@ -24,6 +24,7 @@ from cspm_sim.kernels.affected_cables import (
     TURN_ADDED,
     UNSTRETCHED,
 )
+from cspm_sim.kernels.memory import played
 
 
 def _kernel(parameters: Array, signals: Array, states: Array, rates: Array) -> None:
@@ -44,9 +45,7 @@ def _columns(signals: Array, width: float) -> Array:
     """Return what one unit of width adds where it is near `width`."""
     angle, taut = signals[:, CableSignal.ANGLE], signals[:, CableSignal.TENSION] > 0.0
     lead = np.zeros(len(angle))
-    for k in range(1, len(angle)):
-        turned = lead[k - 1] - (angle[k] - angle[k - 1])
-        lead[k] = 0.0 if taut[k] else min(width, max(0.0, turned))
+    played(np.diff(angle, prepend=angle[0]), taut, width, lead)
     wound = signals[:, CableSignal.WOUND] * signals[:, CableSignal.RADIUS] * lead / width
     return np.asarray((signals[:, CableSignal.STIFFNESS] * wound)[:, None, None])
 

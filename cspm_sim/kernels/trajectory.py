@@ -5,9 +5,10 @@ from numba import njit
 from numpy import float64
 from numpy.typing import NDArray
 
-from cspm_sim.kernels.cable import elastic_tension, law_scale
+from cspm_sim.kernels.cable import cable_spans, elastic_tension, law_scale
 from cspm_sim.kernels.kinematics import cable_geometry
 from cspm_sim.kernels.rotation import (
+    Placement,
     euler_from_quaternion,
     euler_rate_to_world_rate,
     rotate_back,
@@ -15,6 +16,8 @@ from cspm_sim.kernels.rotation import (
 )
 
 Array = NDArray[float64]
+# Of a body: poses (k, 6), rotations (k, 3, 3), velocities and ω in world axes, (k, 3) each.
+Motions = tuple[Array, Array, Array, Array]
 
 
 @njit(cache=True, error_model="numpy")
@@ -68,6 +71,27 @@ def lengths_along(
             for d in range(6):
                 bar_rates[k, i] += of_bar[i, d] * bar_twists[k, d]
                 frame_rates[k, i] += of_frame[i, d] * frame_twists[k, d]
+
+
+@njit(cache=True, error_model="numpy", forceinline=True)
+def _placement(body: Motions, k: int) -> Placement:
+    p, r, v, w = body[0][k], body[1][k], body[2][k], body[3][k]
+    return (
+        (p[0], p[1], p[2]),
+        (r[0, 0], r[0, 1], r[0, 2], r[1, 0], r[1, 1], r[1, 2], r[2, 0], r[2, 1], r[2, 2]),
+        (v[0], v[1], v[2]),
+        (w[0], w[1], w[2]),
+    )
+
+
+@njit(cache=True, error_model="numpy")
+def spans_along(cables: Array, frame: Motions, bar: Motions, out: Array) -> None:
+    """Write all cables' spans, (k, n, SPAN_COLUMNS), without tensions; see `cable_spans`.
+
+    `cables` are parameter rows.
+    """
+    for k in range(len(out)):
+        cable_spans(cables, _placement(frame, k), _placement(bar, k), out[k])
 
 
 @njit(cache=True, error_model="numpy")

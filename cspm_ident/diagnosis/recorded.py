@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Collection, Sequence
 
+from cspm_ident.diagnosis.columns import Candidate
 from cspm_ident.diagnosis.drive import drive_equations
 from cspm_ident.diagnosis.drivers import Knots
 from cspm_ident.diagnosis.equation import Equation
@@ -13,7 +14,7 @@ from cspm_ident.diagnosis.suspension_equations import suspension_equations
 from cspm_ident.signals.measurement import Measurement
 from cspm_ident.signals.timeline import Timeline
 from cspm_sim.effect_entries import read_actions
-from cspm_sim.effects import Effect
+from cspm_sim.effects import Channel, Effect
 
 
 def equations_of(
@@ -21,6 +22,7 @@ def equations_of(
     effects: Sequence[Effect],
     knots: Knots | None = None,
     progress: Callable[[str], None] = lambda _: None,
+    touched: Sequence[Candidate] | None = None,
 ) -> list[Equation]:
     """Return every residual that the sensors allow, less what the machine's effects add.
 
@@ -29,16 +31,32 @@ def equations_of(
         effects: whose columns are wanted, such as the whole catalogue.
         knots: of the free functions; None: without these.
         progress: called with what is being done.
+        touched: by these; other winches, and cables and bar if need be, may be left out.
 
     Raises:
         InputError: the machine's effects cannot be used.
     """
     measurement = settled(measurement)
     known = read_actions(measurement.machine)
+    winches, suspended = _reached(measurement, touched)
+    # First what needs most memory.
+    late: list[Equation] = []
+    if measurement.machine.bar is not None and suspended:
+        progress("cables and bar")
+        late = suspension_equations(Timeline(measurement), effects, known, knots)
     progress("torque equations of the winches")
     found = drive_equations(measurement, effects, known, knots)
-    found += shaft_equations(measurement, effects, known, knots)
-    if measurement.machine.bar is not None:
-        progress("cables and bar")
-        found += suspension_equations(Timeline(measurement), effects, known, knots)
-    return found
+    found += shaft_equations(measurement, effects, known, knots, winches)
+    return found + late
+
+
+def _reached(
+    measurement: Measurement, touched: Sequence[Candidate] | None
+) -> tuple[Collection[str], bool]:
+    """Return the winches that candidates may show at, and whether cables and bar may show them."""
+    names = measurement.machine.cable_names
+    if touched is None:
+        return names, True
+    kinds = {r.channel for c in touched for r in (c.effect.regression, *c.effect.partners)}
+    winches = {c.element for c in touched if c.element in names}
+    return winches, not kinds <= {Channel.SHAFT, Channel.DRIVE}

@@ -61,7 +61,7 @@ def refine(
         except InputError:
             # Such a machine cannot be; what was found before stays, with its interval.
             break
-        parts = cut([equations_of(m, near) for m in moved])
+        parts = cut([equations_of(m, near, touched=candidates) for m in moved])
         evidence = gather(in_noise(steady(parts), noise), block_s)
         shapes, found = _fitted(evidence, shapes, wanted)
         for candidate, (weights, _) in found.items():

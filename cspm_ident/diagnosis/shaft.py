@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Collection, Iterator, Sequence
 
 import numpy as np
 from numpy.typing import NDArray
@@ -42,9 +42,10 @@ def shaft_equations(
     measurement: Measurement,
     effects: Sequence[Effect],
     known: Sequence[Action],
-    knots: Knots | None = None,
+    knots: Knots | None,
+    winches: Collection[str],
 ) -> list[Equation]:
-    """Return the equation of every winch whose signals were recorded.
+    """Return the equation of every winch, of those asked for, whose signals were recorded.
 
     The residual is torque − J·q̈ − (r/n)·t less what the test-bed's own effects add, weighted with
     windows, so that nothing noisy is differentiated.
@@ -54,9 +55,12 @@ def shaft_equations(
         effects: the catalogue.
         known: effects that the test-bed file has.
         knots: of the free functions; None: without these.
+        winches: names of those asked for.
     """
     found: list[Equation] = []
     for i, cable in enumerate(measurement.machine.cables):
+        if cable.name not in winches:
+            continue
         try:
             signals = winch_signals(measurement, cable.name, measurement.torque_age)
         except InputError:

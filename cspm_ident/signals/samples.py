@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import cached_property
 from itertools import pairwise
 
 import numpy as np
@@ -12,6 +13,12 @@ Array = NDArray[np.float64]
 
 # A hole is where samples lie farther apart than this many usual intervals.
 HOLE = 5.5
+# Fewer samples tell no clock.
+_FEWEST = 16
+_DRIFT_ORDER = 3
+# Of the interval: stamps that scatter more are no even clock's.
+_SCATTER = 0.3
+_EXACT = 1e-6
 
 
 @dataclass(frozen=True, eq=False)
@@ -19,14 +26,15 @@ class Samples:
     """Values of one sensor.
 
     Attributes:
-        times: when each is valid [s] after the recording's start, increasing, shape (n,).
+        times: when each is valid [s] after the recording's start, increasing, shape (n,); not to be
+            written to.
         values: shape (n, width).
     """
 
     times: Array
     values: Array
 
-    @property
+    @cached_property
     def interval(self) -> float:
         """The usual time between two samples [s], their median; 0 with fewer than two."""
         return float(np.median(np.diff(self.times))) if len(self.times) > 1 else 0.0
@@ -36,16 +44,27 @@ class Samples:
         """Samples per second; 0 with fewer than two."""
         return 1.0 / self.interval if self.interval > 0 else 0.0
 
-    @property
+    @cached_property
     def spans(self) -> list[slice]:
         """The stretches without a hole, as slices of the samples."""
         holes = np.flatnonzero(np.diff(self.times) > HOLE * self.interval) + 1
         edges = [0, *holes.tolist(), len(self.times)]
         return [slice(a, b) for a, b in pairwise(edges)]
 
+    @cached_property
+    def clocks(self) -> list[tuple[Array, NDArray[np.intp]]]:
+        """Of each stretch the stamps without their scatter, and its samples' numbers by the clock.
+
+        Where stamps follow no even clock, they and the samples' order are returned.
+        """
+        return [_clocked(self.times[span]) for span in self.spans]
+
     def column(self, index: int) -> Samples:
         """Return one column, shape (n, 1)."""
-        return Samples(self.times, self.values[:, index : index + 1])
+        other = Samples(self.times, self.values[:, index : index + 1])
+        # Of the times alone, and the same for all columns.
+        other.__dict__.update(interval=self.interval, spans=self.spans, clocks=self.clocks)
+        return other
 
     def shifted(self, seconds: float) -> Samples:
         """Return the same values, valid `seconds` later."""
@@ -53,8 +72,23 @@ class Samples:
 
     def within(self, start: float, end: float) -> Samples:
         """Return the samples from `start` to `end` [s], both included."""
-        inside = (self.times >= start) & (self.times <= end)
-        return Samples(self.times[inside], self.values[inside])
+        first = np.searchsorted(self.times, start)
+        last = np.searchsorted(self.times, end, side="right")
+        return Samples(self.times[first:last], self.values[first:last])
+
+
+def _clocked(times: Array) -> tuple[Array, NDArray[np.intp]]:
+    order = np.arange(len(times))
+    if len(times) < _FEWEST:
+        return times, order
+    interval = float(np.median(np.diff(times)))
+    place = np.concatenate([[0], np.cumsum(np.maximum(1, np.round(np.diff(times) / interval)))])
+    # Rates drift: a clock is a straight line over some seconds only.
+    line = np.polynomial.Chebyshev.fit(place, times, _DRIFT_ORDER)(place)
+    scatter = np.abs(times - line).max() / interval
+    if scatter > _SCATTER:
+        return times, order
+    return np.asarray(line if scatter > _EXACT else times), place.astype(np.intp)
 
 
 def ordered(times: Array, values: Array) -> Samples:

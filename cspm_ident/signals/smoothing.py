@@ -30,12 +30,6 @@ _SEGMENT_S = 4.0
 _SEGMENTS = 64
 # Knots per period of the highest frequency kept: a spline's error is below 1e-5 of the signal.
 _KNOTS = 40.0
-# Fewer samples tell no clock.
-_FEWEST = 16
-_DRIFT_ORDER = 3
-# Of the interval: stamps that scatter more are no even clock's.
-_SCATTER = 0.3
-_EXACT = 1e-6
 
 
 @dataclass(frozen=True, eq=False)
@@ -68,8 +62,7 @@ def smooth(samples: Samples, band: float | None = None) -> Smooth:
     values, kept = filtered(samples, band)
     skip = max(1, int(samples.rate / (_KNOTS * kept)))
     spans, pieces = [], []
-    for span in samples.spans:
-        times = _clocked(samples.times[span])[0]
+    for span, (times, _) in zip(samples.spans, samples.clocks, strict=True):
         if len(times) < 4 * skip:
             continue
         knots = np.arange(0, len(times), skip)
@@ -92,34 +85,15 @@ def filtered(samples: Samples, band: float | None = None) -> tuple[Array, float]
         return samples.values, float("inf")
     sos = butter(ORDER, band, fs=rate, output="sos")
     out = samples.values.astype(float)
-    for span in samples.spans:
+    for span, (_, place) in zip(samples.spans, samples.clocks, strict=True):
         if span.stop - span.start < 4:
             continue
-        _, place = _clocked(samples.times[span])
         whole = np.arange(place[-1] + 1)
         filled = np.stack([np.interp(whole, place, column) for column in out[span].T], axis=1)
         padding = min(len(whole) - 1, round(3.0 / samples.interval))
         smoothed = sosfiltfilt(sos, filled, axis=0, padtype="odd", padlen=padding)
         out[span] = smoothed[place]
     return out, band
-
-
-def _clocked(times: Array) -> tuple[Array, NDArray[np.intp]]:
-    """Return stamps without their scatter, and each sample's number by the sensor's clock.
-
-    Where stamps follow no even clock, they and the samples' order are returned.
-    """
-    order = np.arange(len(times))
-    if len(times) < _FEWEST:
-        return times, order
-    interval = float(np.median(np.diff(times)))
-    place = np.concatenate([[0], np.cumsum(np.maximum(1, np.round(np.diff(times) / interval)))])
-    # Rates drift: a clock is a straight line over some seconds only.
-    line = np.polynomial.Chebyshev.fit(place, times, _DRIFT_ORDER)(place)
-    scatter = np.abs(times - line).max() / interval
-    if scatter > _SCATTER:
-        return times, order
-    return np.asarray(line if scatter > _EXACT else times), place.astype(np.intp)
 
 
 def band_of(samples: Samples) -> float:

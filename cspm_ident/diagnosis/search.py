@@ -179,8 +179,9 @@ class Search:
 
     def _pruned(self, hypothesis: Hypothesis, base: Index) -> Hypothesis:
         """Return the hypothesis without elements on which the effect may as well be absent."""
-        columns = np.concatenate([base, self.own_columns(hypothesis)])
-        sizes = np.abs(self.sums.weights(columns)) / self.sums.half_width(columns)
+        own_columns = self.own_columns(hypothesis)
+        weights = self.sums.weights(np.concatenate([base, own_columns]))[len(base) :]
+        sizes = np.abs(weights) / self.sums.half_width(base, own_columns)
         own = self.evidence.parted(hypothesis.candidates, sizes)
         kept = tuple(c for c in hypothesis.candidates if own[c].max() > 1.0)
         return replace(hypothesis, candidates=kept) if kept else hypothesis
@@ -344,8 +345,9 @@ class Search:
         candidates: Sequence[Candidate],
     ) -> bool:
         """Return whether weights that depend on one another are those of some parameters."""
-        columns = self.evidence.with_nuisance(candidates)
-        widths = self.evidence.parted(candidates, self.sums.half_width(columns))
+        columns = self.evidence.columns_of(candidates)
+        half = self.sums.half_width(self.evidence.nuisance, columns)
+        widths = self.evidence.parted(candidates, half)
         for each in tied:
             values = each.effect.values(weights[each].tolist(), **each.nonlinear)
             if np.any(np.abs(each.effect.weights(values) - weights[each]) > widths[each]):

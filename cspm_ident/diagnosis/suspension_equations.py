@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import replace
 from functools import partial
 
@@ -34,6 +34,8 @@ PERIOD_NS = 5_000_000
 _HALF_WIDTHS = (0.04, 0.32)
 _WHITE = 1.7
 _SHORTEST_S = 2.0
+# Of an acceleration's square: what has to be common to tensions and poses.
+_COMMON = 0.7
 _TENSION = "tension [N]"
 _DRIVERS = {
     _TENSION: CableSignal.TENSION,
@@ -256,16 +258,34 @@ class _Stretch:
     ) -> Iterator[tuple[Place, Array]]:
         names = self._machine.cable_names
         for regression in (effect.regression, *effect.partners):
-            if regression.channel is Channel.WRENCH:
-                of_cable = effect.acts_on is Elements.CABLES
-                rows = self._here.end_rows[i] if of_cable else self._here.bar_rows
-                yield Place(Channel.WRENCH, BAR), regression.columns(rows, **shape)
+            if regression.channel is Channel.WRENCH and effect.acts_on is Elements.CABLES:
+                yield (
+                    Place(Channel.WRENCH, BAR),
+                    regression.columns(self._here.end_rows[i], **shape),
+                )
+            elif regression.channel is Channel.WRENCH:
+                found = self._quieter(partial(regression.columns, **shape))
+                yield Place(Channel.WRENCH, BAR), found
             elif regression.channel is Channel.TENSION and effect.acts_on is Elements.FRAME:
                 for name, rows in zip(names, self._here.frame_rows, strict=True):
                     yield Place(Channel.TENSION, name), regression.columns(rows, **shape)
             elif regression.channel is Channel.TENSION:
                 rows = self._here.cable_rows[i]
                 yield Place(Channel.TENSION, names[i]), regression.columns(rows, **shape)
+
+    def _quieter(self, columns: Callable[[Array], Array]) -> Array:
+        """Return the bar's columns, each with accelerations by those sensors that tell it better.
+
+        Noise of either stands in the residual as well, of which a noisy column would look like a
+        part. What two sensors tell alike is no noise; columns of which neither tells enough are
+        zero.
+        """
+        ways = [columns(rows) for rows in (self._here.bar_rows, self._here.posed_bar_rows)]
+        by_tension, by_pose = (self._weighed(way, Channel.WRENCH) for way in ways)
+        common = np.einsum("kij,kij->j", by_tension, by_pose)
+        told, posed = (np.sum(way**2, axis=(0, 1)) for way in (by_tension, by_pose))
+        quieter = np.where(told <= posed, ways[0], ways[1])
+        return np.where(common >= _COMMON * np.minimum(told, posed), quieter, 0.0)
 
     def _read(self, effect: Effect, i: int, name: str) -> Iterator[tuple[Place, Array]]:
         """Yield how a sensor's fault changes the residuals, by differences of the readings."""

@@ -92,7 +92,7 @@ def test_coloured_noise_misleads_errors_of_white_rows_and_not_those_of_blocks():
         evidence = gather([[equation(seed, (0.0, 0.0, 0.0), colour=0.95)]], BLOCK_S)
         columns = evidence.with_nuisance([VISCOUS])
         white, blocks = (
-            abs(sums.weights(columns)[-1]) > sums.half_width(columns)[-1]
+            abs(sums.weights(columns)[-1]) > sums.half_width(columns[:-1], columns[-1:])[0]
             for sums in (WhiteSums(evidence), Sums(evidence))
         )
         misled, sound = misled + white, sound + blocks
@@ -109,8 +109,9 @@ def test_errors_of_white_rows_are_the_textbook_s():
     weights, (left,), *_ = np.linalg.lstsq(x, y, rcond=None)
     covariance = left / (ROWS - 3) * np.linalg.inv(x.T @ x)
     np.testing.assert_allclose(sums.weights(columns), weights, rtol=1e-9)
-    np.testing.assert_allclose(sums.covariance(columns), covariance, rtol=1e-6)
     base, own = columns[:2], columns[2:]
+    np.testing.assert_allclose(sums.covariance(columns[:0], columns), covariance, rtol=1e-6)
+    np.testing.assert_allclose(sums.covariance(base, own), covariance[2:, 2:], rtol=1e-6)
     chance = 2.0 * t.sf(weights[2] / np.sqrt(covariance[2, 2]), ROWS - 3)
     assert sums.p_value(base, own) == pytest.approx(chance, rel=1e-3, abs=1e-300)
 

@@ -88,6 +88,36 @@ def is_negligible(members: Mapping[Candidate, Array]) -> bool:
     )
 
 
+def bounded(candidate: Candidate, weights: Array, half: Array) -> Array:
+    """Return weights with those moved to their bound that lie beyond it by chance.
+
+    Args:
+        candidate: of which they are.
+        weights: as fitted.
+        half: half the widths of their 95 % intervals.
+    """
+    effect = candidate.effect
+    if effect.coefficients:
+        return weights
+    linear = [p for p in effect.parameters if p.name not in effect.nonlinear]
+    absent = np.array([p.absent or 0.0 for p in linear])
+    low = np.array([p.minimum for p in linear]) - absent
+    nearest = np.clip(weights, low, np.array([p.maximum for p in linear]) - absent)
+    return np.where(np.abs(nearest - weights) <= half, nearest, weights)
+
+
+def is_allowed(candidate: Candidate, weights: Array) -> bool:
+    """Return whether the catalogue allows such weights, and they do something."""
+    values = candidate.effect.values(weights.tolist(), **candidate.nonlinear)
+    return candidate.effect.is_plausible(values) and not candidate.effect.is_absent(values)
+
+
+def is_tied(candidate: Candidate, weights: Array, half: Array) -> bool:
+    """Return whether weights that depend on one another are those of some parameters."""
+    values = candidate.effect.values(weights.tolist(), **candidate.nonlinear)
+    return bool(np.all(np.abs(candidate.effect.weights(values) - weights) <= half))
+
+
 def joined(chosen: Sequence[Hypothesis], found: Hypothesis) -> list[Hypothesis]:
     """Return hypotheses with a further one; the same effect on more elements is still one."""
     shape, out = found.candidates[0].shape, []

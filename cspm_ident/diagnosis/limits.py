@@ -59,7 +59,7 @@ def detection_limits(search: Search, kept: Sequence[Named]) -> tuple[Limit, ...]
 def _least(search: Search, base: NDArray[np.intp], columns: NDArray[np.intp]) -> float:
     """Return the least weight that would be told."""
     sums = search.sums
-    error = float(np.sqrt(sums.covariance(np.concatenate([base, columns]))[-1, -1]))
+    error = float(np.sqrt(sums.covariance(base, columns)[0, 0]))
     chance = FALSE_ALARMS / len(search.heard)
     sure = error * float(t_distribution.ppf(1.0 - chance / 2.0, max(1, sums.blocks - 1)))
     return max(sure, _material(search.evidence, base, sums.weights(base), columns))

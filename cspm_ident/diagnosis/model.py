@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from cspm_ident.diagnosis.columns import Candidate, Place
 from cspm_ident.diagnosis.equation import Equation, steady
-from cspm_ident.diagnosis.hypothesis import Named, members_of
+from cspm_ident.diagnosis.hypothesis import Named, bounded, members_of
 from cspm_ident.diagnosis.onset import Onset, onset_of
 from cspm_ident.diagnosis.parameters import of_drives, of_shafts, weights_of
 from cspm_ident.diagnosis.refine import Cut, Weights, needs_refining, refine
@@ -96,6 +96,7 @@ def modelled(
     rows = [[e.within(since, np.inf) for e in part] for part in data.rows]
     weights = _parameters(search, kept, data.searched, cut, rows, data.noise, data.block)
     weights = of_drives(weights, 2.0 * data.searched[0].torque_age)
+    weights = {c: (bounded(c, own, half), half) for c, (own, half) in weights.items()}
     values = {c: w for c, (w, _) in weights.items()}
     members = [{c: values[c] for c in members_of(values, each.hypothesis)} for each in kept]
     possible = tuple(is_possible(data.searched[0], own) for own in members)

@@ -19,9 +19,9 @@ Parts = Sequence[Sequence[Equation]]
 
 def weights_of(evidence: Evidence, sums: Sums, candidates: Sequence[Candidate]) -> Weights:
     """Return each candidate's weights with half the width of their 95 % intervals."""
-    columns = evidence.with_nuisance(candidates)
-    values = evidence.parted(candidates, sums.weights(columns))
-    widths = evidence.parted(candidates, sums.half_width(columns))
+    columns = evidence.columns_of(candidates)
+    values = evidence.parted(candidates, sums.weights(evidence.with_nuisance(candidates)))
+    widths = evidence.parted(candidates, sums.half_width(evidence.nuisance, columns))
     return {c: (values[c], widths[c]) for c in candidates}
 
 

@@ -109,11 +109,44 @@ def _fitted(
             best = left, chosen
     assert best is not None
     members = _members(evidence, best[1], wanted)
-    columns = evidence.with_nuisance(members)
-    weights = evidence.parted(members, sums.weights(columns))
-    widths = evidence.parted(members, sums.half_width(columns))
+    weights = evidence.parted(members, sums.weights(evidence.with_nuisance(members)))
+    turns = _turns(evidence, weights)
+    beside = np.append(evidence.nuisance, evidence.width + np.arange(turns.shape[1]))
+    half = sums.beside(turns).half_width(beside, evidence.columns_of(members))
+    widths = evidence.parted(members, half)
     found = {c: (weights[c], widths[c]) for c in members}
     return {name: dict(shape) for name, shape in best[1].items()}, found
+
+
+def _turns(evidence: Evidence, weights: Mapping[Candidate, Array]) -> Array:
+    """Return how what was found changes with the logarithm of each shape, (width, shapes).
+
+    As a combination of columns. A weight is no surer than its shape lets it be.
+    """
+    turns: dict[tuple[str, str], Array] = {}
+    for candidate, own in weights.items():
+        for name in candidate.nonlinear:
+            ends = _ends(evidence, candidate, name)
+            if len(ends) < 2:
+                continue
+            turn = turns.setdefault((candidate.effect_id, name), np.zeros(evidence.width))
+            step = float(np.log(ends[-1].nonlinear[name] / ends[0].nonlinear[name]))
+            turn[evidence.slices[ends[-1]]] += own / step
+            turn[evidence.slices[ends[0]]] -= own / step
+    return np.column_stack([np.zeros((evidence.width, 0)), *turns.values()])
+
+
+def _ends(evidence: Evidence, candidate: Candidate, name: str) -> list[Candidate]:
+    """Return the candidates that differ in one number of the shape only, ascending in it."""
+    kept = {n: value for n, value in candidate.shape if n != name}
+    alike = [
+        term
+        for term in evidence.terms
+        if isinstance(term, Candidate)
+        and (term.effect_id, term.element) == (candidate.effect_id, candidate.element)
+        and {n: value for n, value in term.shape if n != name} == kept
+    ]
+    return sorted(alike, key=lambda term: term.nonlinear[name])
 
 
 def _shapes(evidence: Evidence, name: str) -> list[tuple[tuple[str, float], ...]]:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from contextlib import contextmanager
 from copy import copy
 from dataclasses import replace
@@ -19,8 +19,11 @@ from cspm_ident.diagnosis.hypothesis import (
     Hypothesis,
     Named,
     Rival,
+    bounded,
     freedom,
+    is_allowed,
     is_negligible,
+    is_tied,
     is_wider,
     joined,
 )
@@ -179,8 +182,9 @@ class Search:
 
     def _pruned(self, hypothesis: Hypothesis, base: Index) -> Hypothesis:
         """Return the hypothesis without elements on which the effect may as well be absent."""
-        columns = np.concatenate([base, self.own_columns(hypothesis)])
-        sizes = np.abs(self.sums.weights(columns)) / self.sums.half_width(columns)
+        own_columns = self.own_columns(hypothesis)
+        weights = self.sums.weights(np.concatenate([base, own_columns]))[len(base) :]
+        sizes = np.abs(weights) / self.sums.half_width(base, own_columns)
         own = self.evidence.parted(hypothesis.candidates, sizes)
         kept = tuple(c for c in hypothesis.candidates if own[c].max() > 1.0)
         return replace(hypothesis, candidates=kept) if kept else hypothesis
@@ -255,25 +259,27 @@ class Search:
     ) -> list[Hypothesis]:
         """Return the best point of every other effect that explains the same.
 
-        On the same elements, or on its one body; and the same effect on another single element.
+        On the same elements, or where it acts on others on the best one and on all; and the same
+        effect on another single element.
         """
         elements = set(hypothesis.elements)
         groups: dict[tuple[str, tuple[tuple[str, float], ...]], list[Candidate]] = {}
         for candidate in free:
             groups.setdefault((candidate.effect_id, candidate.shape), []).append(candidate)
-        best: dict[str, tuple[float, Hypothesis]] = {}
+        best: dict[tuple[str, bool], tuple[float, Hypothesis]] = {}
         for (name, _), members in groups.items():
             if name == hypothesis.effect.id:
                 continue
-            same = tuple(c for c in members if c.element in elements) or tuple(members[:1])
-            rival = Hypothesis(members[0].effect, same)
-            gain = float(self.sums.gains_beyond(base, [self.own_columns(rival)])[0])
-            if name not in best or gain > best[name][0]:
-                best[name] = gain, rival
+            for own in _where(members, elements):
+                rival = Hypothesis(members[0].effect, own)
+                gain = float(self.sums.gains_beyond(base, [self.own_columns(rival)])[0])
+                key = name, len(own) > 1
+                if key not in best or gain > best[key][0]:
+                    best[key] = gain, rival
         rivals = [rival for _, rival in best.values()]
         if len(elements) == 1:
-            own = hypothesis.effect.id, hypothesis.candidates[0].shape
-            alike = (c for c in groups.get(own, ()) if c.element not in elements)
+            group = hypothesis.effect.id, hypothesis.candidates[0].shape
+            alike = (c for c in groups.get(group, ()) if c.element not in elements)
             rivals += [Hypothesis(hypothesis.effect, (c,)) for c in alike]
         columns = self.own_columns(hypothesis)
         return [r for r in rivals if self._overlap(base, columns, self.own_columns(r))]
@@ -325,32 +331,20 @@ class Search:
         return bool(np.all(alone > 0.999))
 
     def _is_plausible(self, hypotheses: Sequence[Hypothesis]) -> bool:
-        """Return whether all parameters lie within what the catalogue allows."""
+        """Return whether parameters are what the catalogue allows, but for chance."""
         candidates = [c for h in hypotheses for c in h.candidates]
         columns = self.evidence.with_nuisance(candidates)
         weights = self.evidence.parted(candidates, self.sums.weights(columns))
-        for candidate, own in weights.items():
-            effect = candidate.effect
-            values = effect.values(own.tolist(), **candidate.nonlinear)
-            if not effect.is_plausible(values) or effect.is_absent(values):
-                return False
-        tied = [c for c in candidates if c.effect.tied]
-        return not tied or self._are_parameters(tied, weights, candidates)
-
-    def _are_parameters(
-        self,
-        tied: Iterable[Candidate],
-        weights: Mapping[Candidate, Array],
-        candidates: Sequence[Candidate],
-    ) -> bool:
-        """Return whether weights that depend on one another are those of some parameters."""
-        columns = self.evidence.with_nuisance(candidates)
-        widths = self.evidence.parted(candidates, self.sums.half_width(columns))
-        for each in tied:
-            values = each.effect.values(weights[each].tolist(), **each.nonlinear)
-            if np.any(np.abs(each.effect.weights(values) - weights[each]) > widths[each]):
-                return False
-        return True
+        if all(is_allowed(c, own) and not c.effect.tied for c, own in weights.items()):
+            return True
+        own = self.evidence.columns_of(candidates)
+        half = self.sums.half_width(self.evidence.nuisance, own)
+        widths = self.evidence.parted(candidates, half)
+        near = {c: bounded(c, weights[c], widths[c]) for c in candidates}
+        return all(
+            is_allowed(c, near[c]) and (not c.effect.tied or is_tied(c, weights[c], widths[c]))
+            for c in candidates
+        )
 
     def _onset(self, base: Index, own: Index) -> int:
         """Return the block from which on columns act, 0 unless a later one is surely better."""
@@ -377,6 +371,12 @@ class Search:
 
     def _of(self, term: Candidate | Driver) -> Index:
         return self.evidence.columns_of([term])
+
+
+def _where(members: Sequence[Candidate], elements: set[str]) -> list[tuple[Candidate, ...]]:
+    """Return on which members an effect may do what something on some elements does."""
+    same = tuple(c for c in members if c.element in elements)
+    return [same] if same else list(dict.fromkeys([*((c,) for c in members), tuple(members)]))
 
 
 def _behind(worse: Array) -> float:

@@ -27,7 +27,8 @@ class Number(NamedTuple):
         name: public name.
         value: in `unit`.
         unit: SI.
-        low, high: ends of its 95 % interval; equal to the value where it was searched on a grid.
+        low, high: ends of its 95 % interval; equal to the value where it was searched on a grid;
+            all that the catalogue allows where the data do not tell it.
     """
 
     name: str
@@ -42,6 +43,10 @@ def numbers_of(diagnosis: Diagnosis, candidate: Candidate) -> list[Number]:
     weights, widths = diagnosis.weights[candidate]
     effect = candidate.effect
     values = effect.values(weights.tolist(), **candidate.nonlinear)
+    if not np.all(np.isfinite(widths)):
+        return [
+            Number(p.name, values[p.name], p.unit, p.minimum, p.maximum) for p in effect.parameters
+        ]
     low = effect.values((weights - widths).tolist(), **candidate.nonlinear)
     high = effect.values((weights + widths).tolist(), **candidate.nonlinear)
     return [

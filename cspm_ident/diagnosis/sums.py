@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from contextlib import contextmanager
+from copy import copy
 from functools import cached_property
 from typing import NamedTuple
 
@@ -33,6 +34,22 @@ class Gain(NamedTuple):
     error: float
 
 
+class LeftOut(NamedTuple):
+    """What leaving out one block at a time does to weights, of columns of length 1.
+
+    Attributes:
+        weights: from all blocks, shape (m,).
+        covariance: of the weights, shape (m, m).
+        blocks: effective number of blocks that tell all of them.
+        blocks_of: those that tell each weight, shape (m,).
+    """
+
+    weights: Array
+    covariance: Array
+    blocks: float
+    blocks_of: Array
+
+
 class Sums:
     """All columns' products, scaled so that each column has length 1."""
 
@@ -50,6 +67,23 @@ class Sums:
         self._lengths = lengths[:-1]
         self._whole = self._blocks.sum(axis=0)
         self._folds = np.array_split(np.arange(evidence.blocks), min(FOLDS, evidence.blocks))
+
+    def beside(self, combinations: Array) -> Sums:
+        """Return sums with further columns behind, combinations of these, shape (width, k)."""
+        width, count = combinations.shape
+        turn = np.zeros((width + 1, width + count + 1))
+        turn[:width, :width], turn[-1, -1] = np.eye(width), 1.0
+        turn[:width, width:-1] = combinations * self._lengths[:, None]
+        grams = turn.T @ self._blocks @ turn
+        lengths = np.append(np.sqrt(np.einsum("bii->i", grams))[:-1], 1.0)
+        lengths[lengths == 0.0] = 1.0
+        wider = copy(self)
+        wider._blocks = grams / (lengths[:, None] * lengths)
+        wider._lengths = lengths[:-1] * np.append(self._lengths, np.ones(count))
+        wider._whole = wider._blocks.sum(axis=0)
+        for name in ("_others", "excited"):
+            wider.__dict__.pop(name, None)
+        return wider
 
     def delay(self, columns: Index, block: int) -> None:
         """Let columns act from a block on only."""
@@ -136,50 +170,64 @@ class Sums:
         better = self.held_out(base) - self.held_out(np.concatenate([base, columns]))
         return gain_of(better)
 
-    def covariance(self, columns: Index) -> Array:
-        """Return the weights' covariance, with blocks as independent pieces (Liang, Zeger 1986)."""
-        weights = self._weights(columns, self._whole)
-        bread = _pseudo_inverse(self._whole[np.ix_(columns, columns)])
-        scores = self._blocks[:, columns, -1] - self._blocks[:, columns[:, None], columns] @ weights
-        meat = scores.T @ scores * self.blocks / max(1, self.blocks - len(columns))
+    def covariance(self, base: Index, columns: Index) -> Array:
+        """Return the covariance of the weights of columns beside a base.
+
+        From leaving out one block at a time (Bell and McCaffrey, Surv. Methodol. 28(2), 2002),
+        which is not too small for few blocks; the weights of the base are held.
+        """
         scale = self._lengths[columns]
-        return np.asarray(bread @ meat @ bread / (scale[:, None] * scale))
+        return np.asarray(self._left_out(base, columns).covariance / np.outer(scale, scale))
+
+    def half_width(self, base: Index, columns: Index) -> Array:
+        """Return half the widths of 95 % intervals of the weights of columns beside a base.
+
+        Infinite where a single block tells a weight.
+        """
+        found = self._left_out(base, columns)
+        free = np.maximum(found.blocks_of - 1.0, 1e-9)
+        factor = np.where(found.blocks_of > 1.0, t_distribution.ppf(0.975, free), np.inf)
+        errors = np.sqrt(np.maximum(np.diag(found.covariance), 1e-300))
+        return np.asarray(factor * errors / self._lengths[columns])
 
     def p_value(self, base: Index, columns: Index) -> float:
         """Return the probability of so large weights by chance.
 
-        By Wald's test with the covariance that leaving out one block at a time gives (Bell and
-        McCaffrey, Surv. Methodol. 28(2), 2002), so that what a single block says counts for
+        By Wald's test with the covariance above, so that what a single block says counts for
         nothing, while a few that agree may be enough. Blocks count by what they tell of the
-        columns: the weights of the base are held.
+        columns.
 
         Args:
             base: columns beside them.
             columns: those tested.
         """
+        found, count = self._left_out(base, columns), len(columns)
+        if found.blocks <= count:
+            return 1.0
+        scale = np.sqrt(np.maximum(np.diag(found.covariance), 1e-300))
+        sizes = found.weights / scale
+        wald = sizes @ np.linalg.pinv(found.covariance / np.outer(scale, scale)) @ sizes
+        return float(f_distribution.sf(wald / count, count, found.blocks - count))
+
+    def _left_out(self, base: Index, columns: Index) -> LeftOut:
+        """Return what leaving out one block at a time does to the weights of columns."""
         parts = self._beyond(base, columns)
         whole, count = parts.sum(axis=0), len(columns)
         inverse = _pseudo_inverse(whole[:-1, :-1])
-        told = np.einsum("ij,bji->b", inverse, parts[:, :-1, :-1]) / count
-        blocks, effective = int(np.count_nonzero(told > _RANK)), 1.0 / float(np.sum(told**2))
-        if effective <= count:
-            return 1.0
+        told = np.einsum("ij,bji->bi", inverse, parts[:, :-1, :-1])
+        shares = told.sum(axis=1) / count
+        heard = shares > _RANK
         weights = inverse @ whole[:-1, -1]
-        others = whole - parts[told > _RANK]
+        others = whole - parts[heard]
         without = np.einsum(
             "bij,bj->bi",
             np.linalg.pinv(others[:, :-1, :-1], rcond=_RANK, hermitian=True),
             others[:, :-1, -1],
         )
-        apart = without - weights
+        apart, blocks = without - weights, max(1, int(np.count_nonzero(heard)))
         covariance = (blocks - 1) / blocks * apart.T @ apart
-        scale = np.sqrt(np.maximum(np.diag(covariance), 1e-300))
-        wald = (
-            (weights / scale)
-            @ np.linalg.pinv(covariance / np.outer(scale, scale))
-            @ (weights / scale)
-        )
-        return float(f_distribution.sf(wald / count, count, effective - count))
+        effective = 1.0 / np.maximum(np.sum(told**2, axis=0), _RANK)
+        return LeftOut(weights, covariance, 1.0 / max(float(np.sum(shares**2)), _RANK), effective)
 
     def _beyond(self, base: Index, columns: Index) -> Array:
         """Return each block's products of columns and target less what a base spans of them."""
@@ -189,11 +237,6 @@ class Sums:
         both = np.concatenate([base, table])
         turn = np.vstack([-spanned, np.eye(len(table))])
         return np.asarray(turn.T @ self._blocks[:, both[:, None], both] @ turn)
-
-    def half_width(self, columns: Index) -> Array:
-        """Return half the widths of 95 % intervals of the weights."""
-        factor = t_distribution.ppf(0.975, max(1, self.blocks - 1))
-        return np.asarray(factor * np.sqrt(np.maximum(np.diag(self.covariance(columns)), 0.0)))
 
     def squares_of(self, columns: Index) -> float:
         """Return Σ residual² after a fit of columns."""

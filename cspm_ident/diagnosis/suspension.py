@@ -140,8 +140,9 @@ class Suspension:
         """Elongations by law and measured tension alone, (k, n) [m].
 
         For the columns of effects: a stiff cable's tension tells them far better than poses do,
-        whose noise stands in the residual already; in both it would look like a wrong damper. Law
-        and damper share a tension as spring and dashpot do, solved by Euler's implicit steps.
+        whose noise stands in the residual already; in both it would look like a wrong damper or
+        like less hysteresis than none. Law and damper share a tension as spring and dashpot do,
+        solved by Euler's implicit steps.
         """
         tensions, lengths = self.signals.tensions, self._elastic_lengths
         alone = elongation_at(self.parameters, tensions, lengths, self._near)
@@ -162,9 +163,9 @@ class Suspension:
 
     @cached_property
     def _calm_elongations(self) -> Array:
-        """Measured elongations without reversals that are none but noise, (k, n) [m]."""
+        """Elongations without reversals that are none but noise, (k, n) [m]."""
         sigma = _CALM_S / self.signals.step
-        return np.asarray(gaussian_filter1d(self._stretched, sigma, axis=0, mode="nearest"))
+        return np.asarray(gaussian_filter1d(self._told, sigma, axis=0, mode="nearest"))
 
     @cached_property
     def _near(self) -> Array | None:
@@ -306,13 +307,21 @@ class Suspension:
 
     @cached_property
     def bar_rows(self) -> Array:
-        """`BarSignal` columns."""
+        """`BarSignal` columns, accelerations by the tensions."""
+        return self._bar_rows(*self._told_acceleration)
+
+    @cached_property
+    def posed_bar_rows(self) -> Array:
+        """The same, accelerations by the poses."""
+        return self._bar_rows(self.bar.acceleration, self.bar.alpha)
+
+    def _bar_rows(self, acceleration: Array, alpha: Array) -> Array:
         bar, state = self._testbed.bar, self.bar
         assert bar is not None
         count = len(self.signals.times)
         rows = np.zeros((count, int(BarSignal.TIME) + 1))
         rows[:, :3], rows[:, 3:6] = state.velocity, state.omega
-        rows[:, 6:9], rows[:, 9:12] = self._told_acceleration
+        rows[:, 6:9], rows[:, 9:12] = acceleration, alpha
         rows[:, BarSignal.ROTATION : BarSignal.ROTATION + 9] = state.rotation.reshape(count, 9)
         rows[:, BarSignal.COM : BarSignal.COM + 3] = bar.com
         rows[:, BarSignal.MASS] = bar.mass

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import replace
 from functools import partial
 
@@ -34,6 +34,8 @@ PERIOD_NS = 5_000_000
 _HALF_WIDTHS = (0.04, 0.32)
 _WHITE = 1.7
 _SHORTEST_S = 2.0
+# Of an acceleration's square: what has to be common to tensions and poses.
+_COMMON = 0.7
 _TENSION = "tension [N]"
 _DRIVERS = {
     _TENSION: CableSignal.TENSION,
@@ -257,7 +259,9 @@ class _Stretch:
         for regression in (effect.regression, *effect.partners):
             for place, rows in self._rows_of(effect, regression.channel, i):
                 for shape in shapes:
-                    yield shape, place, regression.columns(rows, **shape)
+                    columns = partial(regression.columns, **shape)
+                    on_bar = rows is self._here.bar_rows
+                    yield shape, place, self._quieter(columns) if on_bar else columns(rows)
 
     def _rows_of(self, effect: Effect, channel: Channel, i: int) -> Iterator[tuple[Place, Array]]:
         """Yield the residuals in which an effect on element i shows, with what it is told by."""
@@ -270,6 +274,20 @@ class _Stretch:
                 yield Place(channel, name), here.frame_rows(k)
         elif channel is Channel.TENSION:
             yield Place(channel, names[i]), here.cable_rows(i)
+
+    def _quieter(self, columns: Callable[[Array], Array]) -> Array:
+        """Return the bar's columns, each with accelerations by those sensors that tell it better.
+
+        Noise of either stands in the residual as well, of which a noisy column would look like a
+        part. What two sensors tell alike is no noise; columns of which neither tells enough are
+        zero.
+        """
+        ways = [columns(rows) for rows in (self._here.bar_rows, self._here.posed_bar_rows)]
+        by_tension, by_pose = (self._weighed(way, Channel.WRENCH) for way in ways)
+        common = np.einsum("kij,kij->j", by_tension, by_pose)
+        told, posed = (np.sum(way**2, axis=(0, 1)) for way in (by_tension, by_pose))
+        quieter = np.where(told <= posed, ways[0], ways[1])
+        return np.where(common >= _COMMON * np.minimum(told, posed), quieter, 0.0)
 
     def _read(self, effect: Effect, i: int, name: str) -> Iterator[tuple[Place, Array]]:
         """Yield how a sensor's fault changes the residuals, by differences of the readings."""

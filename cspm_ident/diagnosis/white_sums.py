@@ -22,12 +22,13 @@ class WhiteSums(Sums):
         super().__init__(evidence)
         self._rows = int(sum(place.rows.sum() for place in evidence.places))
 
-    def covariance(self, columns: Index) -> Array:
-        """Return σ²·(XᵀX)⁻¹."""
-        bread = np.linalg.pinv(self._whole[np.ix_(columns, columns)], rcond=1e-9, hermitian=True)
-        scale = self._lengths[columns]
-        variance = self.squares_of(columns) / self._free(columns)
-        return np.asarray(variance * bread / (scale[:, None] * scale))
+    def covariance(self, base: Index, columns: Index) -> Array:
+        """Return σ²·(XᵀX)⁻¹, the columns' part."""
+        both = np.concatenate([base, columns])
+        bread = np.linalg.pinv(self._whole[np.ix_(both, both)], rcond=1e-9, hermitian=True)
+        own, scale = slice(len(base), None), self._lengths[columns]
+        variance = self.squares_of(both) / self._free(both)
+        return np.asarray(variance * bread[own, own] / np.outer(scale, scale))
 
     def p_value(self, base: Index, columns: Index) -> float:
         """Return the probability of so large a gain by chance, by the F test over rows."""
@@ -36,10 +37,11 @@ class WhiteSums(Sums):
         gained = (self.squares_of(base) - after) / len(columns)
         return float(f_distribution.sf(gained / (after / free), len(columns), free))
 
-    def half_width(self, columns: Index) -> Array:
-        """Return half the widths of 95 % intervals of the weights."""
-        factor = t_distribution.ppf(0.975, self._free(columns))
-        return np.asarray(factor * np.sqrt(np.maximum(np.diag(self.covariance(columns)), 0.0)))
+    def half_width(self, base: Index, columns: Index) -> Array:
+        """Return half the widths of 95 % intervals of the weights of columns beside a base."""
+        factor = t_distribution.ppf(0.975, self._free(np.concatenate([base, columns])))
+        variances = np.diag(self.covariance(base, columns))
+        return np.asarray(factor * np.sqrt(np.maximum(variances, 0.0)))
 
     def _free(self, columns: Index) -> int:
         return max(1, self._rows - len(columns))

@@ -29,10 +29,11 @@ def report_of(library: Library, support: NDArray[np.intp], intervals: bool) -> d
         support: indices of the columns kept, of the evidence.
         intervals: tell the intervals that white residuals would have.
     """
-    columns = np.concatenate([library.evidence.nuisance, support])
+    nuisance = library.evidence.nuisance
+    columns = np.concatenate([nuisance, support])
     full, half = np.zeros(library.evidence.width), np.zeros(library.evidence.width)
     full[columns] = library.sums.weights(columns)
-    half[columns] = library.sums.half_width(columns)
+    half[support] = library.sums.half_width(nuisance, support)
     kept = [c for c in library.candidates if np.isin(_own(library, c), support).any()]
     weights = {c: full[_own(library, c)] for c in kept}
     widths = {c: half[_own(library, c)] for c in kept} if intervals else {}

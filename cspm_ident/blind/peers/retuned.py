@@ -19,12 +19,10 @@ def diagnosis_of(library: Library) -> dict[str, Any]:
     The fit is that of all numbers, told or not.
     """
     own = [c for c in library.candidates if c.effect.alter is not None]
-    columns = library.evidence.with_nuisance(own)
-    numbers = library.evidence.columns_of(own)
-    start = len(columns) - len(numbers)
-    weights = library.sums.weights(columns)[start:]
+    nuisance, numbers = library.evidence.nuisance, library.evidence.columns_of(own)
+    weights = library.sums.weights(library.evidence.with_nuisance(own))[len(nuisance) :]
     # Half the width of a 95 % interval is 1.96 standard errors.
-    errors = library.sums.half_width(columns)[start:] / norm.isf(0.025)
+    errors = library.sums.half_width(nuisance, numbers) / norm.isf(0.025)
     sure = norm.isf(0.5 * _CHANCE / max(1, len(numbers)))
     told = report_of(library, numbers[np.abs(weights) > sure * errors], intervals=True)
     after = left_with(library, retuned_weights(library))

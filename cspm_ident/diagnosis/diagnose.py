@@ -26,7 +26,7 @@ from cspm_ident.diagnosis.refine import Cut, Weights
 from cspm_ident.diagnosis.region import Region, region_of
 from cspm_ident.diagnosis.safeguards import ALL_SAFEGUARDS, Safeguards
 from cspm_ident.diagnosis.search import Search
-from cspm_ident.diagnosis.simulation import SimulatedFit, Worth
+from cspm_ident.diagnosis.simulation import SimulatedFit, Worth, baselines_of
 from cspm_ident.signals.measurement import Measurement
 from cspm_msgs_py.errors import InputError
 from cspm_sim.effects import Effect
@@ -134,18 +134,20 @@ def diagnose(
     found = search.run()
     progress("held-out data")
     judge = _judge(in_noise(judge_parts, noise), found, block)
+    search_parts, judge_parts = _found_only(search_parts, found), _found_only(judge_parts, found)
     kept, rejected = _confirmed(search, judge, found) if safeguards.held_out else (found.named, ())
     starts = [span_of(part)[0] for part in judge_parts]
     judges = held_out or [m.within(s, np.inf) for m, s in zip(searched, starts, strict=True)]
     retuned = search.retuned()
     searched_part: Cut = whole_part if held_out else first_part
-    data = Data(searched, searched_part, judges, in_noise(search_parts, noise), noise, block)
     progress("parameters, and simulation of held-out data")
-    model = modelled(search, kept, data, retuned)
+    baselines, rows = baselines_of(judges, retuned), in_noise(search_parts, noise)
+    data = Data(searched, searched_part, baselines, rows, noise, block)
+    model = modelled(search, kept, data)
     while safeguards.held_out and model.useless:
         rejected += tuple(kept[k] for k in model.useless)
         kept = tuple(each for k, each in enumerate(kept) if k not in model.useless)
-        model = modelled(search, kept, data, retuned)
+        model = modelled(search, kept, data)
     values = {c: w for c, (w, _) in model.weights.items()}
     first = _first_weights(search, kept)
     told = [k for k, each in enumerate(kept) if not _is_negligible(each, values)]
@@ -232,9 +234,20 @@ def _parts(
 
 def _judge(parts: Parts, found: Findings, block: float) -> Evidence:
     """Return the sums of held-out residuals beside what was found and all free functions."""
-    named = {c for each in found.named for c in each.hypothesis.candidates}
-    terms = named | {t for part in parts for e in part for t in e.columns if isinstance(t, Driver)}
+    terms = _named(found) | {
+        t for part in parts for e in part for t in e.columns if isinstance(t, Driver)
+    }
     return gather([[e.only(terms) for e in part] for part in parts], block)
+
+
+def _named(found: Findings) -> set[Candidate | Driver]:
+    return {c for each in found.named for c in each.hypothesis.candidates}
+
+
+def _found_only(parts: Parts, found: Findings) -> Parts:
+    """Return equations without the columns of all that was not found, which nothing needs more."""
+    named = _named(found)
+    return [[equation.only(named) for equation in part] for part in parts]
 
 
 def noise_of(parts: Sequence[Sequence[Equation]]) -> dict[Place, Array]:

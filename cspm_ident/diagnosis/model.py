@@ -2,20 +2,26 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
-from cspm_ident.diagnosis.columns import Candidate, Place
+from cspm_ident.diagnosis.columns import Place
 from cspm_ident.diagnosis.equation import Equation, steady
 from cspm_ident.diagnosis.hypothesis import Named, bounded, members_of
 from cspm_ident.diagnosis.onset import Onset, onset_of
 from cspm_ident.diagnosis.parameters import of_drives, of_shafts, weights_of
 from cspm_ident.diagnosis.refine import Cut, Weights, needs_refining, refine
 from cspm_ident.diagnosis.search import Search
-from cspm_ident.diagnosis.simulation import SimulatedFit, Worth, simulate_held_out, worth_of
+from cspm_ident.diagnosis.simulation import (
+    Baselines,
+    SimulatedFit,
+    Worth,
+    simulate_held_out,
+    worth_of,
+)
 from cspm_ident.diagnosis.supposed import is_possible
 from cspm_ident.signals.measurement import Measurement
 
@@ -32,7 +38,7 @@ class Data(NamedTuple):
     Attributes:
         searched: the recordings, of which `searched_part` was searched.
         searched_part: cuts their equations.
-        judges: what was not searched.
+        baselines: simulations of what was not searched.
         rows: of what was searched, in units of their noise.
         noise: of each residual.
         block: length of the blocks [s].
@@ -40,7 +46,7 @@ class Data(NamedTuple):
 
     searched: Sequence[Measurement]
     searched_part: Cut
-    judges: Sequence[Measurement]
+    baselines: Baselines
     rows: Parts
     noise: dict[Place, Array]
     block: float
@@ -76,16 +82,13 @@ class Model(NamedTuple):
         return [worst] if worst is not None and shares[worst] > WORTH_IT else []
 
 
-def modelled(
-    search: Search, kept: Sequence[Named], data: Data, retuned: Mapping[Candidate, Array]
-) -> Model:
+def modelled(search: Search, kept: Sequence[Named], data: Data) -> Model:
     """Return the model that findings make.
 
     Args:
         search: in which they were found.
         kept: the findings.
         data: to which parameters are fitted and by which the model is judged.
-        retuned: weights of the file's own parameters alone, to compare with.
     """
     onsets = _onsets(kept, steady(data.rows), search.evidence.times)
     since = max((onset.time for onset in onsets if onset is not None), default=-np.inf)
@@ -102,8 +105,9 @@ def modelled(
     possible = tuple(is_possible(data.searched[0], own) for own in members)
     if not all(possible):
         return Model(weights, onsets, (), (), possible)
-    simulated = simulate_held_out(data.judges, retuned, values)
-    worth = tuple(worth_of(data.judges, simulated, values, own) for own in members)
+    simulated = simulate_held_out(data.baselines, values)
+    parts = data.baselines.parts
+    worth = tuple(worth_of(parts, simulated, values, own) for own in members)
     return Model(weights, onsets, simulated, worth, possible)
 
 

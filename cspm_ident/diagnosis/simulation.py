@@ -45,6 +45,9 @@ class Output(NamedTuple):
     kind: Channel
 
 
+Errors = dict[Output, tuple[float, float]]
+
+
 class SimulatedFit(NamedTuple):
     """One quantity of recordings that were not searched, against its simulation.
 
@@ -65,25 +68,44 @@ class SimulatedFit(NamedTuple):
     floor: float
 
 
-def simulate_held_out(
-    measurements: Sequence[Measurement], retuned: Weights, found: Weights
-) -> tuple[SimulatedFit, ...]:
-    """Simulate winches, cables and bar from measured signals with each model.
+class Baselines(NamedTuple):
+    """Simulations without anything found, with which others are compared.
+
+    Attributes:
+        parts: what is simulated, of each recording half a minute.
+        described: spread and RMS error by output with the file's model.
+        retuned: with the file's parameters fitted to the searched data.
+    """
+
+    parts: Sequence[Measurement]
+    described: Errors
+    retuned: Errors
+
+
+def baselines_of(measurements: Sequence[Measurement], retuned: Weights) -> Baselines:
+    """Simulate recordings that were not searched, as described and re-tuned.
+
+    Args:
+        measurements: not searched; of each half a minute is used.
+        retuned: weights of the file's own parameters.
+    """
+    parts = _beginnings(measurements)
+    described = _errors(parts, {})
+    return Baselines(parts, described, _errors(parts, retuned) if retuned else described)
+
+
+def simulate_held_out(baselines: Baselines, found: Weights) -> tuple[SimulatedFit, ...]:
+    """Simulate winches, cables and bar from measured signals with what was found.
 
     Winches are driven by torques and tensions in windows of half a second, the bar by tensions
     likewise, cables and bar by motor angles throughout. What sensors do not allow is left out.
 
     Args:
-        measurements: not searched; of each half a minute is used.
-        retuned: weights of the file's own parameters.
+        baselines: of the recordings.
         found: weights of what was found.
     """
-    parts = _beginnings(measurements)
-    errors = [
-        _errors(parts, weights) if weights or not k else None
-        for k, weights in enumerate(({}, retuned, found))
-    ]
-    described, tuned, after = (each or errors[0] or {} for each in errors)
+    parts, described, tuned = baselines
+    after = _errors(parts, found) if found else described
     floors = _floors(parts, found)
     return tuple(
         SimulatedFit(output, spread, before, tuned[output][1], after[output][1], floors[output])
@@ -107,7 +129,7 @@ class Worth(NamedTuple):
 
 
 def worth_of(
-    measurements: Sequence[Measurement],
+    parts: Sequence[Measurement],
     fits: Sequence[SimulatedFit],
     found: Weights,
     own: Collection[Candidate],
@@ -115,7 +137,7 @@ def worth_of(
     """Return what an effect is worth; None where nothing that it acts on can be simulated.
 
     Args:
-        measurements: not searched; of each half a minute is used.
+        parts: what was simulated.
         fits: their simulation with everything that was found.
         found: weights of all that was found.
         own: the effect's.
@@ -123,7 +145,6 @@ def worth_of(
     kinds = {r.channel for c in own for r in (c.effect.regression, *c.effect.partners)}
     sensed = any(c.effect.sense is not None for c in own)
     fewer = {c: weights for c, weights in found.items() if c not in own}
-    parts = _beginnings(measurements)
     before = _errors(parts, fewer) if fewer else {f.output: (0.0, f.before) for f in fits}
     shown = [
         Worth(fit.output, before[fit.output][1], fit.after)
@@ -140,7 +161,7 @@ def _beginnings(measurements: Sequence[Measurement]) -> list[Measurement]:
     return [m.within(at, at + LONGEST_S) for m, at in zip(measurements, starts, strict=True)]
 
 
-def _errors(parts: Sequence[Measurement], weights: Weights) -> dict[Output, tuple[float, float]]:
+def _errors(parts: Sequence[Measurement], weights: Weights) -> Errors:
     """Return spread and RMS error by output, over all recordings."""
     found: dict[Output, list[tuple[Array, Array]]] = {}
     for part in parts:

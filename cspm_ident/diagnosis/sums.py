@@ -63,7 +63,8 @@ class Sums:
         lengths = np.sqrt(np.einsum("bii->i", grams))
         lengths[lengths == 0.0] = 1.0
         lengths[-1] = 1.0
-        self._blocks = grams / (lengths[:, None] * lengths)
+        grams /= lengths[:, None] * lengths
+        self._blocks = grams
         self._lengths = lengths[:-1]
         self._whole = self._blocks.sum(axis=0)
         self._folds = np.array_split(np.arange(evidence.blocks), min(FOLDS, evidence.blocks))

@@ -150,7 +150,7 @@ class Suspension:
         inert = self._damping / self.signals.step
         told = alone.copy()
         relaxed(alone, inert / np.maximum(stiffness + inert, 1e-300), told)
-        return told
+        return np.asarray(told)
 
     @cached_property
     def _told_rates(self) -> Array:

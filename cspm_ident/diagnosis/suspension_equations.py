@@ -158,8 +158,7 @@ class _Stretch:
         columns: dict[Place, dict[Candidate | Driver, Array]] = {}
         for effect in effects:
             for candidate, place, found in self._columns(effect):
-                weighed = self._weighed(found, place.channel)
-                columns.setdefault(place, {})[candidate] = weighed
+                columns.setdefault(place, {})[candidate] = found
         out = [
             self._cable_equation(
                 i, tensions[:, i], columns.get(Place(Channel.TENSION, name), {}), knots
@@ -244,6 +243,7 @@ class _Stretch:
         return tensions, wrench
 
     def _columns(self, effect: Effect) -> Iterator[tuple[Candidate, Place, Array]]:
+        """Yield what one unit of an effect adds to each residual, weighed."""
         for i, name in enumerate(elements_of(effect, self._machine.cable_names, (BAR, FRAME))):
             if effect.sense is not None:
                 for place, found in self._read(effect, i, name):
@@ -251,7 +251,8 @@ class _Stretch:
                 continue
             shapes = [dict(shape) for shape in shapes_of(effect)]
             for shape, place, found in self._regressed(effect, i, shapes):
-                yield Candidate(effect, name, tuple(shape.items())), place, found
+                candidate = Candidate(effect, name, tuple(shape.items()))
+                yield candidate, place, self._weighed(found, place.channel)
 
     def _regressed(
         self, effect: Effect, i: int, shapes: Sequence[dict[str, float]]
@@ -290,7 +291,7 @@ class _Stretch:
         return np.where(common >= _COMMON * np.minimum(told, posed), quieter, 0.0)
 
     def _read(self, effect: Effect, i: int, name: str) -> Iterator[tuple[Place, Array]]:
-        """Yield how a sensor's fault changes the residuals, by differences of the readings."""
+        """Yield how a sensor's fault changes the weighed residuals, by differences of readings."""
         assert effect.sense is not None
         topic = effect.sense.topics[0]
         if topic in (TENSION, WINCHES):
@@ -305,10 +306,9 @@ class _Stretch:
 
     def _changed(self, moved: MachineSignals, step: float) -> tuple[Array, Array]:
         there = self._here.with_poses(moved)
-        return (
-            (there.tension_residuals - self._here.tension_residuals) / step,
-            (there.wrench_residuals - self._here.wrench_residuals) / step,
-        )
+        tensions = (there.tension_residuals - self._here.tension_residuals) / step
+        wrench = (there.wrench_residuals - self._here.wrench_residuals) / step
+        return self._weighed(tensions, Channel.TENSION), self._weighed(wrench, Channel.WRENCH)
 
     def _misplaced(self, effect: Effect, name: str) -> Iterator[tuple[MachineSignals, float]]:
         """Yield the signals with a little of each of a pose's faults, and how much."""
@@ -320,7 +320,7 @@ class _Stretch:
             yield self._signals.with_pose_change(body, change, step), step
 
     def _read_joint(self, effect: Effect, i: int, topic: str) -> Iterator[tuple[Place, Array]]:
-        """Yield how a fault of a tension or angle changes the residuals of its cable and bar."""
+        """Yield how a fault of a tension or angle changes its cable's and the bar's residuals."""
         signals = self._signals
         readings = signals.tensions if topic == TENSION else signals.angles
         change = effect.regressors(reading_rows(signals.times, readings[:, i]))[:, 0, 0]
@@ -329,13 +329,14 @@ class _Stretch:
         changed[:, i] += step * change
         if topic == TENSION:
             moved = replace(signals, tensions=changed)
-            yield Place(Channel.WRENCH, BAR), -self._here.pulled(i, change)[:, :, None]
+            wrench = self._weighed(-self._here.pulled(i, change), Channel.WRENCH)
+            yield Place(Channel.WRENCH, BAR), wrench[:, :, None]
         else:
             speeds = signals.speeds.copy()
             speeds[:, i] += step * np.gradient(change, signals.step)
             moved = replace(signals, angles=changed, speeds=speeds)
         there = self._here.of_cable(i, moved).tension_residuals[:, 0]
-        column = (there - self._here.tension_residuals[:, i]) / step
+        column = self._weighed((there - self._here.tension_residuals[:, i]) / step, Channel.TENSION)
         yield Place(Channel.TENSION, self._machine.cable_names[i]), column[:, None, None]
 
     def _weighed(self, values: Array, channel: Channel) -> Array:

@@ -75,11 +75,11 @@ def main() -> None:
             print(f"| {' | '.join(row)} |", flush=True)
 
 
-def record(case: Case, seed: int, folder: Path) -> None:
-    """Run the worst sea with an effect planted."""
+def record(case: Case, seed: int, folder: Path, duration: float = DURATION_S) -> None:
+    """Run the worst sea for `duration` [s] with an effect planted."""
     path = SCENARIOS / "worst_case.yaml"
     capture = f"rates.motion_capture={case.capture}"
-    scenario = load_scenario(path, [f"duration={DURATION_S}", f"seed={seed}", capture])
+    scenario = load_scenario(path, [f"duration={duration:g}", f"seed={seed}", capture])
     file = load_testbed(path.parent / scenario.testbed)
     machine = file.testbed
     if case.effect:

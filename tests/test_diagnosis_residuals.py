@@ -12,6 +12,7 @@ from cspm_ident.diagnosis.drive import sampled_constant, time_constant
 from cspm_ident.diagnosis.recorded import equations_of
 from cspm_ident.diagnosis.supposed import with_found
 from cspm_ident.signals.measurement import read_measurement
+from cspm_ident.signals.samples import Samples
 from cspm_msgs_py.testbed import EffectEntry, load_testbed
 from cspm_sim.effect_entries import Action, altered_testbed
 from cspm_sim.effects import Channel, catalogue
@@ -70,6 +71,52 @@ def test_the_machine_itself_leaves_next_to_nothing(equations):
     for place, equation in equations.items():
         left = without_start(equation, equation.target)
         assert np.all(rms(left) < 0.01 * rms(equation.measured - equation.measured.mean(0))), place
+
+
+@pytest.mark.parametrize(
+    ("name", "element", "samples", "change"),
+    [
+        ("tension_gain", "surge_1", "tension", lambda v: 0.002 * v),
+        ("tension_bias", "hoist_2", "tension", lambda v: 0.002 + 0.0 * v),
+        ("encoder_scale", "sway_3", "angle", lambda v: 1e-5 * v),
+    ],
+)
+def test_a_wrong_reading_leaves_its_columns(measurement, equations, name, element, samples, change):
+    """Readings really changed move the residuals of cable and bar by the columns, no others."""
+    weight = 1e-5 if samples == "angle" else 0.002
+    i = measurement.machine.cable_names.index(element)
+    read = getattr(measurement, samples)
+    values = read.values.copy()
+    values[:, i] += change(values[:, i])
+    moved = by_place(measurement.with_samples(samples, Samples(read.times, values)), [])
+    candidate = Candidate(catalogue()[name], element)
+    reached = {Place(Channel.TENSION, element)}
+    reached |= {Place(Channel.WRENCH, "bar")} if samples == "tension" else set()
+    for place, equation in equations.items():
+        if place.channel not in (Channel.TENSION, Channel.WRENCH):
+            continue
+        change_seen = without_start(equation, moved[place].target - equation.target)
+        assert (candidate in equation.columns) == (place in reached)
+        if place not in reached:
+            assert np.all(np.abs(change_seen) < 1e-9)
+            continue
+        expected = without_start(equation, weight * equation.columns[candidate][:, :, 0])
+        # The length at the start, told by the first tension, is taken out to first order only.
+        assert rms(change_seen - expected).max() < 0.03 * rms(expected).max()
+
+
+def test_what_candidates_do_not_touch_may_be_left_out(measurement, equations):
+    winch = Candidate(catalogue()["winch_coulomb_friction"], "sway_1")
+    sensor = Candidate(catalogue()["tension_gain"], "sway_1")
+    radius = Candidate(catalogue()["winch_drum_radius"], "sway_1")
+    for touched, suspended in (([winch], False), ([winch, sensor], True), ([radius], True)):
+        found = equations_of(measurement, [winch.effect], touched=touched)
+        assert [e.place for e in found if e.place.channel is Channel.SHAFT] == [
+            Place(Channel.SHAFT, "sway_1")
+        ]
+        assert suspended == any(e.place.channel is Channel.WRENCH for e in found)
+        for equation in found:
+            assert np.array_equal(equation.target, equations[equation.place].target)
 
 
 @pytest.mark.parametrize(

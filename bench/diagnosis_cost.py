@@ -1,0 +1,67 @@
+"""Time and memory of `cspm diagnose --no-closed-loop`, watched from outside.
+
+Processor time is told beside time by the clock, which other programs make longer.
+"""
+
+from __future__ import annotations
+
+import argparse
+import tempfile
+import time
+from pathlib import Path
+from typing import NamedTuple
+
+import psutil
+
+from bench.child import finish, start_cspm
+from bench.diagnosis import Case, record
+from bench.thesis_machine import SCENARIOS
+
+SAMPLE_S = 0.1
+SEED = 100
+PLANTED = Case("winch_coulomb_friction", ("surge_2",), {"torque": 0.031})
+
+
+class Cost(NamedTuple):
+    """What a command took: by the clock [s], of the processor [s], and at most of memory [B]."""
+
+    clock: float
+    processor: float
+    memory: int
+
+
+def main() -> None:
+    """Run the command line."""
+    parser = argparse.ArgumentParser(prog="python -m bench.diagnosis_cost", description=__doc__)
+    parser.add_argument("--recorded", type=float, nargs="+", default=[60.0, 600.0], metavar="S")
+    print("| recorded [s] | took [s] | of the processor [s] | memory [GB] |\n|---:|---:|---:|---:|")
+    for duration in parser.parse_args().recorded:
+        with tempfile.TemporaryDirectory() as place:
+            record(PLANTED, SEED, Path(place) / "recorded", duration)
+            cost = cost_of(Path(place) / "recorded")
+        row = f"{cost.clock:.0f} | {cost.processor:.0f} | {cost.memory / 1e9:.2f}"
+        print(f"| {duration:g} | {row} |", flush=True)
+
+
+def cost_of(recorded: Path) -> Cost:
+    """Diagnose a recording with the file that knows of no effect; pages are not drawn."""
+    testbed = str(SCENARIOS / "testbeds" / "thesis.yaml")
+    words = ["diagnose", str(recorded), "--testbed", testbed, "--no-closed-loop"]
+    begun = time.perf_counter()
+    child = start_cspm([*words, "--json", str(recorded / "diagnosis.json")], {})
+    process = psutil.Process(child.pid)
+    memory, processor = 0, 0.0
+    while child.poll() is None:
+        try:
+            times = process.cpu_times()
+            memory = max(memory, process.memory_info().rss)
+            processor = max(processor, times.user + times.system)
+        except psutil.NoSuchProcess:
+            break
+        time.sleep(SAMPLE_S)
+    finish(child)
+    return Cost(time.perf_counter() - begun, processor, memory)
+
+
+if __name__ == "__main__":
+    main()

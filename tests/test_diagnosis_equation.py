@@ -50,3 +50,10 @@ def test_columns_that_are_not_asked_for_are_let_go(equation):
     left = made.only([SECOND])
     assert list(left.columns) == [SECOND]
     assert Driver(PLACE, "other") not in left.columns
+
+
+def test_compact_columns_take_half_the_memory_and_say_the_same(equation):
+    made = equation.compact
+    assert made.columns[FIRST].nbytes == equation.columns[FIRST].nbytes // 2
+    assert made.scaled(np.array([0.2])).columns[FIRST].dtype == np.float64
+    assert np.allclose(made.columns[FIRST], equation.columns[FIRST], rtol=1e-7, atol=0.0)

@@ -104,6 +104,12 @@ class Equation:
         return replace(self, columns=columns)
 
     @property
+    def compact(self) -> Equation:
+        """The same with columns in single precision; what is summed of them is in double."""
+        columns = {term: found.astype("f4") for term, found in self.columns.items()}
+        return replace(self, columns=columns)
+
+    @property
     def steady(self) -> Equation:
         """The rows in which no shaft turns round."""
         return self._only(~self.turning) if self.turning.any() else self

@@ -77,7 +77,8 @@ def shaft_equations(
             lost = _lost(signals.torque.times - measurement.torque_age, times)
             make = maker(measurement.pointwise)
             table = _Shaft(rows, cable, half, times, lost, sensors, make)
-            found.append(table.equation(effects, [a for a in known if a.element == i], knots))
+            own = [action for action in known if action.element == i]
+            found.append(table.equation(effects, own, knots).compact)
     return found
 
 

@@ -64,7 +64,7 @@ def suspension_equations(
     """
     machine, make = timeline.measurement.machine, maker(timeline.measurement.pointwise)
     return [
-        equation
+        equation.compact
         for stretch in machine_signals(timeline)
         for equation in _Stretch(stretch, machine, timeline.pose_band, make).equations(
             effects, known, knots

@@ -64,6 +64,13 @@ class MachineSignals:
         """The time between two steps [s]."""
         return float(self.times[1] - self.times[0])
 
+    def of_cable(self, i: int) -> MachineSignals:
+        """Return the signals with angles, speeds and tensions of cable i alone, n = 1."""
+        joints = (self.angles, self.speeds, self.tensions)
+        return MachineSignals(
+            self.times, self.frame, self.bar, *(each[:, i : i + 1] for each in joints)
+        )
+
     def with_pose_change(self, body: str, change: Array, step: float) -> MachineSignals:
         """Return the signals with `step`·change (k, 6) added to the pose of `bar` or `frame`."""
         moved = getattr(self, body).moved(change, self.times, step)

@@ -30,6 +30,8 @@ Cut = Callable[[Sequence[Sequence[Equation]]], Sequence[Sequence[Equation]]]
 _ROUNDS = 4
 # Grid steps are about a factor of three; each round halves the step in the logarithm.
 _FIRST_FACTOR = 1.7
+# Of half an interval: a smaller correction is the last.
+_SETTLED = 0.02
 
 
 def refine(
@@ -68,7 +70,18 @@ def refine(
             if _is_applied(candidate.effect):
                 applied[candidate] = weights + applied.get(candidate, 0.0)
         factor = float(np.sqrt(factor))
+        if _is_settled(found):
+            break
     return {c: (applied[c] if _is_applied(c.effect) else w, half) for c, (w, half) in found.items()}
+
+
+def _is_settled(found: Weights) -> bool:
+    """Return whether corrections have become small against what is not known of them."""
+    return all(
+        not c.shape and np.all(np.abs(weights) <= _SETTLED * half)
+        for c, (weights, half) in found.items()
+        if c.shape or _is_applied(c.effect)
+    )
 
 
 def needs_refining(effect: Effect) -> bool:

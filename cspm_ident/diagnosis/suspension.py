@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
 from functools import cached_property
 
 import numpy as np
@@ -31,6 +30,8 @@ from cspm_sim.kernels.plant import PlantParameters
 Array = NDArray[np.float64]
 
 
+# What `of_cable` takes over where it is known, one column per cable.
+_PER_CABLE = ("_near", "_steady_damper")
 _STEADY_S, _CALM_S, _START_S = 0.01, 0.03, 0.5
 
 
@@ -64,21 +65,28 @@ class Suspension:
         """
         other = Suspension(signals, self._testbed, self.parameters, self.start)
         bar, frame = signals.bar is self.signals.bar, signals.frame is self.signals.frame
-        kept = {"bar": bar, "_needed": bar, "_frame": frame, "_steady_damper": True}
+        kept = {"bar": bar, "needed": bar, "_frame": frame, "_steady_damper": True}
         other.__dict__.update({name: getattr(self, name) for name, same in kept.items() if same})
         other.__dict__["_near"] = self._carrying
         return other
 
-    def of_cable(self, i: int, signals: MachineSignals) -> Suspension:
-        """Return cable i alone, with other angles, speeds and tensions, begun from its length."""
+    def of_cable(self, i: int) -> Suspension:
+        """Return cable i alone."""
         own = slice(i, i + 1)
-        joints = ("angles", "speeds", "tensions")
-        alone = replace(signals, **{name: getattr(signals, name)[:, own] for name in joints})
         parts = self.parameters._replace(
             cables=self.parameters.cables[own], tables=self.parameters.tables[own]
         )
-        other = Suspension(alone, self._testbed, parts, self.start[own])
-        other.__dict__.update(_spans=self._spans.only(i), _near=self._carrying[:, own])
+        other = Suspension(self.signals.of_cable(i), self._testbed, parts, self.start[own])
+        known = {n: getattr(self, n)[:, own] for n in _PER_CABLE if n in self.__dict__}
+        spans = {"_spans": self._spans.only(i)} if "_spans" in self.__dict__ else {}
+        other.__dict__.update(known, **spans, bar=self.bar, _frame=self._frame)
+        return other
+
+    def with_joints(self, signals: MachineSignals) -> Suspension:
+        """Return the same stretch with a little other angles, speeds and tensions."""
+        other = Suspension(signals, self._testbed, self.parameters, self.start)
+        known = {name: getattr(self, name) for name in ("bar", "_frame", "_spans")}
+        other.__dict__.update(known, _near=self._carrying)
         return other
 
     @cached_property
@@ -207,7 +215,7 @@ class Suspension:
         return com, turned, spin
 
     @cached_property
-    def _needed(self) -> Array:
+    def needed(self) -> Array:
         """Force and moment that the bar's motion needs beside its weight, (k, 6) [N, N·m]."""
         bar = self._testbed.bar
         assert bar is not None
@@ -224,7 +232,7 @@ class Suspension:
 
         Moments about the bar frame's origin.
         """
-        return np.asarray(self._needed - self.cable_wrench)
+        return np.asarray(self.needed - self.cable_wrench)
 
     def pulled(self, i: int, tensions: Array) -> Array:
         """Return force and moment of cable i's tensions, (k,) [N], on the bar, (k, 6)."""

@@ -305,10 +305,15 @@ class _Stretch:
         yield Place(Channel.WRENCH, BAR), np.stack([c[1] for c in changes], axis=2)
 
     def _changed(self, moved: MachineSignals, step: float) -> tuple[Array, Array]:
-        there = self._here.with_poses(moved)
-        tensions = (there.tension_residuals - self._here.tension_residuals) / step
-        wrench = (there.wrench_residuals - self._here.wrench_residuals) / step
-        return self._weighed(tensions, Channel.TENSION), self._weighed(wrench, Channel.WRENCH)
+        """Return the change of the weighed residuals, one cable after the other to save memory."""
+        there, here = self._here.with_poses(moved), self._here
+        wrench, tensions = there.needed - here.wrench_residuals, []
+        for i in range(len(self._machine.cable_names)):
+            cable = there.of_cable(i)
+            change = (cable.tension_residuals[:, 0] - here.tension_residuals[:, i]) / step
+            tensions.append(self._weighed(change, Channel.TENSION))
+            wrench = wrench - cable.cable_wrench
+        return np.stack(tensions, axis=1), self._weighed(wrench / step, Channel.WRENCH)
 
     def _misplaced(self, effect: Effect, name: str) -> Iterator[tuple[MachineSignals, float]]:
         """Yield the signals with a little of each of a pose's faults, and how much."""
@@ -335,7 +340,7 @@ class _Stretch:
             speeds = signals.speeds.copy()
             speeds[:, i] += step * np.gradient(change, signals.step)
             moved = replace(signals, angles=changed, speeds=speeds)
-        there = self._here.of_cable(i, moved).tension_residuals[:, 0]
+        there = self._here.with_joints(moved).of_cable(i).tension_residuals[:, 0]
         column = self._weighed((there - self._here.tension_residuals[:, i]) / step, Channel.TENSION)
         yield Place(Channel.TENSION, self._machine.cable_names[i]), column[:, None, None]
 

@@ -34,21 +34,31 @@ def main() -> None:
     """Run the command line."""
     parser = argparse.ArgumentParser(prog="python -m bench.diagnosis_cost", description=__doc__)
     parser.add_argument("--recorded", type=float, nargs="+", default=[60.0, 600.0], metavar="S")
-    print("| recorded [s] | took [s] | of the processor [s] | memory [GB] |\n|---:|---:|---:|---:|")
-    for duration in parser.parse_args().recorded:
-        with tempfile.TemporaryDirectory() as place:
-            record(PLANTED, SEED, Path(place) / "recorded", duration)
-            cost = cost_of(Path(place) / "recorded")
-        row = f"{cost.clock:.0f} | {cost.processor:.0f} | {cost.memory / 1e9:.2f}"
-        print(f"| {duration:g} | {row} |", flush=True)
+    parser.add_argument("--recording", type=Path, help="one of the worst case that there is")
+    arguments = parser.parse_args()
+    print("| recording | took [s] | of the processor [s] | memory [GB] |\n|---|---:|---:|---:|")
+    with tempfile.TemporaryDirectory() as place:
+        if arguments.recording is not None:
+            print_cost(arguments.recording.name, cost_of(arguments.recording, Path(place)))
+            return
+        for duration in arguments.recorded:
+            folder = Path(place) / f"{duration:g} s"
+            record(PLANTED, SEED, folder, duration)
+            print_cost(folder.name, cost_of(folder, Path(place)))
 
 
-def cost_of(recorded: Path) -> Cost:
-    """Diagnose a recording with the file that knows of no effect; pages are not drawn."""
+def print_cost(name: str, cost: Cost) -> None:
+    """Print a row of the table."""
+    row = f"{cost.clock:.0f} | {cost.processor:.0f} | {cost.memory / 1e9:.2f}"
+    print(f"| {name} | {row} |", flush=True)
+
+
+def cost_of(recorded: Path, out: Path) -> Cost:
+    """Diagnose with the file that knows of no effect, into `out`; pages are not drawn."""
     testbed = str(SCENARIOS / "testbeds" / "thesis.yaml")
     words = ["diagnose", str(recorded), "--testbed", testbed, "--no-closed-loop"]
     begun = time.perf_counter()
-    child = start_cspm([*words, "--json", str(recorded / "diagnosis.json")], {})
+    child = start_cspm([*words, "--json", str(out / "diagnosis.json")], {})
     process = psutil.Process(child.pid)
     memory, processor = 0, 0.0
     while child.poll() is None:

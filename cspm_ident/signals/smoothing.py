@@ -89,10 +89,11 @@ def filtered(samples: Samples, band: float | None = None) -> tuple[Array, float]
         if span.stop - span.start < 4:
             continue
         whole = np.arange(place[-1] + 1)
-        filled = np.stack([np.interp(whole, place, column) for column in out[span].T], axis=1)
         padding = min(len(whole) - 1, round(3.0 / samples.interval))
-        smoothed = sosfiltfilt(sos, filled, axis=0, padtype="odd", padlen=padding)
-        out[span] = smoothed[place]
+        # One column after the other: of a long recording all at once are much memory.
+        for column in out[span].T:
+            filled = np.interp(whole, place, column)
+            column[:] = sosfiltfilt(sos, filled, padtype="odd", padlen=padding)[place]
     return out, band
 
 

@@ -122,6 +122,28 @@ CHANGES: dict[str, Effects] = {
     "wind of 2 N in sway and 1 N in surge": (("bar_constant_wrench", (), WIND),),
 }
 
+SURGE, SWAY, HOIST = ("surge_1",), ("sway_1",), ("hoist_1",)
+CORRECTED: dict[str, Effects] = {
+    "nothing": (),
+    "load cell of surge_1 +1 N": (("tension_bias", SURGE, {"bias": 1.0}),),
+    "load cell of sway_1 −1 N": (("tension_bias", SWAY, {"bias": -1.0}),),
+    "load cell of hoist_1 +1 N": (("tension_bias", HOIST, {"bias": 1.0}),),
+    "all load cells +1 N, dry friction 2 mN·m at every motor": (
+        ("tension_bias", (), {"bias": 1.0}),
+        ("winch_coulomb_friction", (), {"torque": 0.002}),
+    ),
+    "hoist_1's drive at half torque": (("winch_torque_gain", HOIST, {"gain": 0.5}),),
+}
+TOLD = "control.force.load_cell_bias={largest: 2.0}"
+
+
+def corrected(duration: float) -> dict[str, Case]:
+    """Return the worst case past the thesis with load cells that are off, and corrected."""
+    return {
+        name: Case(PAST, (f"duration={duration}", TOLD), effects)
+        for name, effects in CORRECTED.items()
+    }
+
 
 def seeded(seeds: int, profile: tuple[str, ...]) -> dict[str, Case]:
     """Return the worst case past the thesis with each of so many seeds and one motion capture."""

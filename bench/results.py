@@ -29,6 +29,7 @@ from bench.result_cases import (
     SWITCHED_4M,
     THESIS,
     changed,
+    corrected,
     seeded,
 )
 from bench.result_figures import bands, draw_comparison, draw_limit
@@ -113,6 +114,7 @@ def main() -> None:
         "limit": lambda: limit_block(store),
         "possible": lambda: possible_block(store),
         "robust": lambda: tracking_block(store.tracks("robust", changed(PAST, ROBUST_S))),
+        "corrected": lambda: tracking_block(store.tracks("corrected", corrected(ROBUST_S))),
         "robust_thesis": lambda: tracking_block(
             store.tracks("robust thesis", changed("worst_case", ROBUST_S))
         ),

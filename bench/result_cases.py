@@ -127,7 +127,6 @@ BEYOND = {
     "all six coordinates": Case(SIX, (SHORT,)),
     "all six coordinates, the whole 200 s": Case(SIX),
     "all six coordinates, 200 s, seed 2": Case(SIX, ("seed=2",)),
-    "all six coordinates, 200 s, seed 3": Case(SIX, ("seed=3",)),
     "all six coordinates, without the governor": Case(SIX, (SHORT, UNGOVERNED)),
     "on the MuJoCo plant": Case(PAST, ("duration=20",), plant="mujoco"),
 }

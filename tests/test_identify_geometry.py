@@ -13,7 +13,7 @@ from cspm_bringup.run import run
 from cspm_ident.signals.measurement import read_measurement
 from cspm_ident.system.choice import choose
 from cspm_ident.system.fitted_file import fitted_testbed
-from cspm_ident.system.identification import identify_system
+from cspm_ident.system.identification import solve
 from cspm_ident.system.machine import machine_with
 from cspm_msgs_py.errors import InputError
 from cspm_msgs_py.testbed import load_testbed, parse_testbed
@@ -29,47 +29,47 @@ TRUE = {
     "frame_offset.pitch": -0.005,
     "frame_offset.yaw": 0.006,
 }
-# In the recording nothing but surge moves.
-UNSEEN = ["frame_offset.roll"]
 
 
-@pytest.fixture(scope="module")
-def result(tmp_path_factory):
+def recorded(folder, scenario, *overrides):
+    """Record a machine whose frame is beside its sensor; return it as the described one's."""
     pytest.importorskip("mujoco", minversion="4.0", reason="the MuJoCo plant needs MuJoCo 4")
-    folder = tmp_path_factory.mktemp("geometry") / "beside"
-    bundle = bundle_of("factor_six_mid", "duration=13", "seed=5")
+    bundle = bundle_of(scenario, "seed=5", *overrides)
     moved = dataclasses.replace(FILE, testbed=with_frame_beside(MACHINE, BESIDE))
-    assert not run(
-        dataclasses.replace(bundle, testbed=moved, plant="mujoco"), folder, lambda now: None
-    ).failure
-    measurement = read_measurement(folder).with_testbed(FILE)
-    return identify_system([measurement], choose(MACHINE, [*TRUE, *UNSEEN]), most_windows=2)
+    changed = dataclasses.replace(bundle, testbed=moved, plant="mujoco")
+    assert not run(changed, folder, lambda now: None).failure
+    return read_measurement(folder).with_testbed(FILE)
 
 
 @pytest.mark.slow
-def test_a_frame_beside_its_sensor_is_found(result):
+def test_a_frame_beside_its_sensor_is_found_from_motion_in_surge(tmp_path):
     """Each interval holds what was put in, and shuts out that there is nothing."""
-    estimate = result.solution.estimate
-    assert result.settled
+    measurement = recorded(tmp_path / "moving", "factor_six_mid", "duration=13")
+    found = solve([measurement], choose(MACHINE, list(TRUE)), most_windows=2)
+    assert found.settled
     for name, true in TRUE.items():
-        low, high = estimate.interval(name)
+        low, high = found.solution.estimate.interval(name)
         assert low <= true <= high, (name, low, high)
         assert not low <= 0.0 <= high, (name, low, high)
 
 
 @pytest.mark.slow
-def test_geometry_that_nothing_excites_is_named_and_not_written(result):
-    estimate = result.solution.estimate
-    assert [direction.name for direction in estimate.unexcited] == UNSEEN
-    for name in UNSEEN:
-        assert estimate.interval(name) == (-np.inf, np.inf)
-    (entry,) = [
-        e
-        for e in fitted_testbed(result, FILE, "t.yaml").testbed.effects
-        if e.effect == "frame_pose_offset"
-    ]
-    assert entry.parameters["surge"] == pytest.approx(0.008, abs=5e-4)
-    assert entry.parameters["roll"] == 0.0
+def test_geometry_that_nothing_excites_is_named_and_has_no_interval(tmp_path):
+    """A bar at rest: the balance of forces tells surge, but only to load cells, and never heave."""
+    still = recorded(tmp_path / "rest", "rest", "duration=12.5", "control.mode=locked_winches")
+    names = ["frame_offset.surge", "frame_offset.heave"]
+    for measurement, unseen in (
+        (still, names[1:]),
+        (dataclasses.replace(still, tension=None), names),
+    ):
+        found = solve([measurement], choose(MACHINE, names), most_windows=1, delays={})
+        estimate = found.solution.estimate
+        assert [direction.name for direction in estimate.unexcited] == unseen
+        for name in unseen:
+            assert estimate.interval(name) == (-np.inf, np.inf)
+        if names[0] not in unseen:
+            low, high = estimate.interval(names[0])
+            assert 0.0 < low <= BESIDE[0] <= high
 
 
 def test_a_frame_offset_moves_exits_as_one_body():
@@ -101,10 +101,11 @@ def test_a_wrong_end_is_one_line(name):
         choose(MACHINE, [name])
 
 
-def found_at(values, text=FILE.text):
+def found_at(values, text=FILE.text, unexcited=()):
     """Return the file with ends of cables put in by name, and a result that says so."""
     file = parse_testbed(text, "described")
     intervals = {name: (value - 1e-3, value + 1e-3) for name, value in values.items()}
+    intervals |= {name: (-np.inf, np.inf) for name in unexcited}
     estimate = SimpleNamespace(value=values.get, interval=intervals.get, at_bound=())
     searched = SimpleNamespace(sha256="5" * 64, duration=13.0)
     result = SimpleNamespace(
@@ -126,6 +127,11 @@ def test_found_ends_stand_with_their_cable_and_its_other_coordinates_keep_their_
     kept = found.provenance[f"cables[{number}].exit[0]"]
     assert kept.provenance == "reconstructed"
     assert "table 6-1" in kept.note
+
+
+def test_an_end_that_is_not_excited_is_not_written():
+    found = found_at({"exit.sway_1.z": -0.26}, unexcited=["exit.sway_1.z"])
+    assert found.text == FILE.text
 
 
 def test_cables_that_take_an_end_from_another_keep_theirs():

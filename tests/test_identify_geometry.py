@@ -31,11 +31,11 @@ TRUE = {
 }
 
 
-def recorded(folder, scenario, *overrides):
+def recorded(folder, beside, scenario, *overrides):
     """Record a machine whose frame is beside its sensor; return it as the described one's."""
     pytest.importorskip("mujoco", minversion="4.0", reason="the MuJoCo plant needs MuJoCo 4")
     bundle = bundle_of(scenario, "seed=5", *overrides)
-    moved = dataclasses.replace(FILE, testbed=with_frame_beside(MACHINE, BESIDE))
+    moved = dataclasses.replace(FILE, testbed=with_frame_beside(MACHINE, beside))
     changed = dataclasses.replace(bundle, testbed=moved, plant="mujoco")
     assert not run(changed, folder, lambda now: None).failure
     return read_measurement(folder).with_testbed(FILE)
@@ -44,7 +44,7 @@ def recorded(folder, scenario, *overrides):
 @pytest.mark.slow
 def test_a_frame_beside_its_sensor_is_found_from_motion_in_surge(tmp_path):
     """Each interval holds what was put in, and shuts out that there is nothing."""
-    measurement = recorded(tmp_path / "moving", "factor_six_mid", "duration=13")
+    measurement = recorded(tmp_path / "moving", BESIDE, "factor_six_mid", "duration=13")
     found = solve([measurement], choose(MACHINE, list(TRUE)), most_windows=2)
     assert found.settled
     for name, true in TRUE.items():
@@ -56,7 +56,9 @@ def test_a_frame_beside_its_sensor_is_found_from_motion_in_surge(tmp_path):
 @pytest.mark.slow
 def test_geometry_that_nothing_excites_is_named_and_has_no_interval(tmp_path):
     """A bar at rest: the balance of forces tells surge, but only to load cells, and never heave."""
-    still = recorded(tmp_path / "rest", "rest", "duration=12.5", "control.mode=locked_winches")
+    beside = (0.008, 0.0, 0.01, 0.0, 0.0, 0.0)
+    options = ("duration=12.5", "control.mode=locked_winches")
+    still = recorded(tmp_path / "rest", beside, "rest", *options)
     names = ["frame_offset.surge", "frame_offset.heave"]
     for measurement, unseen in (
         (still, names[1:]),
@@ -69,7 +71,7 @@ def test_geometry_that_nothing_excites_is_named_and_has_no_interval(tmp_path):
             assert estimate.interval(name) == (-np.inf, np.inf)
         if names[0] not in unseen:
             low, high = estimate.interval(names[0])
-            assert 0.0 < low <= BESIDE[0] <= high
+            assert 0.0 < low <= beside[0] <= high
 
 
 def test_a_frame_offset_moves_exits_as_one_body():

@@ -10,7 +10,9 @@ the other kinds of interval, and by plain least squares that takes the residual 
 from __future__ import annotations
 
 import argparse
+import json
 from collections.abc import Callable, Iterator
+from pathlib import Path
 from typing import NamedTuple, Protocol
 
 import numpy as np
@@ -202,12 +204,30 @@ def _white_interval(values: np.ndarray, residual: np.ndarray, jacobian: np.ndarr
 
 
 def measure_coverage(
-    experiment: Experiment, runs: int, seed: int, advance: Callable[[], None] = lambda: None
+    experiment: Experiment,
+    runs: int,
+    seed: int,
+    advance: Callable[[], None] = lambda: None,
+    kept: Path | None = None,
 ) -> list[Count]:
-    """Simulate and estimate `runs` times; run k uses the random numbers of (seed, k)."""
+    """Simulate and estimate `runs` times; run k uses the random numbers of (seed, k).
+
+    Args:
+        experiment: what is repeated.
+        runs: how often.
+        seed: of all runs.
+        advance: called after each run.
+        kept: a file to which each run's intervals are added as a line of JSON, and from which those
+            of runs already made are taken.
+    """
+    known = _kept_runs(kept, seed)
     inside: dict[str, np.ndarray] = {}
     for run in range(runs):
-        for method, ends in experiment.intervals(np.random.default_rng([seed, run])):
+        if run not in known:
+            drawn = experiment.intervals(np.random.default_rng([seed, run]))
+            known[run] = dict(drawn)
+            _keep(kept, seed, run, known[run])
+        for method, ends in known[run].items():
             held = (ends[:, 0] <= experiment.truth) & (experiment.truth <= ends[:, 1])
             inside[method] = inside.get(method, 0) + held.astype(int)
         advance()
@@ -216,6 +236,26 @@ def measure_coverage(
         for method, counts in inside.items()
         for name, found in zip(experiment.names, counts, strict=True)
     ]
+
+
+def _kept_runs(kept: Path | None, seed: int) -> dict[int, dict[str, np.ndarray]]:
+    """Return the intervals of the runs in a file, by run and method."""
+    if kept is None or not kept.exists():
+        return {}
+    rows = [json.loads(line) for line in kept.read_text(encoding="utf-8").splitlines()]
+    return {
+        row["run"]: {method: np.array(ends) for method, ends in row["intervals"].items()}
+        for row in rows
+        if row["seed"] == seed
+    }
+
+
+def _keep(kept: Path | None, seed: int, run: int, intervals: dict[str, np.ndarray]) -> None:
+    if kept is not None:
+        ends = {method: found.tolist() for method, found in intervals.items()}
+        line = json.dumps({"seed": seed, "run": run, "intervals": ends})
+        with kept.open("a", encoding="utf-8") as file:
+            file.write(f"{line}\n")
 
 
 def main() -> None:
@@ -229,6 +269,12 @@ def main() -> None:
         "--system", action="store_true", help="`cspm identify system` instead: 30 s a run"
     )
     parser.add_argument("--seed", type=int, default=20261121)
+    parser.add_argument(
+        "--keep",
+        type=Path,
+        metavar="FILE",
+        help="with --system: add each run's intervals to it, and leave out the runs that it has",
+    )
     arguments = parser.parse_args()
     console = Console()
     experiments: tuple[Experiment, ...] = (Winch(arguments.seconds), Spring())
@@ -239,7 +285,8 @@ def main() -> None:
         experiments = (System(),)
     for experiment in experiments:
         table = Table("intervals", *experiment.names, title=experiment.__class__.__doc__)
-        counts = measure_coverage(experiment, arguments.runs, arguments.seed)
+        kept = arguments.keep if arguments.system else None
+        counts = measure_coverage(experiment, arguments.runs, arguments.seed, kept=kept)
         for method in dict.fromkeys(count.method for count in counts):
             row = [count for count in counts if count.method == method]
             table.add_row(method, *(_cell(count) for count in row))

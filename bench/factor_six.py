@@ -66,14 +66,14 @@ _COLOURS = 64
 def main() -> None:
     """Run the whole."""
     console = Console()
-    described = _without_factor(load_testbed(SCENARIOS / "testbeds" / "thesis.yaml"))
+    described = without_factor(load_testbed(SCENARIOS / "testbeds" / "thesis.yaml"))
     machine = described.testbed
     hidden = machine_with(machine, choose(machine, list(HIDDEN)), list(HIDDEN.values()))
     with tempfile.TemporaryDirectory(prefix="cspm-factor-six-") as place:
         found = {}
         for name in (*(f"verification_{n}" for n in LENGTHS), *(f"factor_six_{n}" for n in FITTED)):
             console.print(f"recording {name}")
-            found[name] = _record(Path(place) / name, name, described, hidden)
+            found[name] = record(Path(place) / name, name, described, hidden, "mujoco")
     judged = [found[f"verification_{name}"] for name in LENGTHS]
     factor = fit_factor(machine, judged)
     console.print(f"factor {factor:.3f}")
@@ -90,7 +90,7 @@ def main() -> None:
     text = "\n\n".join([*_fitted_lines(factor, right), *_tables(judgements)])
     console.print(text, markup=False, highlight=False)
     _draw(judgements)
-    _into_page(text)
+    into_page("factor six", text)
 
 
 def fit_factor(machine: Testbed, recordings: Sequence[Measurement]) -> float:
@@ -124,26 +124,49 @@ def fit_factor(machine: Testbed, recordings: Sequence[Measurement]) -> float:
     return float(np.exp(found.x))
 
 
-def _without_factor(file: TestbedFile) -> TestbedFile:
+def without_factor(file: TestbedFile) -> TestbedFile:
+    """Return the thesis's machine with the axial damping as it was identified."""
     return parse_testbed(file.text.replace("factor: {value: 6.0", "factor: {value: 1.0"), "thesis")
 
 
-def _record(folder: Path, name: str, described: TestbedFile, hidden: Testbed) -> Measurement:
+def record(
+    folder: Path,
+    name: str,
+    described: TestbedFile,
+    hidden: Testbed,
+    plant: str,
+    slower: float = 1.0,
+) -> Measurement:
+    """Return a recording of the hidden machine that carries the described one.
+
+    Args:
+        folder: a new one.
+        name: of the scenario.
+        described: what is said to be recorded.
+        hidden: what is.
+        plant: `mujoco` or `sim`.
+        slower: factor on the duration of the winch frame's moves, of the thesis's motion only.
+    """
     scenario = load_scenario(SCENARIOS / f"{name}.yaml")
     if name.startswith("verification"):
-        scenario = _slightly_angular(scenario)
+        scenario = _slightly_angular(scenario, slower)
     recorded = replace(described, testbed=hidden)
     bundle = make_bundle(resolve(scenario, hidden), recorded, SCENARIOS)
-    run(replace(bundle, plant="mujoco"), folder)
+    run(replace(bundle, plant=plant), folder)
     # The recording carries the text of the described machine.
     return read_measurement(folder)
 
 
-def _slightly_angular(scenario: Scenario) -> Scenario:
+def _slightly_angular(scenario: Scenario, slower: float) -> Scenario:
     """Return the scenario with sway in proportion to all surge of the winch frame."""
     frame = scenario.winch_frame
     moves = tuple(
-        move.model_copy(update={"by": (move.by[0], SIDEWAYS * move.by[0], *move.by[2:])})
+        move.model_copy(
+            update={
+                "by": (move.by[0], SIDEWAYS * move.by[0], *move.by[2:]),
+                "duration": slower * move.duration,
+            }
+        )
         for move in frame.motion.moves
     )
     motion = frame.motion.model_copy(update={"moves": moves})
@@ -182,12 +205,12 @@ def _tables(judgements: Sequence[Judgement]) -> list[str]:
         for i, (each, length) in enumerate(zip(judgements, LENGTHS.values(), strict=True)):
             thesis = THESIS[dof][i] if dof in THESIS else None
             published = f"{thesis:g}" if thesis is not None else "low" if dof == "heave" else ""
-            shown = [f"{_share(each, label, dof):.2f}" for label in each.vaf]
+            shown = [f"{share(each, label, dof):.2f}" for label in each.vaf]
             rows.append(f"| {dof}, {length} | {published} | {' | '.join(shown)} |")
     return ["\n".join(rows)]
 
 
-def _share(each: Judgement, label: str, dof: str) -> float:
+def share(each: Judgement, label: str, dof: str) -> float:
     """Return the VAF [%] also where little more than the noise moves; see the machine itself."""
     i = DOFS.index(dof)
     return vaf(each.measured[:, i], each.simulated[label][:, i])
@@ -204,7 +227,7 @@ def _draw(judgements: Sequence[Judgement]) -> None:
             measured = 1e3 * (each.measured[:, i] - middle)
             axes.plot(each.times, measured, "k", label="measured")
             for label, bars in list(each.simulated.items())[:_LINES]:
-                text = f"{label}, {_share(each, label, dof):.1f} %"
+                text = f"{label}, {share(each, label, dof):.1f} %"
                 axes.plot(each.times, 1e3 * (bars[:, i] - middle), "--", lw=1.0, label=text)
             axes.set_ylabel(f"{dof} [mm]")
             # Above the axes, where no curve is.
@@ -220,9 +243,10 @@ def _draw(judgements: Sequence[Judgement]) -> None:
     small.save(PICTURE, optimize=True)
 
 
-def _into_page(text: str) -> None:
+def into_page(name: str, text: str) -> None:
+    """Put text between the marks of that name in docs/the-factor-six.md."""
     page = PAGE.read_text(encoding="utf-8")
-    start, end = "<!-- factor six -->", "<!-- end -->"
+    start, end = f"<!-- {name} -->", "<!-- end -->"
     before, _, rest = page.partition(start)
     _, _, after = rest.partition(end)
     PAGE.write_text(f"{before}{start}\n{text}\n{end}{after}", encoding="utf-8")

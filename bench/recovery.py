@@ -7,9 +7,11 @@ throughout, identifies them, and writes the table of docs/identify.md.
 from __future__ import annotations
 
 import tempfile
+from collections.abc import Mapping
 from dataclasses import replace
 from pathlib import Path
 
+import numpy as np
 from rich.console import Console
 
 from bench.system_coverage import damped
@@ -22,11 +24,12 @@ from cspm_ident.system.identification import SystemResult, identify_system
 from cspm_ident.system.machine import machine_with
 from cspm_msgs_py.dofs import DOFS
 from cspm_msgs_py.scenario import load_scenario
-from cspm_msgs_py.testbed import Testbed, load_testbed
+from cspm_msgs_py.testbed import Testbed, TestbedFile, load_testbed
 
 ROOT = Path(__file__).resolve().parents[1]
 SCENARIOS = ROOT / "scenarios"
 PAGE = ROOT / "docs" / "identify.md"
+TESTBED = SCENARIOS / "testbeds" / "thesis.yaml"
 SCENARIO = "factor_six_mid"
 # What the recorded machine has; factors count from the described one.
 TRUTH = {
@@ -44,22 +47,24 @@ _LAWS = ("stiffness", "axial_damping")
 def main() -> None:
     """Run the whole."""
     console = Console()
-    described = load_testbed(SCENARIOS / "testbeds" / "thesis.yaml")
-    with tempfile.TemporaryDirectory(prefix="cspm-recovery-") as place:
-        console.print(f"recording {SCENARIO}")
-        folder = Path(place) / SCENARIO
-        bundle = make_bundle(
-            resolve(load_scenario(SCENARIOS / f"{SCENARIO}.yaml"), described.testbed),
-            replace(described, testbed=_recorded(described.testbed)),
-            SCENARIOS,
-        )
-        run(replace(bundle, plant="mujoco"), folder)
-        measurement: Measurement = read_measurement(folder).with_testbed(described)
+    described = load_testbed(TESTBED)
+    console.print(f"recording {SCENARIO}")
+    measurement = record(described, _recorded(described.testbed))
     chosen = choose(described.testbed, list(TRUTH))
     result = identify_system([measurement], chosen, progress=console.print)
-    text = _table(result)
+    text = "\n\n".join([found_table(result, TRUTH), _vaf_table(result)])
     console.print(text, markup=False, highlight=False)
-    _into_page(text)
+    into_page("recovery", text)
+
+
+def record(described: TestbedFile, machine: Testbed) -> Measurement:
+    """Return the scenario on the MuJoCo plant of a machine, said to be the described one."""
+    scenario = resolve(load_scenario(SCENARIOS / f"{SCENARIO}.yaml"), described.testbed)
+    bundle = make_bundle(scenario, replace(described, testbed=machine), SCENARIOS)
+    with tempfile.TemporaryDirectory(prefix="cspm-recovery-") as place:
+        folder = Path(place) / SCENARIO
+        run(replace(bundle, plant="mujoco"), folder)
+        return read_measurement(folder).with_testbed(described)
 
 
 def _recorded(machine: Testbed) -> Testbed:
@@ -75,26 +80,34 @@ def _recorded(machine: Testbed) -> Testbed:
     return other.model_copy(update={"cables": tuple(cables)})
 
 
-def _table(result: SystemResult) -> str:
+def found_table(result: SystemResult, truth: Mapping[str, float]) -> str:
+    """Return what was found beside the truth, by name, as a table of a page."""
     estimate = result.solution.estimate
     rows = ["| | described | put in | found, 95 % interval | |", "|---|---|---|---|---|"]
     for each in result.chosen:
         low, high = estimate.interval(each.name)
-        true, value = TRUTH[each.name], estimate.value(each.name)
+        true, value = truth[each.name], estimate.value(each.name)
         unit = "" if each.parameter.unit == "1" else f", {each.parameter.unit}"
         held = "holds" if low <= true <= high else "**misses**"
         found = f"{value:.5f} ({low:.5f} … {high:.5f})"
+        if not np.isfinite(high - low):
+            held, found = "", "not excited"
         rows.append(f"| `{each.name}`{unit} | {each.nominal:g} | {true:.5g} | {found} | {held} |")
-    rows += ["", f"| VAF, % | {' | '.join(DOFS)} |", "|---" * (1 + len(DOFS)) + "|"]
+    return "\n".join(rows)
+
+
+def _vaf_table(result: SystemResult) -> str:
+    rows = [f"| VAF, % | {' | '.join(DOFS)} |", "|---" * (1 + len(DOFS)) + "|"]
     for label, shares in result.judgements[0].vaf.items():
         cells = ("still" if share is None else f"{share:.3f}" for share in shares.values())
         rows.append(f"| {label} | {' | '.join(cells)} |")
     return "\n".join(rows)
 
 
-def _into_page(text: str) -> None:
+def into_page(name: str, text: str) -> None:
+    """Put text between the marks of that name in docs/identify.md."""
     page = PAGE.read_text(encoding="utf-8")
-    start, end = "<!-- recovery -->", "<!-- end -->"
+    start, end = f"<!-- {name} -->", "<!-- end -->"
     before, _, rest = page.partition(start)
     _, _, after = rest.partition(end)
     PAGE.write_text(f"{before}{start}\n{text}\n{end}{after}", encoding="utf-8")

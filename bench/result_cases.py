@@ -6,7 +6,7 @@ from collections.abc import Mapping
 
 from bench.tracking import Case
 
-PAST, SIX = "worst_case_past_thesis", "worst_case_six_dof"
+PAST, SIX, DEEP = "worst_case_past_thesis", "worst_case_six_dof", "worst_case_4m_past_thesis"
 CAMERA_100_HZ = (
     "rates.motion_capture=100",
     "rates.motion_controller=100",
@@ -28,18 +28,57 @@ THESIS = {
     "worst case, 4 m": Case("worst_case_4m"),
 }
 HALF = "duration=100"
+MINUTE = "duration=60"
 SHORT = "duration=40"
+IDEAL = "sensors=ideal"
 HALF_WAVES = (
     "target.motion.amplitudes=[0.055, 0.043, 0.159, 0.0135, 0.108, 0.053]",
     "winch_frame.motion.amplitudes=[0.0094, 0.0044, 0.0124, 0.0034, 0.0033, 0.0017]",
 )
+# The fastest loops that the thesis's margins allow; its gains are lost.
+FASTEST = (
+    "control.mode=closed_loop",
+    "control.motion.crossover={surge: 32, sway: 18, heave: 40, pitch: 40, yaw: 18}",
+)
+# As the fastest, but sway at 36 rad/s, with a gain margin of 3.1 instead of 6 dB.
+FASTER_SWAY = (
+    "control.mode=closed_loop",
+    "control.motion.gains={surge: {kp: 1104, ki: 822, kd: 96.3},"
+    " sway: {kp: 1010, ki: 845, kd: 78.3}, heave: {kp: 3820, ki: 3554, kd: 266.5},"
+    " pitch: {kp: 515.2, ki: 479.3, kd: 35.94}, yaw: {kp: 32.86, ki: 13.75, kd: 5.094}}",
+)
+# What a sea from abeam does to a symmetric ship.
+BEAM = (
+    "target.motion.amplitudes=[0.0, 0.0865, 0.318, 0.027, 0.0, 0.0]",
+    "winch_frame.motion.amplitudes=[0.0, 0.0088, 0.0248, 0.0067, 0.0, 0.0]",
+)
+LONG_WAVES = ("target.motion.band=[0.21, 0.25]", "winch_frame.motion.band=[0.21, 0.25]")
 # The thesis's worst case with one thing changed.
 SWITCHED = {
     "as in the thesis": Case("worst_case", (HALF,)),
-    "ideal sensors": Case("worst_case", (HALF, "sensors=ideal")),
+    "ideal sensors": Case("worst_case", (HALF, IDEAL)),
     "analytic centre": Case("worst_case", (HALF, *CENTRE)),
     "analytic centre, wanted tensions down to 0.3 N": Case("worst_case", (HALF, *CENTRE, LOWER)),
     "half the waves": Case("worst_case", (HALF, *HALF_WAVES)),
+}
+# The same with the gains changed, without sensor noise, which gains of this size amplify.
+SWITCHED_GAINS = {
+    "fastest loops": Case("worst_case", (HALF, IDEAL, *FASTEST)),
+    "the same, analytic centre, down to 0.3 N": Case(
+        "worst_case", (HALF, IDEAL, *FASTEST, *CENTRE, LOWER)
+    ),
+    "the same, sway beyond its margin": Case(
+        "worst_case", (HALF, IDEAL, *FASTER_SWAY, *CENTRE, LOWER)
+    ),
+}
+SWITCHED_CALM = {
+    "as in the thesis": Case("calm", (MINUTE,)),
+    "motions of a sea from abeam": Case("calm", (MINUTE, *BEAM)),
+    "the same, fastest loops, ideal sensors": Case("calm", (MINUTE, IDEAL, *FASTEST, *BEAM)),
+    "the same, sway beyond its margin": Case("calm", (MINUTE, IDEAL, *FASTER_SWAY, *BEAM)),
+    "fastest loops, and no wave shorter than 4 s": Case(
+        "calm", (MINUTE, IDEAL, *FASTEST, *BEAM, *LONG_WAVES)
+    ),
 }
 # At 4 m the thesis's margins leave sway and yaw no more than 9 rad/s.
 DESIGNED_AT_FOUR = (
@@ -49,7 +88,7 @@ DESIGNED_AT_FOUR = (
 SWITCHED_4M = {
     "as in the thesis": Case("worst_case_4m", (SHORT,)),
     "gains designed at 4 m": Case("worst_case_4m", (SHORT, DESIGNED_AT_FOUR)),
-    "ideal sensors": Case("worst_case_4m", (SHORT, "sensors=ideal")),
+    "ideal sensors": Case("worst_case_4m", (SHORT, IDEAL)),
     "half the waves": Case("worst_case_4m", (SHORT, *HALF_WAVES)),
     "analytic centre": Case("worst_case_4m", (SHORT, *CENTRE)),
     "wanted tensions down to 0.3 N": Case("worst_case_4m", (SHORT, *CENTRE, LOWER)),
@@ -59,7 +98,7 @@ UNGOVERNED = "control.motion.governor=null"
 ROUGH = (SHORT, "seed=6", UNGOVERNED)
 CAUSES = {
     "without the governor": Case(PAST, ROUGH),
-    "ideal sensors": Case(PAST, (*ROUGH, "sensors=ideal")),
+    "ideal sensors": Case(PAST, (*ROUGH, IDEAL)),
     "force controllers at 1000 instead of 800 rad/s": Case(
         PAST, (*ROUGH, "control.force.bandwidth=1000")
     ),
@@ -74,11 +113,20 @@ BEYOND = {
     "without the governor": Case(PAST, (SHORT, UNGOVERNED)),
     "wanted tensions down to 1 N": Case(PAST, (SHORT, ONE_NEWTON)),
     "poses 5 ms late, which it knows": Case(PAST, (SHORT,), pose_delay=0.005),
+    "force controllers at 400 instead of 800 rad/s": Case(
+        PAST, (SHORT, "control.force.bandwidth=400")
+    ),
+    "dry friction 10 mN·m at every motor": Case(
+        PAST, (SHORT,), (("winch_coulomb_friction", (), {"torque": 0.01}),)
+    ),
     "calm": Case("calm", (SHORT, PAST_ON_CALM)),
-    "worst case, 4 m": Case(PAST, (SHORT, FOUR_METRES)),
+    "worst case, 4 m": Case(DEEP, (SHORT,)),
+    "worst case, 4 m, the whole 200 s": Case(DEEP),
+    "worst case, 4 m, as at 2 m": Case(PAST, (SHORT, FOUR_METRES)),
     "worst case, 4 m, without the governor": Case(PAST, (SHORT, FOUR_METRES, UNGOVERNED)),
     "all six coordinates": Case(SIX, (SHORT,)),
     "all six coordinates, the whole 200 s": Case(SIX),
+    "all six coordinates, 200 s, seed 2": Case(SIX, ("seed=2",)),
     "all six coordinates, without the governor": Case(SIX, (SHORT, UNGOVERNED)),
     "on the MuJoCo plant": Case(PAST, ("duration=20",), plant="mujoco"),
 }
@@ -121,6 +169,28 @@ CHANGES: dict[str, Effects] = {
     "hoist_1's drive at half torque": (("winch_torque_gain", ("hoist_1",), {"gain": 0.5}),),
     "wind of 2 N in sway and 1 N in surge": (("bar_constant_wrench", (), WIND),),
 }
+
+SURGE, SWAY, HOIST = ("surge_1",), ("sway_1",), ("hoist_1",)
+CORRECTED: dict[str, Effects] = {
+    "nothing": (),
+    "load cell of surge_1 +1 N": (("tension_bias", SURGE, {"bias": 1.0}),),
+    "load cell of sway_1 −1 N": (("tension_bias", SWAY, {"bias": -1.0}),),
+    "load cell of hoist_1 +1 N": (("tension_bias", HOIST, {"bias": 1.0}),),
+    "all load cells +1 N, dry friction 2 mN·m at every motor": (
+        ("tension_bias", (), {"bias": 1.0}),
+        ("winch_coulomb_friction", (), {"torque": 0.002}),
+    ),
+    "hoist_1's drive at half torque": (("winch_torque_gain", HOIST, {"gain": 0.5}),),
+}
+TOLD = "control.force.load_cell_bias={largest: 2.0}"
+
+
+def corrected(duration: float) -> dict[str, Case]:
+    """Return the worst case past the thesis with load cells that are off, and corrected."""
+    return {
+        name: Case(PAST, (f"duration={duration}", TOLD), effects)
+        for name, effects in CORRECTED.items()
+    }
 
 
 def seeded(seeds: int, profile: tuple[str, ...]) -> dict[str, Case]:

@@ -27,8 +27,11 @@ from bench.result_cases import (
     PROFILES,
     SWITCHED,
     SWITCHED_4M,
+    SWITCHED_CALM,
+    SWITCHED_GAINS,
     THESIS,
     changed,
+    corrected,
     seeded,
 )
 from bench.result_figures import bands, draw_comparison, draw_limit
@@ -101,6 +104,8 @@ def main() -> None:
         "machine": lambda: _machine_block(seeds),
         "thesis": lambda: thesis_block(store.tracks("thesis", THESIS)),
         "switched": lambda: tracking_block(store.tracks("switched", SWITCHED)),
+        "switched_gains": lambda: tracking_block(store.tracks("switched gains", SWITCHED_GAINS)),
+        "switched_calm": lambda: tracking_block(store.tracks("switched calm", SWITCHED_CALM)),
         "switched_4m": lambda: tracking_block(store.tracks("switched 4 m", SWITCHED_4M)),
         "distribution": lambda: table(
             HEADINGS, store.get("distribution", lambda: distribution_rows(20000, 60.0))
@@ -113,6 +118,7 @@ def main() -> None:
         "limit": lambda: limit_block(store),
         "possible": lambda: possible_block(store),
         "robust": lambda: tracking_block(store.tracks("robust", changed(PAST, ROBUST_S))),
+        "corrected": lambda: tracking_block(store.tracks("corrected", corrected(ROBUST_S))),
         "robust_thesis": lambda: tracking_block(
             store.tracks("robust thesis", changed("worst_case", ROBUST_S))
         ),

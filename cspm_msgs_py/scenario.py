@@ -142,11 +142,22 @@ class ComputedWrenchControl(StrictModel):
         return tuple(self.bandwidth)
 
 
+class LoadCellBias(StrictModel):
+    """Up to how much load cells may say too much or too little [N]."""
+
+    largest: PositiveFloat = 2.0
+
+
 class ForceControl(StrictModel):
-    """Force controllers: closed-loop bandwidth [rad/s] to design for, or the gains per cable."""
+    """Force controllers: closed-loop bandwidth [rad/s] to design for, or the gains per cable.
+
+    With `load_cell_bias` the biases of the load cells are told from torques and speeds of the
+    winches, and taken off.
+    """
 
     bandwidth: PositiveFloat = 800.0
     gains: dict[str, PiGains] | None = None
+    load_cell_bias: LoadCellBias | None = None
 
 
 DistributionMethod = Literal[

@@ -56,3 +56,29 @@ def test_exact_bounds_of_a_count():
     assert binom.cdf(188, 200, high) == pytest.approx(0.025)
     assert Count("", "", 10, 10).bounds[1] == 1.0
     assert Count("", "", 0, 10).bounds[0] == 0.0
+
+
+class Coin:
+    """Intervals of one parameter, counted how often they are asked for."""
+
+    names = ("side",)
+    truth = np.array([0.5])
+    asked = 0
+
+    def intervals(self, rng):
+        self.asked += 1
+        low = rng.uniform(0.0, 1.0)
+        yield "coin", np.array([[low, np.inf]])
+
+
+def test_runs_that_were_kept_are_not_made_again(tmp_path):
+    """And count as if they had been; another seed's do not."""
+    first, second, other = Coin(), Coin(), Coin()
+    file = tmp_path / "runs.jsonl"
+    measure_coverage(first, 4, seed=1, kept=file)
+    found = measure_coverage(second, 10, seed=1, kept=file)
+    assert (first.asked, second.asked) == (4, 6)
+    assert found == measure_coverage(Coin(), 10, seed=1)
+    assert 0 < found[0].inside < 10
+    measure_coverage(other, 2, seed=2, kept=file)
+    assert other.asked == 2

@@ -5,6 +5,7 @@ import numpy as np
 from cspm_ident.diagnosis.columns import Candidate, Place
 from cspm_ident.diagnosis.equation import Equation
 from cspm_ident.diagnosis.evidence import gather
+from cspm_ident.diagnosis.hypothesis import bounded, is_allowed
 from cspm_ident.diagnosis.search import Search
 from cspm_sim.effects import Channel, catalogue
 
@@ -88,3 +89,33 @@ def test_as_much_of_something_else_is_no_rival():
     (named,) = named_in(winch(gain * HELD, noise), swinging(1.0, drag))
     assert named.hypothesis.effect.id == "winch_torque_gain"
     assert named.alternatives == ()
+
+
+AIR = catalogue()["bar_linear_damping"]
+
+
+def test_a_simpler_rival_on_other_elements_is_the_best_of_them():
+    """The bar's damping explains a little more, the second cable's drag nearly all with less."""
+    rng = np.random.default_rng(11)
+    speed, others = np.sin(1.7 * TIMES), rng.standard_normal((ROWS, 5))
+    columns = {
+        Candidate(AIR, "bar"): np.column_stack([-speed, -others]),
+        Candidate(DRAG, "a"): -rng.standard_normal((ROWS, 1)),
+        Candidate(DRAG, "b"): -speed[:, None],
+    }
+    told = named_in(equation(BAR, -0.8 * speed - 0.004 * others[:, 0], columns))
+    assert told[0].hypothesis.effect.id == "cable_transverse_damping"
+    assert told[0].hypothesis.elements == ("b",)
+
+
+BODY = Candidate(AIR, "bar")
+
+
+def test_a_weight_beyond_its_bound_by_chance_is_put_there_and_another_is_left():
+    half = np.array([0.1, 0.1, 0.1, 0.1, 0.1, 0.1])
+    weights = np.array([0.5, -0.05, -0.2, 0.0, 0.1, 0.02])
+    found = bounded(BODY, weights, half)
+    np.testing.assert_array_equal(found, [0.5, 0.0, -0.2, 0.0, 0.1, 0.02])
+    assert not is_allowed(BODY, found)
+    assert is_allowed(BODY, bounded(BODY, weights, 3.0 * half))
+    assert not is_allowed(BODY, np.zeros(6))

@@ -181,3 +181,35 @@ def test_nuisance_is_fitted_wherever_a_model_is_judged():
     evidence = gather([[shifted]], BLOCK_S)
     flat = target + 50.0
     assert evidence.left_with({})[PLACE] == pytest.approx(np.sum((flat - flat.mean()) ** 2))
+
+
+def test_combined_columns_are_as_if_they_had_been_there():
+    equation, columns, _ = made()
+    sums = sums_of(equation)[1]
+    turn = np.array([[1.0], [0.02], [0.0]])
+    wider = sums.beside(turn)
+    shaped = equation.columns | {
+        Candidate(FIRST.effect, "other"): (columns @ turn)[:, None, :],
+    }
+    directly = sums_of(replace(equation, columns=shaped))[1]
+    both = np.array([2, 3])
+    np.testing.assert_allclose(wider.weights(both), directly.weights(both), rtol=1e-9)
+    for base, own in ((both[:1], both[1:]), (both[1:], both[:1])):
+        width = directly.half_width(base, own)
+        np.testing.assert_allclose(wider.half_width(base, own), width, rtol=1e-6)
+
+
+def test_a_weight_beside_a_column_like_its_own_is_less_sure():
+    equation, columns, _ = made()
+    rng = np.random.default_rng(4)
+    near = columns[:, :1] + 0.3 * rng.standard_normal((ROWS, 1))
+    shaped = equation.columns | {Candidate(FIRST.effect, "other"): near[:, None, :]}
+    sums = sums_of(replace(equation, columns=shaped))[1]
+    own, far, close = np.array([0]), np.array([1]), np.array([1, 3])
+    assert sums.half_width(close, own)[0] > 2.0 * sums.half_width(far, own)[0]
+
+
+def test_what_a_single_block_tells_has_no_interval():
+    base, own = np.array([0]), np.array([2])
+    assert np.isinf(in_few_blocks([9]).half_width(base, own)[0])
+    assert np.isfinite(in_few_blocks([3, 9]).half_width(base, own)[0])

@@ -6,7 +6,7 @@ from run_samples import bundle_of
 from scipy.optimize import linprog, lsq_linear
 from test_tension_distribution import structure
 
-from bench.feasibility import REFERENCES
+from bench.feasibility import REFERENCES, least_errors
 from bench.tracking import Case, follow, motions_of_bundle
 from cspm_control.bar_dynamics import bar_parameters, wrench_for
 from cspm_control.governor import SMOOTH, SPACING, Governed, plan_deviation
@@ -204,3 +204,13 @@ def test_a_drop_faster_than_gravity_is_met_better_by_a_third_on_either_plant():
             largest.append(np.abs(errors[:, 2]).max())
         assert largest[1] < 0.7 * largest[0]
         assert tensions.min() > 0.0
+
+
+@pytest.mark.slow
+def test_at_four_metres_no_cable_goes_slack_and_not_much_more_is_lost_than_must_be():
+    bundle = Case("worst_case_4m_past_thesis", ("duration=17.0",)).bundle()
+    errors, tensions, _, failure = follow(bundle)
+    assert failure == ""
+    assert tensions.min() > 0.0
+    lost, least = np.sqrt((errors**2).mean(axis=0)), least_errors(bundle)
+    assert 1e-3 < least[0] < lost[0] < 2.0 * least[0]

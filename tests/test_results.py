@@ -17,8 +17,11 @@ from bench.result_cases import (
     PAST,
     SWITCHED,
     SWITCHED_4M,
+    SWITCHED_CALM,
+    SWITCHED_GAINS,
     THESIS,
     changed,
+    corrected,
     seeded,
 )
 from bench.results import BLOCK, PAGE, Store, main, table, tracking_block
@@ -32,8 +35,18 @@ pytestmark = pytest.mark.compiled
 
 @pytest.mark.slow
 def test_every_case_is_a_run_that_can_be_made():
-    groups = (THESIS, SWITCHED, SWITCHED_4M, CAUSES, BEYOND, CORNERS, LIMITED)
-    groups += (changed(PAST, 1.0), seeded(2, CAMERA_100_HZ))
+    groups = (
+        THESIS,
+        SWITCHED,
+        SWITCHED_GAINS,
+        SWITCHED_CALM,
+        SWITCHED_4M,
+        CAUSES,
+        BEYOND,
+        CORNERS,
+        LIMITED,
+    )
+    groups += (changed(PAST, 1.0), corrected(1.0), seeded(2, CAMERA_100_HZ))
     for case in {case.scenario: case for group in groups for case in group.values()}.values():
         assert case.bundle().testbed.testbed.bar is not None
     for case in SWITCHED_4M.values():

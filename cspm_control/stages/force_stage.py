@@ -10,6 +10,7 @@ from numba import njit
 from numpy.typing import NDArray
 
 from cspm_control.force_controller import ForceController
+from cspm_control.load_cell_bias import LoadCellBias
 from cspm_control.safety import GuardedStage
 from cspm_msgs_py.diagnostics import Level, Status
 from cspm_msgs_py.safety_spec import Safety
@@ -48,10 +49,14 @@ class ForceStage(GuardedStage):
         safe_state: SafeState,
         safety: Safety,
         period_ns: int,
+        bias: LoadCellBias | None = None,
     ) -> None:
-        """Take the controllers, their limits, the cables' names, and the guard's arguments."""
+        """Take the controllers, their limits, the cables' names, and the guard's arguments.
+
+        With `bias` the tensions are corrected before they are controlled; what trips is measured.
+        """
         super().__init__(safe_state, safety, period_ns, len(names))
-        self._controller = controller
+        self._controller, self._bias = controller, bias
         self._limits = limits
         self._names = names
         self._shape = (len(names),)
@@ -71,20 +76,27 @@ class ForceStage(GuardedStage):
             self._latch.stand(now_ns, "input", fault)
             self._send_safe(now_ns, send)
             return
-        torque = self._slew(self._controller.step(self._wanted, measured))
+        corrected = self._corrected(measured, winches)
+        torque = self._slew(self._controller.step(self._wanted, corrected))
         self._steps += 1
         self._limited += self._controller.saturated > 0
         self._clipped += clipped
         self._send(now_ns, torque, send)
 
     def status(self) -> Status:
-        """Return shares of steps with a limit met since the last call, or the safe state."""
+        """Return shares of steps with a limit met since the last call, or the safe state.
+
+        And the largest bias of a load cell, where biases are told.
+        """
         steps = max(1, self._steps)
         values = {
             "limited_share": f"{self._limited / steps:.3f}",
             "slew_share": f"{self._slewed / steps:.3f}",
             "tension_limited_share": f"{self._clipped / steps:.3f}",
         }
+        if self._bias is not None:
+            most = int(np.argmax(np.abs(self._bias.values)))
+            values["load_cell_bias"] = f"{self._names[most]} {self._bias.values[most]:+.2f} N"
         trouble = "ok"
         if self._limited:
             trouble = "torque at its limit"
@@ -100,15 +112,24 @@ class ForceStage(GuardedStage):
     def _restart(self) -> None:
         self._controller.restart()
         self._torque = None
+        if self._bias is not None:
+            self._bias.restart()
 
     def _present_tensions(self) -> Array | None:
         return self._measured.copy() if self._has_measured else None
 
+    def _corrected(self, measured: Array, winches: Array | None) -> Array:
+        """Return tensions without the biases of their load cells, as far as these are known."""
+        if self._bias is None:
+            return measured
+        n = len(self._names)
+        if self._torque is not None and winches is not None and winches.size:
+            self._bias.step(measured, winches[n : 2 * n], self._torque)
+        return measured - self._bias.values
+
     def _slew(self, torque: Array) -> Array:
         step = self._limits.torque_step
-        if step is None:
-            return torque
-        if self._torque is not None:
+        if step is not None and self._torque is not None:
             wanted, torque = torque, np.clip(torque, self._torque - step, self._torque + step)
             self._slewed += bool((wanted != torque).any())
         self._torque = torque

@@ -12,6 +12,7 @@ from cspm_control.bar_dynamics import bar_parameters
 from cspm_control.computed_wrench import ComputedWrench
 from cspm_control.force_controller import ForceController
 from cspm_control.governor import Governed, plan_deviation
+from cspm_control.load_cell_bias import LoadCellBias
 from cspm_control.motion_controller import MotionController
 from cspm_control.stages.angle_stage import AngleStage
 from cspm_control.stages.distribution_stage import DistributionStage
@@ -40,7 +41,7 @@ from cspm_msgs_py.schedule import (
 )
 from cspm_msgs_py.stage import Stage
 from cspm_msgs_py.testbed import Testbed
-from cspm_sim.kernels.cable import RADIUS
+from cspm_sim.kernels.cable import INERTIA, RADIUS
 from cspm_sim.motion import Motion
 from cspm_sim.parameters import nominal_parameters
 from cspm_sim.safe_state import make_safe_state
@@ -229,14 +230,31 @@ def force_stage(control: ClosedLoop, scenario: Scenario, testbed: Testbed) -> Fo
         tension_trips(scenario, testbed),
         None if safety.torque_slew is None else safety.torque_slew / rate,
     )
-    controller = ForceController(
-        [gains[cable.name] for cable in testbed.cables],
-        nominal_parameters(testbed).cables[:, RADIUS].copy(),
-        np.array([cable.torque_limit for cable in testbed.cables]),
-        period=1.0 / rate,
+    radii = nominal_parameters(testbed).cables[:, RADIUS].copy()
+    return ForceStage(
+        ForceController(
+            [gains[cable.name] for cable in testbed.cables],
+            radii,
+            np.array([cable.torque_limit for cable in testbed.cables]),
+            period=1.0 / rate,
+        ),
+        limits,
+        testbed.cable_names,
+        make_safe_state(scenario, testbed),
+        safety,
+        1_000_000_000 // rate,
+        load_cell_bias(control, testbed, 1.0 / rate),
     )
-    state = make_safe_state(scenario, testbed)
-    return ForceStage(controller, limits, testbed.cable_names, state, safety, 1_000_000_000 // rate)
+
+
+def load_cell_bias(control: ClosedLoop, testbed: Testbed, period: float) -> LoadCellBias | None:
+    """Return what tells the load cells' biases every `period` [s], where the scenario wants it."""
+    wanted = control.force.load_cell_bias
+    if wanted is None:
+        return None
+    cables = nominal_parameters(testbed).cables
+    radii, inertias = cables[:, RADIUS].copy(), cables[:, INERTIA].copy()
+    return LoadCellBias(radii, inertias, wanted.largest, period=period)
 
 
 def torque_stage(control: TorqueProfile, scenario: Scenario, testbed: Testbed) -> TorqueStage:

@@ -20,6 +20,8 @@ Index = NDArray[np.intp]
 
 FOLDS = 6
 _RANK = 1e-9
+# Effective blocks beyond the first, below which a single one tells a weight.
+_ALONE = 0.1
 
 
 class Gain(NamedTuple):
@@ -186,8 +188,9 @@ class Sums:
         Infinite where a single block tells a weight.
         """
         found = self._left_out(base, columns)
-        free = np.maximum(found.blocks_of - 1.0, 1e-9)
-        factor = np.where(found.blocks_of > 1.0, t_distribution.ppf(0.975, free), np.inf)
+        free = found.blocks_of - 1.0
+        factor = np.full(len(free), np.inf)
+        factor[free > _ALONE] = t_distribution.ppf(0.975, free[free > _ALONE])
         errors = np.sqrt(np.maximum(np.diag(found.covariance), 1e-300))
         return np.asarray(factor * errors / self._lengths[columns])
 
@@ -216,7 +219,7 @@ class Sums:
         whole, count = parts.sum(axis=0), len(columns)
         inverse = _pseudo_inverse(whole[:-1, :-1])
         told = np.einsum("ij,bji->bi", inverse, parts[:, :-1, :-1])
-        shares = told.sum(axis=1) / count
+        shares = told.sum(axis=1) / max(1, count)
         heard = shares > _RANK
         weights = inverse @ whole[:-1, -1]
         others = whole - parts[heard]

@@ -16,6 +16,7 @@ from cspm_ident.diagnosis.machine_signals import BodyMotion, MachineSignals
 from cspm_ident.diagnosis.readings import pose_rows, reading_rows
 from cspm_ident.diagnosis.suspension import Suspension
 from cspm_ident.signals.measurement import TENSION, WINCHES, Measurement
+from cspm_ident.signals.samples import Samples
 from cspm_ident.signals.timeline import Timeline, whole_stretches
 from cspm_ident.winch.weak_form import Make, maker, weigh
 from cspm_msgs_py.dofs import DOFS
@@ -36,6 +37,8 @@ _WHITE = 1.7
 _SHORTEST_S = 2.0
 # Of an acceleration's square: what has to be common to tensions and poses.
 _COMMON = 0.7
+# Of what differs from reading to reading; coloured noise alone spreads by 1.2 to 1.5 of it.
+_MOVES = 2.5
 _TENSION = "tension [N]"
 _DRIVERS = {
     _TENSION: CableSignal.TENSION,
@@ -62,13 +65,14 @@ def suspension_equations(
         known: effects that the test-bed file has.
         knots: of the free functions; None: without these.
     """
-    machine, make = timeline.measurement.machine, maker(timeline.measurement.pointwise)
+    measured = timeline.measurement
+    make, dofs = maker(measured.pointwise), _moving(measured.bar_pose)
     return [
         equation.compact
         for stretch in machine_signals(timeline)
-        for equation in _Stretch(stretch, machine, timeline.pose_band, make).equations(
-            effects, known, knots
-        )
+        for equation in _Stretch(
+            stretch, measured.machine, timeline.pose_band, make, dofs
+        ).equations(effects, known, knots)
     ]
 
 
@@ -86,7 +90,7 @@ def fine_equations(
     return [
         equation
         for stretch in stretches
-        for equation in _Stretch(stretch, measurement.machine, None, make).equations(
+        for equation in _Stretch(stretch, measurement.machine, None, make, ()).equations(
             (), known, None
         )
     ]
@@ -117,10 +121,18 @@ class _Stretch:
     """One stretch and the window that weighs it."""
 
     def __init__(
-        self, signals: MachineSignals, machine: Testbed, band: float | None, make: Make
+        self,
+        signals: MachineSignals,
+        machine: Testbed,
+        band: float | None,
+        make: Make,
+        dofs: Sequence[str],
     ) -> None:
-        """Take what the poses were smoothed to [Hz]; None asks for the shortest windows."""
-        self._signals, self._machine, self._make = signals, machine, make
+        """Take what the poses were smoothed to [Hz] and which of the bar's coordinates move.
+
+        Without a band windows are the shortest.
+        """
+        self._signals, self._machine, self._make, self._dofs = signals, machine, make, dofs
         self._parameters: PlantParameters = nominal_parameters(machine)
         self._here = Suspension(signals, machine, self._parameters)
         missing = {
@@ -215,11 +227,10 @@ class _Stretch:
         found = []
         for i, dof in enumerate(DOFS):
             unit = "m" if i < 3 else "rad"
-            drivers = {
-                f"{dof} [{unit}]": poses[:, i],
-                f"{dof} speed [{unit}/s]": speeds[:, i],
-                f"time, in {dof} [s]": self._signals.times,
-            }
+            drivers = {f"time, in {dof} [s]": self._signals.times}
+            if dof in self._dofs:
+                drivers[f"{dof} [{unit}]"] = poses[:, i]
+                drivers[f"{dof} speed [{unit}/s]"] = speeds[:, i]
             weighed = {
                 name: self._weighed(values, Channel.WRENCH) for name, values in drivers.items()
             }
@@ -352,6 +363,14 @@ class _Stretch:
         """Return how many rows lie between two windows that share no sample."""
         window, stride = self._windows[channel]
         return -(-len(window) // stride)
+
+
+def _moving(poses: Samples | None) -> list[str]:
+    """Return the coordinates that move by more than their noise, which the residual has as well."""
+    if poses is None or len(poses.times) < 5:
+        return []
+    spread, noise = poses.values.std(axis=0), difference_noise(poses.values)
+    return [dof for dof, moves in zip(DOFS, spread > _MOVES * noise, strict=True) if moves]
 
 
 def around(values: Array, apart: int) -> Array:

@@ -8,6 +8,7 @@ from types import MappingProxyType
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.ndimage import binary_dilation
 
 from cspm_ident.signals.measurement import Measurement
 from cspm_ident.signals.samples import Samples
@@ -21,6 +22,8 @@ Array = NDArray[np.float64]
 
 PERIOD_NS = 1_000_000
 _KNOT_S = 0.005
+# How far from a lost reading speeds are told as well as elsewhere.
+_NEAR_S = 0.01
 # More than is looked at, so that smoothing has both sides.
 _MARGIN_S = 3.0
 
@@ -216,14 +219,19 @@ class Timeline:
     def torques(self) -> Array | None:
         """Torque held from each step to the next, shape (k, n) [N·m]; NaN in holes.
 
-        A drive reports the torque that it applied up to the stamp.
+        A drive reports the torque that it applied up to the stamp. A single lost reading is a hole
+        as well: a rough torque's neighbours do not tell it, and a light shaft takes another speed,
+        which its angles tell only some time later.
         """
         samples = self.measurement.torque
         if samples is None:
             return None
         later = np.searchsorted(samples.times, self.times + 0.5 * self.period)
         out: Array = samples.values[np.minimum(later, len(samples.times) - 1)].copy()
-        out[_far(samples, self.times)] = np.nan
+        lost = _lost(samples, later)
+        near = 2 * round(_NEAR_S / self.period) + 1
+        lost = binary_dilation(lost, np.ones(near, dtype=bool))
+        out[_far(samples, self.times) | lost] = np.nan
         return out
 
     def _late(self, topic: str) -> float:
@@ -282,6 +290,13 @@ def _far(samples: Samples, times: Array) -> NDArray[np.bool_]:
         t = samples.times[span]
         inside |= (times >= t[0] - slack) & (times <= t[-1] + slack)
     return ~inside
+
+
+def _lost(samples: Samples, later: NDArray[np.intp]) -> NDArray[np.bool_]:
+    """Return for which steps, whose next readings are `later`, the reading itself was lost."""
+    held = np.minimum(later, len(samples.times) - 1)
+    gap = samples.times[held] - samples.times[np.maximum(held - 1, 0)] > 1.5 * samples.interval
+    return np.asarray(gap & np.append(held[:-1] == held[1:], False))
 
 
 def _bridged(knots: Array) -> Array:

@@ -23,6 +23,7 @@ DEFAULT = (
 )
 MOMENTS = ("ixx", "iyy", "izz")
 AXES = ("x", "y", "z")
+POINTS = ("exit", "attachment")
 # By name: effect, its parameter, value without it, upper bound, a change that matters.
 _OF_CABLES = {
     "stiffness": ("cable_stiffness", "scale", 0.2, 5.0, 0.3),
@@ -59,6 +60,24 @@ class BarPlace:
 
 
 @dataclass(frozen=True)
+class PointPlace:
+    """A coordinate of one end of a cable.
+
+    Attributes:
+        cable: its number.
+        point: `exit`, in winch_frame_ned, or `attachment`, in bar_ned.
+        axis: number of the coordinate.
+    """
+
+    cable: int
+    point: str
+    axis: int
+
+
+Place = EffectPlace | BarPlace | PointPlace
+
+
+@dataclass(frozen=True)
 class Chosen:
     """A parameter to fit, and where it stands in the machine.
 
@@ -69,7 +88,7 @@ class Chosen:
     """
 
     parameter: Parameter
-    place: EffectPlace | BarPlace
+    place: Place
     nominal: float
 
     @property
@@ -125,6 +144,7 @@ def allowed_names(testbed: Testbed) -> list[str]:
         *(f"{name}[.{'|.'.join(_kinds(testbed))}|.CABLE]" for name in _OF_CABLES),
         *(f"bar_damping.{dof}" for dof in DOFS),
         *(f"frame_offset.{dof}" for dof in DOFS),
+        *(f"{point}.CABLE.{'|'.join(AXES)}" for point in POINTS),
     ]
 
 
@@ -137,6 +157,8 @@ def _chosen(testbed: Testbed, name: str) -> Chosen:
         found = _of_cables(testbed, name, head, rest)
     elif head in ("bar_damping", "frame_offset") and rest in DOFS:
         found = _of_body(testbed, name, head, rest)
+    elif head in POINTS:
+        found = _of_point(testbed, name, head, rest)
     if found is None:
         raise InputError(f"--fit {name}: allowed: {', '.join(allowed_names(testbed))}")
     return found
@@ -186,6 +208,20 @@ def _of_body(testbed: Testbed, name: str, head: str, dof: str) -> Chosen:
         place = EffectPlace("frame_pose_offset", dof)
         parameter = Parameter(name, "m" if straight else "rad", -0.2, 0.2, 0.01)
     return Chosen(parameter, place, _present(testbed, place))
+
+
+def _of_point(testbed: Testbed, name: str, point: str, rest: str) -> Chosen | None:
+    cable, _, axis = rest.partition(".")
+    if cable not in testbed.cable_names or axis not in AXES:
+        return None
+    place = PointPlace(testbed.cable_names.index(cable), point, AXES.index(axis))
+    value = coordinate(testbed, place)
+    return Chosen(Parameter(name, "m", value - 0.2, value + 0.2, 0.01), place, value)
+
+
+def coordinate(testbed: Testbed, place: PointPlace) -> float:
+    """Return the machine's own coordinate of one end of a cable [m]."""
+    return float(getattr(testbed.cables[place.cable], place.point)[place.axis])
 
 
 def _present(testbed: Testbed, place: EffectPlace) -> float:

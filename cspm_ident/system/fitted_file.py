@@ -14,7 +14,9 @@ from cspm_ident.system.choice import (
     BarPlace,
     Chosen,
     EffectPlace,
+    PointPlace,
     absent_values,
+    coordinate,
     same_place,
 )
 from cspm_ident.system.identification import SystemResult
@@ -27,8 +29,9 @@ Content = Any
 def fitted_testbed(result: SystemResult, file: TestbedFile, source: str) -> TestbedFile:
     """Return the test-bed file with the fitted numbers, each with recording and interval.
 
-    Comments and all other numbers stay. Numbers of the bar stand in `bar`, all others in `effects`.
-    What kept its value, or was not excited, is left as it was.
+    Comments and all other numbers stay. Numbers of the bar stand in `bar`, ends of cables with
+    their cable, all others in `effects`. What kept its value, or was not excited, is left as it
+    was.
 
     Args:
         result: what was identified.
@@ -50,6 +53,8 @@ def fitted_testbed(result: SystemResult, file: TestbedFile, source: str) -> Test
         number = _number(result, each)
         if isinstance(each.place, EffectPlace):
             _put_effect(content, file.testbed, each.place, number)
+        elif isinstance(each.place, PointPlace):
+            _put_point(content["cables"], each.place, number)
         elif file.testbed.bar is not None:
             _put_bar(content["bar"], file.testbed.bar, each.place, number)
     stream = io.StringIO()
@@ -76,6 +81,8 @@ def _now(testbed: Testbed, each: Chosen) -> float:
             if same_place(testbed, each.place, entry.effect, entry.elements):
                 return entry.parameters[each.place.parameter]
         return absent_values(each.place.effect)[each.place.parameter]
+    if isinstance(each.place, PointPlace):
+        return coordinate(testbed, each.place)
     bar = testbed.bar
     return bar_value(bar, each.place) if bar is not None else each.nominal
 
@@ -105,6 +112,25 @@ def _put_bar(content: Content, bar: Bar, place: BarPlace, number: FittedNumber) 
             content["inertia"][part] = wanted.content()
         else:
             content[key] = wanted.content()
+
+
+def _put_point(cables: Content, place: PointPlace, number: FittedNumber) -> None:
+    """Put one coordinate in; the others keep what the file said of the whole point."""
+    for cable in cables:
+        # What took the point from this cable by `<<` keeps it as it was.
+        if place.point not in dict(cable.non_merged_items()):
+            cable[place.point] = cable[place.point]
+    cable = cables[place.cable]
+    point = cable[place.point]
+    if not isinstance(point, CommentedSeq):
+        about = {key: remark for key, remark in point.items() if key != "value"}
+        each = [CommentedMap({"value": value, **about}) for value in point["value"]]
+        for old in each:
+            old.fa.set_flow_style()
+        point = _line(each)
+    cable[place.point] = _line(
+        [number.content() if i == place.axis else old for i, old in enumerate(point)]
+    )
 
 
 def _put_effect(

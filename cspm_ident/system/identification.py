@@ -8,12 +8,10 @@ from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.optimize import least_squares
 
 from cspm_ident.estimation import Profile, Solution, find_profile, fit
 from cspm_ident.estimation.estimate import Interval
 from cspm_ident.estimation.noise import unit_noise
-from cspm_ident.estimation.parameter import free_indices, prior_rows, scales
 from cspm_ident.estimation.problem import Problem
 from cspm_ident.recording_roles import check_roles
 from cspm_ident.signals.measurement import Measurement
@@ -30,6 +28,7 @@ from cspm_ident.system.noise_scatter import (
     widened,
     without_bias,
 )
+from cspm_ident.system.search import search
 from cspm_ident.system.shooting import Shooting, make_shooting
 from cspm_msgs_py.errors import InputError
 from cspm_msgs_py.testbed import Testbed
@@ -39,10 +38,6 @@ Progress = Callable[[str], None]
 
 HORIZON = 4.0  # s
 MOST_WINDOWS = 12
-# The initial states are free to first order only, so they are found anew for better parameters.
-_MOST_PASSES = 8
-_EVALUATIONS = 3  # of a pass
-_STILL = 1e-3  # scales
 # Of a scale: below it rounding of the simulation shows in the differences.
 _STEP = 1e-4
 
@@ -197,7 +192,7 @@ def solve(
     shootings = [make_shooting(each, horizon, most_windows, delays) for each in searched]
     theta = np.array([each.nominal for each in chosen])
     problem = make_problem(machine, chosen, shootings)
-    theta, settled = _search(problem, machine, chosen, shootings, theta, progress)
+    theta, settled = search(problem, machine, chosen, shootings, theta, progress)
     progress("noise, drawn anew")
 
     def redrawn(draw: int, sign: float = 1.0) -> Problem:
@@ -254,63 +249,6 @@ def _judged(
         progress(f"prediction of {each.path.name}")
         found.append(judge(each, machines, True, delays))
     return tuple(found)
-
-
-def _search(
-    problem: Problem,
-    machine: Testbed,
-    chosen: Sequence[Chosen],
-    shootings: Sequence[Shooting],
-    theta: Array,
-    progress: Progress,
-) -> tuple[Array, bool]:
-    """Return where parameters and initial states stand still, and whether they came to.
-
-    Residuals are weighted by sensor noise.
-
-    No noise model is fitted on the way: what wrong parameters leave would pass for noise.
-    """
-    unit, free = scales(problem.parameters), free_indices(problem.parameters)
-    if not len(free):
-        raise InputError("identify system: nothing is free, allowed: at least one to be fitted")
-    nominal = theta
-    limits = np.array([(p.lower, p.upper) for p in problem.parameters])[free].T / unit[free]
-    for number in range(_MOST_PASSES):
-        progress(f"initial states and parameters, pass {number + 1}")
-        for shooting in shootings:
-            shooting.relinearise(machine_with(machine, chosen, theta))
-        before, theta = theta, _improved(problem, theta, nominal, limits)
-        if np.all(np.abs(theta - before) <= _STILL * unit):
-            return theta, True
-    return theta, False
-
-
-def _improved(problem: Problem, theta: Array, held: Array, limits: Array) -> Array:
-    unit, free = scales(problem.parameters), free_indices(problem.parameters)
-    where, means, deviations = prior_rows(problem.parameters)
-    # What nothing excites must not wander off on the way; what is excited hardly feels one scale.
-    where, means = np.concatenate([where, free]), np.concatenate([means, held[free]])
-    deviations = np.concatenate([deviations, unit[free]])
-
-    def whole(some: Array) -> Array:
-        moved = theta.copy()
-        moved[free] = some * unit[free]
-        return np.asarray(moved)
-
-    def residual(some: Array) -> Array:
-        values = whole(some)
-        parts = [part.ravel() for part in problem.residuals(values)]
-        return np.concatenate([*parts, (values[where] - means) / deviations])
-
-    def jacobian(some: Array) -> Array:
-        parts = [part.reshape(-1, len(free)) for part in problem.jacobians(whole(some))]
-        prior = np.zeros((len(where), len(free)))
-        prior[np.arange(len(where)), np.searchsorted(free, where)] = 1.0 / deviations
-        return np.asarray(np.concatenate([*parts, prior]) * unit[free])
-
-    start = theta[free] / unit[free]
-    found = least_squares(residual, start, jacobian, limits, max_nfev=_EVALUATIONS)
-    return whole(found.x)
 
 
 def make_problem(

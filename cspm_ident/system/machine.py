@@ -13,10 +13,11 @@ from cspm_ident.system.choice import (
     BarPlace,
     Chosen,
     EffectPlace,
+    PointPlace,
     absent_values,
     same_place,
 )
-from cspm_msgs_py.testbed import Bar, EffectEntry, Testbed
+from cspm_msgs_py.testbed import Bar, Cable, EffectEntry, Testbed
 
 Array = NDArray[np.float64]
 
@@ -30,13 +31,17 @@ def machine_with(
 
     A tensor of inertia that no body has is not refused here, so that a search may pass through it.
     """
-    bar, effects = testbed.bar, list(testbed.effects)
+    bar, effects, cables = testbed.bar, list(testbed.effects), list(testbed.cables)
     for each, value in zip(chosen, values, strict=True):
         if isinstance(each.place, EffectPlace):
             _put_effect(testbed, effects, each.place, float(value))
+        elif isinstance(each.place, PointPlace):
+            number = each.place.cable
+            cables[number] = _put_point(cables[number], each.place, float(value))
         elif bar is not None:
             bar = _put_bar(bar, each.place, float(value))
-    return testbed.model_copy(update={"bar": bar, "effects": tuple(effects)})
+    changes = {"bar": bar, "effects": tuple(effects), "cables": tuple(cables)}
+    return testbed.model_copy(update=changes)
 
 
 def bar_values(place: BarPlace, value: float, bar: Bar) -> Mapping[str, float]:
@@ -60,6 +65,12 @@ def _put_bar(bar: Bar, place: BarPlace, value: float) -> Bar:
         else:
             bar = bar.model_copy(update={key: number})
     return bar
+
+
+def _put_point(cable: Cable, place: PointPlace, value: float) -> Cable:
+    point = list(getattr(cable, place.point))
+    point[place.axis] = value
+    return cable.model_copy(update={place.point: tuple(point)})
 
 
 def _put_effect(

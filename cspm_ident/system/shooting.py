@@ -43,6 +43,7 @@ class Shooting:
         starts: what is added to the state measured at each window's start: bar (12) and unstretched
             lengths, shape (windows, 12 + n).
         spans: per window, an orthonormal basis of what changes of its start do to all residuals.
+        answers: per window, the change of its start from coordinates in that basis.
         weights: by kind, one over the standard deviation of each channel.
         noise: by attribute of the measurement, the standard deviation of each of its columns.
     """
@@ -53,6 +54,7 @@ class Shooting:
     weights: dict[str, Array]
     noise: dict[str, Array]
     spans: list[Array] = field(default_factory=list)
+    answers: list[Array] = field(default_factory=list)
 
     @property
     def kinds(self) -> tuple[str, ...]:
@@ -102,13 +104,22 @@ class Shooting:
         for step, unit in zip(steps, np.eye(width), strict=True):
             self.starts = kept + step * unit
             columns.append(self.raw_residuals(machine))
-        self.starts, self.spans = kept.copy(), []
+        self.starts, self.spans, self.answers = kept.copy(), [], []
         for i, part in enumerate(base):
             target = self._row(part)
             slopes = [(self._row(c[i]) - target) / s for c, s in zip(columns, steps, strict=True)]
-            span, change = _solved(np.stack(slopes, axis=1), target)
+            span, answer = _solution(np.stack(slopes, axis=1))
             self.spans.append(span)
-            self.starts[i] -= change
+            self.answers.append(answer)
+        self._move_starts(base)
+
+    def follow(self, machine: Testbed) -> None:
+        """Move the initial states to their best for another machine, by the slopes known."""
+        self._move_starts(self.raw_residuals(machine))
+
+    def _move_starts(self, residuals: list[dict[str, Array]]) -> None:
+        for i, part in enumerate(residuals):
+            self.starts[i] -= self.answers[i] @ (self.spans[i].T @ self._row(part))
 
     def _row(self, part: dict[str, Array]) -> Array:
         return np.concatenate([part[kind].ravel() for kind in self.kinds])
@@ -228,13 +239,15 @@ def _averaged(error: Array) -> Array:
     return np.asarray(error[: count * _BLOCK].reshape(count, _BLOCK, -1).mean(axis=1))
 
 
-def _solved(slopes: Array, target: Array) -> tuple[Array, Array]:
-    """Return an orthonormal basis of the columns that show, and the least squares solution."""
+def _solution(slopes: Array) -> tuple[Array, Array]:
+    """Return an orthonormal basis of the columns that show, and what solves them from there.
+
+    With Q and A, A·Qᵀ·y is the least squares solution of slopes·x = y.
+    """
     size = np.linalg.norm(slopes, axis=0) + 1e-300
     left, values, right = np.linalg.svd(slopes / size, full_matrices=False)
     seen = values > _UNSEEN * values[0]
-    span = left[:, seen]
-    return span, (right[seen].T @ ((span.T @ target) / values[seen])) / size
+    return left[:, seen], right[seen].T / values[seen] / size[:, None]
 
 
 def _positive(noise: Array) -> Array:

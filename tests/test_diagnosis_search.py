@@ -161,3 +161,27 @@ def test_what_is_never_told_is_fitted_before_a_residual_counts():
 def test_a_shape_is_put_into_a_formula_where_it_follows_one(shape, expected):
     knots = np.linspace(-2.0, 2.0, KNOTS)
     assert sketch(knots, shape(knots), "speed") == expected
+
+
+def drifting(times):
+    return 0.15 * np.sign(np.sin(5.0 * np.pi * times / 48.0))
+
+
+def test_what_only_time_tells_is_unknown_though_no_other_block_foretells_it():
+    equation = turning(missing=lambda speed: drifting(STEP * np.arange(ROWS)))
+    told = {driver.signal for driver, _, _ in found(equation).unknown}
+    assert told == {"time [s]"}
+
+
+def test_a_wrong_number_of_the_file_does_not_begin():
+    """A force that a wrong stiffness would make, but only later, is something else."""
+    stiffness = Candidate(catalogue()["cable_stiffness"], "only")
+    friction = Candidate(catalogue()["cable_hysteresis"], "only", (("displacement", 1e-3),))
+    place = Place(Channel.TENSION, "only")
+    rng, times = np.random.default_rng(5), STEP * np.arange(ROWS)
+    column = np.sin(2.1 * times) + 0.6 * np.sin(0.83 * times)
+    target = 0.3 * column * (times > 24.0) + 0.05 * rng.standard_normal(ROWS)
+    for term, begins in ((stiffness, False), (friction, True)):
+        shaped = {term: column[:, None, None]}
+        (named,) = found(Equation(place, times, target[:, None], shaped, target[:, None])).named
+        assert (named.hypothesis.onset > 0) is begins

@@ -26,6 +26,11 @@ class Driver(NamedTuple):
     place: Place
     signal: str
 
+    @property
+    def of_time(self) -> bool:
+        """Whether it is a function of time, which no two blocks have in common."""
+        return self.signal.startswith("time")
+
 
 class Knots:
     """Where each driver's free function has its values, alike in all recordings."""

@@ -9,7 +9,6 @@ from dataclasses import replace
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.stats import norm, wilcoxon
 
 from cspm_ident.diagnosis.columns import Candidate
 from cspm_ident.diagnosis.drivers import Driver
@@ -27,7 +26,8 @@ from cspm_ident.diagnosis.hypothesis import (
     is_wider,
     joined,
 )
-from cspm_ident.diagnosis.sums import Gain, Sums, gain_of
+from cspm_ident.diagnosis.sums import Gain, Sums, behind, gain_of
+from cspm_sim.effects import Effect
 
 Array = NDArray[np.float64]
 Index = NDArray[np.intp]
@@ -118,8 +118,9 @@ class Search:
 
     def _begun(self, hypothesis: Hypothesis, chosen: Sequence[Hypothesis]) -> Hypothesis:
         """Return the hypothesis with its onset, from which on its columns act henceforth."""
-        own = self.own_columns(hypothesis)
-        onset = hypothesis.onset or self._onset(self.columns(chosen), own)
+        own, onset = self.own_columns(hypothesis), hypothesis.onset
+        if not onset and _may_begin(hypothesis.effect):
+            onset = self._onset(self.columns(chosen), own)
         if onset:
             self.evidence.delay(own, onset)
             self.sums.delay(own, onset)
@@ -153,6 +154,8 @@ class Search:
     def _dated(self, hypothesis: Hypothesis, base: Index) -> Iterable[Hypothesis]:
         """Yield the hypothesis for all the time, and from its onset on if it seems to have one."""
         yield hypothesis
+        if not _may_begin(hypothesis.effect):
+            return
         onset = self._onset(base, self.own_columns(hypothesis))
         if 0 < onset <= self.sums.blocks - _FEWEST_BLOCKS:
             yield replace(hypothesis, onset=onset)
@@ -246,7 +249,7 @@ class Search:
             with self.sums.delayed(own, best.onset):
                 apart = self.sums.held_out(np.concatenate([base, own])) - reference
             worse, wider = gain_of(apart), len(own) - len(self.own_columns(fewest))
-            if wider <= 0 and worse.total < least and _behind(apart) <= -_TIED:
+            if wider <= 0 and worse.total < least and behind(apart) <= -_TIED:
                 fewest, least = replace(rival, onset=best.onset), worse.total
             elif wider < 0 and worse.total <= min(
                 2.0 * gained.error, MATERIAL_SHARE * gained.total
@@ -321,9 +324,9 @@ class Search:
                 worse = self.sums.held_out(np.concatenate([base, columns])) - reference
             if worse.sum() > _RIVAL_SHARE * gained:
                 continue
-            behind = _behind(worse)
-            if behind <= _TIED or worse.sum() <= _TIED_SHARE * gained:
-                yield Rival(rival, min(behind, _TIED))
+            apart = behind(worse)
+            if apart <= _TIED or worse.sum() <= _TIED_SHARE * gained:
+                yield Rival(rival, min(apart, _TIED))
 
     def _contains(self, base: Index, wide: Index, narrow: Index) -> bool:
         """Return whether `narrow` is a case of `wide`, as Coulomb's friction of Stribeck's."""
@@ -359,7 +362,8 @@ class Search:
         found = []
         for driver in self._drivers:
             own = self._of(driver)
-            gain, chance = self.sums.gain(base, own), self.sums.p_value(base, own)
+            told = self.sums.gain_within if driver.of_time else self.sums.gain
+            gain, chance = told(base, own), self.sums.p_value(base, own)
             if gain.total > 0.0 and chance < FALSE_ALARMS / len(self._drivers):
                 share = self.share(base, own)
                 if share >= UNKNOWN_SHARE:
@@ -373,20 +377,15 @@ class Search:
         return self.evidence.columns_of([term])
 
 
+def _may_begin(effect: Effect) -> bool:
+    """Return whether an effect may be absent at first; a wrong number of the file is always one."""
+    return effect.alter is None
+
+
 def _where(members: Sequence[Candidate], elements: set[str]) -> list[tuple[Candidate, ...]]:
     """Return on which members an effect may do what something on some elements does."""
     same = tuple(c for c in members if c.element in elements)
     return [same] if same else list(dict.fromkeys([*((c,) for c in members), tuple(members)]))
-
-
-def _behind(worse: Array) -> float:
-    """Return by how many standard deviations blocks are worse, whatever the size of a single one.
-
-    By Wilcoxon's signed ranks, which no outlying block decides.
-    """
-    if not np.any(worse):
-        return 0.0
-    return float(norm.isf(wilcoxon(worse, alternative="greater").pvalue))
 
 
 def _short_list(candidates: Sequence[Candidate], gains: Array) -> list[Candidate]:

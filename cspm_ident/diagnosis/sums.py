@@ -11,6 +11,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 from scipy.stats import f as f_distribution
+from scipy.stats import norm, wilcoxon
 from scipy.stats import t as t_distribution
 
 from cspm_ident.diagnosis.evidence import Evidence, silence
@@ -173,6 +174,16 @@ class Sums:
         better = self.held_out(base) - self.held_out(np.concatenate([base, columns]))
         return gain_of(better)
 
+    def gain_within(self, base: Index, columns: Index) -> Gain:
+        """Return what columns gain beyond a base in the blocks that they were fitted to.
+
+        For columns that are not the same in any two blocks, as functions of time: blocks that were
+        not fitted say nothing of them.
+        """
+        both, blocks = np.concatenate([base, columns]), np.arange(self.blocks)
+        before = self._left(base, self._weights(base, self._whole), blocks)
+        return gain_of(before - self._left(both, self._weights(both, self._whole), blocks))
+
     def covariance(self, base: Index, columns: Index) -> Array:
         """Return the covariance of the weights of columns beside a base.
 
@@ -290,6 +301,16 @@ def gain_of(better: Array) -> Gain:
     """Return total and standard error of gains by block."""
     spread = float(better.std(ddof=1)) if len(better) > 1 else float("inf")
     return Gain(float(better.sum()), spread * float(np.sqrt(len(better))))
+
+
+def behind(worse: Array) -> float:
+    """Return by how many standard deviations blocks are worse, whatever the size of a single one.
+
+    By Wilcoxon's signed ranks, which no outlying block decides.
+    """
+    if not np.any(worse):
+        return 0.0
+    return float(norm.isf(wilcoxon(worse, alternative="greater").pvalue))
 
 
 def _pseudo_inverse(gram: Array) -> Array:

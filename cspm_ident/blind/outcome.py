@@ -75,8 +75,8 @@ class Outcome:
         beginnings: of what was named.
         estimates: of the parameters named.
         probabilities: of the findings named, with whether they are right.
-        fit: held-out errors in units of the noise floor: before, re-tuned, after, of the residual
-            that was worst before; None without residuals.
+        fit: held-out errors in units of the noise floor: before, re-tuned, after, of the concealed
+            elements' residual that was worst before; None without residuals.
         seconds: processor time.
     """
 
@@ -148,7 +148,7 @@ def judge(item: Data, result: Data) -> Outcome:
             for f in findings
             if f["probability"] is not None
         ),
-        fit=_fit(diagnosis["residuals"]),
+        fit=_fit(diagnosis["residuals"], concealed),
         seconds=float(result["times"]["cpu_s"]),
     )
 
@@ -219,15 +219,18 @@ def _estimates(concealed: Data, findings: Sequence[Data]) -> list[Estimate]:
     return found
 
 
-def _fit(residuals: Sequence[Data]) -> tuple[float, float, float] | None:
-    best = None
-    for each in residuals:
-        held_out = each["held_out"]
-        floor = held_out["noise_floor"]
-        if floor <= 0.0:
-            continue
-        keys = ("nrmse_before", "nrmse_retuned_nominal", "nrmse_after")
-        before, retuned, after = (held_out[key] / floor for key in keys)
-        if best is None or before > best[0]:
-            best = (before, retuned, after)
-    return best
+def _fit(residuals: Sequence[Data], concealed: Sequence[Data]) -> tuple[float, float, float] | None:
+    """Return the held-out errors of the residual of a concealed element that was worst before.
+
+    Others, of which some is always worst by its noise's colour, are not what is to be mended.
+    """
+    where = {"bar" if e == "winch_frame" else e for each in concealed for e in each["elements"]}
+    own = [r for r in residuals if where & set(r["channel"].split("/"))]
+    stages = [each["held_out"] for each in own or residuals]
+    return max((_in_noise(each) for each in stages if each["noise_floor"] > 0.0), default=None)
+
+
+def _in_noise(stages: Data) -> tuple[float, float, float]:
+    keys = ("nrmse_before", "nrmse_retuned_nominal", "nrmse_after")
+    before, retuned, after = (float(stages[key] / stages["noise_floor"]) for key in keys)
+    return before, retuned, after

@@ -161,13 +161,15 @@ def _onsets(outcomes: Sequence[Outcome]) -> dict[str, Any]:
 
 def _fit(outcomes: Sequence[Outcome]) -> dict[str, Any]:
     named = [o.fit for o in outcomes if o.named and o.fit is not None]
+    # A wrong number is what re-tuning mends as well.
+    effects = [o.fit for o in outcomes if o.named and o.fit is not None and o.kind == EFFECT]
     return {
         "cases": len(named),
         "before": median(f[0] for f in named) if named else None,
         "retuned": median(f[1] for f in named) if named else None,
         "after": median(f[2] for f in named) if named else None,
         "near_floor": share(f[2] <= NEAR_FLOOR for f in named),
-        "below_retuned": share(f[2] < f[1] for f in named),
+        "below_retuned": share(f[2] < f[1] for f in effects),
     }
 
 

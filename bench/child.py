@@ -5,8 +5,15 @@ from __future__ import annotations
 import os
 import subprocess
 import sys
-from collections.abc import Mapping, Sequence
+import time
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from pathlib import Path
+from typing import TypeVar
+
+import psutil
+
+SAMPLE_S = 0.1
+T = TypeVar("T")
 
 
 def start_cspm(arguments: Sequence[str], environment: Mapping[str, str]) -> subprocess.Popen[str]:
@@ -29,3 +36,20 @@ def finish(child: subprocess.Popen[str]) -> None:
     _, errors = child.communicate()
     if child.returncode:
         raise RuntimeError(f"cspm ended with {child.returncode}: {errors.strip()}")
+
+
+def watched(child: subprocess.Popen[str], look: Callable[[psutil.Process], T]) -> Iterator[T]:
+    """Yield what a look at a child tells, every `SAMPLE_S`, until it ends.
+
+    Raises:
+        RuntimeError: it failed.
+    """
+    process = psutil.Process(child.pid)
+    while child.poll() is None:
+        try:
+            seen = look(process)
+        except psutil.NoSuchProcess:
+            break
+        yield seen
+        time.sleep(SAMPLE_S)
+    finish(child)

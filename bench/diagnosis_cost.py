@@ -11,13 +11,10 @@ import time
 from pathlib import Path
 from typing import NamedTuple
 
-import psutil
-
-from bench.child import finish, start_cspm
+from bench.child import start_cspm, watched
 from bench.diagnosis import Case, record
 from bench.thesis_machine import SCENARIOS
 
-SAMPLE_S = 0.1
 SEED = 100
 PLANTED = Case("winch_coulomb_friction", ("surge_2",), {"torque": 0.031})
 
@@ -59,17 +56,8 @@ def cost_of(recorded: Path, out: Path) -> Cost:
     words = ["diagnose", str(recorded), "--testbed", testbed, "--no-closed-loop"]
     begun = time.perf_counter()
     child = start_cspm([*words, "--json", str(out / "diagnosis.json")], {})
-    process = psutil.Process(child.pid)
-    memory, processor = 0, 0.0
-    while child.poll() is None:
-        try:
-            times = process.cpu_times()
-            memory = max(memory, process.memory_info().rss)
-            processor = max(processor, times.user + times.system)
-        except psutil.NoSuchProcess:
-            break
-        time.sleep(SAMPLE_S)
-    finish(child)
+    looks = list(watched(child, lambda p: (p.memory_info().rss, sum(p.cpu_times()[:2]))))
+    memory, processor = (max(column) for column in zip(*looks, strict=True))
     return Cost(time.perf_counter() - begun, processor, memory)
 
 

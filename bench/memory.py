@@ -8,13 +8,11 @@ import time
 from pathlib import Path
 
 import numpy as np
-import psutil
 
-from bench.child import finish, start_cspm
+from bench.child import SAMPLE_S, start_cspm, watched
 from bench.figure import Advance, Figure
 
 GROUP = "memory, worst case"
-SAMPLE_S = 0.1
 BYTES_PER_SECOND = 1.6e6
 # Start-up lies before, the run's picture behind.
 STEADY = (0.25, 0.9)
@@ -48,16 +46,8 @@ def measure_memory(duration: float, recorded: bool, advance: Advance) -> list[Fi
 def _watch(arguments: list[str]) -> tuple[np.ndarray, np.ndarray]:
     """Return times [s] and resident memory [MB] of a run."""
     began = time.perf_counter()
-    child = start_cspm(arguments, {})
-    process = psutil.Process(child.pid)
-    samples = []
-    while child.poll() is None:
-        try:
-            samples.append((time.perf_counter() - began, process.memory_info().rss / 1e6))
-        except psutil.NoSuchProcess:
-            break
-        time.sleep(SAMPLE_S)
-    finish(child)
+    looks = watched(start_cspm(arguments, {}), lambda process: process.memory_info().rss / 1e6)
+    samples = [(time.perf_counter() - began, size) for size in looks]
     # A process that has ended and was not yet asked for has no memory left.
     found = np.array([sample for sample in samples if sample[1] > 0.0])
     return found[:, 0], found[:, 1]

@@ -99,10 +99,9 @@ def bounded(candidate: Candidate, weights: Array, half: Array) -> Array:
     effect = candidate.effect
     if effect.coefficients:
         return weights
-    linear = [p for p in effect.parameters if p.name not in effect.nonlinear]
-    absent = np.array([p.absent or 0.0 for p in linear])
-    low = np.array([p.minimum for p in linear]) - absent
-    nearest = np.clip(weights, low, np.array([p.maximum for p in linear]) - absent)
+    absent = np.array([p.absent or 0.0 for p in effect.linear])
+    low = np.array([p.minimum for p in effect.linear]) - absent
+    nearest = np.clip(weights, low, np.array([p.maximum for p in effect.linear]) - absent)
     return np.where(np.abs(nearest - weights) <= half, nearest, weights)
 
 

@@ -86,7 +86,7 @@ def _material(
 
 
 def _limit(candidate: Candidate, least: float) -> Limit:
-    (parameter,) = (p for p in candidate.effect.parameters if p.name not in candidate.nonlinear)
+    (parameter,) = candidate.effect.linear
     absent = parameter.absent or 0.0
     possible = bool(absent + least <= parameter.maximum or absent - least >= parameter.minimum)
     return Limit(

@@ -171,7 +171,7 @@ class Effect:
         """Return what the columns are to be multiplied with for these parameters."""
         if self.coefficients:
             return np.asarray(self.coefficients(values), dtype=float)
-        return np.array([values[p.name] - (p.absent or 0.0) for p in self._linear])
+        return np.array([values[p.name] - (p.absent or 0.0) for p in self.linear])
 
     def values(self, weights: Sequence[float], **nonlinear: float) -> dict[str, float]:
         """Return all parameters for weights that a regression found."""
@@ -179,7 +179,7 @@ class Effect:
             return self.from_coefficients(weights, nonlinear)
         found = {
             p.name: float(weight) + (p.absent or 0.0)
-            for p, weight in zip(self._linear, weights, strict=True)
+            for p, weight in zip(self.linear, weights, strict=True)
         }
         return {p.name: {**nonlinear, **found}[p.name] for p in self.parameters}
 
@@ -202,7 +202,8 @@ class Effect:
         return bool(acting) and all(values[p.name] == p.absent for p in acting)
 
     @property
-    def _linear(self) -> tuple[EffectParameter, ...]:
+    def linear(self) -> tuple[EffectParameter, ...]:
+        """The parameters that are not searched on a grid."""
         return tuple(p for p in self.parameters if p.name not in self.nonlinear)
 
 

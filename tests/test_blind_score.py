@@ -5,6 +5,7 @@ import pytest
 from scipy.stats import binom
 
 from cspm_ident.blind.comparison import comparison
+from cspm_ident.blind.floor import sound_floors
 from cspm_ident.blind.outcome import Beginning, judge, kind_of
 from cspm_ident.blind.page import scorecard_page
 from cspm_ident.blind.scorecard import scorecard
@@ -29,6 +30,7 @@ def item(name, *hidden, stratum="noise", absorbed_by=None):
     return {
         "name": name,
         "stratum": stratum,
+        "scenario": "calm",
         "absorbed_by": absorbed_by,
         "concealed": list(hidden),
     }
@@ -62,10 +64,16 @@ def result(verdict, *findings):
 
 
 FRICTION = "winch_coulomb_friction"
+TORQUE = "winches/torque/surge_1"
+FLOORS = {("calm", TORQUE): 2.0, ("calm", "cables/tension/surge_1"): 1.0}
+
+
+def judged(hidden, told):
+    return judge(hidden, told, FLOORS)
 
 
 def test_a_diagnosis_that_is_right_in_everything():
-    outcome = judge(item("a", concealed()), result("effect", finding(FRICTION)))
+    outcome = judged(item("a", concealed()), result("effect", finding(FRICTION)))
     assert (outcome.kind, outcome.verdict, outcome.multiple) == ("effect", "effect", 2.0)
     assert outcome.detected
     assert outcome.block
@@ -80,11 +88,30 @@ def test_a_diagnosis_that_is_right_in_everything():
     assert estimate.error == pytest.approx(0.05)
     assert estimate.covered
     assert outcome.probabilities == ((0.9, True),)
-    assert outcome.fit == pytest.approx((10.0, 8.0, 1.2))
+    assert outcome.fit == pytest.approx((5.0, 4.0, 0.6))
+
+
+def test_errors_are_told_in_units_of_what_sound_machines_of_the_scenario_leave():
+    sound, broken = item("sound"), item("broken", concealed())
+    other, failed = item("other") | {"scenario": "worst_case"}, item("failed")
+    results = {name: result("consistent") for name in ("sound", "broken", "other")}
+    results["failed"] = {"diagnosis": None, "times": {"cpu_s": 1.0}}
+    found = sound_floors({"items": [sound, broken, other, failed]}, results)
+    assert found["calm", TORQUE] == pytest.approx(10.0)
+    assert found["worst_case", TORQUE] == pytest.approx(10.0)
+    assert found["calm", "winches/torque/surge_2"] == pytest.approx(50.0)
+    louder = result("consistent")
+    louder["diagnosis"]["residuals"][0]["held_out"] = FIT | {"noise_floor": 0.005}
+    two = {"items": [sound, item("louder")]}
+    assert sound_floors(two, {"sound": results["sound"], "louder": louder})[
+        "calm", TORQUE
+    ] == pytest.approx(15.0)
+    assert judge(broken, result("consistent"), {}).fit is None
+    assert sound_floors({"items": [broken]}, results) == {}
 
 
 def test_the_right_effect_on_another_element_is_not_named():
-    outcome = judge(item("a", concealed()), result("effect", finding(FRICTION, "surge_2")))
+    outcome = judged(item("a", concealed()), result("effect", finding(FRICTION, "surge_2")))
     assert outcome.effect_only
     assert not outcome.named
     assert not outcome.element
@@ -93,7 +120,7 @@ def test_the_right_effect_on_another_element_is_not_named():
 
 def test_a_truth_among_the_alternatives_is_tied_and_not_named():
     told = finding("winch_load_friction", alternatives=(FRICTION, "pulley_friction"))
-    outcome = judge(item("a", concealed()), result("tie", told))
+    outcome = judged(item("a", concealed()), result("tie", told))
     assert outcome.tied
     assert not outcome.named
     assert outcome.tie_sizes == (3,)
@@ -103,7 +130,7 @@ def test_a_truth_among_the_alternatives_is_tied_and_not_named():
 
 def test_a_finding_that_holds_no_truth_is_wrong():
     told = result("effect", finding("tension_gain"), finding(FRICTION))
-    outcome = judge(item("a", concealed()), told)
+    outcome = judged(item("a", concealed()), told)
     assert outcome.named
     assert not outcome.first
     assert outcome.wrong == 1
@@ -111,29 +138,29 @@ def test_a_finding_that_holds_no_truth_is_wrong():
 
 def test_company_is_named_when_all_of_it_is():
     pair = item("a", concealed(), concealed("winch_viscous_friction", "sway_1"))
-    half = judge(pair, result("effect", finding(FRICTION)))
+    half = judged(pair, result("effect", finding(FRICTION)))
     assert not half.named
     assert not half.tied
     told = result("effect", finding(FRICTION), finding("winch_viscous_friction", "sway_1"))
-    both = judge(pair, told)
+    both = judged(pair, told)
     assert both.named
 
 
 def test_the_number_that_took_an_effect_over_is_no_wrong_finding():
     told = result("effect", finding(FRICTION), finding("winch_drum_radius"))
-    assert judge(item("a", concealed(), absorbed_by="radius"), told).wrong == 0
-    assert judge(item("a", concealed()), told).wrong == 1
+    assert judged(item("a", concealed(), absorbed_by="radius"), told).wrong == 0
+    assert judged(item("a", concealed()), told).wrong == 1
 
 
 def test_what_the_catalogue_lacks_is_named_unknown():
     hidden = item("a", concealed(effect=None, kind="unknown"))
     assert kind_of(hidden) == "outside"
-    assert judge(hidden, result("unknown", finding("unknown", probability=None))).named
-    assert not judge(hidden, result("effect", finding(FRICTION))).named
+    assert judged(hidden, result("unknown", finding("unknown", probability=None))).named
+    assert not judged(hidden, result("effect", finding(FRICTION))).named
 
 
 def test_a_diagnosis_that_failed_found_nothing():
-    outcome = judge(item("a"), {"diagnosis": None, "times": {"cpu_s": 1.0}})
+    outcome = judged(item("a"), {"diagnosis": None, "times": {"cpu_s": 1.0}})
     assert (outcome.verdict, outcome.detected, outcome.fit) == ("failed", False, None)
 
 
@@ -240,7 +267,7 @@ def test_the_page_says_what_split_it_is_of_and_tells_every_miss():
 def begun(onset, told, interval):
     hidden = item("a", concealed()) | {"onset_s": onset}
     said = finding(FRICTION) | {"onset_s": told, "onset_ci95_s": interval}
-    (found,) = judge(hidden, result("effect", said)).beginnings
+    (found,) = judged(hidden, result("effect", said)).beginnings
     return found
 
 
@@ -249,7 +276,7 @@ def test_a_beginning_is_held_against_the_truth():
     assert begun(12.0, 12.5, [12.2, 13.0]) == Beginning(12.0, 12.5, False)
     assert begun(12.0, None, None) == Beginning(12.0, None, None)
     hidden = item("a", concealed()) | {"onset_s": 12.0}
-    assert judge(hidden, result("effect", finding("tension_gain"))).beginnings == ()
+    assert judged(hidden, result("effect", finding("tension_gain"))).beginnings == ()
 
 
 def test_onsets_are_counted_late_and_false():
@@ -277,13 +304,13 @@ def test_the_signal_of_the_unknown_has_to_be_the_right_one_on_the_right_element(
 
     def told(driver, element="surge_1"):
         said = finding("unknown", element, probability=None) | {"region": {"driver": driver}}
-        return judge(hidden, result("unknown", said)).driver
+        return judged(hidden, result("unknown", said)).driver
 
     assert told("speed [rad/s]") is True
     assert told("time [s]") is False
     assert told("speed [rad/s]", "sway_1") is False
-    assert judge(hidden, result("consistent")).driver is None
-    assert judge(item("a", concealed()), result("unknown", finding("unknown"))).driver is None
+    assert judged(hidden, result("consistent")).driver is None
+    assert judged(item("a", concealed()), result("unknown", finding("unknown"))).driver is None
 
 
 def test_methods_are_compared_on_the_recordings_that_all_have():
@@ -298,7 +325,8 @@ def test_methods_are_compared_on_the_recordings_that_all_have():
     assert [row["first"][:2] for row in rows] == [(1, 1), (0, 1)]
     assert [row["false_alarm"][:2] for row in rows] == [(1, 1), (1, 1)]
     assert [row["wrong_per_recording"] for row in rows] == [0.5, 2.0]
-    assert (rows[0]["before"], rows[0]["after"]) == pytest.approx((10.0, 1.2))
+    # The sound machine's residuals are as large before.
+    assert (rows[0]["before"], rows[0]["after"]) == pytest.approx((1.0, 1.2))
     text = scorecard_page(card() | {"peers": rows}, "ab" * 32, "today")
     assert "2 recordings, the same for all" in text
     assert "| lasso | 1 of 1 | 1 of 1 | 0 of 1 | 0 of 1 |" in text

@@ -6,10 +6,13 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
+from cspm_ident.blind.floor import Floors
+
 NOTHING, PARAMETER, EFFECT, OUTSIDE = "nothing", "parameter", "effect", "outside"
 KINDS = (NOTHING, PARAMETER, EFFECT, OUTSIDE)
 UNKNOWN = "unknown"
 FAILED = "failed"
+_STAGES = ("nrmse_before", "nrmse_retuned_nominal", "nrmse_after")
 # Numbers that an absorbed effect has made wrong, by the truth's name, as effects of the catalogue.
 ABSORBING = {
     "damper": "cable_axial_damping",
@@ -76,7 +79,7 @@ class Outcome:
         estimates: of the parameters named.
         probabilities: of the findings named, with whether they are right.
         fit: held-out errors in units of the noise floor: before, re-tuned, after, of the concealed
-            elements' residual that was worst before; None without residuals.
+            elements' residual that was worst before; None without residuals that have a floor.
         seconds: processor time.
     """
 
@@ -105,12 +108,13 @@ class Outcome:
     seconds: float
 
 
-def judge(item: Data, result: Data) -> Outcome:
+def judge(item: Data, result: Data, floors: Floors) -> Outcome:
     """Return how a diagnosis did.
 
     Args:
         item: of the truth file.
         result: `diagnosis`, as `diagnosis.json` has it or None, and `times`.
+        floors: of the residuals, see `sound_floors`.
     """
     diagnosis: Data = result["diagnosis"] or {"verdict": FAILED, "findings": [], "residuals": []}
     findings: Sequence[Data] = diagnosis["findings"]
@@ -148,7 +152,7 @@ def judge(item: Data, result: Data) -> Outcome:
             for f in findings
             if f["probability"] is not None
         ),
-        fit=_fit(diagnosis["residuals"], concealed),
+        fit=_fit(diagnosis["residuals"], item, floors),
         seconds=float(result["times"]["cpu_s"]),
     )
 
@@ -219,18 +223,21 @@ def _estimates(concealed: Data, findings: Sequence[Data]) -> list[Estimate]:
     return found
 
 
-def _fit(residuals: Sequence[Data], concealed: Sequence[Data]) -> tuple[float, float, float] | None:
+def _fit(
+    residuals: Sequence[Data], item: Data, floors: Floors
+) -> tuple[float, float, float] | None:
     """Return the held-out errors of the residual of a concealed element that was worst before.
 
-    Others, of which some is always worst by its noise's colour, are not what is to be mended.
+    Others are not what is to be mended.
     """
-    where = {"bar" if e == "winch_frame" else e for each in concealed for e in each["elements"]}
+    concealed = {e for each in item["concealed"] for e in each["elements"]}
+    where = {"bar" if element == "winch_frame" else element for element in concealed}
     own = [r for r in residuals if where & set(r["channel"].split("/"))]
-    stages = [each["held_out"] for each in own or residuals]
-    return max((_in_noise(each) for each in stages if each["noise_floor"] > 0.0), default=None)
-
-
-def _in_noise(stages: Data) -> tuple[float, float, float]:
-    keys = ("nrmse_before", "nrmse_retuned_nominal", "nrmse_after")
-    before, retuned, after = (float(stages[key] / stages["noise_floor"]) for key in keys)
-    return before, retuned, after
+    found = []
+    for residual in own or residuals:
+        stages, floor = residual["held_out"], floors.get((item["scenario"], residual["channel"]))
+        if floor is not None and stages["noise_floor"] > 0.0:
+            unit = stages["noise_floor"] * floor
+            before, retuned, after = (float(stages[key] / unit) for key in _STAGES)
+            found.append((before, retuned, after))
+    return max(found, default=None)

@@ -105,7 +105,7 @@ def _targets(card: Data) -> str:
     covered = _percent(card["parameters"]["covered"])
     rows.append(("intervals that hold the truth", covered, "90 to 97 %"))
     fit = card["fit"]
-    rows.append(("held-out error within 1.5 × floor", _percent(fit["near_floor"]), ""))
+    rows.append(("held-out error within 1.5 × floor", _percent(fit["near_floor"]), "all"))
     rows.append(("held-out error below re-tuned", _percent(fit["below_retuned"]), "≥ 95 %"))
     return _table(("", "found", "target"), rows)
 
@@ -152,8 +152,8 @@ _PEERS = (
 _ABLATIONS = "What each safeguard is worth, see [blind.md](blind.md#without-one-safeguard)."
 _COLUMNS = (
     "Hits and cases are those of the targets; wrong findings are per recording; held-out is the"
-    " worst residual in units of its noise, before and after, median of known effects and numbers"
-    " at 2 limits and more, named or not."
+    " worst residual in units of a sound machine's, before and after, median of known effects and"
+    " numbers at 2 limits and more, named or not."
 )
 
 
@@ -181,8 +181,8 @@ def _numbers(card: Data) -> str:
         f"{parameters['estimates']} parameters were estimated, with a median relative error of"
         f" {'—' if error is None else f'{100 * error:.1f} %'};"
         f" {_percent(parameters['within_a_tenth'])} within a tenth. Held-out error of the worst"
-        f" residual in units of its noise, median of {fit['cases']} named: {_number(fit['before'])}"
-        f" before, {_number(fit['retuned'])} re-tuned, {_number(fit['after'])} after. Processor"
+        f" residual in units of a sound machine's, median of {fit['cases']} named:"
+        f" {_number(fit['before'])} before, {_number(fit['retuned'])} re-tuned, {_number(fit['after'])} after. Processor"
         f" time of a diagnosis: {_number(seconds['median'])} s median, {_number(seconds['max'])} s"
         " at most."
     )

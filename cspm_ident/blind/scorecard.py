@@ -9,6 +9,7 @@ from itertools import pairwise
 from statistics import median
 from typing import Any
 
+from cspm_ident.blind.floor import sound_floors
 from cspm_ident.blind.outcome import (
     EFFECT,
     FAILED,
@@ -35,7 +36,8 @@ def scorecard(truth: Mapping[str, Any], results: Mapping[str, Mapping[str, Any]]
         truth: as the truth file has it.
         results: by recording, see `judge`.
     """
-    outcomes = [judge(i, results[i["name"]]) for i in truth["items"] if i["name"] in results]
+    floors, items = sound_floors(truth, results), truth["items"]
+    outcomes = [judge(i, results[i["name"]], floors) for i in items if i["name"] in results]
     clear = [o for o in outcomes if o.kind in (EFFECT, PARAMETER) and o.multiple >= CLEAR]
     return {
         "schema": SCHEMA,

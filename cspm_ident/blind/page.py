@@ -182,9 +182,9 @@ def _numbers(card: Data) -> str:
         f" {'—' if error is None else f'{100 * error:.1f} %'};"
         f" {_percent(parameters['within_a_tenth'])} within a tenth. Held-out error of the worst"
         f" residual in units of a sound machine's, median of {fit['cases']} named:"
-        f" {_number(fit['before'])} before, {_number(fit['retuned'])} re-tuned, {_number(fit['after'])} after. Processor"
-        f" time of a diagnosis: {_number(seconds['median'])} s median, {_number(seconds['max'])} s"
-        " at most."
+        f" {_number(fit['before'])} before, {_number(fit['retuned'])} re-tuned,"
+        f" {_number(fit['after'])} after. Processor time of a diagnosis:"
+        f" {_number(seconds['median'])} s median, {_number(seconds['max'])} s at most."
     )
 
 

@@ -3,6 +3,7 @@
 import numpy as np
 
 from cspm_ident.diagnosis.columns import Candidate, Place
+from cspm_ident.diagnosis.drivers import Knots
 from cspm_ident.diagnosis.equation import Equation
 from cspm_ident.diagnosis.evidence import gather
 from cspm_ident.diagnosis.hypothesis import bounded, is_allowed
@@ -119,3 +120,37 @@ def test_a_weight_beyond_its_bound_by_chance_is_put_there_and_another_is_left():
     assert not is_allowed(BODY, found)
     assert is_allowed(BODY, bounded(BODY, weights, 3.0 * half))
     assert not is_allowed(BODY, np.zeros(6))
+
+
+def torque_of(untrue, rival=0.1):
+    """A drag by its speed, beside a rival that is nearly that, and a function of tension."""
+    rng = np.random.default_rng(3)
+    speed, other = np.sin(1.7 * TIMES), rng.standard_normal(ROWS)
+    place = Place(Channel.SHAFT, "only")
+    columns = {
+        Candidate(catalogue()["winch_viscous_friction"], "only"): -speed[:, None],
+        Candidate(catalogue()["winch_coulomb_friction"], "only"): -(speed + rival * other)[:, None],
+    }
+    shape = Knots().columns(place, {"tension [N]": LOAD})
+    target = 0.05 * (untrue * np.cos(3.0 * LOAD) - speed)
+    return equation(place, target, columns | {d: c[:, 0] for d, c in shape.items()}, noise=0.0025)
+
+
+def test_what_a_true_model_surely_does_better_decides():
+    (named,) = named_in(torque_of(0.0))
+    assert named.hypothesis.effect.id == "winch_viscous_friction"
+    assert named.alternatives == ()
+
+
+def test_less_than_a_model_is_untrue_by_decides_nothing():
+    """The rival leaves 1 % of the gain in every block, a free function finds 8 times as much."""
+    (named,) = named_in(torque_of(0.28))
+    (rival,) = named.alternatives
+    assert rival.hypothesis.effect.id == "winch_coulomb_friction"
+    assert rival.behind == 1.0
+
+
+def test_no_model_is_true_to_less_than_half_a_percent():
+    (named,) = named_in(torque_of(0.0, rival=0.04))
+    (rival,) = named.alternatives
+    assert rival.hypothesis.effect.id == "winch_coulomb_friction"

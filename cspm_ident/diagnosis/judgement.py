@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from cspm_ident.diagnosis.columns import Candidate, Place
 from cspm_ident.diagnosis.drivers import Driver
-from cspm_ident.diagnosis.equation import Equation, in_noise
+from cspm_ident.diagnosis.equation import Equation, difference_noise, in_noise
 from cspm_ident.diagnosis.evidence import Evidence
 from cspm_ident.diagnosis.recorded import equations_of
 from cspm_ident.diagnosis.supposed import as_found
@@ -33,7 +33,7 @@ class HeldOut:
         after: with what was found.
         ceiling: with free functions of every driver fitted to the searched data: what a model
             without physics gets.
-        noise: what differs from row to row.
+        noise: what differs from row to row with what was found, whose own course is then no noise.
     """
 
     place: Place
@@ -71,8 +71,8 @@ def judged(
         spread = float(np.sqrt(np.mean((measured - measured.mean(axis=0)) ** 2)))
         stages = (rms(each.get(place, ())) for each in (described, tuned, after))
         before, then, now = (unit * stage for stage in stages)
-        ceiling = unit * free.get(place, float("nan"))
-        out.append(HeldOut(place, unit * spread, before, then, now, ceiling, unit))
+        ceiling, floor = unit * free.get(place, float("nan")), unit * _floor(after.get(place, ()))
+        out.append(HeldOut(place, unit * spread, before, then, now, ceiling, floor))
     return tuple(out)
 
 
@@ -104,6 +104,12 @@ def rms(equations: Sequence[Equation]) -> float:
         left = without_nuisance(equation)
         squares, count = squares + float(np.sum(left**2)), count + left.size
     return float(np.sqrt(squares / max(count, 1)))
+
+
+def _floor(equations: Sequence[Equation]) -> float:
+    """Return what differs from row to row, root mean square over channels."""
+    noises = [difference_noise(without_nuisance(e)) for e in equations if len(e.times) > 3]
+    return float(np.sqrt(np.mean(np.square(noises)))) if noises else float("nan")
 
 
 def without_nuisance(equation: Equation) -> Array:

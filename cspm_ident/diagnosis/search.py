@@ -26,6 +26,7 @@ from cspm_ident.diagnosis.hypothesis import (
     is_wider,
     joined,
 )
+from cspm_ident.diagnosis.likeness import RIVAL_SHARE, contains, misfit, overlap
 from cspm_ident.diagnosis.sums import Gain, Sums, behind, gain_of
 from cspm_sim.effects import Effect
 
@@ -40,10 +41,8 @@ MOST_EFFECTS = 3
 _SHORT_LIST = 12
 # Standard deviations: what is no farther behind explains as well.
 _TIED = 2.0
-# Of the gain: no model is so true that a smaller difference decides.
-_TIED_SHARE = 0.02
-# Of the gain: what loses more is no rival, however the rest scatters.
-_RIVAL_SHARE = 0.5
+# Standard deviations that a difference counts for, however sure, which models are too untrue for.
+_UNDECIDED = 1.0
 # In which an effect has to act to be told.
 _FEWEST_BLOCKS = 5
 
@@ -285,14 +284,7 @@ class Search:
             alike = (c for c in groups.get(group, ()) if c.element not in elements)
             rivals += [Hypothesis(hypothesis.effect, (c,)) for c in alike]
         columns = self.own_columns(hypothesis)
-        return [r for r in rivals if self._overlap(base, columns, self.own_columns(r))]
-
-    def _overlap(self, base: Index, own: Index, other: Index) -> bool:
-        """Return whether columns explain the same, rather than as much of something else."""
-        parts = (own, other, np.union1d(own, other))
-        without = self.sums.squares_of(base)
-        gains = [without - self.sums.squares_of(np.concatenate([base, part])) for part in parts]
-        return gains[0] + gains[1] - gains[2] >= _RIVAL_SHARE * gains[0]
+        return [r for r in rivals if overlap(self.sums, base, columns, self.own_columns(r))]
 
     def _judged(self, k: int, chosen: Sequence[Hypothesis]) -> Named:
         hypothesis, others = chosen[k], [h for i, h in enumerate(chosen) if i != k]
@@ -313,25 +305,21 @@ class Search:
         free = [c for c in self._effects if (c.effect_id, c.element) not in taken]
         reference = self.sums.held_out(np.concatenate([base, own]))
         gained = float(np.sum(self.sums.held_out(base) - reference))
+        undecided = misfit(self.evidence, self.sums, base, own)
         for rival in self._rivals(hypothesis, free, base):
             columns = self.own_columns(rival)
             wider = freedom(rival) > freedom(hypothesis)
-            if (wider and self._contains(base, columns, own)) or not self._is_plausible(
+            if (wider and contains(self.sums, base, columns, own)) or not self._is_plausible(
                 [*others, rival]
             ):
                 continue
             with self.sums.delayed(np.setdiff1d(columns, own), hypothesis.onset):
                 worse = self.sums.held_out(np.concatenate([base, columns])) - reference
-            if worse.sum() > _RIVAL_SHARE * gained:
+            if worse.sum() > RIVAL_SHARE * gained:
                 continue
-            apart = behind(worse)
-            if apart <= _TIED or worse.sum() <= _TIED_SHARE * gained:
-                yield Rival(rival, min(apart, _TIED))
-
-    def _contains(self, base: Index, wide: Index, narrow: Index) -> bool:
-        """Return whether `narrow` is a case of `wide`, as Coulomb's friction of Stribeck's."""
-        alone = self.sums.spanned(base, wide, narrow)
-        return bool(np.all(alone > 0.999))
+            apart, indifferent = behind(worse), worse.sum() <= undecided
+            if apart <= _TIED or indifferent:
+                yield Rival(rival, min(apart, _UNDECIDED if indifferent else _TIED))
 
     def _is_plausible(self, hypotheses: Sequence[Hypothesis]) -> bool:
         """Return whether parameters are what the catalogue allows, but for chance."""

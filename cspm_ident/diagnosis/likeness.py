@@ -1,0 +1,44 @@
+"""Whether columns explain the same, and how far what they explain is from the truth."""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+from cspm_ident.diagnosis.drivers import Driver
+from cspm_ident.diagnosis.evidence import Evidence
+from cspm_ident.diagnosis.sums import Sums
+
+Index = NDArray[np.intp]
+
+# Of the gain: what loses more is no rival, however the rest scatters.
+RIVAL_SHARE = 0.5
+# Of the gain: no model is so true, 7 % of its amplitude, that a smaller difference decides.
+_UNTRUE_SHARE = 0.005
+
+
+def overlap(sums: Sums, base: Index, own: Index, other: Index) -> bool:
+    """Return whether columns explain the same, rather than as much of something else."""
+    parts = (own, other, np.union1d(own, other))
+    without = sums.squares_of(base)
+    gains = [without - sums.squares_of(np.concatenate([base, part])) for part in parts]
+    return gains[0] + gains[1] - gains[2] >= RIVAL_SHARE * gains[0]
+
+
+def contains(sums: Sums, base: Index, wide: Index, narrow: Index) -> bool:
+    """Return whether `narrow` is a case of `wide`, as Coulomb's friction of Stribeck's."""
+    return bool(np.all(sums.spanned(base, wide, narrow) > 0.999))
+
+
+def misfit(evidence: Evidence, sums: Sums, base: Index, own: Index) -> float:
+    """Return by how many squares columns may be untrue: what is less decides nothing.
+
+    The most that a free function of a measured signal gains beyond them in the residuals that they
+    act on; functions of time are left out, which gain what no other block tells.
+    """
+    both = np.concatenate([base, own])
+    gained = float(np.sum(sums.held_out(base) - sums.held_out(both)))
+    places = {p.place for p in evidence.places if np.isin(own, p.columns).any()}
+    drivers = [t for t in evidence.terms if isinstance(t, Driver) and t.place in places]
+    free = [sums.gain(both, evidence.columns_of([d])).total for d in drivers if not d.of_time]
+    return max(_UNTRUE_SHARE * gained, *free, 0.0)

@@ -43,7 +43,7 @@ class Rival(NamedTuple):
     Attributes:
         hypothesis: what it says.
         behind: by how many standard deviations of a normal it is worse, over the blocks that were
-            not fitted; negative where it is better.
+            not fitted, its further parameters counted; 0 where it is as good or better.
     """
 
     hypothesis: Hypothesis

@@ -41,8 +41,6 @@ MOST_EFFECTS = 3
 _SHORT_LIST = 12
 # Standard deviations: what is no farther behind explains as well.
 _TIED = 2.0
-# Standard deviations that a difference counts for, however sure, which models are too untrue for.
-_UNDECIDED = 1.0
 # In which an effect has to act to be told.
 _FEWEST_BLOCKS = 5
 
@@ -300,7 +298,11 @@ class Search:
     def _alternatives(
         self, hypothesis: Hypothesis, others: Sequence[Hypothesis], base: Index, own: Index
     ) -> Iterable[Rival]:
-        """Yield what explains the same nearly as well, the chosen one taken out."""
+        """Yield what explains the same nearly as well, the chosen one taken out.
+
+        A difference that models are too untrue for counts as much less, and every further parameter
+        as in Schwarz's criterion, blocks being what there is to tell it from.
+        """
         taken = {(c.effect_id, c.element) for h in others for c in h.candidates}
         free = [c for c in self._effects if (c.effect_id, c.element) not in taken]
         reference = self.sums.held_out(np.concatenate([base, own]))
@@ -308,7 +310,7 @@ class Search:
         undecided = misfit(self.evidence, self.sums, base, own)
         for rival in self._rivals(hypothesis, free, base):
             columns = self.own_columns(rival)
-            wider = freedom(rival) > freedom(hypothesis)
+            wider = max(0, freedom(rival) - freedom(hypothesis))
             if (wider and contains(self.sums, base, columns, own)) or not self._is_plausible(
                 [*others, rival]
             ):
@@ -317,9 +319,12 @@ class Search:
                 worse = self.sums.held_out(np.concatenate([base, columns])) - reference
             if worse.sum() > RIVAL_SHARE * gained:
                 continue
-            apart, indifferent = behind(worse), worse.sum() <= undecided
-            if apart <= _TIED or indifferent:
-                yield Rival(rival, min(apart, _UNDECIDED if indifferent else _TIED))
+            apart = max(0.0, behind(worse))
+            if worse.sum() < undecided:
+                apart = min(apart, _TIED) * max(0.0, worse.sum() / undecided)
+            apart = float(np.hypot(apart, np.sqrt(wider * np.log(self.sums.blocks))))
+            if apart <= _TIED:
+                yield Rival(rival, apart)
 
     def _is_plausible(self, hypotheses: Sequence[Hypothesis]) -> bool:
         """Return whether parameters are what the catalogue allows, but for chance."""

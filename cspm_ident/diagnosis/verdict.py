@@ -63,7 +63,7 @@ def probability_of(named: Named) -> float:
 
 
 def _odds(rival: Rival) -> float:
-    return exp(-0.5 * max(0.0, rival.behind) ** 2)
+    return exp(-0.5 * rival.behind**2)
 
 
 _BLOCKS = {

@@ -72,11 +72,17 @@ def run(
         list[str] | None,
         typer.Option(metavar="NAME", help="What diagnoses, repeated; otherwise cspm."),
     ] = None,
+    jobs: Annotated[
+        int | None,
+        typer.Option(
+            metavar="NUMBER", help="Recordings at a time, 1.3 GB each; otherwise one per processor."
+        ),
+    ] = None,
 ) -> None:
     """Diagnose recordings that have not been yet, in processes that can read nothing else."""
     from cspm_bringup.blind.commands import run_command
 
-    run_command(folder, method or ["cspm"])
+    run_command(folder, method or ["cspm"], jobs)
 
 
 @blind.command()

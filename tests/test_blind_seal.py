@@ -6,7 +6,6 @@ import signal
 import subprocess
 import sys
 from itertools import combinations
-from pathlib import Path
 
 import numpy as np
 import pytest
@@ -195,35 +194,67 @@ def test_a_slice_is_diagnosed_and_scored(bench, tmp_path):
         score_command(asked.folder, asked.truth, "00", None, None)
 
 
-def test_a_diagnosis_that_fails_says_why_and_the_others_go_on(tmp_path, monkeypatch):
-    for name in ("a", "b", "empty"):
-        (tmp_path / "recordings" / name).mkdir(parents=True)
-    for name in ("a", "b"):
-        (tmp_path / "recordings" / name / "x.mcap").write_text("no recording")
+STAND_IN = """#!{python}
+import json, sys, time
+from pathlib import Path
+recording, *methods = sys.argv[3:]
+if recording == "a":
+    sys.exit("Traceback\\nValueError: lost")
+if recording == "endless":
+    time.sleep(3600)
+for name in methods:
+    Path(name + ".json").write_text(json.dumps({{"diagnosis": {{"verdict": name}}, "cpu_s": 1.0}}))
+"""
 
-    def diagnose(words, *, cwd, **_):
-        recording, *methods = words[3:]
-        if recording == "a":
-            return subprocess.CompletedProcess(words, 1, "", "Traceback\nValueError: lost\n")
-        for name in methods:
-            report = {"diagnosis": {"verdict": name}, "cpu_s": 1.0}
-            (Path(cwd) / f"{name}.json").write_text(json.dumps(report))
-        return subprocess.CompletedProcess(words, 0, "", "")
 
-    monkeypatch.setattr("cspm_bringup.blind.run.subprocess.run", diagnose)
-    assert run(tmp_path) == {"a": "ValueError: lost"}
-    found = read_results(tmp_path, ["a", "b", "empty"])
+@pytest.fixture
+def recorded(tmp_path, monkeypatch):
+    """Give what makes recordings by name, which a stand-in of the diagnosis is given."""
+    stand_in = tmp_path / "python"
+    stand_in.write_text(STAND_IN.format(python=sys.executable))
+    stand_in.chmod(0o755)
+    monkeypatch.setattr(sys, "executable", str(stand_in))
+
+    def make_all(*names):
+        for name in names:
+            place = tmp_path / "recordings" / name
+            place.mkdir(parents=True)
+            if name != "empty":
+                (place / "x.mcap").write_text("no recording")
+        return tmp_path
+
+    return make_all
+
+
+def test_a_diagnosis_that_fails_says_why_and_the_others_go_on(recorded):
+    place = recorded("a", "b", "empty")
+    assert run(place) == {"a": "ValueError: lost"}
+    found = read_results(place, ["a", "b", "empty"])
     assert found["a"]["diagnosis"] is None
     assert found["b"]["diagnosis"] == {"verdict": "cspm"}
     assert sorted(found) == ["a", "b"]
     with pytest.raises(InputError, match=r"a is not in the truth, allowed: its own recordings$"):
-        read_results(tmp_path, ["b"])
-    assert run(tmp_path, methods=("cspm", "retuned")) == {
+        read_results(place, ["b"])
+    assert run(place, methods=("cspm", "retuned")) == {
         "a": "ValueError: lost",
         "a, retuned": "ValueError: lost",
     }
-    assert read_results(tmp_path, ["a", "b"], "retuned")["b"]["diagnosis"]["verdict"] == "retuned"
-    assert tried(tmp_path, ("retuned", "lasso")) == ["retuned"]
+    assert read_results(place, ["a", "b"], "retuned")["b"]["diagnosis"]["verdict"] == "retuned"
+    assert tried(place, ("retuned", "lasso")) == ["retuned"]
+
+
+def test_an_interrupted_run_keeps_what_is_whole_and_kills_the_rest(recorded):
+    place = recorded("b", "endless")
+
+    def interrupt(text, done, total):
+        if done == 1:
+            raise KeyboardInterrupt
+
+    with pytest.raises(KeyboardInterrupt):
+        run(place, interrupt, jobs=2)
+    assert sorted(p.name for p in (place / "results").iterdir()) == ["b"]
+    with pytest.raises(InputError, match=r"^--jobs 0: allowed: 1 or more$"):
+        run(place, jobs=0)
 
 
 def confined(code, room):

@@ -55,11 +55,11 @@ def make_command(
         make(asked, show)
 
 
-def run_command(folder: Path, methods: Sequence[str]) -> None:
+def run_command(folder: Path, methods: Sequence[str], jobs: int | None) -> None:
     """Diagnose a benchmark's recordings; see `run`."""
     console = make_console()
     with _bar(console) as show:
-        failed = run(folder, show, methods)
+        failed = run(folder, show, methods, jobs)
     for name, reason in failed.items():
         say(console, f"{name}: {reason}")
 

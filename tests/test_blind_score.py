@@ -297,6 +297,7 @@ def test_onsets_are_counted_late_and_false():
     assert onsets["held"][:2] == (1, 1)
     assert onsets["median_error_s"] == pytest.approx(0.5)
     assert onsets["false"][:2] == (1, 2)
+    assert onsets["right"][:2] == (2, 4)
 
 
 def test_the_signal_of_the_unknown_has_to_be_the_right_one_on_the_right_element():

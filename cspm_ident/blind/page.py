@@ -102,6 +102,7 @@ def _targets(card: Data) -> str:
     upper = f"{100 * card['shares']['false_alarm_upper']:.0f} %"
     rows.append(("one-sided upper bound of alarms", upper, "≤ 6 %"))
     rows.append(("mean size of the ties", _number(card["shares"]["mean_tie_size"]), "≤ 1.5"))
+    rows.append(("beginning right, of what was named", _percent(card["onsets"]["right"]), ""))
     covered = _percent(card["parameters"]["covered"])
     rows.append(("intervals that hold the truth", covered, "90 to 97 %"))
     fit = card["fit"]

@@ -158,6 +158,7 @@ def _onsets(outcomes: Sequence[Outcome]) -> dict[str, Any]:
         "held": share(b.held for b in late if b.held is not None),
         "median_error_s": median(errors) if errors else None,
         "false": share(b.told is not None for b in told if b.true == 0.0),
+        "right": share(bool(b.held) if b.true > 0.0 else b.told is None for b in told),
     }
 
 

@@ -52,13 +52,16 @@ def make(
         ),
     ] = "real",
     truth: Truth = None,
+    jobs: Annotated[
+        int | None,
+        typer.Option(metavar="NUMBER", help="Recordings at a time; otherwise one per processor."),
+    ] = None,
 ) -> None:
     """Record machines that conceal something, and write the truth apart."""
     from cspm_bringup.blind.commands import make_command
 
-    make_command(
-        out, _truth(out, truth), seed, count, split, tuple(strata or ()), duration, sensors
-    )
+    where, ways = _truth(out, truth), tuple(strata or ())
+    make_command(out, where, seed, count, split, ways, duration, sensors, jobs)
 
 
 @blind.command(

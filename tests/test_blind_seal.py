@@ -58,7 +58,11 @@ def test_the_hash_is_told_before_anything_is_recorded(bench):
     asked, digest, said = bench
     assert digest == truth_sha256(asked.truth)
     assert digest in said[0][0]
-    assert [text for text, *_ in said[1:-1]] == [f"recording {p.name}" for p in recordings(asked)]
+    assert [(text, done) for text, done, _ in said[-3:]] == [
+        ("recording, 1 made", 1),
+        ("recording, 2 made", 2),
+        ("recordings made", 2),
+    ]
 
 
 @pytest.mark.slow
@@ -110,10 +114,10 @@ def test_an_interrupted_make_goes_on_where_it_was(tmp_path, monkeypatch):
     monkeypatch.setattr(making, "STRATA", {"nothing": NOTHING})
     asked = Request(tmp_path / "bench", tmp_path / "t.json", 3, 3, "dev", ("nothing",), 15.0)
     with pytest.raises(KeyboardInterrupt):
-        make(asked)
+        make(asked, jobs=1)
     digest = truth_sha256(asked.truth)
     assert len(recordings(asked)) == 1
-    assert make(asked) == digest
+    assert make(asked, jobs=1) == digest
     assert [p.name for p in recordings(asked)] == [made[0], *made[2:]]
     assert len(set(made)) == 4
 
@@ -133,6 +137,12 @@ def test_a_recording_that_is_cut_short_is_not_taken_for_whole(tmp_path):
         )
 
 
+def test_recordings_are_made_at_least_one_at_a_time(tmp_path):
+    asked = Request(tmp_path / "bench", tmp_path / "t.json", 3, 3, "dev", ("nothing",), 15.0)
+    with pytest.raises(InputError, match=r"^--jobs 0: allowed: 1 or more$"):
+        make(asked, jobs=0)
+
+
 def test_the_command_line_tells_the_hash_and_keeps_the_truth_beside(tmp_path, monkeypatch, capsys):
     def record(bundle, reality, folder, **_):
         folder.mkdir(parents=True)
@@ -150,7 +160,7 @@ def test_the_command_line_tells_the_hash_and_keeps_the_truth_beside(tmp_path, mo
     truth = tmp_path / "bench.truth.json"
     told = capsys.readouterr().out
     assert f"truth {truth}, SHA-256 {truth_sha256(truth)}" in told
-    assert told.index("SHA-256") < told.index("recording ")
+    assert told.index("SHA-256") < told.index("1 made")
     assert len(list((out / "recordings").iterdir())) == 1
 
 

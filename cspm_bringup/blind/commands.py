@@ -39,6 +39,7 @@ def make_command(
     strata: tuple[str, ...],
     duration: float,
     sensors: str,
+    jobs: int | None,
 ) -> None:
     """Make a benchmark; see `make`.
 
@@ -52,7 +53,7 @@ def make_command(
     console = make_console()
     asked = Request(folder, truth, seed, count, split, strata or tuple(STRATA), duration, sensors)
     with _bar(console) as show:
-        make(asked, show)
+        make(asked, show, jobs)
 
 
 def run_command(folder: Path, methods: Sequence[str], jobs: int | None) -> None:

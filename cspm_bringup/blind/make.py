@@ -5,8 +5,10 @@ from __future__ import annotations
 import json
 import os
 import shutil
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from concurrent.futures import ProcessPoolExecutor, as_completed
 from dataclasses import dataclass
+from multiprocessing import get_context
 from pathlib import Path
 from typing import Any
 
@@ -28,6 +30,7 @@ _BLANK_SEED = 1
 _TOLD = ("seed", "count", "split", "duration", "sensors")
 _ONE_DATE = 1_000_000_000  # of all files, so that it tells no order [s]
 
+Amounts = Mapping[str, Sequence[float]]
 Limits = Mapping[str, Mapping[str, Sequence[float]]]
 Tell = Callable[[str, int, int], None]
 
@@ -62,16 +65,21 @@ class Request:
         return {**asked, "strata": list(self.strata)}
 
 
-def make(request: Request, tell: Tell = lambda text, done, total: None) -> str:
+def make(
+    request: Request, tell: Tell = lambda text, done, total: None, jobs: int | None = None
+) -> str:
     """Make what is not there yet, and return the truth file's SHA-256.
 
     Args:
         request: what to make.
         tell: called with what is being done, how much of it is done, and how much there is.
+        jobs: recordings at a time; None: as many as there are processors.
 
     Raises:
-        InputError: the truth lies among the recordings, or is that of another benchmark.
+        InputError: the truth lies among the recordings, or is that of another benchmark; no jobs.
     """
+    if jobs is not None and jobs < 1:
+        raise InputError(f"--jobs {jobs}: allowed: 1 or more")
     _check(request)
     if not request.truth.exists():
         _write_truth(request, tell)
@@ -89,12 +97,35 @@ def make(request: Request, tell: Tell = lambda text, done, total: None) -> str:
             f"{request.truth}: drawn by another version of cspm, allowed: to be gone on with by"
             " that, or a new file"
         )
-    for done, (item, told) in enumerate(zip(items, truth["items"], strict=True)):
-        tell(f"recording {item.name}", done, request.count)
-        _record(request, item, told["amounts"])
+    amounts = [told["amounts"] for told in truth["items"]]
+    tell("recording", 0, request.count)
+    for done in _recorded(request, items, amounts, jobs or os.cpu_count() or 1):
+        tell(f"recording, {done} made", done, request.count)
     shutil.rmtree(request.folder / ".part", ignore_errors=True)
     tell("recordings made", request.count, request.count)
     return digest
+
+
+def _recorded(
+    request: Request, items: Sequence[Item], amounts: Sequence[Amounts], jobs: int
+) -> Iterator[int]:
+    """Record what is not there, and yield how much is made."""
+    missing = [k for k, item in enumerate(items) if not _place(request, item).exists()]
+    there = len(items) - len(missing)
+    if min(jobs, len(missing)) < 2:
+        for done, k in enumerate(missing, start=1):
+            _record(request, items[k], amounts[k])
+            yield there + done
+        return
+    # MuJoCo's control callback is one per process, which must not have been forked with threads.
+    with ProcessPoolExecutor(jobs, get_context("spawn")) as pool:
+        tasks = [pool.submit(_record, request, items[k], amounts[k]) for k in missing]
+        try:
+            for done, task in enumerate(as_completed(tasks), start=1):
+                task.result()
+                yield there + done
+        finally:
+            pool.shutdown(cancel_futures=True)
 
 
 def _check(request: Request) -> None:
@@ -184,11 +215,13 @@ def _absorbed(
     return {number: found}
 
 
-def _record(request: Request, item: Item, amounts: Mapping[str, Sequence[float]]) -> None:
-    """Record an item unless it is there; what diverges leaves an empty folder of that name."""
-    folder = request.folder / RECORDINGS / item.name
-    if folder.exists():
-        return
+def _place(request: Request, item: Item) -> Path:
+    return request.folder / RECORDINGS / item.name
+
+
+def _record(request: Request, item: Item, amounts: Amounts) -> None:
+    """Record an item; what diverges leaves an empty folder of that name."""
+    folder = _place(request, item)
     part = request.folder / ".part" / item.name
     shutil.rmtree(part, ignore_errors=True)
     bundle = believed(item.scenario, request.duration, item.seed)

@@ -25,7 +25,7 @@ from cspm_ident.diagnosis.part import Kind, Part, part_of
 from cspm_ident.diagnosis.region import Region
 from cspm_ident.diagnosis.simulation import Output, SimulatedFit, Worth
 from cspm_ident.diagnosis.sums import Gain
-from cspm_ident.diagnosis.verdict import Verdict, diagnosis_data, verdict_of
+from cspm_ident.diagnosis.verdict import TRUSTED, Verdict, diagnosis_data, verdict_of
 from cspm_ident.signals.measurement import Measurement
 from cspm_ident.signals.samples import Samples
 from cspm_msgs_py.testbed import load_testbed
@@ -101,6 +101,17 @@ def page_of(tmp_path, found):
 
 def section(page, name):
     return re.search(rf"<section id={name}>.*?</section>", page, re.DOTALL).group()
+
+
+def test_what_rivals_leave_is_shared_by_how_far_they_lie_behind():
+    (alone,) = diagnosis_data(diagnosis())["findings"]
+    assert alone["probability"] == TRUSTED
+    rival = Hypothesis(LOADED.effect, (LOADED,))
+    for behind, odds in ((0.0, 1.0), (2.0, np.exp(-2.0))):
+        (tied,) = diagnosis_data(diagnosis(alternatives=[Rival(rival, behind)]))["findings"]
+        (other,) = tied["alternatives"]
+        assert other["probability"] == pytest.approx(odds * tied["probability"])
+        assert tied["probability"] + other["probability"] == pytest.approx(TRUSTED)
 
 
 def test_a_curve_is_what_the_found_columns_leave():

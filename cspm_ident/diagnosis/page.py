@@ -17,7 +17,7 @@ from cspm_ident.diagnosis.evidence_figure import driver_figure, overlay_figure
 from cspm_ident.diagnosis.hypothesis import Hypothesis, Named
 from cspm_ident.diagnosis.part import Part, part_behind, part_of
 from cspm_ident.diagnosis.statement import channel_of, drive_of, unit_of
-from cspm_ident.diagnosis.verdict import IMPROVED, Verdict, verdict_of
+from cspm_ident.diagnosis.verdict import IMPROVED, TRUSTED, Verdict, verdict_of
 from cspm_ident.offline_page import figure_html, table_html, write_offline_page
 from cspm_ident.signals.samples import Samples
 from cspm_sim.effects import catalogue
@@ -207,7 +207,11 @@ def _hypotheses(found: Diagnosis, data: dict[str, Any]) -> str:
     if not rows:
         return f"<p>None of {found.findings.candidates} stood.</p>"
     heads = ("hypothesis", "verdict", "probability", "gain in standard errors", "residual taken")
-    count = f"<p>{found.findings.candidates} hypotheses were looked at.</p>"
+    count = (
+        f"<p>{found.findings.candidates} hypotheses were looked at. Probabilities are those among"
+        f" what explains the same, times {TRUSTED:g}: the share of findings without a rival that"
+        " were right in blind recordings.</p>"
+    )
     return count + table_html(heads, rows, "hypotheses and their evidence")
 
 

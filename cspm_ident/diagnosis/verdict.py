@@ -27,6 +27,9 @@ from cspm_sim.effects import Block, Channel
 SCHEMA = "cspm.diagnosis/1"
 IMPROVED = "testbed.improved.yaml"
 UNKNOWN = "unknown"
+# Of findings without a rival in blind recordings, those that were right (25 of 30): of the others
+# the catalogue lacks what was there, or has two things that together look like one.
+TRUSTED = 0.83
 
 
 class Verdict(Enum):
@@ -55,11 +58,11 @@ def verdict_of(diagnosis: Diagnosis) -> Verdict:
 
 
 def probability_of(named: Named) -> float:
-    """Return how probable a finding is among what explains the same.
+    """Return how probable a finding is, beside what explains the same and what nobody thought of.
 
     A rival's odds are those of a normal deviate of as many standard deviations as it lies behind.
     """
-    return 1.0 / (1.0 + sum(_odds(rival) for rival in named.alternatives))
+    return TRUSTED / (1.0 + sum(_odds(rival) for rival in named.alternatives))
 
 
 def _odds(rival: Rival) -> float:

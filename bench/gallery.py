@@ -27,6 +27,7 @@ from cspm_ident.diagnosis.statement import line_statement, statement_of, unknown
 from cspm_ident.diagnosis.verdict import verdict_of
 from cspm_ident.signals.measurement import read_measurement
 from cspm_msgs_py.recording.reader import Recording
+from cspm_sim.effects import catalogue
 
 ROOT = Path(__file__).resolve().parents[1]
 PAGE, FIGURES = ROOT / "docs" / "gallery.md", ROOT / "docs" / "figures"
@@ -134,8 +135,8 @@ def _draw_fit(axes: Axes, found: Diagnosis) -> None:
 
 def _text(k: int, stratum: str, item: Mapping[str, Any], found: Diagnosis) -> str:
     concealed = "; ".join(
-        f"{c['phenomenon']} ({c['effect'] or 'not in the catalogue'})"
-        f" on {', '.join(c['elements'])}, {c['multiple']:g} × its detection limit"
+        f"{c['phenomenon']} ({c['effect'] or 'not in the catalogue'}) on {_amounts(c)},"
+        f" {c['multiple']:g} × its detection limit"
         for c in item["concealed"]
     )
     told = [statement_of(found, i) for i in range(len(found.findings.named))]
@@ -154,6 +155,15 @@ def _text(k: int, stratum: str, item: Mapping[str, Any], found: Diagnosis) -> st
         f"Verdict: **{verdict_of(found).value}**.\n\n{lines}\n\n"
         f"![{stratum}](figures/gallery_{k}.png)\n"
     )
+
+
+def _amounts(concealed: Mapping[str, Any]) -> str:
+    """Return on which elements it acts, with the parameter that the catalogue has for it."""
+    name, values = concealed["parameter"], concealed["values"]
+    if name is None:
+        return ", ".join(concealed["elements"])
+    unit = next(p.unit for p in catalogue()[concealed["effect"]].parameters if p.name == name)
+    return ", ".join(f"{e} ({name} {values[e]:.3g} {unit})" for e in concealed["elements"])
 
 
 if __name__ == "__main__":

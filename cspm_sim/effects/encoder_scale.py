@@ -38,7 +38,8 @@ EFFECT = Effect(
     sense=Sense(("/winches/state",), _reading),
     regression=Regression(Channel.READING, _columns),
     equation="measured angle and speed = scale·angle, scale·speed",
-    shows="cable length residual is in proportion to the motor angle, torque residual silent",
+    shows="cable length residual is in proportion to the motor angle, torque residual silent, as of"
+    " a wrong drum radius whose torque a wrong gain of torque or tension makes up for",
     twins=("winch_drum_radius", "cable_stiffness"),
     separating_experiment="wind several metres at constant tension and hold known weights",
     reference="counts per turn of an incremental encoder set wrong",

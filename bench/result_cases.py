@@ -83,7 +83,8 @@ SWITCHED_CALM = {
 # At 4 m the thesis's margins leave sway and yaw no more than 9 rad/s.
 DESIGNED_AT_FOUR = (
     "control={mode: closed_loop, motion: {design_pose: [0, 0, 4, 0, 0, 0],"
-    " crossover: {surge: 12, sway: 9, heave: 12, pitch: 12, yaw: 9}}}"
+    " crossover: {surge: 12, sway: 9, heave: 12, pitch: 12, yaw: 9}},"
+    " tension_distribution: {method: pseudo_inverse}}"
 )
 SWITCHED_4M = {
     "as in the thesis": Case("worst_case_4m", (SHORT,)),

@@ -173,7 +173,7 @@ class TensionDistribution(StrictModel):
     DOF, where the methods `qp` and `analytic_centre` look for the nearest wrench.
     """
 
-    method: DistributionMethod = "pseudo_inverse"
+    method: DistributionMethod = "analytic_centre"
     lower_limit: NonNegativeFloat | None = None
     preferred_tension: PositiveFloat = 5.0
     wrench_weights: WrenchWeights = (1.0, 1.0, 1.0, 6.0, 6.0, 6.0)
@@ -354,5 +354,8 @@ def _override(content: object, override: str) -> dict[str, Any]:
             raise InputError(f"--set {override}: {parent} is no mapping, allowed: keys inside one")
         node[parent] = dict(inner)
         node = node[parent]
+    if key == "control.mode" and node.get("mode") != value:
+        # What the file says of one mode is unknown to another.
+        node.clear()
     node[leaf] = value
     return root

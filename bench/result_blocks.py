@@ -28,15 +28,15 @@ from bench.result_measures import bands, limit, moved_on, past_thesis, possible,
 from bench.result_store import Measurement
 from bench.result_tables import (
     Found,
+    distribution_block,
     errors_block,
     extremes_block,
     limit_block,
     past_block,
-    table,
     thesis_block,
     tracking_block,
 )
-from bench.tension_distribution import HEADINGS, distribution_rows
+from bench.tension_distribution import distribution_rows
 from bench.tracking import Case
 
 Cases = Mapping[str, Case]
@@ -99,7 +99,7 @@ def _tracked(group: str, cases: Cases, write: Callable[[Found], str] = tracking_
 def _distribution() -> Block:
     name = "distribution"
     measurement = Measurement(name, distribution_rows, (20000, 60.0), alone=True)
-    return Block({name: measurement}, lambda found: table(HEADINGS, found[name]))
+    return Block({name: measurement}, lambda found: distribution_block(found[name]))
 
 
 def _limit(name: str, case: Case) -> Measurement:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import ast
 import hashlib
+import inspect
 import json
 import os
 import re
@@ -17,7 +18,8 @@ from typing import Any, NamedTuple
 from bench.tracking import SCENARIOS, Case
 
 ROOT = Path(__file__).resolve().parents[1]
-# What a measurement is made with: rooms, and files of the rooms that hold much else.
+# What all measurements are made with, beside the module that measures: rooms, and files of those
+# that hold much else.
 MADE_WITH = (
     "cspm_control",
     "cspm_mujoco",
@@ -27,10 +29,8 @@ MADE_WITH = (
         f"cspm_msgs_py/{name}.py"
         for name in ("dofs", "motion_spec", "safety_spec", "scenario", "schedule", "testbed")
     ),
-    *(
-        f"bench/{name}.py"
-        for name in ("feasibility", "result_measures", "tension_distribution", "tracking")
-    ),
+    "bench/feasibility.py",
+    "bench/tracking.py",
 )
 NOT_MADE_WITH = "cspm_control/analysis"
 
@@ -55,7 +55,8 @@ class Measurement:
 
     def fingerprint(self) -> str:
         """Return a hash of all that decides what is found, but for libraries and machine."""
-        parts = [code_hash(), self.by.__qualname__, repr(self.arguments)]
+        measuring = Path(inspect.getfile(self.by)).read_text(encoding="utf-8")
+        parts = [code_hash(), spoken(measuring), self.by.__qualname__, repr(self.arguments)]
         for case in self.arguments:
             if isinstance(case, Case):
                 parts.append((SCENARIOS / f"{case.scenario}.yaml").read_text(encoding="utf-8"))

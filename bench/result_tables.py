@@ -7,7 +7,9 @@ from typing import Any
 
 import numpy as np
 
+from bench.tension_distribution import HEADINGS, MET, P99, RESIDUAL
 from cspm_msgs_py.dofs import DOFS
+from cspm_msgs_py.scenario import TensionDistribution
 
 # Tables 8-1 and 8-2: largest and RMS error in mm and rad; None where the text is lost.
 THESIS_TABLES: dict[str, tuple[tuple[float | None, ...], tuple[float | None, ...]]] = {
@@ -157,6 +159,17 @@ def errors_block(found: Found) -> str:
         for name, rms in found.items()
     ]
     return table(["", "surge, sway, heave [mm]", "roll, pitch, yaw [mrad]"], rows)
+
+
+def distribution_block(rows: Sequence[Sequence[str]]) -> str:
+    """Return the methods' table, and what the default reaches."""
+    usual = TensionDistribution().method
+    own = dict(zip(HEADINGS, next(row for row in rows if row[0] == f"`{usual}`"), strict=True))
+    said = (
+        f"The default, `{usual}`: {own[MET]} of the feasible set (to reach: 100 %), residual"
+        f" {own[RESIDUAL]} of the demand (≤ 1e-6), p99 {own[P99]} µs (< 100 µs)."
+    )
+    return f"{table(HEADINGS, rows)}\n\n{said}"
 
 
 def limit_block(found: Found) -> str:

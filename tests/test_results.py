@@ -30,7 +30,7 @@ from bench.result_cases import (
 )
 from bench.result_measures import tracking
 from bench.result_store import Measurement, Store, spoken
-from bench.result_tables import extremes_block, table, tracking_block
+from bench.result_tables import distribution_block, extremes_block, table, tracking_block
 from bench.result_work import work_off
 from bench.results import BLOCK, PAGE, main
 from bench.tension_distribution import drawn_wrenches, score
@@ -221,6 +221,15 @@ def test_an_error_that_nobody_can_avoid_is_where_no_tensions_are_left():
     assert not least_errors(bundle_of("rest", "duration=1.5")).any()
     errors = [least_errors(bundle_of("rest", "duration=1.5", drop), t)[2] for t in (0.0, 1.0)]
     assert 1e-3 < errors[0] < errors[1]
+
+
+def test_what_the_default_distribution_reaches_is_told_beside_the_table():
+    rows = [[f"`{name}`", *"123456", "78"] for name in ("qp", "analytic_centre")]
+    rows[1][1:4] = "100 %", "90 %", "5e-7"
+    assert distribution_block(rows).endswith(
+        "The default, `analytic_centre`: 100 % of the feasible set (to reach: 100 %), residual"
+        " 5e-7 of the demand (≤ 1e-6), p99 78 µs (< 100 µs)."
+    )
 
 
 def test_the_page_has_a_place_for_every_block_and_tables_in_them():

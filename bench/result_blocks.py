@@ -6,6 +6,7 @@ from collections.abc import Callable, Mapping
 from typing import NamedTuple
 
 from bench.result_cases import (
+    AT_FOUR_METRES,
     BEYOND,
     CAUSES,
     CORNERS,
@@ -66,6 +67,7 @@ def blocks_of(seeds: int) -> dict[str, Block]:
         "distribution": _distribution(),
         "causes": _tracked("causes", CAUSES),
         "beyond": _tracked("beyond", BEYOND),
+        "at_four_metres": _tracked("beyond", AT_FOUR_METRES),
         "corners": _tracked("corners", CORNERS),
         "rough_corners": _tracked("rough corners", ROUGH_CORNERS, extremes_block),
         "limit": Block({name: _limit(name, case) for name, case in LIMITED.items()}, limit_block),

@@ -124,6 +124,13 @@ BEYOND = {
         PAST, (SHORT,), (("winch_coulomb_friction", (), {"torque": 0.01}),)
     ),
     "calm": Case("calm", (SHORT, PAST_ON_CALM)),
+    "all six coordinates": Case(SIX, (SHORT,)),
+    "all six coordinates, the whole 200 s": Case(SIX),
+    "all six coordinates, 200 s, seed 2": Case(SIX, ("seed=2",)),
+    "all six coordinates, without the governor": Case(SIX, (SHORT, UNGOVERNED)),
+    "on the MuJoCo plant": Case(PAST, ("duration=20",), plant="mujoco"),
+}
+AT_FOUR_METRES = {
     "worst case, 4 m": Case(DEEP, (SHORT,)),
     "worst case, 4 m, the whole 200 s": Case(DEEP),
     "worst case, 4 m, 200 s, tensions wanted from 0.3 N, planned from 0.5 N": Case(
@@ -134,11 +141,6 @@ BEYOND = {
     ),
     "worst case, 4 m, as at 2 m": Case(PAST, (SHORT, FOUR_METRES)),
     "worst case, 4 m, without the governor": Case(PAST, (SHORT, FOUR_METRES, UNGOVERNED)),
-    "all six coordinates": Case(SIX, (SHORT,)),
-    "all six coordinates, the whole 200 s": Case(SIX),
-    "all six coordinates, 200 s, seed 2": Case(SIX, ("seed=2",)),
-    "all six coordinates, without the governor": Case(SIX, (SHORT, UNGOVERNED)),
-    "on the MuJoCo plant": Case(PAST, ("duration=20",), plant="mujoco"),
 }
 # In the calm sea, about mean places x y z φ θ ψ of the target [m, rad], as far out as the bar can
 # rest with the test-bed's lower limits, from where a run starts.

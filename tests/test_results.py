@@ -11,6 +11,7 @@ from run_samples import bundle_of
 from bench.feasibility import least_errors, least_tensions
 from bench.result_blocks import blocks_of
 from bench.result_cases import (
+    AT_FOUR_METRES,
     BEYOND,
     CAMERA_100_HZ,
     CAUSES,
@@ -52,6 +53,7 @@ def test_every_case_is_a_run_that_can_be_made():
         SWITCHED_4M,
         CAUSES,
         BEYOND,
+        AT_FOUR_METRES,
         CORNERS,
         LIMITED,
     )

@@ -47,8 +47,8 @@ coverage: $(VENV)/test.stamp ## line coverage with the kernels uncompiled
 bench: $(VENV)/test.stamp ## measure speed, start-up and memory; prints a table
 	$(BIN)/python -m bench
 
-results: $(VENV)/test.stamp ## measure anew every number and picture of docs/results.md, about two hours
-	$(BIN)/python -m bench.results
+results: $(VENV)/test.stamp ## every number and picture of docs/results.md: what .results does not keep is measured, at most two hours
+	OMP_NUM_THREADS=1 $(BIN)/python -m bench.results
 
 clean: ## remove the environment and caches
 	rm -rf $(VENV) build install log *.egg-info .pytest_cache .mypy_cache .ruff_cache .hypothesis htmlcov .coverage

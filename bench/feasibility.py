@@ -41,13 +41,14 @@ def least_tensions(bundle: Bundle, times: Array) -> Array:
     bar, frame = (WaveTrajectory(motions[name]) for name in REFERENCES)
     upper = np.array([cable.tension_limits for cable in testbed.cables], dtype=float)[:, 1]
     cables = nominal_parameters(testbed).cables
+    known = np.array(getattr(bundle.scenario.control.motion, "known_wrench", (0.0,) * 6))
     found = []
     for time in times:
         stamp = round(time * 1e9)
         wrench, pose = _wanted(bar.step(stamp), testbed)
         frame.step(stamp)
         structure = -geometry(cables, pose, frame.values[:6].copy()).bar.T[axes]
-        found.append(_least(structure, wrench[axes], upper))
+        found.append(_least(structure, (wrench - known)[axes], upper))
     return np.array(found)
 
 

@@ -12,30 +12,14 @@ from matplotlib.figure import Figure
 from numpy.typing import NDArray
 from PIL import Image
 
-from bench.tracking import Case, follow
 from cspm_msgs_py.dofs import DOFS
 
 Array = NDArray[np.float64]
 
-BINS = 1000
 TRANSLATIONS, ANGLES = (0, 1, 2), (4, 5)
 SHOWN_S = (0.0, 60.0)
 _DPI = 110
 _COLOURS = 96
-
-
-def bands(case: Case) -> dict[str, Any]:
-    """Return lowest and highest error [mm, mrad] and the least tension [N] per bin of time."""
-    bundle = case.bundle()
-    errors, tensions, _, _ = follow(bundle)
-    size = -(-len(errors) // BINS)
-    starts = np.arange(0, len(errors), size)
-    return {
-        "times": (starts / bundle.scenario.rates.plant).tolist(),
-        "low": (1e3 * np.minimum.reduceat(errors, starts)).tolist(),
-        "high": (1e3 * np.maximum.reduceat(errors, starts)).tolist(),
-        "least": np.minimum.reduceat(tensions.min(axis=1), starts).tolist(),
-    }
 
 
 def draw_comparison(path: Path, found: Mapping[str, Mapping[str, Any]]) -> None:

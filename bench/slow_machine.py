@@ -30,4 +30,5 @@ def slow_overrides() -> tuple[str, str]:
         f"{dof}: {{kp: {kp}, ki: {ki}, kd: {kd}}}" for dof, (kp, ki, kd) in MOTION_GAINS.items()
     )
     gains = f"force: {{gains: {{{force}}}}}, motion: {{gains: {{{motion}}}}}"
-    return RATES, f"control={{mode: closed_loop, {gains}}}"
+    method = "tension_distribution: {method: pseudo_inverse}"
+    return RATES, f"control={{mode: closed_loop, {gains}, {method}}}"

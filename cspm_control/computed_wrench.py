@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from math import exp, floor, pi
 
 import numpy as np
@@ -46,6 +46,7 @@ class ComputedWrench:
         period: float,
         steps_per_pose: int,
         pose_age: float = 0.0,
+        known_wrench: Sequence[float] = (0.0,) * 6,
     ) -> None:
         """Make the controller for a test-bed with a bar.
 
@@ -57,6 +58,7 @@ class ComputedWrench:
             period: time between steps [s].
             steps_per_pose: steps from one pose to the next, ≥ 1.
             pose_age: how old a pose is when it is new here [s].
+            known_wrench: constant wrench (6,) on the bar from outside [N, N·m], in world_ned.
         """
         assert testbed.bar is not None
         self._gains = np.zeros((6, 2))
@@ -64,6 +66,7 @@ class ComputedWrench:
             self._gains[DOFS.index(name)] = frequency**2, 2.0 * frequency
         self._bar = bar_parameters(testbed.bar, testbed.gravity)
         self._distribution = distribution
+        self._known_wrench = np.array(known_wrench, dtype=float)
         self._observer = _observer_gains(observer_bandwidth, period * steps_per_pose, pose_age)
         self._period, self._pose_age = period, pose_age
         self._last_pose = np.full(7, np.nan)
@@ -111,6 +114,7 @@ class ComputedWrench:
             wrench,
         )
         self._started = True
+        wrench -= self._known_wrench
         tensions = self._distribution.step(wrench, bar_pose, frame_pose).tensions
         _expect(
             bar_pose,
@@ -119,6 +123,7 @@ class ComputedWrench:
             tensions,
             self._distribution.cables,
             self._bar,
+            self._known_wrench,
             self._memory,
         )
         return wrench
@@ -196,6 +201,7 @@ def _expect(
     tensions: Array,
     cables: Array,
     bar: Array,
+    known_wrench: Array,
     memory: Array,
 ) -> None:
     """Write the acceleration of the error that the tensions are to give into `memory`."""
@@ -204,7 +210,7 @@ def _expect(
     structure, wrench = np.empty((6, len(tensions))), np.empty(6)
     fill_structure(bar_row, frame_row, cables, np.arange(6), structure)
     for row in range(6):
-        wrench[row] = (structure[row] * tensions).sum()
+        wrench[row] = (structure[row] * tensions).sum() + known_wrench[row]
     acceleration_from(pose, wanted[1] - memory[1], wrench, bar, given)
     memory[3] = wanted[2] - given
 

@@ -45,6 +45,7 @@ class Governed(NamedTuple):
         limits: of the planned tensions (n, 2) [N].
         axes: world axes in which the wrench is to be met, which are the coordinates that deviate.
         tolerances: what deviations count against, (6,) [m, rad].
+        known_wrench: constant wrench on the bar from outside, (6,) [N, N·m], in world_ned.
     """
 
     cables: Array
@@ -52,6 +53,7 @@ class Governed(NamedTuple):
     limits: Array
     axes: tuple[int, ...]
     tolerances: Array
+    known_wrench: Array
 
 
 class _Demand(NamedTuple):
@@ -125,7 +127,7 @@ def _demand(machine: Governed, motion: Array, frames: Array) -> _Demand:
         cable_geometry(machine.cables, pose, frames[k], lengths, jacobians[0], jacobians[1])
         found.structure[k] = -jacobians[0].T[axes]
         wrench_for(pose, rate, acceleration, machine.bar, wrench)
-        found.wrench[k] = wrench[axes]
+        found.wrench[k] = (wrench - machine.known_wrench)[axes]
         for column, axis in enumerate(axes):
             unit = acceleration.copy()
             unit[axis] += 1.0

@@ -70,7 +70,7 @@ class TensionDistribution:
         Args:
             cables: the plant's cable rows.
             limits: tension limits (n, 2) [N].
-            how: method and its settings; absent: the pseudo-inverse.
+            how: method and its settings; absent: those of a scenario that names none.
             axes: world axes (0 to 5) in which the wrench is to be met.
         """
         how = how or HowDistributed()

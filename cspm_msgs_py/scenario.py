@@ -26,6 +26,7 @@ from cspm_msgs_py.safety_spec import Safety
 from cspm_msgs_py.yaml_file import StrictModel, parse_yaml, read_yaml, validate
 
 Pose = tuple[float, float, float, float, float, float]
+Wrench = tuple[float, float, float, float, float, float]
 WrenchWeights = tuple[
     PositiveFloat, PositiveFloat, PositiveFloat, PositiveFloat, PositiveFloat, PositiveFloat
 ]
@@ -120,8 +121,9 @@ class ComputedWrenchControl(StrictModel):
 
     `bandwidth` [rad/s] is that of the error's dynamics per controlled DOF, `observer_bandwidth`
     [rad/s] that of the observer. With a `governor` the bar leaves its reference, ahead of time and
-    as little as can be, where no tensions can give it. The force controllers are designed at
-    `design_pose`.
+    as little as can be, where no tensions can give it. `known_wrench` [N, N·m] is a constant one on
+    the bar's origin in world_ned, such as wind that was measured. The force controllers are
+    designed at `design_pose`.
     """
 
     law: Literal["computed_wrench"]
@@ -134,6 +136,7 @@ class ComputedWrenchControl(StrictModel):
     }
     observer_bandwidth: PositiveFloat = 40.0
     governor: Governor | None = None
+    known_wrench: Wrench = ORIGIN
     design_pose: Pose = (0.0, 0.0, 2.0, 0.0, 0.0, 0.0)
 
     @property
@@ -173,7 +176,7 @@ class TensionDistribution(StrictModel):
     DOF, where the methods `qp` and `analytic_centre` look for the nearest wrench.
     """
 
-    method: DistributionMethod = "pseudo_inverse"
+    method: DistributionMethod = "analytic_centre"
     lower_limit: NonNegativeFloat | None = None
     preferred_tension: PositiveFloat = 5.0
     wrench_weights: WrenchWeights = (1.0, 1.0, 1.0, 6.0, 6.0, 6.0)
@@ -354,5 +357,8 @@ def _override(content: object, override: str) -> dict[str, Any]:
             raise InputError(f"--set {override}: {parent} is no mapping, allowed: keys inside one")
         node[parent] = dict(inner)
         node = node[parent]
+    if key == "control.mode" and node.get("mode") != value:
+        # What the file says of one mode is unknown to another.
+        node.clear()
     node[leaf] = value
     return root

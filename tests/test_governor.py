@@ -40,6 +40,7 @@ def machine(thesis):
         np.array([(LOWER, cable.tension_limits[1]) for cable in thesis.cables]),
         CONTROLLED_AXES,
         np.array([0.002] * 3 + [0.004] * 3),
+        np.zeros(6),
     )
 
 
@@ -146,6 +147,21 @@ def test_it_falls_before_its_reference_does_and_that_takes_a_third_of_the_error(
     # The reference falls from here on; z is down.
     assert long.at(2.0)[8] > 0.1
     assert np.abs(long.knots[:, 2]).max() < 0.7 * np.abs(short.knots[:, 2]).max()
+
+
+def test_a_known_force_upward_is_gravity_that_is_missing(thesis, machine, dropped):
+    lift = 0.2 * thesis.bar.mass * thesis.gravity
+    lighter = machine._replace(bar=bar_parameters(thesis.bar, 0.8 * thesis.gravity))
+    lifted, plain = (
+        machine._replace(known_wrench=np.array([0.0, 0.0, force, 0.0, 0.0, 0.0]))
+        for force in (-lift, 0.0)
+    )
+    as_lifted, as_lighter, as_plain = (
+        plan_deviation(each, dropped, FRAME, DURATION, 1.0).knots
+        for each in (lifted, lighter, plain)
+    )
+    np.testing.assert_allclose(as_lifted[:, :6], as_lighter[:, :6], atol=1e-6)
+    assert np.abs(as_lifted[:, 2]).max() > 1.2 * np.abs(as_plain[:, 2]).max()
 
 
 def test_no_further_ahead_than_is_known(machine, dropped):

@@ -19,7 +19,8 @@ FAST = (
     "rates.tension_distribution=500",
 )
 WILD = (
-    "control={mode: closed_loop, motion: {gains: {surge: {kp: -90000, ki: 0, kd: 0}}}}",
+    "control={mode: closed_loop, motion: {gains: {surge: {kp: -90000, ki: 0, kd: 0}}},"
+    " tension_distribution: {method: pseudo_inverse}}",
     "rates.motion_controller=1000",
     "rates.motion_capture=1000",
 )

@@ -2,33 +2,43 @@
 
 import re
 import sys
+from dataclasses import replace
 
 import numpy as np
 import pytest
 from run_samples import bundle_of
 
 from bench.feasibility import least_errors, least_tensions
+from bench.result_blocks import blocks_of
 from bench.result_cases import (
+    AT_FOUR_METRES,
     BEYOND,
     CAMERA_100_HZ,
     CAUSES,
     CORNERS,
     LIMITED,
     PAST,
+    ROUGH_CORNERS,
     SWITCHED,
     SWITCHED_4M,
     SWITCHED_CALM,
     SWITCHED_GAINS,
     THESIS,
+    TOLD_OF,
     changed,
     corrected,
     seeded,
 )
-from bench.results import BLOCK, PAGE, Store, main, table, tracking_block
+from bench.result_measures import tracking
+from bench.result_store import Measurement, Store, spoken
+from bench.result_tables import distribution_block, extremes_block, table, tracking_block
+from bench.result_work import work_off
+from bench.results import BLOCK, PAGE, main
 from bench.tension_distribution import drawn_wrenches, score
 from bench.tracking import Case, follow, track
 from cspm_bringup.run import run
 from cspm_msgs_py.errors import InputError
+from cspm_msgs_py.scenario import TensionDistribution
 
 pytestmark = pytest.mark.compiled
 
@@ -43,10 +53,11 @@ def test_every_case_is_a_run_that_can_be_made():
         SWITCHED_4M,
         CAUSES,
         BEYOND,
+        AT_FOUR_METRES,
         CORNERS,
         LIMITED,
     )
-    groups += (changed(PAST, 1.0), corrected(1.0), seeded(2, CAMERA_100_HZ))
+    groups += (ROUGH_CORNERS, TOLD_OF, changed(PAST), corrected(), seeded(2, CAMERA_100_HZ))
     for case in {case.scenario: case for group in groups for case in group.values()}.values():
         assert case.bundle().testbed.testbed.bar is not None
     for case in SWITCHED_4M.values():
@@ -99,23 +110,89 @@ def test_more_is_asked_than_pulling_cables_can_give():
     assert (least < 0.0).mean() > 0.1
 
 
-def test_the_score_of_a_method_is_that_of_its_wrenches():
+def test_a_scenario_that_names_no_method_gets_one_that_meets_whatever_can_be_met():
     testbed = Case("worst_case").bundle().testbed.testbed
     drawn = drawn_wrenches(testbed, 200, seed=4)
-    found = {name: score(testbed, name, drawn) for name in ("pseudo_inverse", "analytic_centre")}
-    assert found["analytic_centre"].met == 1.0
-    assert found["analytic_centre"].residual <= 1e-6
-    assert 0.0 < found["pseudo_inverse"].met < 0.9
-    assert all(each.wrong == 0 for each in found.values())
+    usual = score(testbed, TensionDistribution().method, drawn)
+    assert usual.met == 1.0
+    assert usual.residual <= 1e-6
+    thesis = score(testbed, "pseudo_inverse", drawn)
+    assert 0.0 < thesis.met < 0.9
+    assert usual.wrong == thesis.wrong == 0
 
 
-def test_what_was_measured_is_kept(tmp_path):
-    from rich.console import Console
+COUNTS = []
 
-    store = Store(tmp_path, Console(quiet=True))
-    assert store.get("a, b", lambda: {"x": 1}) == {"x": 1}
-    assert store.get("a, b", lambda: pytest.fail("measured twice")) == {"x": 1}
-    assert [store.get(f"stiffness {sign}20 %", lambda s=sign: s) for sign in "+−"] == ["+", "−"]
+
+def counted(number, more=0):
+    """Measure something, and leave a trace of having done so."""
+    COUNTS.append(number)
+    return number + more
+
+
+def test_what_was_measured_is_kept_until_what_decides_it_changes(tmp_path, monkeypatch):
+    COUNTS.clear()
+    store, told = Store(tmp_path), []
+    first = Measurement("a, b", counted, (1,))
+    second = Measurement("c", counted, (20,), needs=(first,))
+    timed = Measurement("d", counted, (3,), alone=True)
+    work_off(store, [second, timed], 1, told.append)
+    # What measures time comes first, what needs others last.
+    assert COUNTS == [3, 1, 20]
+    assert store.find(second).found == 21
+    assert told[2] == "3 of 3: c, 0 s of the processor"
+    work_off(store, [second, timed, first], 1, told.append)
+    assert COUNTS == [3, 1, 20]
+    assert store.find(replace(first, arguments=(2,))) is None
+    # Another first one is another second one.
+    assert store.find(replace(second, needs=(replace(first, arguments=(2,)),))) is None
+    monkeypatch.setattr("bench.result_store.code_hash", lambda: "another")
+    assert store.find(first) is None
+
+
+def test_names_that_differ_in_a_sign_are_kept_apart(tmp_path):
+    store = Store(tmp_path)
+    for sign in "+−":
+        store.keep(Measurement(f"stiffness {sign}20 %", counted), sign, 0.0)
+    found = [store.find(Measurement(f"stiffness {sign}20 %", counted)).found for sign in "+−"]
+    assert found == ["+", "−"]
+
+
+def test_a_scenario_and_its_code_decide_but_not_its_comments():
+    calm, rest = (Measurement("m", tracking, (Case(name),)) for name in ("calm", "rest"))
+    assert calm.fingerprint() != rest.fingerprint()
+    assert calm.fingerprint() == Measurement("n", tracking, (Case("calm"),)).fingerprint()
+    code = 'def f(x):\n    """Say."""\n    return x + 1\n'
+    assert spoken(code) == spoken("def f(x):  # say\n    return x + 1\n")
+    assert spoken(code) != spoken(code.replace("1", "2"))
+
+
+@pytest.mark.slow
+def test_processes_measure_what_one_would(tmp_path):
+    cases = [Case("rest", ("duration=0.02", f"seed={seed}")) for seed in (1, 2)]
+    found = []
+    for workers in (1, 2):
+        store = Store(tmp_path / str(workers))
+        wanted = [Measurement(f"seed {i}", tracking, (case,)) for i, case in enumerate(cases)]
+        work_off(store, wanted, workers, lambda _: None)
+        found.append([store.find(each).found for each in wanted])
+    assert found[0] == found[1]
+    assert found[0][0] != found[0][1]
+
+
+def test_what_is_stopped_says_how_it_goes_on(tmp_path, monkeypatch, capsys):
+    def stopped(*_):
+        raise KeyboardInterrupt
+
+    page = tmp_path / "page.md"
+    page.write_text("as it was")
+    monkeypatch.setattr("bench.results.PAGE", page)
+    monkeypatch.setattr("bench.results.work_off", stopped)
+    monkeypatch.setattr(sys, "argv", ["results", "--keep", str(tmp_path / "kept")])
+    assert main() == 1
+    said = "".join(capsys.readouterr().out.split())
+    assert said.endswith("kept,thesamecommandgoeson")
+    assert page.read_text() == "as it was"
 
 
 def test_one_block_is_renewed_alone(tmp_path, monkeypatch, capsys):
@@ -123,15 +200,22 @@ def test_one_block_is_renewed_alone(tmp_path, monkeypatch, capsys):
     blocks = "<!-- results: machine -->\nold\n<!-- end -->\n"
     page.write_text(blocks + blocks.replace("machine", "past"))
     monkeypatch.setattr("bench.results.PAGE", page)
-    monkeypatch.setattr(sys, "argv", ["results", "--seeds", "3", "--only", "machine"])
-    main()
+    nothing = str(tmp_path / "kept")
+    asked = ["results", "--seeds", "3", "--only", "machine", "--keep", nothing]
+    monkeypatch.setattr(sys, "argv", asked)
+    assert main() == 0
     renewed, kept = page.read_text().split("<!-- end -->\n")[:2]
-    assert renewed.endswith("3 seeds.\n")
+    assert "; 3 seeds. 0 of " in renewed
+    assert renewed.endswith("they took 0.0 h of one processor.\n")
     assert kept == "<!-- results: past -->\nold\n"
     monkeypatch.setattr(sys, "argv", ["results", "--only", "machines"])
     with pytest.raises(SystemExit, match="2"):
         main()
     assert "error: --only: machines, allowed: machine, thesis," in capsys.readouterr().err
+    monkeypatch.setattr(sys, "argv", ["results", "--workers", "0"])
+    with pytest.raises(SystemExit, match="2"):
+        main()
+    assert "error: --workers: 0, allowed: 1 or more" in capsys.readouterr().err
 
 
 def test_an_error_that_nobody_can_avoid_is_where_no_tensions_are_left():
@@ -141,11 +225,22 @@ def test_an_error_that_nobody_can_avoid_is_where_no_tensions_are_left():
     assert 1e-3 < errors[0] < errors[1]
 
 
+def test_what_the_default_distribution_reaches_is_told_beside_the_table():
+    rows = [[f"`{name}`", *"123456", "78"] for name in ("qp", "analytic_centre")]
+    rows[1][1:4] = "100 %", "90 %", "5e-7"
+    assert distribution_block(rows).endswith(
+        "The default, `analytic_centre`: 100 % of the feasible set (to reach: 100 %), residual"
+        " 5e-7 of the demand (≤ 1e-6), p99 78 µs (< 100 µs)."
+    )
+
+
 def test_the_page_has_a_place_for_every_block_and_tables_in_them():
     page = PAGE.read_text(encoding="utf-8")
     names = [match[1] for match in BLOCK.finditer(page)]
     assert len(names) == len(set(names)) == page.count("<!-- results: ")
+    assert set(names) == {*blocks_of(1), "machine"}
     assert table(["a", "b"], [["1", "2"]]) == "| a | b |\n| --- | --- |\n| 1 | 2 |"
     data = track(Case("rest", ("duration=0.02",))).data()
-    lines = tracking_block({"rest": data}).splitlines()
-    assert len({re.sub(r"[^|]", "", line) for line in lines}) == 1
+    for block in (tracking_block, extremes_block):
+        lines = block({"rest": data}).splitlines()
+        assert len({re.sub(r"[^|]", "", line) for line in lines}) == 1

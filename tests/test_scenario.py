@@ -1,3 +1,5 @@
+from pathlib import Path
+
 import pytest
 
 from cspm_msgs_py.errors import InputError
@@ -5,12 +7,14 @@ from cspm_msgs_py.scenario import (
     ClosedLoop,
     LockedWinches,
     Scenario,
+    TensionDistribution,
     TorqueProfile,
     load_scenario,
     parse_scenario,
 )
 from cspm_msgs_py.yaml_file import dump_yaml, validate
 
+LIBRARY = Path(__file__).resolve().parents[1] / "scenarios"
 BASE = {"name": "s", "testbed": "t.yaml", "duration": 10.0}
 RATES = ("winches", "load_cells", "motion_capture", "force_controller")
 
@@ -171,6 +175,23 @@ def test_overrides_change_what_they_name_and_nothing_else(path):
     assert changed.control == LockedWinches()
     same = {"seed": plain.seed, "rates": plain.rates, "duration": plain.duration}
     assert changed.model_copy(update={**same, "control": plain.control}) == plain
+
+
+def test_another_mode_keeps_nothing_of_the_files(tmp_path):
+    given = {"mode": "closed_loop", "tension_distribution": {"method": "qp"}}
+    file = tmp_path / "s.yaml"
+    file.write_text(dump_yaml({**BASE, "control": given}))
+    assert load_scenario(file, ["control.mode=locked_winches"]).control == LockedWinches()
+    same = load_scenario(file, ["control.mode=closed_loop"]).control
+    assert same.tension_distribution.method == "qp"
+
+
+@pytest.mark.parametrize(
+    "name", ["calm", "rest", "worst_case", "worst_case_4m", "worst_case_literal"]
+)
+def test_what_reproduces_the_thesis_names_its_tension_distribution(name):
+    control = load_scenario(LIBRARY / f"{name}.yaml").control
+    assert control.tension_distribution == TensionDistribution(method="pseudo_inverse")
 
 
 def test_a_later_override_wins(path):

@@ -6,6 +6,7 @@ from scipy.spatial.transform import Rotation
 from cspm_control.tension_distribution import TensionDistribution
 from cspm_msgs_py.dofs import CONTROLLED_AXES
 from cspm_msgs_py.errors import SingularityError
+from cspm_msgs_py.scenario import TensionDistribution as HowDistributed
 from cspm_sim.kernels.rows import pose_row
 from cspm_sim.parameters import plant_parameters
 
@@ -14,6 +15,7 @@ WEIGHT = 4.06 * 9.81
 HOLD = np.array([0.0, 0.0, -WEIGHT, 0.0, 0.0, 0.0])
 HOME = np.array([0.0, 0.0, 2.0, 0.0, 0.0, 0.0])
 WIDE = (-1e9, 1e9)
+LEAST_SQUARES = HowDistributed(method="pseudo_inverse")
 
 
 def row(pose):
@@ -38,7 +40,7 @@ def structure(testbed, bar_pose, frame_pose):
 def distribution(testbed, limits=None):
     given = [cable.tension_limits for cable in testbed.cables]
     chosen = np.array(given if limits is None else [limits] * len(given), dtype=float)
-    return TensionDistribution(plant_parameters(testbed).cables, chosen)
+    return TensionDistribution(plant_parameters(testbed).cables, chosen, LEAST_SQUARES)
 
 
 @pytest.mark.parametrize("machine", ["thesis", "general"])
@@ -115,13 +117,14 @@ def test_too_much_is_cut_at_the_upper_limit_and_said(thesis):
 
 
 def test_a_tension_exactly_at_its_limit_is_not_saturated(thesis):
-    free = distribution(thesis, WIDE).step(HOLD, row(HOME), row(np.zeros(6))).tensions
+    rest = HOLD, row(HOME), row(np.zeros(6))
+    free = distribution(thesis, WIDE).step(*rest).tensions
     cables = plant_parameters(thesis).cables
     limits = np.column_stack([free, free + 1.0])
-    exact = TensionDistribution(cables, limits).step(HOLD, row(HOME), row(np.zeros(6)))
+    exact = TensionDistribution(cables, limits, LEAST_SQUARES).step(*rest)
     assert exact.feasible
     assert exact.saturated == 0
-    above = TensionDistribution(cables, limits + 1e-3).step(HOLD, row(HOME), row(np.zeros(6)))
+    above = TensionDistribution(cables, limits + 1e-3, LEAST_SQUARES).step(*rest)
     assert not above.feasible
     assert above.saturated == 8
 

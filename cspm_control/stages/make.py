@@ -102,6 +102,7 @@ def motion_stage(
                 1, scenario.rates.motion_controller // scenario.rates.motion_capture
             ),
             pose_age=_pose_age(scenario, testbed),
+            known_wrench=motion.known_wrench,
         )
         return MotionStage(computed, _planned(motion.governor, scenario, testbed, motions))
     return MotionStage(
@@ -149,12 +150,14 @@ def governed(scenario: Scenario, testbed: Testbed, limits: NDArray[np.float64]) 
     assert isinstance(scenario.control, ClosedLoop)
     assert testbed.bar is not None
     requirement = scenario.requirement
+    known = getattr(scenario.control.motion, "known_wrench", (0.0,) * 6)
     return Governed(
         nominal_parameters(testbed).cables,
         bar_parameters(testbed.bar, testbed.gravity),
         limits,
         controlled_axes(scenario.control),
         np.array([requirement.position] * 3 + [requirement.angle] * 3),
+        np.array(known),
     )
 
 

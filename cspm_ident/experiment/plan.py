@@ -27,7 +27,7 @@ from cspm_ident.diagnosis.machine_signals import (
 from cspm_ident.diagnosis.suspension import Suspension
 from cspm_ident.signals.measurement import Measurement
 from cspm_ident.signals.samples import Samples
-from cspm_msgs_py.scenario import AngleProfile, Body, Scenario
+from cspm_msgs_py.scenario import AngleProfile, Body, ClosedLoop, Scenario
 from cspm_msgs_py.testbed import Testbed, TestbedFile
 from cspm_sim.equilibrium import unstretched_lengths
 from cspm_sim.kernels.cable import ATTACHMENT, EXIT, OFFSET_LENGTH, RADIUS
@@ -73,7 +73,11 @@ def planned(scenario: Scenario, testbed: TestbedFile) -> Plan:
     zero = np.zeros((len(times), len(machine.cables)))
     still = MachineSignals(times, frame, bar, zero, zero, zero)
     needed = Suspension(still, machine, parameters, np.ones(zero.shape[1])).wrench_residuals
-    tensions, missed = _distributed(machine, parameters, needed, bar.poses, frame.poses)
+    control = scenario.control
+    how = control.tension_distribution if isinstance(control, ClosedLoop) else None
+    limits = np.array([cable.tension_limits for cable in machine.cables])
+    distribution = TensionDistribution(parameters.cables, limits, how)
+    tensions, missed = _distributed(distribution, needed, bar.poses, frame.poses)
     lengths = cable_spans(still, body_state(bar), body_state(frame), parameters.cables).lengths
     angles = _wound_angles(parameters, lengths, tensions)
     poses = {"frame_pose": Samples(times, frame.poses), "bar_pose": Samples(times, bar.poses)}
@@ -96,10 +100,8 @@ def _motion(body: Body, scenario: Scenario, machine: Testbed, times: Array) -> B
 
 
 def _distributed(
-    machine: Testbed, parameters: PlantParameters, needed: Array, bar: Array, frame: Array
+    distribution: TensionDistribution, needed: Array, bar: Array, frame: Array
 ) -> tuple[Array, Array]:
-    limits = np.array([cable.tension_limits for cable in machine.cables])
-    distribution = TensionDistribution(parameters.cables, limits)
     bars, frames = _rows(bar), _rows(frame)
     found = [distribution.step(*each) for each in zip(needed, bars, frames, strict=True)]
     return np.array([f.tensions for f in found]), np.array([f.residual for f in found])

@@ -1,0 +1,130 @@
+"""What each block of docs/results.md takes to be measured, and how it is written."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from typing import NamedTuple
+
+from bench.result_cases import (
+    AT_FOUR_METRES,
+    BEYOND,
+    CAUSES,
+    CORNERS,
+    LIMITED,
+    PAST,
+    POSSIBLE,
+    PROFILES,
+    ROUGH_CORNERS,
+    SWITCHED,
+    SWITCHED_4M,
+    SWITCHED_CALM,
+    SWITCHED_GAINS,
+    THESIS,
+    TOLD_OF,
+    changed,
+    corrected,
+    seeded,
+)
+from bench.result_measures import bands, limit, moved_on, past_thesis, possible, tracking
+from bench.result_store import Measurement
+from bench.result_tables import (
+    Found,
+    distribution_block,
+    errors_block,
+    extremes_block,
+    limit_block,
+    past_block,
+    thesis_block,
+    tracking_block,
+)
+from bench.tension_distribution import distribution_rows
+from bench.tracking import Case
+
+Cases = Mapping[str, Case]
+LATE_S = 0.005
+
+
+class Block(NamedTuple):
+    """A block of the page, or its pictures.
+
+    Attributes:
+        measurements: by the name that the block's text has for each.
+        write: from what was found, by the same names, to the block's text.
+    """
+
+    measurements: Mapping[str, Measurement]
+    write: Callable[[Found], str]
+
+
+def blocks_of(seeds: int) -> dict[str, Block]:
+    """Return all blocks but that of the machine, by name."""
+    return {
+        "thesis": _tracked("thesis", THESIS, thesis_block),
+        "switched": _tracked("switched", SWITCHED),
+        "switched_gains": _tracked("switched gains", SWITCHED_GAINS),
+        "switched_calm": _tracked("switched calm", SWITCHED_CALM),
+        "switched_4m": _tracked("switched 4 m", SWITCHED_4M),
+        "distribution": _distribution(),
+        "causes": _tracked("causes", CAUSES),
+        "beyond": _tracked("beyond", BEYOND),
+        "at_four_metres": _tracked("beyond", AT_FOUR_METRES),
+        "corners": _tracked("corners", CORNERS),
+        "rough_corners": _tracked("rough corners", ROUGH_CORNERS, extremes_block),
+        "limit": Block({name: _limit(name, case) for name, case in LIMITED.items()}, limit_block),
+        "possible": _possible(),
+        "robust": _tracked("robust", changed(PAST)),
+        "moved_on": _moved_on(),
+        "told": _tracked("told", TOLD_OF),
+        "corrected": _tracked("corrected", corrected()),
+        "robust_thesis": _tracked("robust thesis", changed("worst_case")),
+        "past": _past("1000 Hz", seeds),
+        "past_100": _past("100 Hz", seeds),
+    }
+
+
+def pictured() -> dict[str, Measurement]:
+    """Return what the pictures show, by title, and under `limit` the worst case's."""
+    return {
+        "the thesis's controllers": Measurement("bands thesis", bands, (Case("worst_case"),)),
+        "past the thesis": Measurement("bands past", bands, (Case(PAST),)),
+        "limit": _limit("worst case", LIMITED["worst case"]),
+    }
+
+
+def _tracked(group: str, cases: Cases, write: Callable[[Found], str] = tracking_block) -> Block:
+    return Block(
+        {name: Measurement(f"{group} {name}", tracking, (case,)) for name, case in cases.items()},
+        write,
+    )
+
+
+def _distribution() -> Block:
+    name = "distribution"
+    measurement = Measurement(name, distribution_rows, (20000, 60.0), alone=True)
+    return Block({name: measurement}, lambda found: distribution_block(found[name]))
+
+
+def _limit(name: str, case: Case) -> Measurement:
+    return Measurement(f"limit {name}", limit, (case,))
+
+
+def _possible() -> Block:
+    wanted = {name: Measurement(f"possible {name}", possible, of) for name, of in POSSIBLE.items()}
+    return Block(wanted, errors_block)
+
+
+def _moved_on() -> Block:
+    case = changed(PAST)["nothing"]
+    name = "what the reference moves on by in 5 ms"
+    return Block({name: Measurement(name, moved_on, (case, LATE_S))}, errors_block)
+
+
+def _past(profile: str, seeds: int) -> Block:
+    measurements = {}
+    for name, case in seeded(seeds, PROFILES[profile]).items():
+        # The limit is the reference's, whatever the rates.
+        before = _limit(name, seeded(seeds, ())[name])
+        measurements[name] = Measurement(
+            f"past {profile} {name}", past_thesis, (case,), needs=(before,)
+        )
+    return Block(measurements, past_block)

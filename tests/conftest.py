@@ -165,7 +165,7 @@ def general():
 
 
 def turned(files, turn):
-    """Return the list begun elsewhere; in five turns in a row all comes in the first quarter once."""
+    """Return the list begun elsewhere; in five turns in a row each file is in the first quarter."""
     first = int(len(files) * (turn * GOLDEN_SHARE % 1.0))
     return files[first:] + files[:first]
 

@@ -32,13 +32,17 @@ help: ## show this list
 run: $(VENV)/$(ROS).stamp ## build what a run needs and simulate the worst-case sea (SCENARIO=calm for another)
 	@$(BIN)/cspm run $(SCENARIO)
 
-test: lint kernels ## build what the tests need; then style, types and all tests
-	$(BIN)/python -m pytest $(SPREAD) -m "not slow and not alone"
-	$(MAKE) test-slow
-
-test-slow: $(VENV)/test.stamp ## only what `make test-fast` leaves out
+define run-slow
 	$(BIN)/python -m pytest $(ALONE) -m alone --reruns $(RERUNS)
 	$(BIN)/python -m pytest $(SLOW) $(SPREAD) --no-loadscope-reorder -m "slow and not alone"
+endef
+
+test: lint kernels ## build what the tests need; then style, types and all tests
+	$(BIN)/python -m pytest $(SPREAD) -m "not slow and not alone"
+	$(run-slow)
+
+test-slow: $(VENV)/test.stamp ## only what `make test-fast` leaves out
+	$(run-slow)
 
 test-fast: $(VENV)/test.stamp ## the tests without the slow ones
 	$(BIN)/python -m pytest $(SPREAD) -m "not slow and not alone"

@@ -9,6 +9,9 @@ SPREAD := -n logical --dist loadfile
 # What goes by the wall clock fails where other programs take the processor in between; a defect
 # fails every time.
 RERUNS := 2
+# Only these files are read for such tests: reading all takes longer than many of them.
+ALONE = $(shell grep -lE 'mark\.alone\b' tests/test_*.py)
+SLOW = $(shell grep -lE 'mark\.slow\b' tests/test_*.py)
 
 # ROS 2 Jazzy comes as wheels, unless a native one is sourced. Both at once would mix their libraries.
 ROS := wheels
@@ -21,7 +24,7 @@ export PYTEST_ADDOPTS := -p pytest_cov -p xdist -p pytest_rerunfailures
 endif
 endif
 
-.PHONY: help run test test-fast lint bench results coverage clean
+.PHONY: help run test test-fast test-slow kernels lint bench results coverage clean
 
 help: ## show this list
 	@grep -hE '^[a-z-]+:.*## ' Makefile | sed -E 's/:.*## /\t/' | expand -t 12
@@ -29,12 +32,23 @@ help: ## show this list
 run: $(VENV)/$(ROS).stamp ## build what a run needs and simulate the worst-case sea (SCENARIO=calm for another)
 	@$(BIN)/cspm run $(SCENARIO)
 
-test: lint ## build what the tests need; then style, types and all tests
-	$(BIN)/python -m pytest -m alone --reruns $(RERUNS)
-	$(BIN)/python -m pytest $(SPREAD) -m "not alone"
+define run-slow
+	$(BIN)/python -m pytest $(ALONE) -m alone --reruns $(RERUNS)
+	$(BIN)/python -m pytest $(SLOW) $(SPREAD) --no-loadscope-reorder -m "slow and not alone"
+endef
+
+test: lint kernels ## build what the tests need; then style, types and all tests
+	$(BIN)/python -m pytest $(SPREAD) -m "not slow and not alone"
+	$(run-slow)
+
+test-slow: $(VENV)/test.stamp ## only what `make test-fast` leaves out
+	$(run-slow)
 
 test-fast: $(VENV)/test.stamp ## the tests without the slow ones
-	$(BIN)/python -m pytest $(SPREAD) -m "not slow"
+	$(BIN)/python -m pytest $(SPREAD) -m "not slow and not alone"
+
+kernels: $(VENV)/test.stamp ## compile what all runs share, so that no two tests do it at once
+	@$(BIN)/cspm run calm --duration 0.01 --no-record > /dev/null
 
 lint: $(VENV)/test.stamp ## style and types
 	$(BIN)/ruff check .

@@ -76,6 +76,19 @@ class Margins(NamedTuple):
     bandwidth: float
 
 
+class GridResponse:
+    """A plant whose frequency response on one grid is computed once, for all of its loops."""
+
+    def __init__(self, plant: StateSpace, grid: Array) -> None:
+        """Compute it at angular frequencies of shape (m,) [rad/s]."""
+        self._plant, self._grid = plant, grid
+        self._values = plant.response(grid)
+
+    def response(self, frequencies: ArrayLike) -> ComplexArray:
+        """Return G(jω) as `StateSpace.response` does."""
+        return self._values if frequencies is self._grid else self._plant.response(frequencies)
+
+
 def margins(loop: Response, frequencies: Array) -> Margins:
     """Return the margins of the open loop L(jω).
 
@@ -152,8 +165,9 @@ def motion_margins(
         ConvergenceError: the bar cannot hang at the design pose.
     """
     _check_dofs(gains)
-    plant = motion_plant(testbed, parameters, design_pose)
-    frequencies = loop_frequencies(plant, MOTION_BANDWIDTH)
+    model = motion_plant(testbed, parameters, design_pose)
+    frequencies = loop_frequencies(model, MOTION_BANDWIDTH)
+    plant = GridResponse(model, frequencies)
     return {dof: margins(motion_loop(plant, dof, g), frequencies) for dof, g in gains.items()}
 
 
@@ -172,8 +186,9 @@ def design_force_gains(
             f"control.force.bandwidth: {bandwidth:g} rad/s, allowed: above 0 and at most"
             f" {LARGEST_FORCE_BANDWIDTH:g} rad/s"
         )
-    plant = tension_plant(testbed, parameters, design_pose)
-    frequencies = loop_frequencies(plant, bandwidth)
+    model = tension_plant(testbed, parameters, design_pose)
+    frequencies = loop_frequencies(model, bandwidth)
+    plant = GridResponse(model, frequencies)
     responses = plant.response(frequencies)
     at_bandwidth = plant.response(bandwidth)[0]
     gains = {}
@@ -203,8 +218,9 @@ def force_margins(
     unknown = [name for name in gains if name not in names]
     if unknown:
         raise InputError(f"control.force.gains: {unknown[0]}, allowed: {', '.join(names)}")
-    plant = tension_plant(testbed, parameters, design_pose)
-    frequencies = loop_frequencies(plant, LARGEST_FORCE_BANDWIDTH)
+    model = tension_plant(testbed, parameters, design_pose)
+    frequencies = loop_frequencies(model, LARGEST_FORCE_BANDWIDTH)
+    plant = GridResponse(model, frequencies)
     return {
         name: margins(force_loop(plant, names.index(name), gain), frequencies)
         for name, gain in gains.items()
@@ -267,7 +283,7 @@ def tension_plant(
     return tension_subsystem(linear_model(testbed, parameters, point))
 
 
-def motion_loop(plant: StateSpace, dof: str, gains: PidGains) -> Response:
+def motion_loop(plant: StateSpace | GridResponse, dof: str, gains: PidGains) -> Response:
     """Return one DOF's open loop, PID without derivative filter on the motion sub-system."""
     output, column = DOFS.index(dof), CONTROLLED_DOFS.index(dof)
 
@@ -279,7 +295,7 @@ def motion_loop(plant: StateSpace, dof: str, gains: PidGains) -> Response:
     return loop
 
 
-def force_loop(plant: StateSpace, i: int, gains: PiGains) -> Response:
+def force_loop(plant: StateSpace | GridResponse, i: int, gains: PiGains) -> Response:
     """Return cable i's open loop, PI on the tension sub-system, the other torques held."""
 
     def loop(frequencies: Array) -> ComplexArray:

@@ -9,6 +9,7 @@ from __future__ import annotations
 
 import hashlib
 from dataclasses import dataclass
+from functools import lru_cache
 from pathlib import Path
 from typing import Annotated, Literal
 
@@ -262,6 +263,8 @@ def load_testbed(path: Path) -> TestbedFile:
     return parse_testbed(read_text(path), str(path))
 
 
+# A study reads the same machine again with every recording, and YAML is slow to read.
+@lru_cache(maxsize=16)
 def parse_testbed(text: str, source: str) -> TestbedFile:
     """Check a test-bed's YAML text; `source` names it in errors.
 

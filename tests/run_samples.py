@@ -1,5 +1,6 @@
 """Bundles of the library's scenarios, and short runs of them."""
 
+from functools import cache
 from pathlib import Path
 
 import numpy as np
@@ -17,7 +18,15 @@ THESIS_CABLES = ("hoist_1", "hoist_2", "surge_1", "surge_2", "sway_1", "sway_2",
 
 def bundle_of(path, *overrides):
     """Return what `cspm run` runs for a scenario's name or file and `--set` overrides."""
-    path = path if isinstance(path, Path) else SCENARIOS / f"{path}.yaml"
+    return _bundle(path, overrides) if isinstance(path, Path) else _of_the_library(path, overrides)
+
+
+@cache
+def _of_the_library(name, overrides):
+    return _bundle(SCENARIOS / f"{name}.yaml", overrides)
+
+
+def _bundle(path, overrides):
     scenario = load_scenario(path, overrides)
     testbed = load_testbed(path.parent / scenario.testbed)
     return make_bundle(resolve(scenario, testbed.testbed), testbed, path.parent)

@@ -95,16 +95,18 @@ def test_the_check_sees_ros_where_it_must_not_be():
     assert wrong_imports("cspm_bringup", "runner", text) == set()
 
 
-def modules(*, with_ros):
+def modules():
+    """Names of all modules, and whether each stands on ROS."""
     for package in PACKAGES:
-        if not with_ros:
-            yield package
+        yield package, False
         for info in pkgutil.walk_packages([str(ROOT / package)], f"{package}."):
             place = ROOT / info.name.replace(".", "/")
             text = (place / "__init__.py" if info.ispkg else place.with_suffix(".py")).read_text()
             ros = set(imported(text)) & ROS or ".ros" in info.name or info.name in ON_ROS
-            if bool(ros) == with_ros:
-                yield info.name
+            yield info.name, bool(ros)
+
+
+MODULES = sorted(modules())
 
 
 def check_module(name):
@@ -114,14 +116,14 @@ def check_module(name):
         assert hasattr(module, exported)
 
 
-@pytest.mark.parametrize("name", sorted(modules(with_ros=False)))
+@pytest.mark.parametrize("name", [name for name, ros in MODULES if not ros])
 def test_a_module_imports_and_exports_what_it_says(name):
     if name.endswith("__main__"):
         pytest.skip("runs when imported")
     check_module(name)
 
 
-@pytest.mark.parametrize("name", sorted(modules(with_ros=True)))
+@pytest.mark.parametrize("name", [name for name, ros in MODULES if ros])
 def test_a_module_on_ros_imports_and_exports_what_it_says(name):
     pytest.importorskip("rclpy", reason="ROS 2 is not installed")
     check_module(name)

@@ -1,11 +1,10 @@
 """The simulated plant by the wall: in time it is as in lockstep, late it holds and counts."""
 
 from collections import deque
-from functools import cache
 
 import numpy as np
 import pytest
-from run_samples import bundle_of as read_bundle
+from run_samples import bundle_of
 
 from cspm_bringup.assembly import assemble
 from cspm_bringup.loop import Loop
@@ -22,11 +21,6 @@ START = 1_800_000_000_000 * MS
 FAST = "rates={motion_capture: 1000, motion_controller: 1000, tension_distribution: 1000}"
 QUIET = "rates={plant: 200, winches: 200, load_cells: 200, wave_trajectory: 200,"
 QUIET += " force_controller: 200}"
-
-
-@cache
-def bundle_of(*arguments):
-    return read_bundle(*arguments)
 
 
 def parts_of(tmp_path, *arguments):

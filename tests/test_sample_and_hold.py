@@ -1,10 +1,8 @@
 """A node's part in real time: when it computes, on what, and what it says of lateness."""
 
-from functools import cache
-
 import numpy as np
 import pytest
-from run_samples import bundle_of as read_bundle
+from run_samples import bundle_of
 
 from cspm_control.safety import GuardedStage
 from cspm_control.stages.make import make_controller
@@ -32,11 +30,6 @@ MS = 1_000_000
 # A wall clock's present, far from the zero at which lockstep begins.
 NOW = 1_800_000_000_000 * MS
 N = 8
-
-
-@cache
-def bundle_of(*arguments):
-    return read_bundle(*arguments)
 
 
 def at(ms):

@@ -2,12 +2,11 @@
 
 import subprocess
 import sys
-from functools import cache
 from pathlib import Path
 
 import numpy as np
 import pytest
-from run_samples import bundle_of as read_bundle
+from run_samples import bundle_of
 
 from cspm_bringup.assembly import assemble, assemble_stage
 from cspm_bringup.warm_up import warm_up
@@ -20,11 +19,6 @@ SCENARIOS = {
     "one_winch": (),
     "verification_short": (),
 }
-
-
-@cache
-def bundle_of(*arguments):
-    return read_bundle(*arguments)
 
 
 def nodes_of(bundle):

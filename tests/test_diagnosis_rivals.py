@@ -8,7 +8,9 @@ from cspm_ident.diagnosis.drivers import Knots
 from cspm_ident.diagnosis.equation import Equation
 from cspm_ident.diagnosis.evidence import gather
 from cspm_ident.diagnosis.hypothesis import bounded, is_allowed
+from cspm_ident.diagnosis.likeness import chance
 from cspm_ident.diagnosis.search import Search
+from cspm_ident.diagnosis.sums import Sums
 from cspm_sim.effects import Channel, catalogue
 
 ROWS, STEP, BLOCK_S = 4800, 0.01, 2.0
@@ -179,3 +181,46 @@ def test_further_parameters_have_to_pay():
     (rival,) = named.alternatives
     # A single further parameter costs as much as the logarithm of the blocks.
     assert rival.behind > np.sqrt(np.log(24))
+
+
+def test_an_effect_on_more_elements_than_blocks_tell_of_is_found():
+    """It shows in six blocks of 24, on eight winches, each of which is sure."""
+    names = [f"winch_{k}" for k in range(8)]
+    speed = np.where(TIMES < 12.0, np.sin(1.7 * TIMES), 0.0)
+    viscous = catalogue()["winch_viscous_friction"]
+
+    def drags(size):
+        return [
+            equation(
+                Place(Channel.SHAFT, name),
+                -size * speed,
+                {Candidate(viscous, name): -speed[:, None]},
+                noise=0.0025,
+            )
+            for name in names
+        ]
+
+    (named,) = named_in(*drags(0.05))
+    assert named.hypothesis.elements == tuple(names)
+    base, sums = np.zeros(0, dtype=int), Sums(gather([drags(0.05)], BLOCK_S))
+    parts = [np.array([k]) for k in range(8)]
+    assert sums.p_value(base, np.arange(8)) == 1.0
+    assert chance(sums, base, parts) < 1e-6
+    still = Sums(gather([drags(0.0)], BLOCK_S))
+    assert chance(still, base, parts) > 0.01
+
+
+def test_what_is_not_kept_explains_nothing():
+    speed = np.sin(1.7 * TIMES)
+    place = Place(Channel.SHAFT, "only")
+    viscous = Candidate(catalogue()["winch_viscous_friction"], "only")
+    shape = Knots().columns(place, {"speed [rad/s]": speed})
+    columns = {viscous: -speed[:, None]} | {d: c[:, 0] for d, c in shape.items()}
+    search = Search(gather([[equation(place, -0.05 * speed, columns, noise=0.0025)]], BLOCK_S))
+    found = search.run()
+    assert [n.hypothesis.effect.id for n in found.named] == ["winch_viscous_friction"]
+    assert found.unknown == ()
+    ((driver, gain, share),) = search.unknown([])
+    assert driver.signal == "speed [rad/s]"
+    assert gain.total > 0.0
+    assert share > 0.9

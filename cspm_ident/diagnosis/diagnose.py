@@ -148,20 +148,22 @@ def diagnose(
         rejected += tuple(kept[k] for k in model.useless)
         kept = tuple(each for k, each in enumerate(kept) if k not in model.useless)
         model = modelled(search, kept, data)
+    # What is not kept explains nothing.
+    unknown = search.unknown([each.hypothesis for each in kept]) if rejected else found.unknown
     values = {c: w for c, (w, _) in model.weights.items()}
     first = _first_weights(search, kept)
     told = [k for k, each in enumerate(kept) if not _is_negligible(each, values)]
     return Diagnosis(
         searched,
         held_out,
-        Findings(tuple(kept[k] for k in told), found.unknown, found.candidates),
+        Findings(tuple(kept[k] for k in told), unknown, found.candidates),
         rejected,
         tuple(each for each in kept if _is_negligible(each, values)),
         model.weights,
         judged(judges, retuned, values, noise, free_functions(evidence, judge)),
         model.simulated,
         tuple(model.worth[k] for k in told),
-        _shapes(search, kept, knots, [each[0] for each in found.unknown]),
+        _shapes(search, kept, knots, [each[0] for each in unknown]),
         _lasting(hums, searched, search_parts, values),
         tuple(model.onsets[k] for k in told),
         tuple(region_of(data.rows, kept[k].hypothesis.candidates, first) for k in told),

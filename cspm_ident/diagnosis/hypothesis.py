@@ -130,9 +130,12 @@ def joined(chosen: Sequence[Hypothesis], found: Hypothesis) -> list[Hypothesis]:
 
 
 def freedom(hypothesis: Hypothesis) -> int:
-    """Return how many parameters a hypothesis has that are not of a grid."""
-    effect = hypothesis.effect
-    return len(hypothesis.candidates) * (len(effect.parameters) - len(effect.nonlinear))
+    """Return how many numbers a hypothesis has that are not of a grid.
+
+    Those of its parameters, and one for each element beyond the first, which is a fault of its own.
+    """
+    effect, elements = hypothesis.effect, len(hypothesis.candidates)
+    return elements * (len(effect.parameters) - len(effect.nonlinear)) + elements - 1
 
 
 def is_wider(one: Hypothesis, other: Hypothesis) -> bool:

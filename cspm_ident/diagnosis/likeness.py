@@ -1,6 +1,8 @@
-"""Whether columns explain the same, and how far what they explain is from the truth."""
+"""Whether columns explain anything, or the same, and how far that is from the truth."""
 
 from __future__ import annotations
+
+from collections.abc import Sequence
 
 import numpy as np
 from numpy.typing import NDArray
@@ -28,6 +30,21 @@ def overlap(sums: Sums, base: Index, own: Index, other: Index) -> bool:
 def contains(sums: Sums, base: Index, wide: Index, narrow: Index) -> bool:
     """Return whether `narrow` is a case of `wide`, as Coulomb's friction of Stribeck's."""
     return bool(np.all(sums.spanned(base, wide, narrow) > 0.999))
+
+
+def chance(sums: Sums, base: Index, parts: Sequence[Index]) -> float:
+    """Return how probable weights as large are by chance: of all parts together, or of the surest.
+
+    Where few blocks tell much, many parts leave no test of all together.
+    """
+    together = sums.p_value(base, np.concatenate(parts))
+    if len(parts) == 1:
+        return together
+    surest = 1.0
+    for k, own in enumerate(parts):
+        beside = np.concatenate([base, *parts[:k], *parts[k + 1 :]])
+        surest = min(surest, sums.p_value(beside, own))
+    return min(1.0, 2.0 * min(together, len(parts) * surest))
 
 
 def misfit(evidence: Evidence, sums: Sums, base: Index, own: Index) -> float:

@@ -6,6 +6,7 @@ from collections.abc import Callable, Iterable, Iterator, Sequence
 from contextlib import contextmanager
 from copy import copy
 from dataclasses import replace
+from functools import partial
 
 import numpy as np
 from numpy.typing import NDArray
@@ -26,7 +27,7 @@ from cspm_ident.diagnosis.hypothesis import (
     is_wider,
     joined,
 )
-from cspm_ident.diagnosis.likeness import RIVAL_SHARE, contains, misfit, overlap
+from cspm_ident.diagnosis.likeness import RIVAL_SHARE, chance, contains, misfit, overlap
 from cspm_ident.diagnosis.sums import Gain, Sums, behind, gain_of
 from cspm_sim.effects import Effect
 
@@ -67,7 +68,7 @@ class Search:
         named = [self._judged(k, chosen) for k in range(len(chosen))]
         named.sort(key=lambda each: -each.gain.total)
         self._progress("what is left")
-        return Findings(tuple(named), self._unknown(chosen), len(self._effects))
+        return Findings(tuple(named), self.unknown(chosen), len(self._effects))
 
     @property
     def heard(self) -> tuple[Candidate, ...]:
@@ -163,9 +164,11 @@ class Search:
         """Return what a hypothesis gains in blocks that were not fitted, if it surely does."""
         if not self._is_plausible([*chosen, hypothesis]):
             return None
-        own = self.own_columns(hypothesis)
+        own, onset = self.own_columns(hypothesis), hypothesis.onset
         gain = gain_of(before - self.sums.held_out(np.concatenate([base, own])))
-        return gain if self._counts(base, own, gain, hypothesis.onset) else None
+        parts = [self._of(c) for c in hypothesis.candidates]
+        is_sure = self._counts(base, own, gain, partial(chance, self.sums, base, parts), onset)
+        return gain if is_sure else None
 
     @contextmanager
     def _delayed(self, hypothesis: Hypothesis) -> Iterator[None]:
@@ -213,17 +216,20 @@ class Search:
         for k in np.argsort(-gains):
             beside = np.concatenate([base, self.evidence.columns_of(found)])
             own = self._of(others[k])
-            if self._counts(beside, own, self.sums.gain(beside, own)):
+            gain = self.sums.gain(beside, own)
+            if self._counts(beside, own, gain, partial(self.sums.p_value, beside, own)):
                 found.append(others[k])
         return Hypothesis(candidate.effect, tuple(c for c in alike if c in found))
 
-    def _counts(self, base: Index, own: Index, gain: Gain, onset: int = 0) -> bool:
+    def _counts(
+        self, base: Index, own: Index, gain: Gain, p_value: Callable[[], float], onset: int = 0
+    ) -> bool:
         """Return whether columns are surely there and worth a word."""
         tried = len(self._effects) * (self.sums.blocks if onset else 1)
         return (
             gain.total > 0.0
-            and self.sums.p_value(base, own) < FALSE_ALARMS / tried
             and self.share(base, own) >= MATERIAL_SHARE
+            and p_value() < FALSE_ALARMS / tried
         )
 
     def _simplest(
@@ -233,7 +239,7 @@ class Search:
         base: Index,
         chosen: Sequence[Hypothesis],
     ) -> Hypothesis:
-        """Return the hypothesis of fewest columns that is no worse than the best one.
+        """Return the hypothesis of fewest numbers that is no worse than the best one.
 
         One that explains more in most blocks is taken instead, though it be less sure by itself.
         """
@@ -245,7 +251,7 @@ class Search:
             own = self.own_columns(rival)
             with self.sums.delayed(own, best.onset):
                 apart = self.sums.held_out(np.concatenate([base, own])) - reference
-            worse, wider = gain_of(apart), len(own) - len(self.own_columns(fewest))
+            worse, wider = gain_of(apart), freedom(rival) - freedom(fewest)
             if wider <= 0 and worse.total < least and behind(apart) <= -_TIED:
                 fewest, least = replace(rival, onset=best.onset), worse.total
             elif wider < 0 and worse.total <= min(
@@ -350,7 +356,8 @@ class Search:
         gained = self.sums.squares_of(base) - whole
         return best if left[best] < whole - MATERIAL_SHARE * max(gained, 0.0) else 0
 
-    def _unknown(self, chosen: Sequence[Hypothesis]) -> tuple[tuple[Driver, Gain, float], ...]:
+    def unknown(self, chosen: Sequence[Hypothesis]) -> tuple[tuple[Driver, Gain, float], ...]:
+        """Return free functions of what some hypotheses leave, with their gain and share."""
         base = self.columns(chosen)
         found = []
         for driver in self._drivers:

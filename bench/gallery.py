@@ -163,7 +163,8 @@ def _amounts(concealed: Mapping[str, Any]) -> str:
     if name is None:
         return ", ".join(concealed["elements"])
     unit = next(p.unit for p in catalogue()[concealed["effect"]].parameters if p.name == name)
-    return ", ".join(f"{e} ({name} {values[e]:.3g} {unit})" for e in concealed["elements"])
+    shown = "" if unit == "1" else f" {unit}"
+    return ", ".join(f"{e} ({name} {values[e]:.3g}{shown})" for e in concealed["elements"])
 
 
 if __name__ == "__main__":

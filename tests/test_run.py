@@ -247,6 +247,15 @@ def test_a_signal_ends_the_run_between_two_steps(tmp_path, number):
     assert before == [signal.getsignal(each) for each in (signal.SIGINT, signal.SIGTERM)]
 
 
+@pytest.fixture
+def interruptible():
+    """Let SIGINT interrupt, which programs in a shell's background are started without."""
+    before = signal.signal(signal.SIGINT, signal.default_int_handler)
+    yield
+    signal.signal(signal.SIGINT, before)
+
+
+@pytest.mark.usefixtures("interruptible")
 def test_a_second_signal_means_it(tmp_path):
     def strike(_):
         # Raised in this thread: two that another thread received might count as one.

@@ -10,7 +10,7 @@ from bench.tracking import motions_of_bundle
 from cspm_bringup.bundle import Bundle
 from cspm_control.bar_dynamics import bar_parameters, wanted_motion, wrench_for
 from cspm_control.governor import plan_deviation
-from cspm_control.stages.make import controlled_axes, governed
+from cspm_control.stages.make import controlled_axes, governed, known_wrench
 from cspm_control.wave_trajectory import WaveTrajectory
 from cspm_msgs_py.scenario import ClosedLoop
 from cspm_msgs_py.testbed import Testbed
@@ -41,7 +41,7 @@ def least_tensions(bundle: Bundle, times: Array) -> Array:
     bar, frame = (WaveTrajectory(motions[name]) for name in REFERENCES)
     upper = np.array([cable.tension_limits for cable in testbed.cables], dtype=float)[:, 1]
     cables = nominal_parameters(testbed).cables
-    known = np.array(getattr(bundle.scenario.control.motion, "known_wrench", (0.0,) * 6))
+    known = known_wrench(bundle.scenario.control)
     found = []
     for time in times:
         stamp = round(time * 1e9)

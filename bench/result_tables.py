@@ -8,6 +8,7 @@ from typing import Any
 import numpy as np
 
 from bench.tension_distribution import HEADINGS, MET, P99, RESIDUAL
+from cspm_ident.markdown import markdown_table
 from cspm_msgs_py.dofs import DOFS
 from cspm_msgs_py.scenario import TensionDistribution
 
@@ -51,7 +52,7 @@ def thesis_block(found: Found) -> str:
             values = largest[i], ours["largest"][i] * unit, rms[i], ours["rms"][i] * unit
             rows.append([f"{dof} [{'mm' if i < 3 else 'rad'}]", *(_number(v) for v in values)])
         heads = ["", "largest: thesis", "ours", "RMS: thesis", "ours"]
-        parts.append(f"**{name}**, {_rest(ours)}\n\n{table(heads, rows)}")
+        parts.append(f"**{name}**, {_rest(ours)}\n\n{markdown_table(heads, rows)}")
     deep = found["worst case, 4 m"]
     end = f"ends at {deep['duration']:.1f} s: {deep['failure']}" if deep["failure"] else "holds"
     parts.append(f"With the target 4 m below the frame the run {end}.")
@@ -96,7 +97,7 @@ def tracking_block(found: Found) -> str:
                 "ends there" if each["failure"] else "",
             ]
         )
-    return table(heads, rows)
+    return markdown_table(heads, rows)
 
 
 def extremes_block(found: Found) -> str:
@@ -123,7 +124,7 @@ def extremes_block(found: Found) -> str:
                 "ends there" if each["failure"] else "",
             ]
         )
-    return table(heads, rows)
+    return markdown_table(heads, rows)
 
 
 def past_block(found: Found) -> str:
@@ -145,7 +146,7 @@ def past_block(found: Found) -> str:
         f" which tensions ≥ 0 exist, {taut} have no cable slack at any instant. Runs that ended"
         f" early: {', '.join(failed) if failed else 'none'}."
     )
-    return f"{table(heads, rows)}\n\n{said}"
+    return f"{markdown_table(heads, rows)}\n\n{said}"
 
 
 def _listed(values: Sequence[float]) -> str:
@@ -158,7 +159,7 @@ def errors_block(found: Found) -> str:
         [name, _listed([1e3 * v for v in rms[:3]]), _listed([1e3 * v for v in rms[3:]])]
         for name, rms in found.items()
     ]
-    return table(["", "surge, sway, heave [mm]", "roll, pitch, yaw [mrad]"], rows)
+    return markdown_table(["", "surge, sway, heave [mm]", "roll, pitch, yaw [mrad]"], rows)
 
 
 def distribution_block(rows: Sequence[Sequence[str]]) -> str:
@@ -169,7 +170,7 @@ def distribution_block(rows: Sequence[Sequence[str]]) -> str:
         f"The default, `{usual}`: {own[MET]} of the feasible set (to reach: 100 %), residual"
         f" {own[RESIDUAL]} of the demand (≤ 1e-6), p99 {own[P99]} µs (< 100 µs)."
     )
-    return f"{table(HEADINGS, rows)}\n\n{said}"
+    return f"{markdown_table(HEADINGS, rows)}\n\n{said}"
 
 
 def limit_block(found: Found) -> str:
@@ -178,10 +179,4 @@ def limit_block(found: Found) -> str:
         [name, *(f"{(np.array(least) >= limit).mean():.1%}" for limit in LIMITS)]
         for name, least in found.items()
     ]
-    return table(["", *(f"t_min = {limit:g} N" for limit in LIMITS)], rows)
-
-
-def table(heads: Sequence[str], rows: Sequence[Sequence[str]]) -> str:
-    """Return a table in Markdown."""
-    lines = [heads, ["---"] * len(heads), *rows]
-    return "\n".join(f"| {' | '.join(line)} |" for line in lines)
+    return markdown_table(["", *(f"t_min = {limit:g} N" for limit in LIMITS)], rows)

@@ -31,12 +31,13 @@ from bench.result_cases import (
 )
 from bench.result_measures import tracking
 from bench.result_store import Measurement, Store, spoken
-from bench.result_tables import distribution_block, extremes_block, table, tracking_block
+from bench.result_tables import distribution_block, extremes_block, tracking_block
 from bench.result_work import work_off
 from bench.results import BLOCK, PAGE, main
 from bench.tension_distribution import drawn_wrenches, score
 from bench.tracking import Case, follow, track
 from cspm_bringup.run import run
+from cspm_ident.markdown import markdown_table
 from cspm_msgs_py.errors import InputError
 from cspm_msgs_py.scenario import TensionDistribution
 
@@ -239,7 +240,7 @@ def test_the_page_has_a_place_for_every_block_and_tables_in_them():
     names = [match[1] for match in BLOCK.finditer(page)]
     assert len(names) == len(set(names)) == page.count("<!-- results: ")
     assert set(names) == {*blocks_of(1), "machine"}
-    assert table(["a", "b"], [["1", "2"]]) == "| a | b |\n| --- | --- |\n| 1 | 2 |"
+    assert markdown_table(["a", "b"], [["1", "2"]]) == "| a | b |\n| --- | --- |\n| 1 | 2 |"
     data = track(Case("rest", ("duration=0.02",))).data()
     for block in (tracking_block, extremes_block):
         lines = block({"rest": data}).splitlines()

@@ -6,7 +6,7 @@ import json
 import os
 import shutil
 from collections.abc import Callable, Iterator, Mapping, Sequence
-from concurrent.futures import ProcessPoolExecutor, as_completed
+from concurrent.futures import FIRST_COMPLETED, Future, ProcessPoolExecutor, wait
 from dataclasses import dataclass
 from multiprocessing import get_context
 from pathlib import Path
@@ -14,6 +14,7 @@ from typing import Any
 
 from cspm_bringup.blind.concealed_run import believed, machine_of, record_concealed, watch
 from cspm_bringup.blind.item import Item, amounts_of, draw_items, truth_of
+from cspm_bringup.blind.jobs import jobs_of
 from cspm_bringup.blind.strata import STRATA
 from cspm_bringup.blind.truth import RECORDINGS, SCHEMA, SPLITS, truth_sha256
 from cspm_msgs_py.errors import DivergenceError, InputError
@@ -78,8 +79,7 @@ def make(
     Raises:
         InputError: the truth lies among the recordings, or is that of another benchmark; no jobs.
     """
-    if jobs is not None and jobs < 1:
-        raise InputError(f"--jobs {jobs}: allowed: 1 or more")
+    processes = jobs_of(jobs)
     _check(request)
     if not request.truth.exists():
         _write_truth(request, tell)
@@ -99,7 +99,7 @@ def make(
         )
     amounts = [told["amounts"] for told in truth["items"]]
     tell("recording", 0, request.count)
-    for done in _recorded(request, items, amounts, jobs or os.cpu_count() or 1):
+    for done in _recorded(request, items, amounts, processes):
         tell(f"recording, {done} made", done, request.count)
     shutil.rmtree(request.folder / ".part", ignore_errors=True)
     tell("recordings made", request.count, request.count)
@@ -117,15 +117,19 @@ def _recorded(
             _record(request, items[k], amounts[k])
             yield there + done
         return
+    running: set[Future[None]] = set()
     # MuJoCo's control callback is one per process, which must not have been forked with threads.
     with ProcessPoolExecutor(jobs, get_context("spawn")) as pool:
-        tasks = [pool.submit(_record, request, items[k], amounts[k]) for k in missing]
-        try:
-            for done, task in enumerate(as_completed(tasks), start=1):
+        while missing or running:
+            # What waits in a pool cannot be called off when the user ends the command.
+            while missing and len(running) < jobs:
+                k = missing.pop(0)
+                running.add(pool.submit(_record, request, items[k], amounts[k]))
+            ended, running = wait(running, return_when=FIRST_COMPLETED)
+            for task in ended:
                 task.result()
-                yield there + done
-        finally:
-            pool.shutdown(cancel_futures=True)
+                there += 1
+                yield there
 
 
 def _check(request: Request) -> None:

@@ -14,6 +14,7 @@ from concurrent.futures import ThreadPoolExecutor, as_completed
 from pathlib import Path
 from threading import Event
 
+from cspm_bringup.blind.jobs import jobs_of
 from cspm_bringup.blind.truth import RECORDINGS, results_of
 from cspm_ident.blind.method import CSPM, require_method
 from cspm_msgs_py.errors import InputError
@@ -50,8 +51,7 @@ def run(
     """
     for method in methods:
         require_method(method)
-    if jobs is not None and jobs < 1:
-        raise InputError(f"--jobs {jobs}: allowed: 1 or more")
+    processes = jobs_of(jobs)
     recordings = folder / RECORDINGS
     places = sorted(recordings.iterdir()) if recordings.is_dir() else []
     # A folder is empty where the controllers lost the bar.
@@ -60,7 +60,7 @@ def run(
         raise InputError(f"{folder}: no {RECORDINGS}, allowed: a folder of `cspm blind make`")
     tell(f"diagnosing {len(names)} recordings", 0, len(names))
     ended = Event()
-    with ThreadPoolExecutor(jobs or os.cpu_count()) as pool:
+    with ThreadPoolExecutor(processes) as pool:
         begun = {
             pool.submit(_diagnose, recordings / name, _places(folder, methods, name), ended): name
             for name in names
@@ -108,6 +108,8 @@ def _diagnose(recording: Path, places: Mapping[str, Path], ended: Event) -> None
             stdout=subprocess.DEVNULL,
             stderr=subprocess.PIPE,
             text=True,
+            # Ctrl-C is the parent's, which then keeps nothing of what it kills.
+            start_new_session=True,
         )
         error = _said(process, ended)
         wall = time.perf_counter() - begun

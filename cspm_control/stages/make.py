@@ -24,6 +24,7 @@ from cspm_control.torque_profile import TorqueGenerator
 from cspm_msgs_py.dofs import CONTROLLED_AXES
 from cspm_msgs_py.errors import InputError
 from cspm_msgs_py.scenario import (
+    ORIGIN,
     AngleProfile,
     ClosedLoop,
     ComputedWrenchControl,
@@ -150,14 +151,13 @@ def governed(scenario: Scenario, testbed: Testbed, limits: NDArray[np.float64]) 
     assert isinstance(scenario.control, ClosedLoop)
     assert testbed.bar is not None
     requirement = scenario.requirement
-    known = getattr(scenario.control.motion, "known_wrench", (0.0,) * 6)
     return Governed(
         nominal_parameters(testbed).cables,
         bar_parameters(testbed.bar, testbed.gravity),
         limits,
         controlled_axes(scenario.control),
         np.array([requirement.position] * 3 + [requirement.angle] * 3),
-        np.array(known),
+        known_wrench(scenario.control),
     )
 
 
@@ -200,6 +200,13 @@ def tension_distribution(control: ClosedLoop, testbed: Testbed) -> TensionDistri
 def controlled_axes(control: ClosedLoop) -> tuple[int, ...]:
     """Return the world axes in which the wrench is to be met: roll only where it is controlled."""
     return tuple(range(6)) if "roll" in control.motion.dofs else CONTROLLED_AXES
+
+
+def known_wrench(control: ClosedLoop) -> NDArray[np.float64]:
+    """Return the constant wrench on the bar that the law is told of, (6,) [N, N·m], or zero."""
+    motion = control.motion
+    told = motion.known_wrench if isinstance(motion, ComputedWrenchControl) else ORIGIN
+    return np.array(told, dtype=float)
 
 
 def wanted_tension_limits(control: ClosedLoop, testbed: Testbed) -> NDArray[np.float64]:

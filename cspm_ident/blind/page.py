@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from typing import Any
+
+from cspm_ident.markdown import markdown_table
 
 _TARGETS = (
     ("block", "block found", "≥ 97 %"),
@@ -49,7 +51,7 @@ def scorecard_page(card: Data, sha256: str, machine: str) -> str:
         *_methods("## Peers", _PEERS, card["peers"]),
         *_methods("## Without one safeguard", _ABLATIONS, card["ablations"]),
         "## By amount",
-        _table(
+        markdown_table(
             ("detection limits", "cases", "detected", "among the ties", "named"),
             (
                 (
@@ -63,7 +65,7 @@ def scorecard_page(card: Data, sha256: str, machine: str) -> str:
         "## By stratum",
         _strata(card["by_stratum"]),
         "## Verdicts",
-        _table(
+        markdown_table(
             ("concealed", *_VERDICTS),
             (
                 (kind, *(str(row.get(verdict, 0)) for verdict in _VERDICTS))
@@ -71,7 +73,7 @@ def scorecard_page(card: Data, sha256: str, machine: str) -> str:
             ),
         ),
         "## What was said first",
-        _table(
+        markdown_table(
             ("concealed", "said first", "cases"),
             ((row["concealed"], row["named_first"], str(row["cases"])) for row in card["effects"]),
         ),
@@ -108,7 +110,7 @@ def _targets(card: Data) -> str:
     fit = card["fit"]
     rows.append(("held-out error within 1.5 × floor", _percent(fit["near_floor"]), "all"))
     rows.append(("held-out error below re-tuned", _percent(fit["below_retuned"]), "≥ 95 %"))
-    return _table(("", "found", "target"), rows)
+    return markdown_table(("", "found", "target"), rows)
 
 
 def _methods(title: str, words: str, rows: Sequence[Data]) -> list[str]:
@@ -126,7 +128,7 @@ def _methods(title: str, words: str, rows: Sequence[Data]) -> list[str]:
             "CPU s",
         ),
     )
-    table = _table(heads, (_method(row) for row in rows))
+    table = markdown_table(heads, (_method(row) for row in rows))
     return [title, f"{words} {rows[0]['scored']} recordings, the same for all. {_COLUMNS}", table]
 
 
@@ -172,7 +174,9 @@ def _onsets(found: Data, driver: Sequence[float]) -> str:
 def _strata(rows: Sequence[Data]) -> str:
     keys = ("cases", "detected", "block", "element", "tied", "named", "wrong", "failed")
     heads = ("stratum", *keys[:-2], "wrong findings", "failed")
-    return _table(heads, ((row["stratum"], *(str(row[key]) for key in keys)) for row in rows))
+    return markdown_table(
+        heads, ((row["stratum"], *(str(row[key]) for key in keys)) for row in rows)
+    )
 
 
 def _numbers(card: Data) -> str:
@@ -194,7 +198,7 @@ def _calibration(rows: Sequence[Data]) -> str:
         (f"{row['from']:g} to {row['to']:g}", _number(row["said"]), _percent(row["right"]))
         for row in rows
     )
-    return _table(("probability told", "mean", "effect right"), told)
+    return markdown_table(("probability told", "mean", "effect right"), told)
 
 
 def _recordings(outcomes: Sequence[Data]) -> str:
@@ -210,7 +214,7 @@ def _recordings(outcomes: Sequence[Data]) -> str:
         )
         for o in sorted(outcomes, key=lambda o: (o["stratum"], o["name"]))
     )
-    return _table(heads, rows)
+    return markdown_table(heads, rows)
 
 
 def _listed(pairs: Sequence[tuple[str, Sequence[str]]]) -> str:
@@ -219,11 +223,6 @@ def _listed(pairs: Sequence[tuple[str, Sequence[str]]]) -> str:
         many = len(elements) > 3
         told.append(f"{effect}: {f'{len(elements)} elements' if many else ', '.join(elements)}")
     return "<br>".join(told)
-
-
-def _table(heads: Sequence[str], rows: Iterable[Sequence[str]]) -> str:
-    lines = [heads, ["---"] * len(heads), *rows]
-    return "\n".join(f"| {' | '.join(line)} |" for line in lines)
 
 
 def _percent(found: Sequence[float]) -> str:

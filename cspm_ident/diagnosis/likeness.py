@@ -16,7 +16,7 @@ Index = NDArray[np.intp]
 # Of the gain: what loses more is no rival, however the rest scatters.
 RIVAL_SHARE = 0.5
 # Of the gain: no model is so true, 7 % of its amplitude, that a smaller difference decides.
-_UNTRUE_SHARE = 0.005
+UNTRUE_SHARE = 0.005
 
 
 def overlap(sums: Sums, base: Index, own: Index, other: Index) -> bool:
@@ -47,15 +47,15 @@ def chance(sums: Sums, base: Index, parts: Sequence[Index]) -> float:
     return min(1.0, 2.0 * min(together, len(parts) * surest))
 
 
-def misfit(evidence: Evidence, sums: Sums, base: Index, own: Index) -> float:
-    """Return by how many squares columns may be untrue: what is less decides nothing.
+def freely_gained(evidence: Evidence, sums: Sums, base: Index, own: Index) -> float:
+    """Return by how many squares columns are seen to be untrue, at least none.
 
     The most that a free function of a measured signal gains beyond them in the residuals that they
     act on; functions of time are left out, which gain what no other block tells.
     """
     both = np.concatenate([base, own])
-    gained = float(np.sum(sums.held_out(base) - sums.held_out(both)))
+    left = sums.held_out(both).sum()
     places = {p.place for p in evidence.places if np.isin(own, p.columns).any()}
     drivers = [t for t in evidence.terms if isinstance(t, Driver) and t.place in places]
-    free = [sums.gain(both, evidence.columns_of([d])).total for d in drivers if not d.of_time]
-    return max(_UNTRUE_SHARE * gained, *free, 0.0)
+    free = [np.append(both, evidence.columns_of([d])) for d in drivers if not d.of_time]
+    return max([0.0, *(float(left - sums.held_out(columns).sum()) for columns in free)])

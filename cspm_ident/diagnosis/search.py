@@ -6,7 +6,6 @@ from collections.abc import Callable, Iterable, Iterator, Sequence
 from contextlib import contextmanager
 from copy import copy
 from dataclasses import replace
-from functools import partial
 
 import numpy as np
 from numpy.typing import NDArray
@@ -27,7 +26,14 @@ from cspm_ident.diagnosis.hypothesis import (
     is_wider,
     joined,
 )
-from cspm_ident.diagnosis.likeness import RIVAL_SHARE, chance, contains, misfit, overlap
+from cspm_ident.diagnosis.likeness import (
+    RIVAL_SHARE,
+    UNTRUE_SHARE,
+    chance,
+    contains,
+    freely_gained,
+    overlap,
+)
 from cspm_ident.diagnosis.sums import Gain, Sums, behind, gain_of
 from cspm_sim.effects import Effect
 
@@ -164,11 +170,10 @@ class Search:
         """Return what a hypothesis gains in blocks that were not fitted, if it surely does."""
         if not self._is_plausible([*chosen, hypothesis]):
             return None
-        own, onset = self.own_columns(hypothesis), hypothesis.onset
+        own = self.own_columns(hypothesis)
         gain = gain_of(before - self.sums.held_out(np.concatenate([base, own])))
         parts = [self._of(c) for c in hypothesis.candidates]
-        is_sure = self._counts(base, own, gain, partial(chance, self.sums, base, parts), onset)
-        return gain if is_sure else None
+        return gain if self._counts(base, parts, gain, hypothesis.onset) else None
 
     @contextmanager
     def _delayed(self, hypothesis: Hypothesis) -> Iterator[None]:
@@ -216,20 +221,17 @@ class Search:
         for k in np.argsort(-gains):
             beside = np.concatenate([base, self.evidence.columns_of(found)])
             own = self._of(others[k])
-            gain = self.sums.gain(beside, own)
-            if self._counts(beside, own, gain, partial(self.sums.p_value, beside, own)):
+            if self._counts(beside, [own], self.sums.gain(beside, own)):
                 found.append(others[k])
         return Hypothesis(candidate.effect, tuple(c for c in alike if c in found))
 
-    def _counts(
-        self, base: Index, own: Index, gain: Gain, p_value: Callable[[], float], onset: int = 0
-    ) -> bool:
-        """Return whether columns are surely there and worth a word."""
+    def _counts(self, base: Index, parts: Sequence[Index], gain: Gain, onset: int = 0) -> bool:
+        """Return whether columns, in parts by element, are surely there and worth a word."""
         tried = len(self._effects) * (self.sums.blocks if onset else 1)
         return (
             gain.total > 0.0
-            and self.share(base, own) >= MATERIAL_SHARE
-            and p_value() < FALSE_ALARMS / tried
+            and self.share(base, np.concatenate(parts)) >= MATERIAL_SHARE
+            and chance(self.sums, base, parts) < FALSE_ALARMS / tried
         )
 
     def _simplest(
@@ -313,7 +315,7 @@ class Search:
         free = [c for c in self._effects if (c.effect_id, c.element) not in taken]
         reference = self.sums.held_out(np.concatenate([base, own]))
         gained = float(np.sum(self.sums.held_out(base) - reference))
-        undecided = misfit(self.evidence, self.sums, base, own)
+        undecided = max(UNTRUE_SHARE * gained, freely_gained(self.evidence, self.sums, base, own))
         for rival in self._rivals(hypothesis, free, base):
             columns = self.own_columns(rival)
             wider = max(0, freedom(rival) - freedom(hypothesis))
@@ -363,8 +365,8 @@ class Search:
         for driver in self._drivers:
             own = self._of(driver)
             told = self.sums.gain_within if driver.of_time else self.sums.gain
-            gain, chance = told(base, own), self.sums.p_value(base, own)
-            if gain.total > 0.0 and chance < FALSE_ALARMS / len(self._drivers):
+            gain, p_value = told(base, own), self.sums.p_value(base, own)
+            if gain.total > 0.0 and p_value < FALSE_ALARMS / len(self._drivers):
                 share = self.share(base, own)
                 if share >= UNKNOWN_SHARE:
                     found.append((driver, gain, share))

@@ -10,6 +10,7 @@ from typing import NamedTuple
 import mujoco
 import numpy as np
 from numpy.typing import NDArray
+from scipy.signal import lfilter
 
 from cspm_msgs_py.sensor_spec import Sensor, quantities
 from cspm_msgs_py.topics import Topic
@@ -73,9 +74,11 @@ class RealSensor:
         width = 6 if self._is_pose else topic.width
         repeats = width // len(quantities(topic))
         self._deviation = np.repeat(np.array(sensor.noise, dtype=float), repeats)
-        self._step = np.repeat(np.array(sensor.resolution, dtype=float), repeats)
+        step = np.repeat(np.array(sensor.resolution, dtype=float), repeats)
+        self._coarse = np.flatnonzero(step)
+        self._step = step[self._coarse]
         self._kept = float(np.exp(-1.0 / (rate * COLOUR_TIME)))
-        self._colour = np.zeros(width)
+        self._memory = np.zeros((1, width))
         self._faults = tuple(faults)
         self._generator = np.random.default_rng([seed, zlib.crc32(topic.name.encode()), 1])
         self._quality = quality
@@ -83,7 +86,9 @@ class RealSensor:
         self._offset = float(self._generator.normal(0.0, quality.clock_offset))
         self._drift = float(self._generator.normal(0.0, quality.clock_drift))
         self._taken = 0
-        self._noise: Array = np.zeros((0, 2 * width + 2))
+        self._noise: Array = np.zeros((0, width))
+        self._late: list[float] = []
+        self._drops: list[bool] = []
 
     def observe(self, step: int, now_ns: int, values: Array) -> tuple[int, Array] | None:
         """Take a reading if one is due; return its stamp [ns] and row, None if it was lost."""
@@ -95,27 +100,29 @@ class RealSensor:
             return None
         index = self._taken % _DRAWN_AT_ONCE
         if index == 0:
-            self._noise = self._generator.standard_normal((_DRAWN_AT_ONCE, 2 * len(values) + 2))
+            self._draw(len(values))
         self._taken += 1
-        drawn = self._noise[index]
-        reading = self._noisy(values, drawn)
         # The first reading is what controllers begin from.
-        if step and drawn[-1] > self._lost:
+        if step and self._drops[index]:
             return None
-        jitter = self._quality.jitter * float(np.clip(drawn[-2], -3.0, 3.0))
-        late = self._offset + self._drift * time + jitter
+        reading = values + self._noise[index]
+        reading[self._coarse] = self._step * np.round(reading[self._coarse] / self._step)
+        late = self._offset + self._drift * time + self._late[index]
         return now_ns + round(late * 1e9) * (step > 0), self._row(reading)
 
-    def _noisy(self, values: Array, drawn: Array) -> Array:
-        width = len(values)
-        fresh = np.sqrt(1.0 - self._kept**2) * drawn[width : 2 * width]
-        self._colour = self._kept * self._colour + fresh
+    def _draw(self, width: int) -> None:
+        """Draw noise, lateness and losses of the next readings."""
+        drawn = self._generator.standard_normal((_DRAWN_AT_ONCE, 2 * width + 2))
+        fresh, kept = np.sqrt(1.0 - self._kept**2), self._kept
+        colour, after = lfilter(
+            [fresh], [1.0, -kept], drawn[:, width : 2 * width], axis=0, zi=self._memory
+        )
+        self._memory = after
         share = self._quality.coloured_share
-        noise = np.sqrt(1.0 - share) * drawn[:width] + np.sqrt(share) * self._colour
-        reading: Array = values + self._deviation * noise
-        coarse = self._step > 0.0
-        reading[coarse] = self._step[coarse] * np.round(reading[coarse] / self._step[coarse])
-        return reading
+        noise = np.sqrt(1.0 - share) * drawn[:, :width] + np.sqrt(share) * colour
+        self._noise = self._deviation * noise
+        self._late = (self._quality.jitter * np.clip(drawn[:, -2], -3.0, 3.0)).tolist()
+        self._drops = (drawn[:, -1] > self._lost).tolist()
 
     def _row(self, reading: Array) -> Array:
         if not self._is_pose:

@@ -12,6 +12,7 @@ from pathlib import Path
 
 from rich.console import Console
 
+from bench.page import into_page
 from cspm_bringup.assembly import resolve
 from cspm_bringup.bundle import make_bundle
 from cspm_bringup.run import run
@@ -92,7 +93,7 @@ def main() -> None:
     tables = {"delays": _delay_table(delays), "floors": _floor_table(floors)}
     for name, text in tables.items():
         console.print(text, markup=False, highlight=False)
-        _into_page(name, text)
+        into_page(PAGE, name, text)
 
 
 def ratios(found: Comparison) -> dict[str, str]:
@@ -148,13 +149,6 @@ def _floor_table(found: dict[str, dict[str, str]]) -> str:
         for _, _, title in ROWS
     ]
     return "\n".join([*head, *rows])
-
-
-def _into_page(name: str, text: str) -> None:
-    page = PAGE.read_text(encoding="utf-8")
-    before, start, rest = page.partition(f"<!-- {name} -->")
-    _, end, after = rest.partition("<!-- end -->")
-    PAGE.write_text(f"{before}{start}\n{text}\n{end}{after}", encoding="utf-8")
 
 
 if __name__ == "__main__":

@@ -18,6 +18,7 @@ from PIL import Image
 from rich.console import Console
 from scipy.optimize import minimize_scalar
 
+from bench.page import into_page
 from cspm_bringup.assembly import resolve
 from cspm_bringup.bundle import make_bundle
 from cspm_bringup.run import run
@@ -90,7 +91,7 @@ def main() -> None:
     text = "\n\n".join([*_fitted_lines(factor, right), *_tables(judgements)])
     console.print(text, markup=False, highlight=False)
     _draw(judgements)
-    into_page("factor six", text)
+    into_page(PAGE, "factor six", text)
 
 
 def fit_factor(machine: Testbed, recordings: Sequence[Measurement]) -> float:
@@ -241,15 +242,6 @@ def _draw(judgements: Sequence[Judgement]) -> None:
     with Image.open(PICTURE) as picture:
         small = picture.convert("RGB").quantize(_COLOURS, dither=Image.Dither.NONE)
     small.save(PICTURE, optimize=True)
-
-
-def into_page(name: str, text: str) -> None:
-    """Put text between the marks of that name in docs/the-factor-six.md."""
-    page = PAGE.read_text(encoding="utf-8")
-    start, end = f"<!-- {name} -->", "<!-- end -->"
-    before, _, rest = page.partition(start)
-    _, _, after = rest.partition(end)
-    PAGE.write_text(f"{before}{start}\n{text}\n{end}{after}", encoding="utf-8")
 
 
 if __name__ == "__main__":

@@ -17,14 +17,15 @@ from rich.console import Console
 from bench.factor_six import (
     HIDDEN,
     LENGTHS,
+    PAGE,
     SCENARIOS,
     THESIS,
     fit_factor,
-    into_page,
     record,
     share,
     without_factor,
 )
+from bench.page import into_page
 from cspm_ident.signals.measurement import BAR, FRAME, Measurement
 from cspm_ident.system.choice import choose
 from cspm_ident.system.judgement import Judgement, judge
@@ -68,7 +69,7 @@ def main() -> None:
     for variant in VARIANTS:
         rows += _rows(variant, described)
         console.print("\n".join(rows), markup=False, highlight=False)
-    into_page("factor six motion", "\n".join(rows))
+    into_page(PAGE, "factor six motion", "\n".join(rows))
 
 
 def _published(i: int) -> str:

@@ -13,7 +13,8 @@ import numpy as np
 from rich.console import Console
 from scipy.spatial.transform import Rotation
 
-from bench.recovery import TESTBED, found_table, into_page, record
+from bench.page import into_page
+from bench.recovery import PAGE, TESTBED, found_table, record
 from cspm_ident.signals.measurement import Measurement
 from cspm_ident.system.choice import choose
 from cspm_ident.system.identification import identify_system
@@ -44,11 +45,11 @@ def main() -> None:
     mass = choose(machine, ["bar.mass"])
     moved = machine_with(with_frame_beside(machine, FRAME), mass, [MASS])
     truth = {"bar.mass": MASS, **{f"frame_offset.{d}": v for d, v in zip(DOFS, FRAME, strict=True)}}
-    into_page("frame", _found(record(described, moved), truth, console))
+    into_page(PAGE, "frame", _found(record(described, moved), truth, console))
     chosen = choose(machine, list(POINTS))
     truth = {each.name: each.nominal + POINTS[each.name] for each in chosen}
     moved = machine_with(machine, chosen, list(truth.values()))
-    into_page("points", _found(record(described, moved), truth, console))
+    into_page(PAGE, "points", _found(record(described, moved), truth, console))
 
 
 def with_frame_beside(machine: Testbed, offset: tuple[float, ...]) -> Testbed:

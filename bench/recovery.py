@@ -14,6 +14,7 @@ from pathlib import Path
 import numpy as np
 from rich.console import Console
 
+from bench.page import into_page
 from bench.system_coverage import damped
 from cspm_bringup.assembly import resolve
 from cspm_bringup.bundle import make_bundle
@@ -54,7 +55,7 @@ def main() -> None:
     result = identify_system([measurement], chosen, progress=console.print)
     text = "\n\n".join([found_table(result, TRUTH), _vaf_table(result)])
     console.print(text, markup=False, highlight=False)
-    into_page("recovery", text)
+    into_page(PAGE, "recovery", text)
 
 
 def record(described: TestbedFile, machine: Testbed) -> Measurement:
@@ -102,15 +103,6 @@ def _vaf_table(result: SystemResult) -> str:
         cells = ("still" if share is None else f"{share:.3f}" for share in shares.values())
         rows.append(f"| {label} | {' | '.join(cells)} |")
     return "\n".join(rows)
-
-
-def into_page(name: str, text: str) -> None:
-    """Put text between the marks of that name in docs/identify.md."""
-    page = PAGE.read_text(encoding="utf-8")
-    start, end = f"<!-- {name} -->", "<!-- end -->"
-    before, _, rest = page.partition(start)
-    _, _, after = rest.partition(end)
-    PAGE.write_text(f"{before}{start}\n{text}\n{end}{after}", encoding="utf-8")
 
 
 if __name__ == "__main__":

@@ -9,7 +9,6 @@ from __future__ import annotations
 
 import argparse
 import os
-import re
 from collections.abc import Mapping
 from pathlib import Path
 
@@ -17,6 +16,7 @@ import numpy as np
 from rich.console import Console
 
 from bench.machine import describe_machine
+from bench.page import into_page
 from bench.result_blocks import blocks_of, pictured
 from bench.result_figures import draw_comparison, draw_limit
 from bench.result_measures import LIMIT_PERIOD
@@ -26,7 +26,6 @@ from bench.result_work import work_off
 PAGE = ROOT / "docs" / "results.md"
 FIGURES = ROOT / "docs" / "figures"
 KEEP = ROOT / ".results"
-BLOCK = re.compile(r"<!-- results: (\w+) -->\n.*?<!-- end -->", re.DOTALL)
 MACHINE, PICTURES = "machine", "pictures"
 
 
@@ -55,12 +54,20 @@ def main() -> int:
         return 1
     for name in chosen:
         if name in blocks:
-            _into_page(name, blocks[name].write(_found(store, blocks[name].measurements)))
+            into_page(
+                PAGE,
+                f"results: {name}",
+                blocks[name].write(_found(store, blocks[name].measurements)),
+            )
     if PICTURES in chosen:
         _draw(_found(store, pictured()))
     if MACHINE in chosen:
         every = {each.name: each for source in sources.values() for each in source.values()}
-        _into_page(MACHINE, _machine_block(_kept(store, every), len(every), asked.seeds))
+        into_page(
+            PAGE,
+            f"results: {MACHINE}",
+            _machine_block(_kept(store, every), len(every), asked.seeds),
+        )
     return 0
 
 
@@ -89,16 +96,6 @@ def _draw(found: Mapping[str, object]) -> None:
     draw_comparison(FIGURES / "past_thesis.png", drawn)
     least = np.array(found["limit"])
     draw_limit(FIGURES / "tension_limit.png", least, LIMIT_PERIOD, drawn["past the thesis"])
-
-
-def _into_page(name: str, block: str) -> None:
-    page = PAGE.read_text(encoding="utf-8")
-
-    def renewed(match: re.Match[str]) -> str:
-        is_meant = match[1] == name
-        return f"<!-- results: {name} -->\n{block}\n<!-- end -->" if is_meant else match[0]
-
-    PAGE.write_text(BLOCK.sub(renewed, page), encoding="utf-8")
 
 
 if __name__ == "__main__":

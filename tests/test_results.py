@@ -9,6 +9,7 @@ import pytest
 from run_samples import bundle_of
 
 from bench.feasibility import least_errors, least_tensions
+from bench.page import into_page
 from bench.result_blocks import blocks_of
 from bench.result_cases import (
     AT_FOUR_METRES,
@@ -33,7 +34,7 @@ from bench.result_measures import tracking
 from bench.result_store import Measurement, Store, spoken
 from bench.result_tables import distribution_block, extremes_block, tracking_block
 from bench.result_work import work_off
-from bench.results import BLOCK, PAGE, main
+from bench.results import PAGE, main
 from bench.tension_distribution import drawn_wrenches, score
 from bench.tracking import Case, follow, track
 from cspm_bringup.run import run
@@ -235,9 +236,21 @@ def test_what_the_default_distribution_reaches_is_told_beside_the_table():
     )
 
 
+def test_a_table_goes_between_its_own_marks_alone(tmp_path):
+    page = tmp_path / "page.md"
+    page.write_text("<!-- a -->\nold\n<!-- end -->\n<!-- b -->\nkept\n<!-- end -->\n<!-- c -->\n")
+    into_page(page, "a", "new\nlines")
+    expected = "<!-- a -->\nnew\nlines\n<!-- end -->\n<!-- b -->\nkept\n<!-- end -->\n<!-- c -->\n"
+    assert page.read_text() == expected
+    for name in ("c", "d"):
+        with pytest.raises(ValueError, match=rf"page.md: no <!-- {name} --> with <!-- end -->"):
+            into_page(page, name, "new")
+    assert page.read_text() == expected
+
+
 def test_the_page_has_a_place_for_every_block_and_tables_in_them():
     page = PAGE.read_text(encoding="utf-8")
-    names = [match[1] for match in BLOCK.finditer(page)]
+    names = re.findall(r"<!-- results: (\w+) -->\n.*?<!-- end -->", page, re.DOTALL)
     assert len(names) == len(set(names)) == page.count("<!-- results: ")
     assert set(names) == {*blocks_of(1), "machine"}
     assert markdown_table(["a", "b"], [["1", "2"]]) == "| a | b |\n| --- | --- |\n| 1 | 2 |"

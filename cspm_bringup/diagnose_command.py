@@ -105,10 +105,10 @@ def explain_command(name: str) -> None:
     Console().print(Markdown(effect_section(effects[name])))
 
 
-def print_diagnosis(console: Console, found: Diagnosis) -> None:
-    """Print verdict, findings and how the fit changes on data that was not searched."""
-    console.print(f"verdict: [bold]{verdict_of(found).value}[/]")
+def _print_named(console: Console, found: Diagnosis, *, doubtful: bool) -> None:
     for k, named in enumerate(found.findings.named):
+        if found.findings.is_doubtful(named) != doubtful:
+            continue
         say(console, f"• {statement_of(found, k)}")
         for rival in (each.hypothesis for each in named.alternatives):
             say(
@@ -116,10 +116,17 @@ def print_diagnosis(console: Console, found: Diagnosis) -> None:
                 f"  as well explained by {rival.effect.id} on {', '.join(rival.elements)};"
                 f" to tell: {rival.effect.separating_experiment}",
             )
+
+
+def print_diagnosis(console: Console, found: Diagnosis) -> None:
+    """Print verdict, findings and how the fit changes on data that was not searched."""
+    console.print(f"verdict: [bold]{verdict_of(found).value}[/]")
+    _print_named(console, found, doubtful=False)
     for k in range(len(found.shapes)):
         say(console, f"• {unknown_statement(found, k)}")
     for line in found.lines:
         say(console, f"• {line_statement(line)}")
+    _print_named(console, found, doubtful=True)
     for named in found.rejected:
         say(
             console,

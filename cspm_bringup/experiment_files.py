@@ -8,7 +8,7 @@ from typing import Any
 
 from cspm_ident.diagnosis.diagnose import Diagnosis
 from cspm_ident.diagnosis.hypothesis import Hypothesis, members_of
-from cspm_ident.diagnosis.verdict import IMPROVED
+from cspm_ident.diagnosis.verdict import IMPROVED, named_in
 from cspm_ident.experiment.choice import Question, best_answer, most_showing, safe_plans
 from cspm_msgs_py.scenario import Scenario
 from cspm_msgs_py.yaml_file import dump_yaml
@@ -87,7 +87,7 @@ def _scenario_text(scenario: Scenario) -> str:
 
 def _ties(found: Diagnosis, data: dict[str, Any]) -> Iterator[tuple[dict[str, Any], Question, str]]:
     """Yield every alternative's entry, what would tell it apart, and that in words."""
-    for named, finding in zip(found.findings.named, data["findings"], strict=False):
+    for named, finding in zip(found.findings.named, named_in(data), strict=True):
         members = members_of(found.weights, named.hypothesis)
         truth = {candidate: found.weights[candidate][0] for candidate in members}
         for rival, entry in zip(named.alternatives, finding["alternatives"], strict=True):

@@ -25,7 +25,14 @@ from cspm_ident.diagnosis.part import Kind, Part, part_of
 from cspm_ident.diagnosis.region import Region
 from cspm_ident.diagnosis.simulation import Output, SimulatedFit, Worth
 from cspm_ident.diagnosis.sums import Gain
-from cspm_ident.diagnosis.verdict import TRUSTED, Verdict, diagnosis_data, verdict_of
+from cspm_ident.diagnosis.verdict import (
+    DOUBTED,
+    TRUSTED,
+    Verdict,
+    diagnosis_data,
+    named_in,
+    verdict_of,
+)
 from cspm_ident.signals.measurement import Measurement
 from cspm_ident.signals.samples import Samples
 from cspm_msgs_py.testbed import load_testbed
@@ -246,6 +253,20 @@ def test_a_periodic_force_from_outside_is_unknown(tmp_path):
     assert "162 rounds a minute" in finding["statement"]
     assert "periodic, 2.70 Hz, bar" in page_of(tmp_path, found)
     assert verdict_of(diagnosis(named=False)) is Verdict.CONSISTENT
+
+
+@pytest.mark.parametrize(("left", "doubtful"), [(91.0, True), (89.0, False)])
+def test_a_finding_beside_much_that_nothing_explains_is_doubtful(left, doubtful, tmp_path):
+    """The finding gains 900: a tenth of that is much."""
+    found = diagnosis(unknown=[(Driver(PLACE, "tension [N]"), Gain(left, 1.0), 0.2)])
+    data = diagnosis_data(found)
+    order = ["winch_coulomb_friction", "unknown"]
+    assert [f["effect"] for f in data["findings"]] == (order[::-1] if doubtful else order)
+    (finding,) = named_in(data)
+    assert finding["probability"] == TRUSTED * (DOUBTED if doubtful else 1.0)
+    assert ("Doubtful: beside it is much that nothing" in finding["statement"]) is doubtful
+    assert verdict_of(found) is (Verdict.UNKNOWN if doubtful else Verdict.EFFECT)
+    assert ("Doubtful: beside it" in page_of(tmp_path, found)) is doubtful
 
 
 def test_where_a_finding_shows_is_told():

@@ -185,3 +185,57 @@ def test_a_wrong_number_of_the_file_does_not_begin():
         shaped = {term: column[:, None, None]}
         (named,) = found(Equation(place, times, target[:, None], shaped, target[:, None])).named
         assert (named.hypothesis.onset > 0) is begins
+
+
+BIAS, OFFSET = "tension_bias", "winch_torque_offset"
+
+
+def several(elements, weights, seed=3, noise=0.05):
+    """A residual per element, in which both effects do the same, with weights of what is there."""
+    rng = np.random.default_rng(seed)
+    times = STEP * np.arange(ROWS)
+    equations = []
+    for element, weight in zip(elements, weights, strict=True):
+        column = np.sin(2.1 * times + rng.uniform(0.0, 6.0)) + 0.5
+        target = weight * column + noise * rng.standard_normal(ROWS)
+        columns = {
+            Candidate(catalogue()[name], element): column[:, None, None] for name in (BIAS, OFFSET)
+        }
+        place = Place(Channel.SHAFT, element)
+        equations.append(Equation(place, times, target[:, None], columns, target[:, None]))
+    return equations
+
+
+def test_more_elements_have_to_be_worth_it_whichever_effect_is_theirs():
+    elements = ("surge_1", "surge_2", "sway_1", "sway_2")
+    (named,) = Search(gather([several(elements, (0.3, 0.004, 0.004, 0.004))], BLOCK_S)).run().named
+    assert named.hypothesis.elements == ("surge_1",)
+    (named,) = Search(gather([several(elements, (0.3, 0.3, 0.3, 0.3))], BLOCK_S)).run().named
+    assert named.hypothesis.elements == elements
+
+
+def mixed(own):
+    """Where one element's bias is, and what is like another's bias, but is an offset."""
+    rng = np.random.default_rng(11)
+    times = STEP * np.arange(ROWS)
+    first, like = np.sin(2.1 * times), np.sin(1.3 * times) + 0.3
+    other = like + 0.3 * rng.standard_normal(ROWS)
+    target = 0.3 * first + 0.3 * (other if own else like) + 0.02 * rng.standard_normal(ROWS)
+    columns = {(BIAS, "surge_1"): first, (BIAS, "surge_2"): other, (OFFSET, "surge_1"): like}
+    shaped = {
+        Candidate(catalogue()[name], element): values[:, None, None]
+        for (name, element), values in columns.items()
+    }
+    return Equation(PLACE, times, target[:, None], shaped, target[:, None])
+
+
+@pytest.mark.parametrize(
+    ("own", "expected"),
+    [
+        (False, {(BIAS, ("surge_1",)), (OFFSET, ("surge_1",))}),
+        (True, {(BIAS, ("surge_1", "surge_2"))}),
+    ],
+)
+def test_elements_that_another_effect_explains_are_left_out(own, expected):
+    named = found(mixed(own)).named
+    assert {(n.hypothesis.effect.id, n.hypothesis.elements) for n in named} == expected

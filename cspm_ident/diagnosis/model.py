@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from cspm_ident.diagnosis.columns import Place
 from cspm_ident.diagnosis.equation import Equation, steady
-from cspm_ident.diagnosis.hypothesis import Named, bounded, members_of
+from cspm_ident.diagnosis.hypothesis import Named, bounded, is_negligible, members_of
 from cspm_ident.diagnosis.onset import Onset, onset_of
 from cspm_ident.diagnosis.parameters import of_drives, of_shafts, weights_of
 from cspm_ident.diagnosis.refine import Cut, Weights, needs_refining, refine
@@ -59,7 +59,7 @@ class Model(NamedTuple):
         weights: as of a diagnosis.
         onsets: likewise.
         simulated: likewise.
-        worth: of each finding.
+        worth: of each finding; None where they cannot tell, or it is negligible.
         possible: whether a machine can have each.
     """
 
@@ -107,7 +107,10 @@ def modelled(search: Search, kept: Sequence[Named], data: Data) -> Model:
         return Model(weights, onsets, (), (), possible)
     simulated = simulate_held_out(data.baselines, values)
     parts = data.baselines.parts
-    worth = tuple(worth_of(parts, simulated, values, own) for own in members)
+    # What a sound machine has too is too little to be of use, and there nevertheless.
+    worth = tuple(
+        None if is_negligible(own) else worth_of(parts, simulated, values, own) for own in members
+    )
     return Model(weights, onsets, simulated, worth, possible)
 
 

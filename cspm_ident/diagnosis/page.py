@@ -17,7 +17,7 @@ from cspm_ident.diagnosis.evidence_figure import driver_figure, overlay_figure
 from cspm_ident.diagnosis.hypothesis import Hypothesis, Named
 from cspm_ident.diagnosis.part import Part, part_behind, part_of
 from cspm_ident.diagnosis.statement import channel_of, drive_of, unit_of
-from cspm_ident.diagnosis.verdict import IMPROVED, TRUSTED, Verdict, verdict_of
+from cspm_ident.diagnosis.verdict import IMPROVED, TRUSTED, Verdict, named_in, verdict_of
 from cspm_ident.offline_page import figure_html, table_html, write_offline_page
 from cspm_ident.signals.samples import Samples
 from cspm_sim.effects import catalogue
@@ -192,7 +192,7 @@ def _parameters(data: dict[str, Any]) -> str:
 
 def _hypotheses(found: Diagnosis, data: dict[str, Any]) -> str:
     rows: list[tuple[str, ...]] = []
-    for named, finding in zip(found.findings.named, data["findings"], strict=False):
+    for named, finding in zip(found.findings.named, named_in(data), strict=True):
         rows += _ranked(named, finding)
     for named in found.rejected:
         size = _in_errors(named.gain.total, named.gain.error)
@@ -210,7 +210,7 @@ def _hypotheses(found: Diagnosis, data: dict[str, Any]) -> str:
     count = (
         f"<p>{found.findings.candidates} hypotheses were looked at. Probabilities are those among"
         f" what explains the same, times {TRUSTED:g}: the share of findings without a rival that"
-        " were right in blind recordings.</p>"
+        " were right in blind recordings; a tenth of it beside as much that nothing explains.</p>"
     )
     return count + table_html(heads, rows, "hypotheses and their evidence")
 

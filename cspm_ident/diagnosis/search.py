@@ -34,6 +34,7 @@ from cspm_ident.diagnosis.likeness import (
     freely_gained,
     overlap,
 )
+from cspm_ident.diagnosis.short_list import short_list
 from cspm_ident.diagnosis.sums import Gain, Sums, behind, gain_of
 from cspm_sim.effects import Effect
 
@@ -45,7 +46,6 @@ MATERIAL_SHARE = 0.1
 UNKNOWN_SHARE = 0.15
 FALSE_ALARMS = 0.01
 MOST_EFFECTS = 3
-_SHORT_LIST = 12
 # Standard deviations: what is no farther behind explains as well.
 _TIED = 2.0
 # In which an effect has to act to be told.
@@ -111,6 +111,9 @@ class Search:
             if found is None:
                 break
             chosen = joined(chosen, self._begun(found, chosen) if onsets else found)
+        # What was chosen first did not know of the others.
+        for k, hypothesis in enumerate(chosen):
+            chosen[k] = self._pruned(hypothesis, self.columns([*chosen[:k], *chosen[k + 1 :]]))
         return chosen
 
     def _is_negligible(self, hypothesis: Hypothesis, chosen: Sequence[Hypothesis]) -> bool:
@@ -137,12 +140,12 @@ class Search:
         gains = self.sums.gains_beyond(base, [self._of(c) for c in free])
         held_out = self.sums.held_out(base)
         best: tuple[float, Hypothesis] | None = None
-        for candidate in _short_list(free, gains):
+        for candidate in short_list(free, gains):
             for hypothesis in self._scopes(candidate, free, base):
                 for dated in self._dated(hypothesis, base):
                     with self._delayed(dated):
                         gain = self._sure_gain(dated, chosen, base, held_out)
-                    # More elements, or a beginning, have to be worth it.
+                    # More elements have to be worth it.
                     if gain is not None and (
                         best is None
                         or gain.total > best[0] + 3.0 * gain.error * is_wider(dated, best[1])
@@ -241,7 +244,7 @@ class Search:
         base: Index,
         chosen: Sequence[Hypothesis],
     ) -> Hypothesis:
-        """Return the hypothesis of fewest numbers that is no worse than the best one.
+        """Return the hypothesis of fewest numbers, or elements, that is no worse than the best one.
 
         One that explains more in most blocks is taken instead, though it be less sure by itself.
         """
@@ -254,9 +257,10 @@ class Search:
             with self.sums.delayed(own, best.onset):
                 apart = self.sums.held_out(np.concatenate([base, own])) - reference
             worse, wider = gain_of(apart), freedom(rival) - freedom(fewest)
+            fewer = len(rival.candidates) < len(fewest.candidates)
             if wider <= 0 and worse.total < least and behind(apart) <= -_TIED:
                 fewest, least = replace(rival, onset=best.onset), worse.total
-            elif wider < 0 and worse.total <= min(
+            elif (wider < 0 or (wider == 0 and fewer)) and worse.total <= min(
                 2.0 * gained.error, MATERIAL_SHARE * gained.total
             ):
                 fewest = replace(rival, onset=best.onset)
@@ -388,13 +392,3 @@ def _where(members: Sequence[Candidate], elements: set[str]) -> list[tuple[Candi
     """Return on which members an effect may do what something on some elements does."""
     same = tuple(c for c in members if c.element in elements)
     return [same] if same else list(dict.fromkeys([*((c,) for c in members), tuple(members)]))
-
-
-def _short_list(candidates: Sequence[Candidate], gains: Array) -> list[Candidate]:
-    """Return the best point and element of each effect, of the effects that gain most."""
-    best: dict[str, tuple[float, Candidate]] = {}
-    for candidate, gain in zip(candidates, gains, strict=True):
-        if candidate.effect_id not in best or gain > best[candidate.effect_id][0]:
-            best[candidate.effect_id] = float(gain), candidate
-    ranked = sorted(best.values(), key=lambda each: -each[0])
-    return [candidate for _, candidate in ranked[:_SHORT_LIST]]

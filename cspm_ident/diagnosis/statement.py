@@ -19,6 +19,11 @@ from cspm_ident.diagnosis.sketch import sketch
 from cspm_msgs_py.dofs import DOFS
 from cspm_sim.effects import Channel, Effect
 
+_DOUBT = (
+    " Doubtful: beside it is much that nothing in the catalogue explains, of which this may be a"
+    " part."
+)
+
 
 class Number(NamedTuple):
     """A parameter of a finding.
@@ -63,7 +68,7 @@ def numbers_of(diagnosis: Diagnosis, candidate: Candidate) -> list[Number]:
 
 def statement_of(diagnosis: Diagnosis, k: int) -> str:
     """Return the k-th finding as one sentence that a person can act on."""
-    named, onset, region = diagnosis.findings.named[k], diagnosis.onsets[k], diagnosis.regions[k]
+    named, region = diagnosis.findings.named[k], diagnosis.regions[k]
     effect = named.hypothesis.effect
     members = members_of(diagnosis.weights, named.hypothesis)
     parts = []
@@ -76,19 +81,24 @@ def statement_of(diagnosis: Diagnosis, k: int) -> str:
     missing = (
         "differs from the test-bed file" if effect.alter is not None else "is not in the model"
     )
-    since = ""
-    if onset is not None:
-        since = f", from {onset.time:.1f} s on ({onset.low:.1f} to {onset.high:.1f} s)"
-    elif named.hypothesis.onset:
-        since = f", from block {named.hypothesis.onset} of the recordings on"
     best = max(_concerned(diagnosis, named), key=lambda fit: fit.before / max(fit.after, 1e-300))
+    doubt = _DOUBT if diagnosis.findings.is_doubtful(named) else ""
     where = f" It shows where {region_words(region)}." if region is not None else ""
     return (
-        f"{_words(effect)} {missing}{since} ({'; '.join(parts)}). With it the held-out residual of"
-        f" {channel_of(best)} falls from {_amount(best, best.before)} to"
-        f" {_amount(best, best.after)}, where noise is {_amount(best, best.noise)};"
-        f" {_simulated_worth(diagnosis.worth[k])}.{where}"
+        f"{_words(effect)} {missing}{_since(diagnosis, k)} ({'; '.join(parts)})."
+        f" With it the held-out residual of {channel_of(best)} falls from"
+        f" {_amount(best, best.before)} to {_amount(best, best.after)},"
+        f" where noise is {_amount(best, best.noise)};"
+        f" {_simulated_worth(diagnosis.worth[k])}.{where}{doubt}"
     )
+
+
+def _since(diagnosis: Diagnosis, k: int) -> str:
+    named, onset = diagnosis.findings.named[k], diagnosis.onsets[k]
+    if onset is not None:
+        return f", from {onset.time:.1f} s on ({onset.low:.1f} to {onset.high:.1f} s)"
+    block = named.hypothesis.onset
+    return f", from block {block} of the recordings on" if block else ""
 
 
 def region_words(region: Region) -> str:

@@ -2,12 +2,13 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from enum import Enum
 from math import exp
 from typing import Any
 
 from cspm_ident.diagnosis.diagnose import Diagnosis
-from cspm_ident.diagnosis.hypothesis import Named, Rival, members_of
+from cspm_ident.diagnosis.hypothesis import Findings, Named, Rival, members_of
 from cspm_ident.diagnosis.judgement import HeldOut
 from cspm_ident.diagnosis.lines import Line
 from cspm_ident.diagnosis.region import Region
@@ -30,6 +31,8 @@ UNKNOWN = "unknown"
 # Of findings without a rival in blind recordings, those that were right (25 of 30): of the others
 # the catalogue lacks what was there, or has two things that together look like one.
 TRUSTED = 0.83
+# Of those that are doubtful, for what nothing explains beside them: none of 7 was right.
+DOUBTED = 0.1
 
 
 class Verdict(Enum):
@@ -44,8 +47,9 @@ class Verdict(Enum):
 
 
 def verdict_of(diagnosis: Diagnosis) -> Verdict:
-    """Return the verdict in one word."""
-    named = diagnosis.findings.named
+    """Return the verdict in one word; findings that are doubtful count for nothing."""
+    found = diagnosis.findings
+    named = [each for each in found.named if not found.is_doubtful(each)]
     if not named:
         if diagnosis.findings.unknown or diagnosis.lines:
             return Verdict.UNKNOWN
@@ -57,12 +61,13 @@ def verdict_of(diagnosis: Diagnosis) -> Verdict:
     return Verdict.EFFECT
 
 
-def probability_of(named: Named) -> float:
+def probability_of(found: Findings, named: Named) -> float:
     """Return how probable a finding is, beside what explains the same and what nobody thought of.
 
     A rival's odds are those of a normal deviate of as many standard deviations as it lies behind.
     """
-    return TRUSTED / (1.0 + sum(_odds(rival) for rival in named.alternatives))
+    trusted = TRUSTED * DOUBTED if found.is_doubtful(named) else TRUSTED
+    return trusted / (1.0 + sum(_odds(rival) for rival in named.alternatives))
 
 
 def _odds(rival: Rival) -> float:
@@ -93,9 +98,7 @@ def diagnosis_data(diagnosis: Diagnosis) -> dict[str, Any]:
         "recordings": [_recording(role, m) for role, m in roles],
         "testbed": {"path": _testbed_path(first), "sha256": first.testbed.sha256},
         "verdict": verdict_of(diagnosis).value,
-        "findings": [_finding(diagnosis, k) for k in range(len(diagnosis.findings.named))]
-        + [_unknown(diagnosis, k) for k in range(len(diagnosis.shapes))]
-        + [_line(line) for line in diagnosis.lines],
+        "findings": _findings(diagnosis),
         "not_excited": [
             {"effect": name, "elements": list(elements)} for name, elements in diagnosis.silent
         ],
@@ -104,6 +107,21 @@ def diagnosis_data(diagnosis: Diagnosis) -> dict[str, Any]:
         "residuals": [_equation_fit(each) for each in diagnosis.fit],
         "model": IMPROVED if diagnosis.findings.named else None,
     }
+
+
+def named_in(data: Mapping[str, Any]) -> list[dict[str, Any]]:
+    """Return those findings of `diagnosis.json` that name an effect, the first first."""
+    return [finding for finding in data["findings"] if finding["effect"] != UNKNOWN]
+
+
+def _findings(diagnosis: Diagnosis) -> list[dict[str, Any]]:
+    """Return what was found; the doubtful comes behind the unknown that makes it so."""
+    found = diagnosis.findings
+    named = [_finding(diagnosis, k) for k in range(len(found.named))]
+    # They are in the order of their gains, so that all doubtful ones are the last.
+    sure = sum(not found.is_doubtful(each) for each in found.named)
+    unknown = [_unknown(diagnosis, k) for k in range(len(diagnosis.shapes))]
+    return [*named[:sure], *unknown, *map(_line, diagnosis.lines), *named[sure:]]
 
 
 def _recording(role: str, measurement: Measurement) -> dict[str, str]:
@@ -116,7 +134,7 @@ def _testbed_path(measurement: Measurement) -> str:
 
 def _finding(diagnosis: Diagnosis, k: int) -> dict[str, Any]:
     named, onset = diagnosis.findings.named[k], diagnosis.onsets[k]
-    hypothesis, probability = named.hypothesis, probability_of(named)
+    hypothesis, probability = named.hypothesis, probability_of(diagnosis.findings, named)
     return {
         "subsystem": hypothesis.effect.block.value,
         "elements": list(hypothesis.elements),

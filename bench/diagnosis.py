@@ -106,7 +106,7 @@ def judge(folder: Path) -> tuple[str, str, str]:
                 for n in numbers_of(found, candidate)
             )
             lines.append(f"{candidate.effect_id} {candidate.element}: {numbers}")
-        lines += [f"or {rival.hypothesis.effect.id}" for rival in named.alternatives]
+        lines += [f"or {rival.words}" for rival in named.alternatives]
     lines += [f"unknown, {d.place.element}: {d.signal}" for d, _, _ in found.findings.unknown]
     return verdict_of(found).value, "<br>".join(lines), f"{took:.0f}"
 

@@ -141,8 +141,7 @@ def _text(k: int, stratum: str, item: Mapping[str, Any], found: Diagnosis) -> st
     )
     told = [statement_of(found, i) for i in range(len(found.findings.named))]
     told += [
-        f"as well explained by {rival.hypothesis.effect.id}"
-        f" on {', '.join(rival.hypothesis.elements)}"
+        f"as well explained by {rival.words}"
         for named in found.findings.named
         for rival in named.alternatives
     ]

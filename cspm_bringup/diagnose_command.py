@@ -110,12 +110,9 @@ def _print_named(console: Console, found: Diagnosis, *, doubtful: bool) -> None:
         if found.findings.is_doubtful(named) != doubtful:
             continue
         say(console, f"• {statement_of(found, k)}")
-        for rival in (each.hypothesis for each in named.alternatives):
-            say(
-                console,
-                f"  as well explained by {rival.effect.id} on {', '.join(rival.elements)};"
-                f" to tell: {rival.effect.separating_experiment}",
-            )
+        for rival in named.alternatives:
+            experiment = rival.hypothesis.effect.separating_experiment
+            say(console, f"  as well explained by {rival.words}; to tell: {experiment}")
 
 
 def print_diagnosis(console: Console, found: Diagnosis) -> None:

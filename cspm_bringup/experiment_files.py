@@ -7,7 +7,7 @@ from pathlib import Path
 from typing import Any
 
 from cspm_ident.diagnosis.diagnose import Diagnosis
-from cspm_ident.diagnosis.hypothesis import Hypothesis, members_of
+from cspm_ident.diagnosis.hypothesis import members_of
 from cspm_ident.diagnosis.verdict import IMPROVED, named_in
 from cspm_ident.experiment.choice import Question, best_answer, most_showing, safe_plans
 from cspm_msgs_py.scenario import Scenario
@@ -91,9 +91,5 @@ def _ties(found: Diagnosis, data: dict[str, Any]) -> Iterator[tuple[dict[str, An
         members = members_of(found.weights, named.hypothesis)
         truth = {candidate: found.weights[candidate][0] for candidate in members}
         for rival, entry in zip(named.alternatives, finding["alternatives"], strict=True):
-            title = f"Tells {_words(named.hypothesis)} from {_words(rival.hypothesis)}"
-            yield entry, Question(truth, rival.hypothesis.candidates), title
-
-
-def _words(hypothesis: Hypothesis) -> str:
-    return f"{hypothesis.effect.id} on {', '.join(hypothesis.elements)}"
+            title = f"Tells {named.hypothesis.words} from {rival.words}"
+            yield entry, Question(truth, rival.candidates), title

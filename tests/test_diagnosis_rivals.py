@@ -224,3 +224,38 @@ def test_what_is_not_kept_explains_nothing():
     assert driver.signal == "speed [rad/s]"
     assert gain.total > 0.0
     assert share > 0.9
+
+
+SCALE, RADIUS, DRIVE = (
+    Candidate(catalogue()[name], "only")
+    for name in ("encoder_scale", "winch_drum_radius", "winch_torque_gain")
+)
+
+
+def wound(gain_column):
+    """Lengths as of an encoder's scale; the torque is as it should be."""
+    length = np.sin(1.7 * TIMES)[:, None]
+    load = LOAD[:, None]
+    lengths = {SCALE: 10.0 * length, RADIUS: 1000.0 * length}
+    torques = {RADIUS: 1000.0 * load, DRIVE: gain_column[:, None]}
+    return (
+        equation(Place(Channel.TENSION, "only"), 0.05 * length[:, 0], lengths, noise=0.002),
+        equation(Place(Channel.SHAFT, "only"), 0.0 * LOAD, torques, noise=0.002),
+    )
+
+
+def test_an_effect_that_a_wrong_number_hides_is_an_alternative():
+    """A wrong radius whose torque a gain of the drive makes up for is an encoder's scale."""
+    (named,) = named_in(*wound(10.0 * LOAD))
+    assert named.hypothesis.words == "encoder_scale on only"
+    (rival,) = named.alternatives
+    assert rival.words == "winch_torque_gain on only beside a wrong winch_drum_radius"
+    assert rival.candidates == (DRIVE, RADIUS)
+    # It has one number more.
+    assert rival.behind == pytest.approx(np.sqrt(np.log(24)), abs=0.1)
+
+
+def test_an_effect_that_a_wrong_number_cannot_hide_is_no_alternative():
+    (named,) = named_in(*wound(10.0 * np.sin(5.0 * TIMES)))
+    assert named.hypothesis.words == "encoder_scale on only"
+    assert named.alternatives == ()

@@ -40,6 +40,11 @@ class Hypothesis:
         """What it acts on."""
         return tuple(candidate.element for candidate in self.candidates)
 
+    @property
+    def words(self) -> str:
+        """What it says, for people."""
+        return f"{self.effect.id} on {', '.join(self.elements)}"
+
 
 class Rival(NamedTuple):
     """A hypothesis that explains nearly as much as one that was chosen.
@@ -48,10 +53,24 @@ class Rival(NamedTuple):
         hypothesis: what it says.
         behind: by how many standard deviations of a normal it is worse, over the blocks that were
             not fitted, its further parameters counted; 0 where it is as good or better.
+        beside: a wrong number of the file that hides a part of it; None where it stands alone.
     """
 
     hypothesis: Hypothesis
     behind: float
+    beside: Hypothesis | None = None
+
+    @property
+    def candidates(self) -> tuple[Candidate, ...]:
+        """All that it supposes."""
+        beside = () if self.beside is None else self.beside.candidates
+        return (*self.hypothesis.candidates, *beside)
+
+    @property
+    def words(self) -> str:
+        """What it says, for people."""
+        beside = "" if self.beside is None else f" beside a wrong {self.beside.effect.id}"
+        return f"{self.hypothesis.words}{beside}"
 
 
 class Named(NamedTuple):

@@ -7,14 +7,18 @@ from collections.abc import Sequence
 import numpy as np
 from numpy.typing import NDArray
 
+from cspm_ident.diagnosis.columns import Candidate
 from cspm_ident.diagnosis.drivers import Driver
 from cspm_ident.diagnosis.evidence import Evidence
-from cspm_ident.diagnosis.sums import Sums
+from cspm_ident.diagnosis.sums import Sums, behind
 
+Array = NDArray[np.float64]
 Index = NDArray[np.intp]
 
 # Of the gain: what loses more is no rival, however the rest scatters.
 RIVAL_SHARE = 0.5
+# Standard deviations: what is no farther behind explains as well.
+TIED = 2.0
 # Of the gain: no model is so true, 7 % of its amplitude, that a smaller difference decides.
 UNTRUE_SHARE = 0.005
 
@@ -30,6 +34,20 @@ def overlap(sums: Sums, base: Index, own: Index, other: Index) -> bool:
 def contains(sums: Sums, base: Index, wide: Index, narrow: Index) -> bool:
     """Return whether `narrow` is a case of `wide`, as Coulomb's friction of Stribeck's."""
     return bool(np.all(sums.spanned(base, wide, narrow) > 0.999))
+
+
+def distance(worse: Array, undecided: float, wider: int) -> float:
+    """Return by how many standard deviations of a normal something explains less.
+
+    Args:
+        worse: by how many squares, of each block, (blocks,).
+        undecided: what decides nothing, models being as untrue as they are.
+        wider: how many numbers it has more; each counts as in Schwarz's criterion.
+    """
+    apart = max(0.0, behind(worse))
+    if worse.sum() < undecided:
+        apart = min(apart, TIED) * max(0.0, worse.sum() / undecided)
+    return float(np.hypot(apart, np.sqrt(wider * np.log(len(worse)))))
 
 
 def chance(sums: Sums, base: Index, parts: Sequence[Index]) -> float:
@@ -59,3 +77,9 @@ def freely_gained(evidence: Evidence, sums: Sums, base: Index, own: Index) -> fl
     drivers = [t for t in evidence.terms if isinstance(t, Driver) and t.place in places]
     free = [np.append(both, evidence.columns_of([d])) for d in drivers if not d.of_time]
     return max([0.0, *(float(left - sums.held_out(columns).sum()) for columns in free)])
+
+
+def where_alike(members: Sequence[Candidate], elements: set[str]) -> list[tuple[Candidate, ...]]:
+    """Return on which members an effect may do what something on some elements does."""
+    same = tuple(c for c in members if c.element in elements)
+    return [same] if same else list(dict.fromkeys([*((c,) for c in members), tuple(members)]))

@@ -142,7 +142,7 @@ def _subjects(found: Diagnosis) -> Iterable[tuple[str, Sequence[Curve], str]]:
     for named in found.findings.named:
         own = [c for c in found.curves if _touches(named.hypothesis, c)]
         own.sort(key=lambda curve: -curve.gained)
-        yield _words(named.hypothesis), own[:_MOST_CURVES], ""
+        yield named.hypothesis.words, own[:_MOST_CURVES], ""
     for driver, _, _ in found.findings.unknown:
         own = [c for c in found.curves if c.place == driver.place and driver.signal in c.signals]
         yield (
@@ -196,7 +196,7 @@ def _hypotheses(found: Diagnosis, data: dict[str, Any]) -> str:
         rows += _ranked(named, finding)
     for named in found.rejected:
         size = _in_errors(named.gain.total, named.gain.error)
-        rows.append((_words(named.hypothesis), "not kept", "", size, "no help on held-out data"))
+        rows.append((named.hypothesis.words, "not kept", "", size, "no help on held-out data"))
     for driver, gain, share in found.findings.unknown:
         name = f"a function of {driver.signal}, {driver.place.element}"
         size = _in_errors(gain.total, gain.error)
@@ -220,12 +220,12 @@ def _ranked(named: Named, finding: dict[str, Any]) -> Iterable[tuple[str, ...]]:
     verdict = "tied" if named.alternatives else "found"
     size = _in_errors(named.gain.total, named.gain.error)
     likely, taken = f"{finding['probability']:.2f}", f"{100 * named.share:.0f} %"
-    yield _words(named.hypothesis), verdict, likely, size, taken
+    yield named.hypothesis.words, verdict, likely, size, taken
     rivals = zip(named.alternatives, finding["alternatives"], strict=True)
     for rival, entry in sorted(rivals, key=lambda each: each[0].behind):
         behind = f"{rival.behind:.1f} behind"
         yield (
-            _words(rival.hypothesis),
+            rival.words,
             "explains it as well",
             f"{entry['probability']:.2f}",
             behind,
@@ -235,10 +235,6 @@ def _ranked(named: Named, finding: dict[str, Any]) -> Iterable[tuple[str, ...]]:
 
 def _in_errors(total: float, error: float) -> str:
     return f"{total / error:.1f}" if error > 0.0 else "∞"
-
-
-def _words(hypothesis: Hypothesis) -> str:
-    return f"{hypothesis.effect.id} on {', '.join(hypothesis.elements)}"
 
 
 def _fit(found: Diagnosis) -> str:

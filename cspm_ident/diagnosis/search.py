@@ -10,6 +10,7 @@ from dataclasses import replace
 import numpy as np
 from numpy.typing import NDArray
 
+from cspm_ident.diagnosis.absorbed import absorbed_pairs
 from cspm_ident.diagnosis.columns import Candidate
 from cspm_ident.diagnosis.drivers import Driver
 from cspm_ident.diagnosis.evidence import Evidence
@@ -28,11 +29,14 @@ from cspm_ident.diagnosis.hypothesis import (
 )
 from cspm_ident.diagnosis.likeness import (
     RIVAL_SHARE,
+    TIED,
     UNTRUE_SHARE,
     chance,
     contains,
+    distance,
     freely_gained,
     overlap,
+    where_alike,
 )
 from cspm_ident.diagnosis.short_list import short_list
 from cspm_ident.diagnosis.sums import Gain, Sums, behind, gain_of
@@ -46,8 +50,6 @@ MATERIAL_SHARE = 0.1
 UNKNOWN_SHARE = 0.15
 FALSE_ALARMS = 0.01
 MOST_EFFECTS = 3
-# Standard deviations: what is no farther behind explains as well.
-_TIED = 2.0
 # In which an effect has to act to be told.
 _FEWEST_BLOCKS = 5
 
@@ -258,7 +260,7 @@ class Search:
                 apart = self.sums.held_out(np.concatenate([base, own])) - reference
             worse, wider = gain_of(apart), freedom(rival) - freedom(fewest)
             fewer = len(rival.candidates) < len(fewest.candidates)
-            if wider <= 0 and worse.total < least and behind(apart) <= -_TIED:
+            if wider <= 0 and worse.total < least and behind(apart) <= -TIED:
                 fewest, least = replace(rival, onset=best.onset), worse.total
             elif (wider < 0 or (wider == 0 and fewer)) and worse.total <= min(
                 2.0 * gained.error, MATERIAL_SHARE * gained.total
@@ -282,7 +284,7 @@ class Search:
         for (name, _), members in groups.items():
             if name == hypothesis.effect.id:
                 continue
-            for own in _where(members, elements):
+            for own in where_alike(members, elements):
                 rival = Hypothesis(members[0].effect, own)
                 gain = float(self.sums.gains_beyond(base, [self.own_columns(rival)])[0])
                 key = name, len(own) > 1
@@ -320,23 +322,31 @@ class Search:
         reference = self.sums.held_out(np.concatenate([base, own]))
         gained = float(np.sum(self.sums.held_out(base) - reference))
         undecided = max(UNTRUE_SHARE * gained, freely_gained(self.evidence, self.sums, base, own))
-        for rival in self._rivals(hypothesis, free, base):
-            columns = self.own_columns(rival)
-            wider = max(0, freedom(rival) - freedom(hypothesis))
-            if (wider and contains(self.sums, base, columns, own)) or not self._is_plausible(
-                [*others, rival]
-            ):
+        for rival, beside in self._alike(hypothesis, free, base):
+            supposed = [rival] if beside is None else [rival, beside]
+            columns = self.evidence.columns_of(c for h in supposed for c in h.candidates)
+            wider = max(0, sum(map(freedom, supposed)) - freedom(hypothesis))
+            nested = wider and beside is None and contains(self.sums, base, columns, own)
+            if nested or not self._is_plausible([*others, *supposed]):
                 continue
             with self.sums.delayed(np.setdiff1d(columns, own), hypothesis.onset):
                 worse = self.sums.held_out(np.concatenate([base, columns])) - reference
             if worse.sum() > RIVAL_SHARE * gained:
                 continue
-            apart = max(0.0, behind(worse))
-            if worse.sum() < undecided:
-                apart = min(apart, _TIED) * max(0.0, worse.sum() / undecided)
-            apart = float(np.hypot(apart, np.sqrt(wider * np.log(self.sums.blocks))))
-            if apart <= _TIED:
-                yield Rival(rival, apart)
+            apart = distance(worse, undecided, wider)
+            if apart <= TIED:
+                yield Rival(rival, apart, beside)
+
+    def _alike(
+        self, hypothesis: Hypothesis, free: Sequence[Candidate], base: Index
+    ) -> Iterable[tuple[Hypothesis, Hypothesis | None]]:
+        """Yield what explains the same, alone or beside a wrong number of the file."""
+        rivals = self._rivals(hypothesis, free, base)
+        yield from ((rival, None) for rival in rivals)
+        alone = {rival.effect.id for rival in rivals}
+        for pair in absorbed_pairs(self.evidence, self.sums, base, hypothesis, free):
+            if pair[0].effect.id not in alone:
+                yield pair
 
     def _is_plausible(self, hypotheses: Sequence[Hypothesis]) -> bool:
         """Return whether parameters are what the catalogue allows, but for chance."""
@@ -386,9 +396,3 @@ class Search:
 def _may_begin(effect: Effect) -> bool:
     """Return whether an effect may be absent at first; a wrong number of the file is always one."""
     return effect.alter is None
-
-
-def _where(members: Sequence[Candidate], elements: set[str]) -> list[tuple[Candidate, ...]]:
-    """Return on which members an effect may do what something on some elements does."""
-    same = tuple(c for c in members if c.element in elements)
-    return [same] if same else list(dict.fromkeys([*((c,) for c in members), tuple(members)]))

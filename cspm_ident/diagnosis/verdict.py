@@ -159,6 +159,7 @@ def _finding(diagnosis: Diagnosis, k: int) -> dict[str, Any]:
             {
                 "effect": rival.hypothesis.effect.id,
                 "elements": list(rival.hypothesis.elements),
+                "beside": None if rival.beside is None else rival.beside.effect.id,
                 "probability": probability * _odds(rival),
                 "separating_experiment": None,
             }

@@ -248,6 +248,9 @@ def test_a_scorecard_counts():
     ]
     assert found["confusion"]["nothing"] == {"consistent": 1, "effect": 1, "failed": 1}
     assert found["fit"]["below_retuned"][:2] == (1, 1)
+    (row,) = found["parameters"]["by_effect"]
+    assert (row["effect"], row["estimates"], row["covered"][:2]) == (FRICTION, 1, (1, 1))
+    assert row["median_signed_error"] == pytest.approx(0.05)
     # Of the findings told with 0.9, one is right.
     assert [row["right"][:2] for row in found["calibration"]] == [(0, 0), (0, 0), (1, 3), (0, 0)]
 
@@ -261,6 +264,7 @@ def test_the_page_says_what_split_it_is_of_and_tells_every_miss():
     assert "Scored today on two processors. This is the development split" in text
     assert "under development" in text
     assert "| d | nothing |  | 0 | effect | winch_coulomb_friction: surge_1 |" in text
+    assert "| winch_coulomb_friction | 1 | +5.0 % | 100 % (1 of 1; 3 to 100) |" in text
     assert "| alarm where there is nothing | 50 % (1 of 2; 1 to 99) | ≤ 3 % |" in text
 
 

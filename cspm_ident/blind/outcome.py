@@ -28,10 +28,12 @@ class Estimate:
     """A parameter that was found, against what it is.
 
     Attributes:
+        effect: whose parameter it is.
         error: relative to what the value differs by from a machine without it.
         covered: whether its 95 % interval holds the truth; None without an interval.
     """
 
+    effect: str
     error: float
     covered: bool | None
 
@@ -219,7 +221,7 @@ def _estimates(concealed: Data, findings: Sequence[Data]) -> list[Estimate]:
             true, interval = amounts[element], parameter["ci95"]
             error = (parameter["value"] - true) / (true - base)
             covered = None if interval is None else interval[0] <= true <= interval[1]
-            found.append(Estimate(error, covered))
+            found.append(Estimate(finding["effect"], error, covered))
     return found
 
 

@@ -79,6 +79,18 @@ def scorecard_page(card: Data, sha256: str, machine: str) -> str:
         ),
         "## Parameters, fit, probabilities, time",
         _numbers(card),
+        markdown_table(
+            ("effect", "estimates", "median relative error", "intervals that hold the truth"),
+            (
+                (
+                    row["effect"],
+                    str(row["estimates"]),
+                    f"{100 * row['median_signed_error']:+.1f} %",
+                    _percent(row["covered"]),
+                )
+                for row in card["parameters"]["by_effect"]
+            ),
+        ),
         _calibration(card["calibration"]),
         _onsets(card["onsets"], card["shares"]["driver"]),
         "## Every recording",

@@ -17,6 +17,7 @@ from cspm_ident.blind.outcome import (
     NOTHING,
     OUTSIDE,
     PARAMETER,
+    Estimate,
     Outcome,
     judge,
 )
@@ -146,7 +147,23 @@ def _parameters(outcomes: Sequence[Outcome]) -> dict[str, Any]:
         "median_error": median(errors) if errors else None,
         "within_a_tenth": share(error <= 0.1 for error in errors),
         "covered": share(e.covered for e in estimates if e.covered is not None),
+        "by_effect": [
+            {
+                "effect": effect,
+                "estimates": len(own),
+                "median_signed_error": median(e.error for e in own),
+                "covered": share(e.covered for e in own if e.covered is not None),
+            }
+            for effect, own in sorted(_by_effect(estimates).items())
+        ],
     }
+
+
+def _by_effect(estimates: Sequence[Estimate]) -> dict[str, list[Estimate]]:
+    found: dict[str, list[Estimate]] = {}
+    for estimate in estimates:
+        found.setdefault(estimate.effect, []).append(estimate)
+    return found
 
 
 def _onsets(outcomes: Sequence[Outcome]) -> dict[str, Any]:

@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from cspm_ident.diagnosis.columns import Candidate
-from cspm_ident.diagnosis.evidence import Evidence
+from cspm_ident.diagnosis.evidence import Evidence, PlaceEvidence
 from cspm_ident.diagnosis.hypothesis import Hypothesis
 from cspm_ident.diagnosis.sums import Sums
 
@@ -17,6 +17,8 @@ Index = NDArray[np.intp]
 
 # Of the gain: what two things leave of it is no more than models are untrue by.
 _ALIKE = 0.99
+# Of the squares: what the number has to be like in the residual in which the finding shows most.
+_SAME = 0.99
 # Above which either of the two may as well be absent.
 _NEEDLESS = 0.01
 
@@ -30,7 +32,8 @@ def absorbed_pairs(
 ) -> list[tuple[Hypothesis, Hypothesis]]:
     """Return effects that together with a wrong number explain what one thing on one element does.
 
-    A drum's radius fitted while the drive's gain was wrong is, to every sensor, an encoder's scale.
+    The number would explain it but for what it spoils elsewhere, which the effect makes up for: a
+    drum's radius fitted while the drive's gain was wrong is, to every sensor, an encoder's scale.
 
     Args:
         evidence: of the columns.
@@ -48,12 +51,15 @@ def absorbed_pairs(
     others = [c for c in there if c.effect_id != hypothesis.effect.id]
     numbers = [c for c in others if c.effect.alter is not None]
     effects = [c for c in others if c.effect.alter is None]
-    pairs = list(product(effects, numbers))
-    least = _ALIKE * sums.gains_beyond(base, [evidence.columns_of(hypothesis.candidates)])[0]
+    own = evidence.columns_of(hypothesis.candidates)
+    gained = float(sums.gains_beyond(base, [own])[0])
+    shows = _most(evidence, sums, base, own)
+    hiding = [n for n in numbers if _same(shows, base, own, evidence.columns_of([n]))]
+    pairs = list(product(effects, hiding))
     gains = sums.gains_beyond(base, [evidence.columns_of(pair) for pair in pairs])
     best: dict[tuple[str, str], tuple[Candidate, Candidate]] = {}
     for k in np.argsort(-gains):
-        if gains[k] >= least:
+        if gains[k] >= _ALIKE * gained:
             effect, number = pairs[k]
             best.setdefault((effect.effect_id, number.effect_id), pairs[k])
     return [
@@ -61,6 +67,33 @@ def absorbed_pairs(
         for effect, number in best.values()
         if _needed(evidence, sums, base, effect, number)
     ]
+
+
+def _most(evidence: Evidence, sums: Sums, base: Index, own: Index) -> PlaceEvidence:
+    """Return the residual from which columns take most."""
+    both = np.concatenate([base, own])
+    before = evidence.left(base, sums.weights(base))
+    after = evidence.left(both, sums.weights(both))
+    return max(evidence.places, key=lambda each: before[each.place] - after[each.place])
+
+
+def _same(place: PlaceEvidence, base: Index, own: Index, number: Index) -> bool:
+    """Return whether a number's columns are a finding's in one residual."""
+    left = _left(place, np.concatenate([base, number]), own)
+    return left <= (1.0 - _SAME) * _left(place, base, own)
+
+
+def _left(place: PlaceEvidence, by: Index, own: Index) -> float:
+    """Return the squares of columns in one residual that others do not span."""
+    known = np.flatnonzero(np.isin(place.columns, by))
+    mine = np.flatnonzero(np.isin(place.columns, own))
+    lengths = np.sqrt(np.diag(place.whole))
+    lengths[lengths == 0.0] = 1.0
+    gram = place.whole / (lengths * lengths[:, None])
+    cross = gram[np.ix_(known, mine)]
+    inverse = np.linalg.pinv(gram[np.ix_(known, known)], rcond=1e-9, hermitian=True)
+    spanned = cross.T @ inverse @ cross
+    return float(np.trace(gram[np.ix_(mine, mine)] - spanned))
 
 
 def _needed(evidence: Evidence, sums: Sums, base: Index, one: Candidate, other: Candidate) -> bool:

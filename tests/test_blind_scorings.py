@@ -15,26 +15,41 @@ OTHER = {"a": {"diagnosis": {"verdict": "effect"}, "times": {"cpu_s": 1.0}}}
 DAY, NEXT = date(2026, 1, 2), date(2026, 1, 3)
 
 
+def dates(entry):
+    return {name: each["date"] for name, each in entry["recordings"].items()}
+
+
 def test_results_are_scored_once_and_the_same_ones_again(tmp_path):
     truth = tmp_path / "b.truth.json"
     (entry,) = enter_scoring(truth, "ab", {"cspm": FIRST}, DAY)
-    assert (entry["date"], entry["method"], entry["truth_sha256"]) == ("2026-01-02", "cspm", "ab")
+    assert (entry["method"], entry["truth_sha256"]) == ("cspm", "ab")
+    assert dates(entry) == {"a": "2026-01-02"}
     assert enter_scoring(truth, "ab", {"cspm": FIRST}, NEXT) == [entry]
-    with pytest.raises(InputError, match=r"other results of cspm were scored 2026-01-02"):
+    with pytest.raises(InputError, match=r"another result of cspm for a was scored 2026-01-02"):
         enter_scoring(truth, "ab", {"cspm": OTHER}, NEXT)
     assert json.loads(log_of(truth).read_text()) == [entry]
+
+
+def test_recordings_that_were_not_scored_may_be_added_but_none_left_out(tmp_path):
+    truth = tmp_path / "b.truth.json"
+    enter_scoring(truth, "ab", {"cspm": FIRST}, DAY)
+    both = FIRST | {"b": OTHER["a"]}
+    (entry,) = enter_scoring(truth, "ab", {"cspm": both}, NEXT)
+    assert dates(entry) == {"a": "2026-01-02", "b": "2026-01-03"}
+    with pytest.raises(InputError, match=r"another result of cspm for b was scored 2026-01-03"):
+        enter_scoring(truth, "ab", {"cspm": FIRST}, NEXT)
 
 
 def test_a_further_method_is_entered_beside_the_first(tmp_path):
     truth = tmp_path / "b.truth.json"
     enter_scoring(truth, "ab", {"cspm": FIRST}, DAY)
     entries = enter_scoring(truth, "ab", {"cspm": FIRST, "lasso": OTHER}, NEXT)
-    assert [(e["method"], e["date"]) for e in entries] == [
+    assert [(e["method"], dates(e)["a"]) for e in entries] == [
         ("cspm", "2026-01-02"),
         ("lasso", "2026-01-03"),
     ]
     # Nothing of a scoring that is refused is entered.
-    with pytest.raises(InputError, match=r"other results of lasso"):
+    with pytest.raises(InputError, match=r"another result of lasso for a"):
         enter_scoring(truth, "ab", {"retuned": FIRST, "lasso": FIRST}, NEXT)
     assert len(json.loads(log_of(truth).read_text())) == 2
 
@@ -73,7 +88,9 @@ def test_a_sealed_split_is_not_scored_again_after_another_diagnosis(tmp_path):
     assert json.loads(card.read_text())["shares"]["false_alarm"][:2] == [0, 1]
     page.unlink()
     diagnosed(folder, "unknown")
-    with pytest.raises(InputError, match=r"other results of cspm were scored .* allowed: once$"):
+    with pytest.raises(
+        InputError, match=r"another result of cspm for a was scored .* allowed: each once$"
+    ):
         score_command(folder, truth, None, page, card)
     assert not page.exists()
     diagnosed(folder, "consistent")

@@ -1,4 +1,4 @@
-"""The scorings of a sealed benchmark: once per method, kept beside the truth."""
+"""The scorings of a sealed benchmark: each recording once per method, kept beside the truth."""
 
 from __future__ import annotations
 
@@ -19,10 +19,11 @@ def log_of(truth: Path) -> Path:
 
 def enter_scoring(
     truth: Path, sha256: str, results: Mapping[str, Mapping[str, Any]], today: date
-) -> list[dict[str, str]]:
+) -> list[dict[str, Any]]:
     """Enter that results are scored against a sealed truth; return all scorings so far.
 
-    The same results may be scored again, which tells nothing new.
+    The same results may be scored again, which tells nothing new, and with them those of further
+    recordings, which had not been scored.
 
     Args:
         truth: the truth file.
@@ -31,29 +32,30 @@ def enter_scoring(
         today: the date.
 
     Raises:
-        InputError: other results of a method have been scored before.
+        InputError: another result of a recording has been scored before, or one is left out.
     """
     log = log_of(truth)
-    entries: list[dict[str, str]] = json.loads(log.read_text("utf-8")) if log.exists() else []
+    entries: list[dict[str, Any]] = json.loads(log.read_text("utf-8")) if log.exists() else []
     known = {entry["method"]: entry for entry in entries}
     for method, found in results.items():
-        digest = hashlib.sha256(json.dumps(found, sort_keys=True).encode()).hexdigest()
-        before = known.get(method)
-        if before is None:
-            entries.append(
-                {
-                    "date": str(today),
-                    "method": method,
-                    "results_sha256": digest,
-                    "truth_sha256": sha256,
-                }
-            )
-        elif before["results_sha256"] != digest:
-            raise InputError(
-                f"{truth}: sealed, and other results of {method} were scored {before['date']}"
-                f" ({log}), allowed: once"
-            )
+        if method not in known:
+            known[method] = {"method": method, "truth_sha256": sha256, "recordings": {}}
+            entries.append(known[method])
+        before = known[method]["recordings"]
+        digests = {name: _digest(result) for name, result in found.items()}
+        for name, entry in before.items():
+            if digests.get(name) != entry["results_sha256"]:
+                raise InputError(
+                    f"{truth}: sealed, and another result of {method} for {name} was scored"
+                    f" {entry['date']} ({log}), allowed: each once"
+                )
+        for name in digests.keys() - before.keys():
+            before[name] = {"date": str(today), "results_sha256": digests[name]}
     part = log.with_suffix(".part")
-    part.write_text(json.dumps(entries, indent=1), encoding="utf-8")
+    part.write_text(json.dumps(entries, indent=1, sort_keys=True), encoding="utf-8")
     part.replace(log)
     return entries
+
+
+def _digest(result: Mapping[str, Any]) -> str:
+    return hashlib.sha256(json.dumps(result, sort_keys=True).encode()).hexdigest()

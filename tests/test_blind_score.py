@@ -268,6 +268,13 @@ def test_the_page_says_what_split_it_is_of_and_tells_every_miss():
     assert "| alarm where there is nothing | 50 % (1 of 2; 1 to 99) | ≤ 3 % |" in text
 
 
+def test_the_seed_of_a_sealed_split_is_kept_back_while_recordings_are_left():
+    sealed = card() | {"asked": card()["asked"] | {"split": "sealed"}}
+    assert "7 of 8 recordings; drawn with count 6" in scorecard_page(sealed, "ab" * 32, "today")
+    whole = sealed | {"scored": 8}
+    assert "8 of 8 recordings; drawn with seed 1" in scorecard_page(whole, "ab" * 32, "today")
+
+
 def begun(onset, told, interval):
     hidden = item("a", concealed()) | {"onset_s": onset}
     said = finding(FRICTION) | {"onset_s": told, "onset_ci95_s": interval}

@@ -101,13 +101,16 @@ def scorecard_page(card: Data, sha256: str, machine: str) -> str:
 
 def _about(card: Data, sha256: str, machine: str) -> str:
     asked = card["asked"]
-    options = ", ".join(f"{key} {value}" for key, value in asked.items() if key != "strata")
+    # Whoever knows the seed can draw what is still to be scored.
+    open_yet = asked["split"] == "sealed" and card["scored"] < card["drawn"]
+    silent = {"strata", "seed"} if open_yet else {"strata"}
+    options = ", ".join(f"{key} {value}" for key, value in asked.items() if key not in silent)
     return (
         f"{card['scored']} of {card['drawn']} recordings; drawn with {options}; truth file SHA-256"
         f" `{sha256}`."
         f" Scored {machine}."
         f" {_STANDING[asked['split']]} How it is made and what the words mean:"
-        " [blind.md](blind.md). Written by `cspm blind score DIR --page docs/blind-results.md`."
+        " [blind.md](blind.md). Written by `cspm blind score DIR --page FILE`."
     )
 
 

@@ -13,7 +13,7 @@ from cspm_reality.phenomena import PHENOMENA
 ROOM = Path(__file__).resolve().parents[1] / "cspm_reality"
 ALLOWED = {
     *("__future__", "collections", "dataclasses", "statistics", "typing", "zlib"),
-    *("cspm_msgs_py", "cspm_mujoco", "cspm_reality", "mujoco", "numpy"),
+    *("cspm_msgs_py", "cspm_mujoco", "cspm_reality", "mujoco", "numpy", "scipy"),
 }
 
 

@@ -100,7 +100,7 @@ class RealSensor:
             return None
         index = self._taken % _DRAWN_AT_ONCE
         if index == 0:
-            self._draw(len(values))
+            self._draw()
         self._taken += 1
         # The first reading is what controllers begin from.
         if step and self._drops[index]:
@@ -110,14 +110,14 @@ class RealSensor:
         late = self._offset + self._drift * time + self._late[index]
         return now_ns + round(late * 1e9) * (step > 0), self._row(reading)
 
-    def _draw(self, width: int) -> None:
+    def _draw(self) -> None:
         """Draw noise, lateness and losses of the next readings."""
+        width = len(self._deviation)
         drawn = self._generator.standard_normal((_DRAWN_AT_ONCE, 2 * width + 2))
         fresh, kept = np.sqrt(1.0 - self._kept**2), self._kept
-        colour, after = lfilter(
+        colour, self._memory = lfilter(
             [fresh], [1.0, -kept], drawn[:, width : 2 * width], axis=0, zi=self._memory
         )
-        self._memory = after
         share = self._quality.coloured_share
         noise = np.sqrt(1.0 - share) * drawn[:, :width] + np.sqrt(share) * colour
         self._noise = self._deviation * noise

@@ -54,7 +54,9 @@ def absorbed_pairs(
     own = evidence.columns_of(hypothesis.candidates)
     gained = float(sums.gains_beyond(base, [own])[0])
     shows = _most(evidence, sums, base, own)
-    hiding = [n for n in numbers if _same(shows, base, own, evidence.columns_of([n]))]
+    most = (1.0 - _SAME) * _left(shows, base, own)
+    beside = {n: np.concatenate([base, evidence.columns_of([n])]) for n in numbers}
+    hiding = [n for n in numbers if _left(shows, beside[n], own) <= most]
     pairs = list(product(effects, hiding))
     gains = sums.gains_beyond(base, [evidence.columns_of(pair) for pair in pairs])
     best: dict[tuple[str, str], tuple[Candidate, Candidate]] = {}
@@ -75,12 +77,6 @@ def _most(evidence: Evidence, sums: Sums, base: Index, own: Index) -> PlaceEvide
     before = evidence.left(base, sums.weights(base))
     after = evidence.left(both, sums.weights(both))
     return max(evidence.places, key=lambda each: before[each.place] - after[each.place])
-
-
-def _same(place: PlaceEvidence, base: Index, own: Index, number: Index) -> bool:
-    """Return whether a number's columns are a finding's in one residual."""
-    left = _left(place, np.concatenate([base, number]), own)
-    return left <= (1.0 - _SAME) * _left(place, base, own)
 
 
 def _left(place: PlaceEvidence, by: Index, own: Index) -> float:

@@ -8,9 +8,9 @@ from run_samples import run_to
 
 from cspm_ident.block_simulation import BlockSimulation, Drive
 from cspm_ident.diagnosis.columns import Place
+from cspm_ident.diagnosis.machine_signals import machine_signals
 from cspm_ident.diagnosis.recorded import equations_of
 from cspm_ident.diagnosis.suspension import Suspension
-from cspm_ident.diagnosis.suspension_equations import machine_signals
 from cspm_ident.signals.measurement import read_measurement
 from cspm_ident.signals.timeline import Timeline
 from cspm_sim.effects import Channel, catalogue

@@ -8,7 +8,7 @@ import pytest
 from cspm_ident.diagnosis.columns import Candidate, Place
 from cspm_ident.diagnosis.equation import Equation
 from cspm_ident.diagnosis.evidence import gather
-from cspm_ident.diagnosis.sums import Sums
+from cspm_ident.diagnosis.sums import Sums, paired
 from cspm_sim.effects import Channel, catalogue
 
 ROWS, STEP, BLOCK_S = 2400, 0.01, 1.0
@@ -130,7 +130,7 @@ def test_intervals_hold_for_coloured_noise():
 def test_an_onset_leaves_least_where_it_is():
     equation = made(weights=(3.0, 0.0, 0.0), start=ROWS // 2)[0]
     sums = sums_of(equation)[1]
-    left = [sums.left_from(np.array([1]), np.array([0]), b) for b in range(sums.blocks)]
+    left = sums.left_from(np.array([1]), np.array([0]))
     assert int(np.argmin(left)) == sums.blocks // 2
     assert left[0] == pytest.approx(sums.squares_of(np.array([0, 1])), rel=1e-9)
 
@@ -143,7 +143,7 @@ def test_columns_act_from_a_block_on_while_they_are_delayed():
     fitted = sums.weights(both)
     left = evidence.left(both, fitted)[PLACE]
     with sums.delayed(own, block), evidence.delayed(own, block):
-        assert sums.squares_of(both) == pytest.approx(sums.left_from(base, own, block))
+        assert sums.squares_of(both) == pytest.approx(sums.left_from(base, own)[block])
         assert sums.squares_of(both) < whole
         assert sums.held_out(both).sum() < held_out
         late = evidence.left(both, sums.weights(both))[PLACE]
@@ -213,3 +213,38 @@ def test_what_a_single_block_tells_has_no_interval():
     base, own = np.array([0]), np.array([2])
     assert np.isinf(in_few_blocks([9]).half_width(base, own)[0])
     assert np.isfinite(in_few_blocks([3, 9]).half_width(base, own)[0])
+
+
+def test_a_weight_that_drifts_is_told_from_one_that_does_not():
+    equation, columns, _ = made(weights=(3.0, 0.0, 0.0))
+    steady = sums_of(equation)[1]
+    ramp = np.linspace(0.0, 2.0, ROWS)
+    target = equation.target[:, 0] + 3.0 * (ramp - 1.0) * columns[:, 0]
+    drifting = sums_of(replace(equation, target=target[:, None]))[1]
+    base, own = np.array([1]), np.array([0])
+    gain, p_value = drifting.drift(base, own)
+    assert p_value < 1e-6
+    # A ramp from nothing to twice the mean has a third of the mean's squares beyond it; what was
+    # fitted elsewhere misses more.
+    assert gain.total > drifting.gain(base, own).total / 3.0
+    gain, p_value = steady.drift(base, own)
+    assert p_value > 0.01
+    assert gain.total < 0.01 * steady.gain(base, own).total
+
+
+def test_what_drifts_is_not_told_by_other_columns():
+    """The base has its own weight; only the columns asked about change."""
+    equation, columns, _ = made(weights=(3.0, -2.0, 0.0))
+    target = equation.target[:, 0] + np.linspace(-0.02, 0.02, ROWS) * columns[:, 1]
+    sums = sums_of(replace(equation, target=target[:, None]))[1]
+    assert sums.drift(np.array([0]), np.array([1]))[1] < 0.01
+    assert sums.drift(np.array([1]), np.array([0]))[1] > 0.01
+
+
+@pytest.mark.parametrize("count", [1, 2, 5, 6])
+def test_blocks_are_joined_two_by_two(count):
+    values = 2.0 ** np.arange(count)
+    joined = paired(values)
+    assert len(joined) == -(-count // 2)
+    assert joined.sum() == values.sum()
+    assert joined[0] == values[:2].sum()

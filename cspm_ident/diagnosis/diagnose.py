@@ -35,8 +35,8 @@ Array = NDArray[np.float64]
 Progress = Callable[[str], None]
 Parts = Sequence[Sequence[Equation]]
 
-BLOCKS = 24
-SHORTEST_BLOCK_S = 1.0
+BLOCKS = 48
+SHORTEST_BLOCK_S = 0.5
 # A finding must take this share of a held-out squared residual, or it does not stand.
 CONFIRMED_SHARE = 0.03
 
@@ -265,7 +265,10 @@ def noise_of(parts: Sequence[Sequence[Equation]]) -> dict[Place, Array]:
 def _confirmed(
     search: Search, judge: Evidence, found: Findings
 ) -> tuple[tuple[Named, ...], tuple[Named, ...]]:
-    """Part what was found by whether it lowers a residual that was not searched."""
+    """Part what was found by whether it lowers residuals that were not searched.
+
+    One of them by a share worth a word, and all together.
+    """
     kept = list(found.named)
     rejected: list[Named] = []
     for each in found.named:
@@ -276,7 +279,8 @@ def _confirmed(
         with_it = judge.left_with({c: w for c, (w, _) in whole.items()})
         without = judge.left_with({c: w for c, (w, _) in fewer.items()})
         shares = [1.0 - with_it[p] / without[p] for p in without if without[p] > 0.0]
-        if max(shares) < CONFIRMED_SHARE:
+        worse = sum(with_it.values()) > sum(without.values())
+        if max(shares) < CONFIRMED_SHARE or worse:
             kept.remove(each)
             rejected.append(each)
     return tuple(kept), tuple(rejected)

@@ -156,6 +156,19 @@ def joined(chosen: Sequence[Hypothesis], found: Hypothesis) -> list[Hypothesis]:
     return [*out, found]
 
 
+def shapes_of(hypothesis: Hypothesis, candidates: Iterable[Candidate]) -> list[Hypothesis]:
+    """Return the hypothesis with every shape that its effect has on all its elements."""
+    groups: dict[tuple[tuple[str, float], ...], list[Candidate]] = {}
+    for candidate in candidates:
+        if candidate.effect_id == hypothesis.effect.id and candidate.element in hypothesis.elements:
+            groups.setdefault(candidate.shape, []).append(candidate)
+    return [
+        replace(hypothesis, candidates=tuple(own))
+        for own in groups.values()
+        if len(own) == len(hypothesis.candidates)
+    ]
+
+
 def freedom(hypothesis: Hypothesis) -> int:
     """Return how many numbers a hypothesis has that are not of a grid.
 

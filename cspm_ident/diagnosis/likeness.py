@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 from cspm_ident.diagnosis.columns import Candidate
 from cspm_ident.diagnosis.drivers import Driver
 from cspm_ident.diagnosis.evidence import Evidence
-from cspm_ident.diagnosis.sums import Sums, behind
+from cspm_ident.diagnosis.sums import Sums, behind, paired
 
 Array = NDArray[np.float64]
 Index = NDArray[np.intp]
@@ -44,6 +44,7 @@ def distance(worse: Array, undecided: float, wider: int) -> float:
         undecided: what decides nothing, models being as untrue as they are.
         wider: how many numbers it has more; each counts as in Schwarz's criterion.
     """
+    worse = paired(worse)
     apart = max(0.0, behind(worse))
     if worse.sum() < undecided:
         apart = min(apart, TIED) * max(0.0, worse.sum() / undecided)

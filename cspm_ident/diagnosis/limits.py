@@ -12,7 +12,8 @@ from scipy.stats import t as t_distribution
 from cspm_ident.diagnosis.columns import Candidate
 from cspm_ident.diagnosis.evidence import Evidence
 from cspm_ident.diagnosis.hypothesis import Named
-from cspm_ident.diagnosis.search import FALSE_ALARMS, MATERIAL_SHARE, Search
+from cspm_ident.diagnosis.search import Search
+from cspm_ident.diagnosis.sureness import MATERIAL_SHARE
 
 Array = NDArray[np.float64]
 
@@ -49,18 +50,18 @@ def detection_limits(search: Search, kept: Sequence[Named]) -> tuple[Limit, ...]
         columns = search.evidence.columns_of([candidate])
         if len(columns) != 1 or candidate.effect.coefficients or np.isin(columns, base).any():
             continue
-        limit = _limit(candidate, _least(search, base, columns))
+        limit = _limit(candidate, _least(search, candidate, base))
         key = limit.effect, limit.element
         if key not in best or limit.least < best[key].least:
             best[key] = limit
     return tuple(sorted(best.values()))
 
 
-def _least(search: Search, base: NDArray[np.intp], columns: NDArray[np.intp]) -> float:
+def _least(search: Search, candidate: Candidate, base: NDArray[np.intp]) -> float:
     """Return the least weight that would be told."""
-    sums = search.sums
+    sums, columns = search.sums, search.evidence.columns_of([candidate])
     error = float(np.sqrt(sums.covariance(base, columns)[0, 0]))
-    chance = FALSE_ALARMS / len(search.heard)
+    chance = search.sureness.below(candidate.effect)
     sure = error * float(t_distribution.ppf(1.0 - chance / 2.0, max(1, sums.blocks - 1)))
     return max(sure, _material(search.evidence, base, sums.weights(base), columns))
 

@@ -17,9 +17,9 @@ from scipy.signal import periodogram
 
 from cspm_ident.diagnosis.columns import Candidate, Place
 from cspm_ident.diagnosis.equation import Equation
-from cspm_ident.diagnosis.machine_signals import MachineSignals
+from cspm_ident.diagnosis.machine_signals import MachineSignals, machine_signals
 from cspm_ident.diagnosis.supposed import as_found
-from cspm_ident.diagnosis.suspension_equations import fine_equations, machine_signals
+from cspm_ident.diagnosis.suspension_equations import fine_equations
 from cspm_ident.signals.measurement import Measurement
 from cspm_ident.signals.timeline import Timeline
 from cspm_sim.effect_entries import read_actions

@@ -9,12 +9,16 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.interpolate import CubicSpline
 
+from cspm_ident.signals.timeline import Timeline, whole_stretches
 from cspm_sim.kernels.cable import ARM, DIRECTION, LENGTH, RATE, SPAN_COLUMNS
 from cspm_sim.kernels.cable_law import law_tensions
 from cspm_sim.kernels.plant import PlantParameters
 from cspm_sim.kernels.trajectory import Motions, spans_along
 
 Array = NDArray[np.float64]
+
+PERIOD_NS = 5_000_000
+_SHORTEST_S = 2.0
 
 
 class BodyMotion(NamedTuple):
@@ -75,6 +79,27 @@ class MachineSignals:
         """Return the signals with `step`·change (k, 6) added to the pose of `bar` or `frame`."""
         moved = getattr(self, body).moved(change, self.times, step)
         return replace(self, **{body: moved})
+
+
+def machine_signals(timeline: Timeline) -> list[MachineSignals]:
+    """Return the measured signals at steps of 5 ms, one entry per stretch without hole."""
+    measured = timeline.measurement
+    if measured.bar_pose is None or measured.angle is None or measured.tension is None:
+        return []
+    slow = timeline.slowly(PERIOD_NS, timeline.pose_band)
+    frame, bar = slow.body_motion("frame"), slow.body_motion("bar")
+    columns = [frame[0], bar[0], slow.angles, slow.speeds, slow.smooth_tensions]
+    whole = [np.asarray(c) for c in columns]
+    shortest = round(_SHORTEST_S / slow.period)
+    return [
+        MachineSignals(
+            slow.times[a : b + 1],
+            BodyMotion(*(part[a : b + 1] for part in frame)),
+            BodyMotion(*(part[a : b + 1] for part in bar)),
+            *(each[a : b + 1] for each in whole[2:]),
+        )
+        for a, b in whole_stretches(whole, shortest)
+    ]
 
 
 class BodyState(NamedTuple):

@@ -144,6 +144,6 @@ def _onsets(kept: Sequence[Named], rows: Parts, starts: Array) -> tuple[Onset | 
             found.append(None)
             continue
         others = {c: time for c, time in times.items() if c not in own}
-        low, high = starts[block - 1], starts[min(block + 1, len(starts) - 1)]
+        low, high = starts[max(block - 2, 0)], starts[min(block + 2, len(starts) - 1)]
         found.append(onset_of(rows[0], own, others, float(low), float(high)))
     return tuple(found)

@@ -56,7 +56,7 @@ def onset_of(
     base, columns = evidence.with_nuisance(others), evidence.columns_of(own)
     first, last = np.searchsorted(edges, [low, high])
     blocks = np.arange(max(first, 1), max(min(last, len(edges) - 2), first + 2))
-    left = np.array([sums.left_from(base, columns, int(b)) for b in blocks])
+    left = sums.left_from(base, columns)[blocks]
     best = int(np.argmin(left))
     sums.delay(columns, int(blocks[best]))
     both = np.concatenate([base, columns])

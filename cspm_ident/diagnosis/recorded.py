@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable, Collection, Sequence
 
 from cspm_ident.diagnosis.columns import Candidate
+from cspm_ident.diagnosis.drawn_tension import with_drawn_tension
 from cspm_ident.diagnosis.drive import drive_equations
 from cspm_ident.diagnosis.drivers import Knots
 from cspm_ident.diagnosis.equation import Equation
@@ -43,7 +44,9 @@ def equations_of(
     late: list[Equation] = []
     if measurement.machine.bar is not None and suspended:
         progress("cables and bar")
-        late = suspension_equations(Timeline(measurement), effects, known, knots)
+        drawn = None if measurement.tension else with_drawn_tension(measurement, known)
+        timeline = Timeline(drawn or measurement)
+        late = suspension_equations(timeline, effects, known, knots, drawn=drawn is not None)
     progress("torque equations of the winches")
     found = drive_equations(measurement, effects, known, knots)
     found += shaft_equations(measurement, effects, known, knots, winches)
@@ -55,7 +58,8 @@ def _reached(
 ) -> tuple[Collection[str], bool]:
     """Return the winches that candidates may show at, and whether cables and bar may show them."""
     names = measurement.machine.cable_names
-    if touched is None:
+    # A winch without a load cell shows in what is drawn from its torque.
+    if touched is None or measurement.tension is None:
         return names, True
     kinds = {r.channel for c in touched for r in (c.effect.regression, *c.effect.partners)}
     winches = {c.element for c in touched if c.element in names}

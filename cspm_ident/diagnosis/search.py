@@ -26,32 +26,31 @@ from cspm_ident.diagnosis.hypothesis import (
     is_tied,
     is_wider,
     joined,
+    shapes_of,
 )
 from cspm_ident.diagnosis.likeness import (
     RIVAL_SHARE,
     TIED,
     UNTRUE_SHARE,
-    chance,
     contains,
     distance,
     freely_gained,
-    overlap,
-    where_alike,
 )
+from cspm_ident.diagnosis.rivals import rivals_of
 from cspm_ident.diagnosis.short_list import short_list
-from cspm_ident.diagnosis.sums import Gain, Sums, behind, gain_of
+from cspm_ident.diagnosis.sums import Sums, behind, gain_of, paired
+from cspm_ident.diagnosis.sureness import MATERIAL_SHARE, Sureness
+from cspm_ident.diagnosis.unexplained import Unknown, unexplained
 from cspm_sim.effects import Effect
 
 Array = NDArray[np.float64]
 Index = NDArray[np.intp]
 
-# Less than this share of what is left of the residuals it acts on is not worth a word.
-MATERIAL_SHARE = 0.1
-UNKNOWN_SHARE = 0.15
-FALSE_ALARMS = 0.01
 MOST_EFFECTS = 3
 # In which an effect has to act to be told.
-_FEWEST_BLOCKS = 5
+_FEWEST_BLOCKS = 10
+# Standard errors by which a beginning has to explain more than an effect that was always there.
+_SIGMAS = 2.0
 
 
 class Search:
@@ -68,7 +67,7 @@ class Search:
         self.sums = sums(evidence)
         self._progress = progress
         self._effects = [c for c in evidence.terms if isinstance(c, Candidate) and self._shows(c)]
-        self._drivers = [d for d in evidence.terms if isinstance(d, Driver)]
+        self.sureness = Sureness(evidence, self.sums, self._effects)
 
     def run(self) -> Findings:
         """Choose effects one by one, each with all elements on which it surely acts."""
@@ -87,6 +86,7 @@ class Search:
         """Return the weights of the file's own parameters, fitted where it helps, nothing added."""
         narrow = copy(self)
         narrow._effects = [c for c in self._effects if c.effect.alter is not None]
+        narrow.sureness = Sureness(self.evidence, self.sums, narrow._effects)
         own = [c for h in narrow._chosen(onsets=False) for c in h.candidates]
         return self.evidence.parted(own, self.sums.weights(self.evidence.with_nuisance(own)))
 
@@ -98,13 +98,6 @@ class Search:
         """Return indices of one hypothesis's columns."""
         return self.evidence.columns_of(hypothesis.candidates)
 
-    def share(self, base: Index, columns: Index) -> float:
-        """Return the largest share of a place's squares that columns take beyond a base."""
-        both = np.concatenate([base, columns])
-        before = self.evidence.left(base, self.sums.weights(base))
-        after = self.evidence.left(both, self.sums.weights(both))
-        return max(1.0 - after[place] / before[place] for place in before if before[place] > 0.0)
-
     def _chosen(self, *, onsets: bool = True) -> list[Hypothesis]:
         chosen: list[Hypothesis] = []
         while sum(not self._is_negligible(h, chosen) for h in chosen) < MOST_EFFECTS:
@@ -114,8 +107,12 @@ class Search:
                 break
             chosen = joined(chosen, self._begun(found, chosen) if onsets else found)
         # What was chosen first did not know of the others.
-        for k, hypothesis in enumerate(chosen):
-            chosen[k] = self._pruned(hypothesis, self.columns([*chosen[:k], *chosen[k + 1 :]]))
+        for hypothesis in tuple(chosen):
+            others = [h for h in chosen if h is not hypothesis]
+            base, k = self.columns(others), chosen.index(hypothesis)
+            chosen[k] = self._pruned(hypothesis, base)
+            if self.sums.gain(base, self.own_columns(chosen[k])).total <= 0.0:
+                del chosen[k]
         return chosen
 
     def _is_negligible(self, hypothesis: Hypothesis, chosen: Sequence[Hypothesis]) -> bool:
@@ -129,7 +126,7 @@ class Search:
         """Return the hypothesis with its onset, from which on its columns act henceforth."""
         own, onset = self.own_columns(hypothesis), hypothesis.onset
         if not onset and _may_begin(hypothesis.effect):
-            onset = self._onset(self.columns(chosen), own)
+            onset, _ = self._onset(self.columns(chosen), own)
         if onset:
             self.evidence.delay(own, onset)
             self.sums.delay(own, onset)
@@ -140,45 +137,66 @@ class Search:
         taken = {(c.effect_id, c.element) for h in chosen for c in h.candidates}
         free = [c for c in self._effects if (c.effect_id, c.element) not in taken]
         gains = self.sums.gains_beyond(base, [self._of(c) for c in free])
-        held_out = self.sums.held_out(base)
-        best: tuple[float, Hypothesis] | None = None
-        for candidate in short_list(free, gains):
-            for hypothesis in self._scopes(candidate, free, base):
-                for dated in self._dated(hypothesis, base):
-                    with self._delayed(dated):
-                        gain = self._sure_gain(dated, chosen, base, held_out)
-                    # More elements have to be worth it.
-                    if gain is not None and (
-                        best is None
-                        or gain.total > best[0] + 3.0 * gain.error * is_wider(dated, best[1])
-                    ):
-                        best = gain.total, dated
+        scopes = [h for c in short_list(free, gains) for h in self._scopes(c, free, base)]
+        late = [d for h in scopes for d in self._late(h, free, base)]
+        best = self._surest([*scopes, *late], chosen, base)
         if best is None:
             return None
-        with self._delayed(best[1]):
-            found = self._simplest(best[1], free, base, chosen)
+        with self._delayed(best):
+            found = self._simplest(best, free, base, chosen)
         with self._delayed(found):
             return self._pruned(found, base)
 
-    def _dated(self, hypothesis: Hypothesis, base: Index) -> Iterable[Hypothesis]:
-        """Yield the hypothesis for all the time, and from its onset on if it seems to have one."""
-        yield hypothesis
+    def _surest(
+        self, hypotheses: Iterable[Hypothesis], chosen: Sequence[Hypothesis], base: Index
+    ) -> Hypothesis | None:
+        """Return what gains most in blocks that were not fitted, of what is surely there.
+
+        More elements, and a beginning, have to be worth it.
+        """
+        before = self.sums.held_out(base)
+        best: tuple[Array, Hypothesis] | None = None
+        for hypothesis in hypotheses:
+            with self._delayed(hypothesis):
+                gained = self._sure_gain(hypothesis, chosen, base, before)
+            if gained is None:
+                continue
+            needed = 0.0
+            if best is not None:
+                wider = is_wider(hypothesis, best[1])
+                needed = best[0].sum() + 3.0 * gain_of(gained).error * wider
+                if hypothesis.onset and not best[1].onset:
+                    needed = best[0].sum() + _SIGMAS * gain_of(gained - best[0]).error
+            if best is None or gained.sum() > needed:
+                best = gained, hypothesis
+        return None if best is None else best[1]
+
+    def _late(
+        self, hypothesis: Hypothesis, free: Sequence[Candidate], base: Index
+    ) -> Iterable[Hypothesis]:
+        """Yield the hypothesis from its onset on, if it seems to have one.
+
+        Of the effect's shapes the one that explains most from its onset on.
+        """
         if not _may_begin(hypothesis.effect):
             return
-        onset = self._onset(base, self.own_columns(hypothesis))
-        if 0 < onset <= self.sums.blocks - _FEWEST_BLOCKS:
-            yield replace(hypothesis, onset=onset)
+        late: list[tuple[float, Hypothesis]] = []
+        for shape in shapes_of(hypothesis, free):
+            onset, left = self._onset(base, self.own_columns(shape))
+            if 0 < onset <= self.sums.blocks - _FEWEST_BLOCKS:
+                late.append((left, replace(shape, onset=onset)))
+        if late:
+            yield min(late, key=lambda each: each[0])[1]
 
     def _sure_gain(
         self, hypothesis: Hypothesis, chosen: Sequence[Hypothesis], base: Index, before: Array
-    ) -> Gain | None:
-        """Return what a hypothesis gains in blocks that were not fitted, if it surely does."""
+    ) -> Array | None:
+        """Return what a hypothesis gains in each block, not fitted to it, if it surely does."""
         if not self._is_plausible([*chosen, hypothesis]):
             return None
         own = self.own_columns(hypothesis)
-        gain = gain_of(before - self.sums.held_out(np.concatenate([base, own])))
-        parts = [self._of(c) for c in hypothesis.candidates]
-        return gain if self._counts(base, parts, gain, hypothesis.onset) else None
+        gained = before - self.sums.held_out(np.concatenate([base, own]))
+        return gained if self.sureness.counts(base, hypothesis, gain_of(gained)) else None
 
     @contextmanager
     def _delayed(self, hypothesis: Hypothesis) -> Iterator[None]:
@@ -220,24 +238,16 @@ class Search:
         self, candidate: Candidate, alike: Sequence[Candidate], base: Index
     ) -> Hypothesis:
         """Return the candidate's effect on all elements where it surely acts beside the others."""
-        found = [candidate]
+        found, sure = [candidate], self.sureness
         others = [c for c in alike if c.element != candidate.element]
         gains = self.sums.gains_beyond(base, [self._of(c) for c in others])
         for k in np.argsort(-gains):
             beside = np.concatenate([base, self.evidence.columns_of(found)])
-            own = self._of(others[k])
-            if self._counts(beside, [own], self.sums.gain(beside, own)):
+            further = Hypothesis(candidate.effect, (others[k],))
+            gain = self.sums.gain(beside, self._of(others[k]))
+            if sure.counts(beside, further, gain) or sure.agrees(base, found, further):
                 found.append(others[k])
         return Hypothesis(candidate.effect, tuple(c for c in alike if c in found))
-
-    def _counts(self, base: Index, parts: Sequence[Index], gain: Gain, onset: int = 0) -> bool:
-        """Return whether columns, in parts by element, are surely there and worth a word."""
-        tried = len(self._effects) * (self.sums.blocks if onset else 1)
-        return (
-            gain.total > 0.0
-            and self.share(base, np.concatenate(parts)) >= MATERIAL_SHARE
-            and chance(self.sums, base, parts) < FALSE_ALARMS / tried
-        )
 
     def _simplest(
         self,
@@ -260,7 +270,7 @@ class Search:
                 apart = self.sums.held_out(np.concatenate([base, own])) - reference
             worse, wider = gain_of(apart), freedom(rival) - freedom(fewest)
             fewer = len(rival.candidates) < len(fewest.candidates)
-            if wider <= 0 and worse.total < least and behind(apart) <= -TIED:
+            if wider <= 0 and worse.total < least and behind(paired(apart)) <= -TIED:
                 fewest, least = replace(rival, onset=best.onset), worse.total
             elif (wider < 0 or (wider == 0 and fewer)) and worse.total <= min(
                 2.0 * gained.error, MATERIAL_SHARE * gained.total
@@ -271,32 +281,7 @@ class Search:
     def _rivals(
         self, hypothesis: Hypothesis, free: Sequence[Candidate], base: Index
     ) -> list[Hypothesis]:
-        """Return the best point of every other effect that explains the same.
-
-        On the same elements, or where it acts on others on the best one and on all; and the same
-        effect on another single element.
-        """
-        elements = set(hypothesis.elements)
-        groups: dict[tuple[str, tuple[tuple[str, float], ...]], list[Candidate]] = {}
-        for candidate in free:
-            groups.setdefault((candidate.effect_id, candidate.shape), []).append(candidate)
-        best: dict[tuple[str, bool], tuple[float, Hypothesis]] = {}
-        for (name, _), members in groups.items():
-            if name == hypothesis.effect.id:
-                continue
-            for own in where_alike(members, elements):
-                rival = Hypothesis(members[0].effect, own)
-                gain = float(self.sums.gains_beyond(base, [self.own_columns(rival)])[0])
-                key = name, len(own) > 1
-                if key not in best or gain > best[key][0]:
-                    best[key] = gain, rival
-        rivals = [rival for _, rival in best.values()]
-        if len(elements) == 1:
-            group = hypothesis.effect.id, hypothesis.candidates[0].shape
-            alike = (c for c in groups.get(group, ()) if c.element not in elements)
-            rivals += [Hypothesis(hypothesis.effect, (c,)) for c in alike]
-        columns = self.own_columns(hypothesis)
-        return [r for r in rivals if overlap(self.sums, base, columns, self.own_columns(r))]
+        return rivals_of(self.evidence, self.sums, base, hypothesis, free)
 
     def _judged(self, k: int, chosen: Sequence[Hypothesis]) -> Named:
         hypothesis, others = chosen[k], [h for i, h in enumerate(chosen) if i != k]
@@ -305,7 +290,7 @@ class Search:
         return Named(
             hypothesis,
             gain,
-            self.share(base, own),
+            self.sureness.share(base, own),
             tuple(self._alternatives(hypothesis, others, base, own)),
         )
 
@@ -364,27 +349,21 @@ class Search:
             for c in candidates
         )
 
-    def _onset(self, base: Index, own: Index) -> int:
-        """Return the block from which on columns act, 0 unless a later one is surely better."""
-        whole = self.sums.left_from(base, own, 0)
-        left = [self.sums.left_from(base, own, b) for b in range(self.sums.blocks - 2)]
-        best = int(np.argmin(left))
-        gained = self.sums.squares_of(base) - whole
-        return best if left[best] < whole - MATERIAL_SHARE * max(gained, 0.0) else 0
+    def _onset(self, base: Index, own: Index) -> tuple[int, float]:
+        """Return the block from which on columns act, and what is left then.
 
-    def unknown(self, chosen: Sequence[Hypothesis]) -> tuple[tuple[Driver, Gain, float], ...]:
-        """Return free functions of what some hypotheses leave, with their gain and share."""
-        base = self.columns(chosen)
-        found = []
-        for driver in self._drivers:
-            own = self._of(driver)
-            told = self.sums.gain_within if driver.of_time else self.sums.gain
-            gain, p_value = told(base, own), self.sums.p_value(base, own)
-            if gain.total > 0.0 and p_value < FALSE_ALARMS / len(self._drivers):
-                share = self.share(base, own)
-                if share >= UNKNOWN_SHARE:
-                    found.append((driver, gain, share))
-        return tuple(sorted(found, key=lambda each: -each[1].total))
+        The block is 0 unless a later one is surely better.
+        """
+        left = self.sums.left_from(base, own)[:-2]
+        best = int(np.argmin(left))
+        gained = self.sums.squares_of(base) - left[0]
+        if left[best] < left[0] - MATERIAL_SHARE * max(gained, 0.0):
+            return best, float(left[best])
+        return 0, float(left[0])
+
+    def unknown(self, chosen: Sequence[Hypothesis]) -> tuple[Unknown, ...]:
+        """Return free functions of what some hypotheses leave, the most important first."""
+        return unexplained(self.evidence, self.sums, self.sureness, chosen)
 
     def _shows(self, candidate: Candidate) -> bool:
         return bool(self.sums.excited[self._of(candidate)].all())

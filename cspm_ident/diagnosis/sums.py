@@ -108,18 +108,16 @@ class Sums:
             self._sum_again(columns)
 
     def _sum_again(self, columns: Index) -> None:
-        tables = [(self._whole, np.ones(self.blocks, dtype=bool))]
-        for others, fold in zip(self._others, self._folds, strict=True):
-            tables.append((others, ~self._near(fold)))
         own, sides = self._blocks[:, columns], self._blocks[:, :, columns]
-        for table, blocks in tables:
-            table[columns] = own[blocks].sum(axis=0)
-            table[:, columns] = sides[blocks].sum(axis=0)
+        tables = [(self._whole, slice(0, 0))]
+        tables += [(o, self._near(f)) for o, f in zip(self._others, self._folds, strict=True)]
+        for table, near in tables:
+            table[columns] = own.sum(axis=0) - own[near].sum(axis=0)
+            table[:, columns] = sides.sum(axis=0) - sides[near].sum(axis=0)
 
-    def _near(self, fold: Index) -> NDArray[np.bool_]:
-        """Return which blocks are those of a fold or their neighbours."""
-        blocks = np.arange(self.blocks)
-        return np.asarray((blocks >= fold[0] - 1) & (blocks <= fold[-1] + 1))
+    def _near(self, fold: Index) -> slice:
+        """Return the blocks of a fold and their neighbours."""
+        return slice(max(0, int(fold[0]) - 1), int(fold[-1]) + 2)
 
     @property
     def blocks(self) -> int:
@@ -183,6 +181,26 @@ class Sums:
         both, blocks = np.concatenate([base, columns]), np.arange(self.blocks)
         before = self._left(base, self._weights(base, self._whole), blocks)
         return gain_of(before - self._left(both, self._weights(both, self._whole), blocks))
+
+    def drift(self, base: Index, columns: Index) -> tuple[Gain, float]:
+        """Return what it gains to let weights change over the blocks, and by which chance.
+
+        In proportion to the block's number, beside a base and the columns themselves.
+        """
+        first, count = len(base), len(columns)
+        kept = np.concatenate([base, columns, [len(self._whole) - 1]])
+        turn = np.zeros((self.blocks, len(kept) + count, len(kept)))
+        turn[:, np.arange(first + count), np.arange(first + count)] = 1.0
+        number = np.linspace(-0.5, 0.5, self.blocks)[:, None]
+        turn[:, first + count + np.arange(count), first + np.arange(count)] = number
+        turn[:, -1, -1] = 1.0
+        narrow = copy(self)
+        narrow._blocks = turn @ self._blocks[:, kept[:, None], kept] @ turn.transpose(0, 2, 1)
+        narrow._whole = narrow._blocks.sum(axis=0)
+        for name in ("_others", "excited"):
+            narrow.__dict__.pop(name, None)
+        always, changing = np.arange(first + count), first + count + np.arange(count)
+        return narrow.gain(always, changing), narrow.p_value(always, changing)
 
     def covariance(self, base: Index, columns: Index) -> Array:
         """Return the covariance of the weights of columns beside a base.
@@ -270,22 +288,24 @@ class Sums:
 
         return np.asarray(1.0 - left(both) / np.maximum(left(base), _RANK))
 
-    def left_from(self, base: Index, columns: Index, block: int) -> float:
-        """Return Σ residual² where `columns` act from a block on only."""
-        both = np.concatenate([base, columns])
-        table = np.append(both, -1)
-        whole = self._whole[np.ix_(table, table)]
-        early = self._blocks[:block][:, table[:, None], table].sum(axis=0)
-        # What the columns themselves took before, their products with the base and the target.
-        early[: len(base), : len(base)] = 0.0
-        early[: len(base), -1] = 0.0
-        whole, target = (whole - early)[:-1, :-1], (whole - early)[:-1, -1]
-        return float(self.squares - target @ _pseudo_inverse(whole) @ target)
+    def left_from(self, base: Index, columns: Index) -> Array:
+        """Return Σ residual² where `columns` act from each block on only, shape (blocks,)."""
+        own, table = slice(len(base), -1), np.concatenate([base, columns, [len(self._whole) - 1]])
+        blocks = self._blocks[:, columns[:, None], table]
+        # What the columns meet from a block on, themselves, the base and the target.
+        met = blocks[::-1].cumsum(axis=0)[::-1]
+        crossed, products, told = met[:, :, : len(base)], met[:, :, own], met[:, :, -1]
+        turned = crossed @ _pseudo_inverse(self._whole[np.ix_(base, base)])
+        products = products - turned @ crossed.transpose(0, 2, 1)
+        told = told - turned @ self._whole[base, -1]
+        weights = np.linalg.pinv(products, rcond=_RANK, hermitian=True) @ told[..., None]
+        gained = np.einsum("bi,bi->b", told, weights[..., 0])
+        return np.asarray(self.squares_of(base) - gained)
 
     @cached_property
     def _others(self) -> list[Array]:
         """Sums of all blocks but those of each fold and their neighbours."""
-        return [self._blocks[~self._near(fold)].sum(axis=0) for fold in self._folds]
+        return [self._whole - self._blocks[self._near(fold)].sum(axis=0) for fold in self._folds]
 
     def _weights(self, columns: Index, gram: Array) -> Array:
         return np.asarray(_pseudo_inverse(gram[np.ix_(columns, columns)]) @ gram[columns, -1])
@@ -311,6 +331,15 @@ def behind(worse: Array) -> float:
     if not np.any(worse):
         return 0.0
     return float(norm.isf(wilcoxon(worse, alternative="greater").pvalue))
+
+
+def paired(values: Array) -> Array:
+    """Return sums over blocks two by two, (⌈blocks / 2⌉,).
+
+    What a model leaves is alike for longer than a block, so that single ones would tell two models
+    apart that both are not quite true.
+    """
+    return np.add.reduceat(values, np.arange(0, len(values), 2))
 
 
 def _pseudo_inverse(gram: Array) -> Array:

@@ -10,14 +10,15 @@ import numpy as np
 from numpy.typing import NDArray
 
 from cspm_ident.diagnosis.columns import Candidate, Place, elements_of, shapes_of
+from cspm_ident.diagnosis.drawn_tension import drawn_columns
 from cspm_ident.diagnosis.drivers import Driver, Knots
 from cspm_ident.diagnosis.equation import Equation, difference_noise
-from cspm_ident.diagnosis.machine_signals import BodyMotion, MachineSignals
+from cspm_ident.diagnosis.machine_signals import BodyMotion, MachineSignals, machine_signals
 from cspm_ident.diagnosis.readings import pose_rows, reading_rows
 from cspm_ident.diagnosis.suspension import Suspension
 from cspm_ident.signals.measurement import TENSION, WINCHES, Measurement
 from cspm_ident.signals.samples import Samples
-from cspm_ident.signals.timeline import Timeline, whole_stretches
+from cspm_ident.signals.timeline import Timeline
 from cspm_ident.winch.weak_form import Make, maker, weigh
 from cspm_msgs_py.dofs import DOFS
 from cspm_msgs_py.testbed import Testbed
@@ -29,12 +30,10 @@ from cspm_sim.parameters import nominal_parameters
 
 Array = NDArray[np.float64]
 
-PERIOD_NS = 5_000_000
 # Windows pass what lies well within the band of the smoothed poses, and they are doubled while that
 # takes more noise than of white one: then most lies above what they pass.
 _HALF_WIDTHS = (0.04, 0.32)
 _WHITE = 1.7
-_SHORTEST_S = 2.0
 # Of an acceleration's square: what has to be common to tensions and poses.
 _COMMON = 0.7
 # Of what differs from reading to reading; coloured noise alone spreads by 1.2 to 1.5 of it.
@@ -54,6 +53,8 @@ def suspension_equations(
     effects: Sequence[Effect],
     known: Sequence[Action],
     knots: Knots | None = None,
+    *,
+    drawn: bool = False,
 ) -> list[Equation]:
     """Return the equations of all cables and of the bar, one set for each stretch without hole.
 
@@ -64,6 +65,7 @@ def suspension_equations(
         effects: the catalogue.
         known: effects that the test-bed file has.
         knots: of the free functions; None: without these.
+        drawn: whether no load cell but the winches' torques told the tensions.
     """
     measured = timeline.measurement
     make, dofs = maker(measured.pointwise), _moving(measured.bar_pose)
@@ -71,7 +73,7 @@ def suspension_equations(
         equation.compact
         for stretch in machine_signals(timeline)
         for equation in _Stretch(
-            stretch, measured.machine, timeline.pose_band, make, dofs
+            stretch, measured.machine, timeline.pose_band, make, dofs, drawn=drawn
         ).equations(effects, known, knots)
     ]
 
@@ -96,27 +98,6 @@ def fine_equations(
     ]
 
 
-def machine_signals(timeline: Timeline) -> list[MachineSignals]:
-    """Return the measured signals at steps of 5 ms, one entry per stretch without hole."""
-    measured = timeline.measurement
-    if measured.bar_pose is None or measured.angle is None or measured.tension is None:
-        return []
-    slow = timeline.slowly(PERIOD_NS, timeline.pose_band)
-    frame, bar = slow.body_motion("frame"), slow.body_motion("bar")
-    columns = [frame[0], bar[0], slow.angles, slow.speeds, slow.smooth_tensions]
-    whole = [np.asarray(c) for c in columns]
-    shortest = round(_SHORTEST_S / slow.period)
-    return [
-        MachineSignals(
-            slow.times[a : b + 1],
-            BodyMotion(*(part[a : b + 1] for part in frame)),
-            BodyMotion(*(part[a : b + 1] for part in bar)),
-            *(each[a : b + 1] for each in whole[2:]),
-        )
-        for a, b in whole_stretches(whole, shortest)
-    ]
-
-
 class _Stretch:
     """One stretch and the window that weighs it."""
 
@@ -127,11 +108,14 @@ class _Stretch:
         band: float | None,
         make: Make,
         dofs: Sequence[str],
+        *,
+        drawn: bool = False,
     ) -> None:
         """Take what the poses were smoothed to [Hz] and which of the bar's coordinates move.
 
-        Without a band windows are the shortest.
+        Without a band windows are the shortest. Tensions may be drawn from the winches' torques.
         """
+        self._drawn = drawn
         self._signals, self._machine, self._make, self._dofs = signals, machine, make, dofs
         self._parameters: PlantParameters = nominal_parameters(machine)
         self._here = Suspension(signals, machine, self._parameters)
@@ -170,7 +154,9 @@ class _Stretch:
         columns: dict[Place, dict[Candidate | Driver, Array]] = {}
         for effect in effects:
             for candidate, place, found in self._columns(effect):
-                columns.setdefault(place, {})[candidate] = found
+                beside = columns.setdefault(place, {})
+                # A winch's fault may show in the cable as well as in the tension drawn from it.
+                beside[candidate] = beside[candidate] + found if candidate in beside else found
         out = [
             self._cable_equation(
                 i, tensions[:, i], columns.get(Place(Channel.TENSION, name), {}), knots
@@ -260,6 +246,8 @@ class _Stretch:
                 for place, found in self._read(effect, i, name):
                     yield Candidate(effect, name), place, found
                 continue
+            if self._drawn:
+                yield from self._misread(effect, i)
             shapes = [dict(shape) for shape in shapes_of(effect)]
             for shape, place, found in self._regressed(effect, i, shapes):
                 candidate = Candidate(effect, name, tuple(shape.items()))
@@ -305,6 +293,8 @@ class _Stretch:
         """Yield how a sensor's fault changes the weighed residuals, by differences of readings."""
         assert effect.sense is not None
         topic = effect.sense.topics[0]
+        if topic == TENSION and self._drawn:
+            return
         if topic in (TENSION, WINCHES):
             yield from self._read_joint(effect, i, topic)
             return
@@ -354,6 +344,18 @@ class _Stretch:
         there = self._here.with_joints(moved).of_cable(i).tension_residuals[:, 0]
         column = self._weighed((there - self._here.tension_residuals[:, i]) / step, Channel.TENSION)
         yield Place(Channel.TENSION, self._machine.cable_names[i]), column[:, None, None]
+
+    def _misread(self, effect: Effect, i: int) -> Iterator[tuple[Candidate, Place, Array]]:
+        """Yield how a winch's fault changes the tension drawn from its torque, weighed."""
+        if effect.acts_on is not Elements.CABLES:
+            return
+        for candidate, taken in drawn_columns(effect, self._machine.cables[i], self._signals, i):
+            pulled = [-self._here.pulled(i, each) for each in taken.T]
+            for channel, element, found in (
+                (Channel.TENSION, candidate.element, taken[:, None, :]),
+                (Channel.WRENCH, BAR, np.stack(pulled, axis=2)),
+            ):
+                yield candidate, Place(channel, element), self._weighed(found, channel)
 
     def _weighed(self, values: Array, channel: Channel) -> Array:
         window, stride = self._windows[channel]

@@ -48,8 +48,9 @@ on `{cable}`; parameters that are searched on a grid stand in its middle. Residu
 multiples of {noise}.
 
 Load cells sit on the free cable, on the bar's side of the exit pulley (*free*), or between drum
-and pulley (*drum*). Without load cells `cspm diagnose` has no residual of a winch with a cable, so
-that no pair can be told apart whether there is motion capture or not.
+and pulley (*drum*). Without load cells the winches' torques stand for them, so that a winch's
+faults show in its cable and in the bar's equation (*capture*); without motion capture as well
+`cspm diagnose` has no residual of a winch with a cable.
 
 This page is generated: `python -m cspm_ident.experiment.isolability_page > docs/isolability.md`.
 
@@ -58,16 +59,22 @@ This page is generated: `python -m cspm_ident.experiment.isolability_page > docs
 Declared twins, and every pair below {narrow:g}° with load cells and motion capture. All other pairs
 are above that.
 
-| pair | free, capture | drum, capture | free | drum |
-|---|---:|---:|---:|---:|
+| pair | free, capture | drum, capture | free | drum | capture |
+|---|---:|---:|---:|---:|---:|
 """
 _SHOWN_HEAD = """
 ## What shows at all
 
-| effect | free or drum, capture | free | drum |
-|---|---|---|---|
+| effect | free or drum, capture | free | drum | capture |
+|---|---|---|---|---|
 """
-_SETS = (Sensors.BAR_AND_CAPTURE, Sensors.DRUM_AND_CAPTURE, Sensors.BAR, Sensors.DRUM)
+_SETS = (
+    Sensors.BAR_AND_CAPTURE,
+    Sensors.DRUM_AND_CAPTURE,
+    Sensors.BAR,
+    Sensors.DRUM,
+    Sensors.CAPTURE,
+)
 
 
 def rich_measurement() -> Measurement:
@@ -80,7 +87,7 @@ def rich_measurement() -> Measurement:
 def angle_table(
     measurement: Measurement, effects: Sequence[Effect]
 ) -> dict[Sensors, dict[Pair, float | None]]:
-    """Return the angle [°] of each pair of effects for each set of sensors that has load cells."""
+    """Return the angle [°] of each pair of effects for each set of sensors."""
     out = {}
     for sensors in _SETS:
         found, equations = signatures(measurement, effects, CABLE, sensors)
@@ -127,7 +134,7 @@ def _angles(pair: Pair, table: Table) -> Iterable[str]:
 
 
 def _visible(name: str, table: Table) -> Iterable[str]:
-    for sensors in (Sensors.BAR_AND_CAPTURE, Sensors.BAR, Sensors.DRUM):
+    for sensors in (Sensors.BAR_AND_CAPTURE, Sensors.BAR, Sensors.DRUM, Sensors.CAPTURE):
         own = (angle for pair, angle in table[sensors].items() if name in pair)
         yield "yes" if any(angle is not None for angle in own) else "no"
 

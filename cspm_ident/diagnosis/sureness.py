@@ -1,0 +1,73 @@
+"""Whether an effect is surely there, and worth a word."""
+
+from __future__ import annotations
+
+from collections import Counter
+from collections.abc import Sequence
+
+import numpy as np
+from numpy.typing import NDArray
+
+from cspm_ident.diagnosis.columns import Candidate
+from cspm_ident.diagnosis.evidence import Evidence
+from cspm_ident.diagnosis.hypothesis import Hypothesis
+from cspm_ident.diagnosis.likeness import chance
+from cspm_ident.diagnosis.sums import Gain, Sums
+from cspm_sim.effects import Effect
+
+Index = NDArray[np.intp]
+
+# Less than this share of what is left of the residuals it acts on is not worth a word.
+MATERIAL_SHARE = 0.1
+FALSE_ALARMS = 0.01
+
+
+class Sureness:
+    """What it takes for one of many candidates to be told."""
+
+    def __init__(self, evidence: Evidence, sums: Sums, candidates: Sequence[Candidate]) -> None:
+        """Take all candidates that are looked at."""
+        self._evidence, self._sums = evidence, sums
+        self._tried = Counter(candidate.effect_id for candidate in candidates)
+
+    def below(self, effect: Effect) -> float:
+        """Return how small the chance of a candidate's weights has to be for it to be sure.
+
+        Each effect has an equal part of the false alarms, whose candidates share it, so that those
+        of many shapes do not hide the others (Bonferroni, weighted).
+        """
+        return FALSE_ALARMS / (self._tried[effect.id] * len(self._tried))
+
+    def share(self, base: Index, columns: Index) -> float:
+        """Return the largest share of a place's squares that columns take beyond a base."""
+        both = np.concatenate([base, columns])
+        before = self._evidence.left(base, self._sums.weights(base))
+        after = self._evidence.left(both, self._sums.weights(both))
+        return max(1.0 - after[place] / before[place] for place in before if before[place] > 0.0)
+
+    def counts(self, base: Index, hypothesis: Hypothesis, gain: Gain) -> bool:
+        """Return whether a hypothesis is surely there beside a base and worth a word."""
+        return (
+            gain.total > 0.0
+            and self.share(base, self._evidence.columns_of(hypothesis.candidates)) >= MATERIAL_SHARE
+            and self._is_sure(base, hypothesis)
+        )
+
+    def agrees(self, base: Index, found: Sequence[Candidate], further: Hypothesis) -> bool:
+        """Return whether an effect is surely on a further element, of the size it has elsewhere.
+
+        Then it has one cause, though on that element it be too little to be worth a word.
+        """
+        beside = np.concatenate([base, self._evidence.columns_of(found)])
+        if not self._is_sure(beside, further):
+            return False
+        both = self._evidence.columns_of([found[0], *further.candidates])
+        one, other = np.split(self._sums.weights(np.concatenate([base, both]))[len(base) :], 2)
+        near, far = np.split(self._sums.half_width(base, both), 2)
+        return bool(np.all(np.abs(one - other) <= np.hypot(near, far)))
+
+    def _is_sure(self, base: Index, hypothesis: Hypothesis) -> bool:
+        parts = [self._evidence.columns_of([c]) for c in hypothesis.candidates]
+        # An onset was chosen among the blocks.
+        tried = self._sums.blocks if hypothesis.onset else 1
+        return chance(self._sums, base, parts) < self.below(hypothesis.effect) / tried

@@ -1,0 +1,72 @@
+"""What no effect explains: free functions of what hypotheses leave, or of what they cannot hold."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Iterator, Sequence
+
+import numpy as np
+from numpy.typing import NDArray
+
+from cspm_ident.diagnosis.drivers import Driver
+from cspm_ident.diagnosis.evidence import Evidence
+from cspm_ident.diagnosis.hypothesis import DOUBTFUL_SHARE, Hypothesis
+from cspm_ident.diagnosis.sums import Gain, Sums
+from cspm_ident.diagnosis.sureness import FALSE_ALARMS, Sureness
+
+Index = NDArray[np.intp]
+# A free function, what it gains and its share of the squares of its residual.
+Unknown = tuple[Driver, Gain, float]
+
+UNKNOWN_SHARE = 0.15
+
+
+def unexplained(
+    evidence: Evidence, sums: Sums, sureness: Sureness, chosen: Sequence[Hypothesis]
+) -> tuple[Unknown, ...]:
+    """Return free functions that explain what some hypotheses do not, the most important first."""
+    drivers = [d for d in evidence.terms if isinstance(d, Driver)]
+    base = _columns(evidence, chosen)
+    found: dict[Driver, Unknown] = {}
+    for driver in drivers:
+        own = evidence.columns_of([driver])
+        told = sums.gain_within if driver.of_time else sums.gain
+        gain, p_value = told(base, own), sums.p_value(base, own)
+        if gain.total > 0.0 and p_value < FALSE_ALARMS / len(drivers):
+            share = sureness.share(base, own)
+            if share >= UNKNOWN_SHARE:
+                found[driver] = driver, gain, share
+    found |= {each[0]: each for each in _drifting(evidence, sums, sureness, chosen)}
+    return tuple(sorted(found.values(), key=lambda each: -each[1].total))
+
+
+def _drifting(
+    evidence: Evidence, sums: Sums, sureness: Sureness, chosen: Sequence[Hypothesis]
+) -> Iterator[Unknown]:
+    """Yield functions of time instead of hypotheses whose amount does not stay what it is.
+
+    A load cell that warms up has no constant bias, though a bias explains most of it.
+    """
+    for hypothesis in chosen:
+        base = _columns(evidence, [h for h in chosen if h is not hypothesis])
+        own = evidence.columns_of(hypothesis.candidates)
+        drift, p_value = sums.drift(base, own)
+        held = drift.total <= DOUBTFUL_SHARE * sums.gain(base, own).total
+        if held or p_value >= FALSE_ALARMS / len(chosen):
+            continue
+        times = [d for d in _concerned(evidence, hypothesis, own) if d.of_time]
+        gains = [sums.gain_within(base, evidence.columns_of([d])) for d in times]
+        if times:
+            k = int(np.argmax([gain.total for gain in gains]))
+            yield times[k], gains[k], sureness.share(base, evidence.columns_of([times[k]]))
+
+
+def _concerned(evidence: Evidence, hypothesis: Hypothesis, own: Index) -> list[Driver]:
+    """Return drivers of the residuals in which a hypothesis acts, of its own elements if any."""
+    places = {p.place for p in evidence.places if np.isin(own, p.columns).any()}
+    found = [d for d in evidence.terms if isinstance(d, Driver) and d.place in places]
+    near = [d for d in found if d.place.element in hypothesis.elements]
+    return near or found
+
+
+def _columns(evidence: Evidence, chosen: Iterable[Hypothesis]) -> Index:
+    return evidence.with_nuisance(c for h in chosen for c in h.candidates)

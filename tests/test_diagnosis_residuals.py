@@ -175,8 +175,8 @@ def test_a_late_motion_capture_leaves_its_column(measurement, equations, body):
         assert rms(error - error.mean()) < 0.1 * rms(expected[inner])
 
 
-def test_without_load_cells_there_is_nothing_but_what_needs_none(measurement):
-    deaf = replace(measurement, tension=None)
+def test_without_load_cells_and_motion_capture_there_is_only_what_needs_none(measurement):
+    deaf = replace(measurement, tension=None, bar_pose=None)
     assert {place.channel for place in by_place(deaf)} == {Channel.DRIVE}
     assert by_place(replace(deaf, command=None)) == {}
 

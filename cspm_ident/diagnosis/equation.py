@@ -91,6 +91,11 @@ class Equation:
         first, last = np.searchsorted(self.times, [start, end])
         return self._only(slice(first, last))
 
+    def apart_from(self, moments: Array, distance: float) -> Equation:
+        """Return the rows that are farther than `distance` from all moments, shape (m,) [s]."""
+        near: Array = np.abs(self.times[:, None] - moments)
+        return self._only(np.asarray((near > distance).all(axis=1)))
+
     def weighted(self, weights: Array) -> Equation:
         """Return the equation with each row times a weight, shape (k,)."""
         rows = weights[:, None]

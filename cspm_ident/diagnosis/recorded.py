@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable, Collection, Sequence
 
 from cspm_ident.diagnosis.columns import Candidate
-from cspm_ident.diagnosis.drawn_tension import with_drawn_tension
+from cspm_ident.diagnosis.drawn_tension import lost_torques, with_drawn_tension
 from cspm_ident.diagnosis.drive import drive_equations
 from cspm_ident.diagnosis.drivers import Knots
 from cspm_ident.diagnosis.equation import Equation
@@ -45,8 +45,10 @@ def equations_of(
     if measurement.machine.bar is not None and suspended:
         progress("cables and bar")
         drawn = None if measurement.tension else with_drawn_tension(measurement, known)
-        timeline = Timeline(drawn or measurement)
-        late = suspension_equations(timeline, effects, known, knots, drawn=drawn is not None)
+        lost = lost_torques(measurement) if drawn else None
+        late = suspension_equations(
+            Timeline(drawn or measurement), effects, known, knots, lost=lost
+        )
     progress("torque equations of the winches")
     found = drive_equations(measurement, effects, known, knots)
     found += shaft_equations(measurement, effects, known, knots, winches)

@@ -34,6 +34,8 @@ Array = NDArray[np.float64]
 # takes more noise than of white one: then most lies above what they pass.
 _HALF_WIDTHS = (0.04, 0.32)
 _WHITE = 1.7
+# As far as smoothing spreads a torque that was lost.
+_SPREAD_S = 0.1
 # Of an acceleration's square: what has to be common to tensions and poses.
 _COMMON = 0.7
 # Of what differs from reading to reading; coloured noise alone spreads by 1.2 to 1.5 of it.
@@ -54,7 +56,7 @@ def suspension_equations(
     known: Sequence[Action],
     knots: Knots | None = None,
     *,
-    drawn: bool = False,
+    lost: Array | None = None,
 ) -> list[Equation]:
     """Return the equations of all cables and of the bar, one set for each stretch without hole.
 
@@ -65,7 +67,7 @@ def suspension_equations(
         effects: the catalogue.
         known: effects that the test-bed file has.
         knots: of the free functions; None: without these.
-        drawn: whether no load cell but the winches' torques told the tensions.
+        lost: when no torque is known [s], where no load cell but torques told the tensions.
     """
     measured = timeline.measurement
     make, dofs = maker(measured.pointwise), _moving(measured.bar_pose)
@@ -73,7 +75,7 @@ def suspension_equations(
         equation.compact
         for stretch in machine_signals(timeline)
         for equation in _Stretch(
-            stretch, measured.machine, timeline.pose_band, make, dofs, drawn=drawn
+            stretch, measured.machine, timeline.pose_band, make, dofs, lost=lost
         ).equations(effects, known, knots)
     ]
 
@@ -109,13 +111,13 @@ class _Stretch:
         make: Make,
         dofs: Sequence[str],
         *,
-        drawn: bool = False,
+        lost: Array | None = None,
     ) -> None:
         """Take what the poses were smoothed to [Hz] and which of the bar's coordinates move.
 
         Without a band windows are the shortest. Tensions may be drawn from the winches' torques.
         """
-        self._drawn = drawn
+        self._lost = lost
         self._signals, self._machine, self._make, self._dofs = signals, machine, make, dofs
         self._parameters: PlantParameters = nominal_parameters(machine)
         self._here = Suspension(signals, machine, self._parameters)
@@ -163,10 +165,14 @@ class _Stretch:
             )
             for i, name in enumerate(self._machine.cable_names)
         ]
-        return [
-            *out,
-            self._bar_equation(wrench, columns.get(Place(Channel.WRENCH, BAR), {}), knots),
-        ]
+        out.append(self._bar_equation(wrench, columns.get(Place(Channel.WRENCH, BAR), {}), knots))
+        return out if self._lost is None else [self._known(each) for each in out]
+
+    def _known(self, equation: Equation) -> Equation:
+        """Return the rows that no lost torque reaches."""
+        assert self._lost is not None
+        half_s = 0.5 * len(self._windows[equation.place.channel][0]) * self._signals.step
+        return equation.apart_from(self._lost, half_s + _SPREAD_S)
 
     def _cable_equation(
         self,
@@ -183,13 +189,16 @@ class _Stretch:
         drivers[_TENSION] = around(drivers[_TENSION], self._apart(Channel.TENSION))
         if knots is not None:
             columns = columns | knots.columns(place, drivers)
+        target, start = weighed(missing), weighed(self._here.start_column(i))
+        # Of the order of its noise also where a fold that is left out holds the whole stretch.
+        target = target - start * (start @ target) / (start @ start)
         return Equation(
             place,
             weighed(self._signals.times),
-            weighed(missing)[:, None],
+            target[:, None],
             columns,
             weighed(self._signals.tensions[:, i])[:, None],
-            weighed(self._here.start_column(i))[:, None, None],
+            start[:, None, None],
             signals=drivers,
         )
 
@@ -246,7 +255,7 @@ class _Stretch:
                 for place, found in self._read(effect, i, name):
                     yield Candidate(effect, name), place, found
                 continue
-            if self._drawn:
+            if self._lost is not None:
                 yield from self._misread(effect, i)
             shapes = [dict(shape) for shape in shapes_of(effect)]
             for shape, place, found in self._regressed(effect, i, shapes):
@@ -293,7 +302,7 @@ class _Stretch:
         """Yield how a sensor's fault changes the weighed residuals, by differences of readings."""
         assert effect.sense is not None
         topic = effect.sense.topics[0]
-        if topic == TENSION and self._drawn:
+        if topic == TENSION and self._lost is not None:
             return
         if topic in (TENSION, WINCHES):
             yield from self._read_joint(effect, i, topic)

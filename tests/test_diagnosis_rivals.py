@@ -13,7 +13,7 @@ from cspm_ident.diagnosis.search import Search
 from cspm_ident.diagnosis.sums import Sums
 from cspm_sim.effects import Channel, catalogue
 
-ROWS, STEP, BLOCK_S = 4800, 0.01, 2.0
+ROWS, STEP, BLOCK_S = 4800, 0.01, 1.0
 TIMES = STEP * np.arange(ROWS)
 LOAD = 3.0 + np.sin(2.1 * TIMES)
 SIDE = np.sign(np.sin(0.83 * TIMES))

@@ -16,7 +16,7 @@ from cspm_ident.diagnosis.sketch import sketch
 from cspm_ident.diagnosis.sums import Sums
 from cspm_sim.effects import Channel, catalogue
 
-ROWS, STEP, BLOCK_S = 4800, 0.01, 2.0
+ROWS, STEP, BLOCK_S = 4800, 0.01, 1.0
 PLACE = Place(Channel.SHAFT, "only")
 COULOMB, VISCOUS = (
     Candidate(catalogue()[name], "only")

@@ -57,20 +57,54 @@ class Sums:
     """All columns' products, scaled so that each column has length 1."""
 
     def __init__(self, evidence: Evidence) -> None:
-        """Assemble the products of all residuals."""
+        """Take the products of all residuals, and sum them."""
         width = evidence.width
-        grams = np.zeros((evidence.blocks, width + 1, width + 1))
+        squares, self._at = np.zeros((evidence.blocks, width + 1)), []
         for place in evidence.places:
             own = np.append(place.columns, width)
-            grams[:, own[:, None], own] += place.grams
-        lengths = np.sqrt(np.einsum("bii->i", grams))
+            squares[:, own] += np.einsum("bii->bi", place.grams)
+            at = np.full(width + 1, -1, dtype=np.intp)
+            at[own] = np.arange(len(own))
+            self._at.append(at)
+        lengths = np.sqrt(squares.sum(axis=0))
         lengths[lengths == 0.0] = 1.0
         lengths[-1] = 1.0
-        grams /= lengths[:, None] * lengths
-        self._blocks = grams
+        scales = [lengths[at >= 0] for at in self._at]
+        self._grams = [
+            place.grams / (scale[:, None] * scale)
+            for place, scale in zip(evidence.places, scales, strict=True)
+        ]
         self._lengths = lengths[:-1]
-        self._whole = self._blocks.sum(axis=0)
+        self._whole = self._summed(np.arange(width + 1), slice(None))
         self._folds = np.array_split(np.arange(evidence.blocks), min(FOLDS, evidence.blocks))
+
+    def _of(self, rows: Index, columns: Index) -> Array:
+        """Return each block's products of two sets of columns, (blocks, rows, columns)."""
+        found = np.zeros((self.blocks, len(rows), len(columns)))
+        for grams, at in zip(self._grams, self._at, strict=True):
+            down, across = np.flatnonzero(at[rows] >= 0), np.flatnonzero(at[columns] >= 0)
+            if len(down) and len(across):
+                own = grams[:, at[rows[down]][:, None], at[columns[across]]]
+                found[:, down[:, None], across] += own
+        return found
+
+    def _summed(self, rows: Index, blocks: slice) -> Array:
+        """Return products of some columns with all over some blocks, (rows, width + 1)."""
+        found = np.zeros((len(rows), len(self._at[0])))
+        for grams, at in zip(self._grams, self._at, strict=True):
+            down, across = np.flatnonzero(at[rows] >= 0), np.flatnonzero(at >= 0)
+            if len(down):
+                found[down[:, None], across] += grams[blocks, at[rows[down]]].sum(axis=0)
+        return found
+
+    def _alone(self, blocks: Array, lengths: Array) -> Sums:
+        """Return the sums of other products, (blocks, m + 1, m + 1), of columns so long."""
+        other = copy(self)
+        other._grams, other._at = [blocks], [np.arange(blocks.shape[1])]
+        other._lengths, other._whole = lengths, blocks.sum(axis=0)
+        for name in ("_others", "excited"):
+            other.__dict__.pop(name, None)
+        return other
 
     def beside(self, combinations: Array) -> Sums:
         """Return sums with further columns behind, combinations of these, shape (width, k)."""
@@ -78,42 +112,43 @@ class Sums:
         turn = np.zeros((width + 1, width + count + 1))
         turn[:width, :width], turn[-1, -1] = np.eye(width), 1.0
         turn[:width, width:-1] = combinations * self._lengths[:, None]
-        grams = turn.T @ self._blocks @ turn
+        everything = np.arange(width + 1)
+        grams = turn.T @ self._of(everything, everything) @ turn
         lengths = np.append(np.sqrt(np.einsum("bii->i", grams))[:-1], 1.0)
         lengths[lengths == 0.0] = 1.0
-        wider = copy(self)
-        wider._blocks = grams / (lengths[:, None] * lengths)
-        wider._lengths = lengths[:-1] * np.append(self._lengths, np.ones(count))
-        wider._whole = wider._blocks.sum(axis=0)
-        for name in ("_others", "excited"):
-            wider.__dict__.pop(name, None)
-        return wider
+        grams = grams / (lengths[:, None] * lengths)
+        return self._alone(grams, lengths[:-1] * np.append(self._lengths, np.ones(count)))
 
     def delay(self, columns: Index, block: int) -> None:
         """Let columns act from a block on only."""
-        silence(self._blocks, columns, block)
+        for grams, at in zip(self._grams, self._at, strict=True):
+            silence(grams, at[columns][at[columns] >= 0], block)
         self._sum_again(columns)
 
     @contextmanager
     def delayed(self, columns: Index, block: int) -> Iterator[None]:
         """Let columns act from a block on only, for a while."""
-        rows = self._blocks[:block, columns, :].copy()
-        sides = self._blocks[:block, :, columns].copy()
+        kept = []
+        for grams, at in zip(self._grams, self._at, strict=True):
+            own = at[columns][at[columns] >= 0]
+            if len(own):
+                kept.append((grams, own, grams[:block, own].copy()))
         self.delay(columns, block)
         try:
             yield
         finally:
-            self._blocks[:block, columns, :] = rows
-            self._blocks[:block, :, columns] = sides
+            for grams, own, rows in kept:
+                grams[:block, own] = rows
+                grams[:block, :, own] = rows.transpose(0, 2, 1)
             self._sum_again(columns)
 
     def _sum_again(self, columns: Index) -> None:
-        own, sides = self._blocks[:, columns], self._blocks[:, :, columns]
-        tables = [(self._whole, slice(0, 0))]
-        tables += [(o, self._near(f)) for o, f in zip(self._others, self._folds, strict=True)]
-        for table, near in tables:
-            table[columns] = own.sum(axis=0) - own[near].sum(axis=0)
-            table[:, columns] = sides.sum(axis=0) - sides[near].sum(axis=0)
+        whole = self._summed(columns, slice(None))
+        tables = [(self._whole, whole)]
+        for others, fold in zip(self._others, self._folds, strict=True):
+            tables.append((others, whole - self._summed(columns, self._near(fold))))
+        for table, rows in tables:
+            table[columns], table[:, columns] = rows, rows.T
 
     def _near(self, fold: Index) -> slice:
         """Return the blocks of a fold and their neighbours."""
@@ -122,7 +157,7 @@ class Sums:
     @property
     def blocks(self) -> int:
         """Number of blocks."""
-        return len(self._blocks)
+        return len(self._grams[0])
 
     @property
     def squares(self) -> float:
@@ -162,9 +197,10 @@ class Sums:
 
     def held_out(self, columns: Index) -> Array:
         """Return Σ residual² of each block, fitted to the others without its neighbours."""
-        out = np.zeros(self.blocks)
+        both = np.append(columns, len(self._whole) - 1)
+        parts, out = self._of(both, both), np.zeros(self.blocks)
         for fold, others in zip(self._folds, self._others, strict=True):
-            out[fold] = self._left(columns, self._weights(columns, others), fold)
+            out[fold] = _left(parts[fold], self._weights(columns, others))
         return out
 
     def gain(self, base: Index, columns: Index) -> Gain:
@@ -178,9 +214,14 @@ class Sums:
         For columns that are not the same in any two blocks, as functions of time: blocks that were
         not fitted say nothing of them.
         """
-        both, blocks = np.concatenate([base, columns]), np.arange(self.blocks)
-        before = self._left(base, self._weights(base, self._whole), blocks)
-        return gain_of(before - self._left(both, self._weights(both, self._whole), blocks))
+        both = np.concatenate([base, columns])
+        before, after = self._fitted(base), self._fitted(both)
+        return gain_of(before - after)
+
+    def _fitted(self, columns: Index) -> Array:
+        """Return Σ residual² of each block, fitted to all of them."""
+        both = np.append(columns, len(self._whole) - 1)
+        return _left(self._of(both, both), self._weights(columns, self._whole))
 
     def drift(self, base: Index, columns: Index) -> tuple[Gain, float]:
         """Return what it gains to let weights change over the blocks, and by which chance.
@@ -194,11 +235,8 @@ class Sums:
         number = np.linspace(-0.5, 0.5, self.blocks)[:, None]
         turn[:, first + count + np.arange(count), first + np.arange(count)] = number
         turn[:, -1, -1] = 1.0
-        narrow = copy(self)
-        narrow._blocks = turn @ self._blocks[:, kept[:, None], kept] @ turn.transpose(0, 2, 1)
-        narrow._whole = narrow._blocks.sum(axis=0)
-        for name in ("_others", "excited"):
-            narrow.__dict__.pop(name, None)
+        blocks = turn @ self._of(kept, kept) @ turn.transpose(0, 2, 1)
+        narrow = self._alone(blocks, np.ones(first + 2 * count))
         always, changing = np.arange(first + count), first + count + np.arange(count)
         return narrow.gain(always, changing), narrow.p_value(always, changing)
 
@@ -269,7 +307,7 @@ class Sums:
         spanned = inverse @ self._whole[np.ix_(base, table)]
         both = np.concatenate([base, table])
         turn = np.vstack([-spanned, np.eye(len(table))])
-        return np.asarray(turn.T @ self._blocks[:, both[:, None], both] @ turn)
+        return np.asarray(turn.T @ self._of(both, both) @ turn)
 
     def squares_of(self, columns: Index) -> float:
         """Return Σ residual² after a fit of columns."""
@@ -291,7 +329,7 @@ class Sums:
     def left_from(self, base: Index, columns: Index) -> Array:
         """Return Σ residual² where `columns` act from each block on only, shape (blocks,)."""
         own, table = slice(len(base), -1), np.concatenate([base, columns, [len(self._whole) - 1]])
-        blocks = self._blocks[:, columns[:, None], table]
+        blocks = self._of(columns, table)
         # What the columns meet from a block on, themselves, the base and the target.
         met = blocks[::-1].cumsum(axis=0)[::-1]
         crossed, products, told = met[:, :, : len(base)], met[:, :, own], met[:, :, -1]
@@ -305,16 +343,17 @@ class Sums:
     @cached_property
     def _others(self) -> list[Array]:
         """Sums of all blocks but those of each fold and their neighbours."""
-        return [self._whole - self._blocks[self._near(fold)].sum(axis=0) for fold in self._folds]
+        everything = np.arange(len(self._whole))
+        return [self._whole - self._summed(everything, self._near(f)) for f in self._folds]
 
     def _weights(self, columns: Index, gram: Array) -> Array:
         return np.asarray(_pseudo_inverse(gram[np.ix_(columns, columns)]) @ gram[columns, -1])
 
-    def _left(self, columns: Index, weights: Array, blocks: Index) -> Array:
-        both = np.append(columns, -1)
-        part = self._blocks[np.ix_(blocks, both, both)]
-        vector = np.append(weights, -1.0)
-        return np.asarray(np.einsum("i,bij,j->b", vector, part, vector))
+
+def _left(parts: Array, weights: Array) -> Array:
+    """Return Σ residual² of each block for weights, of products of columns and target."""
+    vector = np.append(weights, -1.0)
+    return np.asarray(np.einsum("i,bij,j->b", vector, parts, vector))
 
 
 def gain_of(better: Array) -> Gain:

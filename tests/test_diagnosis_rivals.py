@@ -184,7 +184,7 @@ def test_further_parameters_have_to_pay():
 
 
 def test_an_effect_on_more_elements_than_blocks_tell_of_is_found():
-    """It shows in six blocks of 24, on eight winches, each of which is sure."""
+    """In six blocks of 24, on eight winches, each of which is sure."""
     names = [f"winch_{k}" for k in range(8)]
     speed = np.where(TIMES < 12.0, np.sin(1.7 * TIMES), 0.0)
     viscous = catalogue()["winch_viscous_friction"]
@@ -202,11 +202,11 @@ def test_an_effect_on_more_elements_than_blocks_tell_of_is_found():
 
     (named,) = named_in(*drags(0.05))
     assert named.hypothesis.elements == tuple(names)
-    base, sums = np.zeros(0, dtype=int), Sums(gather([drags(0.05)], BLOCK_S))
+    base, sums = np.zeros(0, dtype=int), Sums(gather([drags(0.05)], 2.0 * BLOCK_S))
     parts = [np.array([k]) for k in range(8)]
     assert sums.p_value(base, np.arange(8)) == 1.0
     assert chance(sums, base, parts) < 1e-6
-    still = Sums(gather([drags(0.0)], BLOCK_S))
+    still = Sums(gather([drags(0.0)], 2.0 * BLOCK_S))
     assert chance(still, base, parts) > 0.01
 
 

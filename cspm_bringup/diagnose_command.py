@@ -21,6 +21,7 @@ from cspm_ident.diagnosis.statement import (
     drive_of,
     line_statement,
     statement_of,
+    tension_statement,
     unit_of,
     unknown_statement,
 )
@@ -136,6 +137,9 @@ def print_diagnosis(console: Console, found: Diagnosis) -> None:
             f"taken into account, too small to matter: {named.hypothesis.effect.id} on"
             f" {', '.join(named.hypothesis.elements)}",
         )
+    drawn = tension_statement(found)
+    if drawn is not None:
+        say(console, drawn)
     _print_fits(console, found)
     silent = ", ".join(name for name, _ in found.silent)
     if silent:

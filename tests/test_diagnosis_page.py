@@ -4,6 +4,7 @@ import json
 import re
 import shutil
 import subprocess
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -244,6 +245,25 @@ def test_a_page_without_findings_says_so(tmp_path):
     # What was not found changes nothing: there is no after to be drawn.
     assert '"name":"before"' in page
     assert '"name":"after"' not in page
+
+
+@pytest.mark.parametrize(
+    ("channel", "measured", "told"),
+    [
+        (Channel.TENSION, False, True),
+        (Channel.TENSION, True, False),
+        (Channel.SHAFT, False, False),
+    ],
+)
+def test_the_page_says_where_tensions_come_from(tmp_path, channel, measured, told):
+    found = diagnosis()
+    cells = Samples(np.zeros(1), np.zeros((1, 8))) if measured else None
+    found = replace(
+        found,
+        searched=(replace(found.searched[0], tension=cells),),
+        places=(Place(channel, "surge_2"),),
+    )
+    assert ("No load cell was recorded" in section(page_of(tmp_path, found), "where")) is told
 
 
 def test_a_periodic_force_from_outside_is_unknown(tmp_path):

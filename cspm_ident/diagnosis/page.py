@@ -16,7 +16,7 @@ from cspm_ident.diagnosis.drawing import drawing
 from cspm_ident.diagnosis.evidence_figure import driver_figure, overlay_figure
 from cspm_ident.diagnosis.hypothesis import Hypothesis, Named
 from cspm_ident.diagnosis.part import Part, part_behind, part_of
-from cspm_ident.diagnosis.statement import channel_of, drive_of, unit_of
+from cspm_ident.diagnosis.statement import channel_of, drive_of, tension_statement, unit_of
 from cspm_ident.diagnosis.verdict import IMPROVED, TRUSTED, Verdict, named_in, verdict_of
 from cspm_ident.offline_page import figure_html, table_html, write_offline_page
 from cspm_ident.signals.samples import Samples
@@ -103,7 +103,9 @@ def _where(found: Diagnosis) -> str:
         first.machine, _mean_pose(first.bar_pose), _mean_pose(first.frame_pose), parts
     )
     named = ", ".join(part.words for part in parts) or "no part"
-    return f"<p>Marked: {escape(named)}.</p>{picture}"
+    drawn = tension_statement(found)
+    note = "" if drawn is None else f"<p>{escape(drawn)}</p>"
+    return f"<p>Marked: {escape(named)}.</p>{note}{picture}"
 
 
 def _parts(found: Diagnosis) -> Iterable[Part]:

@@ -147,6 +147,14 @@ def unknown_statement(diagnosis: Diagnosis, k: int) -> str:
     )
 
 
+def tension_statement(diagnosis: Diagnosis) -> str | None:
+    """Return where tensions come from if no load cell measured them, else None."""
+    measured = all(m.tension is not None for m in diagnosis.searched)
+    if measured or not any(place.channel is Channel.TENSION for place in diagnosis.places):
+        return None
+    return "No load cell was recorded: tensions are drawn from the winches' torques."
+
+
 def line_statement(line: Line) -> str:
     """Return a periodic part of a residual as one sentence."""
     what = _CHANNELS[line.place.channel].format(line.place.element)

@@ -9,7 +9,7 @@ from __future__ import annotations
 import argparse
 import json
 import tempfile
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
 from pathlib import Path
 from typing import Any
 
@@ -139,14 +139,12 @@ def _text(k: int, stratum: str, item: Mapping[str, Any], found: Diagnosis) -> st
         f" {c['multiple']:g} × its detection limit"
         for c in item["concealed"]
     )
-    told = [statement_of(found, i) for i in range(len(found.findings.named))]
-    told += [
-        f"as well explained by {rival.words}"
-        for named in found.findings.named
-        for rival in named.alternatives
+    told = [
+        *_named(found, doubtful=False),
+        *(unknown_statement(found, i) for i in range(len(found.shapes))),
+        *(line_statement(line) for line in found.lines),
+        *_named(found, doubtful=True),
     ]
-    told += [unknown_statement(found, i) for i in range(len(found.shapes))]
-    told += [line_statement(line) for line in found.lines]
     lines = "\n".join(f"- {sentence}" for sentence in told) or "- nothing"
     return (
         f"## {k}. {stratum}, `{item['scenario']}`\n\n"
@@ -154,6 +152,14 @@ def _text(k: int, stratum: str, item: Mapping[str, Any], found: Diagnosis) -> st
         f"Verdict: **{verdict_of(found).value}**.\n\n{lines}\n\n"
         f"![{stratum}](figures/gallery_{k}.png)\n"
     )
+
+
+def _named(found: Diagnosis, *, doubtful: bool) -> Iterator[str]:
+    """Yield what is said of the findings that are doubtful, or of the others, and their rivals."""
+    for i, named in enumerate(found.findings.named):
+        if found.findings.is_doubtful(named) == doubtful:
+            yield statement_of(found, i)
+            yield from (f"as well explained by {rival.words}" for rival in named.alternatives)
 
 
 def _amounts(concealed: Mapping[str, Any]) -> str:

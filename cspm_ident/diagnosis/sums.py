@@ -252,9 +252,10 @@ class Sums:
     def half_width(self, base: Index, columns: Index) -> Array:
         """Return half the widths of 95 % intervals of the weights of columns beside a base.
 
-        Infinite where a single block tells a weight.
+        From pairs of blocks, for what a model leaves is alike for longer than a block. Infinite
+        where a single pair tells a weight.
         """
-        found = self._left_out(base, columns)
+        found = self._left_out(base, columns, pairs=True)
         free = found.blocks_of - 1.0
         factor = np.full(len(free), np.inf)
         factor[free > _ALONE] = t_distribution.ppf(0.975, free[free > _ALONE])
@@ -280,9 +281,10 @@ class Sums:
         wald = sizes @ np.linalg.pinv(found.covariance / np.outer(scale, scale)) @ sizes
         return float(f_distribution.sf(wald / count, count, found.blocks - count))
 
-    def _left_out(self, base: Index, columns: Index) -> LeftOut:
-        """Return what leaving out one block at a time does to the weights of columns."""
+    def _left_out(self, base: Index, columns: Index, *, pairs: bool = False) -> LeftOut:
+        """Return what leaving out one block, or pair, at a time does to the weights of columns."""
         parts = self._beyond(base, columns)
+        parts = paired(parts) if pairs else parts
         whole, count = parts.sum(axis=0), len(columns)
         inverse = _pseudo_inverse(whole[:-1, :-1])
         told = np.einsum("ij,bji->bi", inverse, parts[:, :-1, :-1])
@@ -373,12 +375,12 @@ def behind(worse: Array) -> float:
 
 
 def paired(values: Array) -> Array:
-    """Return sums over blocks two by two, (⌈blocks / 2⌉,).
+    """Return sums over blocks two by two, (⌈blocks / 2⌉, …).
 
     What a model leaves is alike for longer than a block, so that single ones would tell two models
     apart that both are not quite true.
     """
-    return np.add.reduceat(values, np.arange(0, len(values), 2))
+    return np.add.reduceat(values, np.arange(0, len(values), 2), axis=0)
 
 
 def _pseudo_inverse(gram: Array) -> Array:

@@ -4,7 +4,8 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from run_samples import SCENARIOS, bundle_of, run_to
+from residual_samples import without_start, worst_sea
+from run_samples import SCENARIOS, bundle_of
 
 from cspm_bringup.run import run
 from cspm_ident.diagnosis.columns import Candidate, Place
@@ -23,9 +24,7 @@ THESIS = load_testbed(SCENARIOS / "testbeds" / "thesis.yaml")
 @pytest.fixture(scope="module")
 def measurement(tmp_path_factory):
     """Six seconds of the worst sea, read by ideal sensors."""
-    folder = tmp_path_factory.mktemp("residuals") / "bag"
-    run_to(folder, "worst_case", "duration=6", "sensors=ideal")
-    return read_measurement(folder)
+    return worst_sea(tmp_path_factory.mktemp("residuals") / "bag")
 
 
 @pytest.fixture(scope="module")
@@ -45,14 +44,6 @@ def described(measurement, name, element, **values):
     index = machine.cable_names.index(element) if element in machine.cable_names else 0
     other = altered_testbed(machine, [Action(effect, index, element, values)])
     return measurement.with_testbed(replace(measurement.testbed, testbed=other))
-
-
-def without_start(equation, values):
-    """Return what one unknown length at the start, the same for all time, does not explain."""
-    if not equation.nuisance.size:
-        return values
-    start = equation.nuisance[:, 0]
-    return values - start @ np.linalg.lstsq(start, values, rcond=None)[0]
 
 
 def rms(values):

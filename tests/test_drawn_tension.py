@@ -4,13 +4,12 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from run_samples import run_to
+from residual_samples import without_start, worst_sea
 
 from cspm_ident.diagnosis.columns import Candidate, Place
 from cspm_ident.diagnosis.drawn_tension import with_drawn_tension
 from cspm_ident.diagnosis.recorded import equations_of
 from cspm_ident.diagnosis.supposed import with_found
-from cspm_ident.signals.measurement import read_measurement
 from cspm_sim.effect_entries import read_actions
 from cspm_sim.effects import Channel, catalogue
 
@@ -20,9 +19,7 @@ BAR = Place(Channel.WRENCH, "bar")
 @pytest.fixture(scope="module")
 def whole(tmp_path_factory):
     """Six seconds of the worst sea, read by ideal sensors."""
-    folder = tmp_path_factory.mktemp("drawn") / "bag"
-    run_to(folder, "worst_case", "duration=6", "sensors=ideal")
-    return read_measurement(folder)
+    return worst_sea(tmp_path_factory.mktemp("drawn") / "bag")
 
 
 @pytest.fixture(scope="module")
@@ -72,10 +69,7 @@ def test_residuals_are_those_of_cables_and_bar(blind):
     assert set(places) == expected | {BAR}
     for place, equation in places.items():
         if place.channel is not Channel.DRIVE:
-            left = equation.target
-            if equation.nuisance.size:
-                start = equation.nuisance[:, 0]
-                left = left - start @ np.linalg.lstsq(start, left, rcond=None)[0]
+            left = without_start(equation, equation.target)
             assert rms(left) < 0.02 * rms(equation.measured - equation.measured.mean(0)), place
 
 
@@ -99,12 +93,9 @@ def test_a_winch_s_fault_shows_in_its_cable_and_in_the_bar(blind, name, weight):
     for place, equation in here.items():
         assert (candidate in equation.columns) == (place in (own, BAR)), place
     for place in (own, BAR):
-        change = wrong[place].target - here[place].target
-        expected = weight * here[place].columns[candidate][:, :, 0]
-        if here[place].nuisance.size:
-            start = here[place].nuisance[:, 0]
-            change = change - start @ np.linalg.lstsq(start, change, rcond=None)[0]
-            expected = expected - start @ np.linalg.lstsq(start, expected, rcond=None)[0]
+        equation = here[place]
+        change = without_start(equation, wrong[place].target - equation.target)
+        expected = without_start(equation, weight * equation.columns[candidate][:, :, 0])
         assert rms(change + expected) < 0.05 * rms(expected), place
         assert rms(change - expected) > rms(expected), place
 

@@ -21,8 +21,6 @@ Array = NDArray[np.float64]
 
 # Friction that depends on the tension that it hides.
 _FIXED_POINTS = 3
-# Of the usual interval: readings farther apart have lost one between them.
-_GAP = 1.5
 
 
 def with_drawn_tension(measurement: Measurement, known: Sequence[Action]) -> Measurement | None:
@@ -59,9 +57,8 @@ def lost_torques(measurement: Measurement) -> Array:
     """Return when readings of the torque are missing [s], so that none is known there."""
     assert measurement.torque is not None
     times = measurement.torque.times
-    apart = np.diff(times)
-    gaps = np.flatnonzero(apart > _GAP * np.median(apart))
-    return np.asarray(times[gaps] + 0.5 * apart[gaps])
+    gaps = np.flatnonzero(measurement.torque.gaps)
+    return np.asarray(0.5 * (times[gaps] + times[gaps + 1]))
 
 
 def drawn_columns(

@@ -15,6 +15,8 @@ from cspm_ident.diagnosis.sums import Gain
 from cspm_sim.effects import Effect
 
 Array = NDArray[np.float64]
+# A free function, what it gains and its share of the squares of its residual.
+Unknown = tuple[Driver, Gain, float]
 
 # Of what a finding explains. In blind recordings no finding was right (of 7) beside so much that
 # nothing explained.
@@ -99,7 +101,7 @@ class Findings(NamedTuple):
     """
 
     named: tuple[Named, ...]
-    unknown: tuple[tuple[Driver, Gain, float], ...]
+    unknown: tuple[Unknown, ...]
     candidates: int
 
     def is_doubtful(self, named: Named) -> bool:

@@ -19,6 +19,7 @@ from cspm_ident.diagnosis.hypothesis import (
     Hypothesis,
     Named,
     Rival,
+    Unknown,
     bounded,
     freedom,
     is_allowed,
@@ -40,7 +41,7 @@ from cspm_ident.diagnosis.rivals import rivals_of
 from cspm_ident.diagnosis.short_list import short_list
 from cspm_ident.diagnosis.sums import Sums, behind, gain_of, paired
 from cspm_ident.diagnosis.sureness import MATERIAL_SHARE, Sureness
-from cspm_ident.diagnosis.unexplained import Unknown, unexplained
+from cspm_ident.diagnosis.unexplained import unexplained
 from cspm_sim.effects import Effect
 
 Array = NDArray[np.float64]

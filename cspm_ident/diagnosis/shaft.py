@@ -26,8 +26,6 @@ Array = NDArray[np.float64]
 
 # Of the usual speed: below it a shaft may stick, and its direction is noise.
 STILL_SHARE = 0.05
-# Of the usual interval: readings farther apart have lost one between them.
-_GAP = 1.5
 _MOVES = 3.0
 _STEP_RAD = 1e-6
 _DRIVERS = {
@@ -74,7 +72,7 @@ def shaft_equations(
             if len(rows) < 2 * half + 1 or not _turns(rows[:, WinchSignal.ANGLE], signals.angle):
                 continue
             sensors = (WINCHES,) if signals.tension is None else (WINCHES, TENSION)
-            lost = _lost(signals.torque.times - measurement.torque_age, times)
+            lost = _lost(signals.torque, measurement.torque_age, times)
             make = maker(measurement.pointwise)
             table = _Shaft(rows, cable, half, times, lost, sensors, make)
             own = [action for action in known if action.element == i]
@@ -93,11 +91,10 @@ def _halves(samples: Samples) -> tuple[Array, Array]:
     return samples.times[::2], samples.values[::2, 0]
 
 
-def _lost(stamps: Array, times: Array) -> NDArray[np.bool_]:
+def _lost(torque: Samples, age: float, times: Array) -> NDArray[np.bool_]:
     """Return at which times a reading is missing, so that a torque that chatters is not known."""
-    apart = np.diff(stamps)
-    after = np.clip(np.searchsorted(stamps, times) - 1, 0, len(apart) - 1)
-    return np.asarray(apart[after] > _GAP * np.median(apart))
+    after = np.searchsorted(torque.times - age, times) - 1
+    return np.asarray(torque.gaps[np.clip(after, 0, len(torque.gaps) - 1)])
 
 
 class _Shaft:

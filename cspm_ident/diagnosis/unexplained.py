@@ -9,13 +9,11 @@ from numpy.typing import NDArray
 
 from cspm_ident.diagnosis.drivers import Driver
 from cspm_ident.diagnosis.evidence import Evidence
-from cspm_ident.diagnosis.hypothesis import DOUBTFUL_SHARE, Hypothesis
-from cspm_ident.diagnosis.sums import Gain, Sums
+from cspm_ident.diagnosis.hypothesis import DOUBTFUL_SHARE, Hypothesis, Unknown
+from cspm_ident.diagnosis.sums import Sums
 from cspm_ident.diagnosis.sureness import FALSE_ALARMS, Sureness
 
 Index = NDArray[np.intp]
-# A free function, what it gains and its share of the squares of its residual.
-Unknown = tuple[Driver, Gain, float]
 
 UNKNOWN_SHARE = 0.15
 

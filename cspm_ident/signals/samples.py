@@ -13,6 +13,8 @@ Array = NDArray[np.float64]
 
 # A hole is where samples lie farther apart than this many usual intervals.
 HOLE = 5.5
+# Of the usual interval: readings farther apart have lost one between them.
+_GAP = 1.5
 # Fewer samples tell no clock.
 _FEWEST = 16
 _DRIFT_ORDER = 3
@@ -43,6 +45,11 @@ class Samples:
     def rate(self) -> float:
         """Samples per second; 0 with fewer than two."""
         return 1.0 / self.interval if self.interval > 0 else 0.0
+
+    @cached_property
+    def gaps(self) -> NDArray[np.bool_]:
+        """After which samples, but the last, one has been lost, (n - 1,)."""
+        return np.asarray(np.diff(self.times) > _GAP * self.interval)
 
     @cached_property
     def spans(self) -> list[slice]:

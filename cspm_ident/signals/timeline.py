@@ -295,7 +295,7 @@ def _far(samples: Samples, times: Array) -> NDArray[np.bool_]:
 def _lost(samples: Samples, later: NDArray[np.intp]) -> NDArray[np.bool_]:
     """Return for which steps, whose next readings are `later`, the reading itself was lost."""
     held = np.minimum(later, len(samples.times) - 1)
-    gap = samples.times[held] - samples.times[np.maximum(held - 1, 0)] > 1.5 * samples.interval
+    gap = np.append(False, samples.gaps)[held]
     return np.asarray(gap & np.append(held[:-1] == held[1:], False))
 
 

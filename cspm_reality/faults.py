@@ -66,21 +66,30 @@ class FilteredDelay:
     def __init__(self, delay: float) -> None:
         """Take the delay at low frequencies [s]."""
         self._half = 0.5 * delay
+        self._seen: Array | None = None
         self._past: deque[tuple[float, Array]] = deque()
 
     def __call__(self, values: Array, time: float) -> Array:
         """Return the pose as it was; to be called at every step of the plant."""
-        if self._past:
-            before, held = self._past[-1]
-            share = -np.expm1(-(time - before) / self._half)
-            smooth = held + share * (values - held)
-        else:
-            smooth = values.copy()
-        self._past.append((time, smooth))
+        self._past.append((time, self._filtered(values, time)))
+        self._seen = values.copy()
         wanted = time - self._half
         while len(self._past) > 2 and self._past[1][0] <= wanted:
             self._past.popleft()
         return self._between(wanted)
+
+    def _filtered(self, values: Array, time: float) -> Array:
+        """Return the filter's output, its input being a straight line since the last step.
+
+        Exact however short the filter's time is against the step.
+        """
+        if self._seen is None:
+            return values.copy()
+        before, held = self._past[-1]
+        steps = (time - before) / self._half
+        reached = -np.expm1(-steps)
+        risen = (values - self._seen) * (1.0 - reached / steps)
+        return np.asarray(held + reached * (self._seen - held) + risen)
 
     def _between(self, wanted: float) -> Array:
         begin, first = self._past[0]

@@ -126,6 +126,7 @@ class Snapshots:
                 damper * rate,
                 unstretched / length,
             )
+            out[k, CableSignal.SPEED], out[k, CableSignal.DAMPING] = speed, damper
             out[k, CableSignal.HORIZONTAL] = np.hypot(span[0], span[1])
         out[:, CableSignal.GRAVITY] = self.nominal.gravity
         out[:, CableSignal.ANGLE] = self.angles(i)

@@ -10,10 +10,11 @@ from cspm_ident.diagnosis.evidence import gather
 from cspm_ident.diagnosis.judgement import free_functions, rms, without_nuisance
 from cspm_ident.diagnosis.limits import detection_limits
 from cspm_ident.diagnosis.onset import onset_of
-from cspm_ident.diagnosis.parameters import of_shafts, weights_of
+from cspm_ident.diagnosis.parameters import of_shafts
 from cspm_ident.diagnosis.search import Search
 from cspm_ident.diagnosis.sketch import sketch
 from cspm_ident.diagnosis.sums import Sums
+from cspm_ident.diagnosis.weights import weights_of
 from cspm_sim.effects import Channel, catalogue
 
 ROWS, STEP, BLOCK_S = 4800, 0.01, 1.0

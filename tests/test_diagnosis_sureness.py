@@ -1,4 +1,6 @@
-"""How sure an effect has to be, and when it belongs to those found on other elements."""
+"""How sure an effect has to be, and when several elements have it from one cause."""
+
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -15,18 +17,19 @@ from cspm_sim.effects import Channel, catalogue
 
 ROWS, STEP, BLOCK_S = 2400, 0.01, 0.5
 DRY, WET = (catalogue()[f"winch_{name}_friction"] for name in ("coulomb", "viscous"))
+LATE = catalogue()["pose_delay"]
 NAMES = ("one", "two")
 
 
-def winches(second, noise=0.05, seed=3):
-    """Two winches, the first with 0.3 of dry friction, the other with `second` and a big hum."""
+def winches(second, hum=2.0, effect=DRY, noise=0.05, seed=3):
+    """Two elements, the first with 0.3 of an effect, the other with `second` and a hum."""
     rng = np.random.default_rng(seed)
     times, found = STEP * np.arange(ROWS), []
-    for name, weight, hum in zip(NAMES, (0.3, second), (0.0, 2.0), strict=True):
+    for name, weight, loud in zip(NAMES, (0.3, second), (0.0, hum), strict=True):
         speed = np.sin(2.1 * times + len(name)) + 0.6 * np.sin(0.83 * times)
         target = weight * np.sign(speed) + noise * rng.standard_normal(ROWS)
-        target = target + hum * np.sin(37.0 * times)
-        columns = {Candidate(DRY, name): np.sign(speed), Candidate(WET, name): speed}
+        target = target + loud * np.sin(37.0 * times)
+        columns = {Candidate(effect, name): np.sign(speed), Candidate(WET, name): speed}
         shaped = {term: values[:, None, None] for term, values in columns.items()}
         place = Place(Channel.SHAFT, name)
         found.append(Equation(place, times, target[:, None], shaped, target[:, None]))
@@ -43,24 +46,44 @@ def test_every_effect_has_an_equal_part_of_the_false_alarms():
     assert spent == pytest.approx(FALSE_ALARMS)
 
 
-@pytest.mark.parametrize(("second", "told"), [(0.3, True), (0.0, False), (-0.3, False)])
-def test_what_agrees_with_a_finding_belongs_to_it_though_it_is_little(second, told):
+@pytest.mark.parametrize(("second", "elements"), [(0.3, NAMES), (0.0, NAMES[:1])])
+def test_what_is_little_on_one_element_is_told_of_all_where_one_number_is_better(second, elements):
     """In the hum of the other winch the same friction is a tenth of the squares and less."""
     evidence = gather([winches(second)], BLOCK_S)
     search = Search(evidence)
     one, two = (Candidate(DRY, name) for name in NAMES)
-    further = Hypothesis(DRY, (two,))
-    base = search.columns([])
-    assert search.sureness.agrees(base, [one], further) is told
-    beside = np.append(base, evidence.columns_of([one]))
+    beside = np.append(search.columns([]), evidence.columns_of([one]))
     gain = search.sums.gain(beside, evidence.columns_of([two]))
-    assert not search.sureness.counts(beside, further, gain)
-
-
-@pytest.mark.parametrize(("second", "elements"), [(0.3, NAMES), (0.0, NAMES[:1])])
-def test_a_finding_is_told_of_all_elements_that_agree(second, elements):
-    (named,) = Search(gather([winches(second)], BLOCK_S)).run().named
+    assert not search.sureness.counts(beside, Hypothesis(DRY, (two,)), gain)
+    (named,) = search.run().named
     assert named.hypothesis.elements == elements
+    assert named.hypothesis.common is (elements == NAMES)
+
+
+@pytest.mark.parametrize(("second", "hum", "common"), [(0.3, 8.0, True), (0.0, 2.0, False)])
+def test_what_one_system_reads_has_one_number_unless_data_say_otherwise(second, hum, common):
+    """Under a great hum nothing tells; under a lesser one the other body does not have it."""
+    late, dry = (
+        Search(gather([winches(second, hum, effect)], BLOCK_S)).run().named[0].hypothesis
+        for effect in (LATE, DRY)
+    )
+    assert late.common is common
+    assert late.elements == (NAMES if common else NAMES[:1])
+    assert dry.elements == NAMES[:1]
+
+
+def test_a_common_number_is_that_of_the_sum_of_columns():
+    """Fitted by hand to both winches' rows."""
+    equations = winches(0.1)
+    search = Search(gather([equations], BLOCK_S))
+    both = Hypothesis(DRY, tuple(Candidate(DRY, name) for name in NAMES), common=True)
+    rows = [e.columns[c][:, 0] for e, c in zip(equations, both.candidates, strict=True)]
+    target = np.concatenate([e.target for e in equations])
+    expected = np.linalg.lstsq(np.concatenate(rows), target, rcond=None)[0]
+    found = [weights for weights, _ in search.weights([both]).values()]
+    assert found == [pytest.approx(expected[0], rel=1e-9)] * 2
+    apart = [w for w, _ in search.weights([replace(both, common=False)]).values()]
+    assert apart[0][0] - apart[1][0] == pytest.approx(0.2, abs=0.1)
 
 
 def warming(amount):

@@ -163,11 +163,13 @@ def test_what_begins_late_does_nothing_before():
     assert [fault(np.ones(1), t)[0] for t in (4.9, 5.1)] == [1.0, 1.3]
 
 
-def test_a_filtered_tracker_is_late_by_its_delay_on_slow_motion():
-    late = faults.FilteredDelay(0.02)
+@pytest.mark.parametrize("delay", [0.2 * MS, 0.6 * MS, 3.0 * MS, 0.02])
+def test_a_filtered_tracker_is_late_by_its_delay_on_slow_motion(delay):
+    """However short the delay is against the plant's step."""
+    late = faults.FilteredDelay(delay)
     times = np.arange(0.0, 2.0, MS)
     seen = np.array([late(np.full(6, 3.0 * t), t)[0] for t in times])
-    assert seen[-1] == pytest.approx(3.0 * (times[-1] - 0.02), abs=3.0 * MS)
+    assert seen[-1] == pytest.approx(3.0 * (times[-1] - delay), abs=1e-9)
 
 
 def test_shifted_markers_turn_with_the_bar():

@@ -20,13 +20,13 @@ from cspm_ident.diagnosis.limits import Limit, detection_limits
 from cspm_ident.diagnosis.lines import Line, lines_of, with_lines
 from cspm_ident.diagnosis.model import Data, modelled
 from cspm_ident.diagnosis.onset import Onset
-from cspm_ident.diagnosis.parameters import weights_of
 from cspm_ident.diagnosis.recorded import equations_of
-from cspm_ident.diagnosis.refine import Cut, Weights
+from cspm_ident.diagnosis.refine import Cut
 from cspm_ident.diagnosis.region import Region, region_of
 from cspm_ident.diagnosis.safeguards import ALL_SAFEGUARDS, Safeguards
 from cspm_ident.diagnosis.search import Search
 from cspm_ident.diagnosis.simulation import SimulatedFit, Worth, baselines_of
+from cspm_ident.diagnosis.weights import Weights
 from cspm_ident.signals.measurement import Measurement
 from cspm_msgs_py.errors import InputError
 from cspm_sim.effects import Effect
@@ -207,8 +207,7 @@ def _lasting(
 
 def _first_weights(search: Search, kept: Sequence[Named]) -> dict[Candidate, Array]:
     """Return the weights of what was kept with the shapes that were searched."""
-    own = [c for each in kept for c in each.hypothesis.candidates]
-    return {c: w for c, (w, _) in weights_of(search.evidence, search.sums, own).items()}
+    return search.values([each.hypothesis for each in kept])
 
 
 def _is_negligible(named: Named, weights: Mapping[Candidate, Array]) -> bool:
@@ -272,12 +271,10 @@ def _confirmed(
     kept = list(found.named)
     rejected: list[Named] = []
     for each in found.named:
-        candidates = [c for other in kept for c in other.hypothesis.candidates]
-        whole = weights_of(search.evidence, search.sums, candidates)
+        whole = search.values([other.hypothesis for other in kept])
         own = set(each.hypothesis.candidates)
         fewer = {c: w for c, w in whole.items() if c not in own}
-        with_it = judge.left_with({c: w for c, (w, _) in whole.items()})
-        without = judge.left_with({c: w for c, (w, _) in fewer.items()})
+        with_it, without = judge.left_with(whole), judge.left_with(fewer)
         shares = [1.0 - with_it[p] / without[p] for p in without if without[p] > 0.0]
         worse = sum(with_it.values()) > sum(without.values())
         if max(shares) < CONFIRMED_SHARE or worse:

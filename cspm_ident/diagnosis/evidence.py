@@ -90,7 +90,9 @@ class Evidence:
             found[place.place] = float(vector @ place.whole @ vector)
         return found
 
-    def left_with(self, weights: Mapping[Candidate | Driver, Array]) -> dict[Place, float]:
+    def left_with(
+        self, weights: Mapping[Candidate, Array] | Mapping[Candidate | Driver, Array]
+    ) -> dict[Place, float]:
         """Return Σ residual² of each place for given weights, its own nuisance fitted."""
         found = {}
         full = np.zeros(self.width)

@@ -31,16 +31,23 @@ class Hypothesis:
         effect: of the catalogue.
         candidates: one per element, of the same nonlinear parameters.
         onset: block from which on it acts, 0 for all the time.
+        common: whether all elements share its numbers, having one cause.
     """
 
     effect: Effect
     candidates: tuple[Candidate, ...]
     onset: int = 0
+    common: bool = False
 
     @property
     def elements(self) -> tuple[str, ...]:
         """What it acts on."""
         return tuple(candidate.element for candidate in self.candidates)
+
+    @property
+    def causes(self) -> int:
+        """How many faults it supposes: one for each element that has numbers of its own."""
+        return 1 if self.common else len(self.candidates)
 
     @property
     def words(self) -> str:
@@ -171,18 +178,25 @@ def shapes_of(hypothesis: Hypothesis, candidates: Iterable[Candidate]) -> list[H
     ]
 
 
+def parts_of(hypotheses: Iterable[Hypothesis]) -> tuple[list[Candidate], set[str]]:
+    """Return the candidates of hypotheses, and the effects, by id, whose weights they share."""
+    own = list(hypotheses)
+    common = {h.effect.id for h in own if h.common}
+    return [c for h in own for c in h.candidates], common
+
+
 def freedom(hypothesis: Hypothesis) -> int:
     """Return how many numbers a hypothesis has that are not of a grid.
 
-    Those of its parameters, and one for each element beyond the first, which is a fault of its own.
+    Those of its parameters for each fault, and one for each fault beyond the first.
     """
-    effect, elements = hypothesis.effect, len(hypothesis.candidates)
-    return elements * (len(effect.parameters) - len(effect.nonlinear)) + elements - 1
+    effect, causes = hypothesis.effect, hypothesis.causes
+    return causes * (len(effect.parameters) - len(effect.nonlinear)) + causes - 1
 
 
 def is_wider(one: Hypothesis, other: Hypothesis) -> bool:
-    """Return whether one is of more elements, whatever the effects."""
-    return len(one.candidates) > len(other.candidates)
+    """Return whether one supposes more faults, whatever the effects."""
+    return one.causes > other.causes
 
 
 def members_of(candidates: Iterable[Candidate], hypothesis: Hypothesis) -> list[Candidate]:

@@ -12,8 +12,8 @@ from cspm_ident.diagnosis.columns import Place
 from cspm_ident.diagnosis.equation import Equation, steady
 from cspm_ident.diagnosis.hypothesis import Named, bounded, is_negligible, members_of
 from cspm_ident.diagnosis.onset import Onset, onset_of
-from cspm_ident.diagnosis.parameters import of_drives, of_shafts, weights_of
-from cspm_ident.diagnosis.refine import Cut, Weights, needs_refining, refine
+from cspm_ident.diagnosis.parameters import of_drives, of_shafts
+from cspm_ident.diagnosis.refine import Cut, needs_refining, refine
 from cspm_ident.diagnosis.search import Search
 from cspm_ident.diagnosis.simulation import (
     Baselines,
@@ -23,6 +23,7 @@ from cspm_ident.diagnosis.simulation import (
     worth_of,
 )
 from cspm_ident.diagnosis.supposed import is_possible
+from cspm_ident.diagnosis.weights import Weights
 from cspm_ident.signals.measurement import Measurement
 
 Array = NDArray[np.float64]
@@ -124,10 +125,10 @@ def _parameters(
     block: float,
 ) -> Weights:
     """Return the weights of what was kept, refined where columns depend on them."""
-    candidates = [c for each in kept for c in each.hypothesis.candidates]
-    if any(needs_refining(candidate.effect) for candidate in candidates):
-        return refine(searched, candidates, noise, block, cut)
-    return of_shafts(weights_of(search.evidence, search.sums, candidates), rows, block)
+    hypotheses = [each.hypothesis for each in kept]
+    if any(needs_refining(hypothesis.effect) for hypothesis in hypotheses):
+        return refine(searched, hypotheses, noise, block, cut)
+    return of_shafts(search.weights(hypotheses), rows, block)
 
 
 def _onsets(kept: Sequence[Named], rows: Parts, starts: Array) -> tuple[Onset | None, ...]:

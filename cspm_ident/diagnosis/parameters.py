@@ -9,20 +9,12 @@ import numpy as np
 from cspm_ident.diagnosis.columns import Candidate, Place
 from cspm_ident.diagnosis.drive import time_constant
 from cspm_ident.diagnosis.equation import Equation, steady
-from cspm_ident.diagnosis.evidence import Evidence, gather
-from cspm_ident.diagnosis.refine import Weights
+from cspm_ident.diagnosis.evidence import gather
 from cspm_ident.diagnosis.sums import Sums
+from cspm_ident.diagnosis.weights import Weights, weights_of
 from cspm_sim.effects import Channel
 
 Parts = Sequence[Sequence[Equation]]
-
-
-def weights_of(evidence: Evidence, sums: Sums, candidates: Sequence[Candidate]) -> Weights:
-    """Return each candidate's weights with half the width of their 95 % intervals."""
-    columns = evidence.columns_of(candidates)
-    values = evidence.parted(candidates, sums.weights(evidence.with_nuisance(candidates)))
-    widths = evidence.parted(candidates, sums.half_width(evidence.nuisance, columns))
-    return {c: (values[c], widths[c]) for c in candidates}
 
 
 def of_shafts(weights: Weights, parts: Parts, block_s: float) -> Weights:

@@ -6,7 +6,7 @@ are mended in a few rounds in which only the named effects are fitted.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Collection, Mapping, Sequence
 from dataclasses import replace
 from itertools import product
 
@@ -16,15 +16,16 @@ from numpy.typing import NDArray
 from cspm_ident.diagnosis.columns import Candidate, Place
 from cspm_ident.diagnosis.equation import Equation, in_noise, steady
 from cspm_ident.diagnosis.evidence import Evidence, gather
+from cspm_ident.diagnosis.hypothesis import Hypothesis, parts_of
 from cspm_ident.diagnosis.recorded import equations_of
 from cspm_ident.diagnosis.sums import Sums
 from cspm_ident.diagnosis.supposed import settled, with_found
+from cspm_ident.diagnosis.weights import Weights, values_of, weights_of
 from cspm_ident.signals.measurement import Measurement
 from cspm_msgs_py.errors import InputError
 from cspm_sim.effects import Effect
 
 Array = NDArray[np.float64]
-Weights = dict[Candidate, tuple[Array, Array]]
 Cut = Callable[[Sequence[Sequence[Equation]]], Sequence[Sequence[Equation]]]
 
 _ROUNDS = 4
@@ -36,7 +37,7 @@ _SETTLED = 0.02
 
 def refine(
     searched: Sequence[Measurement],
-    candidates: Sequence[Candidate],
+    hypotheses: Sequence[Hypothesis],
     noise: Mapping[Place, Array],
     block_s: float,
     cut: Cut,
@@ -45,11 +46,12 @@ def refine(
 
     Args:
         searched: the recordings.
-        candidates: what was named, element by element.
+        hypotheses: what was named.
         noise: of each residual, its unit.
         block_s: length of the blocks [s].
         cut: what of the equations was searched.
     """
+    candidates, common = parts_of(hypotheses)
     shapes = {c.effect_id: dict(c.shape) for c in candidates}
     effects = {c.effect_id: c.effect for c in candidates}
     wanted = [(c.effect_id, c.element) for c in candidates]
@@ -65,7 +67,7 @@ def refine(
             break
         parts = cut([equations_of(m, near, touched=candidates) for m in moved])
         evidence = gather(in_noise(steady(parts), noise), block_s)
-        shapes, found = _fitted(evidence, shapes, wanted)
+        shapes, found = _fitted(evidence, shapes, wanted, common)
         for candidate, (weights, _) in found.items():
             if _is_applied(candidate.effect):
                 applied[candidate] = weights + applied.get(candidate, 0.0)
@@ -109,9 +111,12 @@ def _steps(factor: float) -> tuple[float, ...]:
 
 
 def _fitted(
-    evidence: Evidence, shapes: dict[str, dict[str, float]], wanted: Sequence[tuple[str, str]]
+    evidence: Evidence,
+    shapes: dict[str, dict[str, float]],
+    wanted: Sequence[tuple[str, str]],
+    common: Collection[str],
 ) -> tuple[dict[str, dict[str, float]], Weights]:
-    """Return the best shapes and the weights there."""
+    """Return the best shapes and the weights there; those of `common` effects are shared."""
     sums = Sums(evidence)
     grids = {name: _shapes(evidence, name) for name in shapes}
     best: tuple[float, dict[str, tuple[tuple[str, float], ...]]] | None = None
@@ -122,12 +127,11 @@ def _fitted(
             best = left, chosen
     assert best is not None
     members = _members(evidence, best[1], wanted)
-    weights = evidence.parted(members, sums.weights(evidence.with_nuisance(members)))
+    weights = values_of(evidence, sums, members, common)
     turns = _turns(evidence, weights)
     beside = np.append(evidence.nuisance, evidence.width + np.arange(turns.shape[1]))
-    half = sums.beside(turns).half_width(beside, evidence.columns_of(members))
-    widths = evidence.parted(members, half)
-    found = {c: (weights[c], widths[c]) for c in members}
+    widths = weights_of(evidence, sums.beside(turns), members, common, beside)
+    found = {c: (weights[c], widths[c][1]) for c in members}
     return {name: dict(shape) for name, shape in best[1].items()}, found
 
 

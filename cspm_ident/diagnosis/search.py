@@ -27,6 +27,7 @@ from cspm_ident.diagnosis.hypothesis import (
     is_tied,
     is_wider,
     joined,
+    parts_of,
     shapes_of,
 )
 from cspm_ident.diagnosis.likeness import (
@@ -42,6 +43,7 @@ from cspm_ident.diagnosis.short_list import short_list
 from cspm_ident.diagnosis.sums import Sums, behind, gain_of, paired
 from cspm_ident.diagnosis.sureness import MATERIAL_SHARE, Sureness
 from cspm_ident.diagnosis.unexplained import unexplained
+from cspm_ident.diagnosis.weights import Weights, values_of, weights_of
 from cspm_sim.effects import Effect
 
 Array = NDArray[np.float64]
@@ -99,6 +101,14 @@ class Search:
         """Return indices of one hypothesis's columns."""
         return self.evidence.columns_of(hypothesis.candidates)
 
+    def weights(self, hypotheses: Sequence[Hypothesis]) -> Weights:
+        """Return the weights of hypotheses that are fitted together, with half their intervals."""
+        return weights_of(self.evidence, self.sums, *parts_of(hypotheses))
+
+    def values(self, hypotheses: Sequence[Hypothesis]) -> dict[Candidate, Array]:
+        """Return the weights alone, which takes less time."""
+        return values_of(self.evidence, self.sums, *parts_of(hypotheses))
+
     def _chosen(self, *, onsets: bool = True) -> list[Hypothesis]:
         chosen: list[Hypothesis] = []
         while sum(not self._is_negligible(h, chosen) for h in chosen) < MOST_EFFECTS:
@@ -118,10 +128,8 @@ class Search:
 
     def _is_negligible(self, hypothesis: Hypothesis, chosen: Sequence[Hypothesis]) -> bool:
         """Return whether a sound machine has as much of it, so that it counts for no effect."""
-        candidates = [c for h in chosen for c in h.candidates]
-        weights = self.sums.weights(self.evidence.with_nuisance(candidates))
-        own = self.evidence.parted(candidates, weights)
-        return is_negligible({c: own[c] for c in hypothesis.candidates})
+        found = self.values(chosen)
+        return is_negligible({c: found[c] for c in hypothesis.candidates})
 
     def _begun(self, hypothesis: Hypothesis, chosen: Sequence[Hypothesis]) -> Hypothesis:
         """Return the hypothesis with its onset, from which on its columns act henceforth."""
@@ -166,7 +174,7 @@ class Search:
             if best is not None:
                 wider = is_wider(hypothesis, best[1])
                 needed = best[0].sum() + 3.0 * gain_of(gained).error * wider
-                if hypothesis.onset and not best[1].onset:
+                if _is_bolder(hypothesis, best[1]):
                     needed = best[0].sum() + _SIGMAS * gain_of(gained - best[0]).error
             if best is None or gained.sum() > needed:
                 best = gained, hypothesis
@@ -195,9 +203,19 @@ class Search:
         """Return what a hypothesis gains in each block, not fitted to it, if it surely does."""
         if not self._is_plausible([*chosen, hypothesis]):
             return None
-        own = self.own_columns(hypothesis)
-        gained = before - self.sums.held_out(np.concatenate([base, own]))
+        gained = before - self._held_out(hypothesis, base)
         return gained if self.sureness.counts(base, hypothesis, gain_of(gained)) else None
+
+    def _and(self, base: Index, further: Hypothesis | None) -> Index:
+        """Return a base with a hypothesis's columns, if there is one."""
+        return base if further is None else np.concatenate([base, self.own_columns(further)])
+
+    def _held_out(self, hypothesis: Hypothesis, base: Index) -> Array:
+        """Return Σ residual² of each block beside a hypothesis that was not fitted to it."""
+        if not hypothesis.common:
+            return self.sums.held_out(np.concatenate([base, self.own_columns(hypothesis)]))
+        sums, base, own = self.sureness.shared(base, hypothesis)
+        return sums.held_out(np.concatenate([base, own]))
 
     @contextmanager
     def _delayed(self, hypothesis: Hypothesis) -> Iterator[None]:
@@ -214,6 +232,8 @@ class Search:
 
     def _pruned(self, hypothesis: Hypothesis, base: Index) -> Hypothesis:
         """Return the hypothesis without elements on which the effect may as well be absent."""
+        if hypothesis.common:
+            return hypothesis
         own_columns = self.own_columns(hypothesis)
         weights = self.sums.weights(np.concatenate([base, own_columns]))[len(base) :]
         sizes = np.abs(weights) / self.sums.half_width(base, own_columns)
@@ -226,14 +246,20 @@ class Search:
     ) -> list[Hypothesis]:
         """Return the candidate's effect where it surely acts, and on all elements together.
 
-        What is too little to see in any one element may be plain in all of them.
+        What is too little to see in any one element may be plain in all of them, with the same
+        numbers or with others for each.
         """
         alike = [
             c for c in free if c.effect_id == candidate.effect_id and c.shape == candidate.shape
         ]
         whole = Hypothesis(candidate.effect, tuple(alike))
         own = self._extended(candidate, alike, base)
-        return [own] if len(own.candidates) == len(alike) else [own, whole]
+        if len(alike) == 1:
+            return [own]
+        common = replace(whole, common=True)
+        if len(own.candidates) < len(alike):
+            return [own, common, whole]
+        return [common, own] if _has_one_system(own) else [own]
 
     def _extended(
         self, candidate: Candidate, alike: Sequence[Candidate], base: Index
@@ -245,8 +271,7 @@ class Search:
         for k in np.argsort(-gains):
             beside = np.concatenate([base, self.evidence.columns_of(found)])
             further = Hypothesis(candidate.effect, (others[k],))
-            gain = self.sums.gain(beside, self._of(others[k]))
-            if sure.counts(beside, further, gain) or sure.agrees(base, found, further):
+            if sure.counts(beside, further, self.sums.gain(beside, self._of(others[k]))):
                 found.append(others[k])
         return Hypothesis(candidate.effect, tuple(c for c in alike if c in found))
 
@@ -262,15 +287,14 @@ class Search:
         One that explains more in most blocks is taken instead, though it be less sure by itself.
         """
         rivals = [h for h in self._rivals(best, free, base) if self._is_plausible([*chosen, h])]
-        reference = self.sums.held_out(np.concatenate([base, self.own_columns(best)]))
+        reference = self._held_out(best, base)
         gained = gain_of(self.sums.held_out(base) - reference)
         fewest, least = best, 0.0
         for rival in rivals:
-            own = self.own_columns(rival)
-            with self.sums.delayed(own, best.onset):
-                apart = self.sums.held_out(np.concatenate([base, own])) - reference
+            with self.sums.delayed(self.own_columns(rival), best.onset):
+                apart = self._held_out(rival, base) - reference
             worse, wider = gain_of(apart), freedom(rival) - freedom(fewest)
-            fewer = len(rival.candidates) < len(fewest.candidates)
+            fewer = is_wider(fewest, rival)
             if wider <= 0 and worse.total < least and behind(paired(apart)) <= -TIED:
                 fewest, least = replace(rival, onset=best.onset), worse.total
             elif (wider < 0 or (wider == 0 and fewer)) and worse.total <= min(
@@ -305,7 +329,7 @@ class Search:
         """
         taken = {(c.effect_id, c.element) for h in others for c in h.candidates}
         free = [c for c in self._effects if (c.effect_id, c.element) not in taken]
-        reference = self.sums.held_out(np.concatenate([base, own]))
+        reference = self._held_out(hypothesis, base)
         gained = float(np.sum(self.sums.held_out(base) - reference))
         undecided = max(UNTRUE_SHARE * gained, freely_gained(self.evidence, self.sums, base, own))
         for rival, beside in self._alike(hypothesis, free, base):
@@ -315,8 +339,9 @@ class Search:
             nested = wider and beside is None and contains(self.sums, base, columns, own)
             if nested or not self._is_plausible([*others, *supposed]):
                 continue
+            beyond = self._and(base, beside)
             with self.sums.delayed(np.setdiff1d(columns, own), hypothesis.onset):
-                worse = self.sums.held_out(np.concatenate([base, columns])) - reference
+                worse = self._held_out(rival, beyond) - reference
             if worse.sum() > RIVAL_SHARE * gained:
                 continue
             apart = distance(worse, undecided, wider)
@@ -336,18 +361,13 @@ class Search:
 
     def _is_plausible(self, hypotheses: Sequence[Hypothesis]) -> bool:
         """Return whether parameters are what the catalogue allows, but for chance."""
-        candidates = [c for h in hypotheses for c in h.candidates]
-        columns = self.evidence.with_nuisance(candidates)
-        weights = self.evidence.parted(candidates, self.sums.weights(columns))
-        if all(is_allowed(c, own) and not c.effect.tied for c, own in weights.items()):
+        values = self.values(hypotheses)
+        if all(is_allowed(c, own) and not c.effect.tied for c, own in values.items()):
             return True
-        own = self.evidence.columns_of(candidates)
-        half = self.sums.half_width(self.evidence.nuisance, own)
-        widths = self.evidence.parted(candidates, half)
-        near = {c: bounded(c, weights[c], widths[c]) for c in candidates}
+        found = self.weights(hypotheses)
         return all(
-            is_allowed(c, near[c]) and (not c.effect.tied or is_tied(c, weights[c], widths[c]))
-            for c in candidates
+            is_allowed(c, bounded(c, own, half)) and (not c.effect.tied or is_tied(c, own, half))
+            for c, (own, half) in found.items()
         )
 
     def _onset(self, base: Index, own: Index) -> tuple[int, float]:
@@ -376,3 +396,20 @@ class Search:
 def _may_begin(effect: Effect) -> bool:
     """Return whether an effect may be absent at first; a wrong number of the file is always one."""
     return effect.alter is None
+
+
+def _is_bolder(one: Hypothesis, other: Hypothesis) -> bool:
+    """Return whether one has a beginning, or an unlikely extent, and another has not.
+
+    One number for all elements is unlikely unless one system reads them; then it is for a part of
+    them.
+    """
+    if one.onset and not other.onset:
+        return True
+    return one.common != other.common and one.common is not _has_one_system(one)
+
+
+def _has_one_system(hypothesis: Hypothesis) -> bool:
+    """Return whether one system reads all that an effect can act on."""
+    sense = hypothesis.effect.sense
+    return sense is not None and sense.one_system

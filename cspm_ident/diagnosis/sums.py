@@ -108,16 +108,38 @@ class Sums:
 
     def beside(self, combinations: Array) -> Sums:
         """Return sums with further columns behind, combinations of these, shape (width, k)."""
+        return self._turned(np.arange(len(self._lengths)), combinations)
+
+    def combined(
+        self, base: Index, columns: Index, combinations: Array
+    ) -> tuple[Sums, Index, Index]:
+        """Return sums of a base and of combinations of other columns.
+
+        Args:
+            base: columns that stay as they are.
+            columns: others.
+            combinations: of these, (columns, k).
+
+        Returns:
+            The sums, and which of their columns are the base's and the combinations.
+        """
+        kept, first = np.concatenate([base, columns]), len(base)
+        turn = np.vstack([np.zeros((first, combinations.shape[1])), combinations])
+        own = len(kept) + np.arange(turn.shape[1])
+        return self._turned(kept, turn), np.arange(first), own
+
+    def _turned(self, columns: Index, combinations: Array) -> Sums:
+        """Return sums of some columns, and behind them of their combinations, (columns, k)."""
         width, count = combinations.shape
         turn = np.zeros((width + 1, width + count + 1))
         turn[:width, :width], turn[-1, -1] = np.eye(width), 1.0
-        turn[:width, width:-1] = combinations * self._lengths[:, None]
-        everything = np.arange(width + 1)
-        grams = turn.T @ self._of(everything, everything) @ turn
+        turn[:width, width:-1] = combinations * self._lengths[columns, None]
+        table = np.append(columns, len(self._whole) - 1)
+        grams = turn.T @ self._of(table, table) @ turn
         lengths = np.append(np.sqrt(np.einsum("bii->i", grams))[:-1], 1.0)
         lengths[lengths == 0.0] = 1.0
         grams = grams / (lengths[:, None] * lengths)
-        return self._alone(grams, lengths[:-1] * np.append(self._lengths, np.ones(count)))
+        return self._alone(grams, lengths[:-1] * np.append(self._lengths[columns], np.ones(count)))
 
     def delay(self, columns: Index, block: int) -> None:
         """Let columns act from a block on only."""

@@ -53,21 +53,21 @@ class Sureness:
             and self._is_sure(base, hypothesis)
         )
 
-    def agrees(self, base: Index, found: Sequence[Candidate], further: Hypothesis) -> bool:
-        """Return whether an effect is surely on a further element, of the size it has elsewhere.
+    def shared(self, base: Index, hypothesis: Hypothesis) -> tuple[Sums, Index, Index]:
+        """Return sums in which all elements of a hypothesis share their weights.
 
-        Then it has one cause, though on that element it be too little to be worth a word.
+        With the columns of the base and those of the hypothesis.
         """
-        beside = np.concatenate([base, self._evidence.columns_of(found)])
-        if not self._is_sure(beside, further):
-            return False
-        both = self._evidence.columns_of([found[0], *further.candidates])
-        one, other = np.split(self._sums.weights(np.concatenate([base, both]))[len(base) :], 2)
-        near, far = np.split(self._sums.half_width(base, both), 2)
-        return bool(np.all(np.abs(one - other) <= np.hypot(near, far)))
+        columns, elements = self._evidence.columns_of(hypothesis.candidates), hypothesis.elements
+        same = np.tile(np.eye(len(columns) // len(elements)), (len(elements), 1))
+        return self._sums.combined(base, columns, same)
 
     def _is_sure(self, base: Index, hypothesis: Hypothesis) -> bool:
         parts = [self._evidence.columns_of([c]) for c in hypothesis.candidates]
         # An onset was chosen among the blocks.
         tried = self._sums.blocks if hypothesis.onset else 1
-        return chance(self._sums, base, parts) < self.below(hypothesis.effect) / tried
+        sums = self._sums
+        if hypothesis.common:
+            sums, base, own = self.shared(base, hypothesis)
+            parts = [own]
+        return chance(sums, base, parts) < self.below(hypothesis.effect) / tried

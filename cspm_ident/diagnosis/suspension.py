@@ -279,7 +279,6 @@ class Suspension:
         rows, cables = np.zeros((len(self.signals.times), len(CableSignal))), self.parameters.cables
         lengths, wound = self._spans.lengths[:, i], self._wound[:, i]
         directions = self._spans.directions[:, i]
-        damper = self._damping[:, i] * self._told_rates[:, i]
         for column, values in {
             CableSignal.TIME: self.signals.times,
             CableSignal.LENGTH: lengths,
@@ -288,7 +287,8 @@ class Suspension:
             CableSignal.TENSION: self.signals.tensions[:, i],
             CableSignal.STIFFNESS: self._law[:, i, 1],
             CableSignal.LENGTH_SLOPE: self._length_slopes[:, i],
-            CableSignal.DAMPER: damper,
+            CableSignal.DAMPER: self._damping[:, i] * self._told_rates[:, i],
+            CableSignal.DAMPING: self._damping[:, i],
             CableSignal.WOUND: wound / lengths,
             CableSignal.ANGLE: self.signals.angles[:, i],
             CableSignal.SPEED: self.signals.speeds[:, i],

@@ -32,7 +32,7 @@ EFFECT = Effect(
     id="clock_skew",
     block=Block.SENSOR,
     parameters=(EffectParameter("skew", "1", -0.01, 0.01, meaning="of the stamps, less one"),),
-    sense=Sense(("/{}/pose", "/{}/twist"), lateness=_lateness),
+    sense=Sense(("/{}/pose", "/{}/twist"), lateness=_lateness, one_system=True),
     elements=Elements.BODIES,
     regression=Regression(Channel.READING, _columns),
     # What two free clocks do.

@@ -217,11 +217,14 @@ class Sense:
             before noise; of a pose x y z φ θ ψ, of joints by kind and cable.
         lateness: `lateness(time, parameters)`: by how much the reading is older than its stamp says
             [s].
+        one_system: whether one system reads all elements, so that what it does to one it is likely
+            to do to all.
     """
 
     topics: tuple[str, ...]
     reading: Callable[[Array, int, Array], Array] | None = None
     lateness: Callable[[float, Array], float] | None = None
+    one_system: bool = False
 
 
 _ELEMENTS = {

@@ -27,11 +27,11 @@ EFFECT = Effect(
     id="pose_delay",
     block=Block.SENSOR,
     parameters=(EffectParameter("delay", "s", -0.01, 1.0, meaning="below 0: too new"),),
-    sense=Sense(("/{}/pose", "/{}/twist"), lateness=_lateness),
+    sense=Sense(("/{}/pose", "/{}/twist"), lateness=_lateness, one_system=True),
     elements=Elements.BODIES,
     regression=Regression(Channel.READING, _columns),
     # As well as clocks are set to each other.
-    negligible={"delay": 2e-4},
+    negligible={"delay": 2.5e-4},
     equation="pose and twist stamped τ = those at τ − delay",
     shows="tension residuals as of a damper stiffness·delay; pose lags behind the winches' motion",
     twins=("cable_axial_damping", "winch_torque_lag", "clock_skew"),

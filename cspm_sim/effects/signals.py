@@ -42,6 +42,7 @@ class CableSignal(IntEnum):
     GEAR = 12
     HORIZONTAL = 13  # horizontal share of the cable's direction
     GRAVITY = 14
+    DAMPING = 15  # ∂t/∂ε̇ of the nominal damper [N·s/m]
 
 
 class BarSignal(IntEnum):

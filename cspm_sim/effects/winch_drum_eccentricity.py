@@ -32,10 +32,13 @@ def _torque(signals: Array) -> Array:
 
 
 def _tension(signals: Array) -> Array:
-    drum = signals[:, CableSignal.ANGLE] / signals[:, CableSignal.GEAR]
+    gear = signals[:, CableSignal.GEAR]
+    drum, turning = signals[:, CableSignal.ANGLE] / gear, signals[:, CableSignal.SPEED] / gear
     wound = np.stack([np.sin(drum) - np.sin(drum[0]), np.cos(drum) - np.cos(drum[0])], -1)
-    stiffness = signals[:, CableSignal.STIFFNESS] * signals[:, CableSignal.WOUND]
-    return np.asarray(stiffness[:, None] * wound)[:, None]
+    winding = np.stack([np.cos(drum), -np.sin(drum)], -1) * turning[:, None]
+    pulled = signals[:, CableSignal.STIFFNESS, None] * wound
+    damped = signals[:, CableSignal.DAMPING, None] * winding
+    return np.asarray(signals[:, CableSignal.WOUND, None] * (pulled + damped))[:, None]
 
 
 def _weights(values: Values) -> tuple[float, float]:

@@ -29,8 +29,10 @@ def _torque(signals: Array) -> Array:
 
 def _tension(signals: Array) -> Array:
     turned = signals[:, CableSignal.ANGLE] - signals[0, CableSignal.ANGLE]
-    wound = signals[:, CableSignal.WOUND] * turned / signals[:, CableSignal.GEAR]
-    return np.asarray((signals[:, CableSignal.STIFFNESS] * wound)[:, None, None])
+    pulled = signals[:, CableSignal.STIFFNESS] * turned
+    damped = signals[:, CableSignal.DAMPING] * signals[:, CableSignal.SPEED]
+    wound = signals[:, CableSignal.WOUND] / signals[:, CableSignal.GEAR]
+    return np.asarray((wound * (pulled + damped))[:, None, None])
 
 
 EFFECT = Effect(

@@ -119,7 +119,7 @@ def _of_entry(entry: EffectEntry, testbed: Testbed) -> Iterator[Action]:
     if effect.acts_on is Elements.CABLES:
         yield from _on_cables(effect, entry, testbed, values, where)
     else:
-        yield from _on_bodies(effect, entry, testbed, values, where)
+        yield from _on_others(effect, entry, testbed, values, where)
 
 
 def _on_cables(
@@ -137,23 +137,23 @@ def _on_cables(
         yield Action(effect, index, element, values)
 
 
-def _on_bodies(
+def _on_others(
     effect: Effect, entry: EffectEntry, testbed: Testbed, values: dict[str, float], where: str
 ) -> Iterator[Action]:
     if effect.acts_on is Elements.BAR and testbed.bar is None:
         raise InputError(f"{where}: this test-bed has no bar, allowed: effects on winches")
-    bodies = [effect.acts_on.value]
+    names = [effect.acts_on.value]
     if effect.acts_on is Elements.BODIES:
         present = {"winch_frame": testbed.winch_frame, "bar": testbed.bar}
-        bodies = [name for name, body in present.items() if body is not None]
-    if not bodies:
+        names = [name for name, body in present.items() if body is not None]
+    if not names:
         raise InputError(f"{where}: nothing moves here, allowed: a test-bed with bar or frame")
-    for element in entry.elements or bodies:
-        if element not in bodies:
+    for element in entry.elements or names:
+        if element not in names:
             raise InputError(
-                f"{where}: elements {list(entry.elements)}, allowed: [{', '.join(bodies)}] or none"
+                f"{where}: elements {list(entry.elements)}, allowed: [{', '.join(names)}] or none"
             )
-        yield Action(effect, bodies.index(element), element, values)
+        yield Action(effect, names.index(element), element, values)
 
 
 def _ordered(effect: Effect, entry: EffectEntry, where: str) -> dict[str, float]:

@@ -6,10 +6,10 @@ from run_samples import SCENARIOS
 
 from cspm_ident.block_simulation import Drive
 from cspm_ident.diagnosis.columns import Candidate
+from cspm_ident.diagnosis.drivers import around
 from cspm_ident.diagnosis.model import Model
 from cspm_ident.diagnosis.simulation import Output, Worth
 from cspm_ident.diagnosis.supposed import is_possible
-from cspm_ident.diagnosis.suspension_equations import around
 from cspm_ident.signals.measurement import Measurement
 from cspm_msgs_py.testbed import load_testbed
 from cspm_sim.effects import Channel, catalogue

@@ -22,7 +22,7 @@ from cspm_ident.diagnosis.judgement import HeldOut
 from cspm_ident.diagnosis.limits import Limit
 from cspm_ident.diagnosis.lines import Line
 from cspm_ident.diagnosis.page import write_diagnosis_page
-from cspm_ident.diagnosis.part import Kind, Part, part_of
+from cspm_ident.diagnosis.part import Kind, Part, parts_of
 from cspm_ident.diagnosis.region import Region
 from cspm_ident.diagnosis.simulation import Output, SimulatedFit, Worth
 from cspm_ident.diagnosis.sums import Gain
@@ -183,12 +183,18 @@ def test_a_signal_explains_what_is_a_function_of_it():
     ],
 )
 def test_an_effect_sits_in_a_part_that_the_drawing_marks(name, element, words):
-    part = part_of(catalogue()[name], element)
+    (part,) = parts_of(catalogue()[name], element, ("a", "b"))
     assert part.words.replace("_", " ") == words.replace("_", " ")
     picture = drawing(THESIS.testbed, BAR_POSE, None, [part])
     (guilty,) = re.findall(r"<g class=guilty.*?</g>", picture)
     assert f"<title>{part.words}</title>" in guilty
     assert "class=guilty" not in drawing(THESIS.testbed, BAR_POSE, None, [])
+
+
+def test_what_acts_on_all_load_cells_marks_each_of_them():
+    cables = THESIS.testbed.cable_names
+    parts = parts_of(catalogue()["tension_delay"], "load_cells", cables)
+    assert parts == [Part(Kind.LOAD_CELL, name) for name in cables]
 
 
 def test_the_drawing_has_every_part_at_its_place():

@@ -9,6 +9,7 @@ from cspm_ident.diagnosis.columns import Candidate, Place
 from cspm_ident.diagnosis.drivers import Driver, Knots
 from cspm_ident.diagnosis.equation import Equation
 from cspm_ident.diagnosis.evidence import gather
+from cspm_ident.diagnosis.fits import Fits
 from cspm_ident.diagnosis.hypothesis import Hypothesis
 from cspm_ident.diagnosis.search import Search
 from cspm_ident.diagnosis.sums import Sums
@@ -39,7 +40,7 @@ def winches(second, hum=2.0, effect=DRY, noise=0.05, seed=3):
 def test_every_effect_has_an_equal_part_of_the_false_alarms():
     candidates = [Candidate(DRY, "one"), *(Candidate(WET, name) for name in NAMES)]
     evidence = gather([winches(0.0)], BLOCK_S)
-    sureness = Sureness(evidence, Sums(evidence), candidates)
+    sureness = Sureness(Fits(evidence, Sums(evidence)), candidates)
     assert sureness.below(DRY) == pytest.approx(FALSE_ALARMS / 2)
     assert sureness.below(WET) == pytest.approx(FALSE_ALARMS / 4)
     spent = sum(sureness.below(candidate.effect) for candidate in candidates)
@@ -52,7 +53,7 @@ def test_what_is_little_on_one_element_is_told_of_all_where_one_number_is_better
     evidence = gather([winches(second)], BLOCK_S)
     search = Search(evidence)
     one, two = (Candidate(DRY, name) for name in NAMES)
-    beside = np.append(search.columns([]), evidence.columns_of([one]))
+    beside = np.append(search.fits.columns([]), evidence.columns_of([one]))
     gain = search.sums.gain(beside, evidence.columns_of([two]))
     assert not search.sureness.counts(beside, Hypothesis(DRY, (two,)), gain)
     (named,) = search.run().named
@@ -80,9 +81,9 @@ def test_a_common_number_is_that_of_the_sum_of_columns():
     rows = [e.columns[c][:, 0] for e, c in zip(equations, both.candidates, strict=True)]
     target = np.concatenate([e.target for e in equations])
     expected = np.linalg.lstsq(np.concatenate(rows), target, rcond=None)[0]
-    found = [weights for weights, _ in search.weights([both]).values()]
+    found = [weights for weights, _ in search.fits.weights([both]).values()]
     assert found == [pytest.approx(expected[0], rel=1e-9)] * 2
-    apart = [w for w, _ in search.weights([replace(both, common=False)]).values()]
+    apart = [w for w, _ in search.fits.weights([replace(both, common=False)]).values()]
     assert apart[0][0] - apart[1][0] == pytest.approx(0.2, abs=0.1)
 
 

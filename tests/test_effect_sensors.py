@@ -7,7 +7,7 @@ from conftest import build, general_content, rig_content
 from cspm_msgs_py.errors import InputError
 from cspm_msgs_py.sensor_spec import Sensor
 from cspm_sim.effects import Channel, catalogue
-from cspm_sim.effects.signals import PoseSignal, ReadingSignal
+from cspm_sim.effects.signals import PoseSignal
 from cspm_sim.kinematics import euler_rate_map, rotation
 from cspm_sim.sensor_fault import Past, sensor_faults
 from cspm_sim.sensors import SensorModel
@@ -123,6 +123,17 @@ def test_a_late_pose_is_that_of_the_delay_before(delay):
     assert sensor_faults(testbed, "/winch_frame/pose") == []
 
 
+def test_late_load_cells_read_what_all_tensions_were():
+    testbed = machine(entry("tension_delay", ["load_cells"], delay=0.0035))
+    times = 1e-3 * np.arange(40)
+    values = np.outer(times, np.arange(1.0, 9.0))
+    rows = readings(sensor(testbed, "/cables/tension"), values)
+    assert rows[30_000_000] == pytest.approx(0.0265 * np.arange(1.0, 9.0), abs=1e-12)
+    assert sensor_faults(testbed, "/winches/state") == []
+    with pytest.raises(InputError, match=r"elements \['c1'\], allowed: \[load_cells\] or none"):
+        sensor_faults(machine(entry("tension_delay", ["c1"], delay=0.1)), "/cables/tension")
+
+
 def test_a_late_pose_and_a_delayed_message_add_up():
     """The message's own delay moves its arrival; the effect its content."""
     testbed = machine(entry("pose_delay", ["bar"], delay=0.004))
@@ -232,20 +243,19 @@ def test_columns_are_what_the_reading_has_too_much(effect):
 
     step = 1e-5
     rates = (truth(times + step) - truth(times - step)) / (2 * step)
+    late = [sense.lateness(t, parameters) if sense.lateness else 0.0 for t in times]
+    read = np.vstack([truth(t - old) for t, old in zip(times, late, strict=True)])
+    if sense.reading:
+        read = np.array([sense.reading(row, 0, parameters) for row in read])
+    left = read - truth(times)
     if len(effect.regressors(np.zeros((1, 13)))[0]) == 6:
         signals = np.zeros((50, 13))
         signals[:, PoseSignal.TIME] = times
         signals[:, PoseSignal.POSE : PoseSignal.POSE + 6] = truth(times)
         signals[:, PoseSignal.RATE : PoseSignal.RATE + 6] = rates
-        late = [sense.lateness(t, parameters) if sense.lateness else 0.0 for t in times]
-        read = np.vstack([truth(t - old) for t, old in zip(times, late, strict=True)])
-        if sense.reading:
-            read = np.array([sense.reading(row, 0, parameters) for row in read])
-        left = read - truth(times)
     else:
-        signals = np.zeros((50, 3))
-        signals[:, ReadingSignal.TIME], signals[:, ReadingSignal.VALUE] = times, truth(times)[:, 0]
-        left = np.array([sense.reading(row, 0, parameters) - row for row in truth(times)])[:, :1]
+        signals = np.column_stack([times, truth(times)[:, 0], rates[:, 0]])
+        left = left[:, :1]
     model = effect.regressors(signals) @ effect.weights(values)
     assert np.abs(left).max() > 1e-7
     # The second order is a share of about 1e-3 of the first.

@@ -66,6 +66,7 @@ CONTRACT = {
     "pose_offset": "surge sway heave roll pitch yaw",
     "encoder_scale": "scale",
     "clock_skew": "skew",
+    "tension_delay": "delay",
 }
 # What kernels may change, by hook.
 OUTPUTS = {

@@ -73,4 +73,6 @@ def elements_of(effect: Effect, cables: tuple[str, ...], bodies: tuple[str, ...]
         return list(cables)
     if effect.acts_on is Elements.BODIES:
         return list(bodies)
+    if effect.acts_on is Elements.CELLS:
+        return [effect.acts_on.value]
     return [effect.acts_on.value] if effect.acts_on.value in bodies else []

@@ -207,7 +207,7 @@ def _lasting(
 
 def _first_weights(search: Search, kept: Sequence[Named]) -> dict[Candidate, Array]:
     """Return the weights of what was kept with the shapes that were searched."""
-    return search.values([each.hypothesis for each in kept])
+    return search.fits.values([each.hypothesis for each in kept])
 
 
 def _is_negligible(named: Named, weights: Mapping[Candidate, Array]) -> bool:
@@ -271,7 +271,7 @@ def _confirmed(
     kept = list(found.named)
     rejected: list[Named] = []
     for each in found.named:
-        whole = search.values([other.hypothesis for other in kept])
+        whole = search.fits.values([other.hypothesis for other in kept])
         own = set(each.hypothesis.candidates)
         fewer = {c: w for c, w in whole.items() if c not in own}
         with_it, without = judge.left_with(whole), judge.left_with(fewer)
@@ -287,7 +287,7 @@ def _shapes(
     search: Search, kept: Sequence[Named], knots: Knots, drivers: Sequence[Driver]
 ) -> tuple[Shape, ...]:
     """Return the free functions, each fitted to what is left by what was kept."""
-    base = search.columns(each.hypothesis for each in kept)
+    base = search.fits.columns(each.hypothesis for each in kept)
     found = []
     for driver in drivers:
         values = search.sums.weights_beyond(base, search.evidence.columns_of([driver]))

@@ -78,3 +78,9 @@ class Knots:
             columns[:, channel] = hats
             found[driver] = columns
         return found
+
+
+def around(values: Array, apart: int) -> Array:
+    """Return the mean of what is measured `apart` rows before and after each row, (k,)."""
+    padded = np.pad(values, apart, mode="edge")
+    return 0.5 * (padded[: len(values)] + padded[2 * apart :])

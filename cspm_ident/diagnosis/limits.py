@@ -44,7 +44,7 @@ def detection_limits(search: Search, kept: Sequence[Named]) -> tuple[Limit, ...]
     So large that its test over blocks is as sure as the search asks and that it takes as large a
     share of a residual, beside what was found. Of several shapes the one that shows best.
     """
-    base = search.columns(each.hypothesis for each in kept)
+    base = search.fits.columns(each.hypothesis for each in kept)
     best: dict[tuple[str, str], Limit] = {}
     for candidate in search.heard:
         columns = search.evidence.columns_of([candidate])

@@ -128,7 +128,7 @@ def _parameters(
     hypotheses = [each.hypothesis for each in kept]
     if any(needs_refining(hypothesis.effect) for hypothesis in hypotheses):
         return refine(searched, hypotheses, noise, block, cut)
-    return of_shafts(search.weights(hypotheses), rows, block)
+    return of_shafts(search.fits.weights(hypotheses), rows, block)
 
 
 def _onsets(kept: Sequence[Named], rows: Parts, starts: Array) -> tuple[Onset | None, ...]:

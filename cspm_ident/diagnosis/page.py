@@ -15,7 +15,7 @@ from cspm_ident.diagnosis.diagnose import Diagnosis
 from cspm_ident.diagnosis.drawing import drawing
 from cspm_ident.diagnosis.evidence_figure import driver_figure, overlay_figure
 from cspm_ident.diagnosis.hypothesis import Hypothesis, Named
-from cspm_ident.diagnosis.part import Part, part_behind, part_of
+from cspm_ident.diagnosis.part import Part, part_behind, parts_of
 from cspm_ident.diagnosis.statement import channel_of, drive_of, tension_statement, unit_of
 from cspm_ident.diagnosis.verdict import IMPROVED, TRUSTED, Verdict, named_in, verdict_of
 from cspm_ident.offline_page import figure_html, table_html, write_offline_page
@@ -109,9 +109,10 @@ def _where(found: Diagnosis) -> str:
 
 
 def _parts(found: Diagnosis) -> Iterable[Part]:
+    cables = found.searched[0].machine.cable_names
     for named in found.findings.named:
         for element in named.hypothesis.elements:
-            yield part_of(named.hypothesis.effect, element)
+            yield from parts_of(named.hypothesis.effect, element, cables)
     for driver, _, _ in found.findings.unknown:
         yield part_behind(driver.place)
     for line in found.lines:

@@ -2,12 +2,13 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from enum import Enum
 from typing import NamedTuple
 
 from cspm_ident.diagnosis.columns import Place
 from cspm_ident.signals.measurement import TENSION, WINCHES
-from cspm_sim.effects import Block, Channel, Effect
+from cspm_sim.effects import Block, Channel, Effect, Elements
 
 
 class Kind(Enum):
@@ -47,11 +48,13 @@ _CHANNELS = {
 _SENSORS = {WINCHES: Kind.WINCH, TENSION: Kind.LOAD_CELL}
 
 
-def part_of(effect: Effect, element: str) -> Part:
-    """Return the part in which an effect on an element sits."""
+def parts_of(effect: Effect, element: str, cables: Sequence[str]) -> list[Part]:
+    """Return the parts in which an effect on an element sits, in a machine of some cables."""
+    if effect.acts_on is Elements.CELLS:
+        return [Part(Kind.LOAD_CELL, name) for name in cables]
     if effect.sense is not None:
-        return Part(_SENSORS.get(effect.sense.topics[0], Kind.MARKERS), element)
-    return Part(_BLOCKS.get(effect.block, Kind.BODY), element)
+        return [Part(_SENSORS.get(effect.sense.topics[0], Kind.MARKERS), element)]
+    return [Part(_BLOCKS.get(effect.block, Kind.BODY), element)]
 
 
 def part_behind(place: Place) -> Part:

@@ -2,48 +2,38 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Iterator, Sequence
-from contextlib import contextmanager
+from collections.abc import Callable, Iterable, Sequence
 from copy import copy
 from dataclasses import replace
 
 import numpy as np
 from numpy.typing import NDArray
 
-from cspm_ident.diagnosis.absorbed import absorbed_pairs
+from cspm_ident.diagnosis.alternatives import alternatives_of
 from cspm_ident.diagnosis.columns import Candidate
 from cspm_ident.diagnosis.drivers import Driver
 from cspm_ident.diagnosis.evidence import Evidence
+from cspm_ident.diagnosis.fits import Fits
 from cspm_ident.diagnosis.hypothesis import (
     Findings,
     Hypothesis,
     Named,
-    Rival,
     Unknown,
-    bounded,
     freedom,
-    is_allowed,
-    is_negligible,
-    is_tied,
     is_wider,
     joined,
-    parts_of,
     shapes_of,
 )
 from cspm_ident.diagnosis.likeness import (
-    RIVAL_SHARE,
     TIED,
     UNTRUE_SHARE,
-    contains,
-    distance,
-    freely_gained,
 )
+from cspm_ident.diagnosis.pairs import Pair, best_pairs
 from cspm_ident.diagnosis.rivals import rivals_of
 from cspm_ident.diagnosis.short_list import short_list
 from cspm_ident.diagnosis.sums import Sums, behind, gain_of, paired
 from cspm_ident.diagnosis.sureness import MATERIAL_SHARE, Sureness
 from cspm_ident.diagnosis.unexplained import unexplained
-from cspm_ident.diagnosis.weights import Weights, values_of, weights_of
 from cspm_sim.effects import Effect
 
 Array = NDArray[np.float64]
@@ -66,11 +56,11 @@ class Search:
         sums: Callable[[Evidence], Sums] = Sums,
     ) -> None:
         """Take the sums of all residuals, of which `sums` tells what is sure."""
-        self.evidence = evidence
-        self.sums = sums(evidence)
+        self.evidence, self.sums = evidence, sums(evidence)
+        self.fits = Fits(evidence, self.sums)
         self._progress = progress
         self._effects = [c for c in evidence.terms if isinstance(c, Candidate) and self._shows(c)]
-        self.sureness = Sureness(evidence, self.sums, self._effects)
+        self.sureness = Sureness(self.fits, self._effects)
 
     def run(self) -> Findings:
         """Choose effects one by one, each with all elements on which it surely acts."""
@@ -89,60 +79,72 @@ class Search:
         """Return the weights of the file's own parameters, fitted where it helps, nothing added."""
         narrow = copy(self)
         narrow._effects = [c for c in self._effects if c.effect.alter is not None]
-        narrow.sureness = Sureness(self.evidence, self.sums, narrow._effects)
+        narrow.sureness = Sureness(self.fits, narrow._effects)
         own = [c for h in narrow._chosen(onsets=False) for c in h.candidates]
         return self.evidence.parted(own, self.sums.weights(self.evidence.with_nuisance(own)))
 
-    def columns(self, hypotheses: Iterable[Hypothesis]) -> Index:
-        """Return indices of the nuisance and of some hypotheses' columns."""
-        return self.evidence.with_nuisance(c for h in hypotheses for c in h.candidates)
-
-    def own_columns(self, hypothesis: Hypothesis) -> Index:
-        """Return indices of one hypothesis's columns."""
-        return self.evidence.columns_of(hypothesis.candidates)
-
-    def weights(self, hypotheses: Sequence[Hypothesis]) -> Weights:
-        """Return the weights of hypotheses that are fitted together, with half their intervals."""
-        return weights_of(self.evidence, self.sums, *parts_of(hypotheses))
-
-    def values(self, hypotheses: Sequence[Hypothesis]) -> dict[Candidate, Array]:
-        """Return the weights alone, which takes less time."""
-        return values_of(self.evidence, self.sums, *parts_of(hypotheses))
-
     def _chosen(self, *, onsets: bool = True) -> list[Hypothesis]:
         chosen: list[Hypothesis] = []
-        while sum(not self._is_negligible(h, chosen) for h in chosen) < MOST_EFFECTS:
+        while sum(not self.fits.is_negligible(h, chosen) for h in chosen) < MOST_EFFECTS:
             self._progress(f"effect {len(chosen) + 1}")
             found = self._best(chosen)
             if found is None:
                 break
             chosen = joined(chosen, self._begun(found, chosen) if onsets else found)
+        chosen = self._exchanged(chosen)
         # What was chosen first did not know of the others.
         for hypothesis in tuple(chosen):
             others = [h for h in chosen if h is not hypothesis]
-            base, k = self.columns(others), chosen.index(hypothesis)
+            base, k = self.fits.columns(others), chosen.index(hypothesis)
             chosen[k] = self._pruned(hypothesis, base)
-            if self.sums.gain(base, self.own_columns(chosen[k])).total <= 0.0:
+            if self.sums.gain(base, self.fits.own_columns(chosen[k])).total <= 0.0:
                 del chosen[k]
         return chosen
 
-    def _is_negligible(self, hypothesis: Hypothesis, chosen: Sequence[Hypothesis]) -> bool:
-        """Return whether a sound machine has as much of it, so that it counts for no effect."""
-        found = self.values(chosen)
-        return is_negligible({c: found[c] for c in hypothesis.candidates})
+    def _exchanged(self, chosen: list[Hypothesis]) -> list[Hypothesis]:
+        """Return a pair on one element instead of what was chosen one by one, where it is better.
+
+        It has to explain surely more, or as much with fewer numbers, and neither may be absent.
+        """
+        kept = [h for h in chosen if self.fits.is_negligible(h, chosen)]
+        given_up = [h for h in chosen if h not in kept]
+        if len(given_up) < 2 or any(h.onset for h in chosen):
+            return chosen
+        base = self.fits.columns(kept)
+        left = self.sums.held_out(self.fits.columns(chosen))
+        undecided = UNTRUE_SHARE * (self.sums.held_out(base) - left).sum()
+        taken = {(c.effect_id, c.element) for h in kept for c in h.candidates}
+        free = [c for c in self._effects if (c.effect_id, c.element) not in taken]
+        for pair in best_pairs(self.evidence, self.sums, base, free):
+            better = gain_of(left - self.sums.held_out(self.fits.beside(base, *pair)))
+            simpler = sum(map(freedom, pair)) < sum(map(freedom, given_up))
+            if better.total <= (-undecided if simpler else _SIGMAS * better.error):
+                continue
+            if self.fits.is_plausible([*kept, *pair]) and self._are_both_sure(base, pair):
+                return [*kept, *pair]
+        return chosen
+
+    def _are_both_sure(self, base: Index, pair: Pair) -> bool:
+        return all(
+            self.sureness.counts(
+                beside, one, self.sums.gain(beside, self.fits.own_columns(one)), known=1
+            )
+            for one, other in (pair, pair[::-1])
+            for beside in [self.fits.beside(base, other)]
+        )
 
     def _begun(self, hypothesis: Hypothesis, chosen: Sequence[Hypothesis]) -> Hypothesis:
         """Return the hypothesis with its onset, from which on its columns act henceforth."""
-        own, onset = self.own_columns(hypothesis), hypothesis.onset
+        own, onset = self.fits.own_columns(hypothesis), hypothesis.onset
         if not onset and _may_begin(hypothesis.effect):
-            onset, _ = self._onset(self.columns(chosen), own)
+            onset, _ = self._onset(self.fits.columns(chosen), own)
         if onset:
             self.evidence.delay(own, onset)
             self.sums.delay(own, onset)
         return replace(hypothesis, onset=onset)
 
     def _best(self, chosen: Sequence[Hypothesis]) -> Hypothesis | None:
-        base = self.columns(chosen)
+        base = self.fits.columns(chosen)
         taken = {(c.effect_id, c.element) for h in chosen for c in h.candidates}
         free = [c for c in self._effects if (c.effect_id, c.element) not in taken]
         gains = self.sums.gains_beyond(base, [self._of(c) for c in free])
@@ -151,9 +153,9 @@ class Search:
         best = self._surest([*scopes, *late], chosen, base)
         if best is None:
             return None
-        with self._delayed(best):
+        with self.fits.delayed(best):
             found = self._simplest(best, free, base, chosen)
-        with self._delayed(found):
+        with self.fits.delayed(found):
             return self._pruned(found, base)
 
     def _surest(
@@ -166,7 +168,7 @@ class Search:
         before = self.sums.held_out(base)
         best: tuple[Array, Hypothesis] | None = None
         for hypothesis in hypotheses:
-            with self._delayed(hypothesis):
+            with self.fits.delayed(hypothesis):
                 gained = self._sure_gain(hypothesis, chosen, base, before)
             if gained is None:
                 continue
@@ -191,7 +193,7 @@ class Search:
             return
         late: list[tuple[float, Hypothesis]] = []
         for shape in shapes_of(hypothesis, free):
-            onset, left = self._onset(base, self.own_columns(shape))
+            onset, left = self._onset(base, self.fits.own_columns(shape))
             if 0 < onset <= self.sums.blocks - _FEWEST_BLOCKS:
                 late.append((left, replace(shape, onset=onset)))
         if late:
@@ -201,40 +203,17 @@ class Search:
         self, hypothesis: Hypothesis, chosen: Sequence[Hypothesis], base: Index, before: Array
     ) -> Array | None:
         """Return what a hypothesis gains in each block, not fitted to it, if it surely does."""
-        if not self._is_plausible([*chosen, hypothesis]):
+        if not self.fits.is_plausible([*chosen, hypothesis]):
             return None
-        gained = before - self._held_out(hypothesis, base)
-        return gained if self.sureness.counts(base, hypothesis, gain_of(gained)) else None
-
-    def _and(self, base: Index, further: Hypothesis | None) -> Index:
-        """Return a base with a hypothesis's columns, if there is one."""
-        return base if further is None else np.concatenate([base, self.own_columns(further)])
-
-    def _held_out(self, hypothesis: Hypothesis, base: Index) -> Array:
-        """Return Σ residual² of each block beside a hypothesis that was not fitted to it."""
-        if not hypothesis.common:
-            return self.sums.held_out(np.concatenate([base, self.own_columns(hypothesis)]))
-        sums, base, own = self.sureness.shared(base, hypothesis)
-        return sums.held_out(np.concatenate([base, own]))
-
-    @contextmanager
-    def _delayed(self, hypothesis: Hypothesis) -> Iterator[None]:
-        """Let a hypothesis act from its onset on, for a while."""
-        if not hypothesis.onset:
-            yield
-            return
-        own = self.own_columns(hypothesis)
-        with (
-            self.sums.delayed(own, hypothesis.onset),
-            self.evidence.delayed(own, hypothesis.onset),
-        ):
-            yield
+        gained = before - self.fits.held_out(hypothesis, base)
+        known = len(chosen)
+        return gained if self.sureness.counts(base, hypothesis, gain_of(gained), known) else None
 
     def _pruned(self, hypothesis: Hypothesis, base: Index) -> Hypothesis:
         """Return the hypothesis without elements on which the effect may as well be absent."""
         if hypothesis.common:
             return hypothesis
-        own_columns = self.own_columns(hypothesis)
+        own_columns = self.fits.own_columns(hypothesis)
         weights = self.sums.weights(np.concatenate([base, own_columns]))[len(base) :]
         sizes = np.abs(weights) / self.sums.half_width(base, own_columns)
         own = self.evidence.parted(hypothesis.candidates, sizes)
@@ -286,13 +265,13 @@ class Search:
 
         One that explains more in most blocks is taken instead, though it be less sure by itself.
         """
-        rivals = [h for h in self._rivals(best, free, base) if self._is_plausible([*chosen, h])]
-        reference = self._held_out(best, base)
+        rivals = [h for h in self._rivals(best, free, base) if self.fits.is_plausible([*chosen, h])]
+        reference = self.fits.held_out(best, base)
         gained = gain_of(self.sums.held_out(base) - reference)
         fewest, least = best, 0.0
         for rival in rivals:
-            with self.sums.delayed(self.own_columns(rival), best.onset):
-                apart = self._held_out(rival, base) - reference
+            with self.sums.delayed(self.fits.own_columns(rival), best.onset):
+                apart = self.fits.held_out(rival, base) - reference
             worse, wider = gain_of(apart), freedom(rival) - freedom(fewest)
             fewer = is_wider(fewest, rival)
             if wider <= 0 and worse.total < least and behind(paired(apart)) <= -TIED:
@@ -310,64 +289,13 @@ class Search:
 
     def _judged(self, k: int, chosen: Sequence[Hypothesis]) -> Named:
         hypothesis, others = chosen[k], [h for i, h in enumerate(chosen) if i != k]
-        base, own = self.columns(others), self.own_columns(hypothesis)
+        base, own = self.fits.columns(others), self.fits.own_columns(hypothesis)
         gain = self.sums.gain(base, own)
         return Named(
             hypothesis,
             gain,
             self.sureness.share(base, own),
-            tuple(self._alternatives(hypothesis, others, base, own)),
-        )
-
-    def _alternatives(
-        self, hypothesis: Hypothesis, others: Sequence[Hypothesis], base: Index, own: Index
-    ) -> Iterable[Rival]:
-        """Yield what explains the same nearly as well, the chosen one taken out.
-
-        A difference that models are too untrue for counts as much less, and every further parameter
-        as in Schwarz's criterion, blocks being what there is to tell it from.
-        """
-        taken = {(c.effect_id, c.element) for h in others for c in h.candidates}
-        free = [c for c in self._effects if (c.effect_id, c.element) not in taken]
-        reference = self._held_out(hypothesis, base)
-        gained = float(np.sum(self.sums.held_out(base) - reference))
-        undecided = max(UNTRUE_SHARE * gained, freely_gained(self.evidence, self.sums, base, own))
-        for rival, beside in self._alike(hypothesis, free, base):
-            supposed = [rival] if beside is None else [rival, beside]
-            columns = self.evidence.columns_of(c for h in supposed for c in h.candidates)
-            wider = max(0, sum(map(freedom, supposed)) - freedom(hypothesis))
-            nested = wider and beside is None and contains(self.sums, base, columns, own)
-            if nested or not self._is_plausible([*others, *supposed]):
-                continue
-            beyond = self._and(base, beside)
-            with self.sums.delayed(np.setdiff1d(columns, own), hypothesis.onset):
-                worse = self._held_out(rival, beyond) - reference
-            if worse.sum() > RIVAL_SHARE * gained:
-                continue
-            apart = distance(worse, undecided, wider)
-            if apart <= TIED:
-                yield Rival(rival, apart, beside)
-
-    def _alike(
-        self, hypothesis: Hypothesis, free: Sequence[Candidate], base: Index
-    ) -> Iterable[tuple[Hypothesis, Hypothesis | None]]:
-        """Yield what explains the same, alone or beside a wrong number of the file."""
-        rivals = self._rivals(hypothesis, free, base)
-        yield from ((rival, None) for rival in rivals)
-        alone = {rival.effect.id for rival in rivals}
-        for pair in absorbed_pairs(self.evidence, self.sums, base, hypothesis, free):
-            if pair[0].effect.id not in alone:
-                yield pair
-
-    def _is_plausible(self, hypotheses: Sequence[Hypothesis]) -> bool:
-        """Return whether parameters are what the catalogue allows, but for chance."""
-        values = self.values(hypotheses)
-        if all(is_allowed(c, own) and not c.effect.tied for c, own in values.items()):
-            return True
-        found = self.weights(hypotheses)
-        return all(
-            is_allowed(c, bounded(c, own, half)) and (not c.effect.tied or is_tied(c, own, half))
-            for c, (own, half) in found.items()
+            tuple(alternatives_of(self.fits, self._effects, hypothesis, others)),
         )
 
     def _onset(self, base: Index, own: Index) -> tuple[int, float]:

@@ -156,13 +156,12 @@ class _Shaft:
         )
 
     def _columns(self, effect: Effect) -> Iterator[tuple[Candidate, Array]]:
-        if self._name not in elements_of(effect, (self._name,), ()):
-            return
-        if effect.regression.channel is Channel.SHAFT:
-            for shape in shapes_of(effect):
-                yield Candidate(effect, self._name, shape), self._regressed(effect, dict(shape))
-        elif effect.sense is not None and effect.sense.topics[0] in self._sensors:
-            yield Candidate(effect, self._name), self._read(effect)
+        for name in elements_of(effect, (self._name,), ()):
+            if effect.regression.channel is Channel.SHAFT:
+                for shape in shapes_of(effect):
+                    yield Candidate(effect, name, shape), self._regressed(effect, dict(shape))
+            elif effect.sense is not None and effect.sense.topics[0] in self._sensors:
+                yield Candidate(effect, name), self._read(effect)
 
     def _regressed(self, effect: Effect, shape: dict[str, float]) -> Array:
         return self._weighed(effect.regressors(self._rows, **shape)[:, 0])

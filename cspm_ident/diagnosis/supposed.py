@@ -91,9 +91,11 @@ def _true_readings(measurement: Measurement, action: Action) -> Measurement:
     effect = action.effect
     assert effect.sense is not None
     topic = effect.sense.topics[0]
-    if topic in (TENSION, WINCHES):
-        return _true_joint(measurement, action, "tension" if topic == TENSION else "angle")
-    kind = {BAR: "bar_pose", FRAME: "frame_pose"}[f"/{action.name}/pose"]
+    joints = {TENSION: "tension", WINCHES: "angle"}
+    if topic in joints and effect.sense.lateness is None:
+        return _true_joint(measurement, action, joints[topic])
+    poses = {BAR: "bar_pose", FRAME: "frame_pose"}
+    kind = joints[topic] if topic in joints else poses[topic.format(action.name)]
     samples: Samples | None = getattr(measurement, kind)
     if samples is None:
         return measurement

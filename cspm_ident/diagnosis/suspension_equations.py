@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from dataclasses import replace
 from functools import partial
 
@@ -11,13 +11,12 @@ from numpy.typing import NDArray
 
 from cspm_ident.diagnosis.columns import Candidate, Place, elements_of, shapes_of
 from cspm_ident.diagnosis.drawn_tension import drawn_columns
-from cspm_ident.diagnosis.drivers import Driver, Knots
+from cspm_ident.diagnosis.drivers import Driver, Knots, around
 from cspm_ident.diagnosis.equation import Equation, difference_noise
 from cspm_ident.diagnosis.machine_signals import BodyMotion, MachineSignals, machine_signals
-from cspm_ident.diagnosis.readings import pose_rows, reading_rows
+from cspm_ident.diagnosis.readings import moving, pose_rows, reading_rows
 from cspm_ident.diagnosis.suspension import Suspension
 from cspm_ident.signals.measurement import TENSION, WINCHES, Measurement
-from cspm_ident.signals.samples import Samples
 from cspm_ident.signals.timeline import Timeline
 from cspm_ident.winch.weak_form import Make, maker, weigh
 from cspm_msgs_py.dofs import DOFS
@@ -38,8 +37,6 @@ _WHITE = 1.7
 _SPREAD_S = 0.1
 # Of an acceleration's square: what has to be common to tensions and poses.
 _COMMON = 0.7
-# Of what differs from reading to reading; coloured noise alone spreads by 1.2 to 1.5 of it.
-_MOVES = 2.5
 _TENSION = "tension [N]"
 _DRIVERS = {
     _TENSION: CableSignal.TENSION,
@@ -70,7 +67,7 @@ def suspension_equations(
         lost: when no torque is known [s], where no load cell but torques told the tensions.
     """
     measured = timeline.measurement
-    make, dofs = maker(measured.pointwise), _moving(measured.bar_pose)
+    make, dofs = maker(measured.pointwise), moving(measured.bar_pose)
     return [
         equation.compact
         for stretch in machine_signals(timeline)
@@ -305,7 +302,9 @@ class _Stretch:
         if topic == TENSION and self._lost is not None:
             return
         if topic in (TENSION, WINCHES):
-            yield from self._read_joint(effect, i, topic)
+            every = range(len(self._machine.cables))
+            cables = every if effect.acts_on is Elements.CELLS else [i]
+            yield from self._read_joints(effect, cables, topic)
             return
         changes = [self._changed(*faulty) for faulty in self._misplaced(effect, name)]
         tensions = np.stack([c[0] for c in changes], axis=2)
@@ -334,8 +333,21 @@ class _Stretch:
             step = _small(change)
             yield self._signals.with_pose_change(body, change, step), step
 
-    def _read_joint(self, effect: Effect, i: int, topic: str) -> Iterator[tuple[Place, Array]]:
-        """Yield how a fault of a tension or angle changes its cable's and the bar's residuals."""
+    def _read_joints(
+        self, effect: Effect, cables: Iterable[int], topic: str
+    ) -> Iterator[tuple[Place, Array]]:
+        """Yield how a fault of tensions or an angle changes the residuals of cables and bar."""
+        wrench = np.zeros_like(self._here.wrench_residuals)
+        for i in cables:
+            column, change = self._read_joint(effect, i, topic)
+            yield Place(Channel.TENSION, self._machine.cable_names[i]), column[:, None, None]
+            if topic == TENSION:
+                wrench -= self._here.pulled(i, change)
+        if topic == TENSION:
+            yield Place(Channel.WRENCH, BAR), self._weighed(wrench, Channel.WRENCH)[:, :, None]
+
+    def _read_joint(self, effect: Effect, i: int, topic: str) -> tuple[Array, Array]:
+        """Return what a fault of a reading changes of its cable's residual, weighed, and of it."""
         signals = self._signals
         readings = signals.tensions if topic == TENSION else signals.angles
         change = effect.regressors(reading_rows(signals.times, readings[:, i]))[:, 0, 0]
@@ -344,15 +356,13 @@ class _Stretch:
         changed[:, i] += step * change
         if topic == TENSION:
             moved = replace(signals, tensions=changed)
-            wrench = self._weighed(-self._here.pulled(i, change), Channel.WRENCH)
-            yield Place(Channel.WRENCH, BAR), wrench[:, :, None]
         else:
             speeds = signals.speeds.copy()
             speeds[:, i] += step * np.gradient(change, signals.step)
             moved = replace(signals, angles=changed, speeds=speeds)
         there = self._here.with_joints(moved).of_cable(i).tension_residuals[:, 0]
-        column = self._weighed((there - self._here.tension_residuals[:, i]) / step, Channel.TENSION)
-        yield Place(Channel.TENSION, self._machine.cable_names[i]), column[:, None, None]
+        residual = (there - self._here.tension_residuals[:, i]) / step
+        return self._weighed(residual, Channel.TENSION), change
 
     def _misread(self, effect: Effect, i: int) -> Iterator[tuple[Candidate, Place, Array]]:
         """Yield how a winch's fault changes the tension drawn from its torque, weighed."""
@@ -374,20 +384,6 @@ class _Stretch:
         """Return how many rows lie between two windows that share no sample."""
         window, stride = self._windows[channel]
         return -(-len(window) // stride)
-
-
-def _moving(poses: Samples | None) -> list[str]:
-    """Return the coordinates that move by more than their noise, which the residual has as well."""
-    if poses is None or len(poses.times) < 5:
-        return []
-    spread, noise = poses.values.std(axis=0), difference_noise(poses.values)
-    return [dof for dof, moves in zip(DOFS, spread > _MOVES * noise, strict=True) if moves]
-
-
-def around(values: Array, apart: int) -> Array:
-    """Return the mean of what is measured `apart` rows before and after each row, (k,)."""
-    padded = np.pad(values, apart, mode="edge")
-    return 0.5 * (padded[: len(values)] + padded[2 * apart :])
 
 
 _READING_STEP = 1e-6  # m, rad or N

@@ -40,7 +40,13 @@ EFFECT = Effect(
     regression=Regression(Channel.TENSION, _columns),
     equation="damper of the cable = scale·factor·(constant − slope·l)",
     shows="tension residual is in proportion to the rate of elongation, loops grow with frequency",
-    twins=("winch_viscous_friction", "cable_hysteresis", "pose_delay", "bar_linear_damping"),
+    twins=(
+        "winch_viscous_friction",
+        "cable_hysteresis",
+        "pose_delay",
+        "tension_delay",
+        "bar_linear_damping",
+    ),
     separating_experiment="pluck the bar with winches locked, at three frequencies or more",
     reference="thesis (3-13) and its factor of section 4-2",
 )

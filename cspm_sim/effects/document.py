@@ -49,6 +49,7 @@ _ELEMENTS = {
     Elements.BAR: "`bar`",
     Elements.FRAME: "`winch_frame`",
     Elements.BODIES: "`bar`, `winch_frame`, both where none is named",
+    Elements.CELLS: "`load_cells`, all together",
 }
 
 

@@ -47,6 +47,7 @@ class Elements(Enum):
     BAR = "bar"
     FRAME = "winch_frame"
     BODIES = "bodies"
+    CELLS = "load_cells"
 
 
 class Channel(Enum):

@@ -34,7 +34,7 @@ EFFECT = Effect(
     negligible={"delay": 2.5e-4},
     equation="pose and twist stamped τ = those at τ − delay",
     shows="tension residuals as of a damper stiffness·delay; pose lags behind the winches' motion",
-    twins=("cable_axial_damping", "winch_torque_lag", "clock_skew"),
+    twins=("cable_axial_damping", "winch_torque_lag", "clock_skew", "tension_delay"),
     separating_experiment="sweep the frequency: a phase in proportion to it, alike in all cables",
     reference="latency of optical motion capture; first order of the shift in time",
 )

@@ -31,7 +31,12 @@ EFFECT = Effect(
     regression=Regression(Channel.SHAFT, _columns),
     equation="resisting torque = coefficient·q̇",
     shows="winch torque residual is a straight line through zero against motor speed",
-    twins=("winch_coulomb_friction", "winch_stribeck_friction", "cable_axial_damping"),
+    twins=(
+        "winch_coulomb_friction",
+        "winch_stribeck_friction",
+        "cable_axial_damping",
+        "tension_delay",
+    ),
     separating_experiment="constant speeds over at least one decade at constant tension",
     reference="thesis (2-21); Armstrong-Hélouvry, Dupont, Canudas de Wit, Automatica 30(7), 1994",
 )

@@ -1,0 +1,75 @@
+"""What explains nearly as much as what was chosen."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+
+import numpy as np
+
+from cspm_ident.diagnosis.absorbed import absorbed_pairs
+from cspm_ident.diagnosis.columns import Candidate
+from cspm_ident.diagnosis.fits import Fits
+from cspm_ident.diagnosis.hypothesis import Hypothesis, Rival, freedom
+from cspm_ident.diagnosis.likeness import (
+    RIVAL_SHARE,
+    TIED,
+    UNTRUE_SHARE,
+    contains,
+    distance,
+    freely_gained,
+)
+from cspm_ident.diagnosis.rivals import rivals_of
+
+
+def alternatives_of(
+    fits: Fits,
+    candidates: Sequence[Candidate],
+    hypothesis: Hypothesis,
+    others: Sequence[Hypothesis],
+) -> Iterator[Rival]:
+    """Yield what explains the same nearly as well as a hypothesis, that taken out.
+
+    A difference that models are too untrue for counts as much less, and every further parameter
+    as in Schwarz's criterion, blocks being what there is to tell it from.
+
+    Args:
+        fits: of all columns.
+        candidates: what there is to choose from.
+        hypothesis: one that was chosen.
+        others: the rest of what was.
+    """
+    taken = {(c.effect_id, c.element) for h in others for c in h.candidates}
+    free = [c for c in candidates if (c.effect_id, c.element) not in taken]
+    sums, base, own = fits.sums, fits.columns(others), fits.own_columns(hypothesis)
+    reference = fits.held_out(hypothesis, base)
+    gained = float(np.sum(sums.held_out(base) - reference))
+    free_gain = freely_gained(fits.evidence, sums, base, own)
+    undecided = max(UNTRUE_SHARE * gained, free_gain)
+    for rival, *beside in _alike(fits, free, hypothesis, others):
+        supposed = [rival, *beside]
+        columns = fits.evidence.columns_of(c for h in supposed for c in h.candidates)
+        wider = max(0, sum(map(freedom, supposed)) - freedom(hypothesis))
+        nested = wider and not beside and contains(sums, base, columns, own)
+        if nested or not fits.is_plausible([*others, *supposed]):
+            continue
+        with sums.delayed(np.setdiff1d(columns, own), hypothesis.onset):
+            worse = fits.held_out(rival, fits.beside(base, *beside)) - reference
+        if worse.sum() > RIVAL_SHARE * gained:
+            continue
+        apart = distance(worse, undecided, wider)
+        if apart <= TIED:
+            yield Rival(rival, apart, *beside)
+
+
+def _alike(
+    fits: Fits,
+    free: Sequence[Candidate],
+    hypothesis: Hypothesis,
+    others: Sequence[Hypothesis],
+) -> Iterator[tuple[Hypothesis, ...]]:
+    """Yield what explains the same, alone or beside a wrong number of the file."""
+    given = fits.evidence, fits.sums, fits.columns(others), hypothesis, free
+    rivals = rivals_of(*given)
+    yield from ((rival,) for rival in rivals)
+    alone = {rival.effect.id for rival in rivals}
+    yield from (pair for pair in absorbed_pairs(*given) if pair[0].effect.id not in alone)

@@ -1,0 +1,98 @@
+"""What hypotheses leave of the residuals, fitted together."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Iterator, Sequence
+from contextlib import contextmanager
+
+import numpy as np
+from numpy.typing import NDArray
+
+from cspm_ident.diagnosis.columns import Candidate
+from cspm_ident.diagnosis.evidence import Evidence
+from cspm_ident.diagnosis.hypothesis import (
+    Hypothesis,
+    bounded,
+    is_allowed,
+    is_negligible,
+    is_tied,
+    parts_of,
+)
+from cspm_ident.diagnosis.sums import Sums
+from cspm_ident.diagnosis.weights import Weights, values_of, weights_of
+
+Array = NDArray[np.float64]
+Index = NDArray[np.intp]
+
+
+class Fits:
+    """Evidence with its sums, asked in terms of hypotheses."""
+
+    def __init__(self, evidence: Evidence, sums: Sums) -> None:
+        """Take both."""
+        self.evidence, self.sums = evidence, sums
+
+    def columns(self, hypotheses: Iterable[Hypothesis]) -> Index:
+        """Return indices of the nuisance and of some hypotheses' columns."""
+        return self.evidence.with_nuisance(c for h in hypotheses for c in h.candidates)
+
+    def own_columns(self, hypothesis: Hypothesis) -> Index:
+        """Return indices of one hypothesis's columns."""
+        return self.evidence.columns_of(hypothesis.candidates)
+
+    def beside(self, base: Index, *further: Hypothesis) -> Index:
+        """Return a base with the columns of hypotheses."""
+        return np.concatenate([base, *map(self.own_columns, further)])
+
+    def weights(self, hypotheses: Sequence[Hypothesis]) -> Weights:
+        """Return the weights of hypotheses that are fitted together, with half their intervals."""
+        return weights_of(self.evidence, self.sums, *parts_of(hypotheses))
+
+    def values(self, hypotheses: Sequence[Hypothesis]) -> dict[Candidate, Array]:
+        """Return the weights alone, which takes less time."""
+        return values_of(self.evidence, self.sums, *parts_of(hypotheses))
+
+    def shared(self, base: Index, hypothesis: Hypothesis) -> tuple[Sums, Index, Index]:
+        """Return sums in which all elements of a hypothesis share their weights.
+
+        With the columns of the base and those of the hypothesis.
+        """
+        columns, elements = self.own_columns(hypothesis), hypothesis.elements
+        same = np.tile(np.eye(len(columns) // len(elements)), (len(elements), 1))
+        return self.sums.combined(base, columns, same)
+
+    def held_out(self, hypothesis: Hypothesis, base: Index) -> Array:
+        """Return Σ residual² of each block beside a hypothesis that was not fitted to it."""
+        if not hypothesis.common:
+            return self.sums.held_out(self.beside(base, hypothesis))
+        sums, base, own = self.shared(base, hypothesis)
+        return sums.held_out(np.concatenate([base, own]))
+
+    @contextmanager
+    def delayed(self, hypothesis: Hypothesis) -> Iterator[None]:
+        """Let a hypothesis act from its onset on, for a while."""
+        if not hypothesis.onset:
+            yield
+            return
+        own = self.own_columns(hypothesis)
+        with (
+            self.sums.delayed(own, hypothesis.onset),
+            self.evidence.delayed(own, hypothesis.onset),
+        ):
+            yield
+
+    def is_plausible(self, hypotheses: Sequence[Hypothesis]) -> bool:
+        """Return whether parameters are what the catalogue allows, but for chance."""
+        values = self.values(hypotheses)
+        if all(is_allowed(c, own) and not c.effect.tied for c, own in values.items()):
+            return True
+        found = self.weights(hypotheses)
+        return all(
+            is_allowed(c, bounded(c, own, half)) and (not c.effect.tied or is_tied(c, own, half))
+            for c, (own, half) in found.items()
+        )
+
+    def is_negligible(self, hypothesis: Hypothesis, chosen: Sequence[Hypothesis]) -> bool:
+        """Return whether a sound machine has as much of it, so that it counts for no effect."""
+        found = self.values(chosen)
+        return is_negligible({c: found[c] for c in hypothesis.candidates})

@@ -1,0 +1,43 @@
+"""Load cells whose readings are older than their stamps say, as behind an amplifier's filter."""
+
+import numpy as np
+
+from cspm_sim.effects.effect import (
+    Array,
+    Block,
+    Channel,
+    Effect,
+    EffectParameter,
+    Elements,
+    Regression,
+    Sense,
+)
+from cspm_sim.effects.signals import ReadingSignal
+
+
+def _lateness(time: float, parameters: Array) -> float:
+    return float(parameters[0])
+
+
+def _columns(signals: Array) -> Array:
+    return np.asarray(-signals[:, ReadingSignal.RATE, None, None])
+
+
+EFFECT = Effect(
+    id="tension_delay",
+    block=Block.SENSOR,
+    parameters=(EffectParameter("delay", "s", -0.01, 1.0, meaning="below 0: too new"),),
+    sense=Sense(("/cables/tension",), lateness=_lateness),
+    elements=Elements.CELLS,
+    regression=Regression(Channel.READING, _columns),
+    # As well as clocks are set to each other.
+    negligible={"delay": 2.5e-4},
+    equation="tensions stamped τ = those at τ − delay",
+    shows=(
+        "torque residual of each winch in proportion to the rate of its tension, as of viscous"
+        " friction where tension follows the angle; a damper of −stiffness·delay in all cables"
+    ),
+    twins=("winch_viscous_friction", "cable_axial_damping", "pose_delay"),
+    separating_experiment="sweep the frequency with the winch locked: friction is silent then",
+    reference="group delay of a carrier-frequency amplifier's low-pass filter",
+)

@@ -259,3 +259,17 @@ def test_an_effect_that_a_wrong_number_cannot_hide_is_no_alternative():
     (named,) = named_in(*wound(10.0 * np.sin(5.0 * TIMES)))
     assert named.hypothesis.words == "encoder_scale on only"
     assert named.alternatives == ()
+
+
+@pytest.mark.parametrize(
+    ("untrue", "named_first"), [(0.0, "winch_drum_radius"), (0.3, "encoder_scale")]
+)
+def test_of_what_explains_the_same_a_wrong_number_is_named_first(untrue, named_first):
+    """The encoder's column is the truth; the radius's is that, or a little beside it."""
+    radius, scale = (
+        Candidate(catalogue()[name], "only") for name in ("winch_drum_radius", "encoder_scale")
+    )
+    beside = LOAD + untrue * np.sin(5.0 * TIMES)
+    columns = {scale: LOAD[:, None], radius: beside[:, None]}
+    (named,) = named_in(equation(Place(Channel.TENSION, "only"), 0.02 * LOAD, columns, 0.005))
+    assert named.hypothesis.effect.id == named_first

@@ -43,6 +43,7 @@ def test_every_effect_has_an_equal_part_of_the_false_alarms():
     sureness = Sureness(Fits(evidence, Sums(evidence)), candidates)
     assert sureness.below(DRY) == pytest.approx(FALSE_ALARMS / 2)
     assert sureness.below(WET) == pytest.approx(FALSE_ALARMS / 4)
+    assert sureness.below(WET, known=2) == pytest.approx(3.0 * FALSE_ALARMS / 4)
     spent = sum(sureness.below(candidate.effect) for candidate in candidates)
     assert spent == pytest.approx(FALSE_ALARMS)
 
@@ -73,6 +74,20 @@ def test_what_one_system_reads_has_one_number_unless_data_say_otherwise(second, 
     assert dry.elements == NAMES[:1]
 
 
+@pytest.mark.parametrize(("second", "hum", "same"), [(0.3, 1.0, True), (0.2, 0.0, False)])
+def test_all_elements_may_share_a_number_only_if_their_own_agree(second, hum, same):
+    search = Search(gather([winches(second, hum)], BLOCK_S))
+    both = Hypothesis(DRY, tuple(Candidate(DRY, name) for name in NAMES), common=True)
+    assert search._agree(both, search.fits.columns([])) is same
+
+
+def test_one_element_alone_says_nothing_of_all():
+    """The other's number is known too badly to contradict, and not known to be one."""
+    search = Search(gather([winches(0.0, 40.0)], BLOCK_S))
+    both = Hypothesis(DRY, tuple(Candidate(DRY, name) for name in NAMES), common=True)
+    assert not search._agree(both, search.fits.columns([]))
+
+
 def test_a_common_number_is_that_of_the_sum_of_columns():
     """Fitted by hand to both winches' rows."""
     equations = winches(0.1)
@@ -85,6 +100,27 @@ def test_a_common_number_is_that_of_the_sum_of_columns():
     assert found == [pytest.approx(expected[0], rel=1e-9)] * 2
     apart = [w for w, _ in search.fits.weights([replace(both, common=False)]).values()]
     assert apart[0][0] - apart[1][0] == pytest.approx(0.2, abs=0.1)
+
+
+def curved(amount, dry=0.3):
+    """A winch with dry friction, and a wave along its turn that nothing in the catalogue is."""
+    (equation, _) = winches(0.0, noise=0.003)
+    angle = np.cumsum(equation.columns[Candidate(WET, "one")][:, 0, 0]) * STEP
+    wave = amount * np.cos(9.0 * angle)[:, None]
+    target = equation.target + wave + (dry - 0.3) * equation.columns[Candidate(DRY, "one")][:, 0]
+    signals = {"motor angle [rad]": angle}
+    columns = equation.columns | Knots().columns(equation.place, signals)
+    return Equation(equation.place, equation.times, target, columns, target)
+
+
+@pytest.mark.parametrize(("amount", "told"), [(0.06, True), (0.015, False)])
+def test_what_is_left_of_a_great_finding_is_no_unknown(amount, told):
+    """Findings are no truer than 7 % of their amplitude."""
+    found = Search(gather([[curved(amount)]], BLOCK_S)).run()
+    assert [named.hypothesis.effect for named in found.named] == [DRY]
+    assert bool(found.unknown) is told
+    alone = Search(gather([[curved(amount, dry=0.0)]], BLOCK_S)).run()
+    assert alone.unknown
 
 
 def warming(amount):

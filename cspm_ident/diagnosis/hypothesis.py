@@ -194,6 +194,11 @@ def freedom(hypothesis: Hypothesis) -> int:
     return causes * (len(effect.parameters) - len(effect.nonlinear)) + causes - 1
 
 
+def is_number(hypothesis: Hypothesis) -> bool:
+    """Return whether it is a wrong number of the file, rather than physics that is missing."""
+    return hypothesis.effect.alter is not None
+
+
 def is_wider(one: Hypothesis, other: Hypothesis) -> bool:
     """Return whether one supposes more faults, whatever the effects."""
     return one.causes > other.causes

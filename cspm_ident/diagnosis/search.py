@@ -20,6 +20,7 @@ from cspm_ident.diagnosis.hypothesis import (
     Named,
     Unknown,
     freedom,
+    is_number,
     is_wider,
     joined,
     shapes_of,
@@ -32,7 +33,7 @@ from cspm_ident.diagnosis.pairs import Pair, best_pairs
 from cspm_ident.diagnosis.rivals import rivals_of
 from cspm_ident.diagnosis.short_list import short_list
 from cspm_ident.diagnosis.sums import Sums, behind, gain_of, paired
-from cspm_ident.diagnosis.sureness import MATERIAL_SHARE, Sureness
+from cspm_ident.diagnosis.sureness import Sureness
 from cspm_ident.diagnosis.unexplained import unexplained
 from cspm_sim.effects import Effect
 
@@ -44,6 +45,10 @@ MOST_EFFECTS = 3
 _FEWEST_BLOCKS = 10
 # Standard errors by which a beginning has to explain more than an effect that was always there.
 _SIGMAS = 2.0
+# Of the gain: for less no beginning is told, nor a hypothesis of more numbers kept.
+_SIMPLER_SHARE = 0.1
+# Half intervals within which one of several numbers may lie from that of all.
+_AGREES = 1.5
 
 
 class Search:
@@ -108,7 +113,7 @@ class Search:
         """
         kept = [h for h in chosen if self.fits.is_negligible(h, chosen)]
         given_up = [h for h in chosen if h not in kept]
-        if len(given_up) < 2 or any(h.onset for h in chosen):
+        if not given_up or any(h.onset for h in chosen):
             return chosen
         base = self.fits.columns(kept)
         left = self.sums.held_out(self.fits.columns(chosen))
@@ -235,10 +240,24 @@ class Search:
         own = self._extended(candidate, alike, base)
         if len(alike) == 1:
             return [own]
-        common = replace(whole, common=True)
+        one_system = _has_one_system(own)
+        common = [replace(whole, common=True)] if one_system or self._agree(whole, base) else []
         if len(own.candidates) < len(alike):
-            return [own, common, whole]
-        return [common, own] if _has_one_system(own) else [own]
+            return [own, *common, whole]
+        return [*common, own] if one_system else [own]
+
+    def _agree(self, hypothesis: Hypothesis, base: Index) -> bool:
+        """Return whether all elements may have the same numbers, and several surely have some."""
+        columns = self.fits.own_columns(hypothesis)
+        elements = len(hypothesis.candidates)
+        beside = self.fits.beside(base, hypothesis)
+        apart = self.sums.weights(beside)[len(base) :].reshape(elements, -1)
+        half = self.sums.half_width(base, columns).reshape(elements, -1)
+        sums, kept, own = self.fits.shared(base, hypothesis)
+        same = sums.weights(np.concatenate([kept, own]))[len(kept) :]
+        near = np.abs(apart - same) <= _AGREES * half
+        there = np.any(np.abs(apart) > half, axis=1)
+        return bool(np.all(near) and np.count_nonzero(there) > 1)
 
     def _extended(
         self, candidate: Candidate, alike: Sequence[Candidate], base: Index
@@ -263,7 +282,8 @@ class Search:
     ) -> Hypothesis:
         """Return the hypothesis of fewest numbers, or elements, that is no worse than the best one.
 
-        One that explains more in most blocks is taken instead, though it be less sure by itself.
+        One that explains more in most blocks is taken instead, though it be less sure by itself;
+        and of what explains the same a wrong number of the file, for it adds no physics.
         """
         rivals = [h for h in self._rivals(best, free, base) if self.fits.is_plausible([*chosen, h])]
         reference = self.fits.held_out(best, base)
@@ -277,9 +297,15 @@ class Search:
             if wider <= 0 and worse.total < least and behind(paired(apart)) <= -TIED:
                 fewest, least = replace(rival, onset=best.onset), worse.total
             elif (wider < 0 or (wider == 0 and fewer)) and worse.total <= min(
-                2.0 * gained.error, MATERIAL_SHARE * gained.total
+                2.0 * gained.error, _SIMPLER_SHARE * gained.total
             ):
                 fewest = replace(rival, onset=best.onset)
+            elif (
+                wider == 0
+                and is_number(rival) > is_number(fewest)
+                and worse.total <= UNTRUE_SHARE * gained.total
+            ):
+                fewest = rival
         return fewest
 
     def _rivals(
@@ -306,7 +332,7 @@ class Search:
         left = self.sums.left_from(base, own)[:-2]
         best = int(np.argmin(left))
         gained = self.sums.squares_of(base) - left[0]
-        if left[best] < left[0] - MATERIAL_SHARE * max(gained, 0.0):
+        if left[best] < left[0] - _SIMPLER_SHARE * max(gained, 0.0):
             return best, float(left[best])
         return 0, float(left[0])
 

@@ -18,7 +18,7 @@ from cspm_sim.effects import Effect
 Index = NDArray[np.intp]
 
 # Less than this share of what is left of the residuals it acts on is not worth a word.
-MATERIAL_SHARE = 0.1
+MATERIAL_SHARE = 0.05
 FALSE_ALARMS = 0.01
 
 

@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 from cspm_ident.diagnosis.drivers import Driver
 from cspm_ident.diagnosis.evidence import Evidence
 from cspm_ident.diagnosis.hypothesis import DOUBTFUL_SHARE, Hypothesis, Unknown
+from cspm_ident.diagnosis.likeness import UNTRUE_SHARE
 from cspm_ident.diagnosis.sums import Sums
 from cspm_ident.diagnosis.sureness import FALSE_ALARMS, Sureness
 
@@ -31,10 +32,24 @@ def unexplained(
         gain, p_value = told(base, own), sums.p_value(base, own)
         if gain.total > 0.0 and p_value < FALSE_ALARMS / len(drivers):
             share = sureness.share(base, own)
-            if share >= UNKNOWN_SHARE:
+            if share >= UNKNOWN_SHARE and gain.total > _untold(evidence, sums, chosen, driver):
                 found[driver] = driver, gain, share
     found |= {each[0]: each for each in _drifting(evidence, sums, sureness, chosen)}
     return tuple(sorted(found.values(), key=lambda each: -each[1].total))
+
+
+def _untold(
+    evidence: Evidence, sums: Sums, chosen: Sequence[Hypothesis], driver: Driver
+) -> float:
+    """Return the squares that tell nothing in a residual, findings there being not quite true."""
+    (place,) = (p for p in evidence.places if p.place == driver.place)
+    taken = 0.0
+    for hypothesis in chosen:
+        own = evidence.columns_of(hypothesis.candidates)
+        if np.isin(own, place.columns).any():
+            base = _columns(evidence, [h for h in chosen if h is not hypothesis])
+            taken += max(0.0, sums.gain(base, own).total)
+    return UNTRUE_SHARE * taken
 
 
 def _drifting(

@@ -1,0 +1,70 @@
+"""Two faults of one winch that hide each other at its shaft."""
+
+import numpy as np
+import pytest
+
+from cspm_ident.diagnosis.columns import Candidate, Place
+from cspm_ident.diagnosis.equation import Equation
+from cspm_ident.diagnosis.evidence import gather
+from cspm_ident.diagnosis.hypothesis import Hypothesis
+from cspm_ident.diagnosis.pairs import best_pairs
+from cspm_ident.diagnosis.search import Search
+from cspm_sim.effects import Channel, catalogue
+
+ROWS, STEP, BLOCK_S = 2400, 0.01, 0.5
+CELL, DRIVE, COM, MASS = (
+    catalogue()[name] for name in ("tension_bias", "winch_torque_offset", "bar_com", "bar_mass")
+)
+WINCH, OTHER = "hoist_1", "hoist_2"
+
+
+def machine(cell, drive, seed=5):
+    """A shaft on which both zeros act and a bar that feels the cell's alone, as it would others."""
+    rng, times = np.random.default_rng(seed), STEP * np.arange(ROWS)
+    ones, moved = np.ones(ROWS), np.sin(1.7 * times) + 0.5 * np.sin(0.61 * times + 1.0)
+    com = np.stack([0.9 * ones + 0.4 * moved, 0.2 * moved, moved**2], 1)
+    bar = {
+        Candidate(CELL, WINCH): ones[:, None],
+        Candidate(CELL, OTHER): 0.8 * (ones + 0.6 * moved)[:, None],
+        Candidate(COM, "bar"): com,
+        Candidate(MASS, "bar"): (ones + 0.3 * moved)[:, None],
+    }
+    places = {Place(Channel.WRENCH, "bar"): (bar, cell * ones)}
+    for name, torque in ((WINCH, drive - cell), (OTHER, 0.0)):
+        shaft = {Candidate(CELL, name): -ones[:, None], Candidate(DRIVE, name): ones[:, None]}
+        places[Place(Channel.SHAFT, name)] = shaft, torque * ones
+    equations = []
+    for place, (columns, target) in places.items():
+        target = (target + 0.1 * rng.standard_normal(ROWS))[:, None]
+        shaped = {term: values[:, None, :] for term, values in columns.items()}
+        equations.append(Equation(place, times, target, shaped, target))
+    return gather([equations], BLOCK_S)
+
+
+def test_the_pair_that_explains_most_is_the_first_and_of_one_element():
+    search = Search(machine(0.1, 0.1))
+    pairs = best_pairs(search.evidence, search.sums, search.fits.columns([]), search.heard)
+    assert {h.effect.id for h in pairs[0]} == {CELL.id, DRIVE.id}
+    assert {h.elements for h in pairs[0]} == {(WINCH,)}
+    assert all(one.elements == other.elements for one, other in pairs)
+
+
+@pytest.mark.parametrize("drive", [0.1, 0.09])
+def test_zeros_that_hide_each_other_are_found_together(drive):
+    named = Search(machine(0.1, drive)).run().named
+    found = {(n.hypothesis.effect.id, n.hypothesis.elements) for n in named}
+    assert found == {(CELL.id, (WINCH,)), (DRIVE.id, (WINCH,))}
+
+
+def test_one_fault_is_not_taken_for_two():
+    (named,) = Search(machine(0.0, 0.1)).run().named
+    assert (named.hypothesis.effect, named.hypothesis.elements) == (DRIVE, (WINCH,))
+
+
+def test_what_was_chosen_stays_where_no_pair_is_better():
+    search = Search(machine(0.0, 0.1))
+    chosen = [
+        Hypothesis(DRIVE, (Candidate(DRIVE, WINCH),)),
+        Hypothesis(MASS, (Candidate(MASS, "bar"),)),
+    ]
+    assert search._exchanged(chosen) == chosen

@@ -41,10 +41,12 @@ Array = NDArray[np.float64]
 Index = NDArray[np.intp]
 
 MOST_EFFECTS = 3
-# In which an effect has to act to be told.
-_FEWEST_BLOCKS = 10
-# Standard errors by which a beginning has to explain more than an effect that was always there.
+# In which an effect has to act to be told, and to be absent if it is to begin later.
+_FEWEST_BLOCKS, _FEWEST_WITHOUT = 10, 5
+# Standard errors by which an unlikely extent, or a pair, has to explain more than what is simpler.
 _SIGMAS = 2.0
+# And a beginning more than an effect that was always there: the largest of some 48 by chance.
+_SIGMAS_OF_ONSET = 3.0
 # Of the gain: for less no beginning is told, nor a hypothesis of more numbers kept.
 _SIMPLER_SHARE = 0.1
 # Half intervals within which one of several numbers may lie from that of all.
@@ -85,17 +87,18 @@ class Search:
         narrow = copy(self)
         narrow._effects = [c for c in self._effects if c.effect.alter is not None]
         narrow.sureness = Sureness(self.fits, narrow._effects)
-        own = [c for h in narrow._chosen(onsets=False) for c in h.candidates]
+        own = [c for h in narrow._chosen() for c in h.candidates]
         return self.evidence.parted(own, self.sums.weights(self.evidence.with_nuisance(own)))
 
-    def _chosen(self, *, onsets: bool = True) -> list[Hypothesis]:
+    def _chosen(self) -> list[Hypothesis]:
         chosen: list[Hypothesis] = []
         while sum(not self.fits.is_negligible(h, chosen) for h in chosen) < MOST_EFFECTS:
             self._progress(f"effect {len(chosen) + 1}")
             found = self._best(chosen)
             if found is None:
                 break
-            chosen = joined(chosen, self._begun(found, chosen) if onsets else found)
+            self._begin(found)
+            chosen = joined(chosen, found)
         chosen = self._exchanged(chosen)
         # What was chosen first did not know of the others.
         for hypothesis in tuple(chosen):
@@ -138,15 +141,12 @@ class Search:
             for beside in [self.fits.beside(base, other)]
         )
 
-    def _begun(self, hypothesis: Hypothesis, chosen: Sequence[Hypothesis]) -> Hypothesis:
-        """Return the hypothesis with its onset, from which on its columns act henceforth."""
-        own, onset = self.fits.own_columns(hypothesis), hypothesis.onset
-        if not onset and _may_begin(hypothesis.effect):
-            onset, _ = self._onset(self.fits.columns(chosen), own)
-        if onset:
-            self.evidence.delay(own, onset)
-            self.sums.delay(own, onset)
-        return replace(hypothesis, onset=onset)
+    def _begin(self, hypothesis: Hypothesis) -> None:
+        """Let the hypothesis's columns act from its onset on henceforth."""
+        if hypothesis.onset:
+            own = self.fits.own_columns(hypothesis)
+            self.evidence.delay(own, hypothesis.onset)
+            self.sums.delay(own, hypothesis.onset)
 
     def _best(self, chosen: Sequence[Hypothesis]) -> Hypothesis | None:
         base = self.fits.columns(chosen)
@@ -181,8 +181,9 @@ class Search:
             if best is not None:
                 wider = is_wider(hypothesis, best[1])
                 needed = best[0].sum() + 3.0 * gain_of(gained).error * wider
-                if _is_bolder(hypothesis, best[1]):
-                    needed = best[0].sum() + _SIGMAS * gain_of(gained - best[0]).error
+                sigmas = _boldness(hypothesis, best[1])
+                if sigmas:
+                    needed = best[0].sum() + sigmas * gain_of(gained - best[0]).error
             if best is None or gained.sum() > needed:
                 best = gained, hypothesis
         return None if best is None else best[1]
@@ -199,7 +200,7 @@ class Search:
         late: list[tuple[float, Hypothesis]] = []
         for shape in shapes_of(hypothesis, free):
             onset, left = self._onset(base, self.fits.own_columns(shape))
-            if 0 < onset <= self.sums.blocks - _FEWEST_BLOCKS:
+            if _FEWEST_WITHOUT <= onset <= self.sums.blocks - _FEWEST_BLOCKS:
                 late.append((left, replace(shape, onset=onset)))
         if late:
             yield min(late, key=lambda each: each[0])[1]
@@ -352,15 +353,16 @@ def _may_begin(effect: Effect) -> bool:
     return effect.alter is None
 
 
-def _is_bolder(one: Hypothesis, other: Hypothesis) -> bool:
-    """Return whether one has a beginning, or an unlikely extent, and another has not.
+def _boldness(one: Hypothesis, other: Hypothesis) -> float:
+    """Return by how many standard errors one has to explain more than another.
 
-    One number for all elements is unlikely unless one system reads them; then it is for a part of
-    them.
+    For a beginning, chosen among many, and for an unlikely extent, where the other has none: one
+    number for all elements is unlikely unless one system reads them; then it is for a part of them.
     """
     if one.onset and not other.onset:
-        return True
-    return one.common != other.common and one.common is not _has_one_system(one)
+        return _SIGMAS_OF_ONSET
+    unlikely = one.common != other.common and one.common is not _has_one_system(one)
+    return _SIGMAS if unlikely else 0.0
 
 
 def _has_one_system(hypothesis: Hypothesis) -> bool:

@@ -38,9 +38,7 @@ def unexplained(
     return tuple(sorted(found.values(), key=lambda each: -each[1].total))
 
 
-def _untold(
-    evidence: Evidence, sums: Sums, chosen: Sequence[Hypothesis], driver: Driver
-) -> float:
+def _untold(evidence: Evidence, sums: Sums, chosen: Sequence[Hypothesis], driver: Driver) -> float:
     """Return the squares that tell nothing in a residual, findings there being not quite true."""
     (place,) = (p for p in evidence.places if p.place == driver.place)
     taken = 0.0

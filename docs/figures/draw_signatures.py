@@ -31,19 +31,23 @@ SHEETS = {
 }
 
 
-def strongest(signature: Signature) -> tuple[Place, int] | None:
-    """Return the residual and its channel in which an effect stands out most; None: nowhere."""
+def strongest(signature: Signature) -> tuple[Place, int, int] | None:
+    """Return the residual, its channel and the coefficient to draw; None: an effect shows nowhere.
+
+    The first coefficient that shows, in the channel in which it stands out most.
+    """
     sizes = {
-        (place, i): float(np.linalg.norm(columns[:, i, 0])) / NOISE[place.channel]
+        (place, i, k): float(np.linalg.norm(columns[:, i, k])) / NOISE[place.channel]
         for place, columns in signature.columns.items()
-        for i in range(columns.shape[1])
+        for i, k in np.ndindex(columns.shape[1:])
     }
-    best = max(sizes, key=lambda each: sizes[each], default=None)
-    return best if best is not None and sizes[best] > 0.0 else None
+    first = min((k for (_, _, k), size in sizes.items() if size > 0.0), default=None)
+    own = [each for each in sizes if each[2] == first]
+    return max(own, key=lambda each: sizes[each], default=None)
 
 
 def draw(axes: Axes, effect: Effect, signature: Signature, places: dict[Place, Equation]) -> None:
-    """Draw an effect's first coefficient against the signal that explains most of it."""
+    """Draw a coefficient of an effect against the signal that explains most of it."""
     axes.set_title(effect.id, fontsize=8)
     axes.tick_params(labelsize=6, length=2)
     where = strongest(signature)
@@ -51,8 +55,8 @@ def draw(axes: Axes, effect: Effect, signature: Signature, places: dict[Place, E
         axes.text(0.5, 0.5, "not on this motion", ha="center", va="center", fontsize=8)
         axes.set(xticks=[], yticks=[])
         return
-    place, channel = where
-    values = signature.columns[place][:, channel, 0]
+    place, channel, coefficient = where
+    values = signature.columns[place][:, channel, coefficient]
     equation = places[place]
     names = [n for n in equation.signals if not n.startswith("time")]
     if len(signature.columns[place][0]) > 1:

@@ -32,7 +32,7 @@ from cspm_ident.diagnosis.likeness import (
 from cspm_ident.diagnosis.pairs import Pair, best_pairs
 from cspm_ident.diagnosis.rivals import rivals_of
 from cspm_ident.diagnosis.short_list import short_list
-from cspm_ident.diagnosis.sums import Sums, behind, gain_of, paired
+from cspm_ident.diagnosis.sums import Gain, Sums, behind, gain_of, paired
 from cspm_ident.diagnosis.sureness import Sureness
 from cspm_ident.diagnosis.unexplained import unexplained
 from cspm_sim.effects import Effect
@@ -99,15 +99,32 @@ class Search:
                 break
             self._begin(found)
             chosen = joined(chosen, found)
-        chosen = self._exchanged(chosen)
-        # What was chosen first did not know of the others.
-        for hypothesis in tuple(chosen):
-            others = [h for h in chosen if h is not hypothesis]
-            base, k = self.fits.columns(others), chosen.index(hypothesis)
-            chosen[k] = self._pruned(hypothesis, base)
-            if self.sums.gain(base, self.fits.own_columns(chosen[k])).total <= 0.0:
-                del chosen[k]
-        return chosen
+        return self._needed(self._exchanged(chosen))
+
+    def _needed(self, chosen: Sequence[Hypothesis]) -> list[Hypothesis]:
+        """Return what was chosen less what is not needed beside the others, the weakest first.
+
+        What was chosen first did not know of the others.
+        """
+        kept = list(chosen)
+        for k, hypothesis in enumerate(kept):
+            kept[k] = self._pruned(hypothesis, self._others(hypothesis, kept))
+        while kept:
+            gains = {k: self._gain(hypothesis, kept) for k, hypothesis in enumerate(kept)}
+            for k in sorted(gains, key=lambda k: gains[k].total):
+                base = self._others(kept[k], kept)
+                if not self.sureness.counts(base, kept[k], gains[k], known=len(kept) - 1):
+                    del kept[k]
+                    break
+            else:
+                break
+        return kept
+
+    def _others(self, hypothesis: Hypothesis, chosen: Sequence[Hypothesis]) -> Index:
+        return self.fits.columns(h for h in chosen if h is not hypothesis)
+
+    def _gain(self, hypothesis: Hypothesis, chosen: Sequence[Hypothesis]) -> Gain:
+        return self.sums.gain(self._others(hypothesis, chosen), self.fits.own_columns(hypothesis))
 
     def _exchanged(self, chosen: list[Hypothesis]) -> list[Hypothesis]:
         """Return a pair on one element instead of what was chosen one by one, where it is better.
@@ -128,18 +145,21 @@ class Search:
             simpler = sum(map(freedom, pair)) < sum(map(freedom, given_up))
             if better.total <= (-undecided if simpler else _SIGMAS * better.error):
                 continue
-            if self.fits.is_plausible([*kept, *pair]) and self._are_both_sure(base, pair):
+            if self.fits.is_plausible([*kept, *pair]) and self._are_both_needed(base, pair):
                 return [*kept, *pair]
         return chosen
 
-    def _are_both_sure(self, base: Index, pair: Pair) -> bool:
-        return all(
-            self.sureness.counts(
-                beside, one, self.sums.gain(beside, self.fits.own_columns(one)), known=1
-            )
-            for one, other in (pair, pair[::-1])
-            for beside in [self.fits.beside(base, other)]
+    def _are_both_needed(self, base: Index, pair: Pair) -> bool:
+        """Return whether each is surely there beside the other, and no small part of both."""
+        least = (
+            _SIMPLER_SHARE * self.sums.gain(base, self.fits.beside(base, *pair)[len(base) :]).total
         )
+        for one, other in (pair, pair[::-1]):
+            beside = self.fits.beside(base, other)
+            gain = self.sums.gain(beside, self.fits.own_columns(one))
+            if gain.total < least or not self.sureness.counts(beside, one, gain, known=1):
+                return False
+        return True
 
     def _begin(self, hypothesis: Hypothesis) -> None:
         """Let the hypothesis's columns act from its onset on henceforth."""

@@ -109,16 +109,18 @@ class Search:
         kept = list(chosen)
         for k, hypothesis in enumerate(kept):
             kept[k] = self._pruned(hypothesis, self._others(hypothesis, kept))
-        while kept:
-            gains = {k: self._gain(hypothesis, kept) for k, hypothesis in enumerate(kept)}
-            for k in sorted(gains, key=lambda k: gains[k].total):
-                base = self._others(kept[k], kept)
-                if not self.sureness.counts(base, kept[k], gains[k], known=len(kept) - 1):
-                    del kept[k]
-                    break
-            else:
-                break
+        while (needless := self._needless(kept)) is not None:
+            del kept[needless]
         return kept
+
+    def _needless(self, chosen: Sequence[Hypothesis]) -> int | None:
+        """Return which is the weakest that is not surely there beside the others, if any."""
+        gains = [self._gain(hypothesis, chosen) for hypothesis in chosen]
+        for k in np.argsort([gain.total for gain in gains]):
+            base = self._others(chosen[k], chosen)
+            if not self.sureness.counts(base, chosen[k], gains[k], known=len(chosen) - 1):
+                return int(k)
+        return None
 
     def _others(self, hypothesis: Hypothesis, chosen: Sequence[Hypothesis]) -> Index:
         return self.fits.columns(h for h in chosen if h is not hypothesis)
@@ -151,9 +153,8 @@ class Search:
 
     def _are_both_needed(self, base: Index, pair: Pair) -> bool:
         """Return whether each is surely there beside the other, and no small part of both."""
-        least = (
-            _SIMPLER_SHARE * self.sums.gain(base, self.fits.beside(base, *pair)[len(base) :]).total
-        )
+        both = self.evidence.columns_of(c for h in pair for c in h.candidates)
+        least = _SIMPLER_SHARE * self.sums.gain(base, both).total
         for one, other in (pair, pair[::-1]):
             beside = self.fits.beside(base, other)
             gain = self.sums.gain(beside, self.fits.own_columns(one))

@@ -141,7 +141,10 @@ def diagnose(
     retuned = search.retuned()
     searched_part: Cut = whole_part if held_out else first_part
     progress("parameters, and simulation of held-out data")
-    baselines, rows = baselines_of(judges, retuned), in_noise(search_parts, noise)
+    baselines, rows = (
+        baselines_of(held_out or searched, starts, retuned),
+        in_noise(search_parts, noise),
+    )
     data = Data(searched, searched_part, baselines, rows, noise, block)
     model = modelled(search, kept, data)
     while safeguards.held_out and model.useless:

@@ -107,10 +107,10 @@ def modelled(search: Search, kept: Sequence[Named], data: Data) -> Model:
     if not all(possible):
         return Model(weights, onsets, (), (), possible)
     simulated = simulate_held_out(data.baselines, values)
-    parts = data.baselines.parts
     # What a sound machine has too is too little to be of use, and there nevertheless.
     worth = tuple(
-        None if is_negligible(own) else worth_of(parts, simulated, values, own) for own in members
+        None if is_negligible(own) else worth_of(data.baselines, simulated, values, own)
+        for own in members
     )
     return Model(weights, onsets, simulated, worth, possible)
 

@@ -47,6 +47,8 @@ _FEWEST_BLOCKS, _FEWEST_WITHOUT = 10, 5
 _SIGMAS = 2.0
 # And a beginning more than an effect that was always there: the largest of some 48 by chance.
 _SIGMAS_OF_ONSET = 3.0
+# Of the squares of columns: what spans more of them is a wider form of the same.
+_SAME = 0.95
 # Of the gain: for less no beginning is told, nor a hypothesis of more numbers kept.
 _SIMPLER_SHARE = 0.1
 # Half intervals within which one of several numbers may lie from that of all.
@@ -131,7 +133,8 @@ class Search:
     def _exchanged(self, chosen: list[Hypothesis]) -> list[Hypothesis]:
         """Return a pair on one element instead of what was chosen one by one, where it is better.
 
-        It has to explain surely more, or as much with fewer numbers, and neither may be absent.
+        It has to explain surely more, other than as a wider form of the same, or as much with fewer
+        numbers, and neither may be absent.
         """
         kept = [h for h in chosen if self.fits.is_negligible(h, chosen)]
         given_up = [h for h in chosen if h not in kept]
@@ -142,10 +145,14 @@ class Search:
         undecided = UNTRUE_SHARE * (self.sums.held_out(base) - left).sum()
         taken = {(c.effect_id, c.element) for h in kept for c in h.candidates}
         free = [c for c in self._effects if (c.effect_id, c.element) not in taken]
+        replaced = self.evidence.columns_of(c for h in given_up for c in h.candidates)
         for pair in best_pairs(self.evidence, self.sums, base, free):
             better = gain_of(left - self.sums.held_out(self.fits.beside(base, *pair)))
             simpler = sum(map(freedom, pair)) < sum(map(freedom, given_up))
             if better.total <= (-undecided if simpler else _SIGMAS * better.error):
+                continue
+            both = self.fits.beside(base, *pair)[len(base) :]
+            if not simpler and np.all(self.sums.spanned(base, both, replaced) > _SAME):
                 continue
             if self.fits.is_plausible([*kept, *pair]) and self._are_both_needed(base, pair):
                 return [*kept, *pair]

@@ -25,6 +25,8 @@ Weights = Mapping[Candidate, Array]
 # How long errors may grow where a drive is integrated twice or more [s].
 HORIZONS: dict[Drive, float | None] = {Drive.SHAFT: 0.5, Drive.WINCH: None, Drive.TENSION: 0.5}
 LONGEST_S = 30.0
+# In which what a cable remembers of before fades.
+LEAD_S = 10.0
 
 
 class Output(NamedTuple):
@@ -72,26 +74,35 @@ class Baselines(NamedTuple):
     """Simulations without anything found, with which others are compared.
 
     Attributes:
-        parts: what is simulated, of each recording half a minute.
+        parts: what is simulated, of each recording half a minute and what leads up to it.
+        since: from when on each is judged [s].
         described: spread and RMS error by output with the file's model.
         retuned: with the file's parameters fitted to the searched data.
     """
 
     parts: Sequence[Measurement]
+    since: Sequence[float]
     described: Errors
     retuned: Errors
 
 
-def baselines_of(measurements: Sequence[Measurement], retuned: Weights) -> Baselines:
-    """Simulate recordings that were not searched, as described and re-tuned.
+def baselines_of(
+    measurements: Sequence[Measurement], starts: Sequence[float], retuned: Weights
+) -> Baselines:
+    """Simulate what was not searched, as described and re-tuned.
 
     Args:
-        measurements: not searched; of each half a minute is used.
+        measurements: of each half a minute is judged; what is before it, as far as there is any,
+            lets memories such as creep become what they were.
+        starts: from when on none of them was searched [s].
         retuned: weights of the file's own parameters.
     """
-    parts = _beginnings(measurements)
-    described = _errors(parts, {})
-    return Baselines(parts, described, _errors(parts, retuned) if retuned else described)
+    parts = [
+        m.within(at - LEAD_S, at + LONGEST_S) for m, at in zip(measurements, starts, strict=True)
+    ]
+    described = _errors(parts, starts, {})
+    tuned = _errors(parts, starts, retuned) if retuned else described
+    return Baselines(parts, starts, described, tuned)
 
 
 def simulate_held_out(baselines: Baselines, found: Weights) -> tuple[SimulatedFit, ...]:
@@ -104,8 +115,8 @@ def simulate_held_out(baselines: Baselines, found: Weights) -> tuple[SimulatedFi
         baselines: of the recordings.
         found: weights of what was found.
     """
-    parts, described, tuned = baselines
-    after = _errors(parts, found) if found else described
+    parts, since, described, tuned = baselines
+    after = _errors(parts, since, found) if found else described
     floors = _floors(parts, found)
     return tuple(
         SimulatedFit(output, spread, before, tuned[output][1], after[output][1], floors[output])
@@ -129,7 +140,7 @@ class Worth(NamedTuple):
 
 
 def worth_of(
-    parts: Sequence[Measurement],
+    baselines: Baselines,
     fits: Sequence[SimulatedFit],
     found: Weights,
     own: Collection[Candidate],
@@ -137,7 +148,7 @@ def worth_of(
     """Return what an effect is worth; None where nothing that it acts on can be simulated.
 
     Args:
-        parts: what was simulated.
+        baselines: of the recordings that were simulated.
         fits: their simulation with everything that was found.
         found: weights of all that was found.
         own: the effect's.
@@ -145,7 +156,9 @@ def worth_of(
     kinds = {r.channel for c in own for r in (c.effect.regression, *c.effect.partners)}
     sensed = any(c.effect.sense is not None for c in own)
     fewer = {c: weights for c, weights in found.items() if c not in own}
-    before = _errors(parts, fewer) if fewer else {f.output: (0.0, f.before) for f in fits}
+    before = {f.output: (0.0, f.before) for f in fits}
+    if fewer:
+        before = _errors(baselines.parts, baselines.since, fewer)
     shown = [
         Worth(fit.output, before[fit.output][1], fit.after)
         for fit in fits
@@ -155,23 +168,17 @@ def worth_of(
     return min(shown, key=lambda worth: worth.with_it / worth.without, default=None)
 
 
-def _beginnings(measurements: Sequence[Measurement]) -> list[Measurement]:
-    """Return as much of each measurement as is simulated."""
-    starts = [min(float(s.times[0]) for s in m.sensors.values()) for m in measurements]
-    return [m.within(at, at + LONGEST_S) for m, at in zip(measurements, starts, strict=True)]
-
-
-def _errors(parts: Sequence[Measurement], weights: Weights) -> Errors:
+def _errors(parts: Sequence[Measurement], since: Sequence[float], weights: Weights) -> Errors:
     """Return spread and RMS error by output, over all recordings."""
     found: dict[Output, list[tuple[Array, Array]]] = {}
-    for part in parts:
+    for part, start in zip(parts, since, strict=True):
         measurement = as_found(part, weights)
         timeline = Timeline(measurement)
         simulation = BlockSimulation(timeline, measurement.machine)
         for drive in _drives(simulation):
             simulated = simulation.run(drive, simulation.windows(drive, HORIZONS[drive]))
             for output, samples, column, i in _outputs(measurement, drive, simulated):
-                inside = samples.times <= timeline.times[-1]
+                inside = (start <= samples.times) & (samples.times <= timeline.times[-1])
                 at = np.interp(samples.times[inside], timeline.times, column)
                 whole = np.isfinite(at)
                 measured = samples.values[inside, i][whole]

@@ -61,6 +61,27 @@ def test_one_fault_is_not_taken_for_two():
     assert (named.hypothesis.effect, named.hypothesis.elements) == (DRIVE, (WINCH,))
 
 
+def test_a_pair_that_is_a_wider_form_of_a_finding_does_not_replace_it():
+    """Torque less load is what accelerates: gain and radius together do what inertia does."""
+    rng, times = np.random.default_rng(2), STEP * np.arange(ROWS)
+    load = 1.0 + 0.3 * np.sin(0.9 * times)
+    accelerated = 0.2 * np.sin(2.3 * times) + 0.1 * np.sin(3.7 * times)
+    inertia, gain, radius = (
+        Candidate(catalogue()[name], WINCH)
+        for name in ("winch_inertia", "winch_torque_gain", "winch_drum_radius")
+    )
+    # What the pair has more than the inertia is real, though little.
+    target = (0.5 * accelerated + 0.01 * load + 0.02 * rng.standard_normal(ROWS))[:, None]
+    columns = {inertia: accelerated, gain: load + accelerated, radius: load}
+    shaped = {term: values[:, None, None] for term, values in columns.items()}
+    place = Place(Channel.SHAFT, WINCH)
+    search = Search(gather([[Equation(place, times, target, shaped, target)]], BLOCK_S))
+    chosen = [Hypothesis(inertia.effect, (inertia,))]
+    better = search.sums.gain(search.fits.columns(chosen), search.evidence.columns_of([radius]))
+    assert better.total > 2.0 * better.error
+    assert search._exchanged(chosen) == chosen
+
+
 def test_what_was_chosen_stays_where_no_pair_is_better():
     search = Search(machine(0.0, 0.1))
     chosen = [

@@ -1,5 +1,7 @@
 """Drag of still air or water on the bar, in world axes, at the bar frame's origin."""
 
+from math import sqrt
+
 import numpy as np
 
 from cspm_msgs_py.dofs import DOFS
@@ -17,14 +19,17 @@ from cspm_sim.kernels.bar import VELOCITY, WRENCH
 
 
 def _kernel(parameters: Array, signals: Array) -> None:
-    for axis in range(6):
-        velocity = signals[VELOCITY + axis]
-        signals[WRENCH + axis] -= parameters[axis] * abs(velocity) * velocity
+    for first in (0, 3):
+        x, y, z = VELOCITY + first, VELOCITY + first + 1, VELOCITY + first + 2
+        speed = sqrt(signals[x] ** 2 + signals[y] ** 2 + signals[z] ** 2)
+        for axis in range(first, first + 3):
+            signals[WRENCH + axis] -= parameters[axis] * speed * signals[VELOCITY + axis]
 
 
 def _columns(signals: Array) -> Array:
     velocity = signals[:, BarSignal.VELOCITY : BarSignal.VELOCITY + 6]
-    return np.asarray(-(np.abs(velocity) * velocity)[:, :, None] * np.eye(6))
+    speed = np.linalg.norm(velocity.reshape(-1, 2, 3), axis=2).repeat(3, axis=1)
+    return np.asarray(-(speed * velocity)[:, :, None] * np.eye(6))
 
 
 EFFECT = Effect(
@@ -36,8 +41,14 @@ EFFECT = Effect(
     ),
     kernels={Hook.BAR: _kernel},
     regression=Regression(Channel.WRENCH, _columns),
-    equation="wrench on the bar = −coefficient·|velocity|·velocity, axis by axis in world_ned",
-    shows="bar wrench residual is a parabola of both signs against the same axis's velocity",
+    equation=(
+        "force on the bar = −coefficient·|v|·v and moment = −coefficient·|ω|·ω in world_ned, a"
+        " coefficient per axis, |v| and |ω| being those of all three axes together"
+    ),
+    shows=(
+        "bar wrench residual is a parabola of both signs against the same axis's velocity, steeper"
+        " while the other axes move"
+    ),
     twins=("bar_linear_damping", "cable_transverse_damping"),
     separating_experiment="free decay at two amplitudes: the decrement grows with the amplitude",
     reference="Morison drag without added mass, DNV-RP-C205 chapter 6",

@@ -10,17 +10,16 @@ from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.stats import f as f_distribution
 from scipy.stats import norm, wilcoxon
 from scipy.stats import t as t_distribution
 
 from cspm_ident.diagnosis.evidence import Evidence, silence
+from cspm_ident.diagnosis.left_out import RANK, dominant, left_out, pseudo_inverse
 
 Array = NDArray[np.float64]
 Index = NDArray[np.intp]
 
 FOLDS = 6
-_RANK = 1e-9
 # Effective blocks beyond the first, below which a single one tells a weight.
 _ALONE = 0.1
 
@@ -35,22 +34,6 @@ class Gain(NamedTuple):
 
     total: float
     error: float
-
-
-class LeftOut(NamedTuple):
-    """What leaving out one block at a time does to weights, of columns of length 1.
-
-    Attributes:
-        weights: from all blocks, shape (m,).
-        covariance: of the weights, shape (m, m).
-        blocks: effective number of blocks that tell all of them.
-        blocks_of: those that tell each weight, shape (m,).
-    """
-
-    weights: Array
-    covariance: Array
-    blocks: float
-    blocks_of: Array
 
 
 class Sums:
@@ -199,12 +182,12 @@ class Sums:
         """Return the weights of columns fitted to what a base leaves, its own weights held."""
         both = self._whole[np.ix_(columns, base)]
         left = self._whole[columns, -1] - both @ self._weights(base, self._whole)
-        inverse = _pseudo_inverse(self._whole[np.ix_(columns, columns)])
+        inverse = pseudo_inverse(self._whole[np.ix_(columns, columns)])
         return np.asarray(inverse @ left / self._lengths[columns])
 
     def gains_beyond(self, base: Index, groups: list[Index]) -> Array:
         """Return by how much each group of columns lowers Σ residual² beyond a base, (groups,)."""
-        inverse = _pseudo_inverse(self._whole[np.ix_(base, base)])
+        inverse = pseudo_inverse(self._whole[np.ix_(base, base)])
         explained = inverse @ self._whole[base]
         found = np.zeros(len(groups))
         for k, group in enumerate(groups):
@@ -213,7 +196,7 @@ class Sums:
             )
             cross = self._whole[group, -1] - self._whole[np.ix_(group, base)] @ explained[:, -1]
             # What the base nearly spans leaves numbers of rounding only.
-            left[np.diag_indices(len(left))] += _RANK
+            left[np.diag_indices(len(left))] += RANK
             found[k] = cross @ np.linalg.solve(left, cross)
         return found
 
@@ -269,7 +252,8 @@ class Sums:
         which is not too small for few blocks; the weights of the base are held.
         """
         scale = self._lengths[columns]
-        return np.asarray(self._left_out(base, columns).covariance / np.outer(scale, scale))
+        covariance = left_out(self._beyond(base, columns)).covariance
+        return np.asarray(covariance / np.outer(scale, scale))
 
     def half_width(self, base: Index, columns: Index) -> Array:
         """Return half the widths of 95 % intervals of the weights of columns beside a base.
@@ -277,7 +261,7 @@ class Sums:
         From pairs of blocks, for what a model leaves is alike for longer than a block. Infinite
         where a single pair tells a weight.
         """
-        found = self._left_out(base, columns, pairs=True)
+        found = left_out(paired(self._beyond(base, columns)))
         free = found.blocks_of - 1.0
         factor = np.full(len(free), np.inf)
         factor[free > _ALONE] = t_distribution.ppf(0.975, free[free > _ALONE])
@@ -289,49 +273,35 @@ class Sums:
 
         By Wald's test with the covariance above, so that what a single block says counts for
         nothing, while a few that agree may be enough. Blocks count by what they tell of the
-        columns.
+        columns; one that tells more than all others is left out, and they are tested.
 
         Args:
             base: columns beside them.
             columns: those tested.
         """
-        found, count = self._left_out(base, columns), len(columns)
-        if found.blocks <= count:
-            return 1.0
-        scale = np.sqrt(np.maximum(np.diag(found.covariance), 1e-300))
-        sizes = found.weights / scale
-        wald = sizes @ np.linalg.pinv(found.covariance / np.outer(scale, scale)) @ sizes
-        return float(f_distribution.sf(wald / count, count, found.blocks - count))
+        return left_out(self._undominated(base, columns)).chance()
 
-    def _left_out(self, base: Index, columns: Index, *, pairs: bool = False) -> LeftOut:
-        """Return what leaving out one block, or pair, at a time does to the weights of columns."""
+    def _undominated(self, base: Index, columns: Index) -> Array:
+        """Return products as `_beyond`, of all blocks but a dominant one if the others tell any."""
         parts = self._beyond(base, columns)
-        parts = paired(parts) if pairs else parts
-        whole, count = parts.sum(axis=0), len(columns)
-        inverse = _pseudo_inverse(whole[:-1, :-1])
-        told = np.einsum("ij,bji->bi", inverse, parts[:, :-1, :-1])
-        shares = told.sum(axis=1) / max(1, count)
-        heard = shares > _RANK
-        weights = inverse @ whole[:-1, -1]
-        others = whole - parts[heard]
-        without = np.einsum(
-            "bij,bj->bi",
-            np.linalg.pinv(others[:, :-1, :-1], rcond=_RANK, hermitian=True),
-            others[:, :-1, -1],
-        )
-        apart, blocks = without - weights, max(1, int(np.count_nonzero(heard)))
-        covariance = (blocks - 1) / blocks * apart.T @ apart
-        effective = 1.0 / np.maximum(np.sum(told**2, axis=0), _RANK)
-        return LeftOut(weights, covariance, 1.0 / max(float(np.sum(shares**2)), _RANK), effective)
+        most = dominant(parts)
+        if most is None:
+            return parts
+        others = self._beyond(base, columns, np.delete(np.arange(self.blocks), most))
+        tell = np.trace(others.sum(axis=0)[:-1, :-1]) > RANK
+        return others if tell else parts
 
-    def _beyond(self, base: Index, columns: Index) -> Array:
-        """Return each block's products of columns and target less what a base spans of them."""
+    def _beyond(self, base: Index, columns: Index, blocks: Index | None = None) -> Array:
+        """Return blocks' products of columns and target less what a base spans of them."""
         table = np.append(columns, len(self._whole) - 1)
-        inverse = _pseudo_inverse(self._whole[np.ix_(base, base)])
-        spanned = inverse @ self._whole[np.ix_(base, table)]
         both = np.concatenate([base, table])
+        products = self._of(both, both)
+        if blocks is not None:
+            products = products[blocks]
+        whole, own = products.sum(axis=0), slice(len(base))
+        spanned = pseudo_inverse(whole[own, own]) @ whole[own, len(base) :]
         turn = np.vstack([-spanned, np.eye(len(table))])
-        return np.asarray(turn.T @ self._of(both, both) @ turn)
+        return np.asarray(turn.T @ products @ turn)
 
     def squares_of(self, columns: Index) -> float:
         """Return Σ residual² after a fit of columns."""
@@ -343,12 +313,12 @@ class Sums:
         both = np.concatenate([base, wide])
 
         def left(by: Index) -> Array:
-            inverse = _pseudo_inverse(self._whole[np.ix_(by, by)])
+            inverse = pseudo_inverse(self._whole[np.ix_(by, by)])
             cross = self._whole[np.ix_(by, narrow)]
             spanned = np.einsum("ij,ik,kj->j", cross, inverse, cross)
             return np.asarray(np.diag(self._whole)[narrow] - spanned)
 
-        return np.asarray(1.0 - left(both) / np.maximum(left(base), _RANK))
+        return np.asarray(1.0 - left(both) / np.maximum(left(base), RANK))
 
     def left_from(self, base: Index, columns: Index) -> Array:
         """Return Σ residual² where `columns` act from each block on only, shape (blocks,)."""
@@ -357,10 +327,10 @@ class Sums:
         # What the columns meet from a block on, themselves, the base and the target.
         met = blocks[::-1].cumsum(axis=0)[::-1]
         crossed, products, told = met[:, :, : len(base)], met[:, :, own], met[:, :, -1]
-        turned = crossed @ _pseudo_inverse(self._whole[np.ix_(base, base)])
+        turned = crossed @ pseudo_inverse(self._whole[np.ix_(base, base)])
         products = products - turned @ crossed.transpose(0, 2, 1)
         told = told - turned @ self._whole[base, -1]
-        weights = np.linalg.pinv(products, rcond=_RANK, hermitian=True) @ told[..., None]
+        weights = np.linalg.pinv(products, rcond=RANK, hermitian=True) @ told[..., None]
         gained = np.einsum("bi,bi->b", told, weights[..., 0])
         return np.asarray(self.squares_of(base) - gained)
 
@@ -371,7 +341,7 @@ class Sums:
         return [self._whole - self._summed(everything, self._near(f)) for f in self._folds]
 
     def _weights(self, columns: Index, gram: Array) -> Array:
-        return np.asarray(_pseudo_inverse(gram[np.ix_(columns, columns)]) @ gram[columns, -1])
+        return np.asarray(pseudo_inverse(gram[np.ix_(columns, columns)]) @ gram[columns, -1])
 
 
 def _left(parts: Array, weights: Array) -> Array:
@@ -403,12 +373,3 @@ def paired(values: Array) -> Array:
     apart that both are not quite true.
     """
     return np.add.reduceat(values, np.arange(0, len(values), 2), axis=0)
-
-
-def _pseudo_inverse(gram: Array) -> Array:
-    """Return what `numpy.linalg.pinv` does of a symmetric matrix, in a third of its time."""
-    values, vectors = np.linalg.eigh(gram)
-    sizes = np.abs(values)
-    kept = sizes > _RANK * sizes.max(initial=0.0)
-    own = vectors[:, kept]
-    return np.asarray((own / values[kept]) @ own.T)

@@ -1,0 +1,89 @@
+"""What leaving out one block at a time does to the weights of columns."""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.stats import f as f_distribution
+
+Array = NDArray[np.float64]
+
+RANK = 1e-9
+# What tells more of the weights than all other blocks together shows once, whatever it shows.
+_DOMINANT = 0.5
+
+
+class LeftOut(NamedTuple):
+    """What leaving out one block at a time does to weights, of columns of length 1.
+
+    Attributes:
+        weights: from all blocks, shape (m,).
+        covariance: of the weights, shape (m, m).
+        blocks: effective number of blocks that tell all of them.
+        blocks_of: those that tell each weight, shape (m,).
+        shares: of what is told, by block, shape (blocks,).
+    """
+
+    weights: Array
+    covariance: Array
+    blocks: float
+    blocks_of: Array
+    shares: Array
+
+    def chance(self) -> float:
+        """Return the probability of weights as large by chance, by Wald's test."""
+        count = len(self.weights)
+        if self.blocks <= count:
+            return 1.0
+        scale = np.sqrt(np.maximum(np.diag(self.covariance), 1e-300))
+        sizes = self.weights / scale
+        wald = sizes @ np.linalg.pinv(self.covariance / np.outer(scale, scale)) @ sizes
+        return float(f_distribution.sf(wald / count, count, self.blocks - count))
+
+
+def left_out(parts: Array) -> LeftOut:
+    """Return how the weights scatter (Bell and McCaffrey, Surv. Methodol. 28(2), 2002).
+
+    Args:
+        parts: each block's products of columns and target, shape (blocks, m + 1, m + 1).
+    """
+    whole, count = parts.sum(axis=0), parts.shape[1] - 1
+    inverse = pseudo_inverse(whole[:-1, :-1])
+    told = np.einsum("ij,bji->bi", inverse, parts[:, :-1, :-1])
+    shares = told.sum(axis=1) / max(1, count)
+    heard = shares > RANK
+    weights = inverse @ whole[:-1, -1]
+    others = whole - parts[heard]
+    without = np.einsum(
+        "bij,bj->bi",
+        np.linalg.pinv(others[:, :-1, :-1], rcond=RANK, hermitian=True),
+        others[:, :-1, -1],
+    )
+    apart, blocks = without - weights, max(1, int(np.count_nonzero(heard)))
+    covariance = (blocks - 1) / blocks * apart.T @ apart
+    effective = 1.0 / np.maximum(np.sum(told**2, axis=0), RANK)
+    return LeftOut(
+        weights, covariance, 1.0 / max(float(np.sum(shares**2)), RANK), effective, shares
+    )
+
+
+def dominant(parts: Array) -> int | None:
+    """Return which block tells more of the weights than all others, None where none does.
+
+    A violent start tells nearly all of a recording's speeds; that what it shows goes on afterwards
+    is seen only without it.
+    """
+    shares = left_out(parts).shares
+    most = int(np.argmax(shares))
+    return most if shares[most] > _DOMINANT else None
+
+
+def pseudo_inverse(gram: Array) -> Array:
+    """Return what `numpy.linalg.pinv` does of a symmetric matrix, in a third of its time."""
+    values, vectors = np.linalg.eigh(gram)
+    sizes = np.abs(values)
+    kept = sizes > RANK * sizes.max(initial=0.0)
+    own = vectors[:, kept]
+    return np.asarray((own / values[kept]) @ own.T)

@@ -302,3 +302,16 @@ def absorbed_share(
     }
     signature, column = columns[number]
     return [float(share) for share in np.sum(signature * column, 0) / np.sum(column**2, 0)]
+
+
+def likeness(phenomenon: str, scenes: Sequence[Scene], machine: Testbed) -> list[float]:
+    """Return how much of the catalogue's parameter a unit of a phenomenon is, (n,).
+
+    Where the forms differ that is what least squares give in a run without it; 1 where they do not.
+    """
+    column = PHENOMENA[phenomenon].column
+    if column is None:
+        return [1.0] * len(machine.cables)
+    shaft, _, _ = signatures(PHENOMENA[phenomenon], scenes, machine, stiffnesses(scenes, machine))
+    columns = np.array([column(scene) for scene in scenes])
+    return [float(share) for share in np.sum(shaft * columns, 0) / np.sum(columns**2, 0)]

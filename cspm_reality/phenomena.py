@@ -62,7 +62,7 @@ _WINCHES = (
     ),
     Phenomenon(
         "grease", "winch_viscous_friction", "winch", "coefficient",
-        unit=1e-4, influence=_plain(shaft.GreaseDrag),
+        unit=1e-4, influence=_plain(shaft.GreaseDrag), column=lambda scene: -scene.speeds,
     ),
     Phenomenon(
         "cogging", "winch_torque_ripple", "winch", "amplitude", unit=1e-3,

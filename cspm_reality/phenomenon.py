@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from cspm_msgs_py.testbed import Testbed
-from cspm_mujoco.influence import Influence
+from cspm_mujoco.influence import Influence, Scene
 from cspm_reality.sensors import Fault
 
 Array = NDArray[np.float64]
@@ -29,6 +29,8 @@ class Phenomenon:
         block: where it is.
         parameter: the catalogue's parameter that the amount is; None where the forms differ too
             much for a comparison.
+        column: torque on the shafts (n,) [N·m] that a unit of the parameter gives in the
+            catalogue's form; None: the amount is the parameter.
         at: what the amount is per, `CABLES` or `BAR`.
         unit: an amount of usual size, for what is not quite in proportion to it.
         influence: from amounts (n,) or (1,), machine and noise to the physics.
@@ -44,6 +46,7 @@ class Phenomenon:
     effect: str | None
     block: str
     parameter: str | None
+    column: Callable[[Scene], Array] | None = None
     at: str = CABLES
     unit: float = 1.0
     influence: Callable[[Array, Testbed, np.random.Generator], Influence] | None = None

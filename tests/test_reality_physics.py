@@ -9,11 +9,18 @@ pytest.importorskip("mujoco", minversion="4.0", reason="the MuJoCo plant needs M
 from cspm_msgs_py.testbed import load_testbed
 from cspm_mujoco.influence import Acting, Scene
 from cspm_reality import air, alterations, faults, friction, payload, rope, shaft
+from cspm_reality.detection_limit import likeness
 from cspm_reality.late import Late, LateFault
 
 MS = 1e-3
-THESIS = Path(__file__).resolve().parents[1] / "scenarios/testbeds/thesis.yaml"
+TESTBEDS = Path(__file__).resolve().parents[1] / "scenarios/testbeds"
+THESIS = TESTBEDS / "thesis.yaml"
 EXIT, END = np.array([[0.0, 0.0, 0.0]]), np.array([[0.0, 0.0, 2.0]])
+
+
+@pytest.fixture(scope="module")
+def one_winch():
+    return load_testbed(TESTBEDS / "one_winch.yaml").testbed
 
 
 def scene(time=0.0, angle=0.0, speed=0.0, tension=5.0, length=2.0, body=None, torque=0.0):
@@ -231,3 +238,21 @@ def test_a_bar_is_changed_in_the_numbers_that_are_meant():
     rig = load_testbed(THESIS.with_name("one_winch.yaml")).testbed
     assert alterations.harder_to_turn(rig, np.ones(1)) is rig
     assert alterations.off_centre(rig, np.ones(1)) is rig
+
+
+@pytest.mark.parametrize(("speed", "share"), [(1e-3, 1.0), (20.0, 2.0**-0.1), (180.0, 0.1**0.1)])
+def test_thinned_grease_is_less_of_a_straight_line_the_faster_it_is(one_winch, speed, share):
+    there_and_back = [scene(speed=side * speed) for side in (1.0, -1.0, 1.0)]
+    assert likeness("grease", there_and_back, one_winch) == pytest.approx([share], rel=1e-4)
+
+
+def test_what_has_the_catalogues_form_is_its_parameter(one_winch):
+    assert likeness("bristles", [scene(speed=3.0)] * 3, one_winch) == [1.0]
+
+
+def test_a_straight_line_is_fitted_where_the_motion_is(one_winch):
+    """By least squares: Σ thinned·q̇ over Σ q̇²."""
+    speeds = np.array([1.0, -5.0, 30.0, 100.0])
+    thinned = speeds / (1.0 + abs(speeds) / 20.0) ** 0.1
+    found = likeness("grease", [scene(speed=speed) for speed in speeds], one_winch)
+    assert found == pytest.approx([thinned @ speeds / (speeds @ speeds)])

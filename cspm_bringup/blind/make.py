@@ -10,7 +10,7 @@ from concurrent.futures import FIRST_COMPLETED, Future, ProcessPoolExecutor, wai
 from dataclasses import dataclass
 from multiprocessing import get_context
 from pathlib import Path
-from typing import Any
+from typing import Any, NamedTuple
 
 from cspm_bringup.blind.concealed_run import believed, machine_of, record_concealed, watch
 from cspm_bringup.blind.item import Item, amounts_of, draw_items, truth_of
@@ -18,7 +18,7 @@ from cspm_bringup.blind.jobs import jobs_of
 from cspm_bringup.blind.strata import STRATA
 from cspm_bringup.blind.truth import RECORDINGS, SCHEMA, SPLITS, truth_sha256
 from cspm_msgs_py.errors import DivergenceError, InputError
-from cspm_reality.detection_limit import absorbed_share, detection_limits
+from cspm_reality.detection_limit import absorbed_share, detection_limits, likeness
 from cspm_reality.phenomena import PHENOMENA
 from cspm_reality.reality import conceal
 from cspm_reality.sensors import QUALITIES, REAL
@@ -32,7 +32,6 @@ _TOLD = ("seed", "count", "split", "duration", "sensors")
 _ONE_DATE = 1_000_000_000  # of all files, so that it tells no order [s]
 
 Amounts = Mapping[str, Sequence[float]]
-Limits = Mapping[str, Mapping[str, Sequence[float]]]
 Tell = Callable[[str, int, int], None]
 
 
@@ -157,43 +156,70 @@ def _items(request: Request) -> list[Item]:
 def _write_truth(request: Request, tell: Tell) -> None:
     """Fix the limits and the truth before anything is recorded."""
     items = _items(request)
-    limits, shares = _blank_runs(items, request.duration, tell)
+    blank = _blank_runs(items, request.duration, tell)
     told = []
     for item in items:
         machine = machine_of(item.scenario)
-        amounts = amounts_of(item, limits[item.scenario], len(machine.cables))
-        amounts |= _absorbed(item, amounts, shares)
-        told.append({**truth_of(item, amounts, machine), "amounts": amounts})
-    content = {"schema": SCHEMA, "asked": request.told(), "limits": limits, "items": told}
+        amounts = amounts_of(item, blank.limits[item.scenario], len(machine.cables))
+        amounts |= _absorbed(item, amounts, blank.shares)
+        told.append({**truth_of(item, blank.likened(item, amounts), machine), "amounts": amounts})
+    content = {"schema": SCHEMA, "asked": request.told(), "limits": blank.limits, "items": told}
     request.truth.parent.mkdir(parents=True, exist_ok=True)
     part = request.truth.with_suffix(".part")
     part.write_text(json.dumps(content, indent=1, ensure_ascii=False), encoding="utf-8")
     part.replace(request.truth)
 
 
-def _blank_runs(
-    items: Sequence[Item], duration: float, tell: Tell
-) -> tuple[Limits, Mapping[tuple[str, str, str], list[float]]]:
-    """Return detection limits by scenario, and what numbers absorb by scenario and both names."""
+class _Blank(NamedTuple):
+    """What runs without any phenomenon tell.
+
+    Attributes:
+        limits: detection limits by scenario and phenomenon.
+        shares: what numbers absorb, by scenario, phenomenon and number.
+        likeness: what a unit of a phenomenon is of the catalogue's parameter, by scenario and name.
+    """
+
+    limits: dict[str, Mapping[str, Sequence[float]]]
+    shares: dict[tuple[str, str, str], Sequence[float]]
+    likeness: dict[tuple[str, str], Sequence[float]]
+
+    def likened(self, item: Item, amounts: Amounts) -> dict[str, list[float]]:
+        """Return amounts as the catalogue's parameters."""
+        return {
+            name: [
+                amount * like
+                for amount, like in zip(
+                    amounts[name], self.likeness[item.scenario, name], strict=False
+                )
+            ]
+            for name in {each.phenomenon for each in item.concealed}
+        }
+
+
+def _blank_runs(items: Sequence[Item], duration: float, tell: Tell) -> _Blank:
     scenarios = sorted({item.scenario for item in items})
-    pairs = {
-        (item.scenario, each.phenomenon, item.case.absorbed_by)
-        for item in items
-        for each in item.concealed
+    concealed = {(item, each.phenomenon) for item in items for each in item.concealed}
+    names = {(item.scenario, name) for item, name in concealed}
+    numbers = {
+        (item.scenario, name, item.case.absorbed_by)
+        for item, name in concealed
         if item.case.absorbed_by
     }
-    limits, shares = {}, {}
+    blank = _Blank({}, {}, {})
     for done, scenario in enumerate(scenarios):
         tell(f"detection limits in {scenario}", done, len(scenarios))
         bundle = believed(scenario, duration, _BLANK_SEED)
         machine = bundle.testbed.testbed
         scenes = watch(bundle, conceal(machine, {}, 0.0, _BLANK_SEED), SEARCHED_SHARE * duration)
-        limits[scenario] = detection_limits(scenes, machine)
-        for name, phenomenon, number in pairs:
-            if name == scenario:
-                key = (name, phenomenon, number)
-                shares[key] = absorbed_share(phenomenon, number, scenes, machine)
-    return limits, shares
+        blank.limits[scenario] = detection_limits(scenes, machine)
+        for where, name in names:
+            if where == scenario:
+                blank.likeness[scenario, name] = likeness(name, scenes, machine)
+        for where, name, number in numbers:
+            if where == scenario:
+                key = (scenario, name, number)
+                blank.shares[key] = absorbed_share(name, number, scenes, machine)
+    return blank
 
 
 def _absorbed(

@@ -150,6 +150,18 @@ def test_intervals_hold_for_coloured_noise():
     assert 178 <= inside <= 200
 
 
+def test_intervals_hold_for_what_wanders_for_longer_than_blocks():
+    """A constant beside a wind of 3 s in pairs of 2 s, 24 s long: 65 % if pairs were apart."""
+    inside = 0
+    for seed in range(200):
+        equation = made(seed, (0.0, 0.0, 0.0), colour=1.0 - STEP / 3.0)[0]
+        steady = replace(equation, columns=equation.columns | {FIRST: np.ones((ROWS, 1, 1))})
+        sums = sums_of(steady)[1]
+        own = np.arange(3)
+        inside += abs(sums.weights(own)[0]) <= sums.half_width(own[1:], own[:1])[0]
+    assert 170 <= inside <= 200
+
+
 def test_an_onset_leaves_least_where_it_is():
     equation = made(weights=(3.0, 0.0, 0.0), start=ROWS // 2)[0]
     sums = sums_of(equation)[1]

@@ -13,6 +13,8 @@ Array = NDArray[np.float64]
 RANK = 1e-9
 # What tells more of the weights than all other blocks together shows once, whatever it shows.
 _DOMINANT = 0.5
+# Few blocks tell no longer memory than this.
+_MOST_ALIKE = 0.8
 
 
 class LeftOut(NamedTuple):
@@ -24,6 +26,7 @@ class LeftOut(NamedTuple):
         blocks: effective number of blocks that tell all of them.
         blocks_of: those that tell each weight, shape (m,).
         shares: of what is told, by block, shape (blocks,).
+        alike: correlation of what two blocks in turn do to each weight, 0 where it is less, (m,).
     """
 
     weights: Array
@@ -31,6 +34,18 @@ class LeftOut(NamedTuple):
     blocks: float
     blocks_of: Array
     shares: Array
+    alike: Array
+
+    def spread(self) -> tuple[Array, Array]:
+        """Return standard errors (m,) and their degrees of freedom (m,), blocks being alike.
+
+        As of a process of first order, whose mean scatters (1 + ρ)/(1 − ρ) times as much as that of
+        independent blocks: a wind that wanders for seconds is met in few states by a short
+        recording.
+        """
+        more = (1.0 + self.alike) / (1.0 - self.alike)
+        errors = np.sqrt(np.maximum(np.diag(self.covariance), 1e-300) * more)
+        return errors, self.blocks_of / more - 1.0
 
     def chance(self) -> float:
         """Return the probability of weights as large by chance, by Wald's test."""
@@ -64,9 +79,14 @@ def left_out(parts: Array) -> LeftOut:
     apart, blocks = without - weights, max(1, int(np.count_nonzero(heard)))
     covariance = (blocks - 1) / blocks * apart.T @ apart
     effective = 1.0 / np.maximum(np.sum(told**2, axis=0), RANK)
-    return LeftOut(
-        weights, covariance, 1.0 / max(float(np.sum(shares**2)), RANK), effective, shares
-    )
+    together = 1.0 / max(float(np.sum(shares**2)), RANK)
+    return LeftOut(weights, covariance, together, effective, shares, _alike(apart))
+
+
+def _alike(apart: Array) -> Array:
+    """Return the correlation of rows (blocks, m) with the next, from 0 to `_MOST_ALIKE`."""
+    squares = np.maximum(np.sum(apart**2, axis=0), 1e-300)
+    return np.clip(np.sum(apart[1:] * apart[:-1], axis=0) / squares, 0.0, _MOST_ALIKE)
 
 
 def dominant(parts: Array) -> int | None:

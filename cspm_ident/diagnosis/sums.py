@@ -258,14 +258,12 @@ class Sums:
     def half_width(self, base: Index, columns: Index) -> Array:
         """Return half the widths of 95 % intervals of the weights of columns beside a base.
 
-        From pairs of blocks, for what a model leaves is alike for longer than a block. Infinite
-        where a single pair tells a weight.
+        From pairs of blocks, for what a model leaves is alike for longer than a block, and by what
+        pairs in turn have in common. Infinite where a single pair tells a weight.
         """
-        found = left_out(paired(self._beyond(base, columns)))
-        free = found.blocks_of - 1.0
+        errors, free = left_out(paired(self._beyond(base, columns))).spread()
         factor = np.full(len(free), np.inf)
         factor[free > _ALONE] = t_distribution.ppf(0.975, free[free > _ALONE])
-        errors = np.sqrt(np.maximum(np.diag(found.covariance), 1e-300))
         return np.asarray(factor * errors / self._lengths[columns])
 
     def p_value(self, base: Index, columns: Index) -> float:

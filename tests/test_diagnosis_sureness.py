@@ -140,3 +140,16 @@ def test_a_finding_whose_amount_drifts_is_doubtful(amount, told):
     assert any(named.hypothesis.effect is DRY for named in found.named)
     time = Driver(Place(Channel.SHAFT, "one"), "time [s]")
     assert (time in [driver for driver, _, _ in found.unknown]) is told
+
+
+@pytest.mark.parametrize(("height", "told"), [(0.0, False), (0.5, False), (3.0, True)])
+def test_what_shows_once_is_unknown_and_not_consistent(height, told):
+    """A jerk of 40 ms: unknown where it leaves more than all other blocks, 0.05 N·m of noise."""
+    (equation, _) = winches(0.0)
+    dry = 0.3 * equation.columns[Candidate(DRY, "one")][:, 0]
+    jerk = height * (np.arange(ROWS) // 4 == 30)[:, None]
+    target = equation.target - dry + jerk
+    columns = equation.columns | Knots().columns(equation.place, {"time [s]": equation.times})
+    found = Search(gather([[replace(equation, target=target, columns=columns)]], BLOCK_S)).run()
+    assert not found.named
+    assert [driver.signal for driver, _, _ in found.unknown] == ["time [s]"] * told

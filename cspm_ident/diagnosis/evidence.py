@@ -90,6 +90,15 @@ class Evidence:
             found[place.place] = float(vector @ place.whole @ vector)
         return found
 
+    def left_by_block(self, columns: Index, weights: Array) -> dict[Place, Array]:
+        """Return Σ residual² of each place's blocks (blocks,) for some columns' weights."""
+        full = np.zeros(self.width)
+        full[columns] = weights
+        return {
+            place.place: _squares(place.grams, np.append(full[place.columns], -1.0))
+            for place in self.places
+        }
+
     def left_with(
         self, weights: Mapping[Candidate, Array] | Mapping[Candidate | Driver, Array]
     ) -> dict[Place, float]:
@@ -140,6 +149,10 @@ class Evidence:
     def blocks(self) -> int:
         """Number of blocks."""
         return len(self.times)
+
+
+def _squares(grams: Array, vector: Array) -> Array:
+    return np.asarray(np.einsum("i,bij,j->b", vector, grams, vector))
 
 
 def silence(grams: Array, columns: Index, block: int) -> None:

@@ -12,7 +12,7 @@ Array = NDArray[np.float64]
 
 RANK = 1e-9
 # What tells more of the weights than all other blocks together shows once, whatever it shows.
-_DOMINANT = 0.5
+DOMINANT = 0.5
 # Few blocks tell no longer memory than this.
 _MOST_ALIKE = 0.8
 
@@ -86,7 +86,8 @@ def left_out(parts: Array) -> LeftOut:
 def _alike(apart: Array) -> Array:
     """Return the correlation of rows (blocks, m) with the next, from 0 to `_MOST_ALIKE`."""
     squares = np.maximum(np.sum(apart**2, axis=0), 1e-300)
-    return np.clip(np.sum(apart[1:] * apart[:-1], axis=0) / squares, 0.0, _MOST_ALIKE)
+    alike = np.sum(apart[1:] * apart[:-1], axis=0) / squares
+    return np.asarray(np.clip(alike, 0.0, _MOST_ALIKE))
 
 
 def dominant(parts: Array) -> int | None:
@@ -97,7 +98,7 @@ def dominant(parts: Array) -> int | None:
     """
     shares = left_out(parts).shares
     most = int(np.argmax(shares))
-    return most if shares[most] > _DOMINANT else None
+    return most if shares[most] > DOMINANT else None
 
 
 def pseudo_inverse(gram: Array) -> Array:

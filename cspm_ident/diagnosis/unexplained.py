@@ -10,13 +10,17 @@ from numpy.typing import NDArray
 from cspm_ident.diagnosis.drivers import Driver
 from cspm_ident.diagnosis.evidence import Evidence
 from cspm_ident.diagnosis.hypothesis import DOUBTFUL_SHARE, Hypothesis, Unknown
+from cspm_ident.diagnosis.left_out import DOMINANT
 from cspm_ident.diagnosis.likeness import UNTRUE_SHARE
-from cspm_ident.diagnosis.sums import Sums
+from cspm_ident.diagnosis.sums import Gain, Sums
 from cspm_ident.diagnosis.sureness import FALSE_ALARMS, Sureness
 
 Index = NDArray[np.intp]
 
 UNKNOWN_SHARE = 0.15
+# Of fewer blocks one may well hold half.
+_BLOCKS = 8
+_LEAST = 1e-300
 
 
 def unexplained(
@@ -35,7 +39,23 @@ def unexplained(
             if share >= UNKNOWN_SHARE and gain.total > _untold(evidence, sums, chosen, driver):
                 found[driver] = driver, gain, share
     found |= {each[0]: each for each in _drifting(evidence, sums, sureness, chosen)}
+    found |= {each[0]: each for each in _once(evidence, sums, base)}
     return tuple(sorted(found.values(), key=lambda each: -each[1].total))
+
+
+def _once(evidence: Evidence, sums: Sums, base: Index) -> Iterator[Unknown]:
+    """Yield functions of time of residuals that are left in one block more than in all others.
+
+    What shows once has no other block to be tested on, but is not consistent for that.
+    """
+    for place, squares in evidence.left_by_block(base, sums.weights(base)).items():
+        most = float(squares.max(initial=0.0))
+        share = most / max(float(squares.sum()), _LEAST)
+        drivers = [d for d in evidence.terms if isinstance(d, Driver) and d.place == place]
+        gains = {d: sums.gain_within(base, evidence.columns_of([d])) for d in drivers if d.of_time}
+        if gains and len(squares) >= _BLOCKS and share > DOMINANT:
+            excess = most - float(np.median(squares))
+            yield max(gains, key=lambda d: gains[d].total), Gain(excess, excess), share
 
 
 def _untold(evidence: Evidence, sums: Sums, chosen: Sequence[Hypothesis], driver: Driver) -> float:

@@ -6,15 +6,21 @@ from collections.abc import Callable, Mapping
 from typing import NamedTuple
 
 from bench.result_cases import (
+    ADAPTED,
+    AHEAD,
     AT_FOUR_METRES,
     BEYOND,
     CAUSES,
     CORNERS,
+    DESIGNED_THERE,
+    FRICTION,
     LIMITED,
+    MASSES,
     PAST,
     POSSIBLE,
     PROFILES,
     ROUGH_CORNERS,
+    SIX,
     SWITCHED,
     SWITCHED_4M,
     SWITCHED_CALM,
@@ -24,6 +30,7 @@ from bench.result_cases import (
     changed,
     corrected,
     seeded,
+    with_and_without,
 )
 from bench.result_measures import bands, limit, moved_on, past_thesis, possible, tracking
 from bench.result_store import Measurement
@@ -34,6 +41,7 @@ from bench.result_tables import (
     extremes_block,
     limit_block,
     past_block,
+    past_six_block,
     thesis_block,
     tracking_block,
 )
@@ -70,15 +78,19 @@ def blocks_of(seeds: int) -> dict[str, Block]:
         "at_four_metres": _tracked("beyond", AT_FOUR_METRES),
         "corners": _tracked("corners", CORNERS),
         "rough_corners": _tracked("rough corners", ROUGH_CORNERS, extremes_block),
+        "designed_there": _tracked("designed there", DESIGNED_THERE, extremes_block),
+        "friction": _tracked("friction", with_and_without(FRICTION, AHEAD, "fed forward")),
         "limit": Block({name: _limit(name, case) for name, case in LIMITED.items()}, limit_block),
         "possible": _possible(),
         "robust": _tracked("robust", changed(PAST)),
         "moved_on": _moved_on(),
         "told": _tracked("told", TOLD_OF),
         "corrected": _tracked("corrected", corrected()),
+        "adapted": _tracked("adapted", with_and_without(MASSES, ADAPTED, "told from its heave")),
         "robust_thesis": _tracked("robust thesis", changed("worst_case")),
         "past": _past("1000 Hz", seeds),
         "past_100": _past("100 Hz", seeds),
+        "past_six": _past_six(seeds),
     }
 
 
@@ -128,3 +140,11 @@ def _past(profile: str, seeds: int) -> Block:
             f"past {profile} {name}", past_thesis, (case,), needs=(before,)
         )
     return Block(measurements, past_block)
+
+
+def _past_six(seeds: int) -> Block:
+    measurements = {}
+    for name, case in seeded(seeds, (), SIX).items():
+        before = _limit(f"six {name}", case)
+        measurements[name] = Measurement(f"past six {name}", past_thesis, (case,), needs=(before,))
+    return Block(measurements, past_six_block)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
+from dataclasses import replace
 
 from bench.tracking import Case
 
@@ -179,6 +180,14 @@ ROUGH_CORNERS = {
     )
     for (name, place), tenths in zip(PLACES.items(), (10, 3, 3, 1, 7, 5, 4), strict=True)
 }
+# As above, but with the force controllers designed where the bar is instead of at 2 m.
+DESIGNED_THERE = {
+    name: replace(
+        case,
+        overrides=(*case.overrides, f"control.motion.design_pose={place}"),
+    )
+    for (name, case), place in zip(ROUGH_CORNERS.items(), PLACES.values(), strict=True)
+}
 LIMITED = {
     "worst case": Case("worst_case"),
     "worst case, all six coordinates": Case(SIX),
@@ -238,15 +247,62 @@ TOLD_OF = {
 }
 TOLD = "control.force.load_cell_bias={largest: 2.0}"
 
+# Dry friction [N·m] and viscous friction [N·m·s/rad] of every motor, and dry friction as a share of
+# the load's torque.
+DRY_10: Effects = (("winch_coulomb_friction", (), {"torque": 0.01}),)
+DRY_30: Effects = (("winch_coulomb_friction", (), {"torque": 0.03}),)
+VISCOUS: Effects = (("winch_viscous_friction", (), {"coefficient": 1e-4}),)
+OF_LOAD: Effects = (("winch_load_friction", (), {"coefficient": 0.2}),)
+SLOW_FORCE = "control.force.bandwidth=200"
+FRICTION = {
+    "dry friction 10 mN·m": Case(PAST, (SHORT,), DRY_10),
+    "dry friction 30 mN·m": Case(PAST, (SHORT,), DRY_30),
+    "dry friction 30 mN·m, 100 Hz": Case(PAST, (SHORT, *CAMERA_100_HZ), DRY_30),
+    "dry friction 20 % of the load": Case(PAST, (SHORT,), OF_LOAD),
+    "dry friction 10 mN·m, viscous 0.1 mN·m·s": Case(PAST, (SHORT,), DRY_10 + VISCOUS),
+    "dry friction 10 mN·m, force controllers at 200 rad/s": Case(PAST, (SHORT, SLOW_FORCE), DRY_10),
+    "dry friction 10 mN·m, the thesis's controllers": Case("worst_case", (SHORT,), DRY_10),
+}
+AHEAD = "control.force.friction_feedforward={}"
+HEAVY: Effects = (("bar_mass", (), {"mass": 0.812}),)
+LIGHT: Effects = (("bar_mass", (), {"mass": -0.812}),)
+PULLED: Effects = (
+    (
+        "bar_constant_wrench",
+        (),
+        {"surge": 0.0, "sway": 0.0, "heave": 4.0, "roll": 0.0, "pitch": 0.0, "yaw": 0.0},
+    ),
+)
+MASSES = {
+    "nothing": Case(PAST, (HALF,)),
+    "bar's mass +20 %": Case(PAST, (HALF,), HEAVY),
+    "bar's mass −20 %": Case(PAST, (HALF,), LIGHT),
+    "bar's mass +20 %, 100 Hz": Case(PAST, (HALF, *CAMERA_100_HZ), HEAVY),
+    "bar's mass +20 %, all six coordinates": Case(SIX, (HALF,), HEAVY),
+    "steady force of 4 N downwards": Case(PAST, (HALF,), PULLED),
+}
+ADAPTED = "control.motion.mass_adaptation={}"
+
+
+def with_and_without(cases: Mapping[str, Case], option: str, said: str) -> dict[str, Case]:
+    """Return each case, and after it the same with an option."""
+    found = {}
+    for name, case in cases.items():
+        found[name] = case
+        found[f"{name}, {said}"] = replace(case, overrides=(*case.overrides, option))
+    return found
+
 
 def corrected() -> dict[str, Case]:
     """Return the worst case past the thesis with load cells that are off, and corrected."""
     return {name: Case(PAST, (ROBUST, TOLD), effects) for name, effects in CORRECTED.items()}
 
 
-def seeded(seeds: int, profile: tuple[str, ...]) -> dict[str, Case]:
-    """Return the worst case past the thesis with each of so many seeds and one motion capture."""
-    return {f"seed {seed}": Case(PAST, (f"seed={seed}", *profile)) for seed in range(1, seeds + 1)}
+def seeded(seeds: int, profile: tuple[str, ...], scenario: str = PAST) -> dict[str, Case]:
+    """Return a worst case with each of so many seeds and one motion capture."""
+    return {
+        f"seed {seed}": Case(scenario, (f"seed={seed}", *profile)) for seed in range(1, seeds + 1)
+    }
 
 
 def changed(scenario: str) -> dict[str, Case]:

@@ -10,17 +10,24 @@ from numba import njit
 from numpy.typing import NDArray
 
 from cspm_control.bar_dynamics import (
+    GRAVITY,
+    MASS,
     acceleration_from,
     bar_parameters,
     wanted_motion,
     wrench_for,
 )
+from cspm_control.mass_observer import MassObserver
 from cspm_control.tension_distribution import TensionDistribution, fill_structure
 from cspm_msgs_py.dofs import DOFS, Dof
 from cspm_msgs_py.testbed import Testbed
 from cspm_sim.kernels.rotation import euler_from_quaternion
 
 Array = NDArray[np.float64]
+
+HEAVE = DOFS.index("heave")
+# Rows of the observer's memory.
+UNEXPLAINED, EXPECTED = 2, 3
 
 
 class ComputedWrench:
@@ -47,6 +54,7 @@ class ComputedWrench:
         steps_per_pose: int,
         pose_age: float = 0.0,
         known_wrench: Sequence[float] = (0.0,) * 6,
+        mass: MassObserver | None = None,
     ) -> None:
         """Make the controller for a test-bed with a bar.
 
@@ -59,6 +67,7 @@ class ComputedWrench:
             steps_per_pose: steps from one pose to the next, ≥ 1.
             pose_age: how old a pose is when it is new here [s].
             known_wrench: constant wrench (6,) on the bar from outside [N, N·m], in world_ned.
+            mass: what tells the bar's mass; None: it is the nominal one.
         """
         assert testbed.bar is not None
         self._gains = np.zeros((6, 2))
@@ -66,7 +75,7 @@ class ComputedWrench:
             self._gains[DOFS.index(name)] = frequency**2, 2.0 * frequency
         self._bar = bar_parameters(testbed.bar, testbed.gravity)
         self._distribution = distribution
-        self._known_wrench = np.array(known_wrench, dtype=float)
+        self._known_wrench, self._mass = np.array(known_wrench, dtype=float), mass
         self._observer = _observer_gains(observer_bandwidth, period * steps_per_pose, pose_age)
         self._period, self._pose_age = period, pose_age
         self._last_pose = np.full(7, np.nan)
@@ -74,9 +83,16 @@ class ComputedWrench:
         self._memory, self._wanted = np.zeros((5, 6)), np.empty((3, 6))
         self._started = False
 
+    @property
+    def adapted_mass(self) -> float | None:
+        """The mass that the bar is told to have [kg], None where it is not asked for."""
+        return None if self._mass is None else float(self._bar[MASS])
+
     def restart(self) -> None:
         """Let the next wrench be the one that follows the reference, whatever the error."""
         self._started = False
+        if self._mass is not None:
+            self._mass.restart()
 
     def step(
         self,
@@ -126,7 +142,21 @@ class ComputedWrench:
             self._known_wrench,
             self._memory,
         )
+        if self._mass is not None:
+            self._adapt(self._mass)
         return wrench
+
+    def _adapt(self, mass: MassObserver) -> None:
+        """Take the mass that the last step tells, for the next one."""
+        bar, memory = self._bar, self._memory
+        given = self._wanted[2, HEAVE] - memory[EXPECTED, HEAVE]
+        lift = bar[GRAVITY] - given
+        mass.step(bar[MASS] * lift, lift + memory[UNEXPLAINED, HEAVE])
+        # What the mass explains from now on is no longer unexplained.
+        explained = lift * (bar[MASS] / mass.mass - 1.0)
+        memory[EXPECTED, HEAVE] += explained
+        memory[UNEXPLAINED, HEAVE] -= explained
+        bar[MASS] = mass.mass
 
 
 def _observer_gains(bandwidth: float, period: float, age: float) -> Array:

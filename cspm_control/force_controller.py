@@ -35,7 +35,7 @@ class ForceController:
         self._radii = radii
         self._limits = torque_limits
         self._period = period
-        self._integral = np.zeros(len(radii))
+        self._integral, self._nothing = np.zeros(len(radii)), np.zeros(len(radii))
         self._started = False
         self.saturated = 0
 
@@ -43,17 +43,20 @@ class ForceController:
         """Let the next output balance the measured tension again."""
         self._started = False
 
-    def step(self, wanted: Array, measured: Array) -> Array:
+    def step(self, wanted: Array, measured: Array, ahead: Array | None = None) -> Array:
         """Return motor torques (n,) [N·m] for wanted and measured tensions (n,) [N].
 
-        `saturated` then says how many torques stand at their limit.
+        `ahead` (n,) [N·m] is fed forward. `saturated` then says how many torques stand at their
+        limit.
         """
+        ahead = self._nothing if ahead is None else ahead
         if not self._started:
-            self._integral[:] = self._radii * measured - self._gains[:, 0] * (wanted - measured)
+            proportional = self._gains[:, 0] * (wanted - measured)
+            self._integral[:] = self._radii * measured - proportional - ahead
             self._started = True
         torque = np.empty(len(wanted))
         self.saturated = _pi(
-            wanted, measured, self._gains, self._limits, self._period, self._integral, torque
+            wanted, measured, ahead, self._gains, self._limits, self._period, self._integral, torque
         )
         return torque
 
@@ -62,6 +65,7 @@ class ForceController:
 def _pi(
     wanted: Array,
     measured: Array,
+    ahead: Array,
     gains: Array,
     limits: Array,
     period: float,
@@ -71,7 +75,7 @@ def _pi(
     saturated = 0
     for i in range(wanted.shape[0]):
         error = wanted[i] - measured[i]
-        torque = gains[i, 0] * error + integral[i]
+        torque = gains[i, 0] * error + integral[i] + ahead[i]
         out[i] = min(limits[i], max(-limits[i], torque))
         if out[i] != torque:
             saturated += 1

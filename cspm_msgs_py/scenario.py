@@ -116,14 +116,20 @@ class Governor(StrictModel):
     reserve: NonNegativeFloat = 0.2
 
 
+class MassAdaptation(StrictModel):
+    """Up to what share of itself the bar's mass may be wrong."""
+
+    largest: Annotated[float, Field(gt=0.0, lt=1.0)] = 0.5
+
+
 class ComputedWrenchControl(StrictModel):
     """Inverse dynamics of the bar with an observer of its pose error.
 
     `bandwidth` [rad/s] is that of the error's dynamics per controlled DOF, `observer_bandwidth`
     [rad/s] that of the observer. With a `governor` the bar leaves its reference, ahead of time and
     as little as can be, where no tensions can give it. `known_wrench` [N, N·m] is a constant one on
-    the bar's origin in world_ned, such as wind that was measured. The force controllers are
-    designed at `design_pose`.
+    the bar's origin in world_ned, such as wind that was measured. With `mass_adaptation` the bar's
+    mass is told from its heave. The force controllers are designed at `design_pose`.
     """
 
     law: Literal["computed_wrench"]
@@ -137,6 +143,7 @@ class ComputedWrenchControl(StrictModel):
     observer_bandwidth: PositiveFloat = 40.0
     governor: Governor | None = None
     known_wrench: Wrench = ORIGIN
+    mass_adaptation: MassAdaptation | None = None
     design_pose: Pose = (0.0, 0.0, 2.0, 0.0, 0.0, 0.0)
 
     @property
@@ -151,16 +158,24 @@ class LoadCellBias(StrictModel):
     largest: PositiveFloat = 2.0
 
 
+class FrictionFeedforward(StrictModel):
+    """Cable speed [m/s] about which the sign of dry friction turns: tanh(speed/smooth_below)."""
+
+    smooth_below: PositiveFloat = 0.003
+
+
 class ForceControl(StrictModel):
     """Force controllers: closed-loop bandwidth [rad/s] to design for, or the gains per cable.
 
     With `load_cell_bias` the biases of the load cells are told from torques and speeds of the
-    winches, and taken off.
+    winches, and taken off. With `friction_feedforward` the torque goes ahead of the friction that
+    the test-bed's file tells.
     """
 
     bandwidth: PositiveFloat = 800.0
     gains: dict[str, PiGains] | None = None
     load_cell_bias: LoadCellBias | None = None
+    friction_feedforward: FrictionFeedforward | None = None
 
 
 DistributionMethod = Literal[

@@ -35,7 +35,8 @@ RATE_OF_SENSOR = {
     "/cables/tension": "load_cells",
 }
 CLOCK = "/clock"
-BAR_REFERENCE, BAR_POSE, FRAME_POSE = "/bar/reference", "/bar/pose", "/winch_frame/pose"
+BAR_REFERENCE, FRAME_REFERENCE = "/bar/reference", "/winch_frame/reference"
+BAR_POSE, FRAME_POSE = "/bar/pose", "/winch_frame/pose"
 TENSION, WRENCH, WINCH_STATE = "/cables/tension", "/wrench_command", "/winches/state"
 TENSION_COMMAND, TORQUE_COMMAND = "/tension_command", "/winches/torque_command"
 
@@ -173,7 +174,8 @@ def schedule_of(scenario: Scenario, testbed: Testbed) -> Schedule:
         distribution = (WRENCH, BAR_POSE), (TENSION_COMMAND,)
         add(TENSION_DISTRIBUTION, rates.tension_distribution, *distribution)
         force = (TENSION_COMMAND, TENSION), (TORQUE_COMMAND,)
-        add(FORCE_CONTROLLER, rates.force_controller, *force)
+        ahead = references if scenario.control.force.friction_feedforward else ()
+        add(FORCE_CONTROLLER, rates.force_controller, *force, ahead)
     elif isinstance(scenario.control, TorqueProfile):
         add(FORCE_CONTROLLER, rates.plant, (CLOCK,), (TORQUE_COMMAND,))
     elif isinstance(scenario.control, AngleProfile):

@@ -10,17 +10,26 @@ from numba import njit
 from numpy.typing import NDArray
 
 from cspm_control.force_controller import ForceController
+from cspm_control.friction_feedforward import FrictionFeedforward
 from cspm_control.load_cell_bias import LoadCellBias
 from cspm_control.safety import GuardedStage
 from cspm_msgs_py.diagnostics import Level, Status
 from cspm_msgs_py.safety_spec import Safety
-from cspm_msgs_py.schedule import TENSION, TENSION_COMMAND, WINCH_STATE
+from cspm_msgs_py.schedule import (
+    BAR_REFERENCE,
+    FRAME_REFERENCE,
+    TENSION,
+    TENSION_COMMAND,
+    WINCH_STATE,
+)
 from cspm_msgs_py.stage import Send
 from cspm_sim.safe_state import SafeState
 
 Array = NDArray[np.float64]
 
 _NO_ROW = np.zeros(0)
+# The reference of a frame that does not move: pose, twist, acceleration.
+_STILL = np.array([0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 1.0] + 12 * [0.0])
 
 
 @dataclass(frozen=True)
@@ -50,13 +59,15 @@ class ForceStage(GuardedStage):
         safety: Safety,
         period_ns: int,
         bias: LoadCellBias | None = None,
+        friction: FrictionFeedforward | None = None,
     ) -> None:
         """Take the controllers, their limits, the cables' names, and the guard's arguments.
 
         With `bias` the tensions are corrected before they are controlled; what trips is measured.
+        With `friction` its torque at the references' speed is fed forward.
         """
         super().__init__(safe_state, safety, period_ns, len(names))
-        self._controller, self._bias = controller, bias
+        self._controller, self._bias, self._friction = controller, bias, friction
         self._limits = limits
         self._names = names
         self._shape = (len(names),)
@@ -72,12 +83,14 @@ class ForceStage(GuardedStage):
         winches = inputs.get(WINCH_STATE)
         self._begin_step(now_ns, winches)
         fault, clipped = self._examine(wanted, measured, _NO_ROW if winches is None else winches)
+        fault = fault or self._reference_fault(inputs)
         if fault or self._latch.open:
             self._latch.stand(now_ns, "input", fault)
             self._send_safe(now_ns, send)
             return
         corrected = self._corrected(measured, winches)
-        torque = self._slew(self._controller.step(self._wanted, corrected))
+        ahead = self._against_friction(inputs)
+        torque = self._slew(self._controller.step(self._wanted, corrected, ahead))
         self._steps += 1
         self._limited += self._controller.saturated > 0
         self._clipped += clipped
@@ -126,6 +139,24 @@ class ForceStage(GuardedStage):
         if self._torque is not None and winches is not None and winches.size:
             self._bias.step(measured, winches[n : 2 * n], self._torque)
         return measured - self._bias.values
+
+    def _reference_fault(self, inputs: Mapping[str, Array]) -> str | None:
+        if self._friction is None:
+            return None
+        for topic in (BAR_REFERENCE, FRAME_REFERENCE):
+            row = inputs.get(topic, _STILL)
+            if row.shape != _STILL.shape:
+                return f"{topic}: a row of shape {row.shape}, allowed: {_STILL.shape}"
+            if not np.isfinite(row).all():
+                return f"{topic}: {row[~np.isfinite(row)][0]}, allowed: finite numbers"
+        return None
+
+    def _against_friction(self, inputs: Mapping[str, Array]) -> Array | None:
+        """Return what friction will take (n,) [N·m], None as long as no reference has come."""
+        bar = inputs.get(BAR_REFERENCE)
+        if self._friction is None or bar is None:
+            return None
+        return self._friction.torque(bar, inputs.get(FRAME_REFERENCE, _STILL), self._wanted)
 
     def _slew(self, torque: Array) -> Array:
         step = self._limits.torque_step

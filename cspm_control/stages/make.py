@@ -11,8 +11,10 @@ from cspm_control.angle_servo import AngleGenerator, AngleServo
 from cspm_control.bar_dynamics import bar_parameters
 from cspm_control.computed_wrench import ComputedWrench
 from cspm_control.force_controller import ForceController
+from cspm_control.friction_feedforward import FrictionFeedforward, winch_friction
 from cspm_control.governor import Governed, plan_deviation
 from cspm_control.load_cell_bias import LoadCellBias
+from cspm_control.mass_observer import MassObserver
 from cspm_control.motion_controller import MotionController
 from cspm_control.stages.angle_stage import AngleStage
 from cspm_control.stages.distribution_stage import DistributionStage
@@ -36,20 +38,22 @@ from cspm_msgs_py.schedule import (
     BAR_POSE,
     BAR_REFERENCE,
     FORCE_CONTROLLER,
+    FRAME_REFERENCE,
     MOTION_CONTROLLER,
     TENSION_DISTRIBUTION,
     schedule_of,
 )
 from cspm_msgs_py.stage import Stage
-from cspm_msgs_py.testbed import Testbed
+from cspm_msgs_py.testbed import Bar, Testbed
 from cspm_sim.kernels.cable import INERTIA, RADIUS
 from cspm_sim.motion import Motion
 from cspm_sim.parameters import nominal_parameters
 from cspm_sim.safe_state import make_safe_state
 
-FRAME_REFERENCE = "/winch_frame/reference"
 # A measured tension beyond this many times a cable's upper limit trips, unless the scenario says.
 TRIP_FACTOR = 2.0
+# After so many time constants what the pose's observer leaves unexplained is believed.
+SETTLING = 5.0
 
 
 def make_controller(
@@ -104,6 +108,7 @@ def motion_stage(
             ),
             pose_age=_pose_age(scenario, testbed),
             known_wrench=motion.known_wrench,
+            mass=mass_observer(motion, testbed.bar, period),
         )
         return MotionStage(computed, _planned(motion.governor, scenario, testbed, motions))
     return MotionStage(
@@ -116,6 +121,14 @@ def motion_stage(
             integral_limits=motion.integral_limits,
         )
     )
+
+
+def mass_observer(motion: ComputedWrenchControl, bar: Bar, period: float) -> MassObserver | None:
+    """Return what tells the bar's mass every `period` [s], where the scenario wants it."""
+    if motion.mass_adaptation is None:
+        return None
+    settling = SETTLING / motion.observer_bandwidth
+    return MassObserver(bar.mass, motion.mass_adaptation.largest, period=period, settling=settling)
 
 
 def _pose_age(scenario: Scenario, testbed: Testbed) -> float:
@@ -254,6 +267,7 @@ def force_stage(control: ClosedLoop, scenario: Scenario, testbed: Testbed) -> Fo
         safety,
         1_000_000_000 // rate,
         load_cell_bias(control, testbed, 1.0 / rate),
+        friction_feedforward(control, testbed),
     )
 
 
@@ -265,6 +279,19 @@ def load_cell_bias(control: ClosedLoop, testbed: Testbed, period: float) -> Load
     cables = nominal_parameters(testbed).cables
     radii, inertias = cables[:, RADIUS].copy(), cables[:, INERTIA].copy()
     return LoadCellBias(radii, inertias, wanted.largest, period=period)
+
+
+def friction_feedforward(control: ClosedLoop, testbed: Testbed) -> FrictionFeedforward | None:
+    """Return what goes ahead of the winches' friction, where the scenario wants it.
+
+    Raises:
+        InputError: the test-bed's file tells of no friction.
+    """
+    wanted = control.force.friction_feedforward
+    if wanted is None:
+        return None
+    cables = nominal_parameters(testbed).cables
+    return FrictionFeedforward(cables, winch_friction(testbed), wanted.smooth_below)
 
 
 def torque_stage(control: TorqueProfile, scenario: Scenario, testbed: Testbed) -> TorqueStage:

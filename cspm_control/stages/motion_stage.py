@@ -60,5 +60,11 @@ class MotionStage:
             send(WRENCH, self._controller.step(pose, frame, reference, deviation))
 
     def status(self) -> Status:
-        """Return that all is well: the motion controller has no limit of its own to meet."""
-        return Status(Level.OK, self.node, "ok", {})
+        """Return that all is well, the motion controller having no limit of its own to meet.
+
+        And the bar's mass, where that is told.
+        """
+        told = {}
+        if isinstance(self._controller, ComputedWrench) and self._controller.adapted_mass:
+            told["bar_mass"] = f"{self._controller.adapted_mass:.3f} kg"
+        return Status(Level.OK, self.node, "ok", told)

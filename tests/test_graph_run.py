@@ -16,6 +16,7 @@ from run_samples import bundle_of, recorded
 from test_gatherer import late
 from test_loop import WILD
 
+from bench.tracking import Case
 from cspm_bringup.resim import resimulate
 from cspm_bringup.run import metadata, run
 from cspm_msgs_py.errors import CspmError, InputError
@@ -55,6 +56,19 @@ MORE_RUNS = {
     "slow sensors": (
         bundle_of("rest", *[f"rates.{rate}" for rate in (*SLOW_SENSORS, *FAST_CONTROL)]),
         250,
+    ),
+    # The force controller reads references as well.
+    "friction fed forward, mass told": (
+        Case(
+            "worst_case_past_thesis",
+            (
+                "control.motion.governor=null",
+                "control.motion.mass_adaptation={}",
+                "control.force.friction_feedforward={}",
+            ),
+            (("winch_coulomb_friction", (), {"torque": 0.01}),),
+        ).bundle(),
+        400,
     ),
     # Tensions that trip the force controllers.
     "safe state": (bundle_of("worst_case", "safety.tension_trip=8.2"), 700),

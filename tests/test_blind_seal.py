@@ -13,6 +13,7 @@ import pytest
 pytest.importorskip("mujoco", minversion="4.0", reason="the MuJoCo plant needs MuJoCo 4")
 from cspm_bringup import cli
 from cspm_bringup.blind import make as making
+from cspm_bringup.blind.blank_runs import BlankRuns
 from cspm_bringup.blind.commands import score_command
 from cspm_bringup.blind.concealed_run import NOTES, believed, record_concealed
 from cspm_bringup.blind.make import Request, make
@@ -36,12 +37,17 @@ def bench(tmp_path_factory):
     patch = pytest.MonkeyPatch()
     patch.setattr(making, "STRATA", {"nothing": NOTHING, "noise": LOUD})
     limits = {name: [5e-4] * 8 for name in PHENOMENA}
-    patch.setattr(making, "_blank_runs", lambda *_: ({"worst_case": limits}, {}))
+    patch.setattr(making, "run_blank", lambda *_: blank({"worst_case": limits}))
     asked = Request(place / "bench", place / "truth.json", 3, 2, "dev", ("nothing", "noise"), 15.0)
     said = []
     digest = make(asked, lambda *told: said.append(told))
     yield asked, digest, said
     patch.undo()
+
+
+def blank(limits):
+    """What blank runs tell where every phenomenon has the catalogue's form."""
+    return BlankRuns(limits, {}, {(name, each): [1.0] * 8 for name in limits for each in PHENOMENA})
 
 
 def recordings(asked):
@@ -110,7 +116,7 @@ def test_an_interrupted_make_goes_on_where_it_was(tmp_path, monkeypatch):
         made.append(folder.name)
 
     monkeypatch.setattr(making, "record_concealed", record)
-    monkeypatch.setattr(making, "_blank_runs", lambda *_: ({"worst_case": {}}, {}))
+    monkeypatch.setattr(making, "run_blank", lambda *_: blank({"worst_case": {}}))
     monkeypatch.setattr(making, "STRATA", {"nothing": NOTHING})
     asked = Request(tmp_path / "bench", tmp_path / "t.json", 3, 3, "dev", ("nothing",), 15.0)
     with pytest.raises(KeyboardInterrupt):
@@ -149,7 +155,7 @@ def test_the_command_line_tells_the_hash_and_keeps_the_truth_beside(tmp_path, mo
         (folder / "x.mcap").write_text(str(bundle.scenario.seed))
 
     monkeypatch.setattr(making, "record_concealed", record)
-    monkeypatch.setattr(making, "_blank_runs", lambda *_: ({"worst_case": {}}, {}))
+    monkeypatch.setattr(making, "run_blank", lambda *_: blank({"worst_case": {}}))
     monkeypatch.setattr(making, "STRATA", {"nothing": NOTHING})
     out = tmp_path / "bench"
     words = f"cspm blind make --seed 3 --count 1 --duration 15 --strata nothing --out {out}"
@@ -172,7 +178,7 @@ def test_what_diverges_is_an_empty_folder_and_is_not_tried_again(tmp_path, monke
         raise DivergenceError("t = 1 s: gone")
 
     monkeypatch.setattr(making, "record_concealed", record)
-    monkeypatch.setattr(making, "_blank_runs", lambda *_: ({"worst_case": {}}, {}))
+    monkeypatch.setattr(making, "run_blank", lambda *_: blank({"worst_case": {}}))
     monkeypatch.setattr(making, "STRATA", {"nothing": NOTHING})
     asked = Request(tmp_path / "bench", tmp_path / "t.json", 3, 1, "dev", ("nothing",), 15.0)
     make(asked)

@@ -5,34 +5,29 @@ from __future__ import annotations
 import json
 import os
 import shutil
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from concurrent.futures import FIRST_COMPLETED, Future, ProcessPoolExecutor, wait
 from dataclasses import dataclass
 from multiprocessing import get_context
 from pathlib import Path
-from typing import Any, NamedTuple
+from typing import Any
 
-from cspm_bringup.blind.concealed_run import believed, machine_of, record_concealed, watch
+from cspm_bringup.blind.blank_runs import Amounts, Tell, run_blank
+from cspm_bringup.blind.concealed_run import believed, machine_of, record_concealed
 from cspm_bringup.blind.item import Item, amounts_of, draw_items, truth_of
 from cspm_bringup.blind.jobs import jobs_of
 from cspm_bringup.blind.strata import STRATA
 from cspm_bringup.blind.truth import RECORDINGS, SCHEMA, SPLITS, truth_sha256
 from cspm_msgs_py.errors import DivergenceError, InputError
-from cspm_reality.detection_limit import absorbed_share, detection_limits, likeness
 from cspm_reality.phenomena import PHENOMENA
 from cspm_reality.reality import conceal
 from cspm_reality.sensors import QUALITIES, REAL
 
 SHORTEST, LONGEST = 15.0, 200.0  # [s]
-SEARCHED_SHARE = 0.7  # of a recording; the rest is held out by the diagnosis
 # Of a number of the file, more is not taken over by an effect: it stays positive.
 MOST_ABSORBED = 0.8
-_BLANK_SEED = 1
 _TOLD = ("seed", "count", "split", "duration", "sensors")
 _ONE_DATE = 1_000_000_000  # of all files, so that it tells no order [s]
-
-Amounts = Mapping[str, Sequence[float]]
-Tell = Callable[[str, int, int], None]
 
 
 @dataclass(frozen=True)
@@ -156,7 +151,7 @@ def _items(request: Request) -> list[Item]:
 def _write_truth(request: Request, tell: Tell) -> None:
     """Fix the limits and the truth before anything is recorded."""
     items = _items(request)
-    blank = _blank_runs(items, request.duration, tell)
+    blank = run_blank(items, request.duration, tell)
     told = []
     for item in items:
         machine = machine_of(item.scenario)
@@ -168,58 +163,6 @@ def _write_truth(request: Request, tell: Tell) -> None:
     part = request.truth.with_suffix(".part")
     part.write_text(json.dumps(content, indent=1, ensure_ascii=False), encoding="utf-8")
     part.replace(request.truth)
-
-
-class _Blank(NamedTuple):
-    """What runs without any phenomenon tell.
-
-    Attributes:
-        limits: detection limits by scenario and phenomenon.
-        shares: what numbers absorb, by scenario, phenomenon and number.
-        likeness: what a unit of a phenomenon is of the catalogue's parameter, by scenario and name.
-    """
-
-    limits: dict[str, Mapping[str, Sequence[float]]]
-    shares: dict[tuple[str, str, str], Sequence[float]]
-    likeness: dict[tuple[str, str], Sequence[float]]
-
-    def likened(self, item: Item, amounts: Amounts) -> dict[str, list[float]]:
-        """Return amounts as the catalogue's parameters."""
-        return {
-            name: [
-                amount * like
-                for amount, like in zip(
-                    amounts[name], self.likeness[item.scenario, name], strict=False
-                )
-            ]
-            for name in {each.phenomenon for each in item.concealed}
-        }
-
-
-def _blank_runs(items: Sequence[Item], duration: float, tell: Tell) -> _Blank:
-    scenarios = sorted({item.scenario for item in items})
-    concealed = {(item, each.phenomenon) for item in items for each in item.concealed}
-    names = {(item.scenario, name) for item, name in concealed}
-    numbers = {
-        (item.scenario, name, item.case.absorbed_by)
-        for item, name in concealed
-        if item.case.absorbed_by
-    }
-    blank = _Blank({}, {}, {})
-    for done, scenario in enumerate(scenarios):
-        tell(f"detection limits in {scenario}", done, len(scenarios))
-        bundle = believed(scenario, duration, _BLANK_SEED)
-        machine = bundle.testbed.testbed
-        scenes = watch(bundle, conceal(machine, {}, 0.0, _BLANK_SEED), SEARCHED_SHARE * duration)
-        blank.limits[scenario] = detection_limits(scenes, machine)
-        for where, name in names:
-            if where == scenario:
-                blank.likeness[scenario, name] = likeness(name, scenes, machine)
-        for where, name, number in numbers:
-            if where == scenario:
-                key = (scenario, name, number)
-                blank.shares[key] = absorbed_share(name, number, scenes, machine)
-    return blank
 
 
 def _absorbed(

@@ -4,7 +4,8 @@ Two experiments with noise that no autoregression of finite order describes (a s
 process with white noise on top): a winch's friction by linear regression, and a mass on a spring
 that is simulated and fitted. Each is estimated as `cspm_ident.estimation` does it by default, with
 the other kinds of interval, and by plain least squares that takes the residual for white. A third,
-`--system`, is a whole machine that another plant recorded.
+`--system`, is a whole machine that another plant recorded, a fourth, `--rig`, cables on a rig that
+this project's plant did not make.
 """
 
 from __future__ import annotations
@@ -22,6 +23,7 @@ from scipy.optimize import least_squares
 from scipy.signal import lfilter
 from scipy.stats import beta
 
+from bench.rig_coverage import RigDamping, RigStiffness
 from cspm_ident.estimation import (
     Interval,
     Parameter,
@@ -220,13 +222,14 @@ def measure_coverage(
         kept: a file to which each run's intervals are added as a line of JSON, and from which those
             of runs already made are taken.
     """
-    known = _kept_runs(kept, seed)
+    study = (type(experiment).__name__, seed)
+    known = _kept_runs(kept, *study)
     inside: dict[str, np.ndarray] = {}
     for run in range(runs):
         if run not in known:
             drawn = experiment.intervals(np.random.default_rng([seed, run]))
             known[run] = dict(drawn)
-            _keep(kept, seed, run, known[run])
+            _keep(kept, *study, run, known[run])
         for method, ends in known[run].items():
             held = (ends[:, 0] <= experiment.truth) & (experiment.truth <= ends[:, 1])
             inside[method] = inside.get(method, 0) + held.astype(int)
@@ -238,22 +241,24 @@ def measure_coverage(
     ]
 
 
-def _kept_runs(kept: Path | None, seed: int) -> dict[int, dict[str, np.ndarray]]:
-    """Return the intervals of the runs in a file, by run and method."""
+def _kept_runs(kept: Path | None, experiment: str, seed: int) -> dict[int, dict[str, np.ndarray]]:
+    """Return the intervals of an experiment's runs in a file, by run and method."""
     if kept is None or not kept.exists():
         return {}
     rows = [json.loads(line) for line in kept.read_text(encoding="utf-8").splitlines()]
     return {
         row["run"]: {method: np.array(ends) for method, ends in row["intervals"].items()}
         for row in rows
-        if row["seed"] == seed
+        if (row["experiment"], row["seed"]) == (experiment, seed)
     }
 
 
-def _keep(kept: Path | None, seed: int, run: int, intervals: dict[str, np.ndarray]) -> None:
+def _keep(
+    kept: Path | None, experiment: str, seed: int, run: int, intervals: dict[str, np.ndarray]
+) -> None:
     if kept is not None:
         ends = {method: found.tolist() for method, found in intervals.items()}
-        line = json.dumps({"seed": seed, "run": run, "intervals": ends})
+        line = json.dumps({"experiment": experiment, "seed": seed, "run": run, "intervals": ends})
         with kept.open("a", encoding="utf-8") as file:
             file.write(f"{line}\n")
 
@@ -268,12 +273,15 @@ def main() -> None:
     parser.add_argument(
         "--system", action="store_true", help="`cspm identify system` instead: 30 s a run"
     )
+    parser.add_argument(
+        "--rig", action="store_true", help="`cspm identify stiffness` and `damping`: 3 s a run"
+    )
     parser.add_argument("--seed", type=int, default=20261121)
     parser.add_argument(
         "--keep",
         type=Path,
         metavar="FILE",
-        help="with --system: add each run's intervals to it, and leave out the runs that it has",
+        help="add each run's intervals to it, and leave out the runs that it has",
     )
     arguments = parser.parse_args()
     console = Console()
@@ -283,10 +291,11 @@ def main() -> None:
         from bench.system_coverage import System
 
         experiments = (System(),)
+    elif arguments.rig:
+        experiments = (RigStiffness(), RigDamping())
     for experiment in experiments:
         table = Table("intervals", *experiment.names, title=experiment.__class__.__doc__)
-        kept = arguments.keep if arguments.system else None
-        counts = measure_coverage(experiment, arguments.runs, arguments.seed, kept=kept)
+        counts = measure_coverage(experiment, arguments.runs, arguments.seed, kept=arguments.keep)
         for method in dict.fromkeys(count.method for count in counts):
             row = [count for count in counts if count.method == method]
             table.add_row(method, *(_cell(count) for count in row))

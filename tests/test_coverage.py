@@ -71,8 +71,12 @@ class Coin:
         yield "coin", np.array([[low, np.inf]])
 
 
+class Dice(Coin):
+    """Another experiment."""
+
+
 def test_runs_that_were_kept_are_not_made_again(tmp_path):
-    """And count as if they had been; another seed's do not."""
+    """And count as if they had been; another seed's and another experiment's do not."""
     first, second, other = Coin(), Coin(), Coin()
     file = tmp_path / "runs.jsonl"
     measure_coverage(first, 4, seed=1, kept=file)
@@ -82,3 +86,6 @@ def test_runs_that_were_kept_are_not_made_again(tmp_path):
     assert 0 < found[0].inside < 10
     measure_coverage(other, 2, seed=2, kept=file)
     assert other.asked == 2
+    third = Dice()
+    measure_coverage(third, 3, seed=1, kept=file)
+    assert third.asked == 3

@@ -5,8 +5,9 @@ import json
 import pytest
 from conftest import THESIS
 from matplotlib.image import imread
-from rig_samples import Truth, multisine, ramps, record
+from rig_samples import record
 
+from bench.rig_cables import Truth, multisine, ramps
 from cspm_ident.recording_hash import recording_sha256
 from cspm_msgs_py.testbed import load_testbed
 

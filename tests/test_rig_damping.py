@@ -4,25 +4,15 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from rig_samples import Truth, described, multisine
 
+from bench.rig_cables import Truth, described, multisine
 from cspm_ident.rig.damping import DAMPING, identify_damping
 from cspm_msgs_py.errors import InputError
 
 TRUTH = Truth()
-LAW = {
-    "law": "exponential",
-    "a": TRUTH.a,
-    "b": TRUTH.b,
-    "c": TRUTH.c,
-    "d": TRUTH.d,
-    "youngs_modulus": TRUTH.youngs_modulus,
-    "diameter": TRUTH.diameter,
-    "floor_tension": TRUTH.floor,
-}
 
 
-def specimen(length, seed=3, law=LAW, truth=TRUTH, **options):
+def specimen(length, seed=3, law=TRUTH.law, truth=TRUTH, **options):
     """A cable whose stiffness the test-bed file knows."""
     one = multisine(truth, length, seed=seed, **options)
     return replace(one, cable=described(length, truth, one.label, stiffness=law))
@@ -81,7 +71,7 @@ def test_one_length_gives_no_line():
 
 
 def test_a_wrong_stiffness_shows_in_the_vaf():
-    soft = identify_damping([specimen(2.1, law=LAW | {"a": 0.6 * TRUTH.a})])
+    soft = identify_damping([specimen(2.1, law=TRUTH.law | {"a": 0.6 * TRUTH.a})])
     assert soft.specimens[0].vaf < 99.0
 
 

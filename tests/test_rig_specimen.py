@@ -6,9 +6,10 @@ import re
 import numpy as np
 import pytest
 from conftest import THESIS, point_content
-from rig_samples import Truth, multisine, record
+from rig_samples import record
 from run_samples import bundle_of
 
+from bench.rig_cables import Truth, multisine
 from cspm_bringup.run import run
 from cspm_ident.recording_hash import recording_sha256
 from cspm_ident.rig.specimen import read_specimens

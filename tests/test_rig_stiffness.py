@@ -4,8 +4,8 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from rig_samples import Truth, described, ramps
 
+from bench.rig_cables import Truth, described, ramps
 from cspm_ident.rig.flanks import DOWN, UP, find_ramps
 from cspm_ident.rig.hysteresis import find_hysteresis
 from cspm_ident.rig.law import Law, law_of, tension_curve

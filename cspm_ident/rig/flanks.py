@@ -54,7 +54,7 @@ class Ramps:
     Attributes:
         specimen: the cable.
         flanks: in order of time, up and down in turns.
-        lowest: cable wound in where the tension is lowest on any of them [m], and that tension [N].
+        lowest: cable wound in [m] where all of them have begun, and their mean tension there [N].
     """
 
     specimen: Specimen
@@ -101,9 +101,15 @@ def find_ramps(specimen: Specimen, cutoff: float) -> Ramps:
             f"{specimen.label}: {len(flanks) // 2} slow cycles of stretching and releasing in"
             f" {specimen.recording}, allowed: at least {FEWEST_CYCLES}"
         )
-    each = [(float(f.tension.min()), float(f.wound[f.tension.argmin()])) for f in flanks]
-    least, place = min(each)
+    place = max(float(flank.wound.min()) for flank in flanks)
+    least = float(np.mean([_at(place, flank) for flank in flanks]))
     return Ramps(specimen, flanks, (place, least))
+
+
+def _at(place: float, flank: Flank) -> float:
+    """Return the tension [N] where so much cable is wound in [m]."""
+    order = np.argsort(flank.wound)
+    return float(np.interp(place, flank.wound[order], flank.tension[order]))
 
 
 def _runs(speed: Array, shortest: int) -> list[NDArray[np.intp]]:

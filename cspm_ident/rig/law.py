@@ -49,6 +49,12 @@ class Law(NamedTuple):
         curve = tension_curve(self, length, max(tension, self.floor))
         return float(np.interp(tension, curve.tensions, curve.elongations))
 
+    def bend(self, length: float, highest: float) -> float:
+        """Return ε [m] where the asymptote begins; infinite where `highest` [N] is below it."""
+        curve = tension_curve(self, length, highest)
+        above = self.uncapped(curve.tensions, length) > self.rigidity / length
+        return float(curve.elongations[above.argmax()]) if above.any() else np.inf
+
 
 def law_of(cable: Cable) -> Law:
     """Return the law that a test-bed file gives a cable; a linear one has no part below its cap."""

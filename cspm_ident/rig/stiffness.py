@@ -12,6 +12,7 @@ from scipy.stats import t as student
 
 from cspm_ident.rig.branches import BRANCHES, Branch, mean_branches
 from cspm_ident.rig.candidates import Rank, rank_candidates
+from cspm_ident.rig.distortion import centred, modelled, undistorted
 from cspm_ident.rig.flanks import Ramps, find_ramps
 from cspm_ident.rig.hysteresis import Hysteresis, find_hysteresis
 from cspm_ident.rig.law import Law, law_of, section_of
@@ -24,9 +25,12 @@ Array = NDArray[np.float64]
 
 CUTOFF = 2.0
 MEAN, POINTS = "mean", 100
-# The law tells how far the cables are stretched at their lowest tension, and that changes the law
-# by less than its interval from the second round on.
-ROUNDS = 3
+# Where the winch rests the encoder is off by a part of its step all the time; through the filter
+# that reaches so many samples into the ramp, alike in every cycle.
+REACH = 3
+# The law tells how far the cables are stretched at their lowest tension and what the filter did to
+# them, and that changes the law by a tenth of its interval at most from the third round on.
+ROUNDS = 4
 
 
 @dataclass(frozen=True)
@@ -62,7 +66,7 @@ class StiffnessResult:
 
     Attributes:
         specimens: those fitted, then those that verify.
-        both: the law of both branches together.
+        both: the law of both branches together, each moved into the middle of its loop.
         alone: the law of each branch alone, by name.
         candidates: functions of the tension, best first.
         cutoff: of the filter [Hz].
@@ -121,23 +125,36 @@ def identify_stiffness(
     fitted, others = split(specimens, verify)
     floor = law_of(fitted[0].cable).floor
     ramps = [find_ramps(one, cutoff) for one in fitted]
-    law: Law | None = None
-    for _ in range(ROUNDS):
-        groups = [mean_branches(one, law) for one in ramps]
-        both = fit_law(groups, floor)
-        law = both.law
+    both, groups = _law_of_both(ramps, floor, cutoff)
     alone = {
         name: fit_law([[g for g in group if g.branch == name] for group in groups], floor)
         for name in BRANCHES
     }
     judged = [(one, True) for one in ramps] + [(find_ramps(one, cutoff), False) for one in others]
     return StiffnessResult(
-        specimens=tuple(_judge(one, is_fitted, both) for one, is_fitted in judged),
+        specimens=tuple(_judge(one, is_fitted, both, cutoff) for one, is_fitted in judged),
         both=both,
         alone=alone,
         candidates=tuple(rank_candidates(ramps, both.law)),
         cutoff=cutoff,
     )
+
+
+def _law_of_both(
+    ramps: Sequence[Ramps], floor: float, cutoff: float
+) -> tuple[Fitted, list[list[Branch]]]:
+    """Return the law in the middle of the loops, and the branches by specimen where they are."""
+    widths = [find_hysteresis(one).half_width for one in ramps]
+    middle = [centred(one, width) for one, width in zip(ramps, widths, strict=True)]
+    seen: list[Ramps | None] = [None] * len(ramps)
+    law: Law | None = None
+    for _ in range(ROUNDS):
+        pairs = list(zip(middle, seen, strict=True))
+        both = fit_law([undistorted(one, model, law) for one, model in pairs], floor)
+        law = both.law
+        seen = [modelled(m, law, w, cutoff) for m, w in zip(middle, widths, strict=True)]
+    pairs = list(zip(ramps, seen, strict=True))
+    return both, [undistorted(one, model, law) for one, model in pairs]
 
 
 def split(
@@ -178,9 +195,10 @@ def mean_curve(branches: Sequence[Branch]) -> Branch:
     return Branch(MEAN, tension, mean("stiffness"), mean("length"))
 
 
-def _judge(ramps: Ramps, fitted: bool, found: Fitted) -> SpecimenStiffness:
+def _judge(ramps: Ramps, fitted: bool, found: Fitted, cutoff: float) -> SpecimenStiffness:
     branches = tuple(mean_branches(ramps, found.law))
     curves = {one.branch: one for one in (*branches, mean_curve(branches))}
+    hysteresis = find_hysteresis(ramps)
     return SpecimenStiffness(
         ramps=ramps,
         fitted=fitted,
@@ -189,17 +207,23 @@ def _judge(ramps: Ramps, fitted: bool, found: Fitted) -> SpecimenStiffness:
             name: vaf(one.stiffness, found.law.stiffness(one.tension, one.length))
             for name, one in curves.items()
         },
-        hysteresis=find_hysteresis(ramps),
-        asymptote=_asymptote(ramps, found) if found.asymptote else None,
+        hysteresis=hysteresis,
+        asymptote=_asymptote(ramps, found, hysteresis.half_width, cutoff),
     )
 
 
-def _asymptote(ramps: Ramps, found: Fitted) -> tuple[float, tuple[float, float]] | None:
+def _asymptote(
+    ramps: Ramps, found: Fitted, half_width: float, cutoff: float
+) -> tuple[float, tuple[float, float]] | None:
     """Return E from k·l/A on the asymptote, cycle by cycle, as in table 3-5."""
+    if not found.asymptote:
+        return None
     law, area, values = found.law, section_of(ramps.specimen.cable), []
+    middle = centred(ramps, half_width)
+    seen = modelled(middle, law, half_width, cutoff)
     for cycle in range(ramps.cycles):
-        branches = mean_branches(ramps, law, (cycle,))
-        chosen = [(one, above_cap(law, one)) for one in branches]
+        branches = undistorted(middle, seen, law, (cycle,))
+        chosen = [(one, _asymptotic(law, one)) for one in branches]
         if min(float(np.mean(above)) for _, above in chosen) < ASYMPTOTE_SHARE:
             return None
         rigid = np.concatenate([(one.stiffness * one.length)[above] for one, above in chosen])
@@ -208,6 +232,13 @@ def _asymptote(ramps: Ramps, found: Fitted) -> tuple[float, tuple[float, float]]
     spread = float(np.std(values, ddof=1) / np.sqrt(len(values)))
     half = float(student.ppf(0.975, len(values) - 1)) * spread
     return mean, (mean - half, mean + half)
+
+
+def _asymptotic(law: Law, branch: Branch) -> NDArray[np.bool_]:
+    """Return which points tell of the asymptote, (n,): those on it, away from the rest above it."""
+    above = above_cap(law, branch)
+    above[-REACH:] = False
+    return above
 
 
 def _specimen_data(one: SpecimenStiffness) -> dict[str, Any]:

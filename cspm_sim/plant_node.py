@@ -129,7 +129,8 @@ class PlantNode:
             self._node.fail(f"plant: runs in {', '.join(doubled)}")
 
     def _start(self) -> None:
-        if not self._others.unmatched():
+        # Who was told to stop before has told the end already.
+        if not self._plant.ended and not self._others.unmatched():
             self._alone = time.monotonic() + _LOOK_AROUND_S
             self.started = True
             self._others.tell_start_at(0)

@@ -27,10 +27,12 @@ load_ros()
 from std_msgs.msg import Header, String  # noqa: E402
 
 from cspm_bringup.graph_run import run_graph  # noqa: E402
+from cspm_bringup.lockstep_nodes import LockstepRun  # noqa: E402
 from cspm_msgs_py.ros.contract_node import ros_class  # noqa: E402
 from cspm_msgs_py.ros.qos import contract_qos  # noqa: E402
 from cspm_msgs_py.ros.rendezvous import END  # noqa: E402
 from cspm_msgs_py.ros.session import Session  # noqa: E402
+from cspm_msgs_py.schedule import PLANT  # noqa: E402
 
 pytestmark = pytest.mark.compiled
 
@@ -172,6 +174,20 @@ def test_a_signal_ends_the_run_between_two_steps(tmp_path, number, at):
         run(bundle_of("rest", "duration=60"), tmp_path / "again", steps=steps)
         assert_same(tmp_path / "again", tmp_path / "bag")
     assert before == [signal.getsignal(each) for each in (signal.SIGINT, signal.SIGTERM)]
+
+
+@pytest.mark.parametrize("stopped", [False, True])
+def test_a_plant_that_is_stopped_before_its_start_never_starts(stopped):
+    """It has told the end, and who then heard of a first step would wait for the next for ever."""
+    with Session(domain_id=new_domain(), polled=True) as session:
+        plant = LockstepRun(bundle_of("one_winch"), (PLANT,)).plant(session.node(PLANT), 10)
+        if stopped:
+            plant.stop()
+        assert session.spin_until(lambda: not plant._others.unmatched(), 20.0)
+        plant._look_around()
+        assert plant.started is not stopped
+        assert (plant.progress == -1) is stopped
+        assert plant.finished is stopped
 
 
 def test_an_existing_folder_is_left_alone(tmp_path):

@@ -10,9 +10,6 @@ from __future__ import annotations
 from bisect import bisect_left
 from collections.abc import Callable, Collection
 
-import numpy as np
-from numpy.typing import NDArray
-
 from cspm_msgs_py.diagnostics import decode_diagnostics, encode_diagnostics
 from cspm_msgs_py.errors import InputError
 from cspm_msgs_py.lockstep import RECORDED_EVERY, RECORDER_WINDOW, Sequence, check_end
@@ -22,8 +19,8 @@ from cspm_msgs_py.schedule import PLANT, Schedule
 from cspm_msgs_py.topics import DIAGNOSTICS, Topic
 from cspm_msgs_py.wire import WireReader
 
-Array = NDArray[np.float64]
-WRITE_EVERY_NS = 16_000_000
+# Of a block's last steps some messages may be underway, which is no reason to wait for another.
+_ACKNOWLEDGED = RECORDED_EVERY // 2
 
 
 class _Inlet:
@@ -34,9 +31,9 @@ class _Inlet:
         self._delay_ns = schedule.topics[topic.name].delay * schedule.period_ns
         reader = WireReader(topic)
         self._decode, self._decode_block = reader.decode, reader.decode_block
-        self._append = channel.append
-        self._logs: list[int] = []
-        self._messages: list[tuple[int, Array]] = []
+        self._append, self._row_bytes = channel.append_rows, 8 * topic.width
+        self._stamps: list[int] = []
+        self._rows = bytearray()
 
     def take(self, payload: bytes, number: int | None) -> None:
         """Keep a message.
@@ -48,24 +45,26 @@ class _Inlet:
         # What is unusable must not take the place of the message that it pretends to be.
         stamp, row = self._decode(payload)
         self.sequence.take(stamp, number)
-        self._logs.append(stamp + self._delay_ns)
-        self._messages.append((stamp, row))
+        self._stamps.append(stamp)
+        self._rows += row.tobytes()
 
     def take_block(self, payloads: list[bytes], numbers: list[int | None]) -> bool:
         """Keep messages if each is sound and the next one; else keep none and return False."""
         decoded = self._decode_block(payloads)
         if decoded is None or not self.sequence.take_block(decoded[0], numbers):
             return False
-        self._logs += [stamp + self._delay_ns for stamp in decoded[0]]
-        self._messages += zip(*decoded, strict=True)
+        self._stamps += decoded[0]
+        self._rows += decoded[1].tobytes()
         return True
 
     def write(self, end_ns: int) -> None:
-        """Write what came before `end_ns`."""
-        count = bisect_left(self._logs, end_ns)
-        for log, (stamp, row) in zip(self._logs[:count], self._messages, strict=False):
-            self._append(log, stamp, row)
-        del self._logs[:count], self._messages[:count]
+        """Write what came before `end_ns`, all of which has to be of one block of log time."""
+        count = bisect_left(self._stamps, end_ns - self._delay_ns)
+        if count:
+            stamps, size = self._stamps[:count], count * self._row_bytes
+            logs = [stamp + self._delay_ns for stamp in stamps]
+            self._append(logs, stamps, bytes(self._rows[:size]))
+            del self._stamps[:count], self._rows[:size]
 
 
 class Gatherer:
@@ -105,9 +104,8 @@ class Gatherer:
         self._reports = dict.fromkeys(reporting, 0)
         self._numbered = self._reports.keys() >= self._next_status.keys()
         self._statuses: list[tuple[int, int, bytes]] = []
-        self._write_every = max(RECORDED_EVERY, WRITE_EVERY_NS // schedule.period_ns)
         self._written = 0
-        self._target = RECORDED_EVERY - 1
+        self._target = _ACKNOWLEDGED - 1
         self._left = 1
         self._last: int | None = None
         self.completed = -1
@@ -232,16 +230,15 @@ class Gatherer:
         return min(rows, min(self._next_status.values()) - 1)
 
     def _advance(self) -> None:
-        """Acknowledge what is whole, and count what is missing for the next acknowledgement."""
+        """Write and acknowledge what is whole; count what is missing for the next time."""
         self.completed = self._completed()
         if self._last is not None and self.completed >= self._last and not self.done:
             self._write(self._last + 1)
             self.done = True
         if self.completed >= self._target:
-            if self.completed + 1 >= self._written + self._write_every:
-                self._write(self.completed + 1)
+            self._write(self.completed + 1)
             self._acknowledge(self.completed)
-            self._target = self.completed + RECORDED_EVERY
+            self._target = self.completed + _ACKNOWLEDGED
             if self._last is not None:
                 self._target = max(self.completed + 1, min(self._target, self._last))
         # Early messages of later steps count as well; then this is reached early and counts anew.

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import gc
 from collections.abc import Callable
 from contextlib import ExitStack
 from pathlib import Path
@@ -67,10 +66,7 @@ def run_graph(
             progress(max(0, plant.progress) * schedule.period_ns * 1e-9)
 
         session.every(LOOK_EVERY_S, look)
-        # What lives as long as the run need not be looked at by each collection of garbage.
-        gc.freeze()
         session.spin_until(lambda: plant.finished or watch.stuck is not None)
-        gc.unfreeze()
         if watch.stuck is not None:
             raise CspmError(watch.stuck)
     return RunResult(

@@ -22,9 +22,10 @@ Publish = Callable[[int, int, Array], None]
 # The plant runs ahead of what was acknowledged by fewer steps than messages are kept underway.
 WINDOW = 8
 ACKNOWLEDGE_EVERY = 4
-# The recorder works in blocks, and nobody computes from what it does.
-RECORDER_WINDOW = 32
-RECORDED_EVERY = 16
+# The recorder works in blocks, and nobody computes from what it does. At 1 kHz 48 ms may be
+# unwritten, which with the 0.15 s of the writer is less than the 0.2 s that a recording may lose.
+RECORDER_WINDOW = 48
+RECORDED_EVERY = 24
 
 
 class Sequence:

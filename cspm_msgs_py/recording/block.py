@@ -27,7 +27,7 @@ class Batch(NamedTuple):
     Attributes:
         logs: log time of each message [ns].
         stamps: stamp of each message [ns]; empty for a channel of whole payloads.
-        contents: the row's bytes, or the payload, of each message.
+        contents: the bytes of one or several rows in order, or the payload of each message.
     """
 
     logs: list[int]

@@ -55,6 +55,23 @@ class Channel:
         self._stamps.append(stamp_ns)
         self._logs.append(log_ns)
 
+    def append_rows(self, logs_ns: list[int], stamps_ns: list[int], content: bytes) -> None:
+        """Record messages of one block: their log times and stamps [ns], and the rows' bytes.
+
+        Args:
+            logs_ns: when they were recorded [ns], shape (n,); all in one block of log time.
+            stamps_ns: when their values are valid [ns], shape (n,).
+            content: float64 of rows of shape (n, width).
+
+        Raises:
+            CspmError: writing failed earlier.
+        """
+        if logs_ns[0] >= self._end:
+            self._turn(logs_ns[0])
+        self._contents.append(content)
+        self._stamps += stamps_ns
+        self._logs += logs_ns
+
     def append_payload(self, log_ns: int, payload: bytes) -> None:
         """Record a message whose bytes are given."""
         if log_ns >= self._end:

@@ -100,23 +100,28 @@ class ContractNode:
             depth=depth,
         )
 
-    def subscribe_numbered(self, topic: Topic, take: Callable[[bytes, int | None], None]) -> None:
-        """As `subscribe`, with the number that its sender gave each message, None if unknown.
+    def subscribe_numbered(
+        self, topic: Topic, take: Callable[[bytes, int, int | None], None]
+    ) -> None:
+        """As `subscribe`, with each message's time of reception [ns] and its sender's number.
 
-        All messages wait.
+        The number is None if unknown. All messages wait.
         """
         message_class = ros_class(topic.ros_type)
         if self.intake is None:
             numbered, qos = _Numbered(take), contract_qos(None)
             self.node.create_subscription(message_class, topic.name, numbered, qos, raw=True)
             return
-        self.intake.subscribe(
-            topic,
-            message_class,
-            lambda payload, _, number: take(payload, number),
-            numbered=False,
-            depth=None,
-        )
+        self.intake.subscribe(topic, message_class, take, numbered=False, depth=None)
+
+    def subscribe_objects(
+        self, topic: str, message_class: type, take: Callable[[Any], None]
+    ) -> None:
+        """Have `take` called with each message as rclpy's object. All messages wait."""
+        if self.intake is None:
+            self.node.create_subscription(message_class, topic, take, contract_qos(None))
+        else:
+            self.intake.subscribe_objects(topic, message_class, take)
 
     def subscribe_rows(
         self,
@@ -152,7 +157,7 @@ class ContractNode:
         """
         decode = WireReader(topic).decode
 
-        def take(payload: bytes, number: int | None) -> None:
+        def take(payload: bytes, _: int, number: int | None) -> None:
             try:
                 receive(*decode(payload), number)
             except InputError as err:
@@ -226,13 +231,13 @@ class _Numbered:
     # By this rclpy sees that the information on the message is wanted.
     __signature__ = inspect.signature(lambda message, info: None)
 
-    def __init__(self, take: Callable[[bytes, int | None], None]) -> None:
+    def __init__(self, take: Callable[[bytes, int, int | None], None]) -> None:
         self._take = take
 
     def __call__(self, message: Any, info: dict[str, int] | None = None) -> None:  # noqa: ANN401
         # The events executor of rclpy 7.1 passes both as one argument.
         payload, found = message if info is None else (message, info)
-        self._take(payload, found["publication_sequence_number"])
+        self._take(payload, found["received_timestamp"], found["publication_sequence_number"])
 
 
 def _ros_type(message_class: type) -> str:

@@ -32,7 +32,7 @@ class Intake:
 
     def __init__(self, node: Node) -> None:
         self._node = node
-        self._inlets: list[_Inlet | _BlockInlet] = []
+        self._inlets: list[_Inlet | _BlockInlet | _ObjectInlet] = []
 
     @property
     def lost(self) -> dict[str, int]:
@@ -55,7 +55,7 @@ class Intake:
         the numbers are to show losses: of one sender, and of others that may come and go.
         `reliability` is asked of them, the last `depth` messages wait, or all if None.
         """
-        handle = self._handle(topic, message_class, reliability, depth)
+        handle = self._handle(topic.name, message_class, reliability, depth)
         self._inlets.append(_Inlet(topic.name, handle, message_class, receive, numbered))
 
     def subscribe_blocks(
@@ -68,11 +68,18 @@ class Intake:
 
         All messages wait.
         """
-        handle = self._handle(topic, message_class, QOS_RELIABILITY, None)
+        handle = self._handle(topic.name, message_class, QOS_RELIABILITY, None)
         self._inlets.append(_BlockInlet(topic.name, handle, message_class, receive))
 
+    def subscribe_objects(
+        self, topic: str, message_class: type, receive: Callable[[Any], None]
+    ) -> None:
+        """Have `receive` called with each message as rclpy's object. All messages wait."""
+        handle = self._handle(topic, message_class, QOS_RELIABILITY, None)
+        self._inlets.append(_ObjectInlet(topic, handle, message_class, receive))
+
     def _handle(
-        self, topic: Topic, message_class: type, reliability: str, depth: int | None
+        self, topic: str, message_class: type, reliability: str, depth: int | None
     ) -> rclpy_implementation.Subscription:
         node = self._node
         check_for_type_support(message_class)
@@ -80,7 +87,7 @@ class Intake:
             return rclpy_implementation.Subscription(
                 node.handle,
                 message_class,
-                node.resolve_topic_name(topic.name),
+                node.resolve_topic_name(topic),
                 contract_qos(depth, reliability=reliability).get_c_qos_profile(),
             )
 
@@ -127,25 +134,23 @@ class _Inlet:
         taken = self.handle.take_message(self._class, True)
         if taken is None:
             return False
-        self._hand_on(*taken)
-        return True
-
-    def take(self) -> None:
-        take, message_class = self.handle.take_message, self._class
-        for _ in range(_AT_ONCE):
-            if (taken := take(message_class, True)) is None:
-                return
-            self._hand_on(*taken)
-
-    def _hand_on(self, payload: bytes, info: dict[str, Any]) -> None:
+        payload, info = taken
         number = info["publication_sequence_number"]
         if self._numbers is not None and number is not None:
             self._numbers.add(number)
         self._receive(payload, info["received_timestamp"], number)
+        return True
+
+    def take(self) -> None:
+        for _ in range(_AT_ONCE):
+            if not self.take_one():
+                return
 
 
 class _BlockInlet:
-    """One subscription whose messages are handed on together."""
+    """One subscription whose messages are handed on together, to someone who counts them."""
+
+    lost = 0
 
     def __init__(
         self,
@@ -156,12 +161,6 @@ class _BlockInlet:
     ) -> None:
         self.topic, self.handle = topic, handle
         self._class, self._receive = message_class, receive
-        self._numbers = SequenceNumbers()
-
-    @property
-    def lost(self) -> int:
-        """Messages missing by their numbers."""
-        return self._numbers.lost
 
     def take_one(self) -> bool:
         return self._take(1)
@@ -177,9 +176,34 @@ class _BlockInlet:
             payload, info = taken
             payloads.append(payload)
             numbers.append(info["publication_sequence_number"])
-        for number in numbers:
-            if number is not None:
-                self._numbers.add(number)
         if payloads:
             self._receive(payloads, numbers)
         return bool(payloads)
+
+
+class _ObjectInlet:
+    """One subscription whose messages are handed on as rclpy's objects."""
+
+    lost = 0
+
+    def __init__(
+        self,
+        topic: str,
+        handle: rclpy_implementation.Subscription,
+        message_class: type,
+        receive: Callable[[Any], None],
+    ) -> None:
+        self.topic, self.handle = topic, handle
+        self._class, self._receive = message_class, receive
+
+    def take_one(self) -> bool:
+        taken = self.handle.take_message(self._class, False)
+        if taken is None:
+            return False
+        self._receive(taken[0])
+        return True
+
+    def take(self) -> None:
+        for _ in range(_AT_ONCE):
+            if not self.take_one():
+                return

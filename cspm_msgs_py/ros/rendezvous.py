@@ -119,9 +119,7 @@ class PlantSide:
         self._header = ros_class(_HEADER)
         self._publisher = node.node.create_publisher(self._header, END, contract_qos())
         self._starter = node.node.create_publisher(self._header, START, contract_qos())
-        self._progress = node.node.create_subscription(
-            self._header, PROGRESS, self._take, contract_qos(None)
-        )
+        node.subscribe_objects(PROGRESS, self._header, self._take)
         self._settled = time.monotonic() + _SETTLE_S
         self.absent = set(others)
 
@@ -140,7 +138,7 @@ class PlantSide:
     def doubled(self) -> list[str]:
         """Return which of the run's names stand for more than one node, as in two runs at once."""
         names = {self._publisher.topic_name: {self._node.name}}
-        names[self._progress.topic_name] = set(self._others)
+        names[self._node.node.resolve_topic_name(PROGRESS)] = set(self._others)
         return [
             f"one node {name} instead of {count} (ROS_DOMAIN_ID keeps runs apart)"
             for topic, wanted in names.items()

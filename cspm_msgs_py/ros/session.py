@@ -2,10 +2,11 @@
 
 from __future__ import annotations
 
+import gc
 import os
 import time
-from collections.abc import Callable, Sequence
-from contextlib import ExitStack
+from collections.abc import Callable, Iterator, Sequence
+from contextlib import ExitStack, contextmanager
 from pathlib import Path
 
 import rclpy
@@ -28,6 +29,8 @@ _LOOK_EVERY_S = 0.02
 _LONG_S = 1e6
 # In a polled session: how often the executor has its turn, and how long it waits when all is quiet.
 _TURN_S, _IDLE_S = 0.01, 0.001
+# New objects between two collections of garbage, of which nodes make next to none.
+_OBJECTS = 10_000
 
 
 class Session:
@@ -99,11 +102,8 @@ class Session:
 
         timer = self._nodes[0].every(_LOOK_EVERY_S, look)
         try:
-            if self._polled:
-                self._poll_until(over.done, timeout_s)
-            elif not done():
-                # Without a timeout rclpy 7.1 does not see that the future is complete.
-                self._executor.spin_until_future_complete(over, timeout_sec=timeout_s or _LONG_S)
+            with _little_garbage():
+                self._spin(over, done, timeout_s)
         except ExternalShutdownException:
             self._left = True
         finally:
@@ -112,6 +112,13 @@ class Session:
         if (failure := self._failure()) is not None:
             raise CspmError(failure)
         return done()
+
+    def _spin(self, over: Future, done: Callable[[], bool], timeout_s: float | None) -> None:
+        if self._polled:
+            self._poll_until(over.done, timeout_s)
+        elif not done():
+            # Without a timeout rclpy 7.1 does not see that the future is complete.
+            self._executor.spin_until_future_complete(over, timeout_sec=timeout_s or _LONG_S)
 
     def _failure(self) -> str | None:
         return next((node.failure for node in self._nodes if node.failure is not None), None)
@@ -167,6 +174,19 @@ class Session:
     def stop(self) -> None:
         """Ask for the end."""
         self._left = True
+
+
+@contextmanager
+def _little_garbage() -> Iterator[None]:
+    """Have collections of garbage look seldom, and not at what lives as long as the run."""
+    first, *later = gc.get_threshold()
+    gc.freeze()
+    gc.set_threshold(_OBJECTS, *later)
+    try:
+        yield
+    finally:
+        gc.set_threshold(first, *later)
+        gc.unfreeze()
 
 
 def _init(context: Context, args: list[str], domain_id: int | None) -> None:

@@ -110,6 +110,14 @@ def test_what_candidates_do_not_touch_may_be_left_out(measurement, equations):
             assert np.array_equal(equation.target, equations[equation.place].target)
 
 
+def test_load_cells_that_are_late_touch_every_winch(measurement):
+    late = Candidate(catalogue()["tension_delay"], "load_cells")
+    found = equations_of(measurement, [late.effect], touched=[late])
+    shafts = [e for e in found if e.place.channel is Channel.SHAFT]
+    assert [e.place.element for e in shafts] == list(measurement.machine.cable_names)
+    assert all(late in equation.columns for equation in shafts)
+
+
 @pytest.mark.parametrize(
     ("name", "element", "value", "channel"),
     [

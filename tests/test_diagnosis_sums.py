@@ -283,3 +283,12 @@ def test_blocks_are_joined_two_by_two(count):
     assert len(joined) == -(-count // 2)
     assert joined.sum() == values.sum()
     assert joined[0] == values[:2].sum()
+
+
+def test_a_combination_that_is_nothing_tells_nothing():
+    """Three times a column less the same, whose squares are rounded to less than none."""
+    equation = made(seed=7)[0]
+    threefold = equation.columns | {THIRD: 3.0 * equation.columns[FIRST]}
+    sums = sums_of(replace(equation, columns=threefold))[1]
+    turned = sums.beside(np.array([[3.0], [0.0], [-1.0]]))
+    assert np.all(np.isfinite(turned.weights(np.arange(4))))

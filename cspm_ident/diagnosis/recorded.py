@@ -15,7 +15,7 @@ from cspm_ident.diagnosis.suspension_equations import suspension_equations
 from cspm_ident.signals.measurement import Measurement
 from cspm_ident.signals.timeline import Timeline
 from cspm_sim.effect_entries import read_actions
-from cspm_sim.effects import Channel, Effect
+from cspm_sim.effects import Channel, Effect, Elements
 
 
 def equations_of(
@@ -64,5 +64,7 @@ def _reached(
     if touched is None or measurement.tension is None:
         return names, True
     kinds = {r.channel for c in touched for r in (c.effect.regression, *c.effect.partners)}
-    winches = {c.element for c in touched if c.element in names}
+    # Load cells that are late show at every winch.
+    everywhere = any(c.effect.elements is Elements.CELLS for c in touched)
+    winches = names if everywhere else {c.element for c in touched if c.element in names}
     return winches, not kinds <= {Channel.SHAFT, Channel.DRIVE}

@@ -119,7 +119,8 @@ class Sums:
         turn[:width, width:-1] = combinations * self._lengths[columns, None]
         table = np.append(columns, len(self._whole) - 1)
         grams = turn.T @ self._of(table, table) @ turn
-        lengths = np.append(np.sqrt(np.einsum("bii->i", grams))[:-1], 1.0)
+        # A combination of nothing has squares that are rounded, to less than none as well.
+        lengths = np.append(np.sqrt(np.maximum(np.einsum("bii->i", grams), 0.0))[:-1], 1.0)
         lengths[lengths == 0.0] = 1.0
         grams = grams / (lengths[:, None] * lengths)
         return self._alone(grams, lengths[:-1] * np.append(self._lengths[columns], np.ones(count)))

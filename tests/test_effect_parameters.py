@@ -160,3 +160,12 @@ def test_states_of_effects_have_names():
     assert plant.state_name(36) == "state 0 of cable_hysteresis of c3"
     assert plant.state_name(40) == "state 3 of payload_swing of bar"
     assert len(plant.state) == 41
+
+
+@pytest.mark.parametrize(
+    ("breakaway", "coulomb", "plausible"),
+    [(1.0, 0.5, True), (1.0, 1.0, True), (1.0, 0.49, False), (0.99, 1.0, False)],
+)
+def test_dry_friction_falls_to_half_of_breakaway_at_most(breakaway, coulomb, plausible):
+    values = {"breakaway_torque": breakaway, "coulomb_torque": coulomb, "stribeck_speed": 1.0}
+    assert catalogue()["winch_stribeck_friction"].is_plausible(values) is plausible

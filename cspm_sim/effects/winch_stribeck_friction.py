@@ -30,8 +30,13 @@ def _columns(signals: Array, stribeck_speed: float) -> Array:
     return np.asarray(np.sign(speed)[:, None] * np.stack([near_rest, 1.0 - near_rest], -1))[:, None]
 
 
+# Of breakaway: what falls further while it slides is no dry friction (Armstrong-Hélouvry et al.).
+_LEAST_LEFT = 0.5
+
+
 def _falls(values: Values) -> bool:
-    return values["breakaway_torque"] >= values["coulomb_torque"]
+    breakaway, coulomb = values["breakaway_torque"], values["coulomb_torque"]
+    return _LEAST_LEFT * breakaway <= coulomb <= breakaway
 
 
 EFFECT = Effect(
@@ -50,7 +55,10 @@ EFFECT = Effect(
         "resisting torque = (coulomb + (breakaway − coulomb)·exp(−(q̇/stribeck_speed)²))·sign(q̇);"
         " at q̇ = 0 whatever holds, up to breakaway"
     ),
-    shows="winch torque residual peaks on both sides of each reversal and falls to a constant",
+    shows=(
+        "winch torque residual peaks on both sides of each reversal and falls to a constant; to less"
+        " than half is not called dry friction"
+    ),
     twins=("winch_coulomb_friction", "winch_viscous_friction"),
     separating_experiment="slow reversals with speeds from well below to above stribeck_speed",
     reference="Armstrong-Hélouvry, Dupont, Canudas de Wit, Automatica 30(7), 1994 (Gaussian form)",

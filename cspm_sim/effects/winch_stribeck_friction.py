@@ -56,8 +56,8 @@ EFFECT = Effect(
         " at q̇ = 0 whatever holds, up to breakaway"
     ),
     shows=(
-        "winch torque residual peaks on both sides of each reversal and falls to a constant; to less"
-        " than half is not called dry friction"
+        "winch torque residual peaks on both sides of each reversal and falls to a constant; to"
+        " less than half is not called dry friction"
     ),
     twins=("winch_coulomb_friction", "winch_viscous_friction"),
     separating_experiment="slow reversals with speeds from well below to above stribeck_speed",

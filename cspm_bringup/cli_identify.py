@@ -281,11 +281,12 @@ def system(
     ],
     testbed: MachineFile = None,
     fit: Annotated[
-        str | None,
+        list[str] | None,
         typer.Option(
             metavar="NAME,NAME",
-            help="What to fit; a wrong name lists all. Usually mass, centre of mass along the bar,"
-            " inertia, stiffness, damping along and across the cables, damping of the roll.",
+            help="What to fit, repeatable; a wrong name lists all. Usually mass, centre of mass"
+            " along the bar, inertia, stiffness, damping along and across the cables, damping of the"
+            " roll.",
         ),
     ] = None,
     freeze: Annotated[
@@ -334,7 +335,7 @@ def system(
         recordings=tuple(recordings),
         held_out=tuple(held_out or ()),
         testbed=testbed,
-        names=_names("--fit", fit),
+        names=_names("--fit", ",".join(fit) if fit else None),
         frozen=dict(_frozen(text) for text in freeze or ()),
         priors=dict(_prior(text) for text in prior or ()),
         bounds=dict(_bounds(text) for text in bound or ()),

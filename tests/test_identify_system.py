@@ -122,7 +122,8 @@ def test_a_late_motion_capture_is_found_and_taken_out(recordings):
 def test_a_prior_holds_and_a_profile_agrees_with_the_interval(cspm, recordings, tmp_path):
     """Through the command: a scale that says 4.2 kg ± 1 g outweighs what the motion says."""
     searched, _ = recordings
-    words = ["--testbed", THESIS, "--fit", "bar.mass,bar_damping.surge", "--horizon", "6"]
+    fit = ["--fit", "bar.mass", "--fit", "bar_damping.surge"]
+    words = ["--testbed", THESIS, *fit, "--horizon", "6"]
     known = ["--prior", "bar.mass=4.2±0.00001", "--profile", "bar_damping.surge"]
     written = ["--json", "found.json", "--out", "fitted"]
     code, _, err = cspm("identify", "system", searched.path, *words, *known, *written)

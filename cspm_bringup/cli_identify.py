@@ -285,8 +285,8 @@ def system(
         typer.Option(
             metavar="NAME,NAME",
             help="What to fit, repeatable; a wrong name lists all. Usually mass, centre of mass"
-            " along the bar, inertia, stiffness, damping along and across the cables, damping of the"
-            " roll.",
+            " along the bar, inertia, stiffness, damping along and across the cables, damping of"
+            " the roll.",
         ),
     ] = None,
     freeze: Annotated[

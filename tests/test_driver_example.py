@@ -248,6 +248,7 @@ class External:
 
 
 @pytest.mark.slow
+@pytest.mark.alone
 def test_a_run_waits_for_it_says_so_starts_and_records(bundle, tmp_path):
     patient = ("--set", f"safety.stale_after={WAIT}", "--duration", "3")
     with External(tmp_path / "bag", *patient) as run:

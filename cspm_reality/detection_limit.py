@@ -300,8 +300,7 @@ def absorbed_share(
         "stiffness": (tension, _tensions(scenes)),
         "radius": (shaft, -_tensions(scenes) / ratios),
     }
-    signature, column = columns[number]
-    return [float(share) for share in np.sum(signature * column, 0) / np.sum(column**2, 0)]
+    return _shares(*columns[number])
 
 
 def likeness(phenomenon: str, scenes: Sequence[Scene], machine: Testbed) -> list[float]:
@@ -313,5 +312,9 @@ def likeness(phenomenon: str, scenes: Sequence[Scene], machine: Testbed) -> list
     if column is None:
         return [1.0] * len(machine.cables)
     shaft, _, _ = signatures(PHENOMENA[phenomenon], scenes, machine, stiffnesses(scenes, machine))
-    columns = np.array([column(scene) for scene in scenes])
-    return [float(share) for share in np.sum(shaft * columns, 0) / np.sum(columns**2, 0)]
+    return _shares(shaft, np.array([column(scene) for scene in scenes]))
+
+
+def _shares(signature: Array, column: Array) -> list[float]:
+    """Return how much of each column (times, n) is in the signature beside it, by least squares."""
+    return [float(share) for share in np.sum(signature * column, 0) / np.sum(column**2, 0)]

@@ -7,10 +7,10 @@ from typing import NamedTuple
 
 from cspm_bringup.blind.concealed_run import believed, watch
 from cspm_bringup.blind.item import Item
+from cspm_ident.diagnosis.cuts import SEARCHED_SHARE
 from cspm_reality.detection_limit import absorbed_share, detection_limits, likeness
 from cspm_reality.reality import conceal
 
-_SEARCHED_SHARE = 0.7  # of a recording; the rest is held out by the diagnosis
 _SEED = 1
 
 Amounts = Mapping[str, Sequence[float]]
@@ -64,7 +64,7 @@ def run_blank(items: Sequence[Item], duration: float, tell: Tell) -> BlankRuns:
         tell(f"detection limits in {scenario}", done, len(scenarios))
         bundle = believed(scenario, duration, _SEED)
         machine = bundle.testbed.testbed
-        scenes = watch(bundle, conceal(machine, {}, 0.0, _SEED), _SEARCHED_SHARE * duration)
+        scenes = watch(bundle, conceal(machine, {}, 0.0, _SEED), SEARCHED_SHARE * duration)
         blank.limits[scenario] = detection_limits(scenes, machine)
         for where, name in names:
             if where == scenario:

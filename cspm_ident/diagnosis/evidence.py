@@ -95,8 +95,7 @@ class Evidence:
         full = np.zeros(self.width)
         full[columns] = weights
         return {
-            place.place: _squares(place.grams, np.append(full[place.columns], -1.0))
-            for place in self.places
+            place.place: squares_by_block(place.grams, full[place.columns]) for place in self.places
         }
 
     def left_with(
@@ -151,7 +150,14 @@ class Evidence:
         return len(self.times)
 
 
-def _squares(grams: Array, vector: Array) -> Array:
+def squares_by_block(grams: Array, weights: Array) -> Array:
+    """Return Σ residual² of each block (blocks,) from products of columns and target.
+
+    Args:
+        grams: Σ [columns, y]ᵀ[columns, y] per block, shape (blocks, m + 1, m + 1).
+        weights: of the columns, shape (m,).
+    """
+    vector = np.append(weights, -1.0)
     return np.asarray(np.einsum("i,bij,j->b", vector, grams, vector))
 
 

@@ -47,6 +47,15 @@ class LeftOut(NamedTuple):
         errors = np.sqrt(np.maximum(np.diag(self.covariance), 1e-300) * more)
         return errors, self.blocks_of / more - 1.0
 
+    def dominant(self) -> int | None:
+        """Return which block tells more of the weights than all others, None where none does.
+
+        A violent start tells nearly all of a recording's speeds; that what it shows goes on
+        afterwards is seen only without it.
+        """
+        most = int(np.argmax(self.shares))
+        return most if self.shares[most] > DOMINANT else None
+
     def chance(self) -> float:
         """Return the probability of weights as large by chance, by Wald's test."""
         count = len(self.weights)
@@ -88,17 +97,6 @@ def _alike(apart: Array) -> Array:
     squares = np.maximum(np.sum(apart**2, axis=0), 1e-300)
     alike = np.sum(apart[1:] * apart[:-1], axis=0) / squares
     return np.asarray(np.clip(alike, 0.0, _MOST_ALIKE))
-
-
-def dominant(parts: Array) -> int | None:
-    """Return which block tells more of the weights than all others, None where none does.
-
-    A violent start tells nearly all of a recording's speeds; that what it shows goes on afterwards
-    is seen only without it.
-    """
-    shares = left_out(parts).shares
-    most = int(np.argmax(shares))
-    return most if shares[most] > DOMINANT else None
 
 
 def pseudo_inverse(gram: Array) -> Array:

@@ -13,8 +13,8 @@ from numpy.typing import NDArray
 from scipy.stats import norm, wilcoxon
 from scipy.stats import t as t_distribution
 
-from cspm_ident.diagnosis.evidence import Evidence, silence
-from cspm_ident.diagnosis.left_out import RANK, dominant, left_out, pseudo_inverse
+from cspm_ident.diagnosis.evidence import Evidence, silence, squares_by_block
+from cspm_ident.diagnosis.left_out import RANK, LeftOut, left_out, pseudo_inverse
 
 Array = NDArray[np.float64]
 Index = NDArray[np.intp]
@@ -206,7 +206,7 @@ class Sums:
         both = np.append(columns, len(self._whole) - 1)
         parts, out = self._of(both, both), np.zeros(self.blocks)
         for fold, others in zip(self._folds, self._others, strict=True):
-            out[fold] = _left(parts[fold], self._weights(columns, others))
+            out[fold] = squares_by_block(parts[fold], self._weights(columns, others))
         return out
 
     def gain(self, base: Index, columns: Index) -> Gain:
@@ -227,7 +227,7 @@ class Sums:
     def _fitted(self, columns: Index) -> Array:
         """Return Σ residual² of each block, fitted to all of them."""
         both = np.append(columns, len(self._whole) - 1)
-        return _left(self._of(both, both), self._weights(columns, self._whole))
+        return squares_by_block(self._of(both, both), self._weights(columns, self._whole))
 
     def drift(self, base: Index, columns: Index) -> tuple[Gain, float]:
         """Return what it gains to let weights change over the blocks, and by which chance.
@@ -278,17 +278,17 @@ class Sums:
             base: columns beside them.
             columns: those tested.
         """
-        return left_out(self._undominated(base, columns)).chance()
+        return self._undominated(base, columns).chance()
 
-    def _undominated(self, base: Index, columns: Index) -> Array:
-        """Return products as `_beyond`, of all blocks but a dominant one if the others tell any."""
-        parts = self._beyond(base, columns)
-        most = dominant(parts)
+    def _undominated(self, base: Index, columns: Index) -> LeftOut:
+        """Return how weights scatter over all blocks but a dominant one if the others tell any."""
+        found = left_out(self._beyond(base, columns))
+        most = found.dominant()
         if most is None:
-            return parts
+            return found
         others = self._beyond(base, columns, np.delete(np.arange(self.blocks), most))
         tell = np.trace(others.sum(axis=0)[:-1, :-1]) > RANK
-        return others if tell else parts
+        return left_out(others) if tell else found
 
     def _beyond(self, base: Index, columns: Index, blocks: Index | None = None) -> Array:
         """Return blocks' products of columns and target less what a base spans of them."""
@@ -341,12 +341,6 @@ class Sums:
 
     def _weights(self, columns: Index, gram: Array) -> Array:
         return np.asarray(pseudo_inverse(gram[np.ix_(columns, columns)]) @ gram[columns, -1])
-
-
-def _left(parts: Array, weights: Array) -> Array:
-    """Return Σ residual² of each block for weights, of products of columns and target."""
-    vector = np.append(weights, -1.0)
-    return np.asarray(np.einsum("i,bij,j->b", vector, parts, vector))
 
 
 def gain_of(better: Array) -> Gain:

@@ -110,6 +110,12 @@ class Intake:
         self._inlets = []
 
 
+def _take_each(take_one: Callable[[], bool]) -> None:
+    for _ in range(_AT_ONCE):
+        if not take_one():
+            return
+
+
 class _Inlet:
     """One subscription."""
 
@@ -142,9 +148,7 @@ class _Inlet:
         return True
 
     def take(self) -> None:
-        for _ in range(_AT_ONCE):
-            if not self.take_one():
-                return
+        _take_each(self.take_one)
 
 
 class _BlockInlet:
@@ -204,6 +208,4 @@ class _ObjectInlet:
         return True
 
     def take(self) -> None:
-        for _ in range(_AT_ONCE):
-            if not self.take_one():
-                return
+        _take_each(self.take_one)

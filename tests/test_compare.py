@@ -14,11 +14,14 @@ from run_samples import run_to
 
 from cspm_bringup import cli
 from cspm_ident.block_simulation import BlockSimulation, Drive
+from cspm_ident.comparison import floor
 from cspm_ident.comparison.compare import compare
 from cspm_ident.comparison.metrics import best_lag, coherence_of, error_bins, nrmse
 from cspm_ident.offline_page import POINTS, thinned
 from cspm_ident.signals.delays import RESOLUTION_S, find_delays
 from cspm_ident.signals.measurement import read_measurement
+from cspm_ident.signals.noise import with_more_noise
+from cspm_ident.signals.noise_source import noise_of
 from cspm_ident.signals.timeline import Timeline
 from cspm_msgs_py.errors import InputError
 
@@ -197,6 +200,32 @@ def test_error_bins_show_what_drives_an_error():
     bins = error_bins(0.3 * np.sign(speed), speed)
     assert [np.sign(each.bias) for each in bins] == [np.sign(each.centre) for each in bins]
     assert error_bins(speed, np.ones_like(speed)) == []
+
+
+def test_noise_alone_is_no_slope_of_the_error(comparison):
+    """A measured value has its noise in common with its error."""
+    assert "value" not in of(comparison, "bar/pose/sway").bins
+    moves = of(comparison, "cables/tension/sway_1")
+    low, high = np.quantile(moves.simulated, (0.01, 0.99))
+    assert moves.bins["value"][0].centre == pytest.approx(low + (high - low) / 16)
+
+
+def test_one_start_is_drawn_several_times_and_many_once(measurement, monkeypatch):
+    seeds = []
+
+    def noted(measured, noise, seed):
+        seeds.append(seed)
+        return with_more_noise(measured, noise, seed)
+
+    monkeypatch.setattr(floor, "with_more_noise", noted)
+    machine, noise = measurement.machine, noise_of(measurement, None)[0]
+    timeline = Timeline(measurement)
+    for count, draws in ((1, 4), (2, 2), (5, 1)):
+        seeds.clear()
+        windows = [(100 * i, 100 * (i + 1)) for i in range(count)]
+        scatter = floor.propagated(timeline, machine, Drive.WINCH, windows, noise)
+        assert len(set(seeds)) == len(seeds) == draws
+        assert np.isfinite(scatter.bars).all()
 
 
 def test_thinned_lines_keep_spikes():

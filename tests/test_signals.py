@@ -111,6 +111,19 @@ def test_speeds_show_motion_that_an_encoder_hides():
     assert alone.band == ENCODER_BAND_HZ
 
 
+def test_speeds_are_used_where_winches_do_little_but_tremble():
+    """A filter's ends, which see one side only, are no disagreement of encoder and speed."""
+    generator = np.random.default_rng(5)
+    rough = np.zeros(len(TIMES))
+    for _ in range(3):
+        rough = np.convolve(generator.standard_normal(len(TIMES)), [1.0, -1.0], "same") + rough
+    speed = rough[:, None] + 0.02 * wave(0.5)
+    steps = 0.5 * (speed[1:] + speed[:-1]) * np.diff(TIMES)[:, None]
+    angle = np.concatenate([np.zeros((1, 1)), np.cumsum(steps, axis=0)])
+    rounded = Samples(TIMES, np.round(angle / 7.67e-4) * 7.67e-4)
+    assert not np.isfinite(winch_motion(rounded, Samples(TIMES, speed), TIMES).band)
+
+
 def test_a_speed_of_the_wrong_sign_is_not_used():
     _, rounded, speed = encoder(step=0.001)
     wrong = Samples(speed.times, -speed.values)

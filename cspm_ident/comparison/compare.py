@@ -301,7 +301,10 @@ def _bins(timeline: Timeline, channel: Channel, topic: str, i: int) -> dict[str,
         return np.asarray(np.interp(channel.times, timeline.times, signal[:, column]))
 
     rates = timeline.bar_twists if topic == BAR else timeline.speeds
-    quantities: dict[str, Array | None] = {"time_s": channel.times, "value": channel.measured}
+    quantities: dict[str, Array | None] = {"time_s": channel.times}
+    if channel.moves:
+        # Not the measured value, whose noise is in the error as well and would look like a slope.
+        quantities["value"] = channel.simulated
     quantities["speed"] = at(rates, i)
     if topic != BAR:
         quantities["angle_rad"] = at(timeline.angles, i)

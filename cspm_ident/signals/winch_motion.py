@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from cspm_ident.signals.samples import Samples
-from cspm_ident.signals.smoothing import smooth
+from cspm_ident.signals.smoothing import Smooth, smooth
 
 Array = NDArray[np.float64]
 
@@ -16,6 +16,8 @@ Array = NDArray[np.float64]
 ENCODER_BAND_HZ = 100.0
 # With speeds: slow motion from the encoders, fast from the speeds.
 CROSSOVER_HZ = 5.0
+# Of the crossover's periods: so near a stretch's ends the filters have one side only.
+_ENDS = 2.0
 # Largest share of the speed's variance at which encoder and speed may disagree to be joined.
 _DISAGREEMENT = 0.02
 
@@ -66,7 +68,17 @@ def _integral(speed: Samples) -> Samples:
 def _agree(angle: Samples, speed: Samples) -> bool:
     """Return whether the speeds are the angles' derivatives, in the band that both show well."""
     slow_angle, slow_speed = smooth(angle, CROSSOVER_HZ), smooth(speed, CROSSOVER_HZ)
-    derived, said = slow_angle.at(speed.times, 1), slow_speed.at(speed.times)
+    times = _inside(slow_angle, speed.times)
+    derived, said = slow_angle.at(times, 1), slow_speed.at(times)
     apart, whole = np.nanvar(derived - said, axis=0), np.nanvar(said, axis=0)
     # What stands still tells nothing; its speed is noise, and small.
     return bool((apart <= _DISAGREEMENT * whole.max()).all())
+
+
+def _inside(slow: Smooth, times: Array) -> Array:
+    """Return the times that are not near a stretch's ends; all of them where none is left."""
+    end = _ENDS / CROSSOVER_HZ
+    inside = np.zeros(len(times), dtype=np.bool_)
+    for first, last in slow.spans:
+        inside |= (times >= first + end) & (times <= last - end)
+    return times[inside] if inside.any() else times

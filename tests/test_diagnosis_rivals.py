@@ -4,11 +4,13 @@ import numpy as np
 import pytest
 
 from cspm_ident.diagnosis.columns import Candidate, Place
+from cspm_ident.diagnosis.diagnose import _confirmed
 from cspm_ident.diagnosis.drivers import Knots
 from cspm_ident.diagnosis.equation import Equation
 from cspm_ident.diagnosis.evidence import gather
-from cspm_ident.diagnosis.hypothesis import bounded, is_allowed
+from cspm_ident.diagnosis.hypothesis import Hypothesis, bounded, is_allowed
 from cspm_ident.diagnosis.likeness import chance
+from cspm_ident.diagnosis.rivals import rivals_of
 from cspm_ident.diagnosis.search import Search
 from cspm_ident.diagnosis.sums import Sums
 from cspm_sim.effects import Channel, catalogue
@@ -224,6 +226,35 @@ def test_what_is_not_kept_explains_nothing():
     assert driver.signal == "speed [rad/s]"
     assert gain.total > 0.0
     assert share > 0.9
+
+
+@pytest.mark.parametrize(
+    ("name", "common"), [("pose_delay", True), ("winch_viscous_friction", False)]
+)
+def test_what_one_system_reads_is_a_rival_with_one_number_for_all(name, common):
+    late, effect, speed = catalogue()["tension_delay"], catalogue()[name], np.sin(1.7 * TIMES)
+    cells = Candidate(late, "load_cells")
+    each = [Candidate(effect, element) for element in ("bar", "winch_frame")]
+    equations = [
+        equation(Place(Channel.TENSION, c.element), speed, {cells: speed, c: speed}) for c in each
+    ]
+    evidence = gather([equations], BLOCK_S)
+    base, told = np.zeros(0, dtype=int), Hypothesis(late, (cells,))
+    rivals = rivals_of(evidence, Sums(evidence), base, told, each)
+    assert [r.common for r in rivals if len(r.elements) == 2] == [common]
+    assert not any(r.common for r in rivals if len(r.elements) == 1)
+
+
+@pytest.mark.parametrize(("delay", "stays"), [(1e-4, True), (1e-3, False)])
+def test_a_delay_as_of_a_sound_machine_stays_though_little_is_seen_of_it_later(delay, stays):
+    cells = Candidate(catalogue()["tension_delay"], "load_cells")
+    place, steps = Place(Channel.TENSION, "only"), np.sin(1.7 * TIMES)
+    columns = {cells: steps / delay}
+    search = Search(gather([[equation(place, steps, columns)]], BLOCK_S))
+    judge = gather([[equation(place, steps, columns, noise=10.0)]], BLOCK_S)
+    kept, rejected = _confirmed(search, judge, search.run())
+    assert len(kept) == stays
+    assert len(rejected) == (not stays)
 
 
 SCALE, RADIUS, DRIVE = (

@@ -98,11 +98,16 @@ def test_a_few_blocks_that_agree_are_enough_and_a_single_one_is_not():
     assert in_few_blocks([9], weight=3e5).p_value(base, own) > 0.5
 
 
-def with_a_start(seed=0, at_start=0.0, afterwards=0.0):
-    """A column whose first block tells more than all others, and its weights there and later."""
+def with_a_start(seed=0, at_start=0.0, afterwards=0.0, tail=1.0):
+    """A column whose first block tells more than all others, and its weights there and later.
+
+    The second block is `tail` times as loud as those after it.
+    """
     equation, columns, _ = made(seed, (0.3, 0.0, 0.0))
-    first = equation.times < equation.times[0] + BLOCK_S
-    violent = np.where(first, 40.0, 1.0) * columns[:, 2]
+    since = equation.times - equation.times[0]
+    first = since < BLOCK_S
+    loud = np.select([first, since < 2.0 * BLOCK_S], [40.0 * tail, tail], 1.0)
+    violent = loud * columns[:, 2]
     target = equation.target[:, 0] + np.where(first, at_start, afterwards) * violent
     shaped = equation.columns | {THIRD: violent[:, None, None]}
     return sums_of(replace(equation, target=target[:, None], columns=shaped))[1]
@@ -112,12 +117,14 @@ def test_a_violent_start_hides_nothing_of_what_goes_on_afterwards():
     base, own = np.array([0]), np.array([2])
     assert with_a_start(at_start=2e3, afterwards=4e3).p_value(base, own) < 1e-6
     assert with_a_start(at_start=4e3, afterwards=0.0).p_value(base, own) > 1e-2
+    assert with_a_start(at_start=2e3, afterwards=4e3, tail=40.0).p_value(base, own) < 1e-6
 
 
-def test_chance_is_told_as_promised_beside_a_violent_start():
+@pytest.mark.parametrize("tail", [1.0, 40.0])
+def test_chance_is_told_as_promised_beside_a_violent_start(tail):
     """Of 200 absent effects at most 20 may look present at 5 %, by the binomial at 1e-3."""
     base, own = np.array([0]), np.array([2])
-    false = [with_a_start(seed).p_value(base, own) < 0.05 for seed in range(200)]
+    false = [with_a_start(seed, tail=tail).p_value(base, own) < 0.05 for seed in range(200)]
     assert sum(false) <= 20
 
 

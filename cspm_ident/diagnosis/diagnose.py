@@ -14,7 +14,13 @@ from cspm_ident.diagnosis.cuts import first_part, last_part, span_of, whole_part
 from cspm_ident.diagnosis.drivers import Driver, Knots
 from cspm_ident.diagnosis.equation import Equation, in_noise, steady
 from cspm_ident.diagnosis.evidence import Evidence, gather
-from cspm_ident.diagnosis.hypothesis import Findings, Named, is_negligible, members_of
+from cspm_ident.diagnosis.hypothesis import (
+    Findings,
+    Hypothesis,
+    Named,
+    is_negligible,
+    members_of,
+)
 from cspm_ident.diagnosis.judgement import HeldOut, free_functions, judged
 from cspm_ident.diagnosis.limits import Limit, detection_limits
 from cspm_ident.diagnosis.lines import Line, lines_of, with_lines
@@ -152,7 +158,7 @@ def diagnose(
         kept = tuple(each for k, each in enumerate(kept) if k not in model.useless)
         model = modelled(search, kept, data)
     # What is not kept explains nothing.
-    unknown = search.unknown([each.hypothesis for each in kept]) if rejected else found.unknown
+    unknown = search.unknown(_hypotheses(kept)) if rejected else found.unknown
     values = {c: w for c, (w, _) in model.weights.items()}
     first = _first_weights(search, kept)
     told = [k for k, each in enumerate(kept) if not _is_negligible(each, values)]
@@ -210,7 +216,7 @@ def _lasting(
 
 def _first_weights(search: Search, kept: Sequence[Named]) -> dict[Candidate, Array]:
     """Return the weights of what was kept with the shapes that were searched."""
-    return search.fits.values([each.hypothesis for each in kept])
+    return search.fits.values(_hypotheses(kept))
 
 
 def _is_negligible(named: Named, weights: Mapping[Candidate, Array]) -> bool:
@@ -269,28 +275,33 @@ def _confirmed(
 ) -> tuple[tuple[Named, ...], tuple[Named, ...]]:
     """Part what was found by whether it lowers residuals that were not searched.
 
-    One of them by a share worth a word, and all together.
+    One of them by a share worth a word, unless a sound machine has as much of it, and all together.
     """
     kept = list(found.named)
     rejected: list[Named] = []
     for each in found.named:
-        whole = search.fits.values([other.hypothesis for other in kept])
+        whole = search.fits.values(_hypotheses(kept))
         own = set(each.hypothesis.candidates)
         fewer = {c: w for c, w in whole.items() if c not in own}
         with_it, without = judge.left_with(whole), judge.left_with(fewer)
         shares = [1.0 - with_it[p] / without[p] for p in without if without[p] > 0.0]
         worse = sum(with_it.values()) > sum(without.values())
-        if max(shares) < CONFIRMED_SHARE or worse:
+        idle = max(shares) < CONFIRMED_SHARE
+        if worse or (idle and not search.fits.is_negligible(each.hypothesis, _hypotheses(kept))):
             kept.remove(each)
             rejected.append(each)
     return tuple(kept), tuple(rejected)
+
+
+def _hypotheses(named: Sequence[Named]) -> list[Hypothesis]:
+    return [each.hypothesis for each in named]
 
 
 def _shapes(
     search: Search, kept: Sequence[Named], knots: Knots, drivers: Sequence[Driver]
 ) -> tuple[Shape, ...]:
     """Return the free functions, each fitted to what is left by what was kept."""
-    base = search.fits.columns(each.hypothesis for each in kept)
+    base = search.fits.columns(_hypotheses(kept))
     found = []
     for driver in drivers:
         values = search.sums.weights_beyond(base, search.evidence.columns_of([driver]))

@@ -194,6 +194,11 @@ def freedom(hypothesis: Hypothesis) -> int:
     return causes * (len(effect.parameters) - len(effect.nonlinear)) + causes - 1
 
 
+def has_one_system(effect: Effect) -> bool:
+    """Return whether one system reads all that an effect can act on."""
+    return effect.sense is not None and effect.sense.one_system
+
+
 def is_number(hypothesis: Hypothesis) -> bool:
     """Return whether it is a wrong number of the file, rather than physics that is missing."""
     return hypothesis.effect.alter is not None

@@ -12,7 +12,7 @@ from cspm_ident.diagnosis.columns import Place
 from cspm_ident.diagnosis.equation import Equation, steady
 from cspm_ident.diagnosis.hypothesis import Named, bounded, is_negligible, members_of
 from cspm_ident.diagnosis.onset import Onset, onset_of
-from cspm_ident.diagnosis.parameters import of_drives, of_shafts
+from cspm_ident.diagnosis.parameters import of_clocks, of_drives, of_shafts
 from cspm_ident.diagnosis.refine import Cut, needs_refining, refine
 from cspm_ident.diagnosis.search import Search
 from cspm_ident.diagnosis.simulation import (
@@ -99,7 +99,7 @@ def modelled(search: Search, kept: Sequence[Named], data: Data) -> Model:
 
     rows = [[e.within(since, np.inf) for e in part] for part in data.rows]
     weights = _parameters(search, kept, data.searched, cut, rows, data.noise, data.block)
-    weights = of_drives(weights, 2.0 * data.searched[0].torque_age)
+    weights = of_clocks(of_drives(weights, 2.0 * data.searched[0].torque_age))
     weights = {c: (bounded(c, own, half), half) for c, (own, half) in weights.items()}
     values = {c: w for c, (w, _) in weights.items()}
     members = [{c: values[c] for c in members_of(values, each.hypothesis)} for each in kept]

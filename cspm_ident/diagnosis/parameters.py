@@ -64,6 +64,23 @@ def of_drives(weights: Weights, period: float) -> Weights:
     return found
 
 
+def of_clocks(weights: Weights) -> Weights:
+    """Return the weights, of which no part is surer than what a sound machine may have of it.
+
+    A delay is told against clocks that lie apart themselves (GUM, JCGM 100:2008, 4.3).
+
+    Args:
+        weights: as found.
+    """
+    found = dict(weights)
+    for candidate, (values, half) in weights.items():
+        effect = candidate.effect
+        if effect.negligible:
+            own = np.array([effect.negligible.get(p.name, 0.0) for p in effect.linear])
+            found[candidate] = values, np.hypot(half, own)
+    return found
+
+
 def _fitted(parts: Parts, candidates: Sequence[Candidate], block_s: float) -> Weights:
     evidence = gather(parts, block_s)
     return weights_of(evidence, Sums(evidence), candidates)

@@ -56,6 +56,7 @@ def refine(
     effects = {c.effect_id: c.effect for c in candidates}
     wanted = [(c.effect_id, c.element) for c in candidates]
     applied: dict[Candidate, Array] = {}
+    widths: dict[Candidate, Array] = {}
     factor = _FIRST_FACTOR
     found: Weights = {}
     for _ in range(_ROUNDS if candidates else 0):
@@ -68,13 +69,16 @@ def refine(
         parts = cut([equations_of(m, near, touched=candidates) for m in moved])
         evidence = gather(in_noise(steady(parts), noise), block_s)
         shapes, found = _fitted(evidence, shapes, wanted, common)
-        for candidate, (weights, _) in found.items():
+        for candidate, (weights, half) in found.items():
             if _is_applied(candidate.effect):
-                applied[candidate] = weights + applied.get(candidate, 0.0)
+                before = applied.get(candidate, np.zeros_like(weights))
+                turned = _unit_after(candidate.effect, before)
+                applied[candidate] = before + turned * weights
+                widths[candidate] = turned * half
         factor = float(np.sqrt(factor))
         if _is_settled(found):
             break
-    return {c: (applied[c] if _is_applied(c.effect) else w, half) for c, (w, half) in found.items()}
+    return {c: (applied.get(c, w), widths.get(c, half)) for c, (w, half) in found.items()}
 
 
 def _is_settled(found: Weights) -> bool:
@@ -94,6 +98,17 @@ def needs_refining(effect: Effect) -> bool:
 def _is_applied(effect: Effect) -> bool:
     """Return whether machine or readings are corrected by it, so that what is fitted adds up."""
     return effect.alter is not None or effect.sense is not None
+
+
+def _unit_after(effect: Effect, applied: Array) -> Array:
+    """Return what one more unit of each weight is worth, some of it being applied already.
+
+    A factor of the file, or of a reading, multiplies what there is by now.
+    """
+    if effect.coefficients:
+        return np.ones_like(applied)
+    factors = np.array([parameter.absent == 1.0 for parameter in effect.linear])
+    return np.where(factors, 1.0 + applied, 1.0)
 
 
 def _near(effect: Effect, shape: Mapping[str, float], factor: float) -> Effect:

@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 
 from cspm_ident.diagnosis.columns import Candidate
 from cspm_ident.diagnosis.evidence import Evidence
-from cspm_ident.diagnosis.hypothesis import Hypothesis
+from cspm_ident.diagnosis.hypothesis import Hypothesis, has_one_system
 from cspm_ident.diagnosis.likeness import overlap, where_alike
 from cspm_ident.diagnosis.sums import Sums
 
@@ -25,8 +25,8 @@ def rivals_of(
 ) -> list[Hypothesis]:
     """Return the best point of every other effect that explains the same.
 
-    On the same elements, or where it acts on others on the best one and on all; and the same effect
-    on another single element.
+    On the same elements, or where it acts on others on the best one and on all, with the same
+    numbers if one system reads them; and the same effect on another single element.
     """
     elements = set(hypothesis.elements)
     groups: dict[tuple[str, tuple[tuple[str, float], ...]], list[Candidate]] = {}
@@ -37,7 +37,8 @@ def rivals_of(
         if name == hypothesis.effect.id:
             continue
         for own in where_alike(members, elements):
-            rival = Hypothesis(members[0].effect, own)
+            effect = members[0].effect
+            rival = Hypothesis(effect, own, common=len(own) > 1 and has_one_system(effect))
             gain = float(sums.gains_beyond(base, [evidence.columns_of(own)])[0])
             key = name, len(own) > 1
             if key not in best or gain > best[key][0]:

@@ -20,6 +20,7 @@ from cspm_ident.diagnosis.hypothesis import (
     Named,
     Unknown,
     freedom,
+    has_one_system,
     is_number,
     is_wider,
     joined,
@@ -269,7 +270,7 @@ class Search:
         own = self._extended(candidate, alike, base)
         if len(alike) == 1:
             return [own]
-        one_system = _has_one_system(own)
+        one_system = has_one_system(own.effect)
         common = [replace(whole, common=True)] if one_system or self._agree(whole, base) else []
         if len(own.candidates) < len(alike):
             return [own, *common, whole]
@@ -389,11 +390,5 @@ def _boldness(one: Hypothesis, other: Hypothesis) -> float:
     """
     if one.onset and not other.onset:
         return _SIGMAS_OF_ONSET
-    unlikely = one.common != other.common and one.common is not _has_one_system(one)
+    unlikely = one.common != other.common and one.common is not has_one_system(one.effect)
     return _SIGMAS if unlikely else 0.0
-
-
-def _has_one_system(hypothesis: Hypothesis) -> bool:
-    """Return whether one system reads all that an effect can act on."""
-    sense = hypothesis.effect.sense
-    return sense is not None and sense.one_system

@@ -272,7 +272,7 @@ class Sums:
 
         By Wald's test with the covariance above, so that what a single block says counts for
         nothing, while a few that agree may be enough. Blocks count by what they tell of the
-        columns; one that tells more than all others is left out, and they are tested.
+        columns; one that tells more than all others is left out, and they are tested, in turn.
 
         Args:
             base: columns beside them.
@@ -281,14 +281,19 @@ class Sums:
         return self._undominated(base, columns).chance()
 
     def _undominated(self, base: Index, columns: Index) -> LeftOut:
-        """Return how weights scatter over all blocks but a dominant one if the others tell any."""
+        """Return how weights scatter over all blocks but dominant ones while the others tell any.
+
+        What is left without one may be ruled by another, as where a rope is first pulled taut.
+        """
+        heard = np.arange(self.blocks)
         found = left_out(self._beyond(base, columns))
-        most = found.dominant()
-        if most is None:
-            return found
-        others = self._beyond(base, columns, np.delete(np.arange(self.blocks), most))
-        tell = np.trace(others.sum(axis=0)[:-1, :-1]) > RANK
-        return left_out(others) if tell else found
+        while (most := found.dominant()) is not None:
+            heard = np.delete(heard, most)
+            others = self._beyond(base, columns, heard)
+            if np.trace(others.sum(axis=0)[:-1, :-1]) <= RANK:
+                break
+            found = left_out(others)
+        return found
 
     def _beyond(self, base: Index, columns: Index, blocks: Index | None = None) -> Array:
         """Return blocks' products of columns and target less what a base spans of them."""

@@ -1,0 +1,65 @@
+"""Parameters that hold to first order only are corrected until they hold."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from run_samples import bundle_of
+
+from cspm_bringup.run import run
+from cspm_ident.diagnosis.columns import Candidate
+from cspm_ident.diagnosis.diagnose import noise_of
+from cspm_ident.diagnosis.equation import steady
+from cspm_ident.diagnosis.hypothesis import Hypothesis
+from cspm_ident.diagnosis.parameters import of_clocks
+from cspm_ident.diagnosis.recorded import equations_of
+from cspm_ident.diagnosis.refine import refine
+from cspm_ident.signals.measurement import read_measurement
+from cspm_sim.effects import catalogue
+from cspm_sim.effects.alteration import altered_cable
+
+DAMPING = catalogue()["cable_axial_damping"]
+CANDIDATE = Candidate(DAMPING, "hoist_1")
+BLOCK_S = 0.3
+
+
+@pytest.fixture(scope="module")
+def measured(tmp_path_factory):
+    folder = tmp_path_factory.mktemp("refine") / "sea"
+    run(bundle_of("worst_case", "duration=12"), folder)
+    return read_measurement(folder)
+
+
+def damper(measured, factor):
+    """The damper and half its interval, in units of the true one, of a file `factor` times off."""
+    machine = measured.machine
+    law = machine.cables[0].damping.model_dump()
+    described = altered_cable(machine, 0, damping={**law, "factor": factor * law["factor"]})
+    other = measured.with_testbed(replace(measured.testbed, testbed=described))
+    parts = [equations_of(other, [DAMPING], touched=[CANDIDATE])]
+    noise = noise_of(steady(parts))
+    hypothesis = Hypothesis(DAMPING, (CANDIDATE,))
+    found = refine([other], [hypothesis], noise, BLOCK_S, lambda parts: parts)
+    (weight,), (half,) = found[CANDIDATE]
+    return factor * (1.0 + weight), factor * half
+
+
+@pytest.mark.parametrize("factor", [0.4, 3.0])
+def test_a_factor_is_the_same_however_wrong_the_file_was(measured, factor):
+    value, half = damper(measured, 1.0)
+    assert abs(value - 1.0) < 0.1
+    other, other_half = damper(measured, factor)
+    np.testing.assert_allclose(other, value, atol=0.1 * half)
+    np.testing.assert_allclose(other_half, half, rtol=0.05)
+
+
+def test_no_delay_is_surer_than_the_clocks_of_a_sound_machine():
+    late, dry = (
+        Candidate(catalogue()[name], "one") for name in ("tension_delay", "winch_coulomb_friction")
+    )
+    given = {c: (np.array([3e-3]), np.array([1e-4])) for c in (late, dry)}
+    found = of_clocks(given)
+    (sound,) = catalogue()["tension_delay"].negligible.values()
+    assert found[late][1] == pytest.approx(np.hypot(1e-4, sound))
+    assert found[late][0] == given[late][0]
+    assert found[dry][1] == given[dry][1]

@@ -12,7 +12,7 @@ from cspm_ident.diagnosis.evidence import gather
 from cspm_ident.diagnosis.fits import Fits
 from cspm_ident.diagnosis.hypothesis import Hypothesis
 from cspm_ident.diagnosis.search import Search
-from cspm_ident.diagnosis.sums import Sums
+from cspm_ident.diagnosis.sums import Gain, Sums
 from cspm_ident.diagnosis.sureness import FALSE_ALARMS, Sureness
 from cspm_sim.effects import Channel, catalogue
 
@@ -121,6 +121,14 @@ def test_what_is_left_of_a_great_finding_is_no_unknown(amount, told):
     assert bool(found.unknown) is told
     alone = Search(gather([[curved(amount, dry=0.0)]], BLOCK_S)).run()
     assert alone.unknown
+
+
+@pytest.mark.parametrize(("errors", "told"), [(1.6, True), (1.4, False)])
+def test_what_scatters_as_much_as_it_gains_is_no_unknown(monkeypatch, errors, told):
+    search = Search(gather([[curved(0.06, dry=0.0)]], BLOCK_S))
+    gained = search.unknown([])[0][1].total
+    monkeypatch.setattr(Sums, "gain", lambda *_: Gain(gained, gained / errors))
+    assert bool(search.unknown([])) is told
 
 
 def warming(amount):

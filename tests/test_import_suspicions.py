@@ -262,6 +262,15 @@ def test_robust_line_passes_over_what_is_wrong():
     assert robust_line(x, 2.0 * x, ones).explained == pytest.approx(1.0)
 
 
+def test_a_gap_is_where_the_source_has_it_whatever_is_dropped_before(tmp_path):
+    columns = healthy()
+    columns["t"] = columns["t"] + 3.0 * (columns["t"] > 4.0)
+    dropped = MAPPING + "drop:\n  - {start: 0, end: 1.5, reason: not yet hung}\n"
+    report = imported(table(tmp_path / "a.csv", columns), dropped).report
+    places = [one.numbers["at"] for one in report.suspicions if one.kind == "gap"]
+    assert places == pytest.approx([4.0, 4.0], abs=0.01)
+
+
 def test_missing_numbers_that_are_kept_disturb_no_check(tmp_path):
     columns = healthy()
     for name in ("q", "v", "u", "N"):

@@ -68,7 +68,7 @@ def prepare(
     for planned in plan.topics:
         name = planned.topic.name
         reports.append(topic_report(planned, messages[name], raw, unwrapped[name], origin))
-    suspicions = suspicions_of(plan.topics, messages, unwrapped, testbed.testbed)
+    suspicions = suspicions_of(plan.topics, messages, unwrapped, testbed.testbed, origin)
     about, unused = _about(path, mapping, testbed), _unused(source, plan)
     report = ImportReport(about, source.kind, origin, source.notes, unused, reports, suspicions)
     return Prepared(messages, report)

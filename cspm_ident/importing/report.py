@@ -161,14 +161,15 @@ def suspicions_of(
     messages: MappingOf[str, TopicMessages],
     unwrapped: MappingOf[str, MappingOf[str, Unwrapped]],
     testbed: Testbed,
+    origin_ns: int,
 ) -> list[Suspicion]:
-    """Return all that looks wrong."""
+    """Return all that looks wrong; its times count from the origin [ns]."""
     found: list[Suspicion] = []
     for one in planned:
         name = one.topic.name
         mine = messages[name]
         sensor = testbed.sensors.get(name)
-        pace = pace_of(mine.stamp_ns, int(mine.stamp_ns[0]))
+        pace = pace_of(mine.stamp_ns, origin_ns)
         found += time_suspicions(name, pace, sensor.rate if sensor else None)
         head = mine.rows(slice(_HELD_SAMPLE))
         found += held_suspicions(name, head)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from functools import lru_cache
 from pathlib import Path
 from typing import Any, NamedTuple
 
@@ -150,7 +151,8 @@ def specimen(
     """Return what encoder and load cell show of a motion."""
     time = np.arange(len(wound)) / RATE
     counts = 2.0 * np.pi / 8192
-    angle = np.round(wound / RADIUS / counts) * counts
+    # Where between two of its steps an encoder rests is chance.
+    angle = np.round(wound / RADIUS / counts + rng.uniform(-0.5, 0.5)) * counts
     rate = np.gradient(wound, 1.0 / RATE) + RADIUS * rng.normal(0.0, 0.01, len(wound))
     shown = np.round((tension + noise(rng, len(wound))) / 0.005) * 0.005
     return Specimen(
@@ -179,6 +181,16 @@ def ramps(
 ) -> Specimen:
     """Return a specimen that was stretched and released slowly between two tensions."""
     rng = np.random.default_rng([seed, round(1000 * length)])
+    wound, tension = _pulled(truth, length, highest, lowest, ramp, cycles)
+    return specimen(truth, length, wound, tension, rng, label or f"l{round(100 * length)}")
+
+
+# What noise is drawn for again and again.
+@lru_cache(maxsize=16)
+def _pulled(
+    truth: Truth, length: float, highest: float, lowest: float, ramp: float, cycles: int
+) -> tuple[np.ndarray, np.ndarray]:
+    """Return cable wound in [m] and tension [N], without noise."""
     stretch = stretch_at(truth, lowest, length)
     stroke = stretch_at(truth, highest, length) - stretch
     corners = np.cumsum([0.0, 0.7, ramp, 0.7, ramp])
@@ -189,7 +201,7 @@ def ramps(
     wound = np.interp(time, times, heights)
     tension = tension_on(truth, wound, length, stretch, 2.0 * highest)
     tension += truth.damping(length) * np.gradient(wound, 1.0 / RATE) + dahl(truth, wound)
-    return specimen(truth, length, wound, tension, rng, label or f"l{round(100 * length)}")
+    return wound, tension
 
 
 def multisine(

@@ -20,11 +20,9 @@ from cspm_msgs_py.errors import CspmError, InputError
 from cspm_msgs_py.graph import NODES, PLAYER, RECORDER
 from cspm_msgs_py.ros.contract_node import ContractNode
 from cspm_msgs_py.ros.leader import Leader
-from cspm_msgs_py.ros.session import Session
+from cspm_msgs_py.ros.session import FAREWELL_S, Session
 from cspm_msgs_py.schedule import PLANT, Schedule, schedule_of
 
-# A node that was told to stop leaves in less than a second, whoever does not answer it.
-_FAREWELL_S = 0.5
 # Where nobody is in a hurry: longer than lost packets take.
 _DELIVERY_S = 3.0
 _STDIN_BYTES = 4096
@@ -89,13 +87,13 @@ def _run_realtime(
         plant = run.plant(node, steps)
         session.every(
             LOOK_EVERY_S,
-            lambda: _report(path, plant.leader, node, plant.waiting(), plant.failure),
+            lambda: _report(path, plant.leader, plant.waiting(), plant.failure),
         )
         session.spin_until(lambda: plant.ended or session.stopped)
         plant.leader.end()
-        _report(path, plant.leader, node, "", plant.failure)
+        _report(path, plant.leader, "", plant.failure)
         # Nobody hears of the end from a node that has left.
-        session.deliver(_FAREWELL_S)
+        session.deliver(FAREWELL_S)
         if plant.failure is not None:
             raise CspmError(plant.failure)
     elif node.name == RECORDER:
@@ -106,13 +104,13 @@ def _run_realtime(
         if leader is not None:
             session.every(
                 LOOK_EVERY_S,
-                lambda: _report(path, leader, node, _waiting(leader), None),
+                lambda: _report(path, leader, leader.waits(), None),
             )
         session.spin_until(lambda: recorder.ended or session.stopped)
         if leader is not None:
             leader.end()
-            _report(path, leader, node, "", None)
-            session.deliver(_FAREWELL_S)
+            _report(path, leader, "", None)
+            session.deliver(FAREWELL_S)
     else:
         _check_part(node, bundle.scenario.name, schedule)
         stage = run.stage(node)
@@ -127,19 +125,10 @@ def _check_part(node: ContractNode, scenario: str, schedule: Schedule) -> None:
         )
 
 
-def _waiting(leader: Leader) -> str:
-    return f"waits for {', '.join(leader.waiting())}" if leader.start_ns is None else ""
-
-
-def _report(
-    path: Path | None, leader: Leader, node: ContractNode, waiting: str, failure: str | None
-) -> None:
-    if path is None:
-        return
-    now = leader.end_ns or node.now_ns()
-    elapsed = 0.0 if leader.start_ns is None else max(0.0, (now - leader.start_ns) * 1e-9)
-    waits = waiting if leader.start_ns is None else ""
-    Report(elapsed, elapsed, waits, failure, leader.end_ns is not None).write(path)
+def _report(path: Path | None, leader: Leader, waiting: str, failure: str | None) -> None:
+    if path is not None:
+        elapsed, ended = leader.elapsed, leader.end_ns is not None
+        Report(elapsed, elapsed, waiting, failure, ended).write(path)
 
 
 def _spin(session: Session, watch: Watch, ended: Callable[[], bool]) -> None:
@@ -148,7 +137,7 @@ def _spin(session: Session, watch: Watch, ended: Callable[[], bool]) -> None:
     if watch.stuck is not None:
         raise CspmError(watch.stuck)
     if ended():
-        session.deliver(_FAREWELL_S if session.stopped else _DELIVERY_S)
+        session.deliver(FAREWELL_S if session.stopped else _DELIVERY_S)
 
 
 def _run_plant(
@@ -178,7 +167,7 @@ def _run_plant(
     )
     if session.stopped:
         plant.stop()
-        session.spin_until(lambda: plant.finished, _FAREWELL_S)
+        session.spin_until(lambda: plant.finished, FAREWELL_S)
     report()
     if plant.finished and not session.stopped:
         session.deliver(_DELIVERY_S)

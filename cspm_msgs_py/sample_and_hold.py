@@ -9,7 +9,7 @@ All times are on the ROS clock and come in as arguments.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Collection, Mapping
 
 import numpy as np
 from numpy.typing import NDArray
@@ -120,6 +120,11 @@ class SampleAndHold:
             self._due = stamp_ns + self._wait_ns
             self._compute(stamp_ns, now_ns)
 
+    def hears(self, topics: Collection[str], now_ns: int) -> bool:
+        """Return whether messages of these topics came that are not too old to compute on."""
+        came = all(name in self._stamps for name in topics)
+        return came and not self._too_old(topics, now_ns)
+
     def refuse(self, now_ns: int, reason: str) -> None:
         """Take note of an unusable message; with a guard it leads to the safe state."""
         self.refused = (self.refused[0] + 1, reason)
@@ -148,7 +153,7 @@ class SampleAndHold:
             return
         if self._guard is not None:
             self._look_at_clock(self._guard, now_ns)
-        elif self._too_old(now_ns):
+        elif self._too_old(self._inputs, now_ns):
             self.stale += 1
             return
         self._stamp = stamp_ns
@@ -176,16 +181,14 @@ class SampleAndHold:
         # The time itself, which has no stamp here, is never old.
         return max(0, now_ns - self._stamps.get(topic, now_ns) - self._delays[topic])
 
-    def _too_old(self, now_ns: int) -> str:
-        """Return the inputs that are too old to compute on."""
-        return ", ".join(
-            name for name in self._inputs if self._age(name, now_ns) > self._limits[name]
-        )
+    def _too_old(self, inputs: Collection[str], now_ns: int) -> str:
+        """Return which of the inputs are too old to compute on."""
+        return ", ".join(name for name in inputs if self._age(name, now_ns) > self._limits[name])
 
     def _status(self, now_ns: int) -> Status:
         level, name, message, values = self._stage.status()
         missing = [name for name in self._inputs if name not in self._rows]
-        old = "" if missing else self._too_old(now_ns)
+        old = "" if missing else self._too_old(self._inputs, now_ns)
         values = {
             **values,
             "deadlines_missed": str(self.late),

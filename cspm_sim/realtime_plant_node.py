@@ -10,9 +10,8 @@ from numpy.typing import NDArray
 from cspm_msgs_py.graph import Edges
 from cspm_msgs_py.ros.contract_node import ContractNode, ros_class
 from cspm_msgs_py.ros.leader import Leader
-from cspm_msgs_py.ros.qos import contract_qos
 from cspm_msgs_py.schedule import CLOCK, PLANT, TORQUE_COMMAND, Schedule
-from cspm_msgs_py.topics import BRAKE, DIAGNOSTICS, Topic
+from cspm_msgs_py.topics import BRAKE, DIAGNOSTICS, QOS_DEPTH, Topic
 from cspm_sim.any_plant import AnyPlant
 from cspm_sim.realtime_plant import RealtimePlant
 from cspm_sim.sensors import AnySensor
@@ -63,9 +62,7 @@ class RealtimePlantNode:
         )
         if TORQUE_COMMAND in schedule.topics:
             node.subscribe_rows(topics[TORQUE_COMMAND], self._torque, self._refuse)
-        node.node.create_subscription(
-            ros_class(BRAKE.ros_type), BRAKE.name, self._brake, contract_qos()
-        )
+        node.subscribe_objects(BRAKE.name, ros_class(BRAKE.ros_type), self._brake, QOS_DEPTH)
         node.node.create_service(ros_class("std_srvs/srv/Trigger"), RESET, self._reset)
         # Twice as often as steps are due: a timer that is late skips calls.
         node.every(0.5e-9 * schedule.period_ns, self._tick)
@@ -87,8 +84,8 @@ class RealtimePlantNode:
 
     def waiting(self) -> str:
         """Return what the start waits for; empty once the run has begun."""
-        missing = [] if self.leader.start_ns is not None else self.leader.waiting()
-        return f"plant waits for {', '.join(missing)}" if missing else ""
+        waits = self.leader.waits()
+        return f"{PLANT} {waits}" if waits else ""
 
     def _on_wall_clock(self, node: ContractNode, topic: Topic, edge: Edges) -> Publish:
         publish: Callable[[int, int, Array], None] = node.publisher(topic, edge.readers)

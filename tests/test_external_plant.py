@@ -18,6 +18,7 @@ from cspm_msgs_py.schedule import (
     PLANT,
     TENSION,
     TENSION_COMMAND,
+    TENSION_DISTRIBUTION,
     TORQUE_COMMAND,
     WINCH_STATE,
     schedule_of,
@@ -114,6 +115,40 @@ def test_a_run_waits_for_the_hardware_and_holds_its_bar(warm, tmp_path, plant):
     # The first command came after the first reference, whatever the age of what it answers.
     commanded = evidence.rows[TORQUE_COMMAND].log_ns[0]
     assert commanded > evidence.rows["/bar/reference"].log_ns[0] - 20 * MS
+
+
+def test_a_run_waits_until_each_controller_hears_the_hardware(warm, tmp_path):
+    """That the recorder hears it, which leads, is not enough: others may be connected later."""
+    bundle = slow_bundle()
+    deaf, named = TENSION_DISTRIBUTION, f"waits for drivers to reach {TENSION_DISTRIBUTION}"
+    with (
+        external(warm, bundle, tmp_path) as graph,
+        Hardware(warm, bundle, tmp_path / "lab", graph.domain, "sim") as hardware,
+        Witness(graph.domain, topics_of(bundle, TENSION)) as witness,
+    ):
+        graph.start(*(name for name in graph.names if name != deaf))
+        graph.start(deaf, remaps={BAR_POSE: "/elsewhere"})
+        hardware.switch_on()
+        witness.until(lambda: waits_for(graph) == named, named)
+        witness.until_more(TENSION, 200)
+        assert waits_for(graph) == named
+        hardware.end()
+        assert set(graph.end(RECORDER).values()) == {0}
+    assert BAR_POSE in Evidence(graph.folder).rows
+
+
+def test_hardware_that_nobody_commands_is_waited_for(warm, tmp_path):
+    bundle, named = slow_bundle(), f"waits for drivers to reach {FORCE_CONTROLLER}"
+    with (
+        external(warm, bundle, tmp_path) as graph,
+        Hardware(warm, bundle, tmp_path / "lab", graph.domain, "sim") as hardware,
+        Witness(graph.domain) as witness,
+    ):
+        graph.start()
+        hardware.start(remaps=APART | {TORQUE_COMMAND: "/elsewhere"})
+        witness.until(lambda: waits_for(graph) == named, named)
+        hardware.end()
+        assert set(graph.end(RECORDER).values()) == {0}
 
 
 def test_hardware_that_dies_is_missed_and_may_come_back(warm, tmp_path):

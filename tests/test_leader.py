@@ -26,7 +26,10 @@ class Follower:
 
     def __init__(self, session, name):
         self.node, self.started, self.ended = session.node(name), [], []
-        self.side = FollowerSide(self.node, PERIOD, self.ended.append, self.started.append)
+        self.ready = True
+        self.side = FollowerSide(
+            self.node, PERIOD, self.ended.append, self.started.append, lambda: self.ready
+        )
 
 
 class Run:
@@ -81,6 +84,21 @@ def test_it_waits_for_what_else_is_missing_and_says_what(domain):
         Follower(session, "recorder")
         run.until(lambda: run.leader.waiting() == missing)
         missing.clear()
+        run.until(lambda: run.leader.start_ns is not None)
+
+
+def test_it_waits_for_a_node_that_drivers_are_not_connected_to(domain):
+    missing = ["/cables/tension"]
+    with Session(domain_id=domain) as session:
+        run = Run(session, ["force_controller"], missing=lambda: list(missing))
+        follower = Follower(session, "force_controller")
+        follower.ready = False
+        # What nobody sends says it all.
+        run.until(lambda: run.leader.waiting() == missing)
+        missing.clear()
+        run.until(lambda: run.leader.waiting() == ["drivers to reach force_controller"])
+        assert not session.spin_until(lambda: run.leader.start_ns is not None, 0.3)
+        follower.ready = True
         run.until(lambda: run.leader.start_ns is not None)
 
 

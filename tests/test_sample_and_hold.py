@@ -101,6 +101,18 @@ def motion(*overrides, **arguments):
     return Part(MOTION_CONTROLLER, *overrides, **arguments)
 
 
+def test_it_hears_what_came_lately_enough_to_compute_on():
+    part = motion(stale_after=0.05)
+    assert part.part.hears([], at(0.0))
+    part.receive(BAR_POSE, 0.0)
+    assert part.part.hears([BAR_POSE], at(59.9))
+    # As old as a period of the topic and 50 ms.
+    assert not part.part.hears([BAR_POSE], at(60.1))
+    assert not part.part.hears([BAR_POSE, FRAME_POSE], at(0.0))
+    part.receive(BAR_POSE, 60.0)
+    assert part.part.hears([BAR_POSE], at(60.1))
+
+
 # When it computes
 
 

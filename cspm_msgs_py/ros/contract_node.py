@@ -22,6 +22,7 @@ from cspm_msgs_py.diagnostics import Status, encode_diagnostics
 from cspm_msgs_py.errors import CspmError, InputError
 from cspm_msgs_py.ros.intake import Intake
 from cspm_msgs_py.ros.qos import contract_qos
+from cspm_msgs_py.ros.wall_timers import WallTimers
 from cspm_msgs_py.topics import DIAGNOSTICS, QOS_DEPTH, SENDER_DEPTH, Topic
 from cspm_msgs_py.wire import WireReader, WireWriter
 
@@ -40,10 +41,12 @@ class ContractNode:
         failure: why the session is to end, in one line, if `fail` was called.
     """
 
-    def __init__(self, name: str, context: Context, *, polled: bool = False) -> None:
-        """Make a node; a `polled` one gets its messages when somebody empties its intake."""
+    def __init__(self, name: str, context: Context, timers: WallTimers | None = None) -> None:
+        """Make a node; with `timers` somebody runs these and empties its intake, no executor."""
         self.node = Node(name, context=context)
-        self.intake = Intake(self.node) if polled else None
+        self.intake = Intake(self.node) if timers is not None else None
+        self._timers = timers
+        self._clock = self.node.get_clock().handle
         self._publishers: dict[str, tuple[Publisher, frozenset[str]]] = {}
         self._steady = Clock(clock_type=ClockType.STEADY_TIME)
         self._complaints = Complaints(self.warn)
@@ -115,13 +118,17 @@ class ContractNode:
         self.intake.subscribe(topic, message_class, take, numbered=False, depth=None)
 
     def subscribe_objects(
-        self, topic: str, message_class: type, take: Callable[[Any], None]
+        self,
+        topic: str,
+        message_class: type,
+        take: Callable[[Any], None],
+        depth: int | None = None,
     ) -> None:
-        """Have `take` called with each message as rclpy's object. All messages wait."""
+        """Have `take` called with each message as rclpy's object; `depth` wait, or all if None."""
         if self.intake is None:
-            self.node.create_subscription(message_class, topic, take, contract_qos(None))
+            self.node.create_subscription(message_class, topic, take, contract_qos(depth))
         else:
-            self.intake.subscribe_objects(topic, message_class, take)
+            self.intake.subscribe_objects(topic, message_class, take, depth)
 
     def subscribe_rows(
         self,
@@ -193,6 +200,11 @@ class ContractNode:
             return [f"{len(found)} readers"]
         return sorted(absent)
 
+    def has_other_readers(self, topic: str) -> bool:
+        """Return whether more than the run's own readers are connected to our publisher."""
+        publisher, readers = self._publishers[topic]
+        return bool(publisher.get_subscription_count() > len(readers))
+
     def deliver(self, seconds: float) -> bool:
         """Wait until all that was sent has come to those who read it; return whether it has."""
         end = time.monotonic() + seconds
@@ -203,11 +215,20 @@ class ContractNode:
 
     def every(self, seconds: float, call: Callable[[], None]) -> Any:  # noqa: ANN401 - rclpy's timer
         """Have `call` called at an interval of wall time; return the timer."""
+        if self._timers is not None:
+            return self._timers.add(seconds, call)
         return self.node.create_timer(seconds, call, clock=self._steady)
+
+    def forget(self, timer: Any) -> None:  # noqa: ANN401 - rclpy's timer
+        """Cancel a timer for good."""
+        timer.cancel()
+        if self._timers is None:
+            self.node.destroy_timer(timer)
 
     def now_ns(self) -> int:
         """Return the time on the ROS clock [ns], simulated where `use_sim_time` says so."""
-        return int(self.node.get_clock().now().nanoseconds)
+        with self._clock:
+            return int(self._clock.get_now().nanoseconds)
 
     def complain(self, subject: str, text: str) -> None:
         """Say what is wrong with a topic's messages; a flood of them does not fill the log."""

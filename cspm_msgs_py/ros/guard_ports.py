@@ -7,7 +7,7 @@ from collections.abc import Callable
 from cspm_msgs_py.ros.contract_node import ContractNode, ros_class
 from cspm_msgs_py.ros.qos import contract_qos
 from cspm_msgs_py.stage import Guard
-from cspm_msgs_py.topics import BRAKE, EMERGENCY_STOP, SAFE
+from cspm_msgs_py.topics import BRAKE, EMERGENCY_STOP, QOS_DEPTH, SAFE
 
 RESET = "~/reset"
 _TELL_EVERY_S = 0.02
@@ -26,9 +26,8 @@ class GuardPorts:
         self._bool = ros_class(BRAKE.ros_type)
         self._brake = node.node.create_publisher(self._bool, BRAKE.name, contract_qos())
         self._safe = node.node.create_publisher(self._bool, SAFE.name, contract_qos())
-        node.node.create_subscription(
-            ros_class(EMERGENCY_STOP.ros_type), EMERGENCY_STOP.name, self._stop, contract_qos()
-        )
+        stop_class = ros_class(EMERGENCY_STOP.ros_type)
+        node.subscribe_objects(EMERGENCY_STOP.name, stop_class, self._stop, QOS_DEPTH)
         node.node.create_service(ros_class("std_srvs/srv/Trigger"), RESET, self._reset)
         node.every(_TELL_EVERY_S, self._tell)
         self._told: tuple[bool, bool] | None = None

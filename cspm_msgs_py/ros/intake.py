@@ -72,10 +72,10 @@ class Intake:
         self._inlets.append(_BlockInlet(topic.name, handle, message_class, receive))
 
     def subscribe_objects(
-        self, topic: str, message_class: type, receive: Callable[[Any], None]
+        self, topic: str, message_class: type, receive: Callable[[Any], None], depth: int | None
     ) -> None:
-        """Have `receive` called with each message as rclpy's object. All messages wait."""
-        handle = self._handle(topic, message_class, QOS_RELIABILITY, None)
+        """Have `receive` called with each message as rclpy's object; `depth` wait, all if None."""
+        handle = self._handle(topic, message_class, QOS_RELIABILITY, depth)
         self._inlets.append(_ObjectInlet(topic, handle, message_class, receive))
 
     def _handle(

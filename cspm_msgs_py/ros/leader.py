@@ -51,7 +51,22 @@ class Leader:
 
     def waiting(self) -> list[str]:
         """Return what is missing before the run can start."""
-        return [*self._side.unmatched(), *self._missing()]
+        # A topic that is missing says more than who misses it.
+        missing, apart = self._missing(), ", ".join(sorted(self._side.apart))
+        if apart and not missing:
+            missing = [f"drivers to reach {apart}"]
+        return [*self._side.unmatched(), *missing]
+
+    @property
+    def elapsed(self) -> float:
+        """How long the run has lasted, or lasted [s]."""
+        now = self.end_ns or self._node.now_ns()
+        return 0.0 if self.start_ns is None else max(0.0, (now - self.start_ns) * 1e-9)
+
+    def waits(self) -> str:
+        """Return in one line what the start waits for; empty once the run has begun."""
+        missing = [] if self.start_ns is not None else self.waiting()
+        return f"waits for {', '.join(missing)}" if missing else ""
 
     def end(self) -> None:
         """End the run now."""

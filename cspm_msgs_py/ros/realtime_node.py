@@ -11,14 +11,15 @@ from numpy.typing import NDArray
 from cspm_msgs_py.graph import Edges
 from cspm_msgs_py.ros.contract_node import ContractNode, ros_class
 from cspm_msgs_py.ros.guard_ports import GuardPorts
-from cspm_msgs_py.ros.qos import contract_qos
 from cspm_msgs_py.ros.rendezvous import FollowerSide
 from cspm_msgs_py.sample_and_hold import SampleAndHold, WallTrajectory
-from cspm_msgs_py.schedule import CLOCK, Schedule
+from cspm_msgs_py.schedule import CLOCK, TORQUE_COMMAND, Schedule
 from cspm_msgs_py.stage import Guard, Stage
-from cspm_msgs_py.topics import DIAGNOSTICS, SAFE, Topic
+from cspm_msgs_py.topics import DIAGNOSTICS, QOS_DEPTH, SAFE, Topic
 
 Array = NDArray[np.float64]
+# While processes find each other they stand still for some tenths of a second.
+_STEADY_NS = 500_000_000
 
 
 class RealtimeNode:
@@ -62,14 +63,22 @@ class RealtimeNode:
         if guard is not None:
             GuardPorts(node, guard, node.now_ns)
         if on_safe is not None:
-            node.node.create_subscription(
-                ros_class(SAFE.ros_type),
+            node.subscribe_objects(
                 SAFE.name,
+                ros_class(SAFE.ros_type),
                 lambda message: on_safe(bool(message.data)),
-                contract_qos(),
+                QOS_DEPTH,
             )
         self._on_start = on_start
-        self._leader = FollowerSide(node, schedule.period_ns, on_start=self._start)
+        self._foreign = [
+            name for name in (*plan.inputs, *plan.held) if name != CLOCK and not edges[name].senders
+        ]
+        # Drivers in the plant's place read the commands as well.
+        self._driven = [name for name in plan.outputs if name == TORQUE_COMMAND and self._foreign]
+        self._unsteady_ns = node.now_ns()
+        self._leader = FollowerSide(
+            node, schedule.period_ns, on_start=self._start, ready=self._connected
+        )
         node.every(plan.divider * schedule.period_ns * 1e-9, self._tick)
 
     @property
@@ -88,6 +97,14 @@ class RealtimeNode:
         if self._on_start is not None:
             self._on_start(start_ns)
         self._loop.start(start_ns)
+
+    def _connected(self) -> bool:
+        """Return whether drivers have been heard without a pause, and read what they are told."""
+        now = self._node.now_ns()
+        read = all(self._node.has_other_readers(name) for name in self._driven)
+        if not read or not self._loop.hears(self._foreign, now):
+            self._unsteady_ns = now
+        return not self._foreign or now - self._unsteady_ns >= _STEADY_NS
 
     def _tick(self) -> None:
         self._loop.tick(self._node.now_ns())

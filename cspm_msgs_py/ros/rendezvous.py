@@ -1,9 +1,10 @@
 """The nodes of a run find each other, start and end together.
 
 Followers tell the leader, which is the plant where there is a simulated one, on `/run/progress`
-that they are connected (stamp −1 s); in lockstep also, later, through which instant they are
-complete. The leader tells all on `/run/start` that the run begins, in real time at which instant
-the motions do. It tells all on `/run/end` at which instant the run ended.
+that they are connected (stamp −1 s), or are but for somebody else's drivers (−2 s); in lockstep
+also, later, through which instant they are complete. The leader tells all on `/run/start` that the
+run begins, in real time at which instant the motions do. It tells all on `/run/end` at which
+instant the run ended.
 """
 
 from __future__ import annotations
@@ -20,7 +21,7 @@ PROGRESS, START, END = "/run/progress", "/run/start", "/run/end"
 _HEADER = "std_msgs/msg/Header"
 _NANOSECONDS = 1_000_000_000
 _LOOK_EVERY_S = 0.05
-_READY = -1
+_READY, _APART = -1, -2
 # How long it may take on one machine until all who are there are seen.
 _SETTLE_S = 0.5
 
@@ -38,6 +39,7 @@ class FollowerSide:
         period_ns: int,
         on_end: Callable[[int], None] = lambda _: None,
         on_start: Callable[[int], None] = lambda _: None,
+        ready: Callable[[], bool] = lambda: True,
     ) -> None:
         """Announce the node as soon as all its readers are connected, again and again.
 
@@ -49,8 +51,9 @@ class FollowerSide:
             on_end: called with the last step of a lockstep run; raises `InputError` if that cannot
                 be this run's.
             on_start: called with the first instant [ns] of a run in real time.
+            ready: whether the node is connected to what is not of this run, looked at in turn.
         """
-        self._node = node
+        self._node, self._ready = node, ready
         self._period_ns = period_ns
         self._on_end = on_end
         self._header = ros_class(_HEADER)
@@ -77,7 +80,7 @@ class FollowerSide:
             heard = bool(self._publisher.get_subscription_count())
             self._connected = heard and not self._node.unmatched()
         if self._connected:
-            self._send(_READY * _NANOSECONDS)
+            self._send((_READY if self._ready() else _APART) * _NANOSECONDS)
 
     def _send(self, stamp_ns: int) -> None:
         message = self._header(frame_id=self._node.name)
@@ -102,6 +105,7 @@ class PlantSide:
 
     Attributes:
         absent: nodes of the run that have not announced themselves yet.
+        apart: nodes that have, and are not connected to somebody else's drivers yet.
     """
 
     def __init__(
@@ -122,6 +126,7 @@ class PlantSide:
         node.subscribe_objects(PROGRESS, self._header, self._take)
         self._settled = time.monotonic() + _SETTLE_S
         self.absent = set(others)
+        self.apart: set[str] = set()
 
     def unmatched(self) -> list[str]:
         """Return what is still missing before the run can start."""
@@ -170,6 +175,7 @@ class PlantSide:
     def _take(self, message: object) -> None:
         name, total = message.frame_id, _stamp_of(message)  # type: ignore[attr-defined]
         self.absent.discard(name)
+        (self.apart.add if total == _APART * _NANOSECONDS else self.apart.discard)(name)
         if total >= 0 and name in self._others:
             self._on_progress(name, total // self._period_ns)
 

@@ -22,13 +22,16 @@ from typing_extensions import Self
 from cspm_msgs_py.errors import CspmError, InputError
 from cspm_msgs_py.interruption import interruptible
 from cspm_msgs_py.ros.contract_node import ContractNode
+from cspm_msgs_py.ros.wall_timers import WallTimers
 
 DISCOVERY_RANGE = "ROS_AUTOMATIC_DISCOVERY_RANGE"
 MIDDLEWARE_PROFILES = "FASTRTPS_DEFAULT_PROFILES_FILE"
 _LOOK_EVERY_S = 0.02
 _LONG_S = 1e6
+# A node that was told to stop leaves in less than a second, whoever does not answer it.
+FAREWELL_S = 0.5
 # In a polled session: how often the executor has its turn, and how long it waits when all is quiet.
-_TURN_S, _IDLE_S = 0.01, 0.001
+_TURN_S, _IDLE_S = 0.01, 0.0002
 # New objects between two collections of garbage, of which nodes make next to none.
 _OBJECTS = 10_000
 
@@ -64,7 +67,7 @@ class Session:
         self.context = Context()
         _init(self.context, list(args), domain_id)
         self._executor = EventsExecutor(context=self.context)
-        self._polled = polled
+        self._timers = WallTimers() if polled else None
         self._nodes: list[ContractNode] = []
         self._stack = ExitStack()
         self._interrupted: Callable[[], bool] = lambda: False
@@ -72,7 +75,7 @@ class Session:
 
     def node(self, name: str) -> ContractNode:
         """Return a new node that this session spins."""
-        made = ContractNode(name, self.context, polled=self._polled)
+        made = ContractNode(name, self.context, self._timers)
         self._nodes.append(made)
         self._executor.add_node(made.node)
         return made
@@ -107,15 +110,14 @@ class Session:
         except ExternalShutdownException:
             self._left = True
         finally:
-            timer.cancel()
-            self._nodes[0].node.destroy_timer(timer)
+            self._nodes[0].forget(timer)
         if (failure := self._failure()) is not None:
             raise CspmError(failure)
         return done()
 
     def _spin(self, over: Future, done: Callable[[], bool], timeout_s: float | None) -> None:
-        if self._polled:
-            self._poll_until(over.done, timeout_s)
+        if self._timers is not None:
+            self._poll_until(over.done, timeout_s, self._timers)
         elif not done():
             # Without a timeout rclpy 7.1 does not see that the future is complete.
             self._executor.spin_until_future_complete(over, timeout_sec=timeout_s or _LONG_S)
@@ -123,21 +125,25 @@ class Session:
     def _failure(self) -> str | None:
         return next((node.failure for node in self._nodes if node.failure is not None), None)
 
-    def _poll_until(self, done: Callable[[], bool], timeout_s: float | None) -> None:
-        """Hand on messages node by node; services, timers and the handshake have their turn."""
+    def _poll_until(
+        self, done: Callable[[], bool], timeout_s: float | None, timers: WallTimers
+    ) -> None:
+        """Run timers and hand on messages node by node; services and start have their turn."""
         intakes = [node.intake for node in self._nodes if node.intake is not None]
         end = time.monotonic() + (timeout_s or _LONG_S)
         turn = 0.0
         while not done():
-            moved = False
+            moved, rest = False, timers.run()
             for intake in intakes:
                 moved = intake.take_one() or moved
             now = time.monotonic()
             if now >= end:
                 return
-            if not moved or now >= turn:
-                self._executor.spin_once(timeout_sec=0.0 if moved else _IDLE_S)
+            if now >= turn:
+                self._executor.spin_once(timeout_sec=0.0)
                 turn = now + _TURN_S
+            elif not moved and rest > 0.0:
+                time.sleep(min(rest, _IDLE_S))
 
     def deliver(self, seconds: float) -> bool:
         """Wait until all that was sent has come to those who read it; return whether it has.

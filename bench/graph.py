@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import tempfile
 from collections.abc import Callable
+from functools import partial
 from pathlib import Path
 
 from bench.figure import Advance, Figure
@@ -18,6 +19,13 @@ def measure_graph(
     repetitions: int, duration: float, realtime_duration: float, advance: Advance
 ) -> list[Figure]:
     """Simulate `duration` [s] in each mode in turns, and `realtime_duration` [s] by the wall."""
+    return [
+        *_in_step(repetitions, duration, advance),
+        *_by_the_wall(realtime_duration, advance),
+    ]
+
+
+def _in_step(repetitions: int, duration: float, advance: Advance) -> list[Figure]:
     from cspm_bringup.graph_run import run_graph
     from cspm_bringup.process_run import run_processes
 
@@ -31,35 +39,45 @@ def measure_graph(
             factors[name].append(result.real_time_factor)
             missing += round(1000 * duration) - result.messages["/clock"]
             advance(GROUP)
-    with tempfile.TemporaryDirectory(prefix="cspm-bench-") as place:
-        wall = run_processes(
-            worst_case(realtime_duration),
-            Path(place) / "run",
-            mode="realtime",
-            domain_id=DOMAIN_ID,
-        )
-    advance(GROUP)
     note = f"{repetitions} runs of {duration:g} s simulated, all rates 1 kHz, in turns"
-    by_wall = f"real time, {wall.simulated:g} s, all rates 1 kHz, a process per node"
-    steps = max(1.0, 1000 * wall.simulated)
-    late = 100 * wall.timing["plant"]["deadlines_missed"] / steps
     return [
         Figure(GROUP, "one process, × real time", "", factors["graph"], 3.0, note=note),
         Figure(GROUP, "a process per node, × real time", "", factors["processes"], 1.0, note=note),
         Figure(GROUP, "in step: steps not recorded", "", [missing], at_most=0, note=note),
-        Figure(
-            GROUP,
-            "real time: messages lost",
-            "",
-            [wall.timing["recorder"]["lost"]],
-            at_most=0,
-            note=f"{by_wall}, by the senders' sequence numbers",
-        ),
-        Figure(
-            GROUP,
-            "real time: torque commands late",
-            "%",
-            [late],
-            note=f"{by_wall}, later than one period of 1 ms",
-        ),
     ]
+
+
+def _by_the_wall(duration: float, advance: Advance) -> list[Figure]:
+    from cspm_bringup.process_run import run_processes
+    from cspm_bringup.realtime_run import run_realtime
+
+    figures = []
+    runners: dict[str, tuple[Callable[..., RunResult], float | None]] = {
+        "one process": (run_realtime, 0),
+        "a process per node": (partial(run_processes, mode="realtime"), None),
+    }
+    for name, (runner, most) in runners.items():
+        with tempfile.TemporaryDirectory(prefix="cspm-bench-") as place:
+            wall = runner(worst_case(duration), Path(place) / "run", domain_id=DOMAIN_ID)
+        advance(GROUP)
+        note = f"{wall.simulated:g} s, all rates 1 kHz"
+        lost = wall.timing["recorder"]["lost"]
+        late = 100 * wall.timing["plant"]["deadlines_missed"] / max(1.0, 1000 * wall.simulated)
+        figures += [
+            Figure(
+                GROUP,
+                f"real time, {name}: messages lost",
+                "",
+                [lost],
+                at_most=most,
+                note=f"{note}, by the senders' sequence numbers",
+            ),
+            Figure(
+                GROUP,
+                f"real time, {name}: torque commands late",
+                "%",
+                [late],
+                note=f"{note}, later than one period of 1 ms",
+            ),
+        ]
+    return figures

@@ -22,7 +22,7 @@ class Volume(NamedTuple):
     @property
     def parts(self) -> int:
         """How many parts report that they are done."""
-        loops = 2 * self.loops + 2 * self.graphs + 1
+        loops = 2 * self.loops + 2 * self.graphs + 2
         return 2 * self.plant + loops + self.first_runs + self.later_runs + 2
 
 

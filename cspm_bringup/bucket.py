@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
+from itertools import groupby
 
 import numpy as np
 from numpy.typing import NDArray
@@ -10,6 +11,7 @@ from numpy.typing import NDArray
 from cspm_msgs_py.errors import InputError
 from cspm_msgs_py.layout import Layout, layout_of
 from cspm_msgs_py.recording.channel import Channel
+from cspm_msgs_py.recording.writer import BLOCK_NS
 from cspm_msgs_py.topics import Topic
 from cspm_msgs_py.wire import WireReader
 
@@ -39,10 +41,10 @@ class Bucket:
         if not payloads:
             return
         decoded = self._decode_all(payloads)
-        append = self._channel.append
         if decoded is not None:
-            for log, stamp, row in zip(logs, decoded[0].tolist(), decoded[1], strict=True):
-                append(log, stamp, row)
+            stamps, rows = decoded[0].tolist(), decoded[1]
+            for part in _within_blocks(logs):
+                self._channel.append_rows(logs[part], stamps[part], rows[part].tobytes())
             return
         for log, payload in zip(logs, payloads, strict=True):
             try:
@@ -50,7 +52,7 @@ class Bucket:
             except InputError as err:
                 self._refuse(str(err))
             else:
-                append(log, stamp, row)
+                self._channel.append(log, stamp, row)
 
     def _decode_all(
         self, payloads: list[bytes]
@@ -65,3 +67,12 @@ class Bucket:
             return None
         # Whatever the numbers are: that one is not finite is what somebody will look for here.
         return self._layout.decode(block)
+
+
+def _within_blocks(logs_ns: list[int]) -> Iterator[slice]:
+    """Yield stretches of log times [ns] that are of one block of the recording."""
+    first = 0
+    for _, group in groupby(logs_ns, key=lambda log: log // BLOCK_NS):
+        last = first + sum(1 for _ in group)
+        yield slice(first, last)
+        first = last

@@ -88,7 +88,7 @@ def run(
             metavar="MODE",
             help="How to run: inprocess, without ROS; graph, ROS 2 nodes in one process; processes,"
             " a process per node; these three give the same messages, bit for bit. realtime:"
-            " a process per node, paced by the wall clock.",
+            " ROS 2 nodes paced by the wall clock.",
         ),
     ] = MODES[0],
     plant: Annotated[
@@ -99,6 +99,15 @@ def run(
             " MuJoCo engine; or external, nobody's: your drivers take the plant's place.",
         ),
     ] = "sim",
+    one_process: Annotated[
+        bool | None,
+        typer.Option(
+            "--one-process/--process-per-node",
+            help="In real time: all nodes in one process, which loses no message on a small"
+            " computer; or a process per node, each of which may die alone.",
+            show_default="one process",
+        ),
+    ] = None,
     testbed: Annotated[
         Path | None,
         typer.Option(
@@ -155,5 +164,6 @@ def run(
     folder = out if out is not None else new_folder(Path(scenario).stem)
     path = find_scenario(scenario)
     place = folder if record else None
-    finished = run_command(path, [*(overrides or []), *settings], place, json, plant, mode, testbed)
+    settings = [*(overrides or []), *settings]
+    finished = run_command(path, settings, place, json, plant, mode, testbed, one_process)
     raise typer.Exit(0 if finished else RUN_FAILED)

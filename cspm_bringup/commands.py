@@ -33,6 +33,7 @@ from cspm_msgs_py.testbed import TestbedFile, load_testbed
 from cspm_sim.parameters import plant_parameters
 
 REALTIME = "realtime"
+Runner = Callable[[Bundle, Path, Callable[[float], None]], RunResult]
 
 
 def run_command(
@@ -43,6 +44,7 @@ def run_command(
     plant: str = SIM,
     mode: str = INPROCESS,
     machine: Path | None = None,
+    one_process: bool | None = None,
 ) -> bool:
     """Run a scenario file, show the result, and return whether it ran to its end.
 
@@ -54,6 +56,7 @@ def run_command(
         plant: whose equations to simulate.
         mode: how to run.
         machine: a test-bed file instead of the scenario's.
+        one_process: in real time, whether all nodes are to share a process; None: they do.
 
     Raises:
         CspmError: it diverged, or a node failed; what was recorded and drawn up to then is kept.
@@ -67,9 +70,15 @@ def run_command(
     external = plant == EXTERNAL
     if external and mode != REALTIME:
         raise InputError(f"--plant {EXTERNAL} --mode {mode}: allowed: --mode {REALTIME}")
+    if one_process is not None and mode != REALTIME:
+        option = "--one-process" if one_process else "--process-per-node"
+        raise InputError(f"{option} --mode {mode}: allowed: --mode {REALTIME}")
     refuse_existing(folder)
     bundle = dataclasses.replace(bundle, plant=SIM if external else plant)
-    result = _run_with_progress(bundle, folder, console, mode, external=external)
+    runner = None
+    if mode != INPROCESS:
+        runner = _ros_runner(mode, console, external, apart=one_process is False)
+    result = _run_with_progress(bundle, folder, console, runner)
     requirement = scenario.requirement
     print_summary(console, result, requirement)
     if json is not None:
@@ -186,8 +195,9 @@ def resim_command(bag: Path, json: Path | None) -> bool:
 
 
 def _run_with_progress(
-    bundle: Bundle, folder: Path | None, console: Console, mode: str, *, external: bool
+    bundle: Bundle, folder: Path | None, console: Console, runner: Runner | None
 ) -> RunResult:
+    """Run a scenario by a runner that needs ROS, or else in this process."""
     scenario = bundle.scenario
     with _progress(console) as bar:
         task = bar.add_task(escape(scenario.name), total=scenario.duration, speed=0.0)
@@ -195,30 +205,32 @@ def _run_with_progress(
         def show(now: float) -> None:
             _show(bar, task, now, scenario.duration)
 
-        if mode == INPROCESS:
+        if runner is None:
             return run(bundle, folder, show)
         if folder is not None:
-            return _ros_runner(mode, console, external)(bundle, folder, show)
+            return runner(bundle, folder, show)
         # What a graph amounts to is read from its recording.
         with tempfile.TemporaryDirectory(prefix="cspm-run-") as place:
-            runner = _ros_runner(mode, console, external)
             result = runner(bundle, Path(place) / scenario.name, show)
             return dataclasses.replace(result, folder=None)
 
 
-def _ros_runner(
-    mode: str, console: Console, external: bool
-) -> Callable[[Bundle, Path, Callable[[float], None]], RunResult]:
+def _ros_runner(mode: str, console: Console, external: bool, *, apart: bool) -> Runner:
     """Return what runs a scenario in a mode that needs ROS; only now is ROS loaded."""
     find_ros(f"--mode {mode}")
     if mode == "graph":
         from cspm_bringup.graph_run import run_graph
 
         return run_graph
-    from cspm_bringup.process_run import run_processes
 
     def tell(waiting: str) -> None:
         say(console, waiting or "all is there")
+
+    if mode == REALTIME and not apart:
+        from cspm_bringup.realtime_run import run_realtime
+
+        return partial(run_realtime, external=external, tell=tell)
+    from cspm_bringup.process_run import run_processes
 
     return partial(run_processes, mode=mode, external=external, tell=tell)
 

@@ -8,15 +8,13 @@ from pathlib import Path
 
 from cspm_bringup.bundle import Bundle
 from cspm_bringup.lockstep_nodes import LockstepRun
-from cspm_bringup.recorded_tally import tally_recording
-from cspm_bringup.recorded_timing import first_alarm
+from cspm_bringup.recorded_result import recorded_result
 from cspm_bringup.run import new_recording
 from cspm_bringup.run_result import RunResult
 from cspm_bringup.watch import LOOK_EVERY_S, PATIENCE_S, Watch
 from cspm_msgs_py.errors import CspmError
 from cspm_msgs_py.graph import RECORDER
 from cspm_msgs_py.ros.session import Session
-from cspm_msgs_py.scenario import ClosedLoop
 from cspm_msgs_py.schedule import PLANT, schedule_of
 
 GRAPH = "graph"
@@ -69,17 +67,12 @@ def run_graph(
         session.spin_until(lambda: plant.finished or watch.stuck is not None)
         if watch.stuck is not None:
             raise CspmError(watch.stuck)
-    return RunResult(
-        scenario=scenario.name,
-        seed=scenario.seed,
-        mode=GRAPH,
+    return recorded_result(
+        bundle,
+        folder,
+        GRAPH,
         simulated=plant.simulated,
         elapsed=watch.elapsed,
-        tally=tally_recording(folder, testbed),
-        messages=writer.counts,
-        folder=writer.folder,
-        controlled=isinstance(scenario.control, ClosedLoop),
-        has_bar=testbed.bar is not None,
-        interrupted=session.stopped and plant.failure is None,
-        failure=plant.failure or first_alarm(folder),
+        interrupted=session.stopped,
+        failure=plant.failure,
     )

@@ -17,23 +17,18 @@ from cspm_bringup.node_parameters import (
     write_parameters,
 )
 from cspm_bringup.node_processes import FAREWELL_S, SILENCE_S, NodeProcesses
-from cspm_bringup.recorded_tally import tally_recording
-from cspm_bringup.recorded_timing import first_alarm, timing_of
+from cspm_bringup.recorded_result import recorded_result
 from cspm_bringup.report import Report, read_report
 from cspm_bringup.run_result import RunResult
-from cspm_bringup.watch import PATIENCE_S
+from cspm_bringup.watch import PATIENCE_S, StartWatch
 from cspm_control.safety import check_real_time
 from cspm_msgs_py.errors import CspmError
 from cspm_msgs_py.graph import RECORDER
 from cspm_msgs_py.interruption import interruptible
-from cspm_msgs_py.recording.overview import overview
-from cspm_msgs_py.scenario import ClosedLoop
 from cspm_msgs_py.schedule import PLANT, schedule_of
 
 PROCESSES = "processes"
 _LOOK_EVERY_S = 0.1
-# How long a start may take before it is told what it waits for.
-_GRACE_S = 3.0
 # How long a run in real time goes on after a node died, to record what the others do.
 _AFTERMATH_S = 2.0
 # A leader in real time that reports nothing for so long has been stopped.
@@ -102,22 +97,15 @@ def run_processes(
             follower = _Follower(processes, leader, place / "report.json", mode == REALTIME)
             report = follower.follow(progress, tell, stop_wanted)
             interrupted = stop_wanted()
-    found = overview(folder)
-    failure = report.failure or follower.failure or first_alarm(folder)
-    return RunResult(
-        scenario=scenario.name,
-        seed=scenario.seed,
-        mode=mode,
+    return recorded_result(
+        bundle,
+        folder,
+        mode,
         simulated=report.simulated,
         elapsed=report.elapsed,
-        tally=tally_recording(folder, testbed),
-        messages={topic.name: topic.count for topic in found.topics},
-        folder=folder.absolute(),
-        controlled=isinstance(scenario.control, ClosedLoop),
-        has_bar=testbed.bar is not None,
-        interrupted=interrupted and failure is None,
-        failure=failure,
-        timing=timing_of(folder) if mode == REALTIME else {},
+        interrupted=interrupted,
+        failure=report.failure or follower.failure,
+        timed=mode == REALTIME,
     )
 
 
@@ -147,15 +135,12 @@ class _Follower:
         Raises:
             CspmError: a node ended too early; in real time the others first show what they do.
         """
-        processes, told = self._processes, ""
-        began = time.monotonic()
+        processes, start = self._processes, StartWatch(tell)
         while self._leader not in (ended := processes.ended()):
             report = read_report(self._path)
             progress(report.simulated)
-            waits = report.waiting if time.monotonic() - began > _GRACE_S else ""
-            if waits != told and not report.simulated:
-                told = waits
-                tell(waits)
+            if not report.simulated:
+                start.look(report.waiting)
             for warning in processes.warnings():
                 tell(warning)
             self._look_for_dead(self._dead(ended))

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Collection, Mapping
+from itertools import cycle
 
 from cspm_bringup.bucket import Bucket
 from cspm_msgs_py.diagnostics import Level, Status, decode_diagnostics
@@ -46,7 +47,9 @@ class RealtimeRecorderNode:
         self._leader: FollowerSide | Leader | None = None
         self._node, self._period_ns = node, period_ns
         node.every(_TAKE_EVERY_S, self._intake.take)
-        node.every(_WRITE_EVERY_S, self._write)
+        # One topic after the other: all at once would keep other nodes of the process waiting.
+        self._next = cycle(self._buckets.values())
+        node.every(_WRITE_EVERY_S / len(self._buckets), self._write_next)
         self._publish_status = node.status_publisher()
         node.every(1.0 / DIAGNOSTICS_RATE, self._tell)
 
@@ -73,7 +76,8 @@ class RealtimeRecorderNode:
     def close(self) -> None:
         """Write what came, and leave the topics."""
         self._intake.take()
-        self._write()
+        for bucket in self._buckets.values():
+            bucket.write(len(bucket.payloads))
         self._intake.close()
 
     def _subscribe(self, name: str, topic: Topic) -> None:
@@ -105,9 +109,9 @@ class RealtimeRecorderNode:
         status = Status(Level.WARN if bad else Level.OK, RECORDER, trouble if bad else "ok", values)
         self._publish_status(self._node.now_ns(), status)
 
-    def _write(self) -> None:
-        for bucket in self._buckets.values():
-            bucket.write(len(bucket.payloads))
+    def _write_next(self) -> None:
+        bucket = next(self._next)
+        bucket.write(len(bucket.payloads))
 
     def _looks_right(self, payload: bytes) -> bool:
         try:

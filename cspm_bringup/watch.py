@@ -1,4 +1,4 @@
-"""Looks at a lockstep run now and then: shows progress, passes a stop on, loses patience."""
+"""Looks at a run now and then: tells what it waits for, in lockstep loses patience."""
 
 from __future__ import annotations
 
@@ -10,6 +10,8 @@ PATIENCE_S = 30.0
 COMPLAIN_S = 5.0
 LOOK_EVERY_S = 0.1
 STANDSTILL = "nothing moved"
+# How long a start may take before it is told what it waits for.
+GRACE_S = 3.0
 
 
 class Waiting(Protocol):
@@ -66,3 +68,19 @@ class Watch:
     def waiting(self) -> str:
         """Return what the nodes wait for."""
         return "; ".join(node.waiting() for node in self._nodes)
+
+
+class StartWatch:
+    """Tells what a run waits for before it begins, when that changes."""
+
+    def __init__(self, tell: Callable[[str], None]) -> None:
+        """Take whom to tell."""
+        self._tell, self._told = tell, ""
+        self._began = time.monotonic()
+
+    def look(self, waiting: str) -> None:
+        """Take what it waits for now, in one line; empty if for nothing."""
+        waits = waiting if time.monotonic() - self._began > GRACE_S else ""
+        if waits != self._told:
+            self._told = waits
+            self._tell(waits)

@@ -114,6 +114,11 @@ REST = f"{SCENARIOS}/rest.yaml"
             ["--mode", "graph", "--plant", "external"],
             "--plant external --mode graph: allowed: --mode realtime",
         ),
+        (
+            ["--mode", "graph", "--process-per-node"],
+            "--process-per-node --mode graph: allowed: --mode realtime",
+        ),
+        (["--one-process"], "--one-process --mode inprocess: allowed: --mode realtime"),
         (["--duration", "-1"], f"{REST}: duration: -1.0, allowed: greater than 0"),
         (["--duration", "0"], f"{REST}: duration: 0.0, allowed: greater than 0"),
         (

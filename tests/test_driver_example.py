@@ -249,9 +249,11 @@ class External:
 
 @pytest.mark.slow
 @pytest.mark.alone
-def test_a_run_waits_for_it_says_so_starts_and_records(bundle, tmp_path):
+@pytest.mark.usefixtures("uncrowded")
+@pytest.mark.parametrize("processes", ["--one-process", "--process-per-node"])
+def test_a_run_waits_for_it_says_so_starts_and_records(bundle, tmp_path, processes):
     patient = ("--set", f"safety.stale_after={WAIT}", "--duration", "3")
-    with External(tmp_path / "bag", *patient) as run:
+    with External(tmp_path / "bag", processes, *patient) as run:
         run.until(f"waits for {', '.join(MEASURED)}")
         with Process(run.domain, watchdog=WAIT) as driver:
             run.until("all is there")

@@ -27,6 +27,7 @@ from cspm_msgs_py.schedule import FORCE_CONTROLLER, PLANT, TENSION, TORQUE_COMMA
 load_ros()
 pytestmark = [pytest.mark.slow, pytest.mark.alone]
 
+APART, TOGETHER = "--process-per-node", "--one-process"
 CSPM = [sys.executable, "-c", "from cspm_bringup.cli import main; main()"]
 MS = 1_000_000
 GUARDS = (FORCE_CONTROLLER, "plant/watchdog")
@@ -80,9 +81,10 @@ def topics_of(bundle, *names):
     return [bundle.testbed.testbed.topics[name] for name in names]
 
 
-def test_a_run_keeps_the_bar_where_it_is_and_says_how_late_it_was(tmp_path):
+@pytest.mark.parametrize("processes", [TOGETHER, APART])
+def test_a_run_keeps_the_bar_where_it_is_and_says_how_late_it_was(tmp_path, processes):
     bundle = slow_bundle("duration=3.0")
-    with Command(tmp_path, bundle) as command:
+    with Command(tmp_path, bundle, processes) as command:
         code, out, err = command.done()
     assert (code, err) == (0, ""), out
     assert "real time: totals of the run" in out
@@ -121,13 +123,15 @@ def bundle_nodes(bundle):
     return schedule_of(bundle.scenario, bundle.testbed.testbed).nodes
 
 
-def test_interrupting_ends_the_run_early_with_a_complete_recording(tmp_path):
+@pytest.mark.parametrize("processes", [TOGETHER, APART])
+def test_interrupting_ends_the_run_early_with_a_complete_recording(tmp_path, processes):
     bundle = slow_bundle("duration=600.0")
     with (
-        Command(tmp_path, bundle) as command,
+        Command(tmp_path, bundle, processes) as command,
         Witness(command.domain, topics_of(bundle, TENSION)) as witness,
     ):
         under_way(witness)
+        assert bool(command.nodes()) == (processes == APART)
         command.process.send_signal(signal.SIGINT)
         code, out, err = command.done()
     assert (code, err) == (1, "")
@@ -140,7 +144,7 @@ def test_interrupting_ends_the_run_early_with_a_complete_recording(tmp_path):
 def test_a_dead_node_is_named_and_what_the_others_did_is_recorded(tmp_path):
     bundle = slow_bundle("duration=600.0")
     with (
-        Command(tmp_path, bundle) as command,
+        Command(tmp_path, bundle, APART) as command,
         Witness(command.domain, topics_of(bundle, TENSION)) as witness,
     ):
         under_way(witness)

@@ -7,7 +7,7 @@ from ros_graph import load_ros
 
 load_ros()
 
-from cspm_bringup import process_run  # noqa: E402 - after ROS is known to be there
+from cspm_bringup import process_run, watch  # noqa: E402 - after ROS is known to be there
 from cspm_bringup.process_run import _Follower  # noqa: E402
 from cspm_bringup.report import Report  # noqa: E402
 from cspm_msgs_py.errors import CspmError  # noqa: E402
@@ -22,13 +22,13 @@ def quick(monkeypatch):
     """Let the follower look often, and lose its patience soon."""
     for name, seconds in {
         "_LOOK_EVERY_S": 0.005,
-        "_GRACE_S": 0.0,
         "_AFTERMATH_S": 0.1,
         "_STUCK_S": 0.2,
         "FAREWELL_S": 0.2,
         "SILENCE_S": 0.05,
     }.items():
         monkeypatch.setattr(process_run, name, seconds)
+    monkeypatch.setattr(watch, "GRACE_S", 0.0)
 
 
 class Processes:

@@ -73,17 +73,16 @@ def test_at_1_khz_nothing_is_lost_however_late_the_nodes_are(tmp_path):
         while not stop.is_set():
             pass
 
-    burners = [threading.Thread(target=burn) for _ in range(2)]
-    for burner in burners:
-        burner.start()
+    burner = threading.Thread(target=burn)
+    burner.start()
     try:
         result = run_realtime(bundle, tmp_path / "bag", steps=2000, domain_id=new_domain())
     finally:
         stop.set()
-        for burner in burners:
-            burner.join()
-    assert result.timing[PLANT]["late_steps"] > 0
-    assert result.timing[PLANT]["deadlines_missed"] > 0
+        burner.join()
+    # The plant's own totals come every 100 steps, of which there may be fewer.
+    tensions = Evidence(tmp_path / "bag").rows[TENSION]
+    assert (tensions.log_ns - tensions.stamp_ns).max() > MS
     assert result.timing[RECORDER]["lost"] == 0
 
 

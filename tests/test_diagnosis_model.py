@@ -9,7 +9,7 @@ from cspm_ident.diagnosis.columns import Candidate
 from cspm_ident.diagnosis.drivers import around
 from cspm_ident.diagnosis.model import Model
 from cspm_ident.diagnosis.simulation import Output, Worth
-from cspm_ident.diagnosis.supposed import is_possible
+from cspm_ident.diagnosis.supposed import is_possible, nearest_possible
 from cspm_ident.signals.measurement import Measurement
 from cspm_msgs_py.testbed import load_testbed
 from cspm_sim.effects import Channel, catalogue
@@ -47,6 +47,29 @@ def test_a_machine_has_no_inertia_that_no_body_has():
     inertia = Candidate(catalogue()["bar_inertia"], "bar")
     assert is_possible(measured, {inertia: np.array([0.0, 0.01, 0.01])})
     assert not is_possible(measured, {inertia: np.array([0.0, 0.3, 0.0])})
+
+
+@pytest.mark.parametrize(("beyond", "possible"), [(0.002, True), (0.02, False)])
+def test_an_inertia_that_no_body_has_is_the_nearest_that_one_has_if_chance_lies_between(
+    beyond, possible
+):
+    measured = Measurement(SCENARIOS / "today", "ab" * 32, THESIS)
+    own, half = Candidate(catalogue()["bar_inertia"], "bar"), np.array([6e-5, 3e-3, 1e-3])
+    moments = THESIS.testbed.bar.inertia
+    beside = moments.ixx + moments.izz - moments.iyy
+    for found in (np.array([0.0, beside + beyond, 0.0]), np.array([0.0, 0.0, -beside - beyond])):
+        assert not is_possible(measured, {own: found})
+        moved = nearest_possible(measured, own, found, half)
+        assert is_possible(measured, {own: moved}) is possible
+        assert np.array_equal(moved, found) is not possible
+        away = np.abs(moved - found) / half
+        assert away[1] >= away[2] >= away[0]
+
+
+def test_an_inertia_that_a_body_has_stays_as_found():
+    measured = Measurement(SCENARIOS / "today", "ab" * 32, THESIS)
+    own, found = Candidate(catalogue()["bar_inertia"], "bar"), np.array([0.0, 0.05, 0.05])
+    np.testing.assert_array_equal(nearest_possible(measured, own, found, 0.1 * found), found)
 
 
 def test_what_lies_around_a_row_has_none_of_its_noise():

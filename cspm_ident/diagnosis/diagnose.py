@@ -18,6 +18,7 @@ from cspm_ident.diagnosis.hypothesis import (
     Findings,
     Hypothesis,
     Named,
+    Unknown,
     is_negligible,
     members_of,
 )
@@ -157,8 +158,7 @@ def diagnose(
         rejected += tuple(kept[k] for k in model.useless)
         kept = tuple(each for k, each in enumerate(kept) if k not in model.useless)
         model = modelled(search, kept, data)
-    # What is not kept explains nothing.
-    unknown = search.unknown(_hypotheses(kept)) if rejected else found.unknown
+    unknown = _unknown(search, kept, rejected) if rejected else found.unknown
     values = {c: w for c, (w, _) in model.weights.items()}
     first = _first_weights(search, kept)
     told = [k for k, each in enumerate(kept) if not _is_negligible(each, values)]
@@ -275,7 +275,7 @@ def _confirmed(
 ) -> tuple[tuple[Named, ...], tuple[Named, ...]]:
     """Part what was found by whether it lowers residuals that were not searched.
 
-    One of them by a share worth a word, unless a sound machine has as much of it, and all together.
+    One of them by a share worth a word, and all together.
     """
     kept = list(found.named)
     rejected: list[Named] = []
@@ -286,11 +286,23 @@ def _confirmed(
         with_it, without = judge.left_with(whole), judge.left_with(fewer)
         shares = [1.0 - with_it[p] / without[p] for p in without if without[p] > 0.0]
         worse = sum(with_it.values()) > sum(without.values())
-        idle = max(shares) < CONFIRMED_SHARE
-        if worse or (idle and not search.fits.is_negligible(each.hypothesis, _hypotheses(kept))):
+        if max(shares) < CONFIRMED_SHARE or worse:
             kept.remove(each)
             rejected.append(each)
     return tuple(kept), tuple(rejected)
+
+
+def _unknown(
+    search: Search, kept: Sequence[Named], rejected: Sequence[Named]
+) -> tuple[Unknown, ...]:
+    """Return what nothing explains beside what was kept.
+
+    What was rejected explains nothing, but for what a sound machine has as well: clocks drift, so
+    that what they did in the part that was searched may be gone in the other.
+    """
+    every = _hypotheses([*kept, *rejected])
+    sound = [h for h in _hypotheses(rejected) if search.fits.is_negligible(h, every)]
+    return search.unknown([*_hypotheses(kept), *sound])
 
 
 def _hypotheses(named: Sequence[Named]) -> list[Hypothesis]:

@@ -8,7 +8,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from cspm_ident.diagnosis.columns import Place
+from cspm_ident.diagnosis.columns import Candidate, Place
 from cspm_ident.diagnosis.equation import Equation, steady
 from cspm_ident.diagnosis.hypothesis import Named, bounded, is_negligible, members_of
 from cspm_ident.diagnosis.onset import Onset, onset_of
@@ -22,7 +22,7 @@ from cspm_ident.diagnosis.simulation import (
     simulate_held_out,
     worth_of,
 )
-from cspm_ident.diagnosis.supposed import is_possible
+from cspm_ident.diagnosis.supposed import is_possible, nearest_possible
 from cspm_ident.diagnosis.weights import Weights
 from cspm_ident.signals.measurement import Measurement
 
@@ -100,7 +100,9 @@ def modelled(search: Search, kept: Sequence[Named], data: Data) -> Model:
     rows = [[e.within(since, np.inf) for e in part] for part in data.rows]
     weights = _parameters(search, kept, data.searched, cut, rows, data.noise, data.block)
     weights = of_clocks(of_drives(weights, 2.0 * data.searched[0].torque_age))
-    weights = {c: (bounded(c, own, half), half) for c, (own, half) in weights.items()}
+    weights = {
+        c: (_allowed(data.searched[0], c, own, half), half) for c, (own, half) in weights.items()
+    }
     values = {c: w for c, (w, _) in weights.items()}
     members = [{c: values[c] for c in members_of(values, each.hypothesis)} for each in kept]
     possible = tuple(is_possible(data.searched[0], own) for own in members)
@@ -113,6 +115,11 @@ def modelled(search: Search, kept: Sequence[Named], data: Data) -> Model:
         for own in members
     )
     return Model(weights, onsets, simulated, worth, possible)
+
+
+def _allowed(measured: Measurement, candidate: Candidate, weights: Array, half: Array) -> Array:
+    """Return weights moved to what catalogue and machine allow, where chance took them off."""
+    return nearest_possible(measured, candidate, bounded(candidate, weights, half), half)
 
 
 def _parameters(

@@ -86,6 +86,27 @@ def is_possible(measurement: Measurement, weights: Mapping[Candidate, Array]) ->
     return True
 
 
+def nearest_possible(
+    measurement: Measurement, candidate: Candidate, weights: Array, half: Array
+) -> Array:
+    """Return weights that the measured machine can have, if chance alone lies between.
+
+    Args:
+        measurement: of the machine.
+        candidate: whose weights they are.
+        weights: as fitted.
+        half: half the widths of their 95 % intervals.
+    """
+    effect = candidate.effect
+    if effect.nearest is None or not np.all(np.isfinite(half)):
+        return weights
+    names = [parameter.name for parameter in effect.linear]
+    errors = dict(zip(names, half.tolist(), strict=True))
+    values = effect.values(weights.tolist(), **candidate.nonlinear)
+    nearest = effect.weights(effect.nearest(measurement.machine, values, errors))
+    return nearest if np.all(np.abs(nearest - weights) <= half) else weights
+
+
 def _true_readings(measurement: Measurement, action: Action) -> Measurement:
     """Return what a sensor would have read without a fault, to which a fixed point leads."""
     effect = action.effect

@@ -16,6 +16,8 @@ from cspm_sim.effects.effect import (
 )
 
 _MOMENTS = ("ixx", "iyy", "izz")
+# Of the excess, so that rounding leaves none.
+_BEYOND = 1e-6
 
 
 def _alter(testbed: Testbed, element: int, values: Values) -> Testbed:
@@ -24,6 +26,25 @@ def _alter(testbed: Testbed, element: int, values: Values) -> Testbed:
     inertia = testbed.bar.inertia.model_dump()
     changed = {name: inertia[name] + values[name] for name in _MOMENTS}
     return altered_bar(testbed, inertia={**inertia, **changed})
+
+
+def _nearest(testbed: Testbed, values: Values, errors: Values) -> Values:
+    """Return values of which no moment is greater than the other two together.
+
+    The nearest in units of their errors; the products of inertia are taken for none.
+    """
+    if testbed.bar is None:
+        return values
+    inertia = testbed.bar.inertia.model_dump()
+    found = np.array([values[name] for name in _MOMENTS])
+    moments = found + [inertia[name] for name in _MOMENTS]
+    across = np.where(np.arange(3) == np.argmax(moments), 1.0, -1.0)
+    excess = float(across @ moments)
+    if excess <= 0.0:
+        return values
+    turned = np.array([errors[name] ** 2 for name in _MOMENTS]) * across
+    moved = found - (1.0 + _BEYOND) * excess * turned / float(across @ turned)
+    return dict(zip(_MOMENTS, moved.tolist(), strict=True))
 
 
 def _columns(signals: Array) -> Array:
@@ -47,6 +68,7 @@ EFFECT = Effect(
         for name in _MOMENTS
     ),
     alter=_alter,
+    nearest=_nearest,
     regression=Regression(Channel.WRENCH, _columns),
     equation="the bar's inertia about its centre of mass, bar axes = that of the file + diagonal",
     shows="bar wrench residual is a moment in proportion to angular acceleration",

@@ -127,6 +127,8 @@ class Effect:
             the signals of its first hook; None: zeros.
         alter: `alter(testbed, element, values)`: the test-bed with other parameters, for an effect
             that is no more than that.
+        nearest: `nearest(testbed, values, errors)`: of the values that a machine can have those
+            nearest to `values`, in units of their errors; None: any values will do.
         sense: what it does to a sensor's readings.
         elements: what it can act on; None: that which its block says.
         negligible: how far parameters, by name, may lie from where the effect is absent in a sound
@@ -153,6 +155,7 @@ class Effect:
     states: int = 0
     rest: Callable[[Array, Array], Sequence[float]] | None = None
     alter: Callable[[Testbed, int, Values], Testbed] | None = None
+    nearest: Callable[[Testbed, Values, Values], Values] | None = None
     sense: Sense | None = None
     elements: Elements | None = None
     negligible: Mapping[str, float] = field(default_factory=dict)

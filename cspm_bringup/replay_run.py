@@ -22,13 +22,12 @@ from cspm_msgs_py.bag import BagStream, open_bag
 from cspm_msgs_py.errors import CspmError, InputError
 from cspm_msgs_py.graph import PLAYER, RECORDER
 from cspm_msgs_py.ros.contract_node import ContractNode
-from cspm_msgs_py.ros.session import Session
+from cspm_msgs_py.ros.session import FAREWELL_S, Session
 from cspm_msgs_py.schedule import schedule_of
 
 REPLAY = "replay"
 # Readers tell what they have at least every three seconds.
 _ACKNOWLEDGED_S = 4.0
-_FAREWELL_S = 0.5
 _LOOK_OFTEN_S = 0.05
 Look = Callable[[Player], None]
 
@@ -242,7 +241,7 @@ def _play_in_step(
     session.spin_until(lambda: node.finished or session.stopped or watch.stuck is not None)
     if session.stopped:
         node.stop()
-        session.spin_until(lambda: node.finished, _FAREWELL_S)
+        session.spin_until(lambda: node.finished, FAREWELL_S)
     look(player)
     if node.controls.failure is not None:
         raise node.controls.failure

@@ -55,14 +55,14 @@ def refine(
     shapes = {c.effect_id: dict(c.shape) for c in candidates}
     effects = {c.effect_id: c.effect for c in candidates}
     wanted = [(c.effect_id, c.element) for c in candidates]
-    applied: dict[Candidate, Array] = {}
-    widths: dict[Candidate, Array] = {}
+    applied: Weights = {}
     factor = _FIRST_FACTOR
     found: Weights = {}
     for _ in range(_ROUNDS if candidates else 0):
         near = [_near(effects[name], shape, factor) for name, shape in shapes.items()]
         try:
-            moved = [settled(with_found(m, applied)) for m in searched]
+            values = {c: own for c, (own, _) in applied.items()}
+            moved = [settled(with_found(m, values)) for m in searched]
         except InputError:
             # Such a machine cannot be; what was found before stays, with its interval.
             break
@@ -71,14 +71,13 @@ def refine(
         shapes, found = _fitted(evidence, shapes, wanted, common)
         for candidate, (weights, half) in found.items():
             if _is_applied(candidate.effect):
-                before = applied.get(candidate, np.zeros_like(weights))
+                before = values.get(candidate, np.zeros_like(weights))
                 turned = _unit_after(candidate.effect, before)
-                applied[candidate] = before + turned * weights
-                widths[candidate] = turned * half
+                applied[candidate] = before + turned * weights, turned * half
         factor = float(np.sqrt(factor))
         if _is_settled(found):
             break
-    return {c: (applied.get(c, w), widths.get(c, half)) for c, (w, half) in found.items()}
+    return {c: applied.get(c, own) for c, own in found.items()}
 
 
 def _is_settled(found: Weights) -> bool:

@@ -90,7 +90,8 @@ def exert(
         speeds: motor speeds, (n,) [rad/s].
         rows: the cables, see `cable_row`.
         drag: damping of the bar per world axis, about its origin, (6,) [N·s/m, N·m·s/rad].
-        across: damping of each attachment's motion across its cable, (n,) [N·s/m].
+        across: what each attachment's velocity across its cable meets, and by how much the
+            exit's lessens it, (n, 2) [N·s/m].
         radii: length wound per motor angle, (n,) [m/rad].
         given: length that each cable has gained beside its winding, (n,) [m].
         held: tension beside that of law and damper, (n,) [N].
@@ -99,7 +100,7 @@ def exert(
         wrench: receives force, and moment about the centre of mass, in world axes, (6,).
     """
     n, lost = rows.shape[0], -1
-    force, apart = np.zeros(3), np.zeros(3)
+    force, dragged = np.zeros(3), np.zeros(3)
     for axis in range(3):
         wrench[axis] = -drag[axis] * body[3 + axis]
         wrench[3 + axis] = -drag[3 + axis] * body[6 + axis]
@@ -109,24 +110,25 @@ def exert(
         if rows[i, HAS_CABLE] == 0.0:
             continue
         start, end = ends[i], ends[n + i]
-        length, rate = 0.0, 0.0
+        length, rate, along = 0.0, 0.0, 0.0
         for axis in range(3):
             length += (end[axis] - start[axis]) ** 2
         length = length**0.5
         for axis in range(3):
             force[axis] = (start[axis] - end[axis]) / length
-            apart[axis] = _point_velocity(end, body, axis) - _point_velocity(start, frame, axis)
-            rate -= force[axis] * apart[axis]
+            near, far = _point_velocity(start, frame, axis), _point_velocity(end, body, axis)
+            rate -= force[axis] * (far - near)
+            dragged[axis] = across[i, 0] * far - across[i, 1] * near
+            along += force[axis] * dragged[axis]
         winding[i] = -unstretched[i] / length * radii[i] * speeds[i]
         longer = unstretched[i] + given[i]
         tensions[i] = max(0.0, _tension(length, rate, longer, winding[i], rows[i]) + held[i])
         # Written so that NaN counts as well.
         if lost < 0 and not tensions[i] < RUNAWAY:
             lost = i
-        # `force` is the unit vector towards the exit, so the cable stretches at −force · apart.
+        # `force` is the unit vector towards the exit.
         for axis in range(3):
-            sideways = apart[axis] + rate * force[axis]
-            force[axis] = tensions[i] * force[axis] - across[i] * sideways
+            force[axis] = (tensions[i] + along) * force[axis] - dragged[axis]
             wrench[axis] += force[axis]
         _add_moment(end, centre, force, wrench)
     return lost

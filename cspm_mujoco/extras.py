@@ -13,12 +13,15 @@ from cspm_msgs_py.testbed import EffectEntry, Testbed
 
 Array = NDArray[np.float64]
 
-_PARAMETERS = {
+_PARAMETERS: dict[str, tuple[str, ...]] = {
     "bar_linear_damping": DOFS,
-    "cable_transverse_damping": ("coefficient",),
+    "cable_transverse_damping": ("coefficient", "exit_share"),
     "winch_viscous_friction": ("coefficient",),
     "winch_coulomb_friction": ("torque",),
 }
+# Of these a file may leave out what is given here.
+_DEFAULTS = {"cable_transverse_damping": {"exit_share": 1.0}}
+_SIGNED = {"exit_share"}
 
 
 class Extras(NamedTuple):
@@ -26,7 +29,8 @@ class Extras(NamedTuple):
 
     Attributes:
         drag: on the bar per world axis, about its origin, (6,) [N·s/m, N·m·s/rad].
-        across: damping of each attachment's motion across its cable, (n,) [N·s/m].
+        across: what each attachment's velocity across its cable meets, and by how much the
+            exit's lessens it, (n, 2) [N·s/m].
         damping: of the winches, (n,) [N·m·s/rad].
         friction: dry friction of the winches, (n,) [N·m].
     """
@@ -44,9 +48,8 @@ def find_extras(testbed: Testbed) -> Extras:
         InputError: an effect that this plant does not have, or a wrong element or parameter.
     """
     n = len(testbed.cables)
-    extras = Extras(np.zeros(6), np.zeros(n), np.zeros(n), np.zeros(n))
+    extras = Extras(np.zeros(6), np.zeros((n, 2)), np.zeros(n), np.zeros(n))
     of_cables = {
-        "cable_transverse_damping": extras.across,
         "winch_viscous_friction": extras.damping,
         "winch_coulomb_friction": extras.friction,
     }
@@ -60,6 +63,10 @@ def find_extras(testbed: Testbed) -> Extras:
                 )
             extras.drag[:] += values
             continue
+        if entry.effect == "cable_transverse_damping":
+            coefficient, share = values
+            extras.across[_cables(entry, testbed)] += coefficient, coefficient * share
+            continue
         of_cables[entry.effect][_cables(entry, testbed)] += values[0]
     return extras
 
@@ -69,15 +76,16 @@ def _values(entry: EffectEntry) -> list[float]:
     if names is None:
         allowed = ", ".join(_PARAMETERS)
         raise InputError(f"effects: {entry.effect}: not in the MuJoCo plant, allowed: {allowed}")
-    if set(entry.parameters) != set(names):
+    given = {**_DEFAULTS.get(entry.effect, {}), **entry.parameters}
+    if set(given) != set(names):
         raise InputError(
             f"effects: {entry.effect}: parameters {sorted(entry.parameters)}, allowed: exactly"
             f" {list(names)}"
         )
-    negative = [name for name in names if not entry.parameters[name] >= 0.0]
+    negative = [name for name in names if name not in _SIGNED and not given[name] >= 0.0]
     if negative:
         raise InputError(f"effects: {entry.effect}: {negative[0]} below 0, allowed: 0 and more")
-    return [entry.parameters[name] for name in names]
+    return [given[name] for name in names]
 
 
 def _cables(entry: EffectEntry, testbed: Testbed) -> list[int]:

@@ -158,9 +158,14 @@ def _on_others(
 
 def _ordered(effect: Effect, entry: EffectEntry, where: str) -> dict[str, float]:
     names = [parameter.name for parameter in effect.parameters]
-    given = entry.parameters
+    defaults = {p.name: p.default for p in effect.parameters if p.default is not None}
+    given = {**defaults, **entry.parameters}
     if set(given) != set(names):
-        raise InputError(f"{where}: parameters {sorted(given)}, allowed: exactly {names}")
+        needed = [name for name in names if name not in defaults]
+        further = f", and {', '.join(defaults)}" if defaults else ""
+        raise InputError(
+            f"{where}: parameters {sorted(entry.parameters)}, allowed: exactly {needed}{further}"
+        )
     for parameter in effect.parameters:
         if not parameter.minimum <= given[parameter.name] <= parameter.maximum:
             raise InputError(

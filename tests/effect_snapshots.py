@@ -162,7 +162,7 @@ class Snapshots:
 
     def ends(self, i):
         """Signals of cable i's end at the bar."""
-        out = np.zeros((len(self.states), EndSignal.GRAVITY + 1))
+        out = np.zeros((len(self.states), EndSignal.EXIT_VELOCITY + 3))
         cable = self.nominal.cables[i]
         for k, (state, frame) in enumerate(zip(self.states, self.frames, strict=True)):
             turn, base = rotation(state[:6]), rotation(frame[:6])
@@ -177,6 +177,7 @@ class Snapshots:
             line = state[:3] + arm - frame[:3] - exit_arm
             out[k, :3], out[k, 3:6] = line / np.linalg.norm(line), velocity - exit_velocity
             out[k, 6:9], out[k, EndSignal.LENGTH] = arm, np.linalg.norm(line)
+            out[k, EndSignal.EXIT_VELOCITY :] = exit_velocity
         out[:, EndSignal.GRAVITY] = self.nominal.gravity
         return out
 

@@ -1,5 +1,7 @@
 """Which findings stay in a model, and what it is fitted with."""
 
+from types import SimpleNamespace
+
 import numpy as np
 import pytest
 from run_samples import SCENARIOS
@@ -9,6 +11,7 @@ from cspm_ident.diagnosis.columns import Candidate
 from cspm_ident.diagnosis.drivers import around
 from cspm_ident.diagnosis.model import Model
 from cspm_ident.diagnosis.simulation import Output, Worth
+from cspm_ident.diagnosis.statement import numbers_of
 from cspm_ident.diagnosis.supposed import is_possible, nearest_possible
 from cspm_ident.signals.measurement import Measurement
 from cspm_msgs_py.testbed import load_testbed
@@ -70,6 +73,15 @@ def test_an_inertia_that_a_body_has_stays_as_found():
     measured = Measurement(SCENARIOS / "today", "ab" * 32, THESIS)
     own, found = Candidate(catalogue()["bar_inertia"], "bar"), np.array([0.0, 0.05, 0.05])
     np.testing.assert_array_equal(nearest_possible(measured, own, found, 0.1 * found), found)
+
+
+def test_an_interval_ends_where_the_catalogue_does():
+    drag = Candidate(catalogue()["winch_coulomb_friction"], "surge_2")
+    cases = ((0.01, 0.004, (0.006, 0.014)), (0.0, 0.004, (0.0, 0.004)), (0.9, 0.2, (0.7, 1.0)))
+    for value, half, ends in cases:
+        found = SimpleNamespace(weights={drag: (np.array([value]), np.array([half]))})
+        (number,) = numbers_of(found, drag)
+        assert (number.low, number.high) == pytest.approx(ends)
 
 
 def test_what_lies_around_a_row_has_none_of_its_noise():

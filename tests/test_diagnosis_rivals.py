@@ -60,6 +60,7 @@ def test_weights_that_one_coefficient_has_are_found():
 
 
 DRAG = catalogue()["cable_transverse_damping"]
+AGAINST_EXIT = (("exit_share", 1.0),)
 BAR = Place(Channel.WRENCH, "bar")
 
 
@@ -68,8 +69,8 @@ def swinging(apart, drag=0.8):
     rng = np.random.default_rng(7)
     speed, other = np.sin(1.7 * TIMES), rng.standard_normal(ROWS)
     columns = {
-        Candidate(DRAG, "a"): -speed[:, None],
-        Candidate(DRAG, "b"): -(speed + apart * other)[:, None],
+        Candidate(DRAG, "a", AGAINST_EXIT): -speed[:, None],
+        Candidate(DRAG, "b", AGAINST_EXIT): -(speed + apart * other)[:, None],
     }
     return equation(BAR, -drag * speed, columns)
 
@@ -106,8 +107,8 @@ def test_a_simpler_rival_on_other_elements_is_the_best_of_them():
     speed, others = np.sin(1.7 * TIMES), rng.standard_normal((ROWS, 5))
     columns = {
         Candidate(AIR, "bar"): np.column_stack([-speed, -others]),
-        Candidate(DRAG, "a"): -rng.standard_normal((ROWS, 1)),
-        Candidate(DRAG, "b"): -speed[:, None],
+        Candidate(DRAG, "a", AGAINST_EXIT): -rng.standard_normal((ROWS, 1)),
+        Candidate(DRAG, "b", AGAINST_EXIT): -speed[:, None],
     }
     told = named_in(equation(BAR, -0.8 * speed - 0.004 * others[:, 0], columns))
     assert told[0].hypothesis.effect.id == "cable_transverse_damping"

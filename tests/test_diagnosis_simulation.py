@@ -5,9 +5,19 @@ import pytest
 from run_samples import bundle_of
 
 from cspm_bringup.run import run
-from cspm_ident.diagnosis.simulation import baselines_of
+from cspm_ident.block_simulation import Drive
+from cspm_ident.diagnosis.columns import Candidate
+from cspm_ident.diagnosis.simulation import (
+    Baselines,
+    Output,
+    SimulatedFit,
+    Worth,
+    baselines_of,
+    worth_of,
+)
 from cspm_ident.signals.measurement import read_measurement
 from cspm_msgs_py.dofs import DOFS
+from cspm_sim.effects import Channel, catalogue
 
 
 @pytest.fixture(scope="module")
@@ -28,3 +38,20 @@ def test_only_what_was_not_searched_is_judged(recording, start):
     for k, dof in enumerate(DOFS):
         expected = np.std(recording.bar_pose.values[inside, k])
         assert spreads[f"bar/pose/{dof}"] == pytest.approx(expected, rel=0.02)
+
+
+@pytest.mark.parametrize(
+    ("effect", "element", "drive", "told"),
+    [
+        ("cable_stiffness", "sway_1", Drive.WINCH, True),
+        ("cable_stiffness", "sway_1", Drive.TENSION, False),
+        ("winch_coulomb_friction", "sway_1", Drive.WINCH, False),
+        ("bar_mass", "bar", Drive.TENSION, True),
+    ],
+)
+def test_a_pose_tells_of_cables_where_motor_angles_drive_both(effect, element, drive, told):
+    pose = Output(drive, "bar/pose/yaw", "rad", "bar", Channel.WRENCH)
+    fit = SimulatedFit(pose, 1.0, before=0.4, retuned=0.4, after=0.3, floor=0.1)
+    own = {Candidate(catalogue()[effect], element): np.array([0.1])}
+    found = worth_of(Baselines((), (), {}, {}), [fit], own, own)
+    assert found == (Worth(pose, 0.4, 0.3) if told else None)

@@ -10,7 +10,7 @@ from cspm_ident.diagnosis.drivers import Driver, Knots
 from cspm_ident.diagnosis.equation import Equation
 from cspm_ident.diagnosis.evidence import gather
 from cspm_ident.diagnosis.fits import Fits
-from cspm_ident.diagnosis.hypothesis import Hypothesis
+from cspm_ident.diagnosis.hypothesis import Hypothesis, is_spread
 from cspm_ident.diagnosis.search import Search
 from cspm_ident.diagnosis.sums import Gain, Sums
 from cspm_ident.diagnosis.sureness import FALSE_ALARMS, Sureness
@@ -78,14 +78,14 @@ def test_what_one_system_reads_has_one_number_unless_data_say_otherwise(second, 
 def test_all_elements_may_share_a_number_only_if_their_own_agree(second, hum, same):
     search = Search(gather([winches(second, hum)], BLOCK_S))
     both = Hypothesis(DRY, tuple(Candidate(DRY, name) for name in NAMES), common=True)
-    assert search._agree(both, search.fits.columns([])) is same
+    assert search.scopes.agree(both, search.fits.columns([])) is same
 
 
 def test_one_element_alone_says_nothing_of_all():
     """The other's number is known too badly to contradict, and not known to be one."""
     search = Search(gather([winches(0.0, 40.0)], BLOCK_S))
     both = Hypothesis(DRY, tuple(Candidate(DRY, name) for name in NAMES), common=True)
-    assert not search._agree(both, search.fits.columns([]))
+    assert not search.scopes.agree(both, search.fits.columns([]))
 
 
 def test_a_common_number_is_that_of_the_sum_of_columns():
@@ -100,6 +100,50 @@ def test_a_common_number_is_that_of_the_sum_of_columns():
     assert found == [pytest.approx(expected[0], rel=1e-9)] * 2
     apart = [w for w, _ in search.fits.weights([replace(both, common=False)]).values()]
     assert apart[0][0] - apart[1][0] == pytest.approx(0.2, abs=0.1)
+
+
+MANY = ("a", "b", "c", "d")
+
+
+def several(frictions, hums):
+    """Winches of which some are too loud to tell their dry friction."""
+    found = []
+    for k, (name, friction, hum) in enumerate(zip(MANY, frictions, hums, strict=True)):
+        rng = np.random.default_rng(k)
+        times = STEP * np.arange(ROWS)
+        speed = np.sin(2.1 * times + k) + 0.6 * np.sin(0.83 * times)
+        column = np.sign(speed)[:, None]
+        target = friction * column[:, 0] + (0.05 + hum) * rng.standard_normal(ROWS)
+        shaped = {Candidate(DRY, name): column[:, :, None]}
+        found.append(Equation(Place(Channel.SHAFT, name), times, target[:, None], shaped, column))
+    return found
+
+
+@pytest.mark.parametrize(
+    ("frictions", "hums", "elements"),
+    [
+        ((0.3, 0.3, 0.3, 0.3), (0.0, 0.0, 40.0, 40.0), MANY),
+        ((0.3, 0.3, 0.0, 0.0), (0.0, 0.0, 40.0, 0.0), ("a", "b", "c")),
+        ((0.3, 0.0, 0.0, 0.0), (0.0, 40.0, 40.0, 40.0), ("a",)),
+    ],
+)
+def test_what_is_on_half_of_all_elements_is_on_those_that_may_as_well_have_it(
+    frictions, hums, elements
+):
+    search = Search(gather([several(frictions, hums)], BLOCK_S))
+    whole = Hypothesis(DRY, tuple(Candidate(DRY, name) for name in MANY))
+    assert search.scopes.pruned(whole, search.fits.columns([])).elements == elements
+
+
+@pytest.mark.parametrize(
+    ("elements", "of", "spread"),
+    [(("a", "b"), MANY, True), (("a",), MANY, False), (("a",), MANY[:2], False)],
+)
+def test_half_of_several_elements_is_as_good_as_all(elements, of, spread):
+    one, all_of = (Hypothesis(DRY, tuple(Candidate(DRY, n) for n in e)) for e in (elements, of))
+    assert is_spread(one, all_of) is spread
+    other = Hypothesis(WET, tuple(Candidate(WET, name) for name in of))
+    assert not is_spread(one, other)
 
 
 def curved(amount, dry=0.3):

@@ -10,6 +10,7 @@ from cspm_ident.diagnosis.columns import Candidate, Place
 from cspm_ident.diagnosis.drawn_tension import with_drawn_tension
 from cspm_ident.diagnosis.recorded import equations_of
 from cspm_ident.diagnosis.supposed import with_found
+from cspm_ident.signals.samples import Samples
 from cspm_sim.effect_entries import read_actions
 from cspm_sim.effects import Channel, catalogue
 
@@ -103,3 +104,16 @@ def test_a_winch_s_fault_shows_in_its_cable_and_in_the_bar(blind, name, weight):
 def test_a_load_cell_that_is_not_there_has_no_faults(blind):
     for equation in by_place(blind, "tension_gain", "tension_bias").values():
         assert not equation.columns
+
+
+def test_what_torques_that_are_late_do_to_the_bar_is_never_told(blind, whole):
+    """Torques a period late; with load cells there is no such thing."""
+    values = blind.torque.values
+    torque = Samples(blind.torque.times, np.vstack([values[:1], values[:-1]]))
+    here, late = (by_place(m)[BAR] for m in (blind, replace(blind, torque=torque)))
+    change = (late.target - here.target).reshape(-1)
+    column = here.nuisance.reshape(change.size)
+    left = change - column * (column @ change) / (column @ column)
+    assert rms(change) > 0.0
+    assert rms(left) < 0.1 * rms(change)
+    assert not by_place(whole)[BAR].nuisance.size

@@ -28,7 +28,7 @@ EXACT = {
     "winch_drum_eccentricity": {"eccentricity": 0.002, "phase": -0.6},
     "pulley_friction": {"coefficient": 0.15, "wrap": 1.9},
     "cable_axial_damping": {"scale": 1.4},
-    "cable_transverse_damping": {"coefficient": 3.0},
+    "cable_transverse_damping": {"coefficient": 3.0, "exit_share": -0.4},
     "bar_mass": {"mass": 1.5},
     "bar_inertia": {"ixx": 0.03, "iyy": 0.02, "izz": -0.03},
     "bar_linear_damping": dict(

@@ -147,8 +147,8 @@ def test_twins_in_the_catalogue_name_each_other(effect):
 
 
 def test_the_catalogue_is_the_contract():
-    declared = {e.id: " ".join(p.name for p in e.parameters) for e in EFFECTS}
-    assert declared == CONTRACT
+    needed = {e.id: " ".join(p.name for p in e.parameters if p.default is None) for e in EFFECTS}
+    assert needed == CONTRACT
 
 
 @pytest.mark.parametrize("effect", EFFECTS, ids=lambda e: e.id)
@@ -403,6 +403,24 @@ def test_faulty_entries_are_refused_in_one_line(effects, text):
     with pytest.raises(InputError) as caught:
         plant_parameters(build({**general_content(), "effects": effects}))
     assert str(caught.value) == text
+
+
+def test_what_a_file_leaves_out_has_its_default():
+    given = {"coefficient": 2.0}
+    for left_out, values in ((1.0, given), (-0.5, {**given, "exit_share": -0.5})):
+        content = {**general_content(), "effects": [entry("cable_transverse_damping", **values)]}
+        actions = read_actions(build(content))
+        assert all(a.values == {"coefficient": 2.0, "exit_share": left_out} for a in actions)
+
+
+def test_an_unknown_parameter_is_refused_beside_a_default():
+    effects = [entry("cable_transverse_damping", coefficient=2.0, share=0.5)]
+    with pytest.raises(InputError) as caught:
+        read_actions(build({**general_content(), "effects": effects}))
+    assert str(caught.value) == (
+        "effects: cable_transverse_damping: parameters ['coefficient', 'share'], allowed: exactly"
+        " ['coefficient'], and exit_share"
+    )
 
 
 def test_an_effect_on_a_bar_needs_a_bar():

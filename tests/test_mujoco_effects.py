@@ -23,6 +23,7 @@ DRAG = {"surge": 3.0, "sway": 5.0, "heave": 2.0, "roll": 0.3, "pitch": 0.2, "yaw
     [
         ("bar_linear_damping", DRAG),
         ("cable_transverse_damping", {"coefficient": 0.5}),
+        ("cable_transverse_damping", {"coefficient": 0.5, "exit_share": -0.5}),
         ("winch_viscous_friction", {"coefficient": 0.01}),
     ],
 )
@@ -47,12 +48,15 @@ def test_friction_of_one_winch_is_on_that_winch(general):
     assert drive(ours, theirs, swinging_torques(ours, 3))["speeds"] < 1e-5
 
 
-def test_damping_across_a_cable_resists_motion_across_it_alone(general):
+@pytest.mark.parametrize("share", [{}, {"exit_share": -0.5}])
+def test_damping_across_a_cable_resists_motion_across_it_alone(general, share):
     """The wrench from the definition, cable by cable, with vector products."""
     coefficients = np.linspace(0.0, 2.1, 8)
     machine = general
     for name, value in zip(general.cable_names, coefficients, strict=True):
-        machine = with_effect(machine, "cable_transverse_damping", (name,), coefficient=value)
+        machine = with_effect(
+            machine, "cable_transverse_damping", (name,), coefficient=value, **share
+        )
     damped, free = (MujocoPlant(m, waving(1.0).at, MS, bar_pose=POSE) for m in (machine, general))
     rng = np.random.default_rng(4)
     twist = rng.uniform(-0.3, 0.3, 6)
@@ -68,7 +72,8 @@ def test_damping_across_a_cable_resists_motion_across_it_alone(general):
         line = (end - start) / np.linalg.norm(end - start)
         frame = free._frame_body
         apart = twist[:3] + np.cross(spin, end - origin)
-        apart -= frame[3:6] + np.cross(frame[6:], start - frame[:3])
+        exit_velocity = frame[3:6] + np.cross(frame[6:], start - frame[:3])
+        apart -= share.get("exit_share", 1.0) * exit_velocity
         force = -value * np.cross(line, np.cross(apart, line))
         expected[:3] += force
         expected[3:] += np.cross(end - free._centre, force)

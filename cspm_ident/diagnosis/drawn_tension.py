@@ -75,12 +75,25 @@ def drawn_columns(
     rows[:, WinchSignal.TENSION] = signals.tensions[:, i]
     radius = rows[:, WinchSignal.RADIUS]
     rows[:, WinchSignal.ACCELERATION] = np.gradient(signals.speeds[:, i], signals.step)
-    rows[:, WinchSignal.TORQUE] = (
-        radius * signals.tensions[:, i] + cable.rotor_inertia * rows[:, WinchSignal.ACCELERATION]
-    )
+    rows[:, WinchSignal.TORQUE] = _drawing_torque(cable, signals, i)
     for shape in shapes_of(effect):
         taken = effect.regressors(rows, **dict(shape))[:, 0]
         yield Candidate(effect, cable.name, shape), taken / radius[:, None]
+
+
+def late_tension(cable: Cable, signals: MachineSignals, i: int) -> Array:
+    """Return what a torque adds to the tension drawn from it by the second that it is late, (k,).
+
+    Drives say how late they are to a period only.
+    """
+    rate = np.gradient(_drawing_torque(cable, signals, i), signals.step)
+    return np.asarray(rate * cable.gear_ratio / cable.drum_radius)
+
+
+def _drawing_torque(cable: Cable, signals: MachineSignals, i: int) -> Array:
+    radius = cable.drum_radius / cable.gear_ratio
+    accelerated = np.gradient(signals.speeds[:, i], signals.step)
+    return np.asarray(radius * signals.tensions[:, i] + cable.rotor_inertia * accelerated)
 
 
 def _drawn(rows: Array, pulled: Array, own: Sequence[Action]) -> Array:

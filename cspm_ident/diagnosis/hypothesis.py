@@ -209,6 +209,16 @@ def is_wider(one: Hypothesis, other: Hypothesis) -> bool:
     return one.causes > other.causes
 
 
+def is_spread(one: Hypothesis, whole: Hypothesis) -> bool:
+    """Return whether one has the same effect on half of several elements at least.
+
+    Then it is as likely on all of them, which is one cause, as on those alone.
+    """
+    same = one.effect.id == whole.effect.id and one.candidates[0].shape == whole.candidates[0].shape
+    elements = len(whole.elements)
+    return same and elements > 2 and 2 * len(one.elements) >= elements
+
+
 def members_of(candidates: Iterable[Candidate], hypothesis: Hypothesis) -> list[Candidate]:
     """Return a finding's candidates with their final shapes."""
     own = hypothesis.effect.id, hypothesis.elements

@@ -195,8 +195,10 @@ def _motions(motion: BodyMotion, state: BodyState) -> Motions:
     return poses, rotation, velocity, omega
 
 
-def end_velocities(spans: CableSpans, bar: BodyState, frame: BodyState, exits: Array) -> Array:
-    """Return the attachments' velocities against the exits', (k, n, 3) [m/s].
+def end_velocities(
+    spans: CableSpans, bar: BodyState, frame: BodyState, exits: Array
+) -> tuple[Array, Array]:
+    """Return velocities of the attachments against the exits, and of the exits, (k, n, 3) [m/s].
 
     Args:
         spans: the cables.
@@ -205,8 +207,9 @@ def end_velocities(spans: CableSpans, bar: BodyState, frame: BodyState, exits: A
         exits: in winch_frame_ned, shape (n, 3) [m].
     """
     roots = np.einsum("kij,nj->kni", frame.rotation, exits)
-    turned = np.cross(bar.omega[:, None], spans.arms) - np.cross(frame.omega[:, None], roots)
-    return np.asarray((bar.velocity - frame.velocity)[:, None] + turned)
+    near = frame.velocity[:, None] + np.cross(frame.omega[:, None], roots)
+    far = bar.velocity[:, None] + np.cross(bar.omega[:, None], spans.arms)
+    return far - near, near
 
 
 def law_at(parameters: PlantParameters, elongations: Array, elastic_lengths: Array) -> Array:

@@ -22,6 +22,7 @@ from cspm_ident.diagnosis.hypothesis import (
     freedom,
     has_one_system,
     is_number,
+    is_spread,
     is_wider,
     joined,
     shapes_of,
@@ -32,6 +33,7 @@ from cspm_ident.diagnosis.likeness import (
 )
 from cspm_ident.diagnosis.pairs import Pair, best_pairs
 from cspm_ident.diagnosis.rivals import rivals_of
+from cspm_ident.diagnosis.scopes import Scopes
 from cspm_ident.diagnosis.short_list import short_list
 from cspm_ident.diagnosis.sums import Gain, Sums, behind, gain_of, paired
 from cspm_ident.diagnosis.sureness import Sureness
@@ -52,8 +54,6 @@ _SIGMAS_OF_ONSET = 3.0
 _SAME = 0.95
 # Of the gain: for less no beginning is told, nor a hypothesis of more numbers kept.
 _SIMPLER_SHARE = 0.1
-# Half intervals within which one of several numbers may lie from that of all.
-_AGREES = 1.5
 
 
 class Search:
@@ -69,8 +69,12 @@ class Search:
         self.evidence, self.sums = evidence, sums(evidence)
         self.fits = Fits(evidence, self.sums)
         self._progress = progress
-        self._effects = [c for c in evidence.terms if isinstance(c, Candidate) and self._shows(c)]
-        self.sureness = Sureness(self.fits, self._effects)
+        self._look_for([c for c in evidence.terms if isinstance(c, Candidate) and self._shows(c)])
+
+    def _look_for(self, candidates: Sequence[Candidate]) -> None:
+        self._effects = candidates
+        self.sureness = Sureness(self.fits, candidates)
+        self.scopes = Scopes(self.fits, self.sureness, candidates)
 
     def run(self) -> Findings:
         """Choose effects one by one, each with all elements on which it surely acts."""
@@ -88,8 +92,7 @@ class Search:
     def retuned(self) -> dict[Candidate, Array]:
         """Return the weights of the file's own parameters, fitted where it helps, nothing added."""
         narrow = copy(self)
-        narrow._effects = [c for c in self._effects if c.effect.alter is not None]
-        narrow.sureness = Sureness(self.fits, narrow._effects)
+        narrow._look_for([c for c in self._effects if c.effect.alter is not None])
         own = [c for h in narrow._chosen() for c in h.candidates]
         return self.evidence.parted(own, self.sums.weights(self.evidence.with_nuisance(own)))
 
@@ -111,19 +114,42 @@ class Search:
         """
         kept = list(chosen)
         for k, hypothesis in enumerate(kept):
-            kept[k] = self._pruned(hypothesis, self._others(hypothesis, kept))
+            kept[k] = self.scopes.pruned(hypothesis, self._others(hypothesis, kept))
         while (needless := self._needless(kept)) is not None:
             del kept[needless]
         return kept
 
     def _needless(self, chosen: Sequence[Hypothesis]) -> int | None:
-        """Return which is the weakest that is not surely there beside the others, if any."""
+        """Return which is the weakest that is not surely there beside the others, if any.
+
+        Nor is what gains no more than the others may be untrue by where it shows.
+        """
         gains = [self._gain(hypothesis, chosen) for hypothesis in chosen]
+        own = [self.fits.own_columns(hypothesis) for hypothesis in chosen]
         for k in np.argsort([gain.total for gain in gains]):
-            base = self._others(chosen[k], chosen)
-            if not self.sureness.counts(base, chosen[k], gains[k], known=len(chosen) - 1):
+            beside = (i for i in range(len(chosen)) if i != k)
+            taken = sum(gains[i].total for i in beside if self.evidence.meet(own[k], own[i]))
+            if gains[k].total <= UNTRUE_SHARE * taken or not self._is_there(
+                chosen[k], self._others(chosen[k], chosen), gains[k], chosen
+            ):
                 return int(k)
         return None
+
+    def _is_there(
+        self, hypothesis: Hypothesis, base: Index, gain: Gain, chosen: Sequence[Hypothesis]
+    ) -> bool:
+        """Return whether a hypothesis, or something that explains less of the same, surely is."""
+        known = len(chosen) - 1
+        if self.sureness.counts(base, hypothesis, gain, known):
+            return True
+        others = [h for h in chosen if h is not hypothesis]
+        rivals = self._rivals(hypothesis, self._effects, base) if gain.total > 0.0 else []
+        return any(
+            self.sureness.counts(base, rival, rival_gain, known)
+            for rival in rivals
+            if (rival_gain := self.sums.gain(base, self.fits.own_columns(rival))).total < gain.total
+            and self.fits.is_plausible([*others, rival])
+        )
 
     def _others(self, hypothesis: Hypothesis, chosen: Sequence[Hypothesis]) -> Index:
         return self.fits.columns(h for h in chosen if h is not hypothesis)
@@ -182,7 +208,7 @@ class Search:
         taken = {(c.effect_id, c.element) for h in chosen for c in h.candidates}
         free = [c for c in self._effects if (c.effect_id, c.element) not in taken]
         gains = self.sums.gains_beyond(base, [self._of(c) for c in free])
-        scopes = [h for c in short_list(free, gains) for h in self._scopes(c, free, base)]
+        scopes = [h for c in short_list(free, gains) for h in self.scopes.of(c, free, base)]
         late = [d for h in scopes for d in self._late(h, free, base)]
         best = self._surest([*scopes, *late], chosen, base)
         if best is None:
@@ -190,7 +216,7 @@ class Search:
         with self.fits.delayed(best):
             found = self._simplest(best, free, base, chosen)
         with self.fits.delayed(found):
-            return self._pruned(found, base)
+            return self.scopes.pruned(found, base)
 
     def _surest(
         self, hypotheses: Iterable[Hypothesis], chosen: Sequence[Hypothesis], base: Index
@@ -208,7 +234,7 @@ class Search:
                 continue
             needed = 0.0
             if best is not None:
-                wider = is_wider(hypothesis, best[1])
+                wider = is_wider(hypothesis, best[1]) and not is_spread(best[1], hypothesis)
                 needed = best[0].sum() + 3.0 * gain_of(gained).error * wider
                 sigmas = _boldness(hypothesis, best[1])
                 if sigmas:
@@ -243,65 +269,6 @@ class Search:
         gained = before - self.fits.held_out(hypothesis, base)
         known = len(chosen)
         return gained if self.sureness.counts(base, hypothesis, gain_of(gained), known) else None
-
-    def _pruned(self, hypothesis: Hypothesis, base: Index) -> Hypothesis:
-        """Return the hypothesis without elements on which the effect may as well be absent."""
-        if hypothesis.common:
-            return hypothesis
-        own_columns = self.fits.own_columns(hypothesis)
-        weights = self.sums.weights(np.concatenate([base, own_columns]))[len(base) :]
-        sizes = np.abs(weights) / self.sums.half_width(base, own_columns)
-        own = self.evidence.parted(hypothesis.candidates, sizes)
-        kept = tuple(c for c in hypothesis.candidates if own[c].max() > 1.0)
-        return replace(hypothesis, candidates=kept) if kept else hypothesis
-
-    def _scopes(
-        self, candidate: Candidate, free: Sequence[Candidate], base: Index
-    ) -> list[Hypothesis]:
-        """Return the candidate's effect where it surely acts, and on all elements together.
-
-        What is too little to see in any one element may be plain in all of them, with the same
-        numbers or with others for each.
-        """
-        alike = [
-            c for c in free if c.effect_id == candidate.effect_id and c.shape == candidate.shape
-        ]
-        whole = Hypothesis(candidate.effect, tuple(alike))
-        own = self._extended(candidate, alike, base)
-        if len(alike) == 1:
-            return [own]
-        one_system = has_one_system(own.effect)
-        common = [replace(whole, common=True)] if one_system or self._agree(whole, base) else []
-        if len(own.candidates) < len(alike):
-            return [own, *common, whole]
-        return [*common, own] if one_system else [own]
-
-    def _agree(self, hypothesis: Hypothesis, base: Index) -> bool:
-        """Return whether all elements may have the same numbers, and several surely have some."""
-        columns = self.fits.own_columns(hypothesis)
-        elements = len(hypothesis.candidates)
-        beside = self.fits.beside(base, hypothesis)
-        apart = self.sums.weights(beside)[len(base) :].reshape(elements, -1)
-        half = self.sums.half_width(base, columns).reshape(elements, -1)
-        sums, kept, own = self.fits.shared(base, hypothesis)
-        same = sums.weights(np.concatenate([kept, own]))[len(kept) :]
-        near = np.abs(apart - same) <= _AGREES * half
-        there = np.any(np.abs(apart) > half, axis=1)
-        return bool(np.all(near) and np.count_nonzero(there) > 1)
-
-    def _extended(
-        self, candidate: Candidate, alike: Sequence[Candidate], base: Index
-    ) -> Hypothesis:
-        """Return the candidate's effect on all elements where it surely acts beside the others."""
-        found, sure = [candidate], self.sureness
-        others = [c for c in alike if c.element != candidate.element]
-        gains = self.sums.gains_beyond(base, [self._of(c) for c in others])
-        for k in np.argsort(-gains):
-            beside = np.concatenate([base, self.evidence.columns_of(found)])
-            further = Hypothesis(candidate.effect, (others[k],))
-            if sure.counts(beside, further, self.sums.gain(beside, self._of(others[k]))):
-                found.append(others[k])
-        return Hypothesis(candidate.effect, tuple(c for c in alike if c in found))
 
     def _simplest(
         self,

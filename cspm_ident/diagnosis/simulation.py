@@ -162,10 +162,20 @@ def worth_of(
     shown = [
         Worth(fit.output, before[fit.output][1], fit.after)
         for fit in fits
-        if fit.output in before and (sensed or fit.output.kind in kinds)
+        if fit.output in before and (sensed or _is_told(fit.output, kinds))
     ]
     shown = [worth for worth in shown if worth.without > 0.0 and np.isfinite(worth.with_it)]
     return min(shown, key=lambda worth: worth.with_it / worth.without, default=None)
+
+
+def _is_told(output: Output, kinds: Collection[Channel]) -> bool:
+    """Return whether a simulated quantity depends on what shows in residuals of some kinds.
+
+    Motor angles drive cables and bar together, so that what either does moves both.
+    """
+    together = {Channel.TENSION, Channel.WRENCH}
+    both = output.drive is Drive.WINCH and not together.isdisjoint(kinds)
+    return both or output.kind in kinds
 
 
 def _errors(parts: Sequence[Measurement], since: Sequence[float], weights: Weights) -> Errors:

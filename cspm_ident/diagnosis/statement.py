@@ -32,8 +32,8 @@ class Number(NamedTuple):
         name: public name.
         value: in `unit`.
         unit: SI.
-        low, high: ends of its 95 % interval; equal to the value where it was searched on a grid;
-            all that the catalogue allows where the data do not tell it.
+        low, high: ends of its 95 % interval as far as the catalogue allows, all that it allows
+            where the data do not tell it; equal to the value where it was searched on a grid.
     """
 
     name: str
@@ -59,8 +59,8 @@ def numbers_of(diagnosis: Diagnosis, candidate: Candidate) -> list[Number]:
             p.name,
             values[p.name],
             p.unit,
-            min(low[p.name], high[p.name]),
-            max(low[p.name], high[p.name]),
+            max(p.minimum, min(low[p.name], high[p.name])),
+            min(p.maximum, max(low[p.name], high[p.name])),
         )
         for p in effect.parameters
     ]

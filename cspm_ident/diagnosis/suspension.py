@@ -301,17 +301,17 @@ class Suspension:
         return rows
 
     @cached_property
-    def _velocities(self) -> Array:
-        """Of the attachments against the exits, (k, n, 3) [m/s]."""
+    def _velocities(self) -> tuple[Array, Array]:
+        """Of the attachments against the exits, and of the exits, (k, n, 3) [m/s]."""
         exits = self.parameters.cables[:, EXIT : EXIT + 3]
         return end_velocities(self._spans, self.bar, self._frame, exits)
 
     def end_rows(self, i: int) -> Array:
         """Return `EndSignal` columns of cable i."""
-        spans = self._spans
-        parts = (spans.directions, self._velocities, spans.arms, spans.lengths)
+        spans, (apart, exits) = self._spans, self._velocities
+        parts = (spans.directions, apart, spans.arms, spans.lengths)
         gravity = np.full(len(self.signals.times), self._testbed.gravity)
-        return np.column_stack([*(part[:, i] for part in parts), gravity])
+        return np.column_stack([*(part[:, i] for part in parts), gravity, exits[:, i]])
 
     @cached_property
     def bar_rows(self) -> Array:

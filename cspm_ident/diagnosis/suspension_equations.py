@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from cspm_ident.diagnosis.columns import Candidate, Place, elements_of, shapes_of
-from cspm_ident.diagnosis.drawn_tension import drawn_columns
+from cspm_ident.diagnosis.drawn_tension import drawn_columns, late_tension
 from cspm_ident.diagnosis.drivers import Driver, Knots, around
 from cspm_ident.diagnosis.equation import Equation, difference_noise
 from cspm_ident.diagnosis.machine_signals import BodyMotion, MachineSignals, machine_signals
@@ -210,7 +210,12 @@ class _Stretch:
                 columns = columns | knots.columns(place, drivers, i, len(DOFS))
         signals = {name: values for drivers in moved for name, values in drivers.items()}
         times, measured = weighed(self._signals.times), weighed(self._here.cable_wrench)
-        return Equation(place, times, weighed(missing), columns, measured, signals=signals)
+        equation = Equation(place, times, weighed(missing), columns, measured, signals=signals)
+        if self._lost is None:
+            return equation
+        cables = enumerate(self._machine.cables)
+        late = sum(self._here.pulled(i, late_tension(c, self._signals, i)) for i, c in cables)
+        return replace(equation, nuisance=weighed(np.asarray(late))[:, :, None])
 
     def _bar_signals(self) -> list[dict[str, Array]]:
         """Return what each of the bar's six components may depend on, by name and unit."""

@@ -35,15 +35,16 @@ def unexplained(
     found: dict[Driver, Unknown] = {}
     for driver in drivers:
         own = evidence.columns_of([driver])
-        told = sums.gain_within if driver.of_time else sums.gain
-        gain, p_value = told(base, own), sums.p_value(base, own)
+        gained = sums.gain_within if driver.of_time else sums.gain
+        gain, p_value = gained(base, own), sums.p_value(base, own)
         if gain.total > _SIGMAS * gain.error and p_value < FALSE_ALARMS / len(drivers):
             share = sureness.share(base, own)
-            if share >= UNKNOWN_SHARE and gain.total > _untold(evidence, sums, chosen, driver):
+            if share >= UNKNOWN_SHARE:
                 found[driver] = driver, gain, share
     found |= {each[0]: each for each in _drifting(evidence, sums, sureness, chosen)}
     found |= {each[0]: each for each in _once(evidence, sums, base)}
-    return tuple(sorted(found.values(), key=lambda each: -each[1].total))
+    told = [e for e in found.values() if e[1].total > _untold(evidence, sums, chosen, e[0])]
+    return tuple(sorted(told, key=lambda each: -each[1].total))
 
 
 def _once(evidence: Evidence, sums: Sums, base: Index) -> Iterator[Unknown]:

@@ -94,7 +94,8 @@ def effect_section(effect: Effect) -> str:
 def _row(p: EffectParameter) -> str:
     absent = "" if p.absent is None else f"{p.absent:g}"
     bounds = f"{p.minimum:g} to {p.maximum:g}"
-    return f"| `{p.name}` | {p.unit} | {bounds} | {absent} | {p.meaning} |"
+    left_out = "" if p.default is None else f"; {p.default:g} where a file leaves it out"
+    return f"| `{p.name}` | {p.unit} | {bounds} | {absent} | {p.meaning}{left_out} |"
 
 
 def _grids(effect: Effect) -> str:

@@ -74,6 +74,7 @@ class EffectParameter:
         maximum: largest value allowed.
         absent: the value at which the effect is not there; None for a number that only shapes it.
         meaning: what the number is, where the equation does not say it.
+        default: what holds where a file leaves it out; None: it has to be given.
     """
 
     name: str
@@ -82,6 +83,7 @@ class EffectParameter:
     maximum: float
     absent: float | None = 0.0
     meaning: str = ""
+    default: float | None = None
 
 
 @dataclass(frozen=True)

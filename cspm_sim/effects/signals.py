@@ -65,6 +65,7 @@ class EndSignal(IntEnum):
     ARM = 6  # three, from the bar frame's origin to the attachment
     LENGTH = 9
     GRAVITY = 10
+    EXIT_VELOCITY = 11  # three
 
 
 class FrameSignal(IntEnum):

@@ -13,14 +13,16 @@ Array = NDArray[float64]
 Rows = NDArray[int64]
 
 # What effects at an attachment read: cable direction, velocity of the attachment against the exit,
-# world axes, length, tension, gravity; and the force on the bar there that they add to.
+# world axes, length, tension, gravity, velocity of the exit; and the force on the bar at the
+# attachment that they add to.
 END_DIRECTION = 0
 END_VELOCITY = 3
 END_LENGTH = 6
 END_TENSION = 7
 END_GRAVITY = 8
 END_FORCE = 9
-END_SIGNALS = 12
+END_EXIT_VELOCITY = 12
+END_SIGNALS = 15
 # What hangs on the bar reads, beside VELOCITY and WRENCH of the bar: acceleration of the bar
 # frame's origin without it, and what a force there adds to that, row by row.
 FREE_ACCELERATION = 12
@@ -57,10 +59,11 @@ def attachment_wrench(
         bx, by, bz = spans[i, ARM], spans[i, ARM + 1], spans[i, ARM + 2]
         ex, ey, ez = cross(fw[0], fw[1], fw[2], ax, ay, az)
         wx, wy, wz = cross(bw[0], bw[1], bw[2], bx, by, bz)
-        signals[END_VELOCITY] = bv[0] + wx - fv[0] - ex
-        signals[END_VELOCITY + 1] = bv[1] + wy - fv[1] - ey
-        signals[END_VELOCITY + 2] = bv[2] + wz - fv[2] - ez
+        exit_velocity = _sum(fv, (ex, ey, ez))
+        end_velocity = _sum(bv, (wx, wy, wz))
         for d in range(3):
+            signals[END_EXIT_VELOCITY + d] = exit_velocity[d]
+            signals[END_VELOCITY + d] = end_velocity[d] - exit_velocity[d]
             signals[END_DIRECTION + d] = spans[i, DIRECTION + d]
             signals[END_FORCE + d] = 0.0
         signals[END_LENGTH] = spans[i, LENGTH]

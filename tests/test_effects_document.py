@@ -25,7 +25,8 @@ def test_page_holds_all_that_an_effect_declares(effect) -> None:
             f"| `{parameter.name}` | {parameter.unit} |"
             f" {parameter.minimum:g} to {parameter.maximum:g} |"
             + ("  |" if parameter.absent is None else f" {parameter.absent:g} |")
-            + f" {parameter.meaning} |\n"
+            + f" {parameter.meaning}"
+            + ("" if parameter.default is None else f"; {parameter.default:g} where a file")
         )
         assert row in page
     for name, grid in effect.nonlinear.items():

@@ -32,7 +32,7 @@ class RigStiffness:
         law = found.both.estimate.ci95.copy()
         law[-1] /= section_of(found.specimens[0].specimen.cable)
         alone = [one.asymptote[1] for one in found.specimens if one.asymptote is not None]
-        yield "least squares, sandwich", np.vstack([law, alone])
+        yield "least squares, scatter of the cycles", np.vstack([law, alone])
 
 
 class RigDamping:

@@ -39,6 +39,12 @@ def print_stiffness(console: Console, result: StiffnessResult) -> None:
         say(console, f"not seen in these recordings: {direction.name}")
     for name in found.at_bound:
         say(console, f"{name} is at the end of its range: its interval does not hold")
+    if not result.both.fits:
+        say(
+            console,
+            "what the law leaves is more than the cycles differ by: it is not quite these cables',"
+            " and its intervals come from its residuals where those are wider",
+        )
     if not result.both.asymptote:
         say(console, "the asymptote E A/l is not reached: E stays what the test-bed file says")
     if "b" in found.frozen:

@@ -25,12 +25,15 @@ class Branch(NamedTuple):
         tension: (n,) [N].
         stiffness: of the cable at constant unstretched length, (n,) [N/m].
         length: elastic length, (n,) [m].
+        scatter: of each cycle less the mean: tension [N] and stiffness [N/m], (cycles, 2, n); None
+            where nothing was averaged.
     """
 
     branch: str
     tension: Array
     stiffness: Array
     length: Array
+    scatter: Array | None = None
 
 
 def mean_branches(
@@ -48,11 +51,13 @@ def _mean(ramps: Ramps, law: Law | None, flanks: Sequence[Flank]) -> Branch:
     low = max(flank.wound.min() for flank in flanks)
     high = min(flank.wound.max() for flank in flanks)
     grid = np.linspace(low, high, min(len(flank.wound) for flank in flanks))
-    tension = np.mean([_on(grid, flank.wound, flank.tension) for flank in flanks], axis=0)
-    quotient = np.mean([_on(grid, flank.wound, flank.stiffness) for flank in flanks], axis=0)
+    tensions = np.array([_on(grid, flank.wound, flank.tension) for flank in flanks])
+    quotients = np.array([_on(grid, flank.wound, flank.stiffness) for flank in flanks])
     winding = Winding(ramps, law)
-    stiffness = quotient / winding.share(grid)
-    return Branch(flanks[0].branch, tension, stiffness, winding.elastic(grid))
+    each = np.stack([tensions, quotients / winding.share(grid)], axis=1)
+    tension, stiffness = each.mean(axis=0)
+    scatter = each - [tension, stiffness]
+    return Branch(flanks[0].branch, tension, stiffness, winding.elastic(grid), scatter)
 
 
 def _on(grid: Array, wound: Array, values: Array) -> Array:

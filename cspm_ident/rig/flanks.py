@@ -66,6 +66,12 @@ class Ramps:
         """How many cycles there are."""
         return len(self.flanks) // 2
 
+    @property
+    def lowest_by_cycle(self) -> Array:
+        """The tension where all ramps have begun, of each cycle, (cycles,) [N]."""
+        each = np.array([_at(self.lowest[0], flank) for flank in self.flanks])
+        return np.asarray(each.reshape(-1, 2).mean(axis=1))
+
 
 def find_ramps(specimen: Specimen, cutoff: float) -> Ramps:
     """Return the ramps of a specimen that was stretched and released slowly, again and again.

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -16,6 +16,8 @@ from cspm_ident.rig.distortion import centred, modelled, undistorted
 from cspm_ident.rig.flanks import Ramps, find_ramps
 from cspm_ident.rig.hysteresis import Hysteresis, find_hysteresis
 from cspm_ident.rig.law import Law, law_of, section_of
+from cspm_ident.rig.law_interval import with_intervals
+from cspm_ident.rig.response import Response, find_response
 from cspm_ident.rig.specimen import Specimen
 from cspm_ident.rig.stiffness_fit import ASYMPTOTE_SHARE, Fitted, above_cap, fit_law
 from cspm_ident.vaf import vaf
@@ -106,7 +108,10 @@ class StiffnessResult:
             "value": found.law.rigidity / self.area,
             "ci95": [end / self.area for end in found.estimate.interval("rigidity")],
         }
-        return found.estimate.data() | {"youngs_modulus": modulus if found.asymptote else None}
+        return found.estimate.data() | {
+            "youngs_modulus": modulus if found.asymptote else None,
+            "scatter_explains_residuals": found.fits,
+        }
 
 
 def identify_stiffness(
@@ -125,10 +130,10 @@ def identify_stiffness(
     fitted, others = split(specimens, verify)
     floor = law_of(fitted[0].cable).floor
     ramps = [find_ramps(one, cutoff) for one in fitted]
-    both, groups = _law_of_both(ramps, floor, cutoff)
+    both, apart = _law_of_both(ramps, floor, cutoff)
     alone = {
-        name: fit_law([[g for g in group if g.branch == name] for group in groups], floor)
-        for name in BRANCHES
+        name: _law_of_one([[group[i]] for group in apart.branches], apart.response.of(i), floor)
+        for i, name in enumerate(BRANCHES)
     }
     judged = [(one, True) for one in ramps] + [(find_ramps(one, cutoff), False) for one in others]
     return StiffnessResult(
@@ -140,21 +145,33 @@ def identify_stiffness(
     )
 
 
-def _law_of_both(
-    ramps: Sequence[Ramps], floor: float, cutoff: float
-) -> tuple[Fitted, list[list[Branch]]]:
-    """Return the law in the middle of the loops, and the branches by specimen where they are."""
+class _Apart(NamedTuple):
+    """Branches by specimen where they lie in their loops, and how they answer."""
+
+    branches: list[list[Branch]]
+    response: Response
+
+
+def _law_of_both(ramps: Sequence[Ramps], floor: float, cutoff: float) -> tuple[Fitted, _Apart]:
+    """Return the law in the middle of the loops, and what laws of one branch are fitted to."""
     widths = [find_hysteresis(one).half_width for one in ramps]
     middle = [centred(one, width) for one, width in zip(ramps, widths, strict=True)]
     seen: list[Ramps | None] = [None] * len(ramps)
     law: Law | None = None
     for _ in range(ROUNDS):
         pairs = list(zip(middle, seen, strict=True))
-        both = fit_law([undistorted(one, model, law) for one, model in pairs], floor)
+        groups = [undistorted(one, model, law) for one, model in pairs]
+        both = fit_law(groups, floor)
         law = both.law
         seen = [modelled(m, law, w, cutoff) for m, w in zip(middle, widths, strict=True)]
+    response = find_response(ramps, both, cutoff)
     pairs = list(zip(ramps, seen, strict=True))
-    return both, [undistorted(one, model, law) for one, model in pairs]
+    apart = [undistorted(one, model, law) for one, model in pairs]
+    return with_intervals(both, groups, response), _Apart(apart, response)
+
+
+def _law_of_one(groups: Sequence[Sequence[Branch]], response: Response, floor: float) -> Fitted:
+    return with_intervals(fit_law(groups, floor), groups, response)
 
 
 def split(

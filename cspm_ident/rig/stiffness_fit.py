@@ -29,18 +29,27 @@ class Fitted(NamedTuple):
         law: its values.
         estimate: `NAMES` with intervals.
         asymptote: whether the data reaches the asymptote E·A/l; else `rigidity` means nothing.
+        jacobians: of the residuals, by specimen and branch, (n, 5).
+        sizes: of each specimen's residuals, by which they are weighted [N/m].
+        parameters: `NAMES` as they were fitted.
+        fits: whether the scatter of the cycles explains what the law leaves.
     """
 
     law: Law
     estimate: Estimate
     asymptote: bool
+    jacobians: list[list[Array]]
+    sizes: list[float]
+    parameters: list[Parameter]
+    fits: bool = True
 
 
 def fit_law(groups: Sequence[Sequence[Branch]], floor: float) -> Fitted:
     """Return the law of least Euclidean norm of measured less modelled stiffness, thesis (3-8).
 
-    Residuals of neighbouring samples are alike, and the intervals count that (a sandwich of sums
-    over blocks). With cables of one length the exponent b stays at 1, Hooke's.
+    The intervals are those of the residuals alone (a sandwich of sums over blocks); see
+    `law_interval` for what the cycles say. With cables of one length the exponent b stays at 1,
+    Hooke's.
 
     Args:
         groups: the branches of each specimen; specimens weigh by the size of their residuals.
@@ -59,10 +68,26 @@ def fit_law(groups: Sequence[Sequence[Branch]], floor: float) -> Fitted:
         law = _law(theta, floor)
         return [one.stiffness - law.stiffness(one.tension, one.length) for one in branches]
 
-    problem = Problem(residual, _parameters(start, several), labels)
-    estimate = fit(problem, list(start[:5]), whiten=False, interval=Interval.SANDWICH).estimate
+    parameters = _parameters(start, several)
+    problem = Problem(residual, parameters, labels)
+    found = fit(problem, list(start[:5]), whiten=False, interval=Interval.SANDWICH)
+    estimate = found.estimate
     law = _law(estimate.values, floor)
-    return Fitted(law, estimate, _reaches(law, branches, estimate))
+    sizes = [found.noise[str(i)].channels[0].process_variance ** 0.5 for i in range(len(groups))]
+    parts = iter(_jacobians(problem, estimate.values))
+    rows = [[next(parts) for _ in group] for group in groups]
+    return Fitted(law, estimate, _reaches(law, branches, estimate), rows, sizes, parameters)
+
+
+def _jacobians(problem: Problem, values: Array) -> list[Array]:
+    """Return the derivatives of the residuals, (n, 5) each; those of frozen values are zero."""
+    free = [i for i, parameter in enumerate(problem.parameters) if not parameter.frozen]
+    found = []
+    for part in problem.jacobians(values):
+        whole = np.zeros((len(part), len(problem.parameters)))
+        whole[:, free] = part[:, 0]
+        found.append(whole)
+    return found
 
 
 def _law(values: Array, floor: float) -> Law:

@@ -11,7 +11,8 @@ from cspm_ident.rig.law import Law
 
 Array = NDArray[np.float64]
 
-ACCURACY = 1e-8
+# Of the tension; the absolute one [N] far below what a filter's derivative makes of it.
+ACCURACY, ROUNDING = 1e-8, 1e-9
 GRID = 2000
 # A stretched cable's elastic length is shorter by its elongation, which follows from that length.
 ROUNDS = 2
@@ -78,7 +79,13 @@ class Winding:
         for side, end in ((grid <= self._place, low), (grid > self._place, high)):
             if side.any() and end != self._place:
                 run = solve_ivp(
-                    rise, (self._place, end), [self._least], rtol=ACCURACY, dense_output=True
+                    rise,
+                    (self._place, end),
+                    [self._least],
+                    method="DOP853",
+                    rtol=ACCURACY,
+                    atol=ROUNDING,
+                    dense_output=True,
                 )
                 found[side] = run.sol(grid[side])[0]
             else:

@@ -81,8 +81,8 @@ def _write(folder: Path, found: Comparison) -> Path:
 
 def print_comparison(console: Console, found: Comparison) -> None:
     """Print the sensors' delays and a table of channels for the whole and each block."""
-    for delay in found.delays:
-        say(console, f"{delay.topic}: {delay.text}{found.use_of(delay)}")
+    for line in found.clocks:
+        say(console, line)
     titles = {
         "whole": f"whole, driven by {found.drive.value}",
         "winch": "winches alone, driven by measured torques and tensions",

@@ -106,6 +106,9 @@ def print_system(console: Console, result: SystemResult) -> None:
     for profile in result.profiles:
         low, high = profile.ci95
         say(console, f"profile of {profile.name}: {low:.5g} … {high:.5g} {profile.unit}")
+    for name, drifts in result.drifts.items():
+        for drift in drifts:
+            say(console, f"{name}: {drift.topic} {drift.text}, taken out")
     for judgement in result.judgements:
         for topic, seconds in judgement.delays.items():
             name = judgement.measurement.path.name

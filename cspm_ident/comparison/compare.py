@@ -15,6 +15,7 @@ from cspm_ident.block_simulation import BlockSimulation, Drive, Simulated, Windo
 from cspm_ident.comparison.channel import Channel
 from cspm_ident.comparison.floor import lasting_rms, propagated
 from cspm_ident.comparison.metrics import error_bins
+from cspm_ident.signals.clock_drift import ClockDrift, on_one_clock
 from cspm_ident.signals.delays import Delay, find_delays
 from cspm_ident.signals.measurement import BAR, SPEED, TENSION, WINCHES, Measurement
 from cspm_ident.signals.noise_source import NoiseSource, noise_of
@@ -48,6 +49,7 @@ class Comparison:
         channels: the whole's, then those of the blocks, each driven by measured signals alone.
         delays: of the sensors, as found.
         applied: delays that were taken out, by topic [s].
+        drifts: of the sensors' clocks, taken out as well; the delays are those at the beginning.
         noise: where each sensor's noise comes from, by topic.
         windows: how many there were, and how many of them diverged.
         bands: what was kept of the smoothed inputs [Hz], by topic.
@@ -60,6 +62,7 @@ class Comparison:
     channels: list[Channel]
     delays: list[Delay]
     applied: dict[str, float]
+    drifts: list[ClockDrift]
     noise: dict[str, NoiseSource]
     windows: tuple[int, int]
     bands: dict[str, float]
@@ -70,6 +73,12 @@ class Comparison:
         if delay.topic in self.applied:
             return "; taken out"
         return "; too small to matter, left in" if delay.known else ""
+
+    @property
+    def clocks(self) -> list[str]:
+        """What was found of the sensors' clocks, in a line for each."""
+        drifts = [f"{each.topic}: {each.text}; taken out" for each in self.drifts]
+        return drifts + [f"{d.topic}: {d.text}{self.use_of(d)}" for d in self.delays]
 
     def data(self) -> dict[str, Any]:
         """Return the figures as plain data for JSON."""
@@ -82,6 +91,7 @@ class Comparison:
             "diverged": self.windows[1],
             "delays": [delay.data() for delay in self.delays],
             "applied_delays_s": self.applied,
+            "clock_drifts": [drift.data() for drift in self.drifts],
             "noise_from": {name: source.value for name, source in self.noise.items()},
             "bands_hz": {k: v if np.isfinite(v) else None for k, v in self.bands.items()},
             "left_out": self.left_out,
@@ -138,6 +148,10 @@ def compare(
     timeline = Timeline(measurement)
     blocks, left_out = _blocks(BlockSimulation(timeline, machine), drive)
     progress("delays of the sensors")
+    drifts: list[ClockDrift] = []
+    if delays is None:
+        timeline, drifts = on_one_clock(timeline, machine)
+        measurement = timeline.measurement
     found = find_delays(timeline, machine) if delays is None else []
     applied = {d.topic: d.seconds for d in found if d.matters} if delays is None else dict(delays)
     timeline = timeline.delayed(applied)
@@ -163,6 +177,7 @@ def compare(
         [channel for block in blocks for channel in channels[block]],
         found,
         applied,
+        drifts,
         sources,
         (len(runs["whole"].windows), len(runs["whole"].simulated.failed)),
         timeline.bands,

@@ -60,9 +60,7 @@ def write_page(path: Path, comparison: Comparison) -> None:
 
 
 def _about(comparison: Comparison) -> str:
-    lines = []
-    for delay in comparison.delays:
-        lines.append(f"{delay.topic}: {delay.text}{comparison.use_of(delay)}")
+    lines = comparison.clocks
     for source in dict.fromkeys(comparison.noise.values()):
         topics = [topic for topic, each in comparison.noise.items() if each is source]
         lines.append(f"noise from {source.value}: {', '.join(topics)}")

@@ -32,22 +32,24 @@ RESOLUTION_S = 1.5e-3
 # With an interval that reaches farther to a side, a recording does not tell a delay.
 WIDEST_S = 5e-3
 # Error of the equation itself, as a standard deviation: what remains without noise.
-_EQUATION_S = 3e-4
-_SCALE_S = 0.02
+EQUATION_S = 3e-4
+SCALE_S = 0.02
 # Nothing here has dynamics that would ask for a shorter step.
-_PERIOD_NS = 5_000_000
-_ROUNDS = 8
-_STILL_S = 1e-5
+PERIOD_NS = 5_000_000
+ROUNDS = 8
+STILL_S = 1e-5
+# By then the weights of the cables stand still; less than this is rounding [m].
+_WEIGHTINGS, _LEAST_M = 4, 1e-9
 # A step longer than this would leave where the equation is linear.
-_LONGEST_STEP_S = 0.03
-_LONGEST_S = 60.0
-_SHORTEST_S = 2.0
+LONGEST_STEP_S = 0.03
+LONGEST_S = 60.0
+SHORTEST_S = 2.0
 # With winches that wind less than this [m], damping and a delay of both poses are one and the same.
-_LEAST_WOUND_M = 5e-4
+LEAST_WOUND_M = 5e-4
 # Poses are not seen above their band; the comparison stays well below it.
 _BAND_SHARE = 0.7
-_WIDEST_HZ = 20.0
-_NORMAL_95 = 1.96
+WIDEST_HZ = 20.0
+NORMAL_95 = 1.96
 # Standard deviations of the noise that a pose must move by.
 _LEAST_MOTION = 20.0
 
@@ -118,16 +120,16 @@ def find_delays(timeline: Timeline, testbed: Testbed) -> list[Delay]:
         return []
     parameters = plant_parameters(testbed)
     timeline = timeline.within(*_liveliest(timeline))
-    timeline = timeline.slowly(_PERIOD_NS, min(timeline.pose_band, _WIDEST_HZ))
+    timeline = timeline.slowly(PERIOD_NS, min(timeline.pose_band, WIDEST_HZ))
     sensors = timeline.measurement.sensors
     topics = [name for name in (BAR, FRAME) if name in sensors]
-    moving = [name for name in topics if _moves(sensors[name])]
+    moving = [name for name in topics if moves(sensors[name])]
     found = {each.topic: each for each in _search(timeline, parameters, moving)}
     window = float(timeline.times[0]), float(timeline.times[-1])
     return [found.get(name, Delay(name, 0.0, (-np.inf, np.inf), window)) for name in topics]
 
 
-def _moves(samples: Samples) -> bool:
+def moves(samples: Samples) -> bool:
     """Return whether a pose does so much more than its noise that noise cannot pass for motion.
 
     Controllers answer the noise of motion capture with motion, which comes later than the noise.
@@ -140,12 +142,12 @@ def _search(timeline: Timeline, parameters: PlantParameters, wanted: list[str]) 
     delays = dict.fromkeys(wanted, 0.0)
     records: list[Record] = []
     names = wanted
-    for _ in range(_ROUNDS if wanted else 0):
-        records, names = _records(timeline.delayed(delays), parameters, wanted)
+    for _ in range(ROUNDS if wanted else 0):
+        records, names = delay_records(timeline.delayed(delays), parameters, wanted)
         if not records:
             return []
-        steps = np.clip(_steps(records)[: len(wanted)], -_LONGEST_STEP_S, _LONGEST_STEP_S)
-        if np.abs(steps).max() < _STILL_S:
+        steps = np.clip(least_squares(records)[: len(wanted)], -LONGEST_STEP_S, LONGEST_STEP_S)
+        if np.abs(steps).max() < STILL_S:
             break
         delays = {name: delays[name] + float(s) for name, s in zip(wanted, steps, strict=True)}
     return _delays(timeline, records, names, delays) if records else []
@@ -154,7 +156,7 @@ def _search(timeline: Timeline, parameters: PlantParameters, wanted: list[str]) 
 def _liveliest(timeline: Timeline) -> tuple[int, int]:
     """Return first and last step of the stretch in which winches and bar move most."""
     steps = len(timeline.times)
-    length = min(steps - 1, round(_LONGEST_S / timeline.period))
+    length = min(steps - 1, round(LONGEST_S / timeline.period))
     if length == steps - 1 or timeline.speeds is None or timeline.bars is None:
         return 0, steps - 1
     motion = np.nansum(timeline.speeds**2, axis=1) / (np.nanvar(timeline.speeds) + 1e-12)
@@ -165,18 +167,26 @@ def _liveliest(timeline: Timeline) -> tuple[int, int]:
     return first, first + length
 
 
-def _records(
-    timeline: Timeline, parameters: PlantParameters, wanted: list[str]
+def delay_records(
+    timeline: Timeline, parameters: PlantParameters, wanted: list[str], drifting: bool = False
 ) -> tuple[list[Record], list[str]]:
-    """Return the equation in the band that poses show, and the names of its unknowns."""
+    """Return the equation in the band that poses show, and the names of its unknowns.
+
+    Args:
+        timeline: its signals.
+        parameters: of the machine.
+        wanted: sensors whose delay [s] is an unknown.
+        drifting: whether by how much the delay grows per second is one as well, behind the delays.
+    """
     target, columns = _equation(timeline, parameters)
-    names = [*wanted, "compliance"]
-    wound = np.asarray(timeline.angles) * parameters.cables[:, RADIUS]
-    if (np.nanmax(wound, axis=0) - np.nanmin(wound, axis=0)).max() > _LEAST_WOUND_M:
+    grown = {f"{name} drift": columns[name] * timeline.times[:, None] for name in wanted}
+    columns |= grown
+    names = [*wanted, *(grown if drifting else ()), "compliance"]
+    if winds(timeline, parameters):
         names.append("damping")
     regressors = np.stack([columns[name] for name in names], axis=2)
-    band = min(_BAND_SHARE * timeline.pose_band, _WIDEST_HZ)
-    shortest = round(_SHORTEST_S / timeline.period)
+    band = min(_BAND_SHARE * timeline.pose_band, WIDEST_HZ)
+    shortest = round(SHORTEST_S / timeline.period)
     records = [
         Record(
             _in_band(target[a : b + 1], timeline.period, band),
@@ -187,16 +197,29 @@ def _records(
     return records, names
 
 
-def _steps(records: list[Record]) -> Array:
-    """Return the least squares solution.
+def winds(timeline: Timeline, parameters: PlantParameters) -> bool:
+    """Return whether winches move by so much that damping shows otherwise than a delay."""
+    if timeline.angles is None:
+        return False
+    wound = timeline.angles * parameters.cables[:, RADIUS]
+    return bool((np.nanmax(wound, axis=0) - np.nanmin(wound, axis=0)).max() > LEAST_WOUND_M)
 
-    Not whitened: that would give weight to high frequencies, at which the regressors are noise, and
-    noise in regressors draws what is found towards zero.
+
+def least_squares(records: list[Record]) -> Array:
+    """Return the least squares solution, each cable weighted by what is left of it.
+
+    Near zero tension a load cell's noise is half a millimetre of a soft cable, ten times that of
+    the poses. Not whitened: that would give weight to high frequencies, at which the regressors are
+    noise, and noise in regressors draws what is found towards zero.
     """
-    width = records[0].regressors.shape[2]
-    rows = np.concatenate([record.regressors.reshape(-1, width) for record in records])
-    target = np.concatenate([record.target.ravel() for record in records])
-    return np.asarray(np.linalg.lstsq(rows, target, rcond=None)[0])
+    rows = np.concatenate([record.regressors for record in records])
+    target = np.concatenate([record.target for record in records])
+    weights = np.ones(target.shape[1])
+    for _ in range(_WEIGHTINGS):
+        scaled = (rows * weights[:, None]).reshape(-1, rows.shape[2])
+        found = np.linalg.lstsq(scaled, (target * weights).ravel(), rcond=None)[0]
+        weights = 1.0 / np.maximum(np.std(target - rows @ found, axis=0), _LEAST_M)
+    return np.asarray(found)
 
 
 def _delays(
@@ -204,14 +227,14 @@ def _delays(
 ) -> list[Delay]:
     """Return the delays with intervals: of coloured noise, and of the equation's own error."""
     parameters = [
-        Parameter(name, "s", scale=_SCALE_S) if name in delays else Parameter(name, "1", scale=1.0)
+        Parameter(name, "s", scale=SCALE_S) if name in delays else Parameter(name, "1", scale=1.0)
         for name in names
     ]
     ends = fit_linear(records, parameters, whiten=False).estimate.ci95
     window = float(timeline.times[0]), float(timeline.times[-1])
     found = []
     for (topic, seconds), (low, high) in zip(delays.items(), ends, strict=False):
-        half = float(np.hypot(0.5 * (high - low), _NORMAL_95 * _EQUATION_S))
+        half = float(np.hypot(0.5 * (high - low), NORMAL_95 * EQUATION_S))
         found.append(Delay(topic, seconds, (seconds - half, seconds + half), window))
     return found
 

@@ -38,6 +38,8 @@ class Timeline:
         measurement: where it comes from.
         period_ns: the step [ns].
         times: of the steps, on the measurement's clock [s], shape (k,).
+        delays: by topic, by how much its stamps are late [s].
+        drifts: by topic, by how much later they become per second.
     """
 
     def __init__(
@@ -61,6 +63,7 @@ class Timeline:
         self.measurement = measurement
         self.period_ns = period_ns
         self.delays = dict(delays)
+        self.drifts: dict[str, float] = {}
         if pose_band is not None:
             self.__dict__["pose_band"] = pose_band
         sensors = measurement.sensors.values()
@@ -79,9 +82,12 @@ class Timeline:
         """The step [s]."""
         return self.period_ns * 1e-9
 
-    def delayed(self, delays: Mapping[str, float]) -> Timeline:
-        """Return the same signals with other delays [s], by topic, without smoothing them again."""
+    def delayed(
+        self, delays: Mapping[str, float], drifts: Mapping[str, float] = MappingProxyType({})
+    ) -> Timeline:
+        """Return the same signals with other delays and drifts, without smoothing them again."""
         other = Timeline(self.measurement, self.period_ns, delays)
+        other.drifts = dict(drifts)
         kept = ("_frame", "_bar", "_tension", "_winches", "pose_band")
         other.__dict__.update({name: getattr(self, name) for name in kept})
         other.times = self.times
@@ -91,6 +97,7 @@ class Timeline:
         """Return the same signals at longer steps, tensions and angles smoothed to `band` [Hz]."""
         start, end = self.times[0] - _MARGIN_S, self.times[-1] + _MARGIN_S
         other = Timeline(self.measurement.within(start, end), period_ns, self.delays)
+        other.drifts = self.drifts
         other.__dict__.update({n: getattr(self, n) for n in ("_frame", "_bar", "pose_band")})
         tension, angle = other.measurement.tension, other.measurement.angle
         other.__dict__["_tension"] = None if tension is None else smooth(tension, band)
@@ -102,7 +109,7 @@ class Timeline:
 
     def within(self, first: int, last: int) -> Timeline:
         """Return the stretch from step `first` to `last`, without smoothing it again."""
-        other = self.delayed(self.delays)
+        other = self.delayed(self.delays, self.drifts)
         other.times = self.times[first : last + 1]
         if self._winches is not None:
             cut = slice(first, last + 1)
@@ -134,8 +141,8 @@ class Timeline:
         if self._frame is None:
             return Motion.still(np.zeros(6))
         times = np.arange(self.times[0], self.times[-1] + 2 * _KNOT_S, _KNOT_S)
-        late = self._late("/winch_frame/pose")
-        inside = np.clip(times + late, self._frame.spans[0, 0], self._frame.spans[-1, 1])
+        stamps = self._stamps("/winch_frame/pose", times)
+        inside = np.clip(stamps, self._frame.spans[0, 0], self._frame.spans[-1, 1])
         knots = np.hstack([self._frame.at(inside, d) for d in range(3)])
         return Motion(_bridged(knots), _KNOT_S)
 
@@ -144,14 +151,14 @@ class Timeline:
         """The winch frame's pose x y z φ θ ψ, shape (k, 6); NaN in holes."""
         if self._frame is None:
             return np.zeros((len(self.times), 6))
-        return self._frame.at(self.times + self._late("/winch_frame/pose"))
+        return self._frame.at(self._stamps("/winch_frame/pose"))
 
     @cached_property
     def bars(self) -> Array | None:
         """The bar's states: position, Euler angles, velocity (world), ω (bar axes), (k, 12)."""
         if self._bar is None:
             return None
-        out = np.hstack([self._bar.at(self.times + self._late("/bar/pose")), self.bar_twists])
+        out = np.hstack([self._bar.at(self._stamps("/bar/pose")), self.bar_twists])
         body_rates_along(out[:, :6], self.bar_twists[:, 3:], out[:, 9:])
         return out
 
@@ -165,7 +172,7 @@ class Timeline:
         """Velocity and ω of the bar in world axes, shape (k, 6)."""
         if self._bar is None:
             return np.zeros((len(self.times), 6))
-        times = self.times + self._late("/bar/pose")
+        times = self._stamps("/bar/pose")
         return _twists(self._bar.at(times), self._bar.at(times, 1))
 
     @cached_property
@@ -173,7 +180,7 @@ class Timeline:
         """Velocity and ω of the winch frame in world axes, shape (k, 6)."""
         if self._frame is None:
             return np.zeros((len(self.times), 6))
-        times = self.times + self._late("/winch_frame/pose")
+        times = self._stamps("/winch_frame/pose")
         return _twists(self._frame.at(times), self._frame.at(times, 1))
 
     def body_motion(self, body: str) -> tuple[Array, Array, Array]:
@@ -189,7 +196,7 @@ class Timeline:
         if found is None:
             still = np.zeros((len(self.times), 6))
             return still, still, still
-        times = self.times + self._late(topic)
+        times = self._stamps(topic)
         return found.at(times), found.at(times, 1), found.at(times, 2)
 
     @property
@@ -205,15 +212,14 @@ class Timeline:
     @cached_property
     def smooth_tensions(self) -> Array | None:
         """Tensions in the band above their noise, shape (k, n) [N]."""
-        late = self._late("/cables/tension")
-        return None if self._tension is None else self._tension.at(self.times + late)
+        stamps = self._stamps("/cables/tension")
+        return None if self._tension is None else self._tension.at(stamps)
 
     @cached_property
     def tensions(self) -> Array | None:
         """Tensions as measured, joined by straight lines, shape (k, n) [N]; NaN in holes."""
         samples = self.measurement.tension
-        late = self._late("/cables/tension")
-        return None if samples is None else joined(samples, self.times + late)
+        return None if samples is None else joined(samples, self._stamps("/cables/tension"))
 
     @cached_property
     def torques(self) -> Array | None:
@@ -234,8 +240,10 @@ class Timeline:
         out[_far(samples, self.times) | lost] = np.nan
         return out
 
-    def _late(self, topic: str) -> float:
-        return self.delays.get(topic, 0.0)
+    def _stamps(self, topic: str, times: Array | None = None) -> Array:
+        """Return what a sensor stamped at the steps, or at some times, [s]."""
+        times = self.times if times is None else times
+        return times + self.delays.get(topic, 0.0) + self.drifts.get(topic, 0.0) * times
 
     @cached_property
     def _frame(self) -> Smooth | None:

@@ -14,7 +14,9 @@ from cspm_ident.estimation.estimate import Interval
 from cspm_ident.estimation.noise import unit_noise
 from cspm_ident.estimation.problem import Problem
 from cspm_ident.recording_roles import check_roles
+from cspm_ident.signals.clock_drift import ClockDrift, on_one_clock
 from cspm_ident.signals.measurement import Measurement
+from cspm_ident.signals.timeline import Timeline
 from cspm_ident.system.choice import Chosen
 from cspm_ident.system.judgement import Judgement, judge
 from cspm_ident.system.machine import machine_with
@@ -57,6 +59,7 @@ class SystemResult:
         judgements: how well both machines predict each recording, searched first, then held out.
         profiles: those asked for.
         settled: whether parameters and initial states came to stand still.
+        drifts: of motion capture's clocks, by recording, taken out.
     """
 
     chosen: tuple[Chosen, ...]
@@ -69,6 +72,7 @@ class SystemResult:
     judgements: tuple[Judgement, ...]
     profiles: tuple[Profile, ...]
     settled: bool
+    drifts: dict[str, list[ClockDrift]]
 
     def data(self) -> dict[str, Any]:
         """Return everything as plain data for JSON."""
@@ -77,6 +81,9 @@ class SystemResult:
             "horizon_s": self.horizon,
             "windows": list(self.windows),
             "settled": self.settled,
+            "clock_drifts": {
+                name: [drift.data() for drift in found] for name, found in self.drifts.items()
+            },
             "nominal": {each.name: each.nominal for each in self.chosen},
             "estimate": self.solution.estimate.data(),
             "bias_taken_out": {
@@ -133,6 +140,11 @@ def identify_system(
     if not 0.1 <= horizon <= 60.0:
         raise InputError(f"--horizon {horizon:g}: allowed: 0.1 to 60 s")
     machine = searched[0].machine
+    drifts: dict[str, list[ClockDrift]] = {}
+    if delays is None:
+        progress("clocks")
+        searched = [_on_one_clock(each, drifts) for each in searched]
+        held_out = [_on_one_clock(each, drifts) for each in held_out]
     solved = solve(searched, chosen, horizon, most_windows, delays, progress)
     estimate, shootings = solved.solution.estimate, solved.shootings
     profiles = []
@@ -151,7 +163,16 @@ def identify_system(
         _judged(shootings, held_out, {"nominal": machine, "fitted": found}, delays, progress),
         tuple(profiles),
         solved.settled,
+        drifts,
     )
+
+
+def _on_one_clock(measurement: Measurement, drifts: dict[str, list[ClockDrift]]) -> Measurement:
+    """Return the measurement without drifts; those that were taken out are put into `drifts`."""
+    line, found = on_one_clock(Timeline(measurement), measurement.machine)
+    if found:
+        drifts[measurement.path.name] = found
+    return line.measurement
 
 
 class Solved(NamedTuple):
@@ -199,8 +220,8 @@ def solve(
         noisy = [s.redrawn([seed, draw, i], sign) for i, s in enumerate(shootings)]
         return make_problem(machine, chosen, noisy)
 
-    draws = [redrawn(draw) for draw in range(DRAWS)]
-    changes = noise_changes(problem, draws, theta)
+    # One at a time: each keeps all signals of all recordings.
+    changes = noise_changes(problem, (redrawn(draw) for draw in range(DRAWS)), theta)
     progress("intervals")
     # Weighted by the sensors' own noise. Whitened, or decorrelated, the channels in which the noise
     # on the frame's pose cancels would outweigh the rest, and there it biases most.
@@ -214,7 +235,8 @@ def solve(
     scatter = noise_scatter(problem, solution, changes, _window_numbers(shootings))
     optimum = solution._replace(estimate=widened(problem, solution.estimate, scatter))
     progress("bias of noise")
-    bias = noise_bias(problem, optimum, [(draws[i], redrawn(i, -1.0)) for i in range(PAIRS)])
+    pairs = ((redrawn(draw), redrawn(draw, -1.0)) for draw in range(PAIRS))
+    bias = noise_bias(problem, optimum, pairs)
     unbiased = optimum._replace(estimate=without_bias(problem, optimum.estimate, bias))
     return Solved(problem, optimum, unbiased, bias, shootings, settled)
 

@@ -4,15 +4,11 @@ from __future__ import annotations
 
 from math import hypot
 
-import numpy as np
-
-from cspm_ident.signals.delays import RESOLUTION_S, Delay, find_delays
+from cspm_ident.signals.delays import RESOLUTION_S, Delay, find_delays, winds
 from cspm_ident.signals.measurement import BAR, FRAME
 from cspm_ident.signals.timeline import Timeline
 from cspm_msgs_py.testbed import Testbed
-
-# Winches that wind less than this tell no delay of both poses from another damping [m].
-_LEAST_WOUND_M = 5e-4
+from cspm_sim.parameters import plant_parameters
 
 
 def delays_to_remove(timeline: Timeline, machine: Testbed) -> dict[str, float]:
@@ -31,7 +27,7 @@ def delays_to_remove(timeline: Timeline, machine: Testbed) -> dict[str, float]:
     found = {delay.topic: delay for delay in find_delays(timeline, machine) if delay.known}
     if not found:
         return {}
-    if _wound(timeline, machine) > _LEAST_WOUND_M:
+    if winds(timeline, plant_parameters(machine)):
         return {topic: delay.seconds for topic, delay in found.items() if delay.matters}
     if BAR not in found or FRAME not in found:
         return {}
@@ -39,13 +35,6 @@ def delays_to_remove(timeline: Timeline, machine: Testbed) -> dict[str, float]:
     # Each has its own uncertainty, and its own resolution.
     limits = [max(RESOLUTION_S, _half_width(found[topic])) for topic in (BAR, FRAME)]
     return {BAR: late} if abs(late) > hypot(*limits) else {}
-
-
-def _wound(timeline: Timeline, machine: Testbed) -> float:
-    """Return the longest stroke of a winch [m]."""
-    radii = np.array([cable.drum_radius / cable.gear_ratio for cable in machine.cables])
-    wound = np.asarray(timeline.angles) * radii
-    return float((np.nanmax(wound, axis=0) - np.nanmin(wound, axis=0)).max())
 
 
 def _half_width(delay: Delay) -> float:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import replace
 from typing import NamedTuple
 
@@ -26,7 +26,7 @@ _ROUNDING = 1e-6
 _TINY = 1e-300
 
 
-def noise_changes(problem: Problem, redrawn: Sequence[Problem], theta: Array) -> list[list[Array]]:
+def noise_changes(problem: Problem, redrawn: Iterable[Problem], theta: Array) -> list[list[Array]]:
     """Return by how much one more draw of all sensors' noise changes the residuals, per draw.
 
     Args:
@@ -117,7 +117,7 @@ class Bias(NamedTuple):
 
 
 def noise_bias(
-    problem: Problem, solution: Solution, pairs: Sequence[tuple[Problem, Problem]]
+    problem: Problem, solution: Solution, pairs: Iterable[tuple[Problem, Problem]]
 ) -> Bias:
     """Return to which side noise throws each parameter.
 

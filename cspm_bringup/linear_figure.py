@@ -55,7 +55,8 @@ def _relative(
         for i, name in enumerate(names):
             own = part.relative[:, i, i].real
             axes.semilogx(FREQUENCIES, own, style, label=name if style == "-" else None)
-    axes.set_ylim(-1.0, 3.0)
+    lowest, highest = axes.get_ylim()
+    axes.set_ylim(max(lowest, -1.0), min(highest, 3.0))
     axes.set_ylabel("relative gain of each on itself")
     axes.set_xlabel("frequency [rad/s]")
     axes.legend(fontsize="small", ncols=2)

@@ -16,6 +16,7 @@ from cspm_control.analysis.loops import CASCADE, DESIGNED, LATE, SAMPLED, LoopAn
 DPI = 90
 LOWEST_DB = -80.0
 HIGHEST_FREQUENCY = 5e3  # rad/s
+HIGHEST_PHASE = 30.0  # °
 STYLES = {DESIGNED: "-", SAMPLED: "--", CASCADE: "--", LATE: ":"}
 
 
@@ -78,10 +79,11 @@ def _bode(gain: Axes, phase: Axes, view: LoopView, style: str, label: str) -> No
     for name, values, colour in lines:
         decibels = 20.0 * np.log10(np.abs(values))
         gain.semilogx(view.frequencies, decibels, style, color=colour, label=f"{name}, {label}")
-        degrees = np.degrees(np.angle(values))
-        # A line from −180° to 180° is no phase.
-        degrees[1:][np.abs(np.diff(degrees)) > 180.0] = np.nan
+        degrees = np.degrees(np.unwrap(np.angle(values)))
+        # From where it begins, between −330° and 30°, phase goes on without a jump.
+        degrees -= 360.0 * np.ceil((degrees[0] - HIGHEST_PHASE) / 360.0)
         phase.semilogx(view.frequencies, degrees, style, color=colour)
     phase.set_xlim(LOWEST_FREQUENCY, HIGHEST_FREQUENCY)
     gain.set_xlim(LOWEST_FREQUENCY, HIGHEST_FREQUENCY)
-    phase.set_yticks([-180, -90, 0, 90, 180])
+    phase.set_yticks([-360, -270, -180, -90, 0])
+    phase.set_ylim(-375.0, HIGHEST_PHASE)

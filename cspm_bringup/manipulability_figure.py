@@ -9,6 +9,7 @@ import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.figure import Figure
+from matplotlib.ticker import LogLocator, NullFormatter
 from numpy.typing import NDArray
 
 from cspm_control.analysis.cable_structure import CableStructure, structures
@@ -33,11 +34,14 @@ def draw_manipulability(
     """Write ellipses of force in two planes, and what may be accelerated from rest by depth."""
     figure = Figure(figsize=(13, 8), layout="constrained")
     FigureCanvasAgg(figure)
-    top, side, linear, angular = figure.subplots(2, 2).ravel()
+    places = figure.subplot_mosaic(
+        [["top", "side", "linear"], ["top", "side", "angular"]], width_ratios=[1.0, 0.5, 1.1]
+    )
+    top, side, linear, angular = (places[name] for name in ("top", "side", "linear", "angular"))
     _ellipses(top, machine, pose, (0, 1), PLACES)
-    top.set(xlabel="surge [m]", ylabel="sway [m]", title="force in surge and sway for |t| = 1 N")
+    top.set(xlabel="surge [m]", ylabel="sway [m]", title="force for |t| = 1 N, from above")
     _ellipses(side, machine, pose, (0, 2), np.linspace(0.6, 3.8, 5))
-    side.set(xlabel="surge [m]", ylabel="heave, down [m]", title="force in surge and heave")
+    side.set(xlabel="surge [m]", ylabel="heave, down [m]", title="from the side")
     side.invert_yaxis()
     _accelerations(linear, angular, machine, parameters, pose)
     figure.savefig(path, dpi=DPI)
@@ -59,7 +63,8 @@ def _ellipses(
             x, y = SIZE * (left * lengths) @ circle
             axes.plot(across + x, height + y, color="tab:blue", linewidth=1.0)
             axes.plot(across, height, "k.", markersize=3)
-    axes.set_aspect("equal", adjustable="box")
+    axes.set_aspect("equal", adjustable="datalim")
+    axes.set_xticks(PLACES)
     axes.grid(alpha=0.3)
 
 
@@ -85,4 +90,7 @@ def _accelerations(
     for axes, unit in ((linear, "m/s²"), (angular, "rad/s²")):
         axes.set(xlabel="heave, down [m]", ylabel=f"largest acceleration from rest [{unit}]")
         axes.grid(alpha=0.3, which="both")
+        axes.yaxis.set_major_locator(LogLocator(subs=(1.0, 2.0, 5.0)))
+        axes.yaxis.set_major_formatter("{x:g}")
+        axes.yaxis.set_minor_formatter(NullFormatter())
         axes.legend(fontsize="small")

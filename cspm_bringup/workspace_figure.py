@@ -20,7 +20,8 @@ from cspm_control.analysis.workspace_result import WorkspaceResult
 Array = NDArray[np.float64]
 
 DPI = 90
-COLOURS = {"general": "tab:blue", "pseudo_inverse": "gold"}
+# Solid, so that what lies above has the colour of the legend.
+COLOURS = {"general": "#8fb8dc", "pseudo_inverse": "#f2d16b"}
 LABELS = {"general": "any tensions from 0", "pseudo_inverse": "pseudo-inverse, from 0"}
 TIGHTER = (("tab:green", "from t_min"), ("tab:red", "from t_min, accelerating"))
 UNITS = dict.fromkeys(("surge", "sway", "heave"), "m") | dict.fromkeys(("pitch", "yaw"), "rad")
@@ -38,7 +39,7 @@ def draw_workspace(path: Path, found: WorkspaceResult) -> None:
     _space(places["space"], *found.translation)
     for name, each in found.maps.items():
         _plane(places[name], each)
-    handles = [Patch(color=COLOURS[name], alpha=0.6, label=LABELS[name]) for name in COLOURS]
+    handles = [Patch(color=COLOURS[name], label=LABELS[name]) for name in COLOURS]
     handles += [Patch(fill=False, edgecolor=colour, label=label) for colour, label in TIGHTER]
     figure.legend(handles=handles, loc="outside lower center", ncols=4)
     figure.savefig(path, dpi=DPI)
@@ -69,7 +70,7 @@ def _space(
     shape = tuple(len(values) for values in (grid.x, grid.y, grid.z))
     # The deepest first, since what is drawn later lies on top.
     for depth, z in reversed(list(enumerate(grid.z))):
-        for name, alpha in (("general", 0.25), ("pseudo_inverse", 0.8)):
+        for name, alpha in (("general", 0.15), ("pseudo_inverse", 0.9)):
             layer = held[name].reshape(shape)[:, :, depth].T.astype(float)
             if layer.any():
                 style = {"levels": [0.5, 1.5], "colors": [COLOURS[name]], "alpha": alpha}
@@ -90,7 +91,7 @@ def _plane(axes: Axes, each: PoseMap) -> None:
     values = each.grid[across], each.grid[up]
     for name, colour in COLOURS.items():
         mask = each.static[name].reshape(shape).T.astype(float)
-        axes.contourf(*values, mask, levels=[0.5, 1.5], colors=[colour], alpha=0.6)
+        axes.contourf(*values, mask, levels=[0.5, 1.5], colors=[colour])
     for mask, (colour, _) in zip((each.feasible, each.factor >= 1.0), TIGHTER, strict=True):
         drawn = mask.reshape(shape).T.astype(float)
         if 0.0 < drawn.mean() < 1.0:

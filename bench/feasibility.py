@@ -15,11 +15,14 @@ from cspm_control.wave_trajectory import WaveTrajectory
 from cspm_msgs_py.scenario import ClosedLoop
 from cspm_msgs_py.testbed import Testbed
 from cspm_sim.kinematics import geometry
+from cspm_sim.motion import Motion
 from cspm_sim.parameters import nominal_parameters
 
 Array = NDArray[np.float64]
 
 FORESEEN = 2.0
+# Beside half the square of each deviation; three times as much gains 0.1 to 0.3 % of the time.
+GATHERING = 30.0
 REFERENCES = ("/bar/reference", "/winch_frame/reference")
 
 
@@ -59,14 +62,26 @@ def least_errors(bundle: Bundle, lower: float = 0.0) -> Array:
     `FORESEEN` [s] ahead; least in the sum of squared shares of the requirement, but for the
     governor's preference for smooth accelerations.
     """
+    return np.sqrt((_plan(bundle, lower, 0.0).knots[:, :6] ** 2).mean(axis=0))
+
+
+def gathered_deviations(bundle: Bundle, lower: float, times: Array) -> Array:
+    """Return deviations (k, 6) [m, rad] at times (k,) [s] that exceed the requirement seldom.
+
+    As for `least_errors`, but least in what exceeds the requirement, where tensions ≥ 0 exist.
+    """
+    plan = _plan(bundle, lower, GATHERING)
+    return np.array([plan.at(time)[:6] for time in times])
+
+
+def _plan(bundle: Bundle, lower: float, excess_weight: float) -> Motion:
     scenario, testbed = bundle.scenario, bundle.testbed.testbed
     limits = np.array([cable.tension_limits for cable in testbed.cables], dtype=float)
     limits[:, 0] = lower
     motions = motions_of_bundle(bundle)
     bar, frame = (motions[name] for name in REFERENCES)
     machine = governed(scenario, testbed, limits)
-    plan = plan_deviation(machine, bar, frame, scenario.duration, FORESEEN)
-    return np.sqrt((plan.knots[:, :6] ** 2).mean(axis=0))
+    return plan_deviation(machine, bar, frame, scenario.duration, FORESEEN, excess_weight)
 
 
 def _wanted(row: Array, testbed: Testbed) -> tuple[Array, Array]:

@@ -18,6 +18,8 @@ from bench.result_cases import (
     MASSES,
     PAST,
     POSSIBLE,
+    POSSIBLE_LOWER,
+    POSSIBLE_SIX,
     PROFILES,
     ROUGH_CORNERS,
     SIX,
@@ -32,7 +34,15 @@ from bench.result_cases import (
     seeded,
     with_and_without,
 )
-from bench.result_measures import bands, limit, moved_on, past_thesis, possible, tracking
+from bench.result_measures import (
+    bands,
+    limit,
+    moved_on,
+    past_thesis,
+    possible,
+    possible_share,
+    tracking,
+)
 from bench.result_store import Measurement
 from bench.result_tables import (
     Found,
@@ -42,6 +52,7 @@ from bench.result_tables import (
     limit_block,
     past_block,
     past_six_block,
+    shares_block,
     thesis_block,
     tracking_block,
 )
@@ -82,6 +93,7 @@ def blocks_of(seeds: int) -> dict[str, Block]:
         "friction": _tracked("friction", with_and_without(FRICTION, AHEAD, "fed forward")),
         "limit": Block({name: _limit(name, case) for name, case in LIMITED.items()}, limit_block),
         "possible": _possible(),
+        "possible_six": _possible_six(),
         "robust": _tracked("robust", changed(PAST)),
         "moved_on": _moved_on(),
         "told": _tracked("told", TOLD_OF),
@@ -123,6 +135,18 @@ def _limit(name: str, case: Case) -> Measurement:
 def _possible() -> Block:
     wanted = {name: Measurement(f"possible {name}", possible, of) for name, of in POSSIBLE.items()}
     return Block(wanted, errors_block)
+
+
+def _possible_six() -> Block:
+    measurements = {}
+    for name, case in POSSIBLE_SIX.items():
+        before = _limit(f"six {name}", case)
+        for lower in POSSIBLE_LOWER:
+            said = f"{name}, tensions from {lower:g} N on"
+            measurements[said] = Measurement(
+                f"possible six {said}", possible_share, (case, lower), needs=(before,)
+            )
+    return Block(measurements, shares_block)
 
 
 def _moved_on() -> Block:

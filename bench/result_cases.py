@@ -222,6 +222,9 @@ POSSIBLE: dict[str, tuple[Case, float]] = {
     BLOWN: (LIMITED[BLOWN], 0.0),
     f"{BLOWN}, tensions from 0.5 N on": (LIMITED[BLOWN], 0.5),
 }
+# Seeds with all six coordinates, and lower limits of tension [N]: none, what is wanted, planned.
+POSSIBLE_SIX = {f"seed {seed}": Case(SIX, (f"seed={seed}",)) for seed in (1, 9, 14)}
+POSSIBLE_LOWER = (0.0, 0.3, 0.7)
 
 Effects = tuple[tuple[str, tuple[str, ...], Mapping[str, float]], ...]
 WIND = {"surge": 1.0, "sway": 2.0, "heave": 0.0, "roll": 0.0, "pitch": 0.0, "yaw": 0.0}

@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from bench.feasibility import least_errors, least_tensions
+from bench.feasibility import gathered_deviations, least_errors, least_tensions
 from bench.tracking import Case, follow, motions_of_bundle, track, within_requirement
 
 LIMIT_PERIOD = 0.2
@@ -30,6 +30,18 @@ def limit(case: Case) -> list[float]:
 def possible(case: Case, lower: float) -> list[float]:
     """Return the least RMS error [m, rad] that tensions from `lower` [N] on allow."""
     return [float(each) for each in least_errors(case.bundle(), lower)]
+
+
+def possible_share(case: Case, lower: float, least: list[float]) -> float:
+    """Return which share of the possible time can be within the requirement.
+
+    With tensions from `lower` [N] on, of the time in which the case's limit `least` is not below 0.
+    """
+    bundle = case.bundle()
+    possible_time: NDArray[np.bool_] = np.array(least) >= 0.0
+    times = LIMIT_PERIOD * np.arange(len(least))
+    within = within_requirement(bundle, gathered_deviations(bundle, lower, times))
+    return float(within[possible_time].mean())
 
 
 def moved_on(case: Case, delay: float) -> list[float]:

@@ -182,6 +182,11 @@ def distribution_block(rows: Sequence[Sequence[str]]) -> str:
     return f"{markdown_table(HEADINGS, rows)}\n\n{said}"
 
 
+def shares_block(found: Found) -> str:
+    """Return a share per name."""
+    return markdown_table(["", "share"], [[name, f"{share:.2%}"] for name, share in found.items()])
+
+
 def limit_block(found: Found) -> str:
     """Return the share of time in which any tension set exists, by scenario and lower limit."""
     rows = [

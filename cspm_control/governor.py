@@ -34,6 +34,8 @@ SETTLED, MOST_ROUNDS = 0.02, 6
 # a deviation of one limit; and a tension of 1 N. Without the first, tensions jump from limit to
 # limit faster than force controllers follow; the second makes tensions unique.
 SMOOTH, LIGHT = 100.0, 1e-9
+# A deviation within this many tolerances leaves room for what the control adds.
+ROOM = 0.8
 
 
 class Governed(NamedTuple):
@@ -65,12 +67,21 @@ class _Demand(NamedTuple):
 
 
 def plan_deviation(
-    machine: Governed, bar: Motion, frame: Motion, duration: float, preview: float
+    machine: Governed,
+    bar: Motion,
+    frame: Motion,
+    duration: float,
+    preview: float,
+    excess_weight: float = 0.0,
 ) -> Motion:
     """Return by how much the bar is to be where its reference is not, x y z φ θ ψ over time.
 
     It is zero but from `preview` before to `preview` after each instant at which no tensions within
-    the limits give the reference's acceleration. Stretches that touch are planned as one.
+    the limits give the reference's acceleration. Stretches that touch are planned as one. What is
+    least is the sum of half the squared deviations in tolerances and of `excess_weight` times the
+    largest excess over the tolerances of each knot, as a soft constraint with an exact penalty
+    (Kerrigan, Maciejowski, UKACC Control 2000): a deviation that cannot be avoided is then
+    gathered in few knots, first in those whose reference not even tensions from 0 N on can give.
 
     Args:
         machine: what is planned for.
@@ -78,6 +89,7 @@ def plan_deviation(
         frame: the winch frame's motion.
         duration: of the plan [s].
         preview: how far ahead both are known [s].
+        excess_weight: of a tolerance too much where the reference is possible at all, ≥ 0.
 
     Raises:
         ConvergenceError: a plan was not found.
@@ -86,12 +98,14 @@ def plan_deviation(
     wanted = np.array([bar.at(time) for time in times])
     frames = np.array([frame.at(time)[:6] for time in times])
     deviation = np.zeros((len(times), 18))
-    for window in _windows(_blocked(machine, wanted, frames), round(preview / SPACING)):
+    blocked = _blocked(machine, wanted, frames)
+    excess = np.where(_impossible(machine, wanted, frames, blocked), 0.0, excess_weight)
+    for window in _windows(blocked, round(preview / SPACING)):
         ends = window.start == 0, window.stop == len(times)
         for _ in range(MOST_ROUNDS):
             before = deviation[window].copy()
             demand = _demand(machine, wanted[window] + before, frames[window])
-            deviation[window] = _least_deviation(machine, demand, before, ends)
+            deviation[window] = _least_deviation(machine, demand, before, ends, excess[window])
             if (np.abs(deviation[window] - before)[:, :6] < SETTLED * machine.tolerances).all():
                 break
     return Motion(deviation, SPACING)
@@ -107,6 +121,17 @@ def _blocked(machine: Governed, wanted: Array, frames: Array) -> NDArray[np.bool
         missing = np.linalg.norm(structure @ tensions - wrench)
         blocked[k] = missing > RESIDUAL_TOLERANCE * np.linalg.norm(wrench)
     return blocked
+
+
+def _impossible(
+    machine: Governed, wanted: Array, frames: Array, blocked: NDArray[np.bool_]
+) -> NDArray[np.bool_]:
+    """Return at which of the blocked knots no tensions from 0 N on would do either."""
+    limits = machine.limits.copy()
+    limits[:, 0] = 0.0
+    found = blocked.copy()
+    found[blocked] = _blocked(machine._replace(limits=limits), wanted[blocked], frames[blocked])
+    return found
 
 
 def _windows(blocked: NDArray[np.bool_], reach: int) -> list[slice]:
@@ -137,41 +162,77 @@ def _demand(machine: Governed, motion: Array, frames: Array) -> _Demand:
 
 
 def _least_deviation(
-    machine: Governed, demand: _Demand, planned: Array, ends: tuple[bool, bool]
+    machine: Governed, demand: _Demand, planned: Array, ends: tuple[bool, bool], excess: Array
 ) -> Array:
     """Return the deviation rows (k, 18) nearest to zero that tensions within the limits can give.
 
     `demand` is linear about the rows planned so far; `ends` tells where the window begins or ends
-    with the plan, so that the bar need not be on its reference there.
+    with the plan, so that the bar need not be on its reference there; `excess` (k,) weighs what is
+    beyond the tolerances at each knot.
     """
     count, m, n = demand.structure.shape
     axes, size = np.array(machine.axes), count * m
     tolerance = machine.tolerances[axes]
     # In limits, and limits per knot and per knot squared: numbers of one size.
     scales = [tolerance, tolerance / SPACING, tolerance / SPACING**2]
-    change = sparse.eye(count - 1, count, k=1) - sparse.eye(count - 1, count)
-    smooth = SMOOTH * sparse.kron(change.T @ change, sparse.eye(m))
-    nothing = sparse.csc_matrix((size, size))
-    cost = [sparse.eye(size), nothing, smooth, LIGHT * sparse.eye(count * n)]
-    before = planned[:, 12 + axes]
-    right = demand.wrench - np.einsum("kij,kj->ki", demand.mass, before)
-    scaled_mass = demand.mass * scales[2]
-    wrenches = sparse.hstack(
-        [
-            sparse.csc_matrix((size, 2 * size)),
-            -sparse.block_diag(list(scaled_mass)),
-            sparse.block_diag(list(demand.structure)),
-        ]
-    )
+    counted = np.flatnonzero(excess)
+    wrenches, right = _wrenches(demand, planned[:, 12 + axes], scales[2])
     equal = sparse.vstack([_integration(count, m, n), _at_ends(count, m, n, ends), wrenches])
+    unequal, most = _bounds(machine.limits, count, m, counted)
+    linear = np.concatenate([np.zeros(equal.shape[1]), excess[counted]])
+    equal = sparse.hstack([equal, sparse.csc_matrix((equal.shape[0], len(counted)))])
     zeros = np.zeros(equal.shape[0] - size)
-    right = np.concatenate([zeros, right.ravel()])
-    solution = _solve(sparse.block_diag(cost), equal, right, machine.limits, count)
+    right = np.concatenate([zeros, right])
+    solution = _solve(_cost(count, m, n, len(counted)), linear, (equal, right), (unequal, most))
     rows = np.zeros((count, 18))
     for order in range(3):
         part = solution[order * size : (order + 1) * size].reshape(count, m)
         rows[:, 6 * order + axes] = part * scales[order]
     return rows
+
+
+def _cost(count: int, m: int, n: int, counted: int) -> sparse.spmatrix:
+    """Return what squares cost: of deviations, their changes of acceleration, and tensions."""
+    size = count * m
+    change = sparse.eye(count - 1, count, k=1) - sparse.eye(count - 1, count)
+    smooth = SMOOTH * sparse.kron(change.T @ change, sparse.eye(m))
+    nothing, free = sparse.csc_matrix((size, size)), sparse.csc_matrix((counted, counted))
+    return sparse.block_diag(
+        [sparse.eye(size), nothing, smooth, LIGHT * sparse.eye(count * n), free]
+    )
+
+
+def _wrenches(
+    demand: _Demand, before: Array, scale: Array
+) -> tuple[sparse.spmatrix, NDArray[np.float64]]:
+    """Return rows and right side of: tensions give what the deviation's acceleration asks for."""
+    size = before.size
+    right = demand.wrench - np.einsum("kij,kj->ki", demand.mass, before)
+    rows = sparse.hstack(
+        [
+            sparse.csc_matrix((size, 2 * size)),
+            -sparse.block_diag(list(demand.mass * scale)),
+            sparse.block_diag(list(demand.structure)),
+        ]
+    )
+    return rows, right.ravel()
+
+
+def _bounds(
+    limits: Array, count: int, m: int, counted: NDArray[np.int64]
+) -> tuple[sparse.spmatrix, Array]:
+    """Return rows and what they may be at most: tensions, and deviations less their excess."""
+    size, bounded = count * m, count * len(limits)
+    width = 3 * size + bounded + len(counted)
+    tensions = sparse.eye(bounded, width, k=3 * size)
+    picked = (counted[:, None] * m + np.arange(m)).ravel()
+    deviations = sparse.eye(size, width).tocsr()[picked]
+    own = sparse.eye(len(counted), width, k=3 * size + bounded)
+    shared = sparse.kron(own, np.ones((m, 1)))
+    rows = sparse.vstack([tensions, -tensions, deviations - shared, -deviations - shared, -own])
+    low, high = np.tile(limits[:, 0], count), np.tile(limits[:, 1], count)
+    room = np.full(2 * len(picked), ROOM)
+    return rows, np.concatenate([high, -low, room, np.zeros(len(counted))])
 
 
 def _integration(count: int, m: int, n: int) -> sparse.csc_matrix:
@@ -202,21 +263,20 @@ def _at_ends(count: int, m: int, n: int, ends: tuple[bool, bool]) -> sparse.csc_
 
 
 def _solve(
-    cost: sparse.spmatrix, equal: sparse.csc_matrix, right: Array, limits: Array, count: int
+    cost: sparse.spmatrix,
+    linear: Array,
+    equal: tuple[sparse.spmatrix, Array],
+    unequal: tuple[sparse.spmatrix, Array],
 ) -> Array:
-    """Return the x with least ½xᵀ·cost·x where equal·x = right and tensions are within limits."""
-    bounded, width = count * len(limits), cost.shape[0]
-    pick = sparse.eye(bounded, width, k=width - bounded)
-    rows = sparse.vstack([equal, pick, -pick]).tocsc()
-    low, high = np.tile(limits[:, 0], count), np.tile(limits[:, 1], count)
-    cones = [clarabel.ZeroConeT(len(right)), clarabel.NonnegativeConeT(2 * bounded)]
+    """Return the x with least ½xᵀ·cost·x + linearᵀ·x, `equal` and not above `unequal`."""
+    cones = [clarabel.ZeroConeT(len(equal[1])), clarabel.NonnegativeConeT(len(unequal[1]))]
     settings = clarabel.DefaultSettings()
     settings.verbose = False
     solver = clarabel.DefaultSolver(
         sparse.triu(cost).tocsc(),
-        np.zeros(width),
-        rows,
-        np.concatenate([right, high, -low]),
+        linear,
+        sparse.vstack([equal[0], unequal[0]]).tocsc(),
+        np.concatenate([equal[1], unequal[1]]),
         cones,
         settings,
     )

@@ -110,10 +110,16 @@ class MotionControl(StrictModel):
 
 
 class Governor(StrictModel):
-    """How far ahead the reference is known [s], and what plans keep above the lower limit [N]."""
+    """How a plan leaves its reference.
+
+    `preview` [s] is how far ahead the reference is known, `reserve` [N] what plans keep above the
+    lower limit, `excess_weight` what one requirement beyond the requirement counts beside half the
+    square of each deviation.
+    """
 
     preview: PositiveFloat = 0.5
     reserve: NonNegativeFloat = 0.2
+    excess_weight: NonNegativeFloat = 0.0
 
 
 class MassAdaptation(StrictModel):

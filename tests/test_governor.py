@@ -187,6 +187,41 @@ def test_more_reserve_takes_more_deviation(thesis, machine, aside):
     assert 0.0 < sizes[0] < sizes[1] < sizes[2]
 
 
+def test_a_weight_on_what_exceeds_the_tolerance_gathers_it_in_fewer_knots(machine, aside):
+    squares, gathered = (
+        plan_deviation(machine, aside, FRAME, DURATION, 1.0, weight).knots[:, :6]
+        for weight in (0.0, 30.0)
+    )
+    beyond = [(np.abs(each) > machine.tolerances).any(axis=1) for each in (squares, gathered)]
+    assert beyond[1].sum() < 0.8 * beyond[0].sum()
+    assert np.linalg.norm(gathered / machine.tolerances) < 1.3 * np.linalg.norm(
+        squares / machine.tolerances
+    )
+
+
+def test_a_plan_that_exceeds_no_tolerance_is_as_without_the_weight(machine, aside):
+    tolerant = machine._replace(tolerances=10.0 * machine.tolerances)
+    plain, weighted = (
+        plan_deviation(tolerant, aside, FRAME, DURATION, 1.0, weight).knots[:, :6]
+        for weight in (0.0, 30.0)
+    )
+    assert np.abs(plain).max() > 1e-3
+    np.testing.assert_allclose(weighted, plain, atol=1e-5)
+
+
+def test_excess_is_free_where_not_even_tensions_from_zero_would_do(thesis, machine, dropped):
+    """A drop faster than gravity: no bar could follow while it lasts."""
+    plain, weighted = (
+        plan_deviation(machine, dropped, FRAME, DURATION, 1.0, weight).knots[:, 2]
+        for weight in (0.0, 30.0)
+    )
+    times = SPACING * np.arange(len(plain))
+    possible = np.array([room(thesis, machine, dropped.at(t)) >= 0.0 for t in times])
+    before, after = (np.abs(each) > machine.tolerances[2] for each in (plain, weighted))
+    assert after[possible].sum() < 0.7 * before[possible].sum()
+    assert np.abs(weighted[~possible]).max() > 2.0 * machine.tolerances[2]
+
+
 def test_reserve_is_added_to_the_lower_limit_of_the_scenario():
     bundle = bundle_of("worst_case_past_thesis")
     control, testbed = bundle.scenario.control, bundle.testbed.testbed

@@ -156,6 +156,7 @@ def _planned(
         motions[FRAME_REFERENCE],
         scenario.duration,
         governor.preview,
+        governor.excess_weight,
     )
 
 

@@ -209,6 +209,19 @@ def is_wider(one: Hypothesis, other: Hypothesis) -> bool:
     return one.causes > other.causes
 
 
+def unusual(weights: Mapping[Candidate, Array], hypothesis: Hypothesis) -> float:
+    """Return by how many times its usual error a wrong number is wrong; 0 where none is usual."""
+    found = [0.0]
+    for candidate in hypothesis.candidates:
+        values = candidate.effect.values(weights[candidate].tolist(), **candidate.nonlinear)
+        found += [
+            abs(values[p.name] - (p.absent or 0.0)) / p.usual
+            for p in candidate.effect.parameters
+            if p.usual is not None
+        ]
+    return max(found)
+
+
 def is_spread(one: Hypothesis, whole: Hypothesis) -> bool:
     """Return whether one has the same effect on half of several elements at least.
 

@@ -43,14 +43,15 @@ class Scopes:
             return [own]
         one_system = has_one_system(own.effect)
         common = [replace(whole, common=True)] if one_system or self.agree(whole, base) else []
-        if len(own.candidates) < len(alike):
-            return [own, *common, whole]
-        return [*common, own] if one_system else [own]
+        wider = [whole] if len(own.candidates) < len(alike) else []
+        # What is taken later has to explain more.
+        return [*common, own, *wider] if one_system else [own, *common, *wider]
 
     def pruned(self, hypothesis: Hypothesis, base: Index) -> Hypothesis:
         """Return the hypothesis without elements on which the effect may as well be absent.
 
-        But for those on which it may as well be what it is on most.
+        But for those on which it may as well be what it is on most, and unless all that would go
+        surely act together, of which none tells that it is not the others.
         """
         if hypothesis.common:
             return hypothesis
@@ -62,7 +63,15 @@ class Scopes:
         kept = replace(hypothesis, candidates=tuple(compress(members, there)))
         if is_spread(kept, self._everywhere(hypothesis)):
             there |= np.all(np.abs(each - np.median(each[there], axis=0)) <= half, axis=1)
-        return replace(hypothesis, candidates=tuple(compress(members, there)))
+        kept = replace(hypothesis, candidates=tuple(compress(members, there)))
+        gone = replace(hypothesis, candidates=tuple(compress(members, ~there)))
+        return hypothesis if gone.candidates and self._act(gone, kept, base) else kept
+
+    def _act(self, hypothesis: Hypothesis, beside: Hypothesis, base: Index) -> bool:
+        """Return whether a hypothesis surely is there beside another."""
+        base = self._fits.beside(base, beside)
+        gain = self._fits.sums.gain(base, self._fits.own_columns(hypothesis))
+        return self._sureness.counts(base, hypothesis, gain)
 
     def agree(self, hypothesis: Hypothesis, base: Index) -> bool:
         """Return whether all elements may have the same numbers, and several surely have some."""

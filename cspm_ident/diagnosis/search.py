@@ -26,6 +26,7 @@ from cspm_ident.diagnosis.hypothesis import (
     is_wider,
     joined,
     shapes_of,
+    unusual,
 )
 from cspm_ident.diagnosis.likeness import (
     TIED,
@@ -97,7 +98,7 @@ class Search:
         return self.evidence.parted(own, self.sums.weights(self.evidence.with_nuisance(own)))
 
     def _chosen(self) -> list[Hypothesis]:
-        chosen: list[Hypothesis] = []
+        chosen = self._clocks()
         while sum(not self.fits.is_negligible(h, chosen) for h in chosen) < MOST_EFFECTS:
             self._progress(f"effect {len(chosen) + 1}")
             found = self._best(chosen)
@@ -106,6 +107,20 @@ class Search:
             self._begin(found)
             chosen = joined(chosen, found)
         return self._needed(self._exchanged(chosen))
+
+    def _clocks(self) -> list[Hypothesis]:
+        """Return what clocks of a sound machine do to what one system reads, if it surely shows.
+
+        It is looked for first, lest something else that explains as much is taken for a fault.
+        """
+        base = self.fits.columns([])
+        members: dict[str, list[Candidate]] = {}
+        for candidate in self._effects:
+            if candidate.effect.negligible and has_one_system(candidate.effect):
+                members.setdefault(candidate.effect_id, []).append(candidate)
+        late = [Hypothesis(c[0].effect, tuple(c), common=len(c) > 1) for c in members.values()]
+        best = self._surest((h for h in late if self.fits.is_negligible(h, [h])), (), base)
+        return [] if best is None else [best]
 
     def _needed(self, chosen: Sequence[Hypothesis]) -> list[Hypothesis]:
         """Return what was chosen less what is not needed beside the others, the weakest first.
@@ -170,8 +185,7 @@ class Search:
         base = self.fits.columns(kept)
         left = self.sums.held_out(self.fits.columns(chosen))
         undecided = UNTRUE_SHARE * (self.sums.held_out(base) - left).sum()
-        taken = {(c.effect_id, c.element) for h in kept for c in h.candidates}
-        free = [c for c in self._effects if (c.effect_id, c.element) not in taken]
+        free = self._free(kept)
         replaced = self.evidence.columns_of(c for h in given_up for c in h.candidates)
         for pair in best_pairs(self.evidence, self.sums, base, free):
             better = gain_of(left - self.sums.held_out(self.fits.beside(base, *pair)))
@@ -205,8 +219,7 @@ class Search:
 
     def _best(self, chosen: Sequence[Hypothesis]) -> Hypothesis | None:
         base = self.fits.columns(chosen)
-        taken = {(c.effect_id, c.element) for h in chosen for c in h.candidates}
-        free = [c for c in self._effects if (c.effect_id, c.element) not in taken]
+        free = self._free(chosen)
         gains = self.sums.gains_beyond(base, [self._of(c) for c in free])
         scopes = [h for c in short_list(free, gains) for h in self.scopes.of(c, free, base)]
         late = [d for h in scopes for d in self._late(h, free, base)]
@@ -217,6 +230,16 @@ class Search:
             found = self._simplest(best, free, base, chosen)
         with self.fits.delayed(found):
             return self.scopes.pruned(found, base)
+
+    def _free(self, chosen: Sequence[Hypothesis]) -> list[Candidate]:
+        """Return what may be added: no effect twice on an element, nor of two shapes."""
+        taken = {(c.effect_id, c.element) for h in chosen for c in h.candidates}
+        shapes = {c.effect_id: c.shape for h in chosen for c in h.candidates}
+        return [
+            c
+            for c in self._effects
+            if (c.effect_id, c.element) not in taken and shapes.get(c.effect_id, c.shape) == c.shape
+        ]
 
     def _surest(
         self, hypotheses: Iterable[Hypothesis], chosen: Sequence[Hypothesis], base: Index
@@ -299,11 +322,23 @@ class Search:
                 fewest = replace(rival, onset=best.onset)
             elif (
                 wider == 0
-                and is_number(rival) > is_number(fewest)
                 and worse.total <= UNTRUE_SHARE * gained.total
+                and self._is_likelier(rival, fewest, chosen)
             ):
                 fewest = rival
         return fewest
+
+    def _is_likelier(
+        self, one: Hypothesis, other: Hypothesis, chosen: Sequence[Hypothesis]
+    ) -> bool:
+        """Return whether of two that explain the same one is likelier before any data.
+
+        A wrong number of the file adds no physics; of two such it is the one less out of the usual.
+        """
+        if is_number(one) != is_number(other):
+            return is_number(one)
+        sizes = [unusual(self.fits.values([*chosen, each]), each) for each in (one, other)]
+        return is_number(one) and sizes[0] < sizes[1]
 
     def _rivals(
         self, hypothesis: Hypothesis, free: Sequence[Candidate], base: Index

@@ -28,7 +28,9 @@ def _columns(signals: Array) -> Array:
 EFFECT = Effect(
     id="cable_length_offset",
     block=Block.CABLE,
-    parameters=(EffectParameter("offset", "m", -10.0, 10.0, meaning="added to offset_length"),),
+    parameters=(
+        EffectParameter("offset", "m", -10.0, 10.0, meaning="added to offset_length", usual=0.01),
+    ),
     alter=_alter,
     regression=Regression(Channel.TENSION, _columns),
     equation="elastic length = l0 + offset_length + offset",

@@ -37,7 +37,13 @@ EFFECT = Effect(
     block=Block.CABLE,
     parameters=(
         EffectParameter(
-            "scale", "1", 0.1, 10.0, absent=1.0, meaning="multiplies; 1 is the law of the file"
+            "scale",
+            "1",
+            0.1,
+            10.0,
+            absent=1.0,
+            meaning="multiplies; 1 is the law of the file",
+            usual=0.05,
         ),
     ),
     alter=_alter,

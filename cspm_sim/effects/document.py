@@ -95,7 +95,8 @@ def _row(p: EffectParameter) -> str:
     absent = "" if p.absent is None else f"{p.absent:g}"
     bounds = f"{p.minimum:g} to {p.maximum:g}"
     left_out = "" if p.default is None else f"; {p.default:g} where a file leaves it out"
-    return f"| `{p.name}` | {p.unit} | {bounds} | {absent} | {p.meaning}{left_out} |"
+    usual = "" if p.usual is None else f"; wrong by {p.usual:g} as a rule, where it is"
+    return f"| `{p.name}` | {p.unit} | {bounds} | {absent} | {p.meaning}{left_out}{usual} |"
 
 
 def _grids(effect: Effect) -> str:

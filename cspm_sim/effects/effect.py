@@ -75,6 +75,7 @@ class EffectParameter:
         absent: the value at which the effect is not there; None for a number that only shapes it.
         meaning: what the number is, where the equation does not say it.
         default: what holds where a file leaves it out; None: it has to be given.
+        usual: size of the error of a wrong number of the file, where laboratories make one.
     """
 
     name: str
@@ -84,6 +85,7 @@ class EffectParameter:
     absent: float | None = 0.0
     meaning: str = ""
     default: float | None = None
+    usual: float | None = None
 
 
 @dataclass(frozen=True)

@@ -164,7 +164,7 @@ _CAUSES = """
 
 ## Limits of the MuJoCo plant
 
-- Effects: `bar_linear_damping`, `winch_viscous_friction`, `winch_coulomb_friction`. Others are
+- Effects: `bar_linear_damping`, `cable_transverse_damping`, `winch_viscous_friction`, `winch_coulomb_friction`. Others are
   refused.
 - MuJoCo calls back into the process at each stage of a step, and a process has one such callback:
   only one thread may step such plants.

@@ -10,7 +10,7 @@ from cspm_ident.diagnosis.drivers import Driver, Knots
 from cspm_ident.diagnosis.equation import Equation
 from cspm_ident.diagnosis.evidence import gather
 from cspm_ident.diagnosis.fits import Fits
-from cspm_ident.diagnosis.hypothesis import Hypothesis, is_spread
+from cspm_ident.diagnosis.hypothesis import Hypothesis, is_spread, unusual
 from cspm_ident.diagnosis.search import Search
 from cspm_ident.diagnosis.sums import Gain, Sums
 from cspm_ident.diagnosis.sureness import FALSE_ALARMS, Sureness
@@ -205,3 +205,80 @@ def test_what_shows_once_is_unknown_and_not_consistent(height, told):
     found = Search(gather([[replace(equation, target=target, columns=columns)]], BLOCK_S)).run()
     assert not found.named
     assert [driver.signal for driver, _, _ in found.unknown] == ["time [s]"] * told
+
+
+@pytest.mark.parametrize(("amount", "elements"), [(0.3, MANY), (0.0, ("a",))])
+def test_elements_do_not_go_all_at_once_if_together_they_surely_act(amount, elements):
+    """Three columns are alike, so that none of them tells that it is not another."""
+    rng = np.random.default_rng(6)
+    first, second = (np.sign(rng.standard_normal((ROWS, 1))) for _ in range(2))
+    columns = {Candidate(DRY, "a"): first[:, :, None]}
+    for name in MANY[1:]:
+        own = second + 1e-4 * rng.standard_normal((ROWS, 1))
+        columns[Candidate(DRY, name)] = own[:, :, None]
+    target = 0.3 * first + amount * second + 0.05 * rng.standard_normal((ROWS, 1))
+    place = Place(Channel.WRENCH, "bar")
+    search = Search(
+        gather([[Equation(place, STEP * np.arange(ROWS), target, columns, target)]], 0.5)
+    )
+    whole = Hypothesis(DRY, tuple(columns))
+    assert search.scopes.pruned(whole, search.fits.columns([])).elements == elements
+
+
+STIFFNESS, LENGTH = catalogue()["cable_stiffness"], catalogue()["cable_length_offset"]
+
+
+def explained_by(columns, weights, noise=0.05):
+    """One residual of the columns of some candidates, by weight."""
+    rng = np.random.default_rng(8)
+    target = sum(w * columns[c] for c, w in weights.items())
+    target = target + noise * rng.standard_normal((ROWS, 1))
+    shaped = {c: own[:, :, None] for c, own in columns.items()}
+    place = Place(Channel.TENSION, "a")
+    return gather([[Equation(place, STEP * np.arange(ROWS), target, shaped, target)]], BLOCK_S)
+
+
+@pytest.mark.parametrize(("metres", "effect"), [(1.0, STIFFNESS), (0.01, LENGTH)])
+def test_of_two_wrong_numbers_that_do_the_same_the_usual_one_is_told(metres, effect):
+    """A stiffness 10 % off, or a length that far; a length is usually a centimetre off."""
+    waves = np.random.default_rng(9).standard_normal((ROWS, 1))
+    stiff, long = Candidate(STIFFNESS, "a"), Candidate(LENGTH, "a")
+    columns = {stiff: 10.0 * waves, long: waves / metres}
+    found = Search(explained_by(columns, {stiff: -0.1})).run()
+    assert [named.hypothesis.effect for named in found.named] == [effect]
+    assert found.named[0].alternatives
+
+
+def test_how_unusual_a_wrong_number_is():
+    stiff, long, dry = (Candidate(e, "a") for e in (STIFFNESS, LENGTH, DRY))
+    weights = {c: np.array([-0.1]) for c in (stiff, long, dry)}
+    sizes = [unusual(weights, Hypothesis(c.effect, (c,))) for c in (stiff, long, dry)]
+    assert sizes == pytest.approx([2.0, 10.0, 0.0])
+
+
+def test_an_effect_has_one_shape_on_all_elements():
+    """Each element alone would have the other shape than the one that is told first."""
+    effect, rng = catalogue()["cable_transverse_damping"], np.random.default_rng(10)
+    own = {name: rng.standard_normal((ROWS, 1)) for name in ("a", "b")}
+    tilt = {name: 0.3 * rng.standard_normal((ROWS, 1)) for name in own}
+    shapes = {share: (("exit_share", share),) for share in (-0.5, 1.0)}
+    columns = {
+        Candidate(effect, name, shape): wave + share * tilt[name]
+        for name, wave in own.items()
+        for share, shape in shapes.items()
+    }
+    truth = {Candidate(effect, "a", shapes[1.0]): 2.0, Candidate(effect, "b", shapes[-0.5]): 1.0}
+    (named,) = Search(explained_by(columns, truth)).run().named
+    assert sorted(named.hypothesis.elements) == ["a", "b"]
+    assert {c.shape for c in named.hypothesis.candidates} == {shapes[1.0]}
+
+
+@pytest.mark.parametrize(("delay", "effect"), [(1e-4, LATE), (1e-3, WET)])
+def test_clocks_as_of_a_sound_machine_come_before_what_explains_a_little_more(delay, effect):
+    """What friction explains beyond the delay is a hundredth of what is left, worth no word."""
+    wave, more = np.random.default_rng(11).standard_normal((2, ROWS, 1))
+    late = {Candidate(LATE, body): 3e3 * wave for body in ("bar", "winch_frame")}
+    wet = Candidate(WET, "a")
+    columns = {**late, wet: 1e2 * (6e3 * delay * wave + 0.005 * more)}
+    found = Search(explained_by(columns, {wet: 0.01})).run().named
+    assert [named.hypothesis.effect for named in found] == [effect]

@@ -12,7 +12,7 @@ from __future__ import annotations
 
 import argparse
 import json
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Sequence
 from pathlib import Path
 from typing import NamedTuple, Protocol
 
@@ -274,7 +274,7 @@ def main() -> None:
         "--system", action="store_true", help="`cspm identify system` instead: 30 s a run"
     )
     parser.add_argument(
-        "--rig", action="store_true", help="`cspm identify stiffness` and `damping`: 3 s a run"
+        "--rig", action="store_true", help="`cspm identify stiffness` and `damping`: 4 s a run"
     )
     parser.add_argument("--seed", type=int, default=20261121)
     parser.add_argument(
@@ -294,17 +294,21 @@ def main() -> None:
     elif arguments.rig:
         experiments = (RigStiffness(), RigDamping())
     for experiment in experiments:
-        table = Table("intervals", *experiment.names, title=experiment.__class__.__doc__)
         counts = measure_coverage(experiment, arguments.runs, arguments.seed, kept=arguments.keep)
-        for method in dict.fromkeys(count.method for count in counts):
-            row = [count for count in counts if count.method == method]
-            table.add_row(method, *(_cell(count) for count in row))
-        console.print(table)
+        console.print(table_of(experiment.__class__.__doc__, counts))
 
 
-def _cell(count: Count) -> str:
-    low, high = count.bounds
-    return f"{count.share:.1%} ({low:.1%} to {high:.1%})"
+def table_of(title: str | None, counts: Sequence[Count]) -> Table:
+    """Return a table with a row for each count."""
+    table = Table("intervals", "parameter", "hold", "share", "its 95 % interval", title=title)
+    for before, count in zip([None, *counts], counts, strict=False):
+        method = "" if before and before.method == count.method else count.method
+        low, high = count.bounds
+        held = f"{count.inside} of {count.runs}"
+        table.add_row(
+            method, count.parameter, held, f"{count.share:.1%}", f"{low:.1%} to {high:.1%}"
+        )
+    return table
 
 
 if __name__ == "__main__":

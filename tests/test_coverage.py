@@ -2,9 +2,19 @@
 
 import numpy as np
 import pytest
+from rich.console import Console
 from scipy.stats import binom
 
-from bench.coverage import DEFAULT, PLAIN, Count, Spring, Winch, coloured, measure_coverage
+from bench.coverage import (
+    DEFAULT,
+    PLAIN,
+    Count,
+    Spring,
+    Winch,
+    coloured,
+    measure_coverage,
+    table_of,
+)
 
 RUNS = 60
 # With a coverage of 90 to 97 % no more than one in a thousand experiments of 60 runs ends outside.
@@ -89,3 +99,20 @@ def test_runs_that_were_kept_are_not_made_again(tmp_path):
     third = Dice()
     measure_coverage(third, 3, seed=1, kept=file)
     assert third.asked == 3
+
+
+def test_a_table_of_many_parameters_fits_a_narrow_terminal():
+    counts = [
+        Count(method, f"E at {length} m", 181, 200)
+        for method in (DEFAULT, PLAIN)
+        for length in range(9)
+    ]
+    console = Console(width=80)
+    with console.capture() as shown:
+        console.print(table_of("Cables on a rig.", counts))
+    text = shown.get()
+    assert "…" not in text
+    assert text.count(DEFAULT) == text.count(PLAIN) == 1
+    rows = [line for line in text.splitlines() if "E at" in line]
+    assert len(rows) == len(counts)
+    assert all("181 of 200" in row and "85.6% to 94.2%" in row for row in rows)

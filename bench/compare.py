@@ -39,8 +39,11 @@ def main() -> None:
         _cspm("compare", str(recording), "--out", f"{place}/report")
         wall, cpu = time.perf_counter() - begin, _children_cpu() - spent
     peak = resource.getrusage(resource.RUSAGE_CHILDREN).ru_maxrss / 1024.0
+    load = os.getloadavg()[0]
     console.print(
-        f"cspm compare: {wall:.1f} s, {cpu:.1f} s of processor time, {peak:.0f} MB at most"
+        f"cspm compare: {cpu:.1f} s of processor time, {wall:.1f} s by the clock at a load of"
+        f" {load:.1f} in the last minute, {peak:.0f} MB at most",
+        soft_wrap=True,
     )
 
 

@@ -33,6 +33,13 @@ _BLOCKS = {
     "cable": "Cables alone, driven by measured winch and bar motion",
     "bar": "Bar alone, driven by measured tensions",
 }
+_QUANTITIES = {
+    "time_s": "time [s]",
+    "value": "simulated value, in the channel's unit",
+    "speed": "speed of the bar or the winch [m/s, rad/s]",
+    "angle_rad": "winch angle [rad]",
+    "tension_n": "tension [N]",
+}
 
 
 def write_page(path: Path, comparison: Comparison) -> None:
@@ -141,8 +148,8 @@ def _spectra(channels: list[Channel]) -> go.Figure:
 def _bins(channels: list[Channel]) -> go.Figure:
     """Return bias and RMS of the error against each quantity, in multiples of the floor."""
     names = list(dict.fromkeys(name for channel in channels for name in channel.bins))
-    rows = max(1, len(names))
-    figure = make_subplots(rows=rows, cols=1, subplot_titles=names, vertical_spacing=0.2 / rows)
+    rows, titles = max(1, len(names)), [_QUANTITIES[name] for name in names]
+    figure = make_subplots(rows=rows, cols=1, subplot_titles=titles, vertical_spacing=0.2 / rows)
     for i, channel in enumerate(channels):
         colour = _colour(i, len(channels))
         for name, bins in channel.bins.items():

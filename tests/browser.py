@@ -1,0 +1,48 @@
+"""What Chromium makes of a page on a screen of some width."""
+
+import json
+import re
+import shutil
+import subprocess
+
+import pytest
+
+# In a frame, since a window of Chromium is never narrower than 500 pixels.
+_PROBE = """<body><iframe id=f width=%d height=900 src="%s"></iframe><script>
+const errors = [];
+const frame = document.getElementById('f');
+frame.onload = () => {
+  const page = frame.contentDocument.documentElement;
+  frame.contentWindow.addEventListener('error', e => errors.push(e.message));
+  setTimeout(() => {
+    const found = {errors, wide: page.scrollWidth, seen: page.clientWidth,
+      plots: page.querySelectorAll('.scatterlayer').length};
+    const out = document.createElement('pre');
+    out.id = 'found'; out.textContent = JSON.stringify(found);
+    document.body.append(out);
+  }, 5000);
+};
+</script></body>"""
+
+
+def look(page, width):
+    """Return how wide the page is, how wide it is seen, its plots and its errors.
+
+    Skips the test where there is no Chromium.
+    """
+    browser = shutil.which("chromium") or shutil.which("google-chrome")
+    if browser is None:
+        pytest.skip("no Chromium on this system")
+    probe = page.with_name("probe.html")
+    probe.write_text(_PROBE % (width, page.name), encoding="utf-8")
+    options = ["--headless", "--no-sandbox", "--disable-gpu", "--allow-file-access-from-files"]
+    options += ["--virtual-time-budget=20000", "--enable-logging=stderr", "--dump-dom"]
+    shown = subprocess.run(
+        [browser, *options, probe.as_uri()],
+        capture_output=True,
+        text=True,
+        timeout=300,
+        check=True,
+    )
+    assert "CONSOLE" not in shown.stderr
+    return json.loads(re.search(r'<pre id="found">(.*?)</pre>', shown.stdout)[1])

@@ -164,8 +164,8 @@ _CAUSES = """
 
 ## Limits of the MuJoCo plant
 
-- Effects: `bar_linear_damping`, `cable_transverse_damping`, `winch_viscous_friction`, `winch_coulomb_friction`. Others are
-  refused.
+- Effects: `bar_linear_damping`, `cable_transverse_damping`, `winch_viscous_friction`,
+  `winch_coulomb_friction`. Others are refused.
 - MuJoCo calls back into the process at each stage of a step, and a process has one such callback:
   only one thread may step such plants.
 - It needs `pip install 'cspm[mujoco]'`.

@@ -244,8 +244,9 @@ def same_place(testbed: Testbed, place: EffectPlace, effect: str, elements: Iter
 
 
 def absent_values(effect: str) -> dict[str, float]:
-    """Return an effect's parameters at which it does nothing."""
-    return {p.name: p.absent or 0.0 for p in catalogue()[effect].parameters}
+    """Return an effect's parameters at which it does nothing, less what a file may leave out."""
+    needed = (p for p in catalogue()[effect].parameters if p.default is None)
+    return {p.name: p.absent or 0.0 for p in needed}
 
 
 def _kinds(testbed: Testbed) -> list[str]:

@@ -10,7 +10,7 @@ from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.interpolate import CubicSpline
+from scipy.interpolate import BSpline, make_interp_spline
 from scipy.signal import butter, sosfiltfilt, welch
 from scipy.stats import chi2
 
@@ -43,12 +43,12 @@ class Smooth:
     """
 
     spans: Array
-    pieces: tuple[CubicSpline, ...]
+    pieces: tuple[BSpline, ...]
     band: float
 
     def at(self, times: Array, derivative: int = 0) -> Array:
         """Return the values at `times` (k,) [s], or a time derivative; NaN in holes. (k, width)."""
-        width = self.pieces[0].c.shape[2]
+        width = self.pieces[0].c.shape[1]
         out = np.full((len(times), width), np.nan)
         for (start, end), piece in zip(self.spans, self.pieces, strict=True):
             inside = (times >= start) & (times <= end)
@@ -69,7 +69,8 @@ def smooth(samples: Samples, band: float | None = None) -> Smooth:
         if knots[-1] != len(times) - 1:
             knots = np.append(knots, len(times) - 1)
         spans.append((times[0], times[-1]))
-        pieces.append(CubicSpline(times[knots], values[span][knots]))
+        # Basis splines: polynomials of each piece are four times the memory.
+        pieces.append(make_interp_spline(times[knots], values[span][knots]))
     return Smooth(np.array(spans).reshape(len(spans), 2), tuple(pieces), kept)
 
 

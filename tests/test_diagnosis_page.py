@@ -242,6 +242,20 @@ def test_the_page_says_all_that_was_found(tmp_path):
     assert '"name":"after"' in page
 
 
+def test_the_power_of_what_is_missing_is_told(tmp_path):
+    """Dry friction takes torque·⟨|speed|⟩; modelled, nothing is left."""
+    found = diagnosis()
+    (power,) = diagnosis_data(found)["energy"]
+    assert power["channel"] == "winches/torque/surge_2"
+    assert power["lost_before_w"] == pytest.approx(TORQUE * 2.0 / np.pi, rel=0.02)
+    low, high = power["ci95_after_w"]
+    assert low < 0.0 < high < 1e-3
+    told = section(page_of(tmp_path, found), "energy")
+    assert ">0.019<" in told
+    assert ">neither, surely<" in told
+    assert ">takes energy<" in section(page_of(tmp_path, diagnosis(named=False)), "energy")
+
+
 def test_a_page_without_findings_says_so(tmp_path):
     page = page_of(tmp_path, diagnosis(named=False))
     assert "The recordings agree with the model" in page

@@ -55,8 +55,8 @@ def test_every_message_that_is_sent_is_recorded(tmp_path, plant):
     assert found.complete
     counts = {topic.name: topic.count for topic in found.topics}
     assert counts["/truth/bar/pose"] == counts[TENSION] == 600
-    # The first command waits for the first tension command, which comes at half the rate; after that
-    # what is late is not sent, and counted.
+    # The first command waits for the first tension command, which comes at half the rate; after
+    # that what is late is not sent, and counted.
     sent = counts[TORQUE_COMMAND]
     assert 598 - result.timing[FORCE_CONTROLLER]["deadlines_missed"] <= sent <= 605
     # The plant heard no command that is not recorded.

@@ -13,6 +13,7 @@ from cspm_ident.diagnosis.diagnose import Diagnosis, Shape
 from cspm_ident.diagnosis.hypothesis import Named, members_of
 from cspm_ident.diagnosis.judgement import HeldOut
 from cspm_ident.diagnosis.lines import Line
+from cspm_ident.diagnosis.power import Power
 from cspm_ident.diagnosis.region import Region
 from cspm_ident.diagnosis.simulation import SimulatedFit, Worth
 from cspm_ident.diagnosis.sketch import sketch
@@ -175,7 +176,7 @@ def formula_of(shape: Shape) -> str | None:
     return sketch(shape.knots, shape.values, shape.driver.signal.split(" [")[0])
 
 
-def channel_of(fit: HeldOut) -> str:
+def channel_of(fit: HeldOut | Power) -> str:
     """Return the public name of a residual's measured quantity."""
     return _CHANNELS[fit.place.channel].format(fit.place.element)
 

@@ -11,6 +11,7 @@ from cspm_ident.diagnosis.diagnose import Diagnosis
 from cspm_ident.diagnosis.hypothesis import Findings, Named, Rival, members_of
 from cspm_ident.diagnosis.judgement import HeldOut
 from cspm_ident.diagnosis.lines import Line
+from cspm_ident.diagnosis.power import Power, lost_powers
 from cspm_ident.diagnosis.region import Region
 from cspm_ident.diagnosis.simulation import SimulatedFit
 from cspm_ident.diagnosis.statement import (
@@ -105,6 +106,7 @@ def diagnosis_data(diagnosis: Diagnosis) -> dict[str, Any]:
         "detection_limits": [limit._asdict() for limit in diagnosis.limits],
         "fit": [_simulated_fit(each) for each in diagnosis.simulated],
         "residuals": [_equation_fit(each) for each in diagnosis.fit],
+        "energy": [_power(each) for each in lost_powers(diagnosis.curves)],
         "model": IMPROVED if diagnosis.findings.named else None,
     }
 
@@ -218,6 +220,16 @@ def _equation_fit(fit: HeldOut) -> dict[str, Any]:
     found = _fit(channel_of(fit), drive, fit.measured, *numbers)
     found["held_out"]["nrmse_black_box"] = fit.ceiling / max(fit.measured, 1e-300)
     return found
+
+
+def _power(power: Power) -> dict[str, Any]:
+    known = power.half < float("inf")
+    return {
+        "channel": channel_of(power),
+        "lost_before_w": power.before,
+        "lost_after_w": power.after,
+        "ci95_after_w": [power.after - power.half, power.after + power.half] if known else None,
+    }
 
 
 def _simulated_fit(fit: SimulatedFit) -> dict[str, Any]:

@@ -12,6 +12,7 @@ from rich.table import Table
 
 from cspm_bringup.closed_loop import ClosedLoopFit, simulate_closed_loop
 from cspm_bringup.console import make_console, say
+from cspm_bringup.controller_parity import Parity, controller_parity
 from cspm_bringup.experiment_files import write_experiments
 from cspm_bringup.summary import write_json
 from cspm_ident.diagnosis.diagnose import Diagnosis, diagnose
@@ -75,18 +76,36 @@ def diagnose_command(asked: DiagnoseRequest, json: Path | None) -> None:
         if asked.closed_loop and found.findings.named:
             improved = improved_testbed(found, IMPROVED)
             loop = simulate_closed_loop((held_out or searched)[0], improved, status.update)
-        data = diagnosis_data(found) | {"closed_loop": [each._asdict() for each in loop]}
+        status.update("controllers")
+        parity = controller_parity(asked.recordings[0])
+        data = diagnosis_data(found) | {
+            "closed_loop": [each._asdict() for each in loop],
+            "controllers": [each._asdict() for each in parity],
+        }
         if asked.out is not None:
             asked.out.mkdir(parents=True)
             write_experiments(asked.out, found, data, status.update)
             _write(asked.out, found, data)
     print_diagnosis(console, found)
+    _print_parity(console, parity)
     if loop:
         console.print(_loop_table(loop))
     if asked.out is not None:
         say(console, f"written {asked.out}")
     if json is not None:
         write_json(json, data)
+
+
+def _print_parity(console: Console, parity: Sequence[Parity]) -> None:
+    """Print which commands are not those of the described controllers."""
+    for each in parity:
+        if each.different:
+            say(
+                console,
+                f"• {each.topic}: {each.different} of {each.compared} commands are not what the"
+                f" described {each.node} makes of the recorded measurements (up to"
+                f" {each.largest:.2g})",
+            )
 
 
 def explain_command(name: str) -> None:

@@ -15,8 +15,8 @@ from cspm_ident.diagnosis.diagnose import Diagnosis
 from cspm_ident.diagnosis.drawing import drawing
 from cspm_ident.diagnosis.evidence_figure import driver_figure, overlay_figure
 from cspm_ident.diagnosis.hypothesis import Hypothesis, Named
+from cspm_ident.diagnosis.page_checks import controllers_table, energy_table
 from cspm_ident.diagnosis.part import Part, part_behind, parts_of
-from cspm_ident.diagnosis.power import Power, lost_powers
 from cspm_ident.diagnosis.statement import channel_of, drive_of, tension_statement, unit_of
 from cspm_ident.diagnosis.verdict import IMPROVED, TRUSTED, Verdict, named_in, verdict_of
 from cspm_ident.offline_page import figure_html, table_html, write_offline_page
@@ -49,6 +49,7 @@ _SECTIONS = {
     "fit": "Every residual",
     "simulated": "Simulated again",
     "energy": "Where energy goes",
+    "controllers": "Controllers stepped again",
     "limits": "What would have shown",
     "silent": "Not testable here",
     "next": "What to do next",
@@ -76,7 +77,8 @@ def write_diagnosis_page(path: Path, found: Diagnosis, data: dict[str, Any]) -> 
         "hypotheses": _hypotheses(found, data),
         "fit": _fit(found),
         "simulated": _simulated(found, data),
-        "energy": _energy(found),
+        "energy": energy_table(found),
+        "controllers": controllers_table(data),
         "limits": _limits(found),
         "silent": _silent(data),
         "next": _next(found, data),
@@ -283,28 +285,6 @@ def _simulated(found: Diagnosis, data: dict[str, Any]) -> str:
     columns = ("quantity", "before", "after", "unit")
     text = "<p>The recorded scenario run again in closed loop: difference to the recording.</p>"
     return whole + text + table_html(columns, loop, "root mean square differences in closed loop")
-
-
-def _energy(found: Diagnosis) -> str:
-    """Return the power that every residual stands for."""
-    heads = ("residual", "before [W]", "after [W]", "95 % interval [W]", "what is left")
-    rows = []
-    for power in lost_powers(found.curves):
-        ends = f"{power.after - power.half:.2g} to {power.after + power.half:.2g}"
-        told = f"{power.before:.2g}", f"{power.after:.2g}", ends, _takes_or_gives(power)
-        rows.append((channel_of(power), *told))
-    text = (
-        "<p>Mean power that the machine loses beyond the model, on held-out data: residuals times"
-        " the measured rates that they act at. Friction, drag and dampers take energy; where what"
-        " is left gives some, another cause remains: a drive, a sensor or a force from outside.</p>"
-    )
-    return text + table_html(heads, rows, "power beyond the model") if rows else ""
-
-
-def _takes_or_gives(power: Power) -> str:
-    if power.gives:
-        return "gives energy"
-    return "takes energy" if power.after > power.half else "neither, surely"
 
 
 def _limits(found: Diagnosis) -> str:

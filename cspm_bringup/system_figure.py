@@ -14,6 +14,7 @@ from cspm_msgs_py.dofs import DOFS
 DPI = 90
 _MM, _MRAD = 1e3, 1e3
 _TRANSLATIONS = 3
+_TITLE_PAD = 22  # points, above a legend
 
 
 def draw_system(path: Path, judgements: Sequence[Judgement]) -> None:
@@ -22,9 +23,8 @@ def draw_system(path: Path, judgements: Sequence[Judgement]) -> None:
     FigureCanvasAgg(figure)
     rows = figure.subplots(len(DOFS), len(judgements), squeeze=False, sharex="col")
     for column, each in enumerate(judgements):
-        rows[0][column].set_title(
-            each.measurement.path.name + (", held out" if each.held_out else "")
-        )
+        title = each.measurement.path.name + (", held out" if each.held_out else "")
+        rows[0][column].set_title(title, pad=_TITLE_PAD)
         for i, dof in enumerate(DOFS):
             axes = rows[i][column]
             straight = i < _TRANSLATIONS
@@ -38,7 +38,8 @@ def draw_system(path: Path, judgements: Sequence[Judgement]) -> None:
                 line = factor * (bars[:, i] - middle)
                 axes.plot(each.times, line, "--", linewidth=1.0, label=text)
             axes.set_ylabel(f"{dof} [{'mm' if straight else 'mrad'}]")
-            axes.legend(fontsize="x-small", loc="upper right")
+            # Above the axes, where no curve is.
+            axes.legend(fontsize="x-small", loc="lower left", bbox_to_anchor=(0.0, 1.0), ncols=3)
             axes.grid(alpha=0.3)
             axes.margins(x=0)
         rows[-1][column].set_xlabel("time [s]")

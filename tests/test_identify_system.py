@@ -188,6 +188,7 @@ def test_knowledge_goes_to_its_parameter():
         (["stiffness.rope"], {}, r"^--fit stiffness.rope: allowed: .*stiffness\[.hoist\|.surge"),
         (["bar_damping"], {}, r"^--fit bar_damping: allowed: .*bar_damping.surge"),
         (["bar.mass", "bar.mass"], {}, r"^--fit bar.mass: stands twice, allowed: each name once$"),
+        (["bar.mass"], {"bar.weight": 4.0}, r"^--freeze bar.weight: allowed: bar.mass, bar.com.x"),
         (["bar.mass"], {"bar.mass": 900.0}, r"^bar.mass: 900 kg, allowed: 0.406 to 40.6$"),
     ],
 )

@@ -123,15 +123,18 @@ def choose(
             f"identify system: test-bed {testbed.name} has no bar or no winch frame, allowed: a"
             " machine with both; cables on a rig: cspm identify stiffness"
         )
-    wanted = [*(names or DEFAULT), *(name for name in frozen if name not in (names or DEFAULT))]
-    for i, name in enumerate(wanted):
-        if name in wanted[:i]:
+    fitted = list(names or DEFAULT)
+    held = [name for name in frozen if name not in fitted]
+    wanted = [*fitted, *held]
+    for i, name in enumerate(fitted):
+        if name in fitted[:i]:
             raise InputError(f"--fit {name}: stands twice, allowed: each name once")
     for option, known in (("--prior", priors), ("--bound", bounds)):
         for name in known:
             if name not in wanted:
                 raise InputError(f"{option} {name}: is not fitted, allowed: {', '.join(wanted)}")
-    found = [_chosen(testbed, name) for name in wanted]
+    found = [_chosen(testbed, name, "--fit") for name in fitted]
+    found += [_chosen(testbed, name, "--freeze") for name in held]
     bounded = [_within(each, bounds[each.name]) if each.name in bounds else each for each in found]
     return tuple(_with_knowledge(each, frozen, priors) for each in bounded)
 
@@ -148,7 +151,7 @@ def allowed_names(testbed: Testbed) -> list[str]:
     ]
 
 
-def _chosen(testbed: Testbed, name: str) -> Chosen:
+def _chosen(testbed: Testbed, name: str, option: str) -> Chosen:
     head, _, rest = name.partition(".")
     found = None
     if head == "bar":
@@ -160,7 +163,7 @@ def _chosen(testbed: Testbed, name: str) -> Chosen:
     elif head in POINTS:
         found = _of_point(testbed, name, head, rest)
     if found is None:
-        raise InputError(f"--fit {name}: allowed: {', '.join(allowed_names(testbed))}")
+        raise InputError(f"{option} {name}: allowed: {', '.join(allowed_names(testbed))}")
     return found
 
 

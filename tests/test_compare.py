@@ -2,13 +2,12 @@
 
 import json
 import re
-import shutil
-import subprocess
 import sys
 from dataclasses import replace
 
 import numpy as np
 import pytest
+from browser import look
 from conftest import THESIS
 from run_samples import run_to
 
@@ -17,6 +16,7 @@ from cspm_ident.block_simulation import BlockSimulation, Drive
 from cspm_ident.comparison import floor
 from cspm_ident.comparison.compare import compare
 from cspm_ident.comparison.metrics import best_lag, coherence_of, error_bins, nrmse
+from cspm_ident.comparison.page import write_page
 from cspm_ident.offline_page import POINTS, thinned
 from cspm_ident.signals.delays import RESOLUTION_S, find_delays
 from cspm_ident.signals.measurement import read_measurement
@@ -283,29 +283,13 @@ def test_wrong_options_are_one_line(command, folder, words, line):
 
 
 @pytest.mark.slow
-def test_a_browser_draws_the_page(command, folder, tmp_path):
-    browser = shutil.which("chromium") or shutil.which("google-chrome")
-    if browser is None:
-        pytest.skip("no Chromium on this system")
-    assert command("compare", folder, "--out", tmp_path / "report")[0] == 0
-    shown = subprocess.run(
-        [
-            browser,
-            "--headless",
-            "--no-sandbox",
-            "--disable-gpu",
-            "--virtual-time-budget=20000",
-            "--enable-logging=stderr",
-            "--dump-dom",
-            (tmp_path / "report" / "report.html").as_uri(),
-        ],
-        capture_output=True,
-        text=True,
-        timeout=120,
-        check=True,
-    )
-    assert "CONSOLE" not in shown.stderr
-    page = shown.stdout
+@pytest.mark.parametrize("width", [400, 1280])
+def test_a_browser_draws_the_page_and_nothing_but_tables_is_wider_than_the_screen(
+    comparison, width, tmp_path
+):
+    write_page(tmp_path / "report.html", comparison)
+    shown = look(tmp_path / "report.html", width)
+    assert shown["errors"] == []
     # Lines that only the script draws.
-    assert page.count("scatterlayer") > 20
-    assert page.count('class="xtick"') > 20
+    assert shown["plots"] > 20
+    assert shown["wide"] <= shown["seen"] <= width

@@ -189,9 +189,9 @@ scenarios/testbeds/emps.yaml --out emps
 
 cspm identify winch emps --held-out emps_pulses --out fitted
 
-cspm identify winch bag --winches surge_1,surge_2 --effects winch_viscous_friction
+cspm run emps --testbed fitted/fitted_testbed.yaml
 
-cspm run one_winch --testbed fitted/fitted_testbed.yaml"""
+cspm identify winch bag --winches surge_1,surge_2 --effects winch_viscous_friction"""
 )
 def winch(
     recordings: Annotated[

@@ -133,6 +133,8 @@ def test_the_command_on_emps(cspm, tmp_path):
     assert held_out["fitted"] < PUBLISHED_FORCE_ERROR
     assert held_out["described"] > held_out["fitted"]
     assert load_testbed(tmp_path / "fitted" / "fitted_testbed.yaml").testbed.effects[2].elements
+    words = ["--testbed", "fitted/fitted_testbed.yaml", "--duration", "1", "--no-record"]
+    assert cspm("run", "emps", *words)[0] == 0
 
 
 MADE = Winch()

@@ -91,6 +91,23 @@ def test_a_diagnosis_that_is_right_in_everything():
     assert outcome.fit == pytest.approx((5.0, 4.0, 0.6))
 
 
+@pytest.mark.parametrize(
+    ("effect", "channel"),
+    [("cable_transverse_damping", "bar/wrench"), ("cable_hysteresis", "cables/tension/surge_1")],
+)
+def test_errors_are_those_of_the_residual_that_shows_the_effect(effect, channel):
+    """Damping across a cable is no part of its tension's law: it pulls at the bar."""
+    told = result("effect")
+    sides = {"cables/tension/surge_1": 0.3, "bar/wrench": 0.4}
+    told["diagnosis"]["residuals"] = [
+        {"channel": name, "held_out": FIT | {"nrmse_before": before, "noise_floor": 0.01}}
+        for name, before in sides.items()
+    ]
+    floors = {("calm", name): 1.0 for name in sides}
+    hidden = item("a", concealed() | {"effect": effect})
+    assert judge(hidden, told, floors).fit == pytest.approx((100 * sides[channel], 8.0, 1.2))
+
+
 def test_errors_are_told_in_units_of_what_sound_machines_of_the_scenario_leave():
     sound, broken = item("sound"), item("broken", concealed())
     other, failed = item("other") | {"scenario": "worst_case"}, item("failed")

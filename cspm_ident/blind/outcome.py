@@ -7,6 +7,7 @@ from dataclasses import dataclass
 from typing import Any
 
 from cspm_ident.blind.floor import Floors
+from cspm_sim.effects import Channel, catalogue
 
 NOTHING, PARAMETER, EFFECT, OUTSIDE = "nothing", "parameter", "effect", "outside"
 KINDS = (NOTHING, PARAMETER, EFFECT, OUTSIDE)
@@ -228,12 +229,11 @@ def _estimates(concealed: Data, findings: Sequence[Data]) -> list[Estimate]:
 def _fit(
     residuals: Sequence[Data], item: Data, floors: Floors
 ) -> tuple[float, float, float] | None:
-    """Return the held-out errors of the residual of a concealed element that was worst before.
+    """Return the held-out errors of the residual that was worst before of those that show it.
 
     Others are not what is to be mended.
     """
-    concealed = {e for each in item["concealed"] for e in each["elements"]}
-    where = {"bar" if element == "winch_frame" else element for element in concealed}
+    where = {e for each in item["concealed"] for e in _shown_in(each)}
     own = [r for r in residuals if where & set(r["channel"].split("/"))]
     found = []
     for residual in own or residuals:
@@ -243,3 +243,11 @@ def _fit(
             before, retuned, after = (float(stages[key] / unit) for key in _STAGES)
             found.append((before, retuned, after))
     return max(found, default=None)
+
+
+def _shown_in(concealed: Data) -> set[str]:
+    """Return the parts whose residuals show something: its elements, or the bar that it moves."""
+    effect = catalogue().get(concealed["effect"] or "")
+    if effect is not None and effect.regression.channel is Channel.WRENCH:
+        return {"bar"}
+    return {"bar" if element == "winch_frame" else element for element in concealed["elements"]}

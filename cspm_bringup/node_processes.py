@@ -14,7 +14,7 @@ from typing_extensions import Self
 
 from cspm_bringup.watch import STANDSTILL
 
-FAREWELL_S = 5.0
+LEAVING_S = 5.0
 # How long a node may be gone, or silent, before it is told that it is.
 SILENCE_S = 2.0
 _TAIL = 4000
@@ -105,11 +105,11 @@ class NodeProcesses:
                 process.send_signal(signal.SIGTERM)
                 # Who was stopped can end in order as well.
                 process.send_signal(signal.SIGCONT)
-        if not self.wait(FAREWELL_S):
+        if not self.wait(LEAVING_S):
             for process in self.by_name.values():
                 if process.poll() is None:
                     process.kill()
-            self.wait(FAREWELL_S)
+            self.wait(LEAVING_S)
         for process in self.by_name.values():
             if process.stdin is not None:
                 process.stdin.close()

@@ -16,7 +16,7 @@ from cspm_bringup.node_parameters import (
     NodeParameters,
     write_parameters,
 )
-from cspm_bringup.node_processes import FAREWELL_S, SILENCE_S, NodeProcesses
+from cspm_bringup.node_processes import LEAVING_S, SILENCE_S, NodeProcesses
 from cspm_bringup.recorded_result import recorded_result
 from cspm_bringup.report import Report, read_report
 from cspm_bringup.run_result import RunResult
@@ -153,7 +153,7 @@ class _Follower:
             time.sleep(_LOOK_EVERY_S)
         report = read_report(self._path)
         if report.finished or report.failure is not None or stop_wanted():
-            if not processes.wait(FAREWELL_S):
+            if not processes.wait(LEAVING_S):
                 ended = processes.ended()
                 stubborn = ", ".join(name for name in processes.by_name if name not in ended)
                 self.failure = self.failure or f"{stubborn} did not end with the run"
@@ -169,7 +169,7 @@ class _Follower:
         now = time.monotonic()
         if report != self._last:
             self._last, self._moved = report, now
-        told = self._stop_at is not None and now - self._stop_at > FAREWELL_S
+        told = self._stop_at is not None and now - self._stop_at > LEAVING_S
         silent = self._realtime and report.simulated > 0.0 and now - self._moved > _STUCK_S
         if (told or silent) and self.failure is None:
             length = now - self._moved

@@ -24,7 +24,7 @@ def quick(monkeypatch):
         "_LOOK_EVERY_S": 0.005,
         "_AFTERMATH_S": 0.1,
         "_STUCK_S": 0.2,
-        "FAREWELL_S": 0.2,
+        "LEAVING_S": 0.2,
         "SILENCE_S": 0.05,
     }.items():
         monkeypatch.setattr(process_run, name, seconds)

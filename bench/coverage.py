@@ -271,7 +271,7 @@ def main() -> None:
         "--seconds", type=float, default=15.0, metavar="S", help="length of a winch's records"
     )
     parser.add_argument(
-        "--system", action="store_true", help="`cspm identify system` instead: 30 s a run"
+        "--system", action="store_true", help="`cspm identify system` instead: 8 s a run"
     )
     parser.add_argument(
         "--rig", action="store_true", help="`cspm identify stiffness` and `damping`: 4 s a run"

@@ -59,7 +59,7 @@ def analyze_manipulability_command(
 
 def _show(console: Console, machine: AnalyzedMachine, found: Manipulability, radius: float) -> None:
     pose = ", ".join(f"{value:g}" for value in machine.pose)
-    say(console, f"{machine.testbed.name} at [{pose}] (m, rad)")
+    say(console, f"{machine.testbed.name} at [{pose}] (m, rad); rank of Jᵀ {found.rank}")
     say(
         console,
         f"measure of manipulability {found.measure:.4g}, moments over the radius of gyration"
@@ -105,6 +105,7 @@ def _data(machine: AnalyzedMachine, found: Manipulability) -> dict[str, Any]:
     return {
         "testbed": machine.testbed.name,
         "pose": list(machine.pose),
+        "rank": found.rank,
         "measure": found.measure,
         "condition": found.condition,
         "scaled_condition": found.scaled_condition,

@@ -13,9 +13,10 @@ from cspm_control.analysis.claim import Claim
 NOTHING = 1e-9
 
 
-def shown(value: float) -> str:
-    """Return a number to four digits; what is round-off only, as 0."""
-    return "0" if abs(value) < NOTHING else f"{value:.4g}"
+def shown(value: float, published: str) -> str:
+    """Return a number to four digits or as many as were published; round-off alone as 0."""
+    digits = max(4, sum(each.isdigit() for each in published))
+    return "0" if abs(value) < NOTHING else f"{value:.{digits}g}"
 
 
 def claim_table(title: str, claims: Sequence[Claim], headings: dict[str, str]) -> Table:
@@ -31,7 +32,7 @@ def claim_table(title: str, claims: Sequence[Claim], headings: dict[str, str]) -
             cell
             for way in headings
             for cell in (
-                shown(claim.found[way]),
+                shown(claim.found[way], claim.published),
                 "[green]yes[/]" if claim.holds(way) else "[red]no[/]",
             )
         ]

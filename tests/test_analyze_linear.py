@@ -1,6 +1,7 @@
 """Linear analysis: modes, gains and published figures, each by a second road."""
 
 import json
+import re
 
 import control
 import numpy as np
@@ -163,6 +164,20 @@ def test_the_pages_table_is_what_the_code_finds(found):
             number, _, cross = cell.replace("−", "-").partition(" ")
             assert float(number) == pytest.approx(claim.found[way], rel=1e-3, abs=2e-5)
             assert (cross == "✗") is not claim.holds(way)
+
+
+def test_the_pages_python_gives_a_named_system(found, monkeypatch):
+    root = TESTBEDS.parents[1]
+    page = (root / "docs" / "analyze.md").read_text(encoding="utf-8")
+    (code,) = re.findall(r"```python\n(.*?)```", page, re.DOTALL)
+    monkeypatch.chdir(root)
+    said = {}
+    exec(compile(code, "docs/analyze.md", "exec"), said)
+    system, ours = said["system"], found.exact.motion.system
+    assert isinstance(system, control.StateSpace)
+    assert system.input_labels == list(ours.inputs)
+    for name in "ABCD":
+        assert_allclose(getattr(system, name), getattr(ours, name), rtol=1e-12)
 
 
 def test_claims_are_valid_json(found):

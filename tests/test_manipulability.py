@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from conftest import build, general_content
 from scipy.optimize import linprog
-from test_linearisation import CENTRE, THESIS, with_bar, with_cables
+from test_linearisation import CENTRE, TESTBEDS, THESIS, with_bar, with_cables
 
 from cspm_control.analysis.cable_structure import cable_structure, structures
 from cspm_control.analysis.manipulability import (
@@ -16,7 +16,9 @@ from cspm_control.analysis.manipulability import (
 )
 from cspm_control.analysis.pose_grid import Grid
 from cspm_msgs_py.dofs import DOFS
+from cspm_msgs_py.testbed import load_testbed
 from cspm_sim.equilibrium import gravity_wrench
+from cspm_sim.kinematics import RANK_TOLERANCE, geometry
 from cspm_sim.parameters import nominal_parameters
 
 ASIDE = (0.05, -0.08, 1.6, 0.0, 0.2, 0.1)
@@ -36,6 +38,15 @@ def test_measure_is_the_product_of_the_scaled_singular_values():
     values = np.linalg.svd(scaled, compute_uv=False)
     assert found.measure == pytest.approx(values.prod())
     assert found.scaled_condition == pytest.approx(values[0] / values[-1])
+
+
+def test_rank_is_that_of_the_whole_structure_matrix():
+    for name, rank in (("thesis", 5), ("thesis_six_dof", 6)):
+        testbed = load_testbed(TESTBEDS / f"{name}.yaml").testbed
+        machine, parameters, _ = parts(testbed)
+        jacobian = geometry(parameters.cables, ASIDE, np.zeros(6)).bar
+        assert np.linalg.matrix_rank(jacobian, rtol=RANK_TOLERANCE) == rank
+        assert manipulability(machine, parameters, ASIDE).rank == rank
 
 
 def test_radius_of_gyration_of_a_slender_bar_is_its_length_over_the_root_of_twelve():

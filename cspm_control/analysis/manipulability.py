@@ -40,6 +40,7 @@ class Manipulability(NamedTuple):
     """At one pose, at rest.
 
     Attributes:
+        rank: of Jᵀ.
         measure: √det(S·Sᵀ) for moments in units of force × radius of gyration.
         condition: κ of S, thesis (6-11), and of the same scaled S.
         scaled_condition: the latter.
@@ -49,6 +50,7 @@ class Manipulability(NamedTuple):
             with tensions within their limits [m/s², rad/s²]; NaN where the bar cannot rest.
     """
 
+    rank: int
     measure: float
     condition: float
     scaled_condition: float
@@ -100,6 +102,7 @@ def manipulability(
         for i, dof in enumerate(dofs)
     }
     return Manipulability(
+        rank=len(machine.axes),
         measure=float(measures(machine, structure, radius)[0]),
         condition=float(conditions(structure)[0]),
         scaled_condition=float(conditions(_scaled(machine, structure, radius))[0]),

@@ -29,11 +29,13 @@ from bench.result_cases import (
     SWITCHED_GAINS,
     THESIS,
     TOLD_OF,
+    calm,
     changed,
     corrected,
     seeded,
     with_and_without,
 )
+from bench.result_machines import conditions_block, fastest_block
 from bench.result_measures import (
     bands,
     limit,
@@ -46,6 +48,7 @@ from bench.result_measures import (
 from bench.result_store import Measurement
 from bench.result_tables import (
     Found,
+    calm_block,
     distribution_block,
     errors_block,
     extremes_block,
@@ -80,6 +83,7 @@ def blocks_of(seeds: int) -> dict[str, Block]:
     return {
         "thesis": _tracked("thesis", THESIS, thesis_block),
         "switched": _tracked("switched", SWITCHED),
+        "fastest": Block({}, fastest_block),
         "switched_gains": _tracked("switched gains", SWITCHED_GAINS),
         "switched_calm": _tracked("switched calm", SWITCHED_CALM),
         "switched_4m": _tracked("switched 4 m", SWITCHED_4M),
@@ -102,7 +106,9 @@ def blocks_of(seeds: int) -> dict[str, Block]:
         "robust_thesis": _tracked("robust thesis", changed("worst_case")),
         "past": _past("1000 Hz", seeds),
         "past_100": _past("100 Hz", seeds),
+        "conditions": Block({}, conditions_block),
         "past_six": _past_six(seeds),
+        "past_calm": _tracked("past calm", calm(seeds), calm_block),
     }
 
 

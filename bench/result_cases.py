@@ -6,6 +6,7 @@ from collections.abc import Mapping
 from dataclasses import replace
 
 from bench.tracking import Case
+from cspm_msgs_py.dofs import Dof
 
 PAST, SIX, DEEP = "worst_case_past_thesis", "worst_case_six_dof", "worst_case_4m_past_thesis"
 CAMERA_100_HZ = (
@@ -18,6 +19,8 @@ PAST_ON_CALM = (
     "control={mode: closed_loop, motion: {law: computed_wrench, governor: {}},"
     " tension_distribution: {method: analytic_centre, lower_limit: 0.3}}"
 )
+# The calm sea is to be followed ten times as closely.
+TENTH = ("duration=200", PAST_ON_CALM, "requirement={position: 0.0002, angle: 0.0004}")
 FOUR_METRES = "target.mean_pose=[0.0, 0.0, 4.0, 0.0, 0.0, 0.0]"
 CENTRE = ("control.mode=closed_loop", "control.tension_distribution.method=analytic_centre")
 ONE_NEWTON = "control.tension_distribution.lower_limit=1.0"
@@ -39,10 +42,11 @@ HALF_WAVES = (
     "target.motion.amplitudes=[0.055, 0.043, 0.159, 0.0135, 0.108, 0.053]",
     "winch_frame.motion.amplitudes=[0.0094, 0.0044, 0.0124, 0.0034, 0.0033, 0.0017]",
 )
-# The fastest loops that the thesis's margins allow; its gains are lost.
+# About the fastest loops that the thesis's margins allow [rad/s]; its gains are lost.
+FASTEST_CROSSOVER: dict[Dof, int] = {"surge": 32, "sway": 18, "heave": 40, "pitch": 40, "yaw": 18}
 FASTEST = (
     "control.mode=closed_loop",
-    "control.motion.crossover={surge: 32, sway: 18, heave: 40, pitch: 40, yaw: 18}",
+    f"control.motion.crossover={{{', '.join(f'{d}: {w}' for d, w in FASTEST_CROSSOVER.items())}}}",
 )
 # As the fastest, but sway at 36 rad/s, with a gain margin of 3.1 instead of 6 dB.
 FASTER_SWAY = (
@@ -211,10 +215,13 @@ LIMITED = {
     "calm": Case("calm", ("duration=200",)),
     BLOWN: Case(PAST, (ROBUST, KNOWN_WIND)),
 }
+ROUGHEST = "worst case, all six coordinates, seed 9"
 # Cases and the lower limits of tension [N] for which the least error is asked.
 POSSIBLE: dict[str, tuple[Case, float]] = {
     "worst case": (LIMITED["worst case"], 0.0),
     "worst case, all six coordinates": (LIMITED["worst case, all six coordinates"], 0.0),
+    ROUGHEST: (Case(SIX, ("seed=9",)), 0.0),
+    f"{ROUGHEST}, tensions from 0.7 N on": (Case(SIX, ("seed=9",)), 0.7),
     "worst case, 4 m": (LIMITED["worst case, 4 m"], 0.0),
     "worst case, 4 m, tensions from 0.5 N on": (LIMITED["worst case, 4 m"], 0.5),
     "worst case, 4 m, tensions from 0.6 N on": (LIMITED["worst case, 4 m"], 0.6),
@@ -320,6 +327,15 @@ def seeded(seeds: int, profile: tuple[str, ...], scenario: str = PAST) -> dict[s
     """Return a worst case with each of so many seeds and one motion capture."""
     return {
         f"seed {seed}": Case(scenario, (f"seed={seed}", *profile)) for seed in range(1, seeds + 1)
+    }
+
+
+def calm(seeds: int) -> dict[str, Case]:
+    """Return the calm sea past the thesis, with each motion capture and of so many seeds."""
+    return {
+        f"{profile}, {name}": case
+        for profile, rates in PROFILES.items()
+        for name, case in seeded(seeds, (*TENTH, *rates), "calm").items()
     }
 
 

@@ -38,6 +38,8 @@ def draw_comparison(path: Path, found: Mapping[str, Mapping[str, Any]]) -> None:
                 axes[row][column].axhline(side, color="black", linestyle="--", linewidth=0.8)
             # Linear within the requirement, so that both controllers can be seen.
             axes[row][column].set_yscale("symlog", linthresh=limit)
+            ticks = [-100.0, -10.0, -limit, 0.0, limit, 10.0, 100.0]
+            axes[row][column].set_yticks(ticks, [f"{tick:g}" for tick in ticks])
             axes[row][column].legend(loc="upper right", ncols=3, fontsize="small")
         axes[2][column].plot(each["times"], each["least"], linewidth=0.8)
         axes[0][column].set_title(name)

@@ -158,6 +158,35 @@ def _seeds_block(found: Found, angles_said: str, angles: slice) -> str:
     return f"{markdown_table(heads, rows)}\n\n{said}"
 
 
+def calm_block(found: Found) -> str:
+    """Return a row per motion capture with the worst of all seeds of the calm sea, and the reach.
+
+    Names are of motion capture and seed, with a comma between.
+    """
+    heads = ["motion capture", "seeds", "RMS surge, sway, heave [mm]", "pitch, yaw [mrad]"]
+    heads += ["largest surge, sway, heave [mm]", "pitch, yaw [mrad]"]
+    heads += ["within ± 0.2 mm, ± 0.4 mrad", "least tension [N]", "any slack", "ended early"]
+    rows = []
+    for profile in dict.fromkeys(name.partition(", ")[0] for name in found):
+        runs = [each for name, each in found.items() if name.partition(", ")[0] == profile]
+        rms, largest = (
+            1e3 * np.max([each[kind] for each in runs], axis=0) for kind in ("rms", "largest")
+        )
+        rows.append(
+            [
+                profile,
+                str(len(runs)),
+                *(_listed(part) for each in (rms, largest) for part in (each[:3], each[4:])),
+                f"{min(each['within'] for each in runs):.2%}",
+                f"{min(each['tensions'][0] for each in runs):.2f}",
+                f"{max(each['slack'] for each in runs):.3%}",
+                str(sum(bool(each["failure"]) for each in runs)),
+            ]
+        )
+    rows.append(["to reach", "", "≤ 0.2 each", "≤ 0.4 each", "", "", "≥ 99%", "> 0", "0%", "0"])
+    return markdown_table(heads, rows)
+
+
 def _listed(values: Sequence[float]) -> str:
     return ", ".join(f"{value:.2f}" for value in values)
 

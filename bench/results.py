@@ -62,7 +62,8 @@ def main() -> int:
     if PICTURES in chosen:
         _draw(_found(store, pictured()))
     if MACHINE in chosen:
-        every = {each.name: each for source in sources.values() for each in source.values()}
+        everything = (each for source in sources.values() for each in source.values())
+        every = {one.name: one for each in everything for one in (*each.needs, each)}
         into_page(
             PAGE,
             f"results: {MACHINE}",

@@ -10,7 +10,7 @@ from run_samples import bundle_of
 
 from bench.feasibility import least_errors, least_tensions
 from bench.page import into_page
-from bench.result_blocks import blocks_of
+from bench.result_blocks import Block, blocks_of, pictured
 from bench.result_cases import (
     AT_FOUR_METRES,
     BEYOND,
@@ -26,21 +26,30 @@ from bench.result_cases import (
     SWITCHED_GAINS,
     THESIS,
     TOLD_OF,
+    calm,
     changed,
     corrected,
     seeded,
 )
+from bench.result_machines import fastest_crossover
 from bench.result_measures import tracking
 from bench.result_store import Measurement, Store, spoken
-from bench.result_tables import distribution_block, extremes_block, tracking_block
+from bench.result_tables import (
+    calm_block,
+    distribution_block,
+    extremes_block,
+    tracking_block,
+)
 from bench.result_work import work_off
 from bench.results import PAGE, main
 from bench.tension_distribution import drawn_wrenches, score
 from bench.tracking import Case, follow, track
 from cspm_bringup.run import run
+from cspm_control.design import design_motion_gains
 from cspm_ident.markdown import markdown_table
 from cspm_msgs_py.errors import InputError
 from cspm_msgs_py.scenario import TensionDistribution
+from cspm_sim.parameters import nominal_parameters
 
 pytestmark = pytest.mark.compiled
 
@@ -208,6 +217,10 @@ def test_one_block_is_renewed_alone(tmp_path, monkeypatch, capsys):
     assert main() == 0
     renewed, kept = page.read_text().split("<!-- end -->\n")[:2]
     assert "; 3 seeds. 0 of " in renewed
+    sources = [*blocks_of(3).values(), Block(pictured(), str)]
+    every = [each for block in sources for each in block.measurements.values()]
+    names = {one.name for each in every for one in (each, *each.needs)}
+    assert f" of {len(names)} measurements" in renewed
     assert renewed.endswith("they took 0.0 h of one processor.\n")
     assert kept == "<!-- results: past -->\nold\n"
     monkeypatch.setattr(sys, "argv", ["results", "--only", "machines"])
@@ -234,6 +247,41 @@ def test_what_the_default_distribution_reaches_is_told_beside_the_table():
         "The default, `analytic_centre`: 100 % of the feasible set (to reach: 100 %), residual"
         " 5e-7 of the demand (≤ 1e-6), p99 78 µs (< 100 µs)."
     )
+
+
+def test_a_row_of_the_calm_sea_is_the_worst_of_its_seeds():
+    worst = {
+        "rms": [1e-4, 2e-4, 3e-4, 0.9, 4e-4, 5e-4],
+        "largest": [1e-3, 2e-3, 3e-3, 0.9, 4e-3, 5e-3],
+        "within": 0.98,
+        "tensions": [1.5, 9.0],
+        "slack": 0.01,
+        "failure": "",
+    }
+    better = worst | {"rms": [0.0] * 6, "within": 1.0, "tensions": [2.0, 9.0], "slack": 0.0}
+    runs = {"1000 Hz, seed 1": better, "1000 Hz, seed 2": worst, "100 Hz, seed 1": better}
+    _, _, fast, slow, _ = calm_block(runs).splitlines()
+    assert fast == (
+        "| 1000 Hz | 2 | 0.10, 0.20, 0.30 | 0.40, 0.50 | 1.00, 2.00, 3.00 | 4.00, 5.00 | 98.00%"
+        " | 1.50 | 1.000% | 0 |"
+    )
+    assert slow.startswith("| 100 Hz | 1 | 0.00, 0.00, 0.00 | 0.00, 0.00 | 1.00,")
+
+
+def test_the_calm_sea_is_asked_to_be_followed_ten_times_as_closely():
+    usual, tenth = Case("calm").bundle().scenario, calm(1)["100 Hz, seed 1"].bundle().scenario
+    assert tenth.requirement.position == pytest.approx(usual.requirement.position / 10)
+    assert tenth.requirement.angle == pytest.approx(usual.requirement.angle / 10)
+    assert tenth.rates.motion_capture == 100
+
+
+def test_the_fastest_loop_can_be_designed_and_a_faster_one_cannot():
+    testbed, pose = Case(PAST).bundle().testbed.testbed, (0.0, 0.0, 2.0, 0.0, 0.0, 0.0)
+    fastest = fastest_crossover(testbed, pose, "yaw")
+    parameters = nominal_parameters(testbed)
+    assert design_motion_gains(testbed, parameters, pose, {"yaw": fastest})
+    with pytest.raises(InputError, match=r"yaw at \d+ rad/s has a gain margin"):
+        design_motion_gains(testbed, parameters, pose, {"yaw": fastest + 1})
 
 
 def test_a_table_goes_between_its_own_marks_alone(tmp_path):

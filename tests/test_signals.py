@@ -52,6 +52,14 @@ def test_smoothing_knows_nothing_of_holes():
     assert np.isfinite(found.at(np.array([4.0, 9.0]))).all()
 
 
+def test_what_stands_still_has_no_speed_at_all():
+    """A rounding error would have a sign, and with it dry friction."""
+    still = smooth(Samples(TIMES, np.full((len(TIMES), 2), [512.3, -0.1])))
+    assert not still.at(TIMES[:-1] + 3e-4, 1).any()
+    assert not still.at(TIMES, 2).any()
+    np.testing.assert_array_equal(still.at(TIMES[:5]), np.full((5, 2), [512.3, -0.1]))
+
+
 def test_fewer_knots_do_not_show():
     """At the band's edge, where a spline has the fewest knots per period."""
     found = smooth(Samples(TIMES, wave(4.0)), band=5.0)

@@ -38,22 +38,25 @@ class Smooth:
 
     Attributes:
         spans: beginning and end of each piece [s], shape (m, 2).
-        pieces: cubic splines of the smoothed values.
+        pieces: cubic splines of the smoothed values, less their first.
+        firsts: of each piece, shape (m, width).
         band: what was kept [Hz]; infinite where nothing was smoothed.
     """
 
     spans: Array
     pieces: tuple[BSpline, ...]
+    firsts: Array
     band: float
 
     def at(self, times: Array, derivative: int = 0) -> Array:
         """Return the values at `times` (k,) [s], or a time derivative; NaN in holes. (k, width)."""
         width = self.pieces[0].c.shape[1]
         out = np.full((len(times), width), np.nan)
-        for (start, end), piece in zip(self.spans, self.pieces, strict=True):
+        for (start, end), piece, first in zip(self.spans, self.pieces, self.firsts, strict=True):
             inside = (times >= start) & (times <= end)
             if inside.any():
                 out[inside] = piece(times[inside], derivative)
+                out[inside] += first if derivative == 0 else 0.0
         return out
 
 
@@ -61,7 +64,7 @@ def smooth(samples: Samples, band: float | None = None) -> Smooth:
     """Return the samples without what lies above `band` [Hz]; absent: see `band_of`."""
     values, kept = filtered(samples, band)
     skip = max(1, int(samples.rate / (_KNOTS * kept)))
-    spans, pieces = [], []
+    spans, pieces, firsts = [], [], []
     for span, (times, _) in zip(samples.spans, samples.clocks, strict=True):
         if len(times) < 4 * skip:
             continue
@@ -69,9 +72,12 @@ def smooth(samples: Samples, band: float | None = None) -> Smooth:
         if knots[-1] != len(times) - 1:
             knots = np.append(knots, len(times) - 1)
         spans.append((times[0], times[-1]))
-        # Basis splines: polynomials of each piece are four times the memory.
-        pieces.append(make_interp_spline(times[knots], values[span][knots]))
-    return Smooth(np.array(spans).reshape(len(spans), 2), tuple(pieces), kept)
+        firsts.append(values[span][0])
+        # Basis splines: polynomials of each piece are four times the memory. Less the first value,
+        # so that what stands still has no speed, not even one of rounding.
+        pieces.append(make_interp_spline(times[knots], values[span][knots] - firsts[-1]))
+    begun = np.array(firsts).reshape(len(firsts), values.shape[1])
+    return Smooth(np.array(spans).reshape(len(spans), 2), tuple(pieces), begun, kept)
 
 
 def filtered(samples: Samples, band: float | None = None) -> tuple[Array, float]:

@@ -143,6 +143,20 @@ def test_creep_after_a_step_is_the_standard_solid(shortened):
         assert plant.tensions[0] == pytest.approx(k * (stretch - crept), rel=1e-6)
 
 
+@pytest.mark.parametrize("speed", [2.0, -2.0])
+def test_wound_cable_takes_its_creep_with_it(speed):
+    """With a time constant far longer than the run, creep per unstretched length stays."""
+    machine = line([entry("cable_creep", compliance=2e-3, time_constant=1e5)])
+    plant = Plant(machine, STILL, MS, tensions=[20.0], locked=True)
+    strain = plant.state[-1] / plant.unstretched_lengths[0]
+    begin = plant.unstretched_lengths[0]
+    plant.speeds[:] = speed
+    for _ in range(500):
+        plant.step(np.zeros(1))
+    assert abs(plant.unstretched_lengths[0] - begin) > 0.02
+    assert plant.state[-1] / plant.unstretched_lengths[0] == pytest.approx(strain, rel=1e-4)
+
+
 @pytest.mark.compiled
 @pytest.mark.parametrize("period", [0.25, 2.0])
 def test_a_hysteresis_loop_has_the_area_of_dahls_at_any_rate(period):
@@ -362,6 +376,7 @@ def signals_of_cable(lengths, tensions, plant, angles=None):
     row[:, CableSignal.LENGTH], row[:, CableSignal.TENSION] = lengths, tensions
     row[:, CableSignal.ELONGATION] = lengths - plant.unstretched_lengths[0]
     row[:, CableSignal.STIFFNESS] = stiffness_of(machine, plant.unstretched_lengths[0])
+    row[:, CableSignal.WOUND] = plant.unstretched_lengths[0] / lengths
     return row
 
 

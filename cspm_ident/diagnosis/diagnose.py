@@ -144,7 +144,6 @@ def diagnose(
     search_parts, judge_parts = _found_only(search_parts, found), _found_only(judge_parts, found)
     kept, rejected = _confirmed(search, judge, found) if safeguards.held_out else (found.named, ())
     starts = [span_of(part)[0] for part in judge_parts]
-    judges = held_out or [m.within(s, np.inf) for m, s in zip(searched, starts, strict=True)]
     retuned = search.retuned()
     searched_part: Cut = whole_part if held_out else first_part
     progress("parameters, and simulation of held-out data")
@@ -169,7 +168,9 @@ def diagnose(
         rejected,
         tuple(each for each in kept if _is_negligible(each, values)),
         model.weights,
-        judged(judges, retuned, values, noise, free_functions(evidence, judge)),
+        judged(
+            held_out or searched, starts, retuned, values, noise, free_functions(evidence, judge)
+        ),
         model.simulated,
         tuple(model.worth[k] for k in told),
         _shapes(search, kept, knots, [each[0] for each in unknown]),

@@ -13,6 +13,7 @@ from cspm_ident.diagnosis.drivers import Driver
 from cspm_ident.diagnosis.equation import Equation, difference_noise, in_noise
 from cspm_ident.diagnosis.evidence import Evidence
 from cspm_ident.diagnosis.recorded import equations_of
+from cspm_ident.diagnosis.simulation import LEAD_S
 from cspm_ident.diagnosis.supposed import as_found
 from cspm_ident.signals.measurement import Measurement
 
@@ -47,6 +48,7 @@ class HeldOut:
 
 def judged(
     measurements: Sequence[Measurement],
+    starts: Sequence[float],
     retuned: Mapping[Candidate, Array],
     found: Mapping[Candidate, Array],
     noise: Mapping[Place, Array],
@@ -55,15 +57,18 @@ def judged(
     """Return every residual of recordings as described, re-tuned and with what was found.
 
     Args:
-        measurements: not searched.
+        measurements: what is before the start, as far as there is any, lets memories such as creep
+            become what they were.
+        starts: from when on none of them was searched [s].
         retuned: weights of the file's own parameters.
         found: weights of what was found.
         noise: of each residual, its unit.
         free: what free functions leave, root mean square in units of the noise.
     """
-    described = _residuals(measurements, {}, noise)
-    tuned = _residuals(measurements, retuned, noise) if retuned else described
-    after = _residuals(measurements, found, noise) if found else described
+    parts = list(zip(measurements, starts, strict=True))
+    described = _residuals(parts, {}, noise)
+    tuned = _residuals(parts, retuned, noise) if retuned else described
+    after = _residuals(parts, found, noise) if found else described
     out = []
     for place, equations in described.items():
         unit = float(noise[place][0]) if len(noise[place]) == 1 else 1.0
@@ -123,11 +128,18 @@ def without_nuisance(equation: Equation) -> Array:
 
 
 def _residuals(
-    measurements: Sequence[Measurement],
+    measurements: Sequence[tuple[Measurement, float]],
     weights: Mapping[Candidate, Array],
     noise: Mapping[Place, Array],
 ) -> dict[Place, list[Equation]]:
-    parts = [equations_of(as_found(m, weights), ()) for m in measurements]
+    """Return the residuals of recordings from some instant each on."""
+    parts = [
+        [
+            equation.within(start, np.inf)
+            for equation in equations_of(as_found(m.within(start - LEAD_S, np.inf), weights), ())
+        ]
+        for m, start in measurements
+    ]
     found: dict[Place, list[Equation]] = {}
     for part in in_noise(parts, noise):
         for equation in part:

@@ -14,7 +14,15 @@ from cspm_sim.effects.effect import (
     Regression,
 )
 from cspm_sim.effects.signals import CableSignal
-from cspm_sim.kernels.affected_cables import ELASTIC_TENSION, ELONGATION_ADDED
+from cspm_sim.kernels.affected_cables import (
+    ELASTIC_TENSION,
+    ELONGATION_ADDED,
+    MOTOR_SPEED,
+    RADIUS_ADDED,
+    SPAN_LENGTH,
+    TURN_ADDED,
+    WOUND_RADIUS,
+)
 from cspm_sim.kernels.memory import relaxed
 
 
@@ -23,7 +31,11 @@ def _stretch(parameters: Array, signals: Array, states: Array, rates: Array) -> 
 
 
 def _creep(parameters: Array, signals: Array, states: Array, rates: Array) -> None:
-    rates[0] = (parameters[0] * signals[ELASTIC_TENSION] - states[0]) / parameters[1]
+    # Cable that is wound takes its creep with it, and brings it when it is let out.
+    radius = signals[WOUND_RADIUS] + signals[RADIUS_ADDED]
+    wound = radius * (signals[MOTOR_SPEED] + signals[TURN_ADDED]) / signals[SPAN_LENGTH]
+    goal = parameters[0] * signals[ELASTIC_TENSION]
+    rates[0] = (goal - states[0]) / parameters[1] - wound * states[0]
 
 
 def _rest(parameters: Array, signals: Array) -> Sequence[float]:
@@ -31,16 +43,20 @@ def _rest(parameters: Array, signals: Array) -> Sequence[float]:
 
 
 def _columns(signals: Array, time_constant: float) -> Array:
-    """Return what creep adds that was at rest under the first sample's tension."""
+    """Return what creep adds that was at rest under the first sample's tension.
+
+    Per unstretched length creep follows the tension per unstretched length, whatever is wound.
+    """
     time = signals[:, CableSignal.TIME]
-    tension = signals[:, CableSignal.TENSION] - signals[:, CableSignal.DAMPER]
-    means = tension[:, None].copy()
-    means[1:, 0] = 0.5 * (tension[1:] + tension[:-1])
+    lengths = signals[:, CableSignal.WOUND] * signals[:, CableSignal.LENGTH]
+    pull = (signals[:, CableSignal.TENSION] - signals[:, CableSignal.DAMPER]) / lengths
+    means = pull[:, None].copy()
+    means[1:, 0] = 0.5 * (pull[1:] + pull[:-1])
     kept = np.exp(-np.diff(time, prepend=time[0]) / time_constant)[:, None]
     crept = means.copy()
     relaxed(means, kept, crept)
-    crept = crept[:, 0]
-    return np.asarray((-signals[:, CableSignal.STIFFNESS] * (crept - crept[0]))[:, None, None])
+    grown = lengths * (crept[:, 0] - crept[0, 0])
+    return np.asarray((-signals[:, CableSignal.STIFFNESS] * grown)[:, None, None])
 
 
 EFFECT = Effect(
@@ -55,7 +71,7 @@ EFFECT = Effect(
     rest=_rest,
     regression=Regression(Channel.TENSION, _columns),
     nonlinear={"time_constant": (0.1, 0.3, 1.0, 3.0, 10.0, 30.0, 100.0, 300.0)},
-    equation="t = law(ε − e), time_constant·de/dt = compliance·t − e, t without damping",
+    equation="t = law(ε − e), ė = (compliance·t − e)/time_constant + e·l̇0/l0, t undamped",
     shows="tension at fixed length falls slowly after a load step, and recovers after unloading",
     twins=("cable_hysteresis", "cable_stiffness"),
     separating_experiment="hold for several time constants after a step of load up, then down",

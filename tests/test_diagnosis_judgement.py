@@ -1,0 +1,63 @@
+"""Residuals on what was not searched: from its beginning on, with the memory of what was before."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from run_samples import bundle_of
+
+from cspm_bringup.run import run
+from cspm_ident.diagnosis import judgement
+from cspm_ident.diagnosis.columns import Candidate, Place
+from cspm_ident.diagnosis.diagnose import noise_of
+from cspm_ident.diagnosis.equation import steady
+from cspm_ident.diagnosis.judgement import judged
+from cspm_ident.diagnosis.recorded import equations_of
+from cspm_ident.signals.measurement import read_measurement
+from cspm_msgs_py.testbed import parse_testbed
+from cspm_sim.effects import Channel, catalogue
+
+TRUE = np.array([2e-3])
+CREPT, SOUND = Place(Channel.TENSION, "sway_2"), Place(Channel.TENSION, "sway_3")
+CREEP = """  - effect: cable_creep
+    elements: [sway_2]
+    parameters: {compliance: 2.0e-3, time_constant: 3.0}
+"""
+CREEPING = Candidate(catalogue()["cable_creep"], "sway_2", (("time_constant", 3.0),))
+START_S = 12.0
+
+
+@pytest.fixture(scope="module")
+def crept(tmp_path_factory):
+    """Sixteen seconds of the calm sea with a cable that creeps; the file knows nothing of it."""
+    folder = tmp_path_factory.mktemp("judgement") / "bag"
+    bundle = bundle_of("calm", "duration=16")
+    testbed = parse_testbed(bundle.testbed.text + CREEP, "creeping")
+    assert not run(replace(bundle, testbed=testbed), folder).failure
+    return read_measurement(folder).with_testbed(bundle.testbed)
+
+
+def fits(measurement, start=START_S):
+    noise = noise_of(steady([equations_of(measurement, ())]))
+    found = judged([measurement], [start], {}, {CREEPING: TRUE}, noise, {})
+    return {each.place: each for each in found}
+
+
+def test_what_a_cable_remembers_at_the_start_is_what_it_was(crept, monkeypatch):
+    fit = fits(crept)[CREPT]
+    sound = fits(crept)[SOUND]
+    assert fit.before > 5.0 * sound.before
+    assert fit.after < 1.5 * sound.after
+    # Were it at rest there, the right physics would leave far more.
+    monkeypatch.setattr(judgement, "LEAD_S", 0.0)
+    assert fits(crept)[CREPT].after > 2.0 * fit.after
+
+
+def test_only_what_was_not_searched_counts(crept):
+    """What is before the start is for memories alone."""
+    late = fits(crept)[CREPT]
+    alone = fits(crept.within(START_S, np.inf))[CREPT]
+    assert late.before == pytest.approx(alone.before, rel=0.02)
+    assert late.measured == pytest.approx(alone.measured, rel=0.01)
+    # The sea begins with a ramp, so that all of it moves less than its end.
+    assert fits(crept, 0.0)[CREPT].measured < 0.9 * late.measured

@@ -257,6 +257,8 @@ def test_a_scorecard_counts():
         "driver": (0, 0),
         "false_unknown": (0, 6),
         "failed": (1, 7),
+        "region_told": (0, 1),
+        "region": (0, 0),
     }
     assert [(r["multiple"], r["detected"][:2]) for r in found["by_multiple"]] == [
         (0.5, (0, 1)),
@@ -328,6 +330,39 @@ def test_onsets_are_counted_late_and_false():
     assert onsets["right"][:2] == (2, 4)
 
 
+def test_regions_of_what_was_named_are_counted_and_what_tells_nothing_apart():
+    said = {
+        "a": {"driver": "speed [rad/s]", "low": -1.0, "high": 2.0},
+        "b": {"driver": "time [s]", "low": 3.0, "high": 9.0},
+        "c": {},
+    }
+    truth = {"asked": {}, "items": [item(name, concealed()) for name in said]}
+    results = {
+        name: result("effect", finding(FRICTION) | {"region": region}, finding("tension_gain"))
+        for name, region in said.items()
+    }
+    found = scorecard(truth, results)
+    assert [o["regions"] for o in found["outcomes"]] == [(True,), (False,), (None,)]
+    assert found["shares"]["region_told"][:2] == (2, 3)
+    assert found["shares"]["region"][:2] == (1, 2)
+    (row,) = found["by_stratum"]
+    assert row["region"][:2] == (1, 2)
+    page = card() | {key: found[key] for key in ("shares", "by_stratum")}
+    text = scorecard_page(page, "ab" * 32, "today")
+    assert "where one was told | 50 % (1 of 2; 1 to 99); nothing told of 1 |" in text
+    assert "| noise | 3 | 3 | 3 | 3 | 3 | 3 | 1 of 2 | 3 | 0 |" in text
+
+
+def test_the_region_of_something_unknown_counts_and_is_no_beginning():
+    hidden = item("a", concealed(effect=None, kind="unknown") | {"phenomenon": "eddy currents"})
+    said = finding("unknown", probability=None) | {"region": {"driver": "speed [rad/s]"}}
+    outcome = judged(hidden, result("unknown", said))
+    assert outcome.regions == (True,)
+    assert outcome.beginnings == ()
+    elsewhere = said | {"elements": ["sway_1"]}
+    assert judged(hidden, result("unknown", elsewhere)).regions == ()
+
+
 def test_the_signal_of_the_unknown_has_to_be_the_right_one_on_the_right_element():
     hidden = item("a", concealed(effect=None, kind="unknown") | {"driver": "speed"})
 
@@ -358,5 +393,5 @@ def test_methods_are_compared_on_the_recordings_that_all_have():
     assert (rows[0]["before"], rows[0]["after"]) == pytest.approx((1.0, 1.2))
     text = scorecard_page(card() | {"peers": rows}, "ab" * 32, "today")
     assert "2 recordings, the same for all" in text
-    assert "| lasso | 1 of 1 | 1 of 1 | 0 of 1 | 0 of 1 |" in text
+    assert "| lasso | 1 of 1 | 1 of 1 | — | 0 of 1 | 0 of 1 |" in text
     assert "## Without one safeguard" not in text

@@ -6,11 +6,13 @@ import numpy as np
 import pytest
 
 pytest.importorskip("mujoco", minversion="4.0", reason="the MuJoCo plant needs MuJoCo 4")
+from cspm_ident.blind.operating_region import ACTS, LOOSENING, VIBRATION
 from cspm_msgs_py.testbed import load_testbed
 from cspm_mujoco.influence import Acting, Scene
 from cspm_reality import air, alterations, faults, friction, payload, rope, shaft
 from cspm_reality.detection_limit import likeness
 from cspm_reality.late import Late, LateFault
+from cspm_reality.phenomena import LOOSENING_ONSET, PHENOMENA
 
 MS = 1e-3
 TESTBEDS = Path(__file__).resolve().parents[1] / "scenarios/testbeds"
@@ -256,3 +258,47 @@ def test_a_straight_line_is_fitted_where_the_motion_is(one_winch):
     thinned = speeds / (1.0 + abs(speeds) / 20.0) ** 0.1
     found = likeness("grease", [scene(speed=speed) for speed in speeds], one_winch)
     assert found == pytest.approx([thinned @ speeds / (speeds @ speeds)])
+
+
+def on_a_shaft(name, machine, **state):
+    """What a phenomenon adds in the end to a winch's torque [N·m] at steady speed and tension."""
+    now = scene(torque=0.025 * state["tension"], **state)
+    influence = PHENOMENA[name].influence(np.array([0.01]), machine, np.random.default_rng(1))
+    for _ in range(20_000):
+        influence.advance(now, MS)
+    acting = acted(influence, now)
+    return float((acting.torque - acting.radius * state["tension"])[0])
+
+
+@pytest.mark.parametrize(
+    "name",
+    [
+        *("bristles", "breakaway", "loaded bristles", "grease", "cogging", "drive zero"),
+        *("drive scale", "runout", "eddy currents", "capstan"),
+    ],
+)
+def test_what_counts_as_its_operating_region_is_what_a_shaft_feels_it_by(name, one_winch):
+    usual, others = (
+        dict(angle=0.3, speed=1.0, tension=5.0),
+        dict(angle=0.9, speed=-1.0, tension=8.0),
+    )
+    before = on_a_shaft(name, one_winch, **usual)
+    after = {s: on_a_shaft(name, one_winch, **usual | {s: other}) for s, other in others.items()}
+    changed = {s for s, torque in after.items() if torque != pytest.approx(before, rel=1e-6)}
+    assert changed == {acts.signal for acts in ACTS[name]} & set(usual)
+    # What goes by speed resists in both directions.
+    assert (after["speed"] * before < 0.0) == ("speed" in changed)
+
+
+def test_operating_regions_are_known_of_all():
+    assert set(ACTS) == set(PHENOMENA)
+    assert LOOSENING == LOOSENING_ONSET
+    outside = {name: each.driver for name, each in PHENOMENA.items() if each.driver}
+    assert {name: ACTS[name][0].signal for name in outside} == outside
+
+
+def test_the_vibration_has_the_frequency_that_counts_as_right():
+    vibration = air.OutsideVibration(1.0)
+    forces = [acted(vibration, scene(time=t)).wrench[1] for t in np.arange(0.0, 30.0, 0.01)]
+    strongest = np.argmax(np.abs(np.fft.rfft(forces)))
+    assert np.fft.rfftfreq(len(forces), 0.01)[strongest] == pytest.approx(VIBRATION)

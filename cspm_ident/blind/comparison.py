@@ -12,7 +12,7 @@ from cspm_ident.blind.scorecard import CLEAR, scorecard
 Data = Mapping[str, Any]
 
 _SHARES = (
-    *("block", "element", "first", "tied", "nothing_wrong_beside"),
+    *("block", "element", "region", "first", "tied", "nothing_wrong_beside"),
     *("false_alarm", "unknown_recognised", "failed"),
 )
 

@@ -7,6 +7,7 @@ from dataclasses import dataclass
 from typing import Any
 
 from cspm_ident.blind.floor import Floors
+from cspm_ident.blind.operating_region import region_right
 from cspm_sim.effects import Channel, catalogue
 
 NOTHING, PARAMETER, EFFECT, OUTSIDE = "nothing", "parameter", "effect", "outside"
@@ -79,6 +80,8 @@ class Outcome:
         driver: whether what the catalogue lacks was said to be a function of the right signal, on
             its elements; None where none is right, or nothing unknown was reported.
         beginnings: of what was named.
+        regions: of what was named, unknown or not, whether all that was told of where in the
+            machine's range it acts is so; None: nothing was told of that.
         estimates: of the parameters named.
         probabilities: of the findings named, with whether they are right.
         fit: held-out errors in units of the noise floor: before, re-tuned, after, of the concealed
@@ -105,6 +108,7 @@ class Outcome:
     unknown: bool
     driver: bool | None
     beginnings: tuple[Beginning, ...]
+    regions: tuple[bool | None, ...]
     estimates: tuple[Estimate, ...]
     probabilities: tuple[tuple[float, bool], ...]
     fit: tuple[float, float, float] | None
@@ -149,6 +153,12 @@ def judge(item: Data, result: Data, floors: Floors) -> Outcome:
         unknown=any(f["effect"] == UNKNOWN for f in findings),
         driver=_driver(concealed, findings),
         beginnings=tuple(b for c in concealed for b in _beginnings(item, c, findings)),
+        regions=tuple(
+            region_right(c["phenomenon"], _onset(item), f)
+            for c in concealed
+            for f in findings
+            if _names(f, c)
+        ),
         estimates=tuple(e for c in concealed for e in _estimates(c, findings)),
         probabilities=tuple(
             (f["probability"], f["effect"] in right)
@@ -180,8 +190,12 @@ def _same_elements(finding: Data, concealed: Data) -> bool:
 
 
 def _is_named(concealed: Data, findings: Sequence[Data]) -> bool:
-    wanted = concealed["effect"] or UNKNOWN
-    return any(f["effect"] == wanted and _same_elements(f, concealed) for f in findings)
+    return any(_names(f, concealed) for f in findings)
+
+
+def _names(finding: Data, concealed: Data) -> bool:
+    named = finding["effect"] == (concealed["effect"] or UNKNOWN)
+    return named and _same_elements(finding, concealed)
 
 
 def _driver(concealed: Sequence[Data], findings: Sequence[Data]) -> bool | None:
@@ -198,13 +212,17 @@ def _driver(concealed: Sequence[Data], findings: Sequence[Data]) -> bool | None:
 
 def _beginnings(item: Data, concealed: Data, findings: Sequence[Data]) -> list[Beginning]:
     """Return when a concealed effect was said to begin, where it was named."""
-    true, found = float(item.get("onset_s", 0.0)), []
+    true, found = _onset(item), []
     for finding in findings:
-        if finding["effect"] == concealed["effect"] and _same_elements(finding, concealed):
+        if concealed["effect"] and _names(finding, concealed):
             told, interval = finding.get("onset_s"), finding.get("onset_ci95_s")
             held = None if interval is None else interval[0] <= true <= interval[1]
             found.append(Beginning(true, told, held))
     return found
+
+
+def _onset(item: Data) -> float:
+    return float(item.get("onset_s", 0.0))
 
 
 def _estimates(concealed: Data, findings: Sequence[Data]) -> list[Estimate]:

@@ -120,6 +120,7 @@ def _targets(card: Data) -> str:
     rows.append(("one-sided upper bound of alarms", upper, "≤ 6 %"))
     rows.append(("mean size of the ties", _number(card["shares"]["mean_tie_size"]), "≤ 1.5"))
     rows.append(("beginning right, of what was named", _percent(card["onsets"]["right"]), ""))
+    rows.append(("operating region right, where one was told", _region(card["shares"]), ""))
     covered = _percent(card["parameters"]["covered"])
     rows.append(("intervals that hold the truth", covered, "90 to 97 %"))
     fit = card["fit"]
@@ -132,7 +133,7 @@ def _methods(title: str, words: str, rows: Sequence[Data]) -> list[str]:
     if not rows:
         return []
     heads = (
-        *("method", "block", "element", "named first", "among the ties", "ties"),
+        *("method", "block", "element", "region", "named first", "among the ties", "ties"),
         *(
             "named, nothing wrong beside",
             "alarm",
@@ -148,7 +149,7 @@ def _methods(title: str, words: str, rows: Sequence[Data]) -> list[str]:
 
 
 def _method(row: Data) -> tuple[str, ...]:
-    shares = (_short(row[key]) for key in ("block", "element", "first", "tied"))
+    shares = (_short(row[key]) for key in ("block", "element", "region", "first", "tied"))
     return (
         row["method"],
         *shares,
@@ -187,11 +188,25 @@ def _onsets(found: Data, driver: Sequence[float]) -> str:
 
 
 def _strata(rows: Sequence[Data]) -> str:
-    keys = ("cases", "detected", "block", "element", "tied", "named", "wrong", "failed")
-    heads = ("stratum", *keys[:-2], "wrong findings", "failed")
+    keys = ("cases", "detected", "block", "element", "tied", "named")
+    heads = ("stratum", *keys, "region", "wrong findings", "failed")
     return markdown_table(
-        heads, ((row["stratum"], *(str(row[key]) for key in keys)) for row in rows)
+        heads,
+        (
+            (
+                row["stratum"],
+                *(str(row[key]) for key in keys),
+                _short(row["region"]),
+                *(str(row[key]) for key in ("wrong", "failed")),
+            )
+            for row in rows
+        ),
     )
+
+
+def _region(shares: Data) -> str:
+    told, named, *_ = shares["region_told"]
+    return f"{_percent(shares['region'])}; nothing told of {named - told}"
 
 
 def _numbers(card: Data) -> str:

@@ -66,6 +66,7 @@ def _shares(outcomes: Sequence[Outcome], clear: Sequence[Outcome]) -> dict[str, 
     outside = [o for o in outcomes if o.kind == OUTSIDE]
     inside = [o for o in outcomes if o.kind != OUTSIDE]
     alarms = sum(o.detected for o in blank)
+    regions = [told for o in outcomes for told in o.regions]
     return {
         "detected": share(o.detected for o in clear),
         "block": share(o.block for o in clear),
@@ -82,6 +83,8 @@ def _shares(outcomes: Sequence[Outcome], clear: Sequence[Outcome]) -> dict[str, 
         "driver": share(o.driver for o in outside if o.driver is not None),
         "false_unknown": share(o.unknown for o in inside),
         "failed": share(o.verdict == FAILED for o in outcomes),
+        "region_told": share(told is not None for told in regions),
+        "region": share(told for told in regions if told is not None),
         "mean_tie_size": _mean([float(s) for o in clear for s in o.tie_sizes]),
     }
 
@@ -115,6 +118,7 @@ def _by_stratum(outcomes: Sequence[Outcome]) -> list[dict[str, Any]]:
                 "element": sum(o.element for o in these),
                 "tied": sum(o.tied for o in these),
                 "named": sum(o.named for o in these),
+                "region": share(told for o in these for told in o.regions if told is not None),
                 "wrong": sum(o.wrong for o in these),
                 "failed": sum(o.verdict == FAILED for o in these),
             }

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from typing import Any
 
+from cspm_ident.blind.share import share_words
 from cspm_ident.markdown import markdown_table
 
 _TARGETS = (
@@ -57,7 +58,7 @@ def scorecard_page(card: Data, sha256: str, machine: str) -> str:
                 (
                     f"{row['multiple']:g}",
                     str(row["detected"][1]),
-                    *(_percent(row[key]) for key in ("detected", "tied", "named")),
+                    *(share_words(row[key]) for key in ("detected", "tied", "named")),
                 )
                 for row in card["by_multiple"]
             ),
@@ -86,7 +87,7 @@ def scorecard_page(card: Data, sha256: str, machine: str) -> str:
                     row["effect"],
                     str(row["estimates"]),
                     f"{100 * row['median_signed_error']:+.1f} %",
-                    _percent(row["covered"]),
+                    share_words(row["covered"]),
                 )
                 for row in card["parameters"]["by_effect"]
             ),
@@ -115,17 +116,17 @@ def _about(card: Data, sha256: str, machine: str) -> str:
 
 
 def _targets(card: Data) -> str:
-    rows = [(name, _percent(card["shares"][key]), goal) for key, name, goal in _TARGETS]
+    rows = [(name, share_words(card["shares"][key]), goal) for key, name, goal in _TARGETS]
     upper = f"{100 * card['shares']['false_alarm_upper']:.0f} %"
     rows.append(("one-sided upper bound of alarms", upper, "≤ 6 %"))
     rows.append(("mean size of the ties", _number(card["shares"]["mean_tie_size"]), "≤ 1.5"))
-    rows.append(("beginning right, of what was named", _percent(card["onsets"]["right"]), ""))
+    rows.append(("beginning right, of what was named", share_words(card["onsets"]["right"]), ""))
     rows.append(("operating region right, where one was told", _region(card["shares"]), ""))
-    covered = _percent(card["parameters"]["covered"])
+    covered = share_words(card["parameters"]["covered"])
     rows.append(("intervals that hold the truth", covered, "90 to 97 %"))
     fit = card["fit"]
-    rows.append(("held-out error within 1.5 × floor", _percent(fit["near_floor"]), "all"))
-    rows.append(("held-out error below re-tuned", _percent(fit["below_retuned"]), "≥ 95 %"))
+    rows.append(("held-out error within 1.5 × floor", share_words(fit["near_floor"]), "all"))
+    rows.append(("held-out error below re-tuned", share_words(fit["below_retuned"]), "≥ 95 %"))
     return markdown_table(("", "found", "target"), rows)
 
 
@@ -179,11 +180,12 @@ _COLUMNS = (
 def _onsets(found: Data, driver: Sequence[float]) -> str:
     error = found["median_error_s"]
     return (
-        f"Of what was named and began late, a beginning was told for {_percent(found['told'])},"
-        f" with a median error of {'—' if error is None else f'{error:.1f} s'}, and its interval"
-        f" held the truth for {_percent(found['held'])}; of what was there from the start, one was"
-        f" told for {_percent(found['false'])}. Of the unknown that was recognised, the signal that"
-        f" it depends on was right, on its elements, for {_percent(driver)}."
+        "Of what was named and began late, a beginning was told for"
+        f" {share_words(found['told'])}, with a median error of"
+        f" {'—' if error is None else f'{error:.1f} s'}, and its interval held the truth for"
+        f" {share_words(found['held'])}; of what was there from the start, one was told for"
+        f" {share_words(found['false'])}. Of the unknown that was recognised, the signal that it"
+        f" depends on was right, on its elements, for {share_words(driver)}."
     )
 
 
@@ -206,7 +208,7 @@ def _strata(rows: Sequence[Data]) -> str:
 
 def _region(shares: Data) -> str:
     told, named, *_ = shares["region_told"]
-    return f"{_percent(shares['region'])}; nothing told of {named - told}"
+    return f"{share_words(shares['region'])}; nothing told of {named - told}"
 
 
 def _numbers(card: Data) -> str:
@@ -215,7 +217,7 @@ def _numbers(card: Data) -> str:
     return (
         f"{parameters['estimates']} parameters were estimated, with a median relative error of"
         f" {'—' if error is None else f'{100 * error:.1f} %'};"
-        f" {_percent(parameters['within_a_tenth'])} within a tenth. Held-out error of the worst"
+        f" {share_words(parameters['within_a_tenth'])} within a tenth. Held-out error of the worst"
         f" residual in units of a sound machine's, median of {fit['cases']} named:"
         f" {_number(fit['before'])} before, {_number(fit['retuned'])} re-tuned,"
         f" {_number(fit['after'])} after. Processor time of a diagnosis:"
@@ -225,7 +227,7 @@ def _numbers(card: Data) -> str:
 
 def _calibration(rows: Sequence[Data]) -> str:
     told = (
-        (f"{row['from']:g} to {row['to']:g}", _number(row["said"]), _percent(row["right"]))
+        (f"{row['from']:g} to {row['to']:g}", _number(row["said"]), share_words(row["right"]))
         for row in rows
     )
     return markdown_table(("probability told", "mean", "effect right"), told)
@@ -253,15 +255,6 @@ def _listed(pairs: Sequence[tuple[str, Sequence[str]]]) -> str:
         many = len(elements) > 3
         told.append(f"{effect}: {f'{len(elements)} elements' if many else ', '.join(elements)}")
     return "<br>".join(told)
-
-
-def _percent(found: Sequence[float]) -> str:
-    hits, cases, low, high = found
-    if not cases:
-        return "no cases"
-    return (
-        f"{100 * hits / cases:.0f} % ({hits:g} of {cases:g}; {100 * low:.0f} to {100 * high:.0f})"
-    )
 
 
 def _short(found: Sequence[float]) -> str:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+from collections.abc import Iterable, Sequence
 from typing import NamedTuple
 
 from scipy.stats import binomtest
@@ -38,3 +38,13 @@ def upper_bound(hits: int, cases: int) -> float:
         return 1.0
     test = binomtest(hits, cases, alternative="less")
     return float(test.proportion_ci(0.95, method="exact").high)
+
+
+def share_words(found: Sequence[float]) -> str:
+    """Return a share, as its fields or a list of them, as pages tell it."""
+    hits, cases, low, high = found
+    if not cases:
+        return "no cases"
+    return (
+        f"{100 * hits / cases:.0f} % ({hits:g} of {cases:g}; {100 * low:.0f} to {100 * high:.0f})"
+    )

@@ -393,5 +393,7 @@ def test_methods_are_compared_on_the_recordings_that_all_have():
     assert (rows[0]["before"], rows[0]["after"]) == pytest.approx((1.0, 1.2))
     text = scorecard_page(card() | {"peers": rows}, "ab" * 32, "today")
     assert "2 recordings, the same for all" in text
-    assert "| lasso | 1 of 1 | 1 of 1 | — | 0 of 1 | 0 of 1 |" in text
+    found = "1 of 1 | 1 of 1 | 1 of 1 | — | 0 of 1 | 0 of 1 | 0 of 1 | 1 of 1 | — | — | 0 of 2 |"
+    assert f"| lasso | {found} 0 of 2 | — | 100 % | 2.0 |" in text
+    assert "| lasso | — | — | — | — | 1 → 8 → 1.2 | 4 |" in text
     assert "## Without one safeguard" not in text

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from statistics import median
 from typing import Any
 
@@ -12,8 +12,8 @@ from cspm_ident.blind.scorecard import CLEAR, scorecard
 Data = Mapping[str, Any]
 
 _SHARES = (
-    *("block", "element", "region", "first", "tied", "nothing_wrong_beside"),
-    *("false_alarm", "unknown_recognised", "failed"),
+    *("detected", "block", "element", "region", "first", "tied", "nothing_wrong_beside"),
+    *("false_alarm", "parameter_called_effect", "unknown_recognised", "false_unknown", "failed"),
 )
 
 
@@ -38,12 +38,21 @@ def comparison(truth: Data, results: Mapping[str, Mapping[str, Data]]) -> list[d
                 "method": method,
                 "scored": card["scored"],
                 **{key: card["shares"][key] for key in _SHARES},
+                "false_alarm_upper": card["shares"]["false_alarm_upper"],
                 "mean_tie_size": card["shares"]["mean_tie_size"],
                 "wrong_per_recording": sum(o["wrong"] for o in outcomes) / max(1, len(outcomes)),
+                "parameter_error": card["parameters"]["median_error"],
                 "covered": card["parameters"]["covered"],
-                "before": median(f[0] for f in fits) if fits else None,
-                "after": median(f[2] for f in fits) if fits else None,
+                "near_floor": card["fit"]["near_floor"],
+                "below_retuned": card["fit"]["below_retuned"],
+                **_stages(fits),
                 "seconds": card["seconds"]["median"],
             }
         )
     return rows
+
+
+def _stages(fits: Sequence[tuple[float, float, float]]) -> dict[str, float | None]:
+    """Return the median held-out errors before, re-tuned and after."""
+    names = ("before", "retuned", "after")
+    return {name: median(f[k] for f in fits) if fits else None for k, name in enumerate(names)}

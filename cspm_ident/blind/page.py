@@ -133,47 +133,66 @@ def _targets(card: Data) -> str:
 def _methods(title: str, words: str, rows: Sequence[Data]) -> list[str]:
     if not rows:
         return []
-    heads = (
-        *("method", "block", "element", "region", "named first", "among the ties", "ties"),
-        *(
-            "named, nothing wrong beside",
-            "alarm",
-            "wrong findings",
-            "unknown",
-            "intervals",
-            "held-out",
-            "CPU s",
+    found = markdown_table(
+        ("method", *_FOUND.values(), "ties", "alarm bound", "wrong findings"),
+        (
+            (
+                row["method"],
+                *(_short(row[key]) for key in _FOUND),
+                _number(row["mean_tie_size"]),
+                f"{100 * row['false_alarm_upper']:.0f} %",
+                f"{row['wrong_per_recording']:.1f}",
+            )
+            for row in rows
         ),
     )
-    table = markdown_table(heads, (_method(row) for row in rows))
-    return [title, f"{words} {rows[0]['scored']} recordings, the same for all. {_COLUMNS}", table]
+    heads = ("parameter error", *_WORTH.values(), "held-out", "CPU s")
+    worth = markdown_table(("method", *heads), map(_worth, rows))
+    about = f"{words} {rows[0]['scored']} recordings, the same for all. {_COLUMNS}"
+    return [title, about, found, worth]
 
 
-def _method(row: Data) -> tuple[str, ...]:
-    shares = (_short(row[key]) for key in ("block", "element", "region", "first", "tied"))
+def _worth(row: Data) -> tuple[str, ...]:
+    error = row["parameter_error"]
     return (
         row["method"],
-        *shares,
-        _number(row["mean_tie_size"]),
-        _short(row["nothing_wrong_beside"]),
-        _short(row["false_alarm"]),
-        f"{row['wrong_per_recording']:.1f}",
-        _short(row["unknown_recognised"]),
-        _short(row["covered"]),
-        f"{_number(row['before'])} → {_number(row['after'])}",
+        "—" if error is None else f"{100 * error:.1f} %",
+        *(_short(row[key]) for key in _WORTH),
+        "—" if row["after"] is None else " → ".join(_number(row[key]) for key in _STAGES),
         _number(row["seconds"]),
     )
 
 
+_FOUND = {
+    "detected": "anything",
+    "block": "block",
+    "element": "element",
+    "region": "region",
+    "first": "named first",
+    "tied": "among the ties",
+    "nothing_wrong_beside": "named, nothing wrong beside",
+    "false_alarm": "alarm",
+    "parameter_called_effect": "number as effect",
+    "unknown_recognised": "unknown",
+    "false_unknown": "false unknown",
+    "failed": "failed",
+}
+_STAGES = ("before", "retuned", "after")
+_WORTH = {
+    "covered": "intervals",
+    "near_floor": "within 1.5 × floor",
+    "below_retuned": "below re-tuned",
+}
 _PEERS = (
     "Others' ways on the same residuals, see [blind.md](blind.md#peers); `retuned` is what a"
     " laboratory does today."
 )
 _ABLATIONS = "What each safeguard is worth, see [blind.md](blind.md#without-one-safeguard)."
 _COLUMNS = (
-    "Hits and cases are those of the targets; wrong findings are per recording; held-out is the"
-    " worst residual in units of a sound machine's, before and after, median of known effects and"
-    " numbers at 2 limits and more, named or not."
+    "Hits and cases are those of the targets; the bound is the one-sided one of alarms; wrong"
+    " findings are per recording; the parameter error is the median of relative ones; held-out is"
+    " the worst residual in units of a sound machine's, before, re-tuned and after, median of known"
+    " effects and numbers at 2 limits and more, named or not."
 )
 
 

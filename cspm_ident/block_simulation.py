@@ -243,8 +243,17 @@ class BlockSimulation:
             state[first + 2 * n : first + 3 * n] = line.speeds[step]
         if len(state) > first + 3 * n:
             tensions, force = self._tensions_at(step)
-            state[first + 3 * n :] = memory_at_rest(self._actions, self.parameters, tensions, force)
+            # Where poses are missing nothing depends on the lengths.
+            lengths = self._lengths_at(step) if self._is_seen(step) else np.ones(n)
+            state[first + 3 * n :] = memory_at_rest(
+                self._actions, self.parameters, tensions, lengths, force
+            )
         return state
+
+    def _is_seen(self, step: int) -> bool:
+        """Say whether the poses of bar and frame are known at a step."""
+        line = self.timeline
+        return bool(np.isfinite([line.bar_poses[step], line.frame_poses[step]]).all())
 
     def _tensions_at(self, step: int) -> tuple[Array, Array]:
         """Return tensions, (n,) [N], and their force on the winch frame, (3,); of rest if unknown.
@@ -252,8 +261,7 @@ class BlockSimulation:
         Where poses are missing there is no force.
         """
         line = self.timeline
-        pose, frame = line.bar_poses[step], line.frame_poses[step]
-        seen = bool(np.isfinite(pose).all() and np.isfinite(frame).all())
+        seen = self._is_seen(step)
         if line.smooth_tensions is not None:
             tensions = np.maximum(np.nan_to_num(line.smooth_tensions[step]), 0.0)
         elif seen and self.testbed.bar is not None:
@@ -262,7 +270,7 @@ class BlockSimulation:
             tensions = np.zeros(len(self.testbed.cables))
         if not seen or not all(cable.has_cable for cable in self.testbed.cables):
             return tensions, np.zeros(3)
-        spans = geometry(self.parameters.cables, pose, frame)
+        spans = geometry(self.parameters.cables, line.bar_poses[step], line.frame_poses[step])
         return tensions, -spans.frame[:, :3].T @ tensions
 
     def _rest_at(self, step: int) -> Equilibrium:

@@ -222,12 +222,14 @@ class Plant:
 
     def _settle(self, tensions: Array, force: Array) -> None:
         """Bring the states of effects to rest, and the cables with them to their tensions."""
-        self._memory[:] = memory_at_rest(self._actions, self.parameters, tensions, force)
-        hooks = {hook for action in self._actions for hook in action.effect.kernels}
-        if not hooks & {Hook.CABLE, Hook.FRAME}:
-            return
         lengths, loaded = self.unstretched_lengths, tensions > 0.0
+        hooks = {hook for action in self._actions for hook in action.effect.kernels}
         for _ in range(SETTLING_STEPS):
+            self._memory[:] = memory_at_rest(
+                self._actions, self.parameters, tensions, lengths, force
+            )
+            if not hooks & {Hook.CABLE, Hook.FRAME}:
+                break
             excess = self._tensions_at_rest() - tensions
             if np.abs(excess[loaded]).max(initial=0.0) <= SETTLING_TOLERANCE:
                 break

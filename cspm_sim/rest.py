@@ -61,7 +61,11 @@ def frame_shift(actions: Sequence[Action], force: Array) -> Array:
 
 
 def memory_at_rest(
-    actions: Sequence[Action], parameters: PlantParameters, tensions: Array, force: Array
+    actions: Sequence[Action],
+    parameters: PlantParameters,
+    tensions: Array,
+    lengths: Array,
+    force: Array,
 ) -> Array:
     """Return the states of all effects, in the actions' order.
 
@@ -69,6 +73,7 @@ def memory_at_rest(
         actions: of the machine.
         parameters: of the machine.
         tensions: of the cables at rest, (n,) [N].
+        lengths: unstretched, of the cables, (n,) [m].
         force: of all cables on the winch frame, (3,) [N].
     """
     found = [np.zeros(0)]
@@ -77,7 +82,7 @@ def memory_at_rest(
         if hook is Hook.FRAME:
             signals = _frame_signals(force)
         elif hook is Hook.CABLE:
-            signals = _cable_signals(tensions[i])
+            signals = _cable_signals(tensions[i], lengths[i])
         elif hook is Hook.DRIVE:
             signals = _drive_signals(tensions[i], parameters.cables[i, RADIUS])
         else:
@@ -92,9 +97,9 @@ def _frame_signals(force: Array) -> Array:
     return signals
 
 
-def _cable_signals(tension: float) -> Array:
+def _cable_signals(tension: float, length: float) -> Array:
     signals = np.zeros(cable_hooks.CABLE_SIGNALS)
-    signals[cable_hooks.ELASTIC_TENSION] = tension
+    signals[cable_hooks.ELASTIC_TENSION], signals[cable_hooks.UNSTRETCHED] = tension, length
     return signals
 
 

@@ -46,10 +46,11 @@ def test_memory_is_what_it_is_at_rest_under_the_measured_tensions(simulation):
     step = 1500
     memory = simulation.state_at(step)[12 + 3 * 8 :]
     tensions = simulation.timeline.smooth_tensions[step]
-    np.testing.assert_allclose(memory[:2], 2e-4 * tensions[:2], rtol=1e-9)
+    np.testing.assert_allclose(memory[:4:2], 2e-4 * tensions[:2], rtol=1e-9)
+    np.testing.assert_allclose(memory[1:4:2], 1.0 / simulation.state_at(step)[12:14], rtol=1e-9)
     weight = simulation.testbed.bar.mass * simulation.testbed.gravity
-    np.testing.assert_allclose(memory[2:5], [0, 0, 1e-5 * weight], atol=1e-6 * weight)
-    assert not memory[5:].any()
+    np.testing.assert_allclose(memory[4:7], [0, 0, 1e-5 * weight], atol=1e-6 * weight)
+    assert not memory[7:].any()
 
 
 def test_a_drive_that_reports_its_torque_lags_no_second_time(simulation):

@@ -23,7 +23,8 @@ from cspm_bringup.blind.make import Request, make
 from cspm_bringup.blind.truth import RECORDINGS
 from cspm_ident.diagnosis.curves import Curve
 from cspm_ident.diagnosis.diagnose import Diagnosis, diagnose
-from cspm_ident.diagnosis.statement import line_statement, statement_of, unknown_statement
+from cspm_ident.diagnosis.finding_statement import statement_of
+from cspm_ident.diagnosis.statement import line_statement, unknown_statement
 from cspm_ident.diagnosis.verdict import verdict_of
 from cspm_ident.signals.measurement import read_measurement
 from cspm_msgs_py.recording.reader import Recording

@@ -2,9 +2,10 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
+from typing import Any
 
 from rich import box
 from rich.console import Console
@@ -16,20 +17,21 @@ from cspm_bringup.controller_parity import Parity, controller_parity
 from cspm_bringup.experiment_files import write_experiments
 from cspm_bringup.summary import write_json
 from cspm_ident.diagnosis.diagnose import Diagnosis, diagnose
+from cspm_ident.diagnosis.finding_statement import statement_of
 from cspm_ident.diagnosis.improved_file import improved_testbed
 from cspm_ident.diagnosis.statement import (
     channel_of,
     drive_of,
     line_statement,
-    statement_of,
     tension_statement,
     unit_of,
     unknown_statement,
 )
-from cspm_ident.diagnosis.verdict import IMPROVED, diagnosis_data, verdict_of
+from cspm_ident.diagnosis.verdict import IMPROVED, SENTENCES, diagnosis_data, named_in, verdict_of
 from cspm_ident.signals.measurement import read_measurement
 from cspm_msgs_py.errors import InputError
 from cspm_msgs_py.new_folder import refuse_existing
+from cspm_sim.effects import catalogue
 
 REPORT = "diagnosis.json"
 PICTURE = "diagnosis.png"
@@ -78,7 +80,7 @@ def diagnose_command(asked: DiagnoseRequest, json: Path | None) -> None:
             loop = simulate_closed_loop((held_out or searched)[0], improved, status.update)
         status.update("controllers")
         parity = controller_parity(asked.recordings[0])
-        data = diagnosis_data(found) | {
+        data = diagnosis_data(found, asked.testbed) | {
             "closed_loop": [each._asdict() for each in loop],
             "controllers": [each._asdict() for each in parity],
         }
@@ -86,7 +88,7 @@ def diagnose_command(asked: DiagnoseRequest, json: Path | None) -> None:
             asked.out.mkdir(parents=True)
             write_experiments(asked.out, found, data, status.update)
             _write(asked.out, found, data)
-    print_diagnosis(console, found)
+    print_diagnosis(console, found, data, asked.out)
     _print_parity(console, parity)
     if loop:
         console.print(_loop_table(loop))
@@ -116,7 +118,6 @@ def explain_command(name: str) -> None:
     """
     from rich.markdown import Markdown
 
-    from cspm_sim.effects import catalogue
     from cspm_sim.effects.document import effect_section
 
     effects = catalogue()
@@ -125,25 +126,52 @@ def explain_command(name: str) -> None:
     Console().print(Markdown(effect_section(effects[name])))
 
 
-def _print_named(console: Console, found: Diagnosis, *, doubtful: bool) -> None:
+def _print_named(
+    console: Console, found: Diagnosis, experiments: Sequence[Sequence[str]], *, doubtful: bool
+) -> None:
     for k, named in enumerate(found.findings.named):
         if found.findings.is_doubtful(named) != doubtful:
             continue
         say(console, f"• {statement_of(found, k)}")
-        for rival in named.alternatives:
-            experiment = rival.hypothesis.effect.separating_experiment
+        for rival, experiment in zip(named.alternatives, experiments[k], strict=True):
             say(console, f"  as well explained by {rival.words}; to tell: {experiment}")
 
 
-def print_diagnosis(console: Console, found: Diagnosis) -> None:
-    """Print verdict, findings and how the fit changes on data that was not searched."""
-    console.print(f"verdict: [bold]{verdict_of(found).value}[/]")
-    _print_named(console, found, doubtful=False)
+def _experiments(found: Diagnosis, data: Mapping[str, Any], folder: Path | None) -> list[list[str]]:
+    """Return, of every alternative of every finding, what tells it apart."""
+    return [
+        [
+            f"cspm run {folder / entry['separating_experiment']}"
+            if folder is not None and entry["separating_experiment"]
+            else rival.hypothesis.effect.separating_experiment
+            for rival, entry in zip(named.alternatives, finding["alternatives"], strict=True)
+        ]
+        for named, finding in zip(found.findings.named, named_in(data), strict=True)
+    ]
+
+
+def print_diagnosis(
+    console: Console, found: Diagnosis, data: Mapping[str, Any], folder: Path | None
+) -> None:
+    """Print verdict, findings and how the fit changes on data that was not searched.
+
+    Args:
+        console: where.
+        found: the diagnosis.
+        data: the same as `diagnosis.json` has it.
+        folder: where planned experiments were written, if anywhere.
+    """
+    verdict = verdict_of(found)
+    console.print(f"verdict: [bold]{verdict.value}[/]")
+    if not data["findings"]:
+        say(console, SENTENCES[verdict])
+    experiments = _experiments(found, data, folder)
+    _print_named(console, found, experiments, doubtful=False)
     for k in range(len(found.shapes)):
         say(console, f"• {unknown_statement(found, k)}")
     for line in found.lines:
         say(console, f"• {line_statement(line)}")
-    _print_named(console, found, doubtful=True)
+    _print_named(console, found, experiments, doubtful=True)
     for named in found.rejected:
         say(
             console,
@@ -160,9 +188,9 @@ def print_diagnosis(console: Console, found: Diagnosis) -> None:
     if drawn is not None:
         say(console, drawn)
     _print_fits(console, found)
-    silent = ", ".join(name for name, _ in found.silent)
-    if silent:
-        say(console, f"not testable here: {silent}")
+    for name, elements in found.silent:
+        shown = catalogue()[name].separating_experiment
+        say(console, f"not testable here: {name} on {', '.join(elements)}; would show: {shown}")
     told = sorted({limit.effect for limit in found.limits if limit.possible})
     if told:
         say(

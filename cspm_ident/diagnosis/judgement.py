@@ -35,6 +35,8 @@ class HeldOut:
         ceiling: with free functions of every driver fitted to the searched data: what a model
             without physics gets.
         noise: what differs from row to row with what was found, whose own course is then no noise.
+        steady: with what was found, without the rows in which a shaft turns round; None where none
+            does.
     """
 
     place: Place
@@ -44,6 +46,7 @@ class HeldOut:
     after: float
     ceiling: float
     noise: float
+    steady: float | None = None
 
 
 def judged(
@@ -77,7 +80,9 @@ def judged(
         stages = (rms(each.get(place, ())) for each in (described, tuned, after))
         before, then, now = (unit * stage for stage in stages)
         ceiling, floor = unit * free.get(place, float("nan")), unit * _floor(after.get(place, ()))
-        out.append(HeldOut(place, unit * spread, before, then, now, ceiling, floor))
+        steady = _steady(after.get(place, ()))
+        away = None if steady is None else unit * steady
+        out.append(HeldOut(place, unit * spread, before, then, now, ceiling, floor, away))
     return tuple(out)
 
 
@@ -109,6 +114,13 @@ def rms(equations: Sequence[Equation]) -> float:
         left = without_nuisance(equation)
         squares, count = squares + float(np.sum(left**2)), count + left.size
     return float(np.sqrt(squares / max(count, 1)))
+
+
+def _steady(equations: Sequence[Equation]) -> float | None:
+    """Return the root mean square of the rows in which no shaft turns round, if any turns."""
+    if not any(equation.turning.any() for equation in equations):
+        return None
+    return rms([equation.steady for equation in equations])
 
 
 def _floor(equations: Sequence[Equation]) -> float:

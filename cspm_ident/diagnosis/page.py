@@ -18,7 +18,14 @@ from cspm_ident.diagnosis.hypothesis import Hypothesis, Named
 from cspm_ident.diagnosis.page_checks import controllers_table, energy_table
 from cspm_ident.diagnosis.part import Part, part_behind, parts_of
 from cspm_ident.diagnosis.statement import channel_of, drive_of, tension_statement, unit_of
-from cspm_ident.diagnosis.verdict import IMPROVED, TRUSTED, Verdict, named_in, verdict_of
+from cspm_ident.diagnosis.verdict import (
+    IMPROVED,
+    SENTENCES,
+    TRUSTED,
+    Verdict,
+    named_in,
+    verdict_of,
+)
 from cspm_ident.offline_page import figure_html, table_html, write_offline_page
 from cspm_ident.signals.samples import Samples
 from cspm_sim.effects import catalogue
@@ -27,15 +34,6 @@ Array = NDArray[np.float64]
 
 # Curves per finding: one effect on all of eight cables is seen in some of them.
 _MOST_CURVES = 3
-_SENTENCES = {
-    Verdict.CONSISTENT: "The recordings agree with the model. Nothing in the catalogue, and no free"
-    " function of the measured signals, is surely missing and worth a word.",
-    Verdict.EFFECT: "Physics is missing in the model.",
-    Verdict.PARAMETER: "A number of the test-bed file is wrong; no physics is missing.",
-    Verdict.TIE: "Something is missing, and these recordings cannot tell which of several.",
-    Verdict.UNKNOWN: "Something is missing that the catalogue does not have.",
-    Verdict.NOT_EXCITED: "These recordings cannot tell.",
-}
 _STYLE = """<style>
 .verdict {font-size: 1.15em; line-height: 1.5; border-left: 6px solid #c62828; padding: 0.2em 1em}
 .consistent {border-color: #1b7f3b}
@@ -95,7 +93,7 @@ def write_diagnosis_page(path: Path, found: Diagnosis, data: dict[str, Any]) -> 
 
 
 def _verdict(verdict: Verdict, data: dict[str, Any]) -> str:
-    sentences = [_SENTENCES[verdict], *(f["statement"] for f in data["findings"])]
+    sentences = [SENTENCES[verdict], *(f["statement"] for f in data["findings"])]
     kind = " consistent" if verdict is Verdict.CONSISTENT else ""
     text = "<br>".join(escape(sentence) for sentence in sentences)
     return f'<p class="verdict{kind}">{text}</p>'

@@ -52,9 +52,14 @@ def parts_of(effect: Effect, element: str, cables: Sequence[str]) -> list[Part]:
     """Return the parts in which an effect on an element sits, in a machine of some cables."""
     if effect.acts_on is Elements.CELLS:
         return [Part(Kind.LOAD_CELL, name) for name in cables]
+    return [Part(kind_of(effect), element)]
+
+
+def kind_of(effect: Effect) -> Kind:
+    """Return what sort of part an effect sits in."""
     if effect.sense is not None:
-        return [Part(_SENSORS.get(effect.sense.topics[0], Kind.MARKERS), element)]
-    return [Part(_BLOCKS.get(effect.block, Kind.BODY), element)]
+        return _SENSORS.get(effect.sense.topics[0], Kind.MARKERS)
+    return _BLOCKS.get(effect.block, Kind.BODY)
 
 
 def part_behind(place: Place) -> Part:

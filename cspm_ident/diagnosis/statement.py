@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from typing import NamedTuple
 
 import numpy as np
@@ -10,20 +9,13 @@ import numpy as np
 from cspm_ident.block_simulation import Drive
 from cspm_ident.diagnosis.columns import Candidate
 from cspm_ident.diagnosis.diagnose import Diagnosis, Shape
-from cspm_ident.diagnosis.hypothesis import Named, members_of
 from cspm_ident.diagnosis.judgement import HeldOut
 from cspm_ident.diagnosis.lines import Line
 from cspm_ident.diagnosis.power import Power
-from cspm_ident.diagnosis.region import Region
-from cspm_ident.diagnosis.simulation import SimulatedFit, Worth
+from cspm_ident.diagnosis.simulation import SimulatedFit
 from cspm_ident.diagnosis.sketch import sketch
 from cspm_msgs_py.dofs import DOFS
-from cspm_sim.effects import Channel, Effect
-
-_DOUBT = (
-    " Doubtful: beside it is much that nothing in the catalogue explains, of which this may be a"
-    " part."
-)
+from cspm_sim.effects import Channel
 
 
 class Number(NamedTuple):
@@ -65,67 +57,6 @@ def numbers_of(diagnosis: Diagnosis, candidate: Candidate) -> list[Number]:
         )
         for p in effect.parameters
     ]
-
-
-def statement_of(diagnosis: Diagnosis, k: int) -> str:
-    """Return the k-th finding as one sentence that a person can act on."""
-    named, region = diagnosis.findings.named[k], diagnosis.regions[k]
-    effect = named.hypothesis.effect
-    members = members_of(diagnosis.weights, named.hypothesis)
-    parts = []
-    for candidate in members:
-        numbers = [n for n in numbers_of(diagnosis, candidate) if n.low < n.high]
-        told = ", ".join(
-            f"{n.name} {n.value:.4g} ({n.low:.4g} to {n.high:.4g}) {n.unit}" for n in numbers
-        )
-        parts.append(f"{candidate.element}: {told}")
-    missing = (
-        "differs from the test-bed file" if effect.alter is not None else "is not in the model"
-    )
-    best = max(_concerned(diagnosis, named), key=lambda fit: fit.before / max(fit.after, 1e-300))
-    doubt = _DOUBT if diagnosis.findings.is_doubtful(named) else ""
-    where = f" It shows where {region_words(region)}." if region is not None else ""
-    return (
-        f"{_words(effect)} {missing}{_since(diagnosis, k)} ({'; '.join(parts)})."
-        f" With it the held-out residual of {channel_of(best)} falls from"
-        f" {_amount(best, best.before)} to {_amount(best, best.after)},"
-        f" where noise is {_amount(best, best.noise)};"
-        f" {_simulated_worth(diagnosis.worth[k])}.{where}{doubt}"
-    )
-
-
-def _since(diagnosis: Diagnosis, k: int) -> str:
-    named, onset = diagnosis.findings.named[k], diagnosis.onsets[k]
-    if onset is not None:
-        return f", from {onset.time:.1f} s on ({onset.low:.1f} to {onset.high:.1f} s)"
-    block = named.hypothesis.onset
-    return f", from block {block} of the recordings on" if block else ""
-
-
-def region_words(region: Region) -> str:
-    """Return where a finding shows."""
-    signal, unit = region.driver.rstrip("]").split(" [")
-    return (
-        f"{signal} is {region.low:.3g} to {region.high:.3g} {unit}: {100 * region.held:.0f} % of"
-        f" what it takes from the squared residual lies in these {100 * region.share:.0f} % of the"
-        " data"
-    )
-
-
-def _amount(fit: HeldOut, value: float) -> str:
-    """Return a residual in its unit, and as a share of what was measured."""
-    return f"{value:.3g} {unit_of(fit)} ({100.0 * value / max(fit.measured, 1e-300):.2g} %)"
-
-
-def _simulated_worth(worth: Worth | None) -> str:
-    if worth is None:
-        return "what was recorded does not allow to simulate it"
-    if worth.with_it >= worth.without:
-        return "simulations of the held-out data do not improve with it"
-    return (
-        f"simulated, the error of {worth.output.name} falls from {worth.without:.3g} to"
-        f" {worth.with_it:.3g} {worth.output.unit}"
-    )
 
 
 def unknown_statement(diagnosis: Diagnosis, k: int) -> str:
@@ -198,20 +129,3 @@ _CHANNELS = {
     Channel.WRENCH: "{}/wrench",
 }
 _UNITS = {Channel.DRIVE: "N·m", Channel.SHAFT: "N·m", Channel.TENSION: "N"}
-
-
-def _concerned(diagnosis: Diagnosis, named: Named) -> Sequence[HeldOut]:
-    places = {
-        regression.channel
-        for regression in (named.hypothesis.effect.regression, *named.hypothesis.effect.partners)
-    }
-    own = [
-        f
-        for f in diagnosis.fit
-        if f.place.channel in places and f.place.element in (*named.hypothesis.elements, "bar")
-    ]
-    return own or list(diagnosis.fit)
-
-
-def _words(effect: Effect) -> str:
-    return effect.id.replace("_", " ").capitalize()

@@ -5,9 +5,11 @@ from __future__ import annotations
 from collections.abc import Mapping
 from enum import Enum
 from math import exp
+from pathlib import Path
 from typing import Any
 
 from cspm_ident.diagnosis.diagnose import Diagnosis
+from cspm_ident.diagnosis.finding_statement import statement_of
 from cspm_ident.diagnosis.hypothesis import Findings, Named, Rival, members_of
 from cspm_ident.diagnosis.judgement import HeldOut
 from cspm_ident.diagnosis.lines import Line
@@ -20,7 +22,6 @@ from cspm_ident.diagnosis.statement import (
     formula_of,
     line_statement,
     numbers_of,
-    statement_of,
     unknown_statement,
 )
 from cspm_ident.signals.measurement import Measurement
@@ -45,6 +46,17 @@ class Verdict(Enum):
     TIE = "tie"
     UNKNOWN = "unknown"
     NOT_EXCITED = "not_excited"
+
+
+SENTENCES = {
+    Verdict.CONSISTENT: "The recordings agree with the model. Nothing in the catalogue, and no free"
+    " function of the measured signals, is surely missing and worth a word.",
+    Verdict.EFFECT: "Physics is missing in the model.",
+    Verdict.PARAMETER: "A number of the test-bed file is wrong; no physics is missing.",
+    Verdict.TIE: "Something is missing, and these recordings cannot tell which of several.",
+    Verdict.UNKNOWN: "Something is missing that the catalogue does not have.",
+    Verdict.NOT_EXCITED: "These recordings cannot tell.",
+}
 
 
 def verdict_of(diagnosis: Diagnosis) -> Verdict:
@@ -89,15 +101,23 @@ _DRIVES = {
 }
 
 
-def diagnosis_data(diagnosis: Diagnosis) -> dict[str, Any]:
-    """Return a diagnosis as `diagnosis.json` has it."""
+def diagnosis_data(diagnosis: Diagnosis, testbed: Path | None = None) -> dict[str, Any]:
+    """Return a diagnosis as `diagnosis.json` has it.
+
+    Args:
+        diagnosis: what was found.
+        testbed: file of the machine as it is believed to be; None: the first recording's own.
+    """
     first = diagnosis.searched[0]
     roles = [("search", m) for m in diagnosis.searched]
     roles += [("held_out", m) for m in diagnosis.held_out]
     return {
         "schema": SCHEMA,
         "recordings": [_recording(role, m) for role, m in roles],
-        "testbed": {"path": _testbed_path(first), "sha256": first.testbed.sha256},
+        "testbed": {
+            "path": str(testbed or f"{first.path}: testbed.yaml"),
+            "sha256": first.testbed.sha256,
+        },
         "verdict": verdict_of(diagnosis).value,
         "findings": _findings(diagnosis),
         "not_excited": [
@@ -128,10 +148,6 @@ def _findings(diagnosis: Diagnosis) -> list[dict[str, Any]]:
 
 def _recording(role: str, measurement: Measurement) -> dict[str, str]:
     return {"path": str(measurement.path), "sha256": measurement.sha256, "role": role}
-
-
-def _testbed_path(measurement: Measurement) -> str:
-    return f"{measurement.path}: testbed.yaml"
 
 
 def _finding(diagnosis: Diagnosis, k: int) -> dict[str, Any]:

@@ -38,6 +38,7 @@ def _columns(signals: Array) -> Array:
 
 EFFECT = Effect(
     id="bar_com",
+    noun="centre of mass",
     block=Block.BAR,
     parameters=tuple(
         EffectParameter(axis, "m", -1.0, 1.0, meaning="added to com, in bar axes") for axis in "xyz"

@@ -26,6 +26,7 @@ def _columns(signals: Array) -> Array:
 
 EFFECT = Effect(
     id="bar_constant_wrench",
+    noun="a constant wrench from outside",
     block=Block.BAR,
     parameters=tuple(
         EffectParameter(axis, "N" if i < 3 else "N·m", -200.0, 200.0) for i, axis in enumerate(DOFS)

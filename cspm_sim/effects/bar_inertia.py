@@ -62,6 +62,7 @@ def _columns(signals: Array) -> Array:
 
 EFFECT = Effect(
     id="bar_inertia",
+    noun="inertia",
     block=Block.BAR,
     parameters=tuple(
         EffectParameter(name, "kg·m²", -10.0, 10.0, meaning="added to the same entry of inertia")

@@ -28,6 +28,7 @@ def _columns(signals: Array) -> Array:
 
 EFFECT = Effect(
     id="bar_linear_damping",
+    noun="drag in proportion to speed",
     block=Block.BAR,
     parameters=tuple(
         EffectParameter(axis, "N·s/m" if i < 3 else "N·m·s/rad", 0.0, 100.0)

@@ -31,6 +31,7 @@ def _columns(signals: Array) -> Array:
 
 EFFECT = Effect(
     id="bar_mass",
+    noun="mass",
     block=Block.BAR,
     parameters=(EffectParameter("mass", "kg", -100.0, 100.0, meaning="added to the bar's mass"),),
     alter=_alter,

@@ -34,6 +34,7 @@ def _columns(signals: Array) -> Array:
 
 EFFECT = Effect(
     id="bar_quadratic_drag",
+    noun="drag with the square of speed",
     block=Block.BAR,
     parameters=tuple(
         EffectParameter(axis, "N·s²/m²" if i < 3 else "N·m·s²/rad²", 0.0, 100.0)

@@ -30,6 +30,7 @@ def _columns(signals: Array) -> Array:
 
 EFFECT = Effect(
     id="cable_axial_damping",
+    noun="damping along it",
     block=Block.CABLE,
     parameters=(
         EffectParameter(

@@ -53,6 +53,7 @@ def _columns(signals: Array, time_constant: float) -> Array:
 
 EFFECT = Effect(
     id="cable_creep",
+    noun="creep",
     block=Block.CABLE,
     parameters=(
         EffectParameter("compliance", "m/N", 0.0, 0.1, meaning="of the cable at the start"),

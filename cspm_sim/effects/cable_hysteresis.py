@@ -37,6 +37,7 @@ def _columns(signals: Array, displacement: float) -> Array:
 
 EFFECT = Effect(
     id="cable_hysteresis",
+    noun="hysteresis",
     block=Block.CABLE,
     parameters=(
         EffectParameter("force", "N", 0.0, 50.0),

@@ -27,6 +27,7 @@ def _columns(signals: Array) -> Array:
 
 EFFECT = Effect(
     id="cable_length_offset",
+    noun="length",
     block=Block.CABLE,
     parameters=(
         EffectParameter("offset", "m", -10.0, 10.0, meaning="added to offset_length", usual=0.01),

@@ -58,6 +58,7 @@ def _values(weights: Sequence[float], _: Values) -> dict[str, float]:
 
 EFFECT = Effect(
     id="cable_sag",
+    noun="sag under its own weight",
     block=Block.CABLE,
     parameters=(EffectParameter("linear_density", "kg/m", 0.0, 1.0),),
     kernels={Hook.CABLE: _hang, Hook.ATTACHMENT: _pull},

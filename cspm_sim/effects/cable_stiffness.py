@@ -34,6 +34,7 @@ def _columns(signals: Array) -> Array:
 
 EFFECT = Effect(
     id="cable_stiffness",
+    noun="stiffness",
     block=Block.CABLE,
     parameters=(
         EffectParameter(

@@ -44,6 +44,7 @@ def _columns(signals: Array, exit_share: float) -> Array:
 
 EFFECT = Effect(
     id="cable_transverse_damping",
+    noun="damping across it",
     block=Block.CABLE,
     parameters=(
         EffectParameter("coefficient", "N·s/m", 0.0, 100.0),

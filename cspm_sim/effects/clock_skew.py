@@ -30,6 +30,7 @@ def _columns(signals: Array) -> Array:
 
 EFFECT = Effect(
     id="clock_skew",
+    noun="a clock of another rate",
     block=Block.SENSOR,
     parameters=(EffectParameter("skew", "1", -0.01, 0.01, meaning="of the stamps, less one"),),
     sense=Sense(("/{}/pose", "/{}/twist"), lateness=_lateness, one_system=True),

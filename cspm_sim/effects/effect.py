@@ -140,6 +140,7 @@ class Effect:
         plausible: whether parameters within their bounds go together; None: always.
         tied: whether its columns' weights depend on one another, so that weights that were fitted
             freely need not be those of any parameters.
+        noun: what an element has, or of an `alter` has another of, as a verdict calls it.
     """
 
     id: str
@@ -165,6 +166,12 @@ class Effect:
     negligible: Mapping[str, float] = field(default_factory=dict)
     plausible: Callable[[Values], bool] | None = None
     tied: bool = False
+    noun: str = ""
+
+    @property
+    def words(self) -> str:
+        """What it is, for a sentence; made from its id where it does not say."""
+        return self.noun or self.id.removeprefix(f"{self.block.value}_").replace("_", " ")
 
     @property
     def acts_on(self) -> Elements:

@@ -29,6 +29,7 @@ def _columns(signals: Array) -> Array:
 
 EFFECT = Effect(
     id="encoder_scale",
+    noun="a scale error of its encoder",
     block=Block.SENSOR,
     parameters=(
         EffectParameter(

@@ -58,6 +58,7 @@ def _columns(signals: Array, frequency: float, damping: float) -> Array:
 
 EFFECT = Effect(
     id="frame_flexibility",
+    noun="flexibility",
     block=Block.FRAME,
     parameters=(
         EffectParameter("frequency", "Hz", 0.1, 100.0, absent=None),

@@ -40,6 +40,7 @@ def _columns(signals: Array) -> Array:
 
 EFFECT = Effect(
     id="frame_pose_offset",
+    noun="place relative to its markers",
     block=Block.FRAME,
     parameters=tuple(
         EffectParameter(dof, "m" if i < 3 else "rad", -1.0, 1.0) for i, dof in enumerate(DOFS)

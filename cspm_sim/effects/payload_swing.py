@@ -87,6 +87,7 @@ def _values(weights: Sequence[float], nonlinear: Values) -> dict[str, float]:
 
 EFFECT = Effect(
     id="payload_swing",
+    noun="a swinging payload",
     block=Block.BAR,
     parameters=(
         EffectParameter("mass", "kg", 0.0, 100.0),

@@ -45,6 +45,7 @@ def _columns(signals: Array) -> Array:
 
 EFFECT = Effect(
     id="pose_offset",
+    noun="an offset",
     block=Block.SENSOR,
     parameters=tuple(
         EffectParameter(dof, "m" if i < 3 else "rad", -1.0, 1.0) for i, dof in enumerate(DOFS)

@@ -44,6 +44,7 @@ def _values(weights: Sequence[float], nonlinear: Values) -> dict[str, float]:
 
 EFFECT = Effect(
     id="pulley_friction",
+    noun="friction at its pulley",
     block=Block.CABLE,
     parameters=(
         EffectParameter("coefficient", "1", 0.0, 1.0),

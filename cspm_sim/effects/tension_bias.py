@@ -25,6 +25,7 @@ def _columns(signals: Array) -> Array:
 
 EFFECT = Effect(
     id="tension_bias",
+    noun="a zero offset",
     block=Block.SENSOR,
     parameters=(EffectParameter("bias", "N", -100.0, 100.0),),
     sense=Sense(("/cables/tension",), _reading),

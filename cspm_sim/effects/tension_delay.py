@@ -25,6 +25,7 @@ def _columns(signals: Array) -> Array:
 
 EFFECT = Effect(
     id="tension_delay",
+    noun="a delay",
     block=Block.SENSOR,
     parameters=(EffectParameter("delay", "s", -0.01, 1.0, meaning="below 0: too new"),),
     sense=Sense(("/cables/tension",), lateness=_lateness),

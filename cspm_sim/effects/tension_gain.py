@@ -26,6 +26,7 @@ def _columns(signals: Array) -> Array:
 
 EFFECT = Effect(
     id="tension_gain",
+    noun="a scale error",
     block=Block.SENSOR,
     parameters=(
         EffectParameter(

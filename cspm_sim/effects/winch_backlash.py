@@ -52,6 +52,7 @@ def _columns(signals: Array, width: float) -> Array:
 
 EFFECT = Effect(
     id="winch_backlash",
+    noun="backlash",
     block=Block.WINCH,
     parameters=(EffectParameter("width", "rad", 0.0, 0.5),),
     kernels={Hook.CABLE: _kernel},

@@ -25,6 +25,7 @@ def _columns(signals: Array) -> Array:
 
 EFFECT = Effect(
     id="winch_coulomb_friction",
+    noun="dry friction",
     block=Block.WINCH,
     parameters=(EffectParameter("torque", "N·m", 0.0, 1.0),),
     kernels={Hook.WINCH: _kernel},

@@ -52,6 +52,7 @@ def _values(weights: Sequence[float], _: Values) -> dict[str, float]:
 
 EFFECT = Effect(
     id="winch_drum_eccentricity",
+    noun="an eccentric drum",
     block=Block.WINCH,
     parameters=(
         EffectParameter("eccentricity", "m", 0.0, 0.01),

@@ -37,6 +37,7 @@ def _tension(signals: Array) -> Array:
 
 EFFECT = Effect(
     id="winch_drum_radius",
+    noun="drum radius",
     block=Block.WINCH,
     parameters=(EffectParameter("radius", "m", -0.1, 0.1, meaning="added to drum_radius"),),
     alter=_alter,

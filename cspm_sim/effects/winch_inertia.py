@@ -27,6 +27,7 @@ def _columns(signals: Array) -> Array:
 
 EFFECT = Effect(
     id="winch_inertia",
+    noun="inertia",
     block=Block.WINCH,
     parameters=(EffectParameter("inertia", "kg·m²", -1.0, 1.0, meaning="added to rotor_inertia"),),
     alter=_alter,

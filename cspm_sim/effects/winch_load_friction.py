@@ -26,6 +26,7 @@ def _columns(signals: Array) -> Array:
 
 EFFECT = Effect(
     id="winch_load_friction",
+    noun="friction in proportion to tension",
     block=Block.WINCH,
     parameters=(EffectParameter("coefficient", "1", 0.0, 0.5),),
     kernels={Hook.WINCH: _kernel},

@@ -41,6 +41,7 @@ def _falls(values: Values) -> bool:
 
 EFFECT = Effect(
     id="winch_stribeck_friction",
+    noun="dry friction with a larger breakaway torque",
     block=Block.WINCH,
     parameters=(
         EffectParameter("breakaway_torque", "N·m", 0.0, 1.0),

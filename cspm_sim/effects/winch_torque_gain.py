@@ -25,6 +25,7 @@ def _columns(signals: Array) -> Array:
 
 EFFECT = Effect(
     id="winch_torque_gain",
+    noun="a scale error of its torque",
     block=Block.WINCH,
     parameters=(
         EffectParameter(

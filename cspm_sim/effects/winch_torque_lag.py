@@ -32,6 +32,7 @@ def _columns(signals: Array) -> Array:
 
 EFFECT = Effect(
     id="winch_torque_lag",
+    noun="a lag of its drive",
     block=Block.WINCH,
     parameters=(
         EffectParameter(

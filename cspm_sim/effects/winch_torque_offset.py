@@ -24,6 +24,7 @@ def _columns(signals: Array) -> Array:
 
 EFFECT = Effect(
     id="winch_torque_offset",
+    noun="a constant torque",
     block=Block.WINCH,
     parameters=(EffectParameter("torque", "N·m", -1.0, 1.0),),
     kernels={Hook.WINCH: _kernel},

@@ -40,6 +40,7 @@ def _values(weights: Sequence[float], nonlinear: Values) -> dict[str, float]:
 
 EFFECT = Effect(
     id="winch_torque_ripple",
+    noun="torque ripple",
     block=Block.WINCH,
     parameters=(
         EffectParameter("amplitude", "N·m", 0.0, 1.0),

@@ -25,6 +25,7 @@ def _columns(signals: Array) -> Array:
 
 EFFECT = Effect(
     id="winch_viscous_friction",
+    noun="viscous friction",
     block=Block.WINCH,
     parameters=(EffectParameter("coefficient", "N·m·s/rad", 0.0, 0.1),),
     kernels={Hook.WINCH: _kernel},

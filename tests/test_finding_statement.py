@@ -1,0 +1,87 @@
+"""What is said of a finding: what has what, how much, since when, where, and what it is worth."""
+
+from dataclasses import replace
+from pathlib import Path
+
+import pytest
+from test_diagnosis_page import NOISE, PLACE, RUBBING, THESIS, TORQUE, diagnosis
+
+from cspm_ident.diagnosis.amount import amount_words
+from cspm_ident.diagnosis.columns import Candidate
+from cspm_ident.diagnosis.hypothesis import Hypothesis, Rival
+from cspm_ident.diagnosis.judgement import HeldOut
+from cspm_ident.diagnosis.limits import Limit
+from cspm_ident.diagnosis.onset import Onset
+from cspm_ident.diagnosis.verdict import diagnosis_data
+
+
+def test_a_finding_says_what_how_much_since_when_and_what_it_is_worth():
+    (finding,) = diagnosis_data(diagnosis())["findings"]
+    told = finding["statement"]
+    start = "Winch surge_2 has dry friction that the model does not have: torque 30.0 ± 1.0 mN·m."
+    assert told.startswith(f"{start} It is there from the start.")
+    # 0.03 and 0.001 N·m of 0.15, where noise is 0.001.
+    assert "winches/torque/surge_2 falls from 20 % to 0.67 % of what was measured" in told
+    assert "at the noise floor; simulated, the error of winches/angle/surge_2 falls" in told
+    assert "falls from 1.46 rad to 7.1 mrad" in told
+    assert "turns round" not in told
+
+
+def test_what_is_left_above_the_noise_is_told_and_where_it_is_not():
+    found = diagnosis()
+    fit = HeldOut(PLACE, 0.15, TORQUE, TORQUE, 0.003, NOISE, NOISE, 0.0006)
+    (finding,) = diagnosis_data(replace(found, fit=(fit,)))["findings"]
+    assert (
+        "to 2 % of what was measured (0.4 % apart from where the shaft turns round), where"
+        in (finding["statement"])
+    )
+    assert "where noise is 0.67 %" in finding["statement"]
+
+
+@pytest.mark.parametrize(
+    ("least", "missing", "told"),
+    [(0.002, (), True), (0.002, ("sway_4",), False), (0.04, (), False)],
+)
+def test_that_no_other_winch_has_it_is_told_where_it_would_have_shown(least, missing, told):
+    others = [n for n in THESIS.testbed.cable_names if n != "surge_2" and n not in missing]
+    limits = tuple(Limit(RUBBING.effect_id, n, "torque", least, "N·m", True) for n in others)
+    (finding,) = diagnosis_data(replace(diagnosis(), limits=limits))["findings"]
+    assert ("No other winch has it: 2 mN·m would have shown." in finding["statement"]) is told
+
+
+def test_of_an_effect_that_may_be_elsewhere_that_is_not_told():
+    other = Hypothesis(RUBBING.effect, (Candidate(RUBBING.effect, "sway_1"),))
+    cables = [n for n in THESIS.testbed.cable_names if n != "surge_2"]
+    limits = tuple(Limit(RUBBING.effect_id, n, "torque", 0.002, "N·m", True) for n in cables)
+    found = replace(diagnosis(alternatives=[Rival(other, 0.5)]), limits=limits)
+    (finding,) = diagnosis_data(found)["findings"]
+    assert "No other" not in finding["statement"]
+
+
+@pytest.mark.parametrize("low", [None, 12.1])
+def test_a_beginning_is_told(low):
+    onset = None if low is None else Onset(12.3, low, 12.5)
+    (finding,) = diagnosis_data(replace(diagnosis(), onsets=(onset,)))["findings"]
+    assert ("It begins at 12.3 s (12.1 to 12.5 s)." in finding["statement"]) is (low is not None)
+    assert ("from the start" in finding["statement"]) is (low is None)
+
+
+@pytest.mark.parametrize(
+    ("value", "ends", "unit", "words"),
+    [
+        (0.0309, (0.0307, 0.0311), "N·m", "30.90 ± 0.20 mN·m"),
+        (0.85, (0.84, 0.86), "1", "0.850 ± 0.010"),
+        (0.05, (0.04, 0.09), "kg", "50 (40 to 90) g"),
+        (3e-7, None, "m/N", "0.3 µm/N"),
+        (12.0, None, "rad", "12 rad"),
+        (0.0, None, "N", "0 N"),
+    ],
+)
+def test_amounts_are_told_as_an_engineer_writes_them(value, ends, unit, words):
+    assert amount_words(value, unit, ends) == words
+
+
+def test_the_file_of_the_machine_is_named():
+    assert diagnosis_data(diagnosis())["testbed"]["path"].endswith("today: testbed.yaml")
+    given = diagnosis_data(diagnosis(), Path("my_rig.yaml"))["testbed"]
+    assert given == {"path": "my_rig.yaml", "sha256": THESIS.sha256}

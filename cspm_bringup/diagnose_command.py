@@ -28,7 +28,7 @@ from cspm_ident.diagnosis.statement import (
     unknown_statement,
 )
 from cspm_ident.diagnosis.verdict import IMPROVED, SENTENCES, diagnosis_data, named_in, verdict_of
-from cspm_ident.signals.measurement import read_measurement
+from cspm_ident.signals.measurement import Measurement, read_measurement
 from cspm_msgs_py.errors import InputError
 from cspm_msgs_py.new_folder import refuse_existing
 from cspm_sim.effects import catalogue
@@ -65,14 +65,10 @@ def diagnose_command(asked: DiagnoseRequest, json: Path | None) -> None:
     """
     console = make_console()
     refuse_existing(asked.out)
-    twice = set(asked.recordings) & set(asked.held_out)
-    if twice:
-        raise InputError(
-            f"--held-out {twice.pop()}: is searched as well, allowed: recordings that are not"
-        )
     with console.status("reading") as status:
         searched = [read_measurement(path, asked.testbed) for path in asked.recordings]
         held_out = [read_measurement(path, asked.testbed) for path in asked.held_out]
+        _refuse_twice(searched, held_out)
         found = diagnose(searched, held_out, status.update)
         loop: tuple[ClosedLoopFit, ...] = ()
         if asked.closed_loop and found.findings.named:
@@ -96,6 +92,27 @@ def diagnose_command(asked: DiagnoseRequest, json: Path | None) -> None:
         say(console, f"written {asked.out}")
     if json is not None:
         write_json(json, data)
+
+
+def _refuse_twice(searched: Sequence[Measurement], held_out: Sequence[Measurement]) -> None:
+    """Refuse what would count twice, or be judged on what it was found in, under whatever name."""
+    seen: dict[str, Path] = {}
+    for measured in searched:
+        if (other := seen.get(measured.sha256)) is not None:
+            raise InputError(f"{measured.path}: the same recording as {other}, allowed: each once")
+        seen[measured.sha256] = measured.path
+    for measured in held_out:
+        if measured.sha256 in seen:
+            raise InputError(
+                f"--held-out {measured.path}: is searched as well, allowed: recordings that are not"
+            )
+
+
+def _print_cut_short(console: Console, found: Diagnosis) -> None:
+    """Print which recordings end where their writer was killed."""
+    for each in (*found.searched, *found.held_out):
+        if not each.complete:
+            say(console, f"{each.path}: was not closed; of it {each.duration:.1f} s are left")
 
 
 def _print_parity(console: Console, parity: Sequence[Parity]) -> None:
@@ -166,6 +183,7 @@ def print_diagnosis(
     if not data["findings"]:
         say(console, SENTENCES[verdict])
     experiments = _experiments(found, data, folder)
+    _print_cut_short(console, found)
     _print_named(console, found, experiments, doubtful=False)
     for k in range(len(found.shapes)):
         say(console, f"• {unknown_statement(found, k)}")

@@ -124,6 +124,16 @@ def test_a_separation_is_what_the_rival_cannot_imitate(sea):
     assert apart == pytest.approx(np.linalg.norm(left), rel=1e-6)
 
 
+def test_two_that_do_the_same_get_no_experiment(sea, plans):
+    """Friction by load at the motor and at the pulley differ by rounding alone."""
+    noise = {Place(Channel.SHAFT, "surge_2"): np.array([1e-4])}
+    pulley = Candidate(catalogue()["pulley_friction"], "surge_2", (("wrap", 1.57),))
+    same = Question({LOADED: np.array([0.03])}, (pulley,))
+    gentle = sea.within(0.0, 2.0)
+    assert best_answer([gentle], noise, same, plans) is None
+    assert best_answer([gentle], noise, TWINS["friction"], plans) is not None
+
+
 def test_what_cannot_show_safely_is_not_promised(plans):
     few = plans[:1]
     scenario, shown = most_showing([RUBBING.effect, catalogue()["winch_backlash"]], few)

@@ -17,6 +17,8 @@ Point = tuple[float, float]
 Placed = Callable[[Array], Point]
 
 _WIDTH, _HEIGHT, _EDGE = 480.0, 460.0, 36.0
+# Beside the machine, for names, and from one name to the next.
+_NAMES, _LINE = 250.0, 26.0
 # Oblique: depth y runs up and to the right at half its length.
 _DEPTH = np.array([0.40, -0.30])
 # A winch without a cable has no place; such winches stand in a row this far apart [m].
@@ -53,18 +55,20 @@ def drawing(
     bodies = _bodies(machine, bar_pose, frame_pose)
     ends = _ends(machine, bar_pose, frame_pose)
     corners = [point for _, box in bodies for point in box]
-    place, height = _placing(np.array([*corners, *(end for pair in ends for end in pair)]))
+    place, (right, low) = _placing(np.array([*corners, *(end for pair in ends for end in pair)]))
     shapes: list[tuple[Part, str, Point]] = []
     for name, box in bodies:
         shapes += _body(name, [place(corner) for corner in box], Part(Kind.BODY, name) in marked)
     for cable, (top, bottom) in zip(machine.cables, ends, strict=True):
         shapes += _cable(cable.name, place(top), place(bottom), cable.has_cable, marked)
     label = "test-bed" + "".join(f", {part.words} marked" for part in marked)
+    names, lowest = _names(shapes, marked, right + 0.7 * _EDGE)
+    width = max(_WIDTH, right + _NAMES) if names else _WIDTH
     return (
-        f'<svg viewBox="0 0 {_WIDTH:g} {height:.0f}" role=img aria-label="{escape(label)}"'
-        ' style="width:100%;max-width:600px;height:auto">'
+        f'<svg viewBox="0 0 {width:.0f} {max(low + _EDGE, lowest):.0f}" role=img'
+        f' aria-label="{escape(label)}" style="width:100%;max-width:600px;height:auto">'
         f"{''.join(_grouped(part, shape, part in marked) for part, shape, _ in shapes)}"
-        f"{''.join(_names(shapes, marked))}</svg>"
+        f"{names}</svg>"
     )
 
 
@@ -105,8 +109,8 @@ def _ends(
     return found
 
 
-def _placing(points: Array) -> tuple[Placed, float]:
-    """Return the way from the world [m] to the picture [px] that shows all points, and its height.
+def _placing(points: Array) -> tuple[Placed, Point]:
+    """Return the way from the world [m] to the picture [px], and its lowest point to the right.
 
     No machine is drawn larger than fits; a flat one has a low picture.
     """
@@ -114,13 +118,14 @@ def _placing(points: Array) -> tuple[Placed, float]:
     low, size = flat.min(axis=0), np.ptp(flat, axis=0)
     room = np.array([_WIDTH, _HEIGHT]) - 2.0 * _EDGE
     scale = float(np.min(room / np.maximum(size, 1e-6)))
-    shift = np.array([_EDGE + 0.5 * (room[0] - scale * size[0]), _EDGE])
+    shift = np.array([_EDGE, _EDGE])
 
     def place(point: Array) -> Point:
         x, y = shift + scale * (_flat(point) - low)
         return float(x), float(y)
 
-    return place, float(scale * size[1] + 2.0 * _EDGE)
+    right, low = shift + scale * size
+    return place, (float(right), float(low))
 
 
 def _flat(point: Array) -> Array:
@@ -169,20 +174,22 @@ def _grouped(part: Part, shape: str, marked: bool) -> str:
     return f'<g{kind} fill="{fill}" {line}><title>{escape(part.words)}</title>{shape}</g>'
 
 
-def _names(shapes: Sequence[tuple[Part, str, Point]], marked: Collection[Part]) -> Iterable[str]:
-    """Yield the marked parts' names, to the side where there is room, none upon another."""
-    taken: list[float] = []
-    for part, _, (x, y) in shapes:
-        if part not in marked:
-            continue
-        left = x > 0.5 * _WIDTH
-        height = y - 14.0
-        while any(abs(height - other) < 22.0 for other in taken):
-            height += 22.0
-        taken.append(height)
-        anchor, side = ("end", x - 14.0) if left else ("start", x + 14.0)
-        yield (
-            f'<text x="{side:.1f}" y="{height:.1f}" text-anchor="{anchor}" font-size="20"'
-            f' font-weight="bold" fill="{_MARKED}" stroke="white" stroke-width="5"'
-            f' paint-order="stroke">{escape(part.words)}</text>'
+def _names(
+    shapes: Sequence[tuple[Part, str, Point]], marked: Collection[Part], beside: float
+) -> tuple[str, float]:
+    """Return the marked parts' names in a column beside the machine, and where it ends [px].
+
+    Each is led to its part by a line; none lies upon another or upon the machine.
+    """
+    own = [(part, place) for part, _, place in shapes if part in marked]
+    found, below = "", _EDGE
+    for part, (x, y) in sorted(own, key=lambda each: each[1][1]):
+        below = max(below, y + 7.0)
+        found += (
+            f'<line x1="{x:.1f}" y1="{y:.1f}" x2="{beside - 5.0:.1f}" y2="{below - 7.0:.1f}"'
+            f' stroke="{_MARKED}" stroke-width="1" stroke-dasharray="4 3"/>'
+            f'<text x="{beside:.1f}" y="{below:.1f}" font-size="20" font-weight="bold"'
+            f' fill="{_MARKED}">{escape(part.words)}</text>'
         )
+        below += _LINE
+    return found, below

@@ -7,8 +7,10 @@ import plotly.graph_objects as go
 from numpy.typing import NDArray
 from plotly.subplots import make_subplots
 
-from cspm_ident.diagnosis.curves import Curve, bins_of
+from cspm_ident.diagnosis.curves import Curve, bins_of, explained_by
+from cspm_ident.diagnosis.part import part_behind
 from cspm_ident.offline_page import BELOW, thinned
+from cspm_sim.effects import Channel
 
 Array = NDArray[np.float64]
 
@@ -19,6 +21,35 @@ _HOLE = 3.0
 _DOTS = {"mode": "markers", "opacity": 0.35}
 # Significant digits of what is drawn: more than a screen shows.
 _DIGITS = 5
+
+
+def caption_of(curve: Curve, signal: str) -> str:
+    """Return how large a residual is, and how far it depends on a signal, before and after.
+
+    Args:
+        curve: the residual; its rows are those that are searched.
+        signal: one of its signals, or empty.
+    """
+    of = f", {curve.component}" if curve.component else ""
+    before, after = (float(np.sqrt(np.mean(v**2))) for v in (curve.before, curve.after))
+    then = f" before and {after:.3g} {curve.unit} after" if curve.touched else ""
+    away = (
+        ", apart from where the shaft turns round" if curve.place.channel is Channel.SHAFT else ""
+    )
+    text = (
+        f"{part_behind(curve.place).words}{of}: the residual is measured less modelled; its root"
+        f" mean square is {before:.3g} {curve.unit}{then}{away}."
+    )
+    return f"{text} {_dependence(curve, signal)}" if signal else text
+
+
+def _dependence(curve: Curve, signal: str) -> str:
+    """Return how much of a residual's variance is a function of a signal."""
+    before, after = (
+        100.0 * explained_by(curve.signals[signal], v) for v in (curve.before, curve.after)
+    )
+    then = f" before and {after:.0f} % after" if curve.touched else ""
+    return f"A function of {signal.split(' [')[0]} explains {before:.0f} % of its variance{then}."
 
 
 def driver_figure(curve: Curve, name: str) -> go.Figure:

@@ -4,6 +4,8 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
+import numpy as np
+
 from cspm_ident.diagnosis.amount import amount_words
 from cspm_ident.diagnosis.columns import Candidate
 from cspm_ident.diagnosis.diagnose import Diagnosis
@@ -21,6 +23,8 @@ _DOUBT = (
 )
 # Of the noise from row to row: windows overlap, and leave a sound machine 1.4 times as much.
 _AT_NOISE = 1.5
+# What is left apart from where shafts turn round is told where it is so much less.
+_AWAY = 0.8
 
 
 def statement_of(diagnosis: Diagnosis, k: int) -> str:
@@ -68,13 +72,16 @@ def _sizes(diagnosis: Diagnosis, named: Named) -> str:
 
 
 def _size(diagnosis: Diagnosis, candidate: Candidate) -> str:
+    """Return the parameters of one element, of those searched on a grid only where all are."""
     numbers = numbers_of(diagnosis, candidate)
-    known = [n for n in numbers if n.low < n.high]
-    return ", ".join(f"{_name(candidate.effect, n)} {_amount(n)}" for n in known or numbers)
-
-
-def _amount(number: Number) -> str:
-    return amount_words(number.value, number.unit, (number.low, number.high))
+    known = [n for n in numbers if n.low < n.high] or numbers
+    bounded = bool(np.all(np.isfinite(diagnosis.weights[candidate][1])))
+    told = ", ".join(
+        f"{_name(candidate.effect, n)} "
+        + amount_words(n.value, n.unit, (n.low, n.high) if bounded else None)
+        for n in known
+    )
+    return told if bounded else f"{told}, too few data for an interval"
 
 
 def _name(effect: Effect, number: Number) -> str:
@@ -136,7 +143,7 @@ def _worth(diagnosis: Diagnosis, named: Named, worth: Worth | None) -> str:
     if best.after > _AT_NOISE * best.noise:
         noise = f"where noise is {_share(best, best.noise)}"
     away = ""
-    if best.steady is not None and best.steady < best.after:
+    if best.steady is not None and best.steady < _AWAY * best.after:
         away = f" ({_share(best, best.steady)} apart from where the shaft turns round)"
     return (
         f"With it the held-out error of {channel_of(best)} falls from {_share(best, best.before)}"
@@ -146,7 +153,8 @@ def _worth(diagnosis: Diagnosis, named: Named, worth: Worth | None) -> str:
 
 
 def _share(fit: HeldOut, value: float) -> str:
-    return f"{100.0 * value / max(fit.measured, 1e-300):.2g} %"
+    percent = 100.0 * value / max(fit.measured, 1e-300)
+    return f"{percent:.2g} %" if percent < 100.0 else f"{percent:.0f} %"
 
 
 def _simulated_worth(worth: Worth | None) -> str:

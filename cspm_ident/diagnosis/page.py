@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 from cspm_ident.diagnosis.curves import Curve
 from cspm_ident.diagnosis.diagnose import Diagnosis
 from cspm_ident.diagnosis.drawing import drawing
-from cspm_ident.diagnosis.evidence_figure import driver_figure, overlay_figure
+from cspm_ident.diagnosis.evidence_figure import caption_of, driver_figure, overlay_figure
 from cspm_ident.diagnosis.hypothesis import Hypothesis, Named
 from cspm_ident.diagnosis.page_checks import controllers_table, energy_table
 from cspm_ident.diagnosis.part import Part, part_behind, parts_of
@@ -34,6 +34,8 @@ Array = NDArray[np.float64]
 
 # Curves per finding: one effect on all of eight cables is seen in some of them.
 _MOST_CURVES = 3
+# Of the squared residual: less than that is no picture of what was found.
+_GAINED = 0.2
 _STYLE = """<style>
 .verdict {font-size: 1.15em; line-height: 1.5; border-left: 6px solid #c62828; padding: 0.2em 1em}
 .consistent {border-color: #1b7f3b}
@@ -93,10 +95,23 @@ def write_diagnosis_page(path: Path, found: Diagnosis, data: dict[str, Any]) -> 
 
 
 def _verdict(verdict: Verdict, data: dict[str, Any]) -> str:
-    sentences = [SENTENCES[verdict], *(f["statement"] for f in data["findings"])]
+    sentences = [SENTENCES[verdict]]
+    for finding in data["findings"]:
+        sentences.append(finding["statement"])
+        sentences += [f"As well explained by {_twin(each)}." for each in finding["alternatives"]]
     kind = " consistent" if verdict is Verdict.CONSISTENT else ""
     text = "<br>".join(escape(sentence) for sentence in sentences)
     return f'<p class="verdict{kind}">{text}</p>'
+
+
+def _twin(alternative: dict[str, Any]) -> str:
+    """Return an alternative in plain words, with its probability."""
+    beside = alternative["beside"]
+    with_it = f", beside another {catalogue()[beside].words} than the file's" if beside else ""
+    where = ", ".join(alternative["elements"])
+    effect = catalogue()[alternative["effect"]]
+    words = f"another {effect.words}" if effect.alter is not None else effect.words
+    return f"{words} ({alternative['effect']} on {where}{with_it})"
 
 
 def _where(found: Diagnosis) -> str:
@@ -133,8 +148,8 @@ def _evidence(found: Diagnosis) -> str:
     for heading, curves, driver in _subjects(found):
         texts.append(f"<h3>{escape(heading)}</h3>")
         for curve in curves:
-            texts.append(f"<p>{escape(_caption(curve))}</p>")
             signal = driver or curve.main_signal
+            texts.append(f"<p>{escape(caption_of(curve, signal))}</p>")
             if signal:
                 texts.append(figure_html(driver_figure(curve, signal), script=script))
                 script = False
@@ -148,7 +163,8 @@ def _subjects(found: Diagnosis) -> Iterable[tuple[str, Sequence[Curve], str]]:
     for named in found.findings.named:
         own = [c for c in found.curves if _touches(named.hypothesis, c)]
         own.sort(key=lambda curve: -curve.gained)
-        yield named.hypothesis.words, own[:_MOST_CURVES], ""
+        shown = [c for k, c in enumerate(own[:_MOST_CURVES]) if k == 0 or c.gained > _GAINED]
+        yield named.hypothesis.words, shown, ""
     for driver, _, _ in found.findings.unknown:
         own = [c for c in found.curves if c.place == driver.place and driver.signal in c.signals]
         yield (
@@ -170,16 +186,6 @@ def _touches(hypothesis: Hypothesis, curve: Curve) -> bool:
 
 def _size(curve: Curve) -> float:
     return float(np.std(curve.before) / max(np.std(curve.measured), 1e-300))
-
-
-def _caption(curve: Curve) -> str:
-    of = f", {curve.component}" if curve.component else ""
-    before, after = (float(np.sqrt(np.mean(v**2))) for v in (curve.before, curve.after))
-    then = f" before and {after:.3g} {curve.unit} after" if curve.touched else ""
-    return (
-        f"{part_behind(curve.place).words}{of}: the residual is measured less modelled; its root"
-        f" mean square is {before:.3g} {curve.unit}{then}."
-    )
 
 
 def _parameters(data: dict[str, Any]) -> str:
@@ -346,6 +352,11 @@ def _experiment(purpose: str, file: str | None, advice: str) -> str:
 
 
 def _sources(data: dict[str, Any]) -> str:
-    rows = [(r["path"], r["role"].replace("_", " "), r["sha256"]) for r in data["recordings"]]
+    rows = [(r["path"], _role(r), r["sha256"]) for r in data["recordings"]]
     rows.append((data["testbed"]["path"], "test-bed", data["testbed"]["sha256"]))
     return table_html(("file", "role", "SHA-256"), rows, "recordings and files")
+
+
+def _role(recording: dict[str, Any]) -> str:
+    cut = "" if recording["complete"] else ", not closed by its writer"
+    return f"{recording['role'].replace('_', ' ')}{cut}"

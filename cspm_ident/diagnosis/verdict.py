@@ -146,8 +146,13 @@ def _findings(diagnosis: Diagnosis) -> list[dict[str, Any]]:
     return [*named[:sure], *unknown, *map(_line, diagnosis.lines), *named[sure:]]
 
 
-def _recording(role: str, measurement: Measurement) -> dict[str, str]:
-    return {"path": str(measurement.path), "sha256": measurement.sha256, "role": role}
+def _recording(role: str, measurement: Measurement) -> dict[str, Any]:
+    return {
+        "path": str(measurement.path),
+        "sha256": measurement.sha256,
+        "role": role,
+        "complete": measurement.complete,
+    }
 
 
 def _finding(diagnosis: Diagnosis, k: int) -> dict[str, Any]:

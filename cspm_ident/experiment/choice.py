@@ -28,6 +28,8 @@ _SHARES = (1.0, 0.5, 0.25)
 _LOAD_SHARE = 0.9
 # A wrench is missed for a moment where cables reach their least tension; not for long.
 _MISSED, _MISSED_TIME = 0.05, 0.1
+# Standard errors by which an experiment has to separate explanations.
+_TELLS = 3.0
 
 
 @dataclass(frozen=True, eq=False)
@@ -104,7 +106,10 @@ def best_answer(
     question: Question,
     plans: Sequence[tuple[Scenario, Plan]],
 ) -> Answer | None:
-    """Return the experiment that answers a question best; None where none beats the recordings.
+    """Return the experiment that answers a question best.
+
+    None where none beats the recordings, or none tells what is asked: two that do the same to every
+    residual differ by rounding alone.
 
     Args:
         recorded: the recordings so far.
@@ -121,7 +126,9 @@ def best_answer(
         rate = _rate(equations, noise, question, [plan.measurement])
         answers.append(Answer(scenario, rate, so_far))
     best = max(answers, key=lambda answer: answer.separation, default=None)
-    return best if best is not None and best.separation > so_far else None
+    if best is None or best.separation <= so_far:
+        return None
+    return best if best.separation * best.scenario.duration**0.5 > _TELLS else None
 
 
 def _rate(

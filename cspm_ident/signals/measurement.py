@@ -51,6 +51,7 @@ class Measurement:
             known, and 0 is taken.
         pointwise: whether equations hold at single samples instead of under windows, for
             comparison.
+        complete: whether whatever wrote the recording closed it.
     """
 
     path: Path
@@ -65,6 +66,7 @@ class Measurement:
     command: Samples | None = None
     torque_age: float = 0.0
     pointwise: bool = False
+    complete: bool = True
 
     @property
     def machine(self) -> Testbed:
@@ -127,6 +129,7 @@ def read_measurement(path: Path, testbed: Path | None = None) -> Measurement:
         rows = recording.rows_of(names)
         found = {name: recording.topic(name) for name in names}
         simulated = simulated_plant(recording) is not None
+        closed = recording.complete
     if not names:
         raise InputError(f"{path}: no measured topic, allowed: at least one of {', '.join(wanted)}")
     _check_cables(found, machine.testbed, path)
@@ -136,7 +139,16 @@ def read_measurement(path: Path, testbed: Path | None = None) -> Measurement:
         parts.update(_samples(name, found[name], rows[name], start, machine.testbed))
     torque = parts.get("torque")
     age = 0.5 * torque.interval if simulated and torque is not None else 0.0
-    return Measurement(path, digest.result(), machine, **parts, torque_age=age, pointwise=False)
+    # mypy takes `parts` for every argument that is not given.
+    return Measurement(
+        path,
+        digest.result(),
+        machine,
+        **parts,
+        torque_age=age,
+        pointwise=False,
+        complete=closed,
+    )
 
 
 def _count(recording: Recording, name: str) -> int:

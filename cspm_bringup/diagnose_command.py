@@ -36,6 +36,7 @@ from cspm_sim.effects import catalogue
 REPORT = "diagnosis.json"
 PICTURE = "diagnosis.png"
 PAGE = "diagnosis.html"
+_SEARCHED = "--held-out {}: is searched as well, allowed: recordings that are not"
 
 
 @dataclass(frozen=True)
@@ -65,6 +66,9 @@ def diagnose_command(asked: DiagnoseRequest, json: Path | None) -> None:
     """
     console = make_console()
     refuse_existing(asked.out)
+    twice = set(asked.recordings) & set(asked.held_out)
+    if twice:
+        raise InputError(_SEARCHED.format(twice.pop()))
     with console.status("reading") as status:
         searched = [read_measurement(path, asked.testbed) for path in asked.recordings]
         held_out = [read_measurement(path, asked.testbed) for path in asked.held_out]
@@ -103,9 +107,7 @@ def _refuse_twice(searched: Sequence[Measurement], held_out: Sequence[Measuremen
         seen[measured.sha256] = measured.path
     for measured in held_out:
         if measured.sha256 in seen:
-            raise InputError(
-                f"--held-out {measured.path}: is searched as well, allowed: recordings that are not"
-            )
+            raise InputError(_SEARCHED.format(measured.path))
 
 
 def _print_cut_short(console: Console, found: Diagnosis) -> None:
@@ -207,8 +209,12 @@ def print_diagnosis(
         say(console, drawn)
     _print_fits(console, found)
     for name, elements in found.silent:
-        shown = catalogue()[name].separating_experiment
-        say(console, f"not testable here: {name} on {', '.join(elements)}; would show: {shown}")
+        if elements:
+            shown = catalogue()[name].separating_experiment
+            say(console, f"not testable here: {name} on {', '.join(elements)}; would show: {shown}")
+    without = ", ".join(name for name, elements in found.silent if not elements)
+    if without:
+        say(console, f"not testable with the sensors and parts of these recordings: {without}")
     told = sorted({limit.effect for limit in found.limits if limit.possible})
     if told:
         say(

@@ -14,7 +14,6 @@ from cspm_ident.block_simulation import Drive
 from cspm_ident.diagnosis.columns import Candidate, Place
 from cspm_ident.diagnosis.curves import explained_by, held_out_curves
 from cspm_ident.diagnosis.diagnose import Diagnosis, Shape
-from cspm_ident.diagnosis.drawing import drawing
 from cspm_ident.diagnosis.drivers import Driver
 from cspm_ident.diagnosis.equation import Equation
 from cspm_ident.diagnosis.hypothesis import Findings, Hypothesis, Named, Rival
@@ -22,7 +21,6 @@ from cspm_ident.diagnosis.judgement import HeldOut
 from cspm_ident.diagnosis.limits import Limit
 from cspm_ident.diagnosis.lines import Line
 from cspm_ident.diagnosis.page import write_diagnosis_page
-from cspm_ident.diagnosis.part import Kind, Part, parts_of
 from cspm_ident.diagnosis.region import Region
 from cspm_ident.diagnosis.simulation import Output, SimulatedFit, Worth
 from cspm_ident.diagnosis.sums import Gain
@@ -40,7 +38,6 @@ from cspm_msgs_py.testbed import load_testbed
 from cspm_sim.effects import Channel, catalogue
 
 THESIS = load_testbed(SCENARIOS / "testbeds" / "thesis.yaml")
-ONE_WINCH = load_testbed(SCENARIOS / "testbeds" / "one_winch.yaml")
 TORQUE, NOISE = 0.03, 0.001
 PLACE = Place(Channel.SHAFT, "surge_2")
 RUBBING = Candidate(catalogue()["winch_coulomb_friction"], "surge_2")
@@ -170,57 +167,14 @@ def test_a_signal_explains_what_is_a_function_of_it():
     assert explained_by(np.zeros(10), np.arange(10.0)) == 0.0
 
 
-@pytest.mark.parametrize(
-    ("name", "element", "words"),
-    [
-        ("winch_coulomb_friction", "surge_2", "winch surge_2"),
-        ("cable_stiffness", "hoist_1", "cable hoist_1"),
-        ("tension_gain", "sway_3", "load cell sway_3"),
-        ("encoder_scale", "sway_3", "winch sway_3"),
-        ("bar_mass", "bar", "bar"),
-        ("frame_flexibility", "winch_frame", "winch frame"),
-        ("pose_delay", "bar", "motion capture of bar"),
-    ],
-)
-def test_an_effect_sits_in_a_part_that_the_drawing_marks(name, element, words):
-    (part,) = parts_of(catalogue()[name], element, ("a", "b"))
-    assert part.words.replace("_", " ") == words.replace("_", " ")
-    picture = drawing(THESIS.testbed, BAR_POSE, None, [part])
-    (guilty,) = re.findall(r"<g class=guilty.*?</g>", picture)
-    assert f"<title>{part.words}</title>" in guilty
-    assert "class=guilty" not in drawing(THESIS.testbed, BAR_POSE, None, [])
-
-
-def test_what_acts_on_all_load_cells_marks_each_of_them():
-    cables = THESIS.testbed.cable_names
-    parts = parts_of(catalogue()["tension_delay"], "load_cells", cables)
-    assert parts == [Part(Kind.LOAD_CELL, name) for name in cables]
-
-
-def test_the_drawing_has_every_part_at_its_place():
-    picture = drawing(THESIS.testbed, BAR_POSE, None, [])
-    for cable in THESIS.testbed.cable_names:
-        for kind in (Kind.WINCH, Kind.CABLE, Kind.LOAD_CELL):
-            assert f"<title>{Part(kind, cable).words}</title>" in picture
-    line = re.search(r"<title>cable hoist 1</title><line [^>]*", picture).group()
-    top, bottom = (float(re.search(rf'y{k}="([^"]*)"', line)[1]) for k in (1, 2))
-    # z is down in the world and on the screen.
-    assert top < bottom
-    low, high = (
-        float(re.search(r'viewBox="0 0 \S+ (\S+)"', drawing(machine.testbed, pose, None, []))[1])
-        for machine, pose in ((ONE_WINCH, None), (THESIS, BAR_POSE))
-    )
-    assert low < 0.3 * high
-    rig = drawing(ONE_WINCH.testbed, None, None, [Part(Kind.CABLE, "surge")])
-    assert rig.count("<title>") == 3
-
-
 def test_the_page_says_all_that_was_found(tmp_path):
     rival = Rival(Hypothesis(LOADED.effect, (LOADED,)), 0.1)
     page = page_of(tmp_path, diagnosis(alternatives=[rival]))
     assert "Diagnosis of today: tie" in page
     top = page.index('class="verdict"')
     assert top < page.index("<section")
+    twin = "As well explained by friction in proportion to tension (winch_load_friction on surge_2)"
+    assert top < page.index(twin) < page.index("<section")
     simulated = section(page, "simulated")
     for told in ("winches/angle/surge_2", "torque", "1.46", "0.0071", "0.0049"):
         assert f">{told}<" in simulated

@@ -3,16 +3,22 @@
 from dataclasses import replace
 from pathlib import Path
 
+import numpy as np
 import pytest
 from test_diagnosis_page import NOISE, PLACE, RUBBING, THESIS, TORQUE, diagnosis
 
 from cspm_ident.diagnosis.amount import amount_words
-from cspm_ident.diagnosis.columns import Candidate
+from cspm_ident.diagnosis.columns import Candidate, Place
+from cspm_ident.diagnosis.diagnose import Shape
+from cspm_ident.diagnosis.drivers import Driver
 from cspm_ident.diagnosis.hypothesis import Hypothesis, Rival
 from cspm_ident.diagnosis.judgement import HeldOut
 from cspm_ident.diagnosis.limits import Limit
 from cspm_ident.diagnosis.onset import Onset
+from cspm_ident.diagnosis.sketch import is_even
+from cspm_ident.diagnosis.sums import Gain
 from cspm_ident.diagnosis.verdict import diagnosis_data
+from cspm_sim.effects import Channel
 
 
 def test_a_finding_says_what_how_much_since_when_and_what_it_is_worth():
@@ -85,3 +91,32 @@ def test_the_file_of_the_machine_is_named():
     assert diagnosis_data(diagnosis())["testbed"]["path"].endswith("today: testbed.yaml")
     given = diagnosis_data(diagnosis(), Path("my_rig.yaml"))["testbed"]
     assert given == {"path": "my_rig.yaml", "sha256": THESIS.sha256}
+
+
+@pytest.mark.parametrize(
+    ("shape", "even"), [(lambda v: np.sqrt(np.abs(v)), True), (lambda v: v * np.abs(v), False)]
+)
+def test_what_is_even_in_speed_differs_by_direction(shape, even):
+    speeds = np.array([-9.0, -5.0, -2.0, 0.0, 2.0, 5.0, 10.0])
+    values = shape(speeds) - np.mean(shape(speeds))
+    driver = Driver(PLACE, "speed [rad/s]")
+    found = diagnosis(named=False, unknown=[(driver, Gain(50.0, 5.0), 0.4)])
+    found = replace(found, shapes=(Shape(driver, speeds, values),))
+    (told,) = diagnosis_data(found)["findings"]
+    words = "it is the same in both directions, so that friction differs by direction"
+    assert (words in told["statement"]) is even
+
+
+def test_one_direction_alone_is_not_even():
+    speeds = np.linspace(0.5, 5.0, 7)
+    assert not is_even(speeds, np.ones(7))
+
+
+@pytest.mark.parametrize(
+    ("signal", "unit"), [("time, in heave [s]", " N, takes"), ("pitch [rad]", " N·m, takes")]
+)
+def test_an_unknown_wrench_has_the_unit_of_its_component(signal, unit):
+    driver = Driver(Place(Channel.WRENCH, "bar"), signal)
+    found = diagnosis(named=False, unknown=[(driver, Gain(50.0, 5.0), 0.4)])
+    (told,) = diagnosis_data(found)["findings"]
+    assert unit in told["statement"]

@@ -145,9 +145,11 @@ def _worth(diagnosis: Diagnosis, named: Named, worth: Worth | None) -> str:
     away = ""
     if best.steady is not None and best.steady < _AWAY * best.after:
         away = f" ({_share(best, best.steady)} apart from where the shaft turns round)"
+    together = sum(best in _concerned(diagnosis, each) for each in diagnosis.findings.named) > 1
     return (
-        f"With it the held-out error of {channel_of(best)} falls from {_share(best, best.before)}"
-        f" to {_share(best, best.after)} of what was measured{away}, {noise};"
+        f"With {'all that was found' if together else 'it'} the held-out error of"
+        f" {channel_of(best)} falls from {_share(best, best.before)} to"
+        f" {_share(best, best.after)} of what was measured{away}, {noise};"
         f" {_simulated_worth(worth)}."
     )
 

@@ -11,6 +11,8 @@ Array = NDArray[np.float64]
 
 # A formula has to account for so much of the shape.
 _ENOUGH = 0.9
+# Of its larger side, that the smaller one has at least to be one.
+_BOTH = 0.5
 _FORMS: dict[str, Callable[[Array], Array]] = {
     "{x}": lambda x: x,
     "|{x}|": np.abs,
@@ -41,3 +43,20 @@ def sketch(knots: Array, values: Array, name: str) -> str | None:
         if share >= _ENOUGH and (best is None or share > best[0]):
             best = share, f"{found[0]:.3g}·{form.format(x=name)}"
     return None if best is None else best[1]
+
+
+def is_even(knots: Array, values: Array) -> bool:
+    """Return whether a shape is the same on both sides of zero, as far as it has both.
+
+    Args:
+        knots: of the signal, ascending, shape (k,).
+        values: of the shape there, (k,).
+    """
+    reach = min(-float(knots[0]), float(knots[-1]))
+    if reach < _BOTH * float(np.max(np.abs(knots))):
+        return False
+    points = np.linspace(-reach, reach, 41)
+    whole = np.interp(points, knots, values)
+    whole = whole - whole.mean()
+    odd = 0.5 * (whole - whole[::-1])
+    return float(np.sum(odd**2)) <= (1.0 - _ENOUGH) * float(np.sum(whole**2))

@@ -9,11 +9,12 @@ import numpy as np
 from cspm_ident.block_simulation import Drive
 from cspm_ident.diagnosis.columns import Candidate
 from cspm_ident.diagnosis.diagnose import Diagnosis, Shape
+from cspm_ident.diagnosis.drivers import Driver
 from cspm_ident.diagnosis.judgement import HeldOut
 from cspm_ident.diagnosis.lines import Line
 from cspm_ident.diagnosis.power import Power
 from cspm_ident.diagnosis.simulation import SimulatedFit
-from cspm_ident.diagnosis.sketch import sketch
+from cspm_ident.diagnosis.sketch import is_even, sketch
 from cspm_msgs_py.dofs import DOFS
 from cspm_sim.effects import Channel
 
@@ -74,9 +75,24 @@ def unknown_statement(diagnosis: Diagnosis, k: int) -> str:
         f"Something is missing in {_CHANNELS[driver.place.channel].format(driver.place.element)}"
         f" that nothing in the catalogue explains: a function of {driver.signal}, from"
         f" {shape.values.min():.3g} to {shape.values.max():.3g}"
-        f" {_UNITS.get(driver.place.channel, '')}, takes {100 * share:.0f} % of the squared"
-        f" residual{size}{hint}."
+        f" {_unit_in(driver)}, takes {100 * share:.0f} % of the squared"
+        f" residual{size}{hint}{_by_direction(shape)}."
     )
+
+
+def _unit_in(driver: Driver) -> str:
+    """Return the unit of what a driver adds; those of the bar's wrench name its component."""
+    turns = any(dof in driver.signal for dof in DOFS[3:])
+    return _UNITS.get(driver.place.channel, "N·m" if turns else "N")
+
+
+def _by_direction(shape: Shape) -> str:
+    """Return what an even function of a shaft's speed means: friction itself is odd."""
+    driver = shape.driver
+    of_speed = driver.place.channel is Channel.SHAFT and driver.signal.startswith("speed ")
+    if not of_speed or not is_even(shape.knots, shape.values):
+        return ""
+    return "; it is the same in both directions, so that friction differs by direction"
 
 
 def tension_statement(diagnosis: Diagnosis) -> str | None:

@@ -18,7 +18,7 @@ from cspm_ident.diagnosis.onset import Onset
 from cspm_ident.diagnosis.sketch import is_even
 from cspm_ident.diagnosis.sums import Gain
 from cspm_ident.diagnosis.verdict import diagnosis_data
-from cspm_sim.effects import Channel
+from cspm_sim.effects import Channel, catalogue
 
 
 def test_a_finding_says_what_how_much_since_when_and_what_it_is_worth():
@@ -120,3 +120,22 @@ def test_an_unknown_wrench_has_the_unit_of_its_component(signal, unit):
     found = diagnosis(named=False, unknown=[(driver, Gain(50.0, 5.0), 0.4)])
     (told,) = diagnosis_data(found)["findings"]
     assert unit in told["statement"]
+
+
+def test_of_several_numbers_those_that_may_be_nothing_have_none():
+    pushed = Candidate(catalogue()["bar_constant_wrench"], "bar")
+    weights = np.array([0.0004, 0.3, -0.0003, 0.0, 0.0, 0.0])
+    found = diagnosis()
+    named = found.findings.named[0]._replace(hypothesis=Hypothesis(pushed.effect, (pushed,)))
+    for half, told in (
+        (0.001, "sway 0.3000 ± 0.0010 N, surge, heave, roll, pitch, yaw not surely"),
+        (np.inf, "sway 0.3 N, heave -0.3 mN"),
+    ):
+        changed = replace(
+            found,
+            findings=found.findings._replace(named=(named,)),
+            weights={pushed: (weights, np.full(6, half))},
+        )
+        (finding,) = diagnosis_data(changed)["findings"]
+        assert told in finding["statement"]
+        assert ("too few data for an interval" in finding["statement"]) is (half == np.inf)

@@ -72,16 +72,27 @@ def _sizes(diagnosis: Diagnosis, named: Named) -> str:
 
 
 def _size(diagnosis: Diagnosis, candidate: Candidate) -> str:
-    """Return the parameters of one element, of those searched on a grid only where all are."""
-    numbers = numbers_of(diagnosis, candidate)
+    """Return the parameters of one element, of those searched on a grid only where all are.
+
+    Of several those that may as well be nothing are listed without a number.
+    """
+    effect, numbers = candidate.effect, numbers_of(diagnosis, candidate)
     known = [n for n in numbers if n.low < n.high] or numbers
-    bounded = bool(np.all(np.isfinite(diagnosis.weights[candidate][1])))
+    if not np.all(np.isfinite(diagnosis.weights[candidate][1])):
+        told = ", ".join(f"{_name(effect, n)} {amount_words(n.value, n.unit)}" for n in known)
+        return f"{told}, too few data for an interval"
+    sure = [n for n in known if not _may_be_absent(effect, n)] or known
     told = ", ".join(
-        f"{_name(candidate.effect, n)} "
-        + amount_words(n.value, n.unit, (n.low, n.high) if bounded else None)
-        for n in known
+        f"{_name(effect, n)} {amount_words(n.value, n.unit, (n.low, n.high))}" for n in sure
     )
-    return told if bounded else f"{told}, too few data for an interval"
+    rest = ", ".join(n.name for n in known if n not in sure)
+    return f"{told}, {rest} not surely" if rest else told
+
+
+def _may_be_absent(effect: Effect, number: Number) -> bool:
+    """Return whether a parameter's interval holds the value at which it does nothing."""
+    (absent,) = (p.absent for p in effect.parameters if p.name == number.name)
+    return absent is not None and number.low <= absent <= number.high
 
 
 def _name(effect: Effect, number: Number) -> str:

@@ -13,8 +13,8 @@ FRICTION = Candidate(catalogue()["winch_coulomb_friction"], "only")
 OFFSET = Candidate(catalogue()["winch_torque_offset"], "only")
 
 
-def regions(column, weight=2.0, seed=1):
-    """The region of an effect whose column is a function of speed; angle and speed are noise."""
+def regions(column, weight=2.0, seed=1, signal="speed [rad/s]"):
+    """The region of an effect whose column is a function of a signal; all signals are noise."""
     rng = np.random.default_rng(seed)
     speed, angle = rng.uniform(-1.0, 1.0, 4000), rng.uniform(0.0, 1.0, 4000)
     own, other = column(speed)[:, None, None], np.ones((4000, 1, 1))
@@ -25,7 +25,7 @@ def regions(column, weight=2.0, seed=1):
         target,
         {FRICTION: own, OFFSET: other},
         target,
-        signals={"angle [rad]": angle, "speed [rad/s]": speed},
+        signals={"angle [rad]": angle, signal: speed},
     )
     weights = {FRICTION: np.array([weight]), OFFSET: np.array([0.5])}
     return region_of([[equation]], [FRICTION], weights)
@@ -40,6 +40,14 @@ def test_an_effect_of_some_speeds_is_found_there(low, high):
     assert low - a_bin <= found.low < found.high <= high + a_bin
     assert found.share == pytest.approx((high - low) / 2.0, abs=0.03)
     assert found.held >= HELD
+
+
+def test_when_a_machine_moved_is_no_region():
+    def moved(values):
+        return ((values > 0.2) & (values < 0.5)) * 1.0
+
+    assert regions(moved, signal="time [s]") is None
+    assert regions(moved, signal="speed [rad/s]") is not None
 
 
 def test_an_effect_of_all_speeds_has_no_region():

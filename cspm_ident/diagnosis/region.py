@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from cspm_ident.diagnosis.columns import Candidate
+from cspm_ident.diagnosis.drivers import Driver
 from cspm_ident.diagnosis.equation import Equation
 
 Array = NDArray[np.float64]
@@ -60,6 +61,9 @@ def region_of(
             if taken is None:
                 continue
             for name, signal in equation.signals.items():
+                # When it begins is told apart; times would tell when the machine moved.
+                if Driver(equation.place, name).of_time:
+                    continue
                 gains.setdefault(name, []).append(taken)
                 values.setdefault(name, []).append(signal)
     regions = [

@@ -48,6 +48,15 @@ def test_names_stand_beside_the_machine_and_lead_to_their_parts():
     assert picture.count("stroke-dasharray") == len(parts)
 
 
+def test_the_machine_fills_the_height_of_its_picture():
+    picture = drawing(THESIS.testbed, BAR_POSE, None, [])
+    heights = [float(y) for y in re.findall(r'y[12]="([^"]*)"', picture)]
+    height = float(re.search(r'viewBox="0 0 \S+ (\S+)"', picture)[1])
+    assert min(heights) >= 0.0
+    assert max(heights) <= height
+    assert np.ptp(heights) > 0.8 * height
+
+
 def test_what_acts_on_all_load_cells_marks_each_of_them():
     cables = THESIS.testbed.cable_names
     parts = parts_of(catalogue()["tension_delay"], "load_cells", cables)

@@ -55,7 +55,7 @@ def drawing(
     bodies = _bodies(machine, bar_pose, frame_pose)
     ends = _ends(machine, bar_pose, frame_pose)
     corners = [point for _, box in bodies for point in box]
-    place, (right, low) = _placing(np.array([*corners, *(end for pair in ends for end in pair)]))
+    place, (right, foot) = _placing(np.array([*corners, *(end for pair in ends for end in pair)]))
     shapes: list[tuple[Part, str, Point]] = []
     for name, box in bodies:
         shapes += _body(name, [place(corner) for corner in box], Part(Kind.BODY, name) in marked)
@@ -65,7 +65,7 @@ def drawing(
     names, lowest = _names(shapes, marked, right + 0.7 * _EDGE)
     width = max(_WIDTH, right + _NAMES) if names else _WIDTH
     return (
-        f'<svg viewBox="0 0 {width:.0f} {max(low + _EDGE, lowest):.0f}" role=img'
+        f'<svg viewBox="0 0 {width:.0f} {max(foot + _EDGE, lowest):.0f}" role=img'
         f' aria-label="{escape(label)}" style="width:100%;max-width:600px;height:auto">'
         f"{''.join(_grouped(part, shape, part in marked) for part, shape, _ in shapes)}"
         f"{names}</svg>"
@@ -110,7 +110,7 @@ def _ends(
 
 
 def _placing(points: Array) -> tuple[Placed, Point]:
-    """Return the way from the world [m] to the picture [px], and its lowest point to the right.
+    """Return the way from the world [m] to the picture [px], and its corner below to the right.
 
     No machine is drawn larger than fits; a flat one has a low picture.
     """
@@ -124,8 +124,8 @@ def _placing(points: Array) -> tuple[Placed, Point]:
         x, y = shift + scale * (_flat(point) - low)
         return float(x), float(y)
 
-    right, low = shift + scale * size
-    return place, (float(right), float(low))
+    right, bottom = shift + scale * size
+    return place, (float(right), float(bottom))
 
 
 def _flat(point: Array) -> Array:

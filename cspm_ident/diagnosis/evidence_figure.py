@@ -7,7 +7,7 @@ import plotly.graph_objects as go
 from numpy.typing import NDArray
 from plotly.subplots import make_subplots
 
-from cspm_ident.diagnosis.curves import Curve, bins_of, explained_by
+from cspm_ident.diagnosis.curves import Curve, bins_of
 from cspm_ident.diagnosis.part import part_behind
 from cspm_ident.offline_page import BELOW, thinned
 from cspm_sim.effects import Channel
@@ -44,12 +44,16 @@ def caption_of(curve: Curve, signal: str) -> str:
 
 
 def _dependence(curve: Curve, signal: str) -> str:
-    """Return how much of a residual's variance is a function of a signal."""
+    """Return how much of the squares that were there is a function of a signal, and is left."""
+    whole = max(float(np.sum(curve.before**2)), 1e-300)
+    edges, home = bins_of(curve.signals[signal])
     before, after = (
-        100.0 * explained_by(curve.signals[signal], v) for v in (curve.before, curve.after)
+        100.0 * float(np.sum(_means(v, home, len(edges) - 1)[home] ** 2)) / whole
+        for v in (curve.before, curve.after)
     )
-    then = f" before and {after:.0f} % after" if curve.touched else ""
-    return f"A function of {signal.split(' [')[0]} explains {before:.0f} % of its variance{then}."
+    then = f", and {after:.2g} % are left that are" if curve.touched else ""
+    name = signal.split(" [")[0]
+    return f"Of its squares {before:.2g} % are a function of {name}{then}."
 
 
 def driver_figure(curve: Curve, name: str) -> go.Figure:

@@ -14,8 +14,9 @@ const frame = document.getElementById('f');
 frame.onload = () => {
   const page = frame.contentDocument.documentElement;
   frame.contentWindow.addEventListener('error', e => errors.push(e.message));
-  setTimeout(() => {
-    const found = {errors, wide: page.scrollWidth, seen: page.clientWidth,
+  setTimeout(async () => {
+    const told = await frame.contentWindow.eval(`(async () => {%s})()`);
+    const found = {errors, told, wide: page.scrollWidth, seen: page.clientWidth,
       plots: page.querySelectorAll('.scatterlayer').length};
     const out = document.createElement('pre');
     out.id = 'found'; out.textContent = JSON.stringify(found);
@@ -25,16 +26,17 @@ frame.onload = () => {
 </script></body>"""
 
 
-def look(page, width):
-    """Return how wide the page is, how wide it is seen, its plots and its errors.
+def look(page, width, script="return null"):
+    """Return how wide the page is, how wide it is seen, its plots, its errors, and what it told.
 
-    Skips the test where there is no Chromium.
+    The script is run in the page and may wait; what it returns is told. Skips the test where there
+    is no Chromium.
     """
     browser = shutil.which("chromium") or shutil.which("google-chrome")
     if browser is None:
         pytest.skip("no Chromium on this system")
     probe = page.with_name("probe.html")
-    probe.write_text(_PROBE % (width, page.name), encoding="utf-8")
+    probe.write_text(_PROBE % (width, page.name, script), encoding="utf-8")
     options = ["--headless", "--no-sandbox", "--disable-gpu", "--allow-file-access-from-files"]
     options += ["--virtual-time-budget=20000", "--enable-logging=stderr", "--dump-dom"]
     shown = subprocess.run(

@@ -36,6 +36,31 @@ def test_no_part_of_the_page_but_tables_is_wider_than_the_screen(measurement, dr
     assert shown["wide"] <= shown["seen"] <= 400
 
 
+ZOOM = """
+const plots = [...document.querySelectorAll(".over-time .plotly-graph-div")];
+const ranges = () => plots.map(plot => plot.layout.xaxis.range.map(Number));
+const shown = async change => {
+  await Plotly.relayout(plots[0], change);
+  await new Promise(done => setTimeout(done, 1000));
+  return ranges();
+};
+const zoomed = await shown({"xaxis.range": [1, 2], "xaxis2.range": [1, 2]});
+return [zoomed, await shown({"xaxis.autorange": true, "xaxis2.autorange": true})];
+"""
+
+
+@pytest.mark.slow
+def test_who_zooms_one_plot_over_time_zooms_all(measurement, tmp_path):
+    page = tmp_path / "report.html"
+    found = compare(measurement)
+    kinds = {c.block: c for c in found.channels}
+    assert len(kinds) > 2
+    write_page(page, replace(found, channels=list(kinds.values())))
+    zoomed, whole = look(page, 1280, ZOOM)["told"]
+    assert zoomed == [[1, 2]] * len(kinds)
+    assert all(high - low > 0.9 * DURATION for low, high in whole)
+
+
 @pytest.mark.slow
 def test_a_part_that_is_wider_than_the_screen_is_seen(tmp_path):
     page = tmp_path / "wide.html"

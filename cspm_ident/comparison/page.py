@@ -40,6 +40,26 @@ _QUANTITIES = {
     "angle_rad": "winch angle [rad]",
     "tension_n": "tension [N]",
 }
+# All lines over time show the same stretch, whichever of them the reader zooms.
+_OVER_TIME = "over-time"
+_LINKED = f"""<script>
+const plots = [...document.querySelectorAll(".{_OVER_TIME} .plotly-graph-div")];
+let following = false;
+const all = (plot, part, value) => Object.fromEntries(
+  Object.keys(plot.layout).filter(name => /^xaxis/.test(name)).map(name => [name + part, value]));
+const follow = (zoomed, name) => {{
+  const {{autorange, range}} = zoomed.layout[name];
+  const change = plot =>
+    autorange ? all(plot, ".autorange", true) : all(plot, ".range", [...range]);
+  following = true;
+  Promise.all(plots.filter(plot => plot !== zoomed).map(p => Plotly.relayout(p, change(p))))
+    .finally(() => {{ following = false; }});
+}};
+plots.forEach(plot => plot.on("plotly_relayout", change => {{
+  const moved = Object.keys(change).find(key => /^xaxis/.test(key));
+  if (!following && moved) follow(plot, moved.split(".")[0]);
+}}));
+</script>"""
 
 
 def write_page(path: Path, comparison: Comparison) -> None:
@@ -57,13 +77,14 @@ def write_page(path: Path, comparison: Comparison) -> None:
             continue
         heading = _BLOCKS[block].format(drive=comparison.drive.value)
         parts.append(f"<h2>{escape(heading)}</h2>{_table(channels)}")
-        parts.append(figure_html(_lines(channels), script=first))
+        lines = figure_html(_lines(channels), script=first)
+        parts.append(f"<div class={_OVER_TIME}>{lines}</div>")
         parts.append("<h3>Coherence of measured and simulated</h3>")
         parts.append(figure_html(_spectra(channels), script=False))
         parts.append("<h3>Error against what may drive it</h3>")
         parts.append(figure_html(_bins(channels), script=False))
         first = False
-    write_offline_page(path, title, parts)
+    write_offline_page(path, title, [*parts, _LINKED])
 
 
 def _about(comparison: Comparison) -> str:

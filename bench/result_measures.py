@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from bench.feasibility import gathered_deviations, least_errors, least_tensions
-from bench.tracking import Case, follow, motions_of_bundle, track, within_requirement
+from bench.tracking import Case, motions_of_bundle, track, within_requirement
 
 LIMIT_PERIOD = 0.2
 BINS = 1000
@@ -59,7 +59,7 @@ def past_thesis(case: Case, least: list[float]) -> dict[str, Any]:
     `least` is the case's limit.
     """
     bundle = case.bundle()
-    errors, tensions, missed, failure = follow(bundle)
+    errors, tensions, missed, failure = case.run()
     stride = round(LIMIT_PERIOD * bundle.scenario.rates.plant)
     sampled = within_requirement(bundle, errors)[::stride]
     possible_time: NDArray[np.bool_] = np.array(least)[: len(sampled)] >= 0.0
@@ -77,7 +77,7 @@ def past_thesis(case: Case, least: list[float]) -> dict[str, Any]:
 def bands(case: Case) -> dict[str, Any]:
     """Return lowest and highest error [mm, mrad] and the least tension [N] per bin of time."""
     bundle = case.bundle()
-    errors, tensions, _, _ = follow(bundle)
+    errors, tensions, _, _ = case.run()
     size = -(-len(errors) // BINS)
     starts = np.arange(0, len(errors), size)
     return {

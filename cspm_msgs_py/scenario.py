@@ -170,18 +170,31 @@ class FrictionFeedforward(StrictModel):
     smooth_below: PositiveFloat = 0.003
 
 
+class WinchFeedforward(StrictModel):
+    """Bandwidth [rad/s] up to which cables are wound by what wanted tensions stretch them."""
+
+    stretch_bandwidth: PositiveFloat | None = None
+
+
 class ForceControl(StrictModel):
     """Force controllers: closed-loop bandwidth [rad/s] to design for, or the gains per cable.
 
     With `load_cell_bias` the biases of the load cells are told from torques and speeds of the
     winches, and taken off. With `friction_feedforward` the torque goes ahead of the friction that
-    the test-bed's file tells.
+    the test-bed's file tells, with `winch_feedforward` of what the wanted tensions and the
+    references ask of the winches.
     """
 
     bandwidth: PositiveFloat = 800.0
     gains: dict[str, PiGains] | None = None
     load_cell_bias: LoadCellBias | None = None
     friction_feedforward: FrictionFeedforward | None = None
+    winch_feedforward: WinchFeedforward | None = None
+
+    @property
+    def looks_ahead(self) -> bool:
+        """Whether torques depend on the references."""
+        return bool(self.friction_feedforward or self.winch_feedforward)
 
 
 DistributionMethod = Literal[

@@ -174,7 +174,7 @@ def schedule_of(scenario: Scenario, testbed: Testbed) -> Schedule:
         distribution = (WRENCH, BAR_POSE), (TENSION_COMMAND,)
         add(TENSION_DISTRIBUTION, rates.tension_distribution, *distribution)
         force = (TENSION_COMMAND, TENSION), (TORQUE_COMMAND,)
-        ahead = references if scenario.control.force.friction_feedforward else ()
+        ahead = references if scenario.control.force.looks_ahead else ()
         add(FORCE_CONTROLLER, rates.force_controller, *force, ahead)
     elif isinstance(scenario.control, TorqueProfile):
         add(FORCE_CONTROLLER, rates.plant, (CLOCK,), (TORQUE_COMMAND,))

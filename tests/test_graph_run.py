@@ -60,13 +60,14 @@ MORE_RUNS = {
         250,
     ),
     # The force controller reads references as well.
-    "friction fed forward, mass told": (
+    "friction and winches fed forward, mass told": (
         Case(
             "worst_case_past_thesis",
             (
                 "control.motion.governor=null",
                 "control.motion.mass_adaptation={}",
                 "control.force.friction_feedforward={}",
+                "control.force.winch_feedforward={stretch_bandwidth: 200}",
             ),
             (("winch_coulomb_friction", (), {"torque": 0.01}),),
         ).bundle(),

@@ -13,6 +13,7 @@ from cspm_control.force_controller import ForceController
 from cspm_control.friction_feedforward import FrictionFeedforward
 from cspm_control.load_cell_bias import LoadCellBias
 from cspm_control.safety import GuardedStage
+from cspm_control.winch_feedforward import WinchFeedforward
 from cspm_msgs_py.diagnostics import Level, Status
 from cspm_msgs_py.safety_spec import Safety
 from cspm_msgs_py.schedule import (
@@ -60,14 +61,17 @@ class ForceStage(GuardedStage):
         period_ns: int,
         bias: LoadCellBias | None = None,
         friction: FrictionFeedforward | None = None,
+        winch: WinchFeedforward | None = None,
     ) -> None:
         """Take the controllers, their limits, the cables' names, and the guard's arguments.
 
         With `bias` the tensions are corrected before they are controlled; what trips is measured.
-        With `friction` its torque at the references' speed is fed forward.
+        With `friction` its torque at the references' speed is fed forward, with `winch` that of
+        the winches' motion and tension.
         """
         super().__init__(safe_state, safety, period_ns, len(names))
-        self._controller, self._bias, self._friction = controller, bias, friction
+        self._controller, self._bias = controller, bias
+        self._friction, self._winch = friction, winch
         self._limits = limits
         self._names = names
         self._shape = (len(names),)
@@ -89,7 +93,7 @@ class ForceStage(GuardedStage):
             self._send_safe(now_ns, send)
             return
         corrected = self._corrected(measured, winches)
-        ahead = self._against_friction(inputs)
+        ahead = self._ahead(inputs)
         torque = self._slew(self._controller.step(self._wanted, corrected, ahead))
         self._steps += 1
         self._limited += self._controller.saturated > 0
@@ -127,6 +131,8 @@ class ForceStage(GuardedStage):
         self._torque = None
         if self._bias is not None:
             self._bias.restart()
+        if self._winch is not None:
+            self._winch.restart()
 
     def _present_tensions(self) -> Array | None:
         return self._measured.copy() if self._has_measured else None
@@ -141,7 +147,7 @@ class ForceStage(GuardedStage):
         return measured - self._bias.values
 
     def _reference_fault(self, inputs: Mapping[str, Array]) -> str | None:
-        if self._friction is None:
+        if self._friction is None and self._winch is None:
             return None
         for topic in (BAR_REFERENCE, FRAME_REFERENCE):
             row = inputs.get(topic, _STILL)
@@ -151,12 +157,17 @@ class ForceStage(GuardedStage):
                 return f"{topic}: {row[~np.isfinite(row)][0]}, allowed: finite numbers"
         return None
 
-    def _against_friction(self, inputs: Mapping[str, Array]) -> Array | None:
-        """Return what friction will take (n,) [N·m], None as long as no reference has come."""
+    def _ahead(self, inputs: Mapping[str, Array]) -> Array | None:
+        """Return what is fed forward (n,) [N·m], None for nothing or before a reference came."""
         bar = inputs.get(BAR_REFERENCE)
-        if self._friction is None or bar is None:
+        told = [each for each in (self._friction, self._winch) if each is not None]
+        if bar is None or not told:
             return None
-        return self._friction.torque(bar, inputs.get(FRAME_REFERENCE, _STILL), self._wanted)
+        frame = inputs.get(FRAME_REFERENCE, _STILL)
+        first, *more = [each.torque(bar, frame, self._wanted) for each in told]
+        for torque in more:
+            first = first + torque
+        return first
 
     def _slew(self, torque: Array) -> Array:
         step = self._limits.torque_step

@@ -23,6 +23,7 @@ from cspm_control.stages.motion_stage import MotionStage
 from cspm_control.stages.torque_stage import TorqueStage
 from cspm_control.tension_distribution import TensionDistribution
 from cspm_control.torque_profile import TorqueGenerator
+from cspm_control.winch_feedforward import WinchFeedforward
 from cspm_msgs_py.dofs import CONTROLLED_AXES
 from cspm_msgs_py.errors import InputError
 from cspm_msgs_py.scenario import (
@@ -269,6 +270,7 @@ def force_stage(control: ClosedLoop, scenario: Scenario, testbed: Testbed) -> Fo
         1_000_000_000 // rate,
         load_cell_bias(control, testbed, 1.0 / rate),
         friction_feedforward(control, testbed),
+        winch_feedforward(control, testbed, 1.0 / rate),
     )
 
 
@@ -293,6 +295,16 @@ def friction_feedforward(control: ClosedLoop, testbed: Testbed) -> FrictionFeedf
         return None
     cables = nominal_parameters(testbed).cables
     return FrictionFeedforward(cables, winch_friction(testbed), wanted.smooth_below)
+
+
+def winch_feedforward(
+    control: ClosedLoop, testbed: Testbed, period: float
+) -> WinchFeedforward | None:
+    """Return what goes ahead of the winches every `period` [s], where the scenario wants it."""
+    wanted = control.force.winch_feedforward
+    if wanted is None:
+        return None
+    return WinchFeedforward(nominal_parameters(testbed), wanted.stretch_bandwidth, period=period)
 
 
 def torque_stage(control: TorqueProfile, scenario: Scenario, testbed: Testbed) -> TorqueStage:

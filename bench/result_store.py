@@ -32,7 +32,7 @@ MADE_WITH = (
     "bench/feasibility.py",
     "bench/tracking.py",
 )
-NOT_MADE_WITH = "cspm_control/analysis"
+NOT_MADE_WITH = ("cspm_control/analysis", "cspm_sim/effects/document.py")
 
 
 @dataclass(frozen=True)
@@ -140,7 +140,9 @@ def _code() -> tuple[Path, ...]:
     for name in MADE_WITH:
         path = ROOT / name
         found |= {path} if path.is_file() else set(path.rglob("*.py"))
-    return tuple(sorted(path for path in found if not path.is_relative_to(ROOT / NOT_MADE_WITH)))
+    for name in NOT_MADE_WITH:
+        found = {path for path in found if not path.is_relative_to(ROOT / name)}
+    return tuple(sorted(found))
 
 
 @cache

@@ -6,16 +6,12 @@ from collections.abc import Callable, Mapping
 from typing import NamedTuple
 
 from bench.result_cases import (
-    ADAPTED,
-    AHEAD,
     AT_FOUR_METRES,
     BEYOND,
     CAUSES,
     CORNERS,
     DESIGNED_THERE,
-    FRICTION,
     LIMITED,
-    MASSES,
     PAST,
     POSSIBLE,
     POSSIBLE_LOWER,
@@ -28,12 +24,8 @@ from bench.result_cases import (
     SWITCHED_CALM,
     SWITCHED_GAINS,
     THESIS,
-    TOLD_OF,
     calm,
-    changed,
-    corrected,
     seeded,
-    with_and_without,
 )
 from bench.result_machines import conditions_block, fastest_block
 from bench.result_measures import (
@@ -44,6 +36,20 @@ from bench.result_measures import (
     possible,
     possible_share,
     tracking,
+)
+from bench.result_robust_cases import ADAPTED, MASSES, PAYLOADS, TOLD_OF, changed, corrected
+from bench.result_sentences import (
+    ROUGHEST_PLAN,
+    ROUGHEST_SEED,
+    beam_said,
+    causes_said,
+    corrected_said,
+    deep_said,
+    late_said,
+    payload_said,
+    six_said,
+    touched_said,
+    winch_said,
 )
 from bench.result_store import Measurement
 from bench.result_tables import (
@@ -59,6 +65,7 @@ from bench.result_tables import (
     thesis_block,
     tracking_block,
 )
+from bench.result_winch_cases import AHEAD, FRICTION, with_and_without, wound
 from bench.tension_distribution import distribution_rows
 from bench.tracking import Case
 
@@ -85,24 +92,33 @@ def blocks_of(seeds: int) -> dict[str, Block]:
         "switched": _tracked("switched", SWITCHED),
         "fastest": Block({}, fastest_block),
         "switched_gains": _tracked("switched gains", SWITCHED_GAINS),
-        "switched_calm": _tracked("switched calm", SWITCHED_CALM),
+        "switched_calm": _tracked("switched calm", SWITCHED_CALM, _and(beam_said)),
         "switched_4m": _tracked("switched 4 m", SWITCHED_4M),
         "distribution": _distribution(),
-        "causes": _tracked("causes", CAUSES),
+        "causes": _tracked("causes", CAUSES, _and(causes_said)),
         "beyond": _tracked("beyond", BEYOND),
         "at_four_metres": _tracked("beyond", AT_FOUR_METRES),
+        "planned": _planned(),
         "corners": _tracked("corners", CORNERS),
         "rough_corners": _tracked("rough corners", ROUGH_CORNERS, extremes_block),
         "designed_there": _tracked("designed there", DESIGNED_THERE, extremes_block),
         "friction": _tracked("friction", with_and_without(FRICTION, AHEAD, "fed forward")),
+        "winch": _tracked("winch", wound(), _and(winch_said)),
         "limit": Block({name: _limit(name, case) for name, case in LIMITED.items()}, limit_block),
         "possible": _possible(),
         "possible_six": _possible_six(),
-        "robust": _tracked("robust", changed(PAST)),
+        "kept": _kept_in_six(seeds),
+        "changes": Block({"worst case": _limit("worst case", LIMITED["worst case"])}, touched_said),
+        "robust": _tracked("robust", changed(PAST), _and(late_said)),
         "moved_on": _moved_on(),
         "told": _tracked("told", TOLD_OF),
-        "corrected": _tracked("corrected", corrected()),
+        "corrected": _tracked("corrected", corrected(), _and(corrected_said)),
         "adapted": _tracked("adapted", with_and_without(MASSES, ADAPTED, "told from its heave")),
+        "payload": _tracked(
+            "payload",
+            with_and_without(PAYLOADS, ADAPTED, "told from its heave"),
+            _and(payload_said),
+        ),
         "robust_thesis": _tracked("robust thesis", changed("worst_case")),
         "past": _past("1000 Hz", seeds),
         "past_100": _past("100 Hz", seeds),
@@ -128,6 +144,11 @@ def _tracked(group: str, cases: Cases, write: Callable[[Found], str] = tracking_
     )
 
 
+def _and(said: Callable[[Found], str]) -> Callable[[Found], str]:
+    """Return what writes a row per run, and below them what is said of them."""
+    return lambda found: f"{tracking_block(found)}\n\n{said(found)}"
+
+
 def _distribution() -> Block:
     name = "distribution"
     measurement = Measurement(name, distribution_rows, (20000, 60.0), alone=True)
@@ -141,6 +162,18 @@ def _limit(name: str, case: Case) -> Measurement:
 def _possible() -> Block:
     wanted = {name: Measurement(f"possible {name}", possible, of) for name, of in POSSIBLE.items()}
     return Block(wanted, errors_block)
+
+
+def _planned() -> Block:
+    return Block(
+        {**_tracked("beyond", AT_FOUR_METRES).measurements, **_possible().measurements}, deep_said
+    )
+
+
+def _kept_in_six(seeds: int) -> Block:
+    least = {ROUGHEST_PLAN: _possible().measurements[ROUGHEST_PLAN]}
+    enough = max(seeds, int(ROUGHEST_SEED.split()[1]))
+    return Block({**_past_six(enough).measurements, **least}, six_said)
 
 
 def _possible_six() -> Block:

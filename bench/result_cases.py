@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
 from dataclasses import replace
 
 from bench.tracking import Case
@@ -233,95 +232,6 @@ POSSIBLE: dict[str, tuple[Case, float]] = {
 POSSIBLE_SIX = {f"seed {seed}": Case(SIX, (f"seed={seed}",)) for seed in (1, 9, 14)}
 POSSIBLE_LOWER = (0.0, 0.3, 0.7)
 
-Effects = tuple[tuple[str, tuple[str, ...], Mapping[str, float]], ...]
-WIND = {"surge": 1.0, "sway": 2.0, "heave": 0.0, "roll": 0.0, "pitch": 0.0, "yaw": 0.0}
-CHANGES: dict[str, Effects] = {
-    "nothing": (),
-    "cable stiffness +20 %": (("cable_stiffness", (), {"scale": 1.2}),),
-    "cable stiffness −20 %": (("cable_stiffness", (), {"scale": 0.8}),),
-    "cable damping +20 %": (("cable_axial_damping", (), {"scale": 1.2}),),
-    "cable damping −20 %": (("cable_axial_damping", (), {"scale": 0.8}),),
-    "bar's mass +20 %": (("bar_mass", (), {"mass": 0.812}),),
-    "bar's mass −20 %": (("bar_mass", (), {"mass": -0.812}),),
-    "dry friction 2 mN·m at every motor": (("winch_coulomb_friction", (), {"torque": 0.002}),),
-    "poses 5 ms late": (("pose_delay", (), {"delay": 0.005}),),
-    "load cell of surge_1 +0.2 N": (("tension_bias", ("surge_1",), {"bias": 0.2}),),
-    "load cell of surge_1 +1 N": (("tension_bias", ("surge_1",), {"bias": 1.0}),),
-    "hoist_1's drive at half torque": (("winch_torque_gain", ("hoist_1",), {"gain": 0.5}),),
-    "wind of 2 N in sway and 1 N in surge": (("bar_constant_wrench", (), WIND),),
-}
-
-SURGE, SWAY, HOIST = ("surge_1",), ("sway_1",), ("hoist_1",)
-CORRECTED: dict[str, Effects] = {
-    "nothing": (),
-    "load cell of surge_1 +1 N": (("tension_bias", SURGE, {"bias": 1.0}),),
-    "load cell of sway_1 −1 N": (("tension_bias", SWAY, {"bias": -1.0}),),
-    "load cell of hoist_1 +1 N": (("tension_bias", HOIST, {"bias": 1.0}),),
-    "all load cells +1 N, dry friction 2 mN·m at every motor": (
-        ("tension_bias", (), {"bias": 1.0}),
-        ("winch_coulomb_friction", (), {"torque": 0.002}),
-    ),
-    "hoist_1's drive at half torque": (("winch_torque_gain", HOIST, {"gain": 0.5}),),
-}
-# What the machine has and its controllers are told, by the test-bed's file or by the scenario.
-TOLD_OF = {
-    "poses 5 ms late": Case(PAST, (ROBUST,), pose_delay=0.005),
-    "wind of 2 N in sway and 1 N in surge": Case(
-        PAST, (ROBUST, KNOWN_WIND), (("bar_constant_wrench", (), WIND),)
-    ),
-}
-TOLD = "control.force.load_cell_bias={largest: 2.0}"
-
-# Dry friction [N·m] and viscous friction [N·m·s/rad] of every motor, and dry friction as a share of
-# the load's torque.
-DRY_10: Effects = (("winch_coulomb_friction", (), {"torque": 0.01}),)
-DRY_30: Effects = (("winch_coulomb_friction", (), {"torque": 0.03}),)
-VISCOUS: Effects = (("winch_viscous_friction", (), {"coefficient": 1e-4}),)
-OF_LOAD: Effects = (("winch_load_friction", (), {"coefficient": 0.2}),)
-SLOW_FORCE = "control.force.bandwidth=200"
-FRICTION = {
-    "dry friction 10 mN·m": Case(PAST, (SHORT,), DRY_10),
-    "dry friction 30 mN·m": Case(PAST, (SHORT,), DRY_30),
-    "dry friction 30 mN·m, 100 Hz": Case(PAST, (SHORT, *CAMERA_100_HZ), DRY_30),
-    "dry friction 20 % of the load": Case(PAST, (SHORT,), OF_LOAD),
-    "dry friction 10 mN·m, viscous 0.1 mN·m·s": Case(PAST, (SHORT,), DRY_10 + VISCOUS),
-    "dry friction 10 mN·m, force controllers at 200 rad/s": Case(PAST, (SHORT, SLOW_FORCE), DRY_10),
-    "dry friction 10 mN·m, the thesis's controllers": Case("worst_case", (SHORT,), DRY_10),
-}
-AHEAD = "control.force.friction_feedforward={}"
-HEAVY: Effects = (("bar_mass", (), {"mass": 0.812}),)
-LIGHT: Effects = (("bar_mass", (), {"mass": -0.812}),)
-PULLED: Effects = (
-    (
-        "bar_constant_wrench",
-        (),
-        {"surge": 0.0, "sway": 0.0, "heave": 4.0, "roll": 0.0, "pitch": 0.0, "yaw": 0.0},
-    ),
-)
-MASSES = {
-    "nothing": Case(PAST, (HALF,)),
-    "bar's mass +20 %": Case(PAST, (HALF,), HEAVY),
-    "bar's mass −20 %": Case(PAST, (HALF,), LIGHT),
-    "bar's mass +20 %, 100 Hz": Case(PAST, (HALF, *CAMERA_100_HZ), HEAVY),
-    "bar's mass +20 %, all six coordinates": Case(SIX, (HALF,), HEAVY),
-    "steady force of 4 N downwards": Case(PAST, (HALF,), PULLED),
-}
-ADAPTED = "control.motion.mass_adaptation={}"
-
-
-def with_and_without(cases: Mapping[str, Case], option: str, said: str) -> dict[str, Case]:
-    """Return each case, and after it the same with an option."""
-    found = {}
-    for name, case in cases.items():
-        found[name] = case
-        found[f"{name}, {said}"] = replace(case, overrides=(*case.overrides, option))
-    return found
-
-
-def corrected() -> dict[str, Case]:
-    """Return the worst case past the thesis with load cells that are off, and corrected."""
-    return {name: Case(PAST, (ROBUST, TOLD), effects) for name, effects in CORRECTED.items()}
-
 
 def seeded(seeds: int, profile: tuple[str, ...], scenario: str = PAST) -> dict[str, Case]:
     """Return a worst case with each of so many seeds and one motion capture."""
@@ -337,8 +247,3 @@ def calm(seeds: int) -> dict[str, Case]:
         for profile, rates in PROFILES.items()
         for name, case in seeded(seeds, (*TENTH, *rates), "calm").items()
     }
-
-
-def changed(scenario: str) -> dict[str, Case]:
-    """Return a scenario on machines that are not what the controllers think."""
-    return {name: Case(scenario, (ROBUST,), effects) for name, effects in CHANGES.items()}

@@ -25,14 +25,12 @@ from bench.result_cases import (
     SWITCHED_CALM,
     SWITCHED_GAINS,
     THESIS,
-    TOLD_OF,
     calm,
-    changed,
-    corrected,
     seeded,
 )
 from bench.result_machines import fastest_crossover
 from bench.result_measures import tracking
+from bench.result_robust_cases import TOLD_OF, changed, corrected
 from bench.result_store import Measurement, Store, spoken
 from bench.result_tables import (
     calm_block,
@@ -306,3 +304,52 @@ def test_the_page_has_a_place_for_every_block_and_tables_in_them():
     for block in (tracking_block, extremes_block):
         lines = block({"rest": data}).splitlines()
         assert len({re.sub(r"[^|]", "", line) for line in lines}) == 1
+
+
+# What figures the page's prose may have, beside generated blocks: none that was measured.
+THE_THESIS_SAYS = ("Tables 8-1 and 8-2", "tables 7-1 and 7-2", "(60°, 6 dB)")
+RUNS_ARE_SET_TO = (
+    "(its first 200 s)",
+    "target at 4 m the loop fails",
+    "each of 60 000 milliseconds",
+    "wanted tensions down to 0.3 N",
+    "seed 6, with one thing changed",
+    "with 0.5 s of foresight",
+    "but those of force at 1000 Hz",
+    "these controllers at 100 Hz",
+    "worst of all seeds, 200 s each",
+    "target at 4 m, with the settings",
+    "*4 times softer*",
+    "can rest with 2 N in every cable",
+    "tensions from 0.3 N on over the 40 s of each run",
+    "the bar aside at 4 m",
+    "Down at 4 m the cables",
+    "with tensions down to 0 N and the reference known 2 s ahead",
+    "plan from 0.5 N on, at 4 m from 0.6 N, with six coordinates from 0.7 N",
+    "tensions ≥ 0 exist",
+    "with tensions down to 0 N no controller",
+    "lets cables down to 0.3 N",
+    "where one says 1 N too much",
+    "the line with 1 N above",
+    "100 s each",
+)
+
+
+def figures_in(page, allowed=()):
+    """Return what has a digit in a page's prose: outside generated blocks, code and links."""
+    text = re.sub(r"<!-- (results: \w+) -->.*?<!-- end -->", "", page, flags=re.DOTALL)
+    text = re.sub(r"```.*?```|`[^`]*`|\]\([^)]*\)", "", text, flags=re.DOTALL)
+    text = " ".join(text.split())
+    unused = [phrase for phrase in allowed if phrase not in text]
+    for phrase in allowed:
+        text = text.replace(phrase, "")
+    return unused + re.findall(r".{0,30}\d.{0,20}", text)
+
+
+def test_measured_figures_stand_in_generated_blocks_alone():
+    page = PAGE.read_text(encoding="utf-8")
+    assert figures_in(page, THE_THESIS_SAYS + RUNS_ARE_SET_TO) == []
+    block = "<!-- results: a -->\n0.3 mm\n<!-- end -->"
+    assert figures_in(f"It takes `0.2` [long](a1.md).\n{block}\nAnd ends.") == []
+    assert figures_in(f"{block}\nIt costs\n0.2 mm in heave.") == ["It costs 0.2 mm in heave."]
+    assert figures_in("from 1 N on", ("from 2 N on",)) == ["from 2 N on", "from 1 N on"]

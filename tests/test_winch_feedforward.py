@@ -256,6 +256,7 @@ def test_slow_force_controllers_follow_with_it_and_with_its_opposite_worse(monke
     assert heave_error(ahead) > 1.5 * without
 
 
+@pytest.mark.slow
 @pytest.mark.compiled
 def test_stretch_pays_where_cables_are_soft_and_its_opposite_does_not(monkeypatch):
     soft = {"cables": (0.25, 0.5)}

@@ -389,6 +389,13 @@ def signals_of_cable(lengths, tensions, plant, angles=None):
     return row
 
 
+def rested(signals, seconds=0.5):
+    """The same after some time at rest."""
+    before = np.repeat(signals[:1], round(seconds / 1e-3), axis=0)
+    before[:, CableSignal.TIME] += 1e-3 * np.arange(-len(before), 0)
+    return np.vstack([before, signals])
+
+
 def left_over(signals):
     """Tension less that of the linear law, from the first sample on."""
     law = signals[:, CableSignal.STIFFNESS] * signals[:, CableSignal.ELONGATION]
@@ -405,7 +412,7 @@ def left_over(signals):
 )
 def test_columns_of_a_cable_with_memory_are_what_its_law_leaves_over(effect, parameters):
     machine = line([entry(effect, **parameters)])
-    signals = signals_of_cable(*locked_run(machine, swing(0.002, 0.4), 1.2))
+    signals = rested(signals_of_cable(*locked_run(machine, swing(0.002, 0.4), 1.2)))
     found = catalogue()[effect]
     point = {name: parameters[name] for name in found.nonlinear}
     model = (found.regressors(signals, **point) @ found.weights(parameters))[:, 0]
@@ -413,6 +420,17 @@ def test_columns_of_a_cable_with_memory_are_what_its_law_leaves_over(effect, par
     assert np.abs(left).max() > 0.1
     # Straight lines between samples of 1 ms in a cycle of 400.
     assert model - model[0] == pytest.approx(left, abs=5e-3 * np.abs(left).max())
+
+
+def test_one_wrong_tension_at_the_beginning_is_no_creep():
+    """It would be forgotten within a time constant, and look like creep that long."""
+    signals = rested(signals_of_cable(*locked_run(line(), swing(0.002, 2.0), 4.0)))
+    regressors = catalogue()["cable_creep"].regressors
+    clean = regressors(signals, time_constant=3.0)[:, 0, 0]
+    signals[0, CableSignal.TENSION] += 2.0
+    assert regressors(signals, time_constant=3.0)[1:, 0, 0] == pytest.approx(
+        clean[1:], abs=2e-3 * np.abs(clean).max()
+    )
 
 
 def test_columns_of_a_flexible_frame_are_what_the_law_leaves_over():

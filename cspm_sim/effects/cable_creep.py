@@ -21,6 +21,9 @@ from cspm_sim.kernels.affected_cables import (
 )
 from cspm_sim.kernels.memory import relaxed
 
+# A single sample's noise would be forgotten within a time constant only, and look like creep.
+_BEGINNING_S = 0.3
+
 
 def _stretch(parameters: Array, signals: Array, states: Array, rates: Array) -> None:
     signals[ELONGATION_ADDED] -= states[0] * signals[UNSTRETCHED] * states[1]
@@ -38,7 +41,7 @@ def _rest(parameters: Array, signals: Array) -> Sequence[float]:
 
 
 def _columns(signals: Array, time_constant: float) -> Array:
-    """Return what creep adds that was at rest under the first sample's tension."""
+    """Return what creep adds that was at rest under the tension of the beginning."""
     time = signals[:, CableSignal.TIME]
     lengths = signals[:, CableSignal.WOUND] * signals[:, CableSignal.LENGTH]
     tension = signals[:, CableSignal.TENSION] - signals[:, CableSignal.DAMPER]
@@ -46,6 +49,7 @@ def _columns(signals: Array, time_constant: float) -> Array:
     means[1:, 0] = 0.5 * (tension[1:] + tension[:-1])
     kept = np.exp(-np.diff(time, prepend=time[0]) / time_constant)[:, None]
     crept = means.copy()
+    crept[0] = np.median(tension[time - time[0] <= _BEGINNING_S])
     relaxed(means, kept, crept)
     grown = (crept[:, 0] - crept[0, 0]) * lengths / lengths[0]
     return np.asarray((-signals[:, CableSignal.STIFFNESS] * grown)[:, None, None])

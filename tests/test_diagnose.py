@@ -1,6 +1,7 @@
 """What a machine lacks is found, by the command, in recordings that another plant made."""
 
 import json
+import shutil
 import sys
 from dataclasses import replace
 
@@ -195,6 +196,20 @@ def test_of_a_real_machines_full_model_only_what_is_left_is_told(emps):
     assert fit["held_out"]["nrmse_after"] < 0.05
     left = [each for each in found["findings"] if each["effect"] == "unknown"]
     assert "% of what was measured" in left[0]["statement"]
+
+
+def test_a_recording_counts_once_whatever_its_name_and_has_to_be_long_enough(cspm, capsys):
+    code, _, err = cspm(capsys, "run", "rest", "--duration", 2, "--out", "once")
+    assert (code, err) == (0, "")
+    shutil.copytree(cspm.folder / "once", cspm.folder / "copied")
+    for arguments, message in (
+        (("once", "copied"), "copied: the same recording as once, allowed: each once"),
+        (("once", "--held-out", "copied"), "--held-out copied: is searched as well, allowed: "),
+        (("once",), "once: 1.4 s to search, allowed: 3 s or more; without --held-out "),
+    ):
+        code, _, err = cspm(capsys, "diagnose", *arguments)
+        assert code == 2
+        assert err.startswith(f"cspm: {message}")
 
 
 @pytest.mark.parametrize(

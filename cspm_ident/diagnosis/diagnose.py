@@ -33,6 +33,7 @@ from cspm_ident.diagnosis.region import Region, region_of
 from cspm_ident.diagnosis.safeguards import ALL_SAFEGUARDS, Safeguards
 from cspm_ident.diagnosis.search import Search
 from cspm_ident.diagnosis.simulation import SimulatedFit, Worth, baselines_of
+from cspm_ident.diagnosis.sums import FOLDS
 from cspm_ident.diagnosis.weights import Weights
 from cspm_ident.signals.measurement import Measurement
 from cspm_msgs_py.errors import InputError
@@ -125,7 +126,7 @@ def diagnose(
         safeguards: all of them, but for comparisons.
 
     Raises:
-        InputError: the recordings have no residual that could be looked at.
+        InputError: the recordings have no residual that could be looked at, or are too short.
     """
     effects, knots = safeguards.effects, Knots()
     search_parts, judge_parts = _parts(searched, held_out, effects, knots, progress)
@@ -137,6 +138,11 @@ def diagnose(
     spans = [span_of(part) for part in search_parts]
     block = max(SHORTEST_BLOCK_S, sum(b - a for a, b in spans) / BLOCKS)
     evidence = gather(in_noise(steady(search_parts), noise), block)
+    if evidence.blocks < FOLDS:
+        raise InputError(
+            f"{searched[0].path}: {sum(b - a for a, b in spans):.1f} s to search, allowed:"
+            f" {FOLDS * SHORTEST_BLOCK_S:g} s or more; without --held-out seven tenths are searched"
+        )
     search = Search(evidence, progress, safeguards.sums)
     found = search.run()
     progress("held-out data")

@@ -139,3 +139,13 @@ def test_of_several_numbers_those_that_may_be_nothing_have_none():
         (finding,) = diagnosis_data(changed)["findings"]
         assert told in finding["statement"]
         assert ("too few data for an interval" in finding["statement"]) is (half == np.inf)
+
+
+@pytest.mark.parametrize(
+    ("half", "told"),
+    [(5.0, "torque 30 mN·m, too few data for an interval"), (0.001, "torque 30.0 ± 1.0 mN·m.")],
+)
+def test_an_interval_of_all_that_is_allowed_is_none(half, told):
+    weights = {RUBBING: (np.array([TORQUE]), np.array([half]))}
+    (finding,) = diagnosis_data(replace(diagnosis(), weights=weights))["findings"]
+    assert told in finding["statement"]

@@ -4,8 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
-import numpy as np
-
 from cspm_ident.diagnosis.amount import amount_words
 from cspm_ident.diagnosis.columns import Candidate
 from cspm_ident.diagnosis.diagnose import Diagnosis
@@ -78,7 +76,7 @@ def _size(diagnosis: Diagnosis, candidate: Candidate) -> str:
     """
     effect, numbers = candidate.effect, numbers_of(diagnosis, candidate)
     known = [n for n in numbers if n.low < n.high] or numbers
-    if not np.all(np.isfinite(diagnosis.weights[candidate][1])):
+    if all(_is_anything(effect, n) for n in known):
         told = ", ".join(f"{_name(effect, n)} {amount_words(n.value, n.unit)}" for n in known)
         return f"{told}, too few data for an interval"
     sure = [n for n in known if not _may_be_absent(effect, n)] or known
@@ -87,6 +85,12 @@ def _size(diagnosis: Diagnosis, candidate: Candidate) -> str:
     )
     rest = ", ".join(n.name for n in known if n not in sure)
     return f"{told}, {rest} not surely" if rest else told
+
+
+def _is_anything(effect: Effect, number: Number) -> bool:
+    """Return whether a parameter's interval is all that the catalogue allows."""
+    (ends,) = ((p.minimum, p.maximum) for p in effect.parameters if p.name == number.name)
+    return number.low <= ends[0] and number.high >= ends[1]
 
 
 def _may_be_absent(effect: Effect, number: Number) -> bool:

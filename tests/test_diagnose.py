@@ -164,6 +164,8 @@ def test_friction_deleted_from_a_real_machine_comes_back_in_order(emps):
     for each in named(found):
         value = each["parameters"][0]["value"]
         assert value == pytest.approx(PUBLISHED[each["effect"]], rel=0.01)
+    effects = [each["effect"] for each in found["findings"]]
+    assert effects[:4] == [COULOMB, VISCOUS, OFFSET, "unknown"]
     # Friction differs by direction, which the catalogue does not have.
     left = [each for each in found["findings"] if each["effect"] == "unknown"]
     region = left[0]["region"]

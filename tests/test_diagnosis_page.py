@@ -288,6 +288,20 @@ def test_a_finding_beside_much_that_nothing_explains_is_doubtful(left, doubtful,
     assert ("Doubtful: beside it" in page_of(tmp_path, found)) is doubtful
 
 
+@pytest.mark.parametrize(("gain", "behind"), [(201.0, False), (199.0, True)])
+def test_the_doubtful_stands_behind_a_greater_unknown_though_another_is_sure(gain, behind):
+    """The sure one gains 9000, the unknown 200: no tenth of that, and much of the other."""
+    found = diagnosis(unknown=[(Driver(PLACE, "tension [N]"), Gain(200.0, 1.0), 0.2)])
+    (one,) = found.findings.named
+    two = tuple(one._replace(gain=Gain(total, 1.0)) for total in (9000.0, gain))
+    twice = {name: 2 * getattr(found, name) for name in ("onsets", "regions", "worth")}
+    found = replace(found, findings=found.findings._replace(named=two), **twice)
+    effects = [f["effect"] for f in diagnosis_data(found)["findings"]]
+    coulomb = "winch_coulomb_friction"
+    assert effects == [coulomb, *(("unknown", coulomb) if behind else (coulomb, "unknown"))]
+    assert verdict_of(found) is Verdict.EFFECT
+
+
 def test_where_a_finding_shows_is_told():
     (finding,) = diagnosis_data(diagnosis(region=FAST))["findings"]
     assert finding["region"] == FAST._asdict()

@@ -137,13 +137,20 @@ def named_in(data: Mapping[str, Any]) -> list[dict[str, Any]]:
 
 
 def _findings(diagnosis: Diagnosis) -> list[dict[str, Any]]:
-    """Return what was found; the doubtful comes behind the unknown that makes it so."""
+    """Return what was found, the most important first.
+
+    What is doubtful does not come first: it stands behind the unknown that makes it so, unless
+    something sure is told before and the unknown is the lesser.
+    """
     found = diagnosis.findings
     named = [_finding(diagnosis, k) for k in range(len(found.named))]
     # They are in the order of their gains, so that all doubtful ones are the last.
-    sure = sum(not found.is_doubtful(each) for each in found.named)
+    ahead = sum(not found.is_doubtful(each) for each in found.named)
+    if ahead:
+        most = max((gain.total for _, gain, _ in found.unknown), default=0.0)
+        ahead = sum(each.gain.total >= most for each in found.named)
     unknown = [_unknown(diagnosis, k) for k in range(len(diagnosis.shapes))]
-    return [*named[:sure], *unknown, *map(_line, diagnosis.lines), *named[sure:]]
+    return [*named[:ahead], *unknown, *map(_line, diagnosis.lines), *named[ahead:]]
 
 
 def _recording(role: str, measurement: Measurement) -> dict[str, Any]:

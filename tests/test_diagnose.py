@@ -13,7 +13,7 @@ from cspm_bringup import cli
 from cspm_ident.diagnosis.diagnose import diagnose
 from cspm_ident.diagnosis.verdict import diagnosis_data
 from cspm_ident.signals.measurement import read_measurement
-from cspm_msgs_py.testbed import load_testbed
+from cspm_msgs_py.testbed import EffectEntry, load_testbed
 
 THESIS = SCENARIOS / "testbeds" / "thesis.yaml"
 TORQUE = 0.01
@@ -128,10 +128,11 @@ def emps(cspm):
         assert cspm(Silent(), "import", DATA / name, *options)[0] == 0
     measured = [read_measurement(cspm.folder / name[:-4]) for name in (ESTIMATION, PULSES)]
 
-    def call(*deleted):
+    def call(*deleted, added=()):
         machine = measured[0].machine
         kept = tuple(entry for entry in machine.effects if entry.effect not in deleted)
-        bare = machine.model_copy(update={"effects": kept})
+        more = (EffectEntry(effect=n, parameters={"torque": PUBLISHED[n]}) for n in added)
+        bare = machine.model_copy(update={"effects": (*kept, *more)})
         searched, judged = (m.with_testbed(replace(m.testbed, testbed=bare)) for m in measured)
         return diagnosis_data(diagnose([searched], [judged]))
 
@@ -190,14 +191,25 @@ def test_one_term_deleted_from_a_real_machine_is_named_first(emps, deleted):
 
 
 @pytest.mark.compiled
-def test_of_a_real_machines_full_model_only_what_is_left_is_told(emps):
+def test_the_offset_alone_is_named_before_what_is_unknown(emps):
     found = emps()
-    assert [each["effect"] for each in named(found)] == [OFFSET]
+    assert found["verdict"] == "effect"
+    assert [each["effect"] for each in found["findings"]][:2] == [OFFSET, "unknown"]
+    value = named(found)[0]["parameters"][0]["value"]
+    assert value == pytest.approx(PUBLISHED[OFFSET], rel=0.01)
     (fit,) = found["residuals"]
     assert 0.07 < fit["held_out"]["nrmse_before"] < 0.08
     assert fit["held_out"]["nrmse_after"] < 0.05
-    left = [each for each in found["findings"] if each["effect"] == "unknown"]
-    assert "% of what was measured" in left[0]["statement"]
+
+
+@pytest.mark.compiled
+def test_of_a_real_machines_full_model_only_what_is_left_is_told(emps):
+    found = emps(added=[OFFSET])
+    assert found["verdict"] == "unknown"
+    assert not named(found)
+    (fit,) = found["residuals"]
+    assert fit["held_out"]["nrmse_before"] < 0.05
+    assert "% of what was measured" in found["findings"][0]["statement"]
 
 
 def test_a_recording_counts_once_whatever_its_name_and_has_to_be_long_enough(cspm, capsys):

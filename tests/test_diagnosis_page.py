@@ -17,7 +17,7 @@ from cspm_ident.diagnosis.diagnose import Diagnosis, Shape
 from cspm_ident.diagnosis.drivers import Driver
 from cspm_ident.diagnosis.equation import Equation
 from cspm_ident.diagnosis.evidence_figure import caption_of
-from cspm_ident.diagnosis.hypothesis import Findings, Hypothesis, Named, Rival
+from cspm_ident.diagnosis.hypothesis import Findings, Hypothesis, Named, Rival, is_constant
 from cspm_ident.diagnosis.judgement import HeldOut
 from cspm_ident.diagnosis.limits import Limit
 from cspm_ident.diagnosis.lines import Line
@@ -286,6 +286,36 @@ def test_a_finding_beside_much_that_nothing_explains_is_doubtful(left, doubtful,
     assert ("Doubtful: beside it is much that nothing" in finding["statement"]) is doubtful
     assert verdict_of(found) is (Verdict.UNKNOWN if doubtful else Verdict.EFFECT)
     assert ("Doubtful: beside it" in page_of(tmp_path, found)) is doubtful
+
+
+def doubted(effect, signal, left):
+    """Whether a finding that gains 900 is doubtful beside a function that gains `left`."""
+    found = diagnosis(unknown=[(Driver(PLACE, signal), Gain(left, 1.0), 0.2)]).findings
+    candidate = Candidate(catalogue()[effect], "surge_2")
+    hypothesis = Hypothesis(candidate.effect, (candidate,))
+    return found.is_doubtful(found.named[0]._replace(hypothesis=hypothesis))
+
+
+@pytest.mark.parametrize(
+    ("effect", "signal", "most"),
+    [
+        ("winch_torque_offset", "speed [rad/s]", 900.0),
+        ("winch_torque_offset", "time [s]", 90.0),
+        ("winch_torque_gain", "speed [rad/s]", 90.0),
+    ],
+)
+def test_a_constant_is_doubted_by_what_drifts_or_is_greater(effect, signal, most):
+    """It is the mean of whatever function of speed is there as well."""
+    assert not doubted(effect, signal, most - 1.0)
+    assert doubted(effect, signal, most + 1.0)
+
+
+def test_what_the_catalogue_has_as_constants():
+    assert [name for name, effect in catalogue().items() if is_constant(effect)] == [
+        "bar_constant_wrench",
+        "tension_bias",
+        "winch_torque_offset",
+    ]
 
 
 @pytest.mark.parametrize(("gain", "behind"), [(201.0, False), (199.0, True)])

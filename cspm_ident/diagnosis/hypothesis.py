@@ -21,6 +21,8 @@ Unknown = tuple[Driver, Gain, float]
 # Of what a finding explains. In blind recordings no finding was right (of 7) beside so much that
 # nothing explained.
 DOUBTFUL_SHARE = 0.1
+# More signals than any block of the machine has.
+_SIGNALS = 128
 
 
 @dataclass(frozen=True)
@@ -112,8 +114,26 @@ class Findings(NamedTuple):
     candidates: int
 
     def is_doubtful(self, named: Named) -> bool:
-        """Return whether what nothing explains is no small part of what a finding does."""
-        return any(gain.total > DOUBTFUL_SHARE * named.gain.total for _, gain, _ in self.unknown)
+        """Return whether what nothing explains is no small part of what a finding does.
+
+        What is the same at all times is the mean of whatever function of the machine's motion is
+        there beside it, and no part of that; but it may have been drifting, or be the lesser.
+        """
+        gained = named.gain.total
+        constant = is_constant(named.hypothesis.effect)
+        return any(
+            gain.total > gained * (1.0 if constant and not driver.of_time else DOUBTFUL_SHARE)
+            for driver, gain, _ in self.unknown
+        )
+
+
+def is_constant(effect: Effect) -> bool:
+    """Return whether an effect adds the same to its main residual whatever the machine does."""
+    signals = np.random.default_rng(0).normal(size=(16, _SIGNALS))
+    shape = {name: grid[0] for name, grid in effect.nonlinear.items()}
+    with np.errstate(all="ignore"):
+        columns = effect.regressors(signals, **shape)
+    return bool(np.array_equal(columns[:-1], columns[1:]) and columns.any())
 
 
 def is_negligible(members: Mapping[Candidate, Array]) -> bool:

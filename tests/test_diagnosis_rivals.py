@@ -9,7 +9,7 @@ from cspm_ident.diagnosis.drivers import Knots
 from cspm_ident.diagnosis.equation import Equation
 from cspm_ident.diagnosis.evidence import gather
 from cspm_ident.diagnosis.hypothesis import Hypothesis, bounded, is_allowed
-from cspm_ident.diagnosis.likeness import chance
+from cspm_ident.diagnosis.likeness import TIED, chance, distance
 from cspm_ident.diagnosis.rivals import rivals_of
 from cspm_ident.diagnosis.search import Search
 from cspm_ident.diagnosis.sums import Sums
@@ -182,8 +182,17 @@ def test_further_parameters_have_to_pay():
     (named,) = named_in(target)
     assert named.hypothesis.effect.id == "winch_viscous_friction"
     (rival,) = named.alternatives
-    # A single further parameter costs as much as the logarithm of the blocks.
-    assert rival.behind > np.sqrt(np.log(24))
+    # A single further parameter costs as much as the logarithm of the blocks, of 20 at most.
+    assert rival.behind > np.sqrt(np.log(20))
+
+
+@pytest.mark.parametrize(("blocks", "counted"), [(20, 10), (40, 20), (4000, 20)])
+def test_what_explains_the_same_with_a_number_more_is_tied_however_long_is_measured(
+    blocks, counted
+):
+    apart = distance(np.zeros(blocks), 1.0, 1)
+    assert apart == pytest.approx(np.sqrt(np.log(counted)))
+    assert apart < TIED < distance(np.zeros(blocks), 1.0, 2)
 
 
 def test_an_effect_on_more_elements_than_blocks_tell_of_is_found():
@@ -282,7 +291,7 @@ def test_an_effect_that_a_wrong_number_hides_is_an_alternative():
     assert rival.words == "winch_torque_gain on only beside a wrong winch_drum_radius"
     assert rival.candidates == (DRIVE, RADIUS)
     # It has one number more.
-    assert rival.behind == pytest.approx(np.sqrt(np.log(24)), abs=0.1)
+    assert rival.behind == pytest.approx(np.sqrt(np.log(20)), abs=0.1)
 
 
 def test_an_effect_that_a_wrong_number_cannot_hide_is_no_alternative():

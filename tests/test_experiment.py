@@ -12,6 +12,7 @@ from cspm_bringup.bundle import make_bundle
 from cspm_bringup.run import run
 from cspm_ident.diagnosis.columns import Candidate, Place
 from cspm_ident.diagnosis.diagnose import Diagnosis
+from cspm_ident.diagnosis.equation import Equation
 from cspm_ident.diagnosis.hypothesis import Findings, Hypothesis, Named, Rival
 from cspm_ident.diagnosis.judgement import HeldOut
 from cspm_ident.diagnosis.recorded import equations_of
@@ -21,7 +22,7 @@ from cspm_ident.experiment.choice import Question, best_answer, is_safe, most_sh
 from cspm_ident.experiment.envelope import reach_of
 from cspm_ident.experiment.excitations import DURATION_S, excitations
 from cspm_ident.experiment.plan import planned
-from cspm_ident.experiment.separation import separation
+from cspm_ident.experiment.separation import decided, separation
 from cspm_ident.signals.measurement import read_measurement
 from cspm_ident.signals.samples import Samples
 from cspm_msgs_py.scenario import load_scenario, parse_scenario
@@ -122,6 +123,25 @@ def test_a_separation_is_what_the_rival_cannot_imitate(sea):
     one, other = (own.columns[c][:, 0, 0] / 1e-3 for c in (RUBBING, LOADED))
     left = 0.03 * (one - other * (one @ other) / (other @ other))
     assert apart == pytest.approx(np.linalg.norm(left), rel=1e-6)
+
+
+@pytest.mark.parametrize(("unlike", "tells"), [(0.06, False), (0.08, True)])
+def test_what_no_model_is_true_enough_for_is_not_promised(unlike, tells):
+    """Half a percent of the squares is 7 % of the amplitude; both are far above the noise."""
+    turns = np.linspace(0.0, 20.0 * np.pi, 5000, endpoint=False)
+    one, other = np.sin(turns), np.sin(turns) + unlike * np.cos(turns)
+    columns = {RUBBING: one[:, None, None], LOADED: other[:, None, None]}
+    place = Place(Channel.SHAFT, "surge_2")
+    target = 0.03 * one[:, None]
+    equations = [Equation(place, 0.01 * np.arange(5000), target, columns, target)]
+    noise, truth = {place: np.array([1e-5])}, {RUBBING: np.array([0.03])}
+    left = separation(equations, noise, truth, (LOADED,))
+    alone = separation(equations, noise, truth, ())
+    assert left == pytest.approx(unlike * alone, rel=0.01)
+    told = decided(equations, noise, truth, (LOADED,))
+    assert told == pytest.approx(alone * np.sqrt(max(0.0, unlike**2 - 0.005)), rel=0.03)
+    assert (told > 3.0) is tells
+    assert left > 3.0
 
 
 def test_two_that_do_the_same_get_no_experiment(sea, plans):

@@ -21,6 +21,9 @@ RIVAL_SHARE = 0.5
 TIED = 2.0
 # Of the gain: no model is so true, 7 % of its amplitude, that a smaller difference decides.
 UNTRUE_SHARE = 0.005
+# Pairs of blocks. More of them make no further number less likely: how true models are decides
+# then, and not noise.
+_PAIRS = 20
 
 
 def overlap(sums: Sums, base: Index, own: Index, other: Index) -> bool:
@@ -42,13 +45,14 @@ def distance(worse: Array, undecided: float, wider: int) -> float:
     Args:
         worse: by how many squares, of each block, (blocks,).
         undecided: what decides nothing, models being as untrue as they are.
-        wider: how many numbers it has more; each counts as in Schwarz's criterion.
+        wider: how many numbers it has more; each counts as in Schwarz's criterion, but for no more
+            in a long recording than in a short one.
     """
     worse = paired(worse)
     apart = max(0.0, behind(worse))
     if worse.sum() < undecided:
         apart = min(apart, TIED) * max(0.0, worse.sum() / undecided)
-    return float(np.hypot(apart, np.sqrt(wider * np.log(len(worse)))))
+    return float(np.hypot(apart, np.sqrt(wider * np.log(min(len(worse), _PAIRS)))))
 
 
 def chance(sums: Sums, base: Index, parts: Sequence[Index]) -> float:

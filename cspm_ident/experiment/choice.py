@@ -14,7 +14,7 @@ from cspm_ident.diagnosis.equation import Equation, steady
 from cspm_ident.diagnosis.recorded import equations_of
 from cspm_ident.experiment.excitations import excitations
 from cspm_ident.experiment.plan import Plan, planned
-from cspm_ident.experiment.separation import separation, with_shape
+from cspm_ident.experiment.separation import decided, with_shape
 from cspm_ident.signals.measurement import Measurement
 from cspm_msgs_py.errors import SingularityError
 from cspm_msgs_py.scenario import Scenario
@@ -55,7 +55,7 @@ class Answer(NamedTuple):
 
     Attributes:
         scenario: what to run.
-        separation: of the planned experiment, see `separation`, per root of a second.
+        separation: of the planned experiment, see `decided`, per root of a second.
         recorded: of the recordings so far, likewise.
     """
 
@@ -109,7 +109,7 @@ def best_answer(
     """Return the experiment that answers a question best.
 
     None where none beats the recordings, or none tells what is asked: two that do the same to every
-    residual differ by rounding alone.
+    residual differ by rounding alone, or by less than models are untrue by.
 
     Args:
         recorded: the recordings so far.
@@ -137,7 +137,7 @@ def _rate(
     question: Question,
     measured: Sequence[Measurement],
 ) -> float:
-    whole = separation(equations, noise, question.truth, question.rivals)
+    whole = decided(equations, noise, question.truth, question.rivals)
     return whole / float(np.sqrt(sum(each.duration for each in measured)))
 
 

@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 
 from cspm_ident.diagnosis.columns import Candidate, Place
 from cspm_ident.diagnosis.equation import Equation, in_noise
+from cspm_ident.diagnosis.likeness import UNTRUE_SHARE
 from cspm_sim.effects import Effect
 
 Array = NDArray[np.float64]
@@ -50,6 +51,21 @@ def separation(
     return float(np.linalg.norm(target))
 
 
+def decided(
+    equations: Sequence[Equation],
+    noise: Mapping[Place, Array],
+    truth: Mapping[Candidate, Array],
+    rivals: Sequence[Candidate],
+) -> float:
+    """Return the separation less what decides nothing, no model being so true.
+
+    Arguments as of `separation`.
+    """
+    left = separation(equations, noise, truth, rivals)
+    alone = separation(equations, noise, truth, ())
+    return float(np.sqrt(max(0.0, left**2 - UNTRUE_SHARE * alone**2)))
+
+
 def _acting(equation: Equation, truth: Mapping[Candidate, Array]) -> Array:
     """Return what candidates with given weights add to a residual, (k, channels)."""
     out = np.zeros(equation.target.shape)
@@ -74,7 +90,7 @@ def _free(equations: Sequence[Equation], rivals: Sequence[Candidate]) -> Array:
         if equation.nuisance.size:
             own[:, :, first : first + equation.nuisance.shape[2]] = equation.nuisance
         table = np.concatenate([*parts, own], axis=2)
-        rows.append(table.reshape(-1, table.shape[2]))
+        rows.append(table.reshape(shape[0] * shape[1], table.shape[2]))
     return np.concatenate(rows)
 
 

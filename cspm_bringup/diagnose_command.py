@@ -196,7 +196,7 @@ def print_diagnosis(
         say(
             console,
             f"not kept: {named.hypothesis.effect.id} on {', '.join(named.hypothesis.elements)}"
-            " did not help on held-out data",
+            " did not help on held-out data, or is noise that controllers feed back",
         )
     for named in found.negligible:
         say(

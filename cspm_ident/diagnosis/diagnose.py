@@ -4,10 +4,16 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
+from itertools import compress
 
 import numpy as np
 from numpy.typing import NDArray
 
+from cspm_ident.diagnosis.asked_for import (
+    instruments_of,
+    is_proportional,
+    shows_in_what_was_asked,
+)
 from cspm_ident.diagnosis.columns import Candidate, Place
 from cspm_ident.diagnosis.curves import Curve, held_out_curves
 from cspm_ident.diagnosis.cuts import first_part, last_part, span_of, whole_part
@@ -149,21 +155,22 @@ def diagnose(
     judge = _judge(in_noise(judge_parts, noise), found, block)
     search_parts, judge_parts = _found_only(search_parts, found), _found_only(judge_parts, found)
     kept, rejected = _confirmed(search, judge, found) if safeguards.held_out else (found.named, ())
+    rows = in_noise(search_parts, noise)
+    kept, fed_back = _asked_for(search, kept, searched, rows, block)
     starts = [span_of(part)[0] for part in judge_parts]
     retuned = search.retuned()
     searched_part: Cut = whole_part if held_out else first_part
     progress("parameters, and simulation of held-out data")
-    baselines, rows = (
-        baselines_of(held_out or searched, starts, retuned),
-        in_noise(search_parts, noise),
-    )
+    baselines = baselines_of(held_out or searched, starts, retuned)
     data = Data(searched, searched_part, baselines, rows, noise, block)
     model = modelled(search, kept, data)
     while safeguards.held_out and model.useless:
         rejected += tuple(kept[k] for k in model.useless)
         kept = tuple(each for k, each in enumerate(kept) if k not in model.useless)
         model = modelled(search, kept, data)
-    unknown = _unknown(search, kept, rejected) if rejected else found.unknown
+    unknown = found.unknown
+    if rejected or fed_back:
+        unknown = _unknown(search, kept, rejected, fed_back)
     values = {c: w for c, (w, _) in model.weights.items()}
     first = _first_weights(search, kept)
     told = [k for k, each in enumerate(kept) if not _is_negligible(each, values)]
@@ -171,7 +178,7 @@ def diagnose(
         searched,
         held_out,
         Findings(tuple(kept[k] for k in told), unknown, found.candidates),
-        rejected,
+        (*rejected, *fed_back),
         tuple(each for each in kept if _is_negligible(each, values)),
         model.weights,
         judged(
@@ -299,17 +306,46 @@ def _confirmed(
     return tuple(kept), tuple(rejected)
 
 
+def _asked_for(
+    search: Search,
+    kept: Sequence[Named],
+    searched: Sequence[Measurement],
+    rows: Parts,
+    block: float,
+) -> tuple[tuple[Named, ...], tuple[Named, ...]]:
+    """Part what was found by whether the motion that was asked for shows it, if it has to."""
+    hypotheses, wanted = _hypotheses(kept), [instruments_of(each) for each in searched]
+    values, calm = search.fits.values(hypotheses), steady(rows)
+
+    def stays(named: Named) -> bool:
+        own = named.hypothesis
+        return (
+            not is_proportional(own.effect)
+            or own.onset > 0
+            or search.fits.is_negligible(own, hypotheses)
+            or shows_in_what_was_asked(calm, wanted, own.candidates, values, block)
+        )
+
+    told = [stays(each) for each in kept]
+    gone = (each for each, stay in zip(kept, told, strict=True) if not stay)
+    return tuple(compress(kept, told)), tuple(gone)
+
+
 def _unknown(
-    search: Search, kept: Sequence[Named], rejected: Sequence[Named]
+    search: Search,
+    kept: Sequence[Named],
+    rejected: Sequence[Named],
+    fed_back: Sequence[Named] = (),
 ) -> tuple[Unknown, ...]:
     """Return what nothing explains beside what was kept.
 
     What was rejected explains nothing, but for what a sound machine has as well: clocks drift, so
-    that what they did in the part that was searched may be gone in the other.
+    that what they did in the part that was searched may be gone in the other, and controllers feed
+    noise back.
     """
     every = _hypotheses([*kept, *rejected])
     sound = [h for h in _hypotheses(rejected) if search.fits.is_negligible(h, every)]
-    return search.unknown([*_hypotheses(kept), *sound])
+    return search.unknown(_hypotheses(kept), [*sound, *_hypotheses(fed_back)])
 
 
 def _hypotheses(named: Sequence[Named]) -> list[Hypothesis]:

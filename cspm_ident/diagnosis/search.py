@@ -39,7 +39,6 @@ from cspm_ident.diagnosis.short_list import short_list
 from cspm_ident.diagnosis.sums import Gain, Sums, behind, gain_of, paired
 from cspm_ident.diagnosis.sureness import Sureness
 from cspm_ident.diagnosis.unexplained import unexplained
-from cspm_sim.effects import Effect
 
 Array = NDArray[np.float64]
 Index = NDArray[np.intp]
@@ -273,7 +272,8 @@ class Search:
 
         Of the effect's shapes the one that explains most from its onset on.
         """
-        if not _may_begin(hypothesis.effect):
+        # A wrong number of the file is always one.
+        if is_number(hypothesis):
             return
         late: list[tuple[float, Hypothesis]] = []
         for shape in shapes_of(hypothesis, free):
@@ -368,20 +368,19 @@ class Search:
             return best, float(left[best])
         return 0, float(left[0])
 
-    def unknown(self, chosen: Sequence[Hypothesis]) -> tuple[Unknown, ...]:
-        """Return free functions of what some hypotheses leave, the most important first."""
-        return unexplained(self.evidence, self.sums, self.sureness, chosen)
+    def unknown(
+        self, chosen: Sequence[Hypothesis], sound: Sequence[Hypothesis] = ()
+    ) -> tuple[Unknown, ...]:
+        """Return free functions of what hypotheses leave; see `unexplained`."""
+        clocks = [h for h in chosen if self.fits.is_negligible(h, [*chosen, *sound])]
+        told = [h for h in chosen if h not in clocks]
+        return unexplained(self.evidence, self.sums, self.sureness, told, [*clocks, *sound])
 
     def _shows(self, candidate: Candidate) -> bool:
         return bool(self.sums.excited[self._of(candidate)].all())
 
     def _of(self, term: Candidate | Driver) -> Index:
         return self.evidence.columns_of([term])
-
-
-def _may_begin(effect: Effect) -> bool:
-    """Return whether an effect may be absent at first; a wrong number of the file is always one."""
-    return effect.alter is None
 
 
 def _boldness(one: Hypothesis, other: Hypothesis) -> float:

@@ -27,11 +27,24 @@ _LEAST = 1e-300
 
 
 def unexplained(
-    evidence: Evidence, sums: Sums, sureness: Sureness, chosen: Sequence[Hypothesis]
+    evidence: Evidence,
+    sums: Sums,
+    sureness: Sureness,
+    chosen: Sequence[Hypothesis],
+    sound: Sequence[Hypothesis] = (),
 ) -> tuple[Unknown, ...]:
-    """Return free functions that explain what some hypotheses do not, the most important first."""
+    """Return free functions that explain what some hypotheses do not, the most important first.
+
+    Args:
+        evidence: of all free functions.
+        sums: of its columns.
+        sureness: of these.
+        chosen: what was found.
+        sound: what a sound machine has as well, whose amount may drift.
+    """
     drivers = [d for d in evidence.terms if isinstance(d, Driver)]
-    base = _columns(evidence, chosen)
+    supposed = [*chosen, *sound]
+    base = _columns(evidence, supposed)
     found: dict[Driver, Unknown] = {}
     for driver in drivers:
         own = evidence.columns_of([driver])
@@ -41,9 +54,11 @@ def unexplained(
             share = sureness.share(base, own)
             if share >= UNKNOWN_SHARE:
                 found[driver] = driver, gain, share
-    found |= {each[0]: each for each in _drifting(evidence, sums, sureness, chosen)}
+    found |= {each[0]: each for each in _drifting(evidence, sums, sureness, chosen, sound)}
     found |= {each[0]: each for each in _once(evidence, sums, base)}
-    told = [e for e in found.values() if e[1].total > _untold(evidence, sums, chosen, e[0])]
+    told = [
+        e for e in found.values() if e[1].total > _untold(evidence, sums, [*chosen, *sound], e[0])
+    ]
     return tuple(sorted(told, key=lambda each: -each[1].total))
 
 
@@ -75,14 +90,18 @@ def _untold(evidence: Evidence, sums: Sums, chosen: Sequence[Hypothesis], driver
 
 
 def _drifting(
-    evidence: Evidence, sums: Sums, sureness: Sureness, chosen: Sequence[Hypothesis]
+    evidence: Evidence,
+    sums: Sums,
+    sureness: Sureness,
+    chosen: Sequence[Hypothesis],
+    sound: Sequence[Hypothesis],
 ) -> Iterator[Unknown]:
     """Yield functions of time instead of hypotheses whose amount does not stay what it is.
 
     A load cell that warms up has no constant bias, though a bias explains most of it.
     """
     for hypothesis in chosen:
-        base = _columns(evidence, [h for h in chosen if h is not hypothesis])
+        base = _columns(evidence, [h for h in (*chosen, *sound) if h is not hypothesis])
         own = evidence.columns_of(hypothesis.candidates)
         drift, p_value = sums.drift(base, own)
         held = drift.total <= DOUBTFUL_SHARE * sums.gain(base, own).total

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass, replace
 from pathlib import Path
@@ -30,7 +31,10 @@ FRAME, BAR, WINCHES, TENSION = (
     "/cables/tension",
 )
 COMMAND = "/winches/torque_command"
+WANTED = ("/bar/reference", "/winch_frame/reference")
 # Further parts of `/winches/state`, which count as sensors of their own.
+# Plans are smooth.
+_WANTED_EVERY_S = 0.005
 SPEED, TORQUE = "/winches/state velocity", "/winches/state effort"
 
 
@@ -46,6 +50,8 @@ class Measurement:
         angle, speed, torque: at the motor shafts [rad, rad/s, N·m], one column per cable.
         tension: [N], one column per cable.
         command: commanded torque [N·m].
+        wanted: pose, twist and acceleration asked for, of the bar and of the winch frame, (n, 38),
+            where both are recorded.
         torque_age: how long before its stamp the reported torque acted, on average [s]. A simulated
             drive reports what it held since the stamp before: half a period. Of others nothing is
             known, and 0 is taken.
@@ -64,6 +70,7 @@ class Measurement:
     torque: Samples | None = None
     tension: Samples | None = None
     command: Samples | None = None
+    wanted: Samples | None = None
     torque_age: float = 0.0
     pointwise: bool = False
     complete: bool = True
@@ -126,7 +133,8 @@ def read_measurement(path: Path, testbed: Path | None = None) -> Measurement:
         topics = machine.testbed.topics
         wanted = (FRAME, BAR, WINCHES, TENSION, COMMAND)
         names = [n for n in wanted if n in topics and _count(recording, n)]
-        rows = recording.rows_of(names)
+        asked = WANTED if all(_count(recording, n) for n in WANTED) else ()
+        rows = recording.rows_of([*names, *asked])
         found = {name: recording.topic(name) for name in names}
         simulated = simulated_plant(recording) is not None
         closed = recording.complete
@@ -145,6 +153,7 @@ def read_measurement(path: Path, testbed: Path | None = None) -> Measurement:
         digest.result(),
         machine,
         **parts,
+        wanted=_wanted(rows, start) if asked else None,
         torque_age=age,
         pointwise=False,
         complete=closed,
@@ -180,6 +189,17 @@ def _samples(
             columns = [topic.fields.index(f"{part}/{cable}") for cable in machine.cable_names]
             out[kind] = ordered(times, rows.rows[:, columns])
     return {kind: samples for kind, samples in out.items() if len(samples.times)}
+
+
+def _wanted(rows: Mapping[str, Rows], start_ns: int) -> Samples:
+    """Return what was asked of bar and frame, at the bar's times, thinned out."""
+    bar, frame = (rows[name] for name in WANTED)
+    times = np.asarray((bar.stamp_ns - start_ns) * 1e-9, dtype=np.float64)
+    step = max(1, int(_WANTED_EVERY_S * len(times) / max(float(np.ptp(times)), _WANTED_EVERY_S)))
+    times = times[::step]
+    other = (frame.stamp_ns - start_ns) * 1e-9
+    beside = [np.interp(times, other, column) for column in frame.rows.T]
+    return ordered(times, np.column_stack([bar.rows[::step], *beside]))
 
 
 def _euler(rows: Array) -> Array:

@@ -79,6 +79,20 @@ def test_winches_that_stand_still_feed_nothing_back():
 
 
 @pytest.mark.parametrize(
+    ("asked", "pushed", "used"), [(0.1, 0.0, True), (0.1, 0.02, True), (0.0, 0.02, False)]
+)
+def test_a_bar_that_is_pushed_by_hand_moves_without_noise(asked, pushed, used):
+    """Two centimetres beside ten that were asked for are an error of tracking."""
+    rng = np.random.default_rng(3)
+    pose = 5e-5 * rng.standard_normal((len(TIMES), 6))
+    pose[:, 0] += asked * ASKED + pushed * np.cos(1.7 * TIMES)
+    angle = Samples(TIMES, 40.0 * pose[:, :1])
+    known = Measurement(Path("today"), "ab" * 32, THESIS, wanted=WANTED, angle=angle)
+    instruments = instruments_of(known.with_samples("bar_pose", Samples(TIMES, pose)))
+    assert (instruments is WANTED) is used
+
+
+@pytest.mark.parametrize(
     ("effect", "proportional"),
     [
         ("winch_inertia", True),

@@ -27,8 +27,10 @@ _SIGMAS = 2.0
 # instruments: Staiger, Stock, Econometrica 65(3), 1997). In blind recordings 0.7 and more of what
 # was there was so moved, and 0.004 and less of what was fed back.
 _MOVED = 0.05
-# Times its noise: what moves less stands still.
-_STILL = 5.0
+# Times its noise: what moves less stands still, and what moves more does not follow noise.
+_STILL, _DRIVEN = 5.0, 10.0
+# Of the bar's motion: as much has another cause than controllers, such as a hand.
+_UNASKED = 0.1
 _LEAST = 1e-9
 
 
@@ -41,12 +43,29 @@ def is_proportional(effect: Effect) -> bool:
 
 
 def instruments_of(measurement: Measurement) -> Samples | None:
-    """Return what was asked of the machine, None where nothing is fed back or it is not known."""
+    """Return what was asked of the machine.
+
+    None where that is not known, nothing is fed back, or something else moves the bar.
+    """
     angle = measurement.angle
     if angle is None or measurement.wanted is None:
         return None
     moves = np.std(angle.values, axis=0) > _STILL * difference_noise(angle.values)
-    return measurement.wanted if moves.any() else None
+    if not moves.any() or _is_driven(measurement.bar_pose, measurement.wanted):
+        return None
+    return measurement.wanted
+
+
+def _is_driven(bar: Samples | None, wanted: Samples) -> bool:
+    """Return whether the bar moves otherwise than it was asked to, and more than noise makes it."""
+    if bar is None:
+        return False
+    position = bar.values[:, :3] - bar.values[:, :3].mean(axis=0)
+    basis = _basis(_at(wanted, bar.times))
+    unasked = np.std(position - basis @ (basis.T @ position), axis=0)
+    share = np.sum(unasked**2) / np.sum(np.var(position, axis=0))
+    far = np.any(unasked > _DRIVEN * difference_noise(position))
+    return bool(far and share > _UNASKED)
 
 
 def shows_in_what_was_asked(

@@ -9,9 +9,9 @@ from run_samples import bundle_of
 from cspm_bringup.run import run
 from cspm_ident.diagnosis import judgement
 from cspm_ident.diagnosis.columns import Candidate, Place
-from cspm_ident.diagnosis.diagnose import noise_of
 from cspm_ident.diagnosis.equation import steady
 from cspm_ident.diagnosis.judgement import judged
+from cspm_ident.diagnosis.look import noise_of
 from cspm_ident.diagnosis.recorded import equations_of
 from cspm_ident.signals.measurement import read_measurement
 from cspm_msgs_py.testbed import parse_testbed

@@ -8,9 +8,9 @@ from run_samples import bundle_of
 
 from cspm_bringup.run import run
 from cspm_ident.diagnosis.columns import Candidate
-from cspm_ident.diagnosis.diagnose import noise_of
 from cspm_ident.diagnosis.equation import steady
 from cspm_ident.diagnosis.hypothesis import Hypothesis
+from cspm_ident.diagnosis.look import noise_of
 from cspm_ident.diagnosis.parameters import of_clocks
 from cspm_ident.diagnosis.recorded import equations_of
 from cspm_ident.diagnosis.refine import refine

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from itertools import compress
 
@@ -16,9 +16,9 @@ from cspm_ident.diagnosis.asked_for import (
 )
 from cspm_ident.diagnosis.columns import Candidate, Place
 from cspm_ident.diagnosis.curves import Curve, held_out_curves
-from cspm_ident.diagnosis.cuts import first_part, last_part, span_of, whole_part
+from cspm_ident.diagnosis.cuts import first_part, span_of, whole_part
 from cspm_ident.diagnosis.drivers import Driver, Knots
-from cspm_ident.diagnosis.equation import Equation, in_noise, steady
+from cspm_ident.diagnosis.equation import in_noise, steady
 from cspm_ident.diagnosis.evidence import Evidence, gather
 from cspm_ident.diagnosis.hypothesis import (
     Findings,
@@ -30,27 +30,21 @@ from cspm_ident.diagnosis.hypothesis import (
 )
 from cspm_ident.diagnosis.judgement import HeldOut, free_functions, judged
 from cspm_ident.diagnosis.limits import Limit, detection_limits
-from cspm_ident.diagnosis.lines import Line, lines_of, with_lines
+from cspm_ident.diagnosis.lines import Line
+from cspm_ident.diagnosis.look import Parts, Progress, Recordings, hums_of, searched_for
 from cspm_ident.diagnosis.model import Data, modelled
 from cspm_ident.diagnosis.onset import Onset
-from cspm_ident.diagnosis.recorded import equations_of
 from cspm_ident.diagnosis.refine import Cut
 from cspm_ident.diagnosis.region import Region, region_of
 from cspm_ident.diagnosis.safeguards import ALL_SAFEGUARDS, Safeguards
 from cspm_ident.diagnosis.search import Search
 from cspm_ident.diagnosis.simulation import SimulatedFit, Worth, baselines_of
-from cspm_ident.diagnosis.sums import FOLDS
 from cspm_ident.diagnosis.weights import Weights
 from cspm_ident.signals.measurement import Measurement
-from cspm_msgs_py.errors import InputError
 from cspm_sim.effects import Effect
 
 Array = NDArray[np.float64]
-Progress = Callable[[str], None]
-Parts = Sequence[Sequence[Equation]]
 
-BLOCKS = 48
-SHORTEST_BLOCK_S = 0.5
 # A finding must take this share of a held-out squared residual, or it does not stand.
 CONFIRMED_SHARE = 0.03
 
@@ -134,23 +128,11 @@ def diagnose(
     Raises:
         InputError: the recordings have no residual that could be looked at, or are too short.
     """
-    effects, knots = safeguards.effects, Knots()
-    search_parts, judge_parts = _parts(searched, held_out, effects, knots, progress)
-    hums = [_hums(m, part, {}) for m, part in zip(searched, search_parts, strict=True)]
-    search_parts = _beside(search_parts, hums)
-    if not held_out:
-        judge_parts = _beside(judge_parts, hums)
-    noise = noise_of(steady(search_parts))
-    spans = [span_of(part) for part in search_parts]
-    block = max(SHORTEST_BLOCK_S, sum(b - a for a, b in spans) / BLOCKS)
-    evidence = gather(in_noise(steady(search_parts), noise), block)
-    if evidence.blocks < FOLDS:
-        raise InputError(
-            f"{searched[0].path}: {sum(b - a for a, b in spans):.1f} s to search, allowed:"
-            f" {FOLDS * SHORTEST_BLOCK_S:g} s or more; without --held-out seven tenths are searched"
-        )
-    search = Search(evidence, progress, safeguards.sums)
-    found = search.run()
+    # No name for the look itself: its columns go as soon as they are not needed.
+    (search_parts, judge_parts, hums, noise, block, search, knots, supposed), found = searched_for(
+        Recordings(searched, held_out), progress, safeguards
+    )
+    evidence = search.evidence
     progress("held-out data")
     judge = _judge(in_noise(judge_parts, noise), found, block)
     search_parts, judge_parts = _found_only(search_parts, found), _found_only(judge_parts, found)
@@ -162,7 +144,7 @@ def diagnose(
     searched_part: Cut = whole_part if held_out else first_part
     progress("parameters, and simulation of held-out data")
     baselines = baselines_of(held_out or searched, starts, retuned)
-    data = Data(searched, searched_part, baselines, rows, noise, block)
+    data = Data(searched, searched_part, baselines, rows, noise, block, supposed)
     model = modelled(search, kept, data)
     while safeguards.held_out and model.useless:
         rejected += tuple(kept[k] for k in model.useless)
@@ -191,27 +173,12 @@ def diagnose(
         tuple(model.onsets[k] for k in told),
         tuple(region_of(data.rows, kept[k].hypothesis.candidates, first) for k in told),
         detection_limits(search, kept),
-        _silent(search, effects),
+        _silent(search, safeguards.effects),
         tuple(place.place for place in evidence.places),
         evidence.times,
         held_out_curves(steady(judge_parts), first),
         noise,
     )
-
-
-def _hums(
-    measurement: Measurement, part: Sequence[Equation], weights: Mapping[Candidate, Array]
-) -> tuple[Line, ...]:
-    """Return the lines in what was searched of a recording, beyond what was found."""
-    if measurement.machine.bar is None:
-        return ()
-    start, end = span_of(part)
-    return lines_of(measurement.within(start, end), weights)
-
-
-def _beside(parts: Parts, lines: Sequence[Sequence[Line]]) -> Parts:
-    """Return equations in which each recording's lines are fitted always."""
-    return [with_lines(part, own) for part, own in zip(parts, lines, strict=True)]
 
 
 def _lasting(
@@ -223,7 +190,7 @@ def _lasting(
     """Return the lines that are there still, now that all else is known."""
     found = []
     for own, measurement, part in zip(lines, searched, parts, strict=True):
-        now = _hums(measurement, part, weights) if own else ()
+        now = hums_of(measurement, part, weights) if own else ()
         found += [line for line in now if any(line.is_same(before) for before in own)]
     return tuple(found)
 
@@ -235,25 +202,6 @@ def _first_weights(search: Search, kept: Sequence[Named]) -> dict[Candidate, Arr
 
 def _is_negligible(named: Named, weights: Mapping[Candidate, Array]) -> bool:
     return is_negligible({c: weights[c] for c in members_of(weights, named.hypothesis)})
-
-
-def _parts(
-    searched: Sequence[Measurement],
-    held_out: Sequence[Measurement],
-    effects: Sequence[Effect],
-    knots: Knots,
-    progress: Progress,
-) -> tuple[Parts, Parts]:
-    found = [equations_of(m, effects, knots, progress) for m in searched]
-    for measurement, equations in zip(searched, found, strict=True):
-        if not equations:
-            raise InputError(
-                f"{measurement.path}: no residual, allowed: recordings with /winches/state angle"
-                " and torque, and with /cables/tension where there are cables"
-            )
-    if held_out:
-        return found, [equations_of(m, effects, knots, progress) for m in held_out]
-    return first_part(found), last_part(found)
 
 
 def _judge(parts: Parts, found: Findings, block: float) -> Evidence:
@@ -272,16 +220,6 @@ def _found_only(parts: Parts, found: Findings) -> Parts:
     """Return equations without the columns of all that was not found, which nothing needs more."""
     named = _named(found)
     return [[equation.only(named) for equation in part] for part in parts]
-
-
-def noise_of(parts: Sequence[Sequence[Equation]]) -> dict[Place, Array]:
-    """Return the noise of every residual, the median over recordings and stretches."""
-    found: dict[Place, list[Array]] = {}
-    for equations in parts:
-        for equation in equations:
-            if len(equation.times) > 8:
-                found.setdefault(equation.place, []).append(equation.noise)
-    return {place: np.median(noises, axis=0) for place, noises in found.items()}
 
 
 def _confirmed(

@@ -54,6 +54,7 @@ class Equation:
         columns: by candidate or driver, what one unit of each weight adds, (k, channels, weights).
         measured: the measured quantity that the residual is part of, shape of `target`.
         nuisance: what no recording tells, such as the length wound at its start, (k, channels, m).
+        shared: how many of the nuisance, the first, are the same in all stretches of a recording.
         turning: rows in which a shaft turns round, (k,), or none: it may stick there, and dry
             friction then holds with any torque.
         signals: measured signals that it may depend on, by name and unit, each of shape (k,).
@@ -67,6 +68,7 @@ class Equation:
     nuisance: Array = field(default_factory=lambda: np.zeros((0, 0, 0)))
     turning: NDArray[np.bool_] = field(default_factory=lambda: np.zeros(0, dtype=np.bool_))
     signals: Mapping[str, Array] = field(default_factory=dict)
+    shared: int = 0
 
     @property
     def noise(self) -> Array:
@@ -129,6 +131,7 @@ class Equation:
             self.nuisance[rows] if self.nuisance.size else self.nuisance,
             self.turning[rows] if self.turning.size else self.turning,
             {name: found[rows] for name, found in self.signals.items()},
+            self.shared,
         )
 
 

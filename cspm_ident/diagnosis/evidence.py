@@ -186,11 +186,15 @@ def gather(recordings: Sequence[Sequence[Equation]], block_s: float) -> Evidence
     edges, recording = _blocks(equations, block_s)
     first = width
     nuisance: list[int] = []
+    common: dict[tuple[int, Place], list[int]] = {}
     places: dict[Place, list[tuple[int, Equation, list[int]]]] = {}
     for r, equation in equations:
-        own = list(range(first, first + equation.nuisance.shape[2]))
-        first += len(own)
-        nuisance += own
+        known = common.get((r, equation.place), [])
+        new = list(range(first, first + equation.nuisance.shape[2] - len(known)))
+        first += len(new)
+        nuisance += new
+        own = known + new
+        common[r, equation.place] = own[: equation.shared]
         places.setdefault(equation.place, []).append((r, equation, own))
     gathered = tuple(
         _of_place(place, parts, slices, edges, recording) for place, parts in places.items()

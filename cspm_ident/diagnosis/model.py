@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from typing import NamedTuple
 
 import numpy as np
@@ -43,6 +43,7 @@ class Data(NamedTuple):
         rows: of what was searched, in units of their noise.
         noise: of each residual.
         block: length of the blocks [s].
+        supposed: about what they were taken to first order.
     """
 
     searched: Sequence[Measurement]
@@ -51,6 +52,7 @@ class Data(NamedTuple):
     rows: Parts
     noise: dict[Place, Array]
     block: float
+    supposed: Mapping[Candidate, Array]
 
 
 class Model(NamedTuple):
@@ -98,7 +100,7 @@ def modelled(search: Search, kept: Sequence[Named], data: Data) -> Model:
         return [[e.within(since, np.inf) for e in part] for part in data.searched_part(parts)]
 
     rows = [[e.within(since, np.inf) for e in part] for part in data.rows]
-    weights = _parameters(search, kept, data.searched, cut, rows, data.noise, data.block)
+    weights = _parameters(search, kept, data, cut, rows)
     weights = of_clocks(of_drives(weights, 2.0 * data.searched[0].torque_age))
     weights = {
         c: (_allowed(data.searched[0], c, own, half), half) for c, (own, half) in weights.items()
@@ -125,17 +127,15 @@ def _allowed(measured: Measurement, candidate: Candidate, weights: Array, half: 
 def _parameters(
     search: Search,
     kept: Sequence[Named],
-    searched: Sequence[Measurement],
+    data: Data,
     cut: Cut,
     rows: Parts,
-    noise: dict[Place, Array],
-    block: float,
 ) -> Weights:
     """Return the weights of what was kept, refined where columns depend on them."""
     hypotheses = [each.hypothesis for each in kept]
     if any(needs_refining(hypothesis.effect) for hypothesis in hypotheses):
-        return refine(searched, hypotheses, noise, block, cut)
-    return of_shafts(search.fits.weights(hypotheses), rows, block)
+        return refine(data.searched, hypotheses, data.noise, data.block, cut, data.supposed)
+    return of_shafts(search.fits.weights(hypotheses), rows, data.block)
 
 
 def _onsets(kept: Sequence[Named], rows: Parts, starts: Array) -> tuple[Onset | None, ...]:

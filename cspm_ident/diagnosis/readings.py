@@ -36,3 +36,11 @@ def moving(poses: Samples | None) -> list[str]:
         return []
     spread, noise = poses.values.std(axis=0), difference_noise(poses.values)
     return [dof for dof, moves in zip(DOFS, spread > _MOVES * noise, strict=True) if moves]
+
+
+_READING_STEP = 1e-6  # m, rad or N
+
+
+def small_step(change: Array) -> float:
+    """Return by what to multiply a change, so that it stays within what is linear."""
+    return _READING_STEP / (float(np.max(np.abs(change))) + 1e-300)

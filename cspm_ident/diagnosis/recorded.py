@@ -2,10 +2,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Collection, Sequence
+from collections.abc import Callable, Collection, Mapping, Sequence
+from types import MappingProxyType
+
+import numpy as np
+from numpy.typing import NDArray
 
 from cspm_ident.diagnosis.columns import Candidate
-from cspm_ident.diagnosis.drawn_tension import lost_torques, with_drawn_tension
+from cspm_ident.diagnosis.drawn_tension import drawn_tension
 from cspm_ident.diagnosis.drive import drive_equations
 from cspm_ident.diagnosis.drivers import Knots
 from cspm_ident.diagnosis.equation import Equation
@@ -17,6 +21,8 @@ from cspm_ident.signals.timeline import Timeline
 from cspm_sim.effect_entries import read_actions
 from cspm_sim.effects import Channel, Effect, Elements
 
+Array = NDArray[np.float64]
+
 
 def equations_of(
     measurement: Measurement,
@@ -24,6 +30,7 @@ def equations_of(
     knots: Knots | None = None,
     progress: Callable[[str], None] = lambda _: None,
     touched: Sequence[Candidate] | None = None,
+    supposed: Mapping[Candidate, Array] = MappingProxyType({}),
 ) -> list[Equation]:
     """Return every residual that the sensors allow, less what the machine's effects add.
 
@@ -33,6 +40,8 @@ def equations_of(
         knots: of the free functions; None: without these.
         progress: called with what is being done.
         touched: by these; other winches, and cables and bar if need be, may be left out.
+        supposed: weights about which residuals are taken to first order, where tensions are drawn
+            from torques that the faults of winches add to. They stay in the residuals.
 
     Raises:
         InputError: the machine's effects cannot be used.
@@ -44,11 +53,10 @@ def equations_of(
     late: list[Equation] = []
     if measurement.machine.bar is not None and suspended:
         progress("cables and bar")
-        drawn = None if measurement.tension else with_drawn_tension(measurement, known)
-        lost = lost_torques(measurement) if drawn else None
-        late = suspension_equations(
-            Timeline(drawn or measurement), effects, known, knots, lost=lost
-        )
+        drawn = None if measurement.tension else drawn_tension(measurement, known)
+        drawn = drawn and drawn.less(supposed)
+        told = measurement if drawn is None else drawn.measurement
+        late = suspension_equations(Timeline(told), effects, known, knots, drawn=drawn)
     progress("torque equations of the winches")
     found = drive_equations(measurement, effects, known, knots)
     found += shaft_equations(measurement, effects, known, knots, winches)

@@ -9,6 +9,7 @@ from __future__ import annotations
 from collections.abc import Callable, Collection, Mapping, Sequence
 from dataclasses import replace
 from itertools import product
+from types import MappingProxyType
 
 import numpy as np
 from numpy.typing import NDArray
@@ -41,6 +42,7 @@ def refine(
     noise: Mapping[Place, Array],
     block_s: float,
     cut: Cut,
+    supposed: Mapping[Candidate, Array] = MappingProxyType({}),
 ) -> Weights:
     """Return weights, with half the widths of their 95 % intervals, of candidates of better shapes.
 
@@ -50,6 +52,7 @@ def refine(
         noise: of each residual, its unit.
         block_s: length of the blocks [s].
         cut: what of the equations was searched.
+        supposed: weights about which residuals are taken to first order.
     """
     candidates, common = parts_of(hypotheses)
     shapes = {c.effect_id: dict(c.shape) for c in candidates}
@@ -66,7 +69,8 @@ def refine(
         except InputError:
             # Such a machine cannot be; what was found before stays, with its interval.
             break
-        parts = cut([equations_of(m, near, touched=candidates) for m in moved])
+        about = {c: own for c, own in supposed.items() if not _is_applied(c.effect)}
+        parts = cut([equations_of(m, near, touched=candidates, supposed=about) for m in moved])
         evidence = gather(in_noise(steady(parts), noise), block_s)
         shapes, found = _fitted(evidence, shapes, wanted, common)
         for candidate, (weights, half) in found.items():

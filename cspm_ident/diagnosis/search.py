@@ -28,10 +28,7 @@ from cspm_ident.diagnosis.hypothesis import (
     shapes_of,
     unusual,
 )
-from cspm_ident.diagnosis.likeness import (
-    TIED,
-    UNTRUE_SHARE,
-)
+from cspm_ident.diagnosis.likeness import TIED, UNTRUE_SHARE
 from cspm_ident.diagnosis.pairs import Pair, best_pairs
 from cspm_ident.diagnosis.rivals import rivals_of
 from cspm_ident.diagnosis.scopes import Scopes
@@ -83,6 +80,10 @@ class Search:
         named.sort(key=lambda each: -each.gain.total)
         self._progress("what is left")
         return Findings(tuple(named), self.unknown(chosen), len(self._effects))
+
+    def first(self) -> Hypothesis | None:
+        """Return what explains most, if anything surely is there."""
+        return self._best(self._clocks())
 
     @property
     def heard(self) -> tuple[Candidate, ...]:

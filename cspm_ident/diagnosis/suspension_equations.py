@@ -10,11 +10,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from cspm_ident.diagnosis.columns import Candidate, Place, elements_of, shapes_of
-from cspm_ident.diagnosis.drawn_tension import drawn_columns, late_tension
+from cspm_ident.diagnosis.drawn_tension import DrawnTension
 from cspm_ident.diagnosis.drivers import Driver, Knots, around
-from cspm_ident.diagnosis.equation import Equation, difference_noise
+from cspm_ident.diagnosis.equation import Equation
 from cspm_ident.diagnosis.machine_signals import BodyMotion, MachineSignals, machine_signals
-from cspm_ident.diagnosis.readings import moving, pose_rows, reading_rows
+from cspm_ident.diagnosis.quiet_window import quiet_window
+from cspm_ident.diagnosis.readings import moving, pose_rows, reading_rows, small_step
 from cspm_ident.diagnosis.suspension import Suspension
 from cspm_ident.signals.measurement import TENSION, WINCHES, Measurement
 from cspm_ident.signals.timeline import Timeline
@@ -29,10 +30,6 @@ from cspm_sim.parameters import nominal_parameters
 
 Array = NDArray[np.float64]
 
-# Windows pass what lies well within the band of the smoothed poses, and they are doubled while that
-# takes more noise than of white one: then most lies above what they pass.
-_HALF_WIDTHS = (0.04, 0.32)
-_WHITE = 1.7
 # As far as smoothing spreads a torque that was lost.
 _SPREAD_S = 0.1
 # Of an acceleration's square: what has to be common to tensions and poses.
@@ -53,7 +50,7 @@ def suspension_equations(
     known: Sequence[Action],
     knots: Knots | None = None,
     *,
-    lost: Array | None = None,
+    drawn: DrawnTension | None = None,
 ) -> list[Equation]:
     """Return the equations of all cables and of the bar, one set for each stretch without hole.
 
@@ -64,7 +61,7 @@ def suspension_equations(
         effects: the catalogue.
         known: effects that the test-bed file has.
         knots: of the free functions; None: without these.
-        lost: when no torque is known [s], where no load cell but torques told the tensions.
+        drawn: where no load cell but torques told the tensions.
     """
     measured = timeline.measurement
     make, dofs = maker(measured.pointwise), moving(measured.bar_pose)
@@ -72,7 +69,7 @@ def suspension_equations(
         equation.compact
         for stretch in machine_signals(timeline)
         for equation in _Stretch(
-            stretch, measured.machine, timeline.pose_band, make, dofs, lost=lost
+            stretch, measured.machine, timeline.pose_band, make, dofs, drawn=drawn
         ).equations(effects, known, knots)
     ]
 
@@ -108,14 +105,14 @@ class _Stretch:
         make: Make,
         dofs: Sequence[str],
         *,
-        lost: Array | None = None,
+        drawn: DrawnTension | None = None,
     ) -> None:
         """Take what the poses were smoothed to [Hz] and which of the bar's coordinates move.
 
         Without a band windows are the shortest. Tensions may be drawn from the winches' torques.
         """
-        self._lost = lost
-        self._signals, self._machine, self._make, self._dofs = signals, machine, make, dofs
+        self._drawn = drawn
+        self._signals, self._machine, self._dofs = signals, machine, dofs
         self._parameters: PlantParameters = nominal_parameters(machine)
         self._here = Suspension(signals, machine, self._parameters)
         missing = {
@@ -123,28 +120,9 @@ class _Stretch:
             Channel.WRENCH: self._here.wrench_residuals,
         }
         self._windows = {
-            channel: (
-                self._window_of(_HALF_WIDTHS[0]) if band is None else self._window_for(values, band)
-            )
+            channel: quiet_window(values, band, signals.step, make)
             for channel, values in missing.items()
         }
-
-    def _window_for(self, residuals: Array, band: float) -> tuple[Array, int]:
-        """Return a window's weights and the rows between two windows."""
-        half_s, most = float(np.clip(2.0 / band, *_HALF_WIDTHS)), _HALF_WIDTHS[1]
-        found = self._window_of(half_s)
-        noise = difference_noise(weigh(found[0], residuals, found[1]))
-        while 2.0 * half_s <= most:
-            wider = self._window_of(2.0 * half_s)
-            less = difference_noise(weigh(wider[0], residuals, wider[1]))
-            if np.median(noise / np.maximum(less, 1e-300)) <= _WHITE:
-                break
-            half_s, found, noise = 2.0 * half_s, wider, less
-        return found
-
-    def _window_of(self, half_s: float) -> tuple[Array, int]:
-        half = max(2, round(half_s / self._signals.step))
-        return self._make(half, self._signals.step).weights, max(1, half // 2)
 
     def equations(
         self, effects: Sequence[Effect], known: Sequence[Action], knots: Knots | None
@@ -163,13 +141,12 @@ class _Stretch:
             for i, name in enumerate(self._machine.cable_names)
         ]
         out.append(self._bar_equation(wrench, columns.get(Place(Channel.WRENCH, BAR), {}), knots))
-        return out if self._lost is None else [self._known(each) for each in out]
+        return out if self._drawn is None else [self._known(each, self._drawn) for each in out]
 
-    def _known(self, equation: Equation) -> Equation:
+    def _known(self, equation: Equation, drawn: DrawnTension) -> Equation:
         """Return the rows that no lost torque reaches."""
-        assert self._lost is not None
         half_s = 0.5 * len(self._windows[equation.place.channel][0]) * self._signals.step
-        return equation.apart_from(self._lost, half_s + _SPREAD_S)
+        return equation.apart_from(drawn.lost, half_s + _SPREAD_S)
 
     def _cable_equation(
         self,
@@ -187,6 +164,8 @@ class _Stretch:
         if knots is not None:
             columns = columns | knots.columns(place, drivers)
         target, start = weighed(missing), weighed(self._here.start_column(i))
+        drawn, at = self._drawn, self._signals.times
+        untold = [] if drawn is None else [weighed(each) for each in drawn.untold(i, at)]
         # Of the order of its noise also where a fold that is left out holds the whole stretch.
         target = target - start * (start @ target) / (start @ start)
         return Equation(
@@ -195,8 +174,9 @@ class _Stretch:
             target[:, None],
             columns,
             weighed(self._signals.tensions[:, i])[:, None],
-            start[:, None, None],
+            np.stack([*untold, start], axis=1)[:, None],
             signals=drivers,
+            shared=len(untold),
         )
 
     def _bar_equation(
@@ -211,11 +191,14 @@ class _Stretch:
         signals = {name: values for drivers in moved for name, values in drivers.items()}
         times, measured = weighed(self._signals.times), weighed(self._here.cable_wrench)
         equation = Equation(place, times, weighed(missing), columns, measured, signals=signals)
-        if self._lost is None:
+        if self._drawn is None:
             return equation
-        cables = enumerate(self._machine.cables)
-        late = sum(self._here.pulled(i, late_tension(c, self._signals, i)) for i, c in cables)
-        return replace(equation, nuisance=weighed(np.asarray(late))[:, :, None])
+        drawn, here, at = self._drawn, self._here, self._signals.times
+        every = range(len(self._machine.cables))
+        late = np.asarray(sum(here.pulled(i, drawn.late(i, at)) for i in every))
+        free = [late, *(here.pulled(i, drawn.turning(i, at)) for i in every)]
+        nuisance = np.stack([weighed(each) for each in free], axis=2)
+        return replace(equation, nuisance=nuisance, shared=len(free))
 
     def _bar_signals(self) -> list[dict[str, Array]]:
         """Return what each of the bar's six components may depend on, by name and unit."""
@@ -236,6 +219,10 @@ class _Stretch:
 
     def _targets(self, known: Sequence[Action]) -> tuple[Array, Array]:
         tensions, wrench = self._here.tension_residuals.copy(), self._here.wrench_residuals.copy()
+        if self._drawn is not None:
+            taken = self._drawn.taken_at(self._signals.times)
+            tensions += taken
+            wrench -= sum(self._here.pulled(i, each) for i, each in enumerate(taken.T))
         for action in known:
             effect = action.effect
             if effect.alter is not None or effect.sense is not None:
@@ -257,8 +244,8 @@ class _Stretch:
                 for place, found in self._read(effect, i, name):
                     yield Candidate(effect, name), place, found
                 continue
-            if self._lost is not None:
-                yield from self._misread(effect, i)
+            if self._drawn is not None:
+                yield from self._misread(effect, i, self._drawn)
             shapes = [dict(shape) for shape in shapes_of(effect)]
             for shape, place, found in self._regressed(effect, i, shapes):
                 candidate = Candidate(effect, name, tuple(shape.items()))
@@ -304,7 +291,7 @@ class _Stretch:
         """Yield how a sensor's fault changes the weighed residuals, by differences of readings."""
         assert effect.sense is not None
         topic = effect.sense.topics[0]
-        if topic == TENSION and self._lost is not None:
+        if topic == TENSION and self._drawn is not None:
             return
         if topic in (TENSION, WINCHES):
             every = range(len(self._machine.cables))
@@ -335,7 +322,7 @@ class _Stretch:
         motion: BodyMotion = getattr(self._signals, body)
         rows = pose_rows(self._signals.times, motion.poses, motion.rates)
         for change in np.moveaxis(effect.regressors(rows), 2, 0):
-            step = _small(change)
+            step = small_step(change)
             yield self._signals.with_pose_change(body, change, step), step
 
     def _read_joints(
@@ -356,7 +343,7 @@ class _Stretch:
         signals = self._signals
         readings = signals.tensions if topic == TENSION else signals.angles
         change = effect.regressors(reading_rows(signals.times, readings[:, i]))[:, 0, 0]
-        step = _small(change)
+        step = small_step(change)
         changed = readings.copy()
         changed[:, i] += step * change
         if topic == TENSION:
@@ -369,11 +356,13 @@ class _Stretch:
         residual = (there - self._here.tension_residuals[:, i]) / step
         return self._weighed(residual, Channel.TENSION), change
 
-    def _misread(self, effect: Effect, i: int) -> Iterator[tuple[Candidate, Place, Array]]:
+    def _misread(
+        self, effect: Effect, i: int, drawn: DrawnTension
+    ) -> Iterator[tuple[Candidate, Place, Array]]:
         """Yield how a winch's fault changes the tension drawn from its torque, weighed."""
         if effect.acts_on is not Elements.CABLES:
             return
-        for candidate, taken in drawn_columns(effect, self._machine.cables[i], self._signals, i):
+        for candidate, taken in drawn.columns(effect, i, self._signals.times):
             pulled = [-self._here.pulled(i, each) for each in taken.T]
             for channel, element, found in (
                 (Channel.TENSION, candidate.element, taken[:, None, :]),
@@ -389,11 +378,3 @@ class _Stretch:
         """Return how many rows lie between two windows that share no sample."""
         window, stride = self._windows[channel]
         return -(-len(window) // stride)
-
-
-_READING_STEP = 1e-6  # m, rad or N
-
-
-def _small(change: Array) -> float:
-    """Return by what to multiply a change, so that it stays within what is linear."""
-    return _READING_STEP / (float(np.max(np.abs(change))) + 1e-300)

@@ -68,8 +68,12 @@ class Samples:
 
     def column(self, index: int) -> Samples:
         """Return one column, shape (n, 1)."""
-        other = Samples(self.times, self.values[:, index : index + 1])
-        # Of the times alone, and the same for all columns.
+        return self.of_others(self.values[:, index : index + 1])
+
+    def of_others(self, values: Array) -> Samples:
+        """Return other values, shape (n, any), at the same times."""
+        other = Samples(self.times, values)
+        # Of the times alone, and the same for all values.
         other.__dict__.update(interval=self.interval, spans=self.spans, clocks=self.clocks)
         return other
 

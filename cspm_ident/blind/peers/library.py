@@ -7,9 +7,9 @@ from typing import NamedTuple
 
 from cspm_ident.diagnosis.columns import Candidate
 from cspm_ident.diagnosis.cuts import first_part, last_part, span_of
-from cspm_ident.diagnosis.diagnose import BLOCKS, noise_of
 from cspm_ident.diagnosis.equation import Equation, in_noise, steady
 from cspm_ident.diagnosis.evidence import Evidence, gather
+from cspm_ident.diagnosis.look import BLOCKS, noise_of
 from cspm_ident.diagnosis.recorded import equations_of
 from cspm_ident.diagnosis.white_sums import WhiteSums
 from cspm_ident.signals.measurement import Measurement

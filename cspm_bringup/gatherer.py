@@ -10,6 +10,9 @@ from __future__ import annotations
 from bisect import bisect_left
 from collections.abc import Callable, Collection
 
+import numpy as np
+from numpy.typing import NDArray
+
 from cspm_msgs_py.diagnostics import decode_diagnostics, encode_diagnostics
 from cspm_msgs_py.errors import InputError
 from cspm_msgs_py.lockstep import RECORDED_EVERY, RECORDER_WINDOW, Sequence, check_end
@@ -19,6 +22,7 @@ from cspm_msgs_py.schedule import PLANT, Schedule
 from cspm_msgs_py.topics import DIAGNOSTICS, Topic
 from cspm_msgs_py.wire import WireReader
 
+Array = NDArray[np.float64]
 # Of a block's last steps some messages may be underway, which is no reason to wait for another.
 _ACKNOWLEDGED = RECORDED_EVERY // 2
 
@@ -57,6 +61,13 @@ class _Inlet:
         self._rows += decoded[1].tobytes()
         return True
 
+    def take_rows(self, rows: Array) -> None:
+        """Keep the rows of messages that are the next ones, shape (n, width)."""
+        first, step, _ = self.sequence.due
+        self.sequence.advance(len(rows))
+        self._stamps += range(first, first + len(rows) * step, step)
+        self._rows += rows.tobytes()
+
     def write(self, end_ns: int) -> None:
         """Write what came before `end_ns`, all of which has to be of one block of log time."""
         count = bisect_left(self._stamps, end_ns - self._delay_ns)
@@ -65,6 +76,52 @@ class _Inlet:
             logs = [stamp + self._delay_ns for stamp in stamps]
             self._append(logs, stamps, bytes(self._rows[:size]))
             del self._stamps[:count], self._rows[:size]
+
+
+class TopicReceiver:
+    """Takes several of a topic's messages at once.
+
+    What is not as it should be is found by looking at one after the other.
+    """
+
+    def __init__(
+        self,
+        inlet: _Inlet,
+        take: Callable[[bytes, int, int | None], None],
+        count: Callable[[int], None],
+    ) -> None:
+        """Take the topic's inlet, what takes a single message, and what counts those of a block."""
+        self._inlet, self._take, self._count = inlet, take, count
+
+    @property
+    def due(self) -> tuple[int, int, int]:
+        """The next message's stamp, from it to the one after [ns], and its sender's number."""
+        return self._inlet.sequence.due
+
+    def receive_rows(self, rows: Array) -> None:
+        """Take the rows of messages that are due, shape (n, width), and have been looked at."""
+        self._inlet.take_rows(rows)
+        self._count(len(rows))
+
+    def receive_other(self, payload: bytes, number: int | None) -> None:
+        """Take a message that is not due, or not as it should be: bytes, sender's number.
+
+        Raises:
+            CspmError: two senders send the topic.
+        """
+        self._take(payload, 0, number)
+
+    def receive(self, payloads: list[bytes], numbers: list[int | None]) -> None:
+        """Take messages of which nothing is known: bytes, senders' numbers.
+
+        Raises:
+            CspmError: two senders send the topic.
+        """
+        if self._inlet.take_block(payloads, numbers):
+            self._count(len(payloads))
+            return
+        for payload, number in zip(payloads, numbers, strict=True):
+            self.receive_other(payload, number)
 
 
 class Gatherer:
@@ -125,29 +182,18 @@ class Gatherer:
             except InputError as err:
                 self._refuse(topic, str(err))
                 return
-            self._left -= 1
-            if self._left <= 0:
-                self._advance()
+            self._count(1)
 
         return take
 
-    def receive_block(self, topic: str) -> Callable[[list[bytes], list[int | None]], None]:
-        """Return what takes several of a topic's messages at once: bytes, senders' numbers.
+    def receiver(self, topic: str) -> TopicReceiver:
+        """Return what takes several of a topic's messages at once."""
+        return TopicReceiver(self._inlets[topic], self.receive(topic), self._count)
 
-        What is not as it should be is found by looking at one after the other, as `receive` does.
-        """
-        keep, receive = self._inlets[topic].take_block, self.receive(topic)
-
-        def take(payloads: list[bytes], numbers: list[int | None]) -> None:
-            if not keep(payloads, numbers):
-                for payload, number in zip(payloads, numbers, strict=True):
-                    receive(payload, 0, number)
-                return
-            self._left -= len(payloads)
-            if self._left <= 0:
-                self._advance()
-
-        return take
+    def _count(self, taken: int) -> None:
+        self._left -= taken
+        if self._left <= 0:
+            self._advance()
 
     def receive_diagnostics(self, payload: bytes, _: int, number: int | None = None) -> None:
         """Take a message of `/diagnostics`; `number` is its sender's, None where not known."""
@@ -189,9 +235,7 @@ class Gatherer:
         # Between processes the middleware pads what it carries.
         canonical = encode_diagnostics(stamp, [status])
         self._statuses.append((stamp, self._order.index(node), canonical))
-        self._left -= 1
-        if self._left <= 0:
-            self._advance()
+        self._count(1)
 
     def end(self, last_step: int) -> None:
         """Note that the run ended with `last_step`; once that is whole, `done` is True.

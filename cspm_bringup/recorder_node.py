@@ -37,10 +37,8 @@ class RecorderNode:
         self._intake = Intake(node.node)
         for name in schedule.topics:
             if name != CLOCK:
-                receive = self._gatherer.receive_block(name)
-                self._intake.subscribe_blocks(
-                    topics[name], ros_class(topics[name].ros_type), receive
-                )
+                receiver = self._gatherer.receiver(name)
+                self._intake.subscribe_due(topics[name], ros_class(topics[name].ros_type), receiver)
         self._intake.subscribe(
             DIAGNOSTICS,
             ros_class(DIAGNOSTICS.ros_type),
@@ -48,7 +46,7 @@ class RecorderNode:
             numbered=False,
             depth=None,
         )
-        self._receive_clock = self._gatherer.receive_block(CLOCK)
+        self._receive_clock = self._gatherer.receiver(CLOCK).receive
         self._ticks: list[bytes] = []
         self._numbers: list[int | None] = []
         self._ticked = self._looked = 0

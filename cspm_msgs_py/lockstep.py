@@ -59,7 +59,7 @@ class Sequence:
         """
         if stamp_ns != self._next_ns or (number is not None and number != self.next_number):
             self._refuse(stamp_ns, number)
-        self._advance(1)
+        self.advance(1)
 
     def take_block(self, stamps_ns: list[int], numbers: list[int | None]) -> bool:
         """Note messages that are the next ones, all of them; else note none and return False."""
@@ -68,10 +68,16 @@ class Sequence:
         known = range(self.next_number, self.next_number + count)
         if stamps_ns != list(due) or numbers not in (list(known), [None] * count):
             return False
-        self._advance(count)
+        self.advance(count)
         return True
 
-    def _advance(self, count: int) -> None:
+    @property
+    def due(self) -> tuple[int, int, int]:
+        """The next message's stamp, from it to the one after [ns], and its sender's number."""
+        return self._next_ns, self._timing.divider * self._period_ns, self.next_number
+
+    def advance(self, count: int) -> None:
+        """Note so many messages that are the next ones."""
         self._next_ns += count * self._timing.divider * self._period_ns
         self.complete += count * self._timing.divider
         self.next_number += count

@@ -88,7 +88,7 @@ class WireReader:
             InputError: the topic's type carries no row, or its columns do not fit its names.
         """
         self._layout = layout = layout_of(topic)
-        self._mask = _mask(layout)
+        self._mask = mask_of(layout)
         self._masked = (layout.template & self._mask).tobytes()
         self._dtype = layout.dtype
         self._runs = [name for name in layout.dtype.names or () if name.startswith("run")]
@@ -203,7 +203,7 @@ class _Form:
     def __init__(self, layout: Layout, topic: Topic) -> None:
         self.seconds = layout.seconds
         self._size = layout.size
-        mask = _mask(layout)
+        mask = mask_of(layout)
         # One long integer compares all constant bytes at once, however padding divides them.
         self._mask = int.from_bytes(mask.tobytes(), "little")
         self._constant = int.from_bytes((layout.template & mask).tobytes(), "little")
@@ -247,7 +247,7 @@ def _as_contract(message: Any, topic: Topic, sender: Topic) -> Any:  # noqa: ANN
     return message
 
 
-def _mask(layout: Layout) -> NDArray[np.uint8]:
+def mask_of(layout: Layout) -> NDArray[np.uint8]:
     """Return 255 for each byte that all of a sender's messages share, else 0, shape (size,)."""
     mask = np.zeros(layout.size, dtype=np.uint8)
     mask[layout.constant] = 0xFF

@@ -7,6 +7,7 @@ from ros_graph import content
 from test_gatherer import REST, STEPS, Case, Intake, spoilt
 
 from cspm_msgs_py.errors import CspmError
+from cspm_msgs_py.wire import WireReader
 
 
 @pytest.fixture(scope="module")
@@ -20,7 +21,7 @@ def deliver_blocks(intake, sent, rng, share):
     Returns how many were spoilt.
     """
     schedule = [name for name in sent if not isinstance(name, tuple)]
-    receive = {name: intake.gatherer.receive_block(name) for name in schedule}
+    receive = {name: intake.gatherer.receiver(name).receive for name in schedule}
     left, added = {name: list(payloads) for name, payloads in sent.items()}, 0
     while left:
         queue = rng.choice(list(left))
@@ -56,9 +57,32 @@ def test_blocks_make_the_same_file(case, tmp_path, seed, share):
     assert intake.told[-1] == STEPS - 1
 
 
+def test_rows_that_are_due_make_the_same_file(case, tmp_path):
+    intake, rng = Intake(case.bundle, tmp_path / "bag"), random.Random(3)
+    topics = case.bundle.testbed.testbed.topics
+    receivers = {name: intake.gatherer.receiver(name) for name in topics if name in case.sent}
+    left = {queue: list(payloads) for queue, payloads in case.sent.items()}
+    with intake.writer:
+        while queues := [queue for queue, payloads in left.items() if payloads]:
+            queue, count = rng.choice(queues), rng.randrange(1, 20)
+            block, left[queue] = left[queue][:count], left[queue][count:]
+            if queue not in receivers:
+                for payload in block:
+                    intake.take(queue, payload)
+                continue
+            stamps, rows = WireReader(topics[queue]).decode_block(block)
+            first, step, _ = receivers[queue].due
+            assert stamps == list(range(first, first + len(block) * step, step))
+            receivers[queue].receive_rows(rows)
+        intake.gatherer.end(STEPS - 1)
+        assert intake.gatherer.done
+    assert content(tmp_path / "bag") == content(case.expected)
+    assert intake.told[-1] == STEPS - 1
+
+
 def test_a_second_sender_in_a_block_is_an_error(case, tmp_path):
     intake = Intake(case.bundle, tmp_path / "bag")
-    take = intake.gatherer.receive_block("/cables/tension")
+    take = intake.gatherer.receiver("/cables/tension").receive
     first, second, third, *_ = case.sent["/cables/tension"]
     with intake.writer:
         take([first, second], [1, 2])

@@ -106,6 +106,15 @@ def test_the_recording_is_the_one_of_a_run_in_process(tmp_path, name):
         assert recording.attachments == bundle.attachments()
 
 
+@pytest.mark.parametrize("name", ["calm", "late sensors"])
+def test_where_rcl_cannot_be_called_the_recording_is_the_same(tmp_path, monkeypatch, name):
+    bundle, steps = RUNS[name]
+    graph(bundle, tmp_path / "rcl", steps=steps)
+    monkeypatch.setattr("cspm_msgs_py.ros.intake.take_address", lambda: None)
+    graph(bundle, tmp_path / "rclpy", steps=steps)
+    assert content(tmp_path / "rcl") == content(tmp_path / "rclpy")
+
+
 @pytest.mark.skipif(not find_spec("mujoco"), reason="the MuJoCo plant needs MuJoCo")
 def test_the_mujoco_plant_in_the_graph(tmp_path):
     bundle = replace(bundle_of("calm"), plant="mujoco")

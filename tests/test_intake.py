@@ -10,7 +10,7 @@ from cspm_msgs_py.ros.contract_node import ros_class  # noqa: E402 - after ROS i
 from cspm_msgs_py.ros.intake import DEPTH, Intake  # noqa: E402
 from cspm_msgs_py.ros.session import Session  # noqa: E402
 from cspm_msgs_py.topics import contract_topics  # noqa: E402
-from cspm_msgs_py.wire import WireReader  # noqa: E402
+from cspm_msgs_py.wire import WireReader, WireWriter  # noqa: E402
 
 PATIENCE_S = 20.0
 FLOOD = 6000  # more than Fast DDS lets wait
@@ -151,6 +151,98 @@ def test_where_numbers_mean_nothing_nothing_is_lost(session):
         send(stamp)
     taken(session, reader, TENSION, 10)
     assert reader.intake.lost == {TENSION.name: 0, COMMAND.name: 0}
+
+
+class Counter:
+    """Knows what is due of a topic, from stamp and number 1, and keeps all that it is given."""
+
+    def __init__(self):
+        self.due, self.rows, self.others = (1, 1, 1), [], []
+
+    def receive_rows(self, rows):
+        self.rows += rows.tolist()
+        stamp, step, number = self.due
+        self.due = stamp + step * len(rows), step, number + len(rows)
+
+    def receive_other(self, payload, number):
+        if payload == b"none at all.":
+            self.others.append(number)
+            return
+        stamp, row = WireReader(COMMAND).decode(payload)
+        assert (stamp, number) == (self.due[0], self.due[2] + len(self.others))
+        self.receive_rows(row[None])
+
+    def receive(self, payloads, numbers):
+        for payload, number in zip(payloads, numbers, strict=True):
+            self.receive_other(payload, number)
+
+
+ROADS = [pytest.param("rcl", marks=pytest.mark.compiled), "rclpy"]
+
+
+@pytest.fixture(params=ROADS)
+def road(request, monkeypatch):
+    if request.param == "rclpy":
+        monkeypatch.setattr("cspm_msgs_py.ros.intake.take_address", lambda: None)
+
+
+@pytest.mark.usefixtures("road")
+def test_rows_come_whether_rcl_is_called_or_rclpy(session):
+    reader, rows, others = Reader(session), [], []
+    decode = WireReader(TENSION).decode
+
+    def take(stamp, row, number):
+        rows.append((stamp, row.tolist(), number))
+
+    def take_bytes(payload, _, number):
+        if payload == b"none at all.":
+            others.append(number)
+        else:
+            take(*decode(payload), number)
+
+    reader.intake.subscribe_rows(TENSION, ros_class(TENSION.ros_type), take, take_bytes)
+    counter = Counter()
+    reader.intake.subscribe_due(COMMAND, ros_class(COMMAND.ros_type), counter)
+    node = session._nodes[0]
+    raw = {topic: node.raw_publisher(topic, ["reader"]) for topic in (TENSION, COMMAND)}
+    assert session.spin_until(lambda: not node.unmatched(), PATIENCE_S), node.unmatched()
+    for topic, send in raw.items():
+        encode = WireWriter(topic).encode
+        for stamp in range(1, 301):
+            if stamp == 201:
+                send(b"none at all.")
+            send(encode(stamp, np.array([stamp, 0.5])))
+
+    def there():
+        reader.intake.take()
+        return len(rows) == len(counter.rows) == 300
+
+    assert session.spin_until(there, PATIENCE_S)
+    sent = [[float(stamp), 0.5] for stamp in range(1, 301)]
+    assert rows == [(s, sent[s - 1], s + (s > 200)) for s in range(1, 301)]
+    assert (others, counter.rows, counter.others) == ([201], sent, [201])
+
+
+@pytest.mark.usefixtures("road")
+def test_a_row_is_the_readers_own(session):
+    reader, rows = Reader(session), []
+    reader.intake.subscribe_rows(
+        TENSION,
+        ros_class(TENSION.ros_type),
+        lambda _stamp, row, _number: rows.append(row),
+        lambda payload, *_: rows.append(WireReader(TENSION).decode(payload)[1]),
+    )
+    send = sender_of(session, session._nodes[0], TENSION)
+
+    def both():
+        reader.intake.take_one()
+        return len(rows) == 2
+
+    send(1)
+    send(2)
+    assert session.spin_until(both, PATIENCE_S)
+    rows[0][:] = 9.0
+    np.testing.assert_array_equal(rows[1], [1.0, 2.0])
 
 
 def test_closed_it_takes_nothing(session):

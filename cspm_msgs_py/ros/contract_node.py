@@ -103,20 +103,6 @@ class ContractNode:
             depth=depth,
         )
 
-    def subscribe_numbered(
-        self, topic: Topic, take: Callable[[bytes, int, int | None], None]
-    ) -> None:
-        """As `subscribe`, with each message's time of reception [ns] and its sender's number.
-
-        The number is None if unknown. All messages wait.
-        """
-        message_class = ros_class(topic.ros_type)
-        if self.intake is None:
-            numbered, qos = _Numbered(take), contract_qos(None)
-            self.node.create_subscription(message_class, topic.name, numbered, qos, raw=True)
-            return
-        self.intake.subscribe(topic, message_class, take, numbered=False, depth=None)
-
     def subscribe_objects(
         self,
         topic: str,
@@ -164,15 +150,28 @@ class ContractNode:
         """
         decode = WireReader(topic).decode
 
-        def take(payload: bytes, _: int, number: int | None) -> None:
+        def take_row(stamp_ns: int, row: Array, number: int | None) -> None:
             try:
-                receive(*decode(payload), number)
+                receive(stamp_ns, row, number)
             except InputError as err:
                 refuse(str(err))
             except CspmError as err:
                 self.fail(str(err))
 
-        self.subscribe_numbered(topic, take)
+        def take(payload: bytes, _: int, number: int | None) -> None:
+            try:
+                decoded = decode(payload)
+            except InputError as err:
+                refuse(str(err))
+            else:
+                take_row(*decoded, number)
+
+        message_class = ros_class(topic.ros_type)
+        if self.intake is None:
+            numbered, qos = _Numbered(take), contract_qos(None)
+            self.node.create_subscription(message_class, topic.name, numbered, qos, raw=True)
+        else:
+            self.intake.subscribe_rows(topic, message_class, take_row, take)
 
     def unmatched(self) -> list[str]:
         """Return `topic (reader)` for each reader that is not connected to our publisher yet."""

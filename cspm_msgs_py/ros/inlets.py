@@ -1,0 +1,204 @@
+"""Single subscriptions that are looked at, by what they hand on."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import Any, Protocol
+
+import numpy as np
+from numpy.typing import NDArray
+from rclpy.impl.implementation_singleton import rclpy_implementation
+
+from cspm_msgs_py.ros.row_taker import RowTaker, TakenRow
+from cspm_msgs_py.sequence_numbers import SequenceNumbers
+
+Array = NDArray[np.float64]
+# In one look, so that a flood does not keep its reader from all else.
+_AT_ONCE = 2000
+
+
+class DueReceiver(Protocol):
+    """Who knows which of a topic's messages comes next."""
+
+    @property
+    def due(self) -> tuple[int, int, int]:
+        """The next message's stamp, from it to the one after [ns], and its sender's number."""
+
+    def receive_rows(self, rows: Array) -> None:
+        """Take the rows of messages that are due, shape (n, width), valid during the call."""
+
+    def receive_other(self, payload: bytes, number: int | None) -> None:
+        """Take a message that is not due, or not as it should be: CDR bytes, sender's number."""
+
+    def receive(self, payloads: list[bytes], numbers: list[int | None]) -> None:
+        """Take messages of which nothing is known: CDR bytes, senders' numbers."""
+
+
+def _take_each(take_one: Callable[[], bool]) -> None:
+    for _ in range(_AT_ONCE):
+        if not take_one():
+            return
+
+
+class Inlet:
+    """One subscription."""
+
+    def __init__(
+        self,
+        topic: str,
+        handle: rclpy_implementation.Subscription,
+        message_class: type,
+        receive: Callable[[bytes, int, int | None], None],
+        numbered: bool,
+    ) -> None:
+        self.topic, self.handle = topic, handle
+        self._class, self._receive = message_class, receive
+        self._numbers = SequenceNumbers() if numbered else None
+
+    @property
+    def lost(self) -> int:
+        """Messages missing by their numbers."""
+        return self._numbers.lost if self._numbers is not None else 0
+
+    def take_one(self) -> bool:
+        """Hand on a message, if there is one; return whether there was."""
+        taken = self.handle.take_message(self._class, True)
+        if taken is None:
+            return False
+        payload, info = taken
+        number = info["publication_sequence_number"]
+        if self._numbers is not None and number is not None:
+            self._numbers.add(number)
+        self._receive(payload, info["received_timestamp"], number)
+        return True
+
+    def take(self) -> None:
+        """Hand on what has come, of a flood its beginning."""
+        _take_each(self.take_one)
+
+
+class BlockInlet:
+    """One subscription whose messages are handed on together, to someone who counts them."""
+
+    lost = 0
+
+    def __init__(
+        self,
+        topic: str,
+        handle: rclpy_implementation.Subscription,
+        message_class: type,
+        receive: Callable[[list[bytes], list[int | None]], None],
+    ) -> None:
+        self.topic, self.handle = topic, handle
+        self._class, self._receive = message_class, receive
+
+    def take_one(self) -> bool:
+        """Hand on a message, if there is one; return whether there was."""
+        return self._take(1)
+
+    def take(self) -> None:
+        """Hand on what has come, of a flood its beginning."""
+        self._take(_AT_ONCE)
+
+    def _take(self, most: int) -> bool:
+        take, message_class = self.handle.take_message, self._class
+        payloads: list[bytes] = []
+        numbers: list[int | None] = []
+        while len(payloads) < most and (taken := take(message_class, True)) is not None:
+            payload, info = taken
+            payloads.append(payload)
+            numbers.append(info["publication_sequence_number"])
+        if payloads:
+            self._receive(payloads, numbers)
+        return bool(payloads)
+
+
+class ObjectInlet:
+    """One subscription whose messages are handed on as rclpy's objects."""
+
+    lost = 0
+
+    def __init__(
+        self,
+        topic: str,
+        handle: rclpy_implementation.Subscription,
+        message_class: type,
+        receive: Callable[[Any], None],
+    ) -> None:
+        self.topic, self.handle = topic, handle
+        self._class, self._receive = message_class, receive
+
+    def take_one(self) -> bool:
+        """Hand on a message, if there is one; return whether there was."""
+        taken = self.handle.take_message(self._class, False)
+        if taken is None:
+            return False
+        self._receive(taken[0])
+        return True
+
+    def take(self) -> None:
+        """Hand on what has come, of a flood its beginning."""
+        _take_each(self.take_one)
+
+
+class RowInlet:
+    """One subscription whose messages are handed on as rows, one by one."""
+
+    lost = 0
+
+    def __init__(
+        self,
+        topic: str,
+        handle: rclpy_implementation.Subscription,
+        taker: RowTaker,
+        receive: Callable[[int, Array, int | None], None],
+        receive_bytes: Callable[[bytes, int, int | None], None],
+    ) -> None:
+        self.topic, self.handle, self._taker = topic, handle, taker
+        self._receive, self._receive_bytes = receive, receive_bytes
+
+    def take_one(self) -> bool:
+        """Hand on a message, if there is one; return whether there was."""
+        taken = self._taker.take()
+        if taken is None:
+            return False
+        if isinstance(taken, TakenRow):
+            self._receive(*taken)
+        else:
+            self._receive_bytes(taken.payload, 0, taken.number)
+        return True
+
+    def take(self) -> None:
+        """Hand on what has come, of a flood its beginning."""
+        _take_each(self.take_one)
+
+
+class DueInlet(BlockInlet):
+    """One subscription whose messages are handed on as rows as long as they are due."""
+
+    def __init__(
+        self,
+        topic: str,
+        handle: rclpy_implementation.Subscription,
+        message_class: type,
+        taker: RowTaker,
+        receiver: DueReceiver,
+    ) -> None:
+        super().__init__(topic, handle, message_class, receiver.receive)
+        self._taker, self._receiver = taker, receiver
+
+    def take(self) -> None:
+        """Hand on what has come, of a flood its beginning."""
+        receiver, left = self._receiver, _AT_ONCE
+        while left > 0:
+            rows, other = self._taker.take_due(*receiver.due, left)
+            left -= len(rows)
+            if len(rows):
+                receiver.receive_rows(rows)
+            if other is not None:
+                receiver.receive_other(*other)
+                # Where one does not belong there are more, which cost less together.
+                super().take()
+                return
+            if not len(rows):
+                return

@@ -61,3 +61,18 @@ def test_only_what_was_not_searched_counts(crept):
     assert late.measured == pytest.approx(alone.measured, rel=0.01)
     # The sea begins with a ramp, so that all of it moves less than its end.
     assert fits(crept, 0.0)[CREPT].measured < 0.9 * late.measured
+
+
+def test_a_residual_without_rows_there_is_left_out(crept, monkeypatch):
+    """As of a cable that hangs slack in the end."""
+    whole = judgement.equations_of
+
+    def slack(measurement, effects):
+        found = whole(measurement, effects)
+        return [e.within(0.0, START_S) if e.place == SOUND else e for e in found]
+
+    monkeypatch.setattr(judgement, "equations_of", slack)
+    found = fits(crept)
+    assert SOUND not in found
+    assert CREPT in found
+    assert SOUND in fits(crept, 0.0)

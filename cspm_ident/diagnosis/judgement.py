@@ -144,7 +144,7 @@ def _residuals(
     weights: Mapping[Candidate, Array],
     noise: Mapping[Place, Array],
 ) -> dict[Place, list[Equation]]:
-    """Return the residuals of recordings from some instant each on."""
+    """Return the residuals of recordings from some instant each on, where there are any rows."""
     parts = [
         [
             equation.within(start, np.inf)
@@ -155,5 +155,6 @@ def _residuals(
     found: dict[Place, list[Equation]] = {}
     for part in in_noise(parts, noise):
         for equation in part:
-            found.setdefault(equation.place, []).append(equation)
+            if len(equation.times):
+                found.setdefault(equation.place, []).append(equation)
     return found

@@ -23,10 +23,10 @@ Array = NDArray[np.float64]
 
 # Standard errors by which a finding has to show.
 _SIGMAS = 2.0
-# Of a finding's squares: what was asked for has to move it by more than by chance (weak
-# instruments: Staiger, Stock, Econometrica 65(3), 1997). In blind recordings 0.7 and more of what
-# was there was so moved, and 0.004 and less of what was fed back.
-_MOVED = 0.05
+# Of a finding's squares: what was asked for has to move it (weak instruments: Staiger, Stock,
+# Econometrica 65(3), 1997). In blind recordings 0.53 and more of what was there was so moved, and
+# 0.22 and less of nearly all that was fed back.
+_MOVED = 0.3
 # Times its noise: what moves less stands still, and what moves more does not follow noise.
 _STILL, _DRIVEN = 5.0, 10.0
 # Of the bar's motion: as much has another cause than controllers, such as a hand.

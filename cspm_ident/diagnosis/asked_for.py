@@ -32,6 +32,8 @@ _STILL, _DRIVEN = 5.0, 10.0
 # Of the bar's motion: as much has another cause than controllers, such as a hand.
 _UNASKED = 0.1
 _LEAST = 1e-9
+# Of each equation: more say no more of motion that was planned, and take memory.
+_ROWS = 20_000
 
 
 def is_proportional(effect: Effect) -> bool:
@@ -115,18 +117,19 @@ def _moments(
     mine = [c for c in own if c in equation.columns]
     if not mine or not len(equation.times):
         return
-    basis = _basis(_at(wanted, equation.times))
-    home = (equation.times / block_s).astype(int)
+    thin = slice(None, None, -(-len(equation.times) // _ROWS))
+    basis = _basis(_at(wanted, equation.times[thin]))
+    home = (equation.times[thin] / block_s).astype(int)
     others = [c for c in weights if c in equation.columns and c not in own]
     for k in range(equation.target.shape[1]):
-        effect = sum((equation.columns[c][:, k] @ weights[c] for c in mine), np.zeros(len(home)))
-        beside = [equation.columns[c][:, k] for c in others]
+        effect = sum((equation.columns[c][thin, k] @ weights[c] for c in mine), np.zeros(len(home)))
+        beside = [equation.columns[c][thin, k] for c in others]
         if equation.nuisance.size:
-            beside.append(equation.nuisance[:, k])
+            beside.append(equation.nuisance[thin, k])
         taken = _basis(np.concatenate([np.zeros((len(home), 0)), *beside], axis=1))
         left, effect = (
             each - taken @ (taken.T @ each)
-            for each in (np.asarray(equation.target[:, k], dtype=float), effect)
+            for each in (np.asarray(equation.target[thin, k], dtype=float), effect)
         )
         instrument = basis @ (basis.T @ effect)
         instrument = instrument - taken @ (taken.T @ instrument)

@@ -115,6 +115,9 @@ def _moments(
 ) -> Iterator[tuple[float, float, float]]:
     """Yield, by block, the instrument times residual and finding, and the finding's squares."""
     mine = [c for c in own if c in equation.columns]
+    if mine:
+        # One at a time: all of them would be a good part of the memory.
+        equation = equation.steady
     if not mine or not len(equation.times):
         return
     thin = slice(None, None, -(-len(equation.times) // _ROWS))

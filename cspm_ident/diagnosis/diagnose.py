@@ -253,7 +253,7 @@ def _asked_for(
 ) -> tuple[tuple[Named, ...], tuple[Named, ...]]:
     """Part what was found by whether the motion that was asked for shows it, if it has to."""
     hypotheses, wanted = _hypotheses(kept), [instruments_of(each) for each in searched]
-    values, calm = search.fits.values(hypotheses), steady(rows)
+    values = search.fits.values(hypotheses)
 
     def stays(named: Named) -> bool:
         own = named.hypothesis
@@ -261,7 +261,7 @@ def _asked_for(
             not is_proportional(own.effect)
             or own.onset > 0
             or search.fits.is_negligible(own, hypotheses)
-            or shows_in_what_was_asked(calm, wanted, own.candidates, values, block)
+            or shows_in_what_was_asked(rows, wanted, own.candidates, values, block)
         )
 
     told = [stays(each) for each in kept]

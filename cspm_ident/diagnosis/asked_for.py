@@ -8,7 +8,7 @@ system identification, Springer 1983).
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator, Mapping, Sequence
+from collections.abc import Collection, Iterator, Mapping, Sequence, Set
 
 import numpy as np
 from numpy.typing import NDArray
@@ -32,7 +32,7 @@ _STILL, _DRIVEN = 5.0, 10.0
 # Of the bar's motion: as much has another cause than controllers, such as a hand.
 _UNASKED = 0.1
 _LEAST = 1e-9
-# Of each equation: more say no more of motion that was planned, and take memory.
+# Of each recording or equation: more say no more of motion that was planned, and take memory.
 _ROWS = 20_000
 
 
@@ -62,18 +62,19 @@ def _is_driven(bar: Samples | None, wanted: Samples) -> bool:
     """Return whether the bar moves otherwise than it was asked to, and more than noise makes it."""
     if bar is None:
         return False
-    position = bar.values[:, :3] - bar.values[:, :3].mean(axis=0)
-    basis = _basis(_at(wanted, bar.times))
+    noise, thin = difference_noise(bar.values[:, :3]), _thinning(len(bar.times))
+    position = bar.values[thin, :3] - bar.values[thin, :3].mean(axis=0)
+    basis = _basis(_at(wanted, bar.times[thin]))
     unasked = np.std(position - basis @ (basis.T @ position), axis=0)
     share = np.sum(unasked**2) / np.sum(np.var(position, axis=0))
-    far = np.any(unasked > _DRIVEN * difference_noise(position))
+    far = np.any(unasked > _DRIVEN * noise)
     return bool(far and share > _UNASKED)
 
 
 def shows_in_what_was_asked(
     parts: Sequence[Sequence[Equation]],
     wanted: Sequence[Samples | None],
-    own: Iterable[Candidate],
+    own: Collection[Candidate],
     weights: Mapping[Candidate, Array],
     block_s: float,
 ) -> bool:
@@ -89,12 +90,15 @@ def shows_in_what_was_asked(
         weights: of all that was found.
         block_s: length of blocks that are as good as independent [s].
     """
+    mine = frozenset(own)
     found = [
         pair
         for part, instruments in zip(parts, wanted, strict=True)
         if instruments is not None
         for equation in part
-        for pair in _moments(equation, instruments, set(own), weights, block_s)
+        if not mine.isdisjoint(equation.columns)
+        # One at a time: all steady ones would be a good part of the memory.
+        for pair in _moments(equation.steady, instruments, mine, weights, block_s)
     ]
     if not found:
         return True
@@ -109,18 +113,15 @@ def shows_in_what_was_asked(
 def _moments(
     equation: Equation,
     wanted: Samples,
-    own: set[Candidate],
+    own: Set[Candidate],
     weights: Mapping[Candidate, Array],
     block_s: float,
 ) -> Iterator[tuple[float, float, float]]:
     """Yield, by block, the instrument times residual and finding, and the finding's squares."""
-    mine = [c for c in own if c in equation.columns]
-    if mine:
-        # One at a time: all of them would be a good part of the memory.
-        equation = equation.steady
-    if not mine or not len(equation.times):
+    if not len(equation.times):
         return
-    thin = slice(None, None, -(-len(equation.times) // _ROWS))
+    mine = [c for c in own if c in equation.columns]
+    thin = _thinning(len(equation.times))
     basis = _basis(_at(wanted, equation.times[thin]))
     home = (equation.times[thin] / block_s).astype(int)
     others = [c for c in weights if c in equation.columns and c not in own]
@@ -140,6 +141,10 @@ def _moments(
             rows = home == block
             told, moved = instrument[rows], effect[rows]
             yield float(told @ left[rows]), float(told @ moved), float(moved @ moved)
+
+
+def _thinning(rows: int) -> slice:
+    return slice(None, None, max(1, -(-rows // _ROWS)))
 
 
 def _at(wanted: Samples, times: Array) -> Array:

@@ -56,9 +56,7 @@ def unexplained(
                 found[driver] = driver, gain, share
     found |= {each[0]: each for each in _drifting(evidence, sums, sureness, chosen, sound)}
     found |= {each[0]: each for each in _once(evidence, sums, base)}
-    told = [
-        e for e in found.values() if e[1].total > _untold(evidence, sums, [*chosen, *sound], e[0])
-    ]
+    told = [e for e in found.values() if e[1].total > _untold(evidence, sums, supposed, e[0])]
     return tuple(sorted(told, key=lambda each: -each[1].total))
 
 

@@ -64,7 +64,7 @@ def controller_parity(path: Path) -> tuple[Parity, ...]:
                 name for plan in schedule.nodes.values() for name in (*plan.inputs, *plan.held)
             }
             needed |= {name for plan in schedule.nodes.values() for name in plan.outputs}
-            found = recording.rows_of(needed - {CLOCK})
+            found = recording.rows_of(needed - {CLOCK}, round(LONGEST_S * 1e9))
         recorded = {name: _by_step(rows, schedule, name) for name, rows in found.items()}
         return _stepped(bundle, schedule, recorded)
     except CspmError:

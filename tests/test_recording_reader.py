@@ -49,6 +49,30 @@ def test_every_row_comes_back(sample, inside):
         np.testing.assert_array_equal(found[name].rows, rows)
 
 
+@pytest.mark.parametrize("kept", [1, 117, STEPS])
+def test_rows_up_to_a_time_are_the_first_ones(sample, kept):
+    with Recording(sample[0]) as recording:
+        until_ns = recording.start_ns + (kept - 1) * STEP_NS
+        found = recording.rows_of(ROW_TOPICS, until_ns)
+        for name, rows in recording.rows_of(ROW_TOPICS).items():
+            assert len(found[name].log_ns) == kept
+            for part, whole in zip(found[name], rows, strict=True):
+                np.testing.assert_array_equal(part, whole[:kept])
+
+
+def test_chunks_beyond_the_time_are_not_read(sample, monkeypatch):
+    read = []
+    with Recording(sample[0]) as recording:
+        [file] = recording.files
+        assert len(file.chunks) > 2
+        messages = file.messages
+        monkeypatch.setattr(
+            file, "messages", lambda place, index=None: read.append(place) or messages(place, index)
+        )
+        recording.rows_of(ROW_TOPICS, recording.start_ns)
+    assert read == file.chunks[:1]
+
+
 def test_payloads_come_back(sample):
     with Recording(sample[0]) as recording:
         logs, payloads = recording.payloads("/diagnostics")

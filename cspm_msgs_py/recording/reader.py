@@ -17,7 +17,7 @@ from typing_extensions import Self
 
 from cspm_msgs_py.errors import InputError
 from cspm_msgs_py.message import carries_row
-from cspm_msgs_py.recording.chunk import Messages
+from cspm_msgs_py.recording.chunk import ChunkPlace, Messages
 from cspm_msgs_py.recording.mcap_file import McapFile
 from cspm_msgs_py.recording.rosbag2_metadata import read_bag
 from cspm_msgs_py.recording.rows import RowCollector, Rows
@@ -106,13 +106,8 @@ class Recording:
         first, last = 2**64 - 1, -1
         for file in self.files:
             for place in file.chunks:
-                if place.loose:
-                    logs = file.messages(place).logs
-                    head_first, head_last = int(logs.min()), int(logs.max())
-                else:
-                    head = file.head(place)
-                    head_first, head_last = head.first_ns, head.last_ns
-                first, last = min(first, head_first), max(last, head_last)
+                begin, end = _span_of(file, place)
+                first, last = min(first, begin), max(last, end)
         return (first, last) if last >= 0 else (0, 0)
 
     @property
@@ -133,15 +128,21 @@ class Recording:
         """
         return self.rows_of([name])[name]
 
-    def rows_of(self, names: Iterable[str]) -> dict[str, Rows]:
+    def rows_of(self, names: Iterable[str], until_ns: int | None = None) -> dict[str, Rows]:
         """Return the messages of several topics, reading the recording once.
+
+        Args:
+            names: of the topics.
+            until_ns: the latest log time that is wanted [ns]; None: all are.
 
         Raises:
             InputError: a topic is missing, has no row of numbers or another definition, or the
                 recording is damaged.
         """
-        collectors = self._collect(list(names), only_first=False)
+        collectors = self._collect(list(names), only_first=False, until_ns=until_ns)
         found = {name: collector.result() for name, collector in collectors.items()}
+        if until_ns is not None:
+            return {name: rows.until(until_ns) for name, rows in found.items()}
         for name, rows in found.items():
             self._check_count(name, len(rows.log_ns))
         return found
@@ -172,20 +173,24 @@ class Recording:
         order = np.argsort(logs, kind="stable")
         return Payloads(logs[order], [payloads[i] for i in order])
 
-    def _collect(self, names: list[str], *, only_first: bool) -> dict[str, RowCollector]:
+    def _collect(
+        self, names: list[str], *, only_first: bool, until_ns: int | None = None
+    ) -> dict[str, RowCollector]:
         collectors = {}
         for name in names:
             ros_type = self._type_of_topic(name)
             self._check_schema(name, ros_type)
             collectors[name] = RowCollector(name, ros_type, str(self.path))
-        for name, messages in self._messages(names):
+        for name, messages in self._messages(names, until_ns):
             collectors[name].add(messages)
             if only_first:
                 break
         return collectors
 
-    def _messages(self, names: list[str]) -> Iterator[tuple[str, Messages]]:
-        """Yield each topic's messages chunk by chunk."""
+    def _messages(
+        self, names: list[str], until_ns: int | None = None
+    ) -> Iterator[tuple[str, Messages]]:
+        """Yield each topic's messages chunk by chunk, leaving out chunks that begin later."""
         for file in self.files:
             ids = {
                 name: [channel.id for channel in file.channels.values() if channel.topic == name]
@@ -193,6 +198,8 @@ class Recording:
             }
             wanted = {channel for channels in ids.values() for channel in channels}
             for place in file.chunks:
+                if until_ns is not None and _span_of(file, place)[0] > until_ns:
+                    continue
                 index = file.index(place)
                 if index is None or not wanted.isdisjoint(index):
                     messages = file.messages(place, index)
@@ -251,6 +258,15 @@ class Recording:
         trace: TracebackType | None,
     ) -> None:
         self.close()
+
+
+def _span_of(file: McapFile, place: ChunkPlace) -> tuple[int, int]:
+    """Return the earliest and latest log time of a chunk [ns]."""
+    if place.loose:
+        logs = file.messages(place).logs
+        return int(logs.min()), int(logs.max())
+    head = file.head(place)
+    return head.first_ns, head.last_ns
 
 
 def mcap_paths(path: Path) -> list[Path]:

@@ -30,6 +30,11 @@ class Rows(NamedTuple):
     stamp_ns: NDArray[np.int64]
     rows: NDArray[np.float64]
 
+    def until(self, log_ns: int) -> Rows:
+        """Return those recorded not later than a time [ns]."""
+        end = int(np.searchsorted(self.log_ns, log_ns, side="right"))
+        return Rows(self.log_ns[:end], self.stamp_ns[:end], self.rows[:end])
+
 
 class RowCollector:
     """Decodes a topic's messages in batches.

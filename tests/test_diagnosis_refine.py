@@ -11,7 +11,7 @@ from cspm_ident.diagnosis.columns import Candidate
 from cspm_ident.diagnosis.equation import steady
 from cspm_ident.diagnosis.hypothesis import Hypothesis
 from cspm_ident.diagnosis.look import noise_of
-from cspm_ident.diagnosis.parameters import of_clocks
+from cspm_ident.diagnosis.parameters import of_clocks, of_forms
 from cspm_ident.diagnosis.recorded import equations_of
 from cspm_ident.diagnosis.refine import refine
 from cspm_ident.signals.measurement import read_measurement
@@ -63,3 +63,12 @@ def test_no_delay_is_surer_than_the_clocks_of_a_sound_machine():
     assert found[late][1] == pytest.approx(np.hypot(1e-4, sound))
     assert found[late][0] == given[late][0]
     assert found[dry][1] == given[dry][1]
+
+
+def test_no_weight_is_surer_than_the_form_of_its_law():
+    one, other = (Candidate(DAMPING, element) for element in ("hoist_1", "hoist_2"))
+    given = {c: (np.array([-3.0, 0.0]), np.array([0.4, 0.4])) for c in (one, other)}
+    found = of_forms(given, {one: 0.1, other: 0.0})
+    np.testing.assert_allclose(found[one][1], [0.5, 0.4])
+    np.testing.assert_array_equal(found[one][0], given[one][0])
+    np.testing.assert_array_equal(found[other][1], given[other][1])

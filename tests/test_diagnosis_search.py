@@ -2,6 +2,7 @@
 
 import numpy as np
 import pytest
+from scipy.stats import norm
 
 from cspm_ident.diagnosis.columns import Candidate, Place
 from cspm_ident.diagnosis.drivers import KNOTS, Driver, Knots
@@ -14,7 +15,7 @@ from cspm_ident.diagnosis.parameters import of_shafts
 from cspm_ident.diagnosis.search import Search
 from cspm_ident.diagnosis.sketch import sketch
 from cspm_ident.diagnosis.sums import Sums
-from cspm_ident.diagnosis.weights import weights_of
+from cspm_ident.diagnosis.weights import at_once, weights_of
 from cspm_sim.effects import Channel, catalogue
 
 ROWS, STEP, BLOCK_S = 4800, 0.01, 1.0
@@ -240,3 +241,16 @@ def mixed(own):
 def test_elements_that_another_effect_explains_are_left_out(own, expected):
     named = found(mixed(own)).named
     assert {(n.hypothesis.effect.id, n.hypothesis.elements) for n in named} == expected
+
+
+@pytest.mark.parametrize("count", [1, 8])
+def test_intervals_at_once_hold_all_weights_in_nineteen_of_twenty(count):
+    rng = np.random.default_rng(5)
+    errors = rng.standard_normal((20_000, count))
+    half = np.array([norm.isf(0.025)])
+    many = [Candidate(catalogue()["winch_viscous_friction"], f"w{k}") for k in range(count)]
+    wide = at_once({c: (np.zeros(1), half) for c in many})
+    widths = np.array([wide[c][1][0] for c in many])
+    assert np.all(np.abs(errors) < widths, axis=1).mean() == pytest.approx(0.95, abs=0.005)
+    assert (widths[0] == half[0]) == (count == 1)
+    assert at_once({}) == {}

@@ -18,8 +18,9 @@ from cspm_ident.diagnosis.hypothesis import (
     is_tied,
     parts_of,
 )
+from cspm_ident.diagnosis.likeness import freely_gained
 from cspm_ident.diagnosis.sums import Sums
-from cspm_ident.diagnosis.weights import Weights, values_of, weights_of
+from cspm_ident.diagnosis.weights import Weights, at_once, values_of, weights_of
 
 Array = NDArray[np.float64]
 Index = NDArray[np.intp]
@@ -81,12 +82,23 @@ class Fits:
         ):
             yield
 
+    def untrue(self, hypothesis: Hypothesis, others: Sequence[Hypothesis]) -> float:
+        """Return by what share of its amplitude a hypothesis is seen to be off, from 0 to 1.
+
+        From the most that a free function gains beside it, in squares of what it gains itself.
+        """
+        base, own = self.columns(others), self.own_columns(hypothesis)
+        with self.delayed(hypothesis):
+            gained = float(np.sum(self.sums.held_out(base) - self.held_out(hypothesis, base)))
+            free = freely_gained(self.evidence, self.sums, base, own)
+        return float(np.sqrt(free / max(gained, free))) if free else 0.0
+
     def is_plausible(self, hypotheses: Sequence[Hypothesis]) -> bool:
         """Return whether parameters are what the catalogue allows, but for chance."""
         values = self.values(hypotheses)
         if all(is_allowed(c, own) and not c.effect.tied for c, own in values.items()):
             return True
-        found = self.weights(hypotheses)
+        found = at_once(self.weights(hypotheses))
         return all(
             is_allowed(c, bounded(c, own, half)) and (not c.effect.tied or is_tied(c, own, half))
             for c, (own, half) in found.items()

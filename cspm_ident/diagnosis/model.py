@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from typing import NamedTuple
 
 import numpy as np
@@ -12,7 +12,7 @@ from cspm_ident.diagnosis.columns import Candidate, Place
 from cspm_ident.diagnosis.equation import Equation, steady
 from cspm_ident.diagnosis.hypothesis import Named, bounded, is_negligible, members_of
 from cspm_ident.diagnosis.onset import Onset, onset_of
-from cspm_ident.diagnosis.parameters import of_clocks, of_drives, of_shafts
+from cspm_ident.diagnosis.parameters import of_clocks, of_drives, of_forms, of_shafts
 from cspm_ident.diagnosis.refine import Cut, needs_refining, refine
 from cspm_ident.diagnosis.search import Search
 from cspm_ident.diagnosis.simulation import (
@@ -105,6 +105,7 @@ def modelled(search: Search, kept: Sequence[Named], data: Data) -> Model:
     weights = {
         c: (_allowed(data.searched[0], c, own, half), half) for c, (own, half) in weights.items()
     }
+    weights = of_forms(weights, _untrue(search, kept, weights))
     values = {c: w for c, (w, _) in weights.items()}
     members = [{c: values[c] for c in members_of(values, each.hypothesis)} for each in kept]
     possible = tuple(is_possible(data.searched[0], own) for own in members)
@@ -136,6 +137,20 @@ def _parameters(
     if any(needs_refining(hypothesis.effect) for hypothesis in hypotheses):
         return refine(data.searched, hypotheses, data.noise, data.block, cut, data.supposed)
     return of_shafts(search.fits.weights(hypotheses), rows, data.block)
+
+
+def _untrue(
+    search: Search, kept: Sequence[Named], found: Iterable[Candidate]
+) -> dict[Candidate, float]:
+    hypotheses = [each.hypothesis for each in kept]
+    shares = [
+        search.fits.untrue(each, [h for h in hypotheses if h is not each]) for each in hypotheses
+    ]
+    return {
+        c: share
+        for each, share in zip(hypotheses, shares, strict=True)
+        for c in members_of(found, each)
+    }
 
 
 def _onsets(kept: Sequence[Named], rows: Parts, starts: Array) -> tuple[Onset | None, ...]:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 
 import numpy as np
 
@@ -79,6 +79,19 @@ def of_clocks(weights: Weights) -> Weights:
             own = np.array([effect.negligible.get(p.name, 0.0) for p in effect.linear])
             found[candidate] = values, np.hypot(half, own)
     return found
+
+
+def of_forms(weights: Weights, untrue: Mapping[Candidate, float]) -> Weights:
+    """Return the weights, of which none is surer than the form of its law.
+
+    Noise alone makes the interval of a straight line through a curve as narrow as one likes; what
+    the law leaves of the curve may as well have moved the line (GUM, JCGM 100:2008, 4.3).
+
+    Args:
+        weights: as found.
+        untrue: of each, by what share of its amplitude the law is seen to be off.
+    """
+    return {c: (w, np.hypot(half, untrue[c] * np.abs(w))) for c, (w, half) in weights.items()}
 
 
 def _fitted(parts: Parts, candidates: Sequence[Candidate], block_s: float) -> Weights:

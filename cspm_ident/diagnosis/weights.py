@@ -6,6 +6,7 @@ from collections.abc import Collection, Sequence
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.stats import norm
 
 from cspm_ident.diagnosis.columns import Candidate
 from cspm_ident.diagnosis.evidence import Evidence
@@ -13,6 +14,8 @@ from cspm_ident.diagnosis.sums import Sums
 
 Array = NDArray[np.float64]
 Index = NDArray[np.intp]
+# On either side of an interval of 95 %.
+_OUTSIDE = 0.025
 # Of each candidate the weights of its columns, and half the widths of their 95 % intervals.
 Weights = dict[Candidate, tuple[Array, Array]]
 
@@ -50,6 +53,14 @@ def weights_of(
     values = evidence.parted(candidates, free[number])
     widths = evidence.parted(candidates, sums.half_width(beside, own)[number])
     return {c: (values[c], widths[c]) for c in candidates}
+
+
+def at_once(weights: Weights) -> Weights:
+    """Return weights with intervals that hold for all candidates together in 95 % (Bonferroni)."""
+    if not weights:
+        return weights
+    wider = float(norm.isf(_OUTSIDE / len(weights)) / norm.isf(_OUTSIDE))
+    return {c: (own, wider * half) for c, (own, half) in weights.items()}
 
 
 def _numbers(evidence: Evidence, candidates: Sequence[Candidate], common: Collection[str]) -> Index:

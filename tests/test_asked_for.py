@@ -53,6 +53,8 @@ def test_what_only_answers_noise_does_not_show():
     """Motion in proportion to the residual's noise explains all of it, and nothing is missing."""
     assert not shows(0.0, missing=0.0, fed_back=0.3)
     assert not shows(1.0, missing=0.0, fed_back=0.3)
+    # Of what was told a part is there; the number is that of the noise.
+    assert not shows(1.0, missing=0.05, fed_back=0.3)
     # What is there and what is fed back make up to the wrong sign.
     assert not shows(1.0, missing=-0.2, fed_back=0.3)
 

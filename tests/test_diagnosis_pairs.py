@@ -4,6 +4,7 @@ import numpy as np
 import pytest
 
 from cspm_ident.diagnosis.columns import Candidate, Place
+from cspm_ident.diagnosis.drivers import Knots
 from cspm_ident.diagnosis.equation import Equation
 from cspm_ident.diagnosis.evidence import gather
 from cspm_ident.diagnosis.hypothesis import Hypothesis
@@ -89,3 +90,29 @@ def test_what_was_chosen_stays_where_no_pair_is_better():
         Hypothesis(MASS, (Candidate(MASS, "bar"),)),
     ]
     assert search._exchanged(chosen) == chosen
+
+
+RATE = 400.0
+LATE, DRY = (
+    Candidate(catalogue()[name], element)
+    for name, element in (("tension_delay", "load_cells"), ("winch_coulomb_friction", WINCH))
+)
+
+
+def rig(friction, delay, noise=0.02):
+    """A shaft whose tension follows its angle, so that dry friction looks like late load cells."""
+    rng, times = np.random.default_rng(4), STEP * np.arange(ROWS)
+    speed = (0.1 + 2.0 * (times / times[-1]) ** 3) * np.sin(3.1 * times)
+    place = Place(Channel.SHAFT, WINCH)
+    columns = {LATE: RATE * speed[:, None], DRY: -np.sign(speed)[:, None]}
+    columns |= {d: c for d, c in Knots().columns(place, {"speed [rad/s]": speed}).items()}
+    target = delay * RATE * speed - friction * np.sign(speed) + noise * rng.standard_normal(ROWS)
+    shaped = {term: c.reshape(ROWS, 1, -1) for term, c in columns.items()}
+    return Search(gather([[Equation(place, times, target[:, None], shaped, target[:, None])]], 2.0))
+
+
+@pytest.mark.parametrize(("friction", "found"), [(0.0, False), (0.015, True), (0.15, False)])
+def test_friction_is_looked_for_beside_what_sound_clocks_do_to_load_cells(friction, found):
+    """Where anything is left; ten times as late is no sound clock."""
+    pair = rig(friction, friction / RATE)._beside_clocks([])
+    assert [h.candidates for h in pair] == ([(LATE,), (DRY,)] if found else [])

@@ -21,6 +21,9 @@ Unknown = tuple[Driver, Gain, float]
 # Of what a finding explains. In blind recordings no finding was right (of 7) beside so much that
 # nothing explained.
 DOUBTFUL_SHARE = 0.1
+# Standard errors by which a beginning has to explain more than an effect that was always there: the
+# largest of some 48 by chance; and an unlikely extent more than a likely one.
+_SIGMAS_OF_ONSET, _SIGMAS_OF_EXTENT = 3.0, 2.0
 # More signals than any block of the machine has.
 _SIGNALS = 128
 
@@ -227,6 +230,18 @@ def is_number(hypothesis: Hypothesis) -> bool:
 def is_wider(one: Hypothesis, other: Hypothesis) -> bool:
     """Return whether one supposes more faults, whatever the effects."""
     return one.causes > other.causes
+
+
+def boldness(one: Hypothesis, other: Hypothesis) -> float:
+    """Return by how many standard errors one has to explain more than another.
+
+    For a beginning, chosen among many, and for an unlikely extent, where the other has none: one
+    number for all elements is unlikely unless one system reads them; then it is for a part of them.
+    """
+    if one.onset and not other.onset:
+        return _SIGMAS_OF_ONSET
+    unlikely = one.common != other.common and one.common is not has_one_system(one.effect)
+    return _SIGMAS_OF_EXTENT if unlikely else 0.0
 
 
 def unusual(weights: Mapping[Candidate, Array], hypothesis: Hypothesis) -> float:

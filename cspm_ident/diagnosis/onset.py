@@ -1,4 +1,4 @@
-"""When an effect began, more closely than the blocks of the search tell."""
+"""When an effect began: its block, and more closely than blocks tell."""
 
 from __future__ import annotations
 
@@ -6,13 +6,17 @@ from collections.abc import Mapping, Sequence
 from typing import NamedTuple
 
 import numpy as np
+from numpy.typing import NDArray
 
 from cspm_ident.diagnosis.columns import Candidate
 from cspm_ident.diagnosis.equation import Equation
 from cspm_ident.diagnosis.evidence import gather
 from cspm_ident.diagnosis.sums import Sums
 
+Index = NDArray[np.intp]
 FINE_S = 0.1
+# Of the gain: for less no beginning is told, nor anything of more numbers kept.
+SIMPLER_SHARE = 0.1
 # Of the scatter between fine blocks: so much more is left at times that are none.
 _SIGMAS = 3.0
 
@@ -23,6 +27,24 @@ class Onset(NamedTuple):
     time: float
     low: float
     high: float
+
+
+def first_block(sums: Sums, base: Index, own: Index) -> tuple[int, float]:
+    """Return the block from which on columns act, and what is left of all squares then.
+
+    The block is 0 unless a later one is surely better.
+
+    Args:
+        sums: of all columns.
+        base: columns that act all the time.
+        own: those that may begin.
+    """
+    left = sums.left_from(base, own)[:-2]
+    best = int(np.argmin(left))
+    gained = sums.squares_of(base) - left[0]
+    if left[best] < left[0] - SIMPLER_SHARE * max(gained, 0.0):
+        return best, float(left[best])
+    return 0, float(left[0])
 
 
 def onset_of(

@@ -10,6 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from cspm_ident.diagnosis.alternatives import alternatives_of
+from cspm_ident.diagnosis.clocks import clocks_of
 from cspm_ident.diagnosis.columns import Candidate
 from cspm_ident.diagnosis.drivers import Driver
 from cspm_ident.diagnosis.evidence import Evidence
@@ -19,6 +20,7 @@ from cspm_ident.diagnosis.hypothesis import (
     Hypothesis,
     Named,
     Unknown,
+    boldness,
     freedom,
     has_one_system,
     is_number,
@@ -29,6 +31,7 @@ from cspm_ident.diagnosis.hypothesis import (
     unusual,
 )
 from cspm_ident.diagnosis.likeness import TIED, UNTRUE_SHARE
+from cspm_ident.diagnosis.onset import SIMPLER_SHARE, first_block
 from cspm_ident.diagnosis.pairs import Pair, best_pairs
 from cspm_ident.diagnosis.rivals import rivals_of
 from cspm_ident.diagnosis.scopes import Scopes
@@ -43,14 +46,10 @@ Index = NDArray[np.intp]
 MOST_EFFECTS = 3
 # In which an effect has to act to be told, and to be absent if it is to begin later.
 _FEWEST_BLOCKS, _FEWEST_WITHOUT = 10, 5
-# Standard errors by which an unlikely extent, or a pair, has to explain more than what is simpler.
+# Standard errors by which a pair has to explain more than what is simpler.
 _SIGMAS = 2.0
-# And a beginning more than an effect that was always there: the largest of some 48 by chance.
-_SIGMAS_OF_ONSET = 3.0
 # Of the squares of columns: what spans more of them is a wider form of the same.
 _SAME = 0.95
-# Of the gain: for less no beginning is told, nor a hypothesis of more numbers kept.
-_SIMPLER_SHARE = 0.1
 
 
 class Search:
@@ -101,25 +100,45 @@ class Search:
         chosen = self._clocks()
         while sum(not self.fits.is_negligible(h, chosen) for h in chosen) < MOST_EFFECTS:
             self._progress(f"effect {len(chosen) + 1}")
-            found = self._best(chosen)
-            if found is None:
+            best = self._best(chosen)
+            found = self._beside_clocks(chosen) if best is None else (best,)
+            if not found:
                 break
-            self._begin(found)
-            chosen = joined(chosen, found)
+            for each in found:
+                self._begin(each)
+                chosen = joined(chosen, each)
         return self._needed(self._exchanged(chosen))
+
+    def _beside_clocks(self, chosen: Sequence[Hypothesis]) -> tuple[Hypothesis, ...]:
+        """Return what shows only beside what clocks of a sound machine do, with that.
+
+        Looked for where something is left that nothing explains.
+        """
+        if not self.unknown(chosen):
+            return ()
+        for clock in clocks_of(self._free(chosen)):
+            found = self._best([*chosen, clock])
+            if found is None:
+                continue
+            with self.fits.delayed(found):
+                base = self.fits.columns([*chosen, found])
+                gain = self.sums.gain(base, self.fits.own_columns(clock))
+                surely = self.sureness.counts(base, clock, gain, len(chosen) + 1)
+            if surely and self.fits.is_negligible(clock, [*chosen, clock, found]):
+                return clock, found
+        return ()
 
     def _clocks(self) -> list[Hypothesis]:
         """Return what clocks of a sound machine do to what one system reads, if it surely shows.
 
         It is looked for first, lest something else that explains as much is taken for a fault.
         """
-        base = self.fits.columns([])
-        members: dict[str, list[Candidate]] = {}
-        for candidate in self._effects:
-            if candidate.effect.negligible and has_one_system(candidate.effect):
-                members.setdefault(candidate.effect_id, []).append(candidate)
-        late = [Hypothesis(c[0].effect, tuple(c), common=len(c) > 1) for c in members.values()]
-        best = self._surest((h for h in late if self.fits.is_negligible(h, [h])), (), base)
+        late = (
+            h
+            for h in clocks_of(self._effects)
+            if has_one_system(h.effect) and self.fits.is_negligible(h, [h])
+        )
+        best = self._surest(late, (), self.fits.columns([]))
         return [] if best is None else [best]
 
     def _needed(self, chosen: Sequence[Hypothesis]) -> list[Hypothesis]:
@@ -202,7 +221,7 @@ class Search:
     def _are_both_needed(self, base: Index, pair: Pair) -> bool:
         """Return whether each is surely there beside the other, and no small part of both."""
         both = self.evidence.columns_of(c for h in pair for c in h.candidates)
-        least = _SIMPLER_SHARE * self.sums.gain(base, both).total
+        least = SIMPLER_SHARE * self.sums.gain(base, both).total
         for one, other in (pair, pair[::-1]):
             beside = self.fits.beside(base, other)
             gain = self.sums.gain(beside, self.fits.own_columns(one))
@@ -259,7 +278,7 @@ class Search:
             if best is not None:
                 wider = is_wider(hypothesis, best[1]) and not is_spread(best[1], hypothesis)
                 needed = best[0].sum() + 3.0 * gain_of(gained).error * wider
-                sigmas = _boldness(hypothesis, best[1])
+                sigmas = boldness(hypothesis, best[1])
                 if sigmas:
                     needed = best[0].sum() + sigmas * gain_of(gained - best[0]).error
             if best is None or gained.sum() > needed:
@@ -278,7 +297,7 @@ class Search:
             return
         late: list[tuple[float, Hypothesis]] = []
         for shape in shapes_of(hypothesis, free):
-            onset, left = self._onset(base, self.fits.own_columns(shape))
+            onset, left = first_block(self.sums, base, self.fits.own_columns(shape))
             if _FEWEST_WITHOUT <= onset <= self.sums.blocks - _FEWEST_BLOCKS:
                 late.append((left, replace(shape, onset=onset)))
         if late:
@@ -318,7 +337,7 @@ class Search:
             if wider <= 0 and worse.total < least and behind(paired(apart)) <= -TIED:
                 fewest, least = replace(rival, onset=best.onset), worse.total
             elif (wider < 0 or (wider == 0 and fewer)) and worse.total <= min(
-                2.0 * gained.error, _SIMPLER_SHARE * gained.total
+                2.0 * gained.error, SIMPLER_SHARE * gained.total
             ):
                 fewest = replace(rival, onset=best.onset)
             elif (
@@ -357,18 +376,6 @@ class Search:
             tuple(alternatives_of(self.fits, self._effects, hypothesis, others)),
         )
 
-    def _onset(self, base: Index, own: Index) -> tuple[int, float]:
-        """Return the block from which on columns act, and what is left then.
-
-        The block is 0 unless a later one is surely better.
-        """
-        left = self.sums.left_from(base, own)[:-2]
-        best = int(np.argmin(left))
-        gained = self.sums.squares_of(base) - left[0]
-        if left[best] < left[0] - _SIMPLER_SHARE * max(gained, 0.0):
-            return best, float(left[best])
-        return 0, float(left[0])
-
     def unknown(
         self, chosen: Sequence[Hypothesis], sound: Sequence[Hypothesis] = ()
     ) -> tuple[Unknown, ...]:
@@ -382,15 +389,3 @@ class Search:
 
     def _of(self, term: Candidate | Driver) -> Index:
         return self.evidence.columns_of([term])
-
-
-def _boldness(one: Hypothesis, other: Hypothesis) -> float:
-    """Return by how many standard errors one has to explain more than another.
-
-    For a beginning, chosen among many, and for an unlikely extent, where the other has none: one
-    number for all elements is unlikely unless one system reads them; then it is for a part of them.
-    """
-    if one.onset and not other.onset:
-        return _SIGMAS_OF_ONSET
-    unlikely = one.common != other.common and one.common is not has_one_system(one.effect)
-    return _SIGMAS if unlikely else 0.0

@@ -18,7 +18,7 @@ from cspm_bringup.bundle import make_bundle
 from cspm_bringup.run import run
 from cspm_ident.diagnosis.diagnose import diagnose
 from cspm_ident.diagnosis.hypothesis import members_of
-from cspm_ident.diagnosis.statement import numbers_of
+from cspm_ident.diagnosis.statement import Number, numbers_of
 from cspm_ident.diagnosis.verdict import verdict_of
 from cspm_ident.signals.measurement import read_measurement
 from cspm_msgs_py.scenario import load_scenario
@@ -101,14 +101,18 @@ def judge(folder: Path) -> tuple[str, str, str]:
     lines = []
     for named in found.findings.named:
         for candidate in members_of(found.weights, named.hypothesis):
-            numbers = ", ".join(
-                f"{n.name} {n.value:.4g} ({n.low:.4g} to {n.high:.4g})"
-                for n in numbers_of(found, candidate)
-            )
+            numbers = ", ".join(map(number_words, numbers_of(found, candidate)))
             lines.append(f"{candidate.effect_id} {candidate.element}: {numbers}")
         lines += [f"or {rival.words}" for rival in named.alternatives]
     lines += [f"unknown, {d.place.element}: {d.signal}" for d, _, _ in found.findings.unknown]
     return verdict_of(found).value, "<br>".join(lines), f"{took:.0f}"
+
+
+def number_words(number: Number) -> str:
+    """Return a parameter with its interval, if anything bounds it."""
+    told = f"{number.name} {number.value:.4g}"
+    bounded = number.low < number.high
+    return f"{told} ({number.low:.4g} to {number.high:.4g})" if bounded else told
 
 
 def _planted(case: Case) -> str:

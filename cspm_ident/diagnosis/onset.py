@@ -11,12 +11,11 @@ from numpy.typing import NDArray
 from cspm_ident.diagnosis.columns import Candidate
 from cspm_ident.diagnosis.equation import Equation
 from cspm_ident.diagnosis.evidence import gather
+from cspm_ident.diagnosis.likeness import SIMPLER_SHARE
 from cspm_ident.diagnosis.sums import Sums
 
 Index = NDArray[np.intp]
 FINE_S = 0.1
-# Of the gain: for less no beginning is told, nor anything of more numbers kept.
-SIMPLER_SHARE = 0.1
 # Of the scatter between fine blocks: so much more is left at times that are none.
 _SIGMAS = 3.0
 

@@ -30,8 +30,8 @@ from cspm_ident.diagnosis.hypothesis import (
     shapes_of,
     unusual,
 )
-from cspm_ident.diagnosis.likeness import TIED, UNTRUE_SHARE
-from cspm_ident.diagnosis.onset import SIMPLER_SHARE, first_block
+from cspm_ident.diagnosis.likeness import SIMPLER_SHARE, TIED, UNTRUE_SHARE
+from cspm_ident.diagnosis.onset import first_block
 from cspm_ident.diagnosis.pairs import Pair, best_pairs
 from cspm_ident.diagnosis.rivals import rivals_of
 from cspm_ident.diagnosis.scopes import Scopes
@@ -120,11 +120,11 @@ class Search:
             found = self._best([*chosen, clock])
             if found is None:
                 continue
+            both = [*chosen, clock, found]
             with self.fits.delayed(found):
-                base = self.fits.columns([*chosen, found])
-                gain = self.sums.gain(base, self.fits.own_columns(clock))
+                base, gain = self._others(clock, both), self._gain(clock, both)
                 surely = self.sureness.counts(base, clock, gain, len(chosen) + 1)
-            if surely and self.fits.is_negligible(clock, [*chosen, clock, found]):
+            if surely and self.fits.is_negligible(clock, both):
                 return clock, found
         return ()
 

@@ -9,6 +9,8 @@ from collections.abc import Callable, Sequence
 from contextlib import ExitStack
 from pathlib import Path
 
+from cspm_bringup.background import give_way
+from cspm_bringup.farewell import farewell
 from cspm_bringup.lockstep_nodes import LockstepRun
 from cspm_bringup.node_parameters import REALTIME, NodeParameters, read_parameters
 from cspm_bringup.realtime_nodes import RealtimeRun
@@ -26,6 +28,8 @@ from cspm_msgs_py.schedule import PLANT, Schedule, schedule_of
 # Where nobody is in a hurry: longer than lost packets take.
 _DELIVERY_S = 3.0
 _STDIN_BYTES = 4096
+# To destroy what the node has takes a tenth of a second; the processor may be full.
+_LEAVING_S = 3.0
 
 
 def run_node(name: str, args: Sequence[str]) -> None:
@@ -42,7 +46,9 @@ def run_node(name: str, args: Sequence[str]) -> None:
     if name not in NODES:
         raise InputError(f"node {name}: allowed: {', '.join(NODES)}")
     with ExitStack() as stack:
+        begin_farewell = stack.enter_context(farewell(_LEAVING_S))
         session = stack.enter_context(Session(args))
+        stack.callback(begin_farewell)
         node = session.node(name)
         parameters = read_parameters(node.node)
         if parameters.until_stdin_closes:
@@ -64,6 +70,7 @@ def _run_lockstep(
         _run_plant(session, node, parameters, run)
         return
     if node.name == RECORDER:
+        give_way()
         folder = Path(parameters.folder or f"recordings/{bundle.scenario.name}")
         writer = stack.enter_context(new_recording(bundle, folder, parameters.mode))
         recorder = run.recorder(node, writer)

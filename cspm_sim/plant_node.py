@@ -13,6 +13,7 @@ from cspm_msgs_py.errors import InputError
 from cspm_msgs_py.graph import Edges, followers
 from cspm_msgs_py.lockstep import WINDOW
 from cspm_msgs_py.ros.contract_node import ContractNode, ros_class
+from cspm_msgs_py.ros.outbox import Outbox
 from cspm_msgs_py.ros.qos import contract_qos
 from cspm_msgs_py.ros.rendezvous import PROGRESS, PlantSide
 from cspm_msgs_py.schedule import PLANT, TORQUE_COMMAND, Schedule
@@ -61,8 +62,9 @@ class PlantNode:
             controlled: whether a closed loop is to keep the bar upright.
         """
         topics = plant.testbed.topics
+        self._outbox = Outbox(node)
         publish = {
-            name: node.publisher(topics[name], edge.readers)
+            name: self._outbox.publisher(topics[name], edge.readers)
             for name, edge in edges.items()
             if edge.senders == (PLANT,) and name != DIAGNOSTICS.name
         }
@@ -111,7 +113,7 @@ class PlantNode:
     def stop(self) -> None:
         """End the run after the step underway."""
         self._plant.stop()
-        self._tell_end()
+        self._send_rest()
 
     def waiting(self) -> str:
         """Return what the run waits for."""
@@ -135,11 +137,11 @@ class PlantNode:
             self.started = True
             self._others.tell_start_at(0)
             self._plant.start()
-            self._tell_end()
+            self._send_rest()
 
     def _torque(self, stamp_ns: int, row: Array, number: int | None) -> None:
         self._plant.receive_torque(stamp_ns, row, number)
-        self._tell_end()
+        self._send_rest()
 
     def _brake(self, message: object) -> None:
         wanted = bool(message.data)  # type: ignore[attr-defined]
@@ -150,9 +152,11 @@ class PlantNode:
             self._plant.receive_progress(name, step)
         except InputError as err:
             self._refuse(PROGRESS, f"{PROGRESS}: {err}")
-        self._tell_end()
+        self._send_rest()
 
-    def _tell_end(self) -> None:
+    def _send_rest(self) -> None:
+        """Send what nobody computes from and, once it is over, that it is."""
+        self._outbox.send_rest()
         if self._plant.ended and not self._told_end:
             self._told_end = True
             self._others.tell_end(self._plant.last_step)

@@ -12,6 +12,7 @@ from cspm_msgs_py.graph import Edges
 from cspm_msgs_py.lockstep import Acknowledgement, Follower
 from cspm_msgs_py.ros.contract_node import ContractNode
 from cspm_msgs_py.ros.guard_ports import GuardPorts
+from cspm_msgs_py.ros.outbox import Outbox
 from cspm_msgs_py.ros.rendezvous import FollowerSide
 from cspm_msgs_py.schedule import Schedule
 from cspm_msgs_py.stage import Guard, Stage
@@ -52,11 +53,12 @@ class StageNode:
         plan = schedule.nodes[stage.node]
         self._node = node
         self._acknowledgement = Acknowledgement() if tells_progress else None
-        publish = {name: node.publisher(topics[name], edges[name].readers) for name in plan.outputs}
+        self._outbox = outbox = Outbox(node)
+        publish = {n: outbox.publisher(topics[n], edges[n].readers) for n in plan.outputs}
         status = node.status_publisher(edges[DIAGNOSTICS.name].readers)
         self._follower = Follower(stage, schedule, publish, status)
         self._plant = FollowerSide(node, schedule.period_ns, self._end)
-        receive = self._receive_and_tell if tells_progress else self._follower.receive
+        receive = self._receive_and_tell if tells_progress else self._receive
         for name in (*plan.inputs, *plan.held):
             refuse = partial(self._refuse, name)
             node.subscribe_numbered_rows(topics[name], partial(receive, name), refuse)
@@ -79,8 +81,12 @@ class StageNode:
         """Return what the node waits for."""
         return self._follower.waiting()
 
-    def _receive_and_tell(self, topic: str, stamp_ns: int, row: Array, number: int | None) -> None:
+    def _receive(self, topic: str, stamp_ns: int, row: Array, number: int | None) -> None:
         self._follower.receive(topic, stamp_ns, row, number)
+        self._outbox.send_rest()
+
+    def _receive_and_tell(self, topic: str, stamp_ns: int, row: Array, number: int | None) -> None:
+        self._receive(topic, stamp_ns, row, number)
         self._tell()
 
     def _tell(self) -> None:

@@ -106,6 +106,26 @@ def test_the_recording_is_the_one_of_a_run_in_process(tmp_path, scenario, steps)
     assert gone(list(witness.nodes.values()))
 
 
+# Keeps Python's lock for ever, as the middleware does at times when two nodes leave at once.
+_STUCK_PLANT = """
+import ctypes, sys
+from cspm_msgs_py.ros.session import Session
+leave = Session.close
+Session.close = lambda self: (ctypes.PyDLL(None).sleep(600) if "plant" in sys.argv else leave(self))
+"""
+
+
+@pytest.mark.slow
+def test_a_plant_that_cannot_leave_does_not_keep_the_run(tmp_path, monkeypatch):
+    (tmp_path / "sitecustomize.py").write_text(_STUCK_PLANT)
+    path = os.pathsep.join([str(tmp_path), *filter(None, [os.environ.get("PYTHONPATH")])])
+    monkeypatch.setenv("PYTHONPATH", path)
+    result = processes(bundle_of("rest"), tmp_path / "run", steps=100)
+    assert (result.failure, result.interrupted, result.simulated) == (None, False, 0.1)
+    with Recording(tmp_path / "run") as recording:
+        assert recording.complete
+
+
 @pytest.mark.slow
 def test_a_divergence_ends_the_run_and_keeps_its_recording(tmp_path):
     settings = [word for override in WILD for word in ("--set", override)]

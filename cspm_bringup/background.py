@@ -7,22 +7,21 @@ from contextlib import suppress
 from pathlib import Path
 
 _NICE = 10
-_TASKS, _AUTOGROUP = Path("/proc/self/task"), Path("/proc/self/autogroup")
 
 
-def give_way() -> None:
-    """Have all threads of this process wait for a free processor, as far as the system allows.
+def put_behind(process: int) -> None:
+    """Have a process that has just begun wait for a free processor, as far as the system allows.
 
-    Its threads then preempt nobody when they are woken, and have a tenth of others' share while
-    these want all.
+    The threads that it starts then preempt nobody when they are woken, and have a tenth of others'
+    share while these want all.
+
+    Args:
+        process: its number; it leads a session of its own.
     """
-    if not _TASKS.is_dir():
-        return
-    for task in map(int, os.listdir(_TASKS)):
-        # A thread may have ended meanwhile, and a container may forbid it: then it is as before.
-        with suppress(OSError):
-            os.sched_setscheduler(task, os.SCHED_BATCH, os.sched_param(0))
-            os.setpriority(os.PRIO_PROCESS, task, max(_NICE, os.getpriority(os.PRIO_PROCESS, task)))
-    with suppress(OSError):
-        # Linux may share processors out by sessions, and nodes have one each.
-        _AUTOGROUP.write_text(str(_NICE))
+    # A container may forbid it: then all are alike, as where the system knows no such thing.
+    with suppress(OSError, AttributeError):
+        os.sched_setscheduler(process, os.SCHED_BATCH, os.sched_param(0))
+        nice = os.getpriority(os.PRIO_PROCESS, process)
+        os.setpriority(os.PRIO_PROCESS, process, max(_NICE, nice))
+        # Linux may share processors out by sessions.
+        Path(f"/proc/{process}/autogroup").write_text(str(_NICE))

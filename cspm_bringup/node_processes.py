@@ -7,11 +7,12 @@ import signal
 import subprocess
 import sys
 import time
-from collections.abc import Sequence
+from collections.abc import Collection, Sequence
 from pathlib import Path
 
 from typing_extensions import Self
 
+from cspm_bringup.background import put_behind
 from cspm_bringup.watch import STANDSTILL
 
 LEAVING_S = 5.0
@@ -24,18 +25,23 @@ _WARNING = re.compile(r"\[(?:WARN|ERROR|FATAL)\] \[[\d.]+\] \[(.+?)\]: (.+)\n")
 class NodeProcesses:
     """The processes of a run, one a node; they stop with this one, however it ends."""
 
-    def __init__(self, names: Sequence[str], parameters: Path, log: Path) -> None:
+    def __init__(
+        self, names: Sequence[str], parameters: Path, log: Path, behind: Collection[str] = ()
+    ) -> None:
         """Start them.
 
         Args:
             names: of the nodes.
             parameters: ROS 2 parameter file for all of them.
             log: folder for what they print.
+            behind: who of them has time and gives way to the others.
         """
         self._log = log
         self._asked: set[str] = set()
         self._read = dict.fromkeys(names, 0)
         self.by_name = {name: self._start(name, parameters) for name in names}
+        for name in behind:
+            put_behind(self.by_name[name].pid)
 
     def _start(self, name: str, parameters: Path) -> subprocess.Popen[bytes]:
         command = [sys.executable, "-m", "cspm_bringup.node_main", name]

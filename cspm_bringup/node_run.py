@@ -9,7 +9,6 @@ from collections.abc import Callable, Sequence
 from contextlib import ExitStack
 from pathlib import Path
 
-from cspm_bringup.background import give_way
 from cspm_bringup.farewell import farewell
 from cspm_bringup.lockstep_nodes import LockstepRun
 from cspm_bringup.node_parameters import REALTIME, NodeParameters, read_parameters
@@ -70,7 +69,6 @@ def _run_lockstep(
         _run_plant(session, node, parameters, run)
         return
     if node.name == RECORDER:
-        give_way()
         folder = Path(parameters.folder or f"recordings/{bundle.scenario.name}")
         writer = stack.enter_context(new_recording(bundle, folder, parameters.mode))
         recorder = run.recorder(node, writer)

@@ -71,6 +71,8 @@ def run_processes(
     names = (PLANT, *schedule.nodes, RECORDER)[external:]
     if mode == REALTIME:
         check_real_time(scenario.safety, schedule)
+    # In lockstep the recorder has 48 steps of time; by the wall clock it would lose messages.
+    behind = () if mode == REALTIME else (RECORDER,)
     with tempfile.TemporaryDirectory(prefix="cspm-run-") as made:
         place = Path(made)
         parameters = NodeParameters(
@@ -91,7 +93,7 @@ def run_processes(
         with (
             _environment(domain_id),
             interruptible() as stop_wanted,
-            NodeProcesses(names, place / "parameters.yaml", place) as processes,
+            NodeProcesses(names, place / "parameters.yaml", place, behind) as processes,
         ):
             leader = RECORDER if external else PLANT
             follower = _Follower(processes, leader, place / "report.json", mode == REALTIME)

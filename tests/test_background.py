@@ -8,25 +8,21 @@ from pathlib import Path
 
 import pytest
 
+from cspm_bringup.background import put_behind
+
 _TELL = """
 import json, os, threading
 from pathlib import Path
-from cspm_bringup.background import give_way
 
-def told():
-    group = Path("/proc/self/autogroup")
-    nice = group.read_text().split()[-1] if group.exists() else ""
-    return [
-        (os.sched_getscheduler(int(task)), os.getpriority(os.PRIO_PROCESS, int(task)))
-        for task in sorted(os.listdir("/proc/self/task"))
-    ], nice
-
+input()
 over = threading.Event()
 threading.Thread(target=over.wait).start()
-{before}
-give_way()
-threading.Thread(target=over.wait).start()
-print(json.dumps(told()))
+group = Path("/proc/self/autogroup")
+threads = [
+    (os.sched_getscheduler(int(task)), os.getpriority(os.PRIO_PROCESS, int(task)))
+    for task in sorted(os.listdir("/proc/self/task"))
+]
+print(json.dumps([threads, group.read_text().split()[-1] if group.exists() else ""]))
 over.set()
 """
 needs_linux = pytest.mark.skipif(
@@ -34,29 +30,35 @@ needs_linux = pytest.mark.skipif(
 )
 
 
-def run(before=""):
-    done = subprocess.run(
-        [sys.executable, "-c", _TELL.format(before=before)],
-        capture_output=True,
+def run(*before):
+    """Return policy and niceness of each thread, and niceness of the session, once put behind."""
+    with subprocess.Popen(
+        [*before, sys.executable, "-c", _TELL],
+        stdin=subprocess.PIPE,
+        stdout=subprocess.PIPE,
         text=True,
-        check=True,
         start_new_session=True,
-        timeout=60,
-    )
-    return json.loads(done.stdout)
+    ) as process:
+        put_behind(process.pid)
+        out, _ = process.communicate("go\n", timeout=60)
+    return json.loads(out)
 
 
 @needs_linux
-def test_threads_of_before_and_after_preempt_nobody():
+def test_its_threads_preempt_nobody():
     threads, group = run()
     mine = os.getpriority(os.PRIO_PROCESS, 0)
-    assert threads == [[os.SCHED_BATCH, max(10, mine)]] * 3
+    assert threads == [[os.SCHED_BATCH, max(10, mine)]] * 2
     assert group in ("", "10")
 
 
 @needs_linux
 def test_who_was_behind_already_stays_there():
-    threads, _ = run(before="os.nice(19)")
-    # On Linux that is the main thread, and what it starts from then on.
-    nices = [nice for _, nice in threads]
-    assert nices[0] == nices[2] == 19 > nices[1]
+    threads, _ = run("nice", "-n", "19")
+    assert threads == [[os.SCHED_BATCH, 19]] * 2
+
+
+def test_who_is_gone_needs_no_place():
+    with subprocess.Popen([sys.executable, "-c", ""]) as process:
+        process.wait()
+    put_behind(process.pid)

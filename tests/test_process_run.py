@@ -106,6 +106,19 @@ def test_the_recording_is_the_one_of_a_run_in_process(tmp_path, scenario, steps)
     assert gone(list(witness.nodes.values()))
 
 
+@pytest.mark.slow
+@pytest.mark.parametrize(("mode", "behind"), [("processes", {"recorder"}), ("realtime", set())])
+def test_only_a_recorder_in_lockstep_gives_way(tmp_path, mode, behind):
+    found = {}
+
+    def look(nodes):
+        found.update({name: os.sched_getscheduler(node.pid) for name, node in nodes.items()})
+
+    processes(bundle_of("rest", "duration=1"), tmp_path / "run", Witness(look), mode=mode)
+    assert set(found) == set(NODES)
+    assert {name for name, policy in found.items() if policy == os.SCHED_BATCH} == behind
+
+
 # Keeps Python's lock for ever, as the middleware does at times when two nodes leave at once.
 _STUCK_PLANT = """
 import ctypes, sys

@@ -10,7 +10,6 @@ from numpy.typing import NDArray
 from cspm_msgs_py.graph import RECORDER
 from cspm_msgs_py.ros.contract_node import ContractNode
 from cspm_msgs_py.topics import Topic
-from cspm_msgs_py.wire import WireWriter
 
 Array = NDArray[np.float64]
 Publish = Callable[[int, int, Array], None]
@@ -21,22 +20,19 @@ class Outbox:
 
     def __init__(self, node: ContractNode) -> None:
         self._node = node
-        self._rest: list[tuple[Callable[[bytes], None], bytes]] = []
+        self._rest: list[tuple[Publish, int, int, Array]] = []
 
     def publisher(self, topic: Topic, readers: Collection[str]) -> Publish:
         """Return what publishes (log time [ns], stamp [ns], row) to these nodes."""
-        if set(readers) - {RECORDER}:
-            return self._node.publisher(topic, readers)
-        encode, publish = WireWriter(topic).encode, self._node.raw_publisher(topic, readers)
-        rest = self._rest
+        send, rest = self._node.publisher(topic, readers), self._rest
 
-        def keep(_: int, stamp_ns: int, row: Array) -> None:
-            rest.append((publish, encode(stamp_ns, row)))
+        def keep(log_ns: int, stamp_ns: int, row: Array) -> None:
+            rest.append((send, log_ns, stamp_ns, row.copy()))
 
-        return keep
+        return send if set(readers) - {RECORDER} else keep
 
     def send_rest(self) -> None:
         """Send what was kept."""
-        for publish, payload in self._rest:
-            publish(payload)
+        for send, log_ns, stamp_ns, row in self._rest:
+            send(log_ns, stamp_ns, row)
         self._rest.clear()

@@ -9,7 +9,7 @@ from run_samples import SCENARIOS
 from cspm_ident.block_simulation import Drive
 from cspm_ident.diagnosis.columns import Candidate
 from cspm_ident.diagnosis.drivers import around
-from cspm_ident.diagnosis.model import Model
+from cspm_ident.diagnosis.model import WORTH_IT, Model
 from cspm_ident.diagnosis.simulation import Output, Worth
 from cspm_ident.diagnosis.statement import numbers_of
 from cspm_ident.diagnosis.supposed import is_possible, nearest_possible
@@ -21,9 +21,11 @@ THESIS = load_testbed(SCENARIOS / "testbeds" / "thesis.yaml")
 OUTPUT = Output(Drive.SHAFT, "winches/angle/surge_2", "rad", "surge_2", Channel.SHAFT)
 
 
-def model(shares, possible=None):
+def model(shares, possible=None, wanted=None):
     worth = tuple(None if share is None else Worth(OUTPUT, 2.0, 2.0 * share) for share in shares)
-    return Model({}, (), (), worth, possible or (True,) * len(worth))
+    count = len(worth)
+    sound, wanted = (False,) * count, wanted or (WORTH_IT,) * count
+    return Model({}, (), (), worth, possible or (True,) * count, sound, wanted)
 
 
 @pytest.mark.parametrize(
@@ -39,6 +41,11 @@ def model(shares, possible=None):
 )
 def test_the_worst_of_no_use_goes(shares, gone):
     assert model(shares).useless == gone
+
+
+def test_what_moves_too_little_to_tell_is_not_judged_by_simulation():
+    assert model((1.005, 0.995), wanted=(np.inf, WORTH_IT)).useless == [1]
+    assert model((1.005,), wanted=(np.inf,)).useless == []
 
 
 def test_what_no_machine_can_have_goes_before_anything_is_judged():

@@ -288,6 +288,14 @@ def test_a_finding_beside_much_that_nothing_explains_is_doubtful(left, doubtful,
     assert ("Doubtful: beside it" in page_of(tmp_path, found)) is doubtful
 
 
+@pytest.mark.parametrize("faint", [True, False])
+def test_a_finding_that_held_out_data_hardly_show_says_so(faint):
+    found = diagnosis()
+    found = replace(found, faint=found.findings.named if faint else ())
+    (finding,) = named_in(diagnosis_data(found))
+    assert ("What was not searched moves so little" in finding["statement"]) is faint
+
+
 def doubted(effect, signal, left):
     """Whether a finding that gains 900 is doubtful beside a function that gains `left`."""
     found = diagnosis(unknown=[(Driver(PLACE, signal), Gain(left, 1.0), 0.2)]).findings

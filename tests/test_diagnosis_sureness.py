@@ -10,7 +10,7 @@ from cspm_ident.diagnosis.drivers import Driver, Knots
 from cspm_ident.diagnosis.equation import Equation
 from cspm_ident.diagnosis.evidence import gather
 from cspm_ident.diagnosis.fits import Fits
-from cspm_ident.diagnosis.hypothesis import Hypothesis, is_spread, unusual
+from cspm_ident.diagnosis.hypothesis import Hypothesis, boldness, is_spread, unusual
 from cspm_ident.diagnosis.search import Search
 from cspm_ident.diagnosis.sums import Gain, Sums
 from cspm_ident.diagnosis.sureness import FALSE_ALARMS, Sureness
@@ -282,3 +282,10 @@ def test_clocks_as_of_a_sound_machine_come_before_what_explains_a_little_more(de
     columns = {**late, wet: 1e2 * (6e3 * delay * wave + 0.005 * more)}
     found = Search(explained_by(columns, {wet: 0.01})).run().named
     assert [named.hypothesis.effect for named in found] == [effect]
+
+
+def test_a_beginning_has_to_be_worth_more_than_nothing_too():
+    dry = Candidate(DRY, "one")
+    always, late = Hypothesis(DRY, (dry,)), Hypothesis(DRY, (dry,), onset=4)
+    assert boldness(late) == boldness(late, always) > boldness(always) == 0.0
+    assert boldness(late, late) == 0.0

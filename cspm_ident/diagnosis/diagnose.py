@@ -15,6 +15,7 @@ from cspm_ident.diagnosis.asked_for import (
     shows_in_what_was_asked,
 )
 from cspm_ident.diagnosis.columns import Candidate, Place
+from cspm_ident.diagnosis.confirmation import Confirmed, confirmed
 from cspm_ident.diagnosis.curves import Curve, held_out_curves
 from cspm_ident.diagnosis.cuts import first_part, span_of, whole_part
 from cspm_ident.diagnosis.drivers import Driver, Knots
@@ -25,8 +26,6 @@ from cspm_ident.diagnosis.hypothesis import (
     Hypothesis,
     Named,
     Unknown,
-    is_negligible,
-    members_of,
 )
 from cspm_ident.diagnosis.judgement import HeldOut, free_functions, judged
 from cspm_ident.diagnosis.limits import Limit, detection_limits
@@ -44,9 +43,6 @@ from cspm_ident.signals.measurement import Measurement
 from cspm_sim.effects import Effect
 
 Array = NDArray[np.float64]
-
-# A finding must take this share of a held-out squared residual, or it does not stand.
-CONFIRMED_SHARE = 0.03
 
 
 @dataclass(frozen=True, eq=False)
@@ -88,6 +84,7 @@ class Diagnosis:
         starts: of the blocks [s], shape (blocks,).
         curves: the residuals on what was not searched, over time.
         noise: of each residual, what differs from row to row, one number per channel.
+        faint: findings of which what was not searched shows little.
     """
 
     searched: Sequence[Measurement]
@@ -109,6 +106,7 @@ class Diagnosis:
     starts: Array
     curves: tuple[Curve, ...]
     noise: dict[Place, Array]
+    faint: tuple[Named, ...] = ()
 
 
 def diagnose(
@@ -136,7 +134,9 @@ def diagnose(
     progress("held-out data")
     judge = _judge(in_noise(judge_parts, noise), found, block)
     search_parts, judge_parts = _found_only(search_parts, found), _found_only(judge_parts, found)
-    kept, rejected = _confirmed(search, judge, found) if safeguards.held_out else (found.named, ())
+    kept, faint, rejected = Confirmed(found.named, (), ())
+    if safeguards.held_out:
+        kept, faint, rejected = confirmed(search.fits, judge, found.named)
     rows = in_noise(search_parts, noise)
     kept, fed_back = _asked_for(search, kept, searched, rows, block)
     starts = [span_of(part)[0] for part in judge_parts]
@@ -144,7 +144,7 @@ def diagnose(
     searched_part: Cut = whole_part if held_out else first_part
     progress("parameters, and simulation of held-out data")
     baselines = baselines_of(held_out or searched, starts, retuned)
-    data = Data(searched, searched_part, baselines, rows, noise, block, supposed)
+    data = Data(searched, searched_part, baselines, rows, noise, block, supposed, faint)
     model = modelled(search, kept, data)
     while safeguards.held_out and model.useless:
         rejected += tuple(kept[k] for k in model.useless)
@@ -155,13 +155,13 @@ def diagnose(
         unknown = _unknown(search, kept, rejected, fed_back)
     values = {c: w for c, (w, _) in model.weights.items()}
     first = _first_weights(search, kept)
-    told = [k for k, each in enumerate(kept) if not _is_negligible(each, values)]
+    told = [k for k, negligible in enumerate(model.negligible) if not negligible]
     return Diagnosis(
         searched,
         held_out,
         Findings(tuple(kept[k] for k in told), unknown, found.candidates),
         (*rejected, *fed_back),
-        tuple(each for each in kept if _is_negligible(each, values)),
+        tuple(compress(kept, model.negligible)),
         model.weights,
         judged(
             held_out or searched, starts, retuned, values, noise, free_functions(evidence, judge)
@@ -178,6 +178,7 @@ def diagnose(
         evidence.times,
         held_out_curves(steady(judge_parts), first),
         noise,
+        faint,
     )
 
 
@@ -200,10 +201,6 @@ def _first_weights(search: Search, kept: Sequence[Named]) -> dict[Candidate, Arr
     return search.fits.values(_hypotheses(kept))
 
 
-def _is_negligible(named: Named, weights: Mapping[Candidate, Array]) -> bool:
-    return is_negligible({c: weights[c] for c in members_of(weights, named.hypothesis)})
-
-
 def _judge(parts: Parts, found: Findings, block: float) -> Evidence:
     """Return the sums of held-out residuals beside what was found and all free functions."""
     terms = _named(found) | {
@@ -220,28 +217,6 @@ def _found_only(parts: Parts, found: Findings) -> Parts:
     """Return equations without the columns of all that was not found, which nothing needs more."""
     named = _named(found)
     return [[equation.only(named) for equation in part] for part in parts]
-
-
-def _confirmed(
-    search: Search, judge: Evidence, found: Findings
-) -> tuple[tuple[Named, ...], tuple[Named, ...]]:
-    """Part what was found by whether it lowers residuals that were not searched.
-
-    One of them by a share worth a word, and all together.
-    """
-    kept = list(found.named)
-    rejected: list[Named] = []
-    for each in found.named:
-        whole = search.fits.values(_hypotheses(kept))
-        own = set(each.hypothesis.candidates)
-        fewer = {c: w for c, w in whole.items() if c not in own}
-        with_it, without = judge.left_with(whole), judge.left_with(fewer)
-        shares = [1.0 - with_it[p] / without[p] for p in without if without[p] > 0.0]
-        worse = sum(with_it.values()) > sum(without.values())
-        if max(shares) < CONFIRMED_SHARE or worse:
-            kept.remove(each)
-            rejected.append(each)
-    return tuple(kept), tuple(rejected)
 
 
 def _asked_for(

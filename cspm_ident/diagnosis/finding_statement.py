@@ -19,6 +19,7 @@ _DOUBT = (
     " Doubtful: beside it is much that nothing in the catalogue explains, of which this may be a"
     " part."
 )
+_FAINT = " What was not searched moves so little that it shows little of it."
 # Of the noise from row to row: windows overlap, and leave a sound machine 1.4 times as much.
 _AT_NOISE = 1.5
 # What is left apart from where shafts turn round is told where it is so much less.
@@ -29,7 +30,8 @@ def statement_of(diagnosis: Diagnosis, k: int) -> str:
     """Return the k-th finding: what has what, how much, since when, where, and what it is worth."""
     named, region = diagnosis.findings.named[k], diagnosis.regions[k]
     effect = named.hypothesis.effect
-    doubt = _DOUBT if diagnosis.findings.is_doubtful(named) else ""
+    doubt = _FAINT if named in diagnosis.faint else ""
+    doubt += _DOUBT if diagnosis.findings.is_doubtful(named) else ""
     where = f" It shows where {region_words(region)}." if region is not None else ""
     return (
         f"{_subject(effect, named.hypothesis.elements)} {_difference(effect)}:"

@@ -14,8 +14,10 @@ from cspm_ident.diagnosis.hypothesis import (
     Hypothesis,
     bounded,
     is_allowed,
+    is_early,
     is_negligible,
     is_tied,
+    is_timing,
     parts_of,
 )
 from cspm_ident.diagnosis.likeness import freely_gained
@@ -24,6 +26,9 @@ from cspm_ident.diagnosis.weights import Weights, at_once, values_of, weights_of
 
 Array = NDArray[np.float64]
 Index = NDArray[np.intp]
+
+# Of the squares of columns, readings being as noisy as they are.
+_SAME = 0.9
 
 
 class Fits:
@@ -103,6 +108,24 @@ class Fits:
             is_allowed(c, bounded(c, own, half)) and (not c.effect.tied or is_tied(c, own, half))
             for c, (own, half) in found.items()
         )
+
+    def are_early(self, hypotheses: Sequence[Hypothesis]) -> bool:
+        """Return whether with them some readings would be newer than their stamps say."""
+        timing = [h for h in hypotheses if is_timing(h.effect)]
+        values = self.values(hypotheses) if timing else {}
+        return any(is_early(values, h) for h in timing)
+
+    def contradicts(self, hypothesis: Hypothesis, others: Sequence[Hypothesis]) -> bool:
+        """Return whether it says again, as readings that are too new, that others are late.
+
+        Clocks tell times apart only: where nothing else tells which is right it is the same.
+        """
+        late = [h for h in others if is_timing(h.effect) and not self.is_negligible(h, others)]
+        if not late or not is_timing(hypothesis.effect):
+            return False
+        known = np.concatenate([self.own_columns(h) for h in late])
+        own = self.sums.spanned(self.columns([]), known, self.own_columns(hypothesis))
+        return bool(np.all(own > _SAME)) and self.are_early([*others, hypothesis])
 
     def is_negligible(self, hypothesis: Hypothesis, chosen: Sequence[Hypothesis]) -> bool:
         """Return whether a sound machine has as much of it, so that it counts for no effect."""

@@ -147,6 +147,12 @@ def is_negligible(members: Mapping[Candidate, Array]) -> bool:
     )
 
 
+def may_be_negligible(weights: Mapping[Candidate, tuple[Array, Array]]) -> bool:
+    """Return whether weights with half their intervals may be such as a sound machine has."""
+    least = {c: np.sign(w) * np.maximum(np.abs(w) - half, 0.0) for c, (w, half) in weights.items()}
+    return is_negligible(least)
+
+
 def bounded(candidate: Candidate, weights: Array, half: Array) -> Array:
     """Return weights with those moved to their bound that lie beyond it by chance.
 
@@ -232,14 +238,16 @@ def is_wider(one: Hypothesis, other: Hypothesis) -> bool:
     return one.causes > other.causes
 
 
-def boldness(one: Hypothesis, other: Hypothesis) -> float:
-    """Return by how many standard errors one has to explain more than another.
+def boldness(one: Hypothesis, other: Hypothesis | None = None) -> float:
+    """Return by how many standard errors one has to explain more than another, or than nothing.
 
     For a beginning, chosen among many, and for an unlikely extent, where the other has none: one
     number for all elements is unlikely unless one system reads them; then it is for a part of them.
     """
-    if one.onset and not other.onset:
+    if one.onset and (other is None or not other.onset):
         return _SIGMAS_OF_ONSET
+    if other is None:
+        return 0.0
     unlikely = one.common != other.common and one.common is not has_one_system(one.effect)
     return _SIGMAS_OF_EXTENT if unlikely else 0.0
 
@@ -255,6 +263,23 @@ def unusual(weights: Mapping[Candidate, Array], hypothesis: Hypothesis) -> float
             if p.usual is not None
         ]
     return max(found)
+
+
+def is_timing(effect: Effect) -> bool:
+    """Return whether an effect is that readings are older than their stamps say."""
+    return effect.sense is not None and effect.sense.lateness is not None
+
+
+def is_early(weights: Mapping[Candidate, Array], hypothesis: Hypothesis) -> bool:
+    """Return whether readings would be newer than their stamps say, which only clocks can do.
+
+    By more than those of a sound machine.
+    """
+    sense = hypothesis.effect.sense
+    if sense is None or sense.lateness is None:
+        return False
+    own = {c: weights[c] for c in hypothesis.candidates}
+    return min(sense.lateness(0.0, each) for each in own.values()) < 0.0 and not is_negligible(own)
 
 
 def is_spread(one: Hypothesis, whole: Hypothesis) -> bool:

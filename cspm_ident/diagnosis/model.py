@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from cspm_ident.diagnosis.columns import Candidate, Place
 from cspm_ident.diagnosis.equation import Equation, steady
-from cspm_ident.diagnosis.hypothesis import Named, bounded, is_negligible, members_of
+from cspm_ident.diagnosis.hypothesis import Named, bounded, may_be_negligible, members_of
 from cspm_ident.diagnosis.onset import Onset, onset_of
 from cspm_ident.diagnosis.parameters import of_clocks, of_drives, of_forms, of_shafts
 from cspm_ident.diagnosis.refine import Cut, needs_refining, refine
@@ -44,6 +44,7 @@ class Data(NamedTuple):
         noise: of each residual.
         block: length of the blocks [s].
         supposed: about what they were taken to first order.
+        faint: findings of which what was not searched shows little.
     """
 
     searched: Sequence[Measurement]
@@ -53,6 +54,7 @@ class Data(NamedTuple):
     noise: dict[Place, Array]
     block: float
     supposed: Mapping[Candidate, Array]
+    faint: Sequence[Named] = ()
 
 
 class Model(NamedTuple):
@@ -64,6 +66,9 @@ class Model(NamedTuple):
         simulated: likewise.
         worth: of each finding; None where they cannot tell, or it is negligible.
         possible: whether a machine can have each.
+        negligible: whether each may be no more than in a sound machine.
+        wanted: below which share of what it is without each a simulated error has to fall;
+            infinite where it moves too little to tell.
     """
 
     weights: Weights
@@ -71,6 +76,8 @@ class Model(NamedTuple):
     simulated: tuple[SimulatedFit, ...]
     worth: tuple[Worth | None, ...]
     possible: tuple[bool, ...]
+    negligible: tuple[bool, ...]
+    wanted: tuple[float, ...]
 
     @property
     def useless(self) -> list[int]:
@@ -81,8 +88,8 @@ class Model(NamedTuple):
         if not all(self.possible):
             return [k for k, possible in enumerate(self.possible) if not possible]
         shares = {k: worth.with_it / worth.without for k, worth in enumerate(self.worth) if worth}
-        worst = max(shares, key=lambda k: shares[k], default=None)
-        return [worst] if worst is not None and shares[worst] > WORTH_IT else []
+        worst = max(shares, key=lambda k: shares[k] - self.wanted[k], default=None)
+        return [worst] if worst is not None and shares[worst] > self.wanted[worst] else []
 
 
 def modelled(search: Search, kept: Sequence[Named], data: Data) -> Model:
@@ -101,6 +108,10 @@ def modelled(search: Search, kept: Sequence[Named], data: Data) -> Model:
 
     rows = [[e.within(since, np.inf) for e in part] for part in data.rows]
     weights = _parameters(search, kept, data, cut, rows)
+    negligible = tuple(
+        may_be_negligible({c: weights[c] for c in members_of(weights, each.hypothesis)})
+        for each in kept
+    )
     weights = of_clocks(of_drives(weights, 2.0 * data.searched[0].torque_age))
     weights = {
         c: (_allowed(data.searched[0], c, own, half), half) for c, (own, half) in weights.items()
@@ -109,15 +120,16 @@ def modelled(search: Search, kept: Sequence[Named], data: Data) -> Model:
     values = {c: w for c, (w, _) in weights.items()}
     members = [{c: values[c] for c in members_of(values, each.hypothesis)} for each in kept]
     possible = tuple(is_possible(data.searched[0], own) for own in members)
+    wanted = tuple(np.inf if each in data.faint else WORTH_IT for each in kept)
     if not all(possible):
-        return Model(weights, onsets, (), (), possible)
+        return Model(weights, onsets, (), (), possible, negligible, wanted)
     simulated = simulate_held_out(data.baselines, values)
     # What a sound machine has too is too little to be of use, and there nevertheless.
     worth = tuple(
-        None if is_negligible(own) else worth_of(data.baselines, simulated, values, own)
-        for own in members
+        None if sound else worth_of(data.baselines, simulated, values, own)
+        for own, sound in zip(members, negligible, strict=True)
     )
-    return Model(weights, onsets, simulated, worth, possible)
+    return Model(weights, onsets, simulated, worth, possible, negligible, wanted)
 
 
 def _allowed(measured: Measurement, candidate: Candidate, weights: Array, half: Array) -> Array:

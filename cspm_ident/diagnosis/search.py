@@ -28,15 +28,15 @@ from cspm_ident.diagnosis.hypothesis import (
     is_wider,
     joined,
     shapes_of,
-    unusual,
 )
-from cspm_ident.diagnosis.likeness import SIMPLER_SHARE, TIED, UNTRUE_SHARE
+from cspm_ident.diagnosis.likeness import SIMPLER_SHARE, UNTRUE_SHARE
 from cspm_ident.diagnosis.onset import first_block
 from cspm_ident.diagnosis.pairs import Pair, best_pairs
 from cspm_ident.diagnosis.rivals import rivals_of
 from cspm_ident.diagnosis.scopes import Scopes
 from cspm_ident.diagnosis.short_list import short_list
-from cspm_ident.diagnosis.sums import Gain, Sums, behind, gain_of, paired
+from cspm_ident.diagnosis.simplest import simplest
+from cspm_ident.diagnosis.sums import Gain, Sums, gain_of
 from cspm_ident.diagnosis.sureness import Sureness
 from cspm_ident.diagnosis.unexplained import unexplained
 
@@ -124,7 +124,8 @@ class Search:
             with self.fits.delayed(found):
                 base, gain = self._others(clock, both), self._gain(clock, both)
                 surely = self.sureness.counts(base, clock, gain, len(chosen) + 1)
-            if surely and self.fits.is_negligible(clock, both):
+                sound = self.fits.is_negligible(clock, both)
+            if surely and sound:
                 return clock, found
         return ()
 
@@ -156,16 +157,20 @@ class Search:
     def _needless(self, chosen: Sequence[Hypothesis]) -> int | None:
         """Return which is the weakest that is not surely there beside the others, if any.
 
-        Nor is what gains no more than the others may be untrue by where it shows.
+        Nor is what gains no more than the others may be untrue by where it shows; clocks of a sound
+        machine are true. What is late is needed where other readings would be early without it.
         """
         gains = [self._gain(hypothesis, chosen) for hypothesis in chosen]
         own = [self.fits.own_columns(hypothesis) for hypothesis in chosen]
+        untrue = [i for i, h in enumerate(chosen) if not self.fits.is_negligible(h, chosen)]
         for k in np.argsort([gain.total for gain in gains]):
-            beside = (i for i in range(len(chosen)) if i != k)
+            beside = (i for i in untrue if i != k)
             taken = sum(gains[i].total for i in beside if self.evidence.meet(own[k], own[i]))
-            if gains[k].total <= UNTRUE_SHARE * taken or not self._is_there(
+            needless = gains[k].total <= UNTRUE_SHARE * taken or not self._is_there(
                 chosen[k], self._others(chosen[k], chosen), gains[k], chosen
-            ):
+            )
+            rest = [h for h in chosen if h is not chosen[k]]
+            if needless and (self.fits.are_early(chosen) or not self.fits.are_early(rest)):
                 return int(k)
         return None
 
@@ -246,7 +251,8 @@ class Search:
         if best is None:
             return None
         with self.fits.delayed(best):
-            found = self._simplest(best, free, base, chosen)
+            rivals = self._rivals(best, free, base)
+            found = simplest(self.fits, best, rivals, base, chosen)
         with self.fits.delayed(found):
             return self.scopes.pruned(found, base)
 
@@ -274,14 +280,15 @@ class Search:
                 gained = self._sure_gain(hypothesis, chosen, base, before)
             if gained is None:
                 continue
-            needed = 0.0
+            needed = boldness(hypothesis) * gain_of(gained).error
             if best is not None:
                 wider = is_wider(hypothesis, best[1]) and not is_spread(best[1], hypothesis)
-                needed = best[0].sum() + 3.0 * gain_of(gained).error * wider
+                least = best[0].sum() + 3.0 * gain_of(gained).error * wider
                 sigmas = boldness(hypothesis, best[1])
                 if sigmas:
-                    needed = best[0].sum() + sigmas * gain_of(gained - best[0]).error
-            if best is None or gained.sum() > needed:
+                    least = best[0].sum() + sigmas * gain_of(gained - best[0]).error
+                needed = max(needed, least)
+            if gained.sum() > needed:
                 best = gained, hypothesis
         return None if best is None else best[1]
 
@@ -307,58 +314,12 @@ class Search:
         self, hypothesis: Hypothesis, chosen: Sequence[Hypothesis], base: Index, before: Array
     ) -> Array | None:
         """Return what a hypothesis gains in each block, not fitted to it, if it surely does."""
-        if not self.fits.is_plausible([*chosen, hypothesis]):
+        together = [*chosen, hypothesis]
+        if not self.fits.is_plausible(together) or self.fits.contradicts(hypothesis, chosen):
             return None
         gained = before - self.fits.held_out(hypothesis, base)
         known = len(chosen)
         return gained if self.sureness.counts(base, hypothesis, gain_of(gained), known) else None
-
-    def _simplest(
-        self,
-        best: Hypothesis,
-        free: Sequence[Candidate],
-        base: Index,
-        chosen: Sequence[Hypothesis],
-    ) -> Hypothesis:
-        """Return the hypothesis of fewest numbers, or elements, that is no worse than the best one.
-
-        One that explains more in most blocks is taken instead, though it be less sure by itself;
-        and of what explains the same a wrong number of the file, for it adds no physics.
-        """
-        rivals = [h for h in self._rivals(best, free, base) if self.fits.is_plausible([*chosen, h])]
-        reference = self.fits.held_out(best, base)
-        gained = gain_of(self.sums.held_out(base) - reference)
-        fewest, least = best, 0.0
-        for rival in rivals:
-            with self.sums.delayed(self.fits.own_columns(rival), best.onset):
-                apart = self.fits.held_out(rival, base) - reference
-            worse, wider = gain_of(apart), freedom(rival) - freedom(fewest)
-            fewer = is_wider(fewest, rival)
-            if wider <= 0 and worse.total < least and behind(paired(apart)) <= -TIED:
-                fewest, least = replace(rival, onset=best.onset), worse.total
-            elif (wider < 0 or (wider == 0 and fewer)) and worse.total <= min(
-                2.0 * gained.error, SIMPLER_SHARE * gained.total
-            ):
-                fewest = replace(rival, onset=best.onset)
-            elif (
-                wider == 0
-                and worse.total <= UNTRUE_SHARE * gained.total
-                and self._is_likelier(rival, fewest, chosen)
-            ):
-                fewest = rival
-        return fewest
-
-    def _is_likelier(
-        self, one: Hypothesis, other: Hypothesis, chosen: Sequence[Hypothesis]
-    ) -> bool:
-        """Return whether of two that explain the same one is likelier before any data.
-
-        A wrong number of the file adds no physics; of two such it is the one less out of the usual.
-        """
-        if is_number(one) != is_number(other):
-            return is_number(one)
-        sizes = [unusual(self.fits.values([*chosen, each]), each) for each in (one, other)]
-        return is_number(one) and sizes[0] < sizes[1]
 
     def _rivals(
         self, hypothesis: Hypothesis, free: Sequence[Candidate], base: Index

@@ -1,0 +1,105 @@
+"""Whether data that were not searched agree with what was found."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from cspm_ident.diagnosis.columns import Candidate
+from cspm_ident.diagnosis.evidence import Evidence
+from cspm_ident.diagnosis.fits import Fits
+from cspm_ident.diagnosis.hypothesis import Named
+from cspm_ident.diagnosis.sureness import MATERIAL_SHARE
+
+Array = NDArray[np.float64]
+
+# A finding must take this share of a held-out squared residual, or it does not stand.
+CONFIRMED_SHARE = 0.03
+# Of what it should take of all, where it should take less than is worth a word of each.
+_AS_EXPECTED = CONFIRMED_SHARE / MATERIAL_SHARE
+# What it should take to be judged by, in squares of what is left of a row: three standard
+# deviations.
+_LEAST_EXPECTED = 9.0
+
+
+class Confirmed(NamedTuple):
+    """What was found, parted by what data that were not searched say.
+
+    Attributes:
+        kept: what stands.
+        faint: of that, what they show too little of to say how much better they are explained.
+        rejected: what does not stand.
+    """
+
+    kept: tuple[Named, ...]
+    faint: tuple[Named, ...]
+    rejected: tuple[Named, ...]
+
+
+def confirmed(fits: Fits, judge: Evidence, found: Sequence[Named]) -> Confirmed:
+    """Part what was found by whether it lowers residuals that were not searched.
+
+    One of them by a share worth a word; or, where a machine that moves less there shows less of it,
+    all together by what it should. Where it moves too little for that, they say nothing.
+
+    Args:
+        fits: of what was searched.
+        judge: sums of what was not.
+        found: the findings.
+    """
+    kept, faint = list(found), []
+    for each in found:
+        whole = fits.values([other.hypothesis for other in kept])
+        own = set(each.hypothesis.candidates)
+        lowered = _Lowered(judge, whole, own)
+        if lowered.any_or_none and lowered.much:
+            continue
+        if lowered.as_expected:
+            faint.append(each)
+        else:
+            kept.remove(each)
+    rejected = tuple(each for each in found if each not in kept)
+    return Confirmed(tuple(kept), tuple(faint), rejected)
+
+
+class _Lowered:
+    """What weights of one finding among others take of squared residuals, place by place."""
+
+    def __init__(
+        self, judge: Evidence, whole: Mapping[Candidate, Array], own: set[Candidate]
+    ) -> None:
+        """Take all weights, and which are the finding's."""
+        fewer = {c: w for c, w in whole.items() if c not in own}
+        opposite = {c: -w if c in own else w for c, w in whole.items()}
+        places = [place.place for place in judge.places]
+        left, without, against = (
+            np.array([squares[place] for place in places])
+            for squares in map(judge.left_with, (whole, fewer, opposite))
+        )
+        self._without, self._taken = without, without - left
+        # Of a square in the weight: what it would take if all of it were there.
+        self._expected = 0.5 * (left + against) - without
+        self._rows = np.array([place.rows.sum() for place in judge.places])
+
+    @property
+    def any_or_none(self) -> bool:
+        """Whether all together are no larger with it."""
+        return bool(self._taken.sum() >= 0.0)
+
+    @property
+    def much(self) -> bool:
+        """Whether it takes a share worth a word of one."""
+        return bool(np.any(self._taken >= CONFIRMED_SHARE * self._without))
+
+    @property
+    def as_expected(self) -> bool:
+        """Whether it could not take much of any, and takes of all what it should, if that shows."""
+        if np.any(self._expected > MATERIAL_SHARE * self._without):
+            return False
+        expected = self._expected.sum()
+        per_row = float(self._expected @ (self._without / np.maximum(self._rows, 1)))
+        shows = expected**2 >= _LEAST_EXPECTED * per_row
+        return bool(not shows or self._taken.sum() >= _AS_EXPECTED * expected)

@@ -1,0 +1,72 @@
+"""Which of several hypotheses that explain the same supposes least."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from cspm_ident.diagnosis.fits import Fits
+from cspm_ident.diagnosis.hypothesis import Hypothesis, freedom, is_number, is_wider, unusual
+from cspm_ident.diagnosis.likeness import SIMPLER_SHARE, TIED, UNTRUE_SHARE
+from cspm_ident.diagnosis.sums import behind, gain_of, paired
+
+Index = NDArray[np.intp]
+
+
+def simplest(
+    fits: Fits,
+    best: Hypothesis,
+    rivals: Sequence[Hypothesis],
+    base: Index,
+    chosen: Sequence[Hypothesis],
+) -> Hypothesis:
+    """Return the hypothesis of fewest numbers, or elements, that is no worse than the best one.
+
+    One that explains more in most blocks is taken instead, though it be less sure by itself; of
+    what explains the same a wrong number of the file, for it adds no physics; and for a reading
+    that would be newer than its stamp says another one that is older, for only clocks do that.
+
+    Args:
+        fits: of all columns.
+        best: what gains most.
+        rivals: what explains the same.
+        base: columns of all that was chosen before.
+        chosen: that.
+    """
+    reference = fits.held_out(best, base)
+    gained = gain_of(fits.sums.held_out(base) - reference)
+    fewest, least = best, 0.0
+    for rival in rivals:
+        if not fits.is_plausible([*chosen, rival]) or fits.contradicts(rival, chosen):
+            continue
+        with fits.sums.delayed(fits.own_columns(rival), best.onset):
+            apart = fits.held_out(rival, base) - reference
+        worse, wider = gain_of(apart), freedom(rival) - freedom(fewest)
+        fewer = is_wider(fewest, rival)
+        if wider <= 0 and worse.total < least and behind(paired(apart)) <= -TIED:
+            fewest, least = replace(rival, onset=best.onset), worse.total
+        elif (wider < 0 or (wider == 0 and fewer)) and worse.total <= min(
+            2.0 * gained.error, SIMPLER_SHARE * gained.total
+        ):
+            fewest = replace(rival, onset=best.onset)
+        elif wider == 0 and worse.total <= gained.total * _allowed(fits, rival, fewest, chosen):
+            fewest = rival
+    return fewest
+
+
+def _allowed(fits: Fits, one: Hypothesis, other: Hypothesis, chosen: Sequence[Hypothesis]) -> float:
+    """Return the share of the gain by which one may be worse, being likelier before any data.
+
+    A wrong number of the file adds no physics; of two such it is the one less out of the usual.
+    """
+    if fits.are_early([*chosen, other]) and not fits.are_early([*chosen, one]):
+        return SIMPLER_SHARE
+    if is_number(one) != is_number(other):
+        return UNTRUE_SHARE if is_number(one) else -np.inf
+    if not is_number(one):
+        return -np.inf
+    sizes = [unusual(fits.values([*chosen, each]), each) for each in (one, other)]
+    return UNTRUE_SHARE if sizes[0] < sizes[1] else -np.inf

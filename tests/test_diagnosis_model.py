@@ -43,9 +43,10 @@ def test_the_worst_of_no_use_goes(shares, gone):
     assert model(shares).useless == gone
 
 
-def test_what_moves_too_little_to_tell_is_not_judged_by_simulation():
-    assert model((1.005, 0.995), wanted=(np.inf, WORTH_IT)).useless == [1]
-    assert model((1.005,), wanted=(np.inf,)).useless == []
+@pytest.mark.parametrize(("share", "gone"), [(0.995, []), (1.005, [0])])
+def test_what_moves_too_little_to_lower_an_error_by_much_has_to_lower_it(share, gone):
+    assert model((share,), wanted=(1.0,)).useless == gone
+    assert model((share,)).useless == [0]
 
 
 def test_what_no_machine_can_have_goes_before_anything_is_judged():

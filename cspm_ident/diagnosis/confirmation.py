@@ -43,7 +43,7 @@ def confirmed(fits: Fits, judge: Evidence, found: Sequence[Named]) -> Confirmed:
     """Part what was found by whether it lowers residuals that were not searched.
 
     One of them by a share worth a word; or, where a machine that moves less there shows less of it,
-    all together by what it should. Where it moves too little for that, they say nothing.
+    all together by what it should.
 
     Args:
         fits: of what was searched.
@@ -96,10 +96,10 @@ class _Lowered:
 
     @property
     def as_expected(self) -> bool:
-        """Whether it could not take much of any, and takes of all what it should, if that shows."""
+        """Whether it could not take much of any, and surely takes of all what it should."""
         if np.any(self._expected > MATERIAL_SHARE * self._without):
             return False
         expected = self._expected.sum()
         per_row = float(self._expected @ (self._without / np.maximum(self._rows, 1)))
         shows = expected**2 >= _LEAST_EXPECTED * per_row
-        return bool(not shows or self._taken.sum() >= _AS_EXPECTED * expected)
+        return bool(shows and self._taken.sum() >= _AS_EXPECTED * expected)

@@ -67,8 +67,7 @@ class Model(NamedTuple):
         worth: of each finding; None where they cannot tell, or it is negligible.
         possible: whether a machine can have each.
         negligible: whether each may be no more than in a sound machine.
-        wanted: below which share of what it is without each a simulated error has to fall;
-            infinite where it moves too little to tell.
+        wanted: below which share of what it is without each a simulated error has to fall.
     """
 
     weights: Weights
@@ -120,7 +119,7 @@ def modelled(search: Search, kept: Sequence[Named], data: Data) -> Model:
     values = {c: w for c, (w, _) in weights.items()}
     members = [{c: values[c] for c in members_of(values, each.hypothesis)} for each in kept]
     possible = tuple(is_possible(data.searched[0], own) for own in members)
-    wanted = tuple(np.inf if each in data.faint else WORTH_IT for each in kept)
+    wanted = tuple(1.0 if each in data.faint else WORTH_IT for each in kept)
     if not all(possible):
         return Model(weights, onsets, (), (), possible, negligible, wanted)
     simulated = simulate_held_out(data.baselines, values)

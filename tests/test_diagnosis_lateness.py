@@ -49,6 +49,36 @@ def test_what_explains_much_more_is_told_though_it_be_early():
     assert [h.effect for h in named(cable(0.003, apart=0.6))] == [CELLS]
 
 
+def rig(delay, drag=0.0, like=1.0, seed=7):
+    """One winch's torque, load cells late by `delay` [s] and grease; tension follows the angle.
+
+    `like` is how much of the speed's column is that of the tension's rate.
+    """
+    rng = np.random.default_rng(seed)
+    times = STEP * np.arange(ROWS)
+    rate = 100.0 * (np.sin(2.1 * times) + 0.6 * np.sin(0.83 * times))
+    other = 100.0 * np.cos(1.3 * times)
+    speed = like * rate + np.sqrt(1.0 - like**2) * other
+    target = delay * rate + drag * speed + 2e-3 * rng.standard_normal(ROWS)
+    columns = {Candidate(DRAG, "surge"): -speed, TENSION: rate}
+    shaped = {term: values[:, None, None] for term, values in columns.items()}
+    place = Place(Channel.SHAFT, "surge")
+    return Equation(place, times, target[:, None], shaped, target[:, None])
+
+
+@pytest.mark.parametrize(
+    ("delay", "drag", "like", "told"),
+    [
+        (-0.6 * CLOCK, 0.0, -1.0, [CELLS]),
+        (0.0, -2.0 * CLOCK, -0.98, [DRAG]),
+        (0.0, -0.6 * CLOCK, -0.5, [DRAG]),
+    ],
+)
+def test_what_sound_clocks_explain_as_well_is_theirs(delay, drag, like, told):
+    """Where they would have to lie farther apart, or explain less, it is friction."""
+    assert [h.effect for h in named(rig(delay, drag, like))] == told
+
+
 def test_only_effects_on_stamps_are_early_and_only_below_zero():
     def early(candidate, value):
         return is_early({candidate: np.array([value])}, Hypothesis(candidate.effect, (candidate,)))

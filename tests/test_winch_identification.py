@@ -34,6 +34,19 @@ def test_window_integrates_by_parts():
     assert found == pytest.approx(expected, rel=2e-5)
 
 
+def test_readings_at_instants_are_averaged_as_the_second_difference_averages():
+    """A swing of 15 Hz read at 1 kHz: a force that makes it is in step with what it makes."""
+    half, step, rate = 20, 1e-3, 2.0 * np.pi * 15.0
+    window = make_window(half, step)
+    angle = np.cos(rate * step * np.arange(200))
+    force = -(rate**2) * angle
+    moved = weigh(window.second, angle, 1)
+    largest = np.abs(moved).max()
+    # By hand: (ω·1 ms)²/12 is 7.4e-4, and (ω·1 ms)⁴/240 is 3.3e-7.
+    assert np.abs(weigh(window.averaged(step), force, 1) - moved).max() < 1e-6 * largest
+    assert np.abs(weigh(window.weights, force, 1) - moved).max() > 6e-4 * largest
+
+
 def test_straight_lines_have_no_acceleration():
     window = make_window(7, 0.01)
     line = 3.0 + 20.0 * np.arange(60) * 0.01

@@ -14,6 +14,7 @@ from cspm_ident.diagnosis.asked_for import (
     is_proportional,
     shows_in_what_was_asked,
 )
+from cspm_ident.diagnosis.cell_clock import on_drives_clock
 from cspm_ident.diagnosis.columns import Candidate, Place
 from cspm_ident.diagnosis.confirmation import Confirmed, confirmed
 from cspm_ident.diagnosis.curves import Curve, held_out_curves
@@ -126,6 +127,7 @@ def diagnose(
     Raises:
         InputError: the recordings have no residual that could be looked at, or are too short.
     """
+    searched, held_out = ([on_drives_clock(each) for each in own] for own in (searched, held_out))
     # No name for the look itself: its columns go as soon as they are not needed.
     (search_parts, judge_parts, hums, noise, block, search, knots, supposed), found = searched_for(
         Recordings(searched, held_out), progress, safeguards

@@ -28,9 +28,10 @@ Array = NDArray[np.float64]
 STILL_SHARE = 0.05
 _MOVES = 3.0
 _STEP_RAD = 1e-6
+SPEED, PULL = "speed [rad/s]", "tension [N]"
 _DRIVERS = {
-    "speed [rad/s]": WinchSignal.SPEED,
-    "tension [N]": WinchSignal.TENSION,
+    SPEED: WinchSignal.SPEED,
+    PULL: WinchSignal.TENSION,
     "angle [rad]": WinchSignal.ANGLE,
     "time [s]": WinchSignal.TIME,
 }
@@ -112,8 +113,8 @@ class _Shaft:
     ) -> None:
         self._sensors, inertia, name = sensors, winch.rotor_inertia, winch.name
         self._rows, self._inertia, self._name = rows, inertia, name
-        step = float(times[1] - times[0])
-        self._window, self._stride = make(half, step), max(1, half // 2)
+        self._step = float(times[1] - times[0])
+        self._window, self._stride = make(half, self._step), max(1, half // 2)
         speed = np.abs(rows[:, WinchSignal.SPEED])
         view, width = np.lib.stride_tricks.sliding_window_view, len(self._window.weights)
         windows = view(speed, width)[:: self._stride]
@@ -127,9 +128,9 @@ class _Shaft:
         self, effects: Sequence[Effect], known: Sequence[Action], knots: Knots | None
     ) -> Equation:
         rows = self._rows
-        target = self._weighed(
-            rows[:, WinchSignal.TORQUE] - rows[:, WinchSignal.RADIUS] * rows[:, WinchSignal.TENSION]
-        ) - self._inertia * self._accelerated(rows[:, WinchSignal.ANGLE])
+        pulled = rows[:, WinchSignal.RADIUS] * rows[:, WinchSignal.TENSION]
+        target = self._weighed(rows[:, WinchSignal.TORQUE]) - self._averaged(pulled)
+        target = target - self._inertia * self._accelerated(rows[:, WinchSignal.ANGLE])
         for action in known:
             effect = action.effect
             if effect.alter is None and effect.regression.channel is Channel.SHAFT:
@@ -178,6 +179,10 @@ class _Shaft:
 
     def _weighed(self, values: Array) -> Array:
         return np.asarray(weigh(self._window.weights, values, self._stride)[self._moving])
+
+    def _averaged(self, values: Array) -> Array:
+        weights = self._window.averaged(self._step)
+        return np.asarray(weigh(weights, values, self._stride)[self._moving])
 
     def _accelerated(self, values: Array) -> Array:
         return np.asarray(weigh(self._window.second, values, self._stride)[self._moving])

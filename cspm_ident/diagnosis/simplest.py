@@ -26,8 +26,9 @@ def simplest(
     """Return the hypothesis of fewest numbers, or elements, that is no worse than the best one.
 
     One that explains more in most blocks is taken instead, though it be less sure by itself; of
-    what explains the same a wrong number of the file, for it adds no physics; and for a reading
-    that would be newer than its stamp says another one that is older, for only clocks do that.
+    what explains the same a wrong number of the file, for it adds no physics; for a reading that
+    would be newer than its stamp says another one that is older, for only clocks do that; and what
+    sound clocks do instead of a fault.
 
     Args:
         fits: of all columns.
@@ -60,8 +61,12 @@ def simplest(
 def _allowed(fits: Fits, one: Hypothesis, other: Hypothesis, chosen: Sequence[Hypothesis]) -> float:
     """Return the share of the gain by which one may be worse, being likelier before any data.
 
-    A wrong number of the file adds no physics; of two such it is the one less out of the usual.
+    Sound clocks lie as far apart; a wrong number of the file adds no physics, and of two such it is
+    the one less out of the usual.
     """
+    sound = [fits.is_negligible(each, [*chosen, each]) for each in (one, other)]
+    if sound[0] != sound[1]:
+        return SIMPLER_SHARE if sound[0] else -np.inf
     if fits.are_early([*chosen, other]) and not fits.are_early([*chosen, one]):
         return SIMPLER_SHARE
     if is_number(one) != is_number(other):

@@ -28,7 +28,7 @@ from cspm_ident.signals.delays import (
     moves,
     winds,
 )
-from cspm_ident.signals.measurement import BAR, FRAME, Measurement
+from cspm_ident.signals.measurement import BAR, FRAME, TENSION, Measurement
 from cspm_ident.signals.samples import Samples
 from cspm_ident.signals.timeline import Timeline
 from cspm_msgs_py.testbed import Testbed
@@ -37,7 +37,7 @@ from cspm_sim.parameters import plant_parameters
 
 Array = NDArray[np.float64]
 
-_ATTRIBUTES = {BAR: "bar_pose", FRAME: "frame_pose"}
+_ATTRIBUTES = {BAR: "bar_pose", FRAME: "frame_pose", TENSION: "tension"}
 
 
 @dataclass(frozen=True)
@@ -98,7 +98,7 @@ def find_drifts(timeline: Timeline, testbed: Testbed) -> list[ClockDrift]:
     parts = [(0, half), (steps - half, steps)]
     band = min(timeline.pose_band, WIDEST_HZ)
     pieces = [timeline.within(*part).slowly(PERIOD_NS, band) for part in parts]
-    names = [n for n in _ATTRIBUTES if all(_moves(piece, n) for piece in pieces)]
+    names = [n for n in (BAR, FRAME) if all(_moves(piece, n) for piece in pieces)]
     return _search(pieces, parameters, names, (steps - half) * timeline.period) if names else []
 
 

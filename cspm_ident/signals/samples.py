@@ -66,6 +66,12 @@ class Samples:
         """
         return [_clocked(self.times[span]) for span in self.spans]
 
+    @cached_property
+    def even(self) -> Samples:
+        """The same values at stamps without their scatter."""
+        stamps = [times for times, _ in self.clocks]
+        return Samples(np.concatenate(stamps), self.values) if stamps else self
+
     def column(self, index: int) -> Samples:
         """Return one column, shape (n, 1)."""
         return self.of_others(self.values[:, index : index + 1])

@@ -29,6 +29,14 @@ class Window(NamedTuple):
     weights: Array
     second: Array
 
+    def averaged(self, step: float) -> Array:
+        """Return weights of what is read at instants and acts all the time between, shape (w,).
+
+        A second difference of angles is the acceleration averaged over a step before and one after;
+        so is what a drive holds. That of readings is taken to fourth order (Numerov).
+        """
+        return self.weights + step**2 / 12.0 * self.second
+
 
 Make = Callable[[int, float], Window]
 

@@ -18,6 +18,7 @@ from numpy.typing import NDArray
 from cspm_msgs_py.testbed import Testbed
 from cspm_mujoco.cable_law import elongation_at, law_row
 from cspm_mujoco.influence import Acting, Scene
+from cspm_reality.marker_shift import tension_changes, wrench_changes
 from cspm_reality.phenomena import PHENOMENA, shaft_radii
 from cspm_reality.phenomenon import CABLES, Phenomenon
 from cspm_reality.rope import elongations
@@ -263,7 +264,10 @@ def _late(scenes: Sequence[Scene], machine: Testbed, slopes: Array, noise: Noise
 
 
 def _shifted(scenes: Sequence[Scene], machine: Testbed, slopes: Array, noise: Noise) -> Array:
-    return np.asarray(1.0 / noise.position)
+    tension = np.max(rms(tension_changes(scenes, slopes)) / noise.tension)
+    wrenches = wrench_changes(scenes)
+    force, moment = (np.linalg.norm(rms(part)) for part in np.split(wrenches, 2, axis=1))
+    return np.asarray(max(tension, force / noise.force, moment / noise.moment))
 
 
 _NUMBERS = {

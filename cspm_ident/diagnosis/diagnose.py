@@ -36,6 +36,7 @@ from cspm_ident.diagnosis.model import Data, modelled
 from cspm_ident.diagnosis.onset import Onset
 from cspm_ident.diagnosis.refine import Cut
 from cspm_ident.diagnosis.region import Region, region_of
+from cspm_ident.diagnosis.reversals import with_wider
 from cspm_ident.diagnosis.safeguards import ALL_SAFEGUARDS, Safeguards
 from cspm_ident.diagnosis.search import Search
 from cspm_ident.diagnosis.simulation import SimulatedFit, Worth, baselines_of
@@ -133,6 +134,7 @@ def diagnose(
         Recordings(searched, held_out), progress, safeguards
     )
     evidence = search.evidence
+    found = with_wider(found, in_noise(search_parts, noise), block, safeguards.sums)
     progress("held-out data")
     judge = _judge(in_noise(judge_parts, noise), found, block)
     search_parts, judge_parts = _found_only(search_parts, found), _found_only(judge_parts, found)

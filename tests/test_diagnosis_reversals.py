@@ -1,0 +1,64 @@
+"""Whether dry friction is larger near rest, which only rows tell in which a shaft turns round."""
+
+import numpy as np
+import pytest
+
+from cspm_ident.diagnosis.columns import Candidate, Place, shapes_of
+from cspm_ident.diagnosis.equation import Equation, steady
+from cspm_ident.diagnosis.evidence import gather
+from cspm_ident.diagnosis.reversals import with_wider
+from cspm_ident.diagnosis.search import Search
+from cspm_ident.diagnosis.sums import Sums
+from cspm_sim.effects import Channel, catalogue
+from cspm_sim.effects.signals import WinchSignal
+
+ROWS, STEP, BLOCK_S = 4000, 0.01, 0.8
+DRY, WIDER = catalogue()["winch_coulomb_friction"], catalogue()["winch_stribeck_friction"]
+STILL = 3.0  # below it a shaft counts as turning [rad/s]
+
+
+def shaft(law, seed=3, still=STILL):
+    """A winch whose torque misses law(speed), in hundredths of a N·m, beside noise of one."""
+    rng = np.random.default_rng(seed)
+    times = STEP * np.arange(ROWS)
+    speed = 6.0 * (np.sin(2.3 * times) + 0.7 * np.sin(0.91 * times + 1.0))
+    signals = np.zeros((ROWS, len(WinchSignal)))
+    signals[:, WinchSignal.SPEED] = speed
+    columns = {
+        Candidate(effect, "surge_1", shape): effect.regressors(signals, **dict(shape))
+        for effect in (DRY, WIDER)
+        for shape in shapes_of(effect)
+    }
+    target = 0.01 * (np.sign(speed) * law(np.abs(speed)) + rng.standard_normal(ROWS))[:, None]
+    turning = np.abs(speed) < still
+    place = Place(Channel.SHAFT, "surge_1")
+    return Equation(place, times, target, columns, target, turning=turning)
+
+
+def told(equation):
+    parts = [[equation]]
+    found = Search(gather(steady(parts), BLOCK_S)).run()
+    (named,) = with_wider(found, parts, BLOCK_S, Sums).named
+    assert named.hypothesis.effect is DRY
+    return [rival.hypothesis.effect for rival in named.alternatives]
+
+
+@pytest.mark.parametrize(
+    ("law", "wider"),
+    [
+        (lambda v: 3.0 + 2.0 * np.exp(-(v**2)), [WIDER]),
+        (lambda v: 3.0 + 0.0 * v, []),
+        # Bristles that yield: less near rest.
+        (lambda v: 3.0 * (1.0 - np.exp(-(v**2))), []),
+        # No dry friction falls to less than half while it slides.
+        (lambda v: 3.0 + 9.0 * np.exp(-(v**2)), []),
+    ],
+)
+def test_more_torque_near_rest_makes_a_larger_breakaway_an_alternative(law, wider):
+    assert told(shaft(law)) == wider
+
+
+def test_without_reversals_nothing_is_added():
+    fast = shaft(lambda v: 3.0 + 2.0 * np.exp(-(v**2)), still=0.0)
+    found = Search(gather([[fast.within(0.0, 10.0)]], BLOCK_S)).run()
+    assert with_wider(found, [[fast.within(0.0, 10.0)]], BLOCK_S, Sums) == found

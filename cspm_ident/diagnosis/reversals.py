@@ -1,4 +1,4 @@
-"""What the rows in which shafts turn round say of a finding: whether it is a case of something wider.
+"""What rows in which shafts turn round say of a finding: whether it is a case of something wider.
 
 They are left out of the search, for a shaft that sticks takes any torque. But there alone shows
 whether dry friction is larger near rest. Bristles that yield before they slip take torque away near

@@ -92,6 +92,21 @@ def test_a_diagnosis_that_is_right_in_everything():
 
 
 @pytest.mark.parametrize(
+    ("said", "alternatives", "there", "tied"),
+    [
+        ("cable", (), False, False),
+        ("cable", ("winch_load_friction",), False, True),
+        ("cable", ("tension_gain",), False, False),
+        ("winch", ("tension_gain",), True, True),
+    ],
+)
+def test_a_block_may_be_tied_with_what_is_said_first(said, alternatives, there, tied):
+    told = finding("pulley_friction", alternatives=alternatives) | {"subsystem": said}
+    outcome = judged(item("a", concealed()), result("tie", told))
+    assert (outcome.block, outcome.block_tied) == (there, tied)
+
+
+@pytest.mark.parametrize(
     ("effect", "channel"),
     [("cable_transverse_damping", "bar/wrench"), ("cable_hysteresis", "cables/tension/surge_1")],
 )
@@ -245,6 +260,7 @@ def test_a_scorecard_counts():
     assert shares == {
         "detected": (2, 2),
         "block": (2, 2),
+        "block_tied": (2, 2),
         "element": (2, 2),
         "first": (1, 2),
         "named": (1, 2),

@@ -69,6 +69,7 @@ class Outcome:
         found: the findings' effects and elements, the first first.
         detected: whether anything was found.
         block: whether a finding is in a block of the truth.
+        block_tied: whether that finding, or what is tied with it, is.
         element: whether a finding is on just the elements of a truth.
         first: whether the first finding names something concealed on its elements.
         named: whether all concealed effects are named, not as alternatives, each on its elements.
@@ -98,6 +99,7 @@ class Outcome:
     found: tuple[tuple[str, tuple[str, ...]], ...]
     detected: bool
     block: bool
+    block_tied: bool
     element: bool
     first: bool
     named: bool
@@ -141,6 +143,7 @@ def judge(item: Data, result: Data, floors: Floors) -> Outcome:
         found=tuple((f["effect"], tuple(f["elements"])) for f in findings),
         detected=bool(findings),
         block=any(f["subsystem"] in {c["block"] for c in concealed} for f in findings[:1]),
+        block_tied=any(_blocks(f) & {c["block"] for c in concealed} for f in findings[:1]),
         element=any(_same_elements(f, c) for f in findings[:1] for c in concealed),
         first=any(_is_named(c, findings[:1]) for c in concealed),
         named=bool(concealed) and all(_is_named(c, findings) for c in concealed),
@@ -183,6 +186,13 @@ def kind_of(item: Data) -> str:
 def tie_set(finding: Data) -> list[str]:
     """Return the effects of a finding, named and alternative, each once."""
     return list(dict.fromkeys([finding["effect"], *(a["effect"] for a in finding["alternatives"])]))
+
+
+def _blocks(finding: Data) -> set[str]:
+    """Return the blocks of a finding and of its alternatives."""
+    known = catalogue()
+    tied = {known[a["effect"]].block.value for a in finding["alternatives"] if a["effect"] in known}
+    return {finding["subsystem"], *tied}
 
 
 def _same_elements(finding: Data, concealed: Data) -> bool:

@@ -10,6 +10,7 @@ from cspm_ident.markdown import markdown_table
 
 _TARGETS = (
     ("block", "block found", "≥ 97 %"),
+    ("block_tied", "block found, or tied with what was", ""),
     ("element", "element found", "≥ 93 %"),
     ("first", "effect and elements named first", "≥ 85 %"),
     ("named", "all named by some finding", ""),

@@ -70,6 +70,7 @@ def _shares(outcomes: Sequence[Outcome], clear: Sequence[Outcome]) -> dict[str, 
     return {
         "detected": share(o.detected for o in clear),
         "block": share(o.block for o in clear),
+        "block_tied": share(o.block_tied for o in clear),
         "element": share(o.element for o in clear),
         "first": share(o.first for o in clear),
         "named": share(o.named for o in clear),

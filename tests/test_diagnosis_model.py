@@ -87,7 +87,7 @@ def test_an_interval_ends_where_the_catalogue_does():
     drag = Candidate(catalogue()["winch_coulomb_friction"], "surge_2")
     cases = ((0.01, 0.004, (0.006, 0.014)), (0.0, 0.004, (0.0, 0.004)), (0.9, 0.2, (0.7, 1.0)))
     for value, half, ends in cases:
-        found = SimpleNamespace(weights={drag: (np.array([value]), np.array([half]))})
+        found = SimpleNamespace(weights={drag: (np.array([value]), np.array([half]))}, spectra={})
         (number,) = numbers_of(found, drag)
         assert (number.low, number.high) == pytest.approx(ends)
 

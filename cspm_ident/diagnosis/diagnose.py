@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from itertools import compress
 
 import numpy as np
@@ -87,6 +87,8 @@ class Diagnosis:
         curves: the residuals on what was not searched, over time.
         noise: of each residual, what differs from row to row, one number per channel.
         faint: findings of which what was not searched shows little.
+        spectra: of candidates of which there may be more at other time constants, the upper end of
+            the interval of the weights of all together.
     """
 
     searched: Sequence[Measurement]
@@ -109,6 +111,7 @@ class Diagnosis:
     curves: tuple[Curve, ...]
     noise: dict[Place, Array]
     faint: tuple[Named, ...] = ()
+    spectra: Mapping[Candidate, Array] = field(default_factory=dict)
 
 
 def diagnose(
@@ -183,6 +186,7 @@ def diagnose(
         held_out_curves(steady(judge_parts), first),
         noise,
         faint,
+        model.spectra,
     )
 
 

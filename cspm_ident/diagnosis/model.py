@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Mapping, Sequence
+from types import MappingProxyType
 from typing import NamedTuple
 
 import numpy as np
@@ -13,7 +14,7 @@ from cspm_ident.diagnosis.equation import Equation, steady
 from cspm_ident.diagnosis.hypothesis import Named, bounded, may_be_negligible, members_of
 from cspm_ident.diagnosis.onset import Onset, onset_of
 from cspm_ident.diagnosis.parameters import of_clocks, of_drives, of_forms, of_shafts
-from cspm_ident.diagnosis.refine import Cut, needs_refining, refine
+from cspm_ident.diagnosis.refine import Cut, needs_refining, refine, spectra
 from cspm_ident.diagnosis.search import Search
 from cspm_ident.diagnosis.simulation import (
     Baselines,
@@ -68,6 +69,7 @@ class Model(NamedTuple):
         possible: whether a machine can have each.
         negligible: whether each may be no more than in a sound machine.
         wanted: below which share of what it is without each a simulated error has to fall.
+        spectra: as of a diagnosis.
     """
 
     weights: Weights
@@ -77,6 +79,7 @@ class Model(NamedTuple):
     possible: tuple[bool, ...]
     negligible: tuple[bool, ...]
     wanted: tuple[float, ...]
+    spectra: Mapping[Candidate, Array] = MappingProxyType({})
 
     @property
     def useless(self) -> list[int]:
@@ -107,6 +110,7 @@ def modelled(search: Search, kept: Sequence[Named], data: Data) -> Model:
 
     rows = [[e.within(since, np.inf) for e in part] for part in data.rows]
     weights = _parameters(search, kept, data, cut, rows)
+    most = _in_all(kept, weights, data, cut)
     negligible = tuple(
         may_be_negligible({c: weights[c] for c in members_of(weights, each.hypothesis)})
         for each in kept
@@ -121,14 +125,14 @@ def modelled(search: Search, kept: Sequence[Named], data: Data) -> Model:
     possible = tuple(is_possible(data.searched[0], own) for own in members)
     wanted = tuple(1.0 if each in data.faint else WORTH_IT for each in kept)
     if not all(possible):
-        return Model(weights, onsets, (), (), possible, negligible, wanted)
+        return Model(weights, onsets, (), (), possible, negligible, wanted, most)
     simulated = simulate_held_out(data.baselines, values)
     # What a sound machine has too is too little to be of use, and there nevertheless.
     worth = tuple(
         None if sound else worth_of(data.baselines, simulated, values, own)
         for own, sound in zip(members, negligible, strict=True)
     )
-    return Model(weights, onsets, simulated, worth, possible, negligible, wanted)
+    return Model(weights, onsets, simulated, worth, possible, negligible, wanted, most)
 
 
 def _allowed(measured: Measurement, candidate: Candidate, weights: Array, half: Array) -> Array:
@@ -148,6 +152,14 @@ def _parameters(
     if any(needs_refining(hypothesis.effect) for hypothesis in hypotheses):
         return refine(data.searched, hypotheses, data.noise, data.block, cut, data.supposed)
     return of_shafts(search.fits.weights(hypotheses), rows, data.block)
+
+
+def _in_all(
+    kept: Sequence[Named], weights: Weights, data: Data, cut: Cut
+) -> dict[Candidate, Array]:
+    """Return how large findings may be that have parts with other time constants."""
+    hypotheses = [each.hypothesis for each in kept]
+    return spectra(data.searched, hypotheses, weights, data.noise, data.block, cut, data.supposed)
 
 
 def _untrue(

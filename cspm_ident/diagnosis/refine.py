@@ -19,6 +19,7 @@ from cspm_ident.diagnosis.equation import Equation, in_noise, steady
 from cspm_ident.diagnosis.evidence import Evidence, gather
 from cspm_ident.diagnosis.hypothesis import Hypothesis, parts_of
 from cspm_ident.diagnosis.recorded import equations_of
+from cspm_ident.diagnosis.spectrum import most_in_all, with_spectrum
 from cspm_ident.diagnosis.sums import Sums
 from cspm_ident.diagnosis.supposed import settled, with_found
 from cspm_ident.diagnosis.weights import Weights, values_of, weights_of
@@ -65,12 +66,10 @@ def refine(
         near = [_near(effects[name], shape, factor) for name, shape in shapes.items()]
         try:
             values = {c: own for c, (own, _) in applied.items()}
-            moved = [settled(with_found(m, values)) for m in searched]
+            parts = cut(_about(searched, near, candidates, values, supposed))
         except InputError:
             # Such a machine cannot be; what was found before stays, with its interval.
             break
-        about = {c: own for c, own in supposed.items() if not _is_applied(c.effect)}
-        parts = cut([equations_of(m, near, touched=candidates, supposed=about) for m in moved])
         evidence = gather(in_noise(steady(parts), noise), block_s)
         shapes, found = _fitted(evidence, shapes, wanted, common)
         for candidate, (weights, half) in found.items():
@@ -82,6 +81,62 @@ def refine(
         if _is_settled(found):
             break
     return {c: applied.get(c, own) for c, own in found.items()}
+
+
+def spectra(
+    searched: Sequence[Measurement],
+    hypotheses: Sequence[Hypothesis],
+    found: Weights,
+    noise: Mapping[Place, Array],
+    block_s: float,
+    cut: Cut,
+    supposed: Mapping[Candidate, Array] = MappingProxyType({}),
+) -> dict[Candidate, Array]:
+    """Return how large effects that have a spectrum may be in all, where it can be told.
+
+    Args:
+        searched: the recordings.
+        hypotheses: what was named, with the catalogue's grids.
+        found: what `refine` returns.
+        noise: as of `refine`.
+        block_s: likewise.
+        cut: likewise.
+        supposed: likewise.
+    """
+    wanted = [c for c in found if c.effect.spectrum]
+    if not wanted:
+        return {}
+    longest = max(m.duration for m in searched)
+    shapes = {c.effect_id: c.nonlinear for c in found}
+    effects = [
+        with_spectrum(effect, shapes[effect.id], longest)
+        for effect in {h.effect.id: h.effect for h in hypotheses}.values()
+    ]
+    values = {c: own for c, (own, _) in found.items() if _is_applied(c.effect)}
+    try:
+        parts = cut(_about(searched, effects, list(found), values, supposed))
+    except InputError:
+        return {}
+    evidence = gather(in_noise(steady(parts), noise), block_s)
+    most = {c: most_in_all(evidence, c, [o for o in found if o != c]) for c in wanted}
+    return {c: own for c, own in most.items() if own is not None}
+
+
+def _about(
+    searched: Sequence[Measurement],
+    effects: Sequence[Effect],
+    candidates: Sequence[Candidate],
+    applied: Mapping[Candidate, Array],
+    supposed: Mapping[Candidate, Array],
+) -> list[Sequence[Equation]]:
+    """Return the equations of machines and readings that are corrected.
+
+    Raises:
+        InputError: such a machine cannot be.
+    """
+    moved = [settled(with_found(m, applied)) for m in searched]
+    about = {c: own for c, own in supposed.items() if not _is_applied(c.effect)}
+    return [equations_of(m, effects, touched=candidates, supposed=about) for m in moved]
 
 
 def _is_settled(found: Weights) -> bool:

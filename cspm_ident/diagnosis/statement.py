@@ -47,7 +47,8 @@ def numbers_of(diagnosis: Diagnosis, candidate: Candidate) -> list[Number]:
             Number(p.name, values[p.name], p.unit, p.minimum, p.maximum) for p in effect.parameters
         ]
     low = effect.values((weights - widths).tolist(), **candidate.nonlinear)
-    high = effect.values((weights + widths).tolist(), **candidate.nonlinear)
+    most = np.maximum(weights + widths, diagnosis.spectra.get(candidate, -np.inf))
+    high = effect.values(most.tolist(), **candidate.nonlinear)
     return [
         Number(
             p.name,

@@ -68,6 +68,7 @@ EFFECT = Effect(
     rest=_rest,
     regression=Regression(Channel.TENSION, _columns),
     nonlinear={"time_constant": (0.1, 0.3, 1.0, 3.0, 10.0, 30.0, 100.0, 300.0)},
+    spectrum="time_constant",
     equation="t = law(ε − e·l0/l0(0)), time_constant·de/dt = compliance·t − e, t without damping",
     shows="tension at fixed length falls slowly after a load step, and recovers after unloading",
     twins=("cable_hysteresis", "cable_stiffness"),

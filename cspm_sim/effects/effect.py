@@ -120,6 +120,8 @@ class Effect:
         partners: how the same coefficients show in further residuals at the same time.
         nonlinear: coarse grids, by name, of the parameters on which the columns depend otherwise
             than as a factor.
+        spectrum: of these the time constant of which a machine has many, its other number being a
+            share of theirs in all: the interval of that is told for their sum; empty: it has one.
         coefficients: from all parameters to the columns' weights; None: the parameters that are
             not nonlinear, in order, each less its absent value.
         from_coefficients: from weights and nonlinear values to all parameters; None: the inverse of
@@ -154,6 +156,7 @@ class Effect:
     regression: Regression
     partners: tuple[Regression, ...] = ()
     nonlinear: Mapping[str, tuple[float, ...]] = field(default_factory=dict)
+    spectrum: str = ""
     coefficients: Callable[[Values], Sequence[float]] | None = None
     from_coefficients: Callable[[Sequence[float], Values], dict[str, float]] | None = None
     kernels: Mapping[Hook, Callable[..., None]] = field(default_factory=dict)

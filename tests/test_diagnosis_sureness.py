@@ -10,7 +10,7 @@ from cspm_ident.diagnosis.drivers import Driver, Knots
 from cspm_ident.diagnosis.equation import Equation
 from cspm_ident.diagnosis.evidence import gather
 from cspm_ident.diagnosis.fits import Fits
-from cspm_ident.diagnosis.hypothesis import Hypothesis, boldness, is_spread, unusual
+from cspm_ident.diagnosis.hypothesis import Hypothesis, boldness, is_spread, may_be_none, unusual
 from cspm_ident.diagnosis.search import Search
 from cspm_ident.diagnosis.sums import Gain, Sums
 from cspm_ident.diagnosis.sureness import FALSE_ALARMS, Sureness
@@ -289,3 +289,25 @@ def test_a_beginning_has_to_be_worth_more_than_nothing_too():
     always, late = Hypothesis(DRY, (dry,)), Hypothesis(DRY, (dry,), onset=4)
     assert boldness(late) == boldness(late, always) > boldness(always) == 0.0
     assert boldness(late, late) == 0.0
+
+
+@pytest.mark.parametrize(
+    ("weights", "half", "none"),
+    [
+        ([0.13, -1.0], [0.33, 2.0], True),
+        ([0.13, -1.0], [0.33, 0.9], False),
+        ([0.13, -1.0], [0.12, 2.0], False),
+        # Too few data for an interval say nothing against a finding.
+        ([0.13, -1.0], [np.inf, 2.0], False),
+    ],
+)
+def test_what_may_be_none_has_only_intervals_that_hold_zero(weights, half, none):
+    load = Candidate(catalogue()["bar_mass"], "bar")
+    wind = Candidate(catalogue()["bar_constant_wrench"], "bar")
+    found = {
+        load: (np.array(weights[:1]), np.array(half[:1])),
+        wind: (np.array(weights[1:]), np.array(half[1:])),
+    }
+    both = Hypothesis(load.effect, (load, wind))
+    assert may_be_none(found, both) is none
+    assert not may_be_none({}, both)

@@ -153,6 +153,14 @@ def may_be_negligible(weights: Mapping[Candidate, tuple[Array, Array]]) -> bool:
     return is_negligible(least)
 
 
+def may_be_none(weights: Mapping[Candidate, tuple[Array, Array]], hypothesis: Hypothesis) -> bool:
+    """Return whether weights with half their intervals all may be zero, where they have any."""
+    own = [weights[c] for c in hypothesis.candidates if c in weights]
+    return bool(own) and all(
+        bool(np.all(np.abs(w) <= half) and np.all(np.isfinite(half))) for w, half in own
+    )
+
+
 def bounded(candidate: Candidate, weights: Array, half: Array) -> Array:
     """Return weights with those moved to their bound that lie beyond it by chance.
 

@@ -27,6 +27,7 @@ from cspm_ident.diagnosis.hypothesis import (
     is_spread,
     is_wider,
     joined,
+    may_be_none,
     shapes_of,
 )
 from cspm_ident.diagnosis.likeness import SIMPLER_SHARE, UNTRUE_SHARE
@@ -157,17 +158,21 @@ class Search:
     def _needless(self, chosen: Sequence[Hypothesis]) -> int | None:
         """Return which is the weakest that is not surely there beside the others, if any.
 
-        Nor is what gains no more than the others may be untrue by where it shows; clocks of a sound
-        machine are true. What is late is needed where other readings would be early without it.
+        Nor is what gains no more than the others may be untrue by where it shows, clocks of a sound
+        machine being true, nor of what all numbers may be none. What is late is needed where other
+        readings would be early without it.
         """
+        weights = self.fits.weights(chosen) if len(chosen) > 1 else {}
         gains = [self._gain(hypothesis, chosen) for hypothesis in chosen]
         own = [self.fits.own_columns(hypothesis) for hypothesis in chosen]
         untrue = [i for i, h in enumerate(chosen) if not self.fits.is_negligible(h, chosen)]
         for k in np.argsort([gain.total for gain in gains]):
             beside = (i for i in untrue if i != k)
             taken = sum(gains[i].total for i in beside if self.evidence.meet(own[k], own[i]))
-            needless = gains[k].total <= UNTRUE_SHARE * taken or not self._is_there(
-                chosen[k], self._others(chosen[k], chosen), gains[k], chosen
+            needless = (
+                gains[k].total <= UNTRUE_SHARE * taken
+                or (k in untrue and may_be_none(weights, chosen[k]))
+                or not self._is_there(chosen[k], self._others(chosen[k], chosen), gains[k], chosen)
             )
             rest = [h for h in chosen if h is not chosen[k]]
             if needless and (self.fits.are_early(chosen) or not self.fits.are_early(rest)):

@@ -63,6 +63,12 @@ def test_a_clock_that_does_not_drift_and_machines_with_a_bar_are_left_alone(rig,
     assert on_drives_clock(blind) is blind
 
 
+def test_too_short_a_recording_tells_no_drift(rig):
+    short = rig.within(5.0, 5.06)
+    assert cell_drift(short) is None
+    assert on_drives_clock(short) is short
+
+
 @pytest.mark.slow
 def test_a_sound_rig_with_clocks_of_its_own_is_consistent(rig):
     found = diagnose([drifting(rig, 6e-6)])

@@ -21,6 +21,8 @@ _SOUND = 2.5e-5
 # What clocks do to a rope's torque in a recording is no more than this is long [s].
 _LEAST_S = 2e-6
 _NOTHING, _RANK = 1e-300, 1e-9
+# Rows that tell a drift beside the rest.
+_FEWEST = 16
 
 
 def on_drives_clock(measurement: Measurement) -> Measurement:
@@ -46,7 +48,8 @@ def cell_drift(measurement: Measurement) -> ClockDrift | None:
     own = settled(measurement)
     names = own.machine.cable_names
     equations = shaft_equations(own, [_lateness()], read_actions(own.machine), None, names)
-    records = [_record(each.steady) for each in equations]
+    rows = [each.steady for each in equations]
+    records = [_record(each) for each in rows if len(each.times) >= _FEWEST]
     if not records:
         return None
     estimate = fit_linear(records, [Parameter("drift", "1", scale=_SOUND)], whiten=False).estimate

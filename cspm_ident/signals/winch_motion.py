@@ -68,7 +68,7 @@ def _turned(times: Array, speeds: Array) -> CubicHermiteSpline:
     rig's sensors show.
     """
     steps = np.diff(times)
-    bends = np.diff(np.gradient(speeds, times)) if len(times) > 1 else steps
+    bends = np.diff(np.gradient(speeds, times))
     parts = 0.5 * steps * (speeds[1:] + speeds[:-1]) - steps**2 / 12.0 * bends
     return CubicHermiteSpline(times, np.concatenate([[0.0], np.cumsum(parts)]), speeds)
 

@@ -177,11 +177,15 @@ def turned(files, turn):
 
 @pytest.hookimpl(trylast=True)
 def pytest_collection_modifyitems(items):
-    """Begin slow tests with another file each turn, so that where time is short all have theirs."""
+    """Begin slow tests with another file each turn, so that where time is short all have theirs.
+
+    But for what no run may be without.
+    """
     turn = int(os.environ.get("CSPM_SLOW_TESTS_TURN", "0"))
     files = list(dict.fromkeys(item.path for item in items if item.get_closest_marker("slow")))
     place = {path: i for i, path in enumerate(turned(files, turn))}
-    items.sort(key=lambda item: place.get(item.path, -1))
+    early = {item.path for item in items if item.get_closest_marker("early")}
+    items.sort(key=lambda item: -1 if item.path in early else place.get(item.path, -1))
 
 
 def pytest_runtest_setup(item):

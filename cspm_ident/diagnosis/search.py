@@ -159,8 +159,8 @@ class Search:
         """Return which is the weakest that is not surely there beside the others, if any.
 
         Nor is what gains no more than the others may be untrue by where it shows, clocks of a sound
-        machine being true, nor of what all numbers may be none. What is late is needed where other
-        readings would be early without it.
+        machine being true, nor what the others hide, so that all its numbers may be none. What is
+        late is needed where other readings would be early without it.
         """
         weights = self.fits.weights(chosen) if len(chosen) > 1 else {}
         gains = [self._gain(hypothesis, chosen) for hypothesis in chosen]
@@ -171,13 +171,24 @@ class Search:
             taken = sum(gains[i].total for i in beside if self.evidence.meet(own[k], own[i]))
             needless = (
                 gains[k].total <= UNTRUE_SHARE * taken
-                or (k in untrue and may_be_none(weights, chosen[k]))
+                or (
+                    k in untrue
+                    and may_be_none(weights, chosen[k])
+                    and self._is_hidden(chosen[k], chosen)
+                )
                 or not self._is_there(chosen[k], self._others(chosen[k], chosen), gains[k], chosen)
             )
             rest = [h for h in chosen if h is not chosen[k]]
             if needless and (self.fits.are_early(chosen) or not self.fits.are_early(rest)):
                 return int(k)
         return None
+
+    def _is_hidden(self, hypothesis: Hypothesis, chosen: Sequence[Hypothesis]) -> bool:
+        """Return whether others say nearly the same as a part of a hypothesis."""
+        others = [self.fits.own_columns(h) for h in chosen if h is not hypothesis]
+        own = self.fits.own_columns(hypothesis)
+        spanned = self.sums.spanned(self.evidence.nuisance, np.concatenate(others), own)
+        return bool(np.any(spanned > _SAME))
 
     def _is_there(
         self, hypothesis: Hypothesis, base: Index, gain: Gain, chosen: Sequence[Hypothesis]

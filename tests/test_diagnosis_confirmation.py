@@ -1,16 +1,27 @@
 """What data that were not searched say of a finding."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
+from run_samples import bundle_of
 
+from cspm_bringup.run import run
 from cspm_ident.diagnosis.columns import Candidate, Place
 from cspm_ident.diagnosis.confirmation import confirmed
+from cspm_ident.diagnosis.diagnose import diagnose
 from cspm_ident.diagnosis.equation import Equation
 from cspm_ident.diagnosis.evidence import gather
 from cspm_ident.diagnosis.search import Search
+from cspm_ident.diagnosis.verdict import diagnosis_data
+from cspm_ident.signals.measurement import read_measurement
+from cspm_msgs_py.testbed import parse_testbed
 from cspm_sim.effects import Channel, catalogue
 
 ROWS, STEP, BLOCK_S = 2400, 0.01, 0.5
+AIR = """  - effect: bar_quadratic_drag
+    parameters: {surge: 40.0, sway: 40.0, heave: 0.0, roll: 0.0, pitch: 0.0, yaw: 0.0}
+"""
 DRAG = Candidate(catalogue()["winch_viscous_friction"], "surge_1")
 
 
@@ -27,23 +38,23 @@ def winch(weight, loud=1.0, rows=ROWS, seed=1):
 
 
 @pytest.mark.parametrize(
-    ("weight", "loud", "kept", "faint"),
+    ("weight", "loud", "kept", "faint", "untold"),
     [
-        (1.0, 1.0, True, False),
+        (1.0, 1.0, True, False, False),
         # Where it moves a fifth as much it takes two hundredths, which is what it should.
-        (1.0, 0.2, True, True),
+        (1.0, 0.2, True, True, False),
         # There it takes none though it should.
-        (0.0, 0.2, False, False),
-        (0.0, 1.0, False, False),
+        (0.0, 0.2, False, False, False),
+        (0.0, 1.0, False, False, False),
         # It moves so little that what it takes says nothing.
-        (1.0, 0.02, False, False),
+        (1.0, 0.02, False, False, True),
     ],
 )
-def test_a_finding_stands_by_what_it_should_take(weight, loud, kept, faint):
+def test_a_finding_stands_by_what_it_should_take(weight, loud, kept, faint, untold):
     search = Search(winch(1.0))
     found = search.run().named
     stood = confirmed(search.fits, winch(weight, loud, seed=2), found)
-    assert [len(each) for each in stood] == [kept, faint, not kept]
+    assert [len(each) for each in stood] == [kept, faint, not kept and not untold, untold]
 
 
 def test_of_several_findings_those_stand_that_are_confirmed():
@@ -51,3 +62,21 @@ def test_of_several_findings_those_stand_that_are_confirmed():
     (found,) = search.run().named
     assert confirmed(search.fits, winch(-1.0, seed=2), [found]).rejected == (found,)
     assert confirmed(search.fits, winch(1.0, seed=2), []).kept == ()
+
+
+@pytest.mark.slow
+def test_drag_of_a_bar_that_has_come_to_rest_is_doubtful_behind_the_unknown(tmp_path):
+    """In the last three tenths of a minute a plucked bar shows nothing, which confirms nothing."""
+    bundle = bundle_of("verification_mid", "duration=60")
+    air = parse_testbed(bundle.testbed.text + AIR, "in air")
+    assert not run(replace(bundle, testbed=air), tmp_path / "plucked").failure
+    measured = read_measurement(tmp_path / "plucked").with_testbed(bundle.testbed)
+    found = diagnosis_data(diagnose([measured]))
+    assert found["verdict"] == "unknown"
+    effects = [each["effect"] for each in found["findings"]]
+    assert effects[0] == "unknown"
+    (told,) = (each for each in found["findings"] if each["effect"] == "bar_quadratic_drag")
+    assert told["probability"] < 0.1
+    assert "Doubtful" in told["statement"]
+    surge = next(p for p in told["parameters"] if p["name"] == "surge")
+    assert surge["value"] == pytest.approx(40.0, rel=0.02)

@@ -261,8 +261,8 @@ def _fit(
 
     Others are not what is to be mended.
     """
-    where = {e for each in item["concealed"] for e in _shown_in(each)}
-    own = [r for r in residuals if where & set(r["channel"].split("/"))]
+    shown = [place for each in item["concealed"] for place in _shown_in(each)]
+    own = [r for r in residuals if any(_is_of(r["channel"], *place) for place in shown)]
     found = []
     for residual in own or residuals:
         stages, floor = residual["held_out"], floors.get((item["scenario"], residual["channel"]))
@@ -273,9 +273,20 @@ def _fit(
     return max(found, default=None)
 
 
-def _shown_in(concealed: Data) -> set[str]:
-    """Return the parts whose residuals show something: its elements, or the bar that it moves."""
+# How residuals begin in which effects show, where it is one; a sensor's fault shows in several.
+_RESIDUALS = {Channel.SHAFT: "winches/torque/", Channel.TENSION: "cables/tension/"}
+
+
+def _shown_in(concealed: Data) -> list[tuple[str, str]]:
+    """Return the residuals that show something: how they begin, and whose they are."""
     effect = catalogue().get(concealed["effect"] or "")
-    if effect is not None and effect.regression.channel is Channel.WRENCH:
-        return {"bar"}
-    return {"bar" if element == "winch_frame" else element for element in concealed["elements"]}
+    channel = None if effect is None else effect.regression.channel
+    if channel is Channel.WRENCH:
+        return [("bar/", "bar")]
+    elements = {"bar" if element == "winch_frame" else element for element in concealed["elements"]}
+    begins = _RESIDUALS.get(channel, "") if channel is not None else ""
+    return [(begins, element) for element in elements]
+
+
+def _is_of(channel: str, begins: str, element: str) -> bool:
+    return channel.startswith(begins) and element in channel.split("/")

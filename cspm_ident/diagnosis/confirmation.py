@@ -32,11 +32,13 @@ class Confirmed(NamedTuple):
         kept: what stands.
         faint: of that, what they show too little of to say how much better they are explained.
         rejected: what does not stand.
+        untold: what they can say nothing of, as where a plucked bar has come to rest.
     """
 
     kept: tuple[Named, ...]
-    faint: tuple[Named, ...]
-    rejected: tuple[Named, ...]
+    faint: tuple[Named, ...] = ()
+    rejected: tuple[Named, ...] = ()
+    untold: tuple[Named, ...] = ()
 
 
 def confirmed(fits: Fits, judge: Evidence, found: Sequence[Named]) -> Confirmed:
@@ -50,7 +52,7 @@ def confirmed(fits: Fits, judge: Evidence, found: Sequence[Named]) -> Confirmed:
         judge: sums of what was not.
         found: the findings.
     """
-    kept, faint = list(found), []
+    kept, faint, untold = list(found), [], []
     for each in found:
         whole = fits.values([other.hypothesis for other in kept])
         own = set(each.hypothesis.candidates)
@@ -61,8 +63,10 @@ def confirmed(fits: Fits, judge: Evidence, found: Sequence[Named]) -> Confirmed:
             faint.append(each)
         else:
             kept.remove(each)
-    rejected = tuple(each for each in found if each not in kept)
-    return Confirmed(tuple(kept), tuple(faint), rejected)
+            if lowered.says_nothing:
+                untold.append(each)
+    rejected = tuple(each for each in found if each not in kept and each not in untold)
+    return Confirmed(tuple(kept), tuple(faint), rejected, tuple(untold))
 
 
 class _Lowered:
@@ -97,9 +101,20 @@ class _Lowered:
     @property
     def as_expected(self) -> bool:
         """Whether it could not take much of any, and surely takes of all what it should."""
-        if np.any(self._expected > MATERIAL_SHARE * self._without):
+        if self._could_take_much or not self._shows:
             return False
-        expected = self._expected.sum()
+        return bool(self._taken.sum() >= _AS_EXPECTED * self._expected.sum())
+
+    @property
+    def says_nothing(self) -> bool:
+        """Whether it could take neither much of any nor, surely, anything of all."""
+        return not self._could_take_much and not self._shows
+
+    @property
+    def _could_take_much(self) -> bool:
+        return bool(np.any(self._expected > MATERIAL_SHARE * self._without))
+
+    @property
+    def _shows(self) -> bool:
         per_row = float(self._expected @ (self._without / np.maximum(self._rows, 1)))
-        shows = expected**2 >= _LEAST_EXPECTED * per_row
-        return bool(shows and self._taken.sum() >= _AS_EXPECTED * expected)
+        return bool(self._expected.sum() ** 2 >= _LEAST_EXPECTED * per_row)

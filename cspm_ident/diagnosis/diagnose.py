@@ -29,6 +29,7 @@ from cspm_ident.diagnosis.hypothesis import (
     Unknown,
 )
 from cspm_ident.diagnosis.judgement import HeldOut, free_functions, judged
+from cspm_ident.diagnosis.likeness import RIVAL_SHARE
 from cspm_ident.diagnosis.limits import Limit, detection_limits
 from cspm_ident.diagnosis.lines import Line
 from cspm_ident.diagnosis.look import Parts, Progress, Recordings, hums_of, searched_for
@@ -141,11 +142,14 @@ def diagnose(
     progress("held-out data")
     judge = _judge(in_noise(judge_parts, noise), found, block)
     search_parts, judge_parts = _found_only(search_parts, found), _found_only(judge_parts, found)
-    kept, faint, rejected = Confirmed(found.named, (), ())
+    kept, faint, rejected, untold = Confirmed(found.named)
     if safeguards.held_out:
-        kept, faint, rejected = confirmed(search.fits, judge, found.named)
+        kept, faint, rejected, untold = confirmed(search.fits, judge, found.named)
     rows = in_noise(search_parts, noise)
     kept, fed_back = _asked_for(search, kept, searched, rows, block)
+    doubted = _doubted(search, kept, untold, rejected, fed_back)
+    rejected += tuple(each for each in untold if each not in doubted)
+    kept, faint = (*kept, *doubted), (*faint, *doubted)
     starts = [span_of(part)[0] for part in judge_parts]
     retuned = search.retuned()
     searched_part: Cut = whole_part if held_out else first_part
@@ -157,9 +161,10 @@ def diagnose(
         rejected += tuple(kept[k] for k in model.useless)
         kept = tuple(each for k, each in enumerate(kept) if k not in model.useless)
         model = modelled(search, kept, data)
+    sure = tuple(each for each in kept if each not in doubted)
     unknown = found.unknown
-    if rejected or fed_back:
-        unknown = _unknown(search, kept, rejected, fed_back)
+    if rejected or fed_back or doubted:
+        unknown = _unknown(search, sure, (*rejected, *doubted), fed_back)
     values = {c: w for c, (w, _) in model.weights.items()}
     first = _first_weights(search, kept)
     told = [k for k, negligible in enumerate(model.negligible) if not negligible]
@@ -175,7 +180,7 @@ def diagnose(
         ),
         model.simulated,
         tuple(model.worth[k] for k in told),
-        _shapes(search, kept, knots, [each[0] for each in unknown]),
+        _shapes(search, sure, knots, [each[0] for each in unknown]),
         _lasting(hums, searched, search_parts, values),
         tuple(model.onsets[k] for k in told),
         tuple(region_of(data.rows, kept[k].hypothesis.candidates, first) for k in told),
@@ -250,6 +255,25 @@ def _asked_for(
     told = [stays(each) for each in kept]
     gone = (each for each, stay in zip(kept, told, strict=True) if not stay)
     return tuple(compress(kept, told)), tuple(gone)
+
+
+def _doubted(
+    search: Search,
+    kept: Sequence[Named],
+    untold: Sequence[Named],
+    rejected: Sequence[Named],
+    fed_back: Sequence[Named],
+) -> tuple[Named, ...]:
+    """Return what is told as doubtful, though data that were not searched say nothing of it.
+
+    It explains as much as what without it is unknown, of which they say nothing either.
+    """
+    if not untold:
+        return ()
+    unknown = _unknown(search, kept, (*rejected, *untold), fed_back)
+    most = RIVAL_SHARE * max((gain.total for _, gain, _ in unknown), default=np.inf)
+    beside = Findings((), unknown, 0)
+    return tuple(e for e in untold if e.gain.total >= most and beside.is_doubtful(e))
 
 
 def _unknown(

@@ -77,6 +77,8 @@ def _wider(
     """Yield wider forms of a finding that surely explain more, the best of each effect."""
     own, others = named.hypothesis, [h for h in chosen if h is not named.hypothesis]
     evidence = gather([[e.only(_Candidates()) for e in part] for part in rows], block_s)
+    if any(candidate not in evidence.slices for candidate in own.candidates):
+        return
     fits = Fits(evidence, summed(evidence))
     beside = [h for h in (_within(evidence, h) for h in others) if h is not None]
     base, columns = fits.columns(beside), fits.own_columns(own)

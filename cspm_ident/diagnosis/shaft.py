@@ -165,7 +165,7 @@ class _Shaft:
                 yield Candidate(effect, name), self._read(effect)
 
     def _regressed(self, effect: Effect, shape: dict[str, float]) -> Array:
-        return self._weighed(effect.regressors(self._rows, **shape)[:, 0])
+        return self._averaged(effect.regressors(self._rows, **shape)[:, 0])
 
     def _read(self, effect: Effect) -> Array:
         """Return what a sensor's fault makes of the residual, by the reading's share in it."""
@@ -174,7 +174,7 @@ class _Shaft:
         reading = reading_rows(self._rows[:, WinchSignal.TIME], self._rows[:, source])
         change = effect.regressors(reading)[:, 0]
         if tension:
-            return self._weighed(-self._rows[:, WinchSignal.RADIUS, None] * change)
+            return self._averaged(-self._rows[:, WinchSignal.RADIUS, None] * change)
         return -self._inertia * self._accelerated(change)
 
     def _weighed(self, values: Array) -> Array:

@@ -52,19 +52,22 @@ def with_wider(
 
 
 def _reversing(hypothesis: Hypothesis, parts: Parts) -> list[list[Equation]]:
-    """Return the winches' equations that a finding acts in, if their shafts turn round."""
+    """Return the winches' equations that a finding acts in, if their shafts turn round.
+
+    Without free functions.
+    """
     effect = hypothesis.effect
     if effect.regression.channel is not Channel.SHAFT or is_number(hypothesis) or hypothesis.onset:
         return []
     own = [
-        [e for e in part if e.place.channel is Channel.SHAFT and e.place.element in _of(hypothesis)]
+        [
+            e.only({term for term in e.columns if isinstance(term, Candidate)})
+            for e in part
+            if e.place.channel is Channel.SHAFT and e.place.element in hypothesis.elements
+        ]
         for part in parts
     ]
     return own if any(e.turning.any() for part in own for e in part) else []
-
-
-def _of(hypothesis: Hypothesis) -> set[str]:
-    return set(hypothesis.elements)
 
 
 def _wider(
@@ -76,7 +79,7 @@ def _wider(
 ) -> Iterator[Hypothesis]:
     """Yield wider forms of a finding that surely explain more, the best of each effect."""
     own, others = named.hypothesis, [h for h in chosen if h is not named.hypothesis]
-    evidence = gather([[e.only(_Candidates()) for e in part] for part in rows], block_s)
+    evidence = gather(rows, block_s)
     if any(candidate not in evidence.slices for candidate in own.candidates):
         return
     fits = Fits(evidence, summed(evidence))
@@ -95,13 +98,6 @@ def _wider(
     yield from (form for _, form in best.values())
 
 
-class _Candidates:
-    """All candidates, and no free function."""
-
-    def __contains__(self, term: object) -> bool:
-        return isinstance(term, Candidate)
-
-
 def _within(evidence: Evidence, hypothesis: Hypothesis) -> Hypothesis | None:
     """Return what of a hypothesis has columns here."""
     there = tuple(c for c in hypothesis.candidates if c in evidence.slices)
@@ -112,7 +108,7 @@ def _forms(evidence: Evidence, hypothesis: Hypothesis) -> Iterator[Hypothesis]:
     """Yield all effects of more numbers, with each shape, on the hypothesis's elements."""
     groups: dict[tuple[str, tuple[tuple[str, float], ...]], list[Candidate]] = {}
     for term in evidence.terms:
-        if isinstance(term, Candidate) and term.element in _of(hypothesis):
+        if isinstance(term, Candidate) and term.element in hypothesis.elements:
             groups.setdefault((term.effect_id, term.shape), []).append(term)
     for members in groups.values():
         form = Hypothesis(members[0].effect, tuple(members))

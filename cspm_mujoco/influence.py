@@ -70,3 +70,13 @@ class Influence(Protocol):
 
     def advance(self, scene: Scene, period: float) -> None:
         """Bring its memory to the end of a period [s] that ended in this scene."""
+
+
+class Drive(Protocol):
+    """What lies between the torque that is commanded and the torque of the motors."""
+
+    def deliver(self, command: Array) -> Array:
+        """Return the torque (n,) [N·m] at an instant at which a command (n,) [N·m] is given."""
+
+    def advance(self, command: Array, period: float) -> None:
+        """Bring its memory to the end of a period [s] for which a command is held."""

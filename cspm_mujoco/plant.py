@@ -12,7 +12,7 @@ from cspm_msgs_py.errors import DivergenceError, InputError
 from cspm_msgs_py.testbed import Testbed
 from cspm_mujoco.exertion import RADIUS, cable_row, exert, turning
 from cspm_mujoco.extras import find_extras
-from cspm_mujoco.influence import Acting, Influence, Scene
+from cspm_mujoco.influence import Acting, Drive, Influence, Scene
 from cspm_mujoco.machine import BAR_BODY, build_model
 from cspm_mujoco.rest import hanging_roll, holding_tensions, pulls, resting_lengths
 
@@ -43,6 +43,7 @@ class MujocoPlant:
         locked: bool = False,
         substeps: int = 1,
         influences: Sequence[Influence] = (),
+        drive: Drive | None = None,
     ) -> None:
         """Put the machine at rest in equilibrium.
 
@@ -56,6 +57,7 @@ class MujocoPlant:
             locked: hold all motors still.
             substeps: MuJoCo's steps per period.
             influences: physics beside the test-bed's; none of them acts at rest.
+            drive: what lies between command and torque; None: nothing but the limits.
 
         Raises:
             InputError: the test-bed has a bar and no pose for it, an effect that this plant does
@@ -74,6 +76,7 @@ class MujocoPlant:
         self._radii = self._rows[:, RADIUS].copy()
         self._drag, self._across = extras.drag, extras.across
         self._influences = tuple(influences)
+        self._drive = drive
         self._acting = Acting(n)
         self._acting.radius[:] = self._radii
         self._limits = np.array([cable.torque_limit for cable in testbed.cables])
@@ -144,7 +147,7 @@ class MujocoPlant:
             name = self.testbed.cable_names[int(np.argmin(np.isfinite(torque)))]
             raise DivergenceError(f"t = {self.time:.3f} s: torque of {name} is not finite")
         if not self._locked:
-            self._torque[:] = torque
+            self._torque[:] = self.applied_torque(torque)
         self._data.time = self.time
         before = mujoco.get_mjcb_control()
         mujoco.set_mjcb_control(self._at_stage)
@@ -158,11 +161,18 @@ class MujocoPlant:
         self.frame[:] = self._motion(self.time)
         self._check_finite()
         self._observe()
+        period = self.period_ns * 1e-9
         for influence in self._influences:
-            influence.advance(self.scene(self.time), self.period_ns * 1e-9)
+            influence.advance(self.scene(self.time), period)
+        if self._drive is not None:
+            self._drive.advance(self._limited(torque), period)
 
     def applied_torque(self, torque: Array) -> Array:
-        """Return what the drives deliver for a torque command, (n,) [N·m]: the limits applied."""
+        """Return what the drives deliver at this instant for a torque command, (n,) [N·m]."""
+        limited = self._limited(torque)
+        return limited if self._drive is None else self._drive.deliver(limited)
+
+    def _limited(self, torque: Array) -> Array:
         return np.asarray(np.clip(torque, -self._limits, self._limits))
 
     def _at_stage(self, model: object, data: object) -> None:

@@ -26,12 +26,17 @@ from cspm_reality.rope import elongations
 Array = NDArray[np.float64]
 
 _STILL = 1e-9
+# For which a command is held [s]: a drive that is late by less shows it as one period.
+_HELD = 1e-3
+# By this much clocks run apart that nothing disciplines: quartz, without being a fault.
+_QUARTZ = 25e-6
 
 
 class Noise(NamedTuple):
     """Standard deviations of one reading.
 
     Attributes:
+        drive: of a drive's torque [N·m].
         shaft: of the torque that a shaft's equation misses, (n,) [N·m].
         tension: of measured tension less that of the cable's law, (n,) [N].
         cell: of a load cell as torque and radius show it, (n,) [N].
@@ -40,6 +45,7 @@ class Noise(NamedTuple):
         position: of a body [m].
     """
 
+    drive: float
     shaft: Array
     tension: Array
     cell: Array
@@ -100,12 +106,12 @@ def noise_of(machine: Testbed, slopes: Array) -> Noise:
     winches = machine.sensors["/winches/state"]
     cell = machine.sensors["/cables/tension"].noise[0]
     radii = shaft_radii(machine)
-    torque = np.hypot(winches.noise[2], winches.resolution[2] / np.sqrt(12.0))
+    torque = float(np.hypot(winches.noise[2], winches.resolution[2] / np.sqrt(12.0)))
     arms = np.linalg.norm([cable.attachment or (0.0, 0.0, 0.0) for cable in machine.cables])
     shaft = np.hypot(torque, radii * cell)
     tension = np.hypot(cell, slopes * position)
     force = cell * float(np.sqrt(len(radii)))
-    return Noise(shaft, tension, shaft / radii, force, cell * float(arms), position)
+    return Noise(torque, shaft, tension, shaft / radii, force, cell * float(arms), position)
 
 
 def rms(values: Array) -> Array:
@@ -123,13 +129,14 @@ def _shown(
     """Return signature over noise per unit of amount, (n,) or a number."""
     if phenomenon.alter is not None:
         return _NUMBERS[phenomenon.name](scenes, machine, slopes, noise)
-    if phenomenon.faults is not None:
+    if phenomenon.faults is not None or phenomenon.clocks is not None:
         return _READINGS[phenomenon.name](scenes, machine, slopes, noise)
+    if phenomenon.drive is not None:
+        return _lagging(scenes, noise)
     shaft, tension, force = signatures(phenomenon, scenes, machine, slopes)
-    if phenomenon.at == CABLES:
-        own = np.maximum(rms(shaft) / noise.shaft, rms(tension) / noise.tension)
-        return np.asarray(np.maximum(own, force / noise.force))
-    return np.asarray(np.max(force) / noise.force)
+    own = np.maximum(rms(shaft) / noise.shaft, rms(tension) / noise.tension)
+    shown = np.maximum(own, force / noise.force)
+    return np.asarray(shown if phenomenon.at == CABLES else np.max(shown))
 
 
 def signatures(
@@ -263,6 +270,19 @@ def _late(scenes: Sequence[Scene], machine: Testbed, slopes: Array, noise: Noise
     return np.asarray(np.linalg.norm(rms(velocity)) / noise.position)
 
 
+def _skewed(scenes: Sequence[Scene], machine: Testbed, slopes: Array, noise: Noise) -> Array:
+    times = np.array([scene.time for scene in scenes])
+    velocity = np.array([scene.body[3:6] - scene.frame[3:6] for scene in scenes])
+    shown = np.linalg.norm(rms(times[:, None] * velocity)) / noise.position
+    return np.asarray(min(shown, 1.0 / _QUARTZ))
+
+
+def _lagging(scenes: Sequence[Scene], noise: Noise) -> Array:
+    times = np.array([scene.time for scene in scenes])
+    torques = np.array([scene.torque for scene in scenes])
+    return np.minimum(rms(np.gradient(torques, times, axis=0)) / noise.drive, 1.0 / _HELD)
+
+
 def _shifted(scenes: Sequence[Scene], machine: Testbed, slopes: Array, noise: Noise) -> Array:
     tension = np.max(rms(tension_changes(scenes, slopes)) / noise.tension)
     wrenches = wrench_changes(scenes)
@@ -285,6 +305,7 @@ _READINGS = {
     "cell scale": _cell_scale,
     "encoder counts": _counts,
     "late tracker": _late,
+    "fast clock": _skewed,
     "shifted markers": _shifted,
 }
 

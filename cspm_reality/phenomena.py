@@ -9,8 +9,9 @@ from numpy.typing import NDArray
 
 from cspm_msgs_py.testbed import Testbed
 from cspm_mujoco.influence import Influence
-from cspm_reality import air, alterations, faults, friction, payload, rope, shaft
-from cspm_reality.phenomenon import BAR, FRAME, Phenomenon
+from cspm_reality import air, alterations, drive, faults, frame, friction, payload, rope, shaft
+from cspm_reality.heavy_rope import THREAD, HeavyRope
+from cspm_reality.phenomenon import BAR, CAPTURE, FRAME, Phenomenon
 from cspm_reality.sensors import Fault
 
 Array = NDArray[np.float64]
@@ -77,6 +78,10 @@ _WINCHES = (
         unit=1e-2, influence=_plain(shaft.TorqueGain), base=1.0, signed=True,
     ),
     Phenomenon(
+        "slow drive", "winch_torque_lag", "winch", None,
+        unit=1e-3, drive=drive.SlowDrive,
+    ),
+    Phenomenon(
         "runout", "winch_drum_eccentricity", "winch", "eccentricity", unit=1e-4,
         influence=lambda a, m, g: shaft.DrumRunout(a, _ratios(m), _phase(g)),
     ),
@@ -104,6 +109,14 @@ _CABLES = (
         unit=0.1, influence=_plain(rope.SegmentDrag),
     ),
     Phenomenon(
+        "drag on strings", "cable_transverse_damping", "cable", "coefficient", unit=0.1,
+        influence=lambda a, m, g: HeavyRope(np.where(a > 0.0, THREAD, 0.0), a, 0.0),
+    ),
+    Phenomenon(
+        "hanging rope", "cable_sag", "cable", "linear_density", unit=5e-3,
+        influence=lambda a, m, g: HeavyRope(a, np.zeros(len(a)), m.gravity),
+    ),
+    Phenomenon(
         "slip on the drum", None, "winch", None,
         unit=1e-3, influence=_on_radii(rope.DrumSlip), driver="time",
     ),
@@ -113,7 +126,7 @@ _CABLES = (
     ),
 )  # fmt: skip
 
-_BAR = (
+_BODIES = (
     Phenomenon(
         "air", "bar_quadratic_drag", "bar", "sway", at=BAR, unit=1.0,
         influence=lambda a, m, g: air.StripDrag(
@@ -131,6 +144,10 @@ _BAR = (
     Phenomenon(
         "strapped load", "payload_swing", "bar", "mass", at=BAR, unit=0.1,
         influence=lambda a, m, g: payload.StrappedLoad(float(a[0]), m.gravity),
+    ),
+    Phenomenon(
+        "yielding frame", "frame_flexibility", "frame", "compliance", at=FRAME, unit=1e-5,
+        influence=lambda a, m, g: frame.YieldingFrame(float(a[0])),
     ),
 )  # fmt: skip
 
@@ -152,8 +169,12 @@ _SENSORS = (
         faults=lambda a: {"/winches/state": faults.EncoderCounts(a)},
     ),
     Phenomenon(
-        "late tracker", "pose_delay", "sensor", "delay", at=FRAME, unit=1e-3,
+        "late tracker", "pose_delay", "sensor", "delay", at=CAPTURE, unit=1e-3,
         faults=lambda a: {topic: faults.FilteredDelay(float(a[0])) for topic in POSES},
+    ),
+    Phenomenon(
+        "fast clock", "clock_skew", "sensor", "skew", at=CAPTURE, unit=1e-5, signed=True,
+        clocks=lambda a: dict.fromkeys(POSES, float(a[0])),
     ),
     Phenomenon(
         "shifted markers", "pose_offset", "sensor", "sway", at=BAR, unit=1e-4, signed=True,
@@ -193,5 +214,5 @@ _NUMBERS = (
 )  # fmt: skip
 
 PHENOMENA: Mapping[str, Phenomenon] = {
-    each.name: each for each in (*_WINCHES, *_CABLES, *_BAR, *_SENSORS, *_NUMBERS)
+    each.name: each for each in (*_WINCHES, *_CABLES, *_BODIES, *_SENSORS, *_NUMBERS)
 }

@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from cspm_msgs_py.testbed import Testbed
-from cspm_mujoco.influence import Influence
+from cspm_mujoco.influence import Drive, Influence
 from cspm_reality.late import Late, LateFault
 from cspm_reality.phenomena import PHENOMENA
 from cspm_reality.sensors import QUALITIES, REAL, Fault, Quality
@@ -23,13 +23,17 @@ class Reality(NamedTuple):
     Attributes:
         testbed: with the numbers that it has.
         influences: physics beside the test-bed's.
+        drive: what lies between command and torque; None: nothing.
         faults: of its sensors, by topic.
+        clocks: by how much faster than time sensors' clocks run, by topic.
         quality: of its sensors.
     """
 
     testbed: Testbed
     influences: tuple[Influence, ...]
+    drive: Drive | None
     faults: Mapping[str, tuple[Fault, ...]]
+    clocks: Mapping[str, float]
     quality: Quality
 
 
@@ -45,13 +49,16 @@ def conceal(
     Args:
         testbed: the machine as it is believed to be.
         amounts: by phenomenon, per cable (n,), or the one for the bar.
-        onset: when physics and faults begin [s]; numbers of the machine have no onset.
+        onset: when physics and faults begin [s]; numbers of the machine, drives and clocks have
+            none.
         seed: of phases and gusts.
         sensors: one of `QUALITIES`.
     """
     generator = np.random.default_rng([seed, 3])
     influences: list[Influence] = []
+    drive: Drive | None = None
     faults: dict[str, tuple[Fault, ...]] = {}
+    clocks: dict[str, float] = {}
     for name, values in amounts.items():
         phenomenon, amount = PHENOMENA[name], np.array(values, dtype=float)
         if phenomenon.alter is not None:
@@ -59,8 +66,12 @@ def conceal(
         if phenomenon.influence is not None:
             influence = phenomenon.influence(amount, testbed, generator)
             influences.append(Late(influence, onset) if onset else influence)
+        if phenomenon.drive is not None:
+            drive = phenomenon.drive(amount)
+        if phenomenon.clocks is not None:
+            clocks |= phenomenon.clocks(amount)
         if phenomenon.faults is not None:
             for topic, fault in phenomenon.faults(amount).items():
                 added = LateFault(fault, onset) if onset else fault
                 faults[topic] = (*faults.get(topic, ()), added)
-    return Reality(testbed, tuple(influences), faults, QUALITIES[sensors])
+    return Reality(testbed, tuple(influences), drive, faults, clocks, QUALITIES[sensors])

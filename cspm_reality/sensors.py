@@ -67,8 +67,12 @@ class RealSensor:
         seed: int,
         quality: Quality = QUALITIES[REAL],
         faults: Sequence[Fault] = (),
+        skew: float = 0.0,
     ) -> None:
-        """Make the sensor of `topic` at `rate` [Hz] on a plant of period `period_ns` [ns]."""
+        """Make the sensor of `topic` at `rate` [Hz] on a plant of period `period_ns` [ns].
+
+        Its clock runs faster than time by `skew`, beside the drift that any clock has.
+        """
         self._divider = round(1e9 / period_ns) // rate
         self._is_pose = topic.ros_type.endswith("PoseStamped")
         width = 6 if self._is_pose else topic.width
@@ -84,7 +88,7 @@ class RealSensor:
         self._quality = quality
         self._lost = NormalDist().inv_cdf(1.0 - quality.dropout) if quality.dropout else np.inf
         self._offset = float(self._generator.normal(0.0, quality.clock_offset))
-        self._drift = float(self._generator.normal(0.0, quality.clock_drift))
+        self._drift = skew + float(self._generator.normal(0.0, quality.clock_drift))
         self._taken = 0
         self._noise: Array = np.zeros((0, width))
         self._late: list[float] = []

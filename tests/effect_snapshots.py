@@ -128,6 +128,7 @@ class Snapshots:
             )
             out[k, CableSignal.SPEED], out[k, CableSignal.DAMPING] = speed, damper
             out[k, CableSignal.HORIZONTAL] = np.hypot(span[0], span[1])
+            out[k, CableSignal.DOWNWARD] = span[2]
         out[:, CableSignal.GRAVITY] = self.nominal.gravity
         out[:, CableSignal.ANGLE] = self.angles(i)
         out[:, CableSignal.RADIUS], out[:, CableSignal.GEAR] = (

@@ -96,3 +96,31 @@ def test_bristles_slide_as_dry_friction_of_mujoco_does(general):
             machine.step(torque)
     apart = np.abs(bristled.angles - dry.angles).max()
     assert apart < 0.1 * np.abs(free.angles - dry.angles).max()
+
+
+class Halving:
+    """A drive that gives half of what it was told a period ago."""
+
+    def __init__(self):
+        self.told = None
+
+    def deliver(self, command):
+        return 0.5 * (command if self.told is None else self.told)
+
+    def advance(self, command, period):
+        assert period == pytest.approx(1e-3)
+        self.told = command.copy()
+
+
+@pytest.mark.compiled
+def test_a_drive_lies_between_command_and_torque_and_is_told_no_more_than_the_limit(general):
+    direct = plant(general)
+    driven = MujocoPlant(general, still().at, MS, bar_pose=POSE, drive=Halving())
+    limits = np.array([cable.torque_limit for cable in general.cables])
+    commands = [0.3 * limits, 9.0 * limits, 0.1 * limits]
+    delivered = [0.15 * limits, 0.15 * limits, 0.5 * limits]
+    for command, torque in zip(commands, delivered, strict=True):
+        np.testing.assert_allclose(driven.applied_torque(command), torque)
+        driven.step(command)
+        direct.step(torque)
+        np.testing.assert_allclose(driven.speeds, direct.speeds, rtol=1e-12)

@@ -82,3 +82,13 @@ def test_plain_sensors_are_white_complete_and_on_time():
     assert [stamp for stamp, _ in found] == [step * MS for step in range(5000)]
     noise = np.array([row[0] for _, row in found])
     assert abs(np.corrcoef(noise[:-1], noise[1:])[0, 1]) < 4.0 / np.sqrt(5000)
+
+
+def test_a_fast_clock_runs_ahead_of_one_that_is_not_by_its_skew():
+    spec = Sensor(noise=(0.0,), resolution=(0.0,), rate=1000)
+    topic, stamps = TOPICS["/cables/tension"], []
+    for skew in (0.0, 1e-4):
+        sensor = RealSensor(topic, spec, rate=1000, period_ns=MS, seed=1, quality=QUALITIES[PLAIN],
+                            skew=skew)  # fmt: skip
+        stamps.append([sensor.observe(k, k * MS, np.ones(2))[0] for k in (0, 5000, 10_000)])
+    assert np.subtract(stamps[1], stamps[0]).tolist() == [0, 500_000, 1_000_000]

@@ -66,6 +66,7 @@ def assemble_concealed(bundle: Bundle, reality: Reality) -> Assembly:
         bar_pose=parts.plant.bar_state[:6],
         locked=isinstance(scenario.control, LockedWinches),
         influences=reality.influences,
+        drive=reality.drive,
     )
     believed_machine = bundle.testbed.testbed
     sensors: dict[str, AnySensor] = {
@@ -77,6 +78,7 @@ def assemble_concealed(bundle: Bundle, reality: Reality) -> Assembly:
             seed=scenario.seed,
             quality=reality.quality,
             faults=reality.faults.get(name, ()),
+            skew=reality.clocks.get(name, 0.0),
         )
         for name, sensor in believed_machine.sensors.items()
     }

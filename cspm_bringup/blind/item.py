@@ -11,7 +11,7 @@ from cspm_bringup.blind.stratum import Case, Stratum
 from cspm_msgs_py.errors import InputError
 from cspm_msgs_py.testbed import Testbed
 from cspm_reality.phenomena import PHENOMENA
-from cspm_reality.phenomenon import BAR, CABLES, FRAME
+from cspm_reality.phenomenon import BAR, CABLES, CAPTURE, FRAME
 
 NAME_DIGITS = 8
 
@@ -159,7 +159,8 @@ def _told(each: Concealed, amounts: Sequence[float], machine: Testbed) -> dict[s
     elements = {
         CABLES: [machine.cable_names[i] for i in each.cables],
         BAR: ["bar"],
-        FRAME: ["bar", "winch_frame"],
+        FRAME: ["winch_frame"],
+        CAPTURE: ["bar", "winch_frame"],
     }[phenomenon.at]
     used = [amounts[i] for i in each.cables] or [amounts[0]] * len(elements)
     return {

@@ -295,6 +295,7 @@ class Suspension:
             CableSignal.RADIUS: cables[i, RADIUS],
             CableSignal.GEAR: cables[i, GEAR_RATIO],
             CableSignal.HORIZONTAL: np.hypot(directions[:, 0], directions[:, 1]),
+            CableSignal.DOWNWARD: directions[:, 2],
             CableSignal.GRAVITY: self._testbed.gravity,
         }.items():
             rows[:, column] = values

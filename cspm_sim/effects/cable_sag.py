@@ -1,4 +1,8 @@
-"""A cable with weight: it hangs through, and it pulls the bar down with half of its weight."""
+"""A cable with weight: it hangs through, and half of its weight pulls at either end.
+
+Its tension is that at the exit, where load cell and winch are: that of the law, which the middle
+carries, and half of the weight along the cable. At the bar it is less by all of that weight.
+"""
 
 from collections.abc import Sequence
 from math import sqrt
@@ -16,8 +20,15 @@ from cspm_sim.effects.effect import (
     Values,
 )
 from cspm_sim.effects.signals import CableSignal, EndSignal
-from cspm_sim.kernels.affected_cables import CABLE_GRAVITY, HORIZONTAL, SAG, SPAN_LENGTH
-from cspm_sim.kernels.bar_effects import END_FORCE, END_GRAVITY, END_LENGTH
+from cspm_sim.kernels.affected_cables import (
+    CABLE_GRAVITY,
+    DOWNWARD,
+    FORCE_ADDED,
+    HORIZONTAL,
+    SAG,
+    SPAN_LENGTH,
+)
+from cspm_sim.kernels.bar_effects import END_DIRECTION, END_FORCE, END_GRAVITY, END_LENGTH
 
 _LEAST = 1e-3  # [N]; where the tension is less the first order says nothing
 
@@ -25,10 +36,16 @@ _LEAST = 1e-3  # [N]; where the tension is less the first order says nothing
 def _hang(parameters: Array, signals: Array) -> None:
     weight = parameters[0] * signals[CABLE_GRAVITY] * signals[HORIZONTAL]
     signals[SAG] += weight * weight * signals[SPAN_LENGTH] ** 3 / 24.0
+    half = 0.5 * parameters[0] * signals[CABLE_GRAVITY] * signals[SPAN_LENGTH]
+    signals[FORCE_ADDED] += half * signals[DOWNWARD]
 
 
 def _pull(parameters: Array, signals: Array) -> None:
-    signals[END_FORCE + 2] += 0.5 * parameters[0] * signals[END_GRAVITY] * signals[END_LENGTH]
+    half = 0.5 * parameters[0] * signals[END_GRAVITY] * signals[END_LENGTH]
+    for axis in range(3):
+        along = signals[END_DIRECTION + 2] * signals[END_DIRECTION + axis]
+        signals[END_FORCE + axis] += half * along
+    signals[END_FORCE + 2] += half
 
 
 def _tension(signals: Array) -> Array:
@@ -37,12 +54,14 @@ def _tension(signals: Array) -> Array:
     tension = np.maximum(elastic, _LEAST)
     longer = across**2 * signals[:, CableSignal.LENGTH] ** 3 / (24.0 * tension**2)
     column = signals[:, CableSignal.STIFFNESS] * longer
-    return np.stack([column, np.zeros(len(column))], -1)[:, None]
+    half = 0.5 * signals[:, CableSignal.GRAVITY] * signals[:, CableSignal.LENGTH]
+    return np.stack([column, half * signals[:, CableSignal.DOWNWARD]], -1)[:, None]
 
 
 def _wrench(signals: Array) -> Array:
     half = 0.5 * signals[:, EndSignal.GRAVITY] * signals[:, EndSignal.LENGTH]
-    force = half[:, None] * np.array([0.0, 0.0, 1.0])
+    direction = signals[:, EndSignal.DIRECTION : EndSignal.DIRECTION + 3]
+    force = half[:, None] * (np.array([0.0, 0.0, 1.0]) + direction[:, 2:] * direction)
     moment = np.cross(signals[:, EndSignal.ARM : EndSignal.ARM + 3], force)
     column = np.hstack([force, moment])
     return np.stack([np.zeros(column.shape), column], -1)
@@ -53,7 +72,9 @@ def _weights(values: Values) -> tuple[float, float]:
 
 
 def _values(weights: Sequence[float], _: Values) -> dict[str, float]:
-    return {"linear_density": sqrt(max(0.0, float(weights[0])))}
+    # The weight itself tells it better than hanging through does; a level cable shows no weight.
+    hanging, weight = (max(0.0, float(each)) for each in weights)
+    return {"linear_density": weight or sqrt(hanging)}
 
 
 EFFECT = Effect(
@@ -67,9 +88,10 @@ EFFECT = Effect(
     coefficients=_weights,
     from_coefficients=_values,
     equation=(
-        "t = law(ε + (w·l)²·l/(24·t²)), t without damping, w = linear_density·g·(horizontal"
-        " share of the direction);"
-        " force on the bar linear_density·g·l/2 downwards"
+        "t = law(ε + (w·l)²·l/(24·t²)) + W·d, t in the law without damping,"
+        " w = linear_density·g·(horizontal share of the direction), W = linear_density·g·l/2,"
+        " d the direction's share downwards;"
+        " force on the bar W downwards, and W·d off what t pulls"
     ),
     shows="tension residual as 1/t², largest in long, horizontal, lightly loaded cables",
     twins=("cable_stiffness", "bar_mass"),

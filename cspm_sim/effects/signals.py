@@ -43,6 +43,7 @@ class CableSignal(IntEnum):
     HORIZONTAL = 13  # horizontal share of the cable's direction
     GRAVITY = 14
     DAMPING = 15  # ∂t/∂ε̇ of the nominal damper [N·s/m]
+    DOWNWARD = 16  # share of the cable's direction downwards, from exit to attachment
 
 
 class BarSignal(IntEnum):

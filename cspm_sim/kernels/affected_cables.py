@@ -56,17 +56,18 @@ MOTOR_SPEED = 4
 WOUND_RADIUS = 5  # cable wound per radian of the motor [m]
 DRUM_GEAR = 6
 HORIZONTAL = 7  # horizontal share of the cable's direction
-CABLE_GRAVITY = 8
-CABLE_STEP = 9  # of the integration [s]
-ELASTIC_TENSION = 10  # only of a loaded cable [N]
-ELONGATION_RATE = 11  # only of a loaded cable [m/s]
+DOWNWARD = 8  # its share downwards, from exit to attachment
+CABLE_GRAVITY = 9
+CABLE_STEP = 10  # of the integration [s]
+ELASTIC_TENSION = 11  # only of a loaded cable [N]
+ELONGATION_RATE = 12  # only of a loaded cable [m/s]
 # What they add to.
-RADIUS_ADDED = 12  # [m]
-TURN_ADDED = 13  # speed of the drum beyond the motor's, at the motor shaft [rad/s]
-ELONGATION_ADDED = 14  # [m]
-FORCE_ADDED = 15  # tension; fades with the elastic tension as the damper does [N]
-SAG = 16  # elongation added, times the tension squared [m·N²]
-CABLE_SIGNALS = 17
+RADIUS_ADDED = 13  # [m]
+TURN_ADDED = 14  # speed of the drum beyond the motor's, at the motor shaft [rad/s]
+ELONGATION_ADDED = 15  # [m]
+FORCE_ADDED = 16  # tension; fades with the elastic tension as the damper does [N]
+SAG = 17  # elongation added, times the tension squared [m·N²]
+CABLE_SIGNALS = 18
 # What effects on the winch frame read and change.
 FRAME_SHIFT = 0  # of the exits, world axes [m]
 FRAME_SHIFT_RATE = 3
@@ -166,6 +167,7 @@ def fill_cable_signals(
     signals[DRUM_GEAR] = cables[i, GEAR_RATIO]
     x, y = spans[i, DIRECTION], spans[i, DIRECTION + 1]
     signals[HORIZONTAL] = sqrt(x * x + y * y)
+    signals[DOWNWARD] = spans[i, DIRECTION + 2]
     signals[CABLE_GRAVITY] = cables[i, GRAVITY_HERE]
     signals[CABLE_STEP] = period
     for d in range(ELASTIC_TENSION, CABLE_SIGNALS):

@@ -27,6 +27,13 @@ PAIRS = (
     ("late tracker", "damper"),
     ("late tracker", "internal friction"),
     ("drag on ropes", "air"),
+    ("hanging rope", "stiffness"),
+    ("hanging rope", "mass"),
+    ("slow drive", "inertia"),
+    ("slow drive", "late tracker"),
+    ("fast clock", "late tracker"),
+    ("yielding frame", "stiffness"),
+    ("yielding frame", "strapped load"),
     ("cell scale", "mass"),
     ("cell zero", "wind"),
     ("mass", "wind"),
@@ -36,4 +43,4 @@ PAIRS = (
     ("centre of mass", "shifted markers"),
 )
 
-COMPANY = Stratum("company", 2.0, tuple(Case(pair, (2.0, 4.0), MOVING) for pair in PAIRS))
+COMPANY = Stratum("company", 2.5, tuple(Case(pair, (2.0, 4.0), MOVING) for pair in PAIRS))

@@ -7,6 +7,9 @@ EVERYWHERE = Stratum(
     1.0,
     tuple(
         Case((name,), (2.0, 4.0), MOVING, everywhere=True)
-        for name in ("bristles", "grease", "drag on ropes", "internal friction", "capstan")
+        for name in (
+            *("bristles", "grease", "capstan"),
+            *("drag on ropes", "internal friction", "hanging rope"),
+        )
     ),
 )

@@ -31,6 +31,7 @@ from cspm_ident.diagnosis.hypothesis import (
     shapes_of,
 )
 from cspm_ident.diagnosis.likeness import SIMPLER_SHARE, UNTRUE_SHARE
+from cspm_ident.diagnosis.one_instead import one_instead
 from cspm_ident.diagnosis.onset import first_block
 from cspm_ident.diagnosis.pairs import Pair, best_pairs
 from cspm_ident.diagnosis.rivals import rivals_of
@@ -108,7 +109,7 @@ class Search:
             for each in found:
                 self._begin(each)
                 chosen = joined(chosen, each)
-        return self._needed(self._exchanged(chosen))
+        return self._merged(self._needed(self._exchanged(chosen)))
 
     def _beside_clocks(self, chosen: Sequence[Hypothesis]) -> tuple[Hypothesis, ...]:
         """Return what shows only beside what clocks of a sound machine do, with that.
@@ -142,6 +143,13 @@ class Search:
         )
         best = self._surest(late, (), self.fits.columns([]))
         return [] if best is None else [best]
+
+    def _merged(self, chosen: list[Hypothesis]) -> list[Hypothesis]:
+        """Return one effect instead of two wherever it explains both."""
+        while merging := one_instead(self.fits, self.sureness, chosen, self._free(chosen)):
+            one, *two = merging
+            chosen = joined([h for h in chosen if h not in two], one)
+        return chosen
 
     def _needed(self, chosen: Sequence[Hypothesis]) -> list[Hypothesis]:
         """Return what was chosen less what is not needed beside the others, the weakest first.

@@ -72,9 +72,12 @@ def _weights(values: Values) -> tuple[float, float]:
 
 
 def _values(weights: Sequence[float], _: Values) -> dict[str, float]:
-    # The weight itself tells it better than hanging through does; a level cable shows no weight.
-    hanging, weight = (max(0.0, float(each)) for each in weights)
-    return {"linear_density": weight or sqrt(hanging)}
+    """Return the density that the weight tells, which swinging does not change as it does sag.
+
+    Only a level cable that ends at a wall shows no weight.
+    """
+    hanging, weight = weights
+    return {"linear_density": max(0.0, weight) if weight else sqrt(max(0.0, hanging))}
 
 
 EFFECT = Effect(

@@ -29,8 +29,6 @@ PAIRS = (
     ("drag on ropes", "air"),
     ("hanging rope", "stiffness"),
     ("hanging rope", "mass"),
-    ("slow drive", "inertia"),
-    ("slow drive", "late tracker"),
     ("fast clock", "late tracker"),
     ("yielding frame", "stiffness"),
     ("yielding frame", "strapped load"),
@@ -43,4 +41,14 @@ PAIRS = (
     ("centre of mass", "shifted markers"),
 )
 
-COMPANY = Stratum("company", 2.5, tuple(Case(pair, (2.0, 4.0), MOVING) for pair in PAIRS))
+# Of a larger lag the winches shake, which conceals nothing.
+SLOW = (("slow drive", "inertia"), ("slow drive", "late tracker"))
+
+COMPANY = Stratum(
+    "company",
+    2.5,
+    (
+        *(Case(pair, (2.0, 4.0), MOVING) for pair in PAIRS),
+        *(Case(pair, (2.0,), MOVING) for pair in SLOW),
+    ),
+)

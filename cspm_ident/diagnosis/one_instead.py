@@ -1,0 +1,57 @@
+"""One effect on one element instead of two findings that it explains both."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from itertools import combinations
+
+import numpy as np
+
+from cspm_ident.diagnosis.columns import Candidate
+from cspm_ident.diagnosis.fits import Fits
+from cspm_ident.diagnosis.hypothesis import Hypothesis, freedom
+from cspm_ident.diagnosis.likeness import TIED, UNTRUE_SHARE
+from cspm_ident.diagnosis.sums import gain_of
+from cspm_ident.diagnosis.sureness import Sureness
+
+
+def one_instead(
+    fits: Fits, sureness: Sureness, chosen: Sequence[Hypothesis], free: Sequence[Candidate]
+) -> tuple[Hypothesis, Hypothesis, Hypothesis] | None:
+    """Return a hypothesis of fewer numbers, and the two of those chosen that it stands for.
+
+    A heavy rope pulls the bar down at one end: as much as a heavier bar whose centre of mass lies
+    elsewhere, which says the same with two faults. It has to explain as much as both, as far as
+    models are true and blocks tell.
+
+    Args:
+        fits: of what was searched.
+        sureness: of these.
+        chosen: what was found.
+        free: what may be added to it.
+    """
+    found = [h for h in chosen if not fits.is_negligible(h, chosen)]
+    if any(h.onset for h in found):
+        return None
+    left = fits.sums.held_out(fits.columns(chosen))
+    for two in combinations(found, 2):
+        others = [h for h in chosen if h not in two]
+        base = fits.columns(others)
+        gained = gain_of(fits.sums.held_out(base) - left)
+        undecided = UNTRUE_SHARE * gained.total
+        both = np.concatenate([fits.own_columns(h) for h in two])
+        singles = [Hypothesis(c.effect, (c,)) for c in free]
+        columns = [fits.own_columns(h) for h in singles]
+        *gains, most = fits.sums.gains_beyond(base, [*columns, both])
+        for k in np.argsort(gains)[::-1]:
+            if gains[k] < most - undecided:
+                break
+            less = gain_of(fits.sums.held_out(np.concatenate([base, columns[k]])) - left)
+            if (
+                freedom(singles[k]) < sum(map(freedom, two))
+                and less.total <= min(undecided, TIED * less.error)
+                and fits.is_plausible([*others, singles[k]])
+                and sureness.counts(base, singles[k], gained, len(others))
+            ):
+                return singles[k], *two
+    return None

@@ -3,7 +3,6 @@
 import numpy as np
 import pytest
 from conftest import LINEAR, WINCH, build, cable
-from scipy.optimize import brentq
 
 from cspm_sim.effects import catalogue
 from cspm_sim.effects.signals import CableSignal, FrameSignal, WinchSignal
@@ -297,52 +296,6 @@ def test_pulley_friction_is_the_capstan_equation(coefficient, wrap):
         for _ in range(20):
             plant.step(np.array([torque]))
         assert np.sign(plant.angles[0]) * (abs(plant.angles[0]) > 1e-6) == moves
-
-
-SAG_END = (LENGTH_M, 0.0, 0.0)
-STIFF = {**LINEAR, "youngs_modulus": 2e11}
-
-
-@pytest.mark.parametrize("spare", [5e-4, 2e-3, 1e-2])
-def test_a_hanging_cable_carries_what_a_catenary_does(spare):
-    """A cable longer than its span: 2a·sinh(l/2a) = l0 + stretch, t = w·a."""
-    plant = Plant(line([entry("cable_sag", linear_density=0.05)], SAG_END, STIFF), STILL, MS)
-    plant.unstretched_lengths[:] = LENGTH_M + spare
-    plant._observe()
-    weight, law = 0.05 * 9.81, plant.testbed.cables[0]
-    give = weight * (LENGTH_M + spare + law.offset_length) / law.stiffness.axial_rigidity
-
-    def excess(a):
-        return 2 * a * np.sinh(LENGTH_M / (2 * a)) - LENGTH_M - spare - give * a
-
-    a = brentq(excess, 0.5, 40.0)
-    # The parabola's arc and its even tension differ by (l/a)²/20 and less.
-    assert plant.tensions[0] == pytest.approx(weight * a, rel=(LENGTH_M / a) ** 2 / 20 + 1e-6)
-
-
-@pytest.mark.parametrize("tension", [0.5, 1.0, 5.0])
-def test_a_hanging_cable_is_softer_by_irvines_ratio(tension):
-    """dt/dl = k/(1 + λ), λ = k·w²·l³/(12·t³)."""
-    machine = line([entry("cable_sag", linear_density=0.005)], SAG_END)
-    shifted = [Motion.still(np.array([side, 0, 0, 0, 0, 0])) for side in (-1e-6, 1e-6)]
-    plant = Plant(machine, STILL, MS, tensions=[tension])
-    assert plant.tensions[0] == pytest.approx(tension, abs=1e-8)
-    k = stiffness_of(machine, plant.unstretched_lengths[0])
-    found = []
-    for motion in shifted:
-        plant.frame[:] = motion.at(0.0)
-        plant._observe()
-        found.append(plant.tensions[0])
-    softer = k * (0.005 * 9.81) ** 2 * LENGTH_M**3 / (12 * tension**3)
-    # The sag's own dependence on the span is left out: 3·(arc − span)/l, below 1 %.
-    assert (found[0] - found[1]) / 2e-6 == pytest.approx(k / (1 + softer), rel=1e-2)
-
-
-def test_a_vertical_cable_does_not_sag():
-    plant = Plant(line([entry("cable_sag", linear_density=0.05)]), STILL, MS)
-    plant.unstretched_lengths[:] = LENGTH_M + 1e-3
-    plant._observe()
-    assert plant.tensions[0] == 0.0
 
 
 def flexible(damping):

@@ -1,0 +1,72 @@
+"""One effect instead of two findings: only where it explains both, with fewer numbers."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from cspm_ident.diagnosis.columns import Candidate, Place
+from cspm_ident.diagnosis.equation import Equation
+from cspm_ident.diagnosis.evidence import gather
+from cspm_ident.diagnosis.hypothesis import Hypothesis, freedom
+from cspm_ident.diagnosis.one_instead import one_instead
+from cspm_ident.diagnosis.search import Search
+from cspm_sim.effects import Channel, catalogue
+
+ROWS, STEP, BLOCK_S = 4800, 0.01, 1.0
+PLACE = Place(Channel.SHAFT, "only")
+COULOMB, VISCOUS, LOAD, STRIBECK = (
+    Candidate(catalogue()[name], "only")
+    for name in (
+        *("winch_coulomb_friction", "winch_viscous_friction"),
+        *("winch_load_friction", "winch_stribeck_friction"),
+    )
+)
+
+
+def search(share, wide=False):
+    """A shaft with dry and viscous friction, and a third column that has a share of the latter."""
+    rng, times = np.random.default_rng(3), STEP * np.arange(ROWS)
+    speed = np.sin(2.1 * times) + 0.6 * np.sin(0.83 * times)
+    dry, viscous = 0.3 * np.sign(speed), 0.1 * speed
+    target = (dry + viscous + 0.05 * rng.standard_normal(ROWS))[:, None]
+    third = STRIBECK if wide else LOAD
+    columns = {COULOMB: np.sign(speed), VISCOUS: speed, third: 5.0 * (dry + share * viscous)}
+    shaped = {term: values[:, None, None] for term, values in columns.items()}
+    if wide:
+        shaped[third] = np.concatenate([shaped[third], np.cos(times)[:, None, None]], axis=2)
+    return Search(gather([[Equation(PLACE, times, target, shaped, target)]], BLOCK_S))
+
+
+def of(*candidates):
+    return [Hypothesis(candidate.effect, (candidate,)) for candidate in candidates]
+
+
+def instead(looked, chosen, *free):
+    return one_instead(looked.fits, looked.sureness, chosen, free)
+
+
+def test_what_explains_both_stands_for_them():
+    looked, chosen = search(1.0), of(COULOMB, VISCOUS)
+    one, *two = instead(looked, chosen, LOAD)
+    assert (one.effect.id, two) == ("winch_load_friction", chosen)
+    assert looked._merged(chosen) == of(LOAD)
+
+
+@pytest.mark.parametrize("share", [0.0, 0.5, 2.0])
+def test_what_explains_less_does_not(share):
+    looked, chosen = search(share), of(COULOMB, VISCOUS)
+    assert instead(looked, chosen, LOAD) is None
+    assert looked._merged(chosen) == chosen
+
+
+def test_nor_does_what_has_as_many_numbers_or_more():
+    assert freedom(*of(STRIBECK)) >= 2
+    assert instead(search(1.0, wide=True), of(COULOMB, VISCOUS), STRIBECK) is None
+
+
+def test_nor_does_anything_for_what_begins_late_or_stands_alone():
+    looked = search(1.0)
+    late = [replace(each, onset=20) for each in of(COULOMB, VISCOUS)]
+    assert instead(looked, late, LOAD) is None
+    assert instead(looked, of(COULOMB), LOAD) is None

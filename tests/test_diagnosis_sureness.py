@@ -10,7 +10,14 @@ from cspm_ident.diagnosis.drivers import Driver, Knots
 from cspm_ident.diagnosis.equation import Equation
 from cspm_ident.diagnosis.evidence import gather
 from cspm_ident.diagnosis.fits import Fits
-from cspm_ident.diagnosis.hypothesis import Hypothesis, boldness, is_spread, may_be_none, unusual
+from cspm_ident.diagnosis.hypothesis import (
+    Hypothesis,
+    boldness,
+    is_seen_to_begin,
+    is_spread,
+    may_be_none,
+    unusual,
+)
 from cspm_ident.diagnosis.search import Search
 from cspm_ident.diagnosis.sums import Gain, Sums
 from cspm_ident.diagnosis.sureness import FALSE_ALARMS, Sureness
@@ -308,6 +315,9 @@ def test_what_may_be_none_has_only_intervals_that_hold_zero(weights, half, none)
         load: (np.array(weights[:1]), np.array(half[:1])),
         wind: (np.array(weights[1:]), np.array(half[1:])),
     }
-    both = Hypothesis(load.effect, (load, wind))
-    assert may_be_none(found, both) is none
-    assert not may_be_none({}, both)
+    assert may_be_none(found) is none
+    assert not may_be_none({})
+    # A beginning is told of what is not none, what is there all the time in any case.
+    always, late = (Hypothesis(load.effect, (load,), onset=block) for block in (0, 20))
+    assert is_seen_to_begin(late, found) is not none
+    assert is_seen_to_begin(always, found)

@@ -153,12 +153,23 @@ def may_be_negligible(weights: Mapping[Candidate, tuple[Array, Array]]) -> bool:
     return is_negligible(least)
 
 
-def may_be_none(weights: Mapping[Candidate, tuple[Array, Array]], hypothesis: Hypothesis) -> bool:
-    """Return whether weights with half their intervals all may be zero, where they have any."""
-    own = [weights[c] for c in hypothesis.candidates if c in weights]
-    return bool(own) and all(
-        bool(np.all(np.abs(w) <= half) and np.all(np.isfinite(half))) for w, half in own
+def may_be_none(weights: Mapping[Candidate, tuple[Array, Array]]) -> bool:
+    """Return whether weights with half their intervals all may be zero, where there are any."""
+    return bool(weights) and all(
+        bool(np.all(np.abs(w) <= half) and np.all(np.isfinite(half)))
+        for w, half in weights.values()
     )
+
+
+def is_seen_to_begin(
+    hypothesis: Hypothesis, weights: Mapping[Candidate, tuple[Array, Array]]
+) -> bool:
+    """Return whether weights with half their intervals allow a beginning, where there is one.
+
+    A beginning is looked for in all blocks, so that something always begins somewhere; it may be
+    told if any number is surely not zero from then on.
+    """
+    return not hypothesis.onset or not may_be_none(weights)
 
 
 def bounded(candidate: Candidate, weights: Array, half: Array) -> Array:

@@ -11,7 +11,13 @@ from numpy.typing import NDArray
 
 from cspm_ident.diagnosis.columns import Candidate, Place
 from cspm_ident.diagnosis.equation import Equation, steady
-from cspm_ident.diagnosis.hypothesis import Named, bounded, may_be_negligible, members_of
+from cspm_ident.diagnosis.hypothesis import (
+    Named,
+    bounded,
+    is_seen_to_begin,
+    may_be_negligible,
+    members_of,
+)
 from cspm_ident.diagnosis.onset import Onset, onset_of
 from cspm_ident.diagnosis.parameters import of_clocks, of_drives, of_forms, of_shafts
 from cspm_ident.diagnosis.refine import Cut, needs_refining, refine, spectra
@@ -66,7 +72,8 @@ class Model(NamedTuple):
         onsets: likewise.
         simulated: likewise.
         worth: of each finding; None where they cannot tell, or it is negligible.
-        possible: whether a machine can have each.
+        possible: whether a machine can have each, and it is seen to begin where it does not act
+            all the time.
         negligible: whether each may be no more than in a sound machine.
         wanted: below which share of what it is without each a simulated error has to fall.
         spectra: as of a diagnosis.
@@ -83,7 +90,7 @@ class Model(NamedTuple):
 
     @property
     def useless(self) -> list[int]:
-        """Findings that have to go: what no machine can have, else the worst of no use.
+        """Findings that have to go: what is not possible, else the worst of no use.
 
         Of no use is with what no simulation of held-out data comes nearer to what was measured.
         """
@@ -122,7 +129,11 @@ def modelled(search: Search, kept: Sequence[Named], data: Data) -> Model:
     weights = of_forms(weights, _untrue(search, kept, weights))
     values = {c: w for c, (w, _) in weights.items()}
     members = [{c: values[c] for c in members_of(values, each.hypothesis)} for each in kept]
-    possible = tuple(is_possible(data.searched[0], own) for own in members)
+    possible = tuple(
+        is_possible(data.searched[0], own)
+        and is_seen_to_begin(each.hypothesis, {c: weights[c] for c in own})
+        for each, own in zip(kept, members, strict=True)
+    )
     wanted = tuple(1.0 if each in data.faint else WORTH_IT for each in kept)
     if not all(possible):
         return Model(weights, onsets, (), (), possible, negligible, wanted, most)

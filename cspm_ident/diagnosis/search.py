@@ -28,6 +28,7 @@ from cspm_ident.diagnosis.hypothesis import (
     is_wider,
     joined,
     may_be_none,
+    members_of,
     shapes_of,
 )
 from cspm_ident.diagnosis.likeness import SIMPLER_SHARE, UNTRUE_SHARE
@@ -181,7 +182,7 @@ class Search:
                 gains[k].total <= UNTRUE_SHARE * taken
                 or (
                     k in untrue
-                    and may_be_none(weights, chosen[k])
+                    and may_be_none({c: weights[c] for c in members_of(weights, chosen[k])})
                     and self._is_hidden(chosen[k], chosen)
                 )
                 or not self._is_there(chosen[k], self._others(chosen[k], chosen), gains[k], chosen)

@@ -7,7 +7,7 @@ from numpy.typing import NDArray
 
 from cspm_mujoco.influence import Acting, Scene
 from cspm_reality.modes import swung
-from cspm_reality.moments import moment, turned
+from cspm_reality.moments import end_velocities, moment
 
 Array = NDArray[np.float64]
 
@@ -96,8 +96,7 @@ class HeavyRope:
 
     def _velocities(self, scene: Scene, exits: Array, ends: Array) -> Array:
         """Return how lumps would move on a straight thread, (ropes, LUMPS + 1, 3) [m/s]."""
-        near = scene.frame[3:6] + turned(scene.frame[6:], exits - scene.frame[:3])
-        far = scene.body[3:6] + turned(scene.body[6:], ends - scene.body[:3])
+        near, far = end_velocities(scene, exits, ends)
         return np.asarray(near[:, None] + _PLACES[:, None] * (far - near)[:, None])
 
 

@@ -6,7 +6,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from cspm_mujoco.influence import Acting, Scene
-from cspm_reality.moments import moment, turned
+from cspm_reality.moments import end_velocities, moment
 
 Array = NDArray[np.float64]
 
@@ -126,15 +126,13 @@ class SegmentDrag:
         exits, ends = np.split(scene.ends, 2)
         line = ends - exits
         line = line / np.linalg.norm(line, axis=1)[:, None]
-        near = scene.frame[3:6] + turned(scene.frame[6:], exits - scene.frame[:3])
-        arm = ends - scene.body[:3]
-        far = scene.body[3:6] + turned(scene.body[6:], arm)
+        near, far = end_velocities(scene, exits, ends)
         s = self._middle[:, None, None]
         speed = (1.0 - s) * near + s * far
         across = speed - np.sum(speed * line, axis=2)[:, :, None] * line
         force = -self._pieces[:, None] * np.sum(s * across, axis=0)
         acting.wrench[:3] += force.sum(axis=0)
-        acting.wrench[3:] += moment(arm, force)
+        acting.wrench[3:] += moment(ends - scene.body[:3], force)
 
     def advance(self, scene: Scene, period: float) -> None:
         """Keep no memory."""

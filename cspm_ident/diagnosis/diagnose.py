@@ -151,7 +151,7 @@ def diagnose(
     rejected += tuple(each for each in untold if each not in doubted)
     kept, faint = (*kept, *doubted), (*faint, *doubted)
     # Unknown would be told instead, of which held-out data say as little; with it nothing is.
-    if not _unknown(search, kept, rejected, fed_back):
+    if doubted and not _unknown(search, kept, rejected, fed_back):
         doubted = ()
     starts = [span_of(part)[0] for part in judge_parts]
     retuned = search.retuned()

@@ -34,14 +34,14 @@ def one_instead(
     if any(h.onset for h in found):
         return None
     left = fits.sums.held_out(fits.columns(chosen))
+    singles = [Hypothesis(c.effect, (c,)) for c in free]
+    columns = [fits.own_columns(h) for h in singles]
     for two in combinations(found, 2):
         others = [h for h in chosen if h not in two]
         base = fits.columns(others)
         gained = gain_of(fits.sums.held_out(base) - left)
         undecided = UNTRUE_SHARE * gained.total
         both = np.concatenate([fits.own_columns(h) for h in two])
-        singles = [Hypothesis(c.effect, (c,)) for c in free]
-        columns = [fits.own_columns(h) for h in singles]
         *gains, most = fits.sums.gains_beyond(base, [*columns, both])
         for k in np.argsort(gains)[::-1]:
             if gains[k] < most - undecided:

@@ -201,6 +201,19 @@ def test_what_the_catalogue_lacks_is_named_unknown():
     assert not judged(hidden, result("effect", finding(FRICTION))).named
 
 
+@pytest.mark.parametrize(
+    ("effect", "kind", "cases"), [(None, "unknown", 0), (FRICTION, "effect", 1)]
+)
+def test_only_what_was_named_by_an_effect_has_an_error_to_mend(effect, kind, cases):
+    hidden = item("a", concealed(effect=effect, kind=kind))
+    told = result(kind, finding(effect or "unknown", probability=None))
+    blank = [item(name) for name in "bc"]
+    truth = {"asked": {}, "items": [hidden, *blank]}
+    results = {"a": told, "b": result("consistent"), "c": result("consistent")}
+    fit = scorecard(truth, results)["fit"]
+    assert (fit["cases"], fit["near_floor"][1]) == (cases, cases)
+
+
 def test_a_diagnosis_that_failed_found_nothing():
     outcome = judged(item("a"), {"diagnosis": None, "times": {"cpu_s": 1.0}})
     assert (outcome.verdict, outcome.detected, outcome.fit) == ("failed", False, None)

@@ -4,6 +4,7 @@ import numpy as np
 import pytest
 
 from cspm_ident.diagnosis.columns import Candidate, Place
+from cspm_ident.diagnosis.drivers import Knots
 from cspm_ident.diagnosis.equation import Equation
 from cspm_ident.diagnosis.evidence import gather
 from cspm_ident.diagnosis.hypothesis import Hypothesis, is_early, is_timing, may_be_negligible
@@ -104,3 +105,17 @@ def test_a_delay_counts_from_where_its_interval_leaves_what_clocks_may_be_apart(
     for sign in (1.0, -1.0):
         found = {POSE: (np.array([sign * 1.5 * CLOCK]), np.array([half]))}
         assert may_be_negligible(found) is not told
+
+
+@pytest.mark.parametrize(("delay", "told"), [(0.5 * CLOCK, False), (4.0 * CLOCK, True)])
+def test_what_sound_clocks_may_have_done_is_nothing_unknown(delay, told):
+    """A slow motion's delay is a function of time, of which clocks explain what clocks may do."""
+    times = STEP * np.arange(ROWS)
+    rate = 2000.0 * np.sin(0.5 * times)
+    noise = 0.05 * np.random.default_rng(6).standard_normal(ROWS)
+    target = (delay * rate + noise)[:, None]
+    place = Place(Channel.TENSION, "surge_1")
+    columns = {POSE: rate[:, None, None], **Knots().columns(place, {"time [s]": times})}
+    search = Search(gather([[Equation(place, times, target, columns, target)]], BLOCK_S))
+    assert search._unexplained([], [])
+    assert bool(search.unknown([])) is told

@@ -19,8 +19,11 @@ CELL, DRIVE, COM, MASS = (
 WINCH, OTHER = "hoist_1", "hoist_2"
 
 
-def machine(cell, drive, seed=5):
-    """A shaft on which both zeros act and a bar that feels the cell's alone, as it would others."""
+def machine(cell, drive, other=0.0, seed=5):
+    """A shaft on which both zeros act and a bar that feels the cell's alone, as it would others.
+
+    On the other shaft acts the zero of its drive.
+    """
     rng, times = np.random.default_rng(seed), STEP * np.arange(ROWS)
     ones, moved = np.ones(ROWS), np.sin(1.7 * times) + 0.5 * np.sin(0.61 * times + 1.0)
     com = np.stack([0.9 * ones + 0.4 * moved, 0.2 * moved, moved**2], 1)
@@ -31,7 +34,7 @@ def machine(cell, drive, seed=5):
         Candidate(MASS, "bar"): (ones + 0.3 * moved)[:, None],
     }
     places = {Place(Channel.WRENCH, "bar"): (bar, cell * ones)}
-    for name, torque in ((WINCH, drive - cell), (OTHER, 0.0)):
+    for name, torque in ((WINCH, drive - cell), (OTHER, other)):
         shaft = {Candidate(CELL, name): -ones[:, None], Candidate(DRIVE, name): ones[:, None]}
         places[Place(Channel.SHAFT, name)] = shaft, torque * ones
     equations = []
@@ -90,6 +93,23 @@ def test_what_was_chosen_stays_where_no_pair_is_better():
         Hypothesis(MASS, (Candidate(MASS, "bar"),)),
     ]
     assert search._exchanged(chosen) == chosen
+
+
+def chosen_of(*pairs):
+    return [Hypothesis(effect, (Candidate(effect, element),)) for effect, element in pairs]
+
+
+def test_a_pair_replaces_what_it_explains_and_lets_the_rest_stay():
+    weight, zero = chosen = chosen_of((MASS, "bar"), (DRIVE, OTHER))
+    exchanged = Search(machine(0.1, 0.1, other=0.1))._exchanged(chosen)
+    assert weight not in exchanged
+    assert zero in exchanged
+    assert {h.effect.id for h in exchanged if h is not zero} == {CELL.id, DRIVE.id}
+
+
+def test_a_pair_replaces_nothing_that_says_something_else():
+    chosen = chosen_of((DRIVE, OTHER))
+    assert Search(machine(0.1, 0.1, other=0.1))._exchanged(chosen) == chosen
 
 
 RATE = 400.0

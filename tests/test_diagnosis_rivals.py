@@ -3,6 +3,7 @@
 import numpy as np
 import pytest
 
+from cspm_ident.diagnosis.alternatives import alternatives_of
 from cspm_ident.diagnosis.columns import Candidate, Place
 from cspm_ident.diagnosis.diagnose import _unknown
 from cspm_ident.diagnosis.drivers import Knots
@@ -57,6 +58,14 @@ def test_weights_that_one_coefficient_has_are_found():
     x = 0.1
     (named,) = named_in(winch(LOAD * (np.sinh(x) * SIDE + np.cosh(x) - 1.0)))
     assert named.hypothesis.effect.id == "pulley_friction"
+
+
+@pytest.mark.parametrize(("beside", "found"), [(-0.002, True), (-0.02, False)])
+def test_weights_that_differ_from_those_by_less_than_models_are_untrue_are_found(beside, found):
+    """A share of the load against 0.1 of it that changes sides: 2 % of the amplitude, and 20 %."""
+    search = Search(gather([[winch(LOAD * (0.1 * SIDE + beside), noise=0.001)]], BLOCK_S))
+    pulley = Hypothesis(PULLEY.effect, (PULLEY,))
+    assert search.fits.is_plausible([pulley]) is found
 
 
 DRAG = catalogue()["cable_transverse_damping"]
@@ -290,10 +299,10 @@ SCALE, RADIUS, DRIVE = (
 )
 
 
-def wound(gain_column):
-    """Lengths as of an encoder's scale; the torque is as it should be."""
+def wound(gain_column, light=1.0):
+    """Lengths as of an encoder's scale; the torque is as it should be, `light` of the radius's."""
     length = np.sin(1.7 * TIMES)[:, None]
-    load = LOAD[:, None]
+    load = light * LOAD[:, None]
     lengths = {SCALE: 10.0 * length, RADIUS: 1000.0 * length}
     torques = {RADIUS: 1000.0 * load, DRIVE: gain_column[:, None]}
     return (
@@ -311,6 +320,15 @@ def test_an_effect_that_a_wrong_number_hides_is_an_alternative():
     assert rival.candidates == (DRIVE, RADIUS)
     # It has one number more.
     assert rival.behind == pytest.approx(np.sqrt(np.log(20)), abs=0.1)
+
+
+def test_nor_is_it_missed_where_the_number_itself_is_named():
+    """The radius spoils so little elsewhere that it is named, and an encoder's scale beside it."""
+    looked = Search(gather([wound(0.2 * LOAD, light=0.02)], BLOCK_S))
+    radius = Hypothesis(RADIUS.effect, (RADIUS,))
+    told = {rival.words for rival in alternatives_of(looked.fits, looked.heard, radius, [])}
+    pair = "winch_torque_gain on only beside a wrong winch_drum_radius"
+    assert told == {"encoder_scale on only", pair}
 
 
 def test_an_effect_that_a_wrong_number_cannot_hide_is_no_alternative():

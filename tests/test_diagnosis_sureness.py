@@ -201,17 +201,31 @@ def test_a_finding_whose_amount_drifts_is_doubtful(amount, told):
     assert (time in [driver for driver, _, _ in found.unknown]) is told
 
 
-@pytest.mark.parametrize(("height", "told"), [(0.0, False), (0.5, False), (3.0, True)])
-def test_what_shows_once_is_unknown_and_not_consistent(height, told):
-    """A jerk of 40 ms: unknown where it leaves more than all other blocks, 0.05 N·m of noise."""
+def jerked(height):
+    """A sound winch with a jerk of 40 ms in its third block, against 0.05 N·m of noise."""
     (equation, _) = winches(0.0)
     dry = 0.3 * equation.columns[Candidate(DRY, "one")][:, 0]
     jerk = height * (np.arange(ROWS) // 4 == 30)[:, None]
     target = equation.target - dry + jerk
     columns = equation.columns | Knots().columns(equation.place, {"time [s]": equation.times})
-    found = Search(gather([[replace(equation, target=target, columns=columns)]], BLOCK_S)).run()
+    return Search(gather([[replace(equation, target=target, columns=columns)]], BLOCK_S))
+
+
+@pytest.mark.parametrize(("height", "told"), [(0.0, False), (0.5, False), (3.0, True)])
+def test_what_shows_once_is_unknown_and_not_consistent(height, told):
+    """Unknown where it leaves more than all other blocks."""
+    found = jerked(height).run()
     assert not found.named
     assert [driver.signal for driver, _, _ in found.unknown] == ["time [s]"] * told
+
+
+@pytest.mark.parametrize(("onset", "told"), [(1, True), (2, False), (3, False), (4, True)])
+def test_a_block_within_which_something_begins_tells_of_nothing_unknown(onset, told):
+    search = jerked(3.0)
+    (candidate,) = (c for c in search.heard if c.effect is DRY)
+    begun = Hypothesis(DRY, (candidate,), onset=onset)
+    with search.fits.delayed(begun):
+        assert bool(search.unknown([begun])) is told
 
 
 @pytest.mark.parametrize(("amount", "elements"), [(0.3, MANY), (0.0, ("a",))])

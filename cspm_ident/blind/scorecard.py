@@ -185,7 +185,8 @@ def _onsets(outcomes: Sequence[Outcome]) -> dict[str, Any]:
 
 
 def _fit(outcomes: Sequence[Outcome]) -> dict[str, Any]:
-    named = [o.fit for o in outcomes if o.named and o.fit is not None]
+    # What is told as unknown adds nothing to the model.
+    named = [o.fit for o in outcomes if o.named and o.fit is not None and o.kind != OUTSIDE]
     # A wrong number is what re-tuning mends as well.
     effects = [o.fit for o in outcomes if o.named and o.fit is not None and o.kind == EFFECT]
     return {

@@ -67,9 +67,16 @@ def _alike(
     hypothesis: Hypothesis,
     others: Sequence[Hypothesis],
 ) -> Iterator[tuple[Hypothesis, ...]]:
-    """Yield what explains the same, alone or beside a wrong number of the file."""
-    given = fits.evidence, fits.sums, fits.columns(others), hypothesis, free
-    rivals = rivals_of(*given)
+    """Yield what explains the same, alone or beside a wrong number of the file.
+
+    What looks like a rival looks like what it rivals.
+    """
+    given, base = (fits.evidence, fits.sums), fits.columns(others)
+    rivals = rivals_of(*given, base, hypothesis, free)
     yield from ((rival,) for rival in rivals)
-    alone = {rival.effect.id for rival in rivals}
-    yield from (pair for pair in absorbed_pairs(*given) if pair[0].effect.id not in alone)
+    told = {hypothesis.effect.id, *(rival.effect.id for rival in rivals)}
+    for like in (hypothesis, *(r for r in rivals if r.elements == hypothesis.elements)):
+        for effect, number in absorbed_pairs(*given, base, like, free):
+            if effect.effect.id not in told:
+                told.add(effect.effect.id)
+                yield effect, number

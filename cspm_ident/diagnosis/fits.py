@@ -20,7 +20,7 @@ from cspm_ident.diagnosis.hypothesis import (
     is_timing,
     parts_of,
 )
-from cspm_ident.diagnosis.likeness import freely_gained
+from cspm_ident.diagnosis.likeness import UNTRUE_SHARE, freely_gained
 from cspm_ident.diagnosis.sums import Sums
 from cspm_ident.diagnosis.weights import Weights, at_once, values_of, weights_of
 
@@ -99,15 +99,24 @@ class Fits:
         return float(np.sqrt(free / max(gained, free))) if free else 0.0
 
     def is_plausible(self, hypotheses: Sequence[Hypothesis]) -> bool:
-        """Return whether parameters are what the catalogue allows, but for chance."""
+        """Return whether parameters are what the catalogue allows, but for chance.
+
+        Weights that depend on one another may differ from that by as much as models are untrue.
+        """
         values = self.values(hypotheses)
         if all(is_allowed(c, own) and not c.effect.tied for c, own in values.items()):
             return True
         found = at_once(self.weights(hypotheses))
         return all(
-            is_allowed(c, bounded(c, own, half)) and (not c.effect.tied or is_tied(c, own, half))
+            is_allowed(c, bounded(c, own, half))
+            and (not c.effect.tied or is_tied(c, own, half + self._undecided(c, own)))
             for c, (own, half) in found.items()
         )
+
+    def _undecided(self, candidate: Candidate, weights: Array) -> Array:
+        """Return by how much each weight may be off, no model being so true that it decides."""
+        lengths = self.sums.lengths[self.evidence.columns_of([candidate])]
+        return np.asarray(np.sqrt(UNTRUE_SHARE) * np.linalg.norm(lengths * weights) / lengths)
 
     def are_early(self, hypotheses: Sequence[Hypothesis]) -> bool:
         """Return whether with them some readings would be newer than their stamps say."""

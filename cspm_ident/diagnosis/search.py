@@ -21,7 +21,6 @@ from cspm_ident.diagnosis.hypothesis import (
     Named,
     Unknown,
     boldness,
-    freedom,
     has_one_system,
     is_number,
     is_spread,
@@ -31,10 +30,10 @@ from cspm_ident.diagnosis.hypothesis import (
     members_of,
     shapes_of,
 )
-from cspm_ident.diagnosis.likeness import SIMPLER_SHARE, UNTRUE_SHARE
+from cspm_ident.diagnosis.likeness import UNTRUE_SHARE
 from cspm_ident.diagnosis.one_instead import one_instead
 from cspm_ident.diagnosis.onset import first_block
-from cspm_ident.diagnosis.pairs import Pair, best_pairs
+from cspm_ident.diagnosis.pair_instead import pair_instead
 from cspm_ident.diagnosis.rivals import rivals_of
 from cspm_ident.diagnosis.scopes import Scopes
 from cspm_ident.diagnosis.short_list import short_list
@@ -49,8 +48,6 @@ Index = NDArray[np.intp]
 MOST_EFFECTS = 3
 # In which an effect has to act to be told, and to be absent if it is to begin later.
 _FEWEST_BLOCKS, _FEWEST_WITHOUT = 10, 5
-# Standard errors by which a pair has to explain more than what is simpler.
-_SIGMAS = 2.0
 # Of the squares of columns: what spans more of them is a wider form of the same.
 _SAME = 0.95
 
@@ -117,7 +114,7 @@ class Search:
 
         Looked for where something is left that nothing explains.
         """
-        if not self.unknown(chosen):
+        if not self._unexplained(chosen, ()):
             return ()
         for clock in clocks_of(self._free(chosen)):
             found = self._best([*chosen, clock])
@@ -222,42 +219,11 @@ class Search:
         return self.sums.gain(self._others(hypothesis, chosen), self.fits.own_columns(hypothesis))
 
     def _exchanged(self, chosen: list[Hypothesis]) -> list[Hypothesis]:
-        """Return a pair on one element instead of what was chosen one by one, where it is better.
-
-        It has to explain surely more, other than as a wider form of the same, or as much with fewer
-        numbers, and neither may be absent.
-        """
+        """Return a pair on one element instead of what was chosen one by one, if it is better."""
         kept = [h for h in chosen if self.fits.is_negligible(h, chosen)]
-        given_up = [h for h in chosen if h not in kept]
-        if not given_up or any(h.onset for h in chosen):
+        if len(kept) == len(chosen):
             return chosen
-        base = self.fits.columns(kept)
-        left = self.sums.held_out(self.fits.columns(chosen))
-        undecided = UNTRUE_SHARE * (self.sums.held_out(base) - left).sum()
-        free = self._free(kept)
-        replaced = self.evidence.columns_of(c for h in given_up for c in h.candidates)
-        for pair in best_pairs(self.evidence, self.sums, base, free):
-            better = gain_of(left - self.sums.held_out(self.fits.beside(base, *pair)))
-            simpler = sum(map(freedom, pair)) < sum(map(freedom, given_up))
-            if better.total <= (-undecided if simpler else _SIGMAS * better.error):
-                continue
-            both = self.fits.beside(base, *pair)[len(base) :]
-            if not simpler and np.all(self.sums.spanned(base, both, replaced) > _SAME):
-                continue
-            if self.fits.is_plausible([*kept, *pair]) and self._are_both_needed(base, pair):
-                return [*kept, *pair]
-        return chosen
-
-    def _are_both_needed(self, base: Index, pair: Pair) -> bool:
-        """Return whether each is surely there beside the other, and no small part of both."""
-        both = self.evidence.columns_of(c for h in pair for c in h.candidates)
-        least = SIMPLER_SHARE * self.sums.gain(base, both).total
-        for one, other in (pair, pair[::-1]):
-            beside = self.fits.beside(base, other)
-            gain = self.sums.gain(beside, self.fits.own_columns(one))
-            if gain.total < least or not self.sureness.counts(beside, one, gain, known=1):
-                return False
-        return True
+        return pair_instead(self.fits, self.sureness, chosen, kept, self._free(kept)) or chosen
 
     def _begin(self, hypothesis: Hypothesis) -> None:
         """Let the hypothesis's columns act from its onset on henceforth."""
@@ -365,7 +331,23 @@ class Search:
     def unknown(
         self, chosen: Sequence[Hypothesis], sound: Sequence[Hypothesis] = ()
     ) -> tuple[Unknown, ...]:
-        """Return free functions of what hypotheses leave; see `unexplained`."""
+        """Return free functions of what hypotheses leave; see `unexplained`.
+
+        Nor is what sound clocks may have done beside them unknown, though it be no gain elsewhere:
+        clocks wander, and what they did in one part of a recording does not foretell another.
+        """
+        beside = list(sound)
+        left = self._unexplained(chosen, beside)
+        for clock in clocks_of(self._free([*chosen, *sound])) if left else ():
+            if self.fits.is_negligible(clock, [*chosen, *beside, clock]):
+                less = self._unexplained(chosen, [*beside, clock])
+                if len(less) < len(left):
+                    beside, left = [*beside, clock], less
+        return left
+
+    def _unexplained(
+        self, chosen: Sequence[Hypothesis], sound: Sequence[Hypothesis]
+    ) -> tuple[Unknown, ...]:
         clocks = [h for h in chosen if self.fits.is_negligible(h, [*chosen, *sound])]
         told = [h for h in chosen if h not in clocks]
         return unexplained(self.evidence, self.sums, self.sureness, told, [*clocks, *sound])

@@ -166,6 +166,11 @@ class Sums:
         return len(self._grams[0])
 
     @property
+    def lengths(self) -> Array:
+        """Return how long each column is, (width,); 1 where it is zero."""
+        return np.asarray(self._lengths)
+
+    @property
     def squares(self) -> float:
         """Σ y²."""
         return float(self._whole[-1, -1])

@@ -55,17 +55,21 @@ def unexplained(
             if share >= UNKNOWN_SHARE:
                 found[driver] = driver, gain, share
     found |= {each[0]: each for each in _drifting(evidence, sums, sureness, chosen, sound)}
-    found |= {each[0]: each for each in _once(evidence, sums, base)}
+    began = [h.onset for h in supposed if h.onset]
+    found |= {each[0]: each for each in _once(evidence, sums, base, began)}
     told = [e for e in found.values() if e[1].total > _untold(evidence, sums, supposed, e[0])]
     return tuple(sorted(told, key=lambda each: -each[1].total))
 
 
-def _once(evidence: Evidence, sums: Sums, base: Index) -> Iterator[Unknown]:
+def _once(evidence: Evidence, sums: Sums, base: Index, began: Sequence[int]) -> Iterator[Unknown]:
     """Yield functions of time of residuals that are left in one block more than in all others.
 
-    What shows once has no other block to be tested on, but is not consistent for that.
+    What shows once has no other block to be tested on, but is not consistent for that. What begins
+    does so within a block, which is no block of either state.
     """
+    within = [k for onset in began for k in (onset - 1, onset)]
     for place, squares in evidence.left_by_block(base, sums.weights(base)).items():
+        squares = np.delete(squares, within)
         most = float(squares.max(initial=0.0))
         share = most / max(float(squares.sum()), _LEAST)
         drivers = [d for d in evidence.terms if isinstance(d, Driver) and d.place == place]

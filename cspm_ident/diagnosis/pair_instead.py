@@ -1,0 +1,100 @@
+"""Two effects on one element instead of findings that were chosen one by one."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+from numpy.typing import NDArray
+
+from cspm_ident.diagnosis.columns import Candidate
+from cspm_ident.diagnosis.fits import Fits
+from cspm_ident.diagnosis.hypothesis import Hypothesis, freedom
+from cspm_ident.diagnosis.likeness import RIVAL_SHARE, SIMPLER_SHARE, UNTRUE_SHARE
+from cspm_ident.diagnosis.pairs import Pair, best_pairs
+from cspm_ident.diagnosis.sums import Gain, gain_of
+from cspm_ident.diagnosis.sureness import Sureness
+
+Index = NDArray[np.intp]
+
+# Standard errors by which a pair has to explain more than what is simpler.
+_SIGMAS = 2.0
+# Of the squares of columns: what spans more of them is a wider form of the same.
+_SAME = 0.95
+
+
+def pair_instead(
+    fits: Fits,
+    sureness: Sureness,
+    chosen: Sequence[Hypothesis],
+    kept: Sequence[Hypothesis],
+    free: Sequence[Candidate],
+) -> list[Hypothesis] | None:
+    """Return what was chosen with a pair instead of some of it, if one is better.
+
+    The pair has to explain surely more, other than as a wider form of the same, or as much with
+    fewer numbers, and neither may be absent. What explains something else than the pair stays.
+
+    Args:
+        fits: of what was searched.
+        sureness: of these.
+        chosen: what was found.
+        kept: what of it stays in any case.
+        free: what may be added to that.
+    """
+    given_up = [h for h in chosen if h not in kept]
+    if any(h.onset for h in chosen):
+        return None
+    for pair in best_pairs(fits.evidence, fits.sums, fits.columns(kept), free):
+        stay = [h for h in given_up if _says_else(fits, h, chosen, [*kept, *pair])]
+        beside, replaced = [*kept, *stay], [h for h in given_up if h not in stay]
+        if (
+            replaced
+            and _is_better(fits, pair, replaced, beside)
+            and fits.is_plausible([*beside, *pair])
+            and _are_both_needed(fits, sureness, pair, beside)
+        ):
+            return [*beside, *pair]
+    return None
+
+
+def _says_else(
+    fits: Fits, hypothesis: Hypothesis, chosen: Sequence[Hypothesis], instead: Sequence[Hypothesis]
+) -> bool:
+    """Return whether most of what a hypothesis explains is not explained by others instead."""
+    if any(not set(hypothesis.candidates).isdisjoint(h.candidates) for h in instead):
+        return False
+    others = [h for h in chosen if h is not hypothesis]
+    least = RIVAL_SHARE * _gain(fits, hypothesis, others).total
+    return _gain(fits, hypothesis, instead).total > least
+
+
+def _is_better(
+    fits: Fits, pair: Pair, replaced: Sequence[Hypothesis], beside: Sequence[Hypothesis]
+) -> bool:
+    """Return whether a pair explains surely more than others, or as much with fewer numbers."""
+    base = fits.columns(beside)
+    left = fits.sums.held_out(fits.beside(base, *replaced))
+    better = gain_of(left - fits.sums.held_out(fits.beside(base, *pair)))
+    if sum(map(freedom, pair)) < sum(map(freedom, replaced)):
+        return bool(better.total > -UNTRUE_SHARE * (fits.sums.held_out(base) - left).sum())
+    both, own = (np.concatenate([fits.own_columns(h) for h in each]) for each in (pair, replaced))
+    wider = np.all(fits.sums.spanned(base, both, own) > _SAME)
+    return bool(better.total > _SIGMAS * better.error and not wider)
+
+
+def _are_both_needed(
+    fits: Fits, sureness: Sureness, pair: Pair, beside: Sequence[Hypothesis]
+) -> bool:
+    """Return whether each is surely there beside the other, and no small part of both."""
+    both = np.concatenate([fits.own_columns(h) for h in pair])
+    least = SIMPLER_SHARE * fits.sums.gain(fits.columns(beside), both).total
+    for one, other in (pair, pair[::-1]):
+        base, gain = fits.columns([*beside, other]), _gain(fits, one, [*beside, other])
+        if gain.total < least or not sureness.counts(base, one, gain, known=1):
+            return False
+    return True
+
+
+def _gain(fits: Fits, hypothesis: Hypothesis, others: Sequence[Hypothesis]) -> Gain:
+    return fits.sums.gain(fits.columns(others), fits.own_columns(hypothesis))

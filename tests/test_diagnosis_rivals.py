@@ -5,7 +5,6 @@ import pytest
 
 from cspm_ident.diagnosis.alternatives import alternatives_of
 from cspm_ident.diagnosis.columns import Candidate, Place
-from cspm_ident.diagnosis.diagnose import _unknown
 from cspm_ident.diagnosis.drivers import Knots
 from cspm_ident.diagnosis.equation import Equation
 from cspm_ident.diagnosis.evidence import gather
@@ -13,6 +12,7 @@ from cspm_ident.diagnosis.hypothesis import Hypothesis, bounded, is_allowed
 from cspm_ident.diagnosis.likeness import TIED, chance, distance
 from cspm_ident.diagnosis.rivals import rivals_of
 from cspm_ident.diagnosis.search import Search
+from cspm_ident.diagnosis.standing import unknown_beside
 from cspm_ident.diagnosis.sums import Sums
 from cspm_sim.effects import Channel, catalogue
 
@@ -290,7 +290,7 @@ def test_what_a_sound_machine_has_as_well_is_no_unknown_though_it_is_rejected(de
     shape = Knots().columns(place, {"speed [rad/s]": waves})
     columns = {cells: waves / delay} | {d: c[:, 0] for d, c in shape.items()}
     search = Search(gather([[equation(place, waves, columns)]], BLOCK_S))
-    assert bool(_unknown(search, (), search.run().named)) is unknown
+    assert bool(unknown_beside(search, (), search.run().named)) is unknown
 
 
 SCALE, RADIUS, DRIVE = (

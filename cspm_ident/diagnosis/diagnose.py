@@ -9,31 +9,19 @@ from itertools import compress
 import numpy as np
 from numpy.typing import NDArray
 
-from cspm_ident.diagnosis.asked_for import (
-    instruments_of,
-    is_proportional,
-    shows_in_what_was_asked,
-)
 from cspm_ident.diagnosis.cell_clock import on_drives_clock
 from cspm_ident.diagnosis.columns import Candidate, Place
-from cspm_ident.diagnosis.confirmation import Confirmed, confirmed
 from cspm_ident.diagnosis.curves import Curve, held_out_curves
 from cspm_ident.diagnosis.cuts import first_part, span_of, whole_part
 from cspm_ident.diagnosis.drivers import Driver, Knots
 from cspm_ident.diagnosis.equation import in_noise, steady
 from cspm_ident.diagnosis.evidence import Evidence, gather
-from cspm_ident.diagnosis.hypothesis import (
-    Findings,
-    Hypothesis,
-    Named,
-    Unknown,
-)
+from cspm_ident.diagnosis.hypothesis import Findings, Named
 from cspm_ident.diagnosis.judgement import HeldOut, free_functions, judged
-from cspm_ident.diagnosis.likeness import RIVAL_SHARE
 from cspm_ident.diagnosis.limits import Limit, detection_limits
 from cspm_ident.diagnosis.lines import Line
 from cspm_ident.diagnosis.look import Parts, Progress, Recordings, hums_of, searched_for
-from cspm_ident.diagnosis.model import Data, modelled
+from cspm_ident.diagnosis.model import Data, Model, modelled
 from cspm_ident.diagnosis.onset import Onset
 from cspm_ident.diagnosis.refine import Cut
 from cspm_ident.diagnosis.region import Region, region_of
@@ -41,6 +29,7 @@ from cspm_ident.diagnosis.reversals import with_wider
 from cspm_ident.diagnosis.safeguards import ALL_SAFEGUARDS, Safeguards
 from cspm_ident.diagnosis.search import Search
 from cspm_ident.diagnosis.simulation import SimulatedFit, Worth, baselines_of
+from cspm_ident.diagnosis.standing import Standing, standing_of
 from cspm_ident.diagnosis.weights import Weights
 from cspm_ident.signals.measurement import Measurement
 from cspm_sim.effects import Effect
@@ -142,40 +131,25 @@ def diagnose(
     progress("held-out data")
     judge = _judge(in_noise(judge_parts, noise), found, block)
     search_parts, judge_parts = _found_only(search_parts, found), _found_only(judge_parts, found)
-    kept, faint, rejected, untold = Confirmed(found.named)
-    if safeguards.held_out:
-        kept, faint, rejected, untold = confirmed(search.fits, judge, found.named)
     rows = in_noise(search_parts, noise)
-    kept, fed_back = _asked_for(search, kept, searched, rows, block)
-    doubted = _doubted(search, kept, untold, rejected, fed_back)
-    rejected += tuple(each for each in untold if each not in doubted)
-    kept, faint = (*kept, *doubted), (*faint, *doubted)
-    # Unknown would be told instead, of which held-out data say as little; with it nothing is.
-    if doubted and not _unknown(search, kept, rejected, fed_back):
-        doubted = ()
+    judge_by = judge if safeguards.held_out else None
+    standing = standing_of(search, found, judge_by, searched, rows, block)
     starts = [span_of(part)[0] for part in judge_parts]
     retuned = search.retuned()
-    searched_part: Cut = whole_part if held_out else first_part
     progress("parameters, and simulation of held-out data")
     baselines = baselines_of(held_out or searched, starts, retuned)
-    data = Data(searched, searched_part, baselines, rows, noise, block, supposed, faint)
-    model = modelled(search, kept, data)
-    while safeguards.held_out and model.useless:
-        rejected += tuple(kept[k] for k in model.useless)
-        kept = tuple(each for k, each in enumerate(kept) if k not in model.useless)
-        model = modelled(search, kept, data)
-    sure = tuple(each for each in kept if each not in doubted)
-    unknown = found.unknown
-    if rejected or fed_back or doubted:
-        unknown = _unknown(search, sure, (*rejected, *doubted), fed_back)
+    cut: Cut = whole_part if held_out else first_part
+    data = Data(searched, cut, baselines, rows, noise, block, supposed, standing.faint)
+    standing, model = _useful(search, standing, data, safeguards)
+    kept, unknown = standing.kept, standing.unknown(search, found)
     values = {c: w for c, (w, _) in model.weights.items()}
-    first = _first_weights(search, kept)
+    first = search.fits.values([each.hypothesis for each in kept])
     told = [k for k, negligible in enumerate(model.negligible) if not negligible]
     return Diagnosis(
         searched,
         held_out,
         Findings(tuple(kept[k] for k in told), unknown, found.candidates),
-        (*rejected, *fed_back),
+        (*standing.rejected, *standing.fed_back),
         tuple(compress(kept, model.negligible)),
         model.weights,
         judged(
@@ -183,7 +157,7 @@ def diagnose(
         ),
         model.simulated,
         tuple(model.worth[k] for k in told),
-        _shapes(search, sure, knots, [each[0] for each in unknown]),
+        _shapes(search, standing.sure, knots, [each[0] for each in unknown]),
         _lasting(hums, searched, search_parts, values),
         tuple(model.onsets[k] for k in told),
         tuple(region_of(data.rows, kept[k].hypothesis.candidates, first) for k in told),
@@ -193,9 +167,20 @@ def diagnose(
         evidence.times,
         held_out_curves(steady(judge_parts), first),
         noise,
-        faint,
+        standing.faint,
         model.spectra,
     )
+
+
+def _useful(
+    search: Search, standing: Standing, data: Data, safeguards: Safeguards
+) -> tuple[Standing, Model]:
+    """Return what stands and is of use in simulations of held-out data, and its model."""
+    model = modelled(search, standing.kept, data)
+    while safeguards.held_out and model.useless:
+        standing = standing.without(model.useless)
+        model = modelled(search, standing.kept, data)
+    return standing, model
 
 
 def _lasting(
@@ -210,11 +195,6 @@ def _lasting(
         now = hums_of(measurement, part, weights) if own else ()
         found += [line for line in now if any(line.is_same(before) for before in own)]
     return tuple(found)
-
-
-def _first_weights(search: Search, kept: Sequence[Named]) -> dict[Candidate, Array]:
-    """Return the weights of what was kept with the shapes that were searched."""
-    return search.fits.values(_hypotheses(kept))
 
 
 def _judge(parts: Parts, found: Findings, block: float) -> Evidence:
@@ -235,76 +215,11 @@ def _found_only(parts: Parts, found: Findings) -> Parts:
     return [[equation.only(named) for equation in part] for part in parts]
 
 
-def _asked_for(
-    search: Search,
-    kept: Sequence[Named],
-    searched: Sequence[Measurement],
-    rows: Parts,
-    block: float,
-) -> tuple[tuple[Named, ...], tuple[Named, ...]]:
-    """Part what was found by whether the motion that was asked for shows it, if it has to."""
-    hypotheses, wanted = _hypotheses(kept), [instruments_of(each) for each in searched]
-    values = search.fits.values(hypotheses)
-
-    def stays(named: Named) -> bool:
-        own = named.hypothesis
-        return (
-            not is_proportional(own.effect)
-            or own.onset > 0
-            or search.fits.is_negligible(own, hypotheses)
-            or shows_in_what_was_asked(rows, wanted, own.candidates, values, block)
-        )
-
-    told = [stays(each) for each in kept]
-    gone = (each for each, stay in zip(kept, told, strict=True) if not stay)
-    return tuple(compress(kept, told)), tuple(gone)
-
-
-def _doubted(
-    search: Search,
-    kept: Sequence[Named],
-    untold: Sequence[Named],
-    rejected: Sequence[Named],
-    fed_back: Sequence[Named],
-) -> tuple[Named, ...]:
-    """Return what is told as doubtful, though data that were not searched say nothing of it.
-
-    It explains as much as what without it is unknown, of which they say nothing either.
-    """
-    if not untold:
-        return ()
-    unknown = _unknown(search, kept, (*rejected, *untold), fed_back)
-    most = RIVAL_SHARE * max((gain.total for _, gain, _ in unknown), default=np.inf)
-    beside = Findings((), unknown, 0)
-    return tuple(e for e in untold if e.gain.total >= most and beside.is_doubtful(e))
-
-
-def _unknown(
-    search: Search,
-    kept: Sequence[Named],
-    rejected: Sequence[Named],
-    fed_back: Sequence[Named] = (),
-) -> tuple[Unknown, ...]:
-    """Return what nothing explains beside what was kept.
-
-    What was rejected explains nothing, but for what a sound machine has as well: clocks drift, so
-    that what they did in the part that was searched may be gone in the other, and controllers feed
-    noise back.
-    """
-    every = _hypotheses([*kept, *rejected])
-    sound = [h for h in _hypotheses(rejected) if search.fits.is_negligible(h, every)]
-    return search.unknown(_hypotheses(kept), [*sound, *_hypotheses(fed_back)])
-
-
-def _hypotheses(named: Sequence[Named]) -> list[Hypothesis]:
-    return [each.hypothesis for each in named]
-
-
 def _shapes(
     search: Search, kept: Sequence[Named], knots: Knots, drivers: Sequence[Driver]
 ) -> tuple[Shape, ...]:
     """Return the free functions, each fitted to what is left by what was kept."""
-    base = search.fits.columns(_hypotheses(kept))
+    base = search.fits.columns([each.hypothesis for each in kept])
     found = []
     for driver in drivers:
         values = search.sums.weights_beyond(base, search.evidence.columns_of([driver]))

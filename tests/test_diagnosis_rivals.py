@@ -61,11 +61,12 @@ def test_weights_that_one_coefficient_has_are_found():
 
 
 @pytest.mark.parametrize(("beside", "found"), [(-0.002, True), (-0.02, False)])
-def test_weights_that_differ_from_those_by_less_than_models_are_untrue_are_found(beside, found):
+def test_weights_that_differ_by_less_than_models_are_untrue_are_an_alternative(beside, found):
     """A share of the load against 0.1 of it that changes sides: 2 % of the amplitude, and 20 %."""
     search = Search(gather([[winch(LOAD * (0.1 * SIDE + beside), noise=0.001)]], BLOCK_S))
     pulley = Hypothesis(PULLEY.effect, (PULLEY,))
-    assert search.fits.is_plausible([pulley]) is found
+    assert search.fits.is_plausible([pulley], loosely=True) is found
+    assert not search.fits.is_plausible([pulley])
 
 
 DRAG = catalogue()["cable_transverse_damping"]

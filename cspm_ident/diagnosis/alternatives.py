@@ -50,7 +50,7 @@ def alternatives_of(
         columns = fits.evidence.columns_of(c for h in supposed for c in h.candidates)
         wider = max(0, sum(map(freedom, supposed)) - freedom(hypothesis))
         nested = wider and not beside and contains(sums, base, columns, own)
-        if nested or not fits.is_plausible([*others, *supposed]):
+        if nested or not fits.is_plausible([*others, *supposed], loosely=True):
             continue
         with sums.delayed(np.setdiff1d(columns, own), hypothesis.onset):
             worse = fits.held_out(rival, fits.beside(base, *beside)) - reference

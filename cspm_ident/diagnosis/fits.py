@@ -98,10 +98,13 @@ class Fits:
             free = freely_gained(self.evidence, self.sums, base, own)
         return float(np.sqrt(free / max(gained, free))) if free else 0.0
 
-    def is_plausible(self, hypotheses: Sequence[Hypothesis]) -> bool:
+    def is_plausible(self, hypotheses: Sequence[Hypothesis], loosely: bool = False) -> bool:
         """Return whether parameters are what the catalogue allows, but for chance.
 
-        Weights that depend on one another may differ from that by as much as models are untrue.
+        Args:
+            hypotheses: fitted together.
+            loosely: whether weights that depend on one another may be off by what decides nothing,
+                no model being truer: as an alternative, which nothing surely contradicts.
         """
         values = self.values(hypotheses)
         if all(is_allowed(c, own) and not c.effect.tied for c, own in values.items()):
@@ -109,12 +112,12 @@ class Fits:
         found = at_once(self.weights(hypotheses))
         return all(
             is_allowed(c, bounded(c, own, half))
-            and (not c.effect.tied or is_tied(c, own, half + self._undecided(c, own)))
+            and (not c.effect.tied or is_tied(c, own, half + loosely * self._undecided(c, own)))
             for c, (own, half) in found.items()
         )
 
     def _undecided(self, candidate: Candidate, weights: Array) -> Array:
-        """Return by how much each weight may be off, no model being so true that it decides."""
+        """Return by how much each weight may be off and decide nothing."""
         lengths = self.sums.lengths[self.evidence.columns_of([candidate])]
         return np.asarray(np.sqrt(UNTRUE_SHARE) * np.linalg.norm(lengths * weights) / lengths)
 

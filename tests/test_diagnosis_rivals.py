@@ -300,12 +300,17 @@ SCALE, RADIUS, DRIVE = (
 )
 
 
-def wound(gain_column, light=1.0):
-    """Lengths as of an encoder's scale; the torque is as it should be, `light` of the radius's."""
+def wound(gain_column, light=1.0, hiding=()):
+    """Lengths as of an encoder's scale; the torque is as it should be, `light` of the radius's.
+
+    What is `hiding` does what the radius does.
+    """
     length = np.sin(1.7 * TIMES)[:, None]
     load = light * LOAD[:, None]
     lengths = {SCALE: 10.0 * length, RADIUS: 1000.0 * length}
     torques = {RADIUS: 1000.0 * load, DRIVE: gain_column[:, None]}
+    lengths |= dict.fromkeys(hiding, lengths[RADIUS])
+    torques |= dict.fromkeys(hiding, torques[RADIUS])
     return (
         equation(Place(Channel.TENSION, "only"), 0.05 * length[:, 0], lengths, noise=0.002),
         equation(Place(Channel.SHAFT, "only"), 0.0 * LOAD, torques, noise=0.002),
@@ -330,6 +335,16 @@ def test_nor_is_it_missed_where_the_number_itself_is_named():
     told = {rival.words for rival in alternatives_of(looked.fits, looked.heard, radius, [])}
     pair = "winch_torque_gain on only beside a wrong winch_drum_radius"
     assert told == {"encoder_scale on only", pair}
+
+
+def test_an_effect_is_an_alternative_beside_each_number_that_hides_it():
+    stiffness = Candidate(catalogue()["cable_stiffness"], "only")
+    looked = Search(gather([wound(10.0 * LOAD, hiding=(stiffness,))], BLOCK_S))
+    scale = Hypothesis(SCALE.effect, (SCALE,))
+    beside = [rival.beside for rival in alternatives_of(looked.fits, looked.heard, scale, [])]
+    assert sorted(number.effect.id for number in beside) == sorted(
+        [RADIUS.effect_id, stiffness.effect_id]
+    )
 
 
 def test_an_effect_that_a_wrong_number_cannot_hide_is_no_alternative():

@@ -228,7 +228,14 @@ def test_limits_of_drives_and_clocks_are_no_less_than_what_sound_ones_do(eight):
     limits = detection_limits(moving, eight)
     assert limits["slow drive"] == pytest.approx([1e-3] * 8)
     assert limits["fast clock"] == pytest.approx([25e-6])
+    assert limits["late tracker"] == pytest.approx([0.25e-3])
     slow = [each._replace(torque=np.full(8, 1e-4 * k)) for k, each in enumerate(moving)]
     rate, machine = 1e-4 / 0.005, eight.sensors["/winches/state"]
     noise = np.hypot(machine.noise[2], machine.resolution[2] / np.sqrt(12.0))
     assert detection_limits(slow, eight)["slow drive"] == pytest.approx([noise / rate] * 8)
+    calm = [
+        scene(LEVEL.repeat(8, axis=0), body=(0.05, 0, 0))._replace(time=0.005 * k) for k in range(4)
+    ]
+    position = eight.sensors["/bar/pose"].noise[0]
+    assert position / 0.05 > 0.25e-3
+    assert detection_limits(calm, eight)["late tracker"] == pytest.approx([position / 0.05])

@@ -74,9 +74,10 @@ def _alike(
     given, base = (fits.evidence, fits.sums), fits.columns(others)
     rivals = rivals_of(*given, base, hypothesis, free)
     yield from ((rival,) for rival in rivals)
-    told = {hypothesis.effect.id, *(rival.effect.id for rival in rivals)}
-    for like in (hypothesis, *(r for r in rivals if r.elements == hypothesis.elements)):
+    alone = {hypothesis.effect.id, *(rival.effect.id for rival in rivals)}
+    alike = [hypothesis, *(r for r in rivals if r.elements == hypothesis.elements)]
+    pairs: dict[tuple[str, str], tuple[Hypothesis, Hypothesis]] = {}
+    for like in alike:
         for effect, number in absorbed_pairs(*given, base, like, free):
-            if effect.effect.id not in told:
-                told.add(effect.effect.id)
-                yield effect, number
+            pairs.setdefault((effect.effect.id, number.effect.id), (effect, number))
+    yield from (pair for (effect_id, _), pair in pairs.items() if effect_id not in alone)

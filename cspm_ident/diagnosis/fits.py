@@ -21,7 +21,7 @@ from cspm_ident.diagnosis.hypothesis import (
     parts_of,
 )
 from cspm_ident.diagnosis.likeness import UNTRUE_SHARE, freely_gained
-from cspm_ident.diagnosis.sums import Sums
+from cspm_ident.diagnosis.sums import Gain, Sums
 from cspm_ident.diagnosis.weights import Weights, at_once, values_of, weights_of
 
 Array = NDArray[np.float64]
@@ -74,6 +74,10 @@ class Fits:
         sums, base, own = self.shared(base, hypothesis)
         return sums.held_out(np.concatenate([base, own]))
 
+    def gain(self, hypothesis: Hypothesis, base: Index) -> Gain:
+        """Return what a hypothesis takes beyond a base."""
+        return self.sums.gain(base, self.own_columns(hypothesis))
+
     @contextmanager
     def delayed(self, hypothesis: Hypothesis) -> Iterator[None]:
         """Let a hypothesis act from its onset on, for a while."""
@@ -110,10 +114,12 @@ class Fits:
         if all(is_allowed(c, own) and not c.effect.tied for c, own in values.items()):
             return True
         found = at_once(self.weights(hypotheses))
+        if not all(is_allowed(c, bounded(c, own, half)) for c, (own, half) in found.items()):
+            return False
+        tied = {c: weights for c, weights in found.items() if c.effect.tied}
         return all(
-            is_allowed(c, bounded(c, own, half))
-            and (not c.effect.tied or is_tied(c, own, half + loosely * self._undecided(c, own)))
-            for c, (own, half) in found.items()
+            is_tied(c, own, half + self._undecided(c, own) if loosely else half)
+            for c, (own, half) in tied.items()
         )
 
     def _undecided(self, candidate: Candidate, weights: Array) -> Array:

@@ -21,6 +21,8 @@ RIVAL_SHARE = 0.5
 TIED = 2.0
 # Of the gain: no model is so true, 7 % of its amplitude, that a smaller difference decides.
 UNTRUE_SHARE = 0.005
+# Of the squares of columns: what spans more of them says nearly the same, or is a wider form of it.
+SPANNED = 0.95
 # Of the gain: for less no beginning is told, nor anything of more numbers kept.
 SIMPLER_SHARE = 0.1
 # Pairs of blocks. More of them make no further number less likely: how true models are decides

@@ -10,17 +10,15 @@ from numpy.typing import NDArray
 from cspm_ident.diagnosis.columns import Candidate
 from cspm_ident.diagnosis.fits import Fits
 from cspm_ident.diagnosis.hypothesis import Hypothesis, freedom
-from cspm_ident.diagnosis.likeness import RIVAL_SHARE, SIMPLER_SHARE, UNTRUE_SHARE
+from cspm_ident.diagnosis.likeness import RIVAL_SHARE, SIMPLER_SHARE, SPANNED, UNTRUE_SHARE
 from cspm_ident.diagnosis.pairs import Pair, best_pairs
-from cspm_ident.diagnosis.sums import Gain, gain_of
+from cspm_ident.diagnosis.sums import gain_of
 from cspm_ident.diagnosis.sureness import Sureness
 
 Index = NDArray[np.intp]
 
 # Standard errors by which a pair has to explain more than what is simpler.
 _SIGMAS = 2.0
-# Of the squares of columns: what spans more of them is a wider form of the same.
-_SAME = 0.95
 
 
 def pair_instead(
@@ -43,7 +41,7 @@ def pair_instead(
         free: what may be added to that.
     """
     given_up = [h for h in chosen if h not in kept]
-    if any(h.onset for h in chosen):
+    if not given_up or any(h.onset for h in chosen):
         return None
     for pair in best_pairs(fits.evidence, fits.sums, fits.columns(kept), free):
         stay = [h for h in given_up if _says_else(fits, h, chosen, [*kept, *pair])]
@@ -65,8 +63,8 @@ def _says_else(
     if any(not set(hypothesis.candidates).isdisjoint(h.candidates) for h in instead):
         return False
     others = [h for h in chosen if h is not hypothesis]
-    least = RIVAL_SHARE * _gain(fits, hypothesis, others).total
-    return _gain(fits, hypothesis, instead).total > least
+    least = RIVAL_SHARE * fits.gain(hypothesis, fits.columns(others)).total
+    return fits.gain(hypothesis, fits.columns(instead)).total > least
 
 
 def _is_better(
@@ -79,7 +77,7 @@ def _is_better(
     if sum(map(freedom, pair)) < sum(map(freedom, replaced)):
         return bool(better.total > -UNTRUE_SHARE * (fits.sums.held_out(base) - left).sum())
     both, own = (np.concatenate([fits.own_columns(h) for h in each]) for each in (pair, replaced))
-    wider = np.all(fits.sums.spanned(base, both, own) > _SAME)
+    wider = np.all(fits.sums.spanned(base, both, own) > SPANNED)
     return bool(better.total > _SIGMAS * better.error and not wider)
 
 
@@ -90,11 +88,8 @@ def _are_both_needed(
     both = np.concatenate([fits.own_columns(h) for h in pair])
     least = SIMPLER_SHARE * fits.sums.gain(fits.columns(beside), both).total
     for one, other in (pair, pair[::-1]):
-        base, gain = fits.columns([*beside, other]), _gain(fits, one, [*beside, other])
+        base = fits.columns([*beside, other])
+        gain = fits.gain(one, base)
         if gain.total < least or not sureness.counts(base, one, gain, known=1):
             return False
     return True
-
-
-def _gain(fits: Fits, hypothesis: Hypothesis, others: Sequence[Hypothesis]) -> Gain:
-    return fits.sums.gain(fits.columns(others), fits.own_columns(hypothesis))

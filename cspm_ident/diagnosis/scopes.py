@@ -70,8 +70,7 @@ class Scopes:
     def _act(self, hypothesis: Hypothesis, beside: Hypothesis, base: Index) -> bool:
         """Return whether a hypothesis surely is there beside another."""
         base = self._fits.beside(base, beside)
-        gain = self._fits.sums.gain(base, self._fits.own_columns(hypothesis))
-        return self._sureness.counts(base, hypothesis, gain)
+        return self._sureness.counts(base, hypothesis, self._fits.gain(hypothesis, base))
 
     def agree(self, hypothesis: Hypothesis, base: Index) -> bool:
         """Return whether all elements may have the same numbers, and several surely have some."""

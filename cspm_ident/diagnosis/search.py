@@ -30,7 +30,7 @@ from cspm_ident.diagnosis.hypothesis import (
     members_of,
     shapes_of,
 )
-from cspm_ident.diagnosis.likeness import UNTRUE_SHARE
+from cspm_ident.diagnosis.likeness import SPANNED, UNTRUE_SHARE
 from cspm_ident.diagnosis.one_instead import one_instead
 from cspm_ident.diagnosis.onset import first_block
 from cspm_ident.diagnosis.pair_instead import pair_instead
@@ -48,8 +48,6 @@ Index = NDArray[np.intp]
 MOST_EFFECTS = 3
 # In which an effect has to act to be told, and to be absent if it is to begin later.
 _FEWEST_BLOCKS, _FEWEST_WITHOUT = 10, 5
-# Of the squares of columns: what spans more of them is a wider form of the same.
-_SAME = 0.95
 
 
 class Search:
@@ -194,7 +192,7 @@ class Search:
         others = [self.fits.own_columns(h) for h in chosen if h is not hypothesis]
         own = self.fits.own_columns(hypothesis)
         spanned = self.sums.spanned(self.evidence.nuisance, np.concatenate(others), own)
-        return bool(np.any(spanned > _SAME))
+        return bool(np.any(spanned > SPANNED))
 
     def _is_there(
         self, hypothesis: Hypothesis, base: Index, gain: Gain, chosen: Sequence[Hypothesis]
@@ -208,7 +206,7 @@ class Search:
         return any(
             self.sureness.counts(base, rival, rival_gain, known)
             for rival in rivals
-            if (rival_gain := self.sums.gain(base, self.fits.own_columns(rival))).total < gain.total
+            if (rival_gain := self.fits.gain(rival, base)).total < gain.total
             and self.fits.is_plausible([*others, rival])
         )
 
@@ -216,13 +214,11 @@ class Search:
         return self.fits.columns(h for h in chosen if h is not hypothesis)
 
     def _gain(self, hypothesis: Hypothesis, chosen: Sequence[Hypothesis]) -> Gain:
-        return self.sums.gain(self._others(hypothesis, chosen), self.fits.own_columns(hypothesis))
+        return self.fits.gain(hypothesis, self._others(hypothesis, chosen))
 
     def _exchanged(self, chosen: list[Hypothesis]) -> list[Hypothesis]:
         """Return a pair on one element instead of what was chosen one by one, if it is better."""
         kept = [h for h in chosen if self.fits.is_negligible(h, chosen)]
-        if len(kept) == len(chosen):
-            return chosen
         return pair_instead(self.fits, self.sureness, chosen, kept, self._free(kept)) or chosen
 
     def _begin(self, hypothesis: Hypothesis) -> None:

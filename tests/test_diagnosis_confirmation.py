@@ -38,23 +38,25 @@ def winch(weight, loud=1.0, rows=ROWS, seed=1):
 
 
 @pytest.mark.parametrize(
-    ("weight", "loud", "kept", "faint", "untold"),
+    ("weight", "loud", "kept", "faint", "untold", "plain"),
     [
-        (1.0, 1.0, True, False, False),
+        (1.0, 1.0, True, False, False, False),
+        # There it takes most.
+        (1.0, 2.0, True, False, False, True),
         # Where it moves a fifth as much it takes two hundredths, which is what it should.
-        (1.0, 0.2, True, True, False),
+        (1.0, 0.2, True, True, False, False),
         # There it takes none though it should.
-        (0.0, 0.2, False, False, False),
-        (0.0, 1.0, False, False, False),
+        (0.0, 0.2, False, False, False, False),
+        (0.0, 1.0, False, False, False, False),
         # It moves so little that what it takes says nothing.
-        (1.0, 0.02, False, False, True),
+        (1.0, 0.02, False, False, True, False),
     ],
 )
-def test_a_finding_stands_by_what_it_should_take(weight, loud, kept, faint, untold):
+def test_a_finding_stands_by_what_it_should_take(weight, loud, kept, faint, untold, plain):
     search = Search(winch(1.0))
     found = search.run().named
     stood = confirmed(search.fits, winch(weight, loud, seed=2), found)
-    assert [len(each) for each in stood] == [kept, faint, not kept and not untold, untold]
+    assert [len(each) for each in stood] == [kept, faint, not kept and not untold, untold, plain]
 
 
 def test_of_several_findings_those_stand_that_are_confirmed():

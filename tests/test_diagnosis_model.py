@@ -9,9 +9,11 @@ from run_samples import SCENARIOS
 from cspm_ident.block_simulation import Drive
 from cspm_ident.diagnosis.columns import Candidate
 from cspm_ident.diagnosis.drivers import around
-from cspm_ident.diagnosis.model import WORTH_IT, Model
+from cspm_ident.diagnosis.hypothesis import Hypothesis, Named
+from cspm_ident.diagnosis.model import WORTH_IT, Data, Model, _wanted
 from cspm_ident.diagnosis.simulation import Output, Worth
 from cspm_ident.diagnosis.statement import numbers_of
+from cspm_ident.diagnosis.sums import Gain
 from cspm_ident.diagnosis.supposed import is_possible, nearest_possible
 from cspm_ident.signals.measurement import Measurement
 from cspm_msgs_py.testbed import load_testbed
@@ -47,6 +49,32 @@ def test_the_worst_of_no_use_goes(shares, gone):
 def test_what_moves_too_little_to_lower_an_error_by_much_has_to_lower_it(share, gone):
     assert model((share,), wanted=(1.0,)).useless == gone
     assert model((share,)).useless == [0]
+
+
+@pytest.mark.parametrize(
+    ("effect", "seen", "wanted"),
+    [
+        ("cable_creep", {}, WORTH_IT),
+        ("cable_creep", {"faint": True}, 1.0),
+        ("cable_stiffness", {}, 1.0),
+        ("cable_creep", {"plain": True}, np.inf),
+        ("cable_stiffness", {"faint": True, "plain": True}, np.inf),
+    ],
+)
+def test_how_much_a_simulation_has_to_gain_by_what_else_is_known(effect, seen, wanted):
+    candidate = Candidate(catalogue()[effect], "surge_1")
+    found = Named(Hypothesis(candidate.effect, (candidate,)), Gain(1.0, 0.1), 0.1, ())
+    other = found._replace(share=0.2)
+    data = Data(
+        *((), None, None, (), {}, 1.0, {}),
+        **{name: (found,) if seen.get(name) else (other,) for name in ("faint", "plain")},
+    )
+    assert _wanted(found, data) == wanted
+
+
+def test_what_takes_most_of_a_residual_stays_though_no_simulation_gains():
+    assert model((1.3,), wanted=(np.inf,)).useless == []
+    assert model((1.3, 0.995), wanted=(np.inf, WORTH_IT)).useless == [1]
 
 
 def test_what_no_machine_can_have_goes_before_anything_is_judged():

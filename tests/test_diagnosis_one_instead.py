@@ -1,10 +1,11 @@
-"""One effect instead of two findings: only where it explains both, with fewer numbers."""
+"""One effect instead of two findings: only where it explains both."""
 
 from dataclasses import replace
 
 import numpy as np
 import pytest
 
+from cspm_ident.diagnosis import one_instead as module
 from cspm_ident.diagnosis.columns import Candidate, Place
 from cspm_ident.diagnosis.equation import Equation
 from cspm_ident.diagnosis.evidence import gather
@@ -15,26 +16,30 @@ from cspm_sim.effects import Channel, catalogue
 
 ROWS, STEP, BLOCK_S = 4800, 0.01, 1.0
 PLACE = Place(Channel.SHAFT, "only")
-COULOMB, VISCOUS, LOAD, STRIBECK = (
+COULOMB, VISCOUS, LOAD, COM = (
     Candidate(catalogue()[name], "only")
     for name in (
         *("winch_coulomb_friction", "winch_viscous_friction"),
-        *("winch_load_friction", "winch_stribeck_friction"),
+        *("winch_load_friction", "bar_com"),
     )
 )
 
 
-def search(share, wide=False):
-    """A shaft with dry and viscous friction, and a third column that has a share of the latter."""
+def search(share, third=LOAD, further=0.0):
+    """A shaft with dry and viscous friction, and a third effect that has a share of the latter.
+
+    Further columns of the third are waves, of which the shaft has so much.
+    """
     rng, times = np.random.default_rng(3), STEP * np.arange(ROWS)
     speed = np.sin(2.1 * times) + 0.6 * np.sin(0.83 * times)
     dry, viscous = 0.3 * np.sign(speed), 0.1 * speed
-    target = (dry + viscous + 0.05 * rng.standard_normal(ROWS))[:, None]
-    third = STRIBECK if wide else LOAD
+    waves = [np.cos(times), np.cos(3.3 * times)] if third is COM else []
+    noise = 0.05 * rng.standard_normal(ROWS)
+    target = (dry + viscous + sum(further * wave for wave in waves) + noise)[:, None]
     columns = {COULOMB: np.sign(speed), VISCOUS: speed, third: 5.0 * (dry + share * viscous)}
     shaped = {term: values[:, None, None] for term, values in columns.items()}
-    if wide:
-        shaped[third] = np.concatenate([shaped[third], np.cos(times)[:, None, None]], axis=2)
+    own = [shaped[third], *(wave[:, None, None] for wave in waves)]
+    shaped[third] = np.concatenate(own, axis=2)
     return Search(gather([[Equation(PLACE, times, target, shaped, target)]], BLOCK_S))
 
 
@@ -60,9 +65,20 @@ def test_what_explains_less_does_not(share):
     assert looked._merged(chosen) == chosen
 
 
-def test_nor_does_what_has_as_many_numbers_or_more():
-    assert freedom(*of(STRIBECK)) >= 2
-    assert instead(search(1.0, wide=True), of(COULOMB, VISCOUS), STRIBECK) is None
+def test_what_has_no_fewer_numbers_has_to_explain_no_less():
+    """One fault more counts for a number; as much as models are untrue is too much."""
+    chosen = of(COULOMB, VISCOUS)
+    assert freedom(*of(COM)) == 3
+    one, *two = instead(search(1.0, COM, further=0.01), chosen, COM)
+    assert (one, two) == (*of(COM), chosen)
+    assert instead(search(1.03, COM), chosen, COM) is None
+    assert instead(search(1.03), chosen, LOAD) is not None
+
+
+def test_nor_does_what_has_two_numbers_more(monkeypatch):
+    chosen = of(COULOMB, VISCOUS)
+    monkeypatch.setattr(module, "_FURTHER_FAULT", 0)
+    assert instead(search(1.0, COM, further=0.01), chosen, COM) is None
 
 
 def test_nor_does_anything_for_what_begins_late_or_stands_alone():

@@ -12,11 +12,11 @@ from cspm_bringup.run import run
 from cspm_ident.diagnosis.columns import Candidate, Place, shapes_of
 from cspm_ident.diagnosis.equation import Equation, steady
 from cspm_ident.diagnosis.evidence import gather
-from cspm_ident.diagnosis.hypothesis import Hypothesis
+from cspm_ident.diagnosis.hypothesis import Hypothesis, is_seen_to_end
 from cspm_ident.diagnosis.look import noise_of
 from cspm_ident.diagnosis.recorded import equations_of
 from cspm_ident.diagnosis.refine import refine, spectra
-from cspm_ident.diagnosis.spectrum import most_in_all, with_spectrum
+from cspm_ident.diagnosis.spectrum import most_in_all, told_within, with_spectrum
 from cspm_ident.diagnosis.statement import numbers_of
 from cspm_ident.diagnosis.sums import Sums
 from cspm_ident.diagnosis.weights import weights_of
@@ -92,6 +92,25 @@ def test_parts_are_those_of_the_grid_that_a_recording_can_show():
     assert not other.spectrum
     (grid,) = with_spectrum(other, {"displacement": 2e-3}, 42.0).nonlinear.values()
     assert grid == (2e-3,)
+
+
+def test_no_time_constant_is_told_that_outlasts_the_recording():
+    short = told_within(CREEP, 42.0)
+    assert short.nonlinear["time_constant"] == (0.1, 0.3, 1.0, 3.0, 10.0, 30.0)
+    bounds = {p.name: (p.minimum, p.maximum) for p in short.parameters}
+    assert bounds == {"compliance": (0.0, 0.1), "time_constant": (0.01, 42.0)}
+    assert told_within(CREEP, 0.05).nonlinear["time_constant"] == (0.1,)
+    other = catalogue()["cable_hysteresis"]
+    assert told_within(other, 42.0) is other
+
+
+@pytest.mark.parametrize(("time_constant", "ends"), [(30.0, True), (41.9, False), (42.0, False)])
+def test_a_memory_that_is_as_long_as_can_be_told_is_not_seen_to_end(time_constant, ends):
+    shape = (("time_constant", time_constant),)
+    creep = Candidate(told_within(CREEP, 42.0), "surge_1", shape)
+    other = Candidate(catalogue()["cable_hysteresis"], "surge_1", (("displacement", 0.003),))
+    assert is_seen_to_end([creep, other]) is ends
+    assert is_seen_to_end([other])
 
 
 def test_a_spectrum_widens_upwards_only_what_is_told():

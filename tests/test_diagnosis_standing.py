@@ -26,7 +26,7 @@ DRY, WET, MASS = (
         ("bar_mass", "bar"),
     )
 )
-STANDING = Standing((DRY, WET, MASS), (WET,), (WET,), (), ())
+STANDING = Standing((DRY, WET, MASS), (WET,), (), (WET,), (), ())
 
 
 def test_what_is_doubted_is_told_and_not_sure():
@@ -51,6 +51,7 @@ def test_what_is_unknown_is_asked_again_where_less_is_sure_than_was_found(monkey
     found = Findings((DRY, WET, MASS), ("first",), 9)
     stands = Standing(
         (DRY, *less.get("doubted", ())),
+        (),
         (),
         **({"doubted": (), "rejected": (), "fed_back": ()} | less),
     )

@@ -8,6 +8,7 @@ import pytest
 from cspm_ident.diagnosis.columns import Candidate, Place
 from cspm_ident.diagnosis.equation import Equation
 from cspm_ident.diagnosis.evidence import gather
+from cspm_ident.diagnosis.left_out import LeftOut
 from cspm_ident.diagnosis.sums import Sums, paired
 from cspm_sim.effects import Channel, catalogue
 
@@ -255,6 +256,17 @@ def test_what_a_single_block_tells_has_no_interval():
     base, own = np.array([0]), np.array([2])
     assert np.isinf(in_few_blocks([9]).half_width(base, own)[0])
     assert np.isfinite(in_few_blocks([3, 9]).half_width(base, own)[0])
+
+
+@pytest.mark.parametrize(
+    ("alike", "blocks", "free"),
+    [(0.0, 20.0, 19.0), (0.5, 20.0, 20.0 / 3.0 - 1.0), (0.8, 10.0, 1.0), (0.8, 1.5, 0.5)],
+)
+def test_blocks_that_are_alike_leave_one_degree_of_freedom_if_there_is_one(alike, blocks, free):
+    told = LeftOut(np.ones(1), np.eye(1), blocks, np.array([blocks]), np.ones(1), np.array([alike]))
+    errors, freedom = told.spread()
+    assert freedom == pytest.approx([free])
+    assert errors**2 == pytest.approx([(1.0 + alike) / (1.0 - alike)])
 
 
 def test_a_weight_that_drifts_is_told_from_one_that_does_not():

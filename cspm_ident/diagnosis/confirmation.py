@@ -12,6 +12,7 @@ from cspm_ident.diagnosis.columns import Candidate
 from cspm_ident.diagnosis.evidence import Evidence
 from cspm_ident.diagnosis.fits import Fits
 from cspm_ident.diagnosis.hypothesis import Named
+from cspm_ident.diagnosis.sums import gain_of
 from cspm_ident.diagnosis.sureness import MATERIAL_SHARE
 
 Array = NDArray[np.float64]
@@ -20,9 +21,10 @@ Array = NDArray[np.float64]
 CONFIRMED_SHARE = 0.03
 # Of what it should take of all, where it should take less than is worth a word of each.
 _AS_EXPECTED = CONFIRMED_SHARE / MATERIAL_SHARE
-# What it should take to be judged by, in squares of what is left of a row: three standard
-# deviations.
-_LEAST_EXPECTED = 9.0
+# Of a held-out squared residual: what takes more of it is there, whatever else is not right yet.
+_PLAIN_SHARE = 0.5
+# What it should take to be judged by, in standard errors of what it takes.
+_LEAST_EXPECTED = 3.0
 
 
 class Confirmed(NamedTuple):
@@ -33,12 +35,14 @@ class Confirmed(NamedTuple):
         faint: of that, what they show too little of to say how much better they are explained.
         rejected: what does not stand.
         untold: what they can say nothing of, as where a plucked bar has come to rest.
+        plain: of what stands, what takes most of one of their residuals.
     """
 
     kept: tuple[Named, ...]
     faint: tuple[Named, ...] = ()
     rejected: tuple[Named, ...] = ()
     untold: tuple[Named, ...] = ()
+    plain: tuple[Named, ...] = ()
 
 
 def confirmed(fits: Fits, judge: Evidence, found: Sequence[Named]) -> Confirmed:
@@ -52,21 +56,22 @@ def confirmed(fits: Fits, judge: Evidence, found: Sequence[Named]) -> Confirmed:
         judge: sums of what was not.
         found: the findings.
     """
-    kept, faint, untold = list(found), [], []
+    kept, faint, untold, plain = list(found), [], [], []
     for each in found:
         whole = fits.values([other.hypothesis for other in kept])
         own = set(each.hypothesis.candidates)
         lowered = _Lowered(judge, whole, own)
         if lowered.any_or_none and lowered.much:
-            continue
-        if lowered.as_expected:
+            if lowered.most:
+                plain.append(each)
+        elif lowered.as_expected:
             faint.append(each)
         else:
             kept.remove(each)
             if lowered.says_nothing:
                 untold.append(each)
     rejected = tuple(each for each in found if each not in kept and each not in untold)
-    return Confirmed(tuple(kept), tuple(faint), rejected, tuple(untold))
+    return Confirmed(tuple(kept), tuple(faint), rejected, tuple(untold), tuple(plain))
 
 
 class _Lowered:
@@ -81,12 +86,13 @@ class _Lowered:
         places = [place.place for place in judge.places]
         left, without, against = (
             np.array([squares[place] for place in places])
-            for squares in map(judge.left_with, (whole, fewer, opposite))
+            for squares in map(judge.left_by_block_with, (whole, fewer, opposite))
         )
-        self._without, self._taken = without, without - left
+        self._without = without.sum(axis=1)
+        by_block = gain_of((without - left).sum(axis=0))
+        self._taken, self._error = (without - left).sum(axis=1), by_block.error
         # Of a square in the weight: what it would take if all of it were there.
-        self._expected = 0.5 * (left + against) - without
-        self._rows = np.array([place.rows.sum() for place in judge.places])
+        self._expected = 0.5 * (left + against).sum(axis=1) - self._without
 
     @property
     def any_or_none(self) -> bool:
@@ -99,6 +105,11 @@ class _Lowered:
         return bool(np.any(self._taken >= CONFIRMED_SHARE * self._without))
 
     @property
+    def most(self) -> bool:
+        """Whether it takes most of one."""
+        return bool(np.any(self._taken > _PLAIN_SHARE * self._without))
+
+    @property
     def as_expected(self) -> bool:
         """Whether it could not take much of any, and surely takes of all what it should."""
         if self._could_take_much or not self._shows:
@@ -107,8 +118,9 @@ class _Lowered:
 
     @property
     def says_nothing(self) -> bool:
-        """Whether it could take neither much of any nor, surely, anything of all."""
-        return not self._could_take_much and not self._shows
+        """Whether it could surely take nothing of all, and does not surely add to it."""
+        against = self._taken.sum() < -_LEAST_EXPECTED * self._error
+        return not self._shows and not bool(against)
 
     @property
     def _could_take_much(self) -> bool:
@@ -116,5 +128,5 @@ class _Lowered:
 
     @property
     def _shows(self) -> bool:
-        per_row = float(self._expected @ (self._without / np.maximum(self._rows, 1)))
-        return bool(self._expected.sum() ** 2 >= _LEAST_EXPECTED * per_row)
+        """Whether blocks would tell what it should take from nothing, as they scatter."""
+        return bool(self._expected.sum() >= _LEAST_EXPECTED * self._error)

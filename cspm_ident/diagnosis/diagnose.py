@@ -139,7 +139,8 @@ def diagnose(
     progress("parameters, and simulation of held-out data")
     baselines = baselines_of(held_out or searched, starts, retuned)
     cut: Cut = whole_part if held_out else first_part
-    data = Data(searched, cut, baselines, rows, noise, block, supposed, standing.faint)
+    unseen = standing.faint, standing.plain
+    data = Data(searched, cut, baselines, rows, noise, block, supposed, *unseen)
     standing, model = _useful(search, standing, data, safeguards)
     kept, unknown = standing.kept, standing.unknown(search, found)
     values = {c: w for c, (w, _) in model.weights.items()}

@@ -109,21 +109,30 @@ class Evidence:
         self, weights: Mapping[Candidate, Array] | Mapping[Candidate | Driver, Array]
     ) -> dict[Place, float]:
         """Return Σ residual² of each place for given weights, its own nuisance fitted."""
+        left = self.left_by_block_with(weights)
+        return {place: float(squares.sum()) for place, squares in left.items()}
+
+    def left_by_block_with(
+        self, weights: Mapping[Candidate, Array] | Mapping[Candidate | Driver, Array]
+    ) -> dict[Place, Array]:
+        """Return Σ residual² of each place's blocks (blocks,) for given weights.
+
+        The place's own nuisance is fitted to all of them.
+        """
         found = {}
         full = np.zeros(self.width)
         for term, values in weights.items():
             if term in self.slices:
                 full[self.slices[term]] = values
         for place in self.places:
+            own = full[place.columns]
             free = np.isin(place.columns, self.nuisance)
-            vector = np.append(full[place.columns], -1.0)
-            left = float(vector @ place.whole @ vector)
             if free.any():
                 inside = np.append(free, False)
-                own = place.whole[np.ix_(inside, inside)]
-                cross = place.whole[inside] @ vector
-                left -= float(cross @ np.linalg.pinv(own, hermitian=True) @ cross)
-            found[place.place] = left
+                gram = place.whole[np.ix_(inside, inside)]
+                cross = place.whole[inside] @ np.append(own, -1.0)
+                own[free] -= np.linalg.pinv(gram, hermitian=True) @ cross
+            found[place.place] = squares_by_block(place.grams, own)
         return found
 
     def delay(self, columns: Index, block: int) -> None:

@@ -24,6 +24,8 @@ DOUBTFUL_SHARE = 0.1
 # Standard errors by which a beginning has to explain more than an effect that was always there: the
 # largest of some 48 by chance; and an unlikely extent more than a likely one.
 _SIGMAS_OF_ONSET, _SIGMAS_OF_EXTENT = 3.0, 2.0
+# Of the longest time constant that can be told: what ends is shorter.
+_ENDED = 0.99
 # More signals than any block of the machine has.
 _SIGNALS = 128
 
@@ -170,6 +172,19 @@ def is_seen_to_begin(
     told if any number is surely not zero from then on.
     """
     return not hypothesis.onset or not may_be_none(weights)
+
+
+def is_seen_to_end(candidates: Iterable[Candidate]) -> bool:
+    """Return whether a recording shows the ends of all memories, of which time constants tell.
+
+    One that is as long as can be told goes on growing like much else that is not in the catalogue.
+    """
+    longest = {
+        c: next(p.maximum for p in c.effect.parameters if p.name == c.effect.spectrum)
+        for c in candidates
+        if c.effect.spectrum
+    }
+    return all(c.nonlinear[c.effect.spectrum] < _ENDED * most for c, most in longest.items())
 
 
 def bounded(candidate: Candidate, weights: Array, half: Array) -> Array:

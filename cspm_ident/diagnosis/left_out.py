@@ -41,11 +41,12 @@ class LeftOut(NamedTuple):
 
         As of a process of first order, whose mean scatters (1 + ρ)/(1 − ρ) times as much as that of
         independent blocks: a wind that wanders for seconds is met in few states by a short
-        recording.
+        recording. How alike they are is seen roughly, so that it leaves one degree of freedom where
+        there are blocks for it: with less, Student's factor says that nothing is known of anything.
         """
         more = (1.0 + self.alike) / (1.0 - self.alike)
         errors = np.sqrt(np.maximum(np.diag(self.covariance), 1e-300) * more)
-        return errors, self.blocks_of / more - 1.0
+        return errors, np.maximum(self.blocks_of / more, np.minimum(self.blocks_of, 2.0)) - 1.0
 
     def dominant(self) -> int | None:
         """Return which block tells more of the weights than all others, None where none does.

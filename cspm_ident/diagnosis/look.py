@@ -18,6 +18,7 @@ from cspm_ident.diagnosis.lines import Line, lines_of, with_lines
 from cspm_ident.diagnosis.recorded import equations_of
 from cspm_ident.diagnosis.safeguards import Safeguards
 from cspm_ident.diagnosis.search import Search
+from cspm_ident.diagnosis.spectrum import told_within
 from cspm_ident.diagnosis.sums import FOLDS
 from cspm_ident.signals.measurement import Measurement
 from cspm_msgs_py.errors import InputError
@@ -115,15 +116,13 @@ def _look(
     progress: Progress,
     safeguards: Safeguards,
 ) -> Look:
-    knots = Knots()
+    searched, held_out = recordings
+    longest = max(m.duration for m in searched)
+    effects, knots = [told_within(e, longest) for e in safeguards.effects], Knots()
 
     def equations(measurements: Sequence[Measurement]) -> Parts:
-        return [
-            equations_of(m, safeguards.effects, knots, progress, supposed=supposed)
-            for m in measurements
-        ]
+        return [equations_of(m, effects, knots, progress, supposed=supposed) for m in measurements]
 
-    searched, held_out = recordings
     found = equations(searched)
     _check(searched, found)
     parts = found if held_out else first_part(found)

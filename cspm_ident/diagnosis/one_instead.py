@@ -14,15 +14,18 @@ from cspm_ident.diagnosis.likeness import TIED, UNTRUE_SHARE
 from cspm_ident.diagnosis.sums import gain_of
 from cspm_ident.diagnosis.sureness import Sureness
 
+# Numbers that a second fault counts for, as in `freedom`.
+_FURTHER_FAULT = 1
+
 
 def one_instead(
     fits: Fits, sureness: Sureness, chosen: Sequence[Hypothesis], free: Sequence[Candidate]
 ) -> tuple[Hypothesis, Hypothesis, Hypothesis] | None:
-    """Return a hypothesis of fewer numbers, and the two of those chosen that it stands for.
+    """Return a hypothesis of one fault, and the two of those chosen that it stands for.
 
     A heavy rope pulls the bar down at one end: as much as a heavier bar whose centre of mass lies
     elsewhere, which says the same with two faults. It has to explain as much as both, as far as
-    models are true and blocks tell.
+    models are true and blocks tell; where it has no fewer numbers, no less than both.
 
     Args:
         fits: of what was searched.
@@ -47,9 +50,11 @@ def one_instead(
             if gains[k] < most - undecided:
                 break
             less = gain_of(fits.sums.held_out(np.concatenate([base, columns[k]])) - left)
+            wider = freedom(singles[k]) - sum(map(freedom, two))
+            allowed = min(undecided, TIED * less.error) if wider < 0 else 0.0
             if (
-                freedom(singles[k]) < sum(map(freedom, two))
-                and less.total <= min(undecided, TIED * less.error)
+                wider <= _FURTHER_FAULT
+                and less.total <= allowed
                 and fits.is_plausible([*others, singles[k]])
                 and sureness.counts(base, singles[k], gained, len(others))
             ):

@@ -37,24 +37,22 @@ def simplest(
         base: columns of all that was chosen before.
         chosen: that.
     """
-    reference = fits.held_out(best, base)
+    reference = left = fits.held_out(best, base)
     gained = gain_of(fits.sums.held_out(base) - reference)
-    fewest, least = best, 0.0
+    fewest = best
     for rival in rivals:
         if not fits.is_plausible([*chosen, rival]) or fits.contradicts(rival, chosen):
             continue
         with fits.sums.delayed(fits.own_columns(rival), best.onset):
-            apart = fits.held_out(rival, base) - reference
-        worse, wider = gain_of(apart), freedom(rival) - freedom(fewest)
-        fewer = is_wider(fewest, rival)
-        if wider <= 0 and worse.total < least and behind(paired(apart)) <= -TIED:
-            fewest, least = replace(rival, onset=best.onset), worse.total
-        elif (wider < 0 or (wider == 0 and fewer)) and worse.total <= min(
-            2.0 * gained.error, SIMPLER_SHARE * gained.total
-        ):
-            fewest = replace(rival, onset=best.onset)
+            leaves = fits.held_out(rival, base)
+        worse, wider = gain_of(leaves - reference), freedom(rival) - freedom(fewest)
+        fewer = wider < 0 or (wider == 0 and is_wider(fewest, rival))
+        more = leaves.sum() < left.sum() and behind(paired(leaves - left)) <= -TIED
+        little = min(2.0 * gained.error, SIMPLER_SHARE * gained.total)
+        if (wider <= 0 and more) or (fewer and worse.total <= little):
+            fewest, left = replace(rival, onset=best.onset), leaves
         elif wider == 0 and worse.total <= gained.total * _allowed(fits, rival, fewest, chosen):
-            fewest = rival
+            fewest, left = rival, leaves
     return fewest
 
 

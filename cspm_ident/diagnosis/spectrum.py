@@ -39,6 +39,28 @@ class _Form(NamedTuple):
     half: float
 
 
+def told_within(effect: Effect, longest: float) -> Effect:
+    """Return the effect with the time constants alone of which a recording shows the end.
+
+    What takes longer grows as the tension's integral does, and so does all that gives way: a rope
+    that slips on its drum would be told as one that creeps for ever.
+
+    Args:
+        effect: of the catalogue.
+        longest: what the recording lasts [s].
+    """
+    name = effect.spectrum
+    if not name:
+        return effect
+    grid = tuple(value for value in effect.nonlinear[name] if value <= longest)
+    parameters = tuple(
+        replace(p, maximum=max(longest, p.minimum)) if p.name == name else p
+        for p in effect.parameters
+    )
+    kept = {**effect.nonlinear, name: grid or effect.nonlinear[name][:1]}
+    return replace(effect, nonlinear=kept, parameters=parameters)
+
+
 def with_spectrum(effect: Effect, shape: Mapping[str, float], longest: float) -> Effect:
     """Return the effect with a shape and, twice as fine as its grid, other values of its spectrum.
 

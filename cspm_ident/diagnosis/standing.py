@@ -31,6 +31,7 @@ class Standing:
     Attributes:
         kept: what is told.
         faint: of that, of which these data show little.
+        plain: of that, what takes most of one of their residuals.
         doubted: of that, what is told as doubtful, though they say nothing of it.
         rejected: what does not stand.
         fed_back: what the motion that was asked for does not show, and controllers feed back.
@@ -38,6 +39,7 @@ class Standing:
 
     kept: tuple[Named, ...]
     faint: tuple[Named, ...]
+    plain: tuple[Named, ...]
     doubted: tuple[Named, ...]
     rejected: tuple[Named, ...]
     fed_back: tuple[Named, ...]
@@ -86,7 +88,7 @@ def standing_of(
     # Unknown would be told instead, of which held-out data say as little; with it nothing is.
     if doubted and not unknown_beside(search, kept, rejected, fed_back):
         doubted = ()
-    return Standing(kept, faint, doubted, rejected, fed_back)
+    return Standing(kept, faint, stood.plain, doubted, rejected, fed_back)
 
 
 def _asked_for(

@@ -87,6 +87,10 @@ class Evidence:
         parts = np.split(own, np.cumsum(widths, dtype=np.intp))
         return dict(zip(terms, parts[:-1], strict=True))
 
+    def places_of(self, columns: Index) -> list[Place]:
+        """Return the residuals in which any of some columns acts."""
+        return [p.place for p in self.places if np.isin(columns, p.columns).any()]
+
     def left(self, columns: Index, weights: Array) -> dict[Place, float]:
         """Return Σ residual² of each place for some columns' weights."""
         found = {}

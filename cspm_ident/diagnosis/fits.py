@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections import Counter
 from collections.abc import Iterable, Iterator, Sequence
 from contextlib import contextmanager
 
@@ -20,7 +21,7 @@ from cspm_ident.diagnosis.hypothesis import (
     is_timing,
     parts_of,
 )
-from cspm_ident.diagnosis.likeness import UNTRUE_SHARE, freely_gained
+from cspm_ident.diagnosis.likeness import UNTRUE_SHARE, freely_gained_at
 from cspm_ident.diagnosis.sums import Gain, Sums
 from cspm_ident.diagnosis.weights import Weights, at_once, values_of, weights_of
 
@@ -91,16 +92,31 @@ class Fits:
         ):
             yield
 
-    def untrue(self, hypothesis: Hypothesis, others: Sequence[Hypothesis]) -> float:
-        """Return by what share of its amplitude a hypothesis is seen to be off, from 0 to 1.
+    def untrue(
+        self, hypothesis: Hypothesis, others: Sequence[Hypothesis]
+    ) -> dict[Candidate, float]:
+        """Return by what share of its amplitude each candidate is seen to be off, from 0 to 1.
 
-        From the most that a free function gains beside it, in squares of what it gains itself.
+        From the most that a free function gains beside the hypothesis in a residual that the
+        candidate acts on, in squares of what the candidate takes beside all others. Where several
+        act it may be any of them that is off.
         """
         base, own = self.columns(others), self.own_columns(hypothesis)
+        apart = [(c,) for c in hypothesis.candidates]
+        causes = [hypothesis.candidates] if hypothesis.common else apart
         with self.delayed(hypothesis):
-            gained = float(np.sum(self.sums.held_out(base) - self.held_out(hypothesis, base)))
-            free = freely_gained(self.evidence, self.sums, base, own)
-        return float(np.sqrt(free / max(gained, free))) if free else 0.0
+            free = freely_gained_at(self.evidence, self.sums, base, own)
+            parts = {cause: self.evidence.columns_of(cause) for cause in causes}
+            where = {cause: self.evidence.places_of(mine) for cause, mine in parts.items()}
+            acting = Counter(place for places in where.values() for place in places)
+            found: dict[Candidate, float] = {}
+            for cause, mine in parts.items():
+                rest = np.concatenate([base, np.setdiff1d(own, mine)])
+                gained = float(self.sums.gains_beyond(rest, [mine])[0])
+                most = max(free[place] / acting[place] for place in where[cause])
+                share = float(np.sqrt(most / max(gained, most))) if most else 0.0
+                found |= dict.fromkeys(cause, share)
+        return found
 
     def is_plausible(self, hypotheses: Sequence[Hypothesis], loosely: bool = False) -> bool:
         """Return whether parameters are what the catalogue allows, but for chance.

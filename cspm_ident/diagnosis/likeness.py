@@ -7,7 +7,7 @@ from collections.abc import Sequence
 import numpy as np
 from numpy.typing import NDArray
 
-from cspm_ident.diagnosis.columns import Candidate
+from cspm_ident.diagnosis.columns import Candidate, Place
 from cspm_ident.diagnosis.drivers import Driver
 from cspm_ident.diagnosis.evidence import Evidence
 from cspm_ident.diagnosis.sums import Sums, behind, paired
@@ -77,15 +77,25 @@ def chance(sums: Sums, base: Index, parts: Sequence[Index]) -> float:
 def freely_gained(evidence: Evidence, sums: Sums, base: Index, own: Index) -> float:
     """Return by how many squares columns are seen to be untrue, at least none.
 
-    The most that a free function of a measured signal gains beyond them in the residuals that they
-    act on; functions of time are left out, which gain what no other block tells.
+    The most of `freely_gained_at`.
+    """
+    return max(freely_gained_at(evidence, sums, base, own).values(), default=0.0)
+
+
+def freely_gained_at(evidence: Evidence, sums: Sums, base: Index, own: Index) -> dict[Place, float]:
+    """Return by how many squares columns are seen to be untrue in each residual they act on.
+
+    The most that a free function of a measured signal gains beyond them there, at least none;
+    functions of time are left out, which gain what no other block tells.
     """
     both = np.concatenate([base, own])
     left = sums.held_out(both).sum()
-    places = {p.place for p in evidence.places if np.isin(own, p.columns).any()}
-    drivers = [t for t in evidence.terms if isinstance(t, Driver) and t.place in places]
-    free = [np.append(both, evidence.columns_of([d])) for d in drivers if not d.of_time]
-    return max([0.0, *(float(left - sums.held_out(columns).sum()) for columns in free)])
+    found = dict.fromkeys(evidence.places_of(own), 0.0)
+    for driver in evidence.terms:
+        if isinstance(driver, Driver) and driver.place in found and not driver.of_time:
+            free = sums.held_out(np.append(both, evidence.columns_of([driver]))).sum()
+            found[driver.place] = max(found[driver.place], float(left - free))
+    return found
 
 
 def where_alike(members: Sequence[Candidate], elements: set[str]) -> list[tuple[Candidate, ...]]:

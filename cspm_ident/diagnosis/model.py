@@ -193,15 +193,14 @@ def _in_all(
 def _untrue(
     search: Search, kept: Sequence[Named], found: Iterable[Candidate]
 ) -> dict[Candidate, float]:
-    hypotheses = [each.hypothesis for each in kept]
-    shares = [
-        search.fits.untrue(each, [h for h in hypotheses if h is not each]) for each in hypotheses
-    ]
-    return {
-        c: share
-        for each, share in zip(hypotheses, shares, strict=True)
-        for c in members_of(found, each)
-    }
+    """Return by what share of its amplitude each candidate is seen to be off, of final shapes."""
+    hypotheses, final = [each.hypothesis for each in kept], list(found)
+    shares: dict[Candidate, float] = {}
+    for each in hypotheses:
+        own = search.fits.untrue(each, [h for h in hypotheses if h is not each])
+        by_element = {candidate.element: share for candidate, share in own.items()}
+        shares |= {c: by_element[c.element] for c in members_of(final, each)}
+    return shares
 
 
 def _onsets(kept: Sequence[Named], rows: Parts, starts: Array) -> tuple[Onset | None, ...]:

@@ -118,7 +118,7 @@ def _drifting(
 
 def _concerned(evidence: Evidence, hypothesis: Hypothesis, own: Index) -> list[Driver]:
     """Return drivers of the residuals in which a hypothesis acts, of its own elements if any."""
-    places = {p.place for p in evidence.places if np.isin(own, p.columns).any()}
+    places = evidence.places_of(own)
     found = [d for d in evidence.terms if isinstance(d, Driver) and d.place in places]
     near = [d for d in found if d.place.element in hypothesis.elements]
     return near or found

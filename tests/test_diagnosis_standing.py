@@ -2,14 +2,18 @@
 
 from dataclasses import replace
 
+import numpy as np
 import pytest
 
 from cspm_ident.diagnosis import standing as module
-from cspm_ident.diagnosis.columns import Candidate
-from cspm_ident.diagnosis.hypothesis import Findings, Hypothesis, Named
+from cspm_ident.diagnosis.columns import Candidate, Place
+from cspm_ident.diagnosis.equation import Equation
+from cspm_ident.diagnosis.evidence import gather
+from cspm_ident.diagnosis.hypothesis import Findings, Hypothesis, Named, Rival
+from cspm_ident.diagnosis.search import Search
 from cspm_ident.diagnosis.standing import Standing
 from cspm_ident.diagnosis.sums import Gain
-from cspm_sim.effects import catalogue
+from cspm_sim.effects import Channel, catalogue
 
 
 def named(effect_id, element):
@@ -60,3 +64,59 @@ def test_what_is_unknown_is_asked_again_where_less_is_sure_than_was_found(monkey
     assert (unknown, asked) == (
         (("again",), [(None, (DRY,), gone, stands.fed_back)]) if less else (("first",), [])
     )
+
+
+LINE, SQUARE, LATE = (
+    Hypothesis(catalogue()[name], (Candidate(catalogue()[name], element),))
+    for name, element in (
+        ("winch_viscous_friction", "surge"),
+        ("winch_load_friction", "surge"),
+        ("tension_delay", "load_cells"),
+    )
+)
+
+
+def shaft(loud, seed=1, weight=1.0):
+    """Friction by the square of the speed, which moves by `loud`, in units of its noise.
+
+    Columns are in tenths and in ten-thousandths: what they are multiplied with is small.
+    """
+    rng, times = np.random.default_rng(seed), 0.01 * np.arange(2400)
+    speed = loud * (np.sin(2.1 * times) + 0.6 * np.sin(0.83 * times))
+    square = speed * np.abs(speed)
+    target = (weight * square + rng.standard_normal(2400))[:, None]
+    columns = ((LINE, 10.0 * speed), (SQUARE, 10.0 * square), (LATE, 1e4 * square))
+    own = {term.candidates[0]: values[:, None, None] for term, values in columns}
+    place = Place(Channel.SHAFT, "surge")
+    return gather([[Equation(place, times, target, own, target)]], 0.5)
+
+
+def found_in(search, hypothesis, *rivals):
+    base, own = search.fits.columns([]), search.fits.own_columns(hypothesis)
+    gain, share = search.fits.gain(hypothesis, base), search.sureness.share(base, own)
+    return Named(hypothesis, gain, share, tuple(Rival(h, 1.0) for h in rivals))
+
+
+def test_what_explains_the_same_and_is_not_contradicted_stands_instead():
+    """Where it moves a fifth as much, a line is too much, and of a square there is nothing."""
+    search = Search(shaft(2.0))
+    still = shaft(0.2, seed=2)
+    line = found_in(search, LINE, SQUARE)
+    assert module.confirmed(search.fits, still, [line]).rejected == (line,)
+    stood = module._confirmed(search, still, [line])
+    (square,) = stood.untold
+    assert (square.hypothesis, square.alternatives) == (SQUARE, ())
+    assert square.gain.total > line.gain.total
+    alone = found_in(search, LINE)
+    assert module._confirmed(search, still, [alone]).rejected == (alone,)
+    other_way = shaft(2.0, seed=2, weight=-1.0)
+    assert module._confirmed(search, other_way, [line]).rejected == (line,)
+
+
+def test_what_takes_as_much_as_the_unknown_is_told_though_no_free_function_does():
+    search = Search(shaft(2.0))
+    square, late = found_in(search, SQUARE), found_in(search, LATE)
+    assert square.share > 0.5
+    assert module._would_be_unknown(search, square, ())
+    assert not module._would_be_unknown(search, square._replace(share=0.14), ())
+    assert not module._would_be_unknown(search, late, ())

@@ -207,7 +207,8 @@ def _judge(parts: Parts, found: Findings, block: float) -> Evidence:
 
 
 def _named(found: Findings) -> set[Candidate | Driver]:
-    return {c for each in found.named for c in each.hypothesis.candidates}
+    rivals = {c for each in found.named for rival in each.alternatives for c in rival.candidates}
+    return rivals | {c for each in found.named for c in each.hypothesis.candidates}
 
 
 def _found_only(parts: Parts, found: Findings) -> Parts:

@@ -2,11 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Collection, Sequence
+from collections.abc import Collection, Iterator, Sequence
 from dataclasses import dataclass, replace
 from itertools import compress
-
-import numpy as np
 
 from cspm_ident.diagnosis.asked_for import (
     instruments_of,
@@ -19,6 +17,7 @@ from cspm_ident.diagnosis.evidence import Evidence
 from cspm_ident.diagnosis.hypothesis import Findings, Hypothesis, Named, Unknown
 from cspm_ident.diagnosis.likeness import RIVAL_SHARE
 from cspm_ident.diagnosis.search import Search
+from cspm_ident.diagnosis.unexplained import UNKNOWN_SHARE
 from cspm_ident.signals.measurement import Measurement
 
 Parts = Sequence[Sequence[Equation]]
@@ -80,7 +79,7 @@ def standing_of(
         rows: their equations, in units of their noise.
         block: length of the blocks [s].
     """
-    stood = Confirmed(found.named) if judge is None else confirmed(search.fits, judge, found.named)
+    stood = Confirmed(found.named) if judge is None else _confirmed(search, judge, found.named)
     kept, fed_back = _asked_for(search, stood.kept, searched, rows, block)
     doubted = _doubted(search, kept, stood, fed_back)
     rejected = (*stood.rejected, *(each for each in stood.untold if each not in doubted))
@@ -89,6 +88,34 @@ def standing_of(
     if doubted and not unknown_beside(search, kept, rejected, fed_back):
         doubted = ()
     return Standing(kept, faint, stood.plain, doubted, rejected, fed_back)
+
+
+def _confirmed(search: Search, judge: Evidence, found: Sequence[Named]) -> Confirmed:
+    """Part what was found by whether it stands, or what explains the same does in its place.
+
+    A bar that comes to rest contradicts drag in proportion to its speed, and not to its square.
+    """
+    stood = confirmed(search.fits, judge, found)
+    for each in stood.rejected:
+        for instead in _instead(search, each, found):
+            others = [instead if other is each else other for other in found]
+            if instead not in confirmed(search.fits, judge, others).rejected:
+                return _confirmed(search, judge, others)
+    return stood
+
+
+def _instead(search: Search, named: Named, found: Sequence[Named]) -> Iterator[Named]:
+    """Yield what explains the same as a finding by itself, nearest first."""
+    others = [h for h in _hypotheses(found) if h is not named.hypothesis]
+    base = search.fits.columns(others)
+    alone = [a for a in named.alternatives if a.beside is None]
+    for rival in sorted(alone, key=lambda each: each.behind):
+        if not search.fits.is_plausible([*others, rival.hypothesis]):
+            continue
+        gain = search.fits.gain(rival.hypothesis, base)
+        share = search.sureness.share(base, search.fits.own_columns(rival.hypothesis))
+        rest = tuple(a for a in named.alternatives if a is not rival)
+        yield Named(replace(rival.hypothesis, onset=named.hypothesis.onset), gain, share, rest)
 
 
 def _asked_for(
@@ -129,9 +156,20 @@ def _doubted(
     if not stood.untold:
         return ()
     unknown = unknown_beside(search, kept, (*stood.rejected, *stood.untold), fed_back)
-    most = RIVAL_SHARE * max((gain.total for _, gain, _ in unknown), default=np.inf)
+    if not unknown:
+        return tuple(e for e in stood.untold if _would_be_unknown(search, e, kept))
+    most = RIVAL_SHARE * max(gain.total for _, gain, _ in unknown)
     beside = Findings((), unknown, 0)
     return tuple(e for e in stood.untold if e.gain.total >= most and beside.is_doubtful(e))
+
+
+def _would_be_unknown(search: Search, named: Named, kept: Sequence[Named]) -> bool:
+    """Return whether a finding takes as much as is told as unknown, though no free function does.
+
+    Nor may it be what a sound machine has as well.
+    """
+    every = _hypotheses([*kept, named])
+    return named.share >= UNKNOWN_SHARE and not search.fits.is_negligible(named.hypothesis, every)
 
 
 def unknown_beside(

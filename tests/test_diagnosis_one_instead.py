@@ -1,11 +1,10 @@
-"""One effect instead of two findings: only where it explains both."""
+"""One effect instead of several faults: only where it explains all of them."""
 
 from dataclasses import replace
 
 import numpy as np
 import pytest
 
-from cspm_ident.diagnosis import one_instead as module
 from cspm_ident.diagnosis.columns import Candidate, Place
 from cspm_ident.diagnosis.equation import Equation
 from cspm_ident.diagnosis.evidence import gather
@@ -75,10 +74,26 @@ def test_what_has_no_fewer_numbers_has_to_explain_no_less():
     assert instead(search(1.03), chosen, LOAD) is not None
 
 
-def test_nor_does_what_has_two_numbers_more(monkeypatch):
-    chosen = of(COULOMB, VISCOUS)
-    monkeypatch.setattr(module, "_FURTHER_FAULT", 0)
-    assert instead(search(1.0, COM, further=0.01), chosen, COM) is None
+@pytest.mark.parametrize(("weight", "stands"), [(1.0, True), (1.1, False)])
+def test_what_explains_a_finding_on_two_elements_stands_for_it(weight, stands):
+    """A bar's own, which has three numbers, shows in two cables at once."""
+    times = STEP * np.arange(ROWS)
+    speeds = {"a": np.sin(2.1 * times), "b": np.sin(0.83 * times)}
+    rubs = {name: Candidate(VISCOUS.effect, name) for name in speeds}
+    equations = []
+    for k, (name, speed) in enumerate(speeds.items()):
+        noise = 0.3 * np.random.default_rng(7 + k).standard_normal(ROWS)
+        own = speed if name == "a" else weight * speed
+        cable = np.stack([own, 1e-6 * np.cos(times), 1e-6 * np.sin(times)], axis=1)
+        columns = {COM: cable[:, None, :], rubs[name]: speed[:, None, None]}
+        target = (speed + noise)[:, None]
+        place = Place(Channel.SHAFT, name)
+        equations.append(Equation(place, times, target, columns, target))
+    looked = Search(gather([equations], BLOCK_S))
+    both = Hypothesis(VISCOUS.effect, tuple(rubs.values()))
+    assert freedom(both) == freedom(*of(COM)) == 3
+    found = instead(looked, [both], COM)
+    assert found == ((*of(COM), both) if stands else None)
 
 
 def test_nor_does_anything_for_what_begins_late_or_stands_alone():

@@ -207,8 +207,9 @@ def _judge(parts: Parts, found: Findings, block: float) -> Evidence:
 
 
 def _named(found: Findings) -> set[Candidate | Driver]:
-    rivals = {c for each in found.named for rival in each.alternatives for c in rival.candidates}
-    return rivals | {c for each in found.named for c in each.hypothesis.candidates}
+    told = [each.hypothesis.candidates for each in found.named]
+    rivals = [rival.candidates for each in found.named for rival in each.alternatives]
+    return {candidate for own in (*told, *rivals) for candidate in own}
 
 
 def _found_only(parts: Parts, found: Findings) -> Parts:

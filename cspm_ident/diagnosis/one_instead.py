@@ -1,4 +1,4 @@
-"""One effect on one element instead of two findings that it explains both."""
+"""One effect on one element instead of several faults that it explains all."""
 
 from __future__ import annotations
 
@@ -14,18 +14,15 @@ from cspm_ident.diagnosis.likeness import TIED, UNTRUE_SHARE
 from cspm_ident.diagnosis.sums import gain_of
 from cspm_ident.diagnosis.sureness import Sureness
 
-# Numbers that a second fault counts for, as in `freedom`.
-_FURTHER_FAULT = 1
-
 
 def one_instead(
     fits: Fits, sureness: Sureness, chosen: Sequence[Hypothesis], free: Sequence[Candidate]
-) -> tuple[Hypothesis, Hypothesis, Hypothesis] | None:
-    """Return a hypothesis of one fault, and the two of those chosen that it stands for.
+) -> tuple[Hypothesis, ...] | None:
+    """Return a hypothesis of one fault, and those of two and more that it stands for.
 
     A heavy rope pulls the bar down at one end: as much as a heavier bar whose centre of mass lies
-    elsewhere, which says the same with two faults. It has to explain as much as both, as far as
-    models are true and blocks tell; where it has no fewer numbers, no less than both.
+    elsewhere, which says the same with two faults. It has to explain as much as they do, as far as
+    models are true and blocks tell; where it has no fewer numbers, no less.
 
     Args:
         fits: of what was searched.
@@ -39,24 +36,26 @@ def one_instead(
     left = fits.sums.held_out(fits.columns(chosen))
     singles = [Hypothesis(c.effect, (c,)) for c in free]
     columns = [fits.own_columns(h) for h in singles]
-    for two in combinations(found, 2):
-        others = [h for h in chosen if h not in two]
+    several = [(h,) for h in found if h.causes > 1]
+    for few in (*several, *combinations(found, 2)):
+        others = [h for h in chosen if h not in few]
         base = fits.columns(others)
         gained = gain_of(fits.sums.held_out(base) - left)
         undecided = UNTRUE_SHARE * gained.total
-        both = np.concatenate([fits.own_columns(h) for h in two])
-        *gains, most = fits.sums.gains_beyond(base, [*columns, both])
+        together = np.concatenate([fits.own_columns(h) for h in few])
+        *gains, most = fits.sums.gains_beyond(base, [*columns, together])
         for k in np.argsort(gains)[::-1]:
             if gains[k] < most - undecided:
                 break
             less = gain_of(fits.sums.held_out(np.concatenate([base, columns[k]])) - left)
-            wider = freedom(singles[k]) - sum(map(freedom, two))
+            wider = freedom(singles[k]) - sum(map(freedom, few))
+            # A further fault counts for a number, which `freedom` knows of a single finding.
             allowed = min(undecided, TIED * less.error) if wider < 0 else 0.0
             if (
-                wider <= _FURTHER_FAULT
+                wider < len(few)
                 and less.total <= allowed
                 and fits.is_plausible([*others, singles[k]])
                 and sureness.counts(base, singles[k], gained, len(others))
             ):
-                return singles[k], *two
+                return singles[k], *few
     return None

@@ -141,10 +141,10 @@ class Search:
         return [] if best is None else [best]
 
     def _merged(self, chosen: list[Hypothesis]) -> list[Hypothesis]:
-        """Return one effect instead of two wherever it explains both."""
+        """Return one effect instead of several faults wherever it explains all of them."""
         while merging := one_instead(self.fits, self.sureness, chosen, self._free(chosen)):
-            one, *two = merging
-            chosen = joined([h for h in chosen if h not in two], one)
+            one, *few = merging
+            chosen = joined([h for h in chosen if h not in few], one)
         return chosen
 
     def _needed(self, chosen: Sequence[Hypothesis]) -> list[Hypothesis]:

@@ -66,6 +66,13 @@ def test_of_several_findings_those_stand_that_are_confirmed():
     assert confirmed(search.fits, winch(1.0, seed=2), []).kept == ()
 
 
+def test_data_without_any_residual_say_nothing():
+    search = Search(winch(1.0))
+    (found,) = search.run().named
+    nothing = replace(winch(1.0), places=())
+    assert confirmed(search.fits, nothing, [found]).untold == (found,)
+
+
 @pytest.mark.slow
 def test_drag_of_a_bar_that_has_come_to_rest_is_told_with_that_nothing_confirms_it(tmp_path):
     """In the last three tenths of a minute a plucked bar shows nothing, which confirms nothing."""

@@ -85,7 +85,7 @@ class _Lowered:
         opposite = {c: -w if c in own else w for c, w in whole.items()}
         places = [place.place for place in judge.places]
         left, without, against = (
-            np.array([squares[place] for place in places])
+            np.array([squares[place] for place in places]).reshape(len(places), judge.blocks)
             for squares in map(judge.left_by_block_with, (whole, fewer, opposite))
         )
         self._without = without.sum(axis=1)
@@ -129,4 +129,4 @@ class _Lowered:
     @property
     def _shows(self) -> bool:
         """Whether blocks would tell what it should take from nothing, as they scatter."""
-        return bool(self._expected.sum() >= _LEAST_EXPECTED * self._error)
+        return bool(self._expected.sum() > _LEAST_EXPECTED * self._error)

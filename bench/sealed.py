@@ -1,6 +1,7 @@
 """All sealed recordings in one table: `python -m bench.sealed` renews docs/blind-sealed.md.
 
-It counts what the pages of the parts say, each written when its part was scored, once.
+It counts what the pages of the parts say, each written when its part was scored, once: those of
+docs/sealed, and of the last docs/blind-results.md.
 """
 
 from __future__ import annotations
@@ -15,7 +16,7 @@ from cspm_ident.blind.share import Share, share, share_words, upper_bound
 from cspm_ident.markdown import markdown_table
 
 DOCS = Path(__file__).resolve().parents[1] / "docs"
-PAGE = DOCS / "blind-sealed.md"
+PAGE, EARLIER, LAST = DOCS / "blind-sealed.md", "sealed", "blind-results.md"
 ALARMS, BOUND = "alarm where there is nothing", "one-sided upper bound of alarms"
 TIED, TIES = "truth among the ties", "mean size of the ties"
 _COUNTS = re.compile(r"\((\d+) of (\d+);")
@@ -28,7 +29,7 @@ class Part(NamedTuple):
     """What the page of one part says.
 
     Attributes:
-        page: its file's name.
+        page: its file, from the documentation's folder.
         truth: SHA-256 of its set's truth file.
         date: when it was scored.
         recordings: their names.
@@ -55,11 +56,14 @@ def main() -> None:
 def read_parts(folder: Path) -> list[Part]:
     """Return the parts in the order in which they were scored.
 
+    Args:
+        folder: the documentation's.
+
     Raises:
         ValueError: a recording is in two parts.
     """
-    pages = sorted(folder.glob("blind-results-sealed*.md"), key=lambda page: _number(page.stem))
-    parts = [read_part(page) for page in pages]
+    pages = [*sorted((folder / EARLIER).glob("part-*.md")), folder / LAST]
+    parts = [read_part(page, folder) for page in pages]
     seen: set[tuple[str, str]] = set()
     for part in parts:
         own = {(part.truth, name) for name in part.recordings}
@@ -69,12 +73,12 @@ def read_parts(folder: Path) -> list[Part]:
     return parts
 
 
-def _number(stem: str) -> int:
-    return int(stem.removeprefix("blind-results-sealed").removeprefix("-") or "1")
-
-
-def read_part(page: Path) -> Part:
+def read_part(page: Path, folder: Path = DOCS) -> Part:
     """Read a page that `cspm blind score --page` has written.
+
+    Args:
+        page: somewhere in the folder.
+        folder: from which it is linked.
 
     Raises:
         ValueError: it does not say of which truth it is.
@@ -88,7 +92,7 @@ def read_part(page: Path) -> Part:
     _, *targets = _table(sections["Against the targets"])
     _, *recordings = _table(sections["Every recording"])
     return Part(
-        page.name,
+        str(page.relative_to(folder)),
         *told.groups(),
         recordings=tuple(row[0] for row in recordings),
         found={label: found for label, found, _ in targets},

@@ -9,6 +9,8 @@ from bench.sealed import (
     ALARMS,
     BOUND,
     DOCS,
+    EARLIER,
+    LAST,
     PAGE,
     allowed,
     pooled,
@@ -42,9 +44,9 @@ def test_the_committed_page_is_what_the_command_writes(tmp_path):
 
 
 def test_there_is_a_page_for_each_part_that_is_told():
-    told = (DOCS / "blind.md").read_text(encoding="utf-8")
+    _, told = PAGE.read_text(encoding="utf-8").split("\n## The sets\n")
     assert len(PARTS) >= 7
-    assert all(part.page in told for part in PARTS)
+    assert all(f"]({part.page})" in told for part in PARTS)
 
 
 @pytest.mark.parametrize("part", PARTS, ids=lambda part: part.page)
@@ -119,11 +121,13 @@ def test_a_target_is_met_surely_only_where_the_whole_interval_meets_it(
 
 
 def test_no_recording_counts_twice(tmp_path):
-    page = DOCS / PARTS[0].page
-    shutil.copy(page, tmp_path / "blind-results-sealed.md")
-    assert len(read_parts(tmp_path)) == 1
-    shutil.copy(page, tmp_path / "blind-results-sealed-2.md")
-    with pytest.raises(ValueError, match=r"sealed-2\.md: 190 recordings are in an earlier part"):
+    (tmp_path / EARLIER).mkdir()
+    shutil.copy(DOCS / PARTS[1].page, tmp_path / LAST)
+    shutil.copy(DOCS / PARTS[0].page, tmp_path / EARLIER / "part-01.md")
+    first, last = read_parts(tmp_path)
+    assert (first.page, last.page) == ("sealed/part-01.md", "blind-results.md")
+    shutil.copy(DOCS / PARTS[0].page, tmp_path / LAST)
+    with pytest.raises(ValueError, match=r"results\.md: 190 recordings are in an earlier part"):
         read_parts(tmp_path)
 
 

@@ -1,0 +1,221 @@
+"""Could a blind benchmark's misses be told at all? `python -m bench.blind_misses DIR TRUTH`.
+
+DIR is a benchmark that `cspm blind run` has diagnosed and `cspm blind score` has scored. Every
+clear case that is not first, or not among the ties, is searched again, and what is concealed is
+held against what was found, on the same residuals, block by block, each fitted to other blocks.
+Where what is concealed explains no more, nothing in the recording speaks for it, and whoever
+tells it has guessed.
+"""
+
+from __future__ import annotations
+
+import argparse
+from collections import Counter
+from collections.abc import Iterator, Mapping, Sequence
+from concurrent.futures import ProcessPoolExecutor
+from dataclasses import replace
+from itertools import product
+from pathlib import Path
+from typing import Any, NamedTuple
+
+import numpy as np
+from rich.console import Console
+
+from bench.page import into_page
+from cspm_bringup.blind.results import read_results
+from cspm_bringup.blind.truth import RECORDINGS, read_truth
+from cspm_ident.blind.outcome import EFFECT, PARAMETER, Outcome, judge
+from cspm_ident.blind.scorecard import CLEAR
+from cspm_ident.blind.share import share, share_words
+from cspm_ident.diagnosis.hypothesis import Hypothesis, freedom
+from cspm_ident.diagnosis.look import Recordings, searched_for
+from cspm_ident.diagnosis.safeguards import ALL_SAFEGUARDS
+from cspm_ident.diagnosis.search import Search
+from cspm_ident.diagnosis.sums import Gain, gain_of
+from cspm_ident.markdown import markdown_table
+from cspm_ident.signals.measurement import read_measurement
+
+PAGE = Path(__file__).resolve().parents[1] / "docs" / "blind-misses.md"
+# Standard errors of the scatter between blocks.
+SURELY = 2.0
+NO_COLUMN, GIVEN_UP, MORE, SIMPLER, NO_MORE = REASONS = (
+    "the recording has no trace of it",
+    "found, and not told so",
+    "explains surely more than what was found",
+    "explains as much with fewer numbers",
+    "explains no more than what was found",
+)
+# Those of which a recording tells nothing.
+HIDDEN = (NO_COLUMN, NO_MORE)
+_MEASURES = {
+    "block": "block found",
+    "first": "effect and elements named first",
+    "tied": "truth among the ties",
+}
+
+Data = Mapping[str, Any]
+
+
+class Miss(NamedTuple):
+    """What speaks for the truth of a case that was missed.
+
+    Attributes:
+        outcome: how it was scored.
+        gain: by how much the truth explains more than what was found; None without a column.
+        of: the squares that what was found explains, in the same unit.
+        reason: one of `REASONS`.
+    """
+
+    outcome: Outcome
+    gain: Gain | None
+    of: float
+    reason: str
+
+
+def main() -> None:
+    """Run the command line."""
+    parser = argparse.ArgumentParser(prog="python -m bench.blind_misses", description=__doc__)
+    parser.add_argument("folder", type=Path, help="a blind benchmark with its results")
+    parser.add_argument("truth", type=Path, help="its truth file")
+    parser.add_argument("--page", action="store_true", help="renew docs/blind-misses.md")
+    asked, console = parser.parse_args(), Console()
+    items = {item["name"]: item for item in read_truth(asked.truth)["items"]}
+    results = read_results(asked.folder, list(items))
+    outcomes = [judge(items[name], results[name], {}) for name in results]
+    clear = [o for o in outcomes if o.kind in (EFFECT, PARAMETER) and o.multiple >= CLEAR]
+    missed = [o for o in clear if not (o.block and o.first and o.tied)]
+    misses = []
+    with ProcessPoolExecutor() as pool:
+        tasks = [
+            pool.submit(miss_of, o, items[o.name], asked.folder / RECORDINGS / o.name)
+            for o in missed
+        ]
+        for done, task in enumerate(tasks, start=1):
+            misses.append(task.result())
+            console.print(f"{done} of {len(missed)}: {misses[-1].outcome.name}", markup=False)
+    for name, text in {"reach": reach_table(clear, misses), "misses": miss_table(misses)}.items():
+        console.print(text, markup=False, soft_wrap=True)
+        if asked.page:
+            into_page(PAGE, name, text)
+
+
+def miss_of(outcome: Outcome, item: Data, recording: Path) -> Miss:
+    """Search a recording again and hold what is concealed against what was found."""
+    given = Recordings([read_measurement(recording)], [])
+    look, found = searched_for(given, lambda _: None, ALL_SAFEGUARDS)
+    return compared(outcome, item, look.search, [each.hypothesis for each in found.named])
+
+
+def compared(outcome: Outcome, item: Data, search: Search, found: Sequence[Hypothesis]) -> Miss:
+    """Return what speaks for what is concealed, beside what sound clocks do.
+
+    Args:
+        outcome: how the case was scored.
+        item: of the truth file.
+        search: through the recording's residuals.
+        found: what it has found.
+    """
+    fits = search.fits
+    sound = [h for h in found if fits.is_negligible(h, found)]
+    told = fits.sums.held_out(fits.columns(found))
+    squares = float(np.sum(fits.sums.held_out(fits.columns(sound)) - told))
+    true = nearest_truth(search, item, sound)
+    if true is None:
+        return Miss(outcome, None, squares, NO_COLUMN)
+    gain = gain_of(told - _left(search, true, sound))
+    names = {(h.effect.id, e) for h in found for e in h.elements}
+    if {(h.effect.id, e) for h in true for e in h.elements} <= names:
+        return Miss(outcome, gain, squares, GIVEN_UP)
+    return Miss(outcome, gain, squares, reason_of(gain, _numbers(true), _numbers(found)))
+
+
+def reason_of(gain: Gain, true: int, told: int) -> str:
+    """Return what speaks for the truth, by what it explains more and by the numbers of both."""
+    if gain.total > SURELY * gain.error:
+        return MORE
+    alike = gain.total >= -SURELY * gain.error
+    return SIMPLER if alike and true < told else NO_MORE
+
+
+def nearest_truth(
+    search: Search, item: Data, beside: Sequence[Hypothesis]
+) -> list[Hypothesis] | None:
+    """Return what is concealed as the catalogue has it, of the shapes that explain most.
+
+    None where one of its elements has no column.
+    """
+    forms = [list(_forms(search, each)) for each in item["concealed"]]
+    if not all(forms):
+        return None
+    start = float(item.get("onset_s", 0.0))
+    onset = int(np.argmin(np.abs(search.evidence.times - start))) if start else 0
+    options = [[replace(h, onset=onset) for h in option] for option in product(*forms)]
+    return min(options, key=lambda option: float(_left(search, option, beside).sum()))
+
+
+def _forms(search: Search, concealed: Data) -> Iterator[Hypothesis]:
+    """Yield an effect on its elements, in every shape that it has on all of them."""
+    own = [
+        c
+        for c in search.heard
+        if c.effect_id == concealed["effect"] and c.element in concealed["elements"]
+    ]
+    for shape in dict.fromkeys(c.shape for c in own):
+        these = tuple(c for c in own if c.shape == shape)
+        if len(these) == len(concealed["elements"]):
+            yield Hypothesis(these[0].effect, these)
+
+
+def _left(search: Search, true: Sequence[Hypothesis], beside: Sequence[Hypothesis]) -> Any:
+    """Return Σ residual² of each block beside what is true, not fitted to it."""
+    fits, columns = search.fits, search.fits.columns([*true, *beside])
+    onset = max(h.onset for h in true)
+    own = search.evidence.columns_of(c for h in true for c in h.candidates)
+    if not onset:
+        return fits.sums.held_out(columns)
+    with fits.sums.delayed(own, onset):
+        return fits.sums.held_out(columns)
+
+
+def _numbers(hypotheses: Sequence[Hypothesis]) -> int:
+    return sum(map(freedom, hypotheses)) + len(hypotheses)
+
+
+def reach_table(clear: Sequence[Outcome], misses: Sequence[Miss]) -> str:
+    """Return, by what was missed, why, and what there was to reach."""
+    rows = []
+    for key, label in _MEASURES.items():
+        own = Counter(m.reason for m in misses if not getattr(m.outcome, key))
+        hits, hidden = sum(getattr(o, key) for o in clear), sum(own[reason] for reason in HIDDEN)
+        most = len(clear) - hidden
+        words = [share_words(share([True] * n + [False] * (len(clear) - n))) for n in (hits, most)]
+        rows.append((label, words[0], *(str(own[reason]) for reason in REASONS), words[1]))
+    heads = ("", "found", *REASONS, "if all but what is hidden were right")
+    return markdown_table(heads, rows)
+
+
+def miss_table(misses: Sequence[Miss]) -> str:
+    """Return every miss with what speaks for its truth."""
+    rows = [
+        (
+            m.outcome.name,
+            m.outcome.stratum,
+            "<br>".join(_words(each) for each in m.outcome.truth),
+            "<br>".join(_words(each) for each in m.outcome.found) or m.outcome.verdict,
+            ", ".join(key for key in _MEASURES if not getattr(m.outcome, key)),
+            "—" if m.gain is None else f"{m.gain.total:.0f} ± {m.gain.error:.0f} of {m.of:.0f}",
+            m.reason,
+        )
+        for m in sorted(misses, key=lambda m: (REASONS.index(m.reason), m.outcome.stratum))
+    ]
+    heads = ("recording", "stratum", "concealed", "told", "missed", "explains more by", "it")
+    return markdown_table(heads, rows)
+
+
+def _words(named: tuple[str, tuple[str, ...]]) -> str:
+    effect, elements = named
+    return f"{effect}: {', '.join(elements)}" if len(elements) < 8 else f"{effect}: all"
+
+
+if __name__ == "__main__":
+    main()

@@ -13,7 +13,7 @@ from run_samples import SCENARIOS
 from cspm_ident.block_simulation import Drive
 from cspm_ident.diagnosis.columns import Candidate, Place
 from cspm_ident.diagnosis.curves import explained_by, held_out_curves
-from cspm_ident.diagnosis.diagnose import Diagnosis, Shape
+from cspm_ident.diagnosis.diagnose import Detail, Diagnosis, Shape
 from cspm_ident.diagnosis.drivers import Driver
 from cspm_ident.diagnosis.equation import Equation
 from cspm_ident.diagnosis.evidence_figure import caption_of
@@ -76,25 +76,27 @@ def diagnosis(named=True, alternatives=(), unknown=(), rejected=(), lines=(), re
     hypothesis = Hypothesis(RUBBING.effect, (RUBBING,))
     found = (Named(hypothesis, Gain(900.0, 10.0), 0.99, tuple(alternatives)),) if named else ()
     return Diagnosis(
-        (measured,),
-        (),
-        Findings(found, tuple(unknown), 485),
-        tuple(rejected),
-        (),
-        weights,
-        (HeldOut(PLACE, 0.15, TORQUE, TORQUE, NOISE, NOISE, NOISE),),
-        (SimulatedFit(OUTPUT, 3.5, 1.46, 1.45, 0.0071, 0.0049),),
-        (Worth(OUTPUT, 1.46, 0.0071),) * len(found),
-        tuple(Shape(d, np.linspace(0.0, 1.0, 7), np.arange(7.0) - 3.0) for d, _, _ in unknown),
-        tuple(lines),
-        (None,) * len(found),
-        (region,) * len(found),
-        (Limit("winch_viscous_friction", "sway_1", "coefficient", 2.1e-6, "N·m·s/rad", True),),
-        (("winch_backlash", ("sway_1",)),),
-        (PLACE,),
-        np.zeros(1),
-        held_out_curves([[part]], {c: w for c, (w, _) in weights.items()}),
-        {PLACE: np.array([NOISE])},
+        searched=(measured,),
+        held_out=(),
+        findings=Findings(found, tuple(unknown), 485),
+        details=(Detail(None, region, Worth(OUTPUT, 1.46, 0.0071)),) * len(found),
+        rejected=tuple(rejected),
+        negligible=(),
+        weights=weights,
+        fit=(HeldOut(PLACE, 0.15, TORQUE, TORQUE, NOISE, NOISE, NOISE),),
+        simulated=(SimulatedFit(OUTPUT, 3.5, 1.46, 1.45, 0.0071, 0.0049),),
+        shapes=tuple(
+            Shape(d, np.linspace(0.0, 1.0, 7), np.arange(7.0) - 3.0) for d, _, _ in unknown
+        ),
+        lines=tuple(lines),
+        limits=(
+            Limit("winch_viscous_friction", "sway_1", "coefficient", 2.1e-6, "N·m·s/rad", True),
+        ),
+        silent=(("winch_backlash", ("sway_1",)),),
+        places=(PLACE,),
+        starts=np.zeros(1),
+        curves=held_out_curves([[part]], {c: w for c, (w, _) in weights.items()}),
+        noise={PLACE: np.array([NOISE])},
     )
 
 
@@ -332,8 +334,8 @@ def test_the_doubtful_stands_behind_a_greater_unknown_though_another_is_sure(gai
     found = diagnosis(unknown=[(Driver(PLACE, "tension [N]"), Gain(200.0, 1.0), 0.2)])
     (one,) = found.findings.named
     two = tuple(one._replace(gain=Gain(total, 1.0)) for total in (9000.0, gain))
-    twice = {name: 2 * getattr(found, name) for name in ("onsets", "regions", "worth")}
-    found = replace(found, findings=found.findings._replace(named=two), **twice)
+    findings = found.findings._replace(named=two)
+    found = replace(found, findings=findings, details=2 * found.details)
     effects = [f["effect"] for f in diagnosis_data(found)["findings"]]
     coulomb = "winch_coulomb_friction"
     assert effects == [coulomb, *(("unknown", coulomb) if behind else (coulomb, "unknown"))]

@@ -11,7 +11,7 @@ from cspm_bringup.assembly import resolve
 from cspm_bringup.bundle import make_bundle
 from cspm_bringup.run import run
 from cspm_ident.diagnosis.columns import Candidate, Place
-from cspm_ident.diagnosis.diagnose import Diagnosis
+from cspm_ident.diagnosis.diagnose import Detail, Diagnosis
 from cspm_ident.diagnosis.equation import Equation
 from cspm_ident.diagnosis.hypothesis import Findings, Hypothesis, Named, Rival
 from cspm_ident.diagnosis.judgement import HeldOut
@@ -223,9 +223,25 @@ def tied(measurement):
     weights = {RUBBING: (np.array([0.03]), np.array([0.001]))}
     fit = HeldOut(Place(Channel.SHAFT, "surge_2"), 0.1, 0.03, 0.03, 0.001, 0.001, 0.001)
     findings = Findings((named,), (), 1)
-    starts = np.zeros(1)
-    rest = (), (None,), (), (), (None,), (None,), (), (), (), starts, (), noise
-    return Diagnosis((short,), (), findings, (), (), weights, (fit,), *rest)
+    return Diagnosis(
+        searched=(short,),
+        held_out=(),
+        findings=findings,
+        details=(Detail(None, None, None),),
+        rejected=(),
+        negligible=(),
+        weights=weights,
+        fit=(fit,),
+        simulated=(),
+        shapes=(),
+        lines=(),
+        limits=(),
+        silent=(),
+        places=(),
+        starts=np.zeros(1),
+        curves=(),
+        noise=noise,
+    )
 
 
 @pytest.fixture(scope="module")

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from itertools import compress
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -52,7 +53,21 @@ class Shape:
     values: Array
 
 
-@dataclass(frozen=True, eq=False)
+class Detail(NamedTuple):
+    """What is known of a finding beside its numbers.
+
+    Attributes:
+        onset: when it began; None where it acts all the time.
+        region: where it shows; None where it does everywhere.
+        worth: of it in simulations of held-out data; None where they cannot tell.
+    """
+
+    onset: Onset | None
+    region: Region | None
+    worth: Worth | None
+
+
+@dataclass(frozen=True, eq=False, kw_only=True)
 class Diagnosis:
     """What a diagnosis found.
 
@@ -60,16 +75,14 @@ class Diagnosis:
         searched: recordings in which was looked.
         held_out: those on which it was judged; empty where the end of each searched one was.
         findings: what was found, without what did not stand on held-out data.
+        details: of each of these that is named.
         rejected: what did not.
         negligible: what is there, but no more than in a sound machine; taken into account.
         weights: of each candidate found or negligible, with half the width of its 95 % interval.
         fit: residual by residual.
         simulated: quantity by quantity, by simulation.
-        worth: of each finding in these simulations; None where they cannot tell.
         shapes: of the unknown, in the order of `findings.unknown`.
         lines: periodic forces from outside.
-        onsets: when each finding began; None where it acts all the time.
-        regions: where each finding shows; None where it does everywhere.
         limits: from which size on effects would have been told.
         silent: effects and elements that these recordings cannot show.
         places: the residuals that there are.
@@ -84,16 +97,14 @@ class Diagnosis:
     searched: Sequence[Measurement]
     held_out: Sequence[Measurement]
     findings: Findings
+    details: tuple[Detail, ...]
     rejected: tuple[Named, ...]
     negligible: tuple[Named, ...]
     weights: Weights
     fit: tuple[HeldOut, ...]
     simulated: tuple[SimulatedFit, ...]
-    worth: tuple[Worth | None, ...]
     shapes: tuple[Shape, ...]
     lines: tuple[Line, ...]
-    onsets: tuple[Onset | None, ...]
-    regions: tuple[Region | None, ...]
     limits: tuple[Limit, ...]
     silent: tuple[tuple[str, tuple[str, ...]], ...]
     places: tuple[Place, ...]
@@ -146,30 +157,31 @@ def diagnose(
     values = {c: w for c, (w, _) in model.weights.items()}
     first = search.fits.values([each.hypothesis for each in kept])
     told = [k for k, negligible in enumerate(model.negligible) if not negligible]
+    regions = [region_of(data.rows, kept[k].hypothesis.candidates, first) for k in told]
+    free = free_functions(evidence, judge)
     return Diagnosis(
-        searched,
-        held_out,
-        Findings(tuple(kept[k] for k in told), unknown, found.candidates),
-        (*standing.rejected, *standing.fed_back),
-        tuple(compress(kept, model.negligible)),
-        model.weights,
-        judged(
-            held_out or searched, starts, retuned, values, noise, free_functions(evidence, judge)
+        searched=searched,
+        held_out=held_out,
+        findings=Findings(tuple(kept[k] for k in told), unknown, found.candidates),
+        details=tuple(
+            Detail(model.onsets[k], region, model.worth[k])
+            for k, region in zip(told, regions, strict=True)
         ),
-        model.simulated,
-        tuple(model.worth[k] for k in told),
-        _shapes(search, standing.sure, knots, [each[0] for each in unknown]),
-        _lasting(hums, searched, search_parts, values),
-        tuple(model.onsets[k] for k in told),
-        tuple(region_of(data.rows, kept[k].hypothesis.candidates, first) for k in told),
-        detection_limits(search, kept),
-        _silent(search, safeguards.effects),
-        tuple(place.place for place in evidence.places),
-        evidence.times,
-        held_out_curves(steady(judge_parts), first),
-        noise,
-        standing.faint,
-        model.spectra,
+        rejected=(*standing.rejected, *standing.fed_back),
+        negligible=tuple(compress(kept, model.negligible)),
+        weights=model.weights,
+        fit=judged(held_out or searched, starts, retuned, values, noise, free),
+        simulated=model.simulated,
+        shapes=_shapes(search, standing.sure, knots, [each[0] for each in unknown]),
+        lines=_lasting(hums, searched, search_parts, values),
+        limits=detection_limits(search, kept),
+        silent=_silent(search, safeguards.effects),
+        places=tuple(place.place for place in evidence.places),
+        starts=evidence.times,
+        curves=held_out_curves(steady(judge_parts), first),
+        noise=noise,
+        faint=standing.faint,
+        spectra=model.spectra,
     )
 
 

@@ -9,6 +9,7 @@ from cspm_ident.diagnosis.columns import Candidate
 from cspm_ident.diagnosis.diagnose import Diagnosis
 from cspm_ident.diagnosis.hypothesis import Named, members_of
 from cspm_ident.diagnosis.judgement import HeldOut
+from cspm_ident.diagnosis.onset import Onset
 from cspm_ident.diagnosis.part import Kind, kind_of
 from cspm_ident.diagnosis.region import Region
 from cspm_ident.diagnosis.simulation import Worth
@@ -28,15 +29,15 @@ _AWAY = 0.8
 
 def statement_of(diagnosis: Diagnosis, k: int) -> str:
     """Return the k-th finding: what has what, how much, since when, where, and what it is worth."""
-    named, region = diagnosis.findings.named[k], diagnosis.regions[k]
+    named, detail = diagnosis.findings.named[k], diagnosis.details[k]
     effect = named.hypothesis.effect
     doubt = _FAINT if named in diagnosis.faint else ""
     doubt += _DOUBT if diagnosis.findings.is_doubtful(named) else ""
-    where = f" It shows where {region_words(region)}." if region is not None else ""
+    where = f" It shows where {region_words(detail.region)}." if detail.region is not None else ""
     return (
         f"{_subject(effect, named.hypothesis.elements)} {_difference(effect)}:"
-        f" {_sizes(diagnosis, named)}.{_since(diagnosis, k)}{_elsewhere(diagnosis, named)}"
-        f" {_worth(diagnosis, named, diagnosis.worth[k])}{where}{doubt}"
+        f" {_sizes(diagnosis, named)}.{_since(named, detail.onset)}{_elsewhere(diagnosis, named)}"
+        f" {_worth(diagnosis, named, detail.worth)}{where}{doubt}"
     )
 
 
@@ -108,8 +109,8 @@ def _name(effect: Effect, number: Number) -> str:
     return f"{number.name.replace('_', ' ')}{' off by' if added else ''}"
 
 
-def _since(diagnosis: Diagnosis, k: int) -> str:
-    named, onset = diagnosis.findings.named[k], diagnosis.onsets[k]
+def _since(named: Named, onset: Onset | None) -> str:
+    """Return when it began, where a beginning was looked for."""
     if onset is not None:
         return f" It begins at {onset.time:.1f} s ({onset.low:.1f} to {onset.high:.1f} s)."
     block = named.hypothesis.onset

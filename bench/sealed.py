@@ -13,6 +13,7 @@ from typing import NamedTuple
 
 from bench.page import into_page
 from cspm_ident.blind.share import Share, share, share_words, upper_bound
+from cspm_ident.blind.target import Range, allowed
 from cspm_ident.markdown import markdown_table
 
 DOCS = Path(__file__).resolve().parents[1] / "docs"
@@ -21,8 +22,6 @@ ALARMS, BOUND = "alarm where there is nothing", "one-sided upper bound of alarms
 TIED, TIES = "truth among the ties", "mean size of the ties"
 _COUNTS = re.compile(r"\((\d+) of (\d+);")
 _TRUTH = re.compile(r"truth file SHA-256 `(\w+)`\. Scored (\S+) ")
-
-Range = tuple[float, float]
 
 
 class Part(NamedTuple):
@@ -113,17 +112,6 @@ def pooled(cells: Sequence[str]) -> Share:
     counts = [found.groups() for cell in cells if (found := _COUNTS.search(cell))]
     hits, cases = (sum(int(each[k]) for each in counts) for k in (0, 1))
     return share([True] * hits + [False] * (cases - hits))
-
-
-def allowed(target: str) -> Range:
-    """Return between what a target holds; shares are of 1."""
-    if target == "all":
-        return 1.0, 1.0
-    numbers = [float(number) for number in re.findall(r"[\d.]+", target)]
-    unit = 100.0 if target.endswith("%") else 1.0
-    if target.startswith("≥"):
-        return numbers[0] / unit, 1.0
-    return (numbers[0] / unit if len(numbers) > 1 else 0.0), numbers[-1] / unit
 
 
 def verdict(value: float, interval: Range, target: str) -> str:

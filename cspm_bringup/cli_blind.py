@@ -97,7 +97,10 @@ def score(
         typer.Option(metavar="HASH", help="That which `blind make` printed, to be checked."),
     ] = None,
     page: Annotated[
-        Path | None, typer.Option(metavar="FILE", help="Also write the scorecard as Markdown.")
+        Path | None,
+        typer.Option(
+            metavar="FILE", help="Also write the scorecard as Markdown, its picture beside it."
+        ),
     ] = None,
     json: Json = None,
 ) -> None:

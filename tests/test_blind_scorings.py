@@ -85,6 +85,8 @@ def test_a_sealed_split_is_not_scored_again_after_another_diagnosis(tmp_path):
     page, card = tmp_path / "page.md", tmp_path / "card.json"
     score_command(folder, truth, None, page, card)
     assert "This is the sealed split" in page.read_text()
+    assert "![The scorecard in pictures](page.png)" in page.read_text()
+    assert (tmp_path / "page.png").stat().st_size > 10_000
     assert json.loads(card.read_text())["shares"]["false_alarm"][:2] == [0, 1]
     page.unlink()
     diagnosed(folder, "unknown")

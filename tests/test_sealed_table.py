@@ -12,13 +12,13 @@ from bench.sealed import (
     EARLIER,
     LAST,
     PAGE,
-    allowed,
     pooled,
     read_part,
     read_parts,
     tables,
     verdict,
 )
+from cspm_ident.blind.target import allowed
 from cspm_sim.effects import catalogue
 
 PARTS = read_parts(DOCS)

@@ -93,10 +93,13 @@ def score_command(
         f"{date.today()} on {os.cpu_count()} processors ({platform.machine()}), cspm"
         f" {version('cspm')}"
     )
-    text = scorecard_page(card, found, machine)
-    say(console, text)
+    say(console, scorecard_page(card, found, machine))
     if page is not None:
-        page.write_text(text, encoding="utf-8")
+        from cspm_ident.blind.figure import draw_scorecard
+
+        picture = page.with_suffix(".png")
+        draw_scorecard(picture, card)
+        page.write_text(scorecard_page(card, found, machine, picture.name), encoding="utf-8")
     if json is not None:
         write_json(json, json_format.loads(json_format.dumps(card)) | {"truth_sha256": found})
 

@@ -2,28 +2,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from typing import Any
 
 from cspm_ident.blind.share import share_words
+from cspm_ident.blind.target import Judged, findings_judged, numbers_judged
 from cspm_ident.markdown import markdown_table
 
-_TARGETS = (
-    ("block", "block found", "≥ 97 %"),
-    ("block_tied", "block found, or tied with what was", ""),
-    ("element", "element found", "≥ 93 %"),
-    ("first", "effect and elements named first", "≥ 85 %"),
-    ("named", "all named by some finding", ""),
-    ("effect_only", "all named, on whatever elements", ""),
-    ("tied", "truth among the ties", "≥ 97 %"),
-    ("detected", "anything found", ""),
-    ("nothing_wrong_beside", "all named, and nothing wrong beside", ""),
-    ("false_alarm", "alarm where there is nothing", "≤ 3 %"),
-    ("parameter_called_effect", "wrong number called an effect", ""),
-    ("unknown_recognised", "unknown recognised", "≥ 75 %"),
-    ("false_unknown", "unknown where the catalogue has it", "≤ 8 %"),
-    ("failed", "diagnosis failed", ""),
-)
 _VERDICTS = ("consistent", "parameter", "effect", "tie", "unknown", "not_excited", "failed")
 _STANDING = {
     "dev": "This is the development split, on which the diagnosis is being worked at: it proves"
@@ -35,17 +20,19 @@ _STANDING = {
 Data = Mapping[str, Any]
 
 
-def scorecard_page(card: Data, sha256: str, machine: str) -> str:
+def scorecard_page(card: Data, sha256: str, machine: str, figure: str | None = None) -> str:
     """Return the scorecard as Markdown.
 
     Args:
         card: the scorecard, with the rows of `peers` and `ablations` beside it (`comparison`).
         sha256: of the truth file.
         machine: what scored it, and when.
+        figure: its picture, from where the page lies, if there is one.
     """
     parts = [
         "# Blind results",
         _about(card, sha256, machine),
+        *([] if figure is None else [f"![The scorecard in pictures]({figure})"]),
         "## Against the targets",
         "Known effects and numbers at 2 detection limits and more; intervals of 95 % after Clopper"
         " and Pearson.",
@@ -117,18 +104,22 @@ def _about(card: Data, sha256: str, machine: str) -> str:
 
 
 def _targets(card: Data) -> str:
-    rows = [(name, share_words(card["shares"][key]), goal) for key, name, goal in _TARGETS]
-    upper = f"{100 * card['shares']['false_alarm_upper']:.0f} %"
-    rows.append(("one-sided upper bound of alarms", upper, "≤ 6 %"))
-    rows.append(("mean size of the ties", _number(card["shares"]["mean_tie_size"]), "≤ 1.5"))
-    rows.append(("beginning right, of what was named", share_words(card["onsets"]["right"]), ""))
-    rows.append(("operating region right, where one was told", _region(card["shares"]), ""))
-    covered = share_words(card["parameters"]["covered"])
-    rows.append(("intervals that hold the truth", covered, "90 to 97 %"))
-    fit = card["fit"]
-    rows.append(("held-out error within 1.5 × floor", share_words(fit["near_floor"]), "all"))
-    rows.append(("held-out error below re-tuned", share_words(fit["below_retuned"]), "≥ 95 %"))
+    shares = card["shares"]
+    upper = f"{100 * shares['false_alarm_upper']:.0f} %"
+    rows = [
+        *_words(findings_judged(card)),
+        ("one-sided upper bound of alarms", upper, "≤ 6 %"),
+        ("mean size of the ties", _number(shares["mean_tie_size"]), "≤ 1.5"),
+        ("beginning right, of what was named", share_words(card["onsets"]["right"]), ""),
+        ("operating region right, where one was told", _region(shares), ""),
+        *_words(numbers_judged(card)),
+    ]
     return markdown_table(("", "found", "target"), rows)
+
+
+def _words(judged: Sequence[Judged]) -> Iterator[tuple[str, str, str]]:
+    for label, found, target in judged:
+        yield label, share_words(found), target
 
 
 def _methods(title: str, words: str, rows: Sequence[Data]) -> list[str]:

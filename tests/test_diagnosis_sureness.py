@@ -313,16 +313,17 @@ def test_a_beginning_has_to_be_worth_more_than_nothing_too():
 
 
 @pytest.mark.parametrize(
-    ("weights", "half", "none"),
+    ("weights", "half", "none", "begins"),
     [
-        ([0.13, -1.0], [0.33, 2.0], True),
-        ([0.13, -1.0], [0.33, 0.9], False),
-        ([0.13, -1.0], [0.12, 2.0], False),
-        # Too few data for an interval say nothing against a finding.
-        ([0.13, -1.0], [np.inf, 2.0], False),
+        ([0.13, -1.0], [0.33, 2.0], True, False),
+        ([0.13, -1.0], [0.33, 0.9], False, True),
+        ([0.13, -1.0], [0.12, 2.0], False, True),
+        # Too few data for an interval say nothing against a finding, and nothing for a beginning.
+        ([0.13, -1.0], [np.inf, 2.0], False, False),
+        ([0.13, -1.0], [np.inf, 0.9], False, True),
     ],
 )
-def test_what_may_be_none_has_only_intervals_that_hold_zero(weights, half, none):
+def test_what_may_be_none_has_only_intervals_that_hold_zero(weights, half, none, begins):
     load = Candidate(catalogue()["bar_mass"], "bar")
     wind = Candidate(catalogue()["bar_constant_wrench"], "bar")
     found = {
@@ -331,7 +332,7 @@ def test_what_may_be_none_has_only_intervals_that_hold_zero(weights, half, none)
     }
     assert may_be_none(found) is none
     assert not may_be_none({})
-    # A beginning is told of what is not none, what is there all the time in any case.
+    # What is there all the time is told in any case.
     always, late = (Hypothesis(load.effect, (load,), onset=block) for block in (0, 20))
-    assert is_seen_to_begin(late, found) is not none
+    assert is_seen_to_begin(late, found) is begins
     assert is_seen_to_begin(always, found)

@@ -169,9 +169,10 @@ def is_seen_to_begin(
     """Return whether weights with half their intervals allow a beginning, where there is one.
 
     A beginning is looked for in all blocks, so that something always begins somewhere; it may be
-    told if any number is surely not zero from then on.
+    told if any number is surely not zero from then on, which takes an interval.
     """
-    return not hypothesis.onset or not may_be_none(weights)
+    surely = (bool(np.any(np.abs(own) > half)) for own, half in weights.values())
+    return not hypothesis.onset or any(surely)
 
 
 def is_seen_to_end(candidates: Iterable[Candidate]) -> bool:

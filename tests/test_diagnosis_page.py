@@ -342,6 +342,17 @@ def test_the_doubtful_stands_behind_a_greater_unknown_though_another_is_sure(gai
     assert verdict_of(found) is Verdict.EFFECT
 
 
+def test_what_alternates_comes_first_and_the_rest_is_doubtful():
+    """The finding gains more than all that is unknown."""
+    swing = Line(Place(Channel.TENSION, "surge_2"), 0, 500.0, 5.6, 0.0)
+    found = diagnosis(lines=[swing])
+    found = replace(found, findings=found.findings._replace(chattering=frozenset({"surge_2"})))
+    first, second = diagnosis_data(found)["findings"]
+    assert (first["effect"], first["region"]["at"]) == ("unknown", [500.0])
+    assert second["probability"] == pytest.approx(TRUSTED * DOUBTED)
+    assert verdict_of(found) is Verdict.UNKNOWN
+
+
 def test_where_a_finding_shows_is_told():
     (finding,) = diagnosis_data(diagnosis(region=FAST))["findings"]
     assert finding["region"] == FAST._asdict()

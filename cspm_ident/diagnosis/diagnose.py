@@ -11,6 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from cspm_ident.diagnosis.cell_clock import on_drives_clock
+from cspm_ident.diagnosis.chatter import chatters_of
 from cspm_ident.diagnosis.columns import Candidate, Place
 from cspm_ident.diagnosis.curves import Curve, held_out_curves
 from cspm_ident.diagnosis.cuts import first_part, span_of, whole_part
@@ -82,7 +83,7 @@ class Diagnosis:
         fit: residual by residual.
         simulated: quantity by quantity, by simulation.
         shapes: of the unknown, in the order of `findings.unknown`.
-        lines: periodic forces from outside.
+        lines: periodic forces from outside, and before them tensions that alternate.
         limits: from which size on effects would have been told.
         silent: effects and elements that these recordings cannot show.
         places: the residuals that there are.
@@ -159,10 +160,16 @@ def diagnose(
     told = [k for k, negligible in enumerate(model.negligible) if not negligible]
     regions = [region_of(data.rows, kept[k].hypothesis.candidates, first) for k in told]
     free = free_functions(evidence, judge)
+    chatters = tuple(line for each in (*searched, *held_out) for line in chatters_of(each))
     return Diagnosis(
         searched=searched,
         held_out=held_out,
-        findings=Findings(tuple(kept[k] for k in told), unknown, found.candidates),
+        findings=Findings(
+            tuple(kept[k] for k in told),
+            unknown,
+            found.candidates,
+            frozenset(line.place.element for line in chatters),
+        ),
         details=tuple(
             Detail(model.onsets[k], region, model.worth[k])
             for k, region in zip(told, regions, strict=True)
@@ -173,7 +180,7 @@ def diagnose(
         fit=judged(held_out or searched, starts, retuned, values, noise, free),
         simulated=model.simulated,
         shapes=_shapes(search, standing.sure, knots, [each[0] for each in unknown]),
-        lines=_lasting(hums, searched, search_parts, values),
+        lines=(*chatters, *_lasting(hums, searched, search_parts, values)),
         limits=detection_limits(search, kept),
         silent=_silent(search, safeguards.effects),
         places=tuple(place.place for place in evidence.places),

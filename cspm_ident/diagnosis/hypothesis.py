@@ -26,6 +26,8 @@ DOUBTFUL_SHARE = 0.1
 _SIGMAS_OF_ONSET, _SIGMAS_OF_EXTENT = 3.0, 2.0
 # Of the longest time constant that can be told: what ends is shorter.
 _ENDED = 0.99
+# Whose equation every tension enters.
+_FED_BY_ALL = frozenset({"bar", "winch_frame"})
 # More signals than any block of the machine has.
 _SIGNALS = 128
 
@@ -112,18 +114,24 @@ class Findings(NamedTuple):
         named: effects, the most important first.
         unknown: free shapes that explain what no effect does, with their gain and share.
         candidates: how many hypotheses were looked at.
+        chattering: cables whose tensions alternate from one reading to the next.
     """
 
     named: tuple[Named, ...]
     unknown: tuple[Unknown, ...]
     candidates: int
+    chattering: frozenset[str] = frozenset()
 
     def is_doubtful(self, named: Named) -> bool:
         """Return whether what nothing explains is no small part of what a finding does.
 
         What is the same at all times is the mean of whatever function of the machine's motion is
-        there beside it, and no part of that; but it may have been drifting, or be the lesser.
+        there beside it, and no part of that; but it may have been drifting, or be the lesser. Nor
+        is anything sure of what is told by tensions that alternate from one reading to the next.
         """
+        misread = self.chattering | _FED_BY_ALL if self.chattering else frozenset()
+        if misread & set(named.hypothesis.elements):
+            return True
         gained = named.gain.total
         constant = is_constant(named.hypothesis.effect)
         return any(

@@ -144,8 +144,8 @@ def _findings(diagnosis: Diagnosis) -> list[dict[str, Any]]:
     """
     found = diagnosis.findings
     named = [_finding(diagnosis, k) for k in range(len(found.named))]
-    # They are in the order of their gains, so that all doubtful ones are the last.
-    ahead = sum(not found.is_doubtful(each) for each in found.named)
+    # They are in the order of their gains.
+    ahead = next((k for k, e in enumerate(found.named) if found.is_doubtful(e)), len(named))
     if ahead:
         most = max((gain.total for _, gain, _ in found.unknown), default=0.0)
         ahead = sum(each.gain.total >= most for each in found.named)

@@ -24,7 +24,7 @@ from rich.console import Console
 from bench.page import into_page
 from cspm_bringup.blind.results import read_results
 from cspm_bringup.blind.truth import RECORDINGS, read_truth
-from cspm_ident.blind.outcome import EFFECT, PARAMETER, Outcome, judge
+from cspm_ident.blind.outcome import ABSORBING, EFFECT, PARAMETER, Outcome, judge
 from cspm_ident.blind.scorecard import CLEAR
 from cspm_ident.blind.share import share, share_words
 from cspm_ident.diagnosis.hypothesis import Hypothesis, freedom
@@ -126,7 +126,8 @@ def compared(outcome: Outcome, item: Data, search: Search, found: Sequence[Hypot
     names = {(h.effect.id, e) for h in found for e in h.elements}
     if {(h.effect.id, e) for h in true for e in h.elements} <= names:
         return Miss(outcome, gain, squares, GIVEN_UP)
-    return Miss(outcome, gain, squares, reason_of(gain, _numbers(true), _numbers(found)))
+    told_numbers = _numbers([h for h in found if h not in sound])
+    return Miss(outcome, gain, squares, reason_of(gain, _numbers(true), told_numbers))
 
 
 def reason_of(gain: Gain, true: int, told: int) -> str:
@@ -142,9 +143,14 @@ def nearest_truth(
 ) -> list[Hypothesis] | None:
     """Return what is concealed as the catalogue has it, of the shapes that explain most.
 
-    None where one of its elements has no column.
+    With the number of the file that hides it, if one does. None where one of its elements has no
+    column.
     """
-    forms = [list(_forms(search, each)) for each in item["concealed"]]
+    concealed = list(item["concealed"])
+    if item["absorbed_by"]:
+        number = ABSORBING[item["absorbed_by"]]
+        concealed += [{"effect": number, "elements": e["elements"]} for e in item["concealed"]]
+    forms = [list(_forms(search, each)) for each in concealed]
     if not all(forms):
         return None
     start = float(item.get("onset_s", 0.0))

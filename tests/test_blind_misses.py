@@ -49,14 +49,14 @@ def hypothesis(*candidates):
     return Hypothesis(candidates[0].effect, candidates)
 
 
-def item(*effects, onset=0.0):
+def item(*effects, onset=0.0, absorbed_by=None):
     concealed = [
         {"effect": e, "phenomenon": e, "elements": ["only"], "block": "winch", "multiple": 4.0}
         | {"kind": "effect", "parameter": None, "values": {}, "base": 0.0, "driver": None}
         for e in effects
     ]
     told = {"name": "a", "stratum": "noise", "scenario": "calm", "concealed": concealed}
-    return told | {"absorbed_by": None, "onset_s": onset}
+    return told | {"absorbed_by": absorbed_by, "onset_s": onset}
 
 
 def outcome_of(told):
@@ -87,6 +87,27 @@ def test_a_companion_that_adds_nothing_is_hidden_and_one_that_does_is_not():
 def test_a_twin_that_takes_two_faults_is_not_as_simple():
     search = search_of(SIDE, {DRY: SIDE, GREASE: SIDE, GAIN: SPEED})
     assert reason(search, item("winch_coulomb_friction"), GREASE, GAIN) == SIMPLER
+
+
+def test_what_a_wrong_number_hides_is_held_against_with_that_number():
+    radius = Candidate(catalogue()["winch_drum_radius"], "only", ())
+    search = search_of(SIDE - SPEED, {GAIN: SIDE, radius: SPEED, DRY: SIDE - SPEED})
+    hidden = item("winch_torque_gain", absorbed_by="radius")
+    true = nearest_truth(search, hidden, [])
+    assert [h.effect.id for h in true] == ["winch_torque_gain", "winch_drum_radius"]
+    assert reason(search, hidden, DRY) == NO_MORE
+    assert reason(search, item("winch_torque_gain"), DRY) == NO_MORE
+    alone, both = (
+        compared(outcome_of(told), told, search, [hypothesis(DRY)]).gain.total
+        for told in (item("winch_torque_gain"), hidden)
+    )
+    assert both > alone + 100.0
+
+
+def test_what_sound_clocks_do_is_no_number_of_what_was_found():
+    late = Candidate(catalogue()["tension_delay"], "only", ())
+    search = search_of(SIDE, {DRY: SIDE, GREASE: SIDE, late: 1e6 * SPEED})
+    assert reason(search, item("winch_coulomb_friction"), GREASE, late) == NO_MORE
 
 
 def test_what_was_found_and_not_told_first_is_said_so():

@@ -50,9 +50,6 @@ def winch(weight, loud=1.0, rows=ROWS, seed=1):
         (0.0, 1.0, False, False, False, False),
         # It moves so little that what it takes says nothing.
         (1.0, 0.02, False, False, True, False),
-        # It adds hardly more than a column would that is noise alone; surely more.
-        (-0.3, 0.135, False, False, True, False),
-        (-1.0, 0.135, False, False, False, False),
     ],
 )
 def test_a_finding_stands_by_what_it_should_take(weight, loud, kept, faint, untold, plain):

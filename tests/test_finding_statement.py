@@ -67,7 +67,10 @@ def test_of_an_effect_that_may_be_elsewhere_that_is_not_told():
 @pytest.mark.parametrize("low", [None, 12.1])
 def test_a_beginning_is_told(low):
     onset = None if low is None else Onset(12.3, low, 12.5)
-    (finding,) = diagnosis_data(replace(diagnosis(), onsets=(onset,)))["findings"]
+    found = diagnosis()
+    (detail,) = found.details
+    found = replace(found, details=(detail._replace(onset=onset),))
+    (finding,) = diagnosis_data(found)["findings"]
     assert ("It begins at 12.3 s (12.1 to 12.5 s)." in finding["statement"]) is (low is not None)
     assert ("from the start" in finding["statement"]) is (low is None)
 

@@ -118,11 +118,8 @@ class _Lowered:
 
     @property
     def says_nothing(self) -> bool:
-        """Whether it could surely take nothing of all, and does not surely add to it.
-
-        A column that is nothing but noise, as of a bar at rest, adds as much as it should take.
-        """
-        against = self._taken.sum() + self._expected.sum() < -_LEAST_EXPECTED * self._error
+        """Whether it could surely take nothing of all, and does not surely add to it."""
+        against = self._taken.sum() < -_LEAST_EXPECTED * self._error
         return not self._shows and not bool(against)
 
     @property

@@ -11,7 +11,7 @@ from __future__ import annotations
 
 import argparse
 from collections import Counter
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from concurrent.futures import ProcessPoolExecutor
 from dataclasses import replace
 from itertools import product
@@ -19,21 +19,25 @@ from pathlib import Path
 from typing import Any, NamedTuple
 
 import numpy as np
+from numpy.typing import NDArray
 from rich.console import Console
 
 from bench.page import into_page
 from cspm_bringup.blind.results import read_results
 from cspm_bringup.blind.truth import RECORDINGS, read_truth
-from cspm_ident.blind.outcome import ABSORBING, EFFECT, PARAMETER, Outcome, judge
-from cspm_ident.blind.scorecard import CLEAR
-from cspm_ident.blind.share import share, share_words
-from cspm_ident.diagnosis.hypothesis import Hypothesis, freedom
+from cspm_ident.blind.outcome import ABSORBING, Outcome, judge
+from cspm_ident.blind.page import listed
+from cspm_ident.blind.scorecard import is_clear
+from cspm_ident.blind.share import share_of, share_words
+from cspm_ident.diagnosis.columns import Candidate
+from cspm_ident.diagnosis.hypothesis import Hypothesis, freedom, shapes_of
 from cspm_ident.diagnosis.look import Recordings, searched_for
 from cspm_ident.diagnosis.safeguards import ALL_SAFEGUARDS
 from cspm_ident.diagnosis.search import Search
 from cspm_ident.diagnosis.sums import Gain, gain_of
 from cspm_ident.markdown import markdown_table
 from cspm_ident.signals.measurement import read_measurement
+from cspm_sim.effects import catalogue
 
 PAGE = Path(__file__).resolve().parents[1] / "docs" / "blind-misses.md"
 # Standard errors of the scatter between blocks.
@@ -53,6 +57,7 @@ _MEASURES = {
     "tied": "truth among the ties",
 }
 
+Array = NDArray[np.float64]
 Data = Mapping[str, Any]
 
 
@@ -82,7 +87,7 @@ def main() -> None:
     items = {item["name"]: item for item in read_truth(asked.truth)["items"]}
     results = read_results(asked.folder, list(items))
     outcomes = [judge(items[name], results[name], {}) for name in results]
-    clear = [o for o in outcomes if o.kind in (EFFECT, PARAMETER) and o.multiple >= CLEAR]
+    clear = [o for o in outcomes if is_clear(o.kind, o.multiple)]
     missed = [o for o in clear if not (o.block and o.first and o.tied)]
     misses = []
     with ProcessPoolExecutor() as pool:
@@ -150,7 +155,7 @@ def nearest_truth(
     if item["absorbed_by"]:
         number = ABSORBING[item["absorbed_by"]]
         concealed += [{"effect": number, "elements": e["elements"]} for e in item["concealed"]]
-    forms = [list(_forms(search, each)) for each in concealed]
+    forms = [_forms(search, each) for each in concealed]
     if not all(forms):
         return None
     start = float(item.get("onset_s", 0.0))
@@ -159,28 +164,19 @@ def nearest_truth(
     return min(options, key=lambda option: float(_left(search, option, beside).sum()))
 
 
-def _forms(search: Search, concealed: Data) -> Iterator[Hypothesis]:
-    """Yield an effect on its elements, in every shape that it has on all of them."""
-    own = [
-        c
-        for c in search.heard
-        if c.effect_id == concealed["effect"] and c.element in concealed["elements"]
-    ]
-    for shape in dict.fromkeys(c.shape for c in own):
-        these = tuple(c for c in own if c.shape == shape)
-        if len(these) == len(concealed["elements"]):
-            yield Hypothesis(these[0].effect, these)
+def _forms(search: Search, concealed: Data) -> list[Hypothesis]:
+    """Return an effect on its elements, in every shape that it has on all of them."""
+    effect = catalogue()[concealed["effect"]]
+    asked = tuple(Candidate(effect, element) for element in concealed["elements"])
+    return shapes_of(Hypothesis(effect, asked), search.heard)
 
 
-def _left(search: Search, true: Sequence[Hypothesis], beside: Sequence[Hypothesis]) -> Any:
+def _left(search: Search, true: Sequence[Hypothesis], beside: Sequence[Hypothesis]) -> Array:
     """Return Σ residual² of each block beside what is true, not fitted to it."""
-    fits, columns = search.fits, search.fits.columns([*true, *beside])
-    onset = max(h.onset for h in true)
+    fits = search.fits
     own = search.evidence.columns_of(c for h in true for c in h.candidates)
-    if not onset:
-        return fits.sums.held_out(columns)
-    with fits.sums.delayed(own, onset):
-        return fits.sums.held_out(columns)
+    with fits.sums.delayed(own, max(h.onset for h in true)):
+        return fits.sums.held_out(fits.columns([*true, *beside]))
 
 
 def _numbers(hypotheses: Sequence[Hypothesis]) -> int:
@@ -194,7 +190,7 @@ def reach_table(clear: Sequence[Outcome], misses: Sequence[Miss]) -> str:
         own = Counter(m.reason for m in misses if not getattr(m.outcome, key))
         hits, hidden = sum(getattr(o, key) for o in clear), sum(own[reason] for reason in HIDDEN)
         most = len(clear) - hidden
-        words = [share_words(share([True] * n + [False] * (len(clear) - n))) for n in (hits, most)]
+        words = [share_words(share_of(n, len(clear))) for n in (hits, most)]
         rows.append((label, words[0], *(str(own[reason]) for reason in REASONS), words[1]))
     heads = ("", "found", *REASONS, "if all but what is hidden were right")
     return markdown_table(heads, rows)
@@ -206,8 +202,8 @@ def miss_table(misses: Sequence[Miss]) -> str:
         (
             m.outcome.name,
             m.outcome.stratum,
-            "<br>".join(_words(each) for each in m.outcome.truth),
-            "<br>".join(_words(each) for each in m.outcome.found) or m.outcome.verdict,
+            listed(m.outcome.truth),
+            listed(m.outcome.found) or m.outcome.verdict,
             ", ".join(key for key in _MEASURES if not getattr(m.outcome, key)),
             "—" if m.gain is None else f"{m.gain.total:.0f} ± {m.gain.error:.0f} of {m.of:.0f}",
             m.reason,
@@ -216,11 +212,6 @@ def miss_table(misses: Sequence[Miss]) -> str:
     ]
     heads = ("recording", "stratum", "concealed", "told", "missed", "explains more by", "it")
     return markdown_table(heads, rows)
-
-
-def _words(named: tuple[str, tuple[str, ...]]) -> str:
-    effect, elements = named
-    return f"{effect}: {', '.join(elements)}" if len(elements) < 8 else f"{effect}: all"
 
 
 if __name__ == "__main__":

@@ -12,7 +12,7 @@ from pathlib import Path
 from typing import NamedTuple
 
 from bench.page import into_page
-from cspm_ident.blind.share import Share, share, share_words, upper_bound
+from cspm_ident.blind.share import Share, share_of, share_words, upper_bound
 from cspm_ident.blind.target import Range, allowed
 from cspm_ident.markdown import markdown_table
 
@@ -111,7 +111,7 @@ def pooled(cells: Sequence[str]) -> Share:
     """Return the share of all cases of some cells, which may say that there are none."""
     counts = [found.groups() for cell in cells if (found := _COUNTS.search(cell))]
     hits, cases = (sum(int(each[k]) for each in counts) for k in (0, 1))
-    return share([True] * hits + [False] * (cases - hits))
+    return share_of(hits, cases)
 
 
 def verdict(value: float, interval: Range, target: str) -> str:

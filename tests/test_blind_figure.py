@@ -6,13 +6,8 @@ from matplotlib.figure import Figure
 from matplotlib.image import imread
 
 from cspm_ident.blind.figure import _draw_bars, _draw_calibration, _draw_targets, draw_scorecard
-from cspm_ident.blind.share import share
+from cspm_ident.blind.share import share_of as of
 from cspm_ident.blind.target import findings_judged, numbers_judged
-
-
-def of(hits, cases):
-    return share([True] * hits + [False] * (cases - hits))
-
 
 KEYS = (
     *("block", "block_tied", "element", "first", "named", "effect_only", "tied", "detected"),

@@ -344,7 +344,7 @@ def test_the_doubtful_stands_behind_a_greater_unknown_though_another_is_sure(gai
 
 def test_what_alternates_comes_first_and_the_rest_is_doubtful():
     """The finding gains more than all that is unknown."""
-    swing = Line(Place(Channel.TENSION, "surge_2"), 0, 500.0, 5.6, 0.0)
+    swing = Line(Place(Channel.TENSION, "surge_2"), 0, 500.0, 5.6, 0.0, alternates=True)
     found = diagnosis(lines=[swing])
     found = replace(found, findings=found.findings._replace(chattering=frozenset({"surge_2"})))
     first, second = diagnosis_data(found)["findings"]

@@ -6,8 +6,7 @@ from collections.abc import Mapping, Sequence
 from statistics import median
 from typing import Any
 
-from cspm_ident.blind.outcome import EFFECT, PARAMETER
-from cspm_ident.blind.scorecard import CLEAR, scorecard
+from cspm_ident.blind.scorecard import is_clear, scorecard
 
 Data = Mapping[str, Any]
 
@@ -31,7 +30,7 @@ def comparison(truth: Data, results: Mapping[str, Mapping[str, Data]]) -> list[d
     for method, found in results.items():
         card = scorecard(truth, {name: found[name] for name in found if name in common})
         outcomes = card["outcomes"]
-        clear = [o for o in outcomes if o["kind"] in (EFFECT, PARAMETER) and o["multiple"] >= CLEAR]
+        clear = [o for o in outcomes if is_clear(o["kind"], o["multiple"])]
         fits = [o["fit"] for o in clear if o["fit"] is not None]
         rows.append(
             {

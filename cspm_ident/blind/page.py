@@ -250,17 +250,18 @@ def _recordings(outcomes: Sequence[Data]) -> str:
         (
             o["name"],
             o["stratum"],
-            _listed(o["truth"]),
+            listed(o["truth"]),
             f"{o['multiple']:g}",
             o["verdict"],
-            _listed(o["found"]),
+            listed(o["found"]),
         )
         for o in sorted(outcomes, key=lambda o: (o["stratum"], o["name"]))
     )
     return markdown_table(heads, rows)
 
 
-def _listed(pairs: Sequence[tuple[str, Sequence[str]]]) -> str:
+def listed(pairs: Sequence[tuple[str, Sequence[str]]]) -> str:
+    """Return effects and their elements for a cell of a table, a line each."""
     told = []
     for effect, elements in pairs:
         many = len(elements) > 3

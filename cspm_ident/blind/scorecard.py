@@ -39,7 +39,7 @@ def scorecard(truth: Mapping[str, Any], results: Mapping[str, Mapping[str, Any]]
     """
     floors, items = sound_floors(truth, results), truth["items"]
     outcomes = [judge(i, results[i["name"]], floors) for i in items if i["name"] in results]
-    clear = [o for o in outcomes if o.kind in (EFFECT, PARAMETER) and o.multiple >= CLEAR]
+    clear = [o for o in outcomes if is_clear(o.kind, o.multiple)]
     return {
         "schema": SCHEMA,
         "asked": truth["asked"],
@@ -57,6 +57,16 @@ def scorecard(truth: Mapping[str, Any], results: Mapping[str, Mapping[str, Any]]
         "seconds": _seconds(outcomes),
         "outcomes": [asdict(o) for o in outcomes],
     }
+
+
+def is_clear(kind: str, multiple: float) -> bool:
+    """Return whether the targets hold of a case.
+
+    Args:
+        kind: as an outcome has it.
+        multiple: of the detection limit.
+    """
+    return kind in (EFFECT, PARAMETER) and multiple >= CLEAR
 
 
 def _shares(outcomes: Sequence[Outcome], clear: Sequence[Outcome]) -> dict[str, Any]:

@@ -26,10 +26,15 @@ class Share(NamedTuple):
 def share(cases: Iterable[bool]) -> Share:
     """Return the share of true ones."""
     found = list(cases)
-    if not found:
+    return share_of(sum(found), len(found))
+
+
+def share_of(hits: int, cases: int) -> Share:
+    """Return the share of cases that were counted already."""
+    if not cases:
         return Share(0, 0, 0.0, 1.0)
-    interval = binomtest(sum(found), len(found)).proportion_ci(0.95, method="exact")
-    return Share(sum(found), len(found), float(interval.low), float(interval.high))
+    interval = binomtest(hits, cases).proportion_ci(0.95, method="exact")
+    return Share(hits, cases, float(interval.low), float(interval.high))
 
 
 def upper_bound(hits: int, cases: int) -> float:

@@ -37,7 +37,7 @@ def chatters_of(measurement: Measurement) -> tuple[Line, ...]:
     least = _LEAST * np.mean(np.abs(tension.values), axis=0)
     highest = 0.5 / float(np.median(np.diff(tension.times)))
     return tuple(
-        Line(Place(Channel.TENSION, name), 0, highest, float(amplitude), 0.0)
+        Line(Place(Channel.TENSION, name), 0, highest, float(amplitude), 0.0, alternates=True)
         for name, share, amplitude, enough in zip(
             measurement.machine.cable_names, follows, amplitudes, amplitudes > least, strict=True
         )

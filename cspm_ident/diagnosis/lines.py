@@ -50,6 +50,7 @@ class Line(NamedTuple):
         frequency: [Hz].
         amplitude: in the residual's unit.
         chance: how probable noise makes it as high, among all frequencies that were looked at.
+        alternates: whether it is a reading that does so from one to the next, and no residual.
     """
 
     place: Place
@@ -57,6 +58,7 @@ class Line(NamedTuple):
     frequency: float
     amplitude: float
     chance: float
+    alternates: bool = False
 
     def is_same(self, other: Line) -> bool:
         """Return whether two lines are one, found twice."""

@@ -11,7 +11,7 @@ from cspm_ident.diagnosis.columns import Candidate
 from cspm_ident.diagnosis.diagnose import Diagnosis, Shape
 from cspm_ident.diagnosis.drivers import Driver
 from cspm_ident.diagnosis.judgement import HeldOut
-from cspm_ident.diagnosis.lines import HIGHEST_HZ, Line
+from cspm_ident.diagnosis.lines import Line
 from cspm_ident.diagnosis.power import Power
 from cspm_ident.diagnosis.simulation import SimulatedFit
 from cspm_ident.diagnosis.sketch import is_even, sketch
@@ -106,7 +106,7 @@ def tension_statement(diagnosis: Diagnosis) -> str | None:
 
 def line_statement(line: Line) -> str:
     """Return a periodic part of a residual, or what alternates in a reading, in words."""
-    if line.frequency > HIGHEST_HZ:
+    if line.alternates:
         return (
             f"The tension of cable {line.place.element} alternates from one reading to the next, by"
             f" ± {line.amplitude:.3g} N: it swings faster than it is recorded, as where a force"

@@ -293,7 +293,7 @@ def test_a_finding_beside_much_that_nothing_explains_is_doubtful(left, doubtful,
 @pytest.mark.parametrize("faint", [True, False])
 def test_a_finding_that_held_out_data_hardly_show_says_so(faint):
     found = diagnosis()
-    found = replace(found, faint=found.findings.named if faint else ())
+    found = replace(found, details=tuple(d._replace(faint=faint) for d in found.details))
     (finding,) = named_in(diagnosis_data(found))
     assert ("What was not searched moves so little" in finding["statement"]) is faint
 

@@ -7,15 +7,15 @@ import pytest
 from run_samples import bundle_of
 
 from cspm_bringup.run import run
-from cspm_ident.diagnosis.columns import Candidate
-from cspm_ident.diagnosis.equation import steady
+from cspm_ident.diagnosis.columns import Candidate, Place
+from cspm_ident.diagnosis.equation import Equation, steady
 from cspm_ident.diagnosis.hypothesis import Hypothesis
 from cspm_ident.diagnosis.look import noise_of
-from cspm_ident.diagnosis.parameters import of_clocks, of_forms
+from cspm_ident.diagnosis.parameters import of_clocks, of_forms, of_reach
 from cspm_ident.diagnosis.recorded import equations_of
 from cspm_ident.diagnosis.refine import refine
 from cspm_ident.signals.measurement import read_measurement
-from cspm_sim.effects import catalogue
+from cspm_sim.effects import Channel, catalogue
 from cspm_sim.effects.alteration import altered_cable
 
 DAMPING = catalogue()["cable_axial_damping"]
@@ -28,6 +28,14 @@ def measured(tmp_path_factory):
     folder = tmp_path_factory.mktemp("refine") / "sea"
     run(bundle_of("worst_case", "duration=12"), folder)
     return read_measurement(folder)
+
+
+def equation_of(columns):
+    """An equation of one cable with columns alone."""
+    rows = len(next(iter(columns.values())))
+    nothing = np.zeros((rows, 1))
+    times = np.linspace(0.0, 1.0, rows)
+    return Equation(Place(Channel.TENSION, "hoist_1"), times, nothing, columns, nothing)
 
 
 def damper(measured, factor):
@@ -72,3 +80,19 @@ def test_no_weight_is_surer_than_the_form_of_its_law():
     np.testing.assert_allclose(found[one][1], [0.5, 0.4])
     np.testing.assert_array_equal(found[one][0], given[one][0])
     np.testing.assert_array_equal(found[other][1], given[other][1])
+
+
+@pytest.mark.parametrize(("start", "missing"), [(0.0, 0.4), (-5.0, 0.4), (0.9, 0.0)])
+def test_what_saturates_is_no_surer_than_how_much_of_it_has_acted(measured, start, missing):
+    """Half of the range, since a memory may start anywhere."""
+    slides = Candidate(catalogue()["cable_hysteresis"], "hoist_1", (("displacement", 1e-3),))
+    rubs = Candidate(DAMPING, "hoist_1")
+    reach = 1.2 if start == 0.9 else 0.6
+    column = reach * np.sin(np.linspace(0.0, 9.0, 500))[:, None, None] + start
+    part = equation_of({slides: column, rubs: 0.1 * column})
+    given = {c: (np.array([-2.0]), np.array([0.6])) for c in (slides, rubs)}
+    found = of_reach(given, [[part.within(0.0, 1.0)], [part]])
+    np.testing.assert_allclose(found[slides][1], np.hypot(0.6, 2.0 * missing), rtol=1e-4)
+    np.testing.assert_array_equal(found[slides][0], given[slides][0])
+    np.testing.assert_array_equal(found[rubs][1], given[rubs][1])
+    assert of_reach(given, [[]])[slides][1] == pytest.approx(np.hypot(0.6, 2.0))

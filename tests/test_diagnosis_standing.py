@@ -1,12 +1,14 @@
 """Findings parted by what data say that were not searched."""
 
 from dataclasses import replace
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
 
 from cspm_ident.diagnosis import standing as module
 from cspm_ident.diagnosis.columns import Candidate, Place
+from cspm_ident.diagnosis.diagnose import _told
 from cspm_ident.diagnosis.equation import Equation
 from cspm_ident.diagnosis.evidence import gather
 from cspm_ident.diagnosis.hypothesis import Findings, Hypothesis, Named, Rival
@@ -120,3 +122,33 @@ def test_what_takes_as_much_as_the_unknown_is_told_though_no_free_function_does(
     assert module._would_be_unknown(search, square, ())
     assert not module._would_be_unknown(search, square._replace(share=0.14), ())
     assert not module._would_be_unknown(search, late, ())
+
+
+def test_what_was_given_up_says_no_more_what_a_finding_is_and_may_be_what_it_is():
+    search = Search(shaft(2.0))
+    square, late = found_in(search, SQUARE, LINE), found_in(search, LATE)
+    beside = search.judged_again(square, [SQUARE, LATE])
+    assert beside.gain.total < 0.01 * square.gain.total
+    assert [rival.hypothesis for rival in beside.alternatives] == [LINE]
+    again = search.judged_again(square, [SQUARE])
+    assert (again.gain, again.share) == (square.gain, square.share)
+    assert [rival.hypothesis for rival in again.alternatives] == [LINE, late.hypothesis]
+
+
+@pytest.mark.parametrize("gone", [(), (WET,)])
+def test_what_is_told_is_judged_once_more_only_where_something_was_given_up(gone):
+    """The most important first, what is doubted last, and no clock of a sound machine."""
+    doubted = MASS._replace(gain=Gain(900.0, 1.0))
+    clock = Named(LATE, Gain(5.0, 1.0), 0.1, ())
+    stands = Standing((clock, DRY, WET, doubted), (), (), (doubted,), gone, ())
+    more = {"winch_coulomb_friction": 10.0, "winch_viscous_friction": 20.0, "bar_mass": 30.0}
+
+    class Again:
+        def judged_again(self, each, chosen):
+            assert chosen == [kept.hypothesis for kept in stands.kept]
+            return each._replace(gain=Gain(more[each.hypothesis.effect.id], 1.0))
+
+    model = SimpleNamespace(negligible=(True, False, False, False))
+    told = _told(Again(), stands, model)
+    assert list(told) == ([2, 1, 3] if gone else [1, 2, 3])
+    assert told[1].gain.total == (10.0 if gone else DRY.gain.total)

@@ -61,11 +61,13 @@ class Detail(NamedTuple):
         onset: when it began; None where it acts all the time.
         region: where it shows; None where it does everywhere.
         worth: of it in simulations of held-out data; None where they cannot tell.
+        faint: whether what was not searched shows little of it.
     """
 
     onset: Onset | None
     region: Region | None
     worth: Worth | None
+    faint: bool = False
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
@@ -90,7 +92,6 @@ class Diagnosis:
         starts: of the blocks [s], shape (blocks,).
         curves: the residuals on what was not searched, over time.
         noise: of each residual, what differs from row to row, one number per channel.
-        faint: findings of which what was not searched shows little.
         spectra: of candidates of which there may be more at other time constants, the upper end of
             the interval of the weights of all together.
     """
@@ -112,7 +113,6 @@ class Diagnosis:
     starts: Array
     curves: tuple[Curve, ...]
     noise: dict[Place, Array]
-    faint: tuple[Named, ...] = ()
     spectra: Mapping[Candidate, Array] = field(default_factory=dict)
 
 
@@ -157,7 +157,7 @@ def diagnose(
     kept, unknown = standing.kept, standing.unknown(search, found)
     values = {c: w for c, (w, _) in model.weights.items()}
     first = search.fits.values([each.hypothesis for each in kept])
-    told = [k for k, negligible in enumerate(model.negligible) if not negligible]
+    told = _told(search, standing, model)
     regions = [region_of(data.rows, kept[k].hypothesis.candidates, first) for k in told]
     free = free_functions(evidence, judge)
     chatters = tuple(line for each in (*searched, *held_out) for line in chatters_of(each))
@@ -165,13 +165,13 @@ def diagnose(
         searched=searched,
         held_out=held_out,
         findings=Findings(
-            tuple(kept[k] for k in told),
+            tuple(told.values()),
             unknown,
             found.candidates,
             frozenset(line.place.element for line in chatters),
         ),
         details=tuple(
-            Detail(model.onsets[k], region, model.worth[k])
+            Detail(model.onsets[k], region, model.worth[k], kept[k] in standing.faint)
             for k, region in zip(told, regions, strict=True)
         ),
         rejected=(*standing.rejected, *standing.fed_back),
@@ -187,7 +187,6 @@ def diagnose(
         starts=evidence.times,
         curves=held_out_curves(steady(judge_parts), first),
         noise=noise,
-        faint=standing.faint,
         spectra=model.spectra,
     )
 
@@ -201,6 +200,18 @@ def _useful(
         standing = standing.without(model.useless)
         model = modelled(search, standing.kept, data)
     return standing, model
+
+
+def _told(search: Search, standing: Standing, model: Model) -> dict[int, Named]:
+    """Return what is told, by where it is in what was kept, the most important first."""
+    hypotheses = [each.hypothesis for each in standing.kept]
+    told = {
+        k: search.judged_again(each, hypotheses) if standing.has_given_up else each
+        for k, each in enumerate(standing.kept)
+        if not model.negligible[k]
+    }
+    doubted = [standing.kept[k] in standing.doubted for k in range(len(hypotheses))]
+    return dict(sorted(told.items(), key=lambda item: (doubted[item[0]], -item[1].gain.total)))
 
 
 def _lasting(

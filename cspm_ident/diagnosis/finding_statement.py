@@ -31,7 +31,7 @@ def statement_of(diagnosis: Diagnosis, k: int) -> str:
     """Return the k-th finding: what has what, how much, since when, where, and what it is worth."""
     named, detail = diagnosis.findings.named[k], diagnosis.details[k]
     effect = named.hypothesis.effect
-    doubt = _FAINT if named in diagnosis.faint else ""
+    doubt = _FAINT if detail.faint else ""
     doubt += _DOUBT if diagnosis.findings.is_doubtful(named) else ""
     where = f" It shows where {region_words(detail.region)}." if detail.region is not None else ""
     return (

@@ -76,8 +76,8 @@ def left_out(parts: Array) -> LeftOut:
     """
     whole, count = parts.sum(axis=0), parts.shape[1] - 1
     inverse = pseudo_inverse(whole[:-1, :-1])
-    told = np.einsum("ij,bji->bi", inverse, parts[:, :-1, :-1])
-    shares = told.sum(axis=1) / max(1, count)
+    met = parts[:, :-1, :-1]
+    shares = np.einsum("ij,bji->b", inverse, met) / max(1, count)
     heard = shares > RANK
     weights = inverse @ whole[:-1, -1]
     others = whole - parts[heard]
@@ -88,9 +88,20 @@ def left_out(parts: Array) -> LeftOut:
     )
     apart, blocks = without - weights, max(1, int(np.count_nonzero(heard)))
     covariance = (blocks - 1) / blocks * apart.T @ apart
-    effective = 1.0 / np.maximum(np.sum(told**2, axis=0), RANK)
     together = 1.0 / max(float(np.sum(shares**2)), RANK)
-    return LeftOut(weights, covariance, together, effective, shares, _alike(apart))
+    return LeftOut(weights, covariance, together, _telling(inverse, met), shares, _alike(apart))
+
+
+def _telling(inverse: Array, met: Array) -> Array:
+    """Return how many blocks tell each weight, (m,), by their shares in its variance.
+
+    That of white noise (Satterthwaite, Biometrics Bull. 2(6), 1946), which none can have less than
+    nothing of: of columns that resemble each other as well.
+    """
+    variance = np.einsum("ij,bjk,ki->bi", inverse, met, inverse)
+    whole = np.diag(inverse)
+    shares = np.divide(variance, whole, out=np.zeros_like(variance), where=whole > RANK)
+    return np.asarray(1.0 / np.maximum(np.sum(shares**2, axis=0), RANK))
 
 
 def _alike(apart: Array) -> Array:

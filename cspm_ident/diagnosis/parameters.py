@@ -94,6 +94,31 @@ def of_forms(weights: Weights, untrue: Mapping[Candidate, float]) -> Weights:
     return {c: (w, np.hypot(half, untrue[c] * np.abs(w))) for c, (w, half) in weights.items()}
 
 
+def of_reach(weights: Weights, parts: Parts) -> Weights:
+    """Return the weights, of which none is surer than how much of it has acted.
+
+    What saturates and has not been seen to is told beyond what acted by the form of its law alone,
+    and others rise as far and end elsewhere: as much as is missing may be wrong (GUM, JCGM
+    100:2008, 4.3).
+
+    Args:
+        weights: as found.
+        parts: all rows, in the residuals' units.
+    """
+    found = dict(weights)
+    for candidate, (values, half) in weights.items():
+        if candidate.effect.saturates:
+            missing = 1.0 - _reach(candidate, parts)
+            found[candidate] = values, np.hypot(half, missing * np.abs(values))
+    return found
+
+
+def _reach(candidate: Candidate, parts: Parts) -> float:
+    """Return half of the range of a saturating candidate's column, whatever it started from."""
+    rows = (e.columns[candidate][:, 0, 0] for part in parts for e in part if candidate in e.columns)
+    return max((min(1.0, 0.5 * float(np.ptp(own))) for own in rows if len(own)), default=0.0)
+
+
 def _fitted(parts: Parts, candidates: Sequence[Candidate], block_s: float) -> Weights:
     evidence = gather(parts, block_s)
     return weights_of(evidence, Sums(evidence), candidates)

@@ -18,6 +18,7 @@ from cspm_ident.diagnosis.columns import Candidate, Place
 from cspm_ident.diagnosis.equation import Equation, in_noise, steady
 from cspm_ident.diagnosis.evidence import Evidence, gather
 from cspm_ident.diagnosis.hypothesis import Hypothesis, parts_of
+from cspm_ident.diagnosis.parameters import of_reach
 from cspm_ident.diagnosis.recorded import equations_of
 from cspm_ident.diagnosis.spectrum import most_in_all, with_spectrum
 from cspm_ident.diagnosis.sums import Sums
@@ -77,6 +78,7 @@ def refine(
                 before = values.get(candidate, np.zeros_like(weights))
                 turned = _unit_after(candidate.effect, before)
                 applied[candidate] = before + turned * weights, turned * half
+        found = of_reach(found, parts)
         factor = float(np.sqrt(factor))
         if _is_settled(found):
             break

@@ -73,7 +73,7 @@ class Search:
     def run(self) -> Findings:
         """Choose effects one by one, each with all elements on which it surely acts."""
         chosen = self._chosen()
-        named = [self._judged(k, chosen) for k in range(len(chosen))]
+        named = [self._judged(hypothesis, chosen) for hypothesis in chosen]
         named.sort(key=lambda each: -each.gain.total)
         self._progress("what is left")
         return Findings(tuple(named), self.unknown(chosen), len(self._effects))
@@ -313,8 +313,18 @@ class Search:
     ) -> list[Hypothesis]:
         return rivals_of(self.evidence, self.sums, base, hypothesis, free)
 
-    def _judged(self, k: int, chosen: Sequence[Hypothesis]) -> Named:
-        hypothesis, others = chosen[k], [h for i, h in enumerate(chosen) if i != k]
+    def judged_again(self, named: Named, chosen: Sequence[Hypothesis]) -> Named:
+        """Return a finding beside what is left of what was found, with what explains the same now.
+
+        What was given up says no more what the finding is, and may be what it is.
+        """
+        again = self._judged(named.hypothesis, chosen)
+        known = {rival.words for rival in named.alternatives}
+        further = (rival for rival in again.alternatives if rival.words not in known)
+        return again._replace(alternatives=(*named.alternatives, *further))
+
+    def _judged(self, hypothesis: Hypothesis, chosen: Sequence[Hypothesis]) -> Named:
+        others = [h for h in chosen if h is not hypothesis]
         base, own = self.fits.columns(others), self.fits.own_columns(hypothesis)
         gain = self.sums.gain(base, own)
         return Named(

@@ -48,6 +48,11 @@ class Standing:
         """What is told and not doubtful."""
         return tuple(each for each in self.kept if each not in self.doubted)
 
+    @property
+    def has_given_up(self) -> bool:
+        """Whether anything that was found is not told."""
+        return bool(self.rejected or self.fed_back)
+
     def without(self, useless: Collection[int]) -> Standing:
         """Return the same with some of what was kept rejected, by where they are there."""
         gone = tuple(self.kept[k] for k in useless)
@@ -56,7 +61,7 @@ class Standing:
 
     def unknown(self, search: Search, found: Findings) -> tuple[Unknown, ...]:
         """Return what nothing explains beside what is sure, of all that was found."""
-        if not (self.rejected or self.fed_back or self.doubted):
+        if not (self.has_given_up or self.doubted):
             return found.unknown
         return unknown_beside(search, self.sure, (*self.rejected, *self.doubted), self.fed_back)
 

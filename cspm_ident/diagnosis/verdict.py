@@ -163,7 +163,8 @@ def _recording(role: str, measurement: Measurement) -> dict[str, Any]:
 
 
 def _finding(diagnosis: Diagnosis, k: int) -> dict[str, Any]:
-    named, (onset, region, _) = diagnosis.findings.named[k], diagnosis.details[k]
+    named, detail = diagnosis.findings.named[k], diagnosis.details[k]
+    onset = detail.onset
     hypothesis, probability = named.hypothesis, probability_of(diagnosis.findings, named)
     return {
         "subsystem": hypothesis.effect.block.value,
@@ -173,7 +174,7 @@ def _finding(diagnosis: Diagnosis, k: int) -> dict[str, Any]:
         "statement": statement_of(diagnosis, k),
         "onset_s": onset.time if onset is not None else None,
         "onset_ci95_s": [onset.low, onset.high] if onset is not None else None,
-        "region": _region(region),
+        "region": _region(detail.region),
         "parameters": [
             {
                 "element": candidate.element,

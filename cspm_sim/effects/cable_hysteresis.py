@@ -47,6 +47,7 @@ EFFECT = Effect(
     states=1,
     regression=Regression(Channel.TENSION, _columns),
     nonlinear={"displacement": (1e-4, 3e-4, 1e-3, 3e-3, 1e-2, 3e-2)},
+    saturates=True,
     equation="t = law + force·z, dz/dt = (ε̇ − |ε̇|·z)/displacement",
     shows="tension residual loops with an area per cycle that does not depend on the frequency",
     twins=("cable_axial_damping", "cable_creep", "winch_backlash"),

@@ -122,6 +122,7 @@ class Effect:
             than as a factor.
         spectrum: of these the time constant of which a machine has many, its other number being a
             share of theirs in all: the interval of that is told for their sum; empty: it has one.
+        saturates: whether its columns lie between −1 and 1, where all of it acts.
         coefficients: from all parameters to the columns' weights; None: the parameters that are
             not nonlinear, in order, each less its absent value.
         from_coefficients: from weights and nonlinear values to all parameters; None: the inverse of
@@ -157,6 +158,7 @@ class Effect:
     partners: tuple[Regression, ...] = ()
     nonlinear: Mapping[str, tuple[float, ...]] = field(default_factory=dict)
     spectrum: str = ""
+    saturates: bool = False
     coefficients: Callable[[Values], Sequence[float]] | None = None
     from_coefficients: Callable[[Sequence[float], Values], dict[str, float]] | None = None
     kernels: Mapping[Hook, Callable[..., None]] = field(default_factory=dict)

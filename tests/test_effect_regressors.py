@@ -7,6 +7,7 @@ from effect_snapshots import Snapshots
 
 from cspm_msgs_py.testbed import EffectEntry
 from cspm_sim.effects import Channel, catalogue
+from cspm_sim.effects.signals import CableSignal
 
 MACHINE = build(general_content())
 ALL = list(catalogue().values())
@@ -169,3 +170,16 @@ def test_grids_are_of_parameters_and_within_bounds(effect):
     for name, grid in effect.nonlinear.items():
         assert list(grid) == sorted(set(grid))
         assert parameters[name].minimum <= grid[0] <= grid[-1] <= parameters[name].maximum
+
+
+@pytest.mark.parametrize("effect", [e for e in ALL if e.saturates], ids=lambda e: e.id)
+@pytest.mark.parametrize("stroke", [0.1, 10.0])
+def test_what_saturates_has_columns_up_to_one_where_all_of_it_acts(effect, stroke):
+    """Swings by a tenth of the grid's displacement, and by ten times as much."""
+    ((name, grid),) = effect.nonlinear.items()
+    swing = np.sin(np.linspace(0.0, 20.0, 4001))
+    for displacement in grid:
+        rows = np.zeros((len(swing), len(CableSignal)))
+        rows[:, CableSignal.ELONGATION] = stroke * displacement * swing
+        most = np.abs(effect.regressors(rows, **{name: displacement})).max()
+        assert most == pytest.approx(1.0, abs=1e-3) if stroke > 1.0 else most < 0.2

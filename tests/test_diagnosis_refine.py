@@ -82,12 +82,13 @@ def test_no_weight_is_surer_than_the_form_of_its_law():
     np.testing.assert_array_equal(found[other][1], given[other][1])
 
 
-@pytest.mark.parametrize(("start", "missing"), [(0.0, 0.4), (-5.0, 0.4), (0.9, 0.0)])
-def test_what_saturates_is_no_surer_than_how_much_of_it_has_acted(measured, start, missing):
+@pytest.mark.parametrize(
+    ("reach", "start", "missing"), [(0.6, 0.0, 0.4), (0.6, -5.0, 0.4), (1.2, 0.9, 0.0)]
+)
+def test_what_saturates_is_no_surer_than_how_much_of_it_has_acted(reach, start, missing):
     """Half of the range, since a memory may start anywhere."""
     slides = Candidate(catalogue()["cable_hysteresis"], "hoist_1", (("displacement", 1e-3),))
     rubs = Candidate(DAMPING, "hoist_1")
-    reach = 1.2 if start == 0.9 else 0.6
     column = reach * np.sin(np.linspace(0.0, 9.0, 500))[:, None, None] + start
     part = equation_of({slides: column, rubs: 0.1 * column})
     given = {c: (np.array([-2.0]), np.array([0.6])) for c in (slides, rubs)}

@@ -210,8 +210,11 @@ def _told(search: Search, standing: Standing, model: Model) -> dict[int, Named]:
         for k, each in enumerate(standing.kept)
         if not model.negligible[k]
     }
-    doubted = [standing.kept[k] in standing.doubted for k in range(len(hypotheses))]
-    return dict(sorted(told.items(), key=lambda item: (doubted[item[0]], -item[1].gain.total)))
+
+    def rank(k: int) -> tuple[bool, float]:
+        return standing.kept[k] in standing.doubted, -told[k].gain.total
+
+    return {k: told[k] for k in sorted(told, key=rank)}
 
 
 def _lasting(

@@ -76,8 +76,8 @@ def left_out(parts: Array) -> LeftOut:
     """
     whole, count = parts.sum(axis=0), parts.shape[1] - 1
     inverse = pseudo_inverse(whole[:-1, :-1])
-    met = parts[:, :-1, :-1]
-    shares = np.einsum("ij,bji->b", inverse, met) / max(1, count)
+    told = inverse @ parts[:, :-1, :-1]
+    shares = np.einsum("bii->b", told) / max(1, count)
     heard = shares > RANK
     weights = inverse @ whole[:-1, -1]
     others = whole - parts[heard]
@@ -89,16 +89,20 @@ def left_out(parts: Array) -> LeftOut:
     apart, blocks = without - weights, max(1, int(np.count_nonzero(heard)))
     covariance = (blocks - 1) / blocks * apart.T @ apart
     together = 1.0 / max(float(np.sum(shares**2)), RANK)
-    return LeftOut(weights, covariance, together, _telling(inverse, met), shares, _alike(apart))
+    return LeftOut(weights, covariance, together, _telling(told, inverse), shares, _alike(apart))
 
 
-def _telling(inverse: Array, met: Array) -> Array:
+def _telling(told: Array, inverse: Array) -> Array:
     """Return how many blocks tell each weight, (m,), by their shares in its variance.
 
     That of white noise (Satterthwaite, Biometrics Bull. 2(6), 1946), which none can have less than
     nothing of: of columns that resemble each other as well.
+
+    Args:
+        told: the inverse times each block's products, (blocks, m, m).
+        inverse: of the products of all blocks, (m, m).
     """
-    variance = np.einsum("ij,bjk,ki->bi", inverse, met, inverse)
+    variance = np.einsum("bij,ij->bi", told, inverse)
     whole = np.diag(inverse)
     shares = np.divide(variance, whole, out=np.zeros_like(variance), where=whole > RANK)
     return np.asarray(1.0 / np.maximum(np.sum(shares**2, axis=0), RANK))

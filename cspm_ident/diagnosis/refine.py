@@ -63,6 +63,7 @@ def refine(
     applied: Weights = {}
     factor = _FIRST_FACTOR
     found: Weights = {}
+    parts: Sequence[Sequence[Equation]] = ()
     for _ in range(_ROUNDS if candidates else 0):
         near = [_near(effects[name], shape, factor) for name, shape in shapes.items()]
         try:
@@ -78,11 +79,10 @@ def refine(
                 before = values.get(candidate, np.zeros_like(weights))
                 turned = _unit_after(candidate.effect, before)
                 applied[candidate] = before + turned * weights, turned * half
-        found = of_reach(found, parts)
         factor = float(np.sqrt(factor))
         if _is_settled(found):
             break
-    return {c: applied.get(c, own) for c, own in found.items()}
+    return of_reach({c: applied.get(c, own) for c, own in found.items()}, parts)
 
 
 def spectra(

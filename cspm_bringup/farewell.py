@@ -6,6 +6,9 @@ import signal
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 
+# Exit codes of a process that left in order; a signal is negative.
+IN_ORDER = frozenset({0, -signal.SIGALRM})
+
 
 @contextmanager
 def farewell(seconds: float) -> Iterator[Callable[[], None]]:

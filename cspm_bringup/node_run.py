@@ -133,7 +133,7 @@ def _check_part(node: ContractNode, scenario: str, schedule: Schedule) -> None:
 def _report(path: Path | None, leader: Leader, waiting: str, failure: str | None) -> None:
     if path is not None:
         elapsed, ended = leader.elapsed, leader.end_ns is not None
-        Report(elapsed, elapsed, waiting, failure, ended).write(path)
+        Report(elapsed, elapsed, waiting, failure, ended, ended).write(path)
 
 
 def _spin(session: Session, watch: Watch, ended: Callable[[], bool]) -> None:
@@ -156,9 +156,8 @@ def _run_plant(
     def report() -> None:
         if path is not None:
             waiting = "" if plant.finished else plant.waiting()
-            Report(plant.simulated, watch.elapsed, waiting, plant.failure, plant.finished).write(
-                path
-            )
+            times = (plant.simulated, watch.elapsed)
+            Report(*times, waiting, plant.failure, plant.ended, plant.finished).write(path)
 
     def look() -> None:
         watch.look()

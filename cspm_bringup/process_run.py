@@ -10,6 +10,7 @@ from contextlib import contextmanager
 from pathlib import Path
 
 from cspm_bringup.bundle import SCENARIO, Bundle
+from cspm_bringup.farewell import IN_ORDER
 from cspm_bringup.node_parameters import (
     LOCKSTEP,
     REALTIME,
@@ -145,7 +146,7 @@ class _Follower:
                 start.look(report.waiting)
             for warning in processes.warnings():
                 tell(warning)
-            self._look_for_dead(self._dead(ended))
+            self._look_for_dead(self._dead(ended, report))
             if stop_wanted() and self._stop_at is None:
                 self._stop_at = time.monotonic()
             if self._stuck(report):
@@ -179,8 +180,14 @@ class _Follower:
             self.failure = f"{text}, at {report.simulated:.1f} s"
         return told or silent
 
-    def _dead(self, ended: dict[str, int]) -> list[str]:
-        """Return who ended before the leader; in order one may be ahead of it for a moment."""
+    def _dead(self, ended: dict[str, int], report: Report) -> list[str]:
+        """Return who ended too early: in order one may be ahead of the leader for a moment.
+
+        Once the leader makes no further step it waits for what is still to be written, however
+        long that takes, and nobody has to wait with it.
+        """
+        if report.ended:
+            return [name for name, code in ended.items() if code not in IN_ORDER]
         now = time.monotonic()
         for name in ended:
             self._gone.setdefault(name, now)

@@ -16,13 +16,15 @@ class Report:
         elapsed: wall time that took [s], without start-up.
         waiting: what has to come before the run goes on, if it stands still.
         failure: what ended it, in one line, if anything did.
-        finished: whether it is over and everybody has all of it.
+        ended: whether no step follows; others may leave before the leader then.
+        finished: whether moreover everybody has all of it.
     """
 
     simulated: float = 0.0
     elapsed: float = 0.0
     waiting: str = ""
     failure: str | None = None
+    ended: bool = False
     finished: bool = False
 
     def write(self, path: Path) -> None:

@@ -91,6 +91,11 @@ class PlantNode:
         self.refused = (0, "")
 
     @property
+    def ended(self) -> bool:
+        """Whether the last step is done."""
+        return self._plant.ended
+
+    @property
     def finished(self) -> bool:
         """Whether the run is over and everybody has all of it."""
         return self._plant.finished

@@ -119,6 +119,13 @@ def test_only_a_recorder_in_lockstep_gives_way(tmp_path, mode, behind):
     assert {name for name, policy in found.items() if policy == os.SCHED_BATCH} == behind
 
 
+def use_site(folder, monkeypatch, code):
+    """Have each Python that a test starts run some code first."""
+    (folder / "sitecustomize.py").write_text(code)
+    path = os.pathsep.join([str(folder), *filter(None, [os.environ.get("PYTHONPATH")])])
+    monkeypatch.setenv("PYTHONPATH", path)
+
+
 # Keeps Python's lock for ever, as the middleware does at times when two nodes leave at once.
 _STUCK_PLANT = """
 import ctypes, sys
@@ -130,9 +137,25 @@ Session.close = lambda self: (ctypes.PyDLL(None).sleep(600) if "plant" in sys.ar
 
 @pytest.mark.slow
 def test_a_plant_that_cannot_leave_does_not_keep_the_run(tmp_path, monkeypatch):
-    (tmp_path / "sitecustomize.py").write_text(_STUCK_PLANT)
-    path = os.pathsep.join([str(tmp_path), *filter(None, [os.environ.get("PYTHONPATH")])])
-    monkeypatch.setenv("PYTHONPATH", path)
+    use_site(tmp_path, monkeypatch, _STUCK_PLANT)
+    result = processes(bundle_of("rest"), tmp_path / "run", steps=100)
+    assert (result.failure, result.interrupted, result.simulated) == (None, False, 0.1)
+    with Recording(tmp_path / "run") as recording:
+        assert recording.complete
+
+
+# Has nothing left to compute, but keeps the run: as on a machine that is full.
+_SLOW_RECORDER = """
+import time
+from cspm_bringup.gatherer import Gatherer
+end = Gatherer.end
+Gatherer.end = lambda self, last_step: (time.sleep(4), end(self, last_step))
+"""
+
+
+@pytest.mark.slow
+def test_who_leaves_in_order_before_all_is_written_is_not_missed(tmp_path, monkeypatch):
+    use_site(tmp_path, monkeypatch, _SLOW_RECORDER)
     result = processes(bundle_of("rest"), tmp_path / "run", steps=100)
     assert (result.failure, result.interrupted, result.simulated) == (None, False, 0.1)
     with Recording(tmp_path / "run") as recording:

@@ -144,6 +144,32 @@ def test_who_left_in_order_long_before_the_leader_is_named_too(tmp_path):
     assert follower.failure.startswith("recorder ended with 0, at ")
 
 
+@pytest.mark.parametrize("realtime", [True, False])
+@pytest.mark.parametrize("code", [0, -signal.SIGALRM])
+def test_who_left_in_order_once_no_step_follows_is_not_missed(tmp_path, realtime, code):
+    path = tmp_path / "report.json"
+    writing = [Report(1.0, 1.0 + 0.01 * k, ended=True) for k in range(50)]
+    over = Report(1.0, 1.0, ended=True, finished=True)
+    processes = Processes(path, *writing[:1], {FORCE_CONTROLLER: code}, *writing, over, ALL)
+    follower, report, *_ = follow(path, processes, realtime=realtime)
+    assert (follower.failure, report.finished) == (None, True)
+
+
+def test_who_died_while_others_write_ends_the_run(tmp_path):
+    path = tmp_path / "report.json"
+    processes = Processes(path, Report(1.0, 1.0, ended=True), {RECORDER: -9})
+    with pytest.raises(CspmError, match="recorder ended with -9"):
+        follow(path, processes, realtime=False)
+
+
+def test_in_lockstep_who_left_long_before_the_last_step_ends_the_run(tmp_path):
+    path = tmp_path / "report.json"
+    reports = [running(0.6 + 0.01 * k) for k in range(50)]
+    processes = Processes(path, running(0.5), {FORCE_CONTROLLER: 0}, *reports)
+    with pytest.raises(CspmError, match="force_controller ended with 0"):
+        follow(path, processes, realtime=False)
+
+
 @pytest.mark.parametrize("leader", [PLANT, RECORDER])
 def test_a_leader_that_died_under_way_is_named_and_the_run_summed_up(tmp_path, leader):
     path = tmp_path / "report.json"

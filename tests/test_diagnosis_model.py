@@ -9,8 +9,8 @@ from run_samples import SCENARIOS
 from cspm_ident.block_simulation import Drive
 from cspm_ident.diagnosis.columns import Candidate
 from cspm_ident.diagnosis.drivers import around
-from cspm_ident.diagnosis.hypothesis import Hypothesis, Named
-from cspm_ident.diagnosis.model import WORTH_IT, Data, Model, _wanted
+from cspm_ident.diagnosis.hypothesis import Findings, Hypothesis, Named
+from cspm_ident.diagnosis.model import WORTH_IT, Data, Model, _is_unsure, _wanted
 from cspm_ident.diagnosis.simulation import Output, Worth
 from cspm_ident.diagnosis.statement import numbers_of
 from cspm_ident.diagnosis.sums import Gain
@@ -23,11 +23,12 @@ THESIS = load_testbed(SCENARIOS / "testbeds" / "thesis.yaml")
 OUTPUT = Output(Drive.SHAFT, "winches/angle/surge_2", "rad", "surge_2", Channel.SHAFT)
 
 
-def model(shares, possible=None, wanted=None):
+def model(shares, possible=None, wanted=None, unsure=(), harm=()):
     worth = tuple(None if share is None else Worth(OUTPUT, 2.0, 2.0 * share) for share in shares)
     count = len(worth)
     sound, wanted = (False,) * count, wanted or (WORTH_IT,) * count
-    return Model({}, (), (), worth, possible or (True,) * count, sound, wanted)
+    possible = possible or (True,) * count
+    return Model({}, (), (), worth, possible, sound, wanted, unsure, harm)
 
 
 @pytest.mark.parametrize(
@@ -79,6 +80,31 @@ def test_what_takes_most_of_a_residual_stays_though_no_simulation_gains():
 
 def test_what_no_machine_can_have_goes_before_anything_is_judged():
     assert model((1.2, 0.5), (True, False)).useless == [1]
+    assert model((1.2, 0.5), (True, False), unsure=(True, False)).useless == [1]
+
+
+def test_of_what_may_be_none_the_least_goes_then_what_harms_most():
+    """Findings are in the order of their gains."""
+    assert model((), (True,) * 3, unsure=(True, True, False)).useless == [1]
+    assert model((1.2, 0.5, 0.5), harm=(0.0, 3.0, 2.0)).useless == [1]
+    assert model((0.5, 0.5), unsure=(False, False), harm=(0.0, 0.0)).useless == []
+
+
+@pytest.mark.parametrize(
+    ("effect", "half", "unsure"),
+    [
+        ("winch_coulomb_friction", 0.021, True),
+        ("winch_coulomb_friction", 0.019, False),
+        # Nothing is known of where it ends, but that it is there.
+        ("cable_hysteresis", 0.021, False),
+        # What no data tell may be anything, and is no reason to take it for none.
+        ("winch_coulomb_friction", np.inf, False),
+    ],
+)
+def test_what_may_be_none_is_unsure(effect, half, unsure):
+    candidate = Candidate(catalogue()[effect], "surge_2")
+    weights = {candidate: (np.array([-0.02]), np.array([half]))}
+    assert _is_unsure(Hypothesis(candidate.effect, (candidate,)), weights) is unsure
 
 
 def test_a_machine_has_no_inertia_that_no_body_has():
@@ -115,7 +141,8 @@ def test_an_interval_ends_where_the_catalogue_does():
     drag = Candidate(catalogue()["winch_coulomb_friction"], "surge_2")
     cases = ((0.01, 0.004, (0.006, 0.014)), (0.0, 0.004, (0.0, 0.004)), (0.9, 0.2, (0.7, 1.0)))
     for value, half, ends in cases:
-        found = SimpleNamespace(weights={drag: (np.array([value]), np.array([half]))}, spectra={})
+        weights = {drag: (np.array([value]), np.array([half]))}
+        found = SimpleNamespace(weights=weights, spectra={}, findings=Findings((), (), 0))
         (number,) = numbers_of(found, drag)
         assert (number.low, number.high) == pytest.approx(ends)
 

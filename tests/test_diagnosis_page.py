@@ -286,6 +286,8 @@ def test_a_finding_beside_much_that_nothing_explains_is_doubtful(left, doubtful,
     (finding,) = named_in(data)
     assert finding["probability"] == TRUSTED * (DOUBTED if doubtful else 1.0)
     assert ("Doubtful: beside it is much that nothing" in finding["statement"]) is doubtful
+    assert ("torque 30 mN·m." in finding["statement"]) is doubtful
+    assert [n["ci95"] is None for n in finding["parameters"]] == [doubtful]
     assert verdict_of(found) is (Verdict.UNKNOWN if doubtful else Verdict.EFFECT)
     assert ("Doubtful: beside it" in page_of(tmp_path, found)) is doubtful
 

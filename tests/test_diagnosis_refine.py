@@ -10,6 +10,7 @@ from cspm_bringup.run import run
 from cspm_ident.diagnosis.columns import Candidate, Place
 from cspm_ident.diagnosis.equation import Equation, steady
 from cspm_ident.diagnosis.hypothesis import Hypothesis
+from cspm_ident.diagnosis.likeness import UNTRUE_SHARE
 from cspm_ident.diagnosis.look import noise_of
 from cspm_ident.diagnosis.parameters import of_clocks, of_forms, of_reach
 from cspm_ident.diagnosis.recorded import equations_of
@@ -74,12 +75,21 @@ def test_no_delay_is_surer_than_the_clocks_of_a_sound_machine():
 
 
 def test_no_weight_is_surer_than_the_form_of_its_law():
-    one, other = (Candidate(DAMPING, element) for element in ("hoist_1", "hoist_2"))
-    given = {c: (np.array([-3.0, 0.0]), np.array([0.4, 0.4])) for c in (one, other)}
-    found = of_forms(given, {one: 0.1, other: 0.0})
-    np.testing.assert_allclose(found[one][1], [0.5, 0.4])
-    np.testing.assert_array_equal(found[one][0], given[one][0])
-    np.testing.assert_array_equal(found[other][1], given[other][1])
+    """Be it seen to be off or not; a number of the file or of a reading has none."""
+    unseen = np.sqrt(UNTRUE_SHARE)
+    cases = (
+        ("winch_coulomb_friction", 0.1, 0.1),
+        ("winch_viscous_friction", 0.0, unseen),
+        ("cable_stiffness", 0.1, 0.1),
+        ("cable_axial_damping", 0.0, 0.0),
+        ("tension_bias", 0.0, 0.0),
+    )
+    for effect, seen, share in cases:
+        candidate = Candidate(catalogue()[effect], "hoist_1")
+        given = np.array([-3.0, 0.0]), np.array([0.4, 0.4])
+        values, half = of_forms({candidate: given}, {candidate: seen})[candidate]
+        np.testing.assert_allclose(half, [np.hypot(0.4, 3.0 * share), 0.4])
+        np.testing.assert_array_equal(values, given[0])
 
 
 @pytest.mark.parametrize(

@@ -6,7 +6,7 @@ import pytest
 from cspm_ident.diagnosis.columns import Candidate, Place, shapes_of
 from cspm_ident.diagnosis.equation import Equation, steady
 from cspm_ident.diagnosis.evidence import gather
-from cspm_ident.diagnosis.reversals import with_wider
+from cspm_ident.diagnosis.reversals import near_rest, with_wider
 from cspm_ident.diagnosis.search import Search
 from cspm_ident.diagnosis.sums import Sums
 from cspm_sim.effects import Channel, catalogue
@@ -17,8 +17,8 @@ DRY, WIDER = catalogue()["winch_coulomb_friction"], catalogue()["winch_stribeck_
 STILL = 3.0  # below it a shaft counts as turning [rad/s]
 
 
-def shaft(law, seed=3, still=STILL):
-    """A winch whose torque misses law(speed), in hundredths of a N·m, beside noise of one."""
+def shaft(law, seed=3, still=STILL, noise=0.3):
+    """A winch whose torque misses law(speed), in hundredths of a N·m as the noise."""
     rng = np.random.default_rng(seed)
     times = STEP * np.arange(ROWS)
     speed = 6.0 * (np.sin(2.3 * times) + 0.7 * np.sin(0.91 * times + 1.0))
@@ -29,7 +29,9 @@ def shaft(law, seed=3, still=STILL):
         for effect in (DRY, WIDER)
         for shape in shapes_of(effect)
     }
-    target = 0.01 * (np.sign(speed) * law(np.abs(speed)) + rng.standard_normal(ROWS))[:, None]
+    target = (
+        0.01 * (np.sign(speed) * law(np.abs(speed)) + noise * rng.standard_normal(ROWS))[:, None]
+    )
     turning = np.abs(speed) < still
     place = Place(Channel.SHAFT, "surge_1")
     return Equation(place, times, target, columns, target, turning=turning)
@@ -48,14 +50,32 @@ def told(equation):
     [
         (lambda v: 3.0 + 2.0 * np.exp(-(v**2)), [WIDER]),
         (lambda v: 3.0 + 0.0 * v, []),
-        # Bristles that yield: less near rest.
-        (lambda v: 3.0 * (1.0 - np.exp(-(v**2))), []),
+        # Bristles that yield take more away near rest than a breakaway would add.
+        (lambda v: 3.0 * (1.0 - np.exp(-(v**2))), [WIDER]),
         # No dry friction falls to less than half while it slides.
         (lambda v: 3.0 + 9.0 * np.exp(-(v**2)), []),
     ],
 )
 def test_more_torque_near_rest_makes_a_larger_breakaway_an_alternative(law, wider):
     assert told(shaft(law)) == wider
+
+
+@pytest.mark.parametrize("seed", range(3))
+def test_what_reversals_do_not_tell_is_left_open(seed):
+    """Beside noise of three times the friction all rows tell it, those near rest nothing."""
+    assert told(shaft(lambda v: 3.0 + 0.0 * v, seed, noise=8.0)) == [WIDER]
+
+
+@pytest.mark.parametrize(("half", "told"), [(0.9, True), (1.1, False)])
+def test_friction_near_rest_is_told_where_half_of_it_would_show(half, told):
+    sure = np.array([2.5, 2.0]), np.array([0.3, 0.1])
+    other = np.array([1.0, 2.0]), np.array([half, 0.1])
+    near = near_rest([sure, other])
+    assert (near is not None) is told
+    if near is not None:
+        np.testing.assert_array_equal(near.values, [2.5, 1.0])
+        np.testing.assert_array_equal(near.half, [0.3, half])
+        np.testing.assert_array_equal(near.sliding, [2.0, 2.0])
 
 
 def test_without_reversals_nothing_is_added():

@@ -33,6 +33,15 @@ def test_a_finding_says_what_how_much_since_when_and_what_it_is_worth():
     assert "turns round" not in told
 
 
+def test_an_error_that_rises_is_said_to_rise():
+    fit = HeldOut(PLACE, 0.15, TORQUE, TORQUE, 1.5 * TORQUE, NOISE, NOISE)
+    (finding,) = diagnosis_data(replace(diagnosis(), fit=(fit,)))["findings"]
+    assert (
+        "winches/torque/surge_2 rises from 20 % to 30 % of what was measured"
+        in (finding["statement"])
+    )
+
+
 def test_what_is_left_above_the_noise_is_told_and_where_it_is_not():
     found = diagnosis()
     fit = HeldOut(PLACE, 0.15, TORQUE, TORQUE, 0.003, NOISE, NOISE, 0.0006)

@@ -32,7 +32,8 @@ class Estimate:
     Attributes:
         effect: whose parameter it is.
         error: relative to what the value differs by from a machine without it.
-        covered: whether its 95 % interval holds the truth; None without an interval.
+        covered: whether its 95 % interval holds the truth; None without an interval, or with one
+            that is all that the catalogue allows, as where there are too few data for any.
     """
 
     effect: str
@@ -247,11 +248,23 @@ def _estimates(concealed: Data, findings: Sequence[Data]) -> list[Estimate]:
             element = parameter["element"]
             if parameter["name"] != name or element not in amounts:
                 continue
-            true, interval = amounts[element], parameter["ci95"]
+            true, interval = amounts[element], _interval(finding["effect"], parameter)
             error = (parameter["value"] - true) / (true - base)
             covered = None if interval is None else interval[0] <= true <= interval[1]
             found.append(Estimate(finding["effect"], error, covered))
     return found
+
+
+def _interval(effect: str, parameter: Data) -> tuple[float, float] | None:
+    """Return a parameter's interval, unless it is all that the catalogue allows."""
+    if parameter["ci95"] is None:
+        return None
+    low, high = parameter["ci95"]
+    everything = any(
+        p.name == parameter["name"] and low <= p.minimum and high >= p.maximum
+        for p in catalogue()[effect].parameters
+    )
+    return None if everything else (low, high)
 
 
 def _fit(

@@ -22,7 +22,7 @@ CONFIRMED_SHARE = 0.03
 # Of what it should take of all, where it should take less than is worth a word of each.
 _AS_EXPECTED = CONFIRMED_SHARE / MATERIAL_SHARE
 # Of a held-out squared residual: what takes more of it is there, whatever else is not right yet.
-_PLAIN_SHARE = 0.5
+PLAIN_SHARE = 0.5
 # What it should take to be judged by, in standard errors of what it takes.
 _LEAST_EXPECTED = 3.0
 
@@ -107,7 +107,7 @@ class _Lowered:
     @property
     def most(self) -> bool:
         """Whether it takes most of one."""
-        return bool(np.any(self._taken > _PLAIN_SHARE * self._without))
+        return bool(np.any(self._taken > PLAIN_SHARE * self._without))
 
     @property
     def as_expected(self) -> bool:

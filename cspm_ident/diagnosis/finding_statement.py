@@ -18,7 +18,7 @@ from cspm_sim.effects import Block, Effect, Elements
 
 _DOUBT = (
     " Doubtful: beside it is much that nothing in the catalogue explains, of which this may be a"
-    " part."
+    " part, so that its numbers have no interval."
 )
 _FAINT = " What was not searched moves so little that it shows little of it."
 # Of the noise from row to row: windows overlap, and leave a sound machine 1.4 times as much.
@@ -163,10 +163,11 @@ def _worth(diagnosis: Diagnosis, named: Named, worth: Worth | None) -> str:
     away = ""
     if best.steady is not None and best.steady < _AWAY * best.after:
         away = f" ({_share(best, best.steady)} apart from where the shaft turns round)"
+    moves = "falls" if best.after < best.before else "rises"
     together = sum(best in _concerned(diagnosis, each) for each in diagnosis.findings.named) > 1
     return (
         f"With {'all that was found' if together else 'it'} the held-out error of"
-        f" {channel_of(best)} falls from {_share(best, best.before)} to"
+        f" {channel_of(best)} {moves} from {_share(best, best.before)} to"
         f" {_share(best, best.after)} of what was measured{away}, {noise};"
         f" {_simulated_worth(worth)}."
     )

@@ -69,9 +69,9 @@ def judged(
         free: what free functions leave, root mean square in units of the noise.
     """
     parts = list(zip(measurements, starts, strict=True))
-    described = _residuals(parts, {}, noise)
-    tuned = _residuals(parts, retuned, noise) if retuned else described
-    after = _residuals(parts, found, noise) if found else described
+    described = residuals_of(parts, {}, noise)
+    tuned = residuals_of(parts, retuned, noise) if retuned else described
+    after = residuals_of(parts, found, noise) if found else described
     out = []
     for place, equations in described.items():
         unit = float(noise[place][0]) if len(noise[place]) == 1 else 1.0
@@ -139,12 +139,18 @@ def without_nuisance(equation: Equation) -> Array:
     return np.asarray(left.reshape(equation.target.shape))
 
 
-def _residuals(
+def residuals_of(
     measurements: Sequence[tuple[Measurement, float]],
     weights: Mapping[Candidate, Array],
     noise: Mapping[Place, Array],
 ) -> dict[Place, list[Equation]]:
-    """Return the residuals of recordings from some instant each on, where there are any rows."""
+    """Return the residuals of recordings from some instant each on, where there are any rows.
+
+    Args:
+        measurements: each with the instant [s].
+        weights: of what the machine has.
+        noise: of each residual, its unit.
+    """
     parts = [
         [
             equation.within(start, np.inf)

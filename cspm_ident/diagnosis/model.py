@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Mapping, Sequence
+from itertools import compress
 from types import MappingProxyType
 from typing import NamedTuple
 
@@ -11,13 +12,16 @@ from numpy.typing import NDArray
 
 from cspm_ident.diagnosis.columns import Candidate, Place
 from cspm_ident.diagnosis.equation import Equation, steady
+from cspm_ident.diagnosis.harm import harm, squares_left
 from cspm_ident.diagnosis.hypothesis import (
+    Hypothesis,
     Named,
     bounded,
     is_number,
     is_seen_to_begin,
     is_seen_to_end,
     may_be_negligible,
+    may_be_none,
     members_of,
 )
 from cspm_ident.diagnosis.onset import Onset, onset_of
@@ -80,6 +84,8 @@ class Model(NamedTuple):
             the time, and its memory is seen to end.
         negligible: whether each may be no more than in a sound machine.
         wanted: below which share of what it is without each a simulated error has to fall.
+        unsure: whether each may be none, as far as noise tells, and is no sound machine's.
+        harm: squares by which each makes worse what was not searched; 0 where it does not.
         spectra: as of a diagnosis.
     """
 
@@ -90,16 +96,23 @@ class Model(NamedTuple):
     possible: tuple[bool, ...]
     negligible: tuple[bool, ...]
     wanted: tuple[float, ...]
+    unsure: tuple[bool, ...] = ()
+    harm: tuple[float, ...] = ()
     spectra: Mapping[Candidate, Array] = MappingProxyType({})
 
     @property
     def useless(self) -> list[int]:
-        """Findings that have to go: what is not possible, else the worst of no use.
+        """Findings that have to go: what is not possible, else the least of what may be none.
 
-        Of no use is with what no simulation of held-out data comes nearer to what was measured.
+        Else the worst of harm, else of no use: with what no simulation of held-out data comes
+        nearer to what was measured.
         """
         if not all(self.possible):
             return [k for k, possible in enumerate(self.possible) if not possible]
+        if any(self.unsure):
+            return [max(compress(range(len(self.unsure)), self.unsure))]
+        if any(self.harm):
+            return [max(range(len(self.harm)), key=lambda k: self.harm[k])]
         shares = {k: worth.with_it / worth.without for k, worth in enumerate(self.worth) if worth}
         worst = max(shares, key=lambda k: shares[k] - self.wanted[k], default=None)
         return [worst] if worst is not None and shares[worst] > self.wanted[worst] else []
@@ -130,6 +143,10 @@ def modelled(search: Search, kept: Sequence[Named], data: Data) -> Model:
     weights = {
         c: (_allowed(data.searched[0], c, own, half), half) for c, (own, half) in weights.items()
     }
+    unsure = tuple(
+        not sound and _is_unsure(each.hypothesis, weights)
+        for each, sound in zip(kept, negligible, strict=True)
+    )
     weights = of_forms(weights, _untrue(search, kept, weights))
     values = {c: w for c, (w, _) in weights.items()}
     members = [{c: values[c] for c in members_of(values, each.hypothesis)} for each in kept]
@@ -140,15 +157,47 @@ def modelled(search: Search, kept: Sequence[Named], data: Data) -> Model:
         for each, own in zip(kept, members, strict=True)
     )
     wanted = tuple(_wanted(each, data) for each in kept)
-    if not all(possible):
-        return Model(weights, onsets, (), (), possible, negligible, wanted, most)
+    if any(unsure) or not all(possible):
+        return Model(weights, onsets, (), (), possible, negligible, wanted, unsure, spectra=most)
     simulated = simulate_held_out(data.baselines, values)
     # What a sound machine has too is too little to be of use, and there nevertheless.
     worth = tuple(
         None if sound else worth_of(data.baselines, simulated, values, own)
         for own, sound in zip(members, negligible, strict=True)
     )
-    return Model(weights, onsets, simulated, worth, possible, negligible, wanted, most)
+    harms = _harms(data, values, [{} if s else m for m, s in zip(members, negligible, strict=True)])
+    given = possible, negligible, wanted, unsure, harms
+    return Model(weights, onsets, simulated, worth, *given, most)
+
+
+def _is_unsure(hypothesis: Hypothesis, weights: Weights) -> bool:
+    """Return whether all numbers of a finding may be zero, together with what else was found.
+
+    What saturates and has hardly acted is there, though nothing is known of where it ends.
+    """
+    own = {c: weights[c] for c in members_of(weights, hypothesis)}
+    return may_be_none(own) and not hypothesis.effect.saturates
+
+
+def _harms(
+    data: Data, values: Mapping[Candidate, Array], members: Sequence[Mapping[Candidate, Array]]
+) -> tuple[float, ...]:
+    """Return by how many squares each finding makes worse what was not searched.
+
+    Args:
+        data: of which that is.
+        values: weights of all.
+        members: of each finding; none of one that is not judged by it.
+    """
+
+    def left(found: Mapping[Candidate, Array]) -> dict[Place, Array]:
+        return squares_left(data.baselines, found, data.noise, data.block)
+
+    every = left(values)
+    return tuple(
+        harm(left({c: w for c, w in values.items() if c not in own}), every) if own else 0.0
+        for own in members
+    )
 
 
 def _wanted(named: Named, data: Data) -> float:

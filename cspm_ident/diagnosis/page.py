@@ -193,7 +193,7 @@ def _parameters(data: dict[str, Any]) -> str:
     for finding in data["findings"]:
         for each in finding["parameters"]:
             ends = each["ci95"]
-            interval = f"{ends[0]:.4g} to {ends[1]:.4g}" if ends else "searched on a grid"
+            interval = f"{ends[0]:.4g} to {ends[1]:.4g}" if ends else "none"
             value = f"{each['value']:.4g}"
             rows.append(
                 (finding["effect"], each["element"], each["name"], value, interval, each["unit"])

@@ -10,6 +10,7 @@ from cspm_ident.diagnosis.columns import Candidate, Place
 from cspm_ident.diagnosis.drive import time_constant
 from cspm_ident.diagnosis.equation import Equation, steady
 from cspm_ident.diagnosis.evidence import gather
+from cspm_ident.diagnosis.likeness import UNTRUE_SHARE
 from cspm_ident.diagnosis.sums import Sums
 from cspm_ident.diagnosis.weights import Weights, weights_of
 from cspm_sim.effects import Channel
@@ -85,13 +86,20 @@ def of_forms(weights: Weights, untrue: Mapping[Candidate, float]) -> Weights:
     """Return the weights, of which none is surer than the form of its law.
 
     Noise alone makes the interval of a straight line through a curve as narrow as one likes; what
-    the law leaves of the curve may as well have moved the line (GUM, JCGM 100:2008, 4.3).
+    the law leaves of the curve may as well have moved the line (GUM, JCGM 100:2008, 4.3). What is
+    not seen of that no law is free of; a number of the file or of a reading has no form.
 
     Args:
         weights: as found.
         untrue: of each, by what share of its amplitude the law is seen to be off.
     """
-    return {c: (w, np.hypot(half, untrue[c] * np.abs(w))) for c, (w, half) in weights.items()}
+    found = dict(weights)
+    for candidate, (values, half) in weights.items():
+        effect = candidate.effect
+        exact = effect.alter is not None or effect.sense is not None
+        share = max(untrue[candidate], 0.0 if exact else np.sqrt(UNTRUE_SHARE))
+        found[candidate] = values, np.hypot(half, share * np.abs(values))
+    return found
 
 
 def of_reach(weights: Weights, parts: Parts) -> Weights:

@@ -1,14 +1,16 @@
 """What rows in which shafts turn round say of a finding: whether it is a case of something wider.
 
 They are left out of the search, for a shaft that sticks takes any torque. But there alone shows
-whether dry friction is larger near rest. Bristles that yield before they slip take torque away near
-rest, so that what is larger there is none of their doing.
+whether dry friction is larger near rest. Where it may be, within its interval, or where bristles
+that yield before they slip take so much torque away near rest that they hide it, dry friction with
+a larger breakaway explains as well what dry friction does.
 """
 
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import replace
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -19,20 +21,22 @@ from cspm_ident.diagnosis.evidence import Evidence, gather
 from cspm_ident.diagnosis.fits import Fits
 from cspm_ident.diagnosis.hypothesis import Findings, Hypothesis, Named, Rival, freedom, is_number
 from cspm_ident.diagnosis.likeness import contains
-from cspm_ident.diagnosis.sums import Sums, gain_of
+from cspm_ident.diagnosis.sums import Sums
 from cspm_sim.effects import Channel
 
 Parts = Sequence[Sequence[Equation]]
-Index = NDArray[np.intp]
+Array = NDArray[np.float64]
 
-# Standard errors by which the wider form has to explain more.
-_SIGMAS = 2.0
+# Of dry friction while a shaft slides: by how much more it breaks away to be worth a word.
+_LARGER = 0.2
+# Likewise, half of an interval: what is told no better tells nothing.
+_TOLD = 0.5
 
 
 def with_wider(
     found: Findings, parts: Parts, block_s: float, summed: Callable[[Evidence], Sums]
 ) -> Findings:
-    """Return findings, with wider forms that reversals speak for among their alternatives.
+    """Return findings, with wider forms that reversals leave open among their alternatives.
 
     Args:
         found: what a search found.
@@ -77,7 +81,7 @@ def _wider(
     block_s: float,
     summed: Callable[[Evidence], Sums],
 ) -> Iterator[Hypothesis]:
-    """Yield wider forms of a finding that surely explain more, the best of each effect."""
+    """Yield wider forms of a finding that are left open, of each effect what explains most."""
     own, others = named.hypothesis, [h for h in chosen if h is not named.hypothesis]
     evidence = gather(rows, block_s)
     if any(candidate not in evidence.slices for candidate in own.candidates):
@@ -85,17 +89,67 @@ def _wider(
     fits = Fits(evidence, summed(evidence))
     beside = [h for h in (_within(evidence, h) for h in others) if h is not None]
     base, columns = fits.columns(beside), fits.own_columns(own)
-    before = fits.held_out(own, base)
-    best: dict[str, tuple[float, Hypothesis]] = {}
+    forms: dict[str, list[tuple[Hypothesis, NearRest | None]]] = {}
     for form in _forms(evidence, own):
-        wide = fits.own_columns(form)
-        if not contains(fits.sums, base, wide, columns) or not fits.is_plausible([*beside, form]):
-            continue
-        better = gain_of(before - fits.held_out(form, base))
-        least = max(_SIGMAS * better.error, best.get(form.effect.id, (0.0, form))[0])
-        if better.total > least:
-            best[form.effect.id] = better.total, form
-    yield from (form for _, form in best.values())
+        if contains(fits.sums, base, fits.own_columns(form), columns):
+            weights = fits.weights([*beside, form])
+            told = near_rest([weights[c] for c in form.candidates])
+            forms.setdefault(form.effect.id, []).append((form, told))
+    for alike in forms.values():
+        if left_open := _left_open(alike):
+            yield min(left_open, key=lambda form: float(fits.held_out(form, base).sum()))
+
+
+class NearRest(NamedTuple):
+    """Dry friction near rest beside what it is while a shaft slides.
+
+    Attributes:
+        values: of each element, shape (elements,) [N·m].
+        half: half the widths of their 95 % intervals, likewise.
+        sliding: likewise, while it slides.
+    """
+
+    values: Array
+    half: Array
+    sliding: Array
+
+
+def near_rest(weights: Sequence[tuple[Array, Array]]) -> NearRest | None:
+    """Return what reversals say of friction near rest; None where one element's is not told.
+
+    Args:
+        weights: of each element near rest and while it slides, with half their intervals.
+    """
+    found = np.array([own for own, _ in weights])
+    half = np.array([own for _, own in weights])
+    sliding = found[:, 1]
+    if not np.all(half <= _TOLD * sliding[:, None]):
+        return None
+    return NearRest(found[:, 0], half[:, 0], sliding)
+
+
+def _left_open(forms: Sequence[tuple[Hypothesis, NearRest | None]]) -> list[Hypothesis]:
+    """Return the forms of one effect, ascending in reach, that nothing speaks against."""
+    told = [(form, near) for form, near in forms if near is not None]
+    if not told:
+        return [form for form, _ in forms]
+    larger = [form for form, near in told if _is_larger(form, near)]
+    widest, near = told[-1]
+    hidden = np.all(near.values + near.half < (1.0 - 0.5 * _LARGER) * near.sliding)
+    return larger or ([widest] if hidden else [])
+
+
+def _is_larger(form: Hypothesis, near: NearRest) -> bool:
+    """Return whether friction near rest is nearer to a breakaway worth a word than to none.
+
+    And may be dry friction.
+    """
+    effect, shape = form.effect, form.candidates[0].nonlinear
+    least = np.maximum(near.values - near.half, near.sliding)
+    return bool(np.all(near.values >= (1.0 + 0.5 * _LARGER) * near.sliding)) and all(
+        effect.is_plausible(effect.values(each, **shape))
+        for each in np.column_stack([least, near.sliding]).tolist()
+    )
 
 
 def _within(evidence: Evidence, hypothesis: Hypothesis) -> Hypothesis | None:

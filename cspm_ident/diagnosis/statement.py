@@ -27,7 +27,8 @@ class Number(NamedTuple):
         value: in `unit`.
         unit: SI.
         low, high: ends of its 95 % interval as far as the catalogue allows, all that it allows
-            where the data do not tell it; equal to the value where it was searched on a grid.
+            where the data do not tell it; equal to the value where it was searched on a grid, or is
+            doubtful.
     """
 
     name: str
@@ -38,10 +39,17 @@ class Number(NamedTuple):
 
 
 def numbers_of(diagnosis: Diagnosis, candidate: Candidate) -> list[Number]:
-    """Return the parameters of an effect on one element."""
+    """Return the parameters of an effect on one element.
+
+    What is doubtful has no interval: noise says how far others would come with the same law, and
+    not by how much what is unknown beside it moves them all.
+    """
     weights, widths = diagnosis.weights[candidate]
     effect = candidate.effect
     values = effect.values(weights.tolist(), **candidate.nonlinear)
+    if _is_doubtful(diagnosis, candidate):
+        own = ((p, values[p.name]) for p in effect.parameters)
+        return [Number(p.name, value, p.unit, value, value) for p, value in own]
     if not np.all(np.isfinite(widths)):
         return [
             Number(p.name, values[p.name], p.unit, p.minimum, p.maximum) for p in effect.parameters
@@ -59,6 +67,17 @@ def numbers_of(diagnosis: Diagnosis, candidate: Candidate) -> list[Number]:
         )
         for p in effect.parameters
     ]
+
+
+def _is_doubtful(diagnosis: Diagnosis, candidate: Candidate) -> bool:
+    """Return whether the finding that a candidate is part of is doubtful."""
+    findings = diagnosis.findings
+    return any(
+        candidate.effect_id == named.hypothesis.effect.id
+        and candidate.element in named.hypothesis.elements
+        and findings.is_doubtful(named)
+        for named in findings.named
+    )
 
 
 def unknown_statement(diagnosis: Diagnosis, k: int) -> str:

@@ -1,5 +1,7 @@
 """Whether dry friction is larger near rest, which only rows tell in which a shaft turns round."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
@@ -76,6 +78,22 @@ def test_friction_near_rest_is_told_where_half_of_it_would_show(half, told):
         np.testing.assert_array_equal(near.values, [2.5, 1.0])
         np.testing.assert_array_equal(near.half, [0.3, half])
         np.testing.assert_array_equal(near.sliding, [2.0, 2.0])
+
+
+def test_what_is_no_dry_friction_is_none_with_a_larger_breakaway():
+    """Not even where its column lies in the span of one's, as a square of the speed may."""
+    equation = shaft(lambda v: 3.0 + 2.0 * np.exp(-(v**2)))
+    (dry,) = (c for c in equation.columns if c.effect is DRY)
+    churning = Candidate(replace(DRY, id="winch_churning"), "surge_1")
+    (near,) = (c for c in equation.columns if c.nonlinear == {"stribeck_speed": 1.0})
+    others = {c: found for c, found in equation.columns.items() if c is not dry}
+    columns = others | {churning: equation.columns[near][:, :, 1:]}
+    parts = [[replace(equation, columns=columns)]]
+    found = Search(
+        gather(steady([[replace(equation, columns={churning: columns[churning]})]]), BLOCK_S)
+    ).run()
+    assert [each.hypothesis.effect.id for each in found.named] == ["winch_churning"]
+    assert with_wider(found, parts, BLOCK_S, Sums) == found
 
 
 def test_without_reversals_nothing_is_added():

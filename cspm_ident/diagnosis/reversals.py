@@ -20,7 +20,6 @@ from cspm_ident.diagnosis.equation import Equation
 from cspm_ident.diagnosis.evidence import Evidence, gather
 from cspm_ident.diagnosis.fits import Fits
 from cspm_ident.diagnosis.hypothesis import Findings, Hypothesis, Named, Rival, freedom, is_number
-from cspm_ident.diagnosis.likeness import contains
 from cspm_ident.diagnosis.sums import Sums
 from cspm_sim.effects import Channel
 
@@ -88,16 +87,28 @@ def _wider(
         return
     fits = Fits(evidence, summed(evidence))
     beside = [h for h in (_within(evidence, h) for h in others) if h is not None]
-    base, columns = fits.columns(beside), fits.own_columns(own)
+    base = fits.columns(beside)
     forms: dict[str, list[tuple[Hypothesis, NearRest | None]]] = {}
     for form in _forms(evidence, own):
-        if contains(fits.sums, base, fits.own_columns(form), columns):
+        if _is_case(own, form, rows):
             weights = fits.weights([*beside, form])
             told = near_rest([weights[c] for c in form.candidates])
             forms.setdefault(form.effect.id, []).append((form, told))
     for alike in forms.values():
         if left_open := _left_open(alike):
             yield min(left_open, key=lambda form: float(fits.held_out(form, base).sum()))
+
+
+def _is_case(narrow: Hypothesis, wide: Hypothesis, rows: Parts) -> bool:
+    """Return whether one is the other with equal numbers, as friction that is the same at rest."""
+    by_element = {c.element: c for c in wide.candidates}
+    return all(
+        np.allclose(e.columns[c].sum(axis=2), e.columns[by_element[c.element]].sum(axis=2))
+        for part in rows
+        for e in part
+        for c in narrow.candidates
+        if e.place.element == c.element
+    )
 
 
 class NearRest(NamedTuple):

@@ -26,6 +26,8 @@ from cspm_sim.effects import Channel
 Parts = Sequence[Sequence[Equation]]
 Array = NDArray[np.float64]
 
+# Of a column's length: what differs by less is the same.
+_ALIKE = 1e-4
 # Of dry friction while a shaft slides: by how much more it breaks away to be worth a word.
 _LARGER = 0.2
 # Likewise, half of an interval: what is told no better tells nothing.
@@ -102,13 +104,15 @@ def _wider(
 def _is_case(narrow: Hypothesis, wide: Hypothesis, rows: Parts) -> bool:
     """Return whether one is the other with equal numbers, as friction that is the same at rest."""
     by_element = {c.element: c for c in wide.candidates}
-    return all(
-        np.allclose(e.columns[c].sum(axis=2), e.columns[by_element[c.element]].sum(axis=2))
+    pairs = (
+        (e.columns[c].sum(axis=2), e.columns[by_element[c.element]].sum(axis=2))
         for part in rows
         for e in part
         for c in narrow.candidates
         if e.place.element == c.element
     )
+    # Columns are held in single precision.
+    return all(np.linalg.norm(b - a) <= _ALIKE * np.linalg.norm(a) for a, b in pairs)
 
 
 class NearRest(NamedTuple):
@@ -146,7 +150,7 @@ def _left_open(forms: Sequence[tuple[Hypothesis, NearRest | None]]) -> list[Hypo
         return [form for form, _ in forms]
     larger = [form for form, near in told if _is_larger(form, near)]
     widest, near = told[-1]
-    hidden = np.all(near.values + near.half < (1.0 - 0.5 * _LARGER) * near.sliding)
+    hidden = np.all(near.values + near.half < (1.0 - _LARGER) * near.sliding)
     return larger or ([widest] if hidden else [])
 
 

@@ -101,8 +101,14 @@ def _draw_tracking(axes: Axes, recording: Path) -> None:
 
 
 def _draw_residual(axes: Axes, found: Diagnosis) -> None:
-    """Draw the residual on held-out data that a finding lowers most, or else the largest."""
-    curve = max(found.curves, key=lambda c: c.gained if c.touched else -1.0 / (1.0 + _size(c)))
+    """Draw the residual on held-out data that a finding lowers most, else the largest unknown."""
+    unknown = [driver.place for driver, _, _ in found.findings.unknown[:1]]
+
+    def rank(curve: Curve) -> tuple[bool, bool, float]:
+        size = curve.gained if curve.touched else _size(curve)
+        return bool(curve.touched), curve.place in unknown, size
+
+    curve = max(found.curves, key=rank)
     name = curve.main_signal
     signal = curve.signals.get(name, curve.times)
     axes.plot(signal, curve.before, color="tab:red", **_DOTS)

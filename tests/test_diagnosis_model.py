@@ -97,6 +97,9 @@ def test_of_what_may_be_none_the_least_goes_then_what_harms_most():
         ("winch_coulomb_friction", 0.019, False),
         # Nothing is known of where it ends, but that it is there.
         ("cable_hysteresis", 0.021, False),
+        # The mean of what drifts is none of it.
+        ("tension_bias", 0.021, False),
+        ("tension_gain", 0.021, True),
         # What no data tell may be anything, and is no reason to take it for none.
         ("winch_coulomb_friction", np.inf, False),
     ],

@@ -17,6 +17,7 @@ from cspm_ident.diagnosis.hypothesis import (
     Hypothesis,
     Named,
     bounded,
+    is_constant,
     is_number,
     is_seen_to_begin,
     is_seen_to_end,
@@ -173,10 +174,12 @@ def modelled(search: Search, kept: Sequence[Named], data: Data) -> Model:
 def _is_unsure(hypothesis: Hypothesis, weights: Weights) -> bool:
     """Return whether all numbers of a finding may be zero, together with what else was found.
 
-    What saturates and has hardly acted is there, though nothing is known of where it ends.
+    What saturates and has hardly acted is there, though nothing is known of where it ends; and a
+    reading's zero is the mean of what drifts in it, which is there as well.
     """
-    own = {c: weights[c] for c in members_of(weights, hypothesis)}
-    return may_be_none(own) and not hypothesis.effect.saturates
+    effect, own = hypothesis.effect, {c: weights[c] for c in members_of(weights, hypothesis)}
+    drifts = effect.sense is not None and is_constant(effect)
+    return may_be_none(own) and not effect.saturates and not drifts
 
 
 def _harms(

@@ -1,9 +1,9 @@
 """What rows in which shafts turn round say of a finding: whether it is a case of something wider.
 
 They are left out of the search, for a shaft that sticks takes any torque. But there alone shows
-whether dry friction is larger near rest. Where it may be, within its interval, or where bristles
-that yield before they slip take so much torque away near rest that they hide it, dry friction with
-a larger breakaway explains as well what dry friction does.
+whether dry friction is larger near rest. Where it looks so, where they do not tell it, and where
+bristles that yield before they slip take so much away near rest that they hide it, dry friction
+with a larger breakaway explains as well what dry friction does.
 """
 
 from __future__ import annotations
@@ -102,7 +102,9 @@ def _wider(
 
 
 def _is_case(narrow: Hypothesis, wide: Hypothesis, rows: Parts) -> bool:
-    """Return whether one is the other with equal numbers, as friction that is the same at rest."""
+    """Return whether one is the other with two numbers that are equal, near rest and sliding."""
+    if len(wide.effect.linear) != 2:
+        return False
     by_element = {c.element: c for c in wide.candidates}
     pairs = (
         (e.columns[c].sum(axis=2), e.columns[by_element[c.element]].sum(axis=2))

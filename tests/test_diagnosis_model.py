@@ -83,6 +83,15 @@ def test_what_no_machine_can_have_goes_before_anything_is_judged():
     assert model((1.2, 0.5), (True, False), unsure=(True, False)).useless == [1]
 
 
+@pytest.mark.parametrize(
+    ("possible", "unsure", "gone"),
+    [((True, False), (), [1]), ((True, True), (True, True), [1]), ((True, True), (), [])],
+)
+def test_what_is_untenable_goes_though_nothing_is_held_out(possible, unsure, gone):
+    """What is of no use or harms is told by held-out data alone."""
+    assert model((1.2, 0.5), possible, unsure=unsure, harm=(3.0, 0.0)).untenable == gone
+
+
 def test_of_what_may_be_none_the_least_goes_then_what_harms_most():
     """Findings are in the order of their gains."""
     assert model((), (True,) * 3, unsure=(True, True, False)).useless == [1]

@@ -260,11 +260,8 @@ def _interval(effect: str, parameter: Data) -> tuple[float, float] | None:
     if parameter["ci95"] is None:
         return None
     low, high = parameter["ci95"]
-    everything = any(
-        p.name == parameter["name"] and low <= p.minimum and high >= p.maximum
-        for p in catalogue()[effect].parameters
-    )
-    return None if everything else (low, high)
+    own = (p for p in catalogue()[effect].parameters if p.name == parameter["name"])
+    return None if any(p.is_open(low, high) for p in own) else (low, high)
 
 
 def _fit(

@@ -42,7 +42,7 @@ def is_proportional(effect: Effect) -> bool:
 
     Numbers of the file, sensors and the frame; friction and play hang on a direction or a place.
     """
-    return effect.alter is not None or effect.sense is not None or effect.block is Block.FRAME
+    return effect.is_correction or effect.block is Block.FRAME
 
 
 def instruments_of(measurement: Measurement) -> Samples | None:

@@ -196,8 +196,8 @@ def _useful(
 ) -> tuple[Standing, Model]:
     """Return what stands and is of use in simulations of held-out data, and its model."""
     model = modelled(search, standing.kept, data)
-    while safeguards.held_out and model.useless:
-        standing = standing.without(model.useless)
+    while gone := model.useless if safeguards.held_out else model.untenable:
+        standing = standing.without(gone)
         model = modelled(search, standing.kept, data)
     return standing, model
 

@@ -92,8 +92,8 @@ def _size(diagnosis: Diagnosis, candidate: Candidate) -> str:
 
 def _is_anything(effect: Effect, number: Number) -> bool:
     """Return whether a parameter's interval is all that the catalogue allows."""
-    (ends,) = ((p.minimum, p.maximum) for p in effect.parameters if p.name == number.name)
-    return number.low <= ends[0] and number.high >= ends[1]
+    (own,) = (p for p in effect.parameters if p.name == number.name)
+    return own.is_open(number.low, number.high)
 
 
 def _may_be_absent(effect: Effect, number: Number) -> bool:

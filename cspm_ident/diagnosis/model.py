@@ -102,16 +102,23 @@ class Model(NamedTuple):
     spectra: Mapping[Candidate, Array] = MappingProxyType({})
 
     @property
-    def useless(self) -> list[int]:
-        """Findings that have to go: what is not possible, else the least of what may be none.
+    def untenable(self) -> list[int]:
+        """Findings that go whatever held-out data say: what is not possible, else the least unsure.
 
-        Else the worst of harm, else of no use: with what no simulation of held-out data comes
-        nearer to what was measured.
+        With any of them there is no simulation.
         """
         if not all(self.possible):
             return [k for k, possible in enumerate(self.possible) if not possible]
-        if any(self.unsure):
-            return [max(compress(range(len(self.unsure)), self.unsure))]
+        return [max(compress(range(len(self.unsure)), self.unsure))] if any(self.unsure) else []
+
+    @property
+    def useless(self) -> list[int]:
+        """Findings that have to go: what is untenable, else the worst of harm, else of no use.
+
+        Of no use is with what no simulation of held-out data comes nearer to what was measured.
+        """
+        if self.untenable:
+            return self.untenable
         if any(self.harm):
             return [max(range(len(self.harm)), key=lambda k: self.harm[k])]
         shares = {k: worth.with_it / worth.without for k, worth in enumerate(self.worth) if worth}
@@ -166,7 +173,7 @@ def modelled(search: Search, kept: Sequence[Named], data: Data) -> Model:
         None if sound else worth_of(data.baselines, simulated, values, own)
         for own, sound in zip(members, negligible, strict=True)
     )
-    harms = _harms(data, values, [{} if s else m for m, s in zip(members, negligible, strict=True)])
+    harms = _harms(data, values, members, negligible)
     given = possible, negligible, wanted, unsure, harms
     return Model(weights, onsets, simulated, worth, *given, most)
 
@@ -183,14 +190,14 @@ def _is_unsure(hypothesis: Hypothesis, weights: Weights) -> bool:
 
 
 def _harms(
-    data: Data, values: Mapping[Candidate, Array], members: Sequence[Mapping[Candidate, Array]]
+    data: Data,
+    values: Mapping[Candidate, Array],
+    members: Sequence[Mapping[Candidate, Array]],
+    negligible: Sequence[bool],
 ) -> tuple[float, ...]:
     """Return by how many squares each finding makes worse what was not searched.
 
-    Args:
-        data: of which that is.
-        values: weights of all.
-        members: of each finding; none of one that is not judged by it.
+    None does that is no more than in a sound machine.
     """
 
     def left(found: Mapping[Candidate, Array]) -> dict[Place, Array]:
@@ -198,8 +205,8 @@ def _harms(
 
     every = left(values)
     return tuple(
-        harm(left({c: w for c, w in values.items() if c not in own}), every) if own else 0.0
-        for own in members
+        0.0 if sound else harm(left({c: w for c, w in values.items() if c not in own}), every)
+        for own, sound in zip(members, negligible, strict=True)
     )
 
 

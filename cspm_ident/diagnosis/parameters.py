@@ -95,9 +95,8 @@ def of_forms(weights: Weights, untrue: Mapping[Candidate, float]) -> Weights:
     """
     found = dict(weights)
     for candidate, (values, half) in weights.items():
-        effect = candidate.effect
-        exact = effect.alter is not None or effect.sense is not None
-        share = max(untrue[candidate], 0.0 if exact else np.sqrt(UNTRUE_SHARE))
+        least = 0.0 if candidate.effect.is_correction else np.sqrt(UNTRUE_SHARE)
+        share = max(untrue[candidate], least)
         found[candidate] = values, np.hypot(half, share * np.abs(values))
     return found
 

@@ -75,7 +75,7 @@ def refine(
         evidence = gather(in_noise(steady(parts), noise), block_s)
         shapes, found = _fitted(evidence, shapes, wanted, common)
         for candidate, (weights, half) in found.items():
-            if _is_applied(candidate.effect):
+            if candidate.effect.is_correction:
                 before = values.get(candidate, np.zeros_like(weights))
                 turned = _unit_after(candidate.effect, before)
                 applied[candidate] = before + turned * weights, turned * half
@@ -114,7 +114,7 @@ def spectra(
         with_spectrum(effect, shapes[effect.id], longest)
         for effect in {h.effect.id: h.effect for h in hypotheses}.values()
     ]
-    values = {c: own for c, (own, _) in found.items() if _is_applied(c.effect)}
+    values = {c: own for c, (own, _) in found.items() if c.effect.is_correction}
     try:
         parts = cut(_about(searched, effects, list(found), values, supposed))
     except InputError:
@@ -137,7 +137,7 @@ def _about(
         InputError: such a machine cannot be.
     """
     moved = [settled(with_found(m, applied)) for m in searched]
-    about = {c: own for c, own in supposed.items() if not _is_applied(c.effect)}
+    about = {c: own for c, own in supposed.items() if not c.effect.is_correction}
     return [equations_of(m, effects, touched=candidates, supposed=about) for m in moved]
 
 
@@ -146,18 +146,13 @@ def _is_settled(found: Weights) -> bool:
     return all(
         not c.shape and np.all(np.abs(weights) <= _SETTLED * half)
         for c, (weights, half) in found.items()
-        if c.shape or _is_applied(c.effect)
+        if c.shape or c.effect.is_correction
     )
 
 
 def needs_refining(effect: Effect) -> bool:
     """Return whether an effect's columns depend on its parameters, or on what is corrected."""
-    return _is_applied(effect) or bool(effect.nonlinear)
-
-
-def _is_applied(effect: Effect) -> bool:
-    """Return whether machine or readings are corrected by it, so that what is fitted adds up."""
-    return effect.alter is not None or effect.sense is not None
+    return effect.is_correction or bool(effect.nonlinear)
 
 
 def _unit_after(effect: Effect, applied: Array) -> Array:

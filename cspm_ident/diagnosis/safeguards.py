@@ -18,7 +18,8 @@ class Safeguards:
     Attributes:
         joint_refit: numbers of the file are fitted together with effects; otherwise they stay.
         block_null: what is sure is told by the scatter between blocks; otherwise by white rows.
-        held_out: findings have to stand on data that was not searched; otherwise all are kept.
+        held_out: findings have to stand on data that was not searched; otherwise all are kept that
+            may be.
     """
 
     joint_refit: bool = True

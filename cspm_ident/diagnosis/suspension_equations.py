@@ -225,7 +225,7 @@ class _Stretch:
             wrench -= sum(self._here.pulled(i, each) for i, each in enumerate(taken.T))
         for action in known:
             effect = action.effect
-            if effect.alter is not None or effect.sense is not None:
+            if effect.is_correction:
                 continue
             shape = {name: action.values[name] for name in effect.nonlinear}
             weights = effect.weights(action.values)

@@ -87,6 +87,10 @@ class EffectParameter:
     default: float | None = None
     usual: float | None = None
 
+    def is_open(self, low: float, high: float) -> bool:
+        """Return whether an interval is all that is allowed, so that nothing bounds the number."""
+        return low <= self.minimum and high >= self.maximum
+
 
 @dataclass(frozen=True)
 class Regression:
@@ -177,6 +181,11 @@ class Effect:
     def words(self) -> str:
         """What it is, for a sentence; made from its id where it does not say."""
         return self.noun or self.id.removeprefix(f"{self.block.value}_").replace("_", " ")
+
+    @property
+    def is_correction(self) -> bool:
+        """Whether it corrects a number of the file or readings, and adds no physics."""
+        return self.alter is not None or self.sense is not None
 
     @property
     def acts_on(self) -> Elements:

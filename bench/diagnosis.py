@@ -111,8 +111,7 @@ def judge(folder: Path) -> tuple[str, str, str]:
 def number_words(number: Number) -> str:
     """Return a parameter with its interval, if anything bounds it."""
     told = f"{number.name} {number.value:.4g}"
-    bounded = number.low < number.high
-    return f"{told} ({number.low:.4g} to {number.high:.4g})" if bounded else told
+    return told if number.ci95 is None else f"{told} ({number.low:.4g} to {number.high:.4g})"
 
 
 def _planted(case: Case) -> str:

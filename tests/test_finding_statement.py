@@ -154,10 +154,18 @@ def test_of_several_numbers_those_that_may_be_nothing_have_none():
 
 
 @pytest.mark.parametrize(
-    ("half", "told"),
-    [(5.0, "torque 30 mN·m, too few data for an interval"), (0.001, "torque 30.0 ± 1.0 mN·m.")],
+    ("half", "told", "ends"),
+    [
+        (5.0, "torque 30 mN·m, too few data for an interval", None),
+        (np.inf, "torque 30 mN·m, too few data for an interval", None),
+        (0.5, "torque 0.03 (0 to 0.53) N·m", [0.0, 0.53]),
+        (0.001, "torque 30.0 ± 1.0 mN·m.", [0.029, 0.031]),
+    ],
 )
-def test_an_interval_of_all_that_is_allowed_is_none(half, told):
+def test_an_interval_of_all_that_is_allowed_is_none(half, told, ends):
+    """Dry friction may be from 0 to 1 N·m."""
     weights = {RUBBING: (np.array([TORQUE]), np.array([half]))}
     (finding,) = diagnosis_data(replace(diagnosis(), weights=weights))["findings"]
     assert told in finding["statement"]
+    (number,) = finding["parameters"]
+    assert number["ci95"] == (None if ends is None else pytest.approx(ends))

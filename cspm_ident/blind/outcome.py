@@ -248,20 +248,11 @@ def _estimates(concealed: Data, findings: Sequence[Data]) -> list[Estimate]:
             element = parameter["element"]
             if parameter["name"] != name or element not in amounts:
                 continue
-            true, interval = amounts[element], _interval(finding["effect"], parameter)
+            true, interval = amounts[element], parameter["ci95"]
             error = (parameter["value"] - true) / (true - base)
             covered = None if interval is None else interval[0] <= true <= interval[1]
             found.append(Estimate(finding["effect"], error, covered))
     return found
-
-
-def _interval(effect: str, parameter: Data) -> tuple[float, float] | None:
-    """Return a parameter's interval, unless it is all that the catalogue allows."""
-    if parameter["ci95"] is None:
-        return None
-    low, high = parameter["ci95"]
-    own = (p for p in catalogue()[effect].parameters if p.name == parameter["name"])
-    return None if any(p.is_open(low, high) for p in own) else (low, high)
 
 
 def _fit(

@@ -79,7 +79,7 @@ def _size(diagnosis: Diagnosis, candidate: Candidate) -> str:
     """
     effect, numbers = candidate.effect, numbers_of(diagnosis, candidate)
     known = [n for n in numbers if n.low < n.high] or numbers
-    if all(_is_anything(effect, n) for n in known):
+    if all(n.is_open for n in known):
         told = ", ".join(f"{_name(effect, n)} {amount_words(n.value, n.unit)}" for n in known)
         return f"{told}, too few data for an interval"
     sure = [n for n in known if not _may_be_absent(effect, n)] or known
@@ -88,12 +88,6 @@ def _size(diagnosis: Diagnosis, candidate: Candidate) -> str:
     )
     rest = ", ".join(n.name for n in known if n not in sure)
     return f"{told}, {rest} not surely" if rest else told
-
-
-def _is_anything(effect: Effect, number: Number) -> bool:
-    """Return whether a parameter's interval is all that the catalogue allows."""
-    (own,) = (p for p in effect.parameters if p.name == number.name)
-    return own.is_open(number.low, number.high)
 
 
 def _may_be_absent(effect: Effect, number: Number) -> bool:

@@ -10,9 +10,11 @@ from ruamel.yaml.comments import CommentedMap, CommentedSeq
 
 from cspm_ident.diagnosis.diagnose import Diagnosis
 from cspm_ident.diagnosis.hypothesis import members_of
-from cspm_ident.diagnosis.statement import Number, numbers_of
+from cspm_ident.diagnosis.statement import numbers_of
 from cspm_ident.fitted_testbed import WIDEST, FittedNumber
 from cspm_msgs_py.testbed import TestbedFile, parse_testbed
+
+_UNBOUNDED = (-np.inf, np.inf)
 
 
 def improved_testbed(diagnosis: Diagnosis, source: str) -> TestbedFile:
@@ -39,7 +41,7 @@ def improved_testbed(diagnosis: Diagnosis, source: str) -> TestbedFile:
             entry = CommentedMap({"effect": candidate.effect_id, "elements": [candidate.element]})
             entry["parameters"] = CommentedMap(
                 {
-                    n.name: FittedNumber(n.value, _ends(n), hashes).content()
+                    n.name: FittedNumber(n.value, n.ci95 or _UNBOUNDED, hashes).content()
                     for n in numbers_of(diagnosis, candidate)
                 }
             )
@@ -47,8 +49,3 @@ def improved_testbed(diagnosis: Diagnosis, source: str) -> TestbedFile:
     stream = io.StringIO()
     yaml.dump(content, stream)
     return parse_testbed(stream.getvalue(), source)
-
-
-def _ends(number: Number) -> tuple[float, float]:
-    """Return a number's interval; nothing bounds what has none."""
-    return (number.low, number.high) if number.low < number.high else (-np.inf, np.inf)

@@ -16,7 +16,7 @@ from cspm_ident.diagnosis.power import Power
 from cspm_ident.diagnosis.simulation import SimulatedFit
 from cspm_ident.diagnosis.sketch import is_even, sketch
 from cspm_msgs_py.dofs import DOFS
-from cspm_sim.effects import Channel
+from cspm_sim.effects import Channel, EffectParameter
 
 
 class Number(NamedTuple):
@@ -26,9 +26,9 @@ class Number(NamedTuple):
         name: public name.
         value: in `unit`.
         unit: SI.
-        low, high: ends of its 95 % interval as far as the catalogue allows, all that it allows
-            where the data do not tell it; equal to the value where it was searched on a grid, or is
-            doubtful.
+        low, high: ends of its 95 % interval as far as the catalogue allows; equal to the value
+            where it was searched on a grid, or is doubtful.
+        is_open: whether they are all that the catalogue allows, the data telling nothing of it.
     """
 
     name: str
@@ -36,6 +36,12 @@ class Number(NamedTuple):
     unit: str
     low: float
     high: float
+    is_open: bool = False
+
+    @property
+    def ci95(self) -> tuple[float, float] | None:
+        """Its 95 % interval, if it has one."""
+        return (self.low, self.high) if self.low < self.high and not self.is_open else None
 
 
 def numbers_of(diagnosis: Diagnosis, candidate: Candidate) -> list[Number]:
@@ -51,22 +57,23 @@ def numbers_of(diagnosis: Diagnosis, candidate: Candidate) -> list[Number]:
         own = ((p, values[p.name]) for p in effect.parameters)
         return [Number(p.name, value, p.unit, value, value) for p, value in own]
     if not np.all(np.isfinite(widths)):
-        return [
-            Number(p.name, values[p.name], p.unit, p.minimum, p.maximum) for p in effect.parameters
-        ]
+        return [_number(p, values[p.name], p.minimum, p.maximum) for p in effect.parameters]
     low = effect.values((weights - widths).tolist(), **candidate.nonlinear)
     most = np.maximum(weights + widths, diagnosis.spectra.get(candidate, -np.inf))
     high = effect.values(most.tolist(), **candidate.nonlinear)
     return [
-        Number(
-            p.name,
+        _number(
+            p,
             values[p.name],
-            p.unit,
             max(p.minimum, min(low[p.name], high[p.name])),
             min(p.maximum, max(low[p.name], high[p.name])),
         )
         for p in effect.parameters
     ]
+
+
+def _number(own: EffectParameter, value: float, low: float, high: float) -> Number:
+    return Number(own.name, value, own.unit, low, high, own.is_open(low, high))
 
 
 def _is_doubtful(diagnosis: Diagnosis, candidate: Candidate) -> bool:

@@ -181,7 +181,7 @@ def _finding(diagnosis: Diagnosis, k: int) -> dict[str, Any]:
                 "name": n.name,
                 "value": n.value,
                 "unit": n.unit,
-                "ci95": [n.low, n.high] if n.low < n.high else None,
+                "ci95": None if n.ci95 is None else list(n.ci95),
             }
             for candidate in members_of(diagnosis.weights, hypothesis)
             for n in numbers_of(diagnosis, candidate)

@@ -114,7 +114,8 @@ def test_of_what_may_be_none_the_least_goes_then_what_harms_most():
     ],
 )
 def test_what_may_be_none_is_unsure(effect, half, unsure):
-    candidate = Candidate(catalogue()[effect], "surge_2")
+    shape = tuple((name, grid[0]) for name, grid in catalogue()[effect].nonlinear.items())
+    candidate = Candidate(catalogue()[effect], "surge_2", shape)
     weights = {candidate: (np.array([-0.02]), np.array([half]))}
     assert _is_unsure(Hypothesis(candidate.effect, (candidate,)), weights) is unsure
 
@@ -157,6 +158,30 @@ def test_an_interval_ends_where_the_catalogue_does():
         found = SimpleNamespace(weights=weights, spectra={}, findings=Findings((), (), 0))
         (number,) = numbers_of(found, drag)
         assert (number.low, number.high) == pytest.approx(ends)
+
+
+@pytest.mark.parametrize("phase", [0.3, np.pi / 4, 2.0, -np.pi / 4, -2.5])
+def test_an_amplitude_is_as_sure_whatever_its_phase(phase):
+    ripple = Candidate(catalogue()["winch_torque_ripple"], "surge_2", (("order", 6.0),))
+    weights = 0.02 * np.array([np.cos(phase), np.sin(phase)])
+    found = SimpleNamespace(
+        weights={ripple: (weights, np.array([0.001, 0.001]))},
+        spectra={},
+        findings=Findings((), (), 0),
+    )
+    amplitude, order, angle = numbers_of(found, ripple)
+    assert (amplitude.low, amplitude.high) == pytest.approx((0.019, 0.021), abs=5e-5)
+    assert order.ci95 is None
+    assert (angle.low, angle.high) == pytest.approx((phase - 0.05, phase + 0.05), abs=2e-3)
+
+
+def test_of_an_amplitude_one_part_of_which_may_be_none_the_other_is_left():
+    ripple = Candidate(catalogue()["winch_torque_ripple"], "surge_2", (("order", 6.0),))
+    weights = {ripple: (np.array([0.02, 0.003]), np.array([0.001, 0.01]))}
+    found = SimpleNamespace(weights=weights, spectra={}, findings=Findings((), (), 0))
+    amplitude = numbers_of(found, ripple)[0]
+    assert amplitude.low == pytest.approx(0.019, abs=3e-4)
+    assert amplitude.high == pytest.approx(np.hypot(0.02, 0.013), abs=3e-4)
 
 
 def test_what_lies_around_a_row_has_none_of_its_noise():

@@ -321,6 +321,8 @@ def test_a_beginning_has_to_be_worth_more_than_nothing_too():
         # Too few data for an interval say nothing against a finding, and nothing for a beginning.
         ([0.13, -1.0], [np.inf, 2.0], False, False),
         ([0.13, -1.0], [np.inf, 0.9], False, True),
+        # Half an interval that is wider than all masses are.
+        ([0.13, -1.0], [1e6, 2.0], False, False),
     ],
 )
 def test_what_may_be_none_has_only_intervals_that_hold_zero(weights, half, none, begins):

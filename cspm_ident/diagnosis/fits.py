@@ -9,13 +9,14 @@ from contextlib import contextmanager
 import numpy as np
 from numpy.typing import NDArray
 
-from cspm_ident.diagnosis.columns import Candidate
+from cspm_ident.diagnosis.columns import Candidate, Place
 from cspm_ident.diagnosis.evidence import Evidence
 from cspm_ident.diagnosis.hypothesis import (
     Hypothesis,
     bounded,
     is_allowed,
     is_early,
+    is_exact,
     is_negligible,
     is_tied,
     is_timing,
@@ -117,6 +118,36 @@ class Fits:
                 share = float(np.sqrt(most / max(gained, most))) if most else 0.0
                 found |= dict.fromkeys(cause, share)
         return found
+
+    def may_be_untruth(self, hypothesis: Hypothesis, chosen: Sequence[Hypothesis]) -> bool:
+        """Return whether laws beside a hypothesis may be untrue by all it takes, wherever it shows.
+
+        Numbers of the file and of readings have no form to be untrue, nor have clocks of a sound
+        machine; what a constant leaves is a function of time.
+
+        Args:
+            hypothesis: one of what was chosen.
+            chosen: all of it.
+        """
+        laws = [
+            h
+            for h in chosen
+            if h is not hypothesis and not is_exact(h.effect) and not self.is_negligible(h, chosen)
+        ]
+        own, others = self._taken(hypothesis, chosen), [self._taken(h, chosen) for h in laws]
+        return all(
+            own[place] <= UNTRUE_SHARE * sum(max(0.0, taken[place]) for taken in others)
+            for place in self.evidence.places_of(self.own_columns(hypothesis))
+        )
+
+    def _taken(self, hypothesis: Hypothesis, chosen: Sequence[Hypothesis]) -> dict[Place, float]:
+        """Return the squares that a hypothesis takes of each residual beside the others."""
+        base = self.columns(h for h in chosen if h is not hypothesis)
+        both = self.beside(base, hypothesis)
+        without, left = (
+            self.evidence.left(columns, self.sums.weights(columns)) for columns in (base, both)
+        )
+        return {place: without[place] - left[place] for place in left}
 
     def is_plausible(self, hypotheses: Sequence[Hypothesis], loosely: bool = False) -> bool:
         """Return whether parameters are what the catalogue allows, but for chance.

@@ -149,6 +149,15 @@ def is_constant(effect: Effect) -> bool:
     return bool(np.array_equal(columns[:-1], columns[1:]) and columns.any())
 
 
+def is_exact(effect: Effect) -> bool:
+    """Return whether an effect has no form that may be untrue in its course over a recording.
+
+    It corrects a number of the file or of a reading, other than its time, or it is a constant, and
+    what that leaves is a function of time.
+    """
+    return (effect.is_correction and not is_timing(effect)) or is_constant(effect)
+
+
 def is_negligible(members: Mapping[Candidate, Array]) -> bool:
     """Return whether weights of an effect on its elements are such as a sound machine has."""
     return all(
@@ -164,10 +173,13 @@ def may_be_negligible(weights: Mapping[Candidate, tuple[Array, Array]]) -> bool:
 
 
 def may_be_none(weights: Mapping[Candidate, tuple[Array, Array]]) -> bool:
-    """Return whether weights with half their intervals all may be zero, where there are any."""
+    """Return whether weights with half their intervals all may be zero, where there are any.
+
+    Of what nothing bounds, both ends being beyond what the catalogue allows, this says nothing.
+    """
     return bool(weights) and all(
-        bool(np.all(np.abs(w) <= half) and np.all(np.isfinite(half)))
-        for w, half in weights.values()
+        bool(np.all(np.abs(w) <= half)) and any(is_allowed(c, w + end) for end in (half, -half))
+        for c, (w, half) in weights.items()
     )
 
 

@@ -30,7 +30,7 @@ from cspm_ident.diagnosis.hypothesis import (
     members_of,
     shapes_of,
 )
-from cspm_ident.diagnosis.likeness import SPANNED, UNTRUE_SHARE
+from cspm_ident.diagnosis.likeness import SPANNED
 from cspm_ident.diagnosis.one_instead import one_instead
 from cspm_ident.diagnosis.onset import first_block
 from cspm_ident.diagnosis.pair_instead import pair_instead
@@ -162,27 +162,24 @@ class Search:
     def _needless(self, chosen: Sequence[Hypothesis]) -> int | None:
         """Return which is the weakest that is not surely there beside the others, if any.
 
-        Nor is what gains no more than the others may be untrue by where it shows, clocks of a sound
-        machine being true, nor what the others hide, so that all its numbers may be none. What is
-        late is needed where other readings would be early without it.
+        Nor is what laws beside it may be untrue by as much, wherever it shows, nor what the others
+        hide, so that all its numbers may be none. What is late is needed where other readings would
+        be early without it.
         """
         weights = self.fits.weights(chosen) if len(chosen) > 1 else {}
         gains = [self._gain(hypothesis, chosen) for hypothesis in chosen]
-        own = [self.fits.own_columns(hypothesis) for hypothesis in chosen]
-        untrue = [i for i, h in enumerate(chosen) if not self.fits.is_negligible(h, chosen)]
         for k in np.argsort([gain.total for gain in gains]):
-            beside = (i for i in untrue if i != k)
-            taken = sum(gains[i].total for i in beside if self.evidence.meet(own[k], own[i]))
+            own = chosen[k]
             needless = (
-                gains[k].total <= UNTRUE_SHARE * taken
+                self.fits.may_be_untruth(own, chosen)
                 or (
-                    k in untrue
-                    and may_be_none({c: weights[c] for c in members_of(weights, chosen[k])})
-                    and self._is_hidden(chosen[k], chosen)
+                    not self.fits.is_negligible(own, chosen)
+                    and may_be_none({c: weights[c] for c in members_of(weights, own)})
+                    and self._is_hidden(own, chosen)
                 )
-                or not self._is_there(chosen[k], self._others(chosen[k], chosen), gains[k], chosen)
+                or not self._is_there(own, self._others(own, chosen), gains[k], chosen)
             )
-            rest = [h for h in chosen if h is not chosen[k]]
+            rest = [h for h in chosen if h is not own]
             if needless and (self.fits.are_early(chosen) or not self.fits.are_early(rest)):
                 return int(k)
         return None

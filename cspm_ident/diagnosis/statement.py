@@ -5,6 +5,7 @@ from __future__ import annotations
 from typing import NamedTuple
 
 import numpy as np
+from numpy.typing import NDArray
 
 from cspm_ident.block_simulation import Drive
 from cspm_ident.diagnosis.columns import Candidate
@@ -17,6 +18,8 @@ from cspm_ident.diagnosis.simulation import SimulatedFit
 from cspm_ident.diagnosis.sketch import is_even, sketch
 from cspm_msgs_py.dofs import DOFS
 from cspm_sim.effects import Channel, EffectParameter
+
+Array = NDArray[np.float64]
 
 
 class Number(NamedTuple):
@@ -58,18 +61,36 @@ def numbers_of(diagnosis: Diagnosis, candidate: Candidate) -> list[Number]:
         return [Number(p.name, value, p.unit, value, value) for p, value in own]
     if not np.all(np.isfinite(widths)):
         return [_number(p, values[p.name], p.minimum, p.maximum) for p in effect.parameters]
-    low = effect.values((weights - widths).tolist(), **candidate.nonlinear)
     most = np.maximum(weights + widths, diagnosis.spectra.get(candidate, -np.inf))
-    high = effect.values(most.tolist(), **candidate.nonlinear)
+    ends = _ends(candidate, weights, weights - widths, most)
     return [
-        _number(
-            p,
-            values[p.name],
-            max(p.minimum, min(low[p.name], high[p.name])),
-            min(p.maximum, max(low[p.name], high[p.name])),
-        )
-        for p in effect.parameters
+        _number(p, values[p.name], max(p.minimum, low), min(p.maximum, high))
+        for p, (low, high) in zip(effect.parameters, ends, strict=True)
     ]
+
+
+def _ends(
+    candidate: Candidate, weights: Array, low: Array, high: Array
+) -> list[tuple[float, float]]:
+    """Return the intervals of an effect's parameters from those of its weights.
+
+    What each weight moves a parameter down and up within its own interval, in squares (GUM, JCGM
+    100:2008, 5.1.2): an amplitude is as sure whatever its phase is.
+    """
+    names = [p.name for p in candidate.effect.parameters]
+
+    def values(moved: Array) -> Array:
+        found = candidate.effect.values(moved.tolist(), **candidate.nonlinear)
+        return np.array([found[name] for name in names])
+
+    told = values(weights)
+    squares = np.zeros((2, len(names)))
+    for k in range(len(weights)):
+        ends = [low[k], high[k], np.clip(0.0, low[k], high[k])]
+        moved = [values(np.where(np.arange(len(weights)) == k, end, weights)) for end in ends]
+        apart = np.array([told, *moved]) - told
+        squares += np.square([apart.min(axis=0), apart.max(axis=0)])
+    return list(zip(told - np.sqrt(squares[0]), told + np.sqrt(squares[1]), strict=True))
 
 
 def _number(own: EffectParameter, value: float, low: float, high: float) -> Number:

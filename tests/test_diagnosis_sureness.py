@@ -327,7 +327,7 @@ def test_a_beginning_has_to_be_worth_more_than_nothing_too():
 )
 def test_what_may_be_none_has_only_intervals_that_hold_zero(weights, half, none, begins):
     load = Candidate(catalogue()["bar_mass"], "bar")
-    wind = Candidate(catalogue()["bar_constant_wrench"], "bar")
+    wind = Candidate(catalogue()["tension_bias"], "surge_2")
     found = {
         load: (np.array(weights[:1]), np.array(half[:1])),
         wind: (np.array(weights[1:]), np.array(half[1:])),

@@ -1,0 +1,78 @@
+"""Whether a small companion may be no more than what a law beside it is untrue by."""
+
+import numpy as np
+import pytest
+
+from cspm_ident.diagnosis.columns import Candidate, Place
+from cspm_ident.diagnosis.equation import Equation
+from cspm_ident.diagnosis.evidence import gather
+from cspm_ident.diagnosis.fits import Fits
+from cspm_ident.diagnosis.hypothesis import Hypothesis, is_exact
+from cspm_ident.diagnosis.sums import Sums
+from cspm_sim.effects import Channel, catalogue
+
+ROWS, STEP, BLOCK_S = 4800, 0.01, 1.0
+TIMES = STEP * np.arange(ROWS)
+STRONG, WEAK = np.sin(2.1 * TIMES), np.sin(3.7 * TIMES)
+SHAFT, TENSION = Place(Channel.SHAFT, "a"), Place(Channel.TENSION, "a")
+
+
+def only(effect_id):
+    effect = catalogue()[effect_id]
+    shape = tuple((name, grid[0]) for name, grid in effect.nonlinear.items())
+    return Hypothesis(effect, (Candidate(effect, "a", shape),))
+
+
+def equation(place, sizes):
+    """A residual with so much of some effects, each a column that all residuals share."""
+    noise = 0.01 * np.random.default_rng(5).standard_normal(ROWS)
+    waves = dict(zip(sizes, (STRONG, WEAK), strict=False))
+    target = noise + sum(size * waves[h.candidates] for h, size in named(sizes))
+    columns = {h.candidates[0]: waves[h.candidates][:, None, None] for h, _ in named(sizes)}
+    return Equation(place, TIMES, target[:, None], columns, target[:, None])
+
+
+def named(sizes):
+    return [(Hypothesis(c[0].effect, c), size) for c, size in sizes.items()]
+
+
+def may_be_untruth(strong, weak, *residuals):
+    """Ask of the weak one; each residual has a place and how much of either it has."""
+    own = [only(strong), only(weak)]
+    equations = [
+        equation(place, {h.candidates: s for h, s in zip(own, sizes, strict=True)})
+        for place, sizes in residuals
+    ]
+    evidence = gather([equations], BLOCK_S)
+    return Fits(evidence, Sums(evidence)).may_be_untruth(own[1], own)
+
+
+@pytest.mark.parametrize(("size", "untrue"), [(0.06, True), (0.08, False)])
+def test_a_companion_is_more_than_seven_hundredths_of_a_law(size, untrue):
+    told = "winch_viscous_friction", "winch_load_friction"
+    assert may_be_untruth(*told, (SHAFT, (1.0, size))) is untrue
+
+
+@pytest.mark.parametrize(("elsewhere", "untrue"), [(0.0, True), (0.02, False)])
+def test_it_is_held_against_what_the_law_takes_where_it_shows(elsewhere, untrue):
+    """In a residual in which the law takes a tenth it shows by a fifth of that."""
+    residuals = (SHAFT, (1.0, 0.02)), (TENSION, (0.1, elsewhere))
+    assert may_be_untruth("winch_viscous_friction", "winch_load_friction", *residuals) is untrue
+
+
+@pytest.mark.parametrize(
+    ("strong", "exact"),
+    [
+        ("winch_viscous_friction", False),
+        ("frame_flexibility", False),
+        # The form of a delay is one: filters have others.
+        ("tension_delay", False),
+        ("cable_stiffness", True),
+        ("tension_gain", True),
+        ("bar_constant_wrench", True),
+        ("winch_torque_offset", True),
+    ],
+)
+def test_numbers_readings_and_constants_have_no_form_to_be_untrue(strong, exact):
+    assert is_exact(catalogue()[strong]) is exact
+    assert may_be_untruth(strong, "winch_load_friction", (SHAFT, (1.0, 0.01))) is not exact

@@ -30,13 +30,14 @@ FIRST_SEED = 100
 
 @dataclass(frozen=True)
 class Case:
-    """What is planted where, and how it is recorded."""
+    """What is planted where, and how it is recorded; without load cells if not `cells`."""
 
     effect: str = ""
     elements: tuple[str, ...] = ()
     parameters: dict[str, float] = field(default_factory=dict)
     plant: str = "sim"
     capture: int = 1000
+    cells: bool = True
 
 
 CASES = (
@@ -56,6 +57,14 @@ CASES = (
     Case("cable_transverse_damping", (), {"coefficient": 0.5}),
     Case("pose_delay", ("bar",), {"delay": 0.004}),
     Case("bar_mass", (), {"mass": 0.1}),
+    Case(cells=False),
+    Case("winch_coulomb_friction", ("surge_2",), {"torque": 0.031}, cells=False),
+    Case("winch_viscous_friction", ("hoist_2",), {"coefficient": 4e-4}, cells=False),
+    Case("winch_torque_gain", ("surge_1",), {"gain": 0.97}, cells=False),
+    Case("winch_drum_radius", ("sway_2",), {"radius": 5e-4}, cells=False),
+    Case("cable_stiffness", ("hoist_1",), {"scale": 0.8}, cells=False),
+    Case("cable_axial_damping", ("surge_1",), {"scale": 0.5}, cells=False),
+    Case("bar_mass", (), {"mass": 0.1}, cells=False),
 )
 
 
@@ -63,15 +72,21 @@ def main() -> None:
     """Run the command line."""
     parser = argparse.ArgumentParser(prog="python -m bench.diagnosis", description=__doc__)
     parser.add_argument("--only", metavar="EFFECT", help="cases of one effect alone")
-    only = parser.parse_args().only
-    cases = [case for case in CASES if only in (None, case.effect)]
+    parser.add_argument("--without-cells", action="store_true", help="those without load cells")
+    asked = parser.parse_args()
+    cases = [
+        case
+        for case in CASES
+        if asked.only in (None, case.effect) and case.cells is not asked.without_cells
+    ]
     print("| planted | plant, capture | verdict | found | seconds |\n|---|---|---|---|---:|")
     with tempfile.TemporaryDirectory() as folder:
         for case in cases:
             seed = FIRST_SEED + CASES.index(case)
             place = Path(folder) / str(seed)
             record(case, seed, place)
-            row = (_planted(case), f"{case.plant}, {case.capture} Hz", *judge(place))
+            cells = "" if case.cells else ", no load cells"
+            row = _planted(case), f"{case.plant}, {case.capture} Hz{cells}", *judge(case, place)
             print(f"| {' | '.join(row)} |", flush=True)
 
 
@@ -92,10 +107,12 @@ def record(case: Case, seed: int, folder: Path, duration: float = DURATION_S) ->
     run(replace(bundle, plant=case.plant), folder)
 
 
-def judge(folder: Path) -> tuple[str, str, str]:
+def judge(case: Case, folder: Path) -> tuple[str, str, str]:
     """Return verdict, what was found, and how long it took, the file without the effect given."""
     begun = time.perf_counter()
     measurement = read_measurement(folder, SCENARIOS / "testbeds" / "thesis.yaml")
+    if not case.cells:
+        measurement = replace(measurement, tension=None)
     found = diagnose([measurement])
     took = time.perf_counter() - begun
     lines = []

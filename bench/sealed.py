@@ -1,7 +1,7 @@
 """All sealed recordings in one table: `python -m bench.sealed` renews docs/blind-sealed.md.
 
 It counts what the pages of the parts say, each written when its part was scored, once: those of
-docs/sealed, and of the last docs/blind-results.md.
+docs/sealed, and docs/blind-results.md, of the last set of which all recordings were scored.
 """
 
 from __future__ import annotations
@@ -17,7 +17,7 @@ from cspm_ident.blind.target import Range, allowed
 from cspm_ident.markdown import markdown_table
 
 DOCS = Path(__file__).resolve().parents[1] / "docs"
-PAGE, EARLIER, LAST = DOCS / "blind-sealed.md", "sealed", "blind-results.md"
+PAGE, PARTS, WHOLE = DOCS / "blind-sealed.md", "sealed", "blind-results.md"
 ALARMS, BOUND = "alarm where there is nothing", "one-sided upper bound of alarms"
 TIED, TIES = "truth among the ties", "mean size of the ties"
 _COUNTS = re.compile(r"\((\d+) of (\d+);")
@@ -53,7 +53,7 @@ def main() -> None:
 
 
 def read_parts(folder: Path) -> list[Part]:
-    """Return the parts in the order in which they were scored.
+    """Return the parts, those of docs/sealed in the order in which they were scored.
 
     Args:
         folder: the documentation's.
@@ -61,7 +61,7 @@ def read_parts(folder: Path) -> list[Part]:
     Raises:
         ValueError: a recording is in two parts.
     """
-    pages = [*sorted((folder / EARLIER).glob("part-*.md")), folder / LAST]
+    pages = [*sorted((folder / PARTS).glob("part-*.md")), folder / WHOLE]
     parts = [read_part(page, folder) for page in pages]
     seen: set[tuple[str, str]] = set()
     for part in parts:

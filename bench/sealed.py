@@ -17,7 +17,7 @@ from cspm_ident.blind.target import Range, allowed
 from cspm_ident.markdown import markdown_table
 
 DOCS = Path(__file__).resolve().parents[1] / "docs"
-PAGE, PARTS, WHOLE = DOCS / "blind-sealed.md", "sealed", "blind-results.md"
+PAGE, EARLIER, LAST = DOCS / "blind-sealed.md", "sealed", "blind-results.md"
 ALARMS, BOUND = "alarm where there is nothing", "one-sided upper bound of alarms"
 TIED, TIES = "truth among the ties", "mean size of the ties"
 _COUNTS = re.compile(r"\((\d+) of (\d+);")
@@ -61,7 +61,7 @@ def read_parts(folder: Path) -> list[Part]:
     Raises:
         ValueError: a recording is in two parts.
     """
-    pages = [*sorted((folder / PARTS).glob("part-*.md")), folder / WHOLE]
+    pages = [*sorted((folder / EARLIER).glob("part-*.md")), folder / LAST]
     parts = [read_part(page, folder) for page in pages]
     seen: set[tuple[str, str]] = set()
     for part in parts:

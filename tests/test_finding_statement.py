@@ -33,13 +33,20 @@ def test_a_finding_says_what_how_much_since_when_and_what_it_is_worth():
     assert "turns round" not in told
 
 
-def test_an_error_that_rises_is_said_to_rise():
-    fit = HeldOut(PLACE, 0.15, TORQUE, TORQUE, 1.5 * TORQUE, NOISE, NOISE)
+@pytest.mark.parametrize(
+    ("times", "course"),
+    [
+        (1.5, "rises from 20 % to 30 %"),
+        (0.5, "falls from 20 % to 10 %"),
+        (1.001, "stays at 20 %"),
+        (0.999, "stays at 20 %"),
+    ],
+)
+def test_an_error_is_said_to_rise_fall_or_stay(times, course):
+    """As far as two digits tell."""
+    fit = HeldOut(PLACE, 0.15, TORQUE, TORQUE, times * TORQUE, NOISE, NOISE)
     (finding,) = diagnosis_data(replace(diagnosis(), fit=(fit,)))["findings"]
-    assert (
-        "winches/torque/surge_2 rises from 20 % to 30 % of what was measured"
-        in (finding["statement"])
-    )
+    assert f"winches/torque/surge_2 {course} of what was measured" in finding["statement"]
 
 
 def test_what_is_left_above_the_noise_is_told_and_where_it_is_not():

@@ -157,12 +157,13 @@ def _worth(diagnosis: Diagnosis, named: Named, worth: Worth | None) -> str:
     away = ""
     if best.steady is not None and best.steady < _AWAY * best.after:
         away = f" ({_share(best, best.steady)} apart from where the shaft turns round)"
+    before, after = _share(best, best.before), _share(best, best.after)
     moves = "falls" if best.after < best.before else "rises"
+    course = f"stays at {after}" if before == after else f"{moves} from {before} to {after}"
     together = sum(best in _concerned(diagnosis, each) for each in diagnosis.findings.named) > 1
     return (
         f"With {'all that was found' if together else 'it'} the held-out error of"
-        f" {channel_of(best)} {moves} from {_share(best, best.before)} to"
-        f" {_share(best, best.after)} of what was measured{away}, {noise};"
+        f" {channel_of(best)} {course} of what was measured{away}, {noise};"
         f" {_simulated_worth(worth)}."
     )
 

@@ -4,9 +4,9 @@ from dataclasses import fields, replace
 
 import numpy as np
 import pytest
-from run_samples import bundle_of, run_to
+from measured_samples import measured_with
+from run_samples import run_to
 
-from cspm_bringup.run import run
 from cspm_ident.blind.ablation import ABLATIONS, diagnose_without, with_modelled_tensions
 from cspm_ident.diagnosis.recorded import equations_of
 from cspm_ident.diagnosis.safeguards import ALL_SAFEGUARDS, Safeguards
@@ -15,7 +15,6 @@ from cspm_ident.diagnosis.white_sums import WhiteSums
 from cspm_ident.signals.measurement import read_measurement
 from cspm_ident.signals.samples import Samples
 from cspm_ident.winch.weak_form import make_point, make_window, maker, weigh
-from cspm_msgs_py.testbed import parse_testbed
 from cspm_sim.effects import catalogue
 
 
@@ -101,10 +100,7 @@ RUBBING = """  - effect: winch_coulomb_friction
 
 @pytest.mark.slow
 def test_without_held_out_data_what_is_found_is_told_unjudged(tmp_path):
-    bundle = bundle_of("worst_case", "duration=16")
-    testbed = parse_testbed(bundle.testbed.text + RUBBING, "rubbing")
-    assert not run(replace(bundle, testbed=testbed), tmp_path / "bag").failure
-    measured = read_measurement(tmp_path / "bag").with_testbed(bundle.testbed)
+    measured = measured_with(RUBBING, tmp_path / "bag", "worst_case", "duration=16")
     found = diagnose_without(measured, "held-out")
     (named,) = found.findings.named
     assert (named.hypothesis.effect.id, named.hypothesis.elements) == (

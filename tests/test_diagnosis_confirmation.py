@@ -4,9 +4,8 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from run_samples import bundle_of
+from measured_samples import measured_with
 
-from cspm_bringup.run import run
 from cspm_ident.diagnosis.columns import Candidate, Place
 from cspm_ident.diagnosis.confirmation import confirmed
 from cspm_ident.diagnosis.diagnose import diagnose
@@ -14,8 +13,6 @@ from cspm_ident.diagnosis.equation import Equation
 from cspm_ident.diagnosis.evidence import gather
 from cspm_ident.diagnosis.search import Search
 from cspm_ident.diagnosis.verdict import diagnosis_data
-from cspm_ident.signals.measurement import read_measurement
-from cspm_msgs_py.testbed import parse_testbed
 from cspm_sim.effects import Channel, catalogue
 
 ROWS, STEP, BLOCK_S = 2400, 0.01, 0.5
@@ -76,10 +73,7 @@ def test_data_without_any_residual_say_nothing():
 @pytest.mark.slow
 def test_drag_of_a_bar_that_has_come_to_rest_is_told_with_that_nothing_confirms_it(tmp_path):
     """In the last three tenths of a minute a plucked bar shows nothing, which confirms nothing."""
-    bundle = bundle_of("verification_mid", "duration=60")
-    air = parse_testbed(bundle.testbed.text + AIR, "in air")
-    assert not run(replace(bundle, testbed=air), tmp_path / "plucked").failure
-    measured = read_measurement(tmp_path / "plucked").with_testbed(bundle.testbed)
+    measured = measured_with(AIR, tmp_path / "plucked", "verification_mid", "duration=60")
     found = diagnosis_data(diagnose([measured]))
     (told,) = found["findings"]
     assert (found["verdict"], told["effect"]) == ("effect", "bar_quadratic_drag")

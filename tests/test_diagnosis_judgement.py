@@ -1,20 +1,15 @@
 """Residuals on what was not searched: from its beginning on, with the memory of what was before."""
 
-from dataclasses import replace
-
 import numpy as np
 import pytest
-from run_samples import bundle_of
+from measured_samples import measured_with
 
-from cspm_bringup.run import run
 from cspm_ident.diagnosis import judgement
 from cspm_ident.diagnosis.columns import Candidate, Place
 from cspm_ident.diagnosis.equation import steady
 from cspm_ident.diagnosis.judgement import judged
 from cspm_ident.diagnosis.look import noise_of
 from cspm_ident.diagnosis.recorded import equations_of
-from cspm_ident.signals.measurement import read_measurement
-from cspm_msgs_py.testbed import parse_testbed
 from cspm_sim.effects import Channel, catalogue
 
 TRUE = np.array([2e-3])
@@ -31,10 +26,7 @@ START_S = 12.0
 def crept(tmp_path_factory):
     """Sixteen seconds of the calm sea with a cable that creeps; the file knows nothing of it."""
     folder = tmp_path_factory.mktemp("judgement") / "bag"
-    bundle = bundle_of("calm", "duration=16")
-    testbed = parse_testbed(bundle.testbed.text + CREEP, "creeping")
-    assert not run(replace(bundle, testbed=testbed), folder).failure
-    return read_measurement(folder).with_testbed(bundle.testbed)
+    return measured_with(CREEP, folder, "calm", "duration=16")
 
 
 def fits(measurement, start=START_S):

@@ -4,11 +4,10 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from run_samples import bundle_of
+from measured_samples import measured_with
 from scipy.signal import butter, lfilter
 from test_diagnosis_page import diagnosis
 
-from cspm_bringup.run import run
 from cspm_ident.diagnosis.columns import Candidate, Place, shapes_of
 from cspm_ident.diagnosis.equation import Equation, steady
 from cspm_ident.diagnosis.evidence import gather
@@ -20,8 +19,6 @@ from cspm_ident.diagnosis.spectrum import most_in_all, told_within, with_spectru
 from cspm_ident.diagnosis.statement import numbers_of
 from cspm_ident.diagnosis.sums import Sums
 from cspm_ident.diagnosis.weights import weights_of
-from cspm_ident.signals.measurement import read_measurement
-from cspm_msgs_py.testbed import parse_testbed
 from cspm_sim.effects import Channel, catalogue
 from cspm_sim.effects.signals import CableSignal
 
@@ -132,10 +129,8 @@ CREEPING = f"""  - effect: cable_creep
 
 @pytest.mark.slow
 def test_parts_are_fitted_about_what_was_found_of_effects_with_a_spectrum_alone(tmp_path):
-    bundle = bundle_of("worst_case", "duration=16", "sensors=ideal")
-    testbed = parse_testbed(bundle.testbed.text + CREEPING, "creeping")
-    assert not run(replace(bundle, testbed=testbed), tmp_path / "bag").failure
-    measured = read_measurement(tmp_path / "bag").with_testbed(bundle.testbed)
+    overrides = "duration=16", "sensors=ideal"
+    measured = measured_with(CREEPING, tmp_path / "bag", "worst_case", *overrides)
     given = noise_of(steady([equations_of(measured, [])])), 0.5, lambda parts: parts
     damped = Hypothesis(DAMPING, (Candidate(DAMPING, "hoist_1"),))
     hypotheses = [Hypothesis(CREEP, (FOUND,)), damped]

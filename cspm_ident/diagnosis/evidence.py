@@ -73,13 +73,6 @@ class Evidence:
         """Return the indices of the nuisance's columns, then those of some terms."""
         return np.concatenate([self.nuisance, self.columns_of(terms)])
 
-    def meet(self, one: Index, other: Index) -> bool:
-        """Return whether columns show in a residual in which others do."""
-        return any(
-            np.isin(one, place.columns).any() and np.isin(other, place.columns).any()
-            for place in self.places
-        )
-
     def parted(self, terms: Sequence[Candidate], values: Array) -> dict[Candidate, Array]:
         """Return values in the order of `columns_of`, term by term; what precedes is left out."""
         widths = [self.slices[term].stop - self.slices[term].start for term in terms]

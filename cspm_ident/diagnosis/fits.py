@@ -119,26 +119,26 @@ class Fits:
                 found |= dict.fromkeys(cause, share)
         return found
 
-    def may_be_untruth(self, hypothesis: Hypothesis, chosen: Sequence[Hypothesis]) -> bool:
-        """Return whether laws beside a hypothesis may be untrue by all it takes, wherever it shows.
+    def may_be_untruth(self, chosen: Sequence[Hypothesis]) -> list[bool]:
+        """Return of each whether laws beside it may be untrue by all it takes, wherever it shows.
 
         Numbers of the file and of readings have no form to be untrue, nor have clocks of a sound
         machine; what a constant leaves is a function of time.
-
-        Args:
-            hypothesis: one of what was chosen.
-            chosen: all of it.
         """
+        taken = [self._taken(h, chosen) for h in chosen]
         laws = [
-            h
-            for h in chosen
-            if h is not hypothesis and not is_exact(h.effect) and not self.is_negligible(h, chosen)
+            k
+            for k, h in enumerate(chosen)
+            if not is_exact(h.effect) and not self.is_negligible(h, chosen)
         ]
-        own, others = self._taken(hypothesis, chosen), [self._taken(h, chosen) for h in laws]
-        return all(
-            own[place] <= UNTRUE_SHARE * sum(max(0.0, taken[place]) for taken in others)
-            for place in self.evidence.places_of(self.own_columns(hypothesis))
-        )
+        return [
+            all(
+                taken[k][place]
+                <= UNTRUE_SHARE * sum(max(0.0, taken[i][place]) for i in laws if i != k)
+                for place in self.evidence.places_of(self.own_columns(h))
+            )
+            for k, h in enumerate(chosen)
+        ]
 
     def _taken(self, hypothesis: Hypothesis, chosen: Sequence[Hypothesis]) -> dict[Place, float]:
         """Return the squares that a hypothesis takes of each residual beside the others."""

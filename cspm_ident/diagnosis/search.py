@@ -168,10 +168,11 @@ class Search:
         """
         weights = self.fits.weights(chosen) if len(chosen) > 1 else {}
         gains = [self._gain(hypothesis, chosen) for hypothesis in chosen]
+        may_be_untruth = self.fits.may_be_untruth(chosen)
         for k in np.argsort([gain.total for gain in gains]):
             own = chosen[k]
             needless = (
-                self.fits.may_be_untruth(own, chosen)
+                may_be_untruth[k]
                 or (
                     not self.fits.is_negligible(own, chosen)
                     and may_be_none({c: weights[c] for c in members_of(weights, own)})

@@ -10,8 +10,8 @@ SPREAD := -n logical --dist loadfile
 # fails every time.
 RERUNS := 2
 # Only these files are read for such tests: reading all takes longer than many of them.
-ALONE = $(shell grep -lE 'mark\.alone\b' tests/test_*.py)
-SLOW = $(shell grep -lE 'mark\.slow\b' tests/test_*.py)
+ALONE = $(shell grep -rlE --include='test_*.py' 'mark\.alone\b' tests)
+SLOW = $(shell grep -rlE --include='test_*.py' 'mark\.slow\b' tests)
 
 # ROS 2 Jazzy comes as wheels, unless a native one is sourced. Both at once would mix their libraries.
 ROS := wheels

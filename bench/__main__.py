@@ -9,18 +9,18 @@ from pathlib import Path
 from rich.console import Console
 from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeElapsedColumn
 
-from bench.closed_loop import measure_closed_loop
-from bench.figure import Advance, Figure
-from bench.graph import measure_graph
-from bench.machine import describe_machine, is_busy
-from bench.memory import measure_memory
-from bench.plant import measure_against_mujoco, measure_plant
-from bench.reaction import print_reactions
-from bench.report import print_report
-from bench.start_up import measure_start_up
-from bench.volume import QUICK, USUAL, Volume, full
-from cspm_bringup.ros_install import find_ros
+from bench.performance.closed_loop import measure_closed_loop
+from bench.performance.figure_table import print_report
+from bench.performance.graph_speed import measure_graph
+from bench.performance.host import describe_machine, is_busy
+from bench.performance.measured_figure import Advance, Figure
+from bench.performance.memory import measure_memory
+from bench.performance.plant_speed import measure_against_mujoco, measure_plant
+from bench.performance.reaction import print_reactions
+from bench.performance.start_up import measure_start_up
+from bench.performance.volume import QUICK, USUAL, Volume, full
 from cspm_msgs_py.errors import InputError
+from cspm_ros.runtime.ros_install import find_ros
 
 
 def main() -> None:

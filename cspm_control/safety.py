@@ -8,11 +8,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from cspm_msgs_py.errors import InputError
-from cspm_msgs_py.latch import Latch
 from cspm_msgs_py.safety_spec import Safety
 from cspm_msgs_py.schedule import FORCE_CONTROLLER, TORQUE_COMMAND, WINCH_STATE, Schedule
-from cspm_msgs_py.stage import Send
-from cspm_sim.safe_state import SafeState, Winches
+from cspm_msgs_py.stepping.latch import Latch
+from cspm_msgs_py.stepping.safe_state import SafeState, Winches
+from cspm_msgs_py.stepping.stage import Send
 
 Array = NDArray[np.float64]
 

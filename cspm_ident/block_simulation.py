@@ -12,14 +12,14 @@ from numpy.typing import NDArray
 
 from cspm_ident.signals.elongation import damping_of
 from cspm_ident.signals.timeline import Timeline, whole_stretches
+from cspm_model.equilibrium import Equilibrium, find_equilibrium, unstretched_lengths
+from cspm_model.kernels.cable import RADIUS
+from cspm_model.kinematics import geometry
 from cspm_msgs_py.errors import InputError
 from cspm_msgs_py.testbed import Testbed
 from cspm_sim.driven_plant import Driven, DrivenPlant
 from cspm_sim.effect_entries import read_actions
 from cspm_sim.effects import Hook, catalogue
-from cspm_sim.equilibrium import Equilibrium, find_equilibrium, unstretched_lengths
-from cspm_sim.kernels.cable import RADIUS
-from cspm_sim.kinematics import geometry
 from cspm_sim.parameters import plant_parameters
 from cspm_sim.rest import memory_at_rest
 

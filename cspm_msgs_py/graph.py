@@ -5,7 +5,6 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass
 
-from cspm_msgs_py.lockstep import RECORDER_WINDOW, WINDOW
 from cspm_msgs_py.schedule import (
     FORCE_CONTROLLER,
     MOTION_CONTROLLER,
@@ -15,6 +14,7 @@ from cspm_msgs_py.schedule import (
     WAVE_TRAJECTORY,
     Schedule,
 )
+from cspm_msgs_py.stepping.lockstep import RECORDER_WINDOW, WINDOW
 from cspm_msgs_py.topics import DIAGNOSTICS
 
 RECORDER = "recorder"

@@ -1,6 +1,6 @@
-"""The model: kinematics, bar, cables, winches, sensors, effects, plant."""
+"""The simulated test-bed: plant, sensors and the effects catalogue."""
 
-from cspm_sim.kernel_cache import use_kernel_cache
+from cspm_model.kernel_cache import use_kernel_cache
 
 # Before any kernel is defined, since that is when numba looks for its compiled form.
 use_kernel_cache()

@@ -7,14 +7,15 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from cspm_model.kernels.machine import BAR_STATES, PlantParameters
+from cspm_model.motion import Motion
 from cspm_sim.kernels.driven import (
     drive_by_tensions,
     drive_by_torques,
     drive_by_winches,
     drive_shafts,
 )
-from cspm_sim.kernels.plant import BAR_STATES, PlantParameters, make_scratch, state_count
-from cspm_sim.motion import Motion
+from cspm_sim.kernels.plant import make_scratch, state_count
 
 Array = NDArray[np.float64]
 

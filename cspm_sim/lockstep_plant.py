@@ -10,8 +10,8 @@ from numpy.typing import NDArray
 from cspm_msgs_py.diagnostics import Status
 from cspm_msgs_py.errors import DivergenceError, InputError
 from cspm_msgs_py.graph import window_of
-from cspm_msgs_py.lockstep import Sequence
 from cspm_msgs_py.schedule import TORQUE_COMMAND, Schedule
+from cspm_msgs_py.stepping.lockstep import Sequence
 from cspm_sim.simulator import Simulator
 
 Array = NDArray[np.float64]

@@ -1,18 +1,11 @@
-"""From a test-bed description to the plant's flat parameter arrays."""
+"""A test-bed's parameter arrays for the plant, its effects included."""
 
 from __future__ import annotations
 
-import numpy as np
-from numpy.typing import NDArray
-
-from cspm_msgs_py.testbed import Bar, Cable, ExponentialStiffness, Testbed
+from cspm_model.kernels.machine import PlantParameters
+from cspm_model.parameters import nominal_parameters, plant_states
+from cspm_msgs_py.testbed import Testbed
 from cspm_sim.effect_entries import altered_testbed, hook_rows, read_actions
-from cspm_sim.kernels import bar as bar_kernel
-from cspm_sim.kernels import cable as cable_kernel
-from cspm_sim.kernels.plant import BAR_STATES, PlantParameters
-from cspm_sim.stiffness import POINTS, law_slope, law_table
-
-Array = NDArray[np.float64]
 
 
 def plant_parameters(testbed: Testbed) -> PlantParameters:
@@ -22,65 +15,6 @@ def plant_parameters(testbed: Testbed) -> PlantParameters:
         InputError: an effect, one of its elements or parameters is unknown or out of bounds.
     """
     actions = read_actions(testbed)
-    testbed = altered_testbed(testbed, actions)
-    gravity = testbed.gravity
-    rows, tables = zip(*(_cable_row(cable, gravity) for cable in testbed.cables), strict=True)
+    nominal = nominal_parameters(altered_testbed(testbed, actions))
     effects, effect_parameters = hook_rows(actions, plant_states(testbed))
-    return PlantParameters(
-        bar=_bar_array(testbed.bar, gravity) if testbed.bar else np.zeros(0),
-        cables=np.asfortranarray(rows),
-        tables=np.array(tables),
-        effects=effects,
-        effect_parameters=effect_parameters,
-    )
-
-
-def nominal_parameters(testbed: Testbed) -> PlantParameters:
-    """Return the kernels' parameters without effects: what controllers know of the machine."""
-    return plant_parameters(testbed.model_copy(update={"effects": ()}))
-
-
-def plant_states(testbed: Testbed) -> int:
-    """Return the number of states of bar, cables and winches, which those of effects follow."""
-    return (BAR_STATES if testbed.bar else 0) + 3 * len(testbed.cables)
-
-
-def _bar_array(bar: Bar, gravity: float) -> Array:
-    out = np.zeros(bar_kernel.BAR_COLUMNS)
-    out[bar_kernel.MASS] = bar.mass
-    out[bar_kernel.GRAVITY] = gravity
-    out[bar_kernel.COM : bar_kernel.COM + 3] = bar.com
-    out[bar_kernel.INERTIA : bar_kernel.INERTIA + 9] = bar.inertia.matrix.ravel()
-    inverse = np.linalg.inv(bar.inertia.matrix)
-    out[bar_kernel.INVERSE_INERTIA : bar_kernel.INVERSE_INERTIA + 9] = inverse.ravel()
-    return out
-
-
-def _cable_row(cable: Cable, gravity: float) -> tuple[Array, Array]:
-    row = np.zeros(cable_kernel.CABLE_COLUMNS)
-    table = np.zeros((POINTS, 2))
-    row[cable_kernel.GEAR_RATIO] = cable.gear_ratio
-    row[cable_kernel.GRAVITY_HERE] = gravity
-    row[cable_kernel.RADIUS] = cable.drum_radius / cable.gear_ratio
-    row[cable_kernel.INERTIA] = cable.rotor_inertia
-    row[cable_kernel.TORQUE_LIMIT] = cable.torque_limit
-    law, damping = cable.stiffness, cable.damping
-    if not (cable.exit and cable.attachment and law and damping and cable.tension_limits):
-        return row, table
-    row[cable_kernel.HAS_CABLE] = 1.0
-    row[cable_kernel.EXIT : cable_kernel.EXIT + 3] = cable.exit
-    row[cable_kernel.ATTACHMENT : cable_kernel.ATTACHMENT + 3] = cable.attachment
-    row[cable_kernel.OFFSET_LENGTH] = cable.offset_length
-    row[cable_kernel.AXIAL_RIGIDITY] = law.axial_rigidity
-    row[cable_kernel.FLOOR_TENSION] = law.floor_tension
-    row[cable_kernel.DAMPING_CONSTANT] = damping.factor * damping.constant
-    row[cable_kernel.DAMPING_SLOPE] = damping.factor * damping.slope
-    if isinstance(law, ExponentialStiffness):
-        row[cable_kernel.LAW_SCALE] = law.a
-        row[cable_kernel.LAW_EXPONENT] = law.b
-        row[cable_kernel.FLOOR_SLOPE] = law_slope(law, law.floor_tension)
-        row[cable_kernel.FLOOR_SCALED] = law.floor_tension / row[cable_kernel.FLOOR_SLOPE]
-        table, step = law_table(law, cable.tension_limits[1])
-        row[cable_kernel.TABLE_STEP] = step
-        row[cable_kernel.TABLE_STEPS] = 1.0 / step
-    return row, table
+    return nominal._replace(effects=effects, effect_parameters=effect_parameters)

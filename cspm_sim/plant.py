@@ -5,28 +5,23 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from cspm_msgs_py.dofs import DOFS
-from cspm_msgs_py.errors import DivergenceError, InputError
-from cspm_msgs_py.testbed import Testbed
-from cspm_sim.effect_entries import read_actions
-from cspm_sim.effects import Hook
-from cspm_sim.equilibrium import (
+from cspm_model.equilibrium import (
     Equilibrium,
     find_equilibrium,
     gravity_wrench,
     unstretched_lengths,
 )
+from cspm_model.kernels.cable import DIRECTION, TORQUE_LIMIT
+from cspm_model.kernels.machine import BAR_STATES
+from cspm_model.motion import Motion
+from cspm_msgs_py.dofs import DOFS
+from cspm_msgs_py.errors import DivergenceError, InputError
+from cspm_msgs_py.testbed import Testbed
+from cspm_sim.effect_entries import read_actions
+from cspm_sim.effects import Hook
 from cspm_sim.kernels.affected_cables import reported_torques
-from cspm_sim.kernels.cable import DIRECTION, TORQUE_LIMIT
 from cspm_sim.kernels.hooks import HOOK
-from cspm_sim.kernels.plant import (
-    BAR_STATES,
-    make_scratch,
-    plant_advance,
-    plant_tensions,
-    state_count,
-)
-from cspm_sim.motion import Motion
+from cspm_sim.kernels.plant import make_scratch, plant_advance, plant_tensions, state_count
 from cspm_sim.parameters import plant_parameters
 from cspm_sim.rest import frame_shift, memory_at_rest, static_wrench
 

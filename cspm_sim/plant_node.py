@@ -11,12 +11,12 @@ from numpy.typing import NDArray
 
 from cspm_msgs_py.errors import InputError
 from cspm_msgs_py.graph import Edges, followers
-from cspm_msgs_py.lockstep import WINDOW
 from cspm_msgs_py.ros.contract_node import ContractNode, ros_class
 from cspm_msgs_py.ros.outbox import Outbox
 from cspm_msgs_py.ros.qos import contract_qos
 from cspm_msgs_py.ros.rendezvous import PROGRESS, PlantSide
 from cspm_msgs_py.schedule import PLANT, TORQUE_COMMAND, Schedule
+from cspm_msgs_py.stepping.lockstep import WINDOW
 from cspm_msgs_py.topics import BRAKE, DIAGNOSTICS
 from cspm_sim.any_plant import AnyPlant
 from cspm_sim.lockstep_plant import LockstepPlant

@@ -7,15 +7,16 @@ from collections.abc import Sequence
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from cspm_model.kernels.bar import GRAVITY
+from cspm_model.kernels.cable import ATTACHMENT, RADIUS
+from cspm_model.kernels.machine import PlantParameters
+from cspm_model.kinematics import geometry, rotation
 from cspm_sim.effect_entries import Action
 from cspm_sim.effects import Hook
 from cspm_sim.kernels import affected_cables as cable_hooks
 from cspm_sim.kernels import bar_effects as bar_hooks
 from cspm_sim.kernels import winch as winch_hooks
-from cspm_sim.kernels.bar import GRAVITY, WRENCH
-from cspm_sim.kernels.cable import ATTACHMENT, RADIUS
-from cspm_sim.kernels.plant import PlantParameters
-from cspm_sim.kinematics import geometry, rotation
+from cspm_sim.kernels.bar_effects import WRENCH
 
 Array = NDArray[np.float64]
 

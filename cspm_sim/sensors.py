@@ -10,10 +10,10 @@ from typing import Protocol
 import numpy as np
 from numpy.typing import NDArray
 
+from cspm_model.kernels.rows import corrupt, pose_row
 from cspm_msgs_py.errors import InputError
 from cspm_msgs_py.sensor_spec import Sensor, quantities
 from cspm_msgs_py.topics import Topic
-from cspm_sim.kernels.rows import corrupt, pose_row
 from cspm_sim.sensor_fault import Past, SensorFault
 
 Array = NDArray[np.float64]

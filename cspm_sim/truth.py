@@ -7,8 +7,8 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from cspm_model.kernels.rows import bar_twist_row, motion_twist_row, pose_row
 from cspm_sim.any_plant import AnyPlant
-from cspm_sim.kernels.rows import bar_twist_row, motion_twist_row, pose_row
 
 Array = NDArray[np.float64]
 

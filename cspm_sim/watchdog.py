@@ -6,11 +6,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from cspm_msgs_py.diagnostics import Level, Status
-from cspm_msgs_py.latch import Latch
-from cspm_msgs_py.scenario import Scenario
 from cspm_msgs_py.schedule import PLANT, TORQUE_COMMAND
+from cspm_msgs_py.stepping.latch import Latch
+from cspm_msgs_py.stepping.safe_state import SafeState, Winches
 from cspm_sim.any_plant import AnyPlant
-from cspm_sim.safe_state import SafeState, Winches, make_safe_state
 
 Array = NDArray[np.float64]
 
@@ -104,13 +103,3 @@ class Watchdog:
             return None
         i = int(np.argmin(good))
         return f"{TORQUE_COMMAND}: {torque[i]} N·m of {names[i]}, allowed: finite numbers"
-
-
-def make_watchdog(scenario: Scenario, plant: AnyPlant) -> Watchdog:
-    """Return the watchdog of a scenario's plant.
-
-    Raises:
-        InputError: it is to hold the bar where the bar cannot hang.
-    """
-    state = make_safe_state(scenario, plant.testbed)
-    return Watchdog(plant, state, scenario.safety.watchdog)

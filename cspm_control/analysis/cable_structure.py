@@ -8,14 +8,14 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from cspm_control.analysis.pose_grid import Grid
+from cspm_model.kernels import bar as bar_kernel
+from cspm_model.kernels.cable import ATTACHMENT, EXIT
+from cspm_model.kinematics import RANK_TOLERANCE, geometry
+from cspm_model.linearisation import ALL_AXES
+from cspm_model.parameters import nominal_parameters
 from cspm_msgs_py.dofs import CONTROLLED_AXES
 from cspm_msgs_py.errors import InputError
 from cspm_msgs_py.testbed import Testbed
-from cspm_sim.kernels import bar as bar_kernel
-from cspm_sim.kernels.cable import ATTACHMENT, EXIT
-from cspm_sim.kinematics import RANK_TOLERANCE, geometry
-from cspm_sim.linearisation import ALL_AXES
-from cspm_sim.parameters import nominal_parameters
 
 Array = NDArray[np.float64]
 

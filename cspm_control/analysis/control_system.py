@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import control
 
-from cspm_sim.linearisation import StateSpace
+from cspm_model.linearisation import StateSpace
 
 
 def control_system(model: StateSpace) -> control.StateSpace:

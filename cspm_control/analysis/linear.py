@@ -9,9 +9,8 @@ from numpy.typing import ArrayLike, NDArray
 
 from cspm_control.analysis.gain import Directions, directions, relative_gains, singular_values
 from cspm_control.analysis.mode import Mode, drifting_poles, modes
-from cspm_msgs_py.testbed import Testbed
-from cspm_sim.kinematics import RANK_TOLERANCE
-from cspm_sim.linearisation import (
+from cspm_model.kinematics import RANK_TOLERANCE
+from cspm_model.linearisation import (
     OperatingPoint,
     StateSpace,
     linear_model,
@@ -19,7 +18,8 @@ from cspm_sim.linearisation import (
     operating_point,
     tension_subsystem,
 )
-from cspm_sim.parameters import nominal_parameters
+from cspm_model.parameters import nominal_parameters
+from cspm_msgs_py.testbed import Testbed
 
 Array = NDArray[np.float64]
 ComplexArray = NDArray[np.complex128]

@@ -19,7 +19,7 @@ from cspm_control.analysis.sampled_loops import (
     pid_system,
 )
 from cspm_control.analysis.sampled_system import SampledSystem, closed
-from cspm_control.design import (
+from cspm_control.design.gains import (
     CONTROLLED_DOFS,
     LARGEST_FORCE_BANDWIDTH,
     MOTION_BANDWIDTH,
@@ -29,12 +29,12 @@ from cspm_control.design import (
     motion_plant,
     tension_plant,
 )
+from cspm_model.linearisation import StateSpace, linear_model, motion_subsystem, operating_point
+from cspm_model.parameters import nominal_parameters
 from cspm_msgs_py.dofs import DOFS
 from cspm_msgs_py.errors import InputError
 from cspm_msgs_py.scenario import ClosedLoop, MotionControl
 from cspm_msgs_py.testbed import Testbed
-from cspm_sim.linearisation import StateSpace, linear_model, motion_subsystem, operating_point
-from cspm_sim.parameters import nominal_parameters
 
 Array = NDArray[np.float64]
 ComplexArray = NDArray[np.complex128]

@@ -14,10 +14,10 @@ from numpy.typing import NDArray
 from cspm_control.analysis.cable_structure import CableStructure, structures, wanted_at_rest
 from cspm_control.analysis.pose_grid import Grid
 from cspm_control.analysis.wrench_set import wrench_set
+from cspm_model.kernels import bar as bar_kernel
+from cspm_model.kernels.machine import PlantParameters
+from cspm_model.linearisation import mass_matrix
 from cspm_msgs_py.dofs import DOFS
-from cspm_sim.kernels import bar as bar_kernel
-from cspm_sim.kernels.plant import PlantParameters
-from cspm_sim.linearisation import mass_matrix
 
 Array = NDArray[np.float64]
 

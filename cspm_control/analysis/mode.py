@@ -9,10 +9,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from cspm_control.analysis.cable_groups import cable_groups
+from cspm_model.kernels import cable as cable_kernel
+from cspm_model.kernels.machine import BAR_STATES, PlantParameters
+from cspm_model.linearisation import OperatingPoint, StateSpace, mass_matrix
 from cspm_msgs_py.dofs import DOFS
-from cspm_sim.kernels import cable as cable_kernel
-from cspm_sim.kernels.plant import BAR_STATES, PlantParameters
-from cspm_sim.linearisation import OperatingPoint, StateSpace, mass_matrix
 
 Array = NDArray[np.float64]
 ComplexArray = NDArray[np.complex128]

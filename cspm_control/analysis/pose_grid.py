@@ -8,7 +8,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from cspm_sim.kinematics import rotation
+from cspm_model.kinematics import rotation
 
 Array = NDArray[np.float64]
 

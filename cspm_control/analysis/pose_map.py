@@ -8,16 +8,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from cspm_control.analysis.cable_structure import CableStructure, structures, wanted_at_rest
-from cspm_control.analysis.manipulability import (
-    conditions,
-    gyration_radius,
-    mass_columns,
-    measures,
-)
+from cspm_control.analysis.manipulability import conditions, gyration_radius, mass_columns, measures
 from cspm_control.analysis.pose_grid import Grid
 from cspm_control.analysis.workspace import ALGORITHMS, static_workspace
 from cspm_control.analysis.wrench_set import WrenchSet, wrench_set
-from cspm_sim.kernels.plant import PlantParameters
+from cspm_model.kernels.machine import PlantParameters
 
 Array = NDArray[np.float64]
 Mask = NDArray[np.bool_]

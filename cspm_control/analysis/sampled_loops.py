@@ -8,21 +8,15 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from cspm_control.analysis.sampled_system import (
-    SampledSystem,
-    closed,
-    diagonal,
-    sample,
-    series,
-)
-from cspm_control.design import CONTROLLED_DOFS
+from cspm_control.analysis.sampled_system import SampledSystem, closed, diagonal, sample, series
+from cspm_control.design.gains import CONTROLLED_DOFS
+from cspm_model.equilibrium import gravity_wrench
+from cspm_model.kernels.machine import PlantParameters
+from cspm_model.kinematics import RANK_TOLERANCE, geometry
+from cspm_model.linearisation import OperatingPoint, StateSpace
 from cspm_msgs_py.dofs import CONTROLLED_AXES, DOFS
 from cspm_msgs_py.errors import InputError
 from cspm_msgs_py.scenario import MotionControl, PidGains, PiGains, Rates
-from cspm_sim.equilibrium import gravity_wrench
-from cspm_sim.kernels.plant import PlantParameters
-from cspm_sim.kinematics import RANK_TOLERANCE, geometry
-from cspm_sim.linearisation import OperatingPoint, StateSpace
 
 Array = NDArray[np.float64]
 
@@ -103,14 +97,14 @@ def _check_rates(rates: Rates) -> None:
 
 
 def pi_system(gains: PiGains, period: float) -> SampledSystem:
-    """Return the force controller of `cspm_control.force_controller`, which adds up afterwards."""
+    """Return the force controller of `force_controller.py`, which adds up afterwards."""
     step = gains.kp * gains.integral_frequency * period
     one = np.ones((1, 1))
     return SampledSystem(one, step * one, one, gains.kp * one, period)
 
 
 def pid_system(gains: PidGains, pole: float, period: float) -> SampledSystem:
-    """Return the PID of `cspm_control.motion_controller`: states integral, derivative, last error.
+    """Return the PID of `motion_controller.py`: states integral, derivative, last error.
 
     The integral counts the present error; the derivative is a backward difference through `pole`.
     """

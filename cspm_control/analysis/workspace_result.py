@@ -13,17 +13,12 @@ from numpy.typing import NDArray
 from cspm_control.analysis.cable_structure import CableStructure, cable_structure, structures
 from cspm_control.analysis.manipulability import conditions
 from cspm_control.analysis.pose_grid import GRIDS, Grid, steps
-from cspm_control.analysis.pose_map import (
-    PoseMap,
-    feasible_wrenches,
-    pose_map,
-    required_edges,
-)
+from cspm_control.analysis.pose_map import PoseMap, feasible_wrenches, pose_map, required_edges
 from cspm_control.analysis.workspace import ALGORITHMS, static_workspace
 from cspm_control.analysis.workspace_limits import GRID_AXES, limits
+from cspm_model.kernels.machine import PlantParameters
+from cspm_model.parameters import nominal_parameters
 from cspm_msgs_py.testbed import Testbed
-from cspm_sim.kernels.plant import PlantParameters
-from cspm_sim.parameters import nominal_parameters
 
 Array = NDArray[np.float64]
 Mask = NDArray[np.bool_]

@@ -7,7 +7,7 @@ from collections.abc import Mapping
 import numpy as np
 from numpy.typing import NDArray
 
-from cspm_control.tension_distribution import TensionDistribution
+from cspm_control.allocation.tension_distribution import TensionDistribution
 from cspm_msgs_py.diagnostics import Level, Status
 from cspm_msgs_py.schedule import (
     BAR_POSE,
@@ -16,7 +16,7 @@ from cspm_msgs_py.schedule import (
     TENSION_DISTRIBUTION,
     WRENCH,
 )
-from cspm_msgs_py.stage import Send
+from cspm_msgs_py.stepping.stage import Send
 
 Array = NDArray[np.float64]
 

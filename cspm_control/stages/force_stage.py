@@ -9,11 +9,11 @@ import numpy as np
 from numba import njit
 from numpy.typing import NDArray
 
-from cspm_control.force_controller import ForceController
-from cspm_control.friction_feedforward import FrictionFeedforward
-from cspm_control.load_cell_bias import LoadCellBias
+from cspm_control.controllers.force_controller import ForceController
+from cspm_control.controllers.load_cell_bias import LoadCellBias
+from cspm_control.feedforward.friction_feedforward import FrictionFeedforward
+from cspm_control.feedforward.winch_feedforward import WinchFeedforward
 from cspm_control.safety import GuardedStage
-from cspm_control.winch_feedforward import WinchFeedforward
 from cspm_msgs_py.diagnostics import Level, Status
 from cspm_msgs_py.safety_spec import Safety
 from cspm_msgs_py.schedule import (
@@ -23,8 +23,8 @@ from cspm_msgs_py.schedule import (
     TENSION_COMMAND,
     WINCH_STATE,
 )
-from cspm_msgs_py.stage import Send
-from cspm_sim.safe_state import SafeState
+from cspm_msgs_py.stepping.safe_state import SafeState
+from cspm_msgs_py.stepping.stage import Send
 
 Array = NDArray[np.float64]
 

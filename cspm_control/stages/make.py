@@ -7,23 +7,27 @@ from collections.abc import Callable, Mapping
 import numpy as np
 from numpy.typing import NDArray
 
-from cspm_control.angle_servo import AngleGenerator, AngleServo
-from cspm_control.bar_dynamics import bar_parameters
-from cspm_control.computed_wrench import ComputedWrench
-from cspm_control.force_controller import ForceController
-from cspm_control.friction_feedforward import FrictionFeedforward, winch_friction
-from cspm_control.governor import Governed, plan_deviation
-from cspm_control.load_cell_bias import LoadCellBias
-from cspm_control.mass_observer import MassObserver
-from cspm_control.motion_controller import MotionController
+from cspm_control.allocation.tension_distribution import TensionDistribution
+from cspm_control.controllers.angle_servo import AngleGenerator, AngleServo
+from cspm_control.controllers.bar_dynamics import bar_parameters
+from cspm_control.controllers.computed_wrench import ComputedWrench
+from cspm_control.controllers.force_controller import ForceController
+from cspm_control.controllers.governor import Governed, plan_deviation
+from cspm_control.controllers.load_cell_bias import LoadCellBias
+from cspm_control.controllers.mass_observer import MassObserver
+from cspm_control.controllers.motion_controller import MotionController
+from cspm_control.controllers.torque_profile import TorqueGenerator
+from cspm_control.feedforward.friction_feedforward import FrictionFeedforward, winch_friction
+from cspm_control.feedforward.winch_feedforward import WinchFeedforward
+from cspm_control.safe_state import make_safe_state
 from cspm_control.stages.angle_stage import AngleStage
 from cspm_control.stages.distribution_stage import DistributionStage
 from cspm_control.stages.force_stage import ForceLimits, ForceStage
 from cspm_control.stages.motion_stage import MotionStage
 from cspm_control.stages.torque_stage import TorqueStage
-from cspm_control.tension_distribution import TensionDistribution
-from cspm_control.torque_profile import TorqueGenerator
-from cspm_control.winch_feedforward import WinchFeedforward
+from cspm_model.kernels.cable import INERTIA, RADIUS
+from cspm_model.motion import Motion
+from cspm_model.parameters import nominal_parameters
 from cspm_msgs_py.dofs import CONTROLLED_AXES
 from cspm_msgs_py.errors import InputError
 from cspm_msgs_py.scenario import (
@@ -44,12 +48,8 @@ from cspm_msgs_py.schedule import (
     TENSION_DISTRIBUTION,
     schedule_of,
 )
-from cspm_msgs_py.stage import Stage
+from cspm_msgs_py.stepping.stage import Stage
 from cspm_msgs_py.testbed import Bar, Testbed
-from cspm_sim.kernels.cable import INERTIA, RADIUS
-from cspm_sim.motion import Motion
-from cspm_sim.parameters import nominal_parameters
-from cspm_sim.safe_state import make_safe_state
 
 # A measured tension beyond this many times a cable's upper limit trips, unless the scenario says.
 TRIP_FACTOR = 2.0

@@ -7,18 +7,12 @@ from collections.abc import Mapping
 import numpy as np
 from numpy.typing import NDArray
 
-from cspm_control.computed_wrench import ComputedWrench
-from cspm_control.motion_controller import MotionController
+from cspm_control.controllers.computed_wrench import ComputedWrench
+from cspm_control.controllers.motion_controller import MotionController
+from cspm_model.motion import Motion
 from cspm_msgs_py.diagnostics import Level, Status
-from cspm_msgs_py.schedule import (
-    BAR_POSE,
-    BAR_REFERENCE,
-    FRAME_POSE,
-    MOTION_CONTROLLER,
-    WRENCH,
-)
-from cspm_msgs_py.stage import Send
-from cspm_sim.motion import Motion
+from cspm_msgs_py.schedule import BAR_POSE, BAR_REFERENCE, FRAME_POSE, MOTION_CONTROLLER, WRENCH
+from cspm_msgs_py.stepping.stage import Send
 
 Array = NDArray[np.float64]
 

@@ -7,13 +7,13 @@ from collections.abc import Mapping
 import numpy as np
 from numpy.typing import NDArray
 
+from cspm_control.controllers.torque_profile import TorqueGenerator
 from cspm_control.safety import GuardedStage
-from cspm_control.torque_profile import TorqueGenerator
 from cspm_msgs_py.diagnostics import Level, Status
 from cspm_msgs_py.safety_spec import Safety
 from cspm_msgs_py.schedule import WINCH_STATE
-from cspm_msgs_py.stage import Send
-from cspm_sim.safe_state import SafeState
+from cspm_msgs_py.stepping.safe_state import SafeState
+from cspm_msgs_py.stepping.stage import Send
 
 Array = NDArray[np.float64]
 

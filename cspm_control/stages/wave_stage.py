@@ -7,10 +7,10 @@ from collections.abc import Mapping
 import numpy as np
 from numpy.typing import NDArray
 
-from cspm_control.wave_trajectory import WaveTrajectory
+from cspm_control.waves.wave_trajectory import WaveTrajectory
 from cspm_msgs_py.diagnostics import Level, Status
 from cspm_msgs_py.schedule import WAVE_TRAJECTORY
-from cspm_msgs_py.stage import Send
+from cspm_msgs_py.stepping.stage import Send
 
 Array = NDArray[np.float64]
 

@@ -15,6 +15,7 @@ from cspm_control.waves.sea import Array, Complex, WaveSet, draw_waves, wave_num
 from cspm_control.waves.small_body import small_body_response
 from cspm_control.waves.spectrum import jonswap
 from cspm_control.waves.vessel import read_vessel
+from cspm_model.motion import Motion
 from cspm_msgs_py.dofs import DOFS
 from cspm_msgs_py.errors import InputError
 from cspm_msgs_py.motion_spec import (
@@ -26,7 +27,6 @@ from cspm_msgs_py.motion_spec import (
     StillMotion,
     VesselMotion,
 )
-from cspm_sim.motion import Motion
 
 UNEXCITED = 1e-6  # response below this share of the waves cannot honestly be scaled up
 

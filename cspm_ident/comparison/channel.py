@@ -9,13 +9,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from cspm_ident.comparison.metrics import (
-    Bin,
-    best_lag,
-    bins_data,
-    coherence_of,
-    nrmse,
-)
+from cspm_ident.comparison.metrics import Bin, best_lag, bins_data, coherence_of, nrmse
 from cspm_ident.vaf import vaf
 
 Array = NDArray[np.float64]

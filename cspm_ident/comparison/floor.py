@@ -8,14 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from cspm_ident.block_simulation import BlockSimulation, Drive, Simulated, Window
-from cspm_ident.signals.measurement import (
-    BAR,
-    FRAME,
-    SPEED,
-    TENSION,
-    TORQUE,
-    WINCHES,
-)
+from cspm_ident.signals.measurement import BAR, FRAME, SPEED, TENSION, TORQUE, WINCHES
 from cspm_ident.signals.noise import with_more_noise
 from cspm_ident.signals.timeline import Timeline
 from cspm_msgs_py.testbed import Testbed

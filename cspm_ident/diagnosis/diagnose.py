@@ -10,29 +10,35 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from cspm_ident.diagnosis.cell_clock import on_drives_clock
-from cspm_ident.diagnosis.chatter import chatters_of
-from cspm_ident.diagnosis.columns import Candidate, Place
-from cspm_ident.diagnosis.curves import Curve, held_out_curves
-from cspm_ident.diagnosis.cuts import first_part, span_of, whole_part
-from cspm_ident.diagnosis.drivers import Driver, Knots
-from cspm_ident.diagnosis.equation import in_noise, steady
-from cspm_ident.diagnosis.evidence import Evidence, gather
-from cspm_ident.diagnosis.hypothesis import Findings, Named
-from cspm_ident.diagnosis.judgement import HeldOut, free_functions, judged
-from cspm_ident.diagnosis.limits import Limit, detection_limits
-from cspm_ident.diagnosis.lines import Line
-from cspm_ident.diagnosis.look import Parts, Progress, Recordings, hums_of, searched_for
-from cspm_ident.diagnosis.model import Data, Model, modelled
-from cspm_ident.diagnosis.onset import Onset
-from cspm_ident.diagnosis.refine import Cut
-from cspm_ident.diagnosis.region import Region, region_of
-from cspm_ident.diagnosis.reversals import with_wider
-from cspm_ident.diagnosis.safeguards import ALL_SAFEGUARDS, Safeguards
-from cspm_ident.diagnosis.search import Search
-from cspm_ident.diagnosis.simulation import SimulatedFit, Worth, baselines_of
-from cspm_ident.diagnosis.standing import Standing, standing_of
-from cspm_ident.diagnosis.weights import Weights
+from cspm_ident.diagnosis.regression.block_gram import Evidence, gather
+from cspm_ident.diagnosis.regression.coefficients import Weights
+from cspm_ident.diagnosis.regression.hypothesis import Findings, Named
+from cspm_ident.diagnosis.residuals.aliased_tension import chatters_of
+from cspm_ident.diagnosis.residuals.data_split import first_part, span_of, whole_part
+from cspm_ident.diagnosis.residuals.free_shapes import Driver, Knots
+from cspm_ident.diagnosis.residuals.load_cell_clock import on_drives_clock
+from cspm_ident.diagnosis.residuals.regressors import Candidate, Place
+from cspm_ident.diagnosis.residuals.residual_equation import in_noise, steady
+from cspm_ident.diagnosis.residuals.spectral_lines import Line
+from cspm_ident.diagnosis.selection.onset import Onset
+from cspm_ident.diagnosis.selection.refinement import Cut
+from cspm_ident.diagnosis.selection.region import Region, region_of
+from cspm_ident.diagnosis.selection.safeguards import ALL_SAFEGUARDS, Safeguards
+from cspm_ident.diagnosis.selection.search import Search
+from cspm_ident.diagnosis.selection.search_pass import (
+    Parts,
+    Progress,
+    Recordings,
+    hums_of,
+    searched_for,
+)
+from cspm_ident.diagnosis.validation.acceptance import Standing, standing_of
+from cspm_ident.diagnosis.validation.detection_limits import Limit, detection_limits
+from cspm_ident.diagnosis.validation.found_model import Data, Model, modelled
+from cspm_ident.diagnosis.validation.holdout_residuals import HeldOut, free_functions, judged
+from cspm_ident.diagnosis.validation.holdout_simulation import SimulatedFit, Worth, baselines_of
+from cspm_ident.diagnosis.validation.residual_curves import Curve, held_out_curves
+from cspm_ident.diagnosis.validation.reversals import with_wider
 from cspm_ident.signals.measurement import Measurement
 from cspm_sim.effects import Effect
 

@@ -2,11 +2,7 @@
 
 from cspm_ident.estimation.estimate import Estimate, Interval
 from cspm_ident.estimation.identifiability import Direction
-from cspm_ident.estimation.instruments import (
-    Exogeneity,
-    InstrumentalSolution,
-    fit_instruments,
-)
+from cspm_ident.estimation.instruments import Exogeneity, InstrumentalSolution, fit_instruments
 from cspm_ident.estimation.linear import Solution, fit_linear
 from cspm_ident.estimation.nonlinear import fit
 from cspm_ident.estimation.parameter import Parameter, Prior

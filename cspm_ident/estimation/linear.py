@@ -19,13 +19,7 @@ from cspm_ident.estimation.noise import (
     rounding_floors,
     whiten_channels,
 )
-from cspm_ident.estimation.parameter import (
-    Parameter,
-    check_start,
-    free_indices,
-    prior_rows,
-    scales,
-)
+from cspm_ident.estimation.parameter import Parameter, check_start, free_indices, prior_rows, scales
 from cspm_ident.estimation.record import Record, check_records
 from cspm_msgs_py.errors import InputError
 

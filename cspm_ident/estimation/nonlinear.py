@@ -18,12 +18,7 @@ from cspm_ident.estimation.noise import (
     rounding_floors,
     whiten_channels,
 )
-from cspm_ident.estimation.parameter import (
-    check_start,
-    free_indices,
-    prior_rows,
-    scales,
-)
+from cspm_ident.estimation.parameter import check_start, free_indices, prior_rows, scales
 from cspm_ident.estimation.problem import Problem
 from cspm_msgs_py.errors import InputError
 

@@ -9,9 +9,9 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from cspm_ident.diagnosis.columns import Candidate, Place, shapes_of
-from cspm_ident.diagnosis.equation import Equation, steady
-from cspm_ident.diagnosis.recorded import equations_of
+from cspm_ident.diagnosis.residuals.recorded_equations import equations_of
+from cspm_ident.diagnosis.residuals.regressors import Candidate, Place, shapes_of
+from cspm_ident.diagnosis.residuals.residual_equation import Equation, steady
 from cspm_ident.experiment.excitations import excitations
 from cspm_ident.experiment.plan import Plan, planned
 from cspm_ident.experiment.separation import decided, with_shape

@@ -10,9 +10,9 @@ from itertools import combinations
 import numpy as np
 from numpy.typing import NDArray
 
-from cspm_ident.diagnosis.columns import Candidate, Place, shapes_of
-from cspm_ident.diagnosis.equation import Equation, in_noise
-from cspm_ident.diagnosis.recorded import equations_of
+from cspm_ident.diagnosis.residuals.recorded_equations import equations_of
+from cspm_ident.diagnosis.residuals.regressors import Candidate, Place, shapes_of
+from cspm_ident.diagnosis.residuals.residual_equation import Equation, in_noise
 from cspm_ident.signals.measurement import Measurement
 from cspm_ident.signals.samples import Samples
 from cspm_sim.effects import Block, Channel, Effect, Elements

@@ -14,9 +14,10 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.ndimage import gaussian_filter1d
 
-from cspm_control.tension_distribution import TensionDistribution
+from cspm_control.allocation.tension_distribution import TensionDistribution
 from cspm_control.waves.build import build_motion
-from cspm_ident.diagnosis.machine_signals import (
+from cspm_ident.diagnosis.residuals.cable_and_bar import Suspension
+from cspm_ident.diagnosis.residuals.machine_signals import (
     BodyMotion,
     MachineSignals,
     body_state,
@@ -24,16 +25,15 @@ from cspm_ident.diagnosis.machine_signals import (
     elongation_at,
     law_at,
 )
-from cspm_ident.diagnosis.suspension import Suspension
 from cspm_ident.signals.measurement import Measurement
 from cspm_ident.signals.samples import Samples
+from cspm_model.equilibrium import unstretched_lengths
+from cspm_model.kernels.cable import ATTACHMENT, EXIT, OFFSET_LENGTH, RADIUS
+from cspm_model.kernels.machine import PlantParameters
+from cspm_model.kernels.rotation import quaternion_from_euler
+from cspm_model.parameters import nominal_parameters
 from cspm_msgs_py.scenario import AngleProfile, Body, ClosedLoop, Scenario
 from cspm_msgs_py.testbed import Testbed, TestbedFile
-from cspm_sim.equilibrium import unstretched_lengths
-from cspm_sim.kernels.cable import ATTACHMENT, EXIT, OFFSET_LENGTH, RADIUS
-from cspm_sim.kernels.plant import PlantParameters
-from cspm_sim.kernels.rotation import quaternion_from_euler
-from cspm_sim.parameters import nominal_parameters
 
 Array = NDArray[np.float64]
 

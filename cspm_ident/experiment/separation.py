@@ -8,9 +8,9 @@ from dataclasses import replace
 import numpy as np
 from numpy.typing import NDArray
 
-from cspm_ident.diagnosis.columns import Candidate, Place
-from cspm_ident.diagnosis.equation import Equation, in_noise
-from cspm_ident.diagnosis.likeness import UNTRUE_SHARE
+from cspm_ident.diagnosis.regression.collinearity import UNTRUE_SHARE
+from cspm_ident.diagnosis.residuals.regressors import Candidate, Place
+from cspm_ident.diagnosis.residuals.residual_equation import Equation, in_noise
 from cspm_sim.effects import Effect
 
 Array = NDArray[np.float64]

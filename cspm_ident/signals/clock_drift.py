@@ -31,8 +31,8 @@ from cspm_ident.signals.delays import (
 from cspm_ident.signals.measurement import BAR, FRAME, TENSION, Measurement
 from cspm_ident.signals.samples import Samples
 from cspm_ident.signals.timeline import Timeline
+from cspm_model.kernels.machine import PlantParameters
 from cspm_msgs_py.testbed import Testbed
-from cspm_sim.kernels.plant import PlantParameters
 from cspm_sim.parameters import plant_parameters
 
 Array = NDArray[np.float64]

@@ -20,9 +20,9 @@ from cspm_ident.signals.measurement import BAR, FRAME
 from cspm_ident.signals.noise import noise_above_band
 from cspm_ident.signals.samples import Samples
 from cspm_ident.signals.timeline import Timeline, whole_stretches
+from cspm_model.kernels.cable import RADIUS
+from cspm_model.kernels.machine import PlantParameters
 from cspm_msgs_py.testbed import Testbed
-from cspm_sim.kernels.cable import RADIUS
-from cspm_sim.kernels.plant import PlantParameters
 from cspm_sim.parameters import plant_parameters
 
 Array = NDArray[np.float64]

@@ -9,14 +9,9 @@ from numpy.typing import NDArray
 from scipy.interpolate import RegularGridInterpolator
 
 from cspm_ident.signals.timeline import Timeline
-from cspm_sim.kernels.cable import (
-    DAMPING_CONSTANT,
-    DAMPING_SLOPE,
-    OFFSET_LENGTH,
-    RADIUS,
-)
-from cspm_sim.kernels.plant import PlantParameters
-from cspm_sim.kernels.trajectory import lengths_along, tensions_along
+from cspm_model.kernels.cable import DAMPING_CONSTANT, DAMPING_SLOPE, OFFSET_LENGTH, RADIUS
+from cspm_model.kernels.machine import PlantParameters
+from cspm_model.kernels.trajectory import lengths_along, tensions_along
 
 Array = NDArray[np.float64]
 

@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 
 from cspm_ident.recording_hash import recording_sha256
 from cspm_ident.signals.samples import Samples, ordered
+from cspm_model.kernels.trajectory import eulers_along
 from cspm_msgs_py.errors import InputError
 from cspm_msgs_py.recording.attached_testbed import attached_testbed
 from cspm_msgs_py.recording.reader import Recording
@@ -20,7 +21,6 @@ from cspm_msgs_py.recording.rows import Rows
 from cspm_msgs_py.recording.run_record import simulated_plant
 from cspm_msgs_py.testbed import Testbed, TestbedFile, load_testbed
 from cspm_msgs_py.topics import Topic
-from cspm_sim.kernels.trajectory import eulers_along
 
 Array = NDArray[np.float64]
 

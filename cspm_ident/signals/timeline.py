@@ -14,9 +14,9 @@ from cspm_ident.signals.measurement import Measurement
 from cspm_ident.signals.samples import Samples
 from cspm_ident.signals.smoothing import Smooth, band_of, smooth
 from cspm_ident.signals.winch_motion import WinchMotion, winch_motion
+from cspm_model.kernels.trajectory import body_rates_along, twists_along
+from cspm_model.motion import Motion
 from cspm_msgs_py.errors import InputError
-from cspm_sim.kernels.trajectory import body_rates_along, twists_along
-from cspm_sim.motion import Motion
 
 Array = NDArray[np.float64]
 

@@ -18,7 +18,6 @@ from cspm_ident.signals.clock_drift import ClockDrift, on_one_clock
 from cspm_ident.signals.measurement import Measurement
 from cspm_ident.signals.timeline import Timeline
 from cspm_ident.system.choice import Chosen
-from cspm_ident.system.judgement import Judgement, judge
 from cspm_ident.system.machine import machine_with
 from cspm_ident.system.noise_scatter import (
     DRAWS,
@@ -30,6 +29,7 @@ from cspm_ident.system.noise_scatter import (
     widened,
     without_bias,
 )
+from cspm_ident.system.prediction_test import Judgement, judge
 from cspm_ident.system.search import search
 from cspm_ident.system.shooting import Shooting, make_shooting
 from cspm_msgs_py.errors import InputError

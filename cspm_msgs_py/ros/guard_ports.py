@@ -6,7 +6,7 @@ from collections.abc import Callable
 
 from cspm_msgs_py.ros.contract_node import ContractNode, ros_class
 from cspm_msgs_py.ros.qos import contract_qos
-from cspm_msgs_py.stage import Guard
+from cspm_msgs_py.stepping.stage import Guard
 from cspm_msgs_py.topics import BRAKE, EMERGENCY_STOP, QOS_DEPTH, SAFE
 
 RESET = "~/reset"

@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 from rclpy.impl.implementation_singleton import rclpy_implementation
 
 from cspm_msgs_py.ros.row_taker import RowTaker, TakenRow
-from cspm_msgs_py.sequence_numbers import SequenceNumbers
+from cspm_msgs_py.stepping.sequence_numbers import SequenceNumbers
 
 Array = NDArray[np.float64]
 # In one look, so that a flood does not keep its reader from all else.

@@ -15,14 +15,7 @@ from rclpy.impl.implementation_singleton import rclpy_implementation
 from rclpy.node import Node
 from rclpy.type_support import check_for_type_support
 
-from cspm_msgs_py.ros.inlets import (
-    BlockInlet,
-    DueInlet,
-    DueReceiver,
-    Inlet,
-    ObjectInlet,
-    RowInlet,
-)
+from cspm_msgs_py.ros.inlets import BlockInlet, DueInlet, DueReceiver, Inlet, ObjectInlet, RowInlet
 from cspm_msgs_py.ros.qos import contract_qos
 from cspm_msgs_py.ros.rcl_message import take_address
 from cspm_msgs_py.ros.row_taker import RowTaker

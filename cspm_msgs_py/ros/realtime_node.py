@@ -12,9 +12,9 @@ from cspm_msgs_py.graph import Edges
 from cspm_msgs_py.ros.contract_node import ContractNode, ros_class
 from cspm_msgs_py.ros.guard_ports import GuardPorts
 from cspm_msgs_py.ros.rendezvous import FollowerSide
-from cspm_msgs_py.sample_and_hold import SampleAndHold, WallTrajectory
 from cspm_msgs_py.schedule import CLOCK, TORQUE_COMMAND, Schedule
-from cspm_msgs_py.stage import Guard, Stage
+from cspm_msgs_py.stepping.sample_and_hold import SampleAndHold, WallTrajectory
+from cspm_msgs_py.stepping.stage import Guard, Stage
 from cspm_msgs_py.topics import DIAGNOSTICS, QOS_DEPTH, SAFE, Topic
 
 Array = NDArray[np.float64]

@@ -9,13 +9,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from cspm_msgs_py.graph import Edges
-from cspm_msgs_py.lockstep import Acknowledgement, Follower
 from cspm_msgs_py.ros.contract_node import ContractNode
 from cspm_msgs_py.ros.guard_ports import GuardPorts
 from cspm_msgs_py.ros.outbox import Outbox
 from cspm_msgs_py.ros.rendezvous import FollowerSide
 from cspm_msgs_py.schedule import Schedule
-from cspm_msgs_py.stage import Guard, Stage
+from cspm_msgs_py.stepping.lockstep import Acknowledgement, Follower
+from cspm_msgs_py.stepping.stage import Guard, Stage
 from cspm_msgs_py.topics import DIAGNOSTICS, Topic
 
 Array = NDArray[np.float64]

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from functools import cache
 from importlib import import_module
-from pkgutil import iter_modules
+from pkgutil import walk_packages
 
 from cspm_msgs_py.errors import InputError
 from cspm_sim.effects.effect import (
@@ -39,7 +39,8 @@ def catalogue() -> dict[str, Effect]:
     Raises:
         InputError: a file of `CSPM_EFFECTS` is unusable, or its effect's id is taken.
     """
-    modules = (import_module(f"{__name__}.{info.name}") for info in iter_modules(__path__))
+    found = walk_packages(__path__, f"{__name__}.")
+    modules = (import_module(info.name) for info in found if not info.ispkg)
     effects = {module.EFFECT.id: module.EFFECT for module in modules if hasattr(module, "EFFECT")}
     for effect in own_effects():
         if effect.id in effects:

@@ -9,7 +9,7 @@ from numba import njit
 from numpy import float64, int64
 from numpy.typing import NDArray
 
-from cspm_sim.kernels.cable import (
+from cspm_model.kernels.cable import (
     DAMPING_CONSTANT,
     DAMPING_SLOPE,
     DIRECTION,
@@ -26,6 +26,7 @@ from cspm_sim.kernels.cable import (
     elastic_tension,
     law_scale,
 )
+from cspm_model.kernels.rotation import Placement
 from cspm_sim.kernels.hooks import (
     CABLE,
     DRIVE,
@@ -36,7 +37,6 @@ from cspm_sim.kernels.hooks import (
     first_effect,
     run_effects,
 )
-from cspm_sim.kernels.rotation import Placement
 from cspm_sim.kernels.winch import (
     REPORTED_TORQUE,
     RESISTANCE,

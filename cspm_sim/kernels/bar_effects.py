@@ -4,14 +4,18 @@ from numba import njit
 from numpy import float64, int64
 from numpy.typing import NDArray
 
-from cspm_sim.kernels.bar import GRAVITY, VELOCITY, WRENCH, bar_acceleration
-from cspm_sim.kernels.cable import ARM, DIRECTION, EXIT, LENGTH, TENSION
+from cspm_model.kernels.bar import GRAVITY, bar_acceleration
+from cspm_model.kernels.cable import ARM, DIRECTION, EXIT, LENGTH, TENSION
+from cspm_model.kernels.rotation import Placement, Vector, cross, rotate
 from cspm_sim.kernels.hooks import ATTACHMENT, BAR, HOOK, PENDANT, first_effect, run_effects
-from cspm_sim.kernels.rotation import Placement, Vector, cross, rotate
 
 Array = NDArray[float64]
 Rows = NDArray[int64]
 
+# What effects on the bar read and change: velocity of the bar frame's origin, world axes, and the
+# wrench that the effect adds there, world axes.
+VELOCITY = 0
+WRENCH = 6
 # What effects at an attachment read: cable direction, velocity of the attachment against the exit,
 # world axes, length, tension, gravity, velocity of the exit; and the force on the bar at the
 # attachment that they add to.

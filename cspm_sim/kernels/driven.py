@@ -12,20 +12,17 @@ from numba import njit
 from numpy import float64
 from numpy.typing import NDArray
 
+from cspm_model.kernels.cable import TENSION, cable_spans
+from cspm_model.kernels.machine import BAR_STATES, PlantParameters, bar_placement, frame_placement
+from cspm_model.kernels.motion import evaluate_motion
 from cspm_sim.kernels.affected_cables import RADIUS_ADDED, fill_cable_signals
-from cspm_sim.kernels.cable import TENSION, cable_spans
 from cspm_sim.kernels.hooks import CABLE, WINCH, first_effect, run_effects
-from cspm_sim.kernels.motion import evaluate_motion
 from cspm_sim.kernels.plant import (
-    BAR_STATES,
-    PlantParameters,
     Scratch,
     add_stage,
-    bar_placement,
     bar_rate,
     begin_stages,
     end_stages,
-    frame_placement,
     plant_rate,
     plant_step,
     plant_tensions,

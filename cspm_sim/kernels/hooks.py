@@ -8,6 +8,7 @@ from numba import njit
 from numpy import float64, int64
 from numpy.typing import NDArray
 
+from cspm_model.kernels.machine import EFFECT_COLUMNS
 from cspm_sim.kernels.effect_call import call_kernel, call_kernel_with_states
 
 Array = NDArray[float64]
@@ -30,7 +31,7 @@ ELEMENT = 1
 ADDRESS = 2
 FIRST_STATE = 3  # index in the plant's state, -1 without memory
 STATES = 4  # how many
-ROW_COLUMNS = 5
+ROW_COLUMNS = EFFECT_COLUMNS
 
 
 @njit(cache=True, error_model="numpy", _nrt=False)

@@ -13,10 +13,8 @@ from numba import njit
 from numpy import float64, int64
 from numpy.typing import NDArray
 
-from cspm_sim.kernels.affected_cables import CABLE_SIGNALS, affected_cables
-from cspm_sim.kernels.bar import bar_acceleration
-from cspm_sim.kernels.bar_effects import END_SIGNALS, PENDANT_SIGNALS, effects_on_bar
-from cspm_sim.kernels.cable import (
+from cspm_model.kernels.bar import bar_acceleration
+from cspm_model.kernels.cable import (
     LENGTH,
     SPAN_COLUMNS,
     TENSION,
@@ -24,15 +22,15 @@ from cspm_sim.kernels.cable import (
     cable_tensions,
     cable_wrench,
 )
-from cspm_sim.kernels.hooks import FIRST_STATE, HOOK, STATES, WINCH, run_effects
-from cspm_sim.kernels.motion import evaluate_motion
-from cspm_sim.kernels.rotation import (
+from cspm_model.kernels.machine import BAR_STATES, PlantParameters, bar_placement, frame_placement
+from cspm_model.kernels.motion import evaluate_motion
+from cspm_model.kernels.rotation import (
     Placement,
     body_rate_to_euler_rate,
-    euler_rate_to_world_rate,
-    rotate,
-    rotation_from_euler,
 )
+from cspm_sim.kernels.affected_cables import CABLE_SIGNALS, affected_cables
+from cspm_sim.kernels.bar_effects import END_SIGNALS, PENDANT_SIGNALS, effects_on_bar
+from cspm_sim.kernels.hooks import FIRST_STATE, HOOK, STATES, WINCH, run_effects
 from cspm_sim.kernels.winch import (
     DRY_LIMIT,
     RESISTANCE,
@@ -42,28 +40,6 @@ from cspm_sim.kernels.winch import (
 )
 
 Array = NDArray[float64]
-
-BAR_STATES = 12
-
-
-class PlantParameters(NamedTuple):
-    """Everything constant, as flat arrays. `n` cables, `m` effects on single elements.
-
-    Attributes:
-        bar: bar parameters and gravity, empty without a bar; see `kernels.bar`.
-        cables: shape (n, CABLE_COLUMNS), cables with their winches; see `kernels.cable`. In column
-            order in memory, so that a processor takes several cables at a time.
-        tables: shape (n, points, 2): tension and its slope along the stiffness law.
-        effects: shape (m, ROW_COLUMNS): hook, element (cable index, 0 for bar and winch frame),
-            kernel address, first state; see `kernels.hooks`.
-        effect_parameters: shape (m, widest).
-    """
-
-    bar: Array
-    cables: Array
-    tables: Array
-    effects: NDArray[int64]
-    effect_parameters: Array
 
 
 class Scratch(NamedTuple):
@@ -90,33 +66,6 @@ def make_scratch(n_states: int, n_cables: int) -> Scratch:
         stages=np.zeros((3, n_states)),
         spans=np.zeros((n_cables, SPAN_COLUMNS), order="F"),
         signals=np.zeros(max(CABLE_SIGNALS, END_SIGNALS, PENDANT_SIGNALS, WINCH_SIGNALS)),
-    )
-
-
-@njit(cache=True, error_model="numpy", inline="always")
-def frame_placement(frame: Array) -> Placement:
-    """Return the winch frame's position, rotation, velocity and angular velocity."""
-    rate = euler_rate_to_world_rate(frame[4], frame[5], frame[9], frame[10], frame[11])
-    return (
-        (frame[0], frame[1], frame[2]),
-        rotation_from_euler(frame[3], frame[4], frame[5]),
-        (frame[6], frame[7], frame[8]),
-        rate,
-    )
-
-
-@njit(cache=True, error_model="numpy", inline="always")
-def bar_placement(state: Array, has_bar: bool) -> Placement:
-    """Return the bar's placement; without a bar that of the world, where its cables end."""
-    if not has_bar:
-        zero = (0.0, 0.0, 0.0)
-        return zero, rotation_from_euler(0.0, 0.0, 0.0), zero, zero
-    rotation = rotation_from_euler(state[3], state[4], state[5])
-    return (
-        (state[0], state[1], state[2]),
-        rotation,
-        (state[6], state[7], state[8]),
-        rotate(rotation, state[9], state[10], state[11]),
     )
 
 

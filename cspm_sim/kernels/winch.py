@@ -4,7 +4,7 @@ from numba import njit
 from numpy import float64
 from numpy.typing import NDArray
 
-from cspm_sim.kernels.cable import INERTIA, RADIUS, TORQUE_LIMIT
+from cspm_model.kernels.cable import INERTIA, RADIUS, TORQUE_LIMIT
 
 Array = NDArray[float64]
 

@@ -16,8 +16,8 @@ from matplotlib.patches import Arc, Circle, FancyArrowPatch
 from matplotlib.patheffects import withStroke
 from numpy.typing import NDArray
 
+from cspm_model.kinematics import rotation
 from cspm_msgs_py.testbed import Cable, Testbed, load_testbed
-from cspm_sim.kinematics import rotation
 
 Array = NDArray[np.float64]
 

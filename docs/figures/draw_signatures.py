@@ -16,18 +16,18 @@ from matplotlib.axes import Axes
 from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.figure import Figure
 
-from cspm_bringup.assembly import resolve
-from cspm_bringup.bundle import make_bundle
-from cspm_bringup.run import run
-from cspm_ident.diagnosis.columns import Place
-from cspm_ident.diagnosis.curves import explained_by
-from cspm_ident.diagnosis.equation import Equation
+from cspm_ident.diagnosis.residuals.regressors import Place
+from cspm_ident.diagnosis.residuals.residual_equation import Equation
+from cspm_ident.diagnosis.validation.residual_curves import explained_by
 from cspm_ident.experiment.isolability import Sensors, Signature, signatures
 from cspm_ident.experiment.isolability_page import CABLE, NOISE, rich_measurement
 from cspm_ident.signals.measurement import Measurement, read_measurement
 from cspm_msgs_py.dofs import DOFS
 from cspm_msgs_py.scenario import load_scenario
 from cspm_msgs_py.testbed import load_testbed
+from cspm_run.assembly import resolve
+from cspm_run.bundle import make_bundle
+from cspm_run.recorded_run import run
 from cspm_sim.effects import Block, Effect, catalogue
 
 COLUMNS = 4

@@ -13,7 +13,7 @@ from matplotlib.axes import Axes
 from model_numbers import Law, thesis_laws
 from scipy.integrate import solve_ivp
 
-from cspm_sim.stiffness import law_slope
+from cspm_model.stiffness import law_slope
 
 COLOURS = {"tangent": "#1f6fb4", "no cap": "#7fb2de", "secant": "#c8501e", "cap": "#8a8a8a"}
 

@@ -14,10 +14,10 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.integrate import solve_ivp
 
+from cspm_model.motion import Motion
+from cspm_model.stiffness import law_slope, law_table
 from cspm_msgs_py.testbed import Cable, ExponentialStiffness, Testbed, load_testbed
-from cspm_sim.motion import Motion
 from cspm_sim.plant import Plant
-from cspm_sim.stiffness import law_slope, law_table
 
 Array = NDArray[np.float64]
 

@@ -14,9 +14,9 @@ from model_numbers import holding_torque, thesis_plant
 from numpy.typing import NDArray
 from scipy.integrate import simpson
 
+from cspm_model.kernels.cable import LAW_EXPONENT, OFFSET_LENGTH, RADIUS, elastic_tension, law_scale
+from cspm_model.kinematics import geometry, rotation
 from cspm_msgs_py.testbed import ExponentialStiffness
-from cspm_sim.kernels.cable import LAW_EXPONENT, OFFSET_LENGTH, RADIUS, elastic_tension, law_scale
-from cspm_sim.kinematics import geometry, rotation
 from cspm_sim.plant import Plant
 
 Array = NDArray[np.float64]

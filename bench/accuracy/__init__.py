@@ -1,0 +1,1 @@
+"""How exact comparisons, identifications and intervals are, by simulation."""

@@ -1,0 +1,161 @@
+"""Diagnose recordings in processes that are given nothing else to read."""
+
+from __future__ import annotations
+
+import json
+import os
+import shutil
+import subprocess
+import sys
+import tempfile
+import time
+from collections.abc import Callable, Mapping, Sequence
+from concurrent.futures import ThreadPoolExecutor, as_completed
+from pathlib import Path
+from threading import Event
+
+from bench.blind.jobs import jobs_of
+from bench.blind.scoring.method import CSPM, require_method
+from bench.blind.truth import RECORDINGS, results_of
+from cspm_msgs_py.errors import InputError
+
+DIAGNOSIS, TIMES, FAILURE = "diagnosis.json", "times.json", "failure.txt"
+_KEPT = ("PATH", "LANG", "LD_LIBRARY_PATH", "VIRTUAL_ENV")
+_THREADS = ("NUMBA_NUM_THREADS", "OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS")
+
+# Within which a process is killed when the run is ended [s].
+_NOTICED_S = 0.2
+
+Tell = Callable[[str, int, int], None]
+
+
+def run(
+    folder: Path,
+    tell: Tell = lambda text, done, total: None,
+    methods: Sequence[str] = (CSPM,),
+    jobs: int | None = None,
+) -> dict[str, str]:
+    """Diagnose every recording without a result; return what failed, with the reason.
+
+    Each result is there whole or not at all, so that an interrupted run goes on where it was.
+
+    Args:
+        folder: the benchmark's.
+        tell: called with what is being done, how much of it is done, and how much there is.
+        methods: of `METHODS`, each confined with the others to one process per recording.
+        jobs: recordings at a time; None: as many as there are processors.
+
+    Raises:
+        InputError: no recordings there, no such method, one whose packages are not there, or no
+            jobs.
+    """
+    for method in methods:
+        require_method(method)
+    processes = jobs_of(jobs)
+    recordings = folder / RECORDINGS
+    places = sorted(recordings.iterdir()) if recordings.is_dir() else []
+    # A folder is empty where the controllers lost the bar.
+    names = [place.name for place in places if any(place.iterdir())]
+    if not names:
+        raise InputError(
+            f"{folder}: no {RECORDINGS}, allowed: a folder of `python -m bench.blind make`"
+        )
+    tell(f"diagnosing {len(names)} recordings", 0, len(names))
+    ended = Event()
+    with ThreadPoolExecutor(processes) as pool:
+        begun = {
+            pool.submit(_diagnose, recordings / name, _places(folder, methods, name), ended): name
+            for name in names
+        }
+        try:
+            for done, task in enumerate(as_completed(begun), start=1):
+                task.result()
+                tell(f"diagnosed {begun[task]}", done, len(names))
+        finally:
+            ended.set()
+            pool.shutdown(cancel_futures=True)
+    return _failures(folder, methods, names)
+
+
+def _places(folder: Path, methods: Sequence[str], name: str) -> dict[str, Path]:
+    return {method: results_of(folder, method) / name for method in methods}
+
+
+def _failures(folder: Path, methods: Sequence[str], names: Sequence[str]) -> dict[str, str]:
+    failed = {}
+    for name in names:
+        for method, place in _places(folder, methods, name).items():
+            if (place / FAILURE).exists():
+                reason = (place / FAILURE).read_text(encoding="utf-8").splitlines()[-1]
+                failed[name if method == CSPM else f"{name}, {method}"] = reason
+    return failed
+
+
+def _diagnose(recording: Path, places: Mapping[str, Path], ended: Event) -> None:
+    """Diagnose a recording by the methods without a result; each result goes to its place.
+
+    Nothing is kept of a process during which the run was ended.
+    """
+    missing = {method: place for method, place in places.items() if not place.exists()}
+    if not missing or ended.is_set():
+        return
+    with tempfile.TemporaryDirectory(prefix="cspm-blind-") as room:
+        copy = Path(room) / recording.name
+        shutil.copytree(recording, copy)
+        begun = time.perf_counter()
+        process = subprocess.Popen(
+            [sys.executable, "-m", "bench.blind.confined", copy.name, *missing],
+            cwd=room,
+            env=environment(Path(room)),
+            stdout=subprocess.DEVNULL,
+            stderr=subprocess.PIPE,
+            text=True,
+            # Ctrl-C is the parent's, which then keeps nothing of what it kills.
+            start_new_session=True,
+        )
+        error = _said(process, ended)
+        wall = time.perf_counter() - begun
+        if ended.is_set():
+            return
+        said = error.strip() or f"exit {process.returncode}, nothing said"
+        for method, place in missing.items():
+            _keep(Path(room), method, place, said, wall)
+
+
+def _said(process: subprocess.Popen[str], ended: Event) -> str:
+    """Wait for a process, and return what it said of errors; kill it when the run is ended."""
+    while True:
+        try:
+            return process.communicate(timeout=_NOTICED_S)[1]
+        except subprocess.TimeoutExpired:
+            if ended.is_set():
+                process.kill()
+
+
+def _keep(room: Path, method: str, place: Path, said: str, wall: float) -> None:
+    """Keep what a process has left of one method, whole."""
+    part = place.with_name(f".part-{place.name}")
+    shutil.rmtree(part, ignore_errors=True)
+    part.mkdir(parents=True)
+    report, reason = room / f"{method}.json", room / f"{method}.txt"
+    times = {"wall_s": wall, "cpu_s": 0.0}
+    if report.exists():
+        content = json.loads(report.read_text(encoding="utf-8"))
+        times["cpu_s"] = content["cpu_s"]
+        told = json.dumps(content["diagnosis"], indent=2)
+        (part / DIAGNOSIS).write_text(told, encoding="utf-8")
+    else:
+        why = reason.read_text(encoding="utf-8") if reason.exists() else said
+        (part / FAILURE).write_text(f"{why.strip()}\n", encoding="utf-8")
+    (part / TIMES).write_text(json.dumps(times), encoding="utf-8")
+    part.rename(place)
+
+
+def environment(room: Path) -> dict[str, str]:
+    """Return what a confined process knows of its surroundings: the code, and its own room."""
+    kept = {name: os.environ[name] for name in _KEPT if name in os.environ}
+    # As many recordings as there are processors are diagnosed at a time.
+    kept |= {name: os.environ.get(name, "1") for name in _THREADS}
+    code = str(Path(__file__).resolve().parents[2])
+    home = {"HOME": str(room), "TMPDIR": str(room), "MPLCONFIGDIR": str(room)}
+    return kept | home | {"PYTHONPATH": code, "PYTHONSAFEPATH": "1"}

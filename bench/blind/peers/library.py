@@ -1,0 +1,63 @@
+"""The residuals of a recording beside every effect's columns: what peers choose from."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import NamedTuple
+
+from cspm_ident.diagnosis.regression.block_gram import Evidence, gather
+from cspm_ident.diagnosis.regression.white_regression import WhiteSums
+from cspm_ident.diagnosis.residuals.data_split import first_part, last_part, span_of
+from cspm_ident.diagnosis.residuals.recorded_equations import equations_of
+from cspm_ident.diagnosis.residuals.regressors import Candidate
+from cspm_ident.diagnosis.residuals.residual_equation import Equation, in_noise, steady
+from cspm_ident.diagnosis.selection.search_pass import BLOCKS, noise_of
+from cspm_ident.signals.measurement import Measurement
+from cspm_msgs_py.errors import InputError
+from cspm_sim.effects import catalogue
+
+
+class Library(NamedTuple):
+    """Equations in units of their noise, parted as the diagnosis parts them.
+
+    Attributes:
+        searched: what may be fitted to.
+        judge: what may not.
+        evidence: the sums of what is searched.
+        sums: the same, with the errors of white residuals.
+        judge_evidence: the sums of what is not searched.
+    """
+
+    searched: Sequence[Equation]
+    judge: Sequence[Equation]
+    evidence: Evidence
+    sums: WhiteSums
+    judge_evidence: Evidence
+
+    @property
+    def candidates(self) -> list[Candidate]:
+        """Effects on elements whose columns are not zero."""
+        return [
+            term
+            for term in self.evidence.terms
+            if isinstance(term, Candidate)
+            and self.sums.excited[self.evidence.columns_of([term])].all()
+        ]
+
+
+def library_of(measurement: Measurement) -> Library:
+    """Return the library of a recording, with all of the catalogue.
+
+    Raises:
+        InputError: the recording has no residual.
+    """
+    parts = [equations_of(measurement, list(catalogue().values()))]
+    if not parts[0]:
+        raise InputError(f"{measurement.path}: no residual, allowed: recordings to be diagnosed")
+    first, last = steady(first_part(parts)), last_part(parts)
+    noise = noise_of(first)
+    (searched,), (judge,) = in_noise(first, noise), in_noise(last, noise)
+    start, end = span_of(searched)
+    block = (end - start) / BLOCKS
+    evidence = gather([searched], block)
+    return Library(searched, judge, evidence, WhiteSums(evidence), gather([judge], block))

@@ -1,0 +1,1 @@
+"""The numbers and pictures of docs/results.md: `python -m bench.results`."""

@@ -1,0 +1,183 @@
+"""Commands that analyse a machine and its controllers: analyze linear, workspace and so on."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from cspm.cli.app import Json, app
+
+analyze = typer.Typer(
+    no_args_is_help=True,
+    help="What a machine and its controllers can do, beside what the thesis says of its own.",
+)
+app.add_typer(analyze, name="analyze")
+
+ScenarioName = Annotated[
+    str,
+    typer.Argument(
+        metavar="[SCENARIO]", help="A scenario's name or file; its machine and rates are analysed."
+    ),
+]
+MachineFile = Annotated[
+    Path | None,
+    typer.Option("--testbed", metavar="FILE", help="A machine instead of the scenario's."),
+]
+At = Annotated[
+    str | None,
+    typer.Option(
+        "--pose",
+        metavar="X,Y,Z,φ,θ,ψ",
+        help="Where the bar is, in m and rad, z down; otherwise where the scenario's controllers"
+        " are designed.",
+    ),
+]
+Folder = Annotated[
+    Path | None, typer.Option("--out", metavar="FOLDER", help="A new folder for what is drawn.")
+]
+DEFAULT_SCENARIO = "worst_case"
+
+
+@analyze.command(
+    epilog="""Examples:
+
+cspm analyze linear --out linear
+
+cspm analyze linear worst_case_4m --pose 0,0,4,0,0,0 --json linear.json
+
+cspm analyze linear --testbed my_rig.yaml --pose 0,0,1.5,0,0,0
+
+Exit code: 0 done, 1 the bar cannot hang there, 2 unusable input."""
+)
+def linear(
+    scenario: ScenarioName = DEFAULT_SCENARIO,
+    testbed: MachineFile = None,
+    pose: At = None,
+    out: Folder = None,
+    json: Json = None,
+) -> None:
+    """Linearise about rest: modes, damping, singular values, relative gains, condition numbers.
+
+    Once with cable directions held, as the thesis does, and once exactly.
+    """
+    from cspm.commands.analyze_linear_command import analyze_linear_command
+    from cspm.commands.analyzed_machine import read_machine
+
+    analyze_linear_command(read_machine(scenario, testbed, pose), out, json)
+
+
+@analyze.command(
+    epilog="""Examples:
+
+cspm analyze workspace --coarse 4
+
+cspm analyze workspace --out workspace --json workspace.json
+
+cspm analyze workspace --acceleration 0.2,0.2,0.5,0,0.2,0.2 --pose 0,0,3,0,0,0
+
+Exit code: 0 done, 2 unusable input, 130 interrupted: nothing is written."""
+)
+def workspace(
+    scenario: ScenarioName = DEFAULT_SCENARIO,
+    testbed: MachineFile = None,
+    pose: At = None,
+    acceleration: Annotated[
+        str | None,
+        typer.Option(
+            metavar="X,Y,Z,φ,θ,ψ",
+            help="What the bar has to accelerate either way, in all at once, in m/s² and rad/s²;"
+            " otherwise the RMS of the scenario's reference.",
+        ),
+    ] = None,
+    coarse: Annotated[
+        int,
+        typer.Option(
+            metavar="N",
+            min=1,
+            max=14,
+            help="Take every N-th value of each DOF of the thesis's whole grids, 28.6 million"
+            " poses in all, for a quick look. Limits and maps stay as fine.",
+        ),
+    ] = 1,
+    out: Folder = None,
+    json: Json = None,
+) -> None:
+    """Find where the cables can hold the bar: the thesis's algorithms 1 and 2, and beyond.
+
+    Beyond: tensions from their lowest limit, room for an acceleration, conditioning,
+    manipulability.
+    """
+    from cspm.commands.analyze_workspace_command import analyze_workspace_command
+    from cspm.commands.analyzed_machine import read_acceleration, read_machine
+
+    required = None if acceleration is None else read_acceleration(acceleration)
+    machine = read_machine(scenario, testbed, pose)
+    analyze_workspace_command(machine, required, coarse, out, json)
+
+
+@analyze.command(
+    epilog="""Examples:
+
+cspm analyze manipulability
+
+cspm analyze manipulability --pose 0.1,0,1,0,0.2,0 --out manipulability --json found.json
+
+Exit code: 0 done, 2 unusable input."""
+)
+def manipulability(
+    scenario: ScenarioName = DEFAULT_SCENARIO,
+    testbed: MachineFile = None,
+    pose: At = None,
+    out: Folder = None,
+    json: Json = None,
+) -> None:
+    """Tell how well the cables move the bar at a pose: Yoshikawa's measure and ellipsoids.
+
+    And what acceleration gravity and the cables' limits leave in each DOF.
+    """
+    from cspm.commands.analyze_manipulability_command import analyze_manipulability_command
+    from cspm.commands.analyzed_machine import read_machine
+
+    analyze_manipulability_command(read_machine(scenario, testbed, pose), out, json)
+
+
+@analyze.command(
+    epilog="""Examples:
+
+cspm analyze design --out design
+
+cspm analyze design calm --computing 0.002 --json design.json
+
+cspm analyze design my_scenario.yaml --pose 0,0,4,0,0,0
+
+Exit code: 0 done, 1 the bar cannot hang there, 2 unusable input."""
+)
+def design(
+    scenario: ScenarioName = DEFAULT_SCENARIO,
+    testbed: MachineFile = None,
+    pose: At = None,
+    computing: Annotated[
+        float | None,
+        typer.Option(
+            metavar="SECONDS",
+            min=0.0,
+            max=1.0,
+            help="From a measurement to its torque, a whole number of the plant's periods;"
+            " otherwise one period of the force controllers, as of drives that act in their next"
+            " cycle.",
+        ),
+    ] = None,
+    out: Folder = None,
+    json: Json = None,
+) -> None:
+    """Look at a scenario's control loops: margins as designed, as sampled, and as they cascade.
+
+    Gains that the scenario does not give are designed first, at its design pose; the loops are
+    looked at where --pose says.
+    """
+    from cspm.commands.analyze_design_command import analyze_design_command
+    from cspm.commands.analyzed_machine import read_machine
+
+    analyze_design_command(read_machine(scenario, testbed, pose), computing, out, json)

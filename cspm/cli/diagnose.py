@@ -1,0 +1,74 @@
+"""The command that says where a recording and the model differ, and why: diagnose."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from cspm.cli.app import Json, app
+from cspm_msgs_py.errors import InputError
+
+
+@app.command(
+    epilog="""Examples:
+
+cspm diagnose today --held-out yesterday --out verdict
+
+cspm diagnose monday tuesday --testbed my_rig.yaml --json diagnosis.json
+
+cspm diagnose --explain winch_coulomb_friction
+
+Exit code: 0 done, whatever the verdict; 2 unusable input.""",
+)
+def diagnose(
+    recordings: Annotated[
+        list[Path] | None,
+        typer.Argument(metavar="REC...", help="Recordings to search, all of one machine."),
+    ] = None,
+    held_out: Annotated[
+        list[Path] | None,
+        typer.Option(
+            metavar="REC",
+            help="A recording on which to judge what was found; may be repeated. Otherwise the last"
+            " three tenths of each recording are kept for that.",
+        ),
+    ] = None,
+    testbed: Annotated[
+        Path | None,
+        typer.Option(
+            metavar="FILE",
+            help="The machine as it is believed to be, instead of the one that they carry.",
+        ),
+    ] = None,
+    explain: Annotated[
+        str | None,
+        typer.Option(metavar="EFFECT", help="Say what an effect is and how it shows; no more."),
+    ] = None,
+    out: Annotated[
+        Path | None,
+        typer.Option(
+            metavar="FOLDER",
+            help="A new folder for diagnosis.html, .json and .png and testbed.improved.yaml.",
+        ),
+    ] = None,
+    closed_loop: Annotated[
+        bool,
+        typer.Option(help="Simulate the recorded closed loop again with what was found."),
+    ] = True,
+    json: Json = None,
+) -> None:
+    """Locate the mismatch of recording and model, name what is missing, and show the fit improve.
+
+    Every residual is driven by what was measured, so that feedback cannot hide an effect. What is
+    found is judged on data that was not searched.
+    """
+    from cspm.commands.diagnose_command import DiagnoseRequest, diagnose_command, explain_command
+
+    if explain is not None:
+        explain_command(explain)
+        return
+    if not recordings:
+        raise InputError("diagnose: no recording, allowed: one or more, or --explain EFFECT")
+    diagnose_command(DiagnoseRequest(recordings, held_out or [], testbed, out, closed_loop), json)

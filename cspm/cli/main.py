@@ -1,0 +1,173 @@
+"""The command line `cspm`."""
+
+from __future__ import annotations
+
+import sys
+from importlib import import_module
+from pathlib import Path
+from typing import Annotated, NoReturn
+
+import typer
+
+from cspm.cli.app import RUN_FAILED, Json, app, new_folder
+from cspm_msgs_py.errors import CspmError, InputError
+from cspm_run.library import find_scenario, scenario_names
+
+MODES = ("inprocess", "graph", "processes", "realtime")
+BAD_USAGE = 2
+INTERRUPTED = 130
+# Typer exports few of the errors that wrong usage gives; this is the class of all.
+_UsageError: type[typer.BadParameter] = typer.BadParameter.__bases__[0]
+
+
+def main() -> None:
+    """Run the command line; every error is one line on stderr and an exit code."""
+    # They add their commands when they are loaded.
+    import_module("cspm.cli.recordings")
+    import_module("cspm.cli.compare")
+    import_module("cspm.cli.analyze")
+    import_module("cspm.cli.diagnose")
+    import_module("cspm.cli.identify")
+    import_module("cspm.cli.ros")
+    run_app(app, "cspm")
+
+
+def run_app(commands: typer.Typer, name: str) -> NoReturn:
+    """Run commands as the program `name`; every error is one line on stderr and an exit code."""
+    try:
+        code = typer.main.get_command(commands).main(prog_name=name, standalone_mode=False)
+    except CspmError as err:
+        _fail(str(err), err.exit_code)
+    except _UsageError as err:
+        command = err.ctx.command_path if err.ctx else name
+        _fail(f"{err.format_message().rstrip('.')}; see `{command} --help`", BAD_USAGE)
+    except OSError as err:
+        _fail(f"{err.filename or 'system'}: {err.strerror or err}", RUN_FAILED)
+    except typer.Abort:
+        code = INTERRUPTED
+    sys.exit(code)
+
+
+def _fail(text: str, code: int) -> NoReturn:
+    print(f"cspm: {' '.join(text.split())}", file=sys.stderr)  # noqa: T201 - the command line's voice
+    sys.exit(code)
+
+
+@app.callback(invoke_without_command=True)
+def overview(context: typer.Context) -> None:
+    """A cable-suspended test-bed in software: 8 elastic cables carry a bar below moving winches.
+
+    Begin with `cspm run worst_case`. `cspm COMMAND --help` explains a command.
+    """
+    if context.invoked_subcommand is None:
+        typer.echo(context.get_help())
+
+
+@app.command(
+    epilog=f"""Scenarios: {", ".join(scenario_names())}; any scenario file works as well.
+
+Examples:
+
+cspm run calm --duration 60 --out calm_60s
+
+cspm run my_scenario.yaml --seed 2 --no-record --json result.json
+
+cspm run worst_case --set sensors=ideal --set rates.motion_controller=100
+
+cspm run calm --testbed fitted/fitted_testbed.yaml
+
+cspm run calm --mode graph
+
+cspm run calm --mode realtime --plant external
+
+Exit code: 0 done, 1 diverged or interrupted, 2 unusable input.""",
+)
+def run(
+    scenario: Annotated[
+        str, typer.Argument(metavar="SCENARIO", help="A scenario's name, or a scenario file.")
+    ],
+    mode: Annotated[
+        str,
+        typer.Option(
+            metavar="MODE",
+            help="How to run: inprocess, without ROS; graph, ROS 2 nodes in one process; processes,"
+            " a process per node; these three give the same messages, bit for bit. realtime:"
+            " ROS 2 nodes paced by the wall clock.",
+        ),
+    ] = MODES[0],
+    plant: Annotated[
+        str,
+        typer.Option(
+            metavar="PLANT",
+            help="Whose equations to simulate: sim, or mujoco, a second implementation on the"
+            " MuJoCo engine; or external, nobody's: your drivers take the plant's place.",
+        ),
+    ] = "sim",
+    one_process: Annotated[
+        bool | None,
+        typer.Option(
+            "--one-process/--process-per-node",
+            help="In real time: all nodes in one process, which loses no message on a small"
+            " computer; or a process per node, each of which may die alone.",
+            show_default="one process",
+        ),
+    ] = None,
+    testbed: Annotated[
+        Path | None,
+        typer.Option(
+            metavar="FILE",
+            help="The machine to simulate, such as one that was fitted, instead of the scenario's.",
+        ),
+    ] = None,
+    duration: Annotated[
+        float | None,
+        typer.Option(metavar="SECONDS", help="Simulated time, instead of the scenario's."),
+    ] = None,
+    seed: Annotated[
+        int | None,
+        typer.Option(
+            metavar="NUMBER",
+            help="Seed of waves and sensor noise, instead of the scenario's. The same seed gives"
+            " the same run, bit for bit.",
+        ),
+    ] = None,
+    out: Annotated[
+        Path | None,
+        typer.Option(
+            metavar="FOLDER",
+            help="A new folder for the recording, its summary.json and its run.png;"
+            " otherwise recordings/SCENARIO-DATE-TIME.",
+        ),
+    ] = None,
+    record: Annotated[bool, typer.Option(help="Whether to record.")] = True,
+    overrides: Annotated[
+        list[str] | None,
+        typer.Option(
+            "--set",
+            metavar="KEY=VALUE",
+            help="Replace a value of the scenario, in its units (SI, rad), such as"
+            " target.motion.peak_period=2; may be repeated.",
+        ),
+    ] = None,
+    json: Json = None,
+) -> None:
+    """Simulate a scenario: record it, draw it, and tell how well the bar followed.
+
+    Ctrl-C ends the run early with a complete recording.
+    """
+    if mode not in MODES:
+        raise InputError(f"--mode {mode}: allowed: {', '.join(MODES)}")
+    from cspm.commands.run_command import run_command
+    from cspm_msgs_py.recording.run_record import EXTERNAL
+    from cspm_run.plants import PLANTS
+
+    if plant not in (*PLANTS, EXTERNAL):
+        raise InputError(f"--plant {plant}: allowed: {', '.join((*PLANTS, EXTERNAL))}")
+    settings = [f"duration={duration}"] * (duration is not None)
+    settings += [f"seed={seed}"] * (seed is not None)
+    folder = out if out is not None else new_folder(Path(scenario).stem)
+    path = find_scenario(scenario)
+    place = folder if record else None
+    settings = [*(overrides or []), *settings]
+    finished = run_command(path, settings, place, json, plant, mode, testbed, one_process)
+    raise typer.Exit(0 if finished else RUN_FAILED)

@@ -1,0 +1,120 @@
+"""Commands about recordings: info, recover, resim, import."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from cspm.cli.app import RUN_FAILED, Json, app, new_folder
+from cspm_msgs_py.errors import InputError
+
+
+@app.command(epilog="Example: cspm info recordings/calm-20260131-120000")
+def info(
+    bag: Annotated[
+        Path, typer.Argument(metavar="BAG", help="A recording: its folder or its MCAP file.")
+    ],
+    json: Json = None,
+) -> None:
+    """Show a recording's topics, rates in Hz, longest gaps in ms, duration and scenario."""
+    from cspm.commands.run_command import info_command
+
+    info_command(bag, json)
+
+
+@app.command(epilog="Example: cspm recover recordings/calm-20260131-120000 --out restored")
+def recover(
+    bag: Annotated[
+        Path,
+        typer.Argument(
+            metavar="BAG", help="A recording that was cut short: its folder or its MCAP file."
+        ),
+    ],
+    out: Annotated[
+        Path | None,
+        typer.Option(
+            metavar="FOLDER",
+            help="A new folder to write to. Otherwise the recording is mended in place, and the"
+            " original is kept with .broken added to its name.",
+        ),
+    ] = None,
+    json: Json = None,
+) -> None:
+    """Restore a recording whose writer was killed, with its index and metadata.
+
+    At most the last 0.2 s before the kill are lost.
+    """
+    from cspm.commands.run_command import recover_command
+
+    recover_command(bag, out, json)
+
+
+@app.command(
+    epilog="""Example: cspm resim recordings/calm-20260131-120000
+
+Exit code: 0 identical, 1 different, 2 no recording made by cspm."""
+)
+def resim(
+    bag: Annotated[
+        Path, typer.Argument(metavar="BAG", help="A recording made by cspm: its folder or file.")
+    ],
+    json: Json = None,
+) -> None:
+    """Repeat a run from its recording alone, and say whether every message is identical.
+
+    Bit for bit, in every field. Otherwise the first difference is told: topic, message, field.
+    """
+    from cspm.commands.run_command import resim_command
+
+    raise typer.Exit(0 if resim_command(bag, json) else RUN_FAILED)
+
+
+@app.command(
+    "import",
+    epilog="""Examples:
+
+cspm import lab.csv --mapping lab_mapping.yaml --testbed my_rig.yaml --dry-run
+
+cspm import DATA_EMPS.mat --mapping scenarios/mappings/emps.yaml --testbed
+scenarios/testbeds/emps.yaml --out emps
+
+Exit code: 0 done, 2 unusable input.""",
+)
+def import_(
+    file: Annotated[
+        Path,
+        typer.Argument(
+            metavar="FILE",
+            help="A text table, a .mat file up to version 7, or a bag: a rosbag2 folder, an .mcap"
+            " or .db3 file, or a ROS 1 .bag.",
+        ),
+    ],
+    mapping: Annotated[
+        Path,
+        typer.Option(metavar="FILE", help="Which column is which number, in which unit."),
+    ],
+    testbed: Annotated[Path, typer.Option(metavar="FILE", help="The machine that was recorded.")],
+    out: Annotated[
+        Path | None,
+        typer.Option(
+            metavar="FOLDER",
+            help="A new folder for the recording; otherwise recordings/MAPPING-DATE-TIME.",
+        ),
+    ] = None,
+    dry_run: Annotated[
+        bool, typer.Option("--dry-run", help="Show what would be done, and write nothing.")
+    ] = False,
+    json: Json = None,
+) -> None:
+    """Turn a recording of others into one of the contract; every conversion is shown.
+
+    What looks wrong is told: units, signs, gaps, clocks. Nothing is interpolated.
+    """
+    from cspm.commands.import_command import Import, import_command
+
+    if dry_run and out is not None:
+        raise InputError(f"--out {out} --dry-run: allowed: one of both")
+    folder = out if out is not None else new_folder(mapping.stem)
+    import_command(Import(file, mapping, testbed, None if dry_run else folder), json)

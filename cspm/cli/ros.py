@@ -1,0 +1,191 @@
+"""Commands that meet a ROS 2 graph: node, replay, check-drivers."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from cspm.cli.app import RUN_FAILED, Json, app
+from cspm_msgs_py.errors import InputError
+
+
+@app.command(
+    add_help_option=False,
+    context_settings={"allow_extra_args": True, "ignore_unknown_options": True},
+    epilog="""Examples:
+
+cspm node plant --ros-args -p scenario:=calm
+
+cspm node recorder --ros-args -p scenario:=calm -p folder:=calm_run""",
+)
+def node(context: typer.Context) -> None:
+    """Run one node of the graph: plant, wave_trajectory, motion_controller, … (cspm node --help).
+
+    Everything it needs to know are ROS 2 parameters; `--ros-args --params-file FILE` reads them.
+    """
+    name, *rest = context.args or ["--help"]
+    if {"--help", "-h"} & {name, *rest}:
+        typer.echo(context.get_help())
+        raise typer.Exit(0)
+    from cspm_ros.runtime.node_main import start_node
+
+    start_node(name, rest)
+
+
+@app.command(
+    epilog="""Examples:
+
+cspm replay recordings/calm-20260131-120000 --rate 0.5
+
+cspm replay lab.db3 --topics /bar/pose --topics /cables/tension --remap /bar/pose=/mocap/pose
+
+cspm replay recordings/calm-20260131-120000 --through force_controller
+
+Keys in a terminal: space pauses, s or → plays one instant, + and - change the rate, q ends.
+
+Exit code: 0 played, and identical where nodes were fed; 1 different or interrupted; 2 unusable
+input."""
+)
+def replay(
+    bag: Annotated[
+        Path,
+        typer.Argument(
+            metavar="BAG",
+            help="A rosbag2 folder, an .mcap or .db3 file, or a ROS 1 .bag.",
+        ),
+    ],
+    rate: Annotated[
+        float | None,
+        typer.Option(
+            metavar="NUMBER",
+            help="Times real time, 1 unless given; with --through otherwise 0, which is as fast as"
+            " the nodes are.",
+        ),
+    ] = None,
+    topics: Annotated[
+        list[str] | None,
+        typer.Option(
+            "--topics",
+            metavar="TOPIC",
+            help="Play only this topic, and the clock; may be repeated.",
+        ),
+    ] = None,
+    left_out: Annotated[
+        list[str] | None,
+        typer.Option("--except", metavar="TOPIC", help="Do not play this topic; may be repeated."),
+    ] = None,
+    start: Annotated[
+        float, typer.Option(metavar="SECONDS", help="Begin so many seconds into the bag.")
+    ] = 0.0,
+    duration: Annotated[
+        float | None, typer.Option(metavar="SECONDS", help="Play so many seconds of the bag.")
+    ] = None,
+    paused: Annotated[bool, typer.Option("--paused", help="Begin paused.")] = False,
+    remap: Annotated[
+        list[str] | None,
+        typer.Option(metavar="OLD=NEW", help="Play a topic under another name; may be repeated."),
+    ] = None,
+    through: Annotated[
+        str | None,
+        typer.Option(
+            metavar="NODES",
+            help="Feed these nodes in step and compare what they send with the recording, bit for"
+            " bit: all, or names with commas, such as motion_controller,force_controller.",
+        ),
+    ] = None,
+    overrides: Annotated[
+        list[str] | None,
+        typer.Option(
+            "--set",
+            metavar="KEY=VALUE",
+            help="With --through: replace a value of the recorded scenario; may be repeated.",
+        ),
+    ] = None,
+    out: Annotated[
+        Path | None,
+        typer.Option(
+            metavar="FOLDER", help="With --through: a new folder to record the outcome in."
+        ),
+    ] = None,
+    json: Json = None,
+) -> None:
+    """Play a bag to the ROS 2 graph, with /clock, or through nodes to compare their commands.
+
+    The services /player/pause (std_srvs/SetBool) and /player/step (std_srvs/Trigger) steer it too.
+    """
+    from cspm.commands.replay_command import Replay, replay_command
+    from cspm_ros.replay.bag_selection import Selection
+
+    names = dict(_pair(text) for text in remap or ())
+    selection = Selection(topics or (), left_out or (), start, duration, names)
+    nodes = through.split(",") if through is not None else ()
+    asked = Replay(bag, selection, rate, paused, nodes, overrides or (), out)
+    raise typer.Exit(0 if replay_command(asked, json) else RUN_FAILED)
+
+
+def _pair(text: str) -> tuple[str, str]:
+    old, separator, new = text.partition("=")
+    if not separator:
+        raise InputError(f"--remap {text}: allowed: OLD=NEW, such as /bar/pose=/mocap/pose")
+    return old, new
+
+
+@app.command(
+    epilog="""Examples:
+
+cspm check-drivers --scenario calm
+
+cspm check-drivers --testbed lab.yaml --for 20 --json drivers.json
+
+cspm check-drivers --testbed lab.yaml --pull all
+
+Exit code: 0 nothing wrong, 1 an error or interrupted, 2 unusable input."""
+)
+def check_drivers(
+    testbed: Annotated[
+        Path | None,
+        typer.Option(metavar="FILE", help="The machine's test-bed file; usual rates."),
+    ] = None,
+    scenario: Annotated[
+        str | None,
+        typer.Option(
+            metavar="NAME",
+            help="Instead: a scenario's name or file, for its test-bed, rates and safe state.",
+        ),
+    ] = None,
+    seconds: Annotated[
+        float,
+        typer.Option("--for", metavar="SECONDS", help="How long to listen, and to pull."),
+    ] = 5.0,
+    pull: Annotated[
+        str | None,
+        typer.Option(
+            metavar="CABLES",
+            help="Afterwards the guided pull test, which finds swapped cables and inverted signs:"
+            " all, or names with commas. Needs a terminal.",
+        ),
+    ] = None,
+    sim_time: Annotated[
+        bool, typer.Option("--sim-time", help="The stamps follow /clock, not the wall clock.")
+    ] = False,
+    overrides: Annotated[
+        list[str] | None,
+        typer.Option(
+            "--set",
+            metavar="KEY=VALUE",
+            help="Replace a value of the scenario, such as rates.winches=500; may be repeated.",
+        ),
+    ] = None,
+    json: Json = None,
+) -> None:
+    """Listen to somebody's drivers, and say what does not fit the machine and the contract.
+
+    Per topic: type, quality of service, names, rate, jitter, stamps, units, signs; and whether the
+    topics agree with each other and with the machine's geometry. A bar that moves shows more.
+    """
+    from cspm.commands.check_drivers_command import Asked, check_drivers_command, machine_of
+
+    asked = Asked(machine_of(testbed, scenario, overrides or ()), seconds, sim_time, pull)
+    raise typer.Exit(0 if check_drivers_command(asked, json) else RUN_FAILED)

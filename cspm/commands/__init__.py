@@ -1,0 +1,1 @@
+"""What each command does: reads inputs, calls the package that works, prints and writes."""

@@ -1,0 +1,241 @@
+"""What `cspm analyze design` does."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from rich import box
+from rich.console import Console
+from rich.table import Table
+
+from cspm.commands.analyzed_machine import AnalyzedMachine
+from cspm_control.analysis.cable_groups import cable_groups
+from cspm_control.analysis.loop_view import LoopView
+from cspm_control.analysis.loops import (
+    CASCADE,
+    DESIGNED,
+    LATE,
+    SAMPLED,
+    LoopAnalysis,
+    analyse_loops,
+    pid_law,
+)
+from cspm_control.analysis.sampled_loops import LoopTiming, loop_timing
+from cspm_control.design.gains import (
+    GAIN_MARGIN,
+    LOW_FREQUENCY_GAIN,
+    MOTION_BANDWIDTH,
+    PHASE_MARGIN,
+)
+from cspm_msgs_py.errors import InputError
+from cspm_msgs_py.new_folder import refuse_existing
+from cspm_msgs_py.scenario import ClosedLoop
+from cspm_run.assembly import resolve
+from cspm_run.console import make_console, say
+from cspm_run.summary import write_json
+
+PICTURES = ("motion_loops.png", "force_loops.png")
+WAYS = {
+    DESIGNED: "designed",
+    SAMPLED: "sampled",
+    CASCADE: "cascade",
+    LATE: "computing",
+}
+MEANINGS = {
+    DESIGNED: "continuous, this loop alone, cable directions held: the thesis's way",
+    SAMPLED: "the same, sampled, with the sensors' delays",
+    CASCADE: "sampled, every other loop closed, exact model",
+    LATE: "the same, torques late by the time of computing",
+}
+
+
+def analyze_design_command(
+    machine: AnalyzedMachine,
+    computing: float | None,
+    folder: Path | None,
+    json: Path | None,
+) -> None:
+    """Look at all loops of a scenario, print, and write what was asked for.
+
+    Args:
+        machine: with its scenario.
+        computing: from a measurement to its torque [s]; None: one period of the force controllers.
+        folder: a new one for pictures; None draws none.
+        json: where to write what is printed; None writes none.
+
+    Raises:
+        CspmError: the folder exists, or the scenario has no loops that this can follow.
+    """
+    refuse_existing(folder)
+    console = make_console()
+    control, timing = _closed_loop(machine, computing)
+    found = analyse_loops(machine.testbed, control, timing)
+    names = machine.testbed.cable_names
+    groups = {name: names[members[0]] for name, members in cable_groups(names).items()}
+    _show(console, machine, control, found, timing, groups)
+    if folder is not None:
+        from cspm.plots.loop_figure import draw_force_loops, draw_motion_loops
+
+        folder.mkdir(parents=True)
+        draw_motion_loops(folder / PICTURES[0], found)
+        draw_force_loops(folder / PICTURES[1], found, list(groups.values()))
+        say(console, f"written {', '.join(str(folder / name) for name in PICTURES)}")
+    if json is not None:
+        write_json(json, _data(machine, control, found, timing))
+
+
+def _closed_loop(
+    machine: AnalyzedMachine, computing: float | None
+) -> tuple[ClosedLoop, LoopTiming]:
+    scenario = machine.scenario
+    if not isinstance(scenario.control, ClosedLoop):
+        raise InputError(
+            f"scenario {scenario.name}: control.mode {scenario.control.mode}, allowed: closed_loop"
+        )
+    designed = resolve(scenario, machine.testbed).control
+    assert isinstance(designed, ClosedLoop)
+    pid_law(designed)
+    # The gains are those of the design pose; how they do is asked here.
+    motion = designed.motion.model_copy(update={"design_pose": machine.pose})
+    control = designed.model_copy(update={"motion": motion})
+    ideal = scenario.sensors == "ideal"
+    delays = {} if ideal else {name: each.delay for name, each in machine.testbed.sensors.items()}
+    late = 1.0 / scenario.rates.force_controller if computing is None else computing
+    return control, loop_timing(scenario.rates, delays, late)
+
+
+def _show(
+    console: Console,
+    machine: AnalyzedMachine,
+    control: ClosedLoop,
+    found: LoopAnalysis,
+    timing: LoopTiming,
+    groups: dict[str, str],
+) -> None:
+    milliseconds = 1e3 * timing.period
+    say(
+        console,
+        f"{machine.scenario.name}: motion controller every {timing.motion * milliseconds:g} ms,"
+        f" force controllers every {timing.force * milliseconds:g} ms; pose"
+        f" {timing.pose_delay * milliseconds:g} ms late, tensions"
+        f" {timing.tension_delay * milliseconds:g} ms, computing"
+        f" {timing.torque_delay * milliseconds:g} ms",
+    )
+    for way, meaning in MEANINGS.items():
+        say(console, f"  {WAYS[way]}: {meaning}")
+    console.print(_gain_table(control, groups))
+    console.print(_motion_table(found))
+    console.print(_force_table(found, list(groups.values())))
+    for way, (growth, frequency) in found.growth.items():
+        what = "grows" if growth > 0.0 else "decays"
+        say(
+            console,
+            f"{WAYS[way]}: the slowest motion {what} as exp({growth:.3g}·t), t in s, at"
+            f" {frequency:.4g} rad/s",
+        )
+
+
+def _gain_table(control: ClosedLoop, groups: dict[str, str]) -> Table:
+    table = Table(title="gains", box=box.SIMPLE_HEAD)
+    for heading in ("loop", "Kp", "Ki", "Kd", "integral rad/s"):
+        table.add_column(heading, justify="left" if heading == "loop" else "right")
+    for dof, pid in (pid_law(control).gains or {}).items():
+        table.add_row(dof, f"{pid.kp:.4g}", f"{pid.ki:.4g}", f"{pid.kd:.4g}", "")
+    for name, first in groups.items():
+        pi = (control.force.gains or {})[first]
+        table.add_row(f"{name} cables", f"{pi.kp:.4g}", "", "", f"{pi.integral_frequency:.4g}")
+    return table
+
+
+def _motion_table(found: LoopAnalysis) -> Table:
+    table = _margin_table("motion loops")
+    table.add_column("as required")
+    for dof in found.motion[DESIGNED]:
+        for way, loops in found.motion.items():
+            verdict = "[green]yes[/]" if meets_requirements(loops[dof]) else "[red]no[/]"
+            table.add_row(dof if way == DESIGNED else "", WAYS[way], *_cells(loops[dof]), verdict)
+    return table
+
+
+def _force_table(found: LoopAnalysis, cables: list[str]) -> Table:
+    table = _margin_table("force loops, one cable of a kind, other torques held")
+    for name in cables:
+        for way, loops in found.force.items():
+            # There is no cascade yet where only tensions are looked at.
+            label = "sampled, computing" if way == LATE else WAYS[way]
+            table.add_row(name if way == DESIGNED else "", label, *_cells(loops[name]))
+    return table
+
+
+def _margin_table(title: str) -> Table:
+    table = Table(title=title, box=box.SIMPLE_HEAD)
+    table.add_column("loop")
+    table.add_column("way")
+    for heading in (
+        "crossover rad/s",
+        "bandwidth rad/s",
+        "phase °",
+        "gain dB",
+        "low gain dB",
+        "settled s",
+    ):
+        table.add_column(heading, justify="right")
+    return table
+
+
+def _cells(view: LoopView) -> list[str]:
+    found = view.margins
+    values = (
+        found.crossover,
+        found.bandwidth,
+        np.degrees(found.phase_margin),
+        found.gain_margin,
+        found.low_frequency_gain,
+        view.settling_time,
+    )
+    return [f"{value:.4g}" if np.isfinite(value) else "–" for value in values]
+
+
+def meets_requirements(view: LoopView) -> bool:
+    """Return whether a motion loop has all that the thesis's section 7-1 asks for."""
+    found = view.margins
+    return bool(
+        found.phase_margin >= PHASE_MARGIN
+        and found.gain_margin >= GAIN_MARGIN
+        and found.low_frequency_gain >= LOW_FREQUENCY_GAIN
+        and found.bandwidth >= MOTION_BANDWIDTH
+    )
+
+
+def _data(
+    machine: AnalyzedMachine, control: ClosedLoop, found: LoopAnalysis, timing: LoopTiming
+) -> dict[str, Any]:
+    return {
+        "scenario": machine.scenario.name,
+        "testbed": machine.testbed.name,
+        "pose": list(machine.pose),
+        "timing": vars(timing),
+        "gains": {
+            "motion": {d: g.model_dump() for d, g in (pid_law(control).gains or {}).items()},
+            "force": {n: g.model_dump() for n, g in (control.force.gains or {}).items()},
+        },
+        "motion": {way: _views_data(views) for way, views in found.motion.items()},
+        "force": {way: _views_data(views) for way, views in found.force.items()},
+        "growth": {
+            way: {"rate": rate, "frequency": frequency}
+            for way, (rate, frequency) in found.growth.items()
+        },
+    }
+
+
+def _views_data(views: dict[str, LoopView]) -> dict[str, Any]:
+    def plain(value: float) -> float | None:
+        return float(value) if np.isfinite(value) else None
+
+    return {
+        name: {key: plain(value) for key, value in view.margins._asdict().items()}
+        | {"settling_time": plain(view.settling_time)}
+        for name, view in views.items()
+    }

@@ -1,0 +1,168 @@
+"""What `cspm analyze workspace` does."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import typer
+from numpy.typing import NDArray
+from rich import box
+from rich.console import Console
+from rich.progress import BarColumn, Progress, TaskProgressColumn, TextColumn, TimeRemainingColumn
+from rich.table import Table
+
+from cspm.commands.analyzed_machine import AnalyzedMachine
+from cspm.commands.claim_table import claim_table
+from cspm_control.analysis.claim import Claim
+from cspm_control.analysis.pose_grid import GRIDS
+from cspm_control.analysis.published_workspace import OURS, workspace_claims
+from cspm_control.analysis.workspace import ALGORITHMS
+from cspm_control.analysis.workspace_limits import LIMITED
+from cspm_control.analysis.workspace_result import (
+    ACCELERATED,
+    FEASIBLE,
+    WorkspaceResult,
+    analyse_workspace,
+)
+from cspm_control.waves.build import build_motion
+from cspm_msgs_py.interruption import interruptible
+from cspm_msgs_py.new_folder import refuse_existing
+from cspm_run.console import make_console, say
+from cspm_run.summary import write_json
+
+WAYS = {
+    "pseudo_inverse": "pseudo-inverse, t ≥ 0",
+    "general": "any tensions, t ≥ 0",
+    FEASIBLE: "any, t ≥ t_min",
+    ACCELERATED: "any, t ≥ t_min, accelerating",
+}
+UNITS = {"surge": "m", "sway": "m", "pitch": "rad", "yaw": "rad"}
+PICTURES = ("workspace.png", "maps.png")
+
+
+def analyze_workspace_command(
+    machine: AnalyzedMachine,
+    acceleration: tuple[float, ...] | None,
+    coarse: int,
+    folder: Path | None,
+    json: Path | None,
+) -> None:
+    """Find the workspace, print, and write what was asked for.
+
+    Args:
+        machine: what to analyse, and where.
+        acceleration: required either way [m/s², rad/s²]; None: the RMS of the scenario's reference.
+        coarse: take every so-manieth value of each DOF of the whole grids.
+        folder: a new one for pictures; None draws none.
+        json: where to write what is printed; None writes none.
+
+    Raises:
+        CspmError: the folder exists, or the machine has no workspace to speak of.
+        Abort: it was interrupted; nothing is written.
+    """
+    refuse_existing(folder)
+    console = make_console()
+    required = np.array(acceleration or reference_acceleration(machine))
+    with interruptible() as stopped, _bars(console, coarse) as advance:
+        found = analyse_workspace(machine.testbed, machine.pose, required, coarse, advance, stopped)
+    if found is None:
+        raise typer.Abort
+    claims = workspace_claims(found) if machine.is_published else []
+    _show(console, found, claims)
+    if folder is not None:
+        from cspm.plots.workspace_figure import draw_maps, draw_workspace
+
+        folder.mkdir(parents=True)
+        draw_workspace(folder / PICTURES[0], found)
+        draw_maps(folder / PICTURES[1], found)
+        say(console, f"written {', '.join(str(folder / name) for name in PICTURES)}")
+    if json is not None:
+        write_json(json, _data(machine, found, claims, coarse))
+
+
+def reference_acceleration(machine: AnalyzedMachine) -> NDArray[np.float64]:
+    """Return the RMS acceleration of the scenario's reference of the bar, (6,) [m/s², rad/s²]."""
+    scenario = machine.scenario
+    motion = build_motion(
+        scenario.target.motion,
+        scenario.bar_mean_pose,
+        seed=scenario.seed,
+        duration=scenario.duration,
+        gravity=machine.testbed.gravity,
+        folder=machine.folder,
+    )
+    return np.asarray(np.sqrt(np.mean(motion.knots[:, 12:] ** 2, axis=0)))
+
+
+@contextmanager
+def _bars(console: Console, coarse: int) -> Iterator[Callable[[str, int], None]]:
+    """Give what moves one bar per algorithm; nothing is shown where nobody looks."""
+    with Progress(
+        *(TextColumn("{task.description}"), BarColumn(), TaskProgressColumn()),
+        TimeRemainingColumn(),
+        console=console,
+        transient=True,
+        disable=not console.is_terminal,
+    ) as bar:
+        tasks = {}
+        for name in ALGORITHMS:
+            size = GRIDS[name].every(coarse).size
+            tasks[name] = bar.add_task(f"{WAYS[name]}, {size:,} poses", total=size)
+        yield lambda name, count: bar.advance(tasks[name], count)
+
+
+def _show(console: Console, found: WorkspaceResult, claims: list[Claim]) -> None:
+    pose = ", ".join(f"{value:g}" for value in found.pose)
+    console.print(_limit_table(f"how far the bar goes from [{pose}] in one DOF alone", found))
+    required = ", ".join(f"{value:.3g}" for value in found.acceleration)
+    say(
+        console,
+        f"accelerating: up to [{required}] m/s², rad/s² either way, all at once; at this pose the"
+        f" cables give {found.factor:.3g} times that",
+    )
+    for name, whole in found.whole.items():
+        share = whole.held / whole.poses
+        reach = ", ".join(f"{dof} {value:g}" for dof, value in whole.largest.items())
+        say(
+            console,
+            f"{WAYS[name]}: {whole.held:,} of {whole.poses:,} poses of the whole grid,"
+            f" {share:.1%}; farthest anywhere: {reach or 'nowhere'}",
+        )
+    for kind, value in found.largest_condition.items():
+        say(console, f"largest κ over the general workspace, {kind}: {value:.5g}")
+    if claims:
+        console.print(claim_table("the thesis's tables 6-1 and 6-2", claims, {OURS: "ours"}))
+
+
+def _limit_table(title: str, found: WorkspaceResult) -> Table:
+    table = Table(title=title, box=box.SIMPLE_HEAD)
+    table.add_column("")
+    for heading in WAYS.values():
+        table.add_column(heading, justify="right")
+    for dof in LIMITED:
+        values = [found.limits[way][dof] for way in WAYS]
+        cells = ["nowhere" if value is None else f"{value:g} {UNITS[dof]}" for value in values]
+        table.add_row(dof, *cells)
+    return table
+
+
+def _data(
+    machine: AnalyzedMachine, found: WorkspaceResult, claims: list[Claim], coarse: int
+) -> dict[str, Any]:
+    return {
+        "testbed": machine.testbed.name,
+        "pose": list(found.pose),
+        "limits": {name: found.limits[name] for name in ALGORITHMS},
+        "limits_with_lowest_tension": found.limits[FEASIBLE],
+        "limits_accelerating": found.limits[ACCELERATED],
+        "required_acceleration": found.acceleration.tolist(),
+        "acceleration_factor": found.factor if np.isfinite(found.factor) else None,
+        "coarse": coarse,
+        "whole": {name: whole._asdict() for name, whole in found.whole.items()},
+        "largest_condition": found.largest_condition,
+        "claims": [claim.data() for claim in claims],
+    }

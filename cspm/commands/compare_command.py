@@ -1,0 +1,118 @@
+"""What `cspm compare` does."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from pathlib import Path
+
+from rich import box
+from rich.console import Console
+from rich.table import Table
+
+from cspm_ident.block_simulation import Drive
+from cspm_ident.comparison.channel import Channel
+from cspm_ident.comparison.compare import Comparison, compare
+from cspm_ident.signals.measurement import read_measurement
+from cspm_msgs_py.new_folder import refuse_existing
+from cspm_run.console import make_console, say
+from cspm_run.summary import write_json
+
+
+@dataclass(frozen=True)
+class CompareRequest:
+    """What was asked for.
+
+    Attributes:
+        recording: what to compare.
+        testbed: the machine to simulate, instead of the recorded one.
+        drive: which measured signals drive the simulation.
+        horizon: longest window [s].
+        delays: of sensors, by topic [s]; None: find them.
+        repeat: a second recording of the same experiment.
+        out: a new folder for the report page; None: none.
+    """
+
+    recording: Path
+    testbed: Path | None
+    drive: Drive
+    horizon: float | None
+    delays: Mapping[str, float] | None
+    repeat: Path | None
+    out: Path | None
+
+
+def compare_command(asked: CompareRequest, json: Path | None) -> None:
+    """Compare, print, and write what was asked for.
+
+    Raises:
+        InputError: naming what is wrong in recording, test-bed or options.
+    """
+    console = make_console()
+    refuse_existing(asked.out)
+    with console.status("reading") as status:
+        measurement = read_measurement(asked.recording, asked.testbed)
+        repeat = None if asked.repeat is None else read_measurement(asked.repeat, asked.testbed)
+        found = compare(
+            measurement,
+            asked.drive,
+            horizon=asked.horizon,
+            delays=asked.delays,
+            repeat=repeat,
+            progress=status.update,
+        )
+        written = None if asked.out is None else _write(asked.out, found)
+    print_comparison(console, found)
+    if written is not None:
+        say(console, f"report {written}")
+    if json is not None:
+        write_json(json, found.data() | {"report": None if written is None else str(written)})
+
+
+def _write(folder: Path, found: Comparison) -> Path:
+    # Loading plotly takes a second that a table alone need not wait for.
+    from cspm_ident.comparison.page import write_page
+
+    folder.mkdir(parents=True)
+    write_json(folder / "comparison.json", found.data())
+    write_page(folder / "report.html", found)
+    return folder / "report.html"
+
+
+def print_comparison(console: Console, found: Comparison) -> None:
+    """Print the sensors' delays and a table of channels for the whole and each block."""
+    for line in found.clocks:
+        say(console, line)
+    titles = {
+        "whole": f"whole, driven by {found.drive.value}",
+        "winch": "winches alone, driven by measured torques and tensions",
+        "cable": "cables alone, driven by measured winch and bar motion",
+        "bar": "bar alone, driven by measured tensions",
+    }
+    for block, title in titles.items():
+        channels = [channel for channel in found.channels if channel.block == block]
+        if channels:
+            say(console, f"\n{title}")
+            console.print(_table(channels))
+    for block, reason in found.left_out.items():
+        say(console, f"{block}: left out, {reason}")
+    if found.windows[1]:
+        say(console, f"{found.windows[1]} of {found.windows[0]} windows diverged and are left out")
+
+
+def _table(channels: list[Channel]) -> Table:
+    table = Table(box=box.SIMPLE_HEAD, show_edge=False, padding=(0, 1, 0, 0))
+    table.add_column("channel", no_wrap=True)
+    for column in ("VAF %", "NRMSE", "RMS error", "floor", "bias", "lag ms"):
+        table.add_column(column, justify="right", no_wrap=True)
+    for c in channels:
+        table.add_row(
+            f"{c.name} {c.unit}",
+            "at rest" if c.vaf is None else f"{c.vaf:.3f}",
+            "" if c.nrmse is None else f"{c.nrmse:.4f}",
+            f"{c.rms:.3g}",
+            f"{c.floor:.3g}",
+            f"{c.bias:.2g}",
+            "" if c.lag is None else f"{round(1e3 * c.lag, 2) + 0.0:.2f}",
+        )
+    return table

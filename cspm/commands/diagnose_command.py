@@ -1,0 +1,301 @@
+"""What `cspm diagnose` does."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+from rich import box
+from rich.console import Console
+from rich.table import Table
+
+from cspm_ident.diagnosis.diagnose import Diagnosis, diagnose
+from cspm_ident.diagnosis.reporting.experiment_files import write_experiments
+from cspm_ident.diagnosis.reporting.finding_statement import statement_of
+from cspm_ident.diagnosis.reporting.improved_file import improved_testbed
+from cspm_ident.diagnosis.reporting.statement import (
+    channel_of,
+    drive_of,
+    line_statement,
+    tension_statement,
+    unit_of,
+    unknown_statement,
+)
+from cspm_ident.diagnosis.reporting.verdict import (
+    IMPROVED,
+    SENTENCES,
+    diagnosis_data,
+    named_in,
+    verdict_of,
+)
+from cspm_ident.diagnosis.validation.closed_loop import ClosedLoopFit, simulate_closed_loop
+from cspm_ident.diagnosis.validation.controller_parity import Parity, controller_parity
+from cspm_ident.signals.measurement import Measurement, read_measurement
+from cspm_msgs_py.errors import InputError
+from cspm_msgs_py.new_folder import refuse_existing
+from cspm_run.console import make_console, say
+from cspm_run.summary import write_json
+from cspm_sim.effects import catalogue
+
+REPORT = "diagnosis.json"
+PICTURE = "diagnosis.png"
+PAGE = "diagnosis.html"
+_SEARCHED = "--held-out {}: is searched as well, allowed: recordings that are not"
+
+
+@dataclass(frozen=True)
+class DiagnoseRequest:
+    """What was asked for.
+
+    Attributes:
+        recordings: in which to look.
+        held_out: on which to judge; none: the last part of each recording.
+        testbed: the machine as it is believed to be, instead of the recorded one.
+        out: a new folder for what is written; None: nothing is.
+        closed_loop: simulate the closed loop again with what was found.
+    """
+
+    recordings: Sequence[Path]
+    held_out: Sequence[Path]
+    testbed: Path | None
+    out: Path | None
+    closed_loop: bool = True
+
+
+def diagnose_command(asked: DiagnoseRequest, json: Path | None) -> None:
+    """Diagnose, print, and write what was asked for.
+
+    Raises:
+        InputError: naming what is wrong in recordings, test-bed or options.
+    """
+    console = make_console()
+    refuse_existing(asked.out)
+    twice = set(asked.recordings) & set(asked.held_out)
+    if twice:
+        raise InputError(_SEARCHED.format(twice.pop()))
+    with console.status("reading") as status:
+        searched = [read_measurement(path, asked.testbed) for path in asked.recordings]
+        held_out = [read_measurement(path, asked.testbed) for path in asked.held_out]
+        _refuse_twice(searched, held_out)
+        found = diagnose(searched, held_out, status.update)
+        loop: tuple[ClosedLoopFit, ...] = ()
+        if asked.closed_loop and found.findings.named:
+            improved = improved_testbed(found, IMPROVED)
+            loop = simulate_closed_loop((held_out or searched)[0], improved, status.update)
+        status.update("controllers")
+        parity = controller_parity(asked.recordings[0])
+        data = diagnosis_data(found, asked.testbed) | {
+            "closed_loop": [each._asdict() for each in loop],
+            "controllers": [each._asdict() for each in parity],
+        }
+        if asked.out is not None:
+            asked.out.mkdir(parents=True)
+            write_experiments(asked.out, found, data, status.update)
+            _write(asked.out, found, data)
+    print_diagnosis(console, found, data, asked.out)
+    _print_parity(console, parity)
+    if loop:
+        console.print(_loop_table(loop))
+    if asked.out is not None:
+        say(console, f"written {asked.out}")
+    if json is not None:
+        write_json(json, data)
+
+
+def _refuse_twice(searched: Sequence[Measurement], held_out: Sequence[Measurement]) -> None:
+    """Refuse what would count twice, or be judged on what it was found in, under whatever name."""
+    seen: dict[str, Path] = {}
+    for measured in searched:
+        if (other := seen.get(measured.sha256)) is not None:
+            raise InputError(f"{measured.path}: the same recording as {other}, allowed: each once")
+        seen[measured.sha256] = measured.path
+    for measured in held_out:
+        if measured.sha256 in seen:
+            raise InputError(_SEARCHED.format(measured.path))
+
+
+def _print_cut_short(console: Console, found: Diagnosis) -> None:
+    """Print which recordings end where their writer was killed."""
+    for each in (*found.searched, *found.held_out):
+        if not each.complete:
+            say(console, f"{each.path}: was not closed; of it {each.duration:.1f} s are left")
+
+
+def _print_parity(console: Console, parity: Sequence[Parity]) -> None:
+    """Print which commands are not those of the described controllers."""
+    for each in parity:
+        if each.different:
+            say(
+                console,
+                f"• {each.topic}: {each.different} of {each.compared} commands are not what the"
+                f" described {each.node} makes of the recorded measurements (up to"
+                f" {each.largest:.2g})",
+            )
+
+
+def explain_command(name: str) -> None:
+    """Print what an effect is, how it shows and what it is confused with.
+
+    Raises:
+        InputError: no such effect.
+    """
+    from rich.markdown import Markdown
+
+    from cspm_sim.effects.document import effect_section
+
+    effects = catalogue()
+    if name not in effects:
+        raise InputError(f"--explain {name}: allowed: {', '.join(effects)}")
+    Console().print(Markdown(effect_section(effects[name])))
+
+
+def _print_named(
+    console: Console, found: Diagnosis, experiments: Sequence[Sequence[str]], *, doubtful: bool
+) -> None:
+    for k, named in enumerate(found.findings.named):
+        if found.findings.is_doubtful(named) != doubtful:
+            continue
+        say(console, f"• {statement_of(found, k)}")
+        for rival, experiment in zip(named.alternatives, experiments[k], strict=True):
+            say(console, f"  as well explained by {rival.words}; to tell: {experiment}")
+
+
+def _experiments(found: Diagnosis, data: Mapping[str, Any], folder: Path | None) -> list[list[str]]:
+    """Return, of every alternative of every finding, what tells it apart."""
+    return [
+        [
+            f"cspm run {folder / entry['separating_experiment']}"
+            if folder is not None and entry["separating_experiment"]
+            else rival.hypothesis.effect.separating_experiment
+            for rival, entry in zip(named.alternatives, finding["alternatives"], strict=True)
+        ]
+        for named, finding in zip(found.findings.named, named_in(data), strict=True)
+    ]
+
+
+def print_diagnosis(
+    console: Console, found: Diagnosis, data: Mapping[str, Any], folder: Path | None
+) -> None:
+    """Print verdict, findings and how the fit changes on data that was not searched.
+
+    Args:
+        console: where.
+        found: the diagnosis.
+        data: the same as `diagnosis.json` has it.
+        folder: where planned experiments were written, if anywhere.
+    """
+    verdict = verdict_of(found)
+    console.print(f"verdict: [bold]{verdict.value}[/]")
+    if not data["findings"]:
+        say(console, SENTENCES[verdict])
+    experiments = _experiments(found, data, folder)
+    _print_cut_short(console, found)
+    _print_named(console, found, experiments, doubtful=False)
+    for k in range(len(found.shapes)):
+        say(console, f"• {unknown_statement(found, k)}")
+    for line in found.lines:
+        say(console, f"• {line_statement(line)}")
+    _print_named(console, found, experiments, doubtful=True)
+    for named in found.rejected:
+        say(
+            console,
+            f"not kept: {named.hypothesis.effect.id} on {', '.join(named.hypothesis.elements)}"
+            " did not help on held-out data, or is noise that controllers feed back",
+        )
+    for named in found.negligible:
+        say(
+            console,
+            f"taken into account, too small to matter: {named.hypothesis.effect.id} on"
+            f" {', '.join(named.hypothesis.elements)}",
+        )
+    drawn = tension_statement(found)
+    if drawn is not None:
+        say(console, drawn)
+    _print_fits(console, found)
+    for name, elements in found.silent:
+        if elements:
+            shown = catalogue()[name].separating_experiment
+            say(console, f"not testable here: {name} on {', '.join(elements)}; would show: {shown}")
+    without = ", ".join(name for name, elements in found.silent if not elements)
+    if without:
+        say(console, f"not testable with the sensors and parts of these recordings: {without}")
+    told = sorted({limit.effect for limit in found.limits if limit.possible})
+    if told:
+        say(
+            console,
+            f"{len(told)} effects would have been told from some size on, which diagnosis.json has"
+            " by element under detection_limits",
+        )
+
+
+def _print_fits(console: Console, found: Diagnosis) -> None:
+    """Print what changed, or is well above its noise; all else is a count."""
+    judged = "held-out recordings" if found.held_out else "the last part, not searched"
+    rows: list[tuple[str, tuple[float, ...], str]] = [
+        (channel_of(f), (f.before, f.retuned, f.after, f.ceiling, f.noise), unit_of(f))
+        for f in found.fit
+    ]
+    _print_table(console, f"residuals of the equations, {judged}", ("black box", "noise"), rows)
+    rows = [
+        (
+            f"{f.output.name}, driven by {drive_of(f)}",
+            (f.before, f.retuned, f.after, f.floor),
+            f.output.unit,
+        )
+        for f in found.simulated
+    ]
+    if rows:
+        _print_table(console, f"errors of simulations, {judged}", ("noise",), rows)
+
+
+def _print_table(
+    console: Console,
+    title: str,
+    last: Sequence[str],
+    rows: Sequence[tuple[str, tuple[float, ...], str]],
+) -> None:
+    shown = [row for row in rows if _is_worth_showing(row[1])]
+    table = Table(title=f"{title}: root mean square", box=box.SIMPLE_HEAD)
+    for heading in ("", "before", "re-tuned", "after", *last, "unit"):
+        table.add_column(heading, justify="left" if heading in ("", "unit") else "right")
+    for name, numbers, unit in shown:
+        table.add_row(name, *(f"{number:.3g}" for number in numbers), unit)
+    if shown:
+        console.print(table)
+    others = len(rows) - len(shown)
+    say(console, f"{title}: {others} of {len(rows)} at their noise, before and after")
+
+
+def _is_worth_showing(numbers: tuple[float, ...]) -> bool:
+    before, retuned, after, noise = *numbers[:3], numbers[-1]
+    changed = max(before, retuned, after) > _CHANGED * min(before, retuned, after)
+    return changed or after > _ABOVE * noise
+
+
+# Smaller changes of a root mean square, and less above the noise, are left out of what is printed.
+_CHANGED = 1.05
+_ABOVE = 3.0
+
+
+def _loop_table(loop: Sequence[ClosedLoopFit]) -> Table:
+    table = Table(title="closed loop simulated again: RMS difference", box=box.SIMPLE_HEAD)
+    for heading in ("", "before", "after", "unit"):
+        table.add_column(heading, justify="left" if heading in ("", "unit") else "right")
+    for fit in loop:
+        table.add_row(fit.name, f"{fit.before:.3g}", f"{fit.after:.3g}", fit.unit)
+    return table
+
+
+def _write(folder: Path, found: Diagnosis, data: dict[str, object]) -> None:
+    # Drawing takes a second to load that a verdict alone need not wait for.
+    from cspm.plots.diagnosis_figure import draw_diagnosis
+    from cspm_ident.diagnosis.reporting.diagnosis_page import write_diagnosis_page
+
+    write_json(folder / REPORT, data)
+    draw_diagnosis(folder / PICTURE, found)
+    write_diagnosis_page(folder / PAGE, found, data)
+    if found.findings.named:
+        improved = improved_testbed(found, str(folder / IMPROVED))
+        (folder / IMPROVED).write_text(improved.text, encoding="utf-8")

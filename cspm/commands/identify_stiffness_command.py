@@ -1,0 +1,163 @@
+"""What `cspm identify stiffness` does."""
+
+from __future__ import annotations
+
+from functools import partial
+from pathlib import Path
+
+from rich import box
+from rich.console import Console
+from rich.markup import escape
+from rich.table import Table
+
+from cspm.commands.identify_outcome import hand_out
+from cspm.commands.identify_rig import RigRequest, interval_text, provenance
+from cspm_ident.fitted_testbed import FittedNumber
+from cspm_ident.rig.flanks import DOWN, UP
+from cspm_ident.rig.stiffness import CUTOFF, MEAN, StiffnessResult, identify_stiffness
+from cspm_ident.rig.stiffness_fit import NAMES
+from cspm_run.console import say
+
+LAW = "k = min(a/l^b (e^(c t) - e^(d t)), E A/l)"
+
+
+def identify_stiffness_command(asked: RigRequest, json: Path | None) -> None:
+    """Identify, print, and write what was asked for.
+
+    Raises:
+        InputError: naming what is wrong in recordings, test-bed or options.
+    """
+    result = identify_stiffness(asked.specimens(), asked.verify, asked.cutoff or CUTOFF)
+    hand_out(result, print_stiffness, partial(_write, asked), asked.out, json)
+
+
+def print_stiffness(console: Console, result: StiffnessResult) -> None:
+    """Print the law of both branches and of each alone, the candidates and the specimens."""
+    console.print(_law_table(result))
+    found = result.both.estimate
+    for direction in found.unexcited:
+        say(console, f"not seen in these recordings: {direction.name}")
+    for name in found.at_bound:
+        say(console, f"{name} is at the end of its range: its interval does not hold")
+    if not result.both.fits:
+        say(
+            console,
+            "what the law leaves is more than the cycles differ by: it is not quite these cables',"
+            " and its intervals come from its residuals where those are wider",
+        )
+    if not result.both.asymptote:
+        say(console, "the asymptote E A/l is not reached: E stays what the test-bed file says")
+    if "b" in found.frozen:
+        say(console, "cables of one length: b stays 1, Hooke's law")
+    console.print(_candidate_table(result))
+    console.print(_specimen_table(result))
+    console.print(_hysteresis_table(result))
+
+
+def _law_table(result: StiffnessResult) -> Table:
+    table = Table(title=f"{LAW}, t in N, l in m; 95 % intervals", box=box.SIMPLE)
+    for column in ("", "both branches", "up alone", "down alone"):
+        table.add_column(column)
+    laws = (result.both, result.alone[UP], result.alone[DOWN])
+    for name in NAMES[:-1]:
+        cells = [
+            interval_text(one.estimate.value(name), one.estimate.interval(name)) for one in laws
+        ]
+        unit = result.both.estimate.units[NAMES.index(name)]
+        table.add_row(f"{name} [{unit}]" if unit != "1" else name, *cells, style=None)
+    cells = []
+    for one in laws:
+        low, high = one.estimate.interval("rigidity")
+        scale = 1e-6 / result.area
+        value = interval_text(scale * one.law.rigidity, (scale * low, scale * high))
+        cells.append(value if one.asymptote else "not reached")
+    table.add_row(escape("E [N/mm²]"), *cells)
+    return table
+
+
+def _candidate_table(result: StiffnessResult) -> Table:
+    table = Table(title="functions of the tension, by cycles not fitted to", box=box.SIMPLE)
+    table.add_column("function")
+    table.add_column("k(t), each up to an asymptote")
+    table.add_column("parameters", justify="right")
+    table.add_column("VAF %", justify="right")
+    for rank in result.candidates:
+        table.add_row(rank.name, rank.formula, str(rank.parameters), f"{rank.mean:.4f}")
+    return table
+
+
+def _specimen_table(result: StiffnessResult) -> Table:
+    table = Table(title="the law against each specimen", box=box.SIMPLE)
+    table.add_column("cable")
+    for column in ("l m", "cycles", "tension N", "VAF up %", "VAF down %", "VAF mean %"):
+        table.add_column(column, justify="right")
+    table.add_column("E at the asymptote N/mm²")
+    for one in result.specimens:
+        low = min(float(b.tension.min()) for b in one.branches)
+        high = max(float(b.tension.max()) for b in one.branches)
+        modulus = "not reached"
+        if one.asymptote is not None:
+            value, (lower, upper) = one.asymptote
+            modulus = interval_text(1e-6 * value, (1e-6 * lower, 1e-6 * upper))
+        table.add_row(
+            escape(one.specimen.label) + ("" if one.fitted else ", not fitted"),
+            f"{one.specimen.length:.3f}",
+            str(one.ramps.cycles),
+            f"{low:.2f} … {high:.2f}",
+            *(f"{one.vaf[name]:.3f}" for name in (UP, DOWN, MEAN)),
+            modulus,
+        )
+    return table
+
+
+def _hysteresis_table(result: StiffnessResult) -> Table:
+    table = Table(title="hysteresis: half the gap between up and down", box=box.SIMPLE)
+    table.add_column("cable")
+    for column in ("half width N", "of it damper N", "visible from N", "energy lost %"):
+        table.add_column(column, justify="right")
+    table.add_column("")
+    for one in result.specimens:
+        found = one.hysteresis
+        rest = found.half_width - found.viscous
+        verdict = f"{rest:.3g} N of hysteresis" if found.seen else "below what can be seen"
+        table.add_row(
+            escape(one.specimen.label),
+            interval_text(found.half_width, found.interval, 3),
+            f"{found.viscous:.3g}",
+            f"{found.limit:.2g}",
+            f"{100.0 * found.loss:.3f}",
+            verdict,
+        )
+    return table
+
+
+def _write(asked: RigRequest, folder: Path, result: StiffnessResult) -> dict[str, str]:
+    from cspm.plots.stiffness_figure import draw_hysteresis, draw_stiffness
+
+    folder.mkdir(parents=True)
+    pictures = {"stiffness": folder / "stiffness.png", "hysteresis": folder / "hysteresis.png"}
+    draw_stiffness(pictures["stiffness"], result)
+    draw_hysteresis(pictures["hysteresis"], result)
+    specimens = [one.specimen for one in result.specimens]
+    testbed = asked.write_fitted(folder, specimens, "stiffness", fitted_numbers(result))
+    return {name: str(path) for name, path in pictures.items()} | {"testbed": str(testbed)}
+
+
+def fitted_numbers(result: StiffnessResult) -> dict[str, FittedNumber | float | str]:
+    """Return the block `stiffness` of a test-bed file as far as it was fitted."""
+    recordings, windows = provenance([one.specimen for one in result.specimens if one.fitted])
+    estimate = result.both.estimate
+    found: dict[str, FittedNumber | float | str] = {"law": "exponential"}
+    for name in NAMES[:-1]:
+        if name in estimate.frozen:
+            found[name] = estimate.value(name)
+            continue
+        interval = estimate.interval(name)
+        found[name] = FittedNumber(estimate.value(name), interval, recordings, windows)
+    if result.both.asymptote:
+        low, high = (end / result.area for end in estimate.interval("rigidity"))
+        modulus = estimate.value("rigidity") / result.area
+        found["youngs_modulus"] = FittedNumber(
+            modulus, (low, high), recordings, windows, "k l/A on the asymptote"
+        )
+    return found

@@ -1,0 +1,153 @@
+"""What `cspm identify winch` does."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import partial
+from math import isfinite
+from pathlib import Path
+
+from rich import box
+from rich.console import Console
+from rich.markup import escape
+from rich.table import Table
+
+from cspm.commands.identify_outcome import hand_out
+from cspm.commands.identify_rig import FITTED, interval_text
+from cspm_ident.signals.measurement import read_measurement
+from cspm_ident.winch.fitted_file import fitted_testbed
+from cspm_ident.winch.identify_winches import (
+    BAND_HZ,
+    EFFECTS,
+    IdentifiedWinch,
+    WinchesResult,
+    identify_winches,
+)
+from cspm_msgs_py.new_folder import refuse_existing
+from cspm_run.console import make_console, say
+
+# From a parameter's unit at the shaft to that at the drum's rim, and the power of the radius.
+_AT_RIM = {"kg·m²": ("kg", 2), "N·m·s/rad": ("N·s/m", 2), "N·m": ("N", 1)}
+
+
+@dataclass(frozen=True)
+class WinchRequest:
+    """What was asked for on the command line.
+
+    Attributes:
+        recordings: to fit.
+        held_out: to judge only.
+        testbed: the machine's file, instead of what the recordings carry.
+        winches: names of their cables; none for all.
+        effects: to fit beside the inertia; none for the usual ones.
+        torque_age: see `WinchSignals` [s]; None: as the first recording was made.
+        reversals: whether windows count in which the shaft turns round.
+        band: in which torque errors are counted [Hz]; None for the usual one.
+        out: a new folder for pictures and fitted test-bed; None writes nothing.
+    """
+
+    recordings: tuple[Path, ...]
+    held_out: tuple[Path, ...]
+    testbed: Path | None
+    winches: tuple[str, ...]
+    effects: tuple[str, ...]
+    torque_age: float | None
+    reversals: bool
+    band: float | None
+    out: Path | None
+
+
+def identify_winch_command(asked: WinchRequest, json: Path | None) -> None:
+    """Identify, print, and write what was asked for.
+
+    Raises:
+        InputError: naming what is wrong in recordings, test-bed or options.
+    """
+    refuse_existing(asked.out)
+    searched = [read_measurement(path, asked.testbed) for path in asked.recordings]
+    held_out = [read_measurement(path, asked.testbed) for path in asked.held_out]
+    age = searched[0].torque_age if asked.torque_age is None else asked.torque_age
+    with make_console().status("") as status:
+        result = identify_winches(
+            searched,
+            asked.winches,
+            asked.effects or EFFECTS,
+            held_out=held_out,
+            torque_age=age,
+            reversals=asked.reversals,
+            band=BAND_HZ if asked.band is None else asked.band,
+            progress=lambda text: status.update(escape(text)),
+        )
+    hand_out(result, print_winches, partial(_write, asked.testbed), asked.out, json)
+
+
+def print_winches(console: Console, result: WinchesResult) -> None:
+    """Print values with intervals, what was not excited, and how well torques are said."""
+    for winch in result.winches:
+        console.print(_table(winch))
+        for direction in winch.fit.estimate.unexcited:
+            say(console, f"not excited: {direction.name}; its values are no result")
+        if winch.torn:
+            say(console, _torn_text(winch, result.reversals))
+    say(console, f"torque taken to act {1e3 * result.torque_age:g} ms before its stamp")
+    console.print(_error_table(result))
+
+
+def _torn_text(winch: IdentifiedWinch, reversals: bool) -> str:
+    other = winch.otherwise
+    values = [f"{name} {other.estimate.value(name):.5g}" for name in winch.torn] if other else []
+    role = "left out" if reversals else "counted"
+    return (
+        f"with windows {role} in which the shaft turns round: {', '.join(values)}. Dry friction"
+        " sticks there, and these windows say something else than the rest"
+        + (": consider --without-reversals" if reversals else "")
+    )
+
+
+def _table(winch: IdentifiedWinch) -> Table:
+    estimate = winch.fit.estimate
+    title = f"{winch.name}: {estimate.method}, 95 % intervals"
+    table = Table(title=escape(title), box=box.SIMPLE)
+    for column in ("parameter", "unit", "described", "found", "found at the drum's rim"):
+        table.add_column(column, justify="right" if column == "described" else "left")
+    for name, unit in zip(estimate.names, estimate.units, strict=True):
+        value, ends = estimate.value(name), estimate.interval(name)
+        seen = all(isfinite(end) for end in ends)
+        text = interval_text(value, ends, 5) if seen else f"{value:.5g}, not excited"
+        rim = ""
+        if seen and unit in _AT_RIM:
+            rim_unit, power = _AT_RIM[unit]
+            factor = winch.radius**-power
+            low, high = (factor * end for end in ends)
+            rim = f"{interval_text(factor * value, (low, high), 5)} {rim_unit}"
+        table.add_row(name, unit, f"{winch.described[name]:.5g}", text, rim)
+    return table
+
+
+def _error_table(result: WinchesResult) -> Table:
+    title = f"error of the torque below {result.band:g} Hz, 100·|τ − τ̂|/|τ|"
+    table = Table(title=escape(title), box=box.SIMPLE)
+    for column in ("winch", "recording", "described %", "fitted %"):
+        table.add_column(column, justify="right" if column.endswith("%") else "left")
+    for winch in result.winches:
+        for each in winch.judgements:
+            name = escape(each.measurement.path.name) + (", held out" if each.held_out else "")
+            shares = (f"{found.percent:.2f}" for found in each.errors.values())
+            table.add_row(winch.name, name, *shares)
+    return table
+
+
+def _write(testbed: Path | None, folder: Path, result: WinchesResult) -> dict[str, str]:
+    from cspm.plots.winch_figure import draw_winch
+
+    first = result.searched[0]
+    fitted = fitted_testbed(result, first.testbed, str(testbed or first.path))
+    folder.mkdir(parents=True)
+    path = folder / FITTED
+    path.write_text(fitted.text, encoding="utf-8")
+    written = {"testbed": str(path)}
+    for winch in result.winches:
+        picture = folder / f"winch_{winch.name}.png"
+        draw_winch(picture, winch)
+        written[f"winch_{winch.name}"] = str(picture)
+    return written

@@ -1,0 +1,252 @@
+"""What the commands do, behind the command line."""
+
+from __future__ import annotations
+
+import dataclasses
+import tempfile
+from collections.abc import Callable, Sequence
+from functools import partial
+from pathlib import Path
+
+from rich import box
+from rich.console import Console
+from rich.markup import escape
+from rich.progress import BarColumn, Progress, TaskID, TextColumn, TimeRemainingColumn
+from rich.table import Table
+
+from cspm_msgs_py.errors import CspmError, InputError
+from cspm_msgs_py.new_folder import refuse_existing
+from cspm_msgs_py.recording.overview import overview
+from cspm_msgs_py.recording.recover import recover
+from cspm_msgs_py.recording.run_record import EXTERNAL, RECORD_NAME
+from cspm_msgs_py.scenario import load_scenario
+from cspm_msgs_py.testbed import TestbedFile, load_testbed
+from cspm_ros.runtime.ros_install import find_ros
+from cspm_run.assembly import resolve
+from cspm_run.bundle import Bundle, make_bundle
+from cspm_run.console import make_console, say
+from cspm_run.plants import SIM
+from cspm_run.recorded_run import INPROCESS, run
+from cspm_run.resim import resimulate
+from cspm_run.run_result import RunResult
+from cspm_run.summary import print_summary, summary_data, write_json
+from cspm_sim.parameters import plant_parameters
+
+REALTIME = "realtime"
+Runner = Callable[[Bundle, Path, Callable[[float], None]], RunResult]
+
+
+def run_command(
+    path: Path,
+    overrides: Sequence[str],
+    folder: Path | None,
+    json: Path | None,
+    plant: str = SIM,
+    mode: str = INPROCESS,
+    machine: Path | None = None,
+    one_process: bool | None = None,
+) -> bool:
+    """Run a scenario file, show the result, and return whether it ran to its end.
+
+    Args:
+        path: the scenario.
+        overrides: of its values, `KEY=VALUE`.
+        folder: a new one for the recording; None records nothing.
+        json: where to write what is printed.
+        plant: whose equations to simulate.
+        mode: how to run.
+        machine: a test-bed file instead of the scenario's.
+        one_process: in real time, whether all nodes are to share a process; None: they do.
+
+    Raises:
+        CspmError: it diverged, or a node failed; what was recorded and drawn up to then is kept.
+    """
+    console = Console()
+    scenario = load_scenario(path, overrides)
+    testbed_path = machine or path.parent / scenario.testbed
+    testbed = load_testbed(testbed_path)
+    _check_effects(testbed, testbed_path)
+    bundle = make_bundle(resolve(scenario, testbed.testbed), testbed, path.parent)
+    external = plant == EXTERNAL
+    if external and mode != REALTIME:
+        raise InputError(f"--plant {EXTERNAL} --mode {mode}: allowed: --mode {REALTIME}")
+    if one_process is not None and mode != REALTIME:
+        option = "--one-process" if one_process else "--process-per-node"
+        raise InputError(f"{option} --mode {mode}: allowed: --mode {REALTIME}")
+    refuse_existing(folder)
+    bundle = dataclasses.replace(bundle, plant=SIM if external else plant)
+    runner = None
+    if mode != INPROCESS:
+        runner = _ros_runner(mode, console, external, apart=one_process is False)
+    result = _run_with_progress(bundle, folder, console, runner)
+    requirement = scenario.requirement
+    print_summary(console, result, requirement)
+    if json is not None:
+        write_json(json, summary_data(result))
+    if result.folder is not None:
+        # Loading matplotlib takes a quarter of a second, which the first step need not wait for.
+        from cspm.plots.run_figure import draw_run
+
+        write_json(result.folder / "summary.json", summary_data(result))
+        period = 1.0 / scenario.rates.plant
+        names = testbed.testbed.cable_names
+        draw_run(result.folder / "run.png", result, requirement, names, period)
+        say(console, f"recording {result.folder}, picture {result.folder.name}/run.png")
+    if result.failure:
+        diverged = result.failure.startswith("t = ")
+        raise CspmError(f"diverged at {result.failure}" if diverged else result.failure)
+    if result.interrupted:
+        kept = "; the recording is complete so far" if result.folder else ""
+        say(console, f"interrupted after {result.simulated:g} s{kept}")
+    return not result.interrupted
+
+
+def _check_effects(testbed: TestbedFile, path: Path) -> None:
+    """Let a fault among the effects, which only the model can see, name the test-bed's file."""
+    try:
+        plant_parameters(testbed.testbed)
+    except InputError as err:
+        raise InputError(f"{path}: {err}") from None
+
+
+def info_command(bag: Path, json: Path | None) -> None:
+    """Show what a recording holds."""
+    console = make_console()
+    found = overview(bag)
+    table = Table(title=escape(str(found.path)), box=box.SIMPLE)
+    table.add_column("topic", no_wrap=True)
+    # The one that gives way where the terminal is narrow.
+    table.add_column("type", overflow="ellipsis")
+    for column in ("messages", "rate [Hz]", "longest gap [ms]", "at [s]"):
+        table.add_column(escape(column), justify="right", no_wrap=True)
+    for topic in found.topics:
+        table.add_row(
+            escape(topic.name),
+            escape(topic.ros_type),
+            str(topic.count),
+            "" if topic.rate_hz is None else f"{topic.rate_hz:.1f}",
+            "" if topic.gap_ns is None else f"{topic.gap_ns * 1e-6:.3f}",
+            "" if topic.gap_at_ns is None else f"{(topic.gap_at_ns - found.start_ns) * 1e-9:.3f}",
+        )
+    console.print(table)
+    say(
+        console,
+        f"{found.message_count} messages over {found.duration_s:.3f} s,"
+        f" {found.size_bytes / 1e6:.1f} MB, {found.storage} {found.profile}, written by"
+        f" {found.library or 'unknown'}",
+    )
+    record = found.metadata.get(RECORD_NAME, {})
+    if "source" in record:
+        say(
+            console,
+            f"imported from {record['source']} (SHA-256 {record.get('source_sha256', 'unknown')}),"
+            f" mapping {record.get('mapping', 'unknown')}, test-bed {found.testbed}",
+        )
+    elif found.scenario or found.testbed:
+        say(
+            console,
+            f"scenario {found.scenario}, seed {record.get('seed', 'unknown')}, test-bed"
+            f" {found.testbed}, mode {record.get('mode', 'unknown')}, plant"
+            f" {record.get('plant', SIM)}",
+        )
+    if not found.complete:
+        say(console, f"cut short: `cspm recover {bag}` restores its index")
+    if json is not None:
+        write_json(json, dataclasses.asdict(found) | {"path": str(found.path)})
+
+
+def recover_command(bag: Path, out: Path | None, json: Path | None) -> None:
+    """Restore a recording, and say what came back."""
+    console = Console()
+    report = recover(bag, out)
+    if not report.restored:
+        say(console, f"{report.path}: complete, nothing to restore")
+    else:
+        say(
+            console,
+            f"{report.path}: {report.messages} messages up to {report.end_ns * 1e-9:.3f} s,"
+            f" {report.lost_bytes} bytes at the end unusable, {report.damaged} damaged chunks left"
+            f" out; the original is kept as {', '.join(path.name for path in report.kept)}",
+        )
+    if json is not None:
+        paths = {name: [str(p) for p in getattr(report, name)] for name in ("restored", "kept")}
+        write_json(json, dataclasses.asdict(report) | paths | {"path": str(report.path)})
+
+
+def resim_command(bag: Path, json: Path | None) -> bool:
+    """Repeat a recorded run, and return whether every message is identical."""
+    console = Console()
+    with _progress(console) as bar:
+        task = bar.add_task(f"repeating {escape(bag.name)}", total=None, speed=0.0)
+        found = resimulate(bag, lambda now, total: _show(bar, task, now, total))
+    if found.difference is None:
+        end = "" if found.cut_ns is None else f", up to {found.cut_ns * 1e-9:g} s, where it was cut"
+        say(console, f"identical: all {found.messages} messages, bit for bit{end}")
+    else:
+        say(console, f"different: {found.difference}")
+        if not found.same_version:
+            say(console, f"the recording was made by version {found.recorded_version}")
+    if json is not None:
+        difference = dataclasses.asdict(found.difference) if found.difference else None
+        identical = {"identical": difference is None, "first_difference": difference}
+        cut = None if found.cut_ns is None else found.cut_ns * 1e-9
+        write_json(json, identical | {"messages": found.messages, "cut_at_s": cut})
+    return found.difference is None
+
+
+def _run_with_progress(
+    bundle: Bundle, folder: Path | None, console: Console, runner: Runner | None
+) -> RunResult:
+    """Run a scenario by a runner that needs ROS, or else in this process."""
+    scenario = bundle.scenario
+    with _progress(console) as bar:
+        task = bar.add_task(escape(scenario.name), total=scenario.duration, speed=0.0)
+
+        def show(now: float) -> None:
+            _show(bar, task, now, scenario.duration)
+
+        if runner is None:
+            return run(bundle, folder, show)
+        if folder is not None:
+            return runner(bundle, folder, show)
+        # What a graph amounts to is read from its recording.
+        with tempfile.TemporaryDirectory(prefix="cspm-run-") as place:
+            result = runner(bundle, Path(place) / scenario.name, show)
+            return dataclasses.replace(result, folder=None)
+
+
+def _ros_runner(mode: str, console: Console, external: bool, *, apart: bool) -> Runner:
+    """Return what runs a scenario in a mode that needs ROS; only now is ROS loaded."""
+    find_ros(f"--mode {mode}")
+    if mode == "graph":
+        from cspm_ros.runtime.graph_run import run_graph
+
+        return run_graph
+
+    def tell(waiting: str) -> None:
+        say(console, waiting or "all is there")
+
+    if mode == REALTIME and not apart:
+        from cspm_ros.runtime.realtime_run import run_realtime
+
+        return partial(run_realtime, external=external, tell=tell)
+    from cspm_ros.runtime.process_run import run_processes
+
+    return partial(run_processes, mode=mode, external=external, tell=tell)
+
+
+def _progress(console: Console) -> Progress:
+    return Progress(
+        TextColumn("{task.description}"),
+        BarColumn(),
+        TextColumn("{task.completed:.1f} s, {task.fields[speed]:.1f} × real time"),
+        TimeRemainingColumn(),
+        console=console,
+        transient=True,
+    )
+
+
+def _show(bar: Progress, task: TaskID, simulated: float, total: float) -> None:
+    elapsed = bar.tasks[task].elapsed
+    speed = simulated / elapsed if elapsed else 0.0
+    bar.update(task, completed=simulated, total=total, speed=speed)

@@ -1,0 +1,96 @@
+"""The picture of manipulability: ellipses over the workspace, accelerations along the depth."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from pathlib import Path
+
+import numpy as np
+from matplotlib.axes import Axes
+from matplotlib.backends.backend_agg import FigureCanvasAgg
+from matplotlib.figure import Figure
+from matplotlib.ticker import LogLocator, NullFormatter
+from numpy.typing import NDArray
+
+from cspm_control.analysis.cable_structure import CableStructure, structures
+from cspm_control.analysis.manipulability import manipulability
+from cspm_control.analysis.pose_grid import Grid
+from cspm_model.kernels.machine import PlantParameters
+
+Array = NDArray[np.float64]
+
+DPI = 90
+PLACES = np.array([-0.2, 0.0, 0.2])
+DEPTHS = np.linspace(0.4, 4.0, 19)
+# Of ellipses of force, drawn at the pose they hold at [m per N/N].
+SIZE = 0.12
+TURN = np.linspace(0.0, 2.0 * np.pi, 97)
+DOWN, UP = ":", "-"
+
+
+def draw_manipulability(
+    path: Path, machine: CableStructure, parameters: PlantParameters, pose: Sequence[float]
+) -> None:
+    """Write ellipses of force in two planes, and what may be accelerated from rest by depth."""
+    figure = Figure(figsize=(13, 8), layout="constrained")
+    FigureCanvasAgg(figure)
+    places = figure.subplot_mosaic(
+        [["top", "side", "linear"], ["top", "side", "angular"]], width_ratios=[1.0, 0.5, 1.1]
+    )
+    top, side, linear, angular = (places[name] for name in ("top", "side", "linear", "angular"))
+    _ellipses(top, machine, pose, (0, 1), PLACES)
+    top.set(xlabel="surge [m]", ylabel="sway [m]", title="force for |t| = 1 N, from above")
+    _ellipses(side, machine, pose, (0, 2), np.linspace(0.6, 3.8, 5))
+    side.set(xlabel="surge [m]", ylabel="heave, down [m]", title="from the side")
+    side.invert_yaxis()
+    _accelerations(linear, angular, machine, parameters, pose)
+    figure.savefig(path, dpi=DPI)
+
+
+def _ellipses(
+    axes: Axes,
+    machine: CableStructure,
+    pose: Sequence[float],
+    plane: tuple[int, int],
+    heights: Array,
+) -> None:
+    circle = np.array([np.cos(TURN), np.sin(TURN)])
+    for across in PLACES:
+        for height in heights:
+            values = [np.array([pose[axis]]) for axis in (0, 1, 2, 4, 5)]
+            values[plane[0]], values[plane[1]] = np.array([across]), np.array([height])
+            left, lengths, _ = np.linalg.svd(structures(machine, Grid(*values))[0][list(plane)])
+            x, y = SIZE * (left * lengths) @ circle
+            axes.plot(across + x, height + y, color="tab:blue", linewidth=1.0)
+            axes.plot(across, height, "k.", markersize=3)
+    axes.set_aspect("equal", adjustable="datalim")
+    axes.set_xticks(PLACES)
+    axes.grid(alpha=0.3)
+
+
+def _accelerations(
+    linear: Axes,
+    angular: Axes,
+    machine: CableStructure,
+    parameters: PlantParameters,
+    pose: Sequence[float],
+) -> None:
+    found = [
+        manipulability(machine, parameters, (*pose[:2], depth, *pose[3:])).available
+        for depth in DEPTHS
+    ]
+    for dof in found[0]:
+        axes = angular if dof in ("roll", "pitch", "yaw") else linear
+        both = np.array([each[dof] for each in found])
+        lines = axes.semilogy(DEPTHS, both[:, 1], UP, label=f"{dof}, along its axis")
+        if not np.allclose(both[:, 0], both[:, 1], equal_nan=True):
+            axes.semilogy(
+                DEPTHS, both[:, 0], DOWN, color=lines[0].get_color(), label=f"{dof}, against"
+            )
+    for axes, unit in ((linear, "m/s²"), (angular, "rad/s²")):
+        axes.set(xlabel="heave, down [m]", ylabel=f"largest acceleration from rest [{unit}]")
+        axes.grid(alpha=0.3, which="both")
+        axes.yaxis.set_major_locator(LogLocator(subs=(1.0, 2.0, 5.0)))
+        axes.yaxis.set_major_formatter("{x:g}")
+        axes.yaxis.set_minor_formatter(NullFormatter())
+        axes.legend(fontsize="small")

@@ -1,1 +1,0 @@
-"""What runs it all: scenario runner, recorder, command line."""

@@ -1,5 +1,0 @@
-"""By there being nothing to find."""
-
-from cspm_bringup.blind.stratum import Case, Stratum
-
-NOTHING = Stratum("nothing", 4.0, (Case(),))

@@ -1,0 +1,1 @@
+"""Controllers of bar motion and cable tension, observers, and the reference governor."""

@@ -1,0 +1,258 @@
+"""Motion control by computed wrench: inverse dynamics of the bar about an observed error."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from math import exp, floor, pi
+
+import numpy as np
+from numba import njit
+from numpy.typing import NDArray
+
+from cspm_control.allocation.tension_distribution import TensionDistribution, fill_structure
+from cspm_control.controllers.bar_dynamics import (
+    GRAVITY,
+    MASS,
+    acceleration_from,
+    bar_parameters,
+    wanted_motion,
+    wrench_for,
+)
+from cspm_control.controllers.mass_observer import MassObserver
+from cspm_model.kernels.rotation import euler_from_quaternion
+from cspm_msgs_py.dofs import DOFS, Dof
+from cspm_msgs_py.testbed import Testbed
+
+Array = NDArray[np.float64]
+
+HEAVE = DOFS.index("heave")
+# Rows of the observer's memory.
+UNEXPLAINED, EXPECTED = 2, 3
+
+
+class ComputedWrench:
+    """From measured poses and the bar's reference to the wanted wrench on the bar, in world_ned.
+
+    The wrench gives the nominal bar (2-12) the reference's acceleration plus ωc²·e + 2ωc·ė + δ in
+    each controlled coordinate of x y z φ θ ψ: e is the error, δ the acceleration by which it drifts
+    for reasons unknown. A critically damped observer of third order tells all three from the pose
+    alone (extended state observer, Han 2009; as a filter of samples the fading-memory filter of
+    degree 2, Brookner 1998), and goes on by the model between poses that come more seldom than it
+    computes. δ stands where a PID has its integral term. The observer is told the acceleration that
+    the tension distribution can give, not the one wanted, so that a wrench that cannot be met
+    leaves nothing behind in it.
+    """
+
+    def __init__(
+        self,
+        bandwidth: Mapping[Dof, float],
+        testbed: Testbed,
+        distribution: TensionDistribution,
+        *,
+        observer_bandwidth: float,
+        period: float,
+        steps_per_pose: int,
+        pose_age: float = 0.0,
+        known_wrench: Sequence[float] = (0.0,) * 6,
+        mass: MassObserver | None = None,
+    ) -> None:
+        """Make the controller for a test-bed with a bar.
+
+        Args:
+            bandwidth: ωc per DOF [rad/s]; a DOF that is absent gets no feedback.
+            testbed: the nominal machine.
+            distribution: how the wrench becomes tensions.
+            observer_bandwidth: of the observer [rad/s].
+            period: time between steps [s].
+            steps_per_pose: steps from one pose to the next, ≥ 1.
+            pose_age: how old a pose is when it is new here [s].
+            known_wrench: constant wrench (6,) on the bar from outside [N, N·m], in world_ned.
+            mass: what tells the bar's mass; None: it is the nominal one.
+        """
+        assert testbed.bar is not None
+        self._gains = np.zeros((6, 2))
+        for name, frequency in bandwidth.items():
+            self._gains[DOFS.index(name)] = frequency**2, 2.0 * frequency
+        self._bar = bar_parameters(testbed.bar, testbed.gravity)
+        self._distribution = distribution
+        self._known_wrench, self._mass = np.array(known_wrench, dtype=float), mass
+        self._observer = _observer_gains(observer_bandwidth, period * steps_per_pose, pose_age)
+        self._period, self._pose_age = period, pose_age
+        self._last_pose = np.full(7, np.nan)
+        self._steps_per_pose, self._age = steps_per_pose, 0
+        self._memory, self._wanted = np.zeros((5, 6)), np.empty((3, 6))
+        self._started = False
+
+    @property
+    def adapted_mass(self) -> float | None:
+        """The mass that the bar is told to have [kg], None where it is not asked for."""
+        return None if self._mass is None else float(self._bar[MASS])
+
+    def restart(self) -> None:
+        """Let the next wrench be the one that follows the reference, whatever the error."""
+        self._started = False
+        if self._mass is not None:
+            self._mass.restart()
+
+    def step(
+        self,
+        bar_pose: Array,
+        frame_pose: Array,
+        reference: Array,
+        deviation: Array | None = None,
+    ) -> Array:
+        """Return the wrench (6,) for measured pose rows (7,) and a reference row (19,).
+
+        `deviation` (18,) is by how much the bar is to be elsewhere: x y z φ θ ψ, first and second
+        derivatives.
+        """
+        wanted_motion(reference, self._wanted)
+        if deviation is not None:
+            self._wanted += deviation.reshape(3, 6)
+        # A pose that stays the same for longer than its period is a new one all the same.
+        self._age += 1
+        fresh = self._age >= self._steps_per_pose or not np.array_equal(bar_pose, self._last_pose)
+        if fresh:
+            self._last_pose[:] = bar_pose
+            self._age = 0
+        wrench = np.empty(6)
+        _wanted_wrench(
+            bar_pose,
+            fresh,
+            self._wanted,
+            self._bar,
+            self._gains,
+            self._observer,
+            self._period,
+            self._pose_age,
+            self._started,
+            self._memory,
+            wrench,
+        )
+        self._started = True
+        wrench -= self._known_wrench
+        tensions = self._distribution.step(wrench, bar_pose, frame_pose).tensions
+        _expect(
+            bar_pose,
+            frame_pose,
+            self._wanted,
+            tensions,
+            self._distribution.cables,
+            self._bar,
+            self._known_wrench,
+            self._memory,
+        )
+        if self._mass is not None:
+            self._adapt(self._mass)
+        return wrench
+
+    def _adapt(self, mass: MassObserver) -> None:
+        """Take the mass that the last step tells, for the next one."""
+        bar, memory = self._bar, self._memory
+        given = self._wanted[2, HEAVE] - memory[EXPECTED, HEAVE]
+        lift = bar[GRAVITY] - given
+        mass.step(bar[MASS] * lift, lift + memory[UNEXPLAINED, HEAVE])
+        # What the mass explains from now on is no longer unexplained.
+        explained = lift * (bar[MASS] / mass.mass - 1.0)
+        memory[EXPECTED, HEAVE] += explained
+        memory[UNEXPLAINED, HEAVE] -= explained
+        bar[MASS] = mass.mass
+
+
+def _observer_gains(bandwidth: float, period: float, age: float) -> Array:
+    """Return what error, rate and acceleration take of a surprise: three poles at the bandwidth.
+
+    A surprise that is `age` old told of the state then; what it changes is carried on until now.
+    """
+    fade = exp(-bandwidth * period)
+    then = [
+        1.0 - fade**3,
+        1.5 * (1.0 - fade) ** 2 * (1.0 + fade) / period,
+        (1.0 - fade) ** 3 / period**2,
+    ]
+    onward = [[1.0, age, 0.5 * age**2], [0.0, 1.0, age], [0.0, 0.0, 1.0]]
+    return np.array(onward) @ then
+
+
+@njit(cache=True, error_model="numpy")
+def _wanted_wrench(
+    pose_row: Array,
+    fresh: bool,
+    wanted: Array,
+    bar: Array,
+    gains: Array,
+    observer: Array,
+    period: float,
+    age: float,
+    started: bool,
+    memory: Array,
+    out: Array,
+) -> None:
+    """Write the wrench to `out`.
+
+    `memory` (5, 6) holds the error, its rate, its unexplained and its expected acceleration, and
+    what is left of the first error's feedback.
+    """
+    pose = np.empty(6)
+    _pose(pose_row, pose)
+    error, rate, unexplained = memory[0], memory[1], memory[2]
+    for d in range(6):
+        found = _earlier(wanted[0, d], wanted[1, d], wanted[2, d], age) - pose[d]
+        if d >= 3:
+            found -= 2.0 * pi * floor(found / (2.0 * pi) + 0.5)
+        if started:
+            acceleration = unexplained[d] + memory[3, d]
+            ahead = error[d] + period * (rate[d] + 0.5 * period * acceleration)
+            rate[d] += period * acceleration
+            surprise = found - _earlier(ahead, rate[d], acceleration, age) if fresh else 0.0
+            error[d] = ahead + observer[0] * surprise
+            rate[d] += observer[1] * surprise
+            unexplained[d] += observer[2] * surprise
+            if not fresh or age > 0.0:
+                pose[d] = wanted[0, d] - error[d]
+        else:
+            error[d], rate[d], unexplained[d] = found, 0.0, 0.0
+            memory[4, d] = gains[d, 0] * found
+    acceleration = wanted[2].copy()
+    for d in range(6):
+        if gains[d, 0] > 0.0:
+            acceleration[d] += gains[d, 0] * error[d] + gains[d, 1] * rate[d] + unexplained[d]
+            # What stands at the start is taken back gently.
+            acceleration[d] -= memory[4, d]
+            memory[4, d] *= 1.0 - 0.5 * gains[d, 1] * period
+    wrench_for(pose, wanted[1] - rate, acceleration, bar, out)
+
+
+@njit(cache=True, error_model="numpy")
+def _expect(
+    bar_row: Array,
+    frame_row: Array,
+    wanted: Array,
+    tensions: Array,
+    cables: Array,
+    bar: Array,
+    known_wrench: Array,
+    memory: Array,
+) -> None:
+    """Write the acceleration of the error that the tensions are to give into `memory`."""
+    pose, given = np.empty(6), np.empty(6)
+    _pose(bar_row, pose)
+    structure, wrench = np.empty((6, len(tensions))), np.empty(6)
+    fill_structure(bar_row, frame_row, cables, np.arange(6), structure)
+    for row in range(6):
+        wrench[row] = (structure[row] * tensions).sum() + known_wrench[row]
+    acceleration_from(pose, wanted[1] - memory[1], wrench, bar, given)
+    memory[3] = wanted[2] - given
+
+
+@njit(cache=True, error_model="numpy", forceinline=True)
+def _earlier(place: float, rate: float, acceleration: float, age: float) -> float:
+    """Return where something was."""
+    return place - age * rate + 0.5 * age**2 * acceleration
+
+
+@njit(cache=True, error_model="numpy")
+def _pose(row: Array, out: Array) -> None:
+    """Write x y z φ θ ψ of a pose row (7,)."""
+    out[:3] = row[:3]
+    out[3], out[4], out[5] = euler_from_quaternion(row[3:7])

@@ -1,0 +1,1 @@
+"""Motor torques computed ahead from references: friction, winch inertia and cable stretch."""

@@ -1,0 +1,117 @@
+"""Torque ahead of the winches' friction, at the speeds that the references ask for."""
+
+from __future__ import annotations
+
+from math import tanh
+
+import numpy as np
+from numba import njit
+from numpy.typing import NDArray
+
+from cspm_model.kernels.cable import RADIUS
+from cspm_model.kernels.kinematics import cable_geometry
+from cspm_model.kernels.rotation import euler_from_quaternion
+from cspm_msgs_py.errors import InputError
+from cspm_msgs_py.testbed import Testbed
+
+Array = NDArray[np.float64]
+
+# Columns of the winches' friction: constant torque [N·m], torque per speed [N·m·s/rad], share of
+# the load's torque.
+DRY, VISCOUS, LOAD, COLUMNS = 0, 1, 2, 3
+# Effects that tell of it, and which of their parameters goes to which column. Of Stribeck's
+# friction what is left at speed: its peak would be overdone where the smooth sign is not yet ±1.
+TOLD_BY = {
+    "winch_coulomb_friction": ("torque", DRY),
+    "winch_stribeck_friction": ("coulomb_torque", DRY),
+    "winch_viscous_friction": ("coefficient", VISCOUS),
+    "winch_load_friction": ("coefficient", LOAD),
+}
+# Columns of a reference row: the pose, and its twist.
+POSITION, QUATERNION, TWIST = slice(0, 3), slice(3, 7), slice(7, 13)
+
+
+def winch_friction(testbed: Testbed) -> Array:
+    """Return what a test-bed's file tells of its winches' friction, (n, COLUMNS).
+
+    Raises:
+        InputError: it tells of none.
+    """
+    friction = np.zeros((len(testbed.cables), COLUMNS))
+    names = testbed.cable_names
+    for entry in testbed.effects:
+        if entry.effect in TOLD_BY:
+            parameter, column = TOLD_BY[entry.effect]
+            for element in entry.elements or names:
+                if element not in names:
+                    raise InputError(
+                        f"effects: {entry.effect}: no element '{element}', allowed:"
+                        f" {', '.join(names)}"
+                    )
+                friction[names.index(element), column] += entry.parameters[parameter]
+    if not friction.any():
+        raise InputError(
+            f"control.force.friction_feedforward: the effects of test-bed {testbed.name} tell of no"
+            f" friction, allowed: with {', '.join(TOLD_BY)}"
+        )
+    return friction
+
+
+class FrictionFeedforward:
+    """The torque that friction takes, were the winches as fast as bar and frame are to move.
+
+    With q̇ = −l̇/r of the reference lengths (2-6), cables taken as stiff, the torque is
+    (dry + load·r·t)·tanh(r·q̇/v) + viscous·q̇. The reference's speed is free of noise, so that the
+    sign cannot chatter, and changes before a motor does that sticks, which a measured speed of zero
+    would leave stuck.
+    """
+
+    def __init__(self, cables: Array, friction: Array, smooth_below: float) -> None:
+        """Take the cables' parameter rows, friction (n, COLUMNS), and v, a cable's speed [m/s]."""
+        self._cables, self._friction = cables, friction
+        self._smooth_below = smooth_below
+
+    def torque(self, bar: Array, frame: Array, tensions: Array) -> Array:
+        """Return torques (n,) [N·m] for reference rows (19,) and wanted tensions (n,) [N]."""
+        torque = np.empty(len(tensions))
+        _friction_torque(
+            _pose(bar),
+            _pose(frame),
+            bar[TWIST],
+            frame[TWIST],
+            tensions,
+            self._cables,
+            self._friction,
+            self._smooth_below,
+            torque,
+        )
+        return torque
+
+
+def _pose(row: Array) -> Array:
+    """Return x y z φ θ ψ of a reference row."""
+    return np.array([*row[POSITION], *euler_from_quaternion(row[QUATERNION])])
+
+
+@njit(cache=True, error_model="numpy")
+def _friction_torque(
+    bar_pose: Array,
+    frame_pose: Array,
+    bar_twist: Array,
+    frame_twist: Array,
+    tensions: Array,
+    cables: Array,
+    friction: Array,
+    smooth_below: float,
+    out: Array,
+) -> None:
+    n = len(tensions)
+    lengths, of_bar, of_frame = np.empty(n), np.empty((n, 6)), np.empty((n, 6))
+    cable_geometry(cables, bar_pose, frame_pose, lengths, of_bar, of_frame)
+    for i in range(n):
+        winding = 0.0
+        for axis in range(6):
+            winding -= of_bar[i, axis] * bar_twist[axis] + of_frame[i, axis] * frame_twist[axis]
+        radius = cables[i, RADIUS]
+        dry = friction[i, DRY] + friction[i, LOAD] * radius * abs(tensions[i])
+        out[i] = dry * tanh(winding / smooth_below) + friction[i, VISCOUS] * winding / radius

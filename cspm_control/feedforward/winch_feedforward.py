@@ -1,0 +1,180 @@
+"""Torque ahead of what winches take to change tensions, to follow the references and to stretch."""
+
+from __future__ import annotations
+
+from math import exp
+
+import numpy as np
+from numba import njit
+from numpy.typing import NDArray
+
+from cspm_model.kernels.cable import (
+    ARM,
+    DAMPING_CONSTANT,
+    DAMPING_SLOPE,
+    DIRECTION,
+    EXIT,
+    INERTIA,
+    LENGTH,
+    OFFSET_LENGTH,
+    RADIUS,
+    RATE,
+    SPAN_COLUMNS,
+    cable_spans,
+    elastic_tension,
+    law_scale,
+)
+from cspm_model.kernels.machine import PlantParameters
+from cspm_model.kernels.rotation import (
+    Placement,
+    Vector,
+    cross,
+    euler_from_quaternion,
+    rotate,
+    rotation_from_euler,
+)
+
+Array = NDArray[np.float64]
+
+# What is remembered per cable: the wanted tension after one and two filters [N], the elongation
+# [m] that it makes, and how fast that grows [m/s].
+ONCE, TWICE, ELONGATION, STRETCHING, MEMORY = 0, 1, 2, 3, 4
+# Newton steps from here [m] to the elongation of a cable at rest; half of them are never needed.
+FIRST_ELONGATION, NEWTON_STEPS = 1e-3, 50
+LEAST_ELONGATION = 1e-9
+
+
+class WinchFeedforward:
+    """The torque that winches take if bar, frame and tensions are to move as they are asked to.
+
+    By the winch's equation J·q̈ = τ − r·t (2-20) and its winding (2-16 to 2-18) that is
+
+        τ = r·(t − t₀) + (J/r)·(l/l0)·(ε̈ − l̈)
+
+    with the wanted tension t, t₀ that of the first step, the references' cable length l and the
+    elongation ε that t makes of the cable with its law and damper: B·ε̇ + t_el(ε) = t (2-19). For
+    two derivatives of ε the wanted tension is smoothed by two equal filters.
+    """
+
+    def __init__(
+        self, parameters: PlantParameters, stretch_bandwidth: float | None, *, period: float
+    ) -> None:
+        """Take the machine, the filters' bandwidth [rad/s] and the time between steps [s].
+
+        Without the bandwidth cables are taken as stiff: ε̈ = 0.
+        """
+        self._cables, self._tables = parameters.cables, parameters.tables
+        self._fresh = 0.0 if stretch_bandwidth is None else 1.0 - exp(-stretch_bandwidth * period)
+        self._period = period
+        self._memory = np.zeros((len(self._cables), MEMORY))
+        self._first: Array | None = None
+
+    def restart(self) -> None:
+        """Let the next tensions be the first ones, at which the cables rest."""
+        self._first = None
+
+    def torque(self, bar: Array, frame: Array, tensions: Array) -> Array:
+        """Return torques (n,) [N·m] for reference rows (19,) and wanted tensions (n,) [N]."""
+        n = len(tensions)
+        lengths, winding, stretching = np.empty(n), np.empty(n), np.zeros(n)
+        winding_accelerations(self._cables, bar, frame, lengths, winding)
+        if self._first is None:
+            self._first = tensions.copy()
+            _rest(self._cables, self._tables, lengths, tensions, self._memory)
+        if self._fresh > 0.0:
+            _stretch(
+                self._cables,
+                self._tables,
+                lengths,
+                tensions,
+                self._fresh,
+                self._period,
+                self._memory,
+                stretching,
+            )
+        radii, inertias = self._cables[:, RADIUS], self._cables[:, INERTIA]
+        share = lengths / (lengths - self._memory[:, ELONGATION])
+        moved: Array = inertias / radii * share * (stretching + winding)
+        return radii * (tensions - self._first) + moved
+
+
+@njit(cache=True, error_model="numpy")
+def winding_accelerations(
+    cables: Array, bar: Array, frame: Array, lengths: Array, winding: Array
+) -> None:
+    """Write lengths l (n,) [m] and −l̈ (n,) [m/s²] for reference rows (19,) of bar and frame.
+
+    With the ends' relative velocity w and acceleration: l̈ = u·ẇ + (w·w − l̇²)/l.
+    """
+    base = _placement(frame)
+    spans = np.empty((cables.shape[0], SPAN_COLUMNS))
+    cable_spans(cables, base, _placement(bar), spans)
+    for i in range(cables.shape[0]):
+        exit_arm = rotate(base[1], cables[i, EXIT], cables[i, EXIT + 1], cables[i, EXIT + 2])
+        arm = spans[i, ARM], spans[i, ARM + 1], spans[i, ARM + 2]
+        (vx, vy, vz), (ax, ay, az) = _point_motion(bar, arm)
+        (wx, wy, wz), (bx, by, bz) = _point_motion(frame, exit_arm)
+        ux, uy, uz = spans[i, DIRECTION], spans[i, DIRECTION + 1], spans[i, DIRECTION + 2]
+        squared = (vx - wx) ** 2 + (vy - wy) ** 2 + (vz - wz) ** 2
+        along = ux * (ax - bx) + uy * (ay - by) + uz * (az - bz)
+        lengths[i] = spans[i, LENGTH]
+        winding[i] = -along - (squared - spans[i, RATE] ** 2) / lengths[i]
+
+
+@njit(cache=True, error_model="numpy")
+def _placement(row: Array) -> Placement:
+    """Return position, rotation, velocity and spin of a reference row."""
+    roll, pitch, yaw = euler_from_quaternion(row[3:7])
+    rotation = rotation_from_euler(roll, pitch, yaw)
+    return (row[0], row[1], row[2]), rotation, (row[7], row[8], row[9]), (row[10], row[11], row[12])
+
+
+@njit(cache=True, error_model="numpy")
+def _point_motion(row: Array, arm: Vector) -> tuple[Vector, Vector]:
+    """Return velocity and acceleration of a body's point, in world axes as the arm to it."""
+    spin, turned = (row[10], row[11], row[12]), (row[16], row[17], row[18])
+    rx, ry, rz = cross(*spin, *arm)
+    cx, cy, cz = cross(*spin, rx, ry, rz)
+    tx, ty, tz = cross(*turned, *arm)
+    velocity = row[7] + rx, row[8] + ry, row[9] + rz
+    return velocity, (row[13] + tx + cx, row[14] + ty + cy, row[15] + tz + cz)
+
+
+@njit(cache=True, error_model="numpy")
+def _rest(cables: Array, tables: Array, lengths: Array, tensions: Array, memory: Array) -> None:
+    """Write the memory of cables that have long carried these tensions."""
+    for i in range(len(tensions)):
+        elongation = FIRST_ELONGATION
+        for _ in range(NEWTON_STEPS):
+            elastic = lengths[i] - elongation + cables[i, OFFSET_LENGTH]
+            scale = law_scale(elastic, cables, i)
+            found, slope = elastic_tension(elongation, elastic, scale, cables, tables, i)
+            elongation = max(LEAST_ELONGATION, elongation + (tensions[i] - found) / slope)
+        memory[i, ONCE] = memory[i, TWICE] = tensions[i]
+        memory[i, ELONGATION], memory[i, STRETCHING] = elongation, 0.0
+
+
+@njit(cache=True, error_model="numpy")
+def _stretch(
+    cables: Array,
+    tables: Array,
+    lengths: Array,
+    tensions: Array,
+    fresh: float,
+    period: float,
+    memory: Array,
+    out: Array,
+) -> None:
+    """Advance the memory by one step, implicitly, and write ε̈ (n,) [m/s²]."""
+    for i in range(len(tensions)):
+        cable = memory[i]
+        cable[ONCE] += fresh * (tensions[i] - cable[ONCE])
+        cable[TWICE] += fresh * (cable[ONCE] - cable[TWICE])
+        elastic = lengths[i] - cable[ELONGATION] + cables[i, OFFSET_LENGTH]
+        scale = law_scale(elastic, cables, i)
+        damping = max(0.0, cables[i, DAMPING_CONSTANT] - cables[i, DAMPING_SLOPE] * elastic)
+        carried, slope = elastic_tension(cable[ELONGATION], elastic, scale, cables, tables, i)
+        speed = (cable[TWICE] - carried) / (damping + slope * period)
+        out[i] = (speed - cable[STRETCHING]) / period
+        cable[STRETCHING] = speed
+        cable[ELONGATION] = max(LEAST_ELONGATION, cable[ELONGATION] + period * speed)

@@ -1,0 +1,1 @@
+"""Least squares of residuals on the effects' regressors, with errors for coloured residuals."""

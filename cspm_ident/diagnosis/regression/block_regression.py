@@ -1,0 +1,378 @@
+"""Least squares, their errors under coloured residuals and their cross-validation, from sums."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from contextlib import contextmanager
+from copy import copy
+from functools import cached_property
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.stats import norm, wilcoxon
+from scipy.stats import t as t_distribution
+
+from cspm_ident.diagnosis.regression.block_gram import Evidence, silence, squares_by_block
+from cspm_ident.diagnosis.regression.jackknife import RANK, LeftOut, left_out, pseudo_inverse
+
+Array = NDArray[np.float64]
+Index = NDArray[np.intp]
+
+FOLDS = 6
+# Effective blocks beyond the first, below which a single one tells a weight.
+_ALONE = 0.1
+
+
+class Gain(NamedTuple):
+    """What columns take from the squared residual, in blocks that were not fitted.
+
+    Attributes:
+        total: over all blocks.
+        error: its standard error, from the scatter between blocks.
+    """
+
+    total: float
+    error: float
+
+
+class Sums:
+    """All columns' products, scaled so that each column has length 1."""
+
+    def __init__(self, evidence: Evidence) -> None:
+        """Take the products of all residuals, and sum them."""
+        width = evidence.width
+        squares, self._at = np.zeros((evidence.blocks, width + 1)), []
+        for place in evidence.places:
+            own = np.append(place.columns, width)
+            squares[:, own] += np.einsum("bii->bi", place.grams)
+            at = np.full(width + 1, -1, dtype=np.intp)
+            at[own] = np.arange(len(own))
+            self._at.append(at)
+        lengths = np.sqrt(squares.sum(axis=0))
+        lengths[lengths == 0.0] = 1.0
+        lengths[-1] = 1.0
+        scales = [lengths[at >= 0] for at in self._at]
+        self._grams = [
+            place.grams / (scale[:, None] * scale)
+            for place, scale in zip(evidence.places, scales, strict=True)
+        ]
+        self._lengths = lengths[:-1]
+        self._whole = self._summed(np.arange(width + 1), slice(None))
+        self._folds = np.array_split(np.arange(evidence.blocks), min(FOLDS, evidence.blocks))
+
+    def _of(self, rows: Index, columns: Index) -> Array:
+        """Return each block's products of two sets of columns, (blocks, rows, columns)."""
+        found = np.zeros((self.blocks, len(rows), len(columns)))
+        for grams, at in zip(self._grams, self._at, strict=True):
+            down, across = np.flatnonzero(at[rows] >= 0), np.flatnonzero(at[columns] >= 0)
+            if len(down) and len(across):
+                own = grams[:, at[rows[down]][:, None], at[columns[across]]]
+                found[:, down[:, None], across] += own
+        return found
+
+    def _summed(self, rows: Index, blocks: slice) -> Array:
+        """Return products of some columns with all over some blocks, (rows, width + 1)."""
+        found = np.zeros((len(rows), len(self._at[0])))
+        for grams, at in zip(self._grams, self._at, strict=True):
+            down, across = np.flatnonzero(at[rows] >= 0), np.flatnonzero(at >= 0)
+            if len(down):
+                found[down[:, None], across] += grams[blocks, at[rows[down]]].sum(axis=0)
+        return found
+
+    def _alone(self, blocks: Array, lengths: Array) -> Sums:
+        """Return the sums of other products, (blocks, m + 1, m + 1), of columns so long."""
+        other = copy(self)
+        other._grams, other._at = [blocks], [np.arange(blocks.shape[1])]
+        other._lengths, other._whole = lengths, blocks.sum(axis=0)
+        for name in ("_others", "excited"):
+            other.__dict__.pop(name, None)
+        return other
+
+    def beside(self, combinations: Array) -> Sums:
+        """Return sums with further columns behind, combinations of these, shape (width, k)."""
+        return self._turned(np.arange(len(self._lengths)), combinations)
+
+    def combined(
+        self, base: Index, columns: Index, combinations: Array
+    ) -> tuple[Sums, Index, Index]:
+        """Return sums of a base and of combinations of other columns.
+
+        Args:
+            base: columns that stay as they are.
+            columns: others.
+            combinations: of these, (columns, k).
+
+        Returns:
+            The sums, and which of their columns are the base's and the combinations.
+        """
+        kept, first = np.concatenate([base, columns]), len(base)
+        turn = np.vstack([np.zeros((first, combinations.shape[1])), combinations])
+        own = len(kept) + np.arange(turn.shape[1])
+        return self._turned(kept, turn), np.arange(first), own
+
+    def _turned(self, columns: Index, combinations: Array) -> Sums:
+        """Return sums of some columns, and behind them of their combinations, (columns, k)."""
+        width, count = combinations.shape
+        turn = np.zeros((width + 1, width + count + 1))
+        turn[:width, :width], turn[-1, -1] = np.eye(width), 1.0
+        turn[:width, width:-1] = combinations * self._lengths[columns, None]
+        table = np.append(columns, len(self._whole) - 1)
+        grams = turn.T @ self._of(table, table) @ turn
+        # A combination of nothing has squares that are rounded, to less than none as well.
+        lengths = np.append(np.sqrt(np.maximum(np.einsum("bii->i", grams), 0.0))[:-1], 1.0)
+        lengths[lengths == 0.0] = 1.0
+        grams = grams / (lengths[:, None] * lengths)
+        return self._alone(grams, lengths[:-1] * np.append(self._lengths[columns], np.ones(count)))
+
+    def delay(self, columns: Index, block: int) -> None:
+        """Let columns act from a block on only."""
+        for grams, at in zip(self._grams, self._at, strict=True):
+            silence(grams, at[columns][at[columns] >= 0], block)
+        self._sum_again(columns)
+
+    @contextmanager
+    def delayed(self, columns: Index, block: int) -> Iterator[None]:
+        """Let columns act from a block on only, for a while."""
+        kept = []
+        for grams, at in zip(self._grams, self._at, strict=True):
+            own = at[columns][at[columns] >= 0]
+            if len(own):
+                kept.append((grams, own, grams[:block, own].copy()))
+        self.delay(columns, block)
+        try:
+            yield
+        finally:
+            for grams, own, rows in kept:
+                grams[:block, own] = rows
+                grams[:block, :, own] = rows.transpose(0, 2, 1)
+            self._sum_again(columns)
+
+    def _sum_again(self, columns: Index) -> None:
+        whole = self._summed(columns, slice(None))
+        tables = [(self._whole, whole)]
+        for others, fold in zip(self._others, self._folds, strict=True):
+            tables.append((others, whole - self._summed(columns, self._near(fold))))
+        for table, rows in tables:
+            table[columns], table[:, columns] = rows, rows.T
+
+    def _near(self, fold: Index) -> slice:
+        """Return the blocks of a fold and their neighbours."""
+        return slice(max(0, int(fold[0]) - 1), int(fold[-1]) + 2)
+
+    @property
+    def blocks(self) -> int:
+        """Number of blocks."""
+        return len(self._grams[0])
+
+    @property
+    def lengths(self) -> Array:
+        """Return how long each column is, (width,); 1 where it is zero."""
+        return np.asarray(self._lengths)
+
+    @property
+    def squares(self) -> float:
+        """Σ y²."""
+        return float(self._whole[-1, -1])
+
+    @cached_property
+    def excited(self) -> NDArray[np.bool_]:
+        """Which columns are not zero throughout."""
+        return np.asarray(np.diag(self._whole)[:-1] > 0.0)
+
+    def weights(self, columns: Index) -> Array:
+        """Return the least-squares weights of columns."""
+        return np.asarray(self._weights(columns, self._whole) / self._lengths[columns])
+
+    def weights_beyond(self, base: Index, columns: Index) -> Array:
+        """Return the weights of columns fitted to what a base leaves, its own weights held."""
+        both = self._whole[np.ix_(columns, base)]
+        left = self._whole[columns, -1] - both @ self._weights(base, self._whole)
+        inverse = pseudo_inverse(self._whole[np.ix_(columns, columns)])
+        return np.asarray(inverse @ left / self._lengths[columns])
+
+    def gains_beyond(self, base: Index, groups: list[Index]) -> Array:
+        """Return by how much each group of columns lowers Σ residual² beyond a base, (groups,)."""
+        inverse = pseudo_inverse(self._whole[np.ix_(base, base)])
+        explained = inverse @ self._whole[base]
+        found = np.zeros(len(groups))
+        for k, group in enumerate(groups):
+            left = self._whole[np.ix_(group, group)] - (
+                self._whole[np.ix_(group, base)] @ explained[:, group]
+            )
+            cross = self._whole[group, -1] - self._whole[np.ix_(group, base)] @ explained[:, -1]
+            # What the base nearly spans leaves numbers of rounding only.
+            left[np.diag_indices(len(left))] += RANK
+            found[k] = cross @ np.linalg.solve(left, cross)
+        return found
+
+    def held_out(self, columns: Index) -> Array:
+        """Return Σ residual² of each block, fitted to the others without its neighbours."""
+        both = np.append(columns, len(self._whole) - 1)
+        parts, out = self._of(both, both), np.zeros(self.blocks)
+        for fold, others in zip(self._folds, self._others, strict=True):
+            out[fold] = squares_by_block(parts[fold], self._weights(columns, others))
+        return out
+
+    def gain(self, base: Index, columns: Index) -> Gain:
+        """Return what columns gain beyond a base, in blocks that were not fitted."""
+        better = self.held_out(base) - self.held_out(np.concatenate([base, columns]))
+        return gain_of(better)
+
+    def gain_within(self, base: Index, columns: Index) -> Gain:
+        """Return what columns gain beyond a base in the blocks that they were fitted to.
+
+        For columns that are not the same in any two blocks, as functions of time: blocks that were
+        not fitted say nothing of them.
+        """
+        both = np.concatenate([base, columns])
+        before, after = self._fitted(base), self._fitted(both)
+        return gain_of(before - after)
+
+    def _fitted(self, columns: Index) -> Array:
+        """Return Σ residual² of each block, fitted to all of them."""
+        both = np.append(columns, len(self._whole) - 1)
+        return squares_by_block(self._of(both, both), self._weights(columns, self._whole))
+
+    def drift(self, base: Index, columns: Index) -> tuple[Gain, float]:
+        """Return what it gains to let weights change over the blocks, and by which chance.
+
+        In proportion to the block's number, beside a base and the columns themselves.
+        """
+        first, count = len(base), len(columns)
+        kept = np.concatenate([base, columns, [len(self._whole) - 1]])
+        turn = np.zeros((self.blocks, len(kept) + count, len(kept)))
+        turn[:, np.arange(first + count), np.arange(first + count)] = 1.0
+        number = np.linspace(-0.5, 0.5, self.blocks)[:, None]
+        turn[:, first + count + np.arange(count), first + np.arange(count)] = number
+        turn[:, -1, -1] = 1.0
+        blocks = turn @ self._of(kept, kept) @ turn.transpose(0, 2, 1)
+        narrow = self._alone(blocks, np.ones(first + 2 * count))
+        always, changing = np.arange(first + count), first + count + np.arange(count)
+        return narrow.gain(always, changing), narrow.p_value(always, changing)
+
+    def covariance(self, base: Index, columns: Index) -> Array:
+        """Return the covariance of the weights of columns beside a base.
+
+        From leaving out one block at a time (Bell and McCaffrey, Surv. Methodol. 28(2), 2002),
+        which is not too small for few blocks; the weights of the base are held.
+        """
+        scale = self._lengths[columns]
+        covariance = left_out(self._beyond(base, columns)).covariance
+        return np.asarray(covariance / np.outer(scale, scale))
+
+    def half_width(self, base: Index, columns: Index) -> Array:
+        """Return half the widths of 95 % intervals of the weights of columns beside a base.
+
+        From pairs of blocks, for what a model leaves is alike for longer than a block, and by what
+        pairs in turn have in common. Infinite where a single pair tells a weight.
+        """
+        errors, free = left_out(paired(self._beyond(base, columns))).spread()
+        factor = np.full(len(free), np.inf)
+        factor[free > _ALONE] = t_distribution.ppf(0.975, free[free > _ALONE])
+        return np.asarray(factor * errors / self._lengths[columns])
+
+    def p_value(self, base: Index, columns: Index) -> float:
+        """Return the probability of so large weights by chance.
+
+        By Wald's test with the covariance above, so that what a single block says counts for
+        nothing, while a few that agree may be enough. Blocks count by what they tell of the
+        columns; one that tells more than all others is left out, and they are tested, in turn.
+
+        Args:
+            base: columns beside them.
+            columns: those tested.
+        """
+        return self._undominated(base, columns).chance()
+
+    def _undominated(self, base: Index, columns: Index) -> LeftOut:
+        """Return how weights scatter over all blocks but dominant ones while the others tell any.
+
+        What is left without one may be ruled by another, as where a rope is first pulled taut.
+        """
+        heard = np.arange(self.blocks)
+        found = left_out(self._beyond(base, columns))
+        while (most := found.dominant()) is not None:
+            heard = np.delete(heard, most)
+            others = self._beyond(base, columns, heard)
+            if np.trace(others.sum(axis=0)[:-1, :-1]) <= RANK:
+                break
+            found = left_out(others)
+        return found
+
+    def _beyond(self, base: Index, columns: Index, blocks: Index | None = None) -> Array:
+        """Return blocks' products of columns and target less what a base spans of them."""
+        table = np.append(columns, len(self._whole) - 1)
+        both = np.concatenate([base, table])
+        products = self._of(both, both)
+        if blocks is not None:
+            products = products[blocks]
+        whole, own = products.sum(axis=0), slice(len(base))
+        spanned = pseudo_inverse(whole[own, own]) @ whole[own, len(base) :]
+        turn = np.vstack([-spanned, np.eye(len(table))])
+        return np.asarray(turn.T @ products @ turn)
+
+    def squares_of(self, columns: Index) -> float:
+        """Return Σ residual² after a fit of columns."""
+        weights = self._weights(columns, self._whole)
+        return float(self.squares - self._whole[columns, -1] @ weights)
+
+    def spanned(self, base: Index, wide: Index, narrow: Index) -> Array:
+        """Return the share of each narrow column, beyond a base, that wide columns span."""
+        both = np.concatenate([base, wide])
+
+        def left(by: Index) -> Array:
+            inverse = pseudo_inverse(self._whole[np.ix_(by, by)])
+            cross = self._whole[np.ix_(by, narrow)]
+            spanned = np.einsum("ij,ik,kj->j", cross, inverse, cross)
+            return np.asarray(np.diag(self._whole)[narrow] - spanned)
+
+        return np.asarray(1.0 - left(both) / np.maximum(left(base), RANK))
+
+    def left_from(self, base: Index, columns: Index) -> Array:
+        """Return Σ residual² where `columns` act from each block on only, shape (blocks,)."""
+        own, table = slice(len(base), -1), np.concatenate([base, columns, [len(self._whole) - 1]])
+        blocks = self._of(columns, table)
+        # What the columns meet from a block on, themselves, the base and the target.
+        met = blocks[::-1].cumsum(axis=0)[::-1]
+        crossed, products, told = met[:, :, : len(base)], met[:, :, own], met[:, :, -1]
+        turned = crossed @ pseudo_inverse(self._whole[np.ix_(base, base)])
+        products = products - turned @ crossed.transpose(0, 2, 1)
+        told = told - turned @ self._whole[base, -1]
+        weights = np.linalg.pinv(products, rcond=RANK, hermitian=True) @ told[..., None]
+        gained = np.einsum("bi,bi->b", told, weights[..., 0])
+        return np.asarray(self.squares_of(base) - gained)
+
+    @cached_property
+    def _others(self) -> list[Array]:
+        """Sums of all blocks but those of each fold and their neighbours."""
+        everything = np.arange(len(self._whole))
+        return [self._whole - self._summed(everything, self._near(f)) for f in self._folds]
+
+    def _weights(self, columns: Index, gram: Array) -> Array:
+        return np.asarray(pseudo_inverse(gram[np.ix_(columns, columns)]) @ gram[columns, -1])
+
+
+def gain_of(better: Array) -> Gain:
+    """Return total and standard error of gains by block."""
+    spread = float(better.std(ddof=1)) if len(better) > 1 else float("inf")
+    return Gain(float(better.sum()), spread * float(np.sqrt(len(better))))
+
+
+def behind(worse: Array) -> float:
+    """Return by how many standard deviations blocks are worse, whatever the size of a single one.
+
+    By Wilcoxon's signed ranks, which no outlying block decides.
+    """
+    if not np.any(worse):
+        return 0.0
+    return float(norm.isf(wilcoxon(worse, alternative="greater").pvalue))
+
+
+def paired(values: Array) -> Array:
+    """Return sums over blocks two by two, (⌈blocks / 2⌉, …).
+
+    What a model leaves is alike for longer than a block, so that single ones would tell two models
+    apart that both are not quite true.
+    """
+    return np.add.reduceat(values, np.arange(0, len(values), 2), axis=0)

@@ -1,0 +1,76 @@
+"""Weights of candidates with their intervals, where several elements may share theirs."""
+
+from __future__ import annotations
+
+from collections.abc import Collection, Sequence
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.stats import norm
+
+from cspm_ident.diagnosis.regression.block_gram import Evidence
+from cspm_ident.diagnosis.regression.block_regression import Sums
+from cspm_ident.diagnosis.residuals.regressors import Candidate
+
+Array = NDArray[np.float64]
+Index = NDArray[np.intp]
+# On either side of an interval of 95 %.
+_OUTSIDE = 0.025
+# Of each candidate the weights of its columns, and half the widths of their 95 % intervals.
+Weights = dict[Candidate, tuple[Array, Array]]
+
+
+def values_of(
+    evidence: Evidence, sums: Sums, candidates: Sequence[Candidate], common: Collection[str] = ()
+) -> dict[Candidate, Array]:
+    """Return the weights that `weights_of` does, without their intervals."""
+    if not common:
+        return evidence.parted(candidates, sums.weights(evidence.with_nuisance(candidates)))
+    return {c: w for c, (w, _) in weights_of(evidence, sums, candidates, common).items()}
+
+
+def weights_of(
+    evidence: Evidence,
+    sums: Sums,
+    candidates: Sequence[Candidate],
+    common: Collection[str] = (),
+    base: Index | None = None,
+) -> Weights:
+    """Return candidates' weights with half the widths of their 95 % intervals.
+
+    Args:
+        evidence: of their columns.
+        sums: of these.
+        candidates: that are fitted together.
+        common: effects, by id, of which all candidates share their weights.
+        base: columns that are fitted beside them; None: the nuisance.
+    """
+    beside = evidence.nuisance if base is None else base
+    number = _numbers(evidence, candidates, common)
+    causes = np.eye(number.max(initial=-1) + 1)[number]
+    sums, beside, own = sums.combined(beside, evidence.columns_of(candidates), causes)
+    free = sums.weights(np.concatenate([beside, own]))[len(beside) :]
+    values = evidence.parted(candidates, free[number])
+    widths = evidence.parted(candidates, sums.half_width(beside, own)[number])
+    return {c: (values[c], widths[c]) for c in candidates}
+
+
+def at_once(weights: Weights) -> Weights:
+    """Return weights with intervals that hold for all candidates together in 95 % (Bonferroni)."""
+    if not weights:
+        return weights
+    wider = float(norm.isf(_OUTSIDE / len(weights)) / norm.isf(_OUTSIDE))
+    return {c: (own, wider * half) for c, (own, half) in weights.items()}
+
+
+def _numbers(evidence: Evidence, candidates: Sequence[Candidate], common: Collection[str]) -> Index:
+    """Return which number to fit is each column's weight."""
+    numbers: dict[tuple[str, str, int], int] = {}
+    found = []
+    for candidate in candidates:
+        element = "" if candidate.effect_id in common else candidate.element
+        span = evidence.slices[candidate]
+        for k in range(span.stop - span.start):
+            key = candidate.effect_id, element, k
+            found.append(numbers.setdefault(key, len(numbers)))
+    return np.array(found, dtype=np.intp)

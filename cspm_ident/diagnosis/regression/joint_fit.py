@@ -1,0 +1,198 @@
+"""What hypotheses leave of the residuals, fitted together."""
+
+from __future__ import annotations
+
+from collections import Counter
+from collections.abc import Iterable, Iterator, Sequence
+from contextlib import contextmanager
+
+import numpy as np
+from numpy.typing import NDArray
+
+from cspm_ident.diagnosis.regression.block_gram import Evidence
+from cspm_ident.diagnosis.regression.block_regression import Gain, Sums
+from cspm_ident.diagnosis.regression.coefficients import Weights, at_once, values_of, weights_of
+from cspm_ident.diagnosis.regression.collinearity import UNTRUE_SHARE, freely_gained_at
+from cspm_ident.diagnosis.regression.hypothesis import (
+    Hypothesis,
+    bounded,
+    is_allowed,
+    is_early,
+    is_exact,
+    is_negligible,
+    is_tied,
+    is_timing,
+    parts_of,
+)
+from cspm_ident.diagnosis.residuals.regressors import Candidate, Place
+
+Array = NDArray[np.float64]
+Index = NDArray[np.intp]
+
+# Of the squares of columns, readings being as noisy as they are.
+_SAME = 0.9
+
+
+class Fits:
+    """Evidence with its sums, asked in terms of hypotheses."""
+
+    def __init__(self, evidence: Evidence, sums: Sums) -> None:
+        """Take both."""
+        self.evidence, self.sums = evidence, sums
+
+    def columns(self, hypotheses: Iterable[Hypothesis]) -> Index:
+        """Return indices of the nuisance and of some hypotheses' columns."""
+        return self.evidence.with_nuisance(c for h in hypotheses for c in h.candidates)
+
+    def own_columns(self, hypothesis: Hypothesis) -> Index:
+        """Return indices of one hypothesis's columns."""
+        return self.evidence.columns_of(hypothesis.candidates)
+
+    def beside(self, base: Index, *further: Hypothesis) -> Index:
+        """Return a base with the columns of hypotheses."""
+        return np.concatenate([base, *map(self.own_columns, further)])
+
+    def weights(self, hypotheses: Sequence[Hypothesis]) -> Weights:
+        """Return the weights of hypotheses that are fitted together, with half their intervals."""
+        return weights_of(self.evidence, self.sums, *parts_of(hypotheses))
+
+    def values(self, hypotheses: Sequence[Hypothesis]) -> dict[Candidate, Array]:
+        """Return the weights alone, which takes less time."""
+        return values_of(self.evidence, self.sums, *parts_of(hypotheses))
+
+    def shared(self, base: Index, hypothesis: Hypothesis) -> tuple[Sums, Index, Index]:
+        """Return sums in which all elements of a hypothesis share their weights.
+
+        With the columns of the base and those of the hypothesis.
+        """
+        columns, elements = self.own_columns(hypothesis), hypothesis.elements
+        same = np.tile(np.eye(len(columns) // len(elements)), (len(elements), 1))
+        return self.sums.combined(base, columns, same)
+
+    def held_out(self, hypothesis: Hypothesis, base: Index) -> Array:
+        """Return Σ residual² of each block beside a hypothesis that was not fitted to it."""
+        if not hypothesis.common:
+            return self.sums.held_out(self.beside(base, hypothesis))
+        sums, base, own = self.shared(base, hypothesis)
+        return sums.held_out(np.concatenate([base, own]))
+
+    def gain(self, hypothesis: Hypothesis, base: Index) -> Gain:
+        """Return what a hypothesis takes beyond a base."""
+        return self.sums.gain(base, self.own_columns(hypothesis))
+
+    @contextmanager
+    def delayed(self, hypothesis: Hypothesis) -> Iterator[None]:
+        """Let a hypothesis act from its onset on, for a while."""
+        if not hypothesis.onset:
+            yield
+            return
+        own = self.own_columns(hypothesis)
+        with (
+            self.sums.delayed(own, hypothesis.onset),
+            self.evidence.delayed(own, hypothesis.onset),
+        ):
+            yield
+
+    def untrue(
+        self, hypothesis: Hypothesis, others: Sequence[Hypothesis]
+    ) -> dict[Candidate, float]:
+        """Return by what share of its amplitude each candidate is seen to be off, from 0 to 1.
+
+        From the most that a free function gains beside the hypothesis in a residual that the
+        candidate acts on, in squares of what the candidate takes beside all others. Where several
+        act it may be any of them that is off.
+        """
+        base, own = self.columns(others), self.own_columns(hypothesis)
+        apart = [(c,) for c in hypothesis.candidates]
+        causes = [hypothesis.candidates] if hypothesis.common else apart
+        with self.delayed(hypothesis):
+            free = freely_gained_at(self.evidence, self.sums, base, own)
+            parts = {cause: self.evidence.columns_of(cause) for cause in causes}
+            where = {cause: self.evidence.places_of(mine) for cause, mine in parts.items()}
+            acting = Counter(place for places in where.values() for place in places)
+            found: dict[Candidate, float] = {}
+            for cause, mine in parts.items():
+                rest = np.concatenate([base, np.setdiff1d(own, mine)])
+                gained = float(self.sums.gains_beyond(rest, [mine])[0])
+                most = max(free[place] / acting[place] for place in where[cause])
+                share = float(np.sqrt(most / max(gained, most))) if most else 0.0
+                found |= dict.fromkeys(cause, share)
+        return found
+
+    def may_be_untruth(self, chosen: Sequence[Hypothesis]) -> list[bool]:
+        """Return of each whether laws beside it may be untrue by all it takes, wherever it shows.
+
+        Numbers of the file and of readings have no form to be untrue, nor have clocks of a sound
+        machine; what a constant leaves is a function of time.
+        """
+        taken = [self._taken(h, chosen) for h in chosen]
+        laws = [
+            k
+            for k, h in enumerate(chosen)
+            if not is_exact(h.effect) and not self.is_negligible(h, chosen)
+        ]
+        return [
+            all(
+                taken[k][place]
+                <= UNTRUE_SHARE * sum(max(0.0, taken[i][place]) for i in laws if i != k)
+                for place in self.evidence.places_of(self.own_columns(h))
+            )
+            for k, h in enumerate(chosen)
+        ]
+
+    def _taken(self, hypothesis: Hypothesis, chosen: Sequence[Hypothesis]) -> dict[Place, float]:
+        """Return the squares that a hypothesis takes of each residual beside the others."""
+        base = self.columns(h for h in chosen if h is not hypothesis)
+        both = self.beside(base, hypothesis)
+        without, left = (
+            self.evidence.left(columns, self.sums.weights(columns)) for columns in (base, both)
+        )
+        return {place: without[place] - left[place] for place in left}
+
+    def is_plausible(self, hypotheses: Sequence[Hypothesis], loosely: bool = False) -> bool:
+        """Return whether parameters are what the catalogue allows, but for chance.
+
+        Args:
+            hypotheses: fitted together.
+            loosely: whether weights that depend on one another may be off by what decides nothing,
+                no model being truer: as an alternative, which nothing surely contradicts.
+        """
+        values = self.values(hypotheses)
+        if all(is_allowed(c, own) and not c.effect.tied for c, own in values.items()):
+            return True
+        found = at_once(self.weights(hypotheses))
+        if not all(is_allowed(c, bounded(c, own, half)) for c, (own, half) in found.items()):
+            return False
+        tied = {c: weights for c, weights in found.items() if c.effect.tied}
+        return all(
+            is_tied(c, own, half + self._undecided(c, own) if loosely else half)
+            for c, (own, half) in tied.items()
+        )
+
+    def _undecided(self, candidate: Candidate, weights: Array) -> Array:
+        """Return by how much each weight may be off and decide nothing."""
+        lengths = self.sums.lengths[self.evidence.columns_of([candidate])]
+        return np.asarray(np.sqrt(UNTRUE_SHARE) * np.linalg.norm(lengths * weights) / lengths)
+
+    def are_early(self, hypotheses: Sequence[Hypothesis]) -> bool:
+        """Return whether with them some readings would be newer than their stamps say."""
+        timing = [h for h in hypotheses if is_timing(h.effect)]
+        values = self.values(hypotheses) if timing else {}
+        return any(is_early(values, h) for h in timing)
+
+    def contradicts(self, hypothesis: Hypothesis, others: Sequence[Hypothesis]) -> bool:
+        """Return whether it says again, as readings that are too new, that others are late.
+
+        Clocks tell times apart only: where nothing else tells which is right it is the same.
+        """
+        late = [h for h in others if is_timing(h.effect) and not self.is_negligible(h, others)]
+        if not late or not is_timing(hypothesis.effect):
+            return False
+        known = np.concatenate([self.own_columns(h) for h in late])
+        own = self.sums.spanned(self.columns([]), known, self.own_columns(hypothesis))
+        return bool(np.all(own > _SAME)) and self.are_early([*others, hypothesis])
+
+    def is_negligible(self, hypothesis: Hypothesis, chosen: Sequence[Hypothesis]) -> bool:
+        """Return whether a sound machine has as much of it, so that it counts for no effect."""
+        found = self.values(chosen)
+        return is_negligible({c: found[c] for c in hypothesis.candidates})

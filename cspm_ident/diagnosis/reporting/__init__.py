@@ -1,0 +1,1 @@
+"""A diagnosis in sentences, as `diagnosis.json`, as a page and as an improved test-bed file."""

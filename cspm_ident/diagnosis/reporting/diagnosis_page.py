@@ -1,0 +1,367 @@
+"""The report page of a diagnosis: verdict first, then where, why, how surely and what next."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Sequence
+from html import escape
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from cspm_ident.diagnosis.diagnose import Diagnosis
+from cspm_ident.diagnosis.regression.hypothesis import Hypothesis, Named
+from cspm_ident.diagnosis.reporting.evidence_figure import caption_of, driver_figure, overlay_figure
+from cspm_ident.diagnosis.reporting.machine_drawing import drawing
+from cspm_ident.diagnosis.reporting.machine_part import Part, part_behind, parts_of
+from cspm_ident.diagnosis.reporting.page_checks import controllers_table, energy_table
+from cspm_ident.diagnosis.reporting.statement import (
+    channel_of,
+    drive_of,
+    tension_statement,
+    unit_of,
+)
+from cspm_ident.diagnosis.reporting.verdict import (
+    IMPROVED,
+    SENTENCES,
+    TRUSTED,
+    Verdict,
+    named_in,
+    verdict_of,
+)
+from cspm_ident.diagnosis.validation.residual_curves import Curve
+from cspm_ident.offline_page import figure_html, table_html, write_offline_page
+from cspm_ident.signals.samples import Samples
+from cspm_sim.effects import catalogue
+
+Array = NDArray[np.float64]
+
+# Curves per finding: one effect on all of eight cables is seen in some of them.
+_MOST_CURVES = 3
+# Of the squared residual: less than that is no picture of what was found.
+_GAINED = 0.2
+_STYLE = """<style>
+.verdict {font-size: 1.15em; line-height: 1.5; border-left: 6px solid #c62828; padding: 0.2em 1em}
+.consistent {border-color: #1b7f3b}
+nav a {display: inline-block; margin: 0.2em 1em 0.2em 0; padding: 0.3em 0}
+</style>"""
+_SECTIONS = {
+    "where": "Where",
+    "evidence": "Evidence on held-out data",
+    "parameters": "Parameters",
+    "hypotheses": "Hypotheses",
+    "fit": "Every residual",
+    "simulated": "Simulated again",
+    "energy": "Where energy goes",
+    "controllers": "Controllers stepped again",
+    "limits": "What would have shown",
+    "silent": "Not testable here",
+    "next": "What to do next",
+    "sources": "Recordings and files",
+}
+
+
+def write_diagnosis_page(path: Path, found: Diagnosis, data: dict[str, Any]) -> None:
+    """Write one HTML file that needs no network.
+
+    Args:
+        path: of the file.
+        found: the diagnosis.
+        data: the same as `diagnosis.json` has it.
+
+    Raises:
+        OSError: the file cannot be written.
+    """
+    verdict = verdict_of(found)
+    title = f"Diagnosis of {', '.join(m.path.name for m in found.searched)}: {verdict.value}"
+    bodies = {
+        "where": _where(found),
+        "evidence": _evidence(found),
+        "parameters": _parameters(data),
+        "hypotheses": _hypotheses(found, data),
+        "fit": _fit(found),
+        "simulated": _simulated(found, data),
+        "energy": energy_table(found),
+        "controllers": controllers_table(data),
+        "limits": _limits(found),
+        "silent": _silent(data),
+        "next": _next(found, data),
+        "sources": _sources(data),
+    }
+    shown = {name: body for name, body in bodies.items() if body}
+    links = "".join(f"<a href='#{name}'>{escape(_SECTIONS[name])}</a>" for name in shown)
+    sections = (
+        f"<section id={name}><h2>{escape(_SECTIONS[name])}</h2>{body}</section>"
+        for name, body in shown.items()
+    )
+    top = [_STYLE, _verdict(verdict, data), f"<nav aria-label=sections>{links}</nav>"]
+    write_offline_page(path, title, [*top, *sections])
+
+
+def _verdict(verdict: Verdict, data: dict[str, Any]) -> str:
+    sentences = [SENTENCES[verdict]]
+    for finding in data["findings"]:
+        sentences.append(finding["statement"])
+        sentences += [f"As well explained by {_twin(each)}." for each in finding["alternatives"]]
+    kind = " consistent" if verdict is Verdict.CONSISTENT else ""
+    text = "<br>".join(escape(sentence) for sentence in sentences)
+    return f'<p class="verdict{kind}">{text}</p>'
+
+
+def _twin(alternative: dict[str, Any]) -> str:
+    """Return an alternative in plain words, with its probability."""
+    beside = alternative["beside"]
+    with_it = f", beside another {catalogue()[beside].words} than the file's" if beside else ""
+    where = ", ".join(alternative["elements"])
+    effect = catalogue()[alternative["effect"]]
+    words = f"another {effect.words}" if effect.alter is not None else effect.words
+    return f"{words} ({alternative['effect']} on {where}{with_it})"
+
+
+def _where(found: Diagnosis) -> str:
+    first = found.searched[0]
+    parts = list(dict.fromkeys(_parts(found)))
+    picture = drawing(
+        first.machine, _mean_pose(first.bar_pose), _mean_pose(first.frame_pose), parts
+    )
+    named = ", ".join(part.words for part in parts) or "no part"
+    drawn = tension_statement(found)
+    note = "" if drawn is None else f"<p>{escape(drawn)}</p>"
+    return f"<p>Marked: {escape(named)}.</p>{note}{picture}"
+
+
+def _parts(found: Diagnosis) -> Iterable[Part]:
+    cables = found.searched[0].machine.cable_names
+    for named in found.findings.named:
+        for element in named.hypothesis.elements:
+            yield from parts_of(named.hypothesis.effect, element, cables)
+    for driver, _, _ in found.findings.unknown:
+        yield part_behind(driver.place)
+    for line in found.lines:
+        yield part_behind(line.place)
+
+
+def _mean_pose(samples: Samples | None) -> Array | None:
+    return None if samples is None else np.asarray(samples.values.mean(axis=0))
+
+
+def _evidence(found: Diagnosis) -> str:
+    """Return the figures of each finding, or of the largest residual where nothing was found."""
+    texts = []
+    script = True
+    for heading, curves, driver in _subjects(found):
+        texts.append(f"<h3>{escape(heading)}</h3>")
+        for curve in curves:
+            signal = driver or curve.main_signal
+            texts.append(f"<p>{escape(caption_of(curve, signal))}</p>")
+            if signal:
+                texts.append(figure_html(driver_figure(curve, signal), script=script))
+                script = False
+            texts.append(figure_html(overlay_figure(curve), script=script))
+            script = False
+    return "".join(texts)
+
+
+def _subjects(found: Diagnosis) -> Iterable[tuple[str, Sequence[Curve], str]]:
+    """Yield headings, what to draw, and against which signal; empty: that which explains most."""
+    for named in found.findings.named:
+        own = [c for c in found.curves if _touches(named.hypothesis, c)]
+        own.sort(key=lambda curve: -curve.gained)
+        shown = [c for k, c in enumerate(own[:_MOST_CURVES]) if k == 0 or c.gained > _GAINED]
+        yield named.hypothesis.words, shown, ""
+    for driver, _, _ in found.findings.unknown:
+        own = [c for c in found.curves if c.place == driver.place and driver.signal in c.signals]
+        yield (
+            f"unknown, a function of {driver.signal} of {driver.place.element}",
+            own[:1],
+            driver.signal,
+        )
+    if not found.findings.named and not found.findings.unknown and found.curves:
+        largest = max(found.curves, key=_size)
+        yield "nothing found; the residual that is largest against what was measured", [largest], ""
+
+
+def _touches(hypothesis: Hypothesis, curve: Curve) -> bool:
+    return any(
+        c.effect_id == hypothesis.effect.id and c.element in hypothesis.elements
+        for c in curve.touched
+    )
+
+
+def _size(curve: Curve) -> float:
+    return float(np.std(curve.before) / max(np.std(curve.measured), 1e-300))
+
+
+def _parameters(data: dict[str, Any]) -> str:
+    rows = []
+    for finding in data["findings"]:
+        for each in finding["parameters"]:
+            ends = each["ci95"]
+            interval = f"{ends[0]:.4g} to {ends[1]:.4g}" if ends else "none"
+            value = f"{each['value']:.4g}"
+            rows.append(
+                (finding["effect"], each["element"], each["name"], value, interval, each["unit"])
+            )
+    heads = ("effect", "element", "parameter", "value", "95 % interval", "unit")
+    return table_html(heads, rows, "parameters") if rows else ""
+
+
+def _hypotheses(found: Diagnosis, data: dict[str, Any]) -> str:
+    rows: list[tuple[str, ...]] = []
+    for named, finding in zip(found.findings.named, named_in(data), strict=True):
+        rows += _ranked(named, finding)
+    for named in found.rejected:
+        size = _in_errors(named.gain.total, named.gain.error)
+        rows.append((named.hypothesis.words, "not kept", "", size, "no help on held-out data"))
+    for driver, gain, share in found.findings.unknown:
+        name = f"a function of {driver.signal}, {driver.place.element}"
+        size = _in_errors(gain.total, gain.error)
+        rows.append((name, "unknown", "", size, f"{100 * share:.0f} %"))
+    for line in found.lines:
+        name = f"periodic, {line.frequency:.2f} Hz, {line.place.element}"
+        rows.append((name, "unknown", "", f"by chance {line.chance:.1g}", ""))
+    if not rows:
+        return f"<p>None of {found.findings.candidates} stood.</p>"
+    heads = ("hypothesis", "verdict", "probability", "gain in standard errors", "residual taken")
+    count = (
+        f"<p>{found.findings.candidates} hypotheses were looked at. Probabilities are those among"
+        f" what explains the same, times {TRUSTED:g}: the share of findings without a rival that"
+        " were right in blind recordings; a tenth of it beside as much that nothing explains.</p>"
+    )
+    return count + table_html(heads, rows, "hypotheses and their evidence")
+
+
+def _ranked(named: Named, finding: dict[str, Any]) -> Iterable[tuple[str, ...]]:
+    """Yield a finding's row and those of its alternatives, the best first."""
+    verdict = "tied" if named.alternatives else "found"
+    size = _in_errors(named.gain.total, named.gain.error)
+    likely, taken = f"{finding['probability']:.2f}", f"{100 * named.share:.0f} %"
+    yield named.hypothesis.words, verdict, likely, size, taken
+    rivals = zip(named.alternatives, finding["alternatives"], strict=True)
+    for rival, entry in sorted(rivals, key=lambda each: each[0].behind):
+        behind = f"{rival.behind:.1f} behind"
+        yield (
+            rival.words,
+            "explains it as well",
+            f"{entry['probability']:.2f}",
+            behind,
+            "",
+        )
+
+
+def _in_errors(total: float, error: float) -> str:
+    return f"{total / error:.1f}" if error > 0.0 else "∞"
+
+
+def _fit(found: Diagnosis) -> str:
+    judged = "recordings held out" if found.held_out else "the last part, which was not searched"
+    heads = ("residual", "before", "re-tuned", "after", "black box", "noise", "unit")
+    rows = []
+    for fit in found.fit:
+        numbers = (fit.before, fit.retuned, fit.after, fit.ceiling, fit.noise)
+        rows.append((channel_of(fit), *(f"{n:.3g}" for n in numbers), unit_of(fit)))
+    text = (
+        f"<p>Root mean square on {judged}. <i>Re-tuned</i> is the file with its own numbers fitted"
+        " and nothing added; <i>black box</i> is free functions of every signal instead of"
+        " physics; <i>noise</i> is what differs from row to row.</p>"
+    )
+    return text + table_html(heads, rows, "root mean square of every residual")
+
+
+def _simulated(found: Diagnosis, data: dict[str, Any]) -> str:
+    """Return errors of simulations of held-out data, and of the closed loop where it was run."""
+    if not found.simulated:
+        return ""
+    heads = ("quantity", "driven by", "before", "re-tuned", "after", "noise", "unit")
+    rows = []
+    for fit in found.simulated:
+        numbers = (fit.before, fit.retuned, fit.after, fit.floor)
+        told = (f"{n:.3g}" for n in numbers)
+        rows.append((fit.output.name, drive_of(fit), *told, fit.output.unit))
+    text = (
+        "<p>Root mean square errors of held-out data, each part simulated from measured signals:"
+        " winches and bar in windows of half a second, cables and bar from motor angles"
+        " throughout.</p>"
+    )
+    whole = text + table_html(heads, rows, "root mean square errors of simulations")
+    loop = [
+        (each["name"], f"{each['before']:.3g}", f"{each['after']:.3g}", each["unit"])
+        for each in data.get("closed_loop", ())
+    ]
+    if not loop:
+        return whole
+    columns = ("quantity", "before", "after", "unit")
+    text = "<p>The recorded scenario run again in closed loop: difference to the recording.</p>"
+    return whole + text + table_html(columns, loop, "root mean square differences in closed loop")
+
+
+def _limits(found: Diagnosis) -> str:
+    """Return from which size on effects would have been told, over their elements."""
+    sizes: dict[tuple[str, str, str], list[float]] = {}
+    for limit in found.limits:
+        if limit.possible:
+            key = limit.effect, limit.parameter, limit.unit
+            sizes.setdefault(key, []).append(limit.least)
+    rows = [
+        (effect, parameter, f"{min(least):.2g}", f"{max(least):.2g}", unit)
+        for (effect, parameter, unit), least in sizes.items()
+    ]
+    heads = ("effect", "parameter", "on the clearest element", "on the least clear", "unit")
+    text = "<p>More of an effect than this would have been told, beside what was found.</p>"
+    return text + table_html(heads, rows, "limits of detection") if rows else ""
+
+
+def _silent(data: dict[str, Any]) -> str:
+    rows = []
+    known = catalogue()
+    for each in data["not_excited"]:
+        where = ", ".join(each["elements"]) or "everywhere"
+        rows.append((each["effect"], where, known[each["effect"]].separating_experiment))
+    heads = ("effect", "on", "what would show it")
+    return table_html(heads, rows, "effects that these recordings cannot show") if rows else ""
+
+
+def _next(found: Diagnosis, data: dict[str, Any]) -> str:
+    steps = []
+    if data["model"]:
+        steps.append(
+            f"<code>cspm run SCENARIO --testbed {IMPROVED}</code> simulates the machine with what"
+            " was found."
+        )
+    for finding in data["findings"]:
+        for rival in finding["alternatives"]:
+            pair = f"To tell {finding['effect']} from {rival['effect']}"
+            advice = catalogue()[finding["effect"]].separating_experiment
+            steps.append(_experiment(pair, rival["separating_experiment"], advice))
+    shown: dict[str, list[str]] = {}
+    for each in data["not_excited"]:
+        if each.get("separating_experiment"):
+            shown.setdefault(each["separating_experiment"], []).append(each["effect"])
+    for name, effects in shown.items():
+        steps.append(_experiment(f"To make {', '.join(effects)} testable", name, ""))
+    if found.findings.unknown:
+        steps.append("Describe what was found as unknown as an effect of your own.")
+    if not steps:
+        steps.append("Nothing has to be done. What was not testable needs other recordings.")
+    return f"<ul>{''.join(f'<li>{step}</li>' for step in steps)}</ul>"
+
+
+def _experiment(purpose: str, file: str | None, advice: str) -> str:
+    """Return one line of HTML: which scenario to run, or what to do where there is none."""
+    if file is None:
+        reason = "no motion that the recordings show to be safe tells more than they do"
+        return escape(f"{purpose}: {advice} ({reason}).")
+    said = escape(f"{purpose}, record ")
+    return f"{said}<a href='{escape(file)}'><code>cspm run {escape(file)}</code></a>."
+
+
+def _sources(data: dict[str, Any]) -> str:
+    rows = [(r["path"], _role(r), r["sha256"]) for r in data["recordings"]]
+    rows.append((data["testbed"]["path"], "test-bed", data["testbed"]["sha256"]))
+    return table_html(("file", "role", "SHA-256"), rows, "recordings and files")
+
+
+def _role(recording: dict[str, Any]) -> str:
+    cut = "" if recording["complete"] else ", not closed by its writer"
+    return f"{recording['role'].replace('_', ' ')}{cut}"

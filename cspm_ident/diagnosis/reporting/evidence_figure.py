@@ -1,0 +1,143 @@
+"""The evidence for a finding, drawn: its residual against its driver, and over time."""
+
+from __future__ import annotations
+
+import numpy as np
+import plotly.graph_objects as go
+from numpy.typing import NDArray
+from plotly.subplots import make_subplots
+
+from cspm_ident.diagnosis.reporting.machine_part import part_behind
+from cspm_ident.diagnosis.validation.residual_curves import Curve, bins_of
+from cspm_ident.offline_page import BELOW, thinned
+from cspm_sim.effects import Channel
+
+Array = NDArray[np.float64]
+
+_POINTS = 1500
+_BEFORE, _AFTER, _MEASURED = "#c62828", "#1b7f3b", "#9ecae9"
+# A step so many times the usual one is a hole.
+_HOLE = 3.0
+_DOTS = {"mode": "markers", "opacity": 0.35}
+# Significant digits of what is drawn: more than a screen shows.
+_DIGITS = 5
+
+
+def caption_of(curve: Curve, signal: str) -> str:
+    """Return how large a residual is, and how far it depends on a signal, before and after.
+
+    Args:
+        curve: the residual; its rows are those that are searched.
+        signal: one of its signals, or empty.
+    """
+    of = f", {curve.component}" if curve.component else ""
+    before, after = (float(np.sqrt(np.mean(v**2))) for v in (curve.before, curve.after))
+    then = f" before and {after:.3g} {curve.unit} after" if curve.touched else ""
+    away = (
+        ", apart from where the shaft turns round" if curve.place.channel is Channel.SHAFT else ""
+    )
+    text = (
+        f"{part_behind(curve.place).words}{of}: the residual is measured less modelled; its root"
+        f" mean square is {before:.3g} {curve.unit}{then}{away}."
+    )
+    return f"{text} {_dependence(curve, signal)}" if signal else text
+
+
+def _dependence(curve: Curve, signal: str) -> str:
+    """Return how much of the squares that were there is a function of a signal, and is left."""
+    whole = max(float(np.sum(curve.before**2)), 1e-300)
+    edges, home = bins_of(curve.signals[signal])
+    before, after = (
+        100.0 * float(np.sum(_means(v, home, len(edges) - 1)[home] ** 2)) / whole
+        for v in (curve.before, curve.after)
+    )
+    then = f", and {after:.2g} % are left that are" if curve.touched else ""
+    name = signal.split(" [")[0]
+    return f"Of its squares {before:.2g} % are a function of {name}{then}."
+
+
+def driver_figure(curve: Curve, name: str) -> go.Figure:
+    """Return the residual before and after against one of its signals.
+
+    Dots are samples, lines the means over bins that hold equally many. Where nothing that was
+    found acts on it there is no after.
+    """
+    figure = go.Figure()
+    signal = curve.signals[name]
+    step = max(1, len(signal) // _POINTS)
+    edges, home = bins_of(signal)
+    centres = _means(signal, home, len(edges) - 1)
+    stages = [(curve.before, "before", _BEFORE, "circle")]
+    if curve.touched:
+        stages.append((curve.after, "after", _AFTER, "diamond"))
+    for values, stage, colour, symbol in stages:
+        marker = {"color": colour, "size": 4, "symbol": symbol}
+        shown = _short(signal[::step]), _short(values[::step])
+        figure.add_scatter(x=shown[0], y=shown[1], name=stage, marker=marker, **_DOTS)
+    for values, stage, colour, symbol in stages:
+        figure.add_scatter(
+            x=_short(centres),
+            y=_short(_means(values, home, len(edges) - 1)),
+            name=f"{stage}, mean",
+            mode="lines+markers",
+            line={"color": colour, "width": 2},
+            marker={"size": 9, "symbol": symbol, "line": {"color": "white", "width": 1}},
+        )
+    figure.update_xaxes(title_text=name)
+    figure.update_yaxes(title_text=f"residual [{curve.unit}]")
+    figure.update_layout(height=430, **BELOW)
+    return figure
+
+
+def overlay_figure(curve: Curve) -> go.Figure:
+    """Return what was measured with what the model says of it, and the residuals, over time."""
+    figure = make_subplots(rows=2, cols=1, shared_xaxes=True, vertical_spacing=0.06)
+    model, improved = curve.measured - curve.before, curve.measured - curve.after
+    lines = [
+        (curve.measured, "measured", _MEASURED, 1),
+        (model, "before", _BEFORE, 1),
+        (curve.before, "before", _BEFORE, 2),
+    ]
+    if curve.touched:
+        lines += [(improved, "after", _AFTER, 1), (curve.after, "after", _AFTER, 2)]
+    for values, name, colour, row in lines:
+        times, shown = _line(curve.times, values)
+        # What was measured lies below and is wider, so that it shows where the model agrees.
+        width = 4.0 if name == "measured" else 1.2
+        figure.add_scatter(
+            x=times,
+            y=shown,
+            name=name,
+            mode="lines",
+            legendgroup=name,
+            showlegend=row == 1,
+            line={"color": colour, "width": width},
+            row=row,
+            col=1,
+        )
+    figure.update_xaxes(title_text="time [s]", row=2, col=1)
+    figure.update_yaxes(title_text=f"[{curve.unit}]", row=1, col=1)
+    figure.update_yaxes(title_text=f"residual [{curve.unit}]", row=2, col=1)
+    figure.update_layout(height=560, hovermode="x", **BELOW)
+    return figure
+
+
+def _means(values: Array, home: NDArray[np.intp], bins: int) -> Array:
+    counts = np.bincount(home, minlength=bins)
+    return np.asarray(np.bincount(home, weights=values, minlength=bins) / np.maximum(counts, 1))
+
+
+def _line(times: Array, values: Array) -> tuple[list[float | None], list[float | None]]:
+    """Return the thinned line, interrupted where rows are missing."""
+    holes = np.flatnonzero(np.diff(times) > _HOLE * np.median(np.diff(times)))
+    shown_times, shown = thinned(times, values, _POINTS)
+    x: list[float | None] = list(_short(shown_times))
+    y: list[float | None] = list(_short(shown))
+    for after in sorted(set(np.searchsorted(shown_times, times[holes], side="right")))[::-1]:
+        x.insert(int(after), None)
+        y.insert(int(after), None)
+    return x, y
+
+
+def _short(values: Array) -> list[float]:
+    return [float(f"{value:.{_DIGITS}g}") for value in values]

@@ -1,0 +1,51 @@
+"""The test-bed file with the effects that a diagnosis found."""
+
+from __future__ import annotations
+
+import io
+
+import numpy as np
+from ruamel.yaml import YAML
+from ruamel.yaml.comments import CommentedMap, CommentedSeq
+
+from cspm_ident.diagnosis.diagnose import Diagnosis
+from cspm_ident.diagnosis.regression.hypothesis import members_of
+from cspm_ident.diagnosis.reporting.statement import numbers_of
+from cspm_ident.fitted_testbed import WIDEST, FittedNumber
+from cspm_msgs_py.testbed import TestbedFile, parse_testbed
+
+_UNBOUNDED = (-np.inf, np.inf)
+
+
+def improved_testbed(diagnosis: Diagnosis, source: str) -> TestbedFile:
+    """Return the searched machine's file with an entry under `effects` for all that was found.
+
+    Every number carries the recordings it comes from and its interval; all else stays as it was.
+
+    Args:
+        diagnosis: what was found.
+        source: names the new file in errors.
+
+    Raises:
+        InputError: the numbers are no machine's.
+    """
+    yaml = YAML()
+    yaml.preserve_quotes = True
+    yaml.width = WIDEST
+    yaml.indent(mapping=2, sequence=4, offset=2)
+    content = yaml.load(diagnosis.searched[0].testbed.text)
+    entries = content.setdefault("effects", CommentedSeq())
+    hashes = tuple(measurement.sha256 for measurement in diagnosis.searched)
+    for named in diagnosis.findings.named:
+        for candidate in members_of(diagnosis.weights, named.hypothesis):
+            entry = CommentedMap({"effect": candidate.effect_id, "elements": [candidate.element]})
+            entry["parameters"] = CommentedMap(
+                {
+                    n.name: FittedNumber(n.value, n.ci95 or _UNBOUNDED, hashes).content()
+                    for n in numbers_of(diagnosis, candidate)
+                }
+            )
+            entries.append(entry)
+    stream = io.StringIO()
+    yaml.dump(content, stream)
+    return parse_testbed(stream.getvalue(), source)

@@ -1,0 +1,67 @@
+"""The parts of a test-bed that a finding may be about."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from enum import Enum
+from typing import NamedTuple
+
+from cspm_ident.diagnosis.residuals.regressors import Place
+from cspm_ident.signals.measurement import TENSION, WINCHES
+from cspm_sim.effects import Block, Channel, Effect, Elements
+
+
+class Kind(Enum):
+    """What a part is, as a person calls it."""
+
+    WINCH = "winch"
+    CABLE = "cable"
+    LOAD_CELL = "load cell"
+    BODY = "body"
+    MARKERS = "motion capture of"
+
+
+class Part(NamedTuple):
+    """One part.
+
+    Attributes:
+        kind: what it is.
+        element: name of the cable that it belongs to, or of the body.
+    """
+
+    kind: Kind
+    element: str
+
+    @property
+    def words(self) -> str:
+        """Its name for a person."""
+        body = self.element.replace("_", " ")
+        return body if self.kind is Kind.BODY else f"{self.kind.value} {body}"
+
+
+_BLOCKS = {Block.WINCH: Kind.WINCH, Block.CABLE: Kind.CABLE}
+_CHANNELS = {
+    Channel.DRIVE: Kind.WINCH,
+    Channel.SHAFT: Kind.WINCH,
+    Channel.TENSION: Kind.CABLE,
+}
+_SENSORS = {WINCHES: Kind.WINCH, TENSION: Kind.LOAD_CELL}
+
+
+def parts_of(effect: Effect, element: str, cables: Sequence[str]) -> list[Part]:
+    """Return the parts in which an effect on an element sits, in a machine of some cables."""
+    if effect.acts_on is Elements.CELLS:
+        return [Part(Kind.LOAD_CELL, name) for name in cables]
+    return [Part(kind_of(effect), element)]
+
+
+def kind_of(effect: Effect) -> Kind:
+    """Return what sort of part an effect sits in."""
+    if effect.sense is not None:
+        return _SENSORS.get(effect.sense.topics[0], Kind.MARKERS)
+    return _BLOCKS.get(effect.block, Kind.BODY)
+
+
+def part_behind(place: Place) -> Part:
+    """Return the part whose equation a residual belongs to."""
+    return Part(_CHANNELS.get(place.channel, Kind.BODY), place.element)

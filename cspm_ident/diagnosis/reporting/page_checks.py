@@ -1,0 +1,56 @@
+"""Tables of the report page that check what was recorded: its energy, and its controllers."""
+
+from __future__ import annotations
+
+from typing import Any
+
+from cspm_ident.diagnosis.diagnose import Diagnosis
+from cspm_ident.diagnosis.reporting.statement import channel_of
+from cspm_ident.diagnosis.validation.residual_power import Power, lost_powers
+from cspm_ident.offline_page import table_html
+
+
+def energy_table(found: Diagnosis) -> str:
+    """Return the power that every residual stands for, as HTML; empty without any."""
+    heads = ("residual", "before [W]", "after [W]", "95 % interval [W]", "what is left")
+    rows = []
+    for power in lost_powers(found.curves):
+        ends = f"{power.after - power.half:.2g} to {power.after + power.half:.2g}"
+        told = f"{power.before:.2g}", f"{power.after:.2g}", ends, _takes_or_gives(power)
+        rows.append((channel_of(power), *told))
+    text = (
+        "<p>Mean power that the machine loses beyond the model, on held-out data: residuals times"
+        " the measured rates that they act at. Friction, drag and dampers take energy; where what"
+        " is left gives some, another cause remains: a drive, a sensor or a force from outside.</p>"
+    )
+    return text + table_html(heads, rows, "power beyond the model") if rows else ""
+
+
+def _takes_or_gives(power: Power) -> str:
+    if power.gives:
+        return "gives energy"
+    return "takes energy" if power.after > power.half else "neither, surely"
+
+
+def controllers_table(data: dict[str, Any]) -> str:
+    """Return what controllers make of the recorded measurements, as HTML; empty without any.
+
+    Args:
+        data: as `diagnosis.json` has it, with `controllers` where they could be stepped.
+    """
+    rows = [
+        (
+            each["node"],
+            each["topic"],
+            str(each["compared"]),
+            str(each["different"]),
+            f"{each['largest']:.2g}",
+        )
+        for each in data.get("controllers", ())
+    ]
+    heads = ("controller", "commands", "compared", "different", "largest difference")
+    text = (
+        "<p>The described controllers, each stepped again with what was recorded: commands that"
+        " differ are not theirs, whatever the machine does.</p>"
+    )
+    return text + table_html(heads, rows, "recorded commands and described ones") if rows else ""

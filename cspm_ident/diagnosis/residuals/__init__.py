@@ -1,0 +1,1 @@
+"""Residuals of a recording: measured minus modelled, per winch, cable, bar and sensor."""

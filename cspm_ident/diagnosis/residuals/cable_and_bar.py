@@ -1,0 +1,354 @@
+"""What measured poses, angles and tensions say of cables and bar, against the model of both."""
+
+from __future__ import annotations
+
+from functools import cached_property
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.ndimage import gaussian_filter1d
+
+from cspm_ident.diagnosis.residuals.machine_signals import (
+    BodyState,
+    CableSpans,
+    MachineSignals,
+    body_state,
+    cable_spans,
+    elongation_at,
+    end_velocities,
+    law_at,
+)
+from cspm_ident.signals.elongation import damping_of
+from cspm_model.equilibrium import unstretched_lengths
+from cspm_model.kernels.cable import EXIT, GEAR_RATIO, OFFSET_LENGTH, RADIUS
+from cspm_model.kernels.machine import PlantParameters
+from cspm_msgs_py.testbed import Testbed
+from cspm_sim.effects.bar_motion import carried
+from cspm_sim.effects.signals import BarSignal, CableSignal
+from cspm_sim.kernels.memory import relaxed
+
+Array = NDArray[np.float64]
+
+
+# What `of_cable` takes over where it is known, one column per cable.
+_PER_CABLE = ("_near", "_steady_damper")
+_STEADY_S, _CALM_S, _START_S = 0.01, 0.03, 0.5
+
+
+class Suspension:
+    """Bar and cables along one stretch of measured signals.
+
+    Attributes:
+        signals: what was measured.
+        parameters: of the machine as it is described.
+        start: unstretched lengths at the beginning, (n,) [m].
+    """
+
+    def __init__(
+        self,
+        signals: MachineSignals,
+        testbed: Testbed,
+        parameters: PlantParameters,
+        start: Array | None = None,
+    ) -> None:
+        """Take a stretch without holes; `start` is found from the first tensions if not given."""
+        self.signals, self.parameters, self._testbed = signals, parameters, testbed
+        if start is None:
+            tensions = np.maximum(signals.tensions[0], 0.0)
+            start = unstretched_lengths(parameters, self._spans.lengths[0], tensions)
+        self.start = start
+
+    def with_poses(self, signals: MachineSignals) -> Suspension:
+        """Return the same stretch with a little other poses, begun from the same lengths.
+
+        What tensions tell of the rates is kept: of the poses it has the length of the cables alone.
+        """
+        other = Suspension(signals, self._testbed, self.parameters, self.start)
+        bar, frame = signals.bar is self.signals.bar, signals.frame is self.signals.frame
+        kept = {"bar": bar, "needed": bar, "_frame": frame, "_steady_damper": True}
+        other.__dict__.update({name: getattr(self, name) for name, same in kept.items() if same})
+        other.__dict__["_near"] = self._carrying
+        return other
+
+    def of_cable(self, i: int) -> Suspension:
+        """Return cable i alone."""
+        own = slice(i, i + 1)
+        parts = self.parameters._replace(
+            cables=self.parameters.cables[own], tables=self.parameters.tables[own]
+        )
+        other = Suspension(self.signals.of_cable(i), self._testbed, parts, self.start[own])
+        known = {n: getattr(self, n)[:, own] for n in _PER_CABLE if n in self.__dict__}
+        spans = {"_spans": self._spans.only(i)} if "_spans" in self.__dict__ else {}
+        other.__dict__.update(known, **spans, bar=self.bar, _frame=self._frame)
+        return other
+
+    def with_joints(self, signals: MachineSignals) -> Suspension:
+        """Return the same stretch with a little other angles, speeds and tensions."""
+        other = Suspension(signals, self._testbed, self.parameters, self.start)
+        known = {name: getattr(self, name) for name in ("bar", "_frame", "_spans")}
+        other.__dict__.update(known, _near=self._carrying)
+        return other
+
+    @cached_property
+    def bar(self) -> BodyState:
+        """The bar's kinematics."""
+        return body_state(self.signals.bar)
+
+    @cached_property
+    def _frame(self) -> BodyState:
+        return body_state(self.signals.frame)
+
+    @cached_property
+    def _spans(self) -> CableSpans:
+        return cable_spans(self.signals, self.bar, self._frame, self.parameters.cables)
+
+    @cached_property
+    def _wound(self) -> Array:
+        """Unstretched lengths by thesis (2-16..2-18), from the first tensions on, (k, n) [m]."""
+        lengths, cables = self._spans.lengths, self.parameters.cables
+        turned = np.diff(self.signals.angles, axis=0) * cables[:, RADIUS]
+        shrunk = np.cumsum(2.0 * turned / (lengths[1:] + lengths[:-1]), axis=0)
+        return np.asarray(self.start * np.exp(-np.vstack([np.zeros(shrunk.shape[1]), shrunk])))
+
+    @cached_property
+    def _elastic_lengths(self) -> Array:
+        return np.asarray(self._wound + self.parameters.cables[:, OFFSET_LENGTH])
+
+    @cached_property
+    def _rates(self) -> Array:
+        """Of the elongation, (k, n) [m/s]."""
+        wound = self._wound / self._spans.lengths * self.parameters.cables[:, RADIUS]
+        return np.asarray(self._spans.rates + wound * self.signals.speeds)
+
+    @cached_property
+    def _damping(self) -> Array:
+        return damping_of(self.parameters, self._wound)
+
+    @cached_property
+    def _stretched(self) -> Array:
+        """Measured elongations, (k, n) [m]."""
+        return np.asarray(self._spans.lengths - self._wound)
+
+    @cached_property
+    def _damper(self) -> Array:
+        return self._damping * self._rates
+
+    @cached_property
+    def _steady_damper(self) -> Array:
+        """The damper's force without the poses' noise, about which the law is taken.
+
+        In the stiffness that noise would meet itself in the residual: stiffness less its mean would
+        explain it.
+        """
+        sigma, damper = _STEADY_S / self.signals.step, self._damping * self._told_rates
+        return np.asarray(gaussian_filter1d(damper, sigma, axis=0, mode="nearest"))
+
+    @cached_property
+    def _told(self) -> Array:
+        """Elongations by law and measured tension alone, (k, n) [m].
+
+        For the columns of effects: a stiff cable's tension tells them far better than poses do,
+        whose noise stands in the residual already; in both it would look like a wrong damper or
+        like less hysteresis than none. Law and damper share a tension as spring and dashpot do,
+        solved by Euler's implicit steps.
+        """
+        tensions, lengths = self.signals.tensions, self._elastic_lengths
+        alone = elongation_at(self.parameters, tensions, lengths, self._near)
+        stiffness = law_at(self.parameters, alone, lengths)[:, :, 1]
+        inert = self._damping / self.signals.step
+        told = alone.copy()
+        relaxed(alone, inert / np.maximum(stiffness + inert, 1e-300), told)
+        return np.asarray(told)
+
+    @cached_property
+    def _told_rates(self) -> Array:
+        """Of the elongation by law and measured tension alone, (k, n) [m/s]."""
+        rates = np.gradient(self._told, self.signals.step, axis=0)
+        # What the dashpot had before the first sample is not told.
+        start, sigma = round(_START_S / self.signals.step), _STEADY_S / self.signals.step
+        rates[:start] = gaussian_filter1d(self._rates, sigma, axis=0, mode="nearest")[:start]
+        return np.asarray(rates)
+
+    @cached_property
+    def _calm_elongations(self) -> Array:
+        """Elongations without reversals that are none but noise, (k, n) [m]."""
+        sigma = _CALM_S / self.signals.step
+        return np.asarray(gaussian_filter1d(self._told, sigma, axis=0, mode="nearest"))
+
+    @cached_property
+    def _near(self) -> Array | None:
+        """Elongations that are nearly those of `_carrying`, where they are known, (k, n) [m]."""
+        return None
+
+    @cached_property
+    def _carrying(self) -> Array:
+        """The elongation at which law and damper give the measured tension, (k, n) [m]."""
+        elastic = self.signals.tensions - self._steady_damper
+        return elongation_at(self.parameters, elastic, self._elastic_lengths, self._near)
+
+    @cached_property
+    def _law(self) -> Array:
+        """Elastic tension and stiffness at the measured tension, (k, n, 2)."""
+        return law_at(self.parameters, self._carrying, self._elastic_lengths)
+
+    @cached_property
+    def tension_residuals(self) -> Array:
+        """Measured tensions less those of law and damper, (k, n) [N], thesis (2-19).
+
+        To first order about the measured tension: errors and noise of poses enter in proportion,
+        however large they are.
+        """
+        linear = self._law[:, :, 1] * (self._carrying - self._stretched)
+        return np.asarray(linear - (self._damper - self._steady_damper))
+
+    @cached_property
+    def _mass_in_world(self) -> tuple[Array, Array, Array]:
+        """Centre of mass from the origin, inertia about it, and ω × Iω, in world axes.
+
+        Shapes (k, 3) [m], (k, 3, 3) [kg·m²], (k, 3) [N·m].
+        """
+        bar, state = self._testbed.bar, self.bar
+        assert bar is not None
+        com = np.einsum("kij,j->ki", state.rotation, np.array(bar.com))
+        turned = np.einsum("kij,jl,kml->kim", state.rotation, bar.inertia.matrix, state.rotation)
+        spin = np.cross(state.omega, np.einsum("kij,kj->ki", turned, state.omega))
+        return com, turned, spin
+
+    @cached_property
+    def needed(self) -> Array:
+        """Force and moment that the bar's motion needs beside its weight, (k, 6) [N, N·m]."""
+        bar = self._testbed.bar
+        assert bar is not None
+        state, gravity = self.bar, np.array([0.0, 0.0, self._testbed.gravity])
+        com, turned, spin = self._mass_in_world
+        moved = state.acceleration + carried(state.omega, state.alpha, com)
+        moment = np.einsum("kij,kj->ki", turned, state.alpha) + spin
+        inertial = bar.mass * (moved - gravity)
+        return np.hstack([inertial, moment + np.cross(com, inertial)])
+
+    @cached_property
+    def wrench_residuals(self) -> Array:
+        """Force and moment that the bar's equation (2-13) misses, world axes, (k, 6) [N, N·m].
+
+        Moments about the bar frame's origin.
+        """
+        return np.asarray(self.needed - self.cable_wrench)
+
+    def pulled(self, i: int, tensions: Array) -> Array:
+        """Return force and moment of cable i's tensions, (k,) [N], on the bar, (k, 6)."""
+        pull = -tensions[:, None] * self._spans.directions[:, i]
+        return np.hstack([pull, np.cross(self._spans.arms[:, i], pull)])
+
+    @cached_property
+    def cable_wrench(self) -> Array:
+        """Force and moment of the measured tensions on the bar, −Jᵀt of (2-13), (k, 6)."""
+        tensions = self.signals.tensions
+        return np.asarray(sum(self.pulled(i, tensions[:, i]) for i in range(tensions.shape[1])))
+
+    @cached_property
+    def _told_acceleration(self) -> tuple[Array, Array]:
+        """Acceleration of the bar's origin and α by (2-13) from the measured tensions, (k, 3) each.
+
+        For the columns of effects: the poses' own noise, twice differentiated, stands in the
+        residual already, and in both it would look like a wrong mass.
+        """
+        bar, state = self._testbed.bar, self.bar
+        assert bar is not None
+        com, turned, spin = self._mass_in_world
+        carried_com = np.cross(state.omega, np.cross(state.omega, com))
+        weight = bar.mass * np.array([0.0, 0.0, self._testbed.gravity])
+        force = self.cable_wrench[:, :3] + weight
+        about_com = self.cable_wrench[:, 3:] - np.cross(com, self.cable_wrench[:, :3])
+        alpha = np.linalg.solve(turned, (about_com - spin)[:, :, None])[:, :, 0]
+        acceleration = force / bar.mass - np.cross(alpha, com) - carried_com
+        return np.asarray(acceleration), np.asarray(alpha)
+
+    def start_column(self, i: int) -> Array:
+        """Return what a longer unstretched length at the start adds to the residual, (k,) [N/m]."""
+        return np.asarray(self._law[:, i, 1] * self._wound[:, i] / self._wound[0, i])
+
+    @cached_property
+    def _length_slopes(self) -> Array:
+        """Of the elastic tension by the elastic length, (k, n) [N/m]."""
+        step = 1e-5
+        longer = law_at(self.parameters, self._carrying, self._elastic_lengths + step)
+        return np.asarray((longer - self._law)[:, :, 0] / step)
+
+    def cable_rows(self, i: int) -> Array:
+        """Return `CableSignal` columns of cable i."""
+        rows, cables = np.zeros((len(self.signals.times), len(CableSignal))), self.parameters.cables
+        lengths, wound = self._spans.lengths[:, i], self._wound[:, i]
+        directions = self._spans.directions[:, i]
+        for column, values in {
+            CableSignal.TIME: self.signals.times,
+            CableSignal.LENGTH: lengths,
+            CableSignal.ELONGATION: self._calm_elongations[:, i],
+            CableSignal.RATE: self._told_rates[:, i],
+            CableSignal.TENSION: self.signals.tensions[:, i],
+            CableSignal.STIFFNESS: self._law[:, i, 1],
+            CableSignal.LENGTH_SLOPE: self._length_slopes[:, i],
+            CableSignal.DAMPER: self._damping[:, i] * self._told_rates[:, i],
+            CableSignal.DAMPING: self._damping[:, i],
+            CableSignal.WOUND: wound / lengths,
+            CableSignal.ANGLE: self.signals.angles[:, i],
+            CableSignal.SPEED: self.signals.speeds[:, i],
+            CableSignal.RADIUS: cables[i, RADIUS],
+            CableSignal.GEAR: cables[i, GEAR_RATIO],
+            CableSignal.HORIZONTAL: np.hypot(directions[:, 0], directions[:, 1]),
+            CableSignal.DOWNWARD: directions[:, 2],
+            CableSignal.GRAVITY: self._testbed.gravity,
+        }.items():
+            rows[:, column] = values
+        return rows
+
+    @cached_property
+    def _velocities(self) -> tuple[Array, Array]:
+        """Of the attachments against the exits, and of the exits, (k, n, 3) [m/s]."""
+        exits = self.parameters.cables[:, EXIT : EXIT + 3]
+        return end_velocities(self._spans, self.bar, self._frame, exits)
+
+    def end_rows(self, i: int) -> Array:
+        """Return `EndSignal` columns of cable i."""
+        spans, (apart, exits) = self._spans, self._velocities
+        parts = (spans.directions, apart, spans.arms, spans.lengths)
+        gravity = np.full(len(self.signals.times), self._testbed.gravity)
+        return np.column_stack([*(part[:, i] for part in parts), gravity, exits[:, i]])
+
+    @cached_property
+    def bar_rows(self) -> Array:
+        """`BarSignal` columns, accelerations by the tensions."""
+        return self._bar_rows(*self._told_acceleration)
+
+    @cached_property
+    def posed_bar_rows(self) -> Array:
+        """The same, accelerations by the poses."""
+        return self._bar_rows(self.bar.acceleration, self.bar.alpha)
+
+    def _bar_rows(self, acceleration: Array, alpha: Array) -> Array:
+        bar, state = self._testbed.bar, self.bar
+        assert bar is not None
+        count = len(self.signals.times)
+        rows = np.zeros((count, int(BarSignal.TIME) + 1))
+        rows[:, :3], rows[:, 3:6] = state.velocity, state.omega
+        rows[:, 6:9], rows[:, 9:12] = acceleration, alpha
+        rows[:, BarSignal.ROTATION : BarSignal.ROTATION + 9] = state.rotation.reshape(count, 9)
+        rows[:, BarSignal.COM : BarSignal.COM + 3] = bar.com
+        rows[:, BarSignal.MASS] = bar.mass
+        rows[:, BarSignal.GRAVITY] = self._testbed.gravity
+        rows[:, BarSignal.TIME] = self.signals.times
+        return rows
+
+    def frame_rows(self, i: int) -> Array:
+        """Return `FrameSignal` columns of cable i."""
+        count = len(self.signals.times)
+        exits = self.parameters.cables[i, EXIT : EXIT + 3]
+        return np.column_stack(
+            [
+                self.signals.times,
+                self._spans.directions[:, i],
+                np.broadcast_to(exits, (count, 3)),
+                self._frame.rotation.reshape(count, 9),
+                -self.cable_wrench[:, :3],
+                self._law[:, i, 1],
+            ]
+        )

@@ -1,0 +1,143 @@
+"""A recording as it would be, were a machine as supposed and its sensors without their faults."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from cspm_ident.diagnosis.residuals.regressors import Candidate
+from cspm_ident.diagnosis.residuals.sensor_readings import pose_rows, reading_rows
+from cspm_ident.signals.measurement import BAR, FRAME, TENSION, WINCHES, Measurement
+from cspm_ident.signals.samples import Samples
+from cspm_msgs_py.errors import InputError
+from cspm_msgs_py.testbed import EffectEntry
+from cspm_sim.effect_entries import Action, altered_testbed, read_actions
+
+Array = NDArray[np.float64]
+
+_FIXED_POINTS = 4
+
+
+def with_found(measurement: Measurement, weights: Mapping[Candidate, Array]) -> Measurement:
+    """Return the measurement of a machine whose description has further effects.
+
+    Args:
+        measurement: what was recorded.
+        weights: of the effects' columns, by element.
+    """
+    entries = [
+        EffectEntry(
+            effect=candidate.effect_id,
+            elements=(candidate.element,),
+            parameters=dict(candidate.effect.values(own.tolist(), **candidate.nonlinear)),
+        )
+        for candidate, own in weights.items()
+    ]
+    machine = measurement.machine
+    machine = machine.model_copy(update={"effects": (*machine.effects, *entries)})
+    return measurement.with_testbed(replace(measurement.testbed, testbed=machine))
+
+
+def settled(measurement: Measurement) -> Measurement:
+    """Return the measurement with readings and numbers as the described effects make them.
+
+    Sensors' faults are taken out of the readings, changes of the file's numbers are made in it;
+    missing physics stays among the machine's effects.
+
+    Raises:
+        InputError: an effect cannot be used, or no machine has such numbers.
+    """
+    machine, actions = measurement.machine, read_actions(measurement.machine)
+    if not any(action.effect.alter or action.effect.sense for action in actions):
+        return measurement
+    for action in actions:
+        if action.effect.sense is not None:
+            measurement = _true_readings(measurement, action)
+    numbers = altered_testbed(machine, actions)
+    kept = tuple(
+        EffectEntry(effect=a.effect.id, elements=(a.name,), parameters=dict(a.values))
+        for a in actions
+        if a.effect.alter is None and a.effect.sense is None
+    )
+    left = numbers.model_copy(update={"effects": kept})
+    return measurement.with_testbed(replace(measurement.testbed, testbed=left))
+
+
+def as_found(measurement: Measurement, weights: Mapping[Candidate, Array]) -> Measurement:
+    """Return the settled measurement of a machine that has what was found.
+
+    Where no machine has such numbers, what was to be corrected stays as described.
+    """
+    try:
+        return settled(with_found(measurement, weights))
+    except InputError:
+        return settled(measurement)
+
+
+def is_possible(measurement: Measurement, weights: Mapping[Candidate, Array]) -> bool:
+    """Return whether the measured machine can have further effects of such weights."""
+    try:
+        settled(with_found(measurement, weights))
+    except InputError:
+        return False
+    return True
+
+
+def nearest_possible(
+    measurement: Measurement, candidate: Candidate, weights: Array, half: Array
+) -> Array:
+    """Return weights that the measured machine can have, if chance alone lies between.
+
+    Args:
+        measurement: of the machine.
+        candidate: whose weights they are.
+        weights: as fitted.
+        half: half the widths of their 95 % intervals.
+    """
+    effect = candidate.effect
+    if effect.nearest is None or not np.all(np.isfinite(half)):
+        return weights
+    names = [parameter.name for parameter in effect.linear]
+    errors = dict(zip(names, half.tolist(), strict=True))
+    values = effect.values(weights.tolist(), **candidate.nonlinear)
+    nearest = effect.weights(effect.nearest(measurement.machine, values, errors))
+    return nearest if np.all(np.abs(nearest - weights) <= half) else weights
+
+
+def _true_readings(measurement: Measurement, action: Action) -> Measurement:
+    """Return what a sensor would have read without a fault, to which a fixed point leads."""
+    effect = action.effect
+    assert effect.sense is not None
+    topic = effect.sense.topics[0]
+    joints = {TENSION: "tension", WINCHES: "angle"}
+    if topic in joints and effect.sense.lateness is None:
+        return _true_joint(measurement, action, joints[topic])
+    poses = {BAR: "bar_pose", FRAME: "frame_pose"}
+    kind = joints[topic] if topic in joints else poses[topic.format(action.name)]
+    samples: Samples | None = getattr(measurement, kind)
+    if samples is None:
+        return measurement
+    if effect.sense.lateness is not None:
+        parameters = np.array(list(action.values.values()))
+        late = np.array([effect.sense.lateness(float(t), parameters) for t in samples.times])
+        return measurement.with_samples(kind, Samples(samples.times - late, samples.values))
+    values, weights = samples.values, effect.weights(action.values)
+    for _ in range(_FIXED_POINTS):
+        rows = pose_rows(samples.times, values, np.zeros_like(values))
+        values = samples.values - effect.regressors(rows) @ weights
+    return measurement.with_samples(kind, Samples(samples.times, values))
+
+
+def _true_joint(measurement: Measurement, action: Action, kind: str) -> Measurement:
+    samples: Samples | None = getattr(measurement, kind)
+    if samples is None:
+        return measurement
+    i, weights = action.element, action.effect.weights(action.values)
+    values = samples.values.copy()
+    for _ in range(_FIXED_POINTS):
+        rows = reading_rows(samples.times, values[:, i])
+        values[:, i] = samples.values[:, i] - action.effect.regressors(rows)[:, 0] @ weights
+    return measurement.with_samples(kind, Samples(samples.times, values))

@@ -1,0 +1,81 @@
+"""The clock of a rig's load cells, which runs away from that of its drives."""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+from cspm_ident.diagnosis.residuals.corrected_measurement import settled
+from cspm_ident.diagnosis.residuals.residual_equation import Equation
+from cspm_ident.diagnosis.residuals.winch_torque import PULL, SPEED, shaft_equations
+from cspm_ident.estimation import Parameter, Record, fit_linear
+from cspm_ident.signals.clock_drift import ClockDrift, without_drifts
+from cspm_ident.signals.measurement import TENSION, Measurement
+from cspm_sim.effect_entries import read_actions
+from cspm_sim.effects import Effect, Elements, catalogue
+
+Array = NDArray[np.float64]
+
+# Of clocks that nothing disciplines; what runs away faster is a fault.
+_SOUND = 2.5e-5
+# What clocks do to a rope's torque in a recording is no more than this is long [s].
+_LEAST_S = 2e-6
+_NOTHING, _RANK = 1e-300, 1e-9
+# Rows that tell a drift beside the rest.
+_FEWEST = 16
+
+
+def on_drives_clock(measurement: Measurement) -> Measurement:
+    """Return a rig's measurement with stamps of load cells that drift no more.
+
+    What is late at the beginning stays. Where a bar hangs on the cables tensions change too slowly
+    to tell a sound clock's drift, or to suffer from it.
+    """
+    if measurement.machine.bar is not None or measurement.tension is None:
+        return measurement
+    drift = cell_drift(measurement)
+    if drift is None or not _is_sound(drift):
+        return measurement
+    return without_drifts(measurement, [drift])
+
+
+def cell_drift(measurement: Measurement) -> ClockDrift | None:
+    """Return how fast load cells become late in the winches' torque equations, None without any.
+
+    Late readings miss lateness times the rate of the tension. Beside it all are late by as much
+    from the beginning on, and winches may have friction, and scales and zeros that are wrong.
+    """
+    own = settled(measurement)
+    names = own.machine.cable_names
+    equations = shaft_equations(own, [_lateness()], read_actions(own.machine), None, names)
+    rows = [each.steady for each in equations]
+    records = [_record(each) for each in rows if len(each.times) >= _FEWEST]
+    if not records:
+        return None
+    estimate = fit_linear(records, [Parameter("drift", "1", scale=_SOUND)], whiten=False).estimate
+    low, high = estimate.ci95[0]
+    rate = float(estimate.values[0])
+    return ClockDrift(TENSION, rate, (float(low), float(high)), measurement.duration)
+
+
+def _lateness() -> Effect:
+    """Return the effect that load cells are late."""
+    cells = (e for e in catalogue().values() if e.acts_on is Elements.CELLS)
+    return next(e for e in cells if e.sense is not None and e.sense.lateness is not None)
+
+
+def _record(equation: Equation) -> Record:
+    """Return what drifting lateness explains beside all else (Frisch and Waugh, 1933)."""
+    (late,) = (np.asarray(each[:, 0, 0], float) for each in equation.columns.values())
+    speed, tension = (equation.signals[name] for name in (SPEED, PULL))
+    others = np.stack([late, np.ones(len(late)), tension, speed, np.sign(speed)], axis=1)
+    others = others / np.maximum(np.linalg.norm(others, axis=0), _NOTHING)
+    both = np.column_stack([equation.target, late * equation.times])
+    left = both - others @ np.linalg.lstsq(others, both, rcond=_RANK)[0]
+    return Record(left[:, :1], left[:, 1:])
+
+
+def _is_sound(drift: ClockDrift) -> bool:
+    low, high = drift.interval
+    told = not low <= 0.0 <= high and abs(drift.rate) * drift.apart > _LEAST_S
+    return told and abs(drift.rate) <= _SOUND

@@ -1,0 +1,78 @@
+"""All equations of a recording."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Collection, Mapping, Sequence
+from types import MappingProxyType
+
+import numpy as np
+from numpy.typing import NDArray
+
+from cspm_ident.diagnosis.residuals.cable_and_bar_equations import suspension_equations
+from cspm_ident.diagnosis.residuals.corrected_measurement import settled
+from cspm_ident.diagnosis.residuals.drive_torque import drive_equations
+from cspm_ident.diagnosis.residuals.free_shapes import Knots
+from cspm_ident.diagnosis.residuals.regressors import Candidate
+from cspm_ident.diagnosis.residuals.residual_equation import Equation
+from cspm_ident.diagnosis.residuals.virtual_load_cell import drawn_tension
+from cspm_ident.diagnosis.residuals.winch_torque import shaft_equations
+from cspm_ident.signals.measurement import Measurement
+from cspm_ident.signals.timeline import Timeline
+from cspm_sim.effect_entries import read_actions
+from cspm_sim.effects import Channel, Effect, Elements
+
+Array = NDArray[np.float64]
+
+
+def equations_of(
+    measurement: Measurement,
+    effects: Sequence[Effect],
+    knots: Knots | None = None,
+    progress: Callable[[str], None] = lambda _: None,
+    touched: Sequence[Candidate] | None = None,
+    supposed: Mapping[Candidate, Array] = MappingProxyType({}),
+) -> list[Equation]:
+    """Return every residual that the sensors allow, less what the machine's effects add.
+
+    Args:
+        measurement: what was recorded, with the machine as it is described.
+        effects: whose columns are wanted, such as the whole catalogue.
+        knots: of the free functions; None: without these.
+        progress: called with what is being done.
+        touched: by these; other winches, and cables and bar if need be, may be left out.
+        supposed: weights about which residuals are taken to first order, where tensions are drawn
+            from torques that the faults of winches add to. They stay in the residuals.
+
+    Raises:
+        InputError: the machine's effects cannot be used.
+    """
+    measurement = settled(measurement)
+    known = read_actions(measurement.machine)
+    winches, suspended = _reached(measurement, touched)
+    # First what needs most memory.
+    late: list[Equation] = []
+    if measurement.machine.bar is not None and suspended:
+        progress("cables and bar")
+        drawn = None if measurement.tension else drawn_tension(measurement, known)
+        drawn = drawn and drawn.less(supposed)
+        told = measurement if drawn is None else drawn.measurement
+        late = suspension_equations(Timeline(told), effects, known, knots, drawn=drawn)
+    progress("torque equations of the winches")
+    found = drive_equations(measurement, effects, known, knots)
+    found += shaft_equations(measurement, effects, known, knots, winches)
+    return found + late
+
+
+def _reached(
+    measurement: Measurement, touched: Sequence[Candidate] | None
+) -> tuple[Collection[str], bool]:
+    """Return the winches that candidates may show at, and whether cables and bar may show them."""
+    names = measurement.machine.cable_names
+    # A winch without a load cell shows in what is drawn from its torque.
+    if touched is None or measurement.tension is None:
+        return names, True
+    kinds = {r.channel for c in touched for r in (c.effect.regression, *c.effect.partners)}
+    # Load cells that are late show at every winch.
+    everywhere = any(c.effect.elements is Elements.CELLS for c in touched)
+    winches = names if everywhere else {c.element for c in touched if c.element in names}
+    return winches, not kinds <= {Channel.SHAFT, Channel.DRIVE}

@@ -1,0 +1,46 @@
+"""The window under which residuals of cables and bar are looked at, as wide as noise asks for."""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+from cspm_ident.diagnosis.residuals.residual_equation import difference_noise
+from cspm_ident.winch.weak_form import Make, weigh
+
+Array = NDArray[np.float64]
+
+# Windows pass what lies well within the band of the smoothed poses, and they are doubled while that
+# takes more noise than of white one: then most lies above what they pass.
+_HALF_WIDTHS = (0.04, 0.32)
+_WHITE = 1.7
+
+
+def quiet_window(
+    residuals: Array, band: float | None, step: float, make: Make
+) -> tuple[Array, int]:
+    """Return a window's weights and the rows between two windows.
+
+    Args:
+        residuals: what it weighs, shape (k, m).
+        band: to which poses were smoothed [Hz]; None: the shortest window, whatever the noise.
+        step: between rows [s].
+        make: what makes windows.
+    """
+    if band is None:
+        return _window(_HALF_WIDTHS[0], step, make)
+    half_s, most = float(np.clip(2.0 / band, *_HALF_WIDTHS)), _HALF_WIDTHS[1]
+    found = _window(half_s, step, make)
+    noise = difference_noise(weigh(found[0], residuals, found[1]))
+    while 2.0 * half_s <= most:
+        wider = _window(2.0 * half_s, step, make)
+        less = difference_noise(weigh(wider[0], residuals, wider[1]))
+        if np.median(noise / np.maximum(less, 1e-300)) <= _WHITE:
+            break
+        half_s, found, noise = 2.0 * half_s, wider, less
+    return found
+
+
+def _window(half_s: float, step: float, make: Make) -> tuple[Array, int]:
+    half = max(2, round(half_s / step))
+    return make(half, step).weights, max(1, half // 2)

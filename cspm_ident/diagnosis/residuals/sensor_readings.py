@@ -1,0 +1,46 @@
+"""Measured readings in the form that sensor effects' regressors read."""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+from cspm_ident.diagnosis.residuals.residual_equation import difference_noise
+from cspm_ident.signals.samples import Samples
+from cspm_msgs_py.dofs import DOFS
+from cspm_sim.effects.signals import ReadingSignal
+
+Array = NDArray[np.float64]
+
+# Of what differs from reading to reading; coloured noise alone spreads by 1.2 to 1.5 of it.
+_MOVES = 2.5
+
+
+def reading_rows(times: Array, values: Array) -> Array:
+    """Return `ReadingSignal` columns of readings (k,) at times (k,) [s]."""
+    rows = np.zeros((len(times), len(ReadingSignal)))
+    rows[:, ReadingSignal.TIME] = times
+    rows[:, ReadingSignal.VALUE] = values
+    rows[:, ReadingSignal.RATE] = np.gradient(values, times)
+    return rows
+
+
+def pose_rows(times: Array, poses: Array, rates: Array) -> Array:
+    """Return `PoseSignal` columns of poses x y z φ θ ψ and their rates, (k, 6) each."""
+    return np.column_stack([times, poses, rates])
+
+
+def moving(poses: Samples | None) -> list[str]:
+    """Return the coordinates that move by more than their noise, which the residual has as well."""
+    if poses is None or len(poses.times) < 5:
+        return []
+    spread, noise = poses.values.std(axis=0), difference_noise(poses.values)
+    return [dof for dof, moves in zip(DOFS, spread > _MOVES * noise, strict=True) if moves]
+
+
+_READING_STEP = 1e-6  # m, rad or N
+
+
+def small_step(change: Array) -> float:
+    """Return by what to multiply a change, so that it stays within what is linear."""
+    return _READING_STEP / (float(np.max(np.abs(change))) + 1e-300)

@@ -1,0 +1,177 @@
+"""Periodic forces from outside: lines in the spectrum of what is left, above the machine's motion.
+
+No effect of the catalogue makes them, and the windows that quiet the noise of poses hide them, so
+they are looked for in residuals that are hardly weighed.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import replace
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.ndimage import median_filter
+from scipy.signal import periodogram
+
+from cspm_ident.diagnosis.residuals.cable_and_bar_equations import fine_equations
+from cspm_ident.diagnosis.residuals.corrected_measurement import as_found
+from cspm_ident.diagnosis.residuals.machine_signals import MachineSignals, machine_signals
+from cspm_ident.diagnosis.residuals.regressors import Candidate, Place
+from cspm_ident.diagnosis.residuals.residual_equation import Equation
+from cspm_ident.signals.measurement import Measurement
+from cspm_ident.signals.timeline import Timeline
+from cspm_sim.effect_entries import read_actions
+
+Array = NDArray[np.float64]
+
+HIGHEST_HZ = 10.0
+# Of the squares of angles and poses: what lies above so much is not driven.
+_DRIVEN_SHARE = 0.99
+# Times the median of a spectrum: below that is noise.
+_ABOVE_NOISE = 10.0
+_FALSE_ALARMS = 1e-3
+# Of frequencies beside a line, whose median is what noise has there.
+_BESIDE = 101
+# In which a force from outside keeps phase and size; what rings down does not.
+_PIECES = 8
+_COHERENCE = 0.8
+# Lines closer to one another are one.
+_ONE_HZ = 0.1
+
+
+class Line(NamedTuple):
+    """A periodic part of a residual.
+
+    Attributes:
+        place: which residual.
+        channel: which of its channels.
+        frequency: [Hz].
+        amplitude: in the residual's unit.
+        chance: how probable noise makes it as high, among all frequencies that were looked at.
+        alternates: whether it is a reading that does so from one to the next, and no residual.
+    """
+
+    place: Place
+    channel: int
+    frequency: float
+    amplitude: float
+    chance: float
+    alternates: bool = False
+
+    def is_same(self, other: Line) -> bool:
+        """Return whether two lines are one, found twice."""
+        return self.place == other.place and abs(self.frequency - other.frequency) <= _ONE_HZ
+
+
+def lines_of(measurement: Measurement, weights: Mapping[Candidate, Array]) -> tuple[Line, ...]:
+    """Return the lines that a recording's bar and cables have beyond what was found, best first.
+
+    Args:
+        measurement: what was recorded.
+        weights: of what was found.
+    """
+    fitted = as_found(measurement, weights)
+    stretches = machine_signals(Timeline(fitted, pose_band=HIGHEST_HZ))
+    equations = fine_equations(stretches, fitted, read_actions(fitted.machine))
+    lowest = _driven_up_to(stretches)
+    series = [(e.place, c, e.times, e.target[:, c]) for e in equations for c in _channels(e)]
+    found = [
+        line for each in series if (line := highest_line(*each, lowest, len(series))) is not None
+    ]
+    return tuple(_apart(sorted(found, key=lambda line: line.chance)))
+
+
+def _channels(equation: Equation) -> range:
+    return range(equation.target.shape[1])
+
+
+def _driven_up_to(stretches: Sequence[MachineSignals]) -> float:
+    """Return the frequency above which neither winches nor frame are moved [Hz]."""
+    highest = 0.0
+    for signals in stretches:
+        for moved in (signals.frame.poses, signals.angles):
+            frequencies, power = periodogram(moved, 1.0 / signals.step, "hann", axis=0)
+            power[power < _ABOVE_NOISE * np.median(power, axis=0)] = 0.0
+            summed = np.cumsum(power.sum(axis=1))
+            edge = np.searchsorted(summed, _DRIVEN_SHARE * summed[-1])
+            highest = max(highest, float(frequencies[edge]))
+    return highest
+
+
+def highest_line(
+    place: Place, channel: int, times: Array, values: Array, lowest: float, tried: int
+) -> Line | None:
+    """Return a series' highest line, if noise hardly makes one as high and it keeps its phase.
+
+    Args:
+        place: which residual it is of.
+        channel: which of its channels.
+        times: at equal steps, shape (k,) [s].
+        values: (k,).
+        lowest: frequency above which to look [Hz].
+        tried: how many series are looked at.
+    """
+    frequencies, power = periodogram(
+        values, 1.0 / float(np.median(np.diff(times))), "hann", detrend="linear"
+    )
+    floor = median_filter(power, _BESIDE, mode="nearest") / np.log(2.0)
+    looked = (frequencies > lowest) & (frequencies < HIGHEST_HZ)
+    if not looked.any():
+        return None
+    height = np.where(looked, power / np.maximum(floor, 1e-300), 0.0)
+    best = int(np.argmax(height))
+    chance = float(np.exp(-height[best])) * int(looked.sum()) * tried
+    if chance > _FALSE_ALARMS:
+        return None
+    frequency = _refined(times, values, float(frequencies[best]), float(frequencies[1]))
+    if _coherence(times, values, frequency) < _COHERENCE:
+        return None
+    amplitude = 2.0 * abs(_demodulated(times, values, frequency))
+    return Line(place, channel, frequency, amplitude, chance)
+
+
+def _demodulated(times: Array, values: Array, frequency: float) -> complex:
+    window = np.hanning(len(times))
+    turned = values * window * np.exp(-2j * np.pi * frequency * times)
+    return complex(turned.sum() / window.sum())
+
+
+def _refined(times: Array, values: Array, frequency: float, step: float) -> float:
+    """Return the frequency within one step of the spectrum at which the line is highest."""
+    near = frequency + step * np.linspace(-1.0, 1.0, 81)
+    return float(near[np.argmax([abs(_demodulated(times, values, f)) for f in near])])
+
+
+def _coherence(times: Array, values: Array, frequency: float) -> float:
+    """Return |mean|²/mean|·|² of the line's complex amplitude over pieces of the series."""
+    pieces = zip(np.array_split(times, _PIECES), np.array_split(values, _PIECES), strict=True)
+    found = np.array([_demodulated(t, v - v.mean(), frequency) for t, v in pieces])
+    return float(abs(found.mean()) ** 2 / np.mean(np.abs(found) ** 2))
+
+
+def _apart(lines: Iterable[Line]) -> Iterable[Line]:
+    """Yield of lines of the same frequency in one residual the most certain."""
+    kept: list[Line] = []
+    for line in lines:
+        if not any(line.is_same(other) for other in kept):
+            kept.append(line)
+            yield line
+
+
+def with_lines(equations: Sequence[Equation], lines: Sequence[Line]) -> list[Equation]:
+    """Return equations in which lines are fitted always, so that no effect takes them."""
+    return [_with(e, [line for line in lines if line.place == e.place]) for e in equations]
+
+
+def _with(equation: Equation, lines: Sequence[Line]) -> Equation:
+    if not lines:
+        return equation
+    columns = np.zeros((*equation.target.shape, 2 * len(lines)))
+    for k, line in enumerate(lines):
+        turned = 2.0 * np.pi * line.frequency * equation.times
+        columns[:, line.channel, 2 * k] = np.cos(turned)
+        columns[:, line.channel, 2 * k + 1] = np.sin(turned)
+    before = equation.nuisance if equation.nuisance.size else columns[:, :, :0]
+    return replace(equation, nuisance=np.concatenate([before, columns], axis=2))

@@ -1,0 +1,219 @@
+"""The winches as load cells: what their torques say of tensions that nothing measures."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass, replace
+from functools import cached_property
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.ndimage import minimum_filter1d
+
+from cspm_ident.diagnosis.residuals.regressors import Candidate, shapes_of
+from cspm_ident.diagnosis.residuals.winch_torque import STILL_SHARE
+from cspm_ident.signals.measurement import Measurement
+from cspm_ident.signals.samples import Samples
+from cspm_ident.signals.smoothing import filtered, smooth
+from cspm_ident.signals.timeline import Timeline
+from cspm_ident.winch.weak_form import HALF_WIDTH_S
+from cspm_msgs_py.testbed import Cable
+from cspm_sim.effect_entries import Action
+from cspm_sim.effects import Channel, Effect
+from cspm_sim.effects.signals import WinchSignal
+
+Array = NDArray[np.float64]
+
+# Friction that depends on the tension that it hides.
+_FIXED_POINTS = 3
+
+
+@dataclass(frozen=True, eq=False)
+class DrawnTension:
+    """Tensions by the winches' torque equation (2-21), and what winches' faults add to them.
+
+    Attributes:
+        measurement: what was recorded, with these tensions.
+        times: for which they were drawn, shape (k,) [s].
+        angles, speeds, accelerations: of the motors then, (k, n) [rad, rad/s, rad/s²].
+        torques: that they were drawn from, (k, n) [N·m].
+        band: to which they are smoothed [Hz].
+        taken: what was taken out of them beyond what the file says, (k, n) [N].
+    """
+
+    measurement: Measurement
+    times: Array
+    angles: Array
+    speeds: Array
+    accelerations: Array
+    torques: Array
+    band: float
+    taken: Array
+
+    @cached_property
+    def lost(self) -> Array:
+        """When readings of the torque are missing [s], so that none is known there."""
+        assert self.measurement.torque is not None
+        times = self.measurement.torque.times
+        gaps = np.flatnonzero(self.measurement.torque.gaps)
+        return np.asarray(0.5 * (times[gaps] + times[gaps + 1]))
+
+    def less(self, supposed: Mapping[Candidate, Array]) -> DrawnTension:
+        """Return tensions without what winches' supposed faults add to them.
+
+        Laws of cables are then taken about what these carry, not about what friction looks like.
+
+        Args:
+            supposed: weights by candidate, of winches or of anything else.
+        """
+        names, taken = self.measurement.machine.cable_names, np.zeros_like(self.taken)
+        for candidate, weights in supposed.items():
+            if _is_of_shaft(candidate.effect):
+                i = names.index(candidate.element)
+                taken[:, i] += self._added(candidate.effect, candidate.nonlinear, i) @ weights
+        assert self.measurement.tension is not None
+        samples = Samples(self.times, self.measurement.tension.values - taken)
+        told = self.measurement.with_samples("tension", samples)
+        return replace(self, measurement=told, taken=self.taken + taken)
+
+    def taken_at(self, times: Array) -> Array:
+        """Return what was taken out, smoothed as the tensions are, (len(times), n) [N]."""
+        return self._smooth(self.taken, times)
+
+    def columns(self, effect: Effect, i: int, times: Array) -> Iterator[tuple[Candidate, Array]]:
+        """Yield what one unit of an effect on winch i adds to the tension drawn from its torque.
+
+        Smoothed as the tension is: a shaft may turn round several times within a smoothed step.
+
+        Yields:
+            Pairs of candidate and tensions at `times`, shape (len(times), coefficients) [N].
+        """
+        if not _is_of_shaft(effect):
+            return
+        name = self.measurement.machine.cable_names[i]
+        for shape in shapes_of(effect):
+            added = self._added(effect, dict(shape), i)
+            yield Candidate(effect, name, shape), self._smooth(added, times)
+
+    def _added(self, effect: Effect, shape: dict[str, float], i: int) -> Array:
+        rows = self._rows[i]
+        torques = effect.regressors(rows, **shape)[:, 0]
+        return np.asarray(torques / rows[:, WinchSignal.RADIUS, None])
+
+    def late(self, i: int, times: Array) -> Array:
+        """Return what a torque adds to the tension by the second that it is late, shape (k,).
+
+        Drives say how late they are to a period only.
+        """
+        rows = self._rows[i]
+        torque = self._smooth(rows[:, [WinchSignal.TORQUE]], times)[:, 0]
+        return np.asarray(np.gradient(torque, times) / rows[0, WinchSignal.RADIUS])
+
+    def turning(self, i: int, times: Array) -> Array:
+        """Return what dry friction adds to the tension while the shaft turns round, shape (k,).
+
+        By the newton metre of it. The shaft may stick there, and then holds with any torque.
+        """
+        rows = self._rows[i]
+        speeds = rows[:, WinchSignal.SPEED]
+        width = 2 * round(HALF_WIDTH_S / float(np.median(np.diff(self.times)))) + 1
+        near = minimum_filter1d(np.abs(speeds), width) < STILL_SHARE * np.sqrt(np.mean(speeds**2))
+        held = near * np.sign(speeds) / rows[:, WinchSignal.RADIUS]
+        return self._smooth(held[:, None], times)[:, 0]
+
+    def untold(self, i: int, times: Array) -> list[Array]:
+        """Return what no recording tells of winch i's tension, each of shape (len(times),).
+
+        What its shaft holds while it turns round, and of a drive of which nothing is known how late
+        it tells its torque.
+        """
+        late = [] if self.measurement.torque_age > 0.0 else [self.late(i, times)]
+        return [self.turning(i, times), *late]
+
+    @cached_property
+    def _rows(self) -> list[Array]:
+        """`WinchSignal` columns of each winch, tensions smoothed as they are measured."""
+        machine, tension = self.measurement.machine, self.measurement.tension
+        assert tension is not None
+        tensions, found = smooth(tension, self.band).at(self.times), []
+        for i, cable in enumerate(machine.cables):
+            moved = (each[:, i] for each in (self.angles, self.speeds, self.accelerations))
+            rows = _rows(cable, self.times, *moved)
+            rows[:, WinchSignal.TENSION] = tensions[:, i]
+            rows[:, WinchSignal.TORQUE] = self.torques[:, i]
+            found.append(rows)
+        return found
+
+    def _smooth(self, values: Array, times: Array) -> Array:
+        """Return values smoothed as tensions are; splines would take as long as all else."""
+        assert self.measurement.tension is not None
+        slow, _ = filtered(self.measurement.tension.of_others(values), self.band)
+        return np.stack([np.interp(times, self.times, column) for column in slow.T], axis=1)
+
+
+def drawn_tension(measurement: Measurement, known: Sequence[Action]) -> DrawnTension | None:
+    """Return the tensions that the winches tell, if they do.
+
+    What the test-bed's own effects take of the torque is allowed for; what else takes some looks
+    like a fault of a load cell.
+
+    Args:
+        measurement: what was recorded, without tensions.
+        known: effects that the test-bed file has.
+    """
+    if measurement.angle is None or measurement.torque is None:
+        return None
+    timeline = Timeline(measurement)
+    torques, angles, speeds = timeline.torques, timeline.angles, timeline.speeds
+    assert torques is not None
+    assert angles is not None
+    assert speeds is not None
+    accelerations = np.gradient(speeds, timeline.period, axis=0)
+    # A central difference is the mean over two steps, in each of which one torque is held.
+    torques[1:] = 0.5 * (torques[:-1] + torques[1:])
+    drawn = np.zeros_like(torques)
+    for i, cable in enumerate(measurement.machine.cables):
+        rows = _rows(cable, timeline.times, angles[:, i], speeds[:, i], accelerations[:, i])
+        rows[:, WinchSignal.TORQUE] = torques[:, i]
+        pulled = torques[:, i] - cable.rotor_inertia * accelerations[:, i]
+        own = [action for action in known if action.element == i and _is_of_shaft(action.effect)]
+        drawn[:, i] = _drawn(rows, pulled, own)
+    whole = np.isfinite(drawn).all(axis=1)
+    samples = Samples(timeline.times[whole], drawn[whole])
+    return DrawnTension(
+        measurement.with_samples("tension", samples),
+        samples.times,
+        angles[whole],
+        speeds[whole],
+        accelerations[whole],
+        torques[whole],
+        timeline.pose_band,
+        np.zeros_like(samples.values),
+    )
+
+
+def _drawn(rows: Array, pulled: Array, own: Sequence[Action]) -> Array:
+    """Return tensions (k,) [N] of what is left of torques for the cable, friction allowed for."""
+    radius = rows[:, WinchSignal.RADIUS]
+    rows[:, WinchSignal.TENSION] = pulled / radius
+    for _ in range(_FIXED_POINTS if own else 0):
+        taken = np.zeros(len(rows))
+        for action in own:
+            shape = {name: action.values[name] for name in action.effect.nonlinear}
+            columns = action.effect.regressors(rows, **shape)[:, 0]
+            taken += columns @ action.effect.weights(action.values)
+        rows[:, WinchSignal.TENSION] = (pulled - taken) / radius
+    return np.asarray(rows[:, WinchSignal.TENSION].copy())
+
+
+def _rows(cable: Cable, times: Array, angles: Array, speeds: Array, accelerations: Array) -> Array:
+    rows = np.zeros((len(times), len(WinchSignal)))
+    rows[:, WinchSignal.TIME], rows[:, WinchSignal.GEAR] = times, cable.gear_ratio
+    rows[:, WinchSignal.ANGLE], rows[:, WinchSignal.SPEED] = angles, speeds
+    rows[:, WinchSignal.ACCELERATION] = accelerations
+    rows[:, WinchSignal.RADIUS] = cable.drum_radius / cable.gear_ratio
+    return rows
+
+
+def _is_of_shaft(effect: Effect) -> bool:
+    return effect.sense is None and effect.regression.channel is Channel.SHAFT

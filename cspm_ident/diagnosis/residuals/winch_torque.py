@@ -1,0 +1,188 @@
+"""The winches' torque equation (2-21), driven by measured torque, tension and angle."""
+
+from __future__ import annotations
+
+from collections.abc import Collection, Iterator, Sequence
+
+import numpy as np
+from numpy.typing import NDArray
+
+from cspm_ident.diagnosis.residuals.free_shapes import Driver, Knots
+from cspm_ident.diagnosis.residuals.regressors import Candidate, Place, elements_of, shapes_of
+from cspm_ident.diagnosis.residuals.residual_equation import Equation
+from cspm_ident.diagnosis.residuals.sensor_readings import reading_rows
+from cspm_ident.signals.measurement import TENSION, WINCHES, Measurement
+from cspm_ident.signals.samples import Samples
+from cspm_ident.signals.winch_motion import winch_motion
+from cspm_ident.winch.recording import signal_rows, winch_signals
+from cspm_ident.winch.weak_form import HALF_WIDTH_S, Make, maker, weigh
+from cspm_msgs_py.errors import InputError
+from cspm_msgs_py.testbed import Cable
+from cspm_sim.effect_entries import Action
+from cspm_sim.effects import Channel, Effect
+from cspm_sim.effects.signals import WinchSignal
+
+Array = NDArray[np.float64]
+
+# Of the usual speed: below it a shaft may stick, and its direction is noise.
+STILL_SHARE = 0.05
+_MOVES = 3.0
+_STEP_RAD = 1e-6
+SPEED, PULL = "speed [rad/s]", "tension [N]"
+_DRIVERS = {
+    SPEED: WinchSignal.SPEED,
+    PULL: WinchSignal.TENSION,
+    "angle [rad]": WinchSignal.ANGLE,
+    "time [s]": WinchSignal.TIME,
+}
+
+
+def shaft_equations(
+    measurement: Measurement,
+    effects: Sequence[Effect],
+    known: Sequence[Action],
+    knots: Knots | None,
+    winches: Collection[str],
+) -> list[Equation]:
+    """Return the equation of every winch, of those asked for, whose signals were recorded.
+
+    The residual is torque − J·q̈ − (r/n)·t less what the test-bed's own effects add, weighted with
+    windows, so that nothing noisy is differentiated.
+
+    Args:
+        measurement: what was recorded, with the machine as it is described.
+        effects: the catalogue.
+        known: effects that the test-bed file has.
+        knots: of the free functions; None: without these.
+        winches: names of those asked for.
+    """
+    found: list[Equation] = []
+    for i, cable in enumerate(measurement.machine.cables):
+        if cable.name not in winches:
+            continue
+        try:
+            signals = winch_signals(measurement, cable.name, measurement.torque_age)
+        except InputError:
+            continue
+        for times, rows in signal_rows(signals):
+            if measurement.speed is not None:
+                moved = winch_motion(signals.angle, measurement.speed.column(i), times)
+                rows[:, WinchSignal.ANGLE] = moved.angles[:, 0]
+                rows[:, WinchSignal.SPEED] = moved.speeds[:, 0]
+            half = max(2, round(HALF_WIDTH_S / signals.angle.interval))
+            if len(rows) < 2 * half + 1 or not _turns(rows[:, WinchSignal.ANGLE], signals.angle):
+                continue
+            sensors = (WINCHES,) if signals.tension is None else (WINCHES, TENSION)
+            lost = _lost(signals.torque, measurement.torque_age, times)
+            make = maker(measurement.pointwise)
+            table = _Shaft(rows, cable, half, times, lost, sensors, make)
+            own = [action for action in known if action.element == i]
+            found.append(table.equation(effects, own, knots).compact)
+    return found
+
+
+def _turns(angles: Array, samples: Samples) -> bool:
+    """Return whether a shaft moves by more than its encoder's noise; a brake takes any torque."""
+    noise = float(np.std(samples.values[:, 0] - np.interp(samples.times, *_halves(samples))))
+    return bool(np.std(angles) > _MOVES * max(noise, _STEP_RAD))
+
+
+def _halves(samples: Samples) -> tuple[Array, Array]:
+    """Return every other sample, between which straight lines leave little but noise."""
+    return samples.times[::2], samples.values[::2, 0]
+
+
+def _lost(torque: Samples, age: float, times: Array) -> NDArray[np.bool_]:
+    """Return at which times a reading is missing, so that a torque that chatters is not known."""
+    after = np.searchsorted(torque.times - age, times) - 1
+    return np.asarray(torque.gaps[np.clip(after, 0, len(torque.gaps) - 1)])
+
+
+class _Shaft:
+    """One winch's rows and the window that weighs them."""
+
+    def __init__(
+        self,
+        rows: Array,
+        winch: Cable,
+        half: int,
+        times: Array,
+        lost: NDArray[np.bool_],
+        sensors: tuple[str, ...],
+        make: Make,
+    ) -> None:
+        self._sensors, inertia, name = sensors, winch.rotor_inertia, winch.name
+        self._rows, self._inertia, self._name = rows, inertia, name
+        self._step = float(times[1] - times[0])
+        self._window, self._stride = make(half, self._step), max(1, half // 2)
+        speed = np.abs(rows[:, WinchSignal.SPEED])
+        view, width = np.lib.stride_tricks.sliding_window_view, len(self._window.weights)
+        windows = view(speed, width)[:: self._stride]
+        slow = STILL_SHARE * np.sqrt(np.mean(speed**2))
+        whole = ~view(lost, width)[:: self._stride].any(axis=1)
+        self._moving = (windows.max(axis=1) >= slow) & whole
+        self._turning = windows.min(axis=1)[self._moving] < slow
+        self._times = self._weighed(times)
+
+    def equation(
+        self, effects: Sequence[Effect], known: Sequence[Action], knots: Knots | None
+    ) -> Equation:
+        rows = self._rows
+        pulled = rows[:, WinchSignal.RADIUS] * rows[:, WinchSignal.TENSION]
+        target = self._weighed(rows[:, WinchSignal.TORQUE]) - self._averaged(pulled)
+        target = target - self._inertia * self._accelerated(rows[:, WinchSignal.ANGLE])
+        for action in known:
+            effect = action.effect
+            if effect.alter is None and effect.regression.channel is Channel.SHAFT:
+                shape = {name: action.values[name] for name in effect.nonlinear}
+                target = target - self._regressed(effect, shape) @ effect.weights(action.values)
+        columns: dict[Candidate | Driver, Array] = {
+            candidate: found[:, None, :]
+            for effect in effects
+            for candidate, found in self._columns(effect)
+        }
+        place = Place(Channel.SHAFT, self._name)
+        drivers = {name: self._weighed(rows[:, column]) for name, column in _DRIVERS.items()}
+        if knots is not None:
+            columns |= knots.columns(place, drivers)
+        torque = self._weighed(rows[:, WinchSignal.TORQUE])[:, None]
+        return Equation(
+            place,
+            self._times,
+            target[:, None],
+            columns,
+            torque,
+            turning=self._turning,
+            signals=drivers,
+        )
+
+    def _columns(self, effect: Effect) -> Iterator[tuple[Candidate, Array]]:
+        for name in elements_of(effect, (self._name,), ()):
+            if effect.regression.channel is Channel.SHAFT:
+                for shape in shapes_of(effect):
+                    yield Candidate(effect, name, shape), self._regressed(effect, dict(shape))
+            elif effect.sense is not None and effect.sense.topics[0] in self._sensors:
+                yield Candidate(effect, name), self._read(effect)
+
+    def _regressed(self, effect: Effect, shape: dict[str, float]) -> Array:
+        return self._averaged(effect.regressors(self._rows, **shape)[:, 0])
+
+    def _read(self, effect: Effect) -> Array:
+        """Return what a sensor's fault makes of the residual, by the reading's share in it."""
+        tension = effect.sense is not None and effect.sense.topics[0] == TENSION
+        source = WinchSignal.TENSION if tension else WinchSignal.ANGLE
+        reading = reading_rows(self._rows[:, WinchSignal.TIME], self._rows[:, source])
+        change = effect.regressors(reading)[:, 0]
+        if tension:
+            return self._averaged(-self._rows[:, WinchSignal.RADIUS, None] * change)
+        return -self._inertia * self._accelerated(change)
+
+    def _weighed(self, values: Array) -> Array:
+        return np.asarray(weigh(self._window.weights, values, self._stride)[self._moving])
+
+    def _averaged(self, values: Array) -> Array:
+        weights = self._window.averaged(self._step)
+        return np.asarray(weigh(weights, values, self._stride)[self._moving])
+
+    def _accelerated(self, values: Array) -> Array:
+        return np.asarray(weigh(self._window.second, values, self._stride)[self._moving])

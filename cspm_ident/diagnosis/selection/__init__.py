@@ -1,0 +1,1 @@
+"""Which effects on which elements explain the residuals, and what else would."""

@@ -1,0 +1,83 @@
+"""What explains nearly as much as what was chosen."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+
+import numpy as np
+
+from cspm_ident.diagnosis.regression.collinearity import (
+    RIVAL_SHARE,
+    TIED,
+    UNTRUE_SHARE,
+    contains,
+    distance,
+    freely_gained,
+)
+from cspm_ident.diagnosis.regression.hypothesis import Hypothesis, Rival, freedom
+from cspm_ident.diagnosis.regression.joint_fit import Fits
+from cspm_ident.diagnosis.residuals.regressors import Candidate
+from cspm_ident.diagnosis.selection.masked_by_parameter import absorbed_pairs
+from cspm_ident.diagnosis.selection.rivals import rivals_of
+
+
+def alternatives_of(
+    fits: Fits,
+    candidates: Sequence[Candidate],
+    hypothesis: Hypothesis,
+    others: Sequence[Hypothesis],
+) -> Iterator[Rival]:
+    """Yield what explains the same nearly as well as a hypothesis, that taken out.
+
+    A difference that models are too untrue for counts as much less, and every further parameter
+    as in Schwarz's criterion, blocks being what there is to tell it from.
+
+    Args:
+        fits: of all columns.
+        candidates: what there is to choose from.
+        hypothesis: one that was chosen.
+        others: the rest of what was.
+    """
+    taken = {(c.effect_id, c.element) for h in others for c in h.candidates}
+    free = [c for c in candidates if (c.effect_id, c.element) not in taken]
+    sums, base, own = fits.sums, fits.columns(others), fits.own_columns(hypothesis)
+    reference = fits.held_out(hypothesis, base)
+    gained = float(np.sum(sums.held_out(base) - reference))
+    free_gain = freely_gained(fits.evidence, sums, base, own)
+    undecided = max(UNTRUE_SHARE * gained, free_gain)
+    for rival, *beside in _alike(fits, free, hypothesis, others):
+        supposed = [rival, *beside]
+        columns = fits.evidence.columns_of(c for h in supposed for c in h.candidates)
+        wider = max(0, sum(map(freedom, supposed)) - freedom(hypothesis))
+        nested = wider and not beside and contains(sums, base, columns, own)
+        if nested or not fits.is_plausible([*others, *supposed], loosely=True):
+            continue
+        with sums.delayed(np.setdiff1d(columns, own), hypothesis.onset):
+            worse = fits.held_out(rival, fits.beside(base, *beside)) - reference
+        if worse.sum() > RIVAL_SHARE * gained:
+            continue
+        apart = distance(worse, undecided, wider)
+        if apart <= TIED:
+            yield Rival(rival, apart, *beside)
+
+
+def _alike(
+    fits: Fits,
+    free: Sequence[Candidate],
+    hypothesis: Hypothesis,
+    others: Sequence[Hypothesis],
+) -> Iterator[tuple[Hypothesis, ...]]:
+    """Yield what explains the same, alone or beside a wrong number of the file.
+
+    What looks like a rival looks like what it rivals.
+    """
+    given, base = (fits.evidence, fits.sums), fits.columns(others)
+    rivals = rivals_of(*given, base, hypothesis, free)
+    yield from ((rival,) for rival in rivals)
+    alone = {hypothesis.effect.id, *(rival.effect.id for rival in rivals)}
+    alike = [hypothesis, *(r for r in rivals if r.elements == hypothesis.elements)]
+    pairs: dict[tuple[str, str], tuple[Hypothesis, Hypothesis]] = {}
+    for like in alike:
+        for effect, number in absorbed_pairs(*given, base, like, free):
+            pairs.setdefault((effect.effect.id, number.effect.id), (effect, number))
+    yield from (pair for (effect_id, _), pair in pairs.items() if effect_id not in alone)

@@ -1,0 +1,109 @@
+"""On which elements an effect acts."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import replace
+from itertools import compress
+
+import numpy as np
+from numpy.typing import NDArray
+
+from cspm_ident.diagnosis.regression.hypothesis import Hypothesis, has_one_system, is_spread
+from cspm_ident.diagnosis.regression.joint_fit import Fits
+from cspm_ident.diagnosis.regression.significance import Sureness
+from cspm_ident.diagnosis.residuals.regressors import Candidate
+
+Array = NDArray[np.float64]
+Index = NDArray[np.intp]
+
+# Half intervals within which one of several numbers may lie from that of all.
+_AGREES = 1.5
+
+
+class Scopes:
+    """Hypotheses of one effect on more elements, or on fewer."""
+
+    def __init__(self, fits: Fits, sureness: Sureness, candidates: Sequence[Candidate]) -> None:
+        """Take all candidates that are looked at."""
+        self._fits, self._sureness, self._candidates = fits, sureness, candidates
+
+    def of(self, candidate: Candidate, free: Sequence[Candidate], base: Index) -> list[Hypothesis]:
+        """Return the candidate's effect where it surely acts, and on all elements together.
+
+        What is too little to see in any one element may be plain in all of them, with the same
+        numbers or with others for each.
+        """
+        alike = [
+            c for c in free if c.effect_id == candidate.effect_id and c.shape == candidate.shape
+        ]
+        whole = Hypothesis(candidate.effect, tuple(alike))
+        own = self._extended(candidate, alike, base)
+        if len(alike) == 1:
+            return [own]
+        one_system = has_one_system(own.effect)
+        common = [replace(whole, common=True)] if one_system or self.agree(whole, base) else []
+        wider = [whole] if len(own.candidates) < len(alike) else []
+        # What is taken later has to explain more.
+        return [*common, own, *wider] if one_system else [own, *common, *wider]
+
+    def pruned(self, hypothesis: Hypothesis, base: Index) -> Hypothesis:
+        """Return the hypothesis without elements on which the effect may as well be absent.
+
+        But for those on which it may as well be what it is on most, and unless all that would go
+        surely act together, of which none tells that it is not the others.
+        """
+        if hypothesis.common:
+            return hypothesis
+        members = hypothesis.candidates
+        each, half = self._each(hypothesis, base)
+        there = np.any(np.abs(each) > half, axis=1)
+        if not there.any():
+            return hypothesis
+        kept = replace(hypothesis, candidates=tuple(compress(members, there)))
+        if is_spread(kept, self._everywhere(hypothesis)):
+            there |= np.all(np.abs(each - np.median(each[there], axis=0)) <= half, axis=1)
+        kept = replace(hypothesis, candidates=tuple(compress(members, there)))
+        gone = replace(hypothesis, candidates=tuple(compress(members, ~there)))
+        return hypothesis if gone.candidates and self._act(gone, kept, base) else kept
+
+    def _act(self, hypothesis: Hypothesis, beside: Hypothesis, base: Index) -> bool:
+        """Return whether a hypothesis surely is there beside another."""
+        base = self._fits.beside(base, beside)
+        return self._sureness.counts(base, hypothesis, self._fits.gain(hypothesis, base))
+
+    def agree(self, hypothesis: Hypothesis, base: Index) -> bool:
+        """Return whether all elements may have the same numbers, and several surely have some."""
+        each, half = self._each(hypothesis, base)
+        sums, kept, own = self._fits.shared(base, hypothesis)
+        same = sums.weights(np.concatenate([kept, own]))[len(kept) :]
+        near = np.abs(each - same) <= _AGREES * half
+        there = np.any(np.abs(each) > half, axis=1)
+        return bool(np.all(near) and np.count_nonzero(there) > 1)
+
+    def _each(self, hypothesis: Hypothesis, base: Index) -> tuple[Array, Array]:
+        """Return weights of each element, and half their intervals, (elements, columns)."""
+        sums, shape = self._fits.sums, (len(hypothesis.candidates), -1)
+        weights = sums.weights(self._fits.beside(base, hypothesis))[len(base) :]
+        half = sums.half_width(base, self._fits.own_columns(hypothesis))
+        return weights.reshape(shape), half.reshape(shape)
+
+    def _extended(
+        self, candidate: Candidate, alike: Sequence[Candidate], base: Index
+    ) -> Hypothesis:
+        """Return the candidate's effect on all elements where it surely acts beside the others."""
+        sums, evidence, found = self._fits.sums, self._fits.evidence, [candidate]
+        others = [c for c in alike if c.element != candidate.element]
+        columns = [evidence.columns_of([c]) for c in others]
+        for k in np.argsort(-sums.gains_beyond(base, columns)):
+            beside = np.concatenate([base, evidence.columns_of(found)])
+            further = Hypothesis(candidate.effect, (others[k],))
+            if self._sureness.counts(beside, further, sums.gain(beside, columns[k])):
+                found.append(others[k])
+        return Hypothesis(candidate.effect, tuple(c for c in alike if c in found))
+
+    def _everywhere(self, hypothesis: Hypothesis) -> Hypothesis:
+        """Return the hypothesis on all that its effect can act on."""
+        own = hypothesis.effect.id, hypothesis.candidates[0].shape
+        alike = tuple(c for c in self._candidates if (c.effect_id, c.shape) == own)
+        return replace(hypothesis, candidates=alike)

@@ -1,0 +1,101 @@
+"""Effects that a wrong number of the file hides: together the two look like something else."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from itertools import product
+
+import numpy as np
+from numpy.typing import NDArray
+
+from cspm_ident.diagnosis.regression.block_gram import Evidence, PlaceEvidence
+from cspm_ident.diagnosis.regression.block_regression import Sums
+from cspm_ident.diagnosis.regression.hypothesis import Hypothesis
+from cspm_ident.diagnosis.residuals.regressors import Candidate
+
+Index = NDArray[np.intp]
+
+# Of the gain: what two things leave of it is no more than models are untrue by.
+_ALIKE = 0.99
+# Of the squares: what the number has to be like in the residual in which the finding shows most.
+_SAME = 0.99
+# Above which either of the two may as well be absent.
+_NEEDLESS = 0.01
+
+
+def absorbed_pairs(
+    evidence: Evidence,
+    sums: Sums,
+    base: Index,
+    hypothesis: Hypothesis,
+    free: Sequence[Candidate],
+) -> list[tuple[Hypothesis, Hypothesis]]:
+    """Return effects that together with a wrong number explain what one thing on one element does.
+
+    The number would explain it but for what it spoils elsewhere, which the effect makes up for: a
+    drum's radius fitted while the drive's gain was wrong is, to every sensor, an encoder's scale.
+
+    Args:
+        evidence: of the columns.
+        sums: of these.
+        base: columns that are fitted beside.
+        hypothesis: what they are like.
+        free: candidates that are not among what was chosen.
+
+    Returns:
+        (effect, wrong number), of each two the best points; both are needed.
+    """
+    if len(hypothesis.candidates) > 1:
+        return []
+    there = [c for c in free if c.element == hypothesis.elements[0]]
+    others = [c for c in there if c.effect_id != hypothesis.effect.id]
+    numbers = [c for c in others if c.effect.alter is not None]
+    effects = [c for c in others if c.effect.alter is None]
+    own = evidence.columns_of(hypothesis.candidates)
+    gained = float(sums.gains_beyond(base, [own])[0])
+    shows = _most(evidence, sums, base, own)
+    most = (1.0 - _SAME) * _left(shows, base, own)
+    beside = {n: np.concatenate([base, evidence.columns_of([n])]) for n in numbers}
+    hiding = [n for n in numbers if _left(shows, beside[n], own) <= most]
+    pairs = list(product(effects, hiding))
+    gains = sums.gains_beyond(base, [evidence.columns_of(pair) for pair in pairs])
+    best: dict[tuple[str, str], tuple[Candidate, Candidate]] = {}
+    for k in np.argsort(-gains):
+        if gains[k] >= _ALIKE * gained:
+            effect, number = pairs[k]
+            best.setdefault((effect.effect_id, number.effect_id), pairs[k])
+    return [
+        (Hypothesis(effect.effect, (effect,)), Hypothesis(number.effect, (number,)))
+        for effect, number in best.values()
+        if _needed(evidence, sums, base, effect, number)
+    ]
+
+
+def _most(evidence: Evidence, sums: Sums, base: Index, own: Index) -> PlaceEvidence:
+    """Return the residual from which columns take most."""
+    both = np.concatenate([base, own])
+    before = evidence.left(base, sums.weights(base))
+    after = evidence.left(both, sums.weights(both))
+    return max(evidence.places, key=lambda each: before[each.place] - after[each.place])
+
+
+def _left(place: PlaceEvidence, by: Index, own: Index) -> float:
+    """Return the squares of columns in one residual that others do not span."""
+    known = np.flatnonzero(np.isin(place.columns, by))
+    mine = np.flatnonzero(np.isin(place.columns, own))
+    lengths = np.sqrt(np.diag(place.whole))
+    lengths[lengths == 0.0] = 1.0
+    gram = place.whole / (lengths * lengths[:, None])
+    cross = gram[np.ix_(known, mine)]
+    inverse = np.linalg.pinv(gram[np.ix_(known, known)], rcond=1e-9, hermitian=True)
+    spanned = cross.T @ inverse @ cross
+    return float(np.trace(gram[np.ix_(mine, mine)] - spanned))
+
+
+def _needed(evidence: Evidence, sums: Sums, base: Index, one: Candidate, other: Candidate) -> bool:
+    """Return whether neither of two explains as much without the other."""
+    first, second = evidence.columns_of([one]), evidence.columns_of([other])
+    return all(
+        sums.p_value(np.concatenate([base, beside]), own) < _NEEDLESS
+        for beside, own in ((first, second), (second, first))
+    )

@@ -1,0 +1,87 @@
+"""When an effect began: its block, and more closely than blocks tell."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from cspm_ident.diagnosis.regression.block_gram import gather
+from cspm_ident.diagnosis.regression.block_regression import Sums
+from cspm_ident.diagnosis.regression.collinearity import SIMPLER_SHARE
+from cspm_ident.diagnosis.residuals.regressors import Candidate
+from cspm_ident.diagnosis.residuals.residual_equation import Equation
+
+Index = NDArray[np.intp]
+FINE_S = 0.1
+# Of the scatter between fine blocks: so much more is left at times that are none.
+_SIGMAS = 3.0
+
+
+class Onset(NamedTuple):
+    """When an effect began [s], and from when to when it may have."""
+
+    time: float
+    low: float
+    high: float
+
+
+def first_block(sums: Sums, base: Index, own: Index) -> tuple[int, float]:
+    """Return the block from which on columns act, and what is left of all squares then.
+
+    The block is 0 unless a later one is surely better.
+
+    Args:
+        sums: of all columns.
+        base: columns that act all the time.
+        own: those that may begin.
+    """
+    left = sums.left_from(base, own)[:-2]
+    best = int(np.argmin(left))
+    gained = sums.squares_of(base) - left[0]
+    if left[best] < left[0] - SIMPLER_SHARE * max(gained, 0.0):
+        return best, float(left[best])
+    return 0, float(left[0])
+
+
+def onset_of(
+    equations: Sequence[Equation],
+    own: Sequence[Candidate],
+    others: Mapping[Candidate, float],
+    low: float,
+    high: float,
+) -> Onset:
+    """Return when an effect began.
+
+    The squared residual is looked at for every fine block that it may begin with; times at which it
+    exceeds the least by no more than it scatters are possible as well.
+
+    Args:
+        equations: one recording's, in units of their noise.
+        own: the effect on its elements.
+        others: everything else that was found, with when it began [s].
+        low: earliest time to look at [s].
+        high: latest.
+    """
+    terms = [*own, *others]
+    places = {term: [e for e in equations if term in e.columns] for term in own}
+    concerned = {e.place for found in places.values() for e in found}
+    rows = [e.only(terms) for e in equations if e.place in concerned]
+    evidence = gather([rows], FINE_S)
+    sums, edges = Sums(evidence), evidence.times
+    others = {term: time for term, time in others.items() if term in evidence.slices}
+    for term, time in others.items():
+        sums.delay(evidence.columns_of([term]), int(np.searchsorted(edges, time)))
+    base, columns = evidence.with_nuisance(others), evidence.columns_of(own)
+    first, last = np.searchsorted(edges, [low, high])
+    blocks = np.arange(max(first, 1), max(min(last, len(edges) - 2), first + 2))
+    left = sums.left_from(base, columns)[blocks]
+    best = int(np.argmin(left))
+    sums.delay(columns, int(blocks[best]))
+    both = np.concatenate([base, columns])
+    scatter = float(np.std(sums.held_out(both)))
+    possible = edges[blocks[left <= left[best] + _SIGMAS * scatter]]
+    step = edges[1] - edges[0]
+    return Onset(float(edges[blocks[best]]), float(possible[0] - step), float(possible[-1] + step))

@@ -1,0 +1,100 @@
+"""Two effects on one element instead of findings that were chosen one by one."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+from numpy.typing import NDArray
+
+from cspm_ident.diagnosis.regression.block_regression import gain_of
+from cspm_ident.diagnosis.regression.collinearity import (
+    RIVAL_SHARE,
+    SIMPLER_SHARE,
+    SPANNED,
+    UNTRUE_SHARE,
+)
+from cspm_ident.diagnosis.regression.hypothesis import Hypothesis, freedom
+from cspm_ident.diagnosis.regression.joint_fit import Fits
+from cspm_ident.diagnosis.regression.significance import Sureness
+from cspm_ident.diagnosis.residuals.regressors import Candidate
+from cspm_ident.diagnosis.selection.joint_pairs import Pair, best_pairs
+
+Index = NDArray[np.intp]
+
+# Standard errors by which a pair has to explain more than what is simpler.
+_SIGMAS = 2.0
+
+
+def pair_instead(
+    fits: Fits,
+    sureness: Sureness,
+    chosen: Sequence[Hypothesis],
+    kept: Sequence[Hypothesis],
+    free: Sequence[Candidate],
+) -> list[Hypothesis] | None:
+    """Return what was chosen with a pair instead of some of it, if one is better.
+
+    The pair has to explain surely more, other than as a wider form of the same, or as much with
+    fewer numbers, and neither may be absent. What explains something else than the pair stays.
+
+    Args:
+        fits: of what was searched.
+        sureness: of these.
+        chosen: what was found.
+        kept: what of it stays in any case.
+        free: what may be added to that.
+    """
+    given_up = [h for h in chosen if h not in kept]
+    if not given_up or any(h.onset for h in chosen):
+        return None
+    for pair in best_pairs(fits.evidence, fits.sums, fits.columns(kept), free):
+        stay = [h for h in given_up if _says_else(fits, h, chosen, [*kept, *pair])]
+        beside, replaced = [*kept, *stay], [h for h in given_up if h not in stay]
+        if (
+            replaced
+            and _is_better(fits, pair, replaced, beside)
+            and fits.is_plausible([*beside, *pair])
+            and _are_both_needed(fits, sureness, pair, beside)
+        ):
+            return [*beside, *pair]
+    return None
+
+
+def _says_else(
+    fits: Fits, hypothesis: Hypothesis, chosen: Sequence[Hypothesis], instead: Sequence[Hypothesis]
+) -> bool:
+    """Return whether most of what a hypothesis explains is not explained by others instead."""
+    if any(not set(hypothesis.candidates).isdisjoint(h.candidates) for h in instead):
+        return False
+    others = [h for h in chosen if h is not hypothesis]
+    least = RIVAL_SHARE * fits.gain(hypothesis, fits.columns(others)).total
+    return fits.gain(hypothesis, fits.columns(instead)).total > least
+
+
+def _is_better(
+    fits: Fits, pair: Pair, replaced: Sequence[Hypothesis], beside: Sequence[Hypothesis]
+) -> bool:
+    """Return whether a pair explains surely more than others, or as much with fewer numbers."""
+    base = fits.columns(beside)
+    left = fits.sums.held_out(fits.beside(base, *replaced))
+    better = gain_of(left - fits.sums.held_out(fits.beside(base, *pair)))
+    if sum(map(freedom, pair)) < sum(map(freedom, replaced)):
+        return bool(better.total > -UNTRUE_SHARE * (fits.sums.held_out(base) - left).sum())
+    both, own = (np.concatenate([fits.own_columns(h) for h in each]) for each in (pair, replaced))
+    wider = np.all(fits.sums.spanned(base, both, own) > SPANNED)
+    return bool(better.total > _SIGMAS * better.error and not wider)
+
+
+def _are_both_needed(
+    fits: Fits, sureness: Sureness, pair: Pair, beside: Sequence[Hypothesis]
+) -> bool:
+    """Return whether each is surely there beside the other, and no small part of both."""
+    both = np.concatenate([fits.own_columns(h) for h in pair])
+    least = SIMPLER_SHARE * fits.sums.gain(fits.columns(beside), both).total
+    for one, other in (pair, pair[::-1]):
+        base = fits.columns([*beside, other])
+        gain = fits.gain(one, base)
+        if gain.total < least or not sureness.counts(base, one, gain, known=1):
+            return False
+    return True

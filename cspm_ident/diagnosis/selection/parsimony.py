@@ -1,0 +1,81 @@
+"""Which of several hypotheses that explain the same supposes least."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from cspm_ident.diagnosis.regression.block_regression import behind, gain_of, paired
+from cspm_ident.diagnosis.regression.collinearity import SIMPLER_SHARE, TIED, UNTRUE_SHARE
+from cspm_ident.diagnosis.regression.hypothesis import (
+    Hypothesis,
+    freedom,
+    is_number,
+    is_wider,
+    unusual,
+)
+from cspm_ident.diagnosis.regression.joint_fit import Fits
+
+Index = NDArray[np.intp]
+
+
+def simplest(
+    fits: Fits,
+    best: Hypothesis,
+    rivals: Sequence[Hypothesis],
+    base: Index,
+    chosen: Sequence[Hypothesis],
+) -> Hypothesis:
+    """Return the hypothesis of fewest numbers, or elements, that is no worse than the best one.
+
+    One that explains more in most blocks is taken instead, though it be less sure by itself; of
+    what explains the same a wrong number of the file, for it adds no physics; for a reading that
+    would be newer than its stamp says another one that is older, for only clocks do that; and what
+    sound clocks do instead of a fault.
+
+    Args:
+        fits: of all columns.
+        best: what gains most.
+        rivals: what explains the same.
+        base: columns of all that was chosen before.
+        chosen: that.
+    """
+    reference = left = fits.held_out(best, base)
+    gained = gain_of(fits.sums.held_out(base) - reference)
+    fewest = best
+    for rival in rivals:
+        if not fits.is_plausible([*chosen, rival]) or fits.contradicts(rival, chosen):
+            continue
+        with fits.sums.delayed(fits.own_columns(rival), best.onset):
+            leaves = fits.held_out(rival, base)
+        worse, wider = gain_of(leaves - reference), freedom(rival) - freedom(fewest)
+        fewer = wider < 0 or (wider == 0 and is_wider(fewest, rival))
+        more = leaves.sum() < left.sum() and behind(paired(leaves - left)) <= -TIED
+        little = min(2.0 * gained.error, SIMPLER_SHARE * gained.total)
+        if (wider <= 0 and more) or (fewer and worse.total <= little):
+            fewest, left = replace(rival, onset=best.onset), leaves
+        elif wider == 0 and worse.total <= gained.total * _allowed(fits, rival, fewest, chosen):
+            fewest, left = rival, leaves
+    return fewest
+
+
+def _allowed(fits: Fits, one: Hypothesis, other: Hypothesis, chosen: Sequence[Hypothesis]) -> float:
+    """Return the share of the gain by which one may be worse, being likelier before any data.
+
+    Sound clocks lie as far apart; a wrong number of the file adds no physics, and of two such it is
+    the one less out of the usual.
+    """
+    sound = [fits.is_negligible(each, [*chosen, each]) for each in (one, other)]
+    if sound[0] != sound[1]:
+        return SIMPLER_SHARE if sound[0] else -np.inf
+    if fits.are_early([*chosen, other]) and not fits.are_early([*chosen, one]):
+        return SIMPLER_SHARE
+    if is_number(one) != is_number(other):
+        return UNTRUE_SHARE if is_number(one) else -np.inf
+    if not is_number(one):
+        return -np.inf
+    sizes = [unusual(fits.values([*chosen, each]), each) for each in (one, other)]
+    return UNTRUE_SHARE if sizes[0] < sizes[1] else -np.inf

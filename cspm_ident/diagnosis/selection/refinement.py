@@ -1,0 +1,255 @@
+"""Parameters of what was named, model and readings corrected for it and looked at again.
+
+Columns hold to first order about the described machine, and shapes come from a coarse grid. Both
+are mended in a few rounds in which only the named effects are fitted.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Collection, Mapping, Sequence
+from dataclasses import replace
+from itertools import product
+from types import MappingProxyType
+
+import numpy as np
+from numpy.typing import NDArray
+
+from cspm_ident.diagnosis.regression.block_gram import Evidence, gather
+from cspm_ident.diagnosis.regression.block_regression import Sums
+from cspm_ident.diagnosis.regression.coefficients import Weights, values_of, weights_of
+from cspm_ident.diagnosis.regression.hypothesis import Hypothesis, parts_of
+from cspm_ident.diagnosis.regression.parameter_estimates import of_reach
+from cspm_ident.diagnosis.regression.time_constants import most_in_all, with_spectrum
+from cspm_ident.diagnosis.residuals.corrected_measurement import settled, with_found
+from cspm_ident.diagnosis.residuals.recorded_equations import equations_of
+from cspm_ident.diagnosis.residuals.regressors import Candidate, Place
+from cspm_ident.diagnosis.residuals.residual_equation import Equation, in_noise, steady
+from cspm_ident.signals.measurement import Measurement
+from cspm_msgs_py.errors import InputError
+from cspm_sim.effects import Effect
+
+Array = NDArray[np.float64]
+Cut = Callable[[Sequence[Sequence[Equation]]], Sequence[Sequence[Equation]]]
+
+_ROUNDS = 4
+# Grid steps are about a factor of three; each round halves the step in the logarithm.
+_FIRST_FACTOR = 1.7
+# Of half an interval: a smaller correction is the last.
+_SETTLED = 0.02
+
+
+def refine(
+    searched: Sequence[Measurement],
+    hypotheses: Sequence[Hypothesis],
+    noise: Mapping[Place, Array],
+    block_s: float,
+    cut: Cut,
+    supposed: Mapping[Candidate, Array] = MappingProxyType({}),
+) -> Weights:
+    """Return weights, with half the widths of their 95 % intervals, of candidates of better shapes.
+
+    Args:
+        searched: the recordings.
+        hypotheses: what was named.
+        noise: of each residual, its unit.
+        block_s: length of the blocks [s].
+        cut: what of the equations was searched.
+        supposed: weights about which residuals are taken to first order.
+    """
+    candidates, common = parts_of(hypotheses)
+    shapes = {c.effect_id: dict(c.shape) for c in candidates}
+    effects = {c.effect_id: c.effect for c in candidates}
+    wanted = [(c.effect_id, c.element) for c in candidates]
+    applied: Weights = {}
+    factor = _FIRST_FACTOR
+    found: Weights = {}
+    parts: Sequence[Sequence[Equation]] = ()
+    for _ in range(_ROUNDS if candidates else 0):
+        near = [_near(effects[name], shape, factor) for name, shape in shapes.items()]
+        try:
+            values = {c: own for c, (own, _) in applied.items()}
+            parts = cut(_about(searched, near, candidates, values, supposed))
+        except InputError:
+            # Such a machine cannot be; what was found before stays, with its interval.
+            break
+        evidence = gather(in_noise(steady(parts), noise), block_s)
+        shapes, found = _fitted(evidence, shapes, wanted, common)
+        for candidate, (weights, half) in found.items():
+            if candidate.effect.is_correction:
+                before = values.get(candidate, np.zeros_like(weights))
+                turned = _unit_after(candidate.effect, before)
+                applied[candidate] = before + turned * weights, turned * half
+        factor = float(np.sqrt(factor))
+        if _is_settled(found):
+            break
+    return of_reach({c: applied.get(c, own) for c, own in found.items()}, parts)
+
+
+def spectra(
+    searched: Sequence[Measurement],
+    hypotheses: Sequence[Hypothesis],
+    found: Weights,
+    noise: Mapping[Place, Array],
+    block_s: float,
+    cut: Cut,
+    supposed: Mapping[Candidate, Array] = MappingProxyType({}),
+) -> dict[Candidate, Array]:
+    """Return how large effects that have a spectrum may be in all, where it can be told.
+
+    Args:
+        searched: the recordings.
+        hypotheses: what was named, with the catalogue's grids.
+        found: what `refine` returns.
+        noise: as of `refine`.
+        block_s: likewise.
+        cut: likewise.
+        supposed: likewise.
+    """
+    wanted = [c for c in found if c.effect.spectrum]
+    if not wanted:
+        return {}
+    longest = max(m.duration for m in searched)
+    shapes = {c.effect_id: c.nonlinear for c in found}
+    effects = [
+        with_spectrum(effect, shapes[effect.id], longest)
+        for effect in {h.effect.id: h.effect for h in hypotheses}.values()
+    ]
+    values = {c: own for c, (own, _) in found.items() if c.effect.is_correction}
+    try:
+        parts = cut(_about(searched, effects, list(found), values, supposed))
+    except InputError:
+        return {}
+    evidence = gather(in_noise(steady(parts), noise), block_s)
+    most = {c: most_in_all(evidence, c, [o for o in found if o != c]) for c in wanted}
+    return {c: own for c, own in most.items() if own is not None}
+
+
+def _about(
+    searched: Sequence[Measurement],
+    effects: Sequence[Effect],
+    candidates: Sequence[Candidate],
+    applied: Mapping[Candidate, Array],
+    supposed: Mapping[Candidate, Array],
+) -> list[Sequence[Equation]]:
+    """Return the equations of machines and readings that are corrected.
+
+    Raises:
+        InputError: such a machine cannot be.
+    """
+    moved = [settled(with_found(m, applied)) for m in searched]
+    about = {c: own for c, own in supposed.items() if not c.effect.is_correction}
+    return [equations_of(m, effects, touched=candidates, supposed=about) for m in moved]
+
+
+def _is_settled(found: Weights) -> bool:
+    """Return whether corrections have become small against what is not known of them."""
+    return all(
+        not c.shape and np.all(np.abs(weights) <= _SETTLED * half)
+        for c, (weights, half) in found.items()
+        if c.shape or c.effect.is_correction
+    )
+
+
+def needs_refining(effect: Effect) -> bool:
+    """Return whether an effect's columns depend on its parameters, or on what is corrected."""
+    return effect.is_correction or bool(effect.nonlinear)
+
+
+def _unit_after(effect: Effect, applied: Array) -> Array:
+    """Return what one more unit of each weight is worth, some of it being applied already.
+
+    A factor of the file, or of a reading, multiplies what there is by now.
+    """
+    if effect.coefficients:
+        return np.ones_like(applied)
+    factors = np.array([parameter.absent == 1.0 for parameter in effect.linear])
+    return np.where(factors, 1.0 + applied, 1.0)
+
+
+def _near(effect: Effect, shape: Mapping[str, float], factor: float) -> Effect:
+    """Return the effect with a grid around a shape, within its bounds."""
+    bounds = {p.name: (p.minimum, p.maximum) for p in effect.parameters}
+    grid = {
+        name: tuple(sorted({float(np.clip(value * f, *bounds[name])) for f in _steps(factor)}))
+        for name, value in shape.items()
+    }
+    return replace(effect, nonlinear=grid)
+
+
+def _steps(factor: float) -> tuple[float, ...]:
+    return (1.0 / factor, 1.0, factor)
+
+
+def _fitted(
+    evidence: Evidence,
+    shapes: dict[str, dict[str, float]],
+    wanted: Sequence[tuple[str, str]],
+    common: Collection[str],
+) -> tuple[dict[str, dict[str, float]], Weights]:
+    """Return the best shapes and the weights there; those of `common` effects are shared."""
+    sums = Sums(evidence)
+    grids = {name: _shapes(evidence, name) for name in shapes}
+    best: tuple[float, dict[str, tuple[tuple[str, float], ...]]] | None = None
+    for point in product(*grids.values()):
+        chosen = dict(zip(grids, point, strict=True))
+        left = sums.squares_of(evidence.with_nuisance(_members(evidence, chosen, wanted)))
+        if best is None or left < best[0]:
+            best = left, chosen
+    assert best is not None
+    members = _members(evidence, best[1], wanted)
+    weights = values_of(evidence, sums, members, common)
+    turns = _turns(evidence, weights)
+    beside = np.append(evidence.nuisance, evidence.width + np.arange(turns.shape[1]))
+    widths = weights_of(evidence, sums.beside(turns), members, common, beside)
+    found = {c: (weights[c], widths[c][1]) for c in members}
+    return {name: dict(shape) for name, shape in best[1].items()}, found
+
+
+def _turns(evidence: Evidence, weights: Mapping[Candidate, Array]) -> Array:
+    """Return how what was found changes with the logarithm of each shape, (width, shapes).
+
+    As a combination of columns. A weight is no surer than its shape lets it be.
+    """
+    turns: dict[tuple[str, str], Array] = {}
+    for candidate, own in weights.items():
+        for name in candidate.nonlinear:
+            ends = _ends(evidence, candidate, name)
+            if len(ends) < 2:
+                continue
+            turn = turns.setdefault((candidate.effect_id, name), np.zeros(evidence.width))
+            step = float(np.log(ends[-1].nonlinear[name] / ends[0].nonlinear[name]))
+            turn[evidence.slices[ends[-1]]] += own / step
+            turn[evidence.slices[ends[0]]] -= own / step
+    return np.column_stack([np.zeros((evidence.width, 0)), *turns.values()])
+
+
+def _ends(evidence: Evidence, candidate: Candidate, name: str) -> list[Candidate]:
+    """Return the candidates that differ in one number of the shape only, ascending in it."""
+    kept = {n: value for n, value in candidate.shape if n != name}
+    alike = [
+        term
+        for term in evidence.terms
+        if isinstance(term, Candidate)
+        and (term.effect_id, term.element) == (candidate.effect_id, candidate.element)
+        and {n: value for n, value in term.shape if n != name} == kept
+    ]
+    return sorted(alike, key=lambda term: term.nonlinear[name])
+
+
+def _shapes(evidence: Evidence, name: str) -> list[tuple[tuple[str, float], ...]]:
+    candidates = (term for term in evidence.terms if isinstance(term, Candidate))
+    return sorted({c.shape for c in candidates if c.effect_id == name})
+
+
+def _members(
+    evidence: Evidence,
+    shapes: Mapping[str, tuple[tuple[str, float], ...]],
+    wanted: Sequence[tuple[str, str]],
+) -> list[Candidate]:
+    return [
+        term
+        for term in evidence.terms
+        if isinstance(term, Candidate)
+        and (term.effect_id, term.element) in wanted
+        and term.shape == shapes[term.effect_id]
+    ]

@@ -1,0 +1,104 @@
+"""Where a finding shows: of which driver's values, and how little of the data has them."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from cspm_ident.diagnosis.residuals.free_shapes import Driver
+from cspm_ident.diagnosis.residuals.regressors import Candidate
+from cspm_ident.diagnosis.residuals.residual_equation import Equation
+
+Array = NDArray[np.float64]
+
+# Of what a finding takes from the squared residual, that a region has to hold.
+HELD = 0.9
+# Of the data: what shows in more of it shows everywhere.
+_WIDEST = 0.5
+# Of a signal's values, each of equally many.
+_BINS = 50
+# Of the gain: where bins lose more than that, chance decides which ones gain.
+_LOST = 0.1
+
+
+class Region(NamedTuple):
+    """Values of a signal at which a finding shows.
+
+    Attributes:
+        driver: the signal, with its unit.
+        low, high: ends of the interval.
+        share: of the data that lies in it.
+        held: share of what the finding takes from the squared residual that lies in it.
+    """
+
+    driver: str
+    low: float
+    high: float
+    share: float
+    held: float
+
+
+def region_of(
+    parts: Sequence[Sequence[Equation]],
+    own: Sequence[Candidate],
+    weights: Mapping[Candidate, Array],
+) -> Region | None:
+    """Return the narrowest region that holds most of a finding; None where it shows everywhere.
+
+    Args:
+        parts: equations of what was searched, in units of their noise.
+        own: the finding's candidates.
+        weights: of all that was found.
+    """
+    gains: dict[str, list[Array]] = {}
+    values: dict[str, list[Array]] = {}
+    for part in parts:
+        for equation in part:
+            taken = _taken(equation, own, weights)
+            if taken is None:
+                continue
+            for name, signal in equation.signals.items():
+                # When it begins is told apart; times would tell when the machine moved.
+                if Driver(equation.place, name).of_time:
+                    continue
+                gains.setdefault(name, []).append(taken)
+                values.setdefault(name, []).append(signal)
+    regions = [
+        region
+        for name in gains
+        if (region := _narrowest(name, np.concatenate(values[name]), np.concatenate(gains[name])))
+    ]
+    narrowest = min(regions, key=lambda region: region.share, default=None)
+    return narrowest if narrowest is not None and narrowest.share <= _WIDEST else None
+
+
+def _taken(
+    equation: Equation, own: Sequence[Candidate], weights: Mapping[Candidate, Array]
+) -> Array | None:
+    """Return by how much a finding lowers each row's squared residual, (k,)."""
+    added = [equation.columns[c] @ weights[c] for c in own if c in equation.columns]
+    if not added:
+        return None
+    left = equation.target - sum(
+        equation.columns[c] @ w for c, w in weights.items() if c in equation.columns
+    )
+    return np.asarray(((left + sum(added)) ** 2 - left**2).sum(axis=1))
+
+
+def _narrowest(driver: str, values: Array, gains: Array) -> Region | None:
+    """Return the fewest neighbouring bins of a signal that hold most of the gain."""
+    order = np.array_split(np.argsort(values), _BINS)
+    sums = np.array([gains[rows].sum() for rows in order])
+    held = np.concatenate([[0.0], np.cumsum(sums)])
+    if -sums[sums < 0.0].sum() >= _LOST * held[-1]:
+        return None
+    between = (held[None, :] - held[:, None]) / held[-1]
+    starts, ends = np.nonzero(np.triu(between >= HELD))
+    best = int(np.argmin(ends - starts))
+    first, last = int(starts[best]), int(ends[best])
+    low, high = values[order[first][0]], values[order[last - 1][-1]]
+    share = sum(len(rows) for rows in order[first:last]) / len(values)
+    return Region(driver, float(low), float(high), share, float(between[first, last]))

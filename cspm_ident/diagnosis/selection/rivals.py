@@ -1,0 +1,52 @@
+"""Other hypotheses that explain the same as one."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+from numpy.typing import NDArray
+
+from cspm_ident.diagnosis.regression.block_gram import Evidence
+from cspm_ident.diagnosis.regression.block_regression import Sums
+from cspm_ident.diagnosis.regression.collinearity import overlap, where_alike
+from cspm_ident.diagnosis.regression.hypothesis import Hypothesis, has_one_system
+from cspm_ident.diagnosis.residuals.regressors import Candidate
+
+Index = NDArray[np.intp]
+
+
+def rivals_of(
+    evidence: Evidence,
+    sums: Sums,
+    base: Index,
+    hypothesis: Hypothesis,
+    free: Sequence[Candidate],
+) -> list[Hypothesis]:
+    """Return the best point of every other effect that explains the same.
+
+    On the same elements, or where it acts on others on the best one and on all, with the same
+    numbers if one system reads them; and the same effect on another single element.
+    """
+    elements = set(hypothesis.elements)
+    groups: dict[tuple[str, tuple[tuple[str, float], ...]], list[Candidate]] = {}
+    for candidate in free:
+        groups.setdefault((candidate.effect_id, candidate.shape), []).append(candidate)
+    best: dict[tuple[str, bool], tuple[float, Hypothesis]] = {}
+    for (name, _), members in groups.items():
+        if name == hypothesis.effect.id:
+            continue
+        for own in where_alike(members, elements):
+            effect = members[0].effect
+            rival = Hypothesis(effect, own, common=len(own) > 1 and has_one_system(effect))
+            gain = float(sums.gains_beyond(base, [evidence.columns_of(own)])[0])
+            key = name, len(own) > 1
+            if key not in best or gain > best[key][0]:
+                best[key] = gain, rival
+    rivals = [rival for _, rival in best.values()]
+    if len(elements) == 1:
+        group = hypothesis.effect.id, hypothesis.candidates[0].shape
+        alike = (c for c in groups.get(group, ()) if c.element not in elements)
+        rivals += [Hypothesis(hypothesis.effect, (c,)) for c in alike]
+    columns = evidence.columns_of(hypothesis.candidates)
+    return [r for r in rivals if overlap(sums, base, columns, evidence.columns_of(r.candidates))]

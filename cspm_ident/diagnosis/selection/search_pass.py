@@ -1,0 +1,176 @@
+"""Residuals and the search through them, about the best of what is known of drawn tensions."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterable, Mapping, Sequence
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from cspm_ident.diagnosis.regression.block_gram import gather
+from cspm_ident.diagnosis.regression.block_regression import FOLDS
+from cspm_ident.diagnosis.regression.hypothesis import Findings, Hypothesis
+from cspm_ident.diagnosis.regression.time_constants import told_within
+from cspm_ident.diagnosis.residuals.data_split import first_part, last_part, span_of
+from cspm_ident.diagnosis.residuals.free_shapes import Knots
+from cspm_ident.diagnosis.residuals.recorded_equations import equations_of
+from cspm_ident.diagnosis.residuals.regressors import Candidate, Place
+from cspm_ident.diagnosis.residuals.residual_equation import Equation, in_noise, steady
+from cspm_ident.diagnosis.residuals.spectral_lines import Line, lines_of, with_lines
+from cspm_ident.diagnosis.selection.safeguards import Safeguards
+from cspm_ident.diagnosis.selection.search import Search
+from cspm_ident.signals.measurement import Measurement
+from cspm_msgs_py.errors import InputError
+from cspm_sim.effects import Channel
+
+Array = NDArray[np.float64]
+Progress = Callable[[str], None]
+Parts = Sequence[Sequence[Equation]]
+
+BLOCKS = 48
+SHORTEST_BLOCK_S = 0.5
+
+
+class Recordings(NamedTuple):
+    """In which to look, and on which to judge what was found; see `diagnose`."""
+
+    searched: Sequence[Measurement]
+    held_out: Sequence[Measurement]
+
+    @property
+    def are_drawn(self) -> bool:
+        """Whether torques tell tensions that no load cell measured."""
+        return any(m.tension is None and m.machine.bar is not None for m in self.searched)
+
+
+class Look(NamedTuple):
+    """A search, and what it was done in.
+
+    Attributes:
+        search_parts: equations of what was searched.
+        judge_parts: of what was not.
+        hums: lines in what was searched of each recording.
+        noise: of each residual, its unit.
+        block: length of the blocks [s].
+        search: through the residuals.
+        knots: of the free functions.
+        supposed: weights about which residuals were taken to first order.
+    """
+
+    search_parts: Parts
+    judge_parts: Parts
+    hums: Sequence[tuple[Line, ...]]
+    noise: dict[Place, Array]
+    block: float
+    search: Search
+    knots: Knots
+    supposed: Mapping[Candidate, Array]
+
+
+def searched_for(
+    recordings: Recordings, progress: Progress, safeguards: Safeguards
+) -> tuple[Look, Findings]:
+    """Return what a search finds, and the search.
+
+    The law of a cable holds to first order about its tension. One that was drawn from a torque has
+    the winch's friction in it: what explains most is looked for first, and if it is a winch's, laws
+    are taken about the tensions without it; so again if more was found of winches in the end.
+
+    Args:
+        recordings: what to look in.
+        progress: called with what is being done.
+        safeguards: all of them, but for comparisons.
+
+    Raises:
+        InputError: the recordings have no residual that could be looked at, or are too short.
+    """
+    look = _look(recordings, {}, progress, safeguards)
+    if recordings.are_drawn:
+        first = look.search.first()
+        supposed = _of_winches(look.search, () if first is None else (first,))
+        if supposed:
+            # Before the next is made: columns are most of the memory.
+            del look
+            look = _look(recordings, supposed, progress, safeguards)
+    found = look.search.run()
+    if recordings.are_drawn:
+        supposed = _of_winches(look.search, [each.hypothesis for each in found.named])
+        if not supposed.keys() <= look.supposed.keys():
+            del look
+            look = _look(recordings, supposed, progress, safeguards)
+            found = look.search.run()
+    return look, found
+
+
+def _of_winches(search: Search, hypotheses: Iterable[Hypothesis]) -> dict[Candidate, Array]:
+    """Return the weights of what winches add to torques all the time."""
+    lasting = [h for h in hypotheses if not h.onset]
+    weights = search.fits.values(lasting) if lasting else {}
+    return {c: own for c, own in weights.items() if c.effect.regression.channel is Channel.SHAFT}
+
+
+def _look(
+    recordings: Recordings,
+    supposed: Mapping[Candidate, Array],
+    progress: Progress,
+    safeguards: Safeguards,
+) -> Look:
+    searched, held_out = recordings
+    longest = max(m.duration for m in searched)
+    effects, knots = [told_within(e, longest) for e in safeguards.effects], Knots()
+
+    def equations(measurements: Sequence[Measurement]) -> Parts:
+        return [equations_of(m, effects, knots, progress, supposed=supposed) for m in measurements]
+
+    found = equations(searched)
+    _check(searched, found)
+    parts = found if held_out else first_part(found)
+    hums = [hums_of(m, part, {}) for m, part in zip(searched, parts, strict=True)]
+    parts = _beside(parts, hums)
+    judged = equations(held_out) if held_out else _beside(last_part(found), hums)
+    noise = noise_of(steady(parts))
+    spans = [span_of(part) for part in parts]
+    block = max(SHORTEST_BLOCK_S, sum(b - a for a, b in spans) / BLOCKS)
+    evidence = gather(in_noise(steady(parts), noise), block)
+    if evidence.blocks < FOLDS:
+        raise InputError(
+            f"{searched[0].path}: {sum(b - a for a, b in spans):.1f} s to search, allowed:"
+            f" {FOLDS * SHORTEST_BLOCK_S:g} s or more; without --held-out seven tenths are searched"
+        )
+    search = Search(evidence, progress, safeguards.sums)
+    return Look(parts, judged, hums, noise, block, search, knots, supposed)
+
+
+def _check(searched: Sequence[Measurement], found: Parts) -> None:
+    for measurement, equations in zip(searched, found, strict=True):
+        if not equations:
+            raise InputError(
+                f"{measurement.path}: no residual, allowed: recordings with /winches/state angle"
+                " and torque, and with /cables/tension where there are cables"
+            )
+
+
+def hums_of(
+    measurement: Measurement, part: Sequence[Equation], weights: Mapping[Candidate, Array]
+) -> tuple[Line, ...]:
+    """Return the lines in what was searched of a recording, beyond what was found."""
+    if measurement.machine.bar is None:
+        return ()
+    start, end = span_of(part)
+    return lines_of(measurement.within(start, end), weights)
+
+
+def _beside(parts: Parts, lines: Sequence[Sequence[Line]]) -> Parts:
+    """Return equations in which each recording's lines are fitted always."""
+    return [with_lines(part, own) for part, own in zip(parts, lines, strict=True)]
+
+
+def noise_of(parts: Parts) -> dict[Place, Array]:
+    """Return the noise of every residual, the median over recordings and stretches."""
+    found: dict[Place, list[Array]] = {}
+    for equations in parts:
+        for equation in equations:
+            if len(equation.times) > 8:
+                found.setdefault(equation.place, []).append(equation.noise)
+    return {place: np.median(noises, axis=0) for place, noises in found.items()}

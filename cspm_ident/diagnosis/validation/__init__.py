@@ -1,0 +1,1 @@
+"""What hold-out data say of findings: tests, simulations, detection limits."""

@@ -1,0 +1,104 @@
+"""A recorded closed loop simulated again, with the machine as described and as found."""
+
+from __future__ import annotations
+
+import tempfile
+from collections.abc import Callable
+from dataclasses import replace
+from pathlib import Path
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from cspm_ident.signals.measurement import BAR, TENSION, Measurement, read_measurement
+from cspm_ident.signals.samples import Samples
+from cspm_msgs_py.dofs import DOFS
+from cspm_msgs_py.errors import CspmError
+from cspm_msgs_py.scenario import ClosedLoop
+from cspm_msgs_py.testbed import TestbedFile
+from cspm_run.plants import SIM
+from cspm_run.recorded_bundle import recorded_bundle
+from cspm_run.recorded_run import run
+
+Array = NDArray[np.float64]
+
+LONGEST_S = 30.0
+
+
+class ClosedLoopFit(NamedTuple):
+    """A measured quantity against that of the simulated closed loop.
+
+    Attributes:
+        name: topic and column.
+        unit: of the values.
+        measured: standard deviation of the recorded quantity.
+        before: RMS difference with the machine as described.
+        after: with what was found.
+    """
+
+    name: str
+    unit: str
+    measured: float
+    before: float
+    after: float
+
+
+def simulate_closed_loop(
+    recorded: Measurement, improved: TestbedFile, progress: Callable[[str], None] = lambda _: None
+) -> tuple[ClosedLoopFit, ...]:
+    """Return how the recorded scenario, run again under its controllers, differs from what was.
+
+    Of at most half a minute from its start. Waves are those of the recorded seed, and so is the
+    sensors' noise if a simulation was recorded. Empty where the recording carries no closed loop
+    that a simulation can run.
+
+    Args:
+        recorded: with the machine as described.
+        improved: the machine with what was found.
+        progress: called with what is being done.
+    """
+    try:
+        bundle = replace(recorded_bundle(recorded.path), plant=SIM)
+    except CspmError:
+        return ()
+    if not isinstance(bundle.scenario.control, ClosedLoop) or recorded.bar_pose is None:
+        return ()
+    seconds = min(LONGEST_S, recorded.duration)
+    steps = round(seconds * bundle.scenario.rates.plant)
+    found = []
+    with tempfile.TemporaryDirectory(prefix="cspm-closed-loop-") as place:
+        for name, machine in (("described", recorded.testbed), ("found", improved)):
+            progress(f"closed loop with the machine as {name}")
+            folder = Path(place) / name
+            if run(replace(bundle, testbed=machine), folder, steps=steps).failure:
+                return ()
+            found.append(read_measurement(folder))
+    return tuple(_fits(recorded.within(0.0, seconds), *found))
+
+
+def _fits(recorded: Measurement, before: Measurement, after: Measurement) -> list[ClosedLoopFit]:
+    cables = recorded.machine.cable_names
+    tables = [
+        (BAR, DOFS, recorded.bar_pose, before.bar_pose, after.bar_pose),
+        (TENSION, cables, recorded.tension, before.tension, after.tension),
+    ]
+    found = []
+    for topic, names, *samples in tables:
+        measured, plain, better = samples
+        if measured is None or plain is None or better is None:
+            continue
+        spreads = measured.values.std(axis=0)
+        differences = [_rms_difference(measured, each) for each in (plain, better)]
+        for i, name in enumerate(names):
+            unit = "N" if topic == TENSION else ("m" if i < 3 else "rad")
+            numbers = (float(each[i]) for each in (spreads, *differences))
+            found.append(ClosedLoopFit(f"{topic[1:]}/{name}", unit, *numbers))
+    return found
+
+
+def _rms_difference(measured: Samples, simulated: Samples) -> Array:
+    """Return the RMS difference of each column at the measured stamps."""
+    inside = measured.times <= simulated.times[-1]
+    at = [np.interp(measured.times[inside], simulated.times, c) for c in simulated.values.T]
+    return np.asarray(np.sqrt(np.mean((measured.values[inside] - np.stack(at, axis=1)) ** 2, 0)))

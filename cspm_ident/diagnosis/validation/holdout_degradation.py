@@ -1,0 +1,73 @@
+"""Whether something makes residuals worse that were not searched, with the numbers that are told.
+
+What was found stands by columns of first order about the described machine. Its numbers are fitted
+anew to what was searched, about a machine that has it; with these it may explain less than nothing.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+
+import numpy as np
+from numpy.typing import NDArray
+
+from cspm_ident.diagnosis.regression.block_regression import gain_of
+from cspm_ident.diagnosis.residuals.regressors import Candidate, Place
+from cspm_ident.diagnosis.validation.holdout_residuals import residuals_of, without_nuisance
+from cspm_ident.diagnosis.validation.holdout_simulation import LONGEST_S, Baselines
+from cspm_ident.diagnosis.validation.holdout_test import PLAIN_SHARE
+
+Array = NDArray[np.float64]
+# Of each residual, by block.
+Squares = Mapping[Place, Array]
+
+# Standard errors of the blocks.
+_SURELY = 3.0
+
+
+def squares_left(
+    baselines: Baselines,
+    found: Mapping[Candidate, Array],
+    noise: Mapping[Place, Array],
+    block_s: float,
+) -> dict[Place, Array]:
+    """Return what weights leave of what was not searched, in squares of the noise, by block.
+
+    Args:
+        baselines: what is judged.
+        found: weights of a machine's effects.
+        noise: of each residual, its unit.
+        block_s: length of the blocks [s].
+    """
+    blocks = int(np.ceil(LONGEST_S / block_s))
+    left: dict[Place, Array] = {}
+    for part, since in zip(baselines.parts, baselines.since, strict=True):
+        for place, equations in residuals_of([(part, since)], found, noise).items():
+            own = np.zeros(blocks)
+            for equation in equations:
+                rows = np.sum(without_nuisance(equation) ** 2, axis=1)
+                at = np.clip((equation.times - since) // block_s, 0, blocks - 1)
+                own += np.bincount(at.astype(np.intp), rows, blocks)
+            left[place] = np.concatenate([left.get(place, np.zeros(0)), own])
+    return left
+
+
+def harm(without: Squares, with_it: Squares) -> float:
+    """Return by how many squares something makes worse what was not searched; 0 if it is there.
+
+    It surely adds to all residuals together, or more than doubles one; unless it takes most of
+    another, for then it is there, whatever else is not right yet.
+
+    Args:
+        without: what is left without it.
+        with_it: what is left with it.
+    """
+    both = [place for place in without if place in with_it]
+    before = np.array([without[place].sum() for place in both])
+    taken = np.array([without[place] - with_it[place] for place in both])
+    by_place = taken.sum(axis=1) if both else np.zeros(0)
+    if not both or np.any(by_place > PLAIN_SHARE * before):
+        return 0.0
+    whole = gain_of(taken.sum(axis=0))
+    worse = whole.total < -_SURELY * whole.error or np.any(by_place < -before)
+    return float(np.sum(np.maximum(-by_place, 0.0))) if worse else 0.0

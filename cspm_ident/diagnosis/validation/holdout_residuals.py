@@ -1,0 +1,166 @@
+"""What was found, judged by residuals that were not searched."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from cspm_ident.diagnosis.regression.block_gram import Evidence
+from cspm_ident.diagnosis.residuals.corrected_measurement import as_found
+from cspm_ident.diagnosis.residuals.free_shapes import Driver
+from cspm_ident.diagnosis.residuals.recorded_equations import equations_of
+from cspm_ident.diagnosis.residuals.regressors import Candidate, Place
+from cspm_ident.diagnosis.residuals.residual_equation import Equation, difference_noise, in_noise
+from cspm_ident.diagnosis.validation.holdout_simulation import LEAD_S
+from cspm_ident.signals.measurement import Measurement
+
+Array = NDArray[np.float64]
+
+
+@dataclass(frozen=True)
+class HeldOut:
+    """One residual on data that was not searched.
+
+    Root mean squares in its unit; of the bar's six channels together, in units of their noise.
+
+    Attributes:
+        place: which residual.
+        measured: standard deviation of the measured quantity.
+        before: with the file's model.
+        retuned: with the file's parameters fitted to the searched data, nothing added.
+        after: with what was found.
+        ceiling: with free functions of every driver fitted to the searched data: what a model
+            without physics gets.
+        noise: what differs from row to row with what was found, whose own course is then no noise.
+        steady: with what was found, without the rows in which a shaft turns round; None where none
+            does.
+    """
+
+    place: Place
+    measured: float
+    before: float
+    retuned: float
+    after: float
+    ceiling: float
+    noise: float
+    steady: float | None = None
+
+
+def judged(
+    measurements: Sequence[Measurement],
+    starts: Sequence[float],
+    retuned: Mapping[Candidate, Array],
+    found: Mapping[Candidate, Array],
+    noise: Mapping[Place, Array],
+    free: Mapping[Place, float],
+) -> tuple[HeldOut, ...]:
+    """Return every residual of recordings as described, re-tuned and with what was found.
+
+    Args:
+        measurements: what is before the start, as far as there is any, lets memories such as creep
+            become what they were.
+        starts: from when on none of them was searched [s].
+        retuned: weights of the file's own parameters.
+        found: weights of what was found.
+        noise: of each residual, its unit.
+        free: what free functions leave, root mean square in units of the noise.
+    """
+    parts = list(zip(measurements, starts, strict=True))
+    described = residuals_of(parts, {}, noise)
+    tuned = residuals_of(parts, retuned, noise) if retuned else described
+    after = residuals_of(parts, found, noise) if found else described
+    out = []
+    for place, equations in described.items():
+        unit = float(noise[place][0]) if len(noise[place]) == 1 else 1.0
+        measured = np.concatenate([e.measured for e in equations])
+        spread = float(np.sqrt(np.mean((measured - measured.mean(axis=0)) ** 2)))
+        stages = (rms(each.get(place, ())) for each in (described, tuned, after))
+        before, then, now = (unit * stage for stage in stages)
+        ceiling, floor = unit * free.get(place, float("nan")), unit * _floor(after.get(place, ()))
+        steady = _steady(after.get(place, ()))
+        away = None if steady is None else unit * steady
+        out.append(HeldOut(place, unit * spread, before, then, now, ceiling, floor, away))
+    return tuple(out)
+
+
+def free_functions(searched: Evidence, judge: Evidence) -> dict[Place, float]:
+    """Return what free functions of all drivers, fitted to what was searched, leave elsewhere.
+
+    Root mean squares in units of the noise. They stand for a black box: what a model gets that
+    knows what may matter, but no physics.
+    """
+    weights: dict[Candidate | Driver, Array] = {}
+    for place in searched.places:
+        own = [t for t in searched.terms if isinstance(t, Driver) and t.place == place.place]
+        columns = np.intersect1d(place.columns, searched.with_nuisance(own))
+        at = np.searchsorted(place.columns, columns)
+        gram, target = place.whole[np.ix_(at, at)], place.whole[at, -1]
+        fitted = np.linalg.pinv(gram, hermitian=True, rcond=1e-9) @ target
+        full = np.zeros(searched.width)
+        full[columns] = fitted
+        weights |= {term: full[searched.slices[term]] for term in own}
+    left = judge.left_with(weights)
+    rows = {place.place: max(1.0, float(place.rows.sum())) for place in judge.places}
+    return {place: float(np.sqrt(max(0.0, left[place]) / count)) for place, count in rows.items()}
+
+
+def rms(equations: Sequence[Equation]) -> float:
+    """Return the root mean square of residuals, what is never told fitted to each."""
+    squares, count = 0.0, 0
+    for equation in equations:
+        left = without_nuisance(equation)
+        squares, count = squares + float(np.sum(left**2)), count + left.size
+    return float(np.sqrt(squares / max(count, 1)))
+
+
+def _steady(equations: Sequence[Equation]) -> float | None:
+    """Return the root mean square of the rows in which no shaft turns round, if any turns."""
+    if not any(equation.turning.any() for equation in equations):
+        return None
+    return rms([equation.steady for equation in equations])
+
+
+def _floor(equations: Sequence[Equation]) -> float:
+    """Return what differs from row to row, root mean square over channels."""
+    noises = [difference_noise(without_nuisance(e)) for e in equations if len(e.times) > 3]
+    return float(np.sqrt(np.mean(np.square(noises)))) if noises else float("nan")
+
+
+def without_nuisance(equation: Equation) -> Array:
+    """Return the residual less what no recording tells, shape (k, channels)."""
+    if not equation.nuisance.size:
+        return equation.target
+    columns = equation.nuisance.reshape(equation.target.size, -1)
+    target = equation.target.reshape(-1)
+    left = target - columns @ np.linalg.lstsq(columns, target, rcond=None)[0]
+    return np.asarray(left.reshape(equation.target.shape))
+
+
+def residuals_of(
+    measurements: Sequence[tuple[Measurement, float]],
+    weights: Mapping[Candidate, Array],
+    noise: Mapping[Place, Array],
+) -> dict[Place, list[Equation]]:
+    """Return the residuals of recordings from some instant each on, where there are any rows.
+
+    Args:
+        measurements: each with the instant [s].
+        weights: of what the machine has.
+        noise: of each residual, its unit.
+    """
+    parts = [
+        [
+            equation.within(start, np.inf)
+            for equation in equations_of(as_found(m.within(start - LEAD_S, np.inf), weights), ())
+        ]
+        for m, start in measurements
+    ]
+    found: dict[Place, list[Equation]] = {}
+    for part in in_noise(parts, noise):
+        for equation in part:
+            if len(equation.times):
+                found.setdefault(equation.place, []).append(equation)
+    return found

@@ -1,0 +1,259 @@
+"""What was found, judged by simulating recordings that were not searched."""
+
+from __future__ import annotations
+
+from collections.abc import Collection, Mapping, Sequence
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from cspm_ident.block_simulation import BlockSimulation, Drive, Simulated
+from cspm_ident.comparison.floor import lasting_rms, propagated
+from cspm_ident.diagnosis.residuals.corrected_measurement import as_found
+from cspm_ident.diagnosis.residuals.regressors import Candidate
+from cspm_ident.signals.measurement import BAR, TENSION, WINCHES, Measurement
+from cspm_ident.signals.noise_source import noise_of
+from cspm_ident.signals.samples import Samples
+from cspm_ident.signals.timeline import Timeline
+from cspm_msgs_py.dofs import DOFS
+from cspm_sim.effects import Channel
+
+Array = NDArray[np.float64]
+Weights = Mapping[Candidate, Array]
+
+# How long errors may grow where a drive is integrated twice or more [s].
+HORIZONS: dict[Drive, float | None] = {Drive.SHAFT: 0.5, Drive.WINCH: None, Drive.TENSION: 0.5}
+LONGEST_S = 30.0
+# In which what a cable remembers of before fades.
+LEAD_S = 10.0
+
+
+class Output(NamedTuple):
+    """A simulated quantity that was measured.
+
+    Attributes:
+        drive: which measured signals drove the simulation.
+        name: topic and column, such as `cables/tension/surge_2`.
+        unit: of the values.
+        element: name of cable or body.
+        kind: the residual that the same block has.
+    """
+
+    drive: Drive
+    name: str
+    unit: str
+    element: str
+    kind: Channel
+
+
+Errors = dict[Output, tuple[float, float]]
+
+
+class SimulatedFit(NamedTuple):
+    """One quantity of recordings that were not searched, against its simulation.
+
+    Attributes:
+        output: which.
+        measured: its standard deviation.
+        before: RMS error of the simulation with the file's model.
+        retuned: with the file's parameters fitted to the searched data, nothing added.
+        after: with what was found.
+        floor: RMS that noise of sensors and inputs leaves.
+    """
+
+    output: Output
+    measured: float
+    before: float
+    retuned: float
+    after: float
+    floor: float
+
+
+class Baselines(NamedTuple):
+    """Simulations without anything found, with which others are compared.
+
+    Attributes:
+        parts: what is simulated, of each recording half a minute and what leads up to it.
+        since: from when on each is judged [s].
+        described: spread and RMS error by output with the file's model.
+        retuned: with the file's parameters fitted to the searched data.
+    """
+
+    parts: Sequence[Measurement]
+    since: Sequence[float]
+    described: Errors
+    retuned: Errors
+
+
+def baselines_of(
+    measurements: Sequence[Measurement], starts: Sequence[float], retuned: Weights
+) -> Baselines:
+    """Simulate what was not searched, as described and re-tuned.
+
+    Args:
+        measurements: of each half a minute is judged; what is before it, as far as there is any,
+            lets memories such as creep become what they were.
+        starts: from when on none of them was searched [s].
+        retuned: weights of the file's own parameters.
+    """
+    parts = [
+        m.within(at - LEAD_S, at + LONGEST_S) for m, at in zip(measurements, starts, strict=True)
+    ]
+    described = _errors(parts, starts, {})
+    tuned = _errors(parts, starts, retuned) if retuned else described
+    return Baselines(parts, starts, described, tuned)
+
+
+def simulate_held_out(baselines: Baselines, found: Weights) -> tuple[SimulatedFit, ...]:
+    """Simulate winches, cables and bar from measured signals with what was found.
+
+    Winches are driven by torques and tensions in windows of half a second, the bar by tensions
+    likewise, cables and bar by motor angles throughout. What sensors do not allow is left out.
+
+    Args:
+        baselines: of the recordings.
+        found: weights of what was found.
+    """
+    parts, since, described, tuned = baselines
+    after = _errors(parts, since, found) if found else described
+    floors = _floors(parts, found)
+    return tuple(
+        SimulatedFit(output, spread, before, tuned[output][1], after[output][1], floors[output])
+        for output, (spread, before) in described.items()
+        if output in tuned and output in after and output in floors
+    )
+
+
+class Worth(NamedTuple):
+    """What one effect is worth in a simulation.
+
+    Attributes:
+        output: the quantity that gains most, of those in the blocks that it acts on.
+        without: RMS error with everything else that was found.
+        with_it: with everything that was found.
+    """
+
+    output: Output
+    without: float
+    with_it: float
+
+
+def worth_of(
+    baselines: Baselines,
+    fits: Sequence[SimulatedFit],
+    found: Weights,
+    own: Collection[Candidate],
+) -> Worth | None:
+    """Return what an effect is worth; None where nothing that it acts on can be simulated.
+
+    Args:
+        baselines: of the recordings that were simulated.
+        fits: their simulation with everything that was found.
+        found: weights of all that was found.
+        own: the effect's.
+    """
+    kinds = {r.channel for c in own for r in (c.effect.regression, *c.effect.partners)}
+    sensed = any(c.effect.sense is not None for c in own)
+    fewer = {c: weights for c, weights in found.items() if c not in own}
+    before = {f.output: (0.0, f.before) for f in fits}
+    if fewer:
+        before = _errors(baselines.parts, baselines.since, fewer)
+    shown = [
+        Worth(fit.output, before[fit.output][1], fit.after)
+        for fit in fits
+        if fit.output in before and (sensed or _is_told(fit.output, kinds))
+    ]
+    shown = [worth for worth in shown if worth.without > 0.0 and np.isfinite(worth.with_it)]
+    return min(shown, key=lambda worth: worth.with_it / worth.without, default=None)
+
+
+def _is_told(output: Output, kinds: Collection[Channel]) -> bool:
+    """Return whether a simulated quantity depends on what shows in residuals of some kinds.
+
+    Motor angles drive cables and bar together, so that what either does moves both.
+    """
+    together = {Channel.TENSION, Channel.WRENCH}
+    both = output.drive is Drive.WINCH and not together.isdisjoint(kinds)
+    return both or output.kind in kinds
+
+
+def _errors(parts: Sequence[Measurement], since: Sequence[float], weights: Weights) -> Errors:
+    """Return spread and RMS error by output, over all recordings."""
+    found: dict[Output, list[tuple[Array, Array]]] = {}
+    for part, start in zip(parts, since, strict=True):
+        measurement = as_found(part, weights)
+        timeline = Timeline(measurement)
+        simulation = BlockSimulation(timeline, measurement.machine)
+        for drive in _drives(simulation):
+            simulated = simulation.run(drive, simulation.windows(drive, HORIZONS[drive]))
+            for output, samples, column, i in _outputs(measurement, drive, simulated):
+                inside = (start <= samples.times) & (samples.times <= timeline.times[-1])
+                at = np.interp(samples.times[inside], timeline.times, column)
+                whole = np.isfinite(at)
+                measured = samples.values[inside, i][whole]
+                found.setdefault(output, []).append((measured, measured - at[whole]))
+    return {
+        output: (
+            float(np.sqrt(np.mean([np.var(m) for m, _ in pairs]))),
+            float(np.sqrt(np.mean(np.concatenate([e for _, e in pairs]) ** 2))),
+        )
+        for output, pairs in found.items()
+        if all(len(m) > 1 for m, _ in pairs)
+    }
+
+
+def _drives(simulation: BlockSimulation) -> list[Drive]:
+    bar = simulation.testbed.bar is not None
+    return [
+        drive
+        for drive in HORIZONS
+        if (bar or drive is Drive.SHAFT) and not simulation.missing(drive)
+    ]
+
+
+def _floors(parts: Sequence[Measurement], weights: Weights) -> dict[Output, float]:
+    """Return what noise leaves, from the first recording."""
+    measurement = as_found(parts[0], weights)
+    noise, _ = noise_of(measurement, None)
+    timeline = Timeline(measurement)
+    simulation = BlockSimulation(timeline, measurement.machine)
+    found = {}
+    topics = {"angle": WINCHES, "tension": TENSION, "pose": BAR}
+    for drive in _drives(simulation):
+        windows = simulation.windows(drive, HORIZONS[drive])
+        scatter = propagated(timeline, simulation.testbed, drive, windows, noise)
+        steps = sum(end - start for start, end in windows)
+        for output, _, column, i in _outputs(measurement, drive, scatter):
+            topic = topics[output.name.split("/")[1]]
+            found[output] = float(np.hypot(noise[topic][i], lasting_rms(column, steps)))
+    return found
+
+
+def _outputs(
+    measurement: Measurement, drive: Drive, simulated: Simulated
+) -> list[tuple[Output, Samples, Array, int]]:
+    """Return what a drive simulates and a sensor measured, with sensor and column."""
+    cables, kinds = measurement.machine.cable_names, Channel
+    tables = [
+        ("winches/angle", measurement.angle, simulated.angles, cables, kinds.SHAFT),
+        ("cables/tension", measurement.tension, simulated.tensions, cables, kinds.TENSION),
+        ("bar/pose", measurement.bar_pose, simulated.bars, DOFS, kinds.WRENCH),
+    ]
+    found = []
+    for stem, samples, values, names, kind in tables:
+        if samples is None or not values.size:
+            continue
+        for i, name in enumerate(names):
+            if not np.ptp(samples.values[:, i]) > 0.0:
+                continue
+            element = "bar" if kind is Channel.WRENCH else name
+            output = Output(drive, f"{stem}/{name}", _unit(stem, i), element, kind)
+            found.append((output, samples, values[:, i], i))
+    return found
+
+
+def _unit(stem: str, i: int) -> str:
+    if stem == "bar/pose":
+        return "m" if i < 3 else "rad"
+    return "N" if stem == "cables/tension" else "rad"

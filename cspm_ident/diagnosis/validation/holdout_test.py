@@ -1,0 +1,132 @@
+"""Whether data that were not searched agree with what was found."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from cspm_ident.diagnosis.regression.block_gram import Evidence
+from cspm_ident.diagnosis.regression.block_regression import gain_of
+from cspm_ident.diagnosis.regression.hypothesis import Named
+from cspm_ident.diagnosis.regression.joint_fit import Fits
+from cspm_ident.diagnosis.regression.significance import MATERIAL_SHARE
+from cspm_ident.diagnosis.residuals.regressors import Candidate
+
+Array = NDArray[np.float64]
+
+# A finding must take this share of a held-out squared residual, or it does not stand.
+CONFIRMED_SHARE = 0.03
+# Of what it should take of all, where it should take less than is worth a word of each.
+_AS_EXPECTED = CONFIRMED_SHARE / MATERIAL_SHARE
+# Of a held-out squared residual: what takes more of it is there, whatever else is not right yet.
+PLAIN_SHARE = 0.5
+# What it should take to be judged by, in standard errors of what it takes.
+_LEAST_EXPECTED = 3.0
+
+
+class Confirmed(NamedTuple):
+    """What was found, parted by what data that were not searched say.
+
+    Attributes:
+        kept: what stands.
+        faint: of that, what they show too little of to say how much better they are explained.
+        rejected: what does not stand.
+        untold: what they can say nothing of, as where a plucked bar has come to rest.
+        plain: of what stands, what takes most of one of their residuals.
+    """
+
+    kept: tuple[Named, ...]
+    faint: tuple[Named, ...] = ()
+    rejected: tuple[Named, ...] = ()
+    untold: tuple[Named, ...] = ()
+    plain: tuple[Named, ...] = ()
+
+
+def confirmed(fits: Fits, judge: Evidence, found: Sequence[Named]) -> Confirmed:
+    """Part what was found by whether it lowers residuals that were not searched.
+
+    One of them by a share worth a word; or, where a machine that moves less there shows less of it,
+    all together by what it should.
+
+    Args:
+        fits: of what was searched.
+        judge: sums of what was not.
+        found: the findings.
+    """
+    kept, faint, untold, plain = list(found), [], [], []
+    for each in found:
+        whole = fits.values([other.hypothesis for other in kept])
+        own = set(each.hypothesis.candidates)
+        lowered = _Lowered(judge, whole, own)
+        if lowered.any_or_none and lowered.much:
+            if lowered.most:
+                plain.append(each)
+        elif lowered.as_expected:
+            faint.append(each)
+        else:
+            kept.remove(each)
+            if lowered.says_nothing:
+                untold.append(each)
+    rejected = tuple(each for each in found if each not in kept and each not in untold)
+    return Confirmed(tuple(kept), tuple(faint), rejected, tuple(untold), tuple(plain))
+
+
+class _Lowered:
+    """What weights of one finding among others take of squared residuals, place by place."""
+
+    def __init__(
+        self, judge: Evidence, whole: Mapping[Candidate, Array], own: set[Candidate]
+    ) -> None:
+        """Take all weights, and which are the finding's."""
+        fewer = {c: w for c, w in whole.items() if c not in own}
+        opposite = {c: -w if c in own else w for c, w in whole.items()}
+        places = [place.place for place in judge.places]
+        left, without, against = (
+            np.array([squares[place] for place in places]).reshape(len(places), judge.blocks)
+            for squares in map(judge.left_by_block_with, (whole, fewer, opposite))
+        )
+        self._without = without.sum(axis=1)
+        by_block = gain_of((without - left).sum(axis=0))
+        self._taken, self._error = (without - left).sum(axis=1), by_block.error
+        # Of a square in the weight: what it would take if all of it were there.
+        self._expected = 0.5 * (left + against).sum(axis=1) - self._without
+
+    @property
+    def any_or_none(self) -> bool:
+        """Whether all together are no larger with it."""
+        return bool(self._taken.sum() >= 0.0)
+
+    @property
+    def much(self) -> bool:
+        """Whether it takes a share worth a word of one."""
+        return bool(np.any(self._taken >= CONFIRMED_SHARE * self._without))
+
+    @property
+    def most(self) -> bool:
+        """Whether it takes most of one."""
+        return bool(np.any(self._taken > PLAIN_SHARE * self._without))
+
+    @property
+    def as_expected(self) -> bool:
+        """Whether it could not take much of any, and surely takes of all what it should."""
+        if self._could_take_much or not self._shows:
+            return False
+        return bool(self._taken.sum() >= _AS_EXPECTED * self._expected.sum())
+
+    @property
+    def says_nothing(self) -> bool:
+        """Whether it could surely take nothing of all, and does not surely add to it."""
+        against = self._taken.sum() < -_LEAST_EXPECTED * self._error
+        return not self._shows and not bool(against)
+
+    @property
+    def _could_take_much(self) -> bool:
+        return bool(np.any(self._expected > MATERIAL_SHARE * self._without))
+
+    @property
+    def _shows(self) -> bool:
+        """Whether blocks would tell what it should take from nothing, as they scatter."""
+        return bool(self._expected.sum() > _LEAST_EXPECTED * self._error)

@@ -1,0 +1,163 @@
+"""Whether a finding shows in the motion that was asked for, and not in noise fed back alone.
+
+Controllers turn the noise of sensors into motion and tensions. What is in proportion to these is
+then correlated with the same noise in the residuals, though nothing is missing. What was asked for
+knows of no noise: it serves as instrument (Söderström, Stoica, Instrumental variable methods for
+system identification, Springer 1983).
+"""
+
+from __future__ import annotations
+
+from collections.abc import Collection, Iterator, Mapping, Sequence, Set
+
+import numpy as np
+from numpy.typing import NDArray
+
+from cspm_ident.diagnosis.residuals.regressors import Candidate
+from cspm_ident.diagnosis.residuals.residual_equation import Equation, difference_noise
+from cspm_ident.signals.measurement import Measurement
+from cspm_ident.signals.samples import Samples
+from cspm_sim.effects import Block, Effect
+
+Array = NDArray[np.float64]
+
+# Standard errors by which a finding has to show, and may fall short of what was told.
+_SIGMAS = 3.0
+# Of it: so much may be short even where it is known well, for noise that is fed back adds to it.
+_SHORT = 0.4
+# Of a finding's squares: what was asked for has to move it (weak instruments: Staiger, Stock,
+# Econometrica 65(3), 1997).
+_MOVED = 0.1
+# Times its noise: what moves less stands still, and what moves more does not follow noise.
+_STILL, _DRIVEN = 5.0, 10.0
+# Of the bar's motion: as much has another cause than controllers, such as a hand.
+_UNASKED = 0.1
+_LEAST = 1e-9
+# Of each recording or equation: more say no more of motion that was planned, and take memory.
+_ROWS = 20_000
+
+
+def is_proportional(effect: Effect) -> bool:
+    """Return whether an effect adds in proportion to smooth motion or tension, as noise does.
+
+    Numbers of the file, sensors and the frame; friction and play hang on a direction or a place.
+    """
+    return effect.is_correction or effect.block is Block.FRAME
+
+
+def instruments_of(measurement: Measurement) -> Samples | None:
+    """Return what was asked of the machine.
+
+    None where that is not known, nothing is fed back, or something else moves the bar.
+    """
+    angle = measurement.angle
+    if angle is None or measurement.wanted is None:
+        return None
+    moves = np.std(angle.values, axis=0) > _STILL * difference_noise(angle.values)
+    if not moves.any() or _is_driven(measurement.bar_pose, measurement.wanted):
+        return None
+    return measurement.wanted
+
+
+def _is_driven(bar: Samples | None, wanted: Samples) -> bool:
+    """Return whether the bar moves otherwise than it was asked to, and more than noise makes it."""
+    if bar is None:
+        return False
+    noise, thin = difference_noise(bar.values[:, :3]), _thinning(len(bar.times))
+    position = bar.values[thin, :3] - bar.values[thin, :3].mean(axis=0)
+    basis = _basis(_at(wanted, bar.times[thin]))
+    unasked = np.std(position - basis @ (basis.T @ position), axis=0)
+    share = np.sum(unasked**2) / np.sum(np.var(position, axis=0))
+    far = np.any(unasked > _DRIVEN * noise)
+    return bool(far and share > _UNASKED)
+
+
+def shows_in_what_was_asked(
+    parts: Sequence[Sequence[Equation]],
+    wanted: Sequence[Samples | None],
+    own: Collection[Candidate],
+    weights: Mapping[Candidate, Array],
+    block_s: float,
+) -> bool:
+    """Return whether a finding surely shows in the motion that was asked for.
+
+    Its columns, with their weights, explain the residual s times over; by instruments s is one for
+    what is there, whatever the noise, and anything for what answers noise. True where no equation
+    has both.
+
+    Args:
+        parts: equations of each recording, in units of their noise.
+        wanted: instruments of each recording.
+        own: the finding's candidates.
+        weights: of all that was found.
+        block_s: length of blocks that are as good as independent [s].
+    """
+    mine = frozenset(own)
+    found = [
+        pair
+        for part, instruments in zip(parts, wanted, strict=True)
+        if instruments is not None
+        for equation in part
+        if not mine.isdisjoint(equation.columns)
+        # One at a time: all steady ones would be a good part of the memory.
+        for pair in _moments(equation.steady, instruments, mine, weights, block_s)
+    ]
+    if not found:
+        return True
+    explained, predicted, squares = np.array(found).T
+    if predicted.sum() <= _MOVED * squares.sum():
+        return False
+    scale = explained.sum() / predicted.sum()
+    error = np.linalg.norm(explained - scale * predicted) / predicted.sum()
+    return bool(scale > _SIGMAS * error and scale >= 1.0 - max(_SIGMAS * error, _SHORT))
+
+
+def _moments(
+    equation: Equation,
+    wanted: Samples,
+    own: Set[Candidate],
+    weights: Mapping[Candidate, Array],
+    block_s: float,
+) -> Iterator[tuple[float, float, float]]:
+    """Yield, by block, the instrument times residual and finding, and the finding's squares."""
+    if not len(equation.times):
+        return
+    mine = [c for c in own if c in equation.columns]
+    thin = _thinning(len(equation.times))
+    basis = _basis(_at(wanted, equation.times[thin]))
+    home = (equation.times[thin] / block_s).astype(int)
+    others = [c for c in weights if c in equation.columns and c not in own]
+    for k in range(equation.target.shape[1]):
+        effect = sum((equation.columns[c][thin, k] @ weights[c] for c in mine), np.zeros(len(home)))
+        beside = [equation.columns[c][thin, k] for c in others]
+        if equation.nuisance.size:
+            beside.append(equation.nuisance[thin, k])
+        taken = _basis(np.concatenate([np.zeros((len(home), 0)), *beside], axis=1))
+        left, effect = (
+            each - taken @ (taken.T @ each)
+            for each in (np.asarray(equation.target[thin, k], dtype=float), effect)
+        )
+        instrument = basis @ (basis.T @ effect)
+        instrument = instrument - taken @ (taken.T @ instrument)
+        for block in np.unique(home):
+            rows = home == block
+            told, moved = instrument[rows], effect[rows]
+            yield float(told @ left[rows]), float(told @ moved), float(moved @ moved)
+
+
+def _thinning(rows: int) -> slice:
+    return slice(None, None, max(1, -(-rows // _ROWS)))
+
+
+def _at(wanted: Samples, times: Array) -> Array:
+    """Return instruments at some times, and a constant, (k, m)."""
+    values = [np.interp(times, wanted.times, column) for column in wanted.values.T]
+    return np.stack([np.ones(len(times)), *values], axis=1)
+
+
+def _basis(columns: Array) -> Array:
+    """Return an orthonormal basis of what columns span, (k, rank)."""
+    sizes = np.linalg.norm(columns, axis=0)
+    columns = columns[:, sizes > 0.0] / sizes[sizes > 0.0]
+    left, values, _ = np.linalg.svd(columns, full_matrices=False)
+    return np.asarray(left[:, values > _LEAST * values.max(initial=0.0)])

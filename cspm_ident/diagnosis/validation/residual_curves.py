@@ -1,0 +1,128 @@
+"""Residuals on held-out data over time, before and after what was found: what a page draws."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from cspm_ident.diagnosis.residuals.regressors import Candidate, Place
+from cspm_ident.diagnosis.residuals.residual_equation import Equation
+from cspm_msgs_py.dofs import DOFS
+from cspm_sim.effects import Channel
+
+Array = NDArray[np.float64]
+
+_BINS = 12
+
+
+@dataclass(frozen=True, eq=False)
+class Curve:
+    """One component of a residual along one stretch of a recording that was not searched.
+
+    Attributes:
+        place: which residual.
+        component: of the bar's wrench one degree of freedom; else empty.
+        times: shape (k,) [s].
+        measured: the measured quantity, (k,) [N·m for torques and moments, N].
+        before: residual with the file's model, (k,).
+        after: with what was found, (k,).
+        signals: measured signals that it may depend on, by name and unit, (k,) each.
+        touched: candidates that act on it.
+    """
+
+    place: Place
+    component: str
+    times: Array
+    measured: Array
+    before: Array
+    after: Array
+    signals: Mapping[str, Array]
+    touched: tuple[Candidate, ...]
+
+    @property
+    def unit(self) -> str:
+        """Of residual and measured quantity."""
+        moments = DOFS[3:]
+        torque = self.place.channel in (Channel.DRIVE, Channel.SHAFT) or self.component in moments
+        return "N·m" if torque else "N"
+
+    @property
+    def gained(self) -> float:
+        """Share of the squared residual that what was found takes away; below 0 if it harms."""
+        before = float(np.sum(self.before**2))
+        return 1.0 - float(np.sum(self.after**2)) / before if before > 0.0 else 0.0
+
+    @property
+    def main_signal(self) -> str:
+        """The signal whose bins explain most of the residual before; empty without signals."""
+        shares = {name: explained_by(values, self.before) for name, values in self.signals.items()}
+        return max(shares, key=lambda name: shares[name]) if shares else ""
+
+
+def held_out_curves(
+    parts: Sequence[Sequence[Equation]], weights: Mapping[Candidate, Array]
+) -> tuple[Curve, ...]:
+    """Return every component of every residual, before and after.
+
+    Args:
+        parts: equations of each held-out recording, in their own units.
+        weights: of the candidates that were found.
+    """
+    return tuple(
+        curve
+        for part in parts
+        for equation in part
+        if len(equation.times)
+        for curve in _curves(equation, weights)
+    )
+
+
+def _curves(equation: Equation, weights: Mapping[Candidate, Array]) -> list[Curve]:
+    own = {c: w for c, w in weights.items() if c in equation.columns}
+    model = np.zeros_like(equation.target)
+    for candidate, values in own.items():
+        model += equation.columns[candidate] @ values
+    before = _without(equation.nuisance, equation.target)
+    after = _without(equation.nuisance, equation.target - model)
+    components = DOFS if equation.target.shape[1] > 1 else ("",)
+    found = []
+    for i, name in enumerate(components):
+        touched = tuple(c for c in own if np.any(equation.columns[c][:, i]))
+        signals = {k: v for k, v in equation.signals.items() if name in k}
+        measured = equation.measured[:, i]
+        sides = before[:, i], after[:, i]
+        found.append(
+            Curve(equation.place, name, equation.times, measured, *sides, signals, touched)
+        )
+    return found
+
+
+def _without(nuisance: Array, values: Array) -> Array:
+    """Return values (k, channels) without what the nuisance (k, channels, m) explains."""
+    if not nuisance.size:
+        return values
+    table = nuisance.reshape(-1, nuisance.shape[2])
+    known = np.linalg.lstsq(table, values.reshape(-1), rcond=None)[0]
+    return np.asarray(values - nuisance @ known)
+
+
+def bins_of(signal: Array) -> tuple[Array, NDArray[np.intp]]:
+    """Return the edges of bins that hold equally many samples, and the bin of each sample."""
+    edges = np.unique(np.quantile(signal, np.linspace(0.0, 1.0, _BINS + 1)))
+    return edges, np.clip(np.searchsorted(edges, signal, side="right") - 1, 0, len(edges) - 2)
+
+
+def explained_by(signal: Array, values: Array) -> float:
+    """Return the correlation ratio η²: the share of squares that means over bins explain."""
+    edges, home = bins_of(signal)
+    whole = float(np.sum((values - values.mean()) ** 2))
+    if len(edges) < 3 or whole <= 0.0:
+        return 0.0
+    counts = np.bincount(home, minlength=len(edges) - 1)
+    sums = np.bincount(home, weights=values, minlength=len(edges) - 1)
+    filled = counts > 0
+    between = np.sum(counts[filled] * (sums[filled] / counts[filled] - values.mean()) ** 2)
+    return float(between) / whole

@@ -1,0 +1,6 @@
+"""Laws of the machine without state or clock: kinematics, bar, cables, rest, linear model."""
+
+from cspm_model.kernel_cache import use_kernel_cache
+
+# Before any kernel is defined, since that is when numba looks for its compiled form.
+use_kernel_cache()

@@ -1,0 +1,154 @@
+"""Where the machine hangs at rest: tensions, bar attitude and unstretched lengths."""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+from scipy.linalg import null_space
+from scipy.optimize import brentq, lsq_linear, nnls, root_scalar
+
+from cspm_model.kernels import bar as bar_kernel
+from cspm_model.kernels.cable import OFFSET_LENGTH, elastic_tension, law_scale
+from cspm_model.kernels.machine import PlantParameters
+from cspm_model.kinematics import geometry, rotation
+from cspm_msgs_py.errors import ConvergenceError
+
+Array = NDArray[np.float64]
+
+WRENCH_TOLERANCE = 1e-9  # of the weight
+RESIDUAL_TOLERANCE = 1e-6
+RANK_TOLERANCE = 1e-9
+
+
+class Equilibrium(NamedTuple):
+    """A state of rest.
+
+    Attributes:
+        bar_pose: x y z φ θ ψ, its roll adapted where the cables cannot hold the wanted one.
+        tensions: shape (n,) [N].
+        unstretched_lengths: shape (n,) [m].
+    """
+
+    bar_pose: Array
+    tensions: Array
+    unstretched_lengths: Array
+
+
+NOTHING = np.zeros(6)
+
+
+def gravity_wrench(parameters: PlantParameters, bar_pose: ArrayLike) -> Array:
+    """Return gravity's force and moment about the bar frame's origin in world axes, shape (6,)."""
+    bar = parameters.bar
+    force = np.array([0.0, 0.0, bar[bar_kernel.MASS] * bar[bar_kernel.GRAVITY]])
+    arm = rotation(bar_pose) @ bar[bar_kernel.COM : bar_kernel.COM + 3]
+    return np.concatenate([force, np.cross(arm, force)])
+
+
+def find_equilibrium(
+    parameters: PlantParameters,
+    bar_pose: ArrayLike,
+    frame_pose: ArrayLike,
+    limits: Array,
+    load: Array = NOTHING,
+) -> Equilibrium:
+    """Return the state of rest at `bar_pose`, tensions least in norm within `limits` (n, 2) [N].
+
+    Where the cables cannot balance every moment (the thesis's machine, in roll), the roll is found
+    at which gravity needs none. `load` is a wrench on the bar beside gravity's, (6,), world axes.
+
+    Raises:
+        ConvergenceError: no tensions within the limits hold the bar at rest near this pose.
+    """
+    pose = np.array(bar_pose, dtype=float)
+
+    def imbalance(roll: float) -> float:
+        pose[3] = roll
+        structure = -geometry(parameters.cables, pose, frame_pose).bar.T
+        direction = np.linalg.svd(structure)[0][:, -1]
+        return float(direction @ (gravity_wrench(parameters, pose) + load) * np.sign(direction[3]))
+
+    start = float(pose[3])
+    if not _balanced(parameters, pose, frame_pose, load):
+        found = root_scalar(imbalance, x0=start, x1=start + 1e-3, xtol=1e-14)
+        pose[3] = found.root if found.converged else start
+    tensions = _hold(parameters, pose, frame_pose, limits, load)
+    lengths = geometry(parameters.cables, pose, frame_pose).lengths
+    return Equilibrium(pose, tensions, unstretched_lengths(parameters, lengths, tensions))
+
+
+def unstretched_lengths(parameters: PlantParameters, lengths: Array, tensions: Array) -> Array:
+    """Return l0 (n,) [m] at which cables stretched to `lengths` carry `tensions` at rest."""
+    out = np.empty(len(lengths))
+    for i, (length, tension) in enumerate(zip(lengths, tensions, strict=True)):
+        bounds = (0.5 * length, length)
+        args = (length, tension, parameters, i)
+        out[i] = brentq(_excess_tension, *bounds, args, xtol=1e-15) if tension > 0 else length
+    return out
+
+
+def _excess_tension(
+    unstretched: float, length: float, tension: float, parameters: PlantParameters, i: int
+) -> float:
+    cables, tables = parameters.cables, parameters.tables
+    elastic = unstretched + cables[i, OFFSET_LENGTH]
+    scale = law_scale(elastic, cables, i)
+    found, _ = elastic_tension(length - unstretched, elastic, scale, cables, tables, i)
+    return float(found - tension)
+
+
+def _balanced(parameters: PlantParameters, pose: Array, frame_pose: ArrayLike, load: Array) -> bool:
+    structure = -geometry(parameters.cables, pose, frame_pose).bar.T
+    wrench = -gravity_wrench(parameters, pose) - load
+    tensions = np.linalg.pinv(structure, rcond=RANK_TOLERANCE) @ wrench
+    return _residual(structure, tensions, wrench) < WRENCH_TOLERANCE
+
+
+def _residual(structure: Array, tensions: Array, wrench: Array) -> float:
+    weight = np.linalg.norm(wrench) or 1.0  # without gravity: in N
+    return float(np.linalg.norm(structure @ tensions - wrench) / weight)
+
+
+def _hold(
+    parameters: PlantParameters, pose: Array, frame_pose: ArrayLike, limits: Array, load: Array
+) -> Array:
+    structure = -geometry(parameters.cables, pose, frame_pose).bar.T
+    wrench = -gravity_wrench(parameters, pose) - load
+    tensions = least_tensions(structure, wrench, limits)
+    residual = _residual(structure, tensions, wrench)
+    if residual > RESIDUAL_TOLERANCE:
+        place = ", ".join(f"{value:.4g}" for value in pose)
+        raise ConvergenceError(
+            f"no tensions within the limits hold the bar at rest at [{place}] (m, rad): wrench"
+            f" residual {residual:.2g} of the weight"
+        )
+    return tensions
+
+
+def least_tensions(structure: Array, wrench: Array, limits: Array) -> Array:
+    """Return the tensions (n,) [N] least in norm with structure·t = wrench and limits (n, 2).
+
+    Where none are within the limits: those that come closest to the wrench.
+
+    The pseudo-inverse's solution is normal to the null space, so the least tensions are the least
+    distance from it within the null space under linear inequalities, which non-negative least
+    squares solves: Lawson, Hanson, Solving Least Squares Problems (1974), chapter 23.
+
+    Raises:
+        ConvergenceError: that search did not come to an end.
+    """
+    low, high = limits[:, 0], limits[:, 1]
+    base: Array = np.linalg.pinv(structure, rcond=RANK_TOLERANCE) @ wrench
+    null = null_space(structure, rcond=RANK_TOLERANCE)
+    rows = np.vstack([np.hstack([null.T, -null.T]), np.concatenate([low - base, base - high])])
+    goal = np.zeros(len(rows))
+    goal[-1] = 1.0
+    try:
+        gap = rows @ nnls(rows, goal)[0] - goal
+    except RuntimeError as err:
+        raise ConvergenceError(f"least tensions within the limits: {err}") from None
+    if np.linalg.norm(gap) < RESIDUAL_TOLERANCE:
+        return np.asarray(lsq_linear(structure, wrench, (low, high), tol=1e-14).x)
+    return np.clip(base - null @ (gap[:-1] / gap[-1]), low, high)

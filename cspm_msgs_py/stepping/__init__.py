@@ -1,0 +1,1 @@
+"""How a node is stepped: lockstep handshake, sample and hold, stages, latched safe states."""

@@ -1,0 +1,1 @@
+"""Runs, replays and driver checks on a ROS 2 graph."""

@@ -1,0 +1,1 @@
+"""Whether somebody's drivers speak the contract, judged from what they publish."""

@@ -1,0 +1,1 @@
+"""Playing recordings to a ROS 2 graph: in time, or in lockstep and compared."""

@@ -1,0 +1,1 @@
+"""Nodes and processes of a run over real ROS 2 topics, in lockstep or in real time."""

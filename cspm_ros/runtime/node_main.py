@@ -1,0 +1,103 @@
+"""One node as a program of its own, told everything by ROS 2 parameters."""
+
+from __future__ import annotations
+
+import sys
+from collections.abc import Sequence
+
+from cspm_msgs_py.errors import CspmError, InputError
+from cspm_msgs_py.graph import NODES, PLAYER, RECORDER
+from cspm_msgs_py.schedule import (
+    FORCE_CONTROLLER,
+    MOTION_CONTROLLER,
+    PLANT,
+    TENSION_DISTRIBUTION,
+    WAVE_TRAJECTORY,
+)
+from cspm_ros.runtime.ros_install import find_ros
+
+ROS_ARGS = "--ros-args"
+INTERRUPTED = 130
+_HELP = """usage: {name} [--ros-args -p PARAMETER:=VALUE … --params-file FILE -r OLD:=NEW …]
+
+The node {name} of cspm. Parameters: scenario (a name or a file), pace (lockstep or realtime),
+nodes (which take part) and more: `ros2 param describe /{name} NAME` explains each."""
+
+
+def start_node(name: str, args: Sequence[str]) -> None:
+    """Run a node until its run ends or a signal comes.
+
+    Args:
+        name: one of `NODES`.
+        args: what follows the name on the command line, such as `--ros-args -p scenario:=calm`.
+
+    Raises:
+        InputError: no such node, no ROS, or arguments that cannot be used.
+        CspmError: the run failed.
+    """
+    if name not in NODES:
+        raise InputError(f"node {name}: allowed: {', '.join(NODES)}")
+    if args and args[0] != ROS_ARGS:
+        raise InputError(
+            f"node {name}: {args[0]}, allowed: nothing, or {ROS_ARGS} and what ROS 2 takes after it"
+        )
+    find_ros(f"node {name}")
+    # Loading ROS comes after looking for it.
+    from cspm_ros.runtime.node_run import run_node
+
+    run_node(name, [name, *args])
+
+
+def main(name: str, args: Sequence[str]) -> int:
+    """Run a node as a program; return its exit code, errors as one line on stderr."""
+    if {"--help", "-h"} & set(args):
+        print(_HELP.format(name=name))  # noqa: T201 - the program's voice
+        return 0
+    try:
+        start_node(name, args)
+    except CspmError as err:
+        print(f"cspm: {' '.join(str(err).split())}", file=sys.stderr)  # noqa: T201
+        return err.exit_code
+    except KeyboardInterrupt:
+        # Before the node takes signals itself.
+        return INTERRUPTED
+    return 0
+
+
+def plant() -> None:
+    """Run the plant."""
+    sys.exit(main(PLANT, sys.argv[1:]))
+
+
+def wave_trajectory() -> None:
+    """Run the wave trajectory."""
+    sys.exit(main(WAVE_TRAJECTORY, sys.argv[1:]))
+
+
+def motion_controller() -> None:
+    """Run the motion controller."""
+    sys.exit(main(MOTION_CONTROLLER, sys.argv[1:]))
+
+
+def tension_distribution() -> None:
+    """Run the tension distribution."""
+    sys.exit(main(TENSION_DISTRIBUTION, sys.argv[1:]))
+
+
+def force_controller() -> None:
+    """Run the force controller."""
+    sys.exit(main(FORCE_CONTROLLER, sys.argv[1:]))
+
+
+def recorder() -> None:
+    """Run the recorder."""
+    sys.exit(main(RECORDER, sys.argv[1:]))
+
+
+def player() -> None:
+    """Run the player."""
+    sys.exit(main(PLAYER, sys.argv[1:]))
+
+
+if __name__ == "__main__":
+    sys.exit(main(sys.argv[1], sys.argv[2:]))

@@ -1,0 +1,132 @@
+"""What a node is told by ROS 2 parameters."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import Field, dataclass, field, fields, replace
+from pathlib import Path
+from typing import Any
+
+from rcl_interfaces.msg import ParameterDescriptor
+from rclpy.exceptions import InvalidParameterTypeException
+from rclpy.node import Node
+
+from cspm_msgs_py.errors import InputError
+from cspm_msgs_py.graph import PLAYER, RECORDER
+from cspm_msgs_py.scenario import load_scenario
+from cspm_msgs_py.schedule import PLANT, Schedule
+from cspm_msgs_py.testbed import load_testbed
+from cspm_msgs_py.yaml_file import dump_yaml
+from cspm_run.assembly import resolve
+from cspm_run.bundle import Bundle, make_bundle
+from cspm_run.library import find_scenario
+from cspm_run.plants import PLANTS, SIM
+from cspm_run.recorded_bundle import recorded_bundle
+
+LOCKSTEP, REALTIME = "lockstep", "realtime"
+
+
+def _told(default: object, text: str, *choices: str, least: float | None = None) -> Any:  # noqa: ANN401 - a dataclass field
+    return field(default=default, metadata={"text": text, "choices": choices, "least": least})
+
+
+@dataclass(frozen=True)
+class NodeParameters:
+    """One node's parameters; empty text and zero stand for the scenario's own."""
+
+    scenario: str = _told("worst_case", "a scenario's name, or a scenario file")
+    overrides: tuple[str, ...] = _told((), "values put over the scenario's, key.path=value")
+    pace: str = _told(LOCKSTEP, "what paces the run: the schedule or the wall", LOCKSTEP, REALTIME)
+    plant: str = _told(SIM, "whose equations the plant node simulates", *PLANTS)
+    nodes: tuple[str, ...] = _told((), "the nodes of this run; empty: all, and the recorder")
+    steps: int = _told(0, "end after so many plant steps; 0: the scenario's duration", least=0)
+    folder: str = _told("", "recorder: a new folder for the recording")
+    mode: str = _told("processes", "recorder: the mode named in the recording")
+    report: str = _told("", "plant or leader: a file that it keeps up to date with how far it is")
+    patience: float = _told(30.0, "give up when nothing moves for so long [s]", least=0.1)
+    until_stdin_closes: bool = _told(False, "stop when standard input is closed")
+    bag: str = _told("", "player: what to play; others: a recording that names the scenario")
+    rate: float = _told(1.0, "player: bag time per wall time; 0, in lockstep: as nodes can")
+    topics: tuple[str, ...] = _told((), "player: only these topics, and the clock")
+    left_out: tuple[str, ...] = _told((), "player: all topics but these")
+    start: float = _told(0.0, "player: where in the bag to begin [s]")
+    paused: bool = _told(False, "player: whether to begin paused")
+    lockstep: bool = _told(False, "player: take the plant's place in a run in lockstep")
+
+    def bundle(self) -> Bundle:
+        """Return the run's description, resolved.
+
+        Raises:
+            InputError: no such scenario or recording, or one that cannot be used.
+        """
+        if self.bag:
+            return recorded_bundle(Path(self.bag), self.overrides)
+        path = find_scenario(self.scenario)
+        scenario = load_scenario(path, self.overrides)
+        testbed = load_testbed(path.parent / scenario.testbed)
+        bundle = make_bundle(resolve(scenario, testbed.testbed), testbed, path.parent)
+        return replace(bundle, plant=self.plant)
+
+    def members(self, schedule: Schedule) -> tuple[str, ...]:
+        """Return the nodes of this run.
+
+        Raises:
+            InputError: a name that is no node of this scenario.
+        """
+        leader = PLAYER if PLAYER in self.nodes else PLANT
+        possible = (leader, *schedule.nodes, RECORDER)
+        unknown = [name for name in self.nodes if name not in possible]
+        if unknown:
+            raise InputError(f"nodes: {', '.join(unknown)}, allowed: {', '.join(possible)}")
+        return tuple(name for name in possible if name in self.nodes) if self.nodes else possible
+
+
+def read_parameters(node: Node) -> NodeParameters:
+    """Declare the parameters on a node and return their values.
+
+    Raises:
+        InputError: a parameter has another type, or a value that is not allowed.
+    """
+    found = {}
+    for each in fields(NodeParameters):
+        found[each.name] = value = _declare(node, each)
+        choices, least = each.metadata["choices"], each.metadata["least"]
+        if choices and value not in choices:
+            raise InputError(f"parameter {each.name}: {value}, allowed: {', '.join(choices)}")
+        if least is not None and not least <= value < math.inf:
+            raise InputError(f"parameter {each.name}: {value}, allowed: {least} or more")
+    return NodeParameters(**found)
+
+
+def _declare(node: Node, each: Field[Any]) -> Any:  # noqa: ANN401 - of the field's type
+    """Declare a parameter and return its value."""
+    default, text = each.default, each.metadata["text"]
+    # ROS 2 knows no type of an empty list, and takes no whole number for another.
+    several, real = isinstance(default, tuple), isinstance(default, float)
+    descriptor = ParameterDescriptor(description=text, read_only=True, dynamic_typing=real)
+    try:
+        declared = node.declare_parameter(each.name, [""] if several else default, descriptor)
+    except InvalidParameterTypeException:
+        value = None
+    else:
+        value = declared.value
+        if several:
+            return tuple(item for item in value or () if item)
+        if real and isinstance(value, int) and not isinstance(value, bool):
+            return float(value)
+    if type(value) is not type(default):
+        shown = ["…"] if several else default
+        raise InputError(
+            f"parameter {each.name}: of the wrong type, allowed: like {shown!r} ({text})"
+        )
+    return value
+
+
+def write_parameters(path: Path, parameters: NodeParameters) -> None:
+    """Write a ROS 2 parameter file that tells all nodes these parameters."""
+    told = {
+        each.name: list(value) if isinstance(value, tuple) else value
+        for each in fields(NodeParameters)
+        if (value := getattr(parameters, each.name)) != each.default
+    }
+    path.write_text(dump_yaml({"/**": {"ros__parameters": told}}), encoding="utf-8")

@@ -1,0 +1,127 @@
+"""The processes of a run, one a node."""
+
+from __future__ import annotations
+
+import re
+import signal
+import subprocess
+import sys
+import time
+from collections.abc import Collection, Sequence
+from pathlib import Path
+
+from typing_extensions import Self
+
+from cspm_ros.runtime.background import put_behind
+from cspm_ros.runtime.stall_watchdog import STANDSTILL
+
+LEAVING_S = 5.0
+# How long a node may be gone, or silent, before it is told that it is.
+SILENCE_S = 2.0
+_TAIL = 4000
+_WARNING = re.compile(r"\[(?:WARN|ERROR|FATAL)\] \[[\d.]+\] \[(.+?)\]: (.+)\n")
+
+
+class NodeProcesses:
+    """The processes of a run, one a node; they stop with this one, however it ends."""
+
+    def __init__(
+        self, names: Sequence[str], parameters: Path, log: Path, behind: Collection[str] = ()
+    ) -> None:
+        """Start them.
+
+        Args:
+            names: of the nodes.
+            parameters: ROS 2 parameter file for all of them.
+            log: folder for what they print.
+            behind: who of them has time and gives way to the others.
+        """
+        self._log = log
+        self._asked: set[str] = set()
+        self._read = dict.fromkeys(names, 0)
+        self.by_name = {name: self._start(name, parameters) for name in names}
+        for name in behind:
+            put_behind(self.by_name[name].pid)
+
+    def _start(self, name: str, parameters: Path) -> subprocess.Popen[bytes]:
+        command = [sys.executable, "-m", "cspm_ros.runtime.node_main", name]
+        with (self._log / f"{name}.log").open("wb") as log:
+            return subprocess.Popen(
+                [*command, "--ros-args", "--params-file", str(parameters)],
+                stdin=subprocess.PIPE,
+                stdout=log,
+                stderr=subprocess.STDOUT,
+                # Ctrl-C in a terminal goes to a whole group; the nodes end in their own order.
+                start_new_session=True,
+            )
+
+    def ended(self) -> dict[str, int]:
+        """Return the exit codes of those that ended; a signal is negative."""
+        codes = {name: process.poll() for name, process in self.by_name.items()}
+        return {name: code for name, code in codes.items() if code is not None}
+
+    def stop(self, name: str) -> None:
+        """Ask a node to end, once: a second signal would not let it end in order."""
+        if self.by_name[name].poll() is None and name not in self._asked:
+            self._asked.add(name)
+            self.by_name[name].send_signal(signal.SIGINT)
+
+    def obituary(self, name: str) -> str:
+        """Return in one line how a node ended, and its last words."""
+        code, words = self.by_name[name].poll() or 0, self._last_words(name)
+        how = f"by signal {signal.Signals(-code).name}" if code < 0 else f"with exit code {code}"
+        told = f"{name} ended {how} before the run did" + f": {words}" * bool(words)
+        if STANDSTILL not in words or self.wait(SILENCE_S):
+            return told
+        # All nodes give up a run that stands still, but for those that hang themselves.
+        silent = [name for name in self.by_name if name not in self.ended()]
+        return f"no answer from {', '.join(silent)}; {told}"
+
+    def warnings(self) -> list[str]:
+        """Return what the nodes warned of since the last call, a line each."""
+        found = []
+        for name in self.by_name:
+            with (self._log / f"{name}.log").open("rb") as log:
+                log.seek(self._read[name])
+                text, _, _ = log.read().rpartition(b"\n")
+            self._read[name] += len(text)
+            lines = _WARNING.findall(text.decode(errors="replace") + "\n")
+            found += [f"{node}: {line}" for node, line in lines]
+        return found
+
+    def _last_words(self, name: str) -> str:
+        text = (self._log / f"{name}.log").read_text(errors="replace")[-_TAIL:]
+        lines = [line for line in text.splitlines() if line.strip()]
+        return lines[-1] if lines else ""
+
+    def wait(self, seconds: float) -> bool:
+        """Wait for all to end; return whether they did."""
+        deadline = time.monotonic() + seconds
+        for process in self.by_name.values():
+            try:
+                process.wait(max(0.0, deadline - time.monotonic()))
+            except subprocess.TimeoutExpired:
+                return False
+        return True
+
+    def close(self) -> None:
+        """End all that still run, the stubborn by force."""
+        for process in self.by_name.values():
+            if process.poll() is None:
+                process.send_signal(signal.SIGTERM)
+                # Who was stopped can end in order as well.
+                process.send_signal(signal.SIGCONT)
+        if not self.wait(LEAVING_S):
+            for process in self.by_name.values():
+                if process.poll() is None:
+                    process.kill()
+            self.wait(LEAVING_S)
+        for process in self.by_name.values():
+            if process.stdin is not None:
+                process.stdin.close()
+
+    def __enter__(self) -> Self:
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        self.close()

@@ -1,0 +1,189 @@
+"""What one node does in a process of its own."""
+
+from __future__ import annotations
+
+import os
+import sys
+import threading
+from collections.abc import Callable, Sequence
+from contextlib import ExitStack
+from pathlib import Path
+
+from cspm_msgs_py.errors import CspmError, InputError
+from cspm_msgs_py.graph import NODES, PLAYER, RECORDER
+from cspm_msgs_py.ros.contract_node import ContractNode
+from cspm_msgs_py.ros.leader import Leader
+from cspm_msgs_py.ros.session import FAREWELL_S, Session
+from cspm_msgs_py.schedule import PLANT, Schedule, schedule_of
+from cspm_ros.replay.replay_run import run_player
+from cspm_ros.runtime.exit_watchdog import farewell
+from cspm_ros.runtime.lockstep_nodes import LockstepRun
+from cspm_ros.runtime.node_parameters import REALTIME, NodeParameters, read_parameters
+from cspm_ros.runtime.progress_file import Report
+from cspm_ros.runtime.realtime_nodes import RealtimeRun
+from cspm_ros.runtime.stall_watchdog import LOOK_EVERY_S, Watch
+from cspm_run.recorded_run import new_recording
+
+# Where nobody is in a hurry: longer than lost packets take.
+_DELIVERY_S = 3.0
+_STDIN_BYTES = 4096
+# To destroy what the node has takes a tenth of a second; the processor may be full.
+_LEAVING_S = 3.0
+
+
+def run_node(name: str, args: Sequence[str]) -> None:
+    """Run a node until its run ends or a signal comes.
+
+    Args:
+        name: one of `NODES`.
+        args: command line, ROS style: `--ros-args -p scenario:=calm`.
+
+    Raises:
+        InputError: no such node, or parameters that cannot be used.
+        CspmError: the run stood still, or the plant diverged.
+    """
+    if name not in NODES:
+        raise InputError(f"node {name}: allowed: {', '.join(NODES)}")
+    with ExitStack() as stack:
+        begin_farewell = stack.enter_context(farewell(_LEAVING_S))
+        session = stack.enter_context(Session(args))
+        stack.callback(begin_farewell)
+        node = session.node(name)
+        parameters = read_parameters(node.node)
+        if parameters.until_stdin_closes:
+            _stop_when_stdin_closes(session)
+        if name == PLAYER:
+            run_player(session, node, parameters)
+            return
+        pace = _run_realtime if parameters.pace == REALTIME else _run_lockstep
+        pace(session, node, parameters, stack)
+
+
+def _run_lockstep(
+    session: Session, node: ContractNode, parameters: NodeParameters, stack: ExitStack
+) -> None:
+    bundle = parameters.bundle()
+    schedule = schedule_of(bundle.scenario, bundle.testbed.testbed)
+    run = LockstepRun(bundle, parameters.members(schedule))
+    if node.name == PLANT:
+        _run_plant(session, node, parameters, run)
+        return
+    if node.name == RECORDER:
+        folder = Path(parameters.folder or f"recordings/{bundle.scenario.name}")
+        writer = stack.enter_context(new_recording(bundle, folder, parameters.mode))
+        recorder = run.recorder(node, writer)
+        stack.callback(recorder.close)
+        _spin(session, Watch([recorder], parameters.patience, node.warn), lambda: recorder.ended)
+        return
+    _check_part(node, bundle.scenario.name, schedule)
+    stage = run.stage(node)
+    _spin(session, Watch([stage], parameters.patience, node.warn), lambda: stage.ended)
+
+
+def _run_realtime(
+    session: Session, node: ContractNode, parameters: NodeParameters, stack: ExitStack
+) -> None:
+    bundle = parameters.bundle()
+    schedule = schedule_of(bundle.scenario, bundle.testbed.testbed)
+    run = RealtimeRun(bundle, parameters.members(schedule))
+    steps = parameters.steps or round(bundle.scenario.duration * bundle.scenario.rates.plant)
+    path = Path(parameters.report) if parameters.report else None
+    if node.name == PLANT:
+        plant = run.plant(node, steps)
+        session.every(
+            LOOK_EVERY_S,
+            lambda: _report(path, plant.leader, plant.waiting(), plant.failure),
+        )
+        session.spin_until(lambda: plant.ended or session.stopped)
+        plant.leader.end()
+        _report(path, plant.leader, "", plant.failure)
+        # Nobody hears of the end from a node that has left.
+        session.deliver(FAREWELL_S)
+        if plant.failure is not None:
+            raise CspmError(plant.failure)
+    elif node.name == RECORDER:
+        folder = Path(parameters.folder or f"recordings/{bundle.scenario.name}")
+        writer = stack.enter_context(run.new_recording(folder, parameters.mode))
+        recorder, leader = run.recorder(node, writer, steps)
+        stack.callback(recorder.close)
+        if leader is not None:
+            session.every(
+                LOOK_EVERY_S,
+                lambda: _report(path, leader, leader.waits(), None),
+            )
+        session.spin_until(lambda: recorder.ended or session.stopped)
+        if leader is not None:
+            leader.end()
+            _report(path, leader, "", None)
+            session.deliver(FAREWELL_S)
+    else:
+        _check_part(node, bundle.scenario.name, schedule)
+        stage = run.stage(node)
+        session.spin_until(lambda: stage.ended or session.stopped)
+
+
+def _check_part(node: ContractNode, scenario: str, schedule: Schedule) -> None:
+    if node.name not in schedule.nodes:
+        raise InputError(
+            f"node {node.name}: scenario {scenario} has none, allowed:"
+            f" {', '.join((PLANT, *schedule.nodes, RECORDER))}"
+        )
+
+
+def _report(path: Path | None, leader: Leader, waiting: str, failure: str | None) -> None:
+    if path is not None:
+        elapsed, ended = leader.elapsed, leader.end_ns is not None
+        Report(elapsed, elapsed, waiting, failure, ended, ended).write(path)
+
+
+def _spin(session: Session, watch: Watch, ended: Callable[[], bool]) -> None:
+    session.every(LOOK_EVERY_S, watch.look)
+    session.spin_until(lambda: ended() or session.stopped or watch.stuck is not None)
+    if watch.stuck is not None:
+        raise CspmError(watch.stuck)
+    if ended():
+        session.deliver(FAREWELL_S if session.stopped else _DELIVERY_S)
+
+
+def _run_plant(
+    session: Session, node: ContractNode, parameters: NodeParameters, run: LockstepRun
+) -> None:
+    scenario = run.bundle.scenario
+    plant = run.plant(node, parameters.steps or round(scenario.duration * scenario.rates.plant))
+    watch = Watch([plant], parameters.patience, node.warn)
+    path = Path(parameters.report) if parameters.report else None
+
+    def report() -> None:
+        if path is not None:
+            waiting = "" if plant.finished else plant.waiting()
+            times = (plant.simulated, watch.elapsed)
+            Report(*times, waiting, plant.failure, plant.ended, plant.finished).write(path)
+
+    def look() -> None:
+        watch.look()
+        if session.stopped:
+            plant.stop()
+        report()
+
+    session.every(LOOK_EVERY_S, look)
+    session.spin_until(
+        lambda: plant.finished or session.stopped or watch.stuck is not None,
+    )
+    if session.stopped:
+        plant.stop()
+        session.spin_until(lambda: plant.finished, FAREWELL_S)
+    report()
+    if plant.finished and not session.stopped:
+        session.deliver(_DELIVERY_S)
+    if watch.stuck is not None or plant.failure is not None:
+        raise CspmError(watch.stuck or plant.failure or "")
+
+
+def _stop_when_stdin_closes(session: Session) -> None:
+    def wait() -> None:
+        # Not through `sys.stdin`: a thread that waits there holds a lock that Python's end wants.
+        while os.read(sys.stdin.fileno(), _STDIN_BYTES):
+            pass
+        session.stop()
+
+    threading.Thread(target=wait, name="stdin", daemon=True).start()

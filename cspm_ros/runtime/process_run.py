@@ -1,0 +1,220 @@
+"""A run with a process per node, in lockstep or in real time."""
+
+from __future__ import annotations
+
+import os
+import tempfile
+import time
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from pathlib import Path
+
+from cspm_control.safety import check_real_time
+from cspm_msgs_py.errors import CspmError
+from cspm_msgs_py.graph import RECORDER
+from cspm_msgs_py.interruption import interruptible
+from cspm_msgs_py.schedule import PLANT, schedule_of
+from cspm_ros.runtime.exit_watchdog import IN_ORDER
+from cspm_ros.runtime.node_parameters import LOCKSTEP, REALTIME, NodeParameters, write_parameters
+from cspm_ros.runtime.node_processes import LEAVING_S, SILENCE_S, NodeProcesses
+from cspm_ros.runtime.progress_file import Report, read_report
+from cspm_ros.runtime.stall_watchdog import PATIENCE_S, StartWatch
+from cspm_run.bundle import SCENARIO, Bundle
+from cspm_run.recorded_result import recorded_result
+from cspm_run.run_result import RunResult
+
+PROCESSES = "processes"
+_LOOK_EVERY_S = 0.1
+# How long a run in real time goes on after a node died, to record what the others do.
+_AFTERMATH_S = 2.0
+# A leader in real time that reports nothing for so long has been stopped.
+_STUCK_S = 5.0
+
+
+def run_processes(
+    bundle: Bundle,
+    folder: Path,
+    progress: Callable[[float], None] = lambda _: None,
+    *,
+    mode: str = PROCESSES,
+    external: bool = False,
+    tell: Callable[[str], None] = lambda _: None,
+    steps: int | None = None,
+    domain_id: int | None = None,
+    patience_s: float = PATIENCE_S,
+) -> RunResult:
+    """Run a scenario with a process per node.
+
+    Args:
+        bundle: what to run, resolved.
+        folder: where to record.
+        progress: called now and then with the time simulated so far [s].
+        mode: `processes`, in lockstep, or `realtime`.
+        external: leave the plant out: hardware is in its place.
+        tell: called with what the start waits for, in one line, when that changes, and with what
+            the nodes warn of.
+        steps: end after so many plant steps; None runs the scenario's duration.
+        domain_id: instead of `ROS_DOMAIN_ID`.
+        patience_s: give up when nothing moves for so long [s]; lockstep only.
+
+    Raises:
+        InputError: scenario and test-bed do not fit, or inputs that come in time would count as
+            late.
+        CspmError: a node ended before the run did; in real time, before it began.
+    """
+    scenario, testbed = bundle.scenario, bundle.testbed.testbed
+    schedule = schedule_of(scenario, testbed)
+    names = (PLANT, *schedule.nodes, RECORDER)[external:]
+    if mode == REALTIME:
+        check_real_time(scenario.safety, schedule)
+    # In lockstep the recorder has 48 steps of time; by the wall clock it would lose messages.
+    behind = () if mode == REALTIME else (RECORDER,)
+    with tempfile.TemporaryDirectory(prefix="cspm-run-") as made:
+        place = Path(made)
+        parameters = NodeParameters(
+            plant=bundle.plant,
+            pace=REALTIME if mode == REALTIME else LOCKSTEP,
+            scenario=str(place / SCENARIO),
+            nodes=names,
+            steps=steps or round(scenario.duration * scenario.rates.plant),
+            folder=str(folder.absolute()),
+            mode=mode,
+            report=str(place / "report.json"),
+            patience=float(patience_s),
+            until_stdin_closes=True,
+        )
+        for name, content in bundle.attachments().items():
+            (place / name).write_bytes(content)
+        write_parameters(place / "parameters.yaml", parameters)
+        with (
+            _environment(domain_id),
+            interruptible() as stop_wanted,
+            NodeProcesses(names, place / "parameters.yaml", place, behind) as processes,
+        ):
+            leader = RECORDER if external else PLANT
+            follower = _Follower(processes, leader, place / "report.json", mode == REALTIME)
+            report = follower.follow(progress, tell, stop_wanted)
+            interrupted = stop_wanted()
+    return recorded_result(
+        bundle,
+        folder,
+        mode,
+        simulated=report.simulated,
+        elapsed=report.elapsed,
+        interrupted=interrupted,
+        failure=report.failure or follower.failure,
+        timed=mode == REALTIME,
+    )
+
+
+class _Follower:
+    """Follows a run to its end from outside.
+
+    Attributes:
+        failure: the node that ended before the run did, in real time, or that did not end.
+    """
+
+    def __init__(self, processes: NodeProcesses, leader: str, report: Path, realtime: bool) -> None:
+        self._processes, self._leader = processes, leader
+        self._path, self._realtime = report, realtime
+        self._stop_at: float | None = None
+        self._gone: dict[str, float] = {}
+        self._last, self._moved = Report(), time.monotonic()
+        self.failure: str | None = None
+
+    def follow(
+        self,
+        progress: Callable[[float], None],
+        tell: Callable[[str], None],
+        stop_wanted: Callable[[], bool],
+    ) -> Report:
+        """Return the leader's last report, once the leader has ended.
+
+        Raises:
+            CspmError: a node ended too early; in real time the others first show what they do.
+        """
+        processes, start = self._processes, StartWatch(tell)
+        while self._leader not in (ended := processes.ended()):
+            report = read_report(self._path)
+            progress(report.simulated)
+            if not report.simulated:
+                start.look(report.waiting)
+            for warning in processes.warnings():
+                tell(warning)
+            self._look_for_dead(self._dead(ended, report))
+            if stop_wanted() and self._stop_at is None:
+                self._stop_at = time.monotonic()
+            if self._stuck(report):
+                return report
+            if self._stop_at is not None and self._stop_at <= time.monotonic():
+                processes.stop(self._leader)
+            time.sleep(_LOOK_EVERY_S)
+        report = read_report(self._path)
+        if report.finished or report.failure is not None or stop_wanted():
+            if not processes.wait(LEAVING_S):
+                ended = processes.ended()
+                stubborn = ", ".join(name for name in processes.by_name if name not in ended)
+                self.failure = self.failure or f"{stubborn} did not end with the run"
+        elif not self._realtime or not report.simulated:
+            raise CspmError(processes.obituary(self._leader))
+        else:
+            processes.wait(_AFTERMATH_S)
+            self._note_dead(self._leader, report)
+        return report
+
+    def _stuck(self, report: Report) -> bool:
+        """Return whether the leader neither goes on nor ends, as if it had been stopped."""
+        now = time.monotonic()
+        if report != self._last:
+            self._last, self._moved = report, now
+        told = self._stop_at is not None and now - self._stop_at > LEAVING_S
+        silent = self._realtime and report.simulated > 0.0 and now - self._moved > _STUCK_S
+        if (told or silent) and self.failure is None:
+            length = now - self._moved
+            text = f"{self._leader} gave no sign of life for {length:.0f} s"
+            self.failure = f"{text}, at {report.simulated:.1f} s"
+        return told or silent
+
+    def _dead(self, ended: dict[str, int], report: Report) -> list[str]:
+        """Return who ended too early: in order one may be ahead of the leader for a moment.
+
+        Once the leader makes no further step it waits for what is still to be written, however
+        long that takes, and nobody has to wait with it.
+        """
+        if report.ended:
+            return [name for name, code in ended.items() if code not in IN_ORDER]
+        now = time.monotonic()
+        for name in ended:
+            self._gone.setdefault(name, now)
+        return [name for name, code in ended.items() if code or now - self._gone[name] > SILENCE_S]
+
+    def _look_for_dead(self, dead: list[str]) -> None:
+        if not dead or self.failure is not None:
+            return
+        obituary = self._processes.obituary(dead[0])
+        report = read_report(self._path)
+        under_way = self._realtime and report.simulated
+        if not under_way and not report.finished and report.failure is None:
+            raise CspmError(obituary)
+        if self._realtime:
+            self._note_dead(dead[0], report)
+            self._stop_at = time.monotonic() + _AFTERMATH_S
+
+    def _note_dead(self, name: str, report: Report) -> None:
+        if self.failure is None:
+            self.failure = f"{self._processes.obituary(name)}, at {report.simulated:.1f} s"
+
+
+@contextmanager
+def _environment(domain_id: int | None) -> Iterator[None]:
+    """Put the domain into the environment that the nodes inherit."""
+    before = os.environ.get("ROS_DOMAIN_ID")
+    if domain_id is not None:
+        os.environ["ROS_DOMAIN_ID"] = str(domain_id)
+    try:
+        yield
+    finally:
+        if before is None:
+            os.environ.pop("ROS_DOMAIN_ID", None)
+        else:
+            os.environ["ROS_DOMAIN_ID"] = before

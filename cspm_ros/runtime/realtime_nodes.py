@@ -1,0 +1,144 @@
+"""The nodes of a run in real time, made from its description."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from pathlib import Path
+
+from cspm_control.safety import GuardedStage, check_real_time
+from cspm_control.stages.angle_stage import AngleStage
+from cspm_control.stages.motion_stage import MotionStage
+from cspm_control.stages.torque_stage import TorqueStage
+from cspm_msgs_py.errors import InputError
+from cspm_msgs_py.graph import RECORDER, graph_of
+from cspm_msgs_py.recording.run_record import EXTERNAL
+from cspm_msgs_py.recording.writer import RecordingWriter
+from cspm_msgs_py.ros.contract_node import ContractNode
+from cspm_msgs_py.ros.leader import Leader
+from cspm_msgs_py.ros.realtime_node import RealtimeNode, RealtimeWaveNode
+from cspm_msgs_py.scenario import ClosedLoop
+from cspm_msgs_py.schedule import CLOCK, PLANT, WAVE_TRAJECTORY, Schedule, schedule_of
+from cspm_msgs_py.topics import BRAKE, DIAGNOSTICS, EMERGENCY_STOP, SAFE, Topic
+from cspm_ros.runtime.realtime_recorder_node import RealtimeRecorderNode
+from cspm_ros.runtime.warm_up import warm_up
+from cspm_run.assembly import assemble_simulator, assemble_stage
+from cspm_run.bundle import Bundle
+from cspm_run.plant_guard import make_watchdog
+from cspm_run.recorded_run import recording_of
+from cspm_sim.realtime_plant_node import RealtimePlantNode
+
+
+@dataclass(frozen=True)
+class RealtimeRun:
+    """A run whose nodes are to be made.
+
+    Attributes:
+        bundle: what to run, resolved.
+        members: names of the nodes that take part; without the plant, hardware is in its place.
+    """
+
+    bundle: Bundle
+    members: tuple[str, ...]
+
+    @property
+    def schedule(self) -> Schedule:
+        """The run's schedule, of which real time takes rates and delays."""
+        return schedule_of(self.bundle.scenario, self.bundle.testbed.testbed)
+
+    @property
+    def leader(self) -> str:
+        """The node that starts and ends the run.
+
+        Raises:
+            InputError: neither the plant nor the recorder takes part.
+        """
+        for name in (PLANT, RECORDER):
+            if name in self.members:
+                return name
+        raise InputError(f"nodes: {', '.join(self.members)}, allowed: with {PLANT} or {RECORDER}")
+
+    def topics(self) -> dict[str, Topic]:
+        """Return what such a run publishes, in contract order."""
+        schedule = self.schedule
+        all_topics = self.bundle.testbed.testbed.topics
+        found = {
+            name: all_topics[name]
+            for name in schedule.topics
+            if name != CLOCK and (PLANT in self.members or not name.startswith("/truth/"))
+        }
+        return found | {topic.name: topic for topic in (DIAGNOSTICS, EMERGENCY_STOP, BRAKE, SAFE)}
+
+    def measured(self) -> list[str]:
+        """Return the measured topics that the controllers need."""
+        schedule, sensors = self.schedule, self.bundle.testbed.testbed.sensors
+        used = {name for plan in schedule.nodes.values() for name in (*plan.inputs, *plan.held)}
+        return [name for name in sensors if name in used]
+
+    def plant(self, node: ContractNode, steps: int) -> RealtimePlantNode:
+        """Return the plant's node; `steps` is how many plant steps to make."""
+        bundle, schedule = self.bundle, self.schedule
+        check_real_time(bundle.scenario.safety, schedule)
+        with bundle.unpacked() as place:
+            warm_up(PLANT, bundle, place)
+            plant, sensors = assemble_simulator(
+                bundle.scenario, bundle.testbed.testbed, place, bundle.plant
+            )
+        return RealtimePlantNode(
+            node,
+            plant,
+            sensors,
+            schedule,
+            steps,
+            graph_of(schedule, self.members),
+            self.members,
+            make_watchdog(bundle.scenario, plant),
+            controlled=isinstance(bundle.scenario.control, ClosedLoop),
+        )
+
+    def stage(self, node: ContractNode) -> RealtimeNode | RealtimeWaveNode:
+        """Return the node of the controller that `node` is named after."""
+        bundle, schedule = self.bundle, self.schedule
+        topics = bundle.testbed.testbed.topics
+        edges = graph_of(schedule, self.members)
+        safety = bundle.scenario.safety
+        check_real_time(safety, schedule)
+        with bundle.unpacked() as place:
+            warm_up(node.name, bundle, place)
+            stage = assemble_stage(node.name, bundle.scenario, bundle.testbed.testbed, place)
+        if node.name == WAVE_TRAJECTORY:
+            return RealtimeWaveNode(node, stage, schedule, topics, edges)
+        guard = stage if isinstance(stage, GuardedStage) else None
+        timed = TorqueStage | AngleStage | MotionStage
+        return RealtimeNode(
+            node,
+            stage,
+            guard,
+            schedule,
+            topics,
+            edges,
+            safety.stale_after,
+            on_start=stage.start if isinstance(stage, timed) else None,
+            on_safe=stage.suspend if isinstance(stage, MotionStage) else None,
+        )
+
+    def new_recording(self, folder: Path, mode: str) -> RecordingWriter:
+        """Return the recording that the run fills.
+
+        Raises:
+            InputError: the folder exists or cannot be created.
+        """
+        simulated = PLANT in self.members
+        bundle = self.bundle if simulated else replace(self.bundle, plant=EXTERNAL)
+        return recording_of(bundle, folder, mode, self.topics())
+
+    def recorder(
+        self, node: ContractNode, writer: RecordingWriter, steps: int
+    ) -> tuple[RealtimeRecorderNode, Leader | None]:
+        """Return the recorder's node, and the leader if it leads."""
+        period_ns = self.schedule.period_ns
+        made = RealtimeRecorderNode(node, period_ns, self.topics(), writer)
+        if self.leader != RECORDER:
+            made.follow()
+            return made, None
+        others = [name for name in self.members if name != RECORDER]
+        return made, made.lead(others, self.measured(), steps * period_ns)

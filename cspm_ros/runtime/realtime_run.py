@@ -1,0 +1,87 @@
+"""A run in real time with all nodes in one process, over real ROS 2 topics.
+
+Between nodes of one process the middleware hands messages over as they are sent, so that none is
+lost however late a node is. With a process per node each message wakes a thread of each reader's,
+which two cores cannot do at 1 kHz.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from contextlib import ExitStack
+from pathlib import Path
+
+from cspm_msgs_py.graph import RECORDER
+from cspm_msgs_py.ros.session import FAREWELL_S, Session
+from cspm_msgs_py.schedule import PLANT, schedule_of
+from cspm_ros.runtime.realtime_nodes import RealtimeRun
+from cspm_ros.runtime.stall_watchdog import LOOK_EVERY_S, StartWatch
+from cspm_run.bundle import Bundle
+from cspm_run.recorded_result import recorded_result
+from cspm_run.run_result import RunResult
+
+REALTIME = "realtime"
+
+
+def run_realtime(
+    bundle: Bundle,
+    folder: Path,
+    progress: Callable[[float], None] = lambda _: None,
+    *,
+    external: bool = False,
+    tell: Callable[[str], None] = lambda _: None,
+    steps: int | None = None,
+    domain_id: int | None = None,
+) -> RunResult:
+    """Run a scenario by the wall clock, as ROS 2 nodes in this process.
+
+    Args:
+        bundle: what to run, resolved.
+        folder: where to record.
+        progress: called now and then with the time run so far [s].
+        external: leave the plant out: hardware is in its place.
+        tell: called with what the start waits for, in one line, when that changes.
+        steps: end after so many plant steps; None runs the scenario's duration.
+        domain_id: instead of `ROS_DOMAIN_ID`.
+
+    Raises:
+        InputError: scenario and test-bed do not fit, the folder exists, or inputs that come in
+            time would count as late.
+        ConvergenceError: the bar cannot hang where the scenario starts.
+    """
+    scenario, testbed = bundle.scenario, bundle.testbed.testbed
+    stages = schedule_of(scenario, testbed).nodes
+    run = RealtimeRun(bundle, (PLANT, *stages, RECORDER)[external:])
+    steps = steps or round(scenario.duration * scenario.rates.plant)
+    with ExitStack() as stack:
+        session = stack.enter_context(Session(domain_id=domain_id, polled=True))
+        plant = None if external else run.plant(session.node(PLANT), steps)
+        for name in stages:
+            run.stage(session.node(name))
+        writer = stack.enter_context(run.new_recording(folder, REALTIME))
+        recorder, leading = run.recorder(session.node(RECORDER), writer, steps)
+        stack.callback(recorder.close)
+        leader = leading if plant is None else plant.leader
+        assert leader is not None
+        start = StartWatch(tell)
+
+        def look() -> None:
+            if not leader.elapsed:
+                start.look(leader.waits())
+            progress(leader.elapsed)
+
+        session.every(LOOK_EVERY_S, look)
+        session.spin_until(lambda: leader.end_ns is not None or session.stopped)
+        leader.end()
+        # Nobody hears of the end from nodes that have left.
+        session.deliver(FAREWELL_S)
+    return recorded_result(
+        bundle,
+        folder,
+        REALTIME,
+        simulated=leader.elapsed,
+        elapsed=leader.elapsed,
+        interrupted=session.stopped,
+        failure=plant.failure if plant is not None else None,
+        timed=True,
+    )

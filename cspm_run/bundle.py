@@ -1,0 +1,100 @@
+"""A run's description as it travels inside its recording, and out of it again."""
+
+from __future__ import annotations
+
+import tempfile
+from collections.abc import Iterator, Mapping
+from contextlib import contextmanager
+from dataclasses import dataclass
+from pathlib import Path
+
+from cspm_msgs_py.errors import InputError
+from cspm_msgs_py.motion_spec import FileMotion, VesselMotion
+from cspm_msgs_py.recording.attached_testbed import TESTBED, attached_testbed
+from cspm_msgs_py.scenario import Body, Scenario, parse_scenario
+from cspm_msgs_py.testbed import TestbedFile
+from cspm_msgs_py.yaml_file import dump_yaml
+from cspm_run.plants import SIM
+
+SCENARIO = "scenario.yaml"
+
+
+@dataclass(frozen=True)
+class Bundle:
+    """A resolved scenario, its test-bed, files that its motions read, by name, and its plant."""
+
+    scenario: Scenario
+    testbed: TestbedFile
+    files: dict[str, bytes]
+    plant: str = SIM
+
+    def attachments(self) -> dict[str, bytes]:
+        """Return the recording's attachments by name."""
+        text = dump_yaml(self.scenario.model_dump(mode="json"))
+        described = {SCENARIO: text.encode(), TESTBED: self.testbed.text.encode()}
+        return described | self.files
+
+    @contextmanager
+    def unpacked(self) -> Iterator[Path]:
+        """Give a folder in which the scenario's relative paths find the motions' files."""
+        with tempfile.TemporaryDirectory(prefix="cspm-") as place:
+            for name, content in self.files.items():
+                (Path(place) / name).write_bytes(content)
+            yield Path(place)
+
+
+def make_bundle(scenario: Scenario, testbed: TestbedFile, folder: Path) -> Bundle:
+    """Return the self-contained description of a run whose scenario file lies in `folder`.
+
+    Raises:
+        InputError: a file that a motion reads cannot be read.
+    """
+    files: dict[str, bytes] = {}
+
+    def contained(body: Body, role: str) -> Body:
+        motion = body.motion
+        if isinstance(motion, FileMotion):
+            name = _take(folder / motion.path, role, files)
+            return body.model_copy(update={"motion": motion.model_copy(update={"path": name})})
+        if isinstance(motion, VesselMotion):
+            name = _take(folder / motion.rao, role, files)
+            return body.model_copy(update={"motion": motion.model_copy(update={"rao": name})})
+        return body
+
+    changes: dict[str, object] = {
+        "testbed": TESTBED,
+        "winch_frame": contained(scenario.winch_frame, "winch_frame"),
+        "target": contained(scenario.target, "target"),
+    }
+    return Bundle(scenario.model_copy(update=changes), testbed, files)
+
+
+def read_bundle(attachments: Mapping[str, bytes], source: str) -> Bundle:
+    """Return the description that a recording carries.
+
+    Raises:
+        InputError: the recording carries none, or a damaged one.
+    """
+    outside = [name for name in attachments if Path(name).name != name or name == ".."]
+    if outside:
+        raise InputError(f"{source}: attachment {outside[0]!r}, allowed: names without folders")
+    missing = [name for name in (SCENARIO, TESTBED) if name not in attachments]
+    if missing:
+        raise InputError(
+            f"{source}: carries no {' and no '.join(missing)}, allowed: a recording made by cspm"
+        )
+    return Bundle(
+        parse_scenario(attachments[SCENARIO].decode(errors="replace"), f"{source}: {SCENARIO}"),
+        attached_testbed(attachments, source),
+        {name: content for name, content in attachments.items() if name not in (SCENARIO, TESTBED)},
+    )
+
+
+def _take(path: Path, role: str, files: dict[str, bytes]) -> str:
+    try:
+        content = path.read_bytes()
+    except OSError as err:
+        raise InputError(f"{path}: not readable ({err.strerror}), allowed: a file") from None
+    name = f"{role}_motion{path.suffix}"
+    files[name] = content
+    return name

@@ -1,0 +1,49 @@
+"""What a run of nodes amounted to, from its recording."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+from cspm_msgs_py.recording.overview import overview
+from cspm_msgs_py.scenario import ClosedLoop
+from cspm_run.bundle import Bundle
+from cspm_run.recorded_statistics import tally_recording
+from cspm_run.recorded_timing import first_alarm, timing_of
+from cspm_run.run_result import RunResult
+
+
+def recorded_result(
+    bundle: Bundle,
+    folder: Path,
+    mode: str,
+    *,
+    simulated: float,
+    elapsed: float,
+    interrupted: bool,
+    failure: str | None,
+    timed: bool = False,
+) -> RunResult:
+    """Return the result of a run that is recorded in a folder; see `RunResult`.
+
+    `failure` is what is known of it besides alarms in the recording; `timed` says whether nodes
+    told of deadlines.
+
+    Raises:
+        InputError: the recording cannot be read.
+    """
+    scenario, testbed = bundle.scenario, bundle.testbed.testbed
+    return RunResult(
+        scenario=scenario.name,
+        seed=scenario.seed,
+        mode=mode,
+        simulated=simulated,
+        elapsed=elapsed,
+        tally=tally_recording(folder, testbed),
+        messages={topic.name: topic.count for topic in overview(folder).topics},
+        folder=folder.absolute(),
+        controlled=isinstance(scenario.control, ClosedLoop),
+        has_bar=testbed.bar is not None,
+        interrupted=interrupted and failure is None,
+        failure=failure or first_alarm(folder),
+        timing=timing_of(folder) if timed else {},
+    )

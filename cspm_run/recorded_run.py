@@ -1,0 +1,171 @@
+"""A run from start to end: assemble, step, record, and say what it amounted to."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Callable, Mapping
+from importlib.metadata import version
+from pathlib import Path
+
+import numpy as np
+
+from cspm_msgs_py.diagnostics import Level, Status, encode_diagnostics
+from cspm_msgs_py.errors import DivergenceError
+from cspm_msgs_py.interruption import interruptible
+from cspm_msgs_py.recording.writer import RecordingWriter
+from cspm_msgs_py.schedule import schedule_of
+from cspm_msgs_py.topics import DIAGNOSTICS, Topic
+from cspm_run.assembly import Assembly, assemble
+from cspm_run.bundle import Bundle
+from cspm_run.loop import Loop
+from cspm_run.run_result import RunResult
+from cspm_run.run_statistics import Tally
+from cspm_sim.simulator import Publish
+
+CONTRACT_VERSION = "1"
+PROGRESS_STEPS = 50
+INPROCESS = "inprocess"
+
+
+def run(
+    bundle: Bundle,
+    folder: Path | None,
+    progress: Callable[[float], None] = lambda _: None,
+    *,
+    steps: int | None = None,
+) -> RunResult:
+    """Run a scenario in this process.
+
+    Args:
+        bundle: what to run, resolved.
+        folder: where to record; None records nothing.
+        progress: called now and then with the time simulated so far [s].
+        steps: end after so many plant steps; None runs the scenario's duration.
+
+    Raises:
+        InputError: scenario and test-bed do not fit, or the folder exists.
+        ConvergenceError: the bar cannot hang where the scenario starts.
+    """
+    with bundle.unpacked() as place:
+        parts = assemble(bundle.scenario, bundle.testbed.testbed, place, bundle.plant)
+    scenario = bundle.scenario
+    steps = steps or round(scenario.duration * scenario.rates.plant)
+    if folder is None:
+        return simulate(parts, None, progress, steps)
+    with new_recording(bundle, folder, INPROCESS) as writer:
+        return simulate(parts, writer, progress, steps)
+
+
+def new_recording(bundle: Bundle, folder: Path, mode: str) -> RecordingWriter:
+    """Return the recording that a run by the schedule fills.
+
+    Raises:
+        InputError: the folder exists or cannot be created.
+    """
+    return recording_of(bundle, folder, mode, recorded_topics(bundle))
+
+
+def recording_of(
+    bundle: Bundle, folder: Path, mode: str, topics: Mapping[str, Topic]
+) -> RecordingWriter:
+    """Return a new recording of these topics that carries the run's description.
+
+    Raises:
+        InputError: the folder exists or cannot be created.
+    """
+    attachments, about = bundle.attachments(), metadata(bundle, mode)
+    return RecordingWriter(folder, topics, attachments=attachments, metadata=about)
+
+
+def recorded_topics(bundle: Bundle) -> dict[str, Topic]:
+    """Return the topics that a run publishes, in contract order."""
+    testbed = bundle.testbed.testbed
+    published = {*schedule_of(bundle.scenario, testbed).topics, DIAGNOSTICS.name}
+    return {name: topic for name, topic in testbed.topics.items() if name in published}
+
+
+def metadata(bundle: Bundle, mode: str) -> dict[str, str]:
+    """Return the metadata record of the recording of a run in a mode."""
+    return {
+        "contract_version": CONTRACT_VERSION,
+        "scenario": bundle.scenario.name,
+        "seed": str(bundle.scenario.seed),
+        "mode": mode,
+        "plant": bundle.plant,
+        "package_version": version("cspm"),
+        "testbed": bundle.testbed.testbed.name,
+        "testbed_sha256": bundle.testbed.sha256,
+    }
+
+
+def simulate(
+    parts: Assembly,
+    writer: RecordingWriter | None,
+    progress: Callable[[float], None],
+    steps: int,
+) -> RunResult:
+    """Step assembled parts to the end, and say what it amounted to; see `run`.
+
+    Args:
+        parts: what to step.
+        writer: of a recording that has the topics of the parts' schedule; None records nothing.
+        progress: called now and then with the time simulated so far [s].
+        steps: of the plant.
+    """
+    scenario, plant = parts.scenario, parts.plant
+    tally = Tally(steps, len(plant.tensions))
+    publish: Mapping[str, Publish] = {}
+    if writer is not None:
+        publish = {name: writer.channel(name).append for name in parts.schedule.topics}
+
+    alarms: list[str] = []
+
+    def publish_status(now_ns: int, status: Status) -> None:
+        if status.level == Level.ERROR and not alarms:
+            alarms.append(f"{status.name}: {status.message}")
+        if writer is not None:
+            writer.append_payload(DIAGNOSTICS.name, now_ns, encode_diagnostics(now_ns, [status]))
+
+    loop = Loop(parts, publish, publish_status)
+    failure = None
+    with interruptible() as interrupted:
+        began = time.perf_counter()
+        try:
+            # The first step of all compiles the kernels; it is no part of the speed.
+            _advance(loop, parts, tally, 1)
+            began = time.perf_counter()
+            while plant.steps < steps and not interrupted():
+                _advance(loop, parts, tally, min(PROGRESS_STEPS, steps - plant.steps))
+                progress(plant.time)
+        except DivergenceError as err:
+            failure = f"{err}; {loop.history()}"
+        elapsed = time.perf_counter() - began
+        stopped = interrupted()
+    if writer is not None:
+        writer.close()
+    return RunResult(
+        scenario=scenario.name,
+        seed=scenario.seed,
+        mode=INPROCESS,
+        simulated=plant.time,
+        elapsed=elapsed,
+        tally=tally,
+        messages=writer.counts if writer is not None else {},
+        folder=writer.folder if writer is not None else None,
+        controlled=parts.controlled,
+        has_bar=parts.testbed.bar is not None,
+        interrupted=stopped and failure is None,
+        failure=failure or (alarms[0] if alarms else None),
+    )
+
+
+def _advance(loop: Loop, parts: Assembly, tally: Tally, steps: int) -> None:
+    plant = parts.plant
+    reference = parts.references.get("/bar/reference")
+    zero = np.zeros(6)
+    for _ in range(steps):
+        bar_pose = plant.bar_state[:6].copy()
+        tensions = plant.tensions.copy()
+        loop.step()
+        error = reference.values[:6] - bar_pose if reference else zero
+        tally.add(error, tensions, loop.slack, loop.infeasible)

@@ -1,0 +1,100 @@
+"""Repeating a run from its recording alone."""
+
+from __future__ import annotations
+
+import tempfile
+from collections.abc import Callable
+from dataclasses import dataclass, replace
+from importlib.metadata import version
+from pathlib import Path
+
+from cspm_msgs_py.errors import InputError
+from cspm_msgs_py.recording.difference import Difference, first_difference
+from cspm_msgs_py.recording.reader import Recording
+from cspm_msgs_py.recording.run_record import RECORD_NAME, simulated_plant
+from cspm_run.bundle import read_bundle
+from cspm_run.plants import SIM
+from cspm_run.recorded_run import run
+
+
+@dataclass(frozen=True)
+class Resimulation:
+    """How a repeated run compares.
+
+    Attributes:
+        difference: the first place where it differs, None if every message is identical.
+        messages: how many messages the recording holds.
+        cut_ns: the instant inside which the recording ends [ns], None if its last is whole.
+        recorded_version: version of the package that made the recording.
+    """
+
+    difference: Difference | None
+    messages: int
+    cut_ns: int | None
+    recorded_version: str
+
+    @property
+    def same_version(self) -> bool:
+        """Whether the package that made the recording is this one."""
+        return self.recorded_version == version("cspm")
+
+
+def resimulate(path: Path, progress: Callable[[float, float], None]) -> Resimulation:
+    """Run again what a recording says it ran, for as long as it lasts, and compare.
+
+    Args:
+        path: the recording.
+        progress: called with simulated and total time [s].
+
+    Raises:
+        InputError: no recording, or none that cspm made by simulation.
+    """
+    with Recording(path) as recording:
+        return _repeat(recording, path, progress)
+
+
+def _repeat(
+    recording: Recording, path: Path, progress: Callable[[float, float], None]
+) -> Resimulation:
+    record = recording.metadata.get(RECORD_NAME, {})
+    plant = simulated_plant(recording) or SIM
+    bundle = replace(read_bundle(recording.attachments, str(path)), plant=plant)
+    clock = recording.topics.get("/clock")
+    if clock is None or not clock.count:
+        raise InputError(f"{path}: has no /clock messages, allowed: a simulated recording")
+    duration = clock.count / bundle.scenario.rates.plant
+    with tempfile.TemporaryDirectory(prefix="cspm-resim-") as place:
+        folder = Path(place) / "again"
+        run(bundle, folder, lambda now: progress(now, duration), steps=clock.count)
+        with Recording(folder) as repeated:
+            difference = first_difference(recording, repeated)
+            cut = difference is not None and _is_cut(recording, repeated, difference)
+    return Resimulation(
+        difference=None if cut else difference,
+        messages=sum(topic.count for topic in recording.topics.values()),
+        cut_ns=recording.end_ns if cut else None,
+        recorded_version=record.get("package_version", "unknown"),
+    )
+
+
+def _is_cut(recording: Recording, repeated: Recording, difference: Difference) -> bool:
+    """Return whether the difference is only that the recording ends inside its last instant.
+
+    Messages of one instant are written in one order, so what a cut leaves of it comes first. The
+    difference is the earliest, so that nothing before that instant is missing.
+    """
+    if (difference.field, difference.first) != ("message", "missing"):
+        return False
+    (last_ns, left), (whole_ns, whole) = _last_instant(recording), _last_instant(repeated)
+    at_end = difference.index == repeated.topics[difference.topic].count - 1
+    follows = left == whole[: len(left)] and difference.topic in whole[len(left) :]
+    return last_ns == whole_ns and at_end and follows
+
+
+def _last_instant(recording: Recording) -> tuple[int, list[str]]:
+    """Return the last log time [ns] and the topics of its messages, as they were written."""
+    file = recording.files[-1]
+    messages = file.messages(file.chunks[-1])
+    last = messages.logs == messages.logs.max()
+    topics = [file.topic_of(channel) for channel in messages.channels[last].tolist()]
+    return int(messages.logs.max()), topics

@@ -1,0 +1,48 @@
+"""What a run amounted to, however it was run."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+from pathlib import Path
+
+from cspm_run.run_statistics import Tally
+
+
+@dataclass(frozen=True)
+class RunResult:
+    """What a run amounted to.
+
+    Attributes:
+        scenario: the scenario's name.
+        seed: of waves and sensors.
+        mode: how it was run.
+        simulated: time simulated [s].
+        elapsed: wall time that took [s], without start-up and the first step.
+        tally: errors and tensions.
+        messages: how many messages each topic got.
+        folder: the recording, if one was made.
+        controlled: whether a closed loop was to follow the reference.
+        has_bar: whether the errors mean anything.
+        interrupted: whether the user ended it early.
+        failure: what went wrong, in one line, if anything did.
+        timing: in real time, what each node told of its deadlines and inputs, by node.
+    """
+
+    scenario: str
+    seed: int
+    mode: str
+    simulated: float
+    elapsed: float
+    tally: Tally
+    messages: dict[str, int]
+    folder: Path | None
+    controlled: bool
+    has_bar: bool
+    interrupted: bool = False
+    failure: str | None = None
+    timing: dict[str, dict[str, float]] = field(default_factory=dict)
+
+    @property
+    def real_time_factor(self) -> float:
+        """Simulated time over elapsed time."""
+        return self.simulated / self.elapsed if self.elapsed > 0 else 0.0

@@ -1,0 +1,93 @@
+"""A run's summary, for people and for programs."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+from typing import Any
+
+from rich import box
+from rich.console import Console
+from rich.markup import escape
+from rich.table import Table
+
+from cspm_msgs_py.dofs import DOFS
+from cspm_msgs_py.scenario import Requirement
+from cspm_run.run_result import RunResult
+
+
+def summary_data(result: RunResult) -> dict[str, Any]:
+    """Return the content of `summary.json`; errors in m and rad, tensions in N."""
+    tally = result.tally
+    low, high = tally.tension_range
+    errors = zip(DOFS, tally.max_error, tally.rms_error, strict=True)
+    return {
+        "scenario": result.scenario,
+        "seed": result.seed,
+        "mode": result.mode,
+        "duration_s": result.simulated,
+        "real_time_factor": result.real_time_factor,
+        "errors": {dof: {"max": float(peak), "rms": float(rms)} for dof, peak, rms in errors},
+        "tension": {"min": low, "max": high},
+        "slack_share": tally.slack_share,
+        "infeasible_share": tally.infeasible_share,
+        "messages": result.messages,
+    } | ({"realtime": result.timing} if result.timing else {})
+
+
+def write_json(path: Path, data: Any) -> None:  # noqa: ANN401 - any plain data
+    """Write plain data as JSON."""
+    path.write_text(json.dumps(data, indent=2) + "\n", encoding="utf-8")
+
+
+def print_summary(console: Console, result: RunResult, requirement: Requirement) -> None:
+    """Print pose errors (against the requirement where a controller ran), tensions and speed."""
+    data = summary_data(result)
+    if result.has_bar and result.tally.steps:
+        console.print(_error_table(result, data["errors"], requirement))
+    if result.timing:
+        console.print(_timing_table(result.timing))
+    tension = f"tensions {data['tension']['min']:.2f} to {data['tension']['max']:.2f} N"
+    console.print(
+        f"{tension} · any cable slack {data['slack_share']:.2%} of the time · wanted wrench not met"
+        f" within the tension limits {data['infeasible_share']:.1%} of the time",
+        soft_wrap=True,
+    )
+    console.print(f"simulated {result.simulated:g} s at {result.real_time_factor:.1f} × real time")
+
+
+def _error_table(
+    result: RunResult, errors: dict[str, dict[str, float]], requirement: Requirement
+) -> Table:
+    what = "reference − pose" if result.controlled else "mean pose − pose, nothing controls it"
+    table = Table(title=f"{escape(result.scenario)}, seed {result.seed}: {what}")
+    columns = ["", "max", "RMS"] + ["required", "within"] * result.controlled
+    for column in columns:
+        table.add_column(column, justify="right" if column else "left")
+    for i, dof in enumerate(DOFS):
+        limit, unit = (requirement.position, "mm") if i < 3 else (requirement.angle, "mrad")
+        cells = [dof] + [f"{1e3 * errors[dof][kind]:.3f} {unit}" for kind in ("max", "rms")]
+        if result.controlled:
+            cells += [f"± {1e3 * limit:g} {unit}", _verdict(errors[dof], limit)]
+        table.add_row(*cells)
+    return table
+
+
+def _timing_table(timing: dict[str, dict[str, float]]) -> Table:
+    """Return what each node told of its deadlines; a cell is empty where it has none."""
+    table = Table(title="real time: totals of the run", box=box.SIMPLE, pad_edge=False)
+    keys = list(dict.fromkeys(key for told in timing.values() for key in told))
+    table.add_column("node", no_wrap=True)
+    for key in keys:
+        # Two lines each, so that all columns fit into 80 characters.
+        heading = key.replace("_", "\n", 1).replace("latency_ms", "late, ms")
+        table.add_column(heading, justify="right", no_wrap=True)
+    for node, told in timing.items():
+        table.add_row(node, *(f"{told[key]:g}" if key in told else "" for key in keys))
+    return table
+
+
+def _verdict(error: dict[str, float], limit: float) -> str:
+    if error["max"] <= limit:
+        return "[green]always[/]"
+    return "[yellow]RMS only[/]" if error["rms"] <= limit else "[red]no[/]"

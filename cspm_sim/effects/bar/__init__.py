@@ -1,0 +1,1 @@
+"""Effects on the bar, one per file."""

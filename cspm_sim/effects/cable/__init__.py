@@ -1,0 +1,1 @@
+"""Effects on cables, one per file."""

@@ -1,0 +1,1 @@
+"""Effects on the winch frame, one per file."""

@@ -1,0 +1,1 @@
+"""Effects on sensors, one per file."""

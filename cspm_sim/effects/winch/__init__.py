@@ -1,0 +1,1 @@
+"""Effects on winches, one per file."""

@@ -1,0 +1,29 @@
+"""Constant torque at a winch's shaft that its drive does not report."""
+
+import numpy as np
+
+from cspm_sim.effects.effect import Array, Block, Channel, Effect, EffectParameter, Hook, Regression
+from cspm_sim.kernels.winch import RESISTANCE
+
+
+def _kernel(parameters: Array, signals: Array) -> None:
+    signals[RESISTANCE] -= parameters[0]
+
+
+def _columns(signals: Array) -> Array:
+    return np.full((len(signals), 1, 1), -1.0)
+
+
+EFFECT = Effect(
+    id="winch_torque_offset",
+    noun="a constant torque",
+    block=Block.WINCH,
+    parameters=(EffectParameter("torque", "N·m", -1.0, 1.0),),
+    kernels={Hook.WINCH: _kernel},
+    regression=Regression(Channel.SHAFT, _columns),
+    equation="torque at the shaft = reported torque + torque: a resisting torque of −torque",
+    shows="winch torque residual is shifted by a constant, at rest and in motion either way",
+    twins=("winch_torque_gain", "tension_bias", "winch_drum_radius"),
+    separating_experiment="hold still at three tension levels: the offset is the same at all",
+    reference="Janot, Gautier, Brunot, EMPS data set, nonlinearbenchmark.org, 2019 (drive offset)",
+)

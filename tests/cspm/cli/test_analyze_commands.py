@@ -1,0 +1,136 @@
+"""`cspm analyze workspace`, `design` and `manipulability` on the command line."""
+
+import json
+import re
+
+import pytest
+
+from cspm.commands import analyze_workspace_command as workspace_command
+from cspm.commands.analyzed_machine import read_machine
+from cspm_control.analysis.pose_grid import GRIDS
+
+LIMITED = {"surge", "sway", "pitch", "yaw"}
+
+
+@pytest.mark.slow
+def test_workspace_prints_draws_and_writes(cspm, tmp_path):
+    code, out, err = cspm(
+        *("analyze", "workspace", "--coarse", "14", "--out", "found", "--json", "found.json"),
+        *("--acceleration", "0.2,0.2,0.5,0,0.2,0.2"),
+    )
+    assert (code, err) == (0, "")
+    data = json.loads((tmp_path / "found.json").read_text())
+    assert set(data["limits"]) == {"pseudo_inverse", "general"}
+    assert all(set(row) == LIMITED for row in data["limits"].values())
+    assert data["limits"]["general"]["pitch"] == 1.24
+    assert data["required_acceleration"] == [0.2, 0.2, 0.5, 0.0, 0.2, 0.2]
+    assert data["acceleration_factor"] > 1.0
+    assert data["whole"]["pseudo_inverse"]["poses"] == GRIDS["pseudo_inverse"].every(14).size
+    assert sum(claim["holds"]["ours"] for claim in data["claims"]) == 8
+    assert re.search(r"general, pitch +1\.24 +1\.24 +yes", out)
+    # As many digits as were published, so that a reader sees why it does not hold.
+    assert re.search(r"max κ, rotation +68\.8670 +68\.8725 +no", out)
+    for name in ("workspace.png", "maps.png"):
+        assert (tmp_path / "found" / name).stat().st_size > 30_000
+
+
+def test_an_interrupted_workspace_writes_nothing(cspm, tmp_path, monkeypatch):
+    monkeypatch.setattr(workspace_command, "analyse_workspace", lambda *_: None)
+    code, out, _ = cspm("analyze", "workspace", "--out", "found", "--json", "found.json")
+    assert (code, out) == (130, "")
+    assert list(tmp_path.iterdir()) == []
+
+
+def test_the_required_acceleration_is_what_the_scenarios_reference_has():
+    machine = read_machine("worst_case", None, None)
+    found = workspace_command.reference_acceleration(machine)
+    # A sea at the peak, by its amplitudes: σ·ω² with σ about a third of the largest.
+    for value, amplitude in zip(found[:3], (0.1105, 0.0865, 0.318), strict=True):
+        assert value == pytest.approx(amplitude / 3.0 * 2.72**2, rel=0.6)
+    assert not workspace_command.reference_acceleration(read_machine("rest", None, None)).any()
+
+
+@pytest.mark.parametrize(
+    ("arguments", "text"),
+    [
+        (["--coarse", "0"], "Invalid value for '--coarse'"),
+        (
+            ["--acceleration", "1,2"],
+            "--acceleration 1,2: allowed: six numbers with commas, surge, sway, heave, roll, pitch,"
+            " yaw [m/s², rad/s²], such",
+        ),
+        (
+            ["--acceleration=-1,0,0,0,0,0"],
+            "--acceleration -1,0,0,0,0,0: allowed: six numbers that are not negative",
+        ),
+        (["--out", "."], ".: exists, allowed: a new folder"),
+        (["--testbed", "none.yaml"], "none.yaml: "),
+    ],
+)
+def test_bad_input_of_workspace_is_one_line(refused, arguments, text):
+    assert refused("analyze", "workspace", *arguments).startswith(text)
+
+
+@pytest.mark.slow
+def test_design_prints_draws_and_writes(cspm, tmp_path):
+    code, out, err = cspm("analyze", "design", "--out", "found", "--json", "found.json")
+    assert (code, err) == (0, "")
+    data = json.loads((tmp_path / "found.json").read_text())
+    assert set(data["motion"]) == {"designed", "sampled", "cascade", "late"}
+    assert data["motion"]["designed"]["heave"]["gain_margin"] is None
+    assert data["timing"]["torque_delay"] == 1
+    assert data["growth"]["cascade"]["frequency"] == pytest.approx(26.7, abs=0.1)
+    assert "motion controller every 1 ms" in out
+    assert "grows as exp(0.005" in out
+    for name in ("motion_loops.png", "force_loops.png"):
+        assert (tmp_path / "found" / name).stat().st_size > 30_000
+
+
+@pytest.mark.parametrize(
+    ("arguments", "text"),
+    [
+        (
+            ["verification_mid"],
+            "scenario verification_mid: control.mode locked_winches, allowed: closed_loop",
+        ),
+        (
+            ["--computing", "0.0005"],
+            "computing: 0.0005 s, allowed: a whole number of the plant's periods of 0.001 s",
+        ),
+        (["--computing", "-1"], "Invalid value for '--computing'"),
+    ],
+)
+def test_bad_input_of_design_is_one_line(refused, arguments, text):
+    assert refused("analyze", "design", *arguments).startswith(text)
+
+
+@pytest.mark.slow
+def test_manipulability_prints_draws_and_writes(cspm, tmp_path):
+    code, out, err = cspm("analyze", "manipulability", "--out", "found", "--json", "found.json")
+    assert (code, err) == (0, "")
+    data = json.loads((tmp_path / "found.json").read_text())
+    assert data["available_acceleration"]["heave"][1] == pytest.approx(5.911, abs=1e-3)
+    assert data["force_ellipsoids"][0]["dofs"] == ["surge", "sway", "heave"]
+    assert "heave         51.33 m/s²       5.911 m/s²" in out
+    assert "thesis at [0, 0, 2, 0, 0, 0] (m, rad); rank of Jᵀ 5\n" in out
+    assert data["rank"] == 5
+    assert (tmp_path / "found" / "manipulability.png").stat().st_size > 30_000
+
+
+def test_where_the_bar_cannot_rest_no_acceleration_is_told(cspm, tmp_path):
+    code, out, _ = cspm(
+        *("analyze", "manipulability", "--pose", "0.34,0,2,0,0,0", "--json", "found.json")
+    )
+    assert code == 0
+    assert json.loads((tmp_path / "found.json").read_text())["available_acceleration"]["yaw"] == [
+        None,
+        None,
+    ]
+    assert "none" in out
+
+
+def test_commands_of_analyze_are_listed(cspm):
+    code, out, _ = cspm("analyze", "--help")
+    assert code == 0
+    for name in ("linear", "workspace", "design", "manipulability"):
+        assert name in out

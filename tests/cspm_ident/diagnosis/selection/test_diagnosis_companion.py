@@ -1,0 +1,70 @@
+"""Whether a small companion may be no more than what a law beside it is untrue by."""
+
+import numpy as np
+import pytest
+
+from cspm_ident.diagnosis.regression.block_gram import gather
+from cspm_ident.diagnosis.regression.block_regression import Sums
+from cspm_ident.diagnosis.regression.hypothesis import Hypothesis, is_exact
+from cspm_ident.diagnosis.regression.joint_fit import Fits
+from cspm_ident.diagnosis.residuals.regressors import Candidate, Place
+from cspm_ident.diagnosis.residuals.residual_equation import Equation
+from cspm_sim.effects import Channel, catalogue
+
+ROWS, STEP, BLOCK_S = 4800, 0.01, 1.0
+TIMES = STEP * np.arange(ROWS)
+STRONG, WEAK = np.sin(2.1 * TIMES), np.sin(3.7 * TIMES)
+SHAFT, TENSION = Place(Channel.SHAFT, "a"), Place(Channel.TENSION, "a")
+
+
+def only(effect_id):
+    effect = catalogue()[effect_id]
+    shape = tuple((name, grid[0]) for name, grid in effect.nonlinear.items())
+    return Hypothesis(effect, (Candidate(effect, "a", shape),))
+
+
+def equation(place, hypotheses, sizes):
+    """A residual with so much of two effects, each a column that all residuals share."""
+    noise = 0.01 * np.random.default_rng(5).standard_normal(ROWS)
+    target = (noise + np.dot(sizes, (STRONG, WEAK)))[:, None]
+    (strong,), (weak,) = (h.candidates for h in hypotheses)
+    columns = {strong: STRONG[:, None, None], weak: WEAK[:, None, None]}
+    return Equation(place, TIMES, target, columns, target)
+
+
+def may_be_untruth(strong, weak, *residuals):
+    """Ask of the weak one; each residual has a place and how much of either it has."""
+    own = [only(strong), only(weak)]
+    evidence = gather([[equation(place, own, sizes) for place, sizes in residuals]], BLOCK_S)
+    return Fits(evidence, Sums(evidence)).may_be_untruth(own)[1]
+
+
+@pytest.mark.parametrize(("size", "untrue"), [(0.06, True), (0.08, False)])
+def test_a_companion_is_more_than_seven_hundredths_of_a_law(size, untrue):
+    told = "winch_viscous_friction", "winch_load_friction"
+    assert may_be_untruth(*told, (SHAFT, (1.0, size))) is untrue
+
+
+@pytest.mark.parametrize(("elsewhere", "untrue"), [(0.0, True), (0.02, False)])
+def test_it_is_held_against_what_the_law_takes_where_it_shows(elsewhere, untrue):
+    """In a residual in which the law takes a tenth it shows by a fifth of that."""
+    residuals = (SHAFT, (1.0, 0.02)), (TENSION, (0.1, elsewhere))
+    assert may_be_untruth("winch_viscous_friction", "winch_load_friction", *residuals) is untrue
+
+
+@pytest.mark.parametrize(
+    ("strong", "exact"),
+    [
+        ("winch_viscous_friction", False),
+        ("frame_flexibility", False),
+        # The form of a delay is one: filters have others.
+        ("tension_delay", False),
+        ("cable_stiffness", True),
+        ("tension_gain", True),
+        ("bar_constant_wrench", True),
+        ("winch_torque_offset", True),
+    ],
+)
+def test_numbers_readings_and_constants_have_no_form_to_be_untrue(strong, exact):
+    assert is_exact(catalogue()[strong]) is exact
+    assert may_be_untruth(strong, "winch_load_friction", (SHAFT, (1.0, 0.01))) is not exact

@@ -1,0 +1,52 @@
+"""Without load cells what is there is named alone, and a sound machine stays silent."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from run_samples import SCENARIOS, bundle_of
+
+from cspm_ident.diagnosis.diagnose import diagnose
+from cspm_ident.diagnosis.regression.collinearity import UNTRUE_SHARE
+from cspm_ident.diagnosis.reporting.verdict import Verdict, verdict_of
+from cspm_ident.signals.measurement import read_measurement
+from cspm_msgs_py.testbed import EffectEntry
+from cspm_run.recorded_run import run
+
+PLANTED = 0.031
+
+
+def diagnosed(folder, *entries):
+    """Diagnose half a minute of the worst sea with the file that knows of no effect."""
+    described = bundle_of("worst_case", "duration=30", "seed=7")
+    machine = described.testbed.testbed
+    machine = machine.model_copy(update={"effects": (*machine.effects, *entries)})
+    run(replace(described, testbed=replace(described.testbed, testbed=machine)), folder)
+    measured = read_measurement(folder, SCENARIOS / "testbeds" / "thesis.yaml")
+    return diagnose([replace(measured, tension=None)])
+
+
+@pytest.mark.slow
+@pytest.mark.compiled
+def test_a_sound_machine_is_consistent(tmp_path):
+    found = diagnosed(tmp_path / "bag")
+    assert verdict_of(found) is Verdict.CONSISTENT
+    assert not found.findings.named
+    assert not found.findings.unknown
+
+
+@pytest.mark.slow
+@pytest.mark.compiled
+def test_friction_of_one_winch_is_all_that_is_told(tmp_path):
+    entry = EffectEntry(
+        effect="winch_coulomb_friction", elements=("surge_2",), parameters={"torque": PLANTED}
+    )
+    found = diagnosed(tmp_path / "bag", entry)
+    (named,) = found.findings.named
+    assert named.hypothesis.effect.id == entry.effect
+    assert named.hypothesis.elements == entry.elements
+    assert not found.findings.unknown
+    ((value, half),) = found.weights.values()
+    assert value[0] == pytest.approx(PLANTED, rel=0.02)
+    # What noise leaves, beside what the form of a law does.
+    assert np.sqrt(half[0] ** 2 - UNTRUE_SHARE * value[0] ** 2) < 0.02 * PLANTED

@@ -1,0 +1,57 @@
+"""What was not searched is simulated from earlier on, and judged by itself."""
+
+import numpy as np
+import pytest
+from run_samples import bundle_of
+
+from cspm_ident.block_simulation import Drive
+from cspm_ident.diagnosis.residuals.regressors import Candidate
+from cspm_ident.diagnosis.validation.holdout_simulation import (
+    Baselines,
+    Output,
+    SimulatedFit,
+    Worth,
+    baselines_of,
+    worth_of,
+)
+from cspm_ident.signals.measurement import read_measurement
+from cspm_msgs_py.dofs import DOFS
+from cspm_run.recorded_run import run
+from cspm_sim.effects import Channel, catalogue
+
+
+@pytest.fixture(scope="module")
+def recording(tmp_path_factory):
+    """Eight seconds of the worst sea."""
+    folder = tmp_path_factory.mktemp("simulation") / "bag"
+    run(bundle_of("worst_case", "duration=8"), folder)
+    return read_measurement(folder)
+
+
+@pytest.mark.parametrize("start", [0.0, 6.0])
+def test_only_what_was_not_searched_is_judged(recording, start):
+    found = baselines_of([recording], [start], {})
+    (part,) = found.parts
+    assert part.bar_pose.times[0] == recording.bar_pose.times[0]
+    inside = recording.bar_pose.times >= start
+    spreads = {out.name: spread for out, (spread, _) in found.described.items()}
+    for k, dof in enumerate(DOFS):
+        expected = np.std(recording.bar_pose.values[inside, k])
+        assert spreads[f"bar/pose/{dof}"] == pytest.approx(expected, rel=0.02)
+
+
+@pytest.mark.parametrize(
+    ("effect", "element", "drive", "told"),
+    [
+        ("cable_stiffness", "sway_1", Drive.WINCH, True),
+        ("cable_stiffness", "sway_1", Drive.TENSION, False),
+        ("winch_coulomb_friction", "sway_1", Drive.WINCH, False),
+        ("bar_mass", "bar", Drive.TENSION, True),
+    ],
+)
+def test_a_pose_tells_of_cables_where_motor_angles_drive_both(effect, element, drive, told):
+    pose = Output(drive, "bar/pose/yaw", "rad", "bar", Channel.WRENCH)
+    fit = SimulatedFit(pose, 1.0, before=0.4, retuned=0.4, after=0.3, floor=0.1)
+    own = {Candidate(catalogue()[effect], element): np.array([0.1])}
+    found = worth_of(Baselines((), (), {}, {}), [fit], own, own)
+    assert found == (Worth(pose, 0.4, 0.3) if told else None)

@@ -1,0 +1,25 @@
+from numba import config
+
+from cspm_model.kernel_cache import kernel_digest, use_kernel_cache
+
+
+def test_any_change_to_any_kernel_file_gives_another_digest(tmp_path):
+    (tmp_path / "a.py").write_text("x = 1\n")
+    (tmp_path / "b.py").write_text("y = 2\n")
+    first = kernel_digest(tmp_path)
+    (tmp_path / "note.txt").write_text("not code")
+    assert kernel_digest(tmp_path) == first
+    (tmp_path / "b.py").write_text("y = 3\n")
+    changed = kernel_digest(tmp_path)
+    (tmp_path / "b.py").rename(tmp_path / "c.py")
+    assert len({first, changed, kernel_digest(tmp_path)}) == 3
+
+
+def test_the_cache_lies_where_the_user_wants_it(tmp_path, monkeypatch):
+    monkeypatch.setattr(config, "CACHE_DIR", "elsewhere")
+    monkeypatch.setenv("NUMBA_CACHE_DIR", str(tmp_path))
+    use_kernel_cache()
+    assert config.CACHE_DIR.startswith(f"{tmp_path}/kernels-")
+    monkeypatch.delenv("NUMBA_CACHE_DIR")
+    use_kernel_cache()
+    assert "/cspm_sim/kernels/__pycache__/kernels-" in config.CACHE_DIR

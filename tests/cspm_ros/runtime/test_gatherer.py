@@ -1,0 +1,410 @@
+"""The recorder without ROS: any delivery of a run's messages makes the same recording."""
+
+import random
+from itertools import count
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from lockstep_network import Network, chooser
+from ros_graph import content, difference, hashes
+from run_samples import bundle_of
+from test_schedule import delayed
+
+from cspm_msgs_py.diagnostics import encode_diagnostics
+from cspm_msgs_py.errors import CspmError, InputError
+from cspm_msgs_py.message import header_of
+from cspm_msgs_py.recording import Recording
+from cspm_msgs_py.ros_types import message_class, serialize
+from cspm_msgs_py.schedule import schedule_of
+from cspm_msgs_py.stepping.lockstep import RECORDED_EVERY, RECORDER_WINDOW
+from cspm_msgs_py.wire import WireWriter
+from cspm_ros.runtime.lockstep_recorder import Gatherer
+from cspm_run.recorded_run import new_recording, run
+
+MS = 1_000_000
+STEPS = 120
+SEEDS = st.integers(0, 2**32 - 1)
+REST = bundle_of("rest", "rates.tension_distribution=125", "rates.motion_capture=500")
+
+NO_STATUS = "not one status of a node of this run, allowed: one"
+
+
+def late(bundle, **delays):
+    """Return the bundle with sensors that are late by so many milliseconds."""
+    testbed = delayed(
+        bundle.testbed.testbed, {f"/{k.replace('__', '/')}": delays[k] for k in delays}
+    )
+    file = type(bundle.testbed)(testbed, bundle.testbed.text, bundle.testbed.sha256)
+    return type(bundle)(bundle.scenario, file, bundle.files)
+
+
+LATE = late(REST, bar__pose=23, cables__tension=3)
+
+
+class Case:
+    """A run: its description, what it sends by sender's queue in order, and its recording."""
+
+    def __init__(self, bundle, folder):
+        self.bundle, self.expected = bundle, folder
+        run(bundle, folder, steps=STEPS)
+        network = Network(bundle.scenario, bundle.testbed.testbed, STEPS)
+        network.run(lambda waiting: waiting[0])
+        last_ns = network.plant.last_step * MS
+        self.sent = {}
+        for name, heard in network.heard.items():
+            encode = WireWriter(bundle.testbed.testbed.topics[name]).encode
+            self.sent[name] = [encode(stamp, row) for log, stamp, row in heard if log <= last_ns]
+        for now, status in network.statuses:
+            if now <= last_ns:
+                payload = encode_diagnostics(now, [status])
+                self.sent.setdefault(("/diagnostics", status.name), []).append(payload)
+
+
+@pytest.fixture(scope="module", params=[REST, LATE], ids=["ideal", "late"])
+def case(request, tmp_path_factory):
+    return Case(request.param, tmp_path_factory.mktemp("gatherer") / "expected")
+
+
+class Intake:
+    """A gatherer that records to a folder, with what it told."""
+
+    def __init__(self, bundle, folder, acknowledge=None, reporting=()):
+        self.told, self.complaints = [], []
+        schedule = schedule_of(bundle.scenario, bundle.testbed.testbed)
+        self.writer = new_recording(bundle, folder, "graph")
+        self.gatherer = Gatherer(
+            schedule,
+            bundle.testbed.testbed.topics,
+            self.writer,
+            acknowledge or self.told.append,
+            lambda topic, reason: self.complaints.append((topic, reason)),
+            reporting,
+        )
+        self._receive = {name: self.gatherer.receive(name) for name in schedule.topics}
+
+    def take(self, queue, payload):
+        if isinstance(queue, tuple):
+            self.gatherer.receive_diagnostics(payload, 0)
+        else:
+            self._receive[queue](payload, 0)
+
+
+def deliver(intake, sent, seed):
+    """Deliver all of `sent`, in the order of each sender, otherwise in any."""
+    left = {queue: iter(payloads) for queue, payloads in sent.items()}
+    choose, names = chooser(random.Random(seed)), list(sent)
+    while names:
+        queue = choose(names)
+        payload = next(left[queue], None)
+        if payload is None:
+            names.remove(queue)
+        else:
+            intake.take(queue, payload)
+
+
+@pytest.mark.slow
+@settings(max_examples=6)
+@given(seed=SEEDS)
+def test_any_delivery_makes_the_same_file(case, tmp_path_factory, seed):
+    folder = tmp_path_factory.mktemp("any") / "bag"
+    intake = Intake(case.bundle, folder)
+    with intake.writer:
+        deliver(intake, case.sent, seed)
+        assert intake.gatherer.completed <= STEPS - 1
+        intake.gatherer.end(STEPS - 1)
+        assert intake.gatherer.done
+    assert content(folder) == content(case.expected)
+    assert intake.gatherer.refused == (0, "")
+    assert intake.told[-1] == STEPS - 1
+    assert intake.told == sorted(intake.told)
+
+
+@pytest.mark.slow
+@settings(max_examples=5)
+@given(seed=SEEDS)
+def test_recorded_while_it_runs(case, tmp_path_factory, seed):
+    """The recorder holds the plant back, so that no queue overflows, and is told the end."""
+    folder = tmp_path_factory.mktemp("run") / "bag"
+    intakes = []
+
+    def make_recorder(acknowledge):
+        intakes.append(Intake(case.bundle, folder, acknowledge))
+        return intakes[0].gatherer
+
+    testbed = case.bundle.testbed.testbed
+    network = Network(case.bundle.scenario, testbed, STEPS, make_recorder)
+    with intakes[0].writer:
+        network.run(chooser(random.Random(seed)))
+    assert network.lost == 0
+    assert network.plant.finished
+    assert network.recorder.done
+    assert content(folder) == content(case.expected)
+
+
+def test_hashes_tell_recordings_apart(case, tmp_path):
+    run(bundle_of("rest", "seed=2"), tmp_path / "other", steps=STEPS)
+    found, other = hashes(case.expected), hashes(tmp_path / "other")
+    assert found["/cables/tension"] != other["/cables/tension"]
+    assert found["/clock"] == other["/clock"]
+    assert content(case.expected) != content(tmp_path / "other")
+
+
+@pytest.mark.parametrize("end", [0, 1, 49, 50, 117])
+def test_a_run_that_ends_early_is_recorded_to_its_end(case, tmp_path, end):
+    """What nodes computed ahead of the end is left out."""
+    run(case.bundle, tmp_path / "expected", steps=end + 1)
+    intake = Intake(case.bundle, tmp_path / "bag")
+    with intake.writer:
+        deliver_through(intake, case, end + 3, until=end)
+        intake.gatherer.end(end)
+        assert intake.gatherer.done
+    assert difference(tmp_path / "expected", tmp_path / "bag") is None
+    assert content(tmp_path / "expected") == content(tmp_path / "bag")
+
+
+def deliver_through(intake, case, step, until=None):
+    """Deliver what belongs to steps up to `step`; of one topic, the clock, only up to `until`."""
+    schedule = schedule_of(case.bundle.scenario, case.bundle.testbed.testbed)
+    for queue, payloads in case.sent.items():
+        if isinstance(queue, tuple):
+            share = -(-(step + 1) // 100)
+        else:
+            last = until if queue == "/clock" and until is not None else step
+            share = schedule.topics[queue].count(last + 1)
+        for payload in payloads[:share]:
+            intake.take(queue, payload)
+
+
+def test_a_run_that_ends_without_a_word_keeps_its_whole_steps(case, tmp_path):
+    run(case.bundle, tmp_path / "expected", steps=58)
+    intake = Intake(case.bundle, tmp_path / "bag")
+    with intake.writer:
+        deliver_through(intake, case, 70, until=57)
+        assert not intake.gatherer.done
+        intake.gatherer.write_whole()
+    assert difference(tmp_path / "expected", tmp_path / "bag") is None
+
+
+def test_nothing_is_acknowledged_before_all_of_it_is_there(case, tmp_path):
+    intake = Intake(case.bundle, tmp_path / "bag")
+    with intake.writer:
+        deliver_through(intake, case, 40, until=-1)
+        assert intake.told == []
+        assert intake.gatherer.missing() == ["/clock"]
+        clock = count()
+        for payload in case.sent["/clock"][:41]:
+            intake.take("/clock", payload)
+            step = next(clock)
+            assert not intake.told or intake.told[-1] <= step
+            assert step - max(intake.told, default=-1) <= RECORDED_EVERY
+        assert intake.gatherer.completed >= 40 - RECORDED_EVERY
+
+
+def test_a_silent_node_is_missed(case, tmp_path):
+    intake = Intake(case.bundle, tmp_path / "bag")
+    with intake.writer:
+        silent = {
+            key: value for key, value in case.sent.items() if key != ("/diagnostics", "plant")
+        }
+        deliver(intake, silent, 0)
+        assert intake.gatherer.completed == -1
+        assert intake.gatherer.missing() == ["/diagnostics of plant"]
+
+
+def test_an_end_that_cannot_be_is_refused(case, tmp_path):
+    intake = Intake(case.bundle, tmp_path / "bag")
+    with intake.writer:
+        with pytest.raises(InputError, match=r"^the last step is 5000, allowed: -1 to "):
+            intake.gatherer.end(5000)
+        deliver_through(intake, case, 60)
+        reached = intake.gatherer.completed
+        for last in (reached - 1, -1, reached + RECORDER_WINDOW + 3):
+            with pytest.raises(InputError, match=rf"^the last step is {last}, allowed: {reached} "):
+                intake.gatherer.end(last)
+        assert not intake.gatherer.done
+        intake.gatherer.end(60)
+        assert intake.gatherer.done
+
+
+# What does not belong
+
+
+def spoilt(queue, payload, rng):
+    """Return bytes that are no message of the queue's, or not the next one."""
+    kind = rng.randrange(3 if isinstance(queue, tuple) else 5)
+    if kind == 0:
+        return rng.randbytes(rng.randrange(64))
+    if kind == 1:
+        return payload[: rng.randrange(len(payload))]
+    if kind == 2:
+        # Another stamp.
+        at = rng.randrange(4, 12)
+        return payload[:at] + bytes([payload[at] ^ (1 + rng.randrange(255))]) + payload[at + 1 :]
+    if kind == 3:
+        return payload + rng.randbytes(9 + rng.randrange(3000))
+    return payload[:-16] + np.full(2, np.nan).tobytes()
+
+
+@settings(max_examples=6)
+@given(seed=SEEDS)
+def test_what_does_not_belong_changes_nothing(case, tmp_path_factory, seed):
+    """Before each genuine message come copies of it that are broken, late or early."""
+    rng = random.Random(seed)
+    folder = tmp_path_factory.mktemp("spoilt") / "bag"
+    intake = Intake(case.bundle, folder)
+    left = {queue: list(payloads) for queue, payloads in case.sent.items()}
+    at, added = dict.fromkeys(left, 0), 0
+    choose, names = chooser(rng), list(left)
+    with intake.writer:
+        while names:
+            queue = choose(names)
+            payloads, i = left[queue], at[queue]
+            if i == len(payloads):
+                names.remove(queue)
+                continue
+            wrong = [
+                p for j, p in enumerate(payloads[max(0, i - 2) : i + 3]) if j + max(0, i - 2) != i
+            ]
+            if rng.random() < 0.3:
+                wrong += [spoilt(queue, payloads[i], rng) for _ in range(2)]
+            for payload in wrong if rng.random() < 0.2 else []:
+                if payload != payloads[i]:
+                    intake.take(queue, payload)
+                    added += 1
+            intake.take(queue, payloads[i])
+            at[queue] += 1
+        intake.gatherer.end(STEPS - 1)
+    assert content(folder) == content(case.expected)
+    assert intake.gatherer.refused[0] == added == len(intake.complaints)
+    assert added > 100
+    assert all(reason.startswith(f"{topic}: ") for topic, reason in intake.complaints)
+
+
+@pytest.fixture
+def fresh(tmp_path):
+    intake = Intake(REST, tmp_path / "bag")
+    with intake.writer:
+        yield intake
+
+
+def test_a_broken_message_with_the_right_stamp_does_not_take_the_genuine_ones_place(fresh):
+    topic = REST.testbed.testbed.topics["/cables/tension"]
+    encode = WireWriter(topic).encode
+    good = encode(0, np.arange(8.0))
+    names = good.replace(b"hoist_1", b"hoist_9")
+    for payload in (encode(0, np.full(8, np.nan)), names, good[:-8]):
+        fresh.take("/cables/tension", payload)
+    assert fresh.gatherer.refused[0] == 3
+    assert [reason.split(", allowed")[0] for _, reason in fresh.complaints] == [
+        "/cables/tension: effort of hoist_1 is nan",
+        "/cables/tension: name 1 is 'hoist_9'",
+        f"/cables/tension: {len(good) - 8} bytes that are no sensor_msgs/msg/JointState",
+    ]
+    fresh.take("/cables/tension", good)
+    assert fresh.gatherer.refused[0] == 3
+    fresh.take("/cables/tension", good)
+    assert fresh.gatherer.refused == (
+        4,
+        "/cables/tension: stamp 0.000000 s came already: a restarted clock or a second sender,"
+        " allowed: 0.001000 s",
+    )
+
+
+@pytest.mark.parametrize(
+    ("payload", "reason"),
+    [
+        (b"", NO_STATUS),
+        (b"\x00\x01\x00\x00" + b"\xff" * 20, NO_STATUS),
+        (encode_diagnostics(0, []), NO_STATUS),
+        (
+            encode_diagnostics(0, [(0, "plant", "ok", {})] * 2),
+            NO_STATUS,
+        ),
+        (
+            encode_diagnostics(0, [(0, "battery", "ok", {})]),
+            NO_STATUS,
+        ),
+        (encode_diagnostics(5, [(0, "plant", "ok", {})]), "plant at 5 ns, allowed: 0 ns"),
+    ],
+)
+def test_other_diagnostics_are_refused(fresh, payload, reason):
+    fresh.gatherer.receive_diagnostics(payload, 0)
+    assert fresh.gatherer.refused == (1, f"/diagnostics: {reason}")
+    assert fresh.complaints == [("/diagnostics", f"/diagnostics: {reason}")]
+    fresh.gatherer.receive_diagnostics(encode_diagnostics(0, [(0, "plant", "ok", {})]), 0)
+    assert fresh.gatherer.refused[0] == 1
+
+
+def test_a_status_is_known_by_its_senders_number(tmp_path):
+    """Of nodes that speak for themselves; who speaks for others has other numbers."""
+    intake = Intake(REST, tmp_path / "bag", reporting=["plant"])
+    with intake.writer:
+        take, period = intake.gatherer.receive_diagnostics, 100 * MS
+        status = {name: (0, name, "ok", {}) for name in ("plant", "force_controller")}
+        take(encode_diagnostics(0, [status["plant"]]), 0, 2)
+        assert intake.gatherer.refused == (
+            1,
+            "/diagnostics: plant at 0 ns is its sender's message 2, allowed: 1; a second sender",
+        )
+        take(encode_diagnostics(0, [status["plant"]]), 0, 1)
+        take(encode_diagnostics(period, [status["plant"]]), 0, 1)
+        assert intake.gatherer.refused[0] == 2
+        take(encode_diagnostics(period, [status["plant"]]), 0, 2)
+        take(encode_diagnostics(0, [status["force_controller"]]), 0, 77)
+        assert intake.gatherer.refused[0] == 2
+
+
+def test_a_number_that_no_node_has_next_is_refused_unread(tmp_path, monkeypatch):
+    """Whoever floods the topic sends more than can be decoded."""
+    everybody = ["plant", *schedule_of(REST.scenario, REST.testbed.testbed).nodes]
+    intake = Intake(REST, tmp_path / "bag", reporting=everybody)
+    with intake.writer:
+        take = intake.gatherer.receive_diagnostics
+        take(encode_diagnostics(0, [(0, "plant", "ok", {})]), 0, 1)
+        decoded = []
+        monkeypatch.setattr("cspm_ros.runtime.lockstep_recorder.decode_diagnostics", decoded.append)
+        take(b"anything", 0, 9)
+        assert decoded == []
+        assert intake.gatherer.refused == (
+            1,
+            "/diagnostics: its sender's message 9, allowed: 1, 2; a second sender",
+        )
+        monkeypatch.undo()
+        take(encode_diagnostics(100 * MS, [(0, "plant", "ok", {})]), 0, 2)
+        assert intake.gatherer.refused[0] == 1
+
+
+def test_two_senders_of_a_topic_are_an_error(fresh):
+    encode = WireWriter(REST.testbed.testbed.topics["/cables/tension"]).encode
+    take = fresh.gatherer.receive("/cables/tension")
+    take(encode(0, np.arange(8.0)), 0, 1)
+    with pytest.raises(CspmError, match=r"^/cables/tension: two senders"):
+        take(encode(0, np.ones(8)), 0, 1)
+
+
+def test_ten_thousand_statuses_are_refused(fresh):
+    fresh.gatherer.receive_diagnostics(encode_diagnostics(0, [(0, "plant", "ok", {})] * 10_000), 0)
+    assert fresh.gatherer.refused[0] == 1
+
+
+def test_a_status_with_text_that_is_none_is_refused(fresh):
+    payload = encode_diagnostics(0, [(0, "plant", "okay", {})])
+    fresh.gatherer.receive_diagnostics(payload.replace(b"okay", b"\xff\xfe\xfd\xfc"), 0)
+    assert fresh.gatherer.refused[0] == 1
+
+
+def test_the_same_message_of_another_sender_is_recorded_in_the_contracts_form(fresh, tmp_path):
+    """A frame of its own and numbers that are not asked for do not matter."""
+    topic = REST.testbed.testbed.topics["/cables/tension"]
+    message = message_class(topic.ros_type)(
+        header_of(0, "lab"), list(topic.joint_names), np.ones(8), np.zeros(0), np.arange(8.0)
+    )
+    fresh.take("/cables/tension", serialize(message))
+    assert fresh.gatherer.refused == (0, "")
+    fresh.gatherer._write(1)
+    fresh.writer.close()
+    with Recording(tmp_path / "bag") as recording:
+        [payload] = recording.payloads("/cables/tension").payloads
+    assert payload == WireWriter(topic).encode(0, np.arange(8.0))

@@ -1,0 +1,156 @@
+"""A run in real time with all nodes in one process: nothing is lost, and it stops as safely."""
+
+import signal
+import threading
+from dataclasses import replace
+
+import pytest
+from realtime_graph import Evidence, Graph, Witness, slow_bundle, warm_processes
+from ros_graph import load_ros, new_domain
+from test_external_plant import APART, WATCHDOG, check_plant
+from test_realtime_run import TOGETHER, Command, topics_of, under_way
+
+load_ros()
+
+from cspm_msgs_py.errors import InputError  # noqa: E402
+from cspm_msgs_py.graph import RECORDER  # noqa: E402
+from cspm_msgs_py.recording import Recording, overview  # noqa: E402
+from cspm_msgs_py.recording.recover import recover  # noqa: E402
+from cspm_msgs_py.schedule import FORCE_CONTROLLER, PLANT, TENSION, TORQUE_COMMAND  # noqa: E402
+from cspm_msgs_py.topics import EMERGENCY_STOP  # noqa: E402
+from cspm_ros.runtime.realtime_run import run_realtime  # noqa: E402 - after ROS is known to be there
+
+pytestmark = [pytest.mark.slow, pytest.mark.alone, pytest.mark.usefixtures("uncrowded")]
+
+MS = 1_000_000
+PERIOD = 5 * MS
+
+
+@pytest.fixture(scope="module")
+def warm():
+    return warm_processes()
+
+
+class Machine(Graph):
+    """The plant, as hardware that leads nobody."""
+
+    def __init__(self, warm, bundle, place, domain):
+        place.mkdir()
+        super().__init__(warm, bundle, place, members=(PLANT,), domain=domain)
+        self.start(remaps=APART)
+
+
+@pytest.mark.parametrize("plant", ["sim", "mujoco"])
+def test_every_message_that_is_sent_is_recorded(tmp_path, plant):
+    check_plant(plant)
+    bundle = replace(slow_bundle(), plant=plant)
+    told = []
+    result = run_realtime(bundle, tmp_path / "bag", told.append, steps=600, domain_id=new_domain())
+    assert (result.failure, result.interrupted, result.mode) == (None, False, "realtime")
+    assert result.simulated == pytest.approx(3.005, abs=0.1)
+    assert told == sorted(told)
+    assert result.timing[RECORDER] == {"lost": 0, "refused": 0}
+    assert result.timing[PLANT]["refused"] == result.timing[FORCE_CONTROLLER]["refused"] == 0
+    found = overview(tmp_path / "bag")
+    assert found.complete
+    counts = {topic.name: topic.count for topic in found.topics}
+    assert counts["/truth/bar/pose"] == counts[TENSION] == 600
+    # The first command waits for the first tension command, which comes at half the rate; after
+    # that what is late is not sent, and counted.
+    sent = counts[TORQUE_COMMAND]
+    assert 598 - result.timing[FORCE_CONTROLLER]["deadlines_missed"] <= sent <= 605
+    # The plant heard no command that is not recorded.
+    assert 600 - result.timing[PLANT]["deadlines_missed"] <= sent
+    assert max(result.tally.max_error[:3]) < 0.01
+
+
+def test_at_1_khz_nothing_is_lost_however_late_the_nodes_are(tmp_path):
+    bundle = slow_bundle(
+        "rates={plant: 1000, winches: 1000, load_cells: 1000, motion_capture: 1000,"
+        " wave_trajectory: 1000, motion_controller: 1000, tension_distribution: 1000,"
+        " force_controller: 1000}",
+    )
+    stop = threading.Event()
+
+    def burn():
+        while not stop.is_set():
+            pass
+
+    burner = threading.Thread(target=burn)
+    burner.start()
+    try:
+        result = run_realtime(bundle, tmp_path / "bag", steps=2000, domain_id=new_domain())
+    finally:
+        stop.set()
+        burner.join()
+    # The plant's own totals come every 100 steps, of which there may be fewer.
+    tensions = Evidence(tmp_path / "bag").rows[TENSION]
+    assert (tensions.log_ns - tensions.stamp_ns).max() > MS
+    assert result.timing[RECORDER]["lost"] == 0
+
+
+def test_an_emergency_stop_from_outside_is_obeyed_at_once(tmp_path):
+    bundle = slow_bundle("duration=600.0")
+    with (
+        Command(tmp_path, bundle, TOGETHER) as command,
+        Witness(command.domain, topics_of(bundle, TENSION)) as witness,
+    ):
+        under_way(witness)
+        witness.emergency_stop(True)
+        told = witness.until_state(FORCE_CONTROLLER, "hold")
+        assert told.values["reason"] == "emergency stop set"
+        assert not witness.reset(FORCE_CONTROLLER)[0]
+        witness.emergency_stop(False)
+        witness.until_reset(FORCE_CONTROLLER)
+        witness.until_running(FORCE_CONTROLLER, WATCHDOG)
+        command.process.send_signal(signal.SIGINT)
+        code, _, err = command.done()
+    assert code == 1
+    assert err.startswith("cspm: force_controller: safe state hold since ")
+    evidence = Evidence(command.folder)
+    ((since, _),) = evidence.alarms(FORCE_CONTROLLER)
+    with Recording(command.folder) as recording:
+        pressed = int(recording.payloads(EMERGENCY_STOP.name).log_ns[0])
+    gap = evidence.longest_gap(TORQUE_COMMAND, pressed, since + 10 * PERIOD)
+    # What it tells is rounded to 1 ms.
+    assert since - pressed <= 2 * PERIOD + gap + MS
+
+
+def test_hardware_stops_by_itself_when_the_process_is_killed(warm, tmp_path):
+    bundle = slow_bundle("duration=600.0")
+    with (
+        Command(tmp_path, bundle, TOGETHER, "--plant", "external") as command,
+        Machine(warm, bundle, tmp_path / "lab", command.domain) as machine,
+        Witness(command.domain, topics_of(bundle, TENSION)) as witness,
+    ):
+        under_way(witness)
+        command.process.kill()
+        assert command.done()[0] == -signal.SIGKILL
+        told = witness.until_state(WATCHDOG, "hold")
+        assert told.values["reason"].startswith(f"no {TORQUE_COMMAND} for ")
+        assert machine.end() == {PLANT: 0}
+    recover(command.folder)
+    assert len(Evidence(command.folder).stamps(TENSION)) >= 60
+
+
+def test_hardware_that_dies_is_missed(warm, tmp_path):
+    bundle = slow_bundle("duration=600.0")
+    with (
+        Command(tmp_path, bundle, TOGETHER, "--plant", "external") as command,
+        Machine(warm, bundle, tmp_path / "lab", command.domain) as machine,
+        Witness(command.domain, topics_of(bundle, TENSION, TORQUE_COMMAND)) as witness,
+    ):
+        under_way(witness)
+        machine.processes[PLANT].kill()
+        witness.until_state(FORCE_CONTROLLER, "hold")
+        witness.until_more(TORQUE_COMMAND, 50)
+        command.process.send_signal(signal.SIGTERM)
+        code, _, err = command.done()
+    assert code == 1
+    assert err.startswith("cspm: force_controller: safe state hold since ")
+
+
+def test_an_existing_folder_is_left_alone(tmp_path):
+    (tmp_path / "bag").mkdir()
+    with pytest.raises(InputError, match="exists, allowed: a new folder"):
+        run_realtime(slow_bundle(), tmp_path / "bag", steps=10, domain_id=new_domain())

@@ -1,0 +1,395 @@
+"""What happens to the winches when a part of a run in real time dies, stops, or talks nonsense.
+
+Reaction times are read from the recordings: from the stamp of the last good input to the first safe
+torque. What the computer's scheduling adds is read from the same recording, as the longest time
+between two messages of the node that has to react.
+"""
+
+import signal
+
+import numpy as np
+import pytest
+from realtime_graph import (
+    STALE_AFTER,
+    Evidence,
+    Graph,
+    Witness,
+    slow_bundle,
+    warm_processes,
+)
+from ros_graph import load_ros
+
+from cspm_control.safe_state import balancing_tensions
+from cspm_msgs_py.message import message_of
+from cspm_msgs_py.recording import Recording
+from cspm_msgs_py.recording.recover import recover
+from cspm_msgs_py.ros_types import serialize
+from cspm_msgs_py.schedule import (
+    FORCE_CONTROLLER,
+    MOTION_CONTROLLER,
+    PLANT,
+    TENSION,
+    TENSION_COMMAND,
+    TENSION_DISTRIBUTION,
+    TORQUE_COMMAND,
+    WAVE_TRAJECTORY,
+    WINCH_STATE,
+)
+
+load_ros()
+pytestmark = [pytest.mark.slow, pytest.mark.alone]
+
+MS = 1_000_000
+PERIOD = 5 * MS
+WATCHDOG = "plant/watchdog"
+GUARDS = (FORCE_CONTROLLER, WATCHDOG)
+REFERENCE = "/bar/reference"
+# How far the bar may move [m] until somebody holds it; a falling one sinks 0.44 m in STALE_AFTER.
+SAG = 0.02
+# Who falls silent, and what is missing in the end.
+MISSED = {
+    WAVE_TRAJECTORY: TENSION_COMMAND,
+    MOTION_CONTROLLER: TENSION_COMMAND,
+    TENSION_DISTRIBUTION: TENSION_COMMAND,
+}
+
+
+@pytest.fixture(scope="module")
+def warm():
+    return warm_processes()
+
+
+@pytest.fixture
+def tell(request):
+    """Return what shows a measured time among the test's progress."""
+    plugins = request.config.pluginmanager
+
+    def show(text):
+        with plugins.getplugin("capturemanager").global_and_fixture_disabled():
+            plugins.getplugin("terminalreporter").write_line(f"\n{text}")
+
+    return show
+
+
+def topics_of(bundle, *names):
+    return [bundle.testbed.testbed.topics[name] for name in names]
+
+
+def under_way(witness):
+    """Listen until all is well, and for 0.3 s more of it."""
+    witness.until_running(*GUARDS)
+    witness.until_more(TENSION, 60)
+
+
+def balance_torque(bundle):
+    cables = bundle.testbed.testbed.cables
+    radii = np.array([cable.drum_radius / cable.gear_ratio for cable in cables])
+    return radii * balancing_tensions(bundle.scenario, bundle.testbed.testbed)
+
+
+def reaction(evidence, guard, topic, reacts, wait=STALE_AFTER, event=0):
+    """Hold the time from the last good message to the safe state to what it may be; return it [s].
+
+    `reacts` is a topic that the guard's node sends in every period.
+    """
+    since, reason = evidence.alarms(guard)[event]
+    assert reason.startswith((f"{topic} stale: ", f"no {topic} for ")), reason
+    good = evidence.last_before(topic, since)
+    # What it tells is rounded to 1 ms.
+    allowed = round(wait * 1e9) + 2 * PERIOD + MS
+    allowed += evidence.longest_gap(reacts, good, since + 10 * PERIOD)
+    took = since - good
+    assert round(wait * 1e9) - MS < took <= allowed
+    return took * 1e-9
+
+
+def check_torques(evidence, bundle, since, state, blind):
+    """Hold the torques after the event to the safe state; return the first one's stamp [ns]."""
+    stamps, torques = evidence.torques(since + MS)
+    assert len(stamps) > 50
+    assert (np.diff(stamps) > 0).all()
+    if state == "brake":
+        assert not torques.any()
+        assert evidence.brakes[-1]
+    else:
+        # As hung as before: balancing torque, give or take what the spring adds.
+        np.testing.assert_allclose(torques[-1], balance_torque(bundle), rtol=0.2)
+        # Nobody can hold by the motors who does not know how they turn.
+        assert evidence.brakes[-1] == blind
+    return int(stamps[0])
+
+
+def heave(evidence):
+    return evidence.rows["/truth/bar/pose"].rows[:, 2]
+
+
+@pytest.mark.parametrize(
+    ("name", "state"),
+    [
+        (WAVE_TRAJECTORY, "hold"),
+        (MOTION_CONTROLLER, "hold"),
+        (TENSION_DISTRIBUTION, "hold"),
+        (TENSION_DISTRIBUTION, "brake"),
+        (PLANT, "hold"),
+    ],
+)
+def test_a_killed_node_brings_the_force_controllers_to_their_safe_state(
+    warm, tmp_path, name, state, tell
+):
+    bundle = slow_bundle(f"safety.state={state}")
+    with (
+        Graph(warm, bundle, tmp_path) as graph,
+        Witness(graph.domain, topics_of(bundle, TENSION, TORQUE_COMMAND)) as witness,
+    ):
+        graph.start()
+        under_way(witness)
+        graph.send(name, signal.SIGKILL)
+        told = witness.until_state(FORCE_CONTROLLER, state)
+        assert told.level == 2
+        witness.until_more(TORQUE_COMMAND, 100)
+        if name == PLANT:
+            for left in set(graph.names) - {PLANT}:
+                graph.send(left, signal.SIGTERM)
+            codes = graph.join()
+        else:
+            codes = graph.end() | {name: graph.processes[name].exitcode}
+    assert codes == {each: -signal.SIGKILL if each == name else 0 for each in graph.names}
+    evidence = Evidence(graph.folder)
+    since, _ = evidence.alarms(FORCE_CONTROLLER)[0]
+    topic = MISSED.get(name) or evidence.alarms(FORCE_CONTROLLER)[0][1].partition(" ")[0]
+    assert topic in (TENSION_COMMAND, TENSION, WINCH_STATE)
+    took = reaction(evidence, FORCE_CONTROLLER, topic, TORQUE_COMMAND)
+    first = check_torques(evidence, bundle, since, state, blind=name == PLANT)
+    said = f"{name} killed, {state}: {topic} to safe torque {took * 1e3:.0f} ms"
+    if name == WAVE_TRAJECTORY:
+        # The motion controller fell silent first, on a stale reference.
+        whole = first - evidence.last_before(REFERENCE, since)
+        said += f", from the last reference {whole * 1e-6:.0f} ms"
+        assert whole > 1.9 * STALE_AFTER * 1e9
+    if name != PLANT:
+        assert np.ptp(heave(evidence)) < SAG
+        assert not evidence.alarms(WATCHDOG)
+    tell(said)
+
+
+@pytest.mark.parametrize("state", ["hold", "brake"])
+def test_when_the_force_controllers_are_killed_the_plant_stops_itself(warm, tmp_path, state, tell):
+    bundle = slow_bundle(f"safety.state={state}")
+    with (
+        Graph(warm, bundle, tmp_path) as graph,
+        Witness(graph.domain, topics_of(bundle, TENSION)) as witness,
+    ):
+        graph.start()
+        under_way(witness)
+        graph.send(FORCE_CONTROLLER, signal.SIGKILL)
+        witness.until_state(WATCHDOG, state)
+        witness.until_more(TENSION, 200)
+        graph.end()
+    evidence = Evidence(graph.folder)
+    took = reaction(evidence, WATCHDOG, TORQUE_COMMAND, "/truth/winches/state")
+    since, _ = evidence.alarms(WATCHDOG)[0]
+    winches = evidence.rows["/truth/winches/state"]
+    first = evidence.stamps("/truth/winches/state") > since + 2 * PERIOD
+    angles, _, torques = np.split(winches.rows[first], 3, axis=1)
+    if state == "brake":
+        assert not torques.any()
+        assert np.ptp(angles, axis=0).max() == 0.0
+    else:
+        np.testing.assert_allclose(torques[-1], balance_torque(bundle), rtol=0.2)
+    assert np.ptp(heave(evidence)) < SAG
+    assert not evidence.alarms(FORCE_CONTROLLER)
+    tell(f"force_controller killed, {state}: last command to safe torque {took * 1e3:.0f} ms")
+
+
+def test_a_patient_watchdog_lets_the_last_torques_stand(warm, tmp_path):
+    bundle = slow_bundle("safety.watchdog=10.0")
+    with (
+        Graph(warm, bundle, tmp_path) as graph,
+        Witness(graph.domain, topics_of(bundle, TENSION)) as witness,
+    ):
+        graph.start()
+        under_way(witness)
+        graph.send(FORCE_CONTROLLER, signal.SIGKILL)
+        witness.until_more(TENSION, 300)
+        assert witness.until_said(WATCHDOG, lambda _: True, "a status").message == "ok"
+        graph.end()
+    evidence = Evidence(graph.folder)
+    assert not evidence.alarms(WATCHDOG)
+    torques = np.split(evidence.rows["/truth/winches/state"].rows, 3, axis=1)[2]
+    assert (torques[-1] > 0.0).all()
+    np.testing.assert_array_equal(torques[-200:], np.tile(torques[-1], (200, 1)))
+
+
+def test_without_the_recorder_the_winches_go_on_and_the_recording_can_be_restored(warm, tmp_path):
+    bundle = slow_bundle()
+    with (
+        Graph(warm, bundle, tmp_path) as graph,
+        Witness(graph.domain, topics_of(bundle, TENSION)) as witness,
+    ):
+        graph.start()
+        under_way(witness)
+        graph.send("recorder", signal.SIGKILL)
+        witness.until_more(TENSION, 200)
+        witness.until_running(*GUARDS)
+        graph.end()
+    report = recover(graph.folder)
+    assert report.restored
+    with Recording(graph.folder) as recording:
+        assert recording.complete
+    evidence = Evidence(graph.folder)
+    # All but the last 0.2 s of what was recorded before it died.
+    assert len(evidence.stamps(TENSION)) >= 60 - 40
+    assert (np.diff(evidence.stamps(TENSION)) == PERIOD).all()
+
+
+def test_stopped_nodes_are_missed_one_after_the_other_and_come_back(warm, tmp_path, tell):
+    """SIGSTOP hits each node in turn; SIGCONT and a reset bring it back, in one run."""
+    bundle = slow_bundle()
+    guard_of = dict.fromkeys(MISSED, FORCE_CONTROLLER)
+    guard_of |= {PLANT: FORCE_CONTROLLER, FORCE_CONTROLLER: WATCHDOG}
+    with (
+        Graph(warm, bundle, tmp_path) as graph,
+        Witness(graph.domain, topics_of(bundle, TENSION, TORQUE_COMMAND)) as witness,
+    ):
+        graph.start()
+        under_way(witness)
+        for name, guard in guard_of.items():
+            graph.send(name, signal.SIGSTOP)
+            witness.until_state(guard, "hold")
+            if name != FORCE_CONTROLLER:
+                assert not witness.reset(FORCE_CONTROLLER)[0]
+            graph.send(name, signal.SIGCONT)
+            # First the drives follow the safe torques again, then the controllers are let go.
+            witness.until_state(FORCE_CONTROLLER, "hold")
+            for each in (PLANT, FORCE_CONTROLLER):
+                witness.until_reset(each)
+            under_way(witness)
+        # A recorder that is late takes what waits for it, and says what did not.
+        graph.send("recorder", signal.SIGSTOP)
+        witness.until_more(TENSION, 100)
+        graph.send("recorder", signal.SIGCONT)
+        under_way(witness)
+        assert set(graph.end().values()) == {0}
+    evidence = Evidence(graph.folder)
+    reasons = [reason for _, reason in evidence.alarms(FORCE_CONTROLLER)]
+    for event, name in enumerate(MISSED):
+        took = reaction(evidence, FORCE_CONTROLLER, TENSION_COMMAND, TORQUE_COMMAND, event=event)
+        tell(f"{name} stopped: {TENSION_COMMAND} to safe torque {took * 1e3:.0f} ms")
+    silent = (TENSION, WINCH_STATE, TENSION_COMMAND)
+    assert reasons[3].startswith(tuple(f"{topic} stale: " for topic in silent))
+    assert reasons[4].startswith("stood still for ")
+    assert evidence.alarms(WATCHDOG)[-1][1].startswith(f"no {TORQUE_COMMAND} for ")
+    # Through all of that the bar hung where it was.
+    assert np.ptp(heave(evidence)) < SAG
+
+
+# The emergency stop
+
+
+@pytest.mark.parametrize("state", ["hold", "brake"])
+def test_the_emergency_stop_acts_within_two_periods_until_it_is_reset(warm, tmp_path, state, tell):
+    bundle = slow_bundle(f"safety.state={state}")
+    with (
+        Graph(warm, bundle, tmp_path) as graph,
+        Witness(graph.domain, topics_of(bundle, TENSION)) as witness,
+    ):
+        graph.start()
+        under_way(witness)
+        # Released it changes nothing.
+        witness.emergency_stop(False)
+        witness.until_more(TENSION, 50)
+        witness.until_running(FORCE_CONTROLLER)
+        pressed_ns = witness.node.now_ns()
+        witness.emergency_stop(True)
+        told = witness.until_state(FORCE_CONTROLLER, state)
+        assert told.values["reason"] == "emergency stop set"
+        assert witness.reset(FORCE_CONTROLLER) == (False, "reset refused: emergency stop set")
+        witness.emergency_stop(False)
+        witness.until_more(TENSION, 100)
+        # Latched: released it stays safe until it is reset.
+        witness.until_state(FORCE_CONTROLLER, state)
+        witness.until_reset(FORCE_CONTROLLER)
+        under_way(witness)
+        assert set(graph.end().values()) == {0}
+    evidence = Evidence(graph.folder)
+    assert evidence.stops == [False, True, False]
+    ((since, reason),) = evidence.alarms(FORCE_CONTROLLER)
+    assert reason == "emergency stop set"
+    stamps, _ = evidence.torques(since + MS)
+    took = int(stamps[0]) - pressed_ns
+    gap = evidence.longest_gap(TORQUE_COMMAND, pressed_ns - PERIOD, since + 10 * PERIOD)
+    assert took <= 2 * PERIOD + MS + gap
+    assert np.ptp(heave(evidence)) < SAG
+    if state == "brake":
+        assert True in evidence.brakes
+        assert not evidence.brakes[-1]
+        (safe,) = np.nonzero(~evidence.torques()[1].any(axis=1))
+        assert len(safe) > 90
+        took = int(evidence.torques()[0][safe[0]]) - pressed_ns
+        assert took <= 2 * PERIOD + gap
+    tell(f"emergency stop, {state}: to safe torque {took * 1e-6:.1f} ms")
+
+
+# Foreign messages
+
+
+def message(topic, stamp_ns, row, **changes):
+    """Return CDR bytes of a message with some of its fields replaced."""
+    made = message_of(topic, stamp_ns, row)
+    for name, value in changes.items():
+        setattr(made, name, value)
+    return serialize(made)
+
+
+def test_foreign_messages_are_answered_with_the_safe_state_and_its_reason(warm, tmp_path, tell):
+    bundle = slow_bundle()
+    topics = bundle.testbed.testbed.topics
+    tension, command, twist = topics[TENSION], topics[TENSION_COMMAND], topics["/bar/twist"]
+    five, names = np.full(8, 5.0), list(bundle.testbed.testbed.cable_names)
+    nan = np.where(np.arange(8) == 2, np.nan, 5.0)
+    swapped = [names[1], names[0], *names[2:]]
+    thousands = [f"c{i}" for i in range(10_000)]
+    second = 1_000 * MS
+    cases = [
+        (tension, 0, nan, {}, f"{TENSION}: effort of surge_1 is nan, allowed: finite numbers"),
+        (command, 0, nan, {}, f"{TENSION_COMMAND}: effort of surge_1 is nan, allowed: finite"),
+        (command, 0, five, {"effort": five[:7]}, f"{TENSION_COMMAND}: effort has 7 values for 8"),
+        (tension, 0, five, {"name": swapped}, f"{TENSION}: names in a wrong order, name 1 is 'h"),
+        (tension, 0, five, {"name": thousands}, f"{TENSION}: a message of "),
+        (tension, -second, five, {}, f"{TENSION}: stamp went back from "),
+        (command, -second, five, {}, f"{TENSION_COMMAND}: stamp went back from "),
+        (tension, 10 * second, five, {}, f"{TENSION}: stamp "),
+    ]
+    took = []
+    with (
+        Graph(warm, bundle, tmp_path) as graph,
+        Witness(graph.domain, topics_of(bundle, TENSION)) as witness,
+    ):
+        send = {topic.name: witness.publisher(topic) for topic in (tension, command, twist)}
+        graph.start()
+        under_way(witness)
+        # What nobody asked for changes nothing.
+        for _ in range(20):
+            send[twist.name](message(twist, witness.node.now_ns(), np.full(6, np.nan)))
+        witness.until_more(TENSION, 50)
+        witness.until_running(*GUARDS)
+        for topic, shift, row, changes, reason in cases:
+            sent_ns = witness.node.now_ns()
+            send[topic.name](message(topic, sent_ns + shift, row, **changes))
+            told = witness.until_state(FORCE_CONTROLLER, "hold")
+            assert told.values["reason"].startswith(reason)
+            since = float(told.message.partition(" since ")[2].partition(" s:")[0])
+            took.append((round(since * 1e3) * MS - sent_ns, sent_ns))
+            witness.until_reset(FORCE_CONTROLLER)
+            witness.until_running(*GUARDS)
+        assert set(graph.end().values()) == {0}
+    evidence = Evidence(graph.folder)
+    assert len(evidence.alarms(FORCE_CONTROLLER)) == len(cases)
+    for reacted, sent_ns in took:
+        gap = evidence.longest_gap(TORQUE_COMMAND, sent_ns - PERIOD, sent_ns + 10 * PERIOD)
+        assert reacted <= 2 * PERIOD + MS + gap
+    assert np.ptp(heave(evidence)) < SAG
+    # Strangers' numbers are no losses.
+    lost = [s.values["lost"] for s in evidence.statuses if s.name == "recorder"]
+    assert set(lost) == {"0"}
+    tell(f"foreign messages: {max(r for r, _ in took) * 1e-6:.0f} ms at most")

@@ -1,0 +1,58 @@
+"""The two plants share none of their equations, held by reading the source."""
+
+import ast
+from pathlib import Path
+
+ROOT = Path(__file__).resolve().parents[3]
+
+
+# Rooms inside a package that share nothing with the rest of it.
+APART = ("cspm_sim.mujoco", "bench.blind.reality")
+
+
+def room(module):
+    """Return the room apart that a module lies in, or its package."""
+    inside = [name for name in APART if f"{module}.".startswith(f"{name}.")]
+    return inside[0] if inside else module.split(".")[0]
+
+
+def imported(text):
+    for node in ast.walk(ast.parse(text)):
+        if isinstance(node, ast.Import):
+            yield from (room(alias.name) for alias in node.names)
+        elif isinstance(node, ast.ImportFrom):
+            yield room(node.module or "") if node.level == 0 else "."
+
+
+ALLOWED = {"__future__", "collections", "math", "typing", "xml"} | {
+    "cspm_msgs_py",
+    "cspm_sim.mujoco",
+    "mujoco",
+    "numba",
+    "numpy",
+    "scipy",
+}
+
+
+def test_it_shares_no_code_with_the_plant():
+    sources = sorted((ROOT / "cspm_sim" / "mujoco").rglob("*.py"))
+    assert len(sources) >= 5
+    for path in sources:
+        text = path.read_text(encoding="utf-8")
+        assert set(imported(text)) <= ALLOWED, path.name
+        # Nor by a name at run time, or as a file.
+        own = text.replace("cspm_sim.mujoco", "").replace("`cspm_sim", "")
+        assert not any(name in own for name in ("cspm_sim", "cspm_model")), path.name
+    others = [path for path in (ROOT / "cspm_sim").rglob("*.py") if path not in sources]
+    for path in (*others, *(ROOT / "cspm_model").rglob("*.py")):
+        assert "cspm_sim.mujoco" not in set(imported(path.read_text(encoding="utf-8"))), path.name
+
+
+def test_the_check_sees_a_shared_import():
+    for text in (
+        "import cspm_sim.kernels",
+        "def f():\n    from cspm_model.stiffness import law_table",
+        "from . import x",
+        "import importlib",
+    ):
+        assert not set(imported(text)) <= ALLOWED

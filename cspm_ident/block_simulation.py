@@ -10,7 +10,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from cspm_ident.signals.elongation import damping_of
+from cspm_ident.signals.cable_motion import damping_of
 from cspm_ident.signals.timeline import Timeline, whole_stretches
 from cspm_model.equilibrium import Equilibrium, find_equilibrium, unstretched_lengths
 from cspm_model.kernels.cable import RADIUS

@@ -1,4 +1,4 @@
-"""Laws of the machine without state or clock: kinematics, bar, cables, rest, linear model."""
+"""What has no state and no clock: kinematics, cable laws, rest, linear model, robust statistics."""
 
 from cspm_model.kernel_cache import use_kernel_cache
 

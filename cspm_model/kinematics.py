@@ -1,4 +1,4 @@
-"""Kinematics of the cables, thesis chapter 2: lengths from poses and poses from lengths.
+"""Kinematics of the cables, thesis chapter 2: lengths and length rates from poses and twists.
 
 Poses are x y z φ θ ψ in world_ned (m, rad). A cable's vector runs from its exit on the winch frame
 to its attachment on the bar (2-2).
@@ -6,12 +6,10 @@ to its attachment on the bar (2-2).
 
 from __future__ import annotations
 
-from collections.abc import Mapping
 from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
-from scipy.optimize import least_squares
 
 from cspm_model.kernels.kinematics import cable_geometry
 from cspm_model.kernels.rotation import (
@@ -19,8 +17,7 @@ from cspm_model.kernels.rotation import (
     euler_rate_to_world_rate,
     rotation_from_euler,
 )
-from cspm_msgs_py.dofs import DOFS
-from cspm_msgs_py.errors import ConvergenceError, InputError, SingularityError
+from cspm_msgs_py.errors import InputError, SingularityError
 
 Array = NDArray[np.float64]
 
@@ -30,7 +27,6 @@ SMALLEST_COSINE = 1e-3
 # Singular values below this share of the largest: near such a pose a length error of a micrometre
 # is a pose error without meaning.
 RANK_TOLERANCE = 1e-6
-STEP_TOLERANCE = 1e-15
 LENGTH_TOLERANCE = 1e-9
 
 
@@ -90,94 +86,6 @@ def euler_rates(pose: ArrayLike, body_rate: ArrayLike) -> Array:
 def rotation(pose: ArrayLike) -> Array:
     """Return R_world_body = Rz(ψ)Ry(θ)Rx(φ), shape (3, 3), thesis (2-3)."""
     return np.array(rotation_from_euler(*_pose(pose)[3:6])).reshape(3, 3)
-
-
-def forward_kinematics(
-    cables: Array,
-    lengths: ArrayLike,
-    frame_pose: ArrayLike,
-    guess: ArrayLike,
-    known: Mapping[str, float] | None = None,
-    tolerance: float = 1e-9,
-) -> Array:
-    """Return the bar's pose (6,) whose cable lengths are `lengths`, nearest to `guess`.
-
-    Args:
-        cables: the plant's cable parameter rows.
-        lengths: wanted lengths, shape (n,) [m].
-        frame_pose: the winch frame's pose.
-        guess: start of the search.
-        known: DOFs that are given, by name, such as `{"roll": 0.0}`. The thesis's machine needs its
-            roll so: all its attachments lie on one line, and turning about it changes no length.
-        tolerance: largest allowed difference of a length [m]; measured ones need their noise.
-
-    Raises:
-        InputError: `lengths` are not one positive number per cable, or `known` names no or every
-            DOF.
-        ConvergenceError: no pose near the guess has these lengths, or more than one has.
-    """
-    known = dict(known or {})
-    free = [i for i, dof in enumerate(DOFS) if dof not in known]
-    if not free:
-        raise InputError("known: all six DOFs, allowed: at least one left to be found")
-    base = _pose(guess).copy()
-    for name, value in known.items():
-        if name not in DOFS:
-            raise InputError(f"known: no DOF '{name}', allowed: {', '.join(DOFS)}")
-        base[DOFS.index(name)] = value
-    wanted = _lengths(lengths, len(cables))
-
-    def pose_of(values: Array) -> Array:
-        pose = base.copy()
-        pose[free] = values
-        return pose
-
-    def residual(values: Array) -> Array:
-        return inverse_kinematics(cables, pose_of(values), frame_pose) - wanted
-
-    def slope(values: Array) -> Array:
-        return euler_jacobian(cables, pose_of(values), frame_pose)[:, free]
-
-    tolerances = dict.fromkeys(("xtol", "ftol", "gtol"), STEP_TOLERANCE)
-    solution = least_squares(residual, base[free], slope, method="trf", **tolerances)
-    _check_unique(slope(solution.x), [DOFS[i] for i in free])
-    worst = float(np.max(np.abs(solution.fun)))
-    if worst > tolerance:
-        raise ConvergenceError(
-            f"forward kinematics: lengths differ by {worst:.3g} m at the nearest pose, allowed:"
-            " lengths that one pose has"
-        )
-    return pose_of(solution.x)
-
-
-def euler_jacobian(cables: Array, bar_pose: ArrayLike, frame_pose: ArrayLike) -> Array:
-    """Return J of (2-6) for ẋ with Euler rates, rows [uᵀ, (R b × u)ᵀ J_w], shape (n, 6)."""
-    jacobian = geometry(cables, bar_pose, frame_pose).bar
-    return np.hstack([jacobian[:, :3], jacobian[:, 3:] @ euler_rate_map(bar_pose)])
-
-
-def _check_unique(slope: Array, names: list[str]) -> None:
-    _, values, directions = np.linalg.svd(slope)
-    rank = int(np.sum(values > RANK_TOLERANCE * values[0]))
-    if rank == slope.shape[1]:
-        return
-    weights = np.abs(directions[rank:]).max(axis=0)
-    loose = [name for name, weight in zip(names, weights, strict=True) if weight > 0.1]
-    raise ConvergenceError(
-        f"forward kinematics: the lengths do not fix {', '.join(loose)} near the guess (rank {rank}"
-        f" of {slope.shape[1]}), allowed: give it as known"
-    )
-
-
-def _lengths(value: ArrayLike, count: int) -> Array:
-    lengths = np.asarray(value, dtype=float)
-    if lengths.shape != (count,):
-        raise InputError(f"lengths: shape {lengths.shape}, allowed: ({count},), one per cable")
-    if not np.isfinite(lengths).all():
-        raise InputError("lengths: not finite, allowed: finite numbers")
-    if lengths.min() <= 0.0:
-        raise InputError(f"lengths: {lengths.min():g} m, allowed: > 0")
-    return lengths
 
 
 def _pose(value: ArrayLike) -> Array:

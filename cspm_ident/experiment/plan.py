@@ -22,11 +22,10 @@ from cspm_ident.diagnosis.residuals.machine_signals import (
     MachineSignals,
     body_state,
     cable_spans,
-    elongation_at,
-    law_at,
 )
 from cspm_ident.signals.measurement import Measurement
 from cspm_ident.signals.samples import Samples
+from cspm_model.elastic_law import elongation_at, law_at
 from cspm_model.equilibrium import unstretched_lengths
 from cspm_model.kernels.cable import ATTACHMENT, EXIT, OFFSET_LENGTH, RADIUS
 from cspm_model.kernels.machine import PlantParameters

@@ -7,10 +7,13 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from cspm_model.robust_statistics import huber_fit
+
 Array = NDArray[np.float64]
 _HUBER = 1.345  # 95 % efficiency with normal errors, Huber 1964
-_MAD_TO_SIGMA = 1.4826
-_ITERATIONS = 30
+_ROUNDS = 30
+# Numbers that follow a line to their last digits are made by a formula, not measured.
+_EXACT = 1e-12
 
 
 class Line(NamedTuple):
@@ -41,16 +44,7 @@ def robust_line(x: Array, y: Array, z: Array) -> Line | None:
     columns = np.stack([x / size[0], z / size[1]], axis=1)
     if np.linalg.svd(columns, compute_uv=False)[1] < 1e-6:
         return None
-    weights = np.ones(len(x))
-    solution = np.zeros(2)
-    for _ in range(_ITERATIONS):
-        root = np.sqrt(weights)[:, None]
-        solution = np.linalg.lstsq(columns * root, y * root[:, 0], rcond=None)[0]
-        residual = np.abs(y - columns @ solution)
-        scale = _MAD_TO_SIGMA * float(np.median(residual))
-        if scale <= 1e-12 * float(np.abs(y).max()):
-            break
-        weights = np.minimum(1.0, _HUBER * scale / np.maximum(residual, 1e-300))
+    solution, weights = huber_fit(columns, y, _HUBER, _ROUNDS, exact=_EXACT)
     left = float(np.sum(weights * (y - columns @ solution) ** 2))
     # Against what z alone explains, so that a common trend is no relation.
     alone = (weights * z) @ y / ((weights * z) @ z)

@@ -15,11 +15,12 @@ from numpy.typing import NDArray
 from scipy.signal import butter, sosfiltfilt
 
 from cspm_ident.estimation import Parameter, Record, fit_linear
-from cspm_ident.signals.elongation import cable_motion, damping_of, elongations
+from cspm_ident.signals.cable_motion import cable_motion, damping_of
 from cspm_ident.signals.measurement import BAR, FRAME
 from cspm_ident.signals.noise import noise_above_band
 from cspm_ident.signals.samples import Samples
 from cspm_ident.signals.timeline import Timeline, whole_stretches
+from cspm_model.elastic_law import tabulated_elongation
 from cspm_model.kernels.cable import RADIUS
 from cspm_model.kernels.machine import PlantParameters
 from cspm_msgs_py.testbed import Testbed
@@ -250,10 +251,10 @@ def _equation(timeline: Timeline, parameters: PlantParameters) -> tuple[Array, d
     damping = damping_of(parameters, motion.lengths)
     # The elongation's rate from the load cells: that of the poses is too noisy to be multiplied
     # by the damping, and its noise would come back in what the delays are fitted by.
-    stretch = elongations(parameters, tensions, motion.lengths)
+    stretch = tabulated_elongation(parameters, tensions, motion.lengths)
     rates = np.gradient(stretch, timeline.period, axis=0)
     elastic = tensions - damping * rates
-    stretch = elongations(parameters, elastic, motion.lengths - stretch)
+    stretch = tabulated_elongation(parameters, elastic, motion.lengths - stretch)
     target = motion.lengths - stretch
     target -= np.nanmean(target / motion.left, axis=0) * motion.left
     softness = np.gradient(stretch, axis=0) / (np.gradient(elastic, axis=0) + 1e-12)

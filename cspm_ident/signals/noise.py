@@ -11,11 +11,13 @@ from numpy.typing import NDArray
 from cspm_ident.signals.measurement import Measurement
 from cspm_ident.signals.samples import Samples
 from cspm_ident.signals.smoothing import filtered
+from cspm_model.robust_statistics import difference_noise
 
 Array = NDArray[np.float64]
 
 _REST_S = 1.0
 _QUIET = 4.5
+_FEWEST = 16
 
 
 def noise_above_band(samples: Samples) -> Array:
@@ -25,18 +27,11 @@ def noise_above_band(samples: Samples) -> Array:
     """
     smoothed, band = filtered(samples)
     if not np.isfinite(band):
-        return _noise_of_differences(samples)
+        # A sensor whose band is full: fourth differences leave little else than noise.
+        few = len(samples.times) < _FEWEST
+        return np.zeros(samples.values.shape[1]) if few else difference_noise(samples.values, 4)
     seen = 1.0 - min(0.9, 2.0 * band / samples.rate)
     return np.asarray((samples.values - smoothed).std(axis=0) / np.sqrt(seen))
-
-
-def _noise_of_differences(samples: Samples) -> Array:
-    """Return the noise of a sensor whose band is full: fourth differences leave little else."""
-    if len(samples.times) < 16:
-        return np.zeros(samples.values.shape[1])
-    fourth = np.diff(samples.values, 4, axis=0)
-    # The binomial coefficients 1 4 6 4 1 squared sum to 70; 1.4826 MAD is robust to real jerks.
-    return np.asarray(1.4826 * np.median(np.abs(fourth), axis=0) / np.sqrt(70.0))
 
 
 def rest_of(measurement: Measurement) -> tuple[float, float] | None:

@@ -5,7 +5,7 @@ from numba import njit
 from numpy import float64
 from numpy.typing import NDArray
 
-from cspm_model.kernels.cable import cable_spans, elastic_tension, law_scale
+from cspm_model.kernels.cable import cable_spans
 from cspm_model.kernels.kinematics import cable_geometry
 from cspm_model.kernels.rotation import (
     Placement,
@@ -92,13 +92,3 @@ def spans_along(cables: Array, frame: Motions, bar: Motions, out: Array) -> None
     """
     for k in range(len(out)):
         cable_spans(cables, _placement(frame, k), _placement(bar, k), out[k])
-
-
-@njit(cache=True, error_model="numpy")
-def tensions_along(
-    elongations: Array, elastic_length: float, cables: Array, tables: Array, i: int, out: Array
-) -> None:
-    """Write the elastic tension [N] of cable i at elongations (k,) [m]; see `elastic_tension`."""
-    scale = law_scale(elastic_length, cables, i)
-    for k in range(len(elongations)):
-        out[k], _ = elastic_tension(elongations[k], elastic_length, scale, cables, tables, i)

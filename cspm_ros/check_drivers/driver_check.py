@@ -64,25 +64,6 @@ def _spoils(finding: Finding) -> bool:
     return finding.check in _SPOILING and finding.ok is False
 
 
-def check_topic(
-    topic: Topic, rate_hz: float, observation: Observation, testbed: Testbed
-) -> list[Finding]:
-    """Judge one measured topic by itself.
-
-    Args:
-        topic: what the contract says of it.
-        rate_hz: the rate that the scenario expects [Hz].
-        observation: what was heard.
-        testbed: the machine, for limits and sizes.
-
-    Raises:
-        InputError: it is no measured topic.
-    """
-    if topic.name not in MEASURED:
-        raise InputError(f"{topic.name}: no measured topic, allowed: {', '.join(MEASURED)}")
-    return _check(topic, rate_hz, observation, testbed)[0]
-
-
 def _check(
     topic: Topic, rate_hz: float, observation: Observation, testbed: Testbed
 ) -> tuple[list[Finding], Heard | None]:

@@ -7,6 +7,7 @@ from typing import NamedTuple
 
 import numpy as np
 
+from cspm_model.robust_statistics import difference_noise
 from cspm_ros.check_drivers.driver_observation import Array, Finding
 
 FACTOR_TOLERANCE = 0.1
@@ -55,7 +56,7 @@ class Series(NamedTuple):
         """Standard deviation of what is white in it, from third differences, and half a step."""
         if len(self.values) < 4:
             return float("inf")
-        white = 1.4826 * np.median(np.abs(np.diff(self.values, 3))) / np.sqrt(20.0)
+        white = difference_noise(self.values)
         steps = np.abs(np.diff(self.values))
         quantum = float(np.min(steps[steps > 0])) if (steps > 0).any() else 0.0
         return float(white) + 0.5 * quantum

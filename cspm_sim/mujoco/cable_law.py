@@ -8,6 +8,9 @@ and a straight line below f. 1/g has the pole 1/((c − d)·t) at t = 0, whose i
 logarithm; the smooth remainder is left to Gauss-Legendre quadrature. The tension at an elongation
 is the root of that integral.
 
+`cspm_model.elastic_law` has the law and its inverse for production. This is a second one on
+purpose: the MuJoCo plant checks the other plant, so it must not share its table nor its mistakes.
+
 A law is a row (a, b, c, d, E·A, f). The linear law is the one whose curve is infinitely stiff, so
 that only the cap is left: a = ∞.
 """

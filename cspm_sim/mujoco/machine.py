@@ -21,8 +21,7 @@ from cspm_sim.mujoco.extras import Extras
 Element = ElementTree.Element
 
 ORIGIN = (0.0, 0.0, 0.0)
-FRAME_BODY = 1
-BAR_BODY = 2
+BAR_BODY = 2  # after the world and the winch frame
 # MuJoCo keeps a dry joint at rest by a damper; the stiffest that it has, with a time constant of
 # two steps.
 _STICKING_STEPS = 2.0

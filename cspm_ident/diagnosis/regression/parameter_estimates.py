@@ -13,6 +13,7 @@ from cspm_ident.diagnosis.regression.collinearity import UNTRUE_SHARE
 from cspm_ident.diagnosis.residuals.drive_torque import time_constant
 from cspm_ident.diagnosis.residuals.regressors import Candidate, Place
 from cspm_ident.diagnosis.residuals.residual_equation import Equation, steady
+from cspm_model.robust_statistics import huber_fit
 from cspm_sim.effects import Channel
 
 Parts = Sequence[Sequence[Equation]]
@@ -141,13 +142,7 @@ def _calmed(parts: Parts, candidates: Sequence[Candidate]) -> Parts:
             for e in part
         ]
     )
-    counts = np.ones(len(target))
-    for _ in range(_ROUNDS):
-        root = np.sqrt(counts)
-        weights = np.linalg.lstsq(columns * root[:, None], target * root, rcond=None)[0]
-        left = np.abs(target - columns @ weights)
-        scale = max(1.4826 * float(np.median(left)), 1e-300)
-        counts = np.minimum(1.0, _HUBER * scale / np.maximum(left, 1e-300))
+    _, counts = huber_fit(columns, target, _HUBER, _ROUNDS)
     edges = np.cumsum([len(e.times) for part in parts for e in part])[:-1]
     roots = iter(np.split(np.sqrt(counts), edges))
     return [[e.weighted(next(roots)) for e in part] for part in parts]

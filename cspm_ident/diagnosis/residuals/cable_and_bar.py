@@ -14,11 +14,10 @@ from cspm_ident.diagnosis.residuals.machine_signals import (
     MachineSignals,
     body_state,
     cable_spans,
-    elongation_at,
     end_velocities,
-    law_at,
 )
-from cspm_ident.signals.elongation import damping_of
+from cspm_ident.signals.cable_motion import damping_of
+from cspm_model.elastic_law import elongation_at, law_at
 from cspm_model.equilibrium import unstretched_lengths
 from cspm_model.kernels.cable import EXIT, GEAR_RATIO, OFFSET_LENGTH, RADIUS
 from cspm_model.kernels.machine import PlantParameters

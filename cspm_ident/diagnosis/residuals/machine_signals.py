@@ -11,8 +11,6 @@ from scipy.interpolate import CubicSpline
 
 from cspm_ident.signals.timeline import Timeline, whole_stretches
 from cspm_model.kernels.cable import ARM, DIRECTION, LENGTH, RATE, SPAN_COLUMNS
-from cspm_model.kernels.cable_law import law_tensions
-from cspm_model.kernels.machine import PlantParameters
 from cspm_model.kernels.trajectory import Motions, spans_along
 
 Array = NDArray[np.float64]
@@ -210,40 +208,3 @@ def end_velocities(
     near = frame.velocity[:, None] + np.cross(frame.omega[:, None], roots)
     far = bar.velocity[:, None] + np.cross(bar.omega[:, None], spans.arms)
     return far - near, near
-
-
-def law_at(parameters: PlantParameters, elongations: Array, elastic_lengths: Array) -> Array:
-    """Return elastic tension and tangent stiffness, shape (k, n, 2), thesis (3-7), (3-10)."""
-    out = np.empty((*elongations.shape, 2))
-    law_tensions(elongations, elastic_lengths, parameters.cables, parameters.tables, out)
-    return out
-
-
-def elongation_at(
-    parameters: PlantParameters,
-    tensions: Array,
-    elastic_lengths: Array,
-    near: Array | None = None,
-) -> Array:
-    """Return the elongation at which cables carry elastic tensions, (k, n) [m]; 0 where slack.
-
-    By Newton's method, from what is `near` or from a chord; the law is smooth and rises (3-7).
-    """
-    wanted = np.maximum(tensions, 0.0)
-    if near is None or np.any((near <= 0.0) & (wanted > 0.0)):
-        law = law_at(parameters, np.full(tensions.shape, _FIRST_M), elastic_lengths)
-        near = _FIRST_M * wanted / law[:, :, 0]
-    found = np.where(wanted > 0.0, near, 0.0)
-    for _ in range(_ROUNDS):
-        law = law_at(parameters, found, elastic_lengths)
-        slope = np.where(law[:, :, 1] > 0.0, law[:, :, 1], np.inf)
-        before, found = found, np.maximum(found + (wanted - law[:, :, 0]) / slope, 0.0)
-        if np.max(np.abs(found - before), initial=0.0) < _EXACT_M:
-            break
-    return found
-
-
-_FIRST_M = 1e-4
-_ROUNDS = 12
-# Newton's next step would be the square of this.
-_EXACT_M = 1e-10

@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 
 from cspm_ident.diagnosis.residuals.free_shapes import Driver
 from cspm_ident.diagnosis.residuals.regressors import Candidate, Place
+from cspm_model.robust_statistics import difference_noise
 
 Array = NDArray[np.float64]
 Term = Candidate | Driver
@@ -133,16 +134,6 @@ class Equation:
             {name: found[rows] for name, found in self.signals.items()},
             self.shared,
         )
-
-
-def difference_noise(rows: Array) -> Array:
-    """Return what differs from row to row without connection, one sd per column of (k, channels).
-
-    By third differences, whose binomial coefficients squared sum to 20; 1.4826 times the median is
-    robust to steps.
-    """
-    apart = np.abs(np.diff(rows, 3, axis=0))
-    return np.asarray(1.4826 * np.median(apart, axis=0) / np.sqrt(20.0))
 
 
 def steady(parts: Sequence[Sequence[Equation]]) -> list[list[Equation]]:

@@ -5,8 +5,8 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from cspm_ident.diagnosis.residuals.residual_equation import difference_noise
 from cspm_ident.signals.samples import Samples
+from cspm_model.robust_statistics import difference_noise
 from cspm_msgs_py.dofs import DOFS
 from cspm_sim.effects.signals import ReadingSignal
 

@@ -13,9 +13,10 @@ from cspm_ident.diagnosis.residuals.corrected_measurement import as_found
 from cspm_ident.diagnosis.residuals.free_shapes import Driver
 from cspm_ident.diagnosis.residuals.recorded_equations import equations_of
 from cspm_ident.diagnosis.residuals.regressors import Candidate, Place
-from cspm_ident.diagnosis.residuals.residual_equation import Equation, difference_noise, in_noise
+from cspm_ident.diagnosis.residuals.residual_equation import Equation, in_noise
 from cspm_ident.diagnosis.validation.holdout_simulation import LEAD_S
 from cspm_ident.signals.measurement import Measurement
+from cspm_model.robust_statistics import difference_noise
 
 Array = NDArray[np.float64]
 

@@ -14,9 +14,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from cspm_ident.diagnosis.residuals.regressors import Candidate
-from cspm_ident.diagnosis.residuals.residual_equation import Equation, difference_noise
+from cspm_ident.diagnosis.residuals.residual_equation import Equation
 from cspm_ident.signals.measurement import Measurement
 from cspm_ident.signals.samples import Samples
+from cspm_model.robust_statistics import difference_noise
 from cspm_sim.effects import Block, Effect
 
 Array = NDArray[np.float64]

@@ -7,7 +7,7 @@ from pathlib import Path
 from cspm_msgs_py.recording.overview import overview
 from cspm_msgs_py.scenario import ClosedLoop
 from cspm_run.bundle import Bundle
-from cspm_run.recorded_statistics import tally_recording
+from cspm_run.recorded_statistics import recording_statistics
 from cspm_run.recorded_timing import first_alarm, timing_of
 from cspm_run.run_result import RunResult
 
@@ -38,7 +38,7 @@ def recorded_result(
         mode=mode,
         simulated=simulated,
         elapsed=elapsed,
-        tally=tally_recording(folder, testbed),
+        statistics=recording_statistics(folder, testbed),
         messages={topic.name: topic.count for topic in overview(folder).topics},
         folder=folder.absolute(),
         controlled=isinstance(scenario.control, ClosedLoop),

@@ -19,7 +19,7 @@ from cspm_run.assembly import Assembly, assemble
 from cspm_run.bundle import Bundle
 from cspm_run.loop import Loop
 from cspm_run.run_result import RunResult
-from cspm_run.run_statistics import Tally
+from cspm_run.run_statistics import RunStatistics
 from cspm_sim.simulator import Publish
 
 CONTRACT_VERSION = "1"
@@ -113,7 +113,7 @@ def simulate(
         steps: of the plant.
     """
     scenario, plant = parts.scenario, parts.plant
-    tally = Tally(steps, len(plant.tensions))
+    statistics = RunStatistics(steps, len(plant.tensions))
     publish: Mapping[str, Publish] = {}
     if writer is not None:
         publish = {name: writer.channel(name).append for name in parts.schedule.topics}
@@ -132,10 +132,10 @@ def simulate(
         began = time.perf_counter()
         try:
             # The first step of all compiles the kernels; it is no part of the speed.
-            _advance(loop, parts, tally, 1)
+            _advance(loop, parts, statistics, 1)
             began = time.perf_counter()
             while plant.steps < steps and not interrupted():
-                _advance(loop, parts, tally, min(PROGRESS_STEPS, steps - plant.steps))
+                _advance(loop, parts, statistics, min(PROGRESS_STEPS, steps - plant.steps))
                 progress(plant.time)
         except DivergenceError as err:
             failure = f"{err}; {loop.history()}"
@@ -149,7 +149,7 @@ def simulate(
         mode=INPROCESS,
         simulated=plant.time,
         elapsed=elapsed,
-        tally=tally,
+        statistics=statistics,
         messages=writer.counts if writer is not None else {},
         folder=writer.folder if writer is not None else None,
         controlled=parts.controlled,
@@ -159,7 +159,7 @@ def simulate(
     )
 
 
-def _advance(loop: Loop, parts: Assembly, tally: Tally, steps: int) -> None:
+def _advance(loop: Loop, parts: Assembly, statistics: RunStatistics, steps: int) -> None:
     plant = parts.plant
     reference = parts.references.get("/bar/reference")
     zero = np.zeros(6)
@@ -168,4 +168,4 @@ def _advance(loop: Loop, parts: Assembly, tally: Tally, steps: int) -> None:
         tensions = plant.tensions.copy()
         loop.step()
         error = reference.values[:6] - bar_pose if reference else zero
-        tally.add(error, tensions, loop.slack, loop.infeasible)
+        statistics.add(error, tensions, loop.slack, loop.infeasible)

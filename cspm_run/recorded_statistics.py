@@ -14,12 +14,12 @@ from cspm_msgs_py.recording.rows import Rows
 from cspm_msgs_py.schedule import BAR_POSE, BAR_REFERENCE, TENSION, TENSION_DISTRIBUTION
 from cspm_msgs_py.testbed import Testbed
 from cspm_msgs_py.topics import DIAGNOSTICS
-from cspm_run.run_statistics import Tally
+from cspm_run.run_statistics import RunStatistics
 
 Array = NDArray[np.float64]
 
 
-def tally_recording(path: Path, testbed: Testbed) -> Tally:
+def recording_statistics(path: Path, testbed: Testbed) -> RunStatistics:
     """Return errors and tensions of a recording: true ones, or measured where no truth is there.
 
     The share of infeasible wrenches is what the tension distribution reported.
@@ -35,7 +35,7 @@ def tally_recording(path: Path, testbed: Testbed) -> Tally:
         rows = recording.rows_of(names)
         shares = _infeasible_shares(recording) if counts.get(DIAGNOSTICS.name) else np.zeros(0)
     if tension is None:
-        return Tally(1, len(testbed.cables))
+        return RunStatistics(1, len(testbed.cables))
     tensions = rows[tension]
     steps = len(tensions.rows)
     errors = np.zeros((steps, 6))
@@ -45,10 +45,10 @@ def tally_recording(path: Path, testbed: Testbed) -> Tally:
     infeasible[: round(float(shares.mean() * steps)) if len(shares) else 0] = True
     limit = np.array([0.0 if cable.has_cable else -1.0 for cable in testbed.cables])
     slack = np.any(tensions.rows <= limit, axis=1)
-    tally = Tally(steps, tensions.rows.shape[1])
+    statistics = RunStatistics(steps, tensions.rows.shape[1])
     for i in range(steps):
-        tally.add(errors[i], tensions.rows[i], bool(slack[i]), bool(infeasible[i]))
-    return tally
+        statistics.add(errors[i], tensions.rows[i], bool(slack[i]), bool(infeasible[i]))
+    return statistics
 
 
 def _present(counts: dict[str, int], name: str) -> str | None:

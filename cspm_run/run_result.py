@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass, field
 from pathlib import Path
 
-from cspm_run.run_statistics import Tally
+from cspm_run.run_statistics import RunStatistics
 
 
 @dataclass(frozen=True)
@@ -18,7 +18,7 @@ class RunResult:
         mode: how it was run.
         simulated: time simulated [s].
         elapsed: wall time that took [s], without start-up and the first step.
-        tally: errors and tensions.
+        statistics: errors and tensions.
         messages: how many messages each topic got.
         folder: the recording, if one was made.
         controlled: whether a closed loop was to follow the reference.
@@ -33,7 +33,7 @@ class RunResult:
     mode: str
     simulated: float
     elapsed: float
-    tally: Tally
+    statistics: RunStatistics
     messages: dict[str, int]
     folder: Path | None
     controlled: bool

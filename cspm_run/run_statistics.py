@@ -11,7 +11,7 @@ Array = NDArray[np.float64]
 BINS = 2000
 
 
-class Tally:
+class RunStatistics:
     """Largest and mean-square pose errors, tension range, and their envelopes over time.
 
     Attributes:

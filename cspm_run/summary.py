@@ -18,9 +18,9 @@ from cspm_run.run_result import RunResult
 
 def summary_data(result: RunResult) -> dict[str, Any]:
     """Return the content of `summary.json`; errors in m and rad, tensions in N."""
-    tally = result.tally
-    low, high = tally.tension_range
-    errors = zip(DOFS, tally.max_error, tally.rms_error, strict=True)
+    statistics = result.statistics
+    low, high = statistics.tension_range
+    errors = zip(DOFS, statistics.max_error, statistics.rms_error, strict=True)
     return {
         "scenario": result.scenario,
         "seed": result.seed,
@@ -29,8 +29,8 @@ def summary_data(result: RunResult) -> dict[str, Any]:
         "real_time_factor": result.real_time_factor,
         "errors": {dof: {"max": float(peak), "rms": float(rms)} for dof, peak, rms in errors},
         "tension": {"min": low, "max": high},
-        "slack_share": tally.slack_share,
-        "infeasible_share": tally.infeasible_share,
+        "slack_share": statistics.slack_share,
+        "infeasible_share": statistics.infeasible_share,
         "messages": result.messages,
     } | ({"realtime": result.timing} if result.timing else {})
 
@@ -43,7 +43,7 @@ def write_json(path: Path, data: Any) -> None:  # noqa: ANN401 - any plain data
 def print_summary(console: Console, result: RunResult, requirement: Requirement) -> None:
     """Print pose errors (against the requirement where a controller ran), tensions and speed."""
     data = summary_data(result)
-    if result.has_bar and result.tally.steps:
+    if result.has_bar and result.statistics.steps:
         console.print(_error_table(result, data["errors"], requirement))
     if result.timing:
         console.print(_timing_table(result.timing))

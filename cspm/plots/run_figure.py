@@ -35,10 +35,10 @@ def draw_run(
         period: the plant's period [s].
     """
     has_bar = result.has_bar
-    used = -(-result.tally.steps // result.tally.bin_steps)
-    envelope = result.tally.envelope[:used]
+    used = -(-result.statistics.steps // result.statistics.bin_steps)
+    envelope = result.statistics.envelope[:used]
     thousandths: Array = 1e3 * envelope
-    time = np.arange(used, dtype=np.float64) * (result.tally.bin_steps * period)
+    time = np.arange(used, dtype=np.float64) * (result.statistics.bin_steps * period)
     figure = Figure(figsize=(11, 9 if has_bar else 4), layout="constrained")
     FigureCanvasAgg(figure)
     rows = figure.subplots(3 if has_bar else 1, 1, sharex=True, squeeze=False)[:, 0]

@@ -17,9 +17,9 @@ from rclpy.node import Node
 from rclpy.publisher import Publisher
 from rclpy.qos import DurabilityPolicy
 
-from cspm_msgs_py.complaints import Complaints
 from cspm_msgs_py.diagnostics import Status, encode_diagnostics
 from cspm_msgs_py.errors import CspmError, InputError
+from cspm_msgs_py.rate_limited_warnings import RateLimitedWarnings
 from cspm_msgs_py.ros.intake import Intake
 from cspm_msgs_py.ros.qos import contract_qos
 from cspm_msgs_py.ros.wall_timers import WallTimers
@@ -49,7 +49,7 @@ class ContractNode:
         self._clock = self.node.get_clock().handle
         self._publishers: dict[str, tuple[Publisher, frozenset[str]]] = {}
         self._steady = Clock(clock_type=ClockType.STEADY_TIME)
-        self._complaints = Complaints(self.warn)
+        self._complaints = RateLimitedWarnings(self.warn)
         self.failure: str | None = None
 
     @property

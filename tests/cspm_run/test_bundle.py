@@ -84,7 +84,7 @@ def test_a_run_needs_only_the_bundle(scenario_path, tmp_path):
     assert again == bundle
     assert surge[100] == pytest.approx(0.01 * np.sin(1.0), abs=1e-6)
     result = run(again, None, steps=200)
-    assert np.isfinite(result.tally.max_error).all()
+    assert np.isfinite(result.statistics.max_error).all()
 
 
 def test_a_file_that_cannot_be_read_is_one_line(scenario_path):

@@ -181,8 +181,8 @@ def test_recording_changes_nothing(folder):
     assert result.folder is None
     assert result.messages == {}
     again = run(bundle_of("worst_case"), folder.parent / "third", steps=300)
-    np.testing.assert_array_equal(result.tally.rms_error, again.tally.rms_error)
-    assert result.tally.tension_range == again.tally.tension_range
+    np.testing.assert_array_equal(result.statistics.rms_error, again.statistics.rms_error)
+    assert result.statistics.tension_range == again.statistics.tension_range
 
 
 def test_the_recording_says_what_was_run(folder):

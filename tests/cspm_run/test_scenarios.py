@@ -37,12 +37,12 @@ def test_each_runs_for_two_seconds(name, tmp_path):
     assert len(rows["/clock"].stamp_ns) == 2000
     for topic, found in rows.items():
         assert np.isfinite(found.rows).all(), topic
-    low, high = result.tally.tension_range
+    low, high = result.statistics.tension_range
     assert 0.0 <= low <= high < 100.0
     cables = bundle_of(name).testbed.testbed.cables
     assert (low < high) == any(cable.stiffness is not None for cable in cables)
     if result.controlled:
-        errors = result.tally.max_error
+        errors = result.statistics.max_error
         assert errors[:3].max() < 5 * POSITION
         assert errors[4:].max() < 5 * ANGLE
 
@@ -85,18 +85,18 @@ def test_the_thesis_seas_are_ridden_out():
     worst = run(bundle_of("worst_case", "duration=80"), None)
     for result, largest in ((calm, 0.05), (worst, 0.5)):
         assert result.failure is None
-        peak, rms = result.tally.max_error, result.tally.rms_error
+        peak, rms = result.statistics.max_error, result.statistics.rms_error
         assert (peak[:3] < largest).all()
         assert (rms[:3] < largest / 5).all()
         assert peak[3] < 0.3
         assert peak[4] < 0.8
-        assert result.tally.slack_share < 0.01
-        low, high = result.tally.tension_range
+        assert result.statistics.slack_share < 0.01
+        low, high = result.statistics.tension_range
         # The commands stay between 2 N and the limits of 15, 35 and 60 N.
         assert low > 1.0
         assert high < 40.0
-    assert (worst.tally.rms_error > 2 * calm.tally.rms_error).all()
-    assert worst.tally.infeasible_share > 2 * calm.tally.infeasible_share
+    assert (worst.statistics.rms_error > 2 * calm.statistics.rms_error).all()
+    assert worst.statistics.infeasible_share > 2 * calm.statistics.infeasible_share
 
 
 @pytest.mark.slow
@@ -104,10 +104,10 @@ def test_the_thesis_seas_are_ridden_out():
 def test_rest_at_full_length_shows_the_noise_floor():
     result = full("rest")
     assert result.failure is None
-    assert (result.tally.rms_error[[0, 1, 2]] < 1e-4).all()
-    assert (result.tally.rms_error[[4, 5]] < 2e-4).all()
-    assert result.tally.rms_error[3] < ANGLE
-    assert result.tally.infeasible_share == 0.0
+    assert (result.statistics.rms_error[[0, 1, 2]] < 1e-4).all()
+    assert (result.statistics.rms_error[[4, 5]] < 2e-4).all()
+    assert result.statistics.rms_error[3] < ANGLE
+    assert result.statistics.infeasible_share == 0.0
 
 
 @pytest.mark.slow
@@ -117,7 +117,7 @@ def test_verification_leaves_the_bar_swinging(length, tmp_path):
     """After the last move the bar swings as a pendulum about the frame, undamped in surge."""
     result, rows = run_to(tmp_path / "bag", f"verification_{length}")
     assert result.failure is None
-    assert result.tally.slack_share == 0.0
+    assert result.statistics.slack_share == 0.0
     stamps = rows["/truth/bar/pose"].stamp_ns
     still = stamps > 34 * 10**9
     surge = rows["/truth/bar/pose"].rows[still, 0]

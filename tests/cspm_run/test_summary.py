@@ -1,4 +1,4 @@
-"""What a run amounts to: tally, summary, figure."""
+"""What a run amounts to: statistics, summary, figure."""
 
 import json
 from dataclasses import replace
@@ -15,7 +15,7 @@ from cspm_model.kernels.rotation import euler_from_quaternion
 from cspm_msgs_py.dofs import DOFS
 from cspm_msgs_py.scenario import Requirement
 from cspm_run.recorded_run import run
-from cspm_run.run_statistics import BINS, Tally
+from cspm_run.run_statistics import BINS, RunStatistics
 from cspm_run.summary import print_summary, summary_data, write_json
 
 REQUIREMENT = Requirement()
@@ -55,7 +55,7 @@ def test_slack_share_is_that_of_the_recorded_truth(tmp_path):
     slack = (recorded(tmp_path / "bag")["/truth/cables/tension"].rows <= 0.0).any(axis=1)
     assert 0.2 < slack.mean() < 1.0
     assert summary_data(result)["slack_share"] == slack.mean()
-    assert result.tally.tension_range[0] == 0.0
+    assert result.statistics.tension_range[0] == 0.0
 
 
 def test_infeasible_share_is_that_of_the_saturated_commands(measured):
@@ -105,16 +105,16 @@ def lines_of(text):
 
 def test_the_table_judges_each_dof_against_the_requirement(measured):
     result, _ = measured
-    rms = result.tally.rms_error
+    rms = result.statistics.rms_error
     cells = lines_of(printed(result))
     assert list(cells) == list(DOFS)
     for i, dof in enumerate(DOFS):
         limit, unit = (0.002, "mm") if i < 3 else (0.004, "mrad")
         peak, mean, required, verdict = cells[dof]
-        assert peak == f"{1e3 * result.tally.max_error[i]:.3f} {unit}"
+        assert peak == f"{1e3 * result.statistics.max_error[i]:.3f} {unit}"
         assert mean == f"{1e3 * rms[i]:.3f} {unit}"
         assert required == f"± {1e3 * limit:g} {unit}"
-        worst = result.tally.max_error[i]
+        worst = result.statistics.max_error[i]
         within = "always" if worst <= limit else "RMS only" if rms[i] <= limit else "no"
         assert verdict == within
     # With another requirement every verdict turns.
@@ -125,7 +125,7 @@ def test_the_table_judges_each_dof_against_the_requirement(measured):
     text = StringIO()
     print_summary(Console(file=text, width=100), result, Requirement(position=9.0, angle=9.0))
     assert {found[-1] for found in lines_of(text.getvalue()).values()} == {"always"}
-    surge = result.tally.max_error[0], rms[0]
+    surge = result.statistics.max_error[0], rms[0]
     text = StringIO()
     between = Requirement(position=sum(surge) / 2, angle=9.0)
     print_summary(Console(file=text, width=100), result, between)
@@ -159,35 +159,38 @@ def test_tally_against_numpy():
     steps = 2 * BINS + 345
     errors, tensions = rng.normal(size=(steps, 6)), rng.uniform(1.0, 9.0, (steps, 3))
     slack, infeasible = rng.random(steps) < 0.3, rng.random(steps) < 0.6
-    tally = Tally(steps, 3)
-    assert tally.bin_steps == 3
+    statistics = RunStatistics(steps, 3)
+    assert statistics.bin_steps == 3
     for i in range(steps):
-        tally.add(errors[i], tensions[i], bool(slack[i]), bool(infeasible[i]))
-    np.testing.assert_array_equal(tally.max_error, np.abs(errors).max(axis=0))
-    np.testing.assert_allclose(tally.rms_error, np.sqrt((errors**2).mean(axis=0)), rtol=1e-12)
-    assert tally.tension_range == (tensions.min(), tensions.max())
-    assert (tally.slack_share, tally.infeasible_share) == (slack.mean(), infeasible.mean())
+        statistics.add(errors[i], tensions[i], bool(slack[i]), bool(infeasible[i]))
+    np.testing.assert_array_equal(statistics.max_error, np.abs(errors).max(axis=0))
+    np.testing.assert_allclose(statistics.rms_error, np.sqrt((errors**2).mean(axis=0)), rtol=1e-12)
+    assert statistics.tension_range == (tensions.min(), tensions.max())
+    assert (statistics.slack_share, statistics.infeasible_share) == (
+        slack.mean(),
+        infeasible.mean(),
+    )
     # The figure's envelope: lowest and highest of every three steps, also of the unfinished bin.
     for i in (0, 7, steps // 3):
         part = slice(3 * i, 3 * i + 3)
         both = np.hstack([errors[part], tensions[part]])
-        np.testing.assert_array_equal(tally.envelope[i], [both.min(axis=0), both.max(axis=0)])
+        np.testing.assert_array_equal(statistics.envelope[i], [both.min(axis=0), both.max(axis=0)])
 
 
 def test_a_tally_of_nothing():
-    tally = Tally(10, 2)
-    np.testing.assert_array_equal(tally.max_error, np.zeros(6))
-    np.testing.assert_array_equal(tally.rms_error, np.zeros(6))
-    assert tally.tension_range == (0.0, 0.0)
-    assert (tally.slack_share, tally.infeasible_share) == (0.0, 0.0)
+    statistics = RunStatistics(10, 2)
+    np.testing.assert_array_equal(statistics.max_error, np.zeros(6))
+    np.testing.assert_array_equal(statistics.rms_error, np.zeros(6))
+    assert statistics.tension_range == (0.0, 0.0)
+    assert (statistics.slack_share, statistics.infeasible_share) == (0.0, 0.0)
 
 
 @pytest.mark.parametrize("steps", [1, 2, 2 * BINS + 1])
 def test_a_tally_has_room_for_its_steps(steps):
-    tally = Tally(steps, 1)
+    statistics = RunStatistics(steps, 1)
     for _ in range(steps):
-        tally.add(np.ones(6), np.ones(1), False, False)
-    assert tally.tension_range == (1.0, 1.0)
+        statistics.add(np.ones(6), np.ones(1), False, False)
+    assert statistics.tension_range == (1.0, 1.0)
 
 
 def draw(path, result, cables):
@@ -214,16 +217,18 @@ def test_a_spike_of_one_step_is_drawn(tmp_path):
     result = run(bundle_of("one_winch"), None, steps=1)
     pictures = []
     for spike in (0.0, 5.0):
-        tally = Tally(40_000, 1)
+        statistics = RunStatistics(40_000, 1)
         for i in range(40_000):
-            tally.add(np.zeros(6), np.array([1.0 + (i % 2) + spike * (i == 20_001)]), False, False)
+            statistics.add(
+                np.zeros(6), np.array([1.0 + (i % 2) + spike * (i == 20_001)]), False, False
+            )
         path = tmp_path / f"{spike}.png"
-        pictures.append(draw(path, replace(result, tally=tally), ("surge",)))
-    assert tally.tension_range == (1.0, 7.0)
+        pictures.append(draw(path, replace(result, statistics=statistics), ("surge",)))
+    assert statistics.tension_range == (1.0, 7.0)
     assert (pictures[0] != pictures[1]).mean() > 0.01
 
 
 def test_a_run_that_ended_at_once_can_be_drawn(tmp_path):
-    result = replace(run(bundle_of("rest"), None, steps=1), tally=Tally(10, 8))
+    result = replace(run(bundle_of("rest"), None, steps=1), statistics=RunStatistics(10, 8))
     assert draw(tmp_path / "run.png", result, THESIS_CABLES).size > 0
     assert "│" not in printed(result)

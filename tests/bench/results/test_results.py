@@ -79,10 +79,10 @@ def test_every_case_is_a_run_that_can_be_made():
 def test_following_finds_what_a_run_finds():
     case = Case("worst_case", ("duration=0.5",))
     errors, tensions, missed, failure = follow(case.bundle())
-    tally = run(case.bundle(), None).tally
-    np.testing.assert_allclose(np.sqrt((errors**2).mean(axis=0)), tally.rms_error, rtol=1e-9)
-    assert (tensions.min(), tensions.max()) == tally.tension_range
-    assert missed.mean() == pytest.approx(tally.infeasible_share)
+    statistics = run(case.bundle(), None).statistics
+    np.testing.assert_allclose(np.sqrt((errors**2).mean(axis=0)), statistics.rms_error, rtol=1e-9)
+    assert (tensions.min(), tensions.max()) == statistics.tension_range
+    assert missed.mean() == pytest.approx(statistics.infeasible_share)
     assert failure == ""
 
 

@@ -71,7 +71,7 @@ class Intake:
     """A gatherer that records to a folder, with what it told."""
 
     def __init__(self, bundle, folder, acknowledge=None, reporting=()):
-        self.told, self.complaints = [], []
+        self.told, self.rate_limited_warnings = [], []
         schedule = schedule_of(bundle.scenario, bundle.testbed.testbed)
         self.writer = new_recording(bundle, folder, "graph")
         self.gatherer = Gatherer(
@@ -79,7 +79,7 @@ class Intake:
             bundle.testbed.testbed.topics,
             self.writer,
             acknowledge or self.told.append,
-            lambda topic, reason: self.complaints.append((topic, reason)),
+            lambda topic, reason: self.rate_limited_warnings.append((topic, reason)),
             reporting,
         )
         self._receive = {name: self.gatherer.receive(name) for name in schedule.topics}
@@ -277,9 +277,9 @@ def test_what_does_not_belong_changes_nothing(case, tmp_path_factory, seed):
             at[queue] += 1
         intake.gatherer.end(STEPS - 1)
     assert content(folder) == content(case.expected)
-    assert intake.gatherer.refused[0] == added == len(intake.complaints)
+    assert intake.gatherer.refused[0] == added == len(intake.rate_limited_warnings)
     assert added > 100
-    assert all(reason.startswith(f"{topic}: ") for topic, reason in intake.complaints)
+    assert all(reason.startswith(f"{topic}: ") for topic, reason in intake.rate_limited_warnings)
 
 
 @pytest.fixture
@@ -297,7 +297,7 @@ def test_a_broken_message_with_the_right_stamp_does_not_take_the_genuine_ones_pl
     for payload in (encode(0, np.full(8, np.nan)), names, good[:-8]):
         fresh.take("/cables/tension", payload)
     assert fresh.gatherer.refused[0] == 3
-    assert [reason.split(", allowed")[0] for _, reason in fresh.complaints] == [
+    assert [reason.split(", allowed")[0] for _, reason in fresh.rate_limited_warnings] == [
         "/cables/tension: effort of hoist_1 is nan",
         "/cables/tension: name 1 is 'hoist_9'",
         f"/cables/tension: {len(good) - 8} bytes that are no sensor_msgs/msg/JointState",
@@ -332,7 +332,7 @@ def test_a_broken_message_with_the_right_stamp_does_not_take_the_genuine_ones_pl
 def test_other_diagnostics_are_refused(fresh, payload, reason):
     fresh.gatherer.receive_diagnostics(payload, 0)
     assert fresh.gatherer.refused == (1, f"/diagnostics: {reason}")
-    assert fresh.complaints == [("/diagnostics", f"/diagnostics: {reason}")]
+    assert fresh.rate_limited_warnings == [("/diagnostics", f"/diagnostics: {reason}")]
     fresh.gatherer.receive_diagnostics(encode_diagnostics(0, [(0, "plant", "ok", {})]), 0)
     assert fresh.gatherer.refused[0] == 1
 

@@ -52,7 +52,7 @@ def test_blocks_make_the_same_file(case, tmp_path, seed, share):
         intake.gatherer.end(STEPS - 1)
         assert intake.gatherer.done
     assert content(tmp_path / "bag") == content(case.expected)
-    assert intake.gatherer.refused[0] == added == len(intake.complaints)
+    assert intake.gatherer.refused[0] == added == len(intake.rate_limited_warnings)
     assert (added > 20) == (share > 0.0)
     assert intake.told[-1] == STEPS - 1
 

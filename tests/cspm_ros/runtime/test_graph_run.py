@@ -99,7 +99,9 @@ def test_the_recording_is_the_one_of_a_run_in_process(tmp_path, name):
     assert result.simulated == kept.simulated
     assert (result.failure, result.interrupted) == (kept.failure, False)
     assert (result.failure is not None) == (name == "safe state")
-    np.testing.assert_allclose(result.tally.rms_error, kept.tally.rms_error, rtol=1e-9, atol=1e-14)
+    np.testing.assert_allclose(
+        result.statistics.rms_error, kept.statistics.rms_error, rtol=1e-9, atol=1e-14
+    )
     with Recording(tmp_path / "graph") as recording:
         assert recording.complete
         assert recording.metadata["cspm"] == metadata(bundle, "graph")

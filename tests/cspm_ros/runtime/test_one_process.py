@@ -61,7 +61,7 @@ def test_every_message_that_is_sent_is_recorded(tmp_path, plant):
     assert 598 - result.timing[FORCE_CONTROLLER]["deadlines_missed"] <= sent <= 605
     # The plant heard no command that is not recorded.
     assert 600 - result.timing[PLANT]["deadlines_missed"] <= sent
-    assert max(result.tally.max_error[:3]) < 0.01
+    assert max(result.statistics.max_error[:3]) < 0.01
 
 
 def test_at_1_khz_nothing_is_lost_however_late_the_nodes_are(tmp_path):

@@ -8,7 +8,7 @@ from cspm_msgs_py.diagnostics import encode_diagnostics
 from cspm_msgs_py.errors import InputError
 from cspm_msgs_py.recording import Recording
 from cspm_run.recorded_run import new_recording, run
-from cspm_run.recorded_statistics import tally_recording
+from cspm_run.recorded_statistics import recording_statistics
 
 MS = 1_000_000
 # A cable is let go.
@@ -19,7 +19,7 @@ def both(tmp_path, scenario, *overrides, steps):
     """Return the account of a run and the one of its recording."""
     bundle = bundle_of(scenario, *overrides)
     result = run(bundle, tmp_path / "bag", steps=steps)
-    return result.tally, tally_recording(tmp_path / "bag", bundle.testbed.testbed)
+    return result.statistics, recording_statistics(tmp_path / "bag", bundle.testbed.testbed)
 
 
 def assert_alike(kept, found):
@@ -70,9 +70,9 @@ def keep_only(source, folder, bundle, wanted):
 
 def test_without_truth_the_measured_values_are_taken(tmp_path):
     bundle = bundle_of("rest")
-    kept = run(bundle, tmp_path / "bag", steps=400).tally
+    kept = run(bundle, tmp_path / "bag", steps=400).statistics
     keep_only(tmp_path / "bag", tmp_path / "real", bundle, lambda name: "/truth" not in name)
-    found = tally_recording(tmp_path / "real", bundle.testbed.testbed)
+    found = recording_statistics(tmp_path / "real", bundle.testbed.testbed)
     assert found.steps == 400
     with Recording(tmp_path / "bag") as recording:
         tensions = recording.rows("/cables/tension").rows
@@ -88,9 +88,9 @@ def test_without_truth_the_measured_values_are_taken(tmp_path):
 @pytest.mark.parametrize("missing", ["/bar/reference", "pose"])
 def test_without_reference_or_pose_there_are_no_errors(tmp_path, missing):
     bundle = bundle_of("rest")
-    kept = run(bundle, tmp_path / "bag", steps=100).tally
+    kept = run(bundle, tmp_path / "bag", steps=100).statistics
     keep_only(tmp_path / "bag", tmp_path / "part", bundle, lambda name: missing not in name)
-    found = tally_recording(tmp_path / "part", bundle.testbed.testbed)
+    found = recording_statistics(tmp_path / "part", bundle.testbed.testbed)
     assert not found.rms_error.any()
     assert found.tension_range == kept.tension_range
 
@@ -98,7 +98,7 @@ def test_without_reference_or_pose_there_are_no_errors(tmp_path, missing):
 def test_without_tensions_nothing_is_counted(tmp_path):
     bundle = bundle_of("rest")
     new_recording(bundle, tmp_path / "bag", "graph").close()
-    found = tally_recording(tmp_path / "bag", bundle.testbed.testbed)
+    found = recording_statistics(tmp_path / "bag", bundle.testbed.testbed)
     assert found.steps == 0
     assert found.tension_range == (0.0, 0.0)
     assert (found.slack_share, found.infeasible_share) == (0.0, 0.0)
@@ -113,7 +113,7 @@ def test_a_turn_is_no_error(tmp_path):
         writer.channel("/truth/bar/pose").append(0, 0, np.array([0, 0, 2.0, *quaternion[1]]))
         reference = np.array([0, 0, 2.0, *quaternion[-1], *np.zeros(12)])
         writer.channel("/bar/reference").append(0, 0, reference)
-    found = tally_recording(tmp_path / "bag", bundle.testbed.testbed)
+    found = recording_statistics(tmp_path / "bag", bundle.testbed.testbed)
     assert found.max_error[5] == pytest.approx(2 * np.pi - 6.2)
     assert not found.max_error[:5].any()
 
@@ -140,10 +140,10 @@ def test_shares_are_those_that_the_distribution_told(tmp_path, told, expected):
                 (0, "tension_distribution", "ok", {"another": "1"}),
             ]
             writer.append_payload("/diagnostics", i * MS, encode_diagnostics(i * MS, statuses))
-    found = tally_recording(tmp_path / "bag", bundle.testbed.testbed)
+    found = recording_statistics(tmp_path / "bag", bundle.testbed.testbed)
     assert found.infeasible_share == pytest.approx(expected)
 
 
 def test_no_recording_is_one_line(tmp_path):
     with pytest.raises(InputError, match=r"no such file or folder$"):
-        tally_recording(tmp_path / "none", bundle_of("rest").testbed.testbed)
+        recording_statistics(tmp_path / "none", bundle_of("rest").testbed.testbed)

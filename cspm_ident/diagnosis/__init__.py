@@ -1,0 +1,1 @@
+"""From recordings and a test-bed file to findings: which physics the file lacks, and how sure."""

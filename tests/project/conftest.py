@@ -1,0 +1,25 @@
+"""What tests of the project as a whole share."""
+
+import shutil
+import subprocess
+from pathlib import Path
+
+import pytest
+
+ROOT = Path(__file__).resolve().parents[2]
+
+
+@pytest.fixture(scope="session")
+def source(tmp_path_factory):
+    """A workspace with a copy of all files that are under version control or will be."""
+    listed = ["git", "ls-files", "--cached", "--others", "--exclude-standard", "-z"]
+    found = subprocess.run(listed, cwd=ROOT, capture_output=True, text=True, check=False)
+    if found.returncode:
+        pytest.skip("not a git checkout")
+    workspace = tmp_path_factory.mktemp("workspace")
+    for name in found.stdout.split("\0"):
+        if name and (ROOT / name).is_file():
+            target = workspace / "src" / "cspm" / name
+            target.parent.mkdir(parents=True, exist_ok=True)
+            shutil.copy2(ROOT / name, target)
+    return workspace

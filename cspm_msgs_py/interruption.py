@@ -10,7 +10,7 @@ from types import FrameType
 
 @contextmanager
 def interruptible() -> Iterator[Callable[[], bool]]:
-    """Give what tells whether SIGINT or SIGTERM came; a second one ends the program as usual."""
+    """Return whether SIGINT or SIGTERM came, as a function; a second one ends the program."""
     seen: list[int] = []
 
     def note(number: int, _: FrameType | None) -> None:

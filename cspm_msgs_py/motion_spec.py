@@ -128,7 +128,7 @@ class FileMotion(StrictModel):
 
     Attributes:
         path: the file, relative to the scenario's folder.
-        rate: knots per second [Hz]; absent: as many as the file's shortest time step asks for.
+        rate: knots per second [Hz]; absent: as many as the file's shortest time step requires.
     """
 
     type: Literal["file"] = "file"

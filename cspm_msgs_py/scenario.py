@@ -135,7 +135,7 @@ class ComputedWrenchControl(StrictModel):
     [rad/s] that of the observer. With a `governor` the bar leaves its reference, ahead of time and
     as little as can be, where no tensions can give it. `known_wrench` [N, N·m] is a constant one on
     the bar's origin in world_ned, such as wind that was measured. With `mass_adaptation` the bar's
-    mass is told from its heave. The force controllers are designed at `design_pose`.
+    mass is estimated from its heave. The force controllers are designed at `design_pose`.
     """
 
     law: Literal["computed_wrench"]
@@ -159,7 +159,7 @@ class ComputedWrenchControl(StrictModel):
 
 
 class LoadCellBias(StrictModel):
-    """Up to how much load cells may say too much or too little [N]."""
+    """Largest bias of a load cell that is corrected [N]."""
 
     largest: PositiveFloat = 2.0
 
@@ -179,10 +179,10 @@ class WinchFeedforward(StrictModel):
 class ForceControl(StrictModel):
     """Force controllers: closed-loop bandwidth [rad/s] to design for, or the gains per cable.
 
-    With `load_cell_bias` the biases of the load cells are told from torques and speeds of the
+    With `load_cell_bias` the biases of the load cells are estimated from torques and speeds of the
     winches, and taken off. With `friction_feedforward` the torque goes ahead of the friction that
-    the test-bed's file tells, with `winch_feedforward` of what the wanted tensions and the
-    references ask of the winches.
+    the test-bed's file describes, with `winch_feedforward` of what the wanted tensions and the
+    references require of the winches.
     """
 
     bandwidth: PositiveFloat = 800.0
@@ -217,7 +217,7 @@ class TensionDistribution(StrictModel):
 
 
 def law(motion: object) -> object:
-    """Return a motion controller's law: the thesis's where none is said."""
+    """Return a motion controller's law: the thesis's by default."""
     if isinstance(motion, dict):
         return motion.get("law", "pid")
     return getattr(motion, "law", "pid")
@@ -392,7 +392,7 @@ def _override(content: object, override: str) -> dict[str, Any]:
         node[parent] = dict(inner)
         node = node[parent]
     if key == "control.mode" and node.get("mode") != value:
-        # What the file says of one mode is unknown to another.
+        # What the file sets for one mode is unknown to another.
         node.clear()
     node[leaf] = value
     return root

@@ -2,7 +2,7 @@
 
 A topic's messages have one layout (`cspm_msgs_py.layout`), so writing one is filling in stamp and
 numbers, and reading one is comparing everything else and taking them out: 1 to 2 µs each. Other
-senders may fill more of a message than the contract asks for; their form is learned from the first
+senders may fill more of a message than the contract requires; their form is learned from the first
 such message, with the typed reader of `rosbags`. Whatever else arrives is refused with one line.
 
 Writers and readers keep state: use each from one thread at a time.
@@ -105,7 +105,7 @@ class WireReader:
         Accepted is what carries the contract's numbers: any frame, in a JointState more parts than
         asked for (they are not looked at), either byte order, uninitialised padding, and up to 8
         bytes that some serialisers append. The bytes do not name their type: that twist and wrench
-        are told apart is up to the middleware.
+        are distinguished is up to the middleware.
 
         Raises:
             InputError: no message of the topic's type, other names or another order of them, a
@@ -260,7 +260,7 @@ def _is_unit(quaternions: Array) -> bool:
 
 
 def _sender_of(topic: Topic, message: Any) -> Topic:  # noqa: ANN401 - generated classes
-    """Return the topic as the message's sender writes it, if all the contract asks for is there."""
+    """Return the topic as the message's sender writes it, if it has all that is required."""
     for part in ("name", "joint_names"):
         if hasattr(message, part):
             _check_names(topic, getattr(message, part))

@@ -74,8 +74,8 @@ def _yaml_fault(err: MarkedYAMLError) -> str:
     line = err.problem_mark.line + 1 if err.problem_mark else 0
     problem = " ".join(str(err.problem).split())
     if isinstance(err, DuplicateKeyError):
-        told = problem.removeprefix("found ").split(" with value ")[0]
-        return f"line {line}: {told}, allowed: each key once"
+        found = problem.removeprefix("found ").split(" with value ")[0]
+        return f"line {line}: {found}, allowed: each key once"
     if problem.startswith("but "):
         problem = f"{' '.join(str(err.context).split())}, {problem}"
     return f"line {line}: not YAML: {problem}"

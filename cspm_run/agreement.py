@@ -1,4 +1,4 @@
-"""How far the two plants are apart, and the page that says so.
+"""How far the two plants differ, and the page that shows it.
 
 Run `python -m cspm_run.agreement > docs/agreement.md` after a change in either plant.
 """

@@ -82,10 +82,10 @@ class Assembly:
 
 
 def resolve(scenario: Scenario, testbed: Testbed) -> Scenario:
-    """Return the scenario with its controller gains worked out, so that it says all of itself.
+    """Return the scenario with its controller gains computed, so that it is complete.
 
     Raises:
-        InputError: the machine cannot be controlled as the scenario asks.
+        InputError: the machine cannot be controlled as the scenario requires.
     """
     control = scenario.control
     if not isinstance(control, ClosedLoop):

@@ -35,7 +35,7 @@ class _Due(NamedTuple):
 class Loop:
     """One run in one process; `step` advances it by one plant period.
 
-    After a step `slack` and `infeasible` tell of the state that was just published.
+    After a step `slack` and `infeasible` describe the state that was just published.
     """
 
     def __init__(

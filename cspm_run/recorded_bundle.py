@@ -1,4 +1,4 @@
-"""What a recording says was run."""
+"""The run that a recording describes."""
 
 from __future__ import annotations
 

@@ -26,7 +26,7 @@ def recorded_result(
     """Return the result of a run that is recorded in a folder; see `RunResult`.
 
     `failure` is what is known of it besides alarms in the recording; `timed` says whether nodes
-    told of deadlines.
+    reported deadlines.
 
     Raises:
         InputError: the recording cannot be read.

@@ -1,4 +1,4 @@
-"""A run from start to end: assemble, step, record, and say what it amounted to."""
+"""A run from start to end: assemble, step, record, and return its statistics."""
 
 from __future__ import annotations
 
@@ -104,7 +104,7 @@ def simulate(
     progress: Callable[[float], None],
     steps: int,
 ) -> RunResult:
-    """Step assembled parts to the end, and say what it amounted to; see `run`.
+    """Step assembled parts to the end, and return the statistics; see `run`.
 
     Args:
         parts: what to step.

@@ -74,8 +74,8 @@ def _values(rows: Array) -> Array:
 
 
 def _infeasible_shares(recording: Recording) -> Array:
-    """Return the shares that the tension distribution told, each of about the same time."""
-    told = [
+    """Return the shares that the tension distribution reported, each of about the same time."""
+    reported = [
         status.values["infeasible_share"]
         for payload in recording.payloads(DIAGNOSTICS.name).payloads
         for status in decode_diagnostics(payload).statuses
@@ -83,7 +83,7 @@ def _infeasible_shares(recording: Recording) -> Array:
     ]
     # The first of several is that of a single computation.
     return np.array(
-        [share for text in told[len(told) > 1 :] if 0.0 <= (share := _number(text)) <= 1.0]
+        [share for text in reported[len(reported) > 1 :] if 0.0 <= (share := _number(text)) <= 1.0]
     )
 
 

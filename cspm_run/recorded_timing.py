@@ -1,4 +1,4 @@
-"""What the nodes of a recorded run told of themselves on `/diagnostics`."""
+"""What the nodes of a recorded run reported about themselves on `/diagnostics`."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ LARGEST = ("worst_latency_ms",)
 
 
 def first_alarm(path: Path) -> str | None:
-    """Return the first error that a node told, with its name, if one did.
+    """Return the first error that a node reported, with its name, if one did.
 
     Raises:
         InputError: the recording cannot be read.
@@ -27,7 +27,7 @@ def first_alarm(path: Path) -> str | None:
 
 
 def timing_of(path: Path) -> dict[str, dict[str, float]]:
-    """Return by node what it told of deadlines, stale and unusable inputs, and losses.
+    """Return by node what it reported of deadlines, stale and unusable inputs, and losses.
 
     Raises:
         InputError: the recording cannot be read.
@@ -38,8 +38,8 @@ def timing_of(path: Path) -> dict[str, dict[str, float]]:
             if key in TOTALS:
                 found.setdefault(status.name, {})[key] = int(text)
             elif key in LARGEST:
-                told = found.setdefault(status.name, {})
-                told[key] = max(told.get(key, 0.0), float(text))
+                reported = found.setdefault(status.name, {})
+                reported[key] = max(reported.get(key, 0.0), float(text))
     return found
 
 

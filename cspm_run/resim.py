@@ -40,7 +40,7 @@ class Resimulation:
 
 
 def resimulate(path: Path, progress: Callable[[float, float], None]) -> Resimulation:
-    """Run again what a recording says it ran, for as long as it lasts, and compare.
+    """Repeat the run that a recording describes, for as long as it lasts, and compare.
 
     Args:
         path: the recording.

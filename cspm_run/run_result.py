@@ -25,7 +25,7 @@ class RunResult:
         has_bar: whether the errors mean anything.
         interrupted: whether the user ended it early.
         failure: what went wrong, in one line, if anything did.
-        timing: in real time, what each node told of its deadlines and inputs, by node.
+        timing: in real time, what each node reported of its deadlines and inputs, by node.
     """
 
     scenario: str

@@ -74,16 +74,16 @@ def _error_table(
 
 
 def _timing_table(timing: dict[str, dict[str, float]]) -> Table:
-    """Return what each node told of its deadlines; a cell is empty where it has none."""
+    """Return what each node reported of its deadlines; a cell is empty where it has none."""
     table = Table(title="real time: totals of the run", box=box.SIMPLE, pad_edge=False)
-    keys = list(dict.fromkeys(key for told in timing.values() for key in told))
+    keys = list(dict.fromkeys(key for reported in timing.values() for key in reported))
     table.add_column("node", no_wrap=True)
     for key in keys:
         # Two lines each, so that all columns fit into 80 characters.
         heading = key.replace("_", "\n", 1).replace("latency_ms", "late, ms")
         table.add_column(heading, justify="right", no_wrap=True)
-    for node, told in timing.items():
-        table.add_row(node, *(f"{told[key]:g}" if key in told else "" for key in keys))
+    for node, reported in timing.items():
+        table.add_row(node, *(f"{reported[key]:g}" if key in reported else "" for key in keys))
     return table
 
 

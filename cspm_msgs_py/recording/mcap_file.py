@@ -128,7 +128,7 @@ class McapFile:
         return parse(Footer, tail[HEAD.size : -len(MAGIC)], str(self.path))
 
     def _read_summary(self, footer: Footer) -> bool:
-        """Take all from the summary; return whether it tells where the messages are."""
+        """Take all from the summary; return whether it lists where the messages are."""
         start, end = footer.summary_start, self._size - _FOOTER_SIZE
         if start == 0:
             return False
@@ -265,7 +265,7 @@ class McapFile:
         return self.channels[channel].topic
 
     def check_not_bare(self) -> None:
-        """Refuse a file that was not closed and tells nothing of any message.
+        """Refuse a file that was not closed and lists no message.
 
         Raises:
             InputError: it is such a file.

@@ -39,7 +39,7 @@ class Rows(NamedTuple):
 class RowCollector:
     """Decodes a topic's messages in batches.
 
-    The first message tells frame and names. A message that has the same bytes but for stamp,
+    The first message gives frame and names. A message that has the same bytes but for stamp,
     numbers and padding is decoded by array operations, any other one by one; one that has other
     names or another frame is refused.
     """

@@ -1,4 +1,4 @@
-"""What a recording says of the run that made it, in its metadata."""
+"""What a recording states about the run that made it, in its metadata."""
 
 from __future__ import annotations
 

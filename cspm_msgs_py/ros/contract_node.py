@@ -185,7 +185,7 @@ class ContractNode:
     def unconnected(self, publisher: Publisher, readers: Collection[str]) -> list[str]:
         """Return which of `readers`, by node, a publisher of this node does not reach yet.
 
-        Others may listen as well; those who ask for another type or for stored messages are never
+        Others may listen as well; those who want another type or for stored messages are never
         reached.
         """
         found = [
@@ -225,23 +225,23 @@ class ContractNode:
             self.node.destroy_timer(timer)
 
     def now_ns(self) -> int:
-        """Return the time on the ROS clock [ns], simulated where `use_sim_time` says so."""
+        """Return the time on the ROS clock [ns], simulated where `use_sim_time` is set."""
         with self._clock:
             return int(self._clock.get_now().nanoseconds)
 
     def complain(self, subject: str, text: str) -> None:
-        """Say what is wrong with a topic's messages; a flood of them does not fill the log."""
+        """Log what is wrong with a topic's messages; a flood of them does not fill the log."""
         self._complaints.add(subject, text)
 
     def fail(self, text: str) -> None:
         """Have the session end with what is wrong; the first one counts.
 
-        An exception in a callback would be told by ROS as well, with its traceback.
+        An exception in a callback would be printed by ROS as well, with its traceback.
         """
         self.failure = self.failure or text
 
     def warn(self, text: str) -> None:
-        """Say something on the node's log."""
+        """Write a line to the node's log."""
         self.node.get_logger().warning(text)
 
 

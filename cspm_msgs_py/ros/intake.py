@@ -55,7 +55,7 @@ class Intake:
     ) -> None:
         """Have `receive` called with each message's CDR bytes, time of reception [ns], and number.
 
-        The number is its sender's, None where the middleware tells none. `numbered` says whether
+        The number is its sender's, None where the middleware gives none. `numbered` says whether
         the numbers are to show losses: of one sender, and of others that may come and go.
         `reliability` is asked of them, the last `depth` messages wait, or all if None.
         """
@@ -84,7 +84,7 @@ class Intake:
     ) -> None:
         """Have `receive` called with each message's stamp [ns], row and number.
 
-        What is not sound and in the contract's own bytes goes to `receive_bytes` as in `subscribe`
+        What is not intact and in the contract's own bytes goes to `receive_bytes` as in `subscribe`
         with numbers that mean nothing, and so does all where rcl cannot be called. All messages
         wait.
         """

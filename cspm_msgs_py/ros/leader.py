@@ -13,7 +13,7 @@ _NOTICE_NS = 200_000_000
 
 
 class Leader:
-    """Waits for all nodes and inputs, sets the start, and tells the end.
+    """Waits for all nodes and inputs, sets the start, and announces the end.
 
     Attributes:
         start_ns: when the run begins [ns], None while something is missing.

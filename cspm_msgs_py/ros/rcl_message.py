@@ -37,7 +37,7 @@ class RclMessage:
 
     Attributes:
         address: of the message.
-        info_address: of what the middleware tells of it: times of sending and reception, number.
+        info_address: of what the middleware knows of it: times of sending and reception, number.
         state: both as words, (24,).
     """
 

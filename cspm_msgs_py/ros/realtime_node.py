@@ -99,7 +99,7 @@ class RealtimeNode:
         self._loop.start(start_ns)
 
     def _connected(self) -> bool:
-        """Return whether drivers have been heard without a pause, and read what they are told."""
+        """Return whether drivers have been heard without a pause, and read the commands to them."""
         now = self._node.now_ns()
         read = all(self._node.has_other_readers(name) for name in self._driven)
         if not read or not self._loop.hears(self._foreign, now):

@@ -1,9 +1,9 @@
 """The nodes of a run find each other, start and end together.
 
-Followers tell the leader, which is the plant where there is a simulated one, on `/run/progress`
+Followers report to the leader, a simulated plant where there is one, on `/run/progress`
 that they are connected (stamp −1 s), or are but for somebody else's drivers (−2 s); in lockstep
-also, later, through which instant they are complete. The leader tells all on `/run/start` that the
-run begins, in real time at which instant the motions do. It tells all on `/run/end` at which
+also, later, through which instant they are complete. The leader announces on `/run/start` that the
+run begins, in real time at which instant the motions do. It announces on `/run/end` at which
 instant the run ended.
 """
 
@@ -30,7 +30,7 @@ class FollowerSide:
     """A follower's side.
 
     Attributes:
-        end_ns: the instant at which the run ended [ns], once the leader has told.
+        end_ns: the instant at which the run ended [ns], once the leader has announced it.
     """
 
     def __init__(
@@ -67,11 +67,11 @@ class FollowerSide:
 
     @property
     def end_step(self) -> int | None:
-        """The last step of a lockstep run, once the plant has told."""
+        """The last step of a lockstep run, once the plant has announced it."""
         return None if self.end_ns is None else self.end_ns // self._period_ns
 
-    def tell(self, step: int) -> None:
-        """Tell that this node is complete through `step`."""
+    def report(self, step: int) -> None:
+        """Report that this node is complete through `step`."""
         self._timer.cancel()
         self._send(step * self._period_ns)
 
@@ -156,15 +156,15 @@ class PlantSide:
         return Counter(str(info.node_name) for info in found)
 
     def tell_end(self, step: int) -> None:
-        """Tell all that a lockstep run ended with `step`."""
+        """Announce that a lockstep run ended with `step`."""
         self.tell_end_at(step * self._period_ns)
 
     def tell_end_at(self, stamp_ns: int) -> None:
-        """Tell all at which instant [ns] the run ended."""
+        """Announce at which instant [ns] the run ended."""
         self._publisher.publish(self._stamped(stamp_ns))
 
     def tell_start_at(self, stamp_ns: int) -> None:
-        """Tell all at which instant [ns] the run begins: on the ROS clock, in lockstep 0."""
+        """Announce at which instant [ns] the run begins: on the ROS clock, in lockstep 0."""
         self._starter.publish(self._stamped(stamp_ns))
 
     def _stamped(self, stamp_ns: int) -> object:

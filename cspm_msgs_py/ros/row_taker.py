@@ -23,7 +23,7 @@ _MOST_ROWS = 64
 
 
 class TakenRow(NamedTuple):
-    """A sound message: stamp [ns], row (width,), and its sender's number, None where not known."""
+    """An intact message: stamp [ns], row (width,), and its sender's number, None if unknown."""
 
     stamp_ns: int
     row: Array
@@ -31,7 +31,7 @@ class TakenRow(NamedTuple):
 
 
 class TakenBytes(NamedTuple):
-    """Any other message: its CDR bytes, and its sender's number, None where not known."""
+    """Any other message: its CDR bytes, and its sender's number, None if unknown."""
 
     payload: bytes
     number: int | None

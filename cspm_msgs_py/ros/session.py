@@ -28,7 +28,7 @@ DISCOVERY_RANGE = "ROS_AUTOMATIC_DISCOVERY_RANGE"
 MIDDLEWARE_PROFILES = "FASTRTPS_DEFAULT_PROFILES_FILE"
 _LOOK_EVERY_S = 0.02
 _LONG_S = 1e6
-# A node that was told to stop leaves in less than a second, whoever does not answer it.
+# A node that was ordered to stop leaves in less than a second, whoever does not answer it.
 FAREWELL_S = 0.5
 # In a polled session: how often the executor has its turn, and how long it waits when all is quiet.
 _TURN_S, _IDLE_S = 0.01, 0.0002
@@ -61,7 +61,7 @@ class Session:
         Raises:
             InputError: ROS does not understand the command line.
         """
-        # Strangers on the network must not reach winches by accident: who wants more says so.
+        # Strangers on the network must not reach winches: who wants more sets the variable.
         os.environ.setdefault(DISCOVERY_RANGE, "LOCALHOST")
         os.environ.setdefault(MIDDLEWARE_PROFILES, str(Path(__file__).with_name("fastdds.xml")))
         self.context = Context()
@@ -85,7 +85,7 @@ class Session:
         self._nodes[0].every(seconds, call)
 
     def warn(self, text: str) -> None:
-        """Say something on the first node's log."""
+        """Write a line to the first node's log."""
         self._nodes[0].warn(text)
 
     def spin_until(self, done: Callable[[], bool], timeout_s: float | None = None) -> bool:
@@ -178,7 +178,7 @@ class Session:
         return self._left or self._interrupted()
 
     def stop(self) -> None:
-        """Ask for the end."""
+        """Request the end."""
         self._left = True
 
 

@@ -22,7 +22,7 @@ Array = NDArray[np.float64]
 
 
 class StageNode:
-    """Feeds a stage with messages as the lockstep schedule asks.
+    """Feeds a stage with messages as the lockstep schedule requires.
 
     Attributes:
         refused: how many messages were unusable, and why the last was.
@@ -92,7 +92,7 @@ class StageNode:
     def _tell(self) -> None:
         reached = self._follower.reached
         if self._acknowledgement is not None and self._acknowledgement.due(reached):
-            self._plant.tell(reached)
+            self._plant.report(reached)
 
     def _end(self, last_step: int) -> None:
         self._follower.check_end(last_step)

@@ -28,8 +28,8 @@ FOUND_BUFFER, FOUND_LENGTH, FOUND_NUMBER = 0, 1, 10
 # Places in `found` and `due`: stamp [ns], sender's number, and from one stamp to the next [ns].
 STAMP, NUMBER, STEP = range(3)
 UNKNOWN = -1  # number of a middleware that counts nothing
-# How a look ends, beside an error's code: a sound message was taken, nothing was there, or one that
-# is not as it should be lies in the buffer.
+# How a look ends, beside an error's code: an intact message was taken, nothing was there, or a
+# malformed one lies in the buffer.
 TAKEN, NOTHING, STRANGE = 0, 401, -1
 
 _NANOSECONDS = 1_000_000_000
@@ -60,7 +60,7 @@ def take_row(
     found: Words,
     row: Array,
 ) -> int:
-    """Take a message; read it if it is sound and has the contract's own bytes.
+    """Take a message; read it if it is intact and has the contract's own bytes.
 
     Args:
         form: addresses to call and to write to, and the form of the topic's messages, (8,).

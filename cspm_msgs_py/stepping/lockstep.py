@@ -1,6 +1,6 @@
 """One node's part in the lockstep handshake: it computes when what the schedule names is there.
 
-Nobody asks for the time. A node computes step k once the messages with exactly the stamps that it
+No node reads a clock. A node computes step k once the messages with exactly the stamps that it
 needs at k have come, in whatever order; so neither the machine's speed nor the network's changes
 what is computed.
 """
@@ -50,12 +50,12 @@ class Sequence:
 
         Args:
             stamp_ns: its stamp [ns].
-            number: that its sender gave it, None where the middleware tells none. Others may send
+            number: that its sender gave it, None where the middleware gives none. Others may send
                 the very stamp that is due, but not as their message of that number.
 
         Raises:
             InputError: it is not the next one.
-            CspmError: it cannot be told from the one that was taken in its place.
+            CspmError: it cannot be distinguished from the one that was taken in its place.
         """
         if stamp_ns != self._next_ns or (number is not None and number != self.next_number):
             self._refuse(stamp_ns, number)
@@ -122,7 +122,7 @@ def check_end(last_step: int, earliest: int, latest: int) -> None:
 
 
 class Acknowledgement:
-    """When a node tells the plant how far it is: every few steps, and at the last.
+    """When a node reports to the plant how far it is: every few steps, and at the last.
 
     Attributes:
         last: the run's last step, once it is known.
@@ -133,7 +133,7 @@ class Acknowledgement:
         self.last: int | None = None
 
     def due(self, reached: int) -> bool:
-        """Return whether to tell that all is there through step `reached`; then it is told."""
+        """Return whether to report that all is there through step `reached`."""
         at_last = self.last is not None and self._told < self.last <= reached
         if not at_last and reached < self._told + ACKNOWLEDGE_EVERY:
             return False
@@ -192,7 +192,7 @@ class Follower:
     def reached(self) -> int:
         """The last plant step through which every message came and nothing is left to compute.
 
-        A node that computes seldom has to tell this: what it has not read yet may be overwritten.
+        A node that computes seldom has to report this: what it has not read yet may be overwritten.
         """
         return min(self.completed, *(each.complete for each in self._sequences.values()))
 

@@ -29,7 +29,7 @@ Window = tuple[int, int]
 _OFFSET_ROUNDS = 3
 _OFFSET_STEP_M = 1e-6
 _OFFSET_MOST_M = 5e-3
-# A minute tells the zero of the lengths well enough.
+# A minute determines the zero of the lengths well enough.
 _OFFSET_LONGEST_S = 60.0
 
 
@@ -171,7 +171,7 @@ class BlockSimulation:
 
         Encoders count from an arbitrary zero, so one length per cable is unknown. It is the one at
         which the cables under measured winch and bar motion carry the mean tension measured in the
-        window, or in its first minute; a single noisy sample at its start would tell it badly.
+        window, or in its first minute; a single noisy sample at its start would determine it badly.
         Without load cells it is the one at which the bar under measured winch motion is on average
         where it was measured. Zero for a drive that does not simulate cables.
         """
@@ -218,7 +218,7 @@ class BlockSimulation:
         return out
 
     def _told(self, window: Window) -> Window:
-        """Return the part of a window that tells the zero of the lengths."""
+        """Return the part of a window that determines the zero of the lengths."""
         start, end = window
         return start, min(end, start + round(_OFFSET_LONGEST_S / self.timeline.period))
 
@@ -338,7 +338,7 @@ class BlockSimulation:
 
 
 def _as_reported(testbed: Testbed) -> Testbed:
-    """Return the machine whose drives deliver what they are told: the torque that they reported."""
+    """Return the machine whose drives deliver their command: the torque that they reported."""
     effects = [
         entry
         for entry in testbed.effects

@@ -44,7 +44,7 @@ def read_actions(testbed: Testbed) -> list[Action]:
 
     Raises:
         InputError: an effect, one of its elements or parameters is unknown or out of bounds, or an
-            effect with memory stands twice on one element.
+            effect with memory is listed twice on one element.
     """
     actions = [action for entry in testbed.effects for action in _of_entry(entry, testbed)]
     seen = set()

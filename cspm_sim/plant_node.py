@@ -136,7 +136,7 @@ class PlantNode:
             self._node.fail(f"plant: runs in {', '.join(doubled)}")
 
     def _start(self) -> None:
-        # Who was told to stop before has told the end already.
+        # A plant that was stopped before has announced the end already.
         if not self._plant.ended and not self._others.unmatched():
             self._alone = time.monotonic() + _LOOK_AROUND_S
             self.started = True

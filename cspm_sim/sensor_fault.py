@@ -47,7 +47,7 @@ class SensorFault:
 
 
 class Past:
-    """The latest history of a sensor's quantities, as far as it is still asked for.
+    """The latest history of a sensor's quantities, as far as it is still needed.
 
     Between instants it is a straight line, before the first it stands still.
     """
@@ -61,7 +61,7 @@ class Past:
         self._rows.append((time, values.copy()))
 
     def at(self, time: float) -> Array:
-        """Return the quantities at a time [s] no earlier than any asked for before."""
+        """Return the quantities at a time [s] no earlier than any before."""
         rows = self._rows
         while len(rows) > 1 and rows[1][0] <= time:
             rows.popleft()

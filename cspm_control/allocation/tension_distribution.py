@@ -133,8 +133,8 @@ def fill_structure(
 @njit(cache=True, error_model="numpy")
 def _residual(structure: Array, wanted: Array, tensions: Array) -> float:
     """Return |A·t − w| as a share of |w|."""
-    missing = asked = 0.0
+    missing = total = 0.0
     for row in range(wanted.shape[0]):
         missing += ((structure[row] * tensions).sum() - wanted[row]) ** 2
-        asked += wanted[row] ** 2
-    return np.sqrt(missing / max(asked, 1e-24))
+        total += wanted[row] ** 2
+    return np.sqrt(missing / max(total, 1e-24))

@@ -20,7 +20,7 @@ ComplexArray = NDArray[np.complex128]
 # A pole closer to zero than this is one of drifting; round-off spreads several of them, the model's
 # entries of up to 1e5 with it [rad/s].
 SLOWEST = 1e-3
-# What has less than this share of a mode's kinetic energy is not worth a word.
+# A coordinate with less than this share of a mode's kinetic energy is not named.
 LEAST_SHARE = 0.1
 
 

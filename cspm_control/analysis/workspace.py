@@ -37,7 +37,7 @@ def static_workspace(
         machine: the machine.
         grid: the poses.
         algorithm: one of `ALGORITHMS`.
-        advance: is told how many more poses are done.
+        advance: called with how many more poses are done.
         stopped: says whether to give up; what is not done then counts as not held.
     """
     kernel: Callable[..., None] = pseudo_inverse_holds

@@ -84,7 +84,7 @@ def analyse_workspace(
         pose: x y z φ θ ψ of the bar [m, rad]; its roll is taken as 0.
         acceleration: required either way, (6,) [m/s², rad/s²].
         coarse: take every so-manieth value of each DOF of the whole grids.
-        advance: is told per algorithm how many more poses of its whole grid are done.
+        advance: called per algorithm with how many more poses of its whole grid are done.
         stopped: says whether to give up.
 
     Raises:

@@ -35,11 +35,11 @@ class ComputedWrench:
 
     The wrench gives the nominal bar (2-12) the reference's acceleration plus ωc²·e + 2ωc·ė + δ in
     each controlled coordinate of x y z φ θ ψ: e is the error, δ the acceleration by which it drifts
-    for reasons unknown. A critically damped observer of third order tells all three from the pose
-    alone (extended state observer, Han 2009; as a filter of samples the fading-memory filter of
-    degree 2, Brookner 1998), and goes on by the model between poses that come more seldom than it
-    computes. δ stands where a PID has its integral term. The observer is told the acceleration that
-    the tension distribution can give, not the one wanted, so that a wrench that cannot be met
+    for reasons unknown. A critically damped observer of third order estimates all three from the
+    pose alone (extended state observer, Han 2009; as a filter of samples the fading-memory filter
+    of degree 2, Brookner 1998), and goes on by the model between poses that come more seldom than
+    it computes. δ takes the place of a PID's integral term. The observer is given the acceleration
+    that the tension distribution can give, not the one wanted, so that a wrench that cannot be met
     leaves nothing behind in it.
     """
 
@@ -67,7 +67,7 @@ class ComputedWrench:
             steps_per_pose: steps from one pose to the next, ≥ 1.
             pose_age: how old a pose is when it is new here [s].
             known_wrench: constant wrench (6,) on the bar from outside [N, N·m], in world_ned.
-            mass: what tells the bar's mass; None: it is the nominal one.
+            mass: the observer of the bar's mass; None: it is the nominal one.
         """
         assert testbed.bar is not None
         self._gains = np.zeros((6, 2))
@@ -85,7 +85,7 @@ class ComputedWrench:
 
     @property
     def adapted_mass(self) -> float | None:
-        """The mass that the bar is told to have [kg], None where it is not asked for."""
+        """The estimated mass of the bar [kg], None where it is not estimated."""
         return None if self._mass is None else float(self._bar[MASS])
 
     def restart(self) -> None:
@@ -147,7 +147,7 @@ class ComputedWrench:
         return wrench
 
     def _adapt(self, mass: MassObserver) -> None:
-        """Take the mass that the last step tells, for the next one."""
+        """Take the mass estimated in the last step, for the next one."""
         bar, memory = self._bar, self._memory
         given = self._wanted[2, HEAVE] - memory[EXPECTED, HEAVE]
         lift = bar[GRAVITY] - given
@@ -162,7 +162,7 @@ class ComputedWrench:
 def _observer_gains(bandwidth: float, period: float, age: float) -> Array:
     """Return what error, rate and acceleration take of a surprise: three poles at the bandwidth.
 
-    A surprise that is `age` old told of the state then; what it changes is carried on until now.
+    A surprise that is `age` old describes the state then; its change is carried on until now.
     """
     fade = exp(-bandwidth * period)
     then = [
@@ -217,7 +217,7 @@ def _wanted_wrench(
     for d in range(6):
         if gains[d, 0] > 0.0:
             acceleration[d] += gains[d, 0] * error[d] + gains[d, 1] * rate[d] + unexplained[d]
-            # What stands at the start is taken back gently.
+            # The initial error is reduced gently.
             acceleration[d] -= memory[4, d]
             memory[4, d] *= 1.0 - 0.5 * gains[d, 1] * period
     wrench_for(pose, wanted[1] - rate, acceleration, bar, out)

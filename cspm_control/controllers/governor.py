@@ -142,7 +142,7 @@ def _windows(blocked: NDArray[np.bool_], reach: int) -> list[slice]:
 
 
 def _demand(machine: Governed, motion: Array, frames: Array) -> _Demand:
-    """Return what motion rows (k, 18) ask for at the winch frame's poses (k, 6)."""
+    """Return what motion rows (k, 18) require at the winch frame's poses (k, 6)."""
     axes, n = list(machine.axes), len(machine.cables)
     count, m = len(motion), len(axes)
     found = _Demand(np.empty((count, m, n)), np.empty((count, m)), np.empty((count, m, m)))
@@ -205,7 +205,7 @@ def _cost(count: int, m: int, n: int, counted: int) -> sparse.spmatrix:
 def _wrenches(
     demand: _Demand, before: Array, scale: Array
 ) -> tuple[sparse.spmatrix, NDArray[np.float64]]:
-    """Return rows and right side of: tensions give what the deviation's acceleration asks for."""
+    """Return rows and right side of: tensions give what the deviation's acceleration requires."""
     size = before.size
     right = demand.wrench - np.einsum("kij,kj->ki", demand.mass, before)
     rows = sparse.hstack(

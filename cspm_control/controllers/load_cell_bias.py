@@ -1,4 +1,4 @@
-"""What load cells say too much, told from the balance of torques at their winches."""
+"""Biases of load cells, estimated from the balance of torques at their winches."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ UNEXPLAINED = 0.1
 GAIN, DRY = 0.3, 1.0
 # How far a bias wanders [N/√s].
 WANDER = 0.003
-# Motors slower than this [rad/s] do not tell the sign of their dry friction.
+# Motors slower than this [rad/s] do not show the sign of their dry friction.
 CREEP = 0.05
 BIAS, UNKNOWNS = 0, 3
 

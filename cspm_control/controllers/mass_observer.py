@@ -1,4 +1,4 @@
-"""What the bar weighs, told from its heave while it is carried."""
+"""The bar's mass, estimated from its heave while it is carried."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ class MassObserver:
 
     The bar falls with g − F/m + c, so that what it falls less than g is (F/m₀)·(m₀/m) − c for the
     nominal m₀. A steady force (c) and a wrong mass differ in that only the mass counts for more
-    where more is carried: told apart once the bar has been accelerated up and down. Before, the
+    where more is carried: distinguished once the bar has been accelerated up and down. Before, the
     prior shares out what is seen.
     """
 
@@ -48,7 +48,7 @@ class MassObserver:
         return self._nominal / min(high, max(low, float(self._mean[0])))
 
     def restart(self) -> None:
-        """Wait until what is told has settled again; what was learnt stays."""
+        """Wait until the estimate has settled again; what was learnt stays."""
         self._wait = self._settling_steps
 
     def step(self, force: float, carried: float) -> None:

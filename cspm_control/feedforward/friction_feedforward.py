@@ -1,4 +1,4 @@
-"""Torque ahead of the winches' friction, at the speeds that the references ask for."""
+"""Torque ahead of the winches' friction, at the speeds of the references."""
 
 from __future__ import annotations
 
@@ -19,9 +19,9 @@ Array = NDArray[np.float64]
 # Columns of the winches' friction: constant torque [N·m], torque per speed [N·m·s/rad], share of
 # the load's torque.
 DRY, VISCOUS, LOAD, COLUMNS = 0, 1, 2, 3
-# Effects that tell of it, and which of their parameters goes to which column. Of Stribeck's
+# Effects that describe it, and which of their parameters goes to which column. Of Stribeck's
 # friction what is left at speed: its peak would be overdone where the smooth sign is not yet ±1.
-TOLD_BY = {
+DESCRIBED_BY = {
     "winch_coulomb_friction": ("torque", DRY),
     "winch_stribeck_friction": ("coulomb_torque", DRY),
     "winch_viscous_friction": ("coefficient", VISCOUS),
@@ -32,16 +32,16 @@ POSITION, QUATERNION, TWIST = slice(0, 3), slice(3, 7), slice(7, 13)
 
 
 def winch_friction(testbed: Testbed) -> Array:
-    """Return what a test-bed's file tells of its winches' friction, (n, COLUMNS).
+    """Return the winches' friction as a test-bed's effects describe it, (n, COLUMNS).
 
     Raises:
-        InputError: it tells of none.
+        InputError: they describe none.
     """
     friction = np.zeros((len(testbed.cables), COLUMNS))
     names = testbed.cable_names
     for entry in testbed.effects:
-        if entry.effect in TOLD_BY:
-            parameter, column = TOLD_BY[entry.effect]
+        if entry.effect in DESCRIBED_BY:
+            parameter, column = DESCRIBED_BY[entry.effect]
             for element in entry.elements or names:
                 if element not in names:
                     raise InputError(
@@ -52,7 +52,7 @@ def winch_friction(testbed: Testbed) -> Array:
     if not friction.any():
         raise InputError(
             f"control.force.friction_feedforward: the effects of test-bed {testbed.name} tell of no"
-            f" friction, allowed: with {', '.join(TOLD_BY)}"
+            f" friction, allowed: with {', '.join(DESCRIBED_BY)}"
         )
     return friction
 

@@ -45,7 +45,7 @@ LEAST_ELONGATION = 1e-9
 
 
 class WinchFeedforward:
-    """The torque that winches take if bar, frame and tensions are to move as they are asked to.
+    """The torque that winches take if bar, frame and tensions are to move as their references do.
 
     By the winch's equation J·q̈ = τ − r·t (2-20) and its winding (2-16 to 2-18) that is
 
@@ -132,10 +132,10 @@ def _placement(row: Array) -> Placement:
 @njit(cache=True, error_model="numpy")
 def _point_motion(row: Array, arm: Vector) -> tuple[Vector, Vector]:
     """Return velocity and acceleration of a body's point, in world axes as the arm to it."""
-    spin, turned = (row[10], row[11], row[12]), (row[16], row[17], row[18])
+    spin, spin_rate = (row[10], row[11], row[12]), (row[16], row[17], row[18])
     rx, ry, rz = cross(*spin, *arm)
     cx, cy, cz = cross(*spin, rx, ry, rz)
-    tx, ty, tz = cross(*turned, *arm)
+    tx, ty, tz = cross(*spin_rate, *arm)
     velocity = row[7] + rx, row[8] + ry, row[9] + rz
     return velocity, (row[13] + tx + cx, row[14] + ty + cy, row[15] + tz + cz)
 

@@ -81,7 +81,7 @@ class AngleStage(GuardedStage):
         self._send(now_ns, torque, send)
 
     def status(self) -> Status:
-        """Return how the servos fared since last asked."""
+        """Return the servos' statistics since the last call."""
         values = {"saturated_share": f"{self._limited / max(1, self._steps):.3f}"}
         limited = self._limited > 0
         self._steps = self._limited = 0

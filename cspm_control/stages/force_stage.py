@@ -38,7 +38,7 @@ class ForceLimits:
     """What tensions and torques may do.
 
     Attributes:
-        tensions: lowest and highest tension that is asked for, (n, 2) [N].
+        tensions: lowest and highest wanted tension, (n, 2) [N].
         trip: highest tension that is measured while all is well, (n,) [N].
         torque_step: largest change of a torque from one step to the next [N·m]; None: any.
     """
@@ -103,7 +103,7 @@ class ForceStage(GuardedStage):
     def status(self) -> Status:
         """Return shares of steps with a limit met since the last call, or the safe state.
 
-        And the largest bias of a load cell, where biases are told.
+        And the largest bias of a load cell, where biases are estimated.
         """
         steps = max(1, self._steps)
         values = {
@@ -160,11 +160,11 @@ class ForceStage(GuardedStage):
     def _ahead(self, inputs: Mapping[str, Array]) -> Array | None:
         """Return what is fed forward (n,) [N·m], None for nothing or before a reference came."""
         bar = inputs.get(BAR_REFERENCE)
-        told = [each for each in (self._friction, self._winch) if each is not None]
-        if bar is None or not told:
+        ahead = [each for each in (self._friction, self._winch) if each is not None]
+        if bar is None or not ahead:
             return None
         frame = inputs.get(FRAME_REFERENCE, _STILL)
-        first, *more = [each.torque(bar, frame, self._wanted) for each in told]
+        first, *more = [each.torque(bar, frame, self._wanted) for each in ahead]
         for torque in more:
             first = first + torque
         return first

@@ -125,7 +125,7 @@ def motion_stage(
 
 
 def mass_observer(motion: ComputedWrenchControl, bar: Bar, period: float) -> MassObserver | None:
-    """Return what tells the bar's mass every `period` [s], where the scenario wants it."""
+    """Return the observer of the bar's mass at `period` [s], where the scenario wants it."""
     if motion.mass_adaptation is None:
         return None
     settling = SETTLING / motion.observer_bandwidth
@@ -218,10 +218,10 @@ def controlled_axes(control: ClosedLoop) -> tuple[int, ...]:
 
 
 def known_wrench(control: ClosedLoop) -> NDArray[np.float64]:
-    """Return the constant wrench on the bar that the law is told of, (6,) [N, N·m], or zero."""
+    """Return the constant wrench on the bar that the law is given, (6,) [N, N·m], or zero."""
     motion = control.motion
-    told = motion.known_wrench if isinstance(motion, ComputedWrenchControl) else ORIGIN
-    return np.array(told, dtype=float)
+    known = motion.known_wrench if isinstance(motion, ComputedWrenchControl) else ORIGIN
+    return np.array(known, dtype=float)
 
 
 def wanted_tension_limits(control: ClosedLoop, testbed: Testbed) -> NDArray[np.float64]:
@@ -275,7 +275,7 @@ def force_stage(control: ClosedLoop, scenario: Scenario, testbed: Testbed) -> Fo
 
 
 def load_cell_bias(control: ClosedLoop, testbed: Testbed, period: float) -> LoadCellBias | None:
-    """Return what tells the load cells' biases every `period` [s], where the scenario wants it."""
+    """Return the observer of load cell biases at `period` [s], where the scenario wants it."""
     wanted = control.force.load_cell_bias
     if wanted is None:
         return None
@@ -288,7 +288,7 @@ def friction_feedforward(control: ClosedLoop, testbed: Testbed) -> FrictionFeedf
     """Return what goes ahead of the winches' friction, where the scenario wants it.
 
     Raises:
-        InputError: the test-bed's file tells of no friction.
+        InputError: the test-bed's file has no friction.
     """
     wanted = control.force.friction_feedforward
     if wanted is None:

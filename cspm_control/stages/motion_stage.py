@@ -56,9 +56,9 @@ class MotionStage:
     def status(self) -> Status:
         """Return that all is well, the motion controller having no limit of its own to meet.
 
-        And the bar's mass, where that is told.
+        And the bar's mass, where that is estimated.
         """
-        told = {}
+        values = {}
         if isinstance(self._controller, ComputedWrench) and self._controller.adapted_mass:
-            told["bar_mass"] = f"{self._controller.adapted_mass:.3f} kg"
-        return Status(Level.OK, self.node, "ok", told)
+            values["bar_mass"] = f"{self._controller.adapted_mass:.3f} kg"
+        return Status(Level.OK, self.node, "ok", values)

@@ -77,7 +77,7 @@ def start_from_rest(knots: Array, spacing: float, ramp: float, duration: float) 
         duration: how long the motion must last [s].
 
     Raises:
-        InputError: the duration asks for more knots than can be stored.
+        InputError: the duration requires more knots than can be stored.
     """
     count = checked_count(ceil(duration / spacing) + 2)
     full = knots[np.arange(count) % len(knots)]

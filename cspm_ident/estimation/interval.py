@@ -27,7 +27,7 @@ class Linearisation(NamedTuple):
         jacobians: of the model or of the residuals, by the free parameters, per record, shape
             (n, channels, free).
         rounding: relative error of the Jacobians.
-        effective_samples: how many independent samples the residuals are worth.
+        effective_samples: the number of independent samples that the residuals amount to.
         white: whether their colour was taken out; else only their size.
     """
 

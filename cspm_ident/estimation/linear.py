@@ -73,7 +73,7 @@ def fit_linear(
         seed: of the bootstrap.
 
     Raises:
-        InputError: records or parameters do not fit, or the likelihood's interval is asked for
+        InputError: records or parameters do not fit, or the likelihood's interval is requested
             without whitening.
     """
     channels = max((record.target.shape[1] for record in records), default=1)

@@ -1,1 +1,1 @@
-"""Experiments that tell apart what recordings so far cannot."""
+"""Experiments that separate what recordings so far cannot."""

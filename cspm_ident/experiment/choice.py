@@ -1,4 +1,4 @@
-"""The experiment that best tells explanations apart, of those that are safe on the machine."""
+"""The experiment that best separates explanations, of those that are safe on the machine."""
 
 from __future__ import annotations
 
@@ -108,13 +108,13 @@ def best_answer(
 ) -> Answer | None:
     """Return the experiment that answers a question best.
 
-    None where none beats the recordings, or none tells what is asked: two that do the same to every
-    residual differ by rounding alone, or by less than models are untrue by.
+    None where none beats the recordings, or none separates the pair: two that do the same to every
+    residual differ by rounding alone, or by less than the model-form error.
 
     Args:
         recorded: the recordings so far.
         noise: of each residual.
-        question: what is to be told apart.
+        question: what is to be separated.
         plans: what may be run.
     """
     effects = question.effects

@@ -1,4 +1,4 @@
-"""What a machine was seen to do: an experiment that stays within it asks nothing new of it."""
+"""What a machine was seen to do: an experiment within it is no new load for the machine."""
 
 from __future__ import annotations
 

@@ -46,7 +46,7 @@ def prepare(
         mapping: what its columns are.
         testbed: the machine.
         store: holds the columns as long as the messages are used.
-        progress: told the share of the file that was read.
+        progress: called with the share of the file that was read.
         trial: nothing will be written: show also what the mapping refuses to write.
 
     Raises:

@@ -34,7 +34,7 @@ def robust_line(x: Array, y: Array, z: Array) -> Line | None:
     """Return the line through points by Huber's weights; None where x does not vary beside z.
 
     Args:
-        x: the regressor asked about, shape (n,).
+        x: the regressor of interest, shape (n,).
         y: what it shall explain, shape (n,).
         z: a second regressor, such as ones for a constant, shape (n,).
     """

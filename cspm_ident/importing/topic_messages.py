@@ -168,7 +168,7 @@ def _check_pairs(
     mapping: Mapping,
     where: str,
 ) -> None:
-    told = " and ".join(
+    both = " and ".join(
         f"{', '.join(names)} ({len(own)})" for (_, names), own in zip(groups, stamps, strict=True)
     )
     if len(common) and mapping.unpaired == "drop":
@@ -177,7 +177,7 @@ def _check_pairs(
     if len(common):
         allowed += " to another topic or leave it out, or unpaired: drop"
     raise InputError(
-        f"{where}: {told} have {len(common)} stamps in common and nothing is interpolated, allowed:"
+        f"{where}: {both} have {len(common)} stamps in common and nothing is interpolated, allowed:"
         f" {allowed}{'' if len(common) else ' to another topic or leave it out'}"
     )
 

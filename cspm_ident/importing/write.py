@@ -31,7 +31,7 @@ def write_messages(
         messages: by topic.
         attachments: files to keep in it.
         metadata: its record.
-        progress: told the share that was written.
+        progress: called with the share that was written.
 
     Raises:
         InputError: the folder exists or cannot be created.

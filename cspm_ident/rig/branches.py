@@ -41,7 +41,7 @@ def mean_branches(
 ) -> list[Branch]:
     """Return the mean branches, up and down, of some cycles by number; of all where none is named.
 
-    `law` tells how far the cable is stretched at the lowest tension; without it nothing does.
+    `law` determines how far the cable is stretched at the lowest tension; without it nothing does.
     """
     flanks = [flank for flank in ramps.flanks if cycles is None or flank.cycle in cycles]
     return [_mean(ramps, law, [f for f in flanks if f.branch == branch]) for branch in BRANCHES]

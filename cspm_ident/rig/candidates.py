@@ -1,4 +1,4 @@
-"""Six functions that may tell how the stiffness depends on the tension, ranked.
+"""Six functions that may describe how the stiffness depends on the tension, ranked.
 
 The thesis compares six and names one, (3-5); the other five are customary forms of stiffening.
 """

@@ -50,7 +50,7 @@ def undistorted(
     """Return the mean branches of `ramps` less what the filter makes of the law in them.
 
     The filter rounds the law where it bends and at the ramps' ends; of a cable that obeys the law
-    it can be told how much, since what is there without a filter is known.
+    the amount is known, since what is there without a filter is known.
 
     Args:
         ramps: centred.

@@ -34,7 +34,7 @@ class Hysteresis:
 
     @property
     def limit(self) -> float:
-        """Half width below which nothing can be told from none [N]."""
+        """Half width below which it cannot be distinguished from none [N]."""
         return 0.5 * (self.interval[1] - self.interval[0]) + self.alignment
 
     @property

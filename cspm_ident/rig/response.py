@@ -122,11 +122,11 @@ def _of_lowest(ramps: Ramps, base: Sequence[Branch], law: Law, cutoff: float) ->
 def _rested_elsewhere(ramps: Ramps, cutoff: float) -> list[Ramps]:
     """Return the ramps had the encoder rested a standard deviation on, low and high."""
     specimen = ramps.specimen
-    turned = np.abs(np.diff(specimen.wound))
-    turned = turned[turned > ROUNDING]
-    if not turned.size:
+    steps = np.abs(np.diff(specimen.wound))
+    steps = steps[steps > ROUNDING]
+    if not steps.size:
         return []
-    step = float(turned.min())
+    step = float(steps.min())
     low = specimen.wound <= specimen.wound.min() + ALIKE * step
     high = specimen.wound >= specimen.wound.max() - ALIKE * step
     moved = [specimen.wound + where * step / np.sqrt(12.0) for where in (low, high)]

@@ -30,14 +30,14 @@ MEAN, POINTS = "mean", 100
 # Where the winch rests the encoder is off by a part of its step all the time; through the filter
 # that reaches so many samples into the ramp, alike in every cycle.
 REACH = 3
-# The law tells how far the cables are stretched at their lowest tension and what the filter did to
-# them, and that changes the law by a tenth of its interval at most from the third round on.
+# The law determines how far the cables are stretched at their lowest tension and what the filter
+# did to them, and that changes the law by a tenth of its interval at most from the third round on.
 ROUNDS = 4
 
 
 @dataclass(frozen=True)
 class SpecimenStiffness:
-    """What the law is worth for one specimen.
+    """How well the law fits one specimen.
 
     Attributes:
         ramps: its measured flanks.
@@ -191,8 +191,8 @@ def split(
         raise InputError(f"--verify {', '.join(verify)}: leaves no cable to fit, allowed: some")
     sizes = {one.cable.stiffness.diameter: one.label for one in specimens if one.cable.stiffness}
     if len(sizes) > 1:
-        told = ", ".join(f"{label} {1e3 * size:g} mm" for size, label in sizes.items())
-        raise InputError(f"diameters {told}, allowed: cables of one kind; choose with --cables")
+        sizes_mm = ", ".join(f"{label} {1e3 * size:g} mm" for size, label in sizes.items())
+        raise InputError(f"diameters {sizes_mm}, allowed: cables of one kind; choose with --cables")
     return fitted, [one for one in specimens if one.label in verify]
 
 
@@ -252,7 +252,7 @@ def _asymptote(
 
 
 def _asymptotic(law: Law, branch: Branch) -> NDArray[np.bool_]:
-    """Return which points tell of the asymptote, (n,): those on it, away from the rest above it."""
+    """Return which points lie on the asymptote, (n,): those away from the rest above it."""
     above = above_cap(law, branch)
     above[-REACH:] = False
     return above

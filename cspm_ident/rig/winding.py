@@ -22,7 +22,7 @@ class Winding:
     """The lengths of a specimen's cable over what is wound in.
 
     The winch takes stretched cable, so the unstretched length l0 falls by l0/l of what is wound,
-    thesis (2-18). How far the cable is stretched at the lowest tension no sensor tells; the law
+    thesis (2-18). How far the cable is stretched at the lowest tension no sensor measures; the law
     does, and without it nothing.
     """
 

@@ -59,7 +59,7 @@ class ClockDrift:
 
     @property
     def matters(self) -> bool:
-        """Whether it is surely there, and more than smoothing and noise can make up."""
+        """Whether it is significant, and more than smoothing and noise can cause."""
         low, high = self.interval
         # The delay of either part has its own resolution.
         return not low <= 0.0 <= high and abs(self.rate) * self.apart > sqrt(2.0) * RESOLUTION_S

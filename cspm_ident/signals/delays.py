@@ -1,8 +1,9 @@
 """How late motion capture is: what it says of the cables' lengths must fit winches and load cells.
 
-Drives and load cells are the reference; a load cell that is late cannot be told from a cable whose
-damping is wrong, so that is not tried. A late pose shows in all cables alike, in proportion to how
-fast it changes the length. Wrong compliance and damping show otherwise and are fitted beside it.
+Drives and load cells are the reference; a load cell that is late cannot be distinguished from a
+cable whose damping is wrong, so that is not tried. A late pose shows in all cables alike, in
+proportion to how fast it changes the length. Wrong compliance and damping show otherwise and are
+fitted beside it.
 """
 
 from __future__ import annotations
@@ -30,12 +31,12 @@ Array = NDArray[np.float64]
 
 # What smoothing and noise make up where there is no delay.
 RESOLUTION_S = 1.5e-3
-# With an interval that reaches farther to a side, a recording does not tell a delay.
+# With an interval that reaches farther to a side, a recording does not determine a delay.
 WIDEST_S = 5e-3
 # Error of the equation itself, as a standard deviation: what remains without noise.
 EQUATION_S = 3e-4
 SCALE_S = 0.02
-# Nothing here has dynamics that would ask for a shorter step.
+# Nothing here has dynamics that would need a shorter step.
 PERIOD_NS = 5_000_000
 ROUNDS = 8
 STILL_S = 1e-5
@@ -62,7 +63,7 @@ class Delay:
     Attributes:
         topic: the sensor.
         seconds: by how much its stamps are late [s].
-        interval: of 95 % [s]; infinite where the recording cannot tell.
+        interval: of 95 % [s]; infinite where the recording does not determine it.
         window: the time that was looked at, where most moves [s].
     """
 
@@ -73,7 +74,7 @@ class Delay:
 
     @property
     def known(self) -> bool:
-        """Whether the recording tells the delay well enough to be of use."""
+        """Whether the recording determines the delay well enough to be of use."""
         return self.interval[1] - self.interval[0] <= 2.0 * WIDEST_S
 
     @property
@@ -83,7 +84,7 @@ class Delay:
 
     @property
     def matters(self) -> bool:
-        """Whether it is surely there, and more than smoothing and noise can make up."""
+        """Whether it is significant, and more than smoothing and noise can cause."""
         return self.significant and abs(self.seconds) > RESOLUTION_S
 
     @property

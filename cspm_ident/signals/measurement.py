@@ -50,7 +50,7 @@ class Measurement:
         angle, speed, torque: at the motor shafts [rad, rad/s, N·m], one column per cable.
         tension: [N], one column per cable.
         command: commanded torque [N·m].
-        wanted: pose, twist and acceleration asked for, of the bar and of the winch frame, (n, 38),
+        wanted: wanted pose, twist and acceleration, of the bar and of the winch frame, (n, 38),
             where both are recorded.
         torque_age: how long before its stamp the reported torque acted, on average [s]. A simulated
             drive reports what it held since the stamp before: half a period. Of others nothing is
@@ -133,8 +133,8 @@ def read_measurement(path: Path, testbed: Path | None = None) -> Measurement:
         topics = machine.testbed.topics
         wanted = (FRAME, BAR, WINCHES, TENSION, COMMAND)
         names = [n for n in wanted if n in topics and _count(recording, n)]
-        asked = WANTED if all(_count(recording, n) for n in WANTED) else ()
-        rows = recording.rows_of([*names, *asked])
+        wanted = WANTED if all(_count(recording, n) for n in WANTED) else ()
+        rows = recording.rows_of([*names, *wanted])
         found = {name: recording.topic(name) for name in names}
         simulated = simulated_plant(recording) is not None
         closed = recording.complete
@@ -153,7 +153,7 @@ def read_measurement(path: Path, testbed: Path | None = None) -> Measurement:
         digest.result(),
         machine,
         **parts,
-        wanted=_wanted(rows, start) if asked else None,
+        wanted=_wanted(rows, start) if wanted else None,
         torque_age=age,
         pointwise=False,
         complete=closed,
@@ -192,7 +192,7 @@ def _samples(
 
 
 def _wanted(rows: Mapping[str, Rows], start_ns: int) -> Samples:
-    """Return what was asked of bar and frame, at the bar's times, thinned out."""
+    """Return the references of bar and frame, at the bar's times, thinned out."""
     bar, frame = (rows[name] for name in WANTED)
     times = np.asarray((bar.stamp_ns - start_ns) * 1e-9, dtype=np.float64)
     step = max(1, int(_WANTED_EVERY_S * len(times) / max(float(np.ptp(times)), _WANTED_EVERY_S)))

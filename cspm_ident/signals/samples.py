@@ -15,7 +15,7 @@ Array = NDArray[np.float64]
 HOLE = 5.5
 # Of the usual interval: readings farther apart have lost one between them.
 _GAP = 1.5
-# Fewer samples tell no clock.
+# Fewer samples determine no clock.
 _FEWEST = 16
 _DRIFT_ORDER = 3
 # Of the interval: stamps that scatter more are no even clock's.

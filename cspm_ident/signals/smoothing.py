@@ -1,7 +1,7 @@
 """From noisy samples to smooth functions of time, without phase.
 
 Whatever enters one equation is smoothed alike, or the difference of the smoothings would look like
-physics: so the band is chosen once per sensor and is told.
+physics: so the band is chosen once per sensor and is reported.
 """
 
 from __future__ import annotations

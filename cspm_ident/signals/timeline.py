@@ -22,7 +22,7 @@ Array = NDArray[np.float64]
 
 PERIOD_NS = 1_000_000
 _KNOT_S = 0.005
-# How far from a lost reading speeds are told as well as elsewhere.
+# How far from a lost reading speeds are known as well as elsewhere.
 _NEAR_S = 0.01
 # More than is looked at, so that smoothing has both sides.
 _MARGIN_S = 3.0
@@ -226,8 +226,9 @@ class Timeline:
         """Torque held from each step to the next, shape (k, n) [N·m]; NaN in holes.
 
         A drive reports the torque that it applied up to the stamp. A single lost reading is a hole
-        as well: a rough torque's neighbours do not tell it, and a light shaft takes another speed,
-        which its angles tell only some time later.
+        as well: a rough torque does not follow from its neighbours, and a light shaft takes another
+            speed,
+        which its angles show only some time later.
         """
         samples = self.measurement.torque
         if samples is None:

@@ -54,9 +54,9 @@ def winch_motion(angle: Samples, speed: Samples | None, times: Array) -> WinchMo
     at = angle.even.times
     for i, column in enumerate(even.values.T):
         # One column after the other: of a long recording all at once are much memory.
-        turned = _turned(even.times, column)
-        rest[:, i] = angle.values[:, i] - turned(at)
-        summed[:, i] = turned(times)
+        path = _turned(even.times, column)
+        rest[:, i] = angle.values[:, i] - path(at)
+        summed[:, i] = path(times)
     slow = smooth(angle.of_others(rest), CROSSOVER_HZ)
     return WinchMotion(summed + slow.at(times), fast + slow.at(times, 1), float("inf"))
 
@@ -79,7 +79,7 @@ def _agree(angle: Samples, speed: Samples) -> bool:
     times = _inside(slow_angle, speed.times)
     derived, said = slow_angle.at(times, 1), slow_speed.at(times)
     apart, whole = np.nanvar(derived - said, axis=0), np.nanvar(said, axis=0)
-    # What stands still tells nothing; its speed is noise, and small.
+    # A winch at rest shows no motion; its speed is noise, and small.
     return bool((apart <= _DISAGREEMENT * whole.max()).all())
 
 

@@ -79,7 +79,7 @@ Place = EffectPlace | BarPlace | PointPlace
 
 @dataclass(frozen=True)
 class Chosen:
-    """A parameter to fit, and where it stands in the machine.
+    """A parameter to fit, and where it lies in the machine.
 
     Attributes:
         parameter: bounds, scale, prior, frozen.

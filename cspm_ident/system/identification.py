@@ -57,7 +57,7 @@ class SystemResult:
         windows: how many of each recording were used.
         searched: recordings that were fitted, in order.
         judgements: how well both machines predict each recording, searched first, then held out.
-        profiles: those asked for.
+        profiles: those requested.
         settled: whether parameters and initial states came to stand still.
         drifts: of motion capture's clocks, by recording, taken out.
     """

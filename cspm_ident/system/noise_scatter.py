@@ -62,9 +62,9 @@ def noise_scatter(
     """Return how noise throws each parameter.
 
     Noise on the frame's pose passes through cables and bar, which ring for longer than a window
-    lasts, so the residuals of a few windows tell its colour badly. Here it went through the model
-    itself, and each draw takes one step from the optimum. Windows are independent of each other, so
-    that their variances add up, with as many degrees of freedom (Satterthwaite 1946).
+    lasts, so the residuals of a few windows determine its colour badly. Here it went through the
+    model itself, and each draw takes one step from the optimum. Windows are independent of each
+    other, so that their variances add up, with as many degrees of freedom (Satterthwaite 1946).
 
     Args:
         problem: what was solved.

@@ -20,7 +20,7 @@ from cspm_msgs_py.testbed import Testbed
 
 Array = NDArray[np.float64]
 
-# Below this many times its noise a coordinate stands still, and shares of it mean nothing.
+# Below this many times its noise a coordinate is at rest, and shares of it mean nothing.
 _MOVES = 10.0
 
 

@@ -162,8 +162,8 @@ def make_shooting(
         delays: of the sensors, by topic [s]; None: those found, see `delays_to_remove`.
 
     Raises:
-        InputError: a sensor is missing, motion cannot be told from noise, or no window is long
-            enough.
+        InputError: a sensor is missing, motion cannot be distinguished from noise, or no window is
+            long enough.
     """
     line = Timeline(measurement)
     BlockSimulation(line, measurement.machine).check(Drive.WINCH)
@@ -205,7 +205,7 @@ def _noise_of_signals(measurement: Measurement, noise: Mapping[str, Array]) -> d
 
 
 def _check_band(line: Timeline, noise: Mapping[str, Array], duration: float) -> None:
-    """Refuse poses of which nothing tells the motion from the noise."""
+    """Refuse poses of which the motion cannot be distinguished from the noise."""
     if duration < _LONG_ENOUGH and not np.isfinite(line.pose_band) and noise[BAR].any():
         raise InputError(
             f"{line.measurement.path}: {duration:.1f} s, the motion of its poses does not stand out"

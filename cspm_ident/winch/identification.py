@@ -70,7 +70,7 @@ def identify_winch(
             measured signals carry noise that the controller feeds back.
         half_width: of the windows [s].
         band: kept of the angle for the speed [Hz]; by default what stands out of its noise.
-        reversals: whether windows count in which the shaft turns round. Dry friction holds it there
+        reversals: whether windows count in which the shaft reverses. Dry friction holds it there
             for a while, and is then whatever holds, which no regressor of the speed's sign says.
         whiten: see `fit_linear`; not used with instruments.
         interval: see `fit_linear`.
@@ -126,10 +126,10 @@ def winch_records(
                     chosen = None if other is None else other[part]
                     records.append(Record(target[part], columns[part], instruments=chosen))
     if not records:
-        turned = "" if reversals else " without a reversal"
+        without = "" if reversals else " without a reversal"
         raise InputError(
             f"no stretch of angle and torque is as long as a window, {2.0 * half_width:g} s"
-            f"{turned}; allowed: longer stretches"
+            f"{without}; allowed: longer stretches"
         )
     return records
 
@@ -142,7 +142,7 @@ def relative_error(records: Sequence[Record], values: Array) -> float:
 
 
 class _Weak(NamedTuple):
-    """One stretch in weak form: target, columns, and whether the shaft turns round, by window."""
+    """One stretch in weak form: target, columns, and whether the shaft reverses, by window."""
 
     target: Array
     columns: Array

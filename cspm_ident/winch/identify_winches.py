@@ -66,7 +66,7 @@ class IdentifiedWinch:
 
     @property
     def torn(self) -> tuple[str, ...]:
-        """Parameters for which the windows across reversals say surely something else."""
+        """Parameters for which the windows across reversals differ significantly."""
         if self.otherwise is None:
             return ()
         pair = self.fit.estimate, self.otherwise.estimate
@@ -95,11 +95,11 @@ class WinchesResult:
     """Winches of one machine.
 
     Attributes:
-        winches: in the order asked for.
+        winches: in the order requested.
         searched: recordings that were fitted.
         band: in which the torque errors are counted [Hz].
         torque_age: see `WinchSignals` [s].
-        reversals: whether windows counted in which the shaft turns round.
+        reversals: whether windows counted in which the shaft reverses.
     """
 
     winches: tuple[IdentifiedWinch, ...]

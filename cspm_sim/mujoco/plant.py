@@ -25,7 +25,7 @@ class MujocoPlant:
     """Bar, cables and winches on a moving winch frame, on MuJoCo's dynamics and integrator.
 
     MuJoCo holds and integrates the bar, the rotors and the unstretched lengths, by its Runge-Kutta
-    scheme; at each of its stages this class tells it what the cables exert. It does so through
+    scheme; at each of its stages this class sets what the cables exert. It does so through
     MuJoCo's control callback, of which a process has one: set during a step, put back after it.
     So only one thread may step such plants.
 
@@ -176,7 +176,7 @@ class MujocoPlant:
         return np.asarray(np.clip(torque, -self._limits, self._limits))
 
     def _at_stage(self, model: object, data: object) -> None:
-        """Tell MuJoCo the forces at the state and time of a stage of its integrator."""
+        """Set MuJoCo's forces at the state and time of a stage of its integrator."""
         if self._failure is not None:
             return
         try:

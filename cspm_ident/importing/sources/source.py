@@ -19,7 +19,7 @@ class Source(Protocol):
     Attributes:
         path: the file or folder.
         kind: what it is, for people.
-        columns: names of its columns, as far as the file tells without being read.
+        columns: names of its columns, as far as they are known without reading the file.
         notes: what a person should know about how it was read.
         stamped: whether its rows are messages that bring their own stamps.
     """
@@ -46,7 +46,7 @@ class Source(Protocol):
             numbers: columns to be stored as float64.
             times: columns to be stored with every digit, as longdouble.
             store: gets them.
-            progress: told the share that was read.
+            progress: called with the share that was read.
 
         Raises:
             InputError: a column is missing or holds other than numbers, or the file is damaged.

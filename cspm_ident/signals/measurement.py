@@ -133,8 +133,8 @@ def read_measurement(path: Path, testbed: Path | None = None) -> Measurement:
         topics = machine.testbed.topics
         wanted = (FRAME, BAR, WINCHES, TENSION, COMMAND)
         names = [n for n in wanted if n in topics and _count(recording, n)]
-        wanted = WANTED if all(_count(recording, n) for n in WANTED) else ()
-        rows = recording.rows_of([*names, *wanted])
+        reference_topics = WANTED if all(_count(recording, n) for n in WANTED) else ()
+        rows = recording.rows_of([*names, *reference_topics])
         found = {name: recording.topic(name) for name in names}
         simulated = simulated_plant(recording) is not None
         closed = recording.complete
@@ -153,7 +153,7 @@ def read_measurement(path: Path, testbed: Path | None = None) -> Measurement:
         digest.result(),
         machine,
         **parts,
-        wanted=_wanted(rows, start) if wanted else None,
+        wanted=_wanted(rows, start) if reference_topics else None,
         torque_age=age,
         pointwise=False,
         complete=closed,

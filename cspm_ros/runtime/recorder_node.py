@@ -32,7 +32,7 @@ class RecorderNode:
         self._node = node
         self._plant = FollowerSide(node, schedule.period_ns, self._end)
         self._gatherer = Gatherer(
-            schedule, dict(topics), writer, self._plant.tell, node.complain, reporting
+            schedule, dict(topics), writer, self._plant.report, node.complain, reporting
         )
         self._intake = Intake(node.node)
         for name in schedule.topics:

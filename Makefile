@@ -4,14 +4,11 @@ VENV := .venv
 BIN := $(VENV)/bin
 PIP := $(BIN)/python -m pip install --quiet --disable-pip-version-check
 SCENARIO ?= worst_case
-# One worker per processor; a file's tests stay together, since they share what they set up.
-SPREAD := -n logical --dist loadfile
-# What goes by the wall clock fails where other programs take the processor in between; a defect
-# fails every time.
-RERUNS := 2
+# One worker per processor. Each begins with its share of the files in order, and takes over from
+# the other what that has not begun: both end together, and few files are set up twice.
+SPREAD := -n logical --dist worksteal
 # Only these files are read for such tests: reading all takes longer than many of them.
 ALONE = $(shell grep -rlE --include='test_*.py' 'mark\.alone\b' tests)
-SLOW = $(shell grep -rlE --include='test_*.py' 'mark\.slow\b' tests)
 
 # ROS 2 Jazzy comes as wheels, unless a native one is sourced. Both at once would mix their libraries.
 ROS := wheels
@@ -20,7 +17,7 @@ ifneq ($(wildcard $(addsuffix /rclpy/_rclpy_pybind11*.so,$(subst :, ,$(PYTHONPAT
 ROS := native
 # Its plugins for pytest are written for the pytest of its own distribution.
 export PYTEST_DISABLE_PLUGIN_AUTOLOAD := 1
-export PYTEST_ADDOPTS := -p pytest_cov -p xdist -p pytest_rerunfailures
+export PYTEST_ADDOPTS := -p pytest_cov -p xdist
 endif
 endif
 
@@ -32,17 +29,9 @@ help: ## show this list
 run: $(VENV)/$(ROS).stamp ## build what a run needs and simulate the worst-case sea (SCENARIO=calm for another)
 	@$(BIN)/cspm run $(SCENARIO)
 
-define run-slow
-	$(BIN)/python -m pytest $(ALONE) -m alone --reruns $(RERUNS)
-	$(BIN)/python -m pytest $(SLOW) $(SPREAD) --no-loadscope-reorder -m "slow and not alone"
-endef
-
 test: lint kernels ## build what the tests need; then style, types and all tests
-	$(BIN)/python -m pytest $(SPREAD) -m "not slow and not alone"
-	$(run-slow)
-
-test-slow: $(VENV)/test.stamp ## only what `make test-fast` leaves out
-	$(run-slow)
+	$(BIN)/python -m pytest $(SPREAD) -m "not alone"
+	$(BIN)/python -m pytest $(ALONE) -m alone
 
 test-fast: $(VENV)/test.stamp ## the tests without the slow ones
 	$(BIN)/python -m pytest $(SPREAD) -m "not slow and not alone"

@@ -1,10 +1,9 @@
 """The linear model against the plant's own derivative and against the published figures."""
 
-from pathlib import Path
-
 import control
 import numpy as np
 import pytest
+from altered_machines import CENTRE, THESIS, with_bar, with_cables
 from machines import build, general_content
 
 from cspm_model.kernels.cable import OFFSET_LENGTH, RADIUS, elastic_tension, law_scale
@@ -17,19 +16,11 @@ from cspm_model.linearisation import (
     tension_subsystem,
 )
 from cspm_msgs_py.errors import InputError
-from cspm_msgs_py.testbed import LinearStiffness, Testbed, load_testbed
+from cspm_msgs_py.testbed import LinearStiffness, Testbed
 from cspm_sim.kernels.plant import make_scratch, plant_rate
 from cspm_sim.parameters import plant_parameters
 
-TESTBEDS = Path(__file__).resolve().parents[2] / "scenarios" / "testbeds"
-THESIS = load_testbed(TESTBEDS / "thesis.yaml").testbed.model_copy(update={"effects": ()})
-CENTRE = (0.0, 0.0, 2.0, 0.0, 0.0, 0.0)
 LOW = 0.1  # rad/s, where the thesis takes its singular values
-
-
-def with_cables(testbed: Testbed, **changes) -> Testbed:
-    cables = tuple(cable.model_copy(update=changes) for cable in testbed.cables)
-    return testbed.model_copy(update={"cables": cables})
 
 
 def with_floor(testbed: Testbed, floor: float) -> Testbed:
@@ -40,10 +31,6 @@ def with_floor(testbed: Testbed, floor: float) -> Testbed:
         for cable in testbed.cables
     )
     return testbed.model_copy(update={"cables": cables})
-
-
-def with_bar(testbed: Testbed, **changes) -> Testbed:
-    return testbed.model_copy(update={"bar": testbed.bar.model_copy(update=changes)})
 
 
 LINEAR_LAW = LinearStiffness(youngs_modulus=8.721e9, diameter=1e-3, floor_tension=0.05)

@@ -2,7 +2,7 @@
 
 import pytest
 from run_samples import bundle_of
-from test_schedule import delayed
+from schedules import delayed
 
 from cspm_msgs_py.graph import NODES, PLAYER, RECORDER, STAGES, followers, graph_of
 from cspm_msgs_py.schedule import PLANT, schedule_of

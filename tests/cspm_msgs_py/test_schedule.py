@@ -4,9 +4,10 @@ import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
+from loops import Listener
 from machines import build, point_content, rig_content
 from run_samples import bundle_of
-from test_loop import Listener
+from schedules import delayed
 
 from cspm_msgs_py.errors import InputError
 from cspm_msgs_py.scenario import parse_scenario
@@ -33,15 +34,6 @@ THESIS = bundle_of("rest").testbed.testbed
 def scenario(text="", **rates):
     told = "".join(f"  {name}: {rate}\n" for name, rate in rates.items())
     return parse_scenario(f"{PLAIN}rates:\n{told}{text}" if rates else PLAIN + text, "my.yaml")
-
-
-def delayed(testbed, delays):
-    """Return the machine with sensors that are late by so many milliseconds."""
-    sensors = {
-        name: sensor.model_copy(update={"delay": delays.get(name, 0) * 1e-3})
-        for name, sensor in testbed.sensors.items()
-    }
-    return testbed.model_copy(update={"sensors": sensors})
 
 
 class Account:

@@ -2,28 +2,13 @@
 
 import numpy as np
 import pytest
-from test_lockstep import MS, schedule_with
+from schedules import MS, schedule_with
+from wire_rows import COUNT, TOPICS, rows_of
 
 from cspm_msgs_py.errors import InputError
 from cspm_msgs_py.ros_types import deserialize, serialize
 from cspm_msgs_py.stepping.lockstep import Sequence
-from cspm_msgs_py.topics import POSE, contract_topics
 from cspm_msgs_py.wire import UNIT_LENGTH_TOLERANCE, WireReader, WireWriter
-
-COUNT = 5
-TOPICS = {
-    name: topic
-    for name, topic in contract_topics(["a", "bb", "c"], has_bar=True, has_winch_frame=True).items()
-    if name != "/diagnostics"
-}
-
-
-def rows_of(topic, seed=0):
-    """Return rows that are sound for a topic, shape (COUNT, width)."""
-    rows = np.random.default_rng(seed).normal(size=(COUNT, topic.width))
-    if topic.fields[: len(POSE)] == POSE:
-        rows[:, 3:7] /= np.linalg.norm(rows[:, 3:7], axis=1)[:, None]
-    return rows
 
 
 def block_of(topic, rows=None):

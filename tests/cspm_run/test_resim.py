@@ -5,14 +5,15 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from loops import WILD
 from recording_samples import write_sample
+from rewritten_recordings import rewrite
 from rosbags.rosbag2 import Writer
 from rosbags.rosbag2.enums import StoragePlugin
 from run_samples import bundle_of
-from test_loop import WILD
 
 from cspm_msgs_py.errors import InputError
-from cspm_msgs_py.recording import Recording, RecordingWriter, recover
+from cspm_msgs_py.recording import Recording, recover
 from cspm_msgs_py.recording.mcap_file import McapFile
 from cspm_run.recorded_run import run
 from cspm_run.resim import resimulate
@@ -30,35 +31,6 @@ def folder(tmp_path_factory):
 
 def again(path):
     return resimulate(path, lambda now, total: None)
-
-
-def rewrite(folder, target, change=None, *, attachments=None, metadata=None):
-    """Write a recording anew; `change(topic, index, row)` returns the row, or None to drop it."""
-    with Recording(folder) as recording:
-        names = list(recording.topics)
-        topics = {name: recording.topic(name) for name in names if name != "/diagnostics"}
-        rows = recording.rows_of(topics)
-        statuses = recording.payloads("/diagnostics")
-        attached = recording.attachments if attachments is None else attachments
-        about = recording.metadata["cspm"] | (metadata or {})
-    found = bundle_of("worst_case").testbed.testbed.topics
-    order = {name: found[name] for name in found if name in names}
-    messages = [
-        (log, name, stamp, row if change is None else change(name, i, row.copy()))
-        for name in topics
-        for i, (log, stamp, row) in enumerate(zip(*rows[name], strict=True))
-    ]
-    messages += [
-        (log, "/diagnostics", log, payload)
-        for log, payload in zip(statuses.log_ns, statuses.payloads, strict=True)
-    ]
-    with RecordingWriter(target, order, attachments=attached, metadata=about) as writer:
-        for log, name, stamp, content in sorted(messages, key=lambda message: message[0]):
-            if isinstance(content, bytes):
-                writer.append_payload(name, int(log), content)
-            elif content is not None:
-                writer.channel(name).append(int(log), int(stamp), content)
-    return target
 
 
 def cut(folder, target, size):

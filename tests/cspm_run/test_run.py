@@ -8,9 +8,9 @@ from importlib.metadata import version
 
 import numpy as np
 import pytest
+from loops import WILD, Listener
 from rosbags.highlevel import AnyReader
 from run_samples import THESIS_CABLES, bundle_of, recorded, run_to, stamps
-from test_loop import WILD, Listener
 
 from cspm_msgs_py.errors import CspmError, InputError
 from cspm_msgs_py.recording import Recording, first_difference, overview

@@ -4,9 +4,8 @@ from dataclasses import dataclass
 
 import numpy as np
 import pytest
-from machines import build, general_content
+from machines import build, entry, general_content
 from run_samples import SCENARIOS
-from test_effect_parameters import entry
 
 from cspm_model.kernels.cable import RADIUS
 from cspm_model.motion import Motion

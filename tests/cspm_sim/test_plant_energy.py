@@ -6,9 +6,9 @@ import numpy as np
 import pytest
 from independent_plant import IndependentPlant, scaled_elongation, slope
 from machines import LINEAR, build, general_content
+from plant_samples import make_plant, random_motion, swell
 from scipy.integrate import simpson
 from scipy.interpolate import CubicHermiteSpline
-from test_plant_trajectory import make_plant, random_motion, swell
 
 from cspm_model.motion import Motion
 from cspm_sim.plant import Plant

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 from machines import THESIS, build, general_content, point_content, rig_content, with_bar
-from test_plant_trajectory import plant_derivative
+from plant_samples import plant_derivative
 
 from cspm_model.kernels.cable import RADIUS
 from cspm_model.kinematics import rotation

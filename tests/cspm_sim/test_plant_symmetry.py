@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 from machines import random_poses, with_bar
-from test_plant_trajectory import plant_derivative, run, swell, torques_about_rest
+from plant_samples import plant_derivative, run, swell, torques_about_rest
 
 from cspm_model.kernels.cable import ARM, DIRECTION, SPAN_COLUMNS, TENSION, cable_wrench
 from cspm_model.kernels.machine import frame_placement

@@ -3,7 +3,7 @@
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
-from test_lockstep import schedule_with
+from schedules import schedule_with
 
 from cspm_msgs_py.errors import CspmError, InputError
 from cspm_msgs_py.stepping.lockstep import Sequence

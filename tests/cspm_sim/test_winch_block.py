@@ -4,10 +4,10 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from emps_samples import DATA, ESTIMATION, MAPPING, TESTBED
+from emps_samples import recorded as emps_needed
 from import_samples import imported
 from run_samples import run_to
-from test_emps_import import DATA, ESTIMATION, MAPPING, TESTBED
-from test_emps_import import recorded as emps_needed
 
 from cspm_ident.block_simulation import Drive
 from cspm_ident.comparison.compare import compare

@@ -103,6 +103,11 @@ def general_content(stiffness=EXPONENTIAL):
     }
 
 
+def entry(effect, elements=(), **parameters):
+    """One entry of a machine's `effects`."""
+    return {"effect": effect, "elements": list(elements), "parameters": parameters}
+
+
 def build(content):
     """Check a machine that is written as plain data."""
     return validate(Testbed, content, "test.yaml")

@@ -3,6 +3,8 @@
 import multiprocessing
 import os
 import signal
+import subprocess
+import sys
 import time
 from collections import defaultdict
 from contextlib import ExitStack
@@ -10,7 +12,8 @@ from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
-from ros_graph import new_domain
+import pytest
+from ros_graph import new_domain, node_processes
 from run_samples import bundle_of
 
 from bench.performance.slow_machine import slow_overrides
@@ -21,10 +24,25 @@ from cspm_msgs_py.recording import Recording
 from cspm_msgs_py.ros.contract_node import ros_class
 from cspm_msgs_py.ros.qos import contract_qos
 from cspm_msgs_py.ros.session import Session
-from cspm_msgs_py.schedule import FORCE_CONTROLLER, PLANT, TORQUE_COMMAND, schedule_of
+from cspm_msgs_py.schedule import (
+    FORCE_CONTROLLER,
+    PLANT,
+    TENSION,
+    TORQUE_COMMAND,
+    schedule_of,
+)
 from cspm_msgs_py.topics import BRAKE, DIAGNOSTICS, EMERGENCY_STOP
 from cspm_ros.runtime.node_parameters import REALTIME, NodeParameters, write_parameters
 from cspm_run.bundle import SCENARIO
+
+APART, TOGETHER = "--process-per-node", "--one-process"
+CSPM = [sys.executable, "-c", "from cspm.cli.main import main; main()"]
+WATCHDOG = "plant/watchdog"
+GUARDS = (FORCE_CONTROLLER, WATCHDOG)
+# A start takes its time where others use the processor.
+START_S = 90.0
+# What the run's leader says is none of the hardware's business, nor the other way round.
+OWN_RUN = {f"/run/{name}": f"/hardware/{name}" for name in ("start", "end", "progress")}
 
 TESTS = Path(__file__).resolve().parent
 # Long enough for a machine that has much else to do.
@@ -267,3 +285,54 @@ class Evidence:
         rows = self.rows[TORQUE_COMMAND]
         chosen = (rows.stamp_ns >= start_ns) & (rows.stamp_ns <= end_ns)
         return rows.stamp_ns[chosen], rows.rows[chosen]
+
+
+def check_plant(plant):
+    if plant == "mujoco":
+        pytest.importorskip("mujoco", minversion="4.0", reason="the MuJoCo plant needs MuJoCo 4")
+
+
+class Command:
+    """`cspm run … --mode realtime` as a process, on a domain of its own."""
+
+    def __init__(self, place, bundle, *arguments):
+        self.domain = new_domain()
+        self.folder = place / "bag"
+        for name, content in bundle.attachments().items():
+            (place / name).write_bytes(content)
+        command = [*CSPM, "run", place / "scenario.yaml", "--mode", "realtime"]
+        self.process = subprocess.Popen(
+            [*map(str, [*command, "--out", self.folder, *arguments])],
+            stdout=subprocess.PIPE,
+            stderr=subprocess.PIPE,
+            text=True,
+            env=os.environ | {"ROS_DOMAIN_ID": str(self.domain)},
+        )
+
+    def nodes(self):
+        """Return the processes of the run's nodes, by name."""
+        return node_processes(self.process.pid)
+
+    def done(self):
+        """Wait for the end; return exit code, stdout and stderr."""
+        out, err = self.process.communicate(timeout=START_S)
+        return self.process.returncode, out, err
+
+    def __enter__(self):
+        return self
+
+    def __exit__(self, *_):
+        if self.process.poll() is None:
+            self.process.kill()
+            self.process.communicate()
+
+
+def under_way(witness):
+    for guard in GUARDS:
+        witness.until(lambda guard=guard: guard in witness.latest, guard, START_S)
+    witness.until_running(*GUARDS)
+    witness.until_more(TENSION, 100)
+
+
+def topics_of(bundle, *names):
+    return [bundle.testbed.testbed.topics[name] for name in names]

@@ -14,9 +14,18 @@ from pathlib import Path
 
 import psutil
 import pytest
-from test_cli_process import CSPM, child
+from cspm_process import CSPM, child
 
 from cspm_msgs_py.recording import Recording, first_difference
+
+NODES = (
+    "plant",
+    "wave_trajectory",
+    "motion_controller",
+    "tension_distribution",
+    "force_controller",
+    "recorder",
+)
 
 # Above 101 the ports that a domain needs lie among those that the system hands out.
 DOMAINS, HELD = 100, 12

@@ -81,7 +81,7 @@ def card(tmp_path_factory):
     return scorecard(truth, read_results(asked.folder, [item["name"] for item in truth["items"]]))
 
 
-pytestmark = [pytest.mark.slow, pytest.mark.early]
+pytestmark = pytest.mark.slow
 
 
 def test_sound_machines_are_consistent_and_no_diagnosis_fails(card):

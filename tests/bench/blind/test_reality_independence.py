@@ -3,7 +3,7 @@
 from pathlib import Path
 
 import pytest
-from test_mujoco_independence import imported
+from imported_modules import imported
 
 from cspm_sim.effects import catalogue
 

@@ -195,8 +195,8 @@ def test_what_is_stopped_says_how_it_goes_on(tmp_path, monkeypatch, capsys):
 
     page = tmp_path / "page.md"
     page.write_text("as it was")
-    monkeypatch.setattr("bench.results.PAGE", page)
-    monkeypatch.setattr("bench.results.work_off", stopped)
+    monkeypatch.setattr("bench.results.__main__.PAGE", page)
+    monkeypatch.setattr("bench.results.__main__.work_off", stopped)
     monkeypatch.setattr(sys, "argv", ["results", "--keep", str(tmp_path / "kept")])
     assert main() == 1
     said = "".join(capsys.readouterr().out.split())
@@ -208,7 +208,7 @@ def test_one_block_is_renewed_alone(tmp_path, monkeypatch, capsys):
     page = tmp_path / "page.md"
     blocks = "<!-- results: machine -->\nold\n<!-- end -->\n"
     page.write_text(blocks + blocks.replace("machine", "past"))
-    monkeypatch.setattr("bench.results.PAGE", page)
+    monkeypatch.setattr("bench.results.__main__.PAGE", page)
     nothing = str(tmp_path / "kept")
     asked = ["results", "--seeds", "3", "--only", "machine", "--keep", nothing]
     monkeypatch.setattr(sys, "argv", asked)

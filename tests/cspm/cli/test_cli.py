@@ -4,10 +4,10 @@ import json
 from pathlib import Path
 
 import pytest
+from loops import WILD
 from matplotlib.image import imread
 from recording_samples import write_sample
 from run_samples import SCENARIOS, bundle_of
-from test_loop import WILD
 
 from cspm.cli import main as cli
 from cspm_msgs_py.recording import Recording, overview

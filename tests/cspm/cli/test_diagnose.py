@@ -6,8 +6,8 @@ import sys
 from dataclasses import replace
 
 import pytest
+from emps_samples import DATA, ESTIMATION, MAPPING, PULSES, TESTBED
 from run_samples import SCENARIOS
-from test_emps_import import DATA, ESTIMATION, MAPPING, PULSES, TESTBED
 
 from cspm.cli import main as cli
 from cspm_ident.diagnosis.diagnose import diagnose

@@ -8,7 +8,7 @@ from machines import build, point_content, random_poses
 from run_samples import SCENARIOS
 from scipy.linalg import null_space
 from scipy.optimize import linprog, lsq_linear
-from test_tension_distribution import HOLD, HOME, row, structure
+from structure_samples import HOLD, HOME, row, structure
 
 from cspm_control.allocation.tension_distribution import TensionDistribution
 from cspm_control.stages.make import wanted_tension_limits

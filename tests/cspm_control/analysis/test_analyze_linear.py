@@ -6,9 +6,9 @@ import re
 import control
 import numpy as np
 import pytest
+from altered_machines import CENTRE, TESTBEDS, THESIS
 from machines import build, general_content
 from numpy.testing import assert_allclose
-from test_linearisation import CENTRE, TESTBEDS, THESIS
 
 from cspm_control.analysis.cable_groups import cable_groups
 from cspm_control.analysis.claim import Claim, rounded

@@ -2,9 +2,9 @@
 
 import numpy as np
 import pytest
+from altered_machines import CENTRE, TESTBEDS, THESIS, with_bar, with_cables
 from machines import build, general_content
 from scipy.optimize import linprog
-from test_linearisation import CENTRE, TESTBEDS, THESIS, with_bar, with_cables
 
 from cspm_control.analysis.cable_structure import cable_structure, structures
 from cspm_control.analysis.manipulability import (

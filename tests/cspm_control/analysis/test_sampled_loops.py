@@ -5,10 +5,10 @@ from dataclasses import replace
 import control
 import numpy as np
 import pytest
+from altered_machines import CENTRE, THESIS
+from cascade import Cascade
 from numpy.testing import assert_allclose
 from run_samples import bundle_of, recorded
-from test_cascade import Cascade
-from test_linearisation import CENTRE, THESIS
 
 from cspm_control.allocation.tension_distribution import TensionDistribution
 from cspm_control.analysis import sampled_loops

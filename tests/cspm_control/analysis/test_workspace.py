@@ -4,9 +4,9 @@ from itertools import combinations
 
 import numpy as np
 import pytest
+from altered_machines import CENTRE, THESIS, with_bar, with_cables
 from machines import build, general_content, point_content
 from scipy.optimize import linprog
-from test_linearisation import CENTRE, THESIS, with_bar, with_cables
 
 from cspm_control.analysis.cable_structure import cable_structure, structures, wanted_at_rest
 from cspm_control.analysis.pose_grid import GRIDS, Grid, steps

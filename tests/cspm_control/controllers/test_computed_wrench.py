@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from run_samples import bundle_of
 from scipy.spatial.transform import Rotation
-from test_tension_distribution import structure
+from structure_samples import structure
 
 from cspm_control.allocation.tension_distribution import TensionDistribution
 from cspm_control.controllers.computed_wrench import ComputedWrench

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from run_samples import bundle_of
 from scipy.optimize import linprog, lsq_linear
-from test_tension_distribution import structure
+from structure_samples import structure
 
 from bench.results.feasibility import REFERENCES, least_errors
 from bench.results.tracking import Case, follow, motions_of_bundle

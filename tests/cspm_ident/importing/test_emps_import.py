@@ -1,11 +1,19 @@
 """The electro-mechanical positioning system: its test-bed, and its recordings as published."""
 
-from pathlib import Path
-
 import numpy as np
 import pytest
+from emps_samples import (
+    DATA,
+    ESTIMATION,
+    MAPPING,
+    PUBLISHED,
+    PULSES,
+    RADIUS,
+    STATE,
+    TESTBED,
+    recorded,
+)
 from import_samples import imported
-from run_samples import SCENARIOS
 from scipy.io import loadmat
 from scipy.signal import butter, decimate, filtfilt
 
@@ -17,16 +25,6 @@ from cspm_model.motion import Motion
 from cspm_msgs_py.recording import Recording
 from cspm_msgs_py.testbed import load_testbed
 from cspm_sim.plant import Plant
-
-DATA = Path(__file__).resolve().parents[4] / "shared" / "data" / "emps"
-TESTBED = SCENARIOS / "testbeds" / "emps.yaml"
-MAPPING = SCENARIOS / "mappings" / "emps.yaml"
-STATE = "/winches/state"
-ESTIMATION, PULSES = "DATA_EMPS.mat", "DATA_EMPS_PULSES.mat"
-RADIUS = 0.01  # m, of the test-bed's drum
-# Janot, Gautier and Brunot 2019: mass [kg], viscous [N·s/m], Coulomb [N], constant force [N].
-PUBLISHED = np.array([95.1089, 203.5034, 20.3935, -3.1648])
-recorded = pytest.mark.skipif(not DATA.is_dir(), reason="the EMPS recordings are not here")
 
 
 def emps(tmp_path, name, mapping=None):

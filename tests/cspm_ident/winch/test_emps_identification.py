@@ -2,9 +2,9 @@
 
 import numpy as np
 import pytest
+from emps_samples import DATA, ESTIMATION, MAPPING, PUBLISHED, PULSES, RADIUS, STATE, TESTBED
 from import_samples import imported
 from scipy.signal import butter, decimate, filtfilt
-from test_emps_import import DATA, ESTIMATION, MAPPING, PUBLISHED, PULSES, RADIUS, STATE, TESTBED
 
 from cspm_ident.signals.samples import Samples
 from cspm_ident.winch import WinchSignals, identify_winch, torque_error

@@ -5,10 +5,10 @@ import json
 
 import numpy as np
 import pytest
+from emps_samples import DATA, ESTIMATION, MAPPING, PUBLISHED, PULSES, TESTBED, recorded
 from machines import THESIS
 from matplotlib.image import imread
 from run_samples import SCENARIOS, bundle_of
-from test_emps_import import DATA, ESTIMATION, MAPPING, PUBLISHED, PULSES, TESTBED, recorded
 from winch_samples import EFFECTS, Winch, closed_loop
 
 from cspm_ident.signals.measurement import Measurement, read_measurement

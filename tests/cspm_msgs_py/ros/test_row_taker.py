@@ -5,9 +5,9 @@ from contextlib import contextmanager
 
 import numpy as np
 import pytest
+from gathered_runs import spoilt
 from ros_graph import load_ros, new_domain
-from test_gatherer import spoilt
-from test_wire_block import TOPICS, rows_of
+from wire_rows import TOPICS, rows_of
 
 from cspm_msgs_py.errors import CspmError, InputError
 from cspm_msgs_py.message import message_of

@@ -8,9 +8,9 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from lockstep_network import Network, chooser, with_rates
+from loops import WILD, Listener
 from run_samples import bundle_of
-from test_loop import WILD, Listener
-from test_schedule import delayed
+from schedules import MS, delayed, schedule_with
 
 from cspm_msgs_py.diagnostics import Level, Status
 from cspm_msgs_py.errors import DivergenceError, InputError
@@ -24,7 +24,6 @@ from cspm_msgs_py.stepping.lockstep import (
 )
 from cspm_msgs_py.topics import QOS_DEPTH
 
-MS = 1_000_000
 REST = bundle_of("rest")
 SCENARIOS = {name: bundle_of(name) for name in ("rest", "verification_mid", "one_winch")}
 DIVISORS = st.sampled_from([10, 40, 50, 100, 125, 200, 500, 1000])
@@ -185,13 +184,6 @@ def test_a_divergence_ends_the_run_with_the_state_that_led_to_it():
 
 
 # A topic's stamps
-
-
-def schedule_with(first=0, divider=1, delay=0):
-    """Return a schedule of one topic and one node that reads it, at 1 kHz."""
-    plan = NodePlan(first, divider, 100, ("/in",), (), ("/out",))
-    topics = {"/in": Timing(first, divider, delay), "/out": Timing(first, divider)}
-    return Schedule(MS, topics, {"node": plan}, 100)
 
 
 # A follower

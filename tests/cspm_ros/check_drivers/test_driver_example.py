@@ -249,7 +249,6 @@ class External:
 
 @pytest.mark.slow
 @pytest.mark.alone
-@pytest.mark.usefixtures("uncrowded")
 @pytest.mark.parametrize("processes", ["--one-process", "--process-per-node"])
 def test_a_run_waits_for_it_says_so_starts_and_records(bundle, tmp_path, processes):
     patient = ("--set", f"safety.stale_after={WAIT}", "--duration", "3")

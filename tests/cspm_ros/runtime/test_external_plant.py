@@ -5,7 +5,17 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from realtime_graph import STALE_AFTER, Evidence, Graph, Witness, slow_bundle, warm_processes
+from realtime_graph import (
+    OWN_RUN,
+    STALE_AFTER,
+    WATCHDOG,
+    Evidence,
+    Graph,
+    Witness,
+    check_plant,
+    slow_bundle,
+    warm_processes,
+)
 from ros_graph import load_ros
 
 from cspm_msgs_py.graph import RECORDER
@@ -30,9 +40,6 @@ pytestmark = [pytest.mark.slow, pytest.mark.alone]
 MS = 1_000_000
 MEASURED = (FRAME_POSE, BAR_POSE, WINCH_STATE, TENSION)
 TRUTH = "/truth/bar/pose"
-WATCHDOG = "plant/watchdog"
-# What the run's leader says is none of the hardware's business, nor the other way round.
-APART = {f"/run/{name}": f"/hardware/{name}" for name in ("start", "end", "progress")}
 
 
 @pytest.fixture(scope="module")
@@ -54,7 +61,7 @@ class Hardware(Graph):
         super().__init__(warm, replace(bundle, plant=plant), place, members=(PLANT,), domain=domain)
 
     def switch_on(self):
-        self.start(remaps=APART)
+        self.start(remaps=OWN_RUN)
 
 
 def topics_of(bundle, *names):
@@ -63,11 +70,6 @@ def topics_of(bundle, *names):
 
 def waits_for(graph):
     return read_report(Path(graph.parameters.report)).waiting
-
-
-def check_plant(plant):
-    if plant == "mujoco":
-        pytest.importorskip("mujoco", minversion="4.0", reason="the MuJoCo plant needs MuJoCo 4")
 
 
 @pytest.mark.parametrize("plant", ["mujoco", "sim"])
@@ -145,7 +147,7 @@ def test_hardware_that_nobody_commands_is_waited_for(warm, tmp_path):
         Witness(graph.domain) as witness,
     ):
         graph.start()
-        hardware.start(remaps=APART | {TORQUE_COMMAND: "/elsewhere"})
+        hardware.start(remaps=OWN_RUN | {TORQUE_COMMAND: "/elsewhere"})
         witness.until(lambda: waits_for(graph) == named, named)
         hardware.end()
         assert set(graph.end(RECORDER).values()) == {0}

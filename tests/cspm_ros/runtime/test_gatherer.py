@@ -5,12 +5,12 @@ from itertools import count
 
 import numpy as np
 import pytest
+from gathered_runs import MS, REST, STEPS, Case, Intake, late, spoilt
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from lockstep_network import Network, chooser
 from ros_graph import content, difference, hashes
 from run_samples import bundle_of
-from test_schedule import delayed
 
 from cspm_msgs_py.diagnostics import encode_diagnostics
 from cspm_msgs_py.errors import CspmError, InputError
@@ -20,75 +20,19 @@ from cspm_msgs_py.ros_types import message_class, serialize
 from cspm_msgs_py.schedule import schedule_of
 from cspm_msgs_py.stepping.lockstep import RECORDED_EVERY, RECORDER_WINDOW
 from cspm_msgs_py.wire import WireWriter
-from cspm_ros.runtime.lockstep_recorder import Gatherer
-from cspm_run.recorded_run import new_recording, run
+from cspm_run.recorded_run import run
 
-MS = 1_000_000
-STEPS = 120
 SEEDS = st.integers(0, 2**32 - 1)
-REST = bundle_of("rest", "rates.tension_distribution=125", "rates.motion_capture=500")
 
 NO_STATUS = "not one status of a node of this run, allowed: one"
-
-
-def late(bundle, **delays):
-    """Return the bundle with sensors that are late by so many milliseconds."""
-    testbed = delayed(
-        bundle.testbed.testbed, {f"/{k.replace('__', '/')}": delays[k] for k in delays}
-    )
-    file = type(bundle.testbed)(testbed, bundle.testbed.text, bundle.testbed.sha256)
-    return type(bundle)(bundle.scenario, file, bundle.files)
 
 
 LATE = late(REST, bar__pose=23, cables__tension=3)
 
 
-class Case:
-    """A run: its description, what it sends by sender's queue in order, and its recording."""
-
-    def __init__(self, bundle, folder):
-        self.bundle, self.expected = bundle, folder
-        run(bundle, folder, steps=STEPS)
-        network = Network(bundle.scenario, bundle.testbed.testbed, STEPS)
-        network.run(lambda waiting: waiting[0])
-        last_ns = network.plant.last_step * MS
-        self.sent = {}
-        for name, heard in network.heard.items():
-            encode = WireWriter(bundle.testbed.testbed.topics[name]).encode
-            self.sent[name] = [encode(stamp, row) for log, stamp, row in heard if log <= last_ns]
-        for now, status in network.statuses:
-            if now <= last_ns:
-                payload = encode_diagnostics(now, [status])
-                self.sent.setdefault(("/diagnostics", status.name), []).append(payload)
-
-
 @pytest.fixture(scope="module", params=[REST, LATE], ids=["ideal", "late"])
 def case(request, tmp_path_factory):
     return Case(request.param, tmp_path_factory.mktemp("gatherer") / "expected")
-
-
-class Intake:
-    """A gatherer that records to a folder, with what it told."""
-
-    def __init__(self, bundle, folder, acknowledge=None, reporting=()):
-        self.told, self.rate_limited_warnings = [], []
-        schedule = schedule_of(bundle.scenario, bundle.testbed.testbed)
-        self.writer = new_recording(bundle, folder, "graph")
-        self.gatherer = Gatherer(
-            schedule,
-            bundle.testbed.testbed.topics,
-            self.writer,
-            acknowledge or self.told.append,
-            lambda topic, reason: self.rate_limited_warnings.append((topic, reason)),
-            reporting,
-        )
-        self._receive = {name: self.gatherer.receive(name) for name in schedule.topics}
-
-    def take(self, queue, payload):
-        if isinstance(queue, tuple):
-            self.gatherer.receive_diagnostics(payload, 0)
-        else:
-            self._receive[queue](payload, 0)
 
 
 def deliver(intake, sent, seed):
@@ -229,22 +173,6 @@ def test_an_end_that_cannot_be_is_refused(case, tmp_path):
 
 
 # What does not belong
-
-
-def spoilt(queue, payload, rng):
-    """Return bytes that are no message of the queue's, or not the next one."""
-    kind = rng.randrange(3 if isinstance(queue, tuple) else 5)
-    if kind == 0:
-        return rng.randbytes(rng.randrange(64))
-    if kind == 1:
-        return payload[: rng.randrange(len(payload))]
-    if kind == 2:
-        # Another stamp.
-        at = rng.randrange(4, 12)
-        return payload[:at] + bytes([payload[at] ^ (1 + rng.randrange(255))]) + payload[at + 1 :]
-    if kind == 3:
-        return payload + rng.randbytes(9 + rng.randrange(3000))
-    return payload[:-16] + np.full(2, np.nan).tobytes()
 
 
 @settings(max_examples=6)

@@ -3,8 +3,8 @@
 import random
 
 import pytest
+from gathered_runs import REST, STEPS, Case, Intake, spoilt
 from ros_graph import content
-from test_gatherer import REST, STEPS, Case, Intake, spoilt
 
 from cspm_msgs_py.errors import CspmError
 from cspm_msgs_py.wire import WireReader

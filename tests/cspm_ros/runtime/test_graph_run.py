@@ -11,10 +11,10 @@ from importlib.util import find_spec
 
 import numpy as np
 import pytest
+from gathered_runs import late
+from loops import WILD
 from ros_graph import assert_same, content, difference, done, load_ros, new_domain
 from run_samples import bundle_of, recorded
-from test_gatherer import late
-from test_loop import WILD
 
 from bench.results.tracking import Case
 from cspm_msgs_py.errors import CspmError, InputError
@@ -274,7 +274,6 @@ def test_listeners_that_cannot_be_served_do_not_keep_a_run_from_starting(tmp_pat
 
 @pytest.mark.slow
 @pytest.mark.alone
-@pytest.mark.usefixtures("uncrowded")  # two seconds must do to find the other run
 @pytest.mark.parametrize(
     ("name", "topic"), [("plant", END), ("motion_controller", "/run/progress")]
 )

@@ -3,6 +3,7 @@
 import re
 
 import pytest
+from cspm_process import grown
 from network_hosts import LOSS, shape, two_hosts
 from ros_graph import (
     assert_same,
@@ -13,7 +14,6 @@ from ros_graph import (
     start_node,
 )
 from run_samples import bundle_of
-from test_cli_process import grown
 
 from cspm_msgs_py.recording.recover import recover
 from cspm_run.recorded_run import run

@@ -5,7 +5,9 @@ import signal
 
 import psutil
 import pytest
+from cspm_process import grown
 from ros_graph import (
+    NODES,
     assert_same,
     ended_in_any_case,
     load_ros,
@@ -14,8 +16,6 @@ from ros_graph import (
     start_node,
 )
 from run_samples import SCENARIOS, bundle_of
-from test_cli_process import grown
-from test_process_run import NODES
 
 from cspm_msgs_py.recording import Recording
 from cspm_msgs_py.recording.recover import recover

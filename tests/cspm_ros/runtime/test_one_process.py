@@ -5,10 +5,21 @@ import threading
 from dataclasses import replace
 
 import pytest
-from realtime_graph import Evidence, Graph, Witness, slow_bundle, warm_processes
+from realtime_graph import (
+    OWN_RUN,
+    TOGETHER,
+    WATCHDOG,
+    Command,
+    Evidence,
+    Graph,
+    Witness,
+    check_plant,
+    slow_bundle,
+    topics_of,
+    under_way,
+    warm_processes,
+)
 from ros_graph import load_ros, new_domain
-from test_external_plant import APART, WATCHDOG, check_plant
-from test_realtime_run import TOGETHER, Command, topics_of, under_way
 
 load_ros()
 
@@ -20,7 +31,7 @@ from cspm_msgs_py.schedule import FORCE_CONTROLLER, PLANT, TENSION, TORQUE_COMMA
 from cspm_msgs_py.topics import EMERGENCY_STOP  # noqa: E402
 from cspm_ros.runtime.realtime_run import run_realtime  # noqa: E402 - after ROS is known to be there
 
-pytestmark = [pytest.mark.slow, pytest.mark.alone, pytest.mark.usefixtures("uncrowded")]
+pytestmark = [pytest.mark.slow, pytest.mark.alone]
 
 MS = 1_000_000
 PERIOD = 5 * MS
@@ -37,7 +48,7 @@ class Machine(Graph):
     def __init__(self, warm, bundle, place, domain):
         place.mkdir()
         super().__init__(warm, bundle, place, members=(PLANT,), domain=domain)
-        self.start(remaps=APART)
+        self.start(remaps=OWN_RUN)
 
 
 @pytest.mark.parametrize("plant", ["sim", "mujoco"])

@@ -13,7 +13,10 @@ from pathlib import Path
 
 import psutil
 import pytest
+from cspm_process import child, grown
+from loops import WILD
 from ros_graph import (
+    NODES,
     assert_same,
     content,
     difference,
@@ -23,8 +26,6 @@ from ros_graph import (
     node_processes,
 )
 from run_samples import bundle_of
-from test_cli_process import child, grown
-from test_loop import WILD
 
 from cspm_msgs_py.errors import CspmError
 from cspm_msgs_py.recording import Recording, overview
@@ -39,14 +40,6 @@ from cspm_ros.runtime.process_run import run_processes  # noqa: E402
 
 pytestmark = pytest.mark.compiled
 
-NODES = (
-    "plant",
-    "wave_trajectory",
-    "motion_controller",
-    "tension_distribution",
-    "force_controller",
-    "recorder",
-)
 # Reading the calm sea's waves takes longer than hanging at rest, and says no more here.
 LONG = bundle_of("rest", "duration=3600")
 LOST_S = 0.2

@@ -129,7 +129,7 @@ def connect(bench):
 
     def obey(name, stamp, row):
         if name == TORQUE_COMMAND:
-            bench.performance.plant_speed.receive_torque(stamp, row, bench.now)
+            bench.plant.receive_torque(stamp, row, bench.now)
 
     bench.listeners.append(obey)
     return waves, nodes
@@ -144,41 +144,41 @@ def test_with_all_deadlines_met_every_message_is_that_of_lockstep(tmp_path, scen
     expected = lockstep(parts_of(tmp_path, *scenario), steps)
     bench = Bench(parts_of(tmp_path, *scenario), steps)
     waves, nodes = connect(bench)
-    bench.performance.plant_speed.start(START)
+    bench.plant.start(START)
     for k in range(steps + 1):
         # Any jitter below a period, the same for all.
         bench.now = START + k * bench.period + (37 * k) % 900_000
         waves.tick(bench.now)
-        bench.performance.plant_speed.tick(bench.now)
+        bench.plant.tick(bench.now)
         for node in nodes:
             node.tick(bench.now)
-    assert bench.performance.plant_speed.ended
+    assert bench.plant.ended
     del expected[CLOCK]
     for name, messages in expected.items():
         found = bench.sent[name][: len(messages)]
         assert [stamp for stamp, _ in found] == [stamp for stamp, _ in messages], name
         for (_, row), (_, wanted) in zip(found, messages, strict=True):
             np.testing.assert_array_equal(row, wanted, err_msg=name)
-    assert (bench.performance.plant_speed.missed, bench.performance.plant_speed.late) == (0, 0)
+    assert (bench.plant.missed, bench.plant.late) == (0, 0)
     assert [node.late for node in nodes] == [0, 0, 0]
     assert not bench.dog.safe
 
 
 def quiet(tmp_path, steps=100, *overrides, **arguments):
     bench = Bench(parts_of(tmp_path, "rest", QUIET, *overrides), steps, **arguments)
-    bench.performance.plant_speed.start(START)
+    bench.plant.start(START)
     return bench
 
 
 def test_before_the_start_nothing_happens(tmp_path):
     bench = Bench(parts_of(tmp_path, "rest", QUIET), 100)
     bench.at(5)
-    assert bench.performance.plant_speed.step == -1
-    bench.performance.plant_speed.start(START)
+    assert bench.plant.step == -1
+    bench.plant.start(START)
     bench.at(0, late_ns=-1)
-    assert bench.performance.plant_speed.step == -1
+    assert bench.plant.step == -1
     bench.at(0)
-    assert bench.performance.plant_speed.step == 0
+    assert bench.plant.step == 0
     assert len(bench.sent["/truth/bar/pose"]) == 1
     assert bench.parts.plant.steps == 0
 
@@ -201,16 +201,16 @@ def test_a_late_command_is_held_counted_and_followed_when_it_comes(tmp_path):
     bench.at(1)
     # The command of step 1 comes in step 2: the plant has held that of step 0.
     bench.at(2)
-    assert bench.performance.plant_speed.missed == 1
+    assert bench.plant.missed == 1
     np.testing.assert_array_equal(bench.simulator.torque, bench.hanging)
     bench.command(1, changed)
     bench.at(3)
     # Used, but not the command of its own step.
     np.testing.assert_array_equal(bench.simulator.torque, changed)
-    assert bench.performance.plant_speed.missed == 2
+    assert bench.plant.missed == 2
     bench.command(3)
     bench.at(4)
-    assert bench.performance.plant_speed.missed == 2
+    assert bench.plant.missed == 2
 
 
 def test_missed_commands_are_told(tmp_path):
@@ -228,16 +228,16 @@ def test_missed_commands_are_told(tmp_path):
 def test_where_commands_come_seldom_only_theirs_are_missed(tmp_path):
     rates = "rates={plant: 200, winches: 200, load_cells: 200, wave_trajectory: 200,"
     bench = Bench(parts_of(tmp_path, "rest", rates + " force_controller: 100}"), 100)
-    bench.performance.plant_speed.start(START)
+    bench.plant.start(START)
     for k in range(20):
         bench.at(k)
         if k % 2 == 0:
             bench.command(k)
-    assert bench.performance.plant_speed.missed == 0
+    assert bench.plant.missed == 0
     for k in range(20, 31):
         bench.at(k)
     # Those of 20, 22, 24, 26 and 28; that of 30 may still come.
-    assert bench.performance.plant_speed.missed == 5
+    assert bench.plant.missed == 5
 
 
 def test_it_catches_up_two_steps_at_a_time(tmp_path):
@@ -246,7 +246,7 @@ def test_it_catches_up_two_steps_at_a_time(tmp_path):
     found = [bench.at(10).step for _ in range(6)]
     assert found == [2, 4, 6, 8, 10, 10]
     # Steps 1 to 9 were made more than a period after they were due.
-    assert bench.performance.plant_speed.late == 9
+    assert bench.plant.late == 9
     assert len(bench.sent["/truth/bar/pose"]) == 11
 
 
@@ -254,16 +254,16 @@ def test_steps_within_their_period_are_not_late(tmp_path):
     bench = quiet(tmp_path)
     for k in range(10):
         bench.at(k, late_ns=bench.period - 1)
-    assert bench.performance.plant_speed.late == 0
+    assert bench.plant.late == 0
 
 
 def test_it_ends_after_the_last_step(tmp_path):
     bench = quiet(tmp_path, steps=3)
     for k in range(3):
         bench.at(k)
-        assert not bench.performance.plant_speed.ended
+        assert not bench.plant.ended
     bench.at(3)
-    assert bench.performance.plant_speed.ended
+    assert bench.plant.ended
     assert bench.parts.plant.steps == 3
     bench.at(4)
     assert bench.parts.plant.steps == 3
@@ -306,9 +306,9 @@ def test_the_brake_topic_sets_and_releases_the_brakes(tmp_path):
     bench = quiet(tmp_path)
     bench.at(0)
     for wanted in (True, False):
-        bench.performance.plant_speed.receive_brake(wanted)
+        bench.plant.receive_brake(wanted)
         assert bench.parts.plant.locked is wanted
-    bench.performance.plant_speed.receive_brake(True)
+    bench.plant.receive_brake(True)
     slack = np.zeros_like(bench.hanging)
     angles = bench.parts.plant.angles.copy()
     for k in range(1, 50):
@@ -320,7 +320,7 @@ def test_the_brake_topic_sets_and_releases_the_brakes(tmp_path):
 def test_refused_commands_are_counted_and_told(tmp_path):
     bench = quiet(tmp_path)
     bench.at(0)
-    bench.performance.plant_speed.refuse("a reason")
+    bench.plant.refuse("a reason")
     for k in range(1, 21):
         bench.command(k - 1)
         bench.at(k)
@@ -335,11 +335,11 @@ def test_a_plant_that_leaves_its_equations_says_so_and_ends(tmp_path):
     for k in range(2000):
         bench.at(k)
         bench.command(k, wild)
-        if bench.performance.plant_speed.ended:
+        if bench.plant.ended:
             break
-    assert bench.performance.plant_speed.ended
-    assert bench.performance.plant_speed.failure.startswith("t = ")
-    assert "; before it: " in bench.performance.plant_speed.failure
+    assert bench.plant.ended
+    assert bench.plant.failure.startswith("t = ")
+    assert "; before it: " in bench.plant.failure
     steps = bench.parts.plant.steps
     bench.at(2500)
     assert bench.parts.plant.steps == steps

@@ -9,14 +9,20 @@ import sys
 import numpy as np
 import pytest
 from realtime_graph import (
+    APART,
+    GUARDS,
     PATIENCE_S,
+    TOGETHER,
+    Command,
     Evidence,
     Graph,
     Witness,
     slow_bundle,
+    topics_of,
+    under_way,
     warm_processes,
 )
-from ros_graph import load_ros, new_domain, node_processes
+from ros_graph import load_ros
 from run_samples import bundle_of
 
 from cspm_control.controllers.torque_profile import TorqueGenerator
@@ -27,58 +33,7 @@ from cspm_run.recorded_timing import timing_of
 load_ros()
 pytestmark = [pytest.mark.slow, pytest.mark.alone]
 
-APART, TOGETHER = "--process-per-node", "--one-process"
-CSPM = [sys.executable, "-c", "from cspm.cli.main import main; main()"]
 MS = 1_000_000
-GUARDS = (FORCE_CONTROLLER, "plant/watchdog")
-# A start takes its time where others use the processor.
-START_S = 90.0
-
-
-class Command:
-    """`cspm run … --mode realtime` as a process, on a domain of its own."""
-
-    def __init__(self, place, bundle, *arguments):
-        self.domain = new_domain()
-        self.folder = place / "bag"
-        for name, content in bundle.attachments().items():
-            (place / name).write_bytes(content)
-        command = [*CSPM, "run", place / "scenario.yaml", "--mode", "realtime"]
-        self.process = subprocess.Popen(
-            [*map(str, [*command, "--out", self.folder, *arguments])],
-            stdout=subprocess.PIPE,
-            stderr=subprocess.PIPE,
-            text=True,
-            env=os.environ | {"ROS_DOMAIN_ID": str(self.domain)},
-        )
-
-    def nodes(self):
-        """Return the processes of the run's nodes, by name."""
-        return node_processes(self.process.pid)
-
-    def done(self):
-        """Wait for the end; return exit code, stdout and stderr."""
-        out, err = self.process.communicate(timeout=START_S)
-        return self.process.returncode, out, err
-
-    def __enter__(self):
-        return self
-
-    def __exit__(self, *_):
-        if self.process.poll() is None:
-            self.process.kill()
-            self.process.communicate()
-
-
-def under_way(witness):
-    for guard in GUARDS:
-        witness.until(lambda guard=guard: guard in witness.latest, guard, START_S)
-    witness.until_running(*GUARDS)
-    witness.until_more(TENSION, 100)
-
-
-def topics_of(bundle, *names):
-    return [bundle.testbed.testbed.topics[name] for name in names]
 
 
 @pytest.mark.parametrize("processes", [TOGETHER, APART])

@@ -2,38 +2,19 @@
 
 import numpy as np
 import pytest
-from machines import LINEAR, WINCH, build, cable
+from creep_samples import LENGTH_M, MS, STILL, line, stiffness_of
+from machines import WINCH, build, entry
 
 from cspm_model.motion import Motion
 from cspm_sim.effects import catalogue
 from cspm_sim.effects.signals import CableSignal, FrameSignal, WinchSignal
 from cspm_sim.plant import Plant
 
-STILL = Motion.still(np.zeros(6))
-MS = 1_000_000
-LENGTH_M = 2.1
-
-
-def entry(effect, **parameters):
-    return {"effect": effect, "elements": [], "parameters": parameters}
-
-
-def line(effects=(), end=(0.0, 0.0, LENGTH_M), stiffness=LINEAR, damping=0.0, **winch):
-    """One linear cable without damping to a fixed point."""
-    only = cable("only", (0, 0, 0), end, stiffness, **winch)
-    only["damping"] = {"constant": damping}
-    return build({"name": "line", "cables": [only], "effects": list(effects)})
-
 
 def bench(effects=(), **winch):
     """One winch without cable."""
     only = {"name": "w", **WINCH, "rotor_inertia": 1e-3, **winch}
     return build({"name": "bench", "cables": [only], "effects": list(effects)})
-
-
-def stiffness_of(machine, unstretched):
-    found = machine.cables[0]
-    return found.stiffness.axial_rigidity / (unstretched + found.offset_length)
 
 
 def heaving(samples, period):

@@ -2,7 +2,7 @@
 
 import numpy as np
 import pytest
-from machines import build, changed, general_content
+from machines import build, changed, entry, general_content
 
 from cspm_model.equilibrium import gravity_wrench
 from cspm_model.kinematics import geometry, rotation
@@ -16,10 +16,6 @@ STILL = Motion.still(np.zeros(6))
 POSE = [0.02, -0.03, 2.0, 0.05, -0.04, 0.1]
 MS = 1_000_000
 DOFS = ("surge", "sway", "heave", "roll", "pitch", "yaw")
-
-
-def entry(effect, elements=(), **parameters):
-    return {"effect": effect, "elements": list(elements), "parameters": parameters}
 
 
 def moved(point, offset):

@@ -2,7 +2,7 @@
 
 import numpy as np
 import pytest
-from machines import build, changed, general_content
+from machines import build, changed, entry, general_content
 
 from cspm_model.kinematics import rotation
 from cspm_model.motion import Motion
@@ -13,10 +13,6 @@ from cspm_sim.plant import Plant
 
 STILL = Motion.still(np.zeros(6))
 MS = 1_000_000
-
-
-def entry(effect, **parameters):
-    return {"effect": effect, "elements": [], "parameters": parameters}
 
 
 def floating(effects, gravity, **bar):

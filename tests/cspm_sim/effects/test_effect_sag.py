@@ -2,9 +2,9 @@
 
 import numpy as np
 import pytest
-from machines import LINEAR
+from creep_samples import LENGTH_M, MS, STILL, line, stiffness_of
+from machines import LINEAR, entry
 from scipy.optimize import brentq
-from test_effect_memory import LENGTH_M, MS, STILL, entry, line, stiffness_of
 
 from cspm_model.motion import Motion
 from cspm_sim.effects import catalogue

@@ -2,7 +2,7 @@
 
 import numpy as np
 import pytest
-from machines import build, general_content, rig_content
+from machines import build, entry, general_content, rig_content
 
 from cspm_model.kinematics import euler_rate_map, rotation
 from cspm_msgs_py.errors import InputError
@@ -16,10 +16,6 @@ DOFS = ("surge", "sway", "heave", "roll", "pitch", "yaw")
 OFFSET = dict(zip(DOFS, (0.02, -0.03, 0.05, 0.1, -0.2, 0.3), strict=True))
 NOISES = {"/winches/state": 3, "/cables/tension": 1}
 READINGS = [e for e in catalogue().values() if e.regression.channel is Channel.READING]
-
-
-def entry(effect, elements=(), **parameters):
-    return {"effect": effect, "elements": list(elements), "parameters": parameters}
 
 
 def machine(*effects):

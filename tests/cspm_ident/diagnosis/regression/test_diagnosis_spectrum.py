@@ -4,9 +4,9 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from diagnosis_samples import diagnosis
 from measured_samples import measured_with
 from scipy.signal import butter, lfilter
-from test_diagnosis_page import diagnosis
 
 from cspm_ident.diagnosis.regression.block_gram import gather
 from cspm_ident.diagnosis.regression.block_regression import Sums

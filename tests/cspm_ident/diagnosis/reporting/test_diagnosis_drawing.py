@@ -4,8 +4,8 @@ import re
 
 import numpy as np
 import pytest
+from diagnosis_samples import BAR_POSE, THESIS
 from run_samples import SCENARIOS
-from test_diagnosis_page import BAR_POSE, THESIS
 
 from cspm_ident.diagnosis.reporting.machine_drawing import drawing
 from cspm_ident.diagnosis.reporting.machine_part import Kind, Part, parts_of

@@ -5,7 +5,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from test_diagnosis_page import NOISE, PLACE, RUBBING, THESIS, TORQUE, diagnosis
+from diagnosis_samples import NOISE, PLACE, RUBBING, THESIS, TORQUE, diagnosis
 
 from cspm_ident.diagnosis.diagnose import Shape
 from cspm_ident.diagnosis.regression.block_regression import Gain

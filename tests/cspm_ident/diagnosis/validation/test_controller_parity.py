@@ -3,8 +3,8 @@
 from functools import partial
 
 import pytest
+from rewritten_recordings import rewrite
 from run_samples import bundle_of
-from test_resim import rewrite
 
 from cspm_ident.diagnosis.reporting.page_checks import controllers_table
 from cspm_ident.diagnosis.validation import controller_parity as module

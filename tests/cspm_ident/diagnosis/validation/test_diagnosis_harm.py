@@ -2,7 +2,7 @@
 
 import numpy as np
 import pytest
-from test_diagnosis_judgement import CREEPING, CREPT, SOUND, START_S, TRUE, crept
+from crept_cables import CREEPING, CREPT, SOUND, START_S, TRUE
 
 from cspm_ident.diagnosis.residuals.recorded_equations import equations_of
 from cspm_ident.diagnosis.residuals.regressors import Place
@@ -13,7 +13,6 @@ from cspm_ident.diagnosis.validation.holdout_residuals import rms
 from cspm_ident.diagnosis.validation.holdout_simulation import baselines_of
 from cspm_sim.effects import Channel
 
-__all__ = ["crept"]
 ONE, OTHER = Place(Channel.TENSION, "sway_2"), Place(Channel.WRENCH, "bar")
 BLOCKS, BLOCK_S = 12, 0.5
 

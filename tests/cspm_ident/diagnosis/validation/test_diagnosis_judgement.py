@@ -2,31 +2,13 @@
 
 import numpy as np
 import pytest
-from measured_samples import measured_with
+from crept_cables import CREEPING, CREPT, SOUND, START_S, TRUE
 
 from cspm_ident.diagnosis.residuals.recorded_equations import equations_of
-from cspm_ident.diagnosis.residuals.regressors import Candidate, Place
 from cspm_ident.diagnosis.residuals.residual_equation import steady
 from cspm_ident.diagnosis.selection.search_pass import noise_of
 from cspm_ident.diagnosis.validation import holdout_residuals as judgement
 from cspm_ident.diagnosis.validation.holdout_residuals import judged
-from cspm_sim.effects import Channel, catalogue
-
-TRUE = np.array([2e-3])
-CREPT, SOUND = Place(Channel.TENSION, "sway_2"), Place(Channel.TENSION, "sway_3")
-CREEP = """  - effect: cable_creep
-    elements: [sway_2]
-    parameters: {compliance: 2.0e-3, time_constant: 3.0}
-"""
-CREEPING = Candidate(catalogue()["cable_creep"], "sway_2", (("time_constant", 3.0),))
-START_S = 12.0
-
-
-@pytest.fixture(scope="module")
-def crept(tmp_path_factory):
-    """Sixteen seconds of the calm sea with a cable that creeps; the file knows nothing of it."""
-    folder = tmp_path_factory.mktemp("judgement") / "bag"
-    return measured_with(CREEP, folder, "calm", "duration=16")
 
 
 def fits(measurement, start=START_S):

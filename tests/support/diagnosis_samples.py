@@ -1,0 +1,78 @@
+"""A diagnosis whose numbers are given, not computed."""
+
+import numpy as np
+from run_samples import SCENARIOS
+
+from cspm_ident.block_simulation import Drive
+from cspm_ident.diagnosis.diagnose import Detail, Diagnosis, Shape
+from cspm_ident.diagnosis.regression.block_regression import Gain
+from cspm_ident.diagnosis.regression.hypothesis import (
+    Findings,
+    Hypothesis,
+    Named,
+)
+from cspm_ident.diagnosis.residuals.regressors import Candidate, Place
+from cspm_ident.diagnosis.residuals.residual_equation import Equation
+from cspm_ident.diagnosis.validation.detection_limits import Limit
+from cspm_ident.diagnosis.validation.holdout_residuals import HeldOut
+from cspm_ident.diagnosis.validation.holdout_simulation import Output, SimulatedFit, Worth
+from cspm_ident.diagnosis.validation.residual_curves import held_out_curves
+from cspm_ident.signals.measurement import Measurement
+from cspm_ident.signals.samples import Samples
+from cspm_msgs_py.testbed import load_testbed
+from cspm_sim.effects import Channel, catalogue
+
+THESIS = load_testbed(SCENARIOS / "testbeds" / "thesis.yaml")
+TORQUE, NOISE = 0.03, 0.001
+PLACE = Place(Channel.SHAFT, "surge_2")
+RUBBING = Candidate(catalogue()["winch_coulomb_friction"], "surge_2")
+BAR_POSE = np.array([0.0, 0.0, 1.8, 0.0, 0.0, 0.0])
+
+
+def equation(seed=1):
+    """A winch's equation with dry friction in it, and a signal that has nothing to do with it."""
+    rng = np.random.default_rng(seed)
+    times = 0.01 * np.arange(3000)
+    speed, other = np.cos(2.0 * times), rng.standard_normal(3000)
+    column = np.sign(speed)[:, None, None]
+    target = TORQUE * np.sign(speed) + NOISE * rng.standard_normal(3000)
+    measured = 0.2 * np.sin(times) + target
+    signals = {"tension [N]": other, "speed [rad/s]": speed}
+    return Equation(
+        PLACE, times, target[:, None], {RUBBING: column}, measured[:, None], signals=signals
+    )
+
+
+OUTPUT = Output(Drive.SHAFT, "winches/angle/surge_2", "rad", "surge_2", Channel.SHAFT)
+
+
+def diagnosis(named=True, alternatives=(), unknown=(), rejected=(), lines=(), region=None):
+    part = equation()
+    poses = Samples(np.array([0.0, 1.0]), np.array([BAR_POSE, BAR_POSE]))
+    measured = Measurement(SCENARIOS / "today", "ab" * 32, THESIS, bar_pose=poses)
+    weights = {RUBBING: (np.array([TORQUE]), np.array([0.001]))} if named else {}
+    hypothesis = Hypothesis(RUBBING.effect, (RUBBING,))
+    found = (Named(hypothesis, Gain(900.0, 10.0), 0.99, tuple(alternatives)),) if named else ()
+    return Diagnosis(
+        searched=(measured,),
+        held_out=(),
+        findings=Findings(found, tuple(unknown), 485),
+        details=(Detail(None, region, Worth(OUTPUT, 1.46, 0.0071)),) * len(found),
+        rejected=tuple(rejected),
+        negligible=(),
+        weights=weights,
+        fit=(HeldOut(PLACE, 0.15, TORQUE, TORQUE, NOISE, NOISE, NOISE),),
+        simulated=(SimulatedFit(OUTPUT, 3.5, 1.46, 1.45, 0.0071, 0.0049),),
+        shapes=tuple(
+            Shape(d, np.linspace(0.0, 1.0, 7), np.arange(7.0) - 3.0) for d, _, _ in unknown
+        ),
+        lines=tuple(lines),
+        limits=(
+            Limit("winch_viscous_friction", "sway_1", "coefficient", 2.1e-6, "N·m·s/rad", True),
+        ),
+        silent=(("winch_backlash", ("sway_1",)),),
+        places=(PLACE,),
+        starts=np.zeros(1),
+        curves=held_out_curves([[part]], {c: w for c, (w, _) in weights.items()}),
+        noise={PLACE: np.array([NOISE])},
+    )

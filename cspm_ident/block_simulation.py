@@ -342,6 +342,7 @@ def _as_reported(testbed: Testbed) -> Testbed:
     effects = [
         entry
         for entry in testbed.effects
-        if entry.effect not in catalogue() or set(catalogue()[entry.effect].kernels) != {Hook.DRIVE}
+        if entry.effect not in catalogue()
+        or set(catalogue()[entry.effect].physics.kernels) != {Hook.DRIVE}
     ]
     return testbed.model_copy(update={"effects": tuple(effects)})

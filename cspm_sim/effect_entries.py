@@ -50,7 +50,7 @@ def read_actions(testbed: Testbed) -> list[Action]:
     seen = set()
     for action in actions:
         place = action.effect.id, action.name
-        if action.effect.states and place in seen:
+        if action.effect.physics.states and place in seen:
             raise InputError(f"{action.where}: twice on {action.name}, allowed: once per element")
         seen.add(place)
     return [action for action in actions if not action.effect.is_absent(action.values)]
@@ -63,9 +63,9 @@ def altered_testbed(testbed: Testbed, actions: Iterable[Action]) -> Testbed:
         InputError: a changed parameter is out of bounds.
     """
     for action in actions:
-        if action.effect.alter:
+        if action.effect.physics.alter:
             try:
-                testbed = action.effect.alter(testbed, action.element, action.values)
+                testbed = action.effect.physics.alter(testbed, action.element, action.values)
             except InputError as err:
                 raise InputError(f"{action.where}: {err}") from None
     return testbed
@@ -73,9 +73,9 @@ def altered_testbed(testbed: Testbed, actions: Iterable[Action]) -> Testbed:
 
 def first_states(actions: Sequence[Action], n_states: int) -> list[int]:
     """Return the index of each action's first state, the plant having `n_states`; -1 for none."""
-    ends = np.cumsum([n_states] + [action.effect.states for action in actions])
+    ends = np.cumsum([n_states] + [action.effect.physics.states for action in actions])
     return [
-        int(end) if action.effect.states else -1
+        int(end) if action.effect.physics.states else -1
         for end, action in zip(ends[:-1], actions, strict=True)
     ]
 
@@ -86,7 +86,7 @@ def hook_rows(actions: Sequence[Action], n_states: int) -> tuple[NDArray[np.int6
     calls = sorted(
         (int(hook), action.element, k)
         for k, action in enumerate(actions)
-        for hook in action.effect.kernels
+        for hook in action.effect.physics.kernels
     )
     width = max((len(actions[k].values) for *_, k in calls), default=1)
     effects = np.zeros((len(calls), ROW_COLUMNS), dtype=np.int64)
@@ -94,14 +94,14 @@ def hook_rows(actions: Sequence[Action], n_states: int) -> tuple[NDArray[np.int6
     for row, (hook, element, k) in enumerate(calls):
         effect, values = actions[k].effect, list(actions[k].values.values())
         address = _address(effect, Hook(hook))
-        effects[row] = hook, element, address, first[k], effect.states
+        effects[row] = hook, element, address, first[k], effect.physics.states
         parameters[row, : len(values)] = values
     return effects, parameters
 
 
 def _address(effect: Effect, hook: Hook) -> int:
     try:
-        return kernel_address(effect.kernels[hook], effect.states > 0)
+        return kernel_address(effect.physics.kernels[hook], effect.physics.states > 0)
     except NumbaError as err:
         reason = str(err).strip().splitlines()[-1]
         raise InputError(

@@ -153,9 +153,9 @@ class Plant:
         if index >= first + 3 * n:
             index -= first + 3 * n
             for action in self._actions:
-                if index < action.effect.states:
+                if index < action.effect.physics.states:
                     return f"state {index} of {action.effect.id} of {action.name}"
-                index -= action.effect.states
+                index -= action.effect.physics.states
         kind, cable = divmod(index - first, n)
         name = ("unstretched length", "motor angle", "motor speed")[kind]
         return f"{name} of {self.testbed.cable_names[cable]}"
@@ -218,7 +218,7 @@ class Plant:
     def _settle(self, tensions: Array, force: Array) -> None:
         """Bring the states of effects to rest, and the cables with them to their tensions."""
         lengths, loaded = self.unstretched_lengths, tensions > 0.0
-        hooks = {hook for action in self._actions for hook in action.effect.kernels}
+        hooks = {hook for action in self._actions for hook in action.effect.physics.kernels}
         for _ in range(SETTLING_STEPS):
             self._memory[:] = memory_at_rest(
                 self._actions, self.parameters, tensions, lengths, force

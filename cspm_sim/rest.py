@@ -29,7 +29,7 @@ def static_wrench(
     signals[bar_hooks.PENDANT_GRAVITY] = parameters.bar[GRAVITY]
     for action in actions:
         for hook in (Hook.BAR, Hook.PENDANT):
-            _call(action, hook, signals, np.zeros(action.effect.states))
+            _call(action, hook, signals, np.zeros(action.effect.physics.states))
     return signals[WRENCH : WRENCH + 6] + _end_wrench(actions, parameters, bar_pose, frame)
 
 
@@ -39,13 +39,13 @@ def _end_wrench(
     wrench = np.zeros(6)
     lengths, jacobian, _ = geometry(parameters.cables, bar_pose, frame)
     for action in actions:
-        if Hook.ATTACHMENT not in action.effect.kernels:
+        if Hook.ATTACHMENT not in action.effect.physics.kernels:
             continue
         i, signals = action.element, np.zeros(bar_hooks.END_SIGNALS)
         signals[bar_hooks.END_DIRECTION : bar_hooks.END_DIRECTION + 3] = jacobian[i, :3]
         signals[bar_hooks.END_LENGTH] = lengths[i]
         signals[bar_hooks.END_GRAVITY] = parameters.bar[GRAVITY]
-        _call(action, Hook.ATTACHMENT, signals, np.zeros(action.effect.states))
+        _call(action, Hook.ATTACHMENT, signals, np.zeros(action.effect.physics.states))
         force = signals[bar_hooks.END_FORCE : bar_hooks.END_FORCE + 3]
         arm = rotation(bar_pose) @ parameters.cables[i, ATTACHMENT : ATTACHMENT + 3]
         wrench += np.concatenate([force, np.cross(arm, force)])
@@ -79,7 +79,7 @@ def memory_at_rest(
     """
     found = [np.zeros(0)]
     for action in actions:
-        hook, i = min(action.effect.kernels, default=Hook.BAR), action.element
+        hook, i = min(action.effect.physics.kernels, default=Hook.BAR), action.element
         if hook is Hook.FRAME:
             signals = _frame_signals(force)
         elif hook is Hook.CABLE:
@@ -112,15 +112,17 @@ def _drive_signals(tension: float, radius: float) -> Array:
 
 def _states(action: Action, hook: Hook, signals: Array) -> Array:
     effect = action.effect
-    if effect.rest is None or hook not in effect.kernels:
-        return np.zeros(effect.states)
-    return np.array(effect.rest(np.array(list(action.values.values())), signals), dtype=float)
+    if effect.physics.rest is None or hook not in effect.physics.kernels:
+        return np.zeros(effect.physics.states)
+    return np.array(
+        effect.physics.rest(np.array(list(action.values.values())), signals), dtype=float
+    )
 
 
 def _call(action: Action, hook: Hook, signals: Array, states: Array) -> None:
-    kernel = action.effect.kernels.get(hook)
+    kernel = action.effect.physics.kernels.get(hook)
     if kernel is None:
         return
     values = np.array(list(action.values.values()))
-    memory = (states, np.zeros(len(states))) if action.effect.states else ()
+    memory = (states, np.zeros(len(states))) if action.effect.physics.states else ()
     kernel(values, signals, *memory)

@@ -24,19 +24,19 @@ class SensorFault:
     @property
     def is_late(self) -> bool:
         """Whether readings can be older than their stamps say."""
-        sense = self.action.effect.sense
+        sense = self.action.effect.physics.sense
         return sense is not None and sense.lateness is not None
 
     def lateness(self, time: float) -> float:
         """Return by how much a reading stamped `time` [s] is older than that [s]."""
-        sense = self.action.effect.sense
+        sense = self.action.effect.physics.sense
         if sense is None or sense.lateness is None:
             return 0.0
         return sense.lateness(time, self._parameters)
 
     def reading(self, values: Array) -> Array:
         """Return the quantities as the faulty sensor takes them in."""
-        sense = self.action.effect.sense
+        sense = self.action.effect.physics.sense
         if sense is None or sense.reading is None:
             return values
         return sense.reading(values, self.action.element, self._parameters)
@@ -81,7 +81,7 @@ def sensor_faults(testbed: Testbed, topic: str) -> list[SensorFault]:
     """
     faults = []
     for action in read_actions(testbed):
-        sense = action.effect.sense
+        sense = action.effect.physics.sense
         if sense and topic in (name.format(action.name) for name in sense.topics):
             faults.append(SensorFault(action))
             if faults[-1].lateness(1.0) < 0.0:

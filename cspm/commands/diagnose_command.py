@@ -168,7 +168,7 @@ def _experiments(found: Diagnosis, data: Mapping[str, Any], folder: Path | None)
         [
             f"cspm run {folder / entry['separating_experiment']}"
             if folder is not None and entry["separating_experiment"]
-            else rival.hypothesis.effect.separating_experiment
+            else rival.hypothesis.effect.description.separating_experiment
             for rival, entry in zip(named.alternatives, finding["alternatives"], strict=True)
         ]
         for named, finding in zip(found.findings.named, named_in(data), strict=True)
@@ -216,7 +216,7 @@ def print_diagnosis(
     _print_fits(console, found)
     for name, elements in found.silent:
         if elements:
-            shown = catalogue()[name].separating_experiment
+            shown = catalogue()[name].description.separating_experiment
             say(console, f"not testable here: {name} on {', '.join(elements)}; would show: {shown}")
     without = ", ".join(name for name, elements in found.silent if not elements)
     if without:

@@ -63,7 +63,7 @@ class Signature:
 def only_shape(effect: Effect) -> Effect:
     """Return the effect, looked at in the middle of its grid alone."""
     shapes = list(shapes_of(effect))
-    return replace(effect, nonlinear={k: (v,) for k, v in shapes[len(shapes) // 2]})
+    return effect.with_grid({k: (v,) for k, v in shapes[len(shapes) // 2]})
 
 
 def signatures(
@@ -106,7 +106,7 @@ def _seen_at_drum(
 
     There the winch equation is right, and the reading differs from the free cable's tension.
     """
-    if effect.regression.channel is not Channel.SHAFT or measurement.tension is None:
+    if effect.signature.regression.channel is not Channel.SHAFT or measurement.tension is None:
         return columns
     i = measurement.machine.cable_names.index(cable)
     lost, readings = _tension_lost(measurement, effect, i), measurement.tension

@@ -33,7 +33,7 @@ NOISE = {
     Channel.TENSION: 0.02,
     Channel.WRENCH: 0.05,
 }
-# Below this angle a pair is listed, twins or not.
+# Below this angle a pair is listed, declared as confounded or not.
 NARROW_DEG = 15.0
 _SCENARIOS = Path(__file__).resolve().parents[2] / "scenarios"
 _HEAD = """\
@@ -56,8 +56,8 @@ This page is generated: `python -m cspm_ident.experiment.isolability_page > docs
 
 ## Pairs
 
-Declared twins, and every pair below {narrow:g}° with load cells and motion capture. All other pairs
-are above that.
+Pairs declared as confounded, and every pair below {narrow:g}° with load cells and motion capture.
+All other pairs are above that.
 
 | pair | free, capture | drum, capture | free | drum | capture |
 |---|---:|---:|---:|---:|---:|
@@ -117,7 +117,8 @@ _UNITS = {
 
 def _is_listed(pair: Pair, effects: Mapping[str, Effect], table: Table) -> bool:
     one, other = pair
-    if other in effects[one].twins or one in effects[other].twins:
+    declared = {id_: effects[id_].description.confounded_with for id_ in pair}
+    if other in declared[one] or one in declared[other]:
         return True
     capture = (table[s][pair] for s in (Sensors.BAR_AND_CAPTURE, Sensors.DRUM_AND_CAPTURE))
     return any(angle is not None and angle < NARROW_DEG for angle in capture)

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -18,7 +17,7 @@ Array = NDArray[np.float64]
 
 def with_shape(candidate: Candidate) -> Effect:
     """Return the candidate's effect, looked at with its own nonlinear parameters alone."""
-    return replace(candidate.effect, nonlinear={k: (v,) for k, v in candidate.shape})
+    return candidate.effect.with_grid({k: (v,) for k, v in candidate.shape})
 
 
 def separation(

@@ -210,8 +210,8 @@ def _linear_effect(name: str) -> Effect:
 
 
 def _is_linear(effect: Effect) -> bool:
-    at_shaft = effect.regression.channel is Channel.SHAFT
-    return at_shaft and not effect.nonlinear and effect.coefficients is None
+    at_shaft = effect.signature.regression.channel is Channel.SHAFT
+    return at_shaft and not effect.signature.nonlinear and effect.signature.coefficients is None
 
 
 def _is_inertia(effect: Effect) -> bool:

@@ -10,24 +10,30 @@ from cspm_msgs_py.errors import InputError
 from cspm_sim.effects.effect import (
     Block,
     Channel,
+    Description,
     Effect,
     EffectParameter,
     Elements,
     Hook,
+    Physics,
     Regression,
     Sense,
+    Signature,
 )
 from cspm_sim.effects.own_files import VARIABLE, own_effects
 
 __all__ = [
     "Block",
     "Channel",
+    "Description",
     "Effect",
     "EffectParameter",
     "Elements",
     "Hook",
+    "Physics",
     "Regression",
     "Sense",
+    "Signature",
     "catalogue",
 ]
 

@@ -69,16 +69,17 @@ def _summary(effect: Effect) -> str:
 
 def effect_section(effect: Effect) -> str:
     """Return all that an effect declares, in Markdown."""
+    states, words = effect.physics.states, effect.description
     facts = {
         "Acts on": _ELEMENTS[effect.acts_on],
-        "Equation": effect.equation,
-        "Memory": f"{effect.states} states per element" if effect.states else "none",
-        "Residual": effect.regression.channel.value,
-        "Shows": effect.shows,
+        "Equation": words.equation,
+        "Memory": f"{states} states per element" if states else "none",
+        "Residual": effect.signature.regression.channel.value,
+        "Shows": words.shows,
         "Searched over": _grids(effect) or "nothing, all parameters are factors",
-        "Twins": _listed(effect.twins),
-        "Told apart by": effect.separating_experiment,
-        "Reference": effect.reference,
+        "Confounded with": _listed(words.confounded_with),
+        "Separated by": words.separating_experiment,
+        "Reference": words.reference,
     }
     return "\n".join(
         [
@@ -103,12 +104,12 @@ def _row(p: EffectParameter) -> str:
 def _grids(effect: Effect) -> str:
     return "; ".join(
         f"`{name}` {', '.join(f'{value:g}' for value in grid)}"
-        for name, grid in effect.nonlinear.items()
+        for name, grid in effect.signature.nonlinear.items()
     )
 
 
 def _listed(ids: Iterable[str]) -> str:
-    return ", ".join(f"`{twin}`" for twin in ids) or "none known"
+    return ", ".join(f"`{other}`" for other in ids) or "none known"
 
 
 if __name__ == "__main__":

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from enum import Enum, IntEnum
 
 import numpy as np
@@ -108,135 +108,6 @@ class Regression:
 
 
 @dataclass(frozen=True)
-class Effect:
-    """Physics that can be added to the test-bed and recognised in a recording.
-
-    Attributes:
-        id: the public name.
-        block: the part that it belongs to.
-        parameters: its numbers, in the kernels' order.
-        equation: the effect in one line.
-        shows: how it looks in the residual.
-        twins: effects it is easily confused with.
-        separating_experiment: what tells it from its twins.
-        reference: where the equation comes from.
-        regression: how it shows in its main residual.
-        partners: how the same coefficients show in further residuals at the same time.
-        nonlinear: coarse grids, by name, of the parameters on which the columns depend otherwise
-            than as a factor.
-        spectrum: of these the time constant of which a machine has many, its other number being a
-            share of theirs in all: the interval of that is told for their sum; empty: it has one.
-        saturates: whether its columns lie between −1 and 1, where all of it acts.
-        coefficients: from all parameters to the columns' weights; None: the parameters that are
-            not nonlinear, in order, each less its absent value.
-        from_coefficients: from weights and nonlinear values to all parameters; None: the inverse of
-            the default above.
-        kernels: by hook `kernel(parameters, signals)`, with memory `kernel(parameters, signals,
-            states, rates)`, compiled when used. They read the hook's signals and add to them.
-        states: how many numbers its memory holds, which follow the plant's own states.
-        rest: `rest(parameters, signals)`: its states in a machine at rest, shape (states,), from
-            the signals of its first hook; None: zeros.
-        alter: `alter(testbed, element, values)`: the test-bed with other parameters, for an effect
-            that is no more than that.
-        nearest: `nearest(testbed, values, errors)`: of the values that a machine can have those
-            nearest to `values`, in units of their errors; None: any values will do.
-        sense: what it does to a sensor's readings.
-        elements: what it can act on; None: that which its block says.
-        negligible: how far parameters, by name, may lie from where the effect is absent in a sound
-            machine; less is taken into account and not told.
-        plausible: whether parameters within their bounds go together; None: always.
-        tied: whether its columns' weights depend on one another, so that weights that were fitted
-            freely need not be those of any parameters.
-        noun: what an element has, or of an `alter` has another of, as a verdict calls it.
-    """
-
-    id: str
-    block: Block
-    parameters: tuple[EffectParameter, ...]
-    equation: str
-    shows: str
-    twins: tuple[str, ...]
-    separating_experiment: str
-    reference: str
-    regression: Regression
-    partners: tuple[Regression, ...] = ()
-    nonlinear: Mapping[str, tuple[float, ...]] = field(default_factory=dict)
-    spectrum: str = ""
-    saturates: bool = False
-    coefficients: Callable[[Values], Sequence[float]] | None = None
-    from_coefficients: Callable[[Sequence[float], Values], dict[str, float]] | None = None
-    kernels: Mapping[Hook, Callable[..., None]] = field(default_factory=dict)
-    states: int = 0
-    rest: Callable[[Array, Array], Sequence[float]] | None = None
-    alter: Callable[[Testbed, int, Values], Testbed] | None = None
-    nearest: Callable[[Testbed, Values, Values], Values] | None = None
-    sense: Sense | None = None
-    elements: Elements | None = None
-    negligible: Mapping[str, float] = field(default_factory=dict)
-    plausible: Callable[[Values], bool] | None = None
-    tied: bool = False
-    noun: str = ""
-
-    @property
-    def words(self) -> str:
-        """What it is, for a sentence; made from its id where it does not say."""
-        return self.noun or self.id.removeprefix(f"{self.block.value}_").replace("_", " ")
-
-    @property
-    def is_correction(self) -> bool:
-        """Whether it corrects a number of the file or readings, and adds no physics."""
-        return self.alter is not None or self.sense is not None
-
-    @property
-    def acts_on(self) -> Elements:
-        """What its `elements` name."""
-        return self.elements or _ELEMENTS[self.block]
-
-    def regressors(self, signals: Array, **nonlinear: float) -> Array:
-        """Return the columns of its main residual, shape (samples, channels, coefficients)."""
-        return self.regression.columns(signals, **nonlinear)
-
-    def weights(self, values: Values) -> Array:
-        """Return what the columns are to be multiplied with for these parameters."""
-        if self.coefficients:
-            return np.asarray(self.coefficients(values), dtype=float)
-        return np.array([values[p.name] - (p.absent or 0.0) for p in self.linear])
-
-    def values(self, weights: Sequence[float], **nonlinear: float) -> dict[str, float]:
-        """Return all parameters for weights that a regression found."""
-        if self.from_coefficients:
-            return self.from_coefficients(weights, nonlinear)
-        found = {
-            p.name: float(weight) + (p.absent or 0.0)
-            for p, weight in zip(self.linear, weights, strict=True)
-        }
-        return {p.name: {**nonlinear, **found}[p.name] for p in self.parameters}
-
-    def is_plausible(self, values: Values) -> bool:
-        """Return whether values are such as the catalogue allows."""
-        within = all(p.minimum <= values[p.name] <= p.maximum for p in self.parameters)
-        return within and (self.plausible is None or self.plausible(values))
-
-    def is_negligible(self, values: Values) -> bool:
-        """Return whether values are such as a sound machine has as well."""
-        return bool(self.negligible) and all(
-            abs(values[p.name] - (p.absent or 0.0)) <= self.negligible[p.name]
-            for p in self.parameters
-            if p.name in self.negligible
-        )
-
-    def is_absent(self, values: Values) -> bool:
-        """Return whether the effect does nothing with these parameters."""
-        acting = [p for p in self.parameters if p.absent is not None]
-        return bool(acting) and all(values[p.name] == p.absent for p in acting)
-
-    @property
-    def linear(self) -> tuple[EffectParameter, ...]:
-        """The parameters that are not searched on a grid."""
-        return tuple(p for p in self.parameters if p.name not in self.nonlinear)
-
-
-@dataclass(frozen=True)
 class Sense:
     """What an effect does to the readings of a sensor.
 
@@ -254,6 +125,176 @@ class Sense:
     reading: Callable[[Array, int, Array], Array] | None = None
     lateness: Callable[[float, Array], float] | None = None
     one_system: bool = False
+
+
+@dataclass(frozen=True)
+class Physics:
+    """What an effect does in the plant: kernels, another machine, or a sensor's fault.
+
+    Attributes:
+        kernels: by hook `kernel(parameters, signals)`, with memory `kernel(parameters, signals,
+            states, rates)`, compiled when used. They read the hook's signals and add to them.
+        states: how many numbers its memory holds, which follow the plant's own states.
+        rest: `rest(parameters, signals)`: its states in a machine at rest, shape (states,), from
+            the signals of its first hook; None: zeros.
+        alter: `alter(testbed, element, values)`: the test-bed with other parameters, for an effect
+            that is no more than that.
+        sense: what it does to a sensor's readings.
+        plausible: whether parameters within their bounds go together; None: always.
+        nearest: `nearest(testbed, values, errors)`: of the values that a machine can have those
+            nearest to `values`, in units of their errors; None: any values will do.
+    """
+
+    kernels: Mapping[Hook, Callable[..., None]] = field(default_factory=dict)
+    states: int = 0
+    rest: Callable[[Array, Array], Sequence[float]] | None = None
+    alter: Callable[[Testbed, int, Values], Testbed] | None = None
+    sense: Sense | None = None
+    plausible: Callable[[Values], bool] | None = None
+    nearest: Callable[[Testbed, Values, Values], Values] | None = None
+
+
+@dataclass(frozen=True)
+class Signature:
+    """How a regression recognises an effect in a recording.
+
+    Attributes:
+        regression: how it shows in its main residual.
+        partners: how the same coefficients show in further residuals at the same time.
+        nonlinear: coarse grids, by name, of the parameters on which the columns depend otherwise
+            than as a factor.
+        spectrum: of these the time constant of which a machine has many, its other number being a
+            share of theirs in all: the interval of that is reported for their sum; empty: it has
+            one.
+        saturates: whether its columns lie between −1 and 1, where all of it acts.
+        coefficients: from all parameters to the columns' weights; None: the parameters that are
+            not nonlinear, in order, each less its absent value.
+        from_coefficients: from weights and nonlinear values to all parameters; None: the inverse of
+            the default above.
+        tied: whether its columns' weights depend on one another, so that weights that were fitted
+            freely need not be those of any parameters.
+        negligible: how far parameters, by name, may lie from where the effect is absent in a
+            healthy machine; less is taken into account and not reported.
+    """
+
+    regression: Regression
+    partners: tuple[Regression, ...] = ()
+    nonlinear: Mapping[str, tuple[float, ...]] = field(default_factory=dict)
+    spectrum: str = ""
+    saturates: bool = False
+    coefficients: Callable[[Values], Sequence[float]] | None = None
+    from_coefficients: Callable[[Sequence[float], Values], dict[str, float]] | None = None
+    tied: bool = False
+    negligible: Mapping[str, float] = field(default_factory=dict)
+
+
+@dataclass(frozen=True)
+class Description:
+    """An effect in words, for the pages, verdicts and plans of experiments.
+
+    Attributes:
+        equation: the effect in one line.
+        shows: how it looks in the residual.
+        confounded_with: ids of effects that look alike in most recordings.
+        separating_experiment: which experiment separates it from them.
+        reference: where the equation comes from.
+        noun: what an element has, or of an `alter` has another of, as a verdict calls it.
+    """
+
+    equation: str
+    shows: str
+    confounded_with: tuple[str, ...]
+    separating_experiment: str
+    reference: str
+    noun: str = ""
+
+
+@dataclass(frozen=True)
+class Effect:
+    """Physics that can be added to the test-bed and recognised in a recording.
+
+    Attributes:
+        id: the public name.
+        block: the part that it belongs to.
+        parameters: its numbers, in the kernels' order.
+        physics: what it does in the plant.
+        signature: how it is recognised in a recording.
+        description: what people read about it.
+        elements: what it can act on; None: that which its block says.
+    """
+
+    id: str
+    block: Block
+    parameters: tuple[EffectParameter, ...]
+    physics: Physics
+    signature: Signature
+    description: Description
+    elements: Elements | None = None
+
+    @property
+    def words(self) -> str:
+        """What it is, for a sentence; made from its id where it does not say."""
+        plain = self.id.removeprefix(f"{self.block.value}_").replace("_", " ")
+        return self.description.noun or plain
+
+    @property
+    def is_correction(self) -> bool:
+        """Whether it corrects a number of the file or readings, and adds no physics."""
+        return self.physics.alter is not None or self.physics.sense is not None
+
+    @property
+    def acts_on(self) -> Elements:
+        """What its `elements` name."""
+        return self.elements or _ELEMENTS[self.block]
+
+    def with_grid(self, nonlinear: Mapping[str, tuple[float, ...]]) -> Effect:
+        """Return the effect with other grids of its nonlinear parameters, by name."""
+        return replace(self, signature=replace(self.signature, nonlinear=nonlinear))
+
+    def regressors(self, signals: Array, **nonlinear: float) -> Array:
+        """Return the columns of its main residual, shape (samples, channels, coefficients)."""
+        return self.signature.regression.columns(signals, **nonlinear)
+
+    def weights(self, values: Values) -> Array:
+        """Return what the columns are to be multiplied with for these parameters."""
+        coefficients = self.signature.coefficients
+        if coefficients:
+            return np.asarray(coefficients(values), dtype=float)
+        return np.array([values[p.name] - (p.absent or 0.0) for p in self.linear])
+
+    def values(self, weights: Sequence[float], **nonlinear: float) -> dict[str, float]:
+        """Return all parameters for weights that a regression found."""
+        if self.signature.from_coefficients:
+            return self.signature.from_coefficients(weights, nonlinear)
+        found = {
+            p.name: float(weight) + (p.absent or 0.0)
+            for p, weight in zip(self.linear, weights, strict=True)
+        }
+        return {p.name: {**nonlinear, **found}[p.name] for p in self.parameters}
+
+    def is_plausible(self, values: Values) -> bool:
+        """Return whether values are such as the catalogue allows."""
+        within = all(p.minimum <= values[p.name] <= p.maximum for p in self.parameters)
+        return within and (self.physics.plausible is None or self.physics.plausible(values))
+
+    def is_negligible(self, values: Values) -> bool:
+        """Return whether values are such as a healthy machine has as well."""
+        limits = self.signature.negligible
+        return bool(limits) and all(
+            abs(values[p.name] - (p.absent or 0.0)) <= limits[p.name]
+            for p in self.parameters
+            if p.name in limits
+        )
+
+    def is_absent(self, values: Values) -> bool:
+        """Return whether the effect does nothing with these parameters."""
+        acting = [p for p in self.parameters if p.absent is not None]
+        return bool(acting) and all(values[p.name] == p.absent for p in acting)
+
+    @property
+    def linear(self) -> tuple[EffectParameter, ...]:
+        """The parameters that are not searched on a grid."""
+        return tuple(p for p in self.parameters if p.name not in self.signature.nonlinear)
 
 
 _ELEMENTS = {

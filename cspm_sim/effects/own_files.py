@@ -3,14 +3,16 @@
 from __future__ import annotations
 
 import os
+import re
 import sys
 from collections.abc import Iterator
+from dataclasses import fields
 from hashlib import sha256
 from importlib.util import module_from_spec, spec_from_file_location
 from pathlib import Path
 
 from cspm_msgs_py.errors import InputError
-from cspm_sim.effects.effect import Effect
+from cspm_sim.effects.effect import Description, Effect, Physics, Signature
 
 # Files, or folders of files, joined as in PATH. Processes that a run starts inherit it.
 VARIABLE = "CSPM_EFFECTS"
@@ -55,6 +57,9 @@ def _effect_of(path: Path) -> Iterator[Effect]:
         spec.loader.exec_module(module)
     except Exception as err:
         del sys.modules[name]
+        moved = _moved_argument(err)
+        if moved:
+            raise InputError(f"{VARIABLE}: {path}: {moved}") from err
         raise InputError(
             f"{VARIABLE}: {path}: {type(err).__name__}: {err}, allowed: a file that Python can run"
         ) from err
@@ -66,3 +71,20 @@ def _effect_of(path: Path) -> Iterator[Effect]:
             f"{VARIABLE}: {path}: EFFECT is a {type(declared).__name__}, allowed: an Effect"
         )
     yield declared
+
+
+def _moved_argument(err: Exception) -> str:
+    """Return what to change in a file that gives `Effect` what its parts take now; empty if not."""
+    found = re.match(r"Effect\.__init__\(\) got an unexpected keyword argument '(\w+)'", str(err))
+    if not isinstance(err, TypeError) or not found:
+        return ""
+    old = found[1]
+    new = {"twins": "confounded_with"}.get(old, old)
+    for part in (Physics, Signature, Description):
+        if new in (field.name for field in fields(part)):
+            where = f"{part.__name__.lower()}={part.__name__}({new}=…)"
+            return (
+                f"'{old}' is no argument of Effect since version 0.2, allowed: {where}; Effect"
+                " takes id, block, parameters, elements, physics, signature, description"
+            )
+    return ""

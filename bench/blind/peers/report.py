@@ -82,7 +82,7 @@ def fits(library: Library, after: Mapping[Place, float]) -> list[dict[str, Any]]
 
 def retuned_weights(library: Library) -> dict[Candidate, Array]:
     """Return the file's own numbers, all fitted to what was searched."""
-    own = [c for c in library.candidates if c.effect.alter is not None]
+    own = [c for c in library.candidates if c.effect.physics.alter is not None]
     fitted = library.sums.weights(library.evidence.with_nuisance(own))
     return library.evidence.parted(own, fitted)
 
@@ -145,5 +145,5 @@ def _parameters(candidate: Candidate, weights: Array, half: Array | None) -> lis
 def _verdict(told: Sequence[Sequence[Candidate]]) -> Verdict:
     if not told:
         return Verdict.CONSISTENT
-    numbers = all(group[0].effect.alter is not None for group in told)
+    numbers = all(group[0].effect.physics.alter is not None for group in told)
     return Verdict.PARAMETER if numbers else Verdict.EFFECT

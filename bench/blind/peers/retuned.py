@@ -18,7 +18,7 @@ def diagnosis_of(library: Library) -> dict[str, Any]:
 
     The fit is that of all numbers, told or not.
     """
-    own = [c for c in library.candidates if c.effect.alter is not None]
+    own = [c for c in library.candidates if c.effect.physics.alter is not None]
     nuisance, numbers = library.evidence.nuisance, library.evidence.columns_of(own)
     weights = library.sums.weights(library.evidence.with_nuisance(own))[len(nuisance) :]
     # Half the width of a 95 % interval is 1.96 standard errors.

@@ -281,7 +281,7 @@ _RESIDUALS = {Channel.SHAFT: "winches/torque/", Channel.TENSION: "cables/tension
 def _shown_in(concealed: Data) -> list[tuple[str, str]]:
     """Return the residuals that show something: how they begin, and whose they are."""
     effect = catalogue().get(concealed["effect"] or "")
-    channel = None if effect is None else effect.regression.channel
+    channel = None if effect is None else effect.signature.regression.channel
     if channel is Channel.WRENCH:
         return [("bar/", "bar")]
     elements = {"bar" if element == "winch_frame" else element for element in concealed["elements"]}

@@ -2,7 +2,7 @@
 
 from bench.blind.stratum import MOVING, Case, Stratum
 
-# All that the catalogue calls twins, and a delay that looks like internal friction.
+# All that the catalogue declares as confounded, and a delay that looks like internal friction.
 PAIRS = (
     ("bristles", "grease"),
     ("bristles", "breakaway"),

@@ -143,7 +143,7 @@ class Findings(NamedTuple):
 def is_constant(effect: Effect) -> bool:
     """Return whether an effect adds the same to its main residual whatever the machine does."""
     signals = np.random.default_rng(0).normal(size=(16, _SIGNALS))
-    shape = {name: grid[0] for name, grid in effect.nonlinear.items()}
+    shape = {name: grid[0] for name, grid in effect.signature.nonlinear.items()}
     with np.errstate(all="ignore"):
         columns = effect.regressors(signals, **shape)
     return bool(np.array_equal(columns[:-1], columns[1:]) and columns.any())
@@ -201,11 +201,13 @@ def is_seen_to_end(candidates: Iterable[Candidate]) -> bool:
     One that is as long as can be told goes on growing like much else that is not in the catalogue.
     """
     longest = {
-        c: next(p.maximum for p in c.effect.parameters if p.name == c.effect.spectrum)
+        c: next(p.maximum for p in c.effect.parameters if p.name == c.effect.signature.spectrum)
         for c in candidates
-        if c.effect.spectrum
+        if c.effect.signature.spectrum
     }
-    return all(c.nonlinear[c.effect.spectrum] < _ENDED * most for c, most in longest.items())
+    return all(
+        c.nonlinear[c.effect.signature.spectrum] < _ENDED * most for c, most in longest.items()
+    )
 
 
 def bounded(candidate: Candidate, weights: Array, half: Array) -> Array:
@@ -217,7 +219,7 @@ def bounded(candidate: Candidate, weights: Array, half: Array) -> Array:
         half: half the widths of their 95 % intervals.
     """
     effect = candidate.effect
-    if effect.coefficients:
+    if effect.signature.coefficients:
         return weights
     absent = np.array([p.absent or 0.0 for p in effect.linear])
     low = np.array([p.minimum for p in effect.linear]) - absent
@@ -275,17 +277,17 @@ def freedom(hypothesis: Hypothesis) -> int:
     Those of its parameters for each fault, and one for each fault beyond the first.
     """
     effect, causes = hypothesis.effect, hypothesis.causes
-    return causes * (len(effect.parameters) - len(effect.nonlinear)) + causes - 1
+    return causes * (len(effect.parameters) - len(effect.signature.nonlinear)) + causes - 1
 
 
 def has_one_system(effect: Effect) -> bool:
     """Return whether one system reads all that an effect can act on."""
-    return effect.sense is not None and effect.sense.one_system
+    return effect.physics.sense is not None and effect.physics.sense.one_system
 
 
 def is_number(hypothesis: Hypothesis) -> bool:
     """Return whether it is a wrong number of the file, rather than physics that is missing."""
-    return hypothesis.effect.alter is not None
+    return hypothesis.effect.physics.alter is not None
 
 
 def is_wider(one: Hypothesis, other: Hypothesis) -> bool:
@@ -322,7 +324,7 @@ def unusual(weights: Mapping[Candidate, Array], hypothesis: Hypothesis) -> float
 
 def is_timing(effect: Effect) -> bool:
     """Return whether an effect is that readings are older than their stamps say."""
-    return effect.sense is not None and effect.sense.lateness is not None
+    return effect.physics.sense is not None and effect.physics.sense.lateness is not None
 
 
 def is_early(weights: Mapping[Candidate, Array], hypothesis: Hypothesis) -> bool:
@@ -330,7 +332,7 @@ def is_early(weights: Mapping[Candidate, Array], hypothesis: Hypothesis) -> bool
 
     By more than those of a sound machine.
     """
-    sense = hypothesis.effect.sense
+    sense = hypothesis.effect.physics.sense
     if sense is None or sense.lateness is None:
         return False
     own = {c: weights[c] for c in hypothesis.candidates}

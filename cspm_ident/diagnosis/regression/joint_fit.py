@@ -158,12 +158,12 @@ class Fits:
                 no model being truer: as an alternative, which nothing surely contradicts.
         """
         values = self.values(hypotheses)
-        if all(is_allowed(c, own) and not c.effect.tied for c, own in values.items()):
+        if all(is_allowed(c, own) and not c.effect.signature.tied for c, own in values.items()):
             return True
         found = at_once(self.weights(hypotheses))
         if not all(is_allowed(c, bounded(c, own, half)) for c, (own, half) in found.items()):
             return False
-        tied = {c: weights for c, weights in found.items() if c.effect.tied}
+        tied = {c: weights for c, weights in found.items() if c.effect.signature.tied}
         return all(
             is_tied(c, own, half + self._undecided(c, own) if loosely else half)
             for c, (own, half) in tied.items()

@@ -35,7 +35,7 @@ def of_shafts(weights: Weights, parts: Parts, block_s: float) -> Weights:
     found = dict(weights)
     for winch in {e.place.element for part in parts for e in part if e.turning.any()}:
         place = Place(Channel.SHAFT, winch)
-        own = [c for c in weights if (c.effect.regression.channel, c.element) == place]
+        own = [c for c in weights if (c.effect.signature.regression.channel, c.element) == place]
         if not own:
             continue
         rows = [[e.only(own) for e in part if e.place == place] for part in parts]
@@ -58,7 +58,7 @@ def of_drives(weights: Weights, period: float) -> Weights:
     """
     found = dict(weights)
     for candidate, (values, half) in weights.items():
-        if candidate.effect.regression.channel is Channel.DRIVE:
+        if candidate.effect.signature.regression.channel is Channel.DRIVE:
             low, middle, high = (
                 time_constant(each, period) for each in (values - half, values, values + half)
             )
@@ -77,8 +77,8 @@ def of_clocks(weights: Weights) -> Weights:
     found = dict(weights)
     for candidate, (values, half) in weights.items():
         effect = candidate.effect
-        if effect.negligible:
-            own = np.array([effect.negligible.get(p.name, 0.0) for p in effect.linear])
+        if effect.signature.negligible:
+            own = np.array([effect.signature.negligible.get(p.name, 0.0) for p in effect.linear])
             found[candidate] = values, np.hypot(half, own)
     return found
 
@@ -115,7 +115,7 @@ def of_reach(weights: Weights, parts: Parts) -> Weights:
     """
     found = dict(weights)
     for candidate, (values, half) in weights.items():
-        if candidate.effect.saturates:
+        if candidate.effect.signature.saturates:
             missing = 1.0 - _reach(candidate, parts)
             found[candidate] = values, np.hypot(half, missing * np.abs(values))
     return found

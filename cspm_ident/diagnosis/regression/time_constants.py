@@ -49,16 +49,18 @@ def told_within(effect: Effect, longest: float) -> Effect:
         effect: of the catalogue.
         longest: what the recording lasts [s].
     """
-    name = effect.spectrum
+    name = effect.signature.spectrum
     if not name:
         return effect
-    grid = tuple(value for value in effect.nonlinear[name] if value <= longest)
+    grid = tuple(value for value in effect.signature.nonlinear[name] if value <= longest)
     parameters = tuple(
         replace(p, maximum=max(longest, p.minimum)) if p.name == name else p
         for p in effect.parameters
     )
-    kept = {**effect.nonlinear, name: grid or effect.nonlinear[name][:1]}
-    return replace(effect, nonlinear=kept, parameters=parameters)
+    grids = effect.signature.nonlinear
+    return replace(
+        effect.with_grid({**grids, name: grid or grids[name][:1]}), parameters=parameters
+    )
 
 
 def with_spectrum(effect: Effect, shape: Mapping[str, float], longest: float) -> Effect:
@@ -70,11 +72,11 @@ def with_spectrum(effect: Effect, shape: Mapping[str, float], longest: float) ->
         longest: what the recording can show [s].
     """
     grid = {name: {value} for name, value in shape.items()}
-    if effect.spectrum:
-        coarse = np.array(effect.nonlinear[effect.spectrum])
+    if effect.signature.spectrum:
+        coarse = np.array(effect.signature.nonlinear[effect.signature.spectrum])
         fine = np.append(coarse, np.sqrt(coarse[1:] * coarse[:-1]))
-        grid[effect.spectrum] |= set(fine[fine <= longest].tolist())
-    return replace(effect, nonlinear={name: tuple(sorted(own)) for name, own in grid.items()})
+        grid[effect.signature.spectrum] |= set(fine[fine <= longest].tolist())
+    return effect.with_grid({name: tuple(sorted(own)) for name, own in grid.items()})
 
 
 def most_in_all(

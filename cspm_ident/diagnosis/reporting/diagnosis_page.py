@@ -115,7 +115,7 @@ def _twin(alternative: dict[str, Any]) -> str:
     with_it = f", beside another {catalogue()[beside].words} than the file's" if beside else ""
     where = ", ".join(alternative["elements"])
     effect = catalogue()[alternative["effect"]]
-    words = f"another {effect.words}" if effect.alter is not None else effect.words
+    words = f"another {effect.words}" if effect.physics.alter is not None else effect.words
     return f"{words} ({alternative['effect']} on {where}{with_it})"
 
 
@@ -317,7 +317,9 @@ def _silent(data: dict[str, Any]) -> str:
     known = catalogue()
     for each in data["not_excited"]:
         where = ", ".join(each["elements"]) or "everywhere"
-        rows.append((each["effect"], where, known[each["effect"]].separating_experiment))
+        rows.append(
+            (each["effect"], where, known[each["effect"]].description.separating_experiment)
+        )
     heads = ("effect", "on", "what would show it")
     return table_html(heads, rows, "effects that these recordings cannot show") if rows else ""
 
@@ -332,7 +334,7 @@ def _next(found: Diagnosis, data: dict[str, Any]) -> str:
     for finding in data["findings"]:
         for rival in finding["alternatives"]:
             pair = f"To tell {finding['effect']} from {rival['effect']}"
-            advice = catalogue()[finding["effect"]].separating_experiment
+            advice = catalogue()[finding["effect"]].description.separating_experiment
             steps.append(_experiment(pair, rival["separating_experiment"], advice))
     shown: dict[str, list[str]] = {}
     for each in data["not_excited"]:

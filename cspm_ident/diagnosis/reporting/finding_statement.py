@@ -58,7 +58,7 @@ def _subject(effect: Effect, elements: Sequence[str]) -> str:
 
 
 def _difference(effect: Effect) -> str:
-    if effect.alter is not None:
+    if effect.physics.alter is not None:
         return f"another {effect.words} than the test-bed file says"
     return f"{effect.words} that the model does not have"
 
@@ -99,7 +99,7 @@ def _may_be_absent(effect: Effect, number: Number) -> bool:
 def _name(effect: Effect, number: Number) -> str:
     """Return a parameter's name; of one that is added to the file's number, that it is."""
     (absent,) = (p.absent for p in effect.parameters if p.name == number.name)
-    added = effect.alter is not None and absent == 0.0
+    added = effect.physics.alter is not None and absent == 0.0
     return f"{number.name.replace('_', ' ')}{' off by' if added else ''}"
 
 
@@ -111,7 +111,9 @@ def _since(named: Named, onset: Onset | None) -> str:
     if block:
         return f" It begins with block {block} of the recordings."
     # A number of the file is wrong all the time: no beginning is looked for.
-    return "" if named.hypothesis.effect.alter is not None else " It is there from the start."
+    return (
+        "" if named.hypothesis.effect.physics.alter is not None else " It is there from the start."
+    )
 
 
 def _elsewhere(diagnosis: Diagnosis, named: Named) -> str:
@@ -196,7 +198,10 @@ def region_words(region: Region) -> str:
 def _concerned(diagnosis: Diagnosis, named: Named) -> Sequence[HeldOut]:
     """Return the residuals of a finding's own elements that it changes, else all that it may."""
     effect, elements = named.hypothesis.effect, named.hypothesis.elements
-    places = {regression.channel for regression in (effect.regression, *effect.partners)}
+    places = {
+        regression.channel
+        for regression in (effect.signature.regression, *effect.signature.partners)
+    }
     fits = [f for f in diagnosis.fit if f.place.element in (*elements, "bar")]
     fits = [f for f in fits if f.place.channel in places] or fits or list(diagnosis.fit)
     own = [f for f in fits if f.place.element in elements and f.after < f.before]

@@ -57,8 +57,8 @@ def parts_of(effect: Effect, element: str, cables: Sequence[str]) -> list[Part]:
 
 def kind_of(effect: Effect) -> Kind:
     """Return what sort of part an effect sits in."""
-    if effect.sense is not None:
-        return _SENSORS.get(effect.sense.topics[0], Kind.MARKERS)
+    if effect.physics.sense is not None:
+        return _SENSORS.get(effect.physics.sense.topics[0], Kind.MARKERS)
     return _BLOCKS.get(effect.block, Kind.BODY)
 
 

@@ -69,7 +69,7 @@ def verdict_of(diagnosis: Diagnosis) -> Verdict:
         return Verdict.CONSISTENT if diagnosis.places else Verdict.NOT_EXCITED
     if any(each.alternatives for each in named):
         return Verdict.TIE
-    if all(each.hypothesis.effect.alter is not None for each in named):
+    if all(each.hypothesis.effect.physics.alter is not None for each in named):
         return Verdict.PARAMETER
     return Verdict.EFFECT
 

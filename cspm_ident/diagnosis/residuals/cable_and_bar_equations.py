@@ -236,7 +236,7 @@ class _Stretch:
             effect = action.effect
             if effect.is_correction:
                 continue
-            shape = {name: action.values[name] for name in effect.nonlinear}
+            shape = {name: action.values[name] for name in effect.signature.nonlinear}
             weights = effect.weights(action.values)
             for _, place, found in self._regressed(effect, action.element, [shape]):
                 if place.channel is Channel.TENSION:
@@ -249,7 +249,7 @@ class _Stretch:
     def _columns(self, effect: Effect) -> Iterator[tuple[Candidate, Place, Array]]:
         """Yield what one unit of an effect adds to each residual, weighed."""
         for i, name in enumerate(elements_of(effect, self._machine.cable_names, (BAR, FRAME))):
-            if effect.sense is not None:
+            if effect.physics.sense is not None:
                 for place, found in self._read(effect, i, name):
                     yield Candidate(effect, name), place, found
                 continue
@@ -263,7 +263,7 @@ class _Stretch:
     def _regressed(
         self, effect: Effect, i: int, shapes: Sequence[dict[str, float]]
     ) -> Iterator[tuple[dict[str, float], Place, Array]]:
-        for regression in (effect.regression, *effect.partners):
+        for regression in (effect.signature.regression, *effect.signature.partners):
             for place, rows in self._rows_of(effect, regression.channel, i):
                 for shape in shapes:
                     columns = partial(regression.columns, **shape)
@@ -298,8 +298,8 @@ class _Stretch:
 
     def _read(self, effect: Effect, i: int, name: str) -> Iterator[tuple[Place, Array]]:
         """Yield how a sensor's fault changes the weighed residuals, by differences of readings."""
-        assert effect.sense is not None
-        topic = effect.sense.topics[0]
+        assert effect.physics.sense is not None
+        topic = effect.physics.sense.topics[0]
         if topic == TENSION and self._drawn is not None:
             return
         if topic in (TENSION, WINCHES):

@@ -51,16 +51,16 @@ def settled(measurement: Measurement) -> Measurement:
         InputError: an effect cannot be used, or no machine has such numbers.
     """
     machine, actions = measurement.machine, read_actions(measurement.machine)
-    if not any(action.effect.alter or action.effect.sense for action in actions):
+    if not any(action.effect.physics.alter or action.effect.physics.sense for action in actions):
         return measurement
     for action in actions:
-        if action.effect.sense is not None:
+        if action.effect.physics.sense is not None:
             measurement = _true_readings(measurement, action)
     numbers = altered_testbed(machine, actions)
     kept = tuple(
         EffectEntry(effect=a.effect.id, elements=(a.name,), parameters=dict(a.values))
         for a in actions
-        if a.effect.alter is None and a.effect.sense is None
+        if a.effect.physics.alter is None and a.effect.physics.sense is None
     )
     left = numbers.model_copy(update={"effects": kept})
     return measurement.with_testbed(replace(measurement.testbed, testbed=left))
@@ -98,31 +98,33 @@ def nearest_possible(
         half: half the widths of their 95 % intervals.
     """
     effect = candidate.effect
-    if effect.nearest is None or not np.all(np.isfinite(half)):
+    if effect.physics.nearest is None or not np.all(np.isfinite(half)):
         return weights
     names = [parameter.name for parameter in effect.linear]
     errors = dict(zip(names, half.tolist(), strict=True))
     values = effect.values(weights.tolist(), **candidate.nonlinear)
-    nearest = effect.weights(effect.nearest(measurement.machine, values, errors))
+    nearest = effect.weights(effect.physics.nearest(measurement.machine, values, errors))
     return nearest if np.all(np.abs(nearest - weights) <= half) else weights
 
 
 def _true_readings(measurement: Measurement, action: Action) -> Measurement:
     """Return what a sensor would have read without a fault, to which a fixed point leads."""
     effect = action.effect
-    assert effect.sense is not None
-    topic = effect.sense.topics[0]
+    assert effect.physics.sense is not None
+    topic = effect.physics.sense.topics[0]
     joints = {TENSION: "tension", WINCHES: "angle"}
-    if topic in joints and effect.sense.lateness is None:
+    if topic in joints and effect.physics.sense.lateness is None:
         return _true_joint(measurement, action, joints[topic])
     poses = {BAR: "bar_pose", FRAME: "frame_pose"}
     kind = joints[topic] if topic in joints else poses[topic.format(action.name)]
     samples: Samples | None = getattr(measurement, kind)
     if samples is None:
         return measurement
-    if effect.sense.lateness is not None:
+    if effect.physics.sense.lateness is not None:
         parameters = np.array(list(action.values.values()))
-        late = np.array([effect.sense.lateness(float(t), parameters) for t in samples.times])
+        late = np.array(
+            [effect.physics.sense.lateness(float(t), parameters) for t in samples.times]
+        )
         return measurement.with_samples(kind, Samples(samples.times - late, samples.values))
     values, weights = samples.values, effect.weights(action.values)
     for _ in range(_FIXED_POINTS):

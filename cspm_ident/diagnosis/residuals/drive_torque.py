@@ -75,7 +75,11 @@ def drive_equations(
         told = command.values[np.maximum(last, 0), i]
         # No drive delivers more than its limit.
         told[(np.abs(told) >= cable.torque_limit) | ~known_from] = np.nan
-        own = [a for a in known if a.element == i and a.effect.regression.channel is Channel.DRIVE]
+        own = [
+            a
+            for a in known
+            if a.element == i and a.effect.signature.regression.channel is Channel.DRIVE
+        ]
         missing, make = told - rows[:, WinchSignal.TORQUE], maker(measurement.pointwise)
         equation = _equation(cable.name, missing, rows, effects, own, held, knots, make)
         if equation is not None:
@@ -101,7 +105,7 @@ def _equation(
         return None
     window, stride = make(half, step).weights, max(1, half // 2)
     for action in known:
-        shape = {n: action.values[n] for n in action.effect.nonlinear}
+        shape = {n: action.values[n] for n in action.effect.signature.nonlinear}
         columns = action.effect.regressors(rows, **shape)[:, 0]
         missing = missing - columns @ sampled_constant(action.effect.weights(action.values), held)
     place = Place(Channel.DRIVE, name)
@@ -110,7 +114,7 @@ def _equation(
             window, effect.regressors(rows, **dict(shape))[:, 0], stride
         )[:, None, :]
         for effect in effects
-        if effect.regression.channel is Channel.DRIVE
+        if effect.signature.regression.channel is Channel.DRIVE
         for shape in shapes_of(effect)
     }
     signals = {key: weigh(window, rows[:, c], stride) for key, c in _DRIVERS.items()}

@@ -61,7 +61,7 @@ def cell_drift(measurement: Measurement) -> ClockDrift | None:
 def _lateness() -> Effect:
     """Return the effect that load cells are late."""
     cells = (e for e in catalogue().values() if e.acts_on is Elements.CELLS)
-    return next(e for e in cells if e.sense is not None and e.sense.lateness is not None)
+    return next(e for e in cells if e.physics.sense and e.physics.sense.lateness)
 
 
 def _record(equation: Equation) -> Record:

@@ -71,7 +71,11 @@ def _reached(
     # A winch without a load cell shows in what is drawn from its torque.
     if touched is None or measurement.tension is None:
         return names, True
-    kinds = {r.channel for c in touched for r in (c.effect.regression, *c.effect.partners)}
+    kinds = {
+        r.channel
+        for c in touched
+        for r in (c.effect.signature.regression, *c.effect.signature.partners)
+    }
     # Load cells that are late show at every winch.
     everywhere = any(c.effect.elements is Elements.CELLS for c in touched)
     winches = names if everywhere else {c.element for c in touched if c.element in names}

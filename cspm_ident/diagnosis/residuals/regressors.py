@@ -56,8 +56,8 @@ class Candidate:
 
 def shapes_of(effect: Effect) -> Iterator[tuple[tuple[str, float], ...]]:
     """Yield every point of an effect's grid of nonlinear parameters; one empty point if linear."""
-    names = sorted(effect.nonlinear)
-    for values in product(*(effect.nonlinear[name] for name in names)):
+    names = sorted(effect.signature.nonlinear)
+    for values in product(*(effect.signature.nonlinear[name] for name in names)):
         yield tuple(zip(names, values, strict=True))
 
 

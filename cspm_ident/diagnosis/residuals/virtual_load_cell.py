@@ -199,7 +199,7 @@ def _drawn(rows: Array, pulled: Array, own: Sequence[Action]) -> Array:
     for _ in range(_FIXED_POINTS if own else 0):
         taken = np.zeros(len(rows))
         for action in own:
-            shape = {name: action.values[name] for name in action.effect.nonlinear}
+            shape = {name: action.values[name] for name in action.effect.signature.nonlinear}
             columns = action.effect.regressors(rows, **shape)[:, 0]
             taken += columns @ action.effect.weights(action.values)
         rows[:, WinchSignal.TENSION] = (pulled - taken) / radius
@@ -216,4 +216,4 @@ def _rows(cable: Cable, times: Array, angles: Array, speeds: Array, acceleration
 
 
 def _is_of_shaft(effect: Effect) -> bool:
-    return effect.sense is None and effect.regression.channel is Channel.SHAFT
+    return effect.physics.sense is None and effect.signature.regression.channel is Channel.SHAFT

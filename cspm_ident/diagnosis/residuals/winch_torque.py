@@ -133,8 +133,11 @@ class _Shaft:
         target = target - self._inertia * self._accelerated(rows[:, WinchSignal.ANGLE])
         for action in known:
             effect = action.effect
-            if effect.alter is None and effect.regression.channel is Channel.SHAFT:
-                shape = {name: action.values[name] for name in effect.nonlinear}
+            if (
+                effect.physics.alter is None
+                and effect.signature.regression.channel is Channel.SHAFT
+            ):
+                shape = {name: action.values[name] for name in effect.signature.nonlinear}
                 target = target - self._regressed(effect, shape) @ effect.weights(action.values)
         columns: dict[Candidate | Driver, Array] = {
             candidate: found[:, None, :]
@@ -158,10 +161,10 @@ class _Shaft:
 
     def _columns(self, effect: Effect) -> Iterator[tuple[Candidate, Array]]:
         for name in elements_of(effect, (self._name,), ()):
-            if effect.regression.channel is Channel.SHAFT:
+            if effect.signature.regression.channel is Channel.SHAFT:
                 for shape in shapes_of(effect):
                     yield Candidate(effect, name, shape), self._regressed(effect, dict(shape))
-            elif effect.sense is not None and effect.sense.topics[0] in self._sensors:
+            elif (sense := effect.physics.sense) and sense.topics[0] in self._sensors:
                 yield Candidate(effect, name), self._read(effect)
 
     def _regressed(self, effect: Effect, shape: dict[str, float]) -> Array:
@@ -169,7 +172,7 @@ class _Shaft:
 
     def _read(self, effect: Effect) -> Array:
         """Return what a sensor's fault makes of the residual, by the reading's share in it."""
-        tension = effect.sense is not None and effect.sense.topics[0] == TENSION
+        tension = effect.physics.sense is not None and effect.physics.sense.topics[0] == TENSION
         source = WinchSignal.TENSION if tension else WinchSignal.ANGLE
         reading = reading_rows(self._rows[:, WinchSignal.TIME], self._rows[:, source])
         change = effect.regressors(reading)[:, 0]

@@ -12,6 +12,6 @@ def clocks_of(candidates: Iterable[Candidate]) -> list[Hypothesis]:
     """Return, of every such effect among candidates, that it acts on all that it can."""
     members: dict[str, list[Candidate]] = {}
     for candidate in candidates:
-        if candidate.effect.negligible:
+        if candidate.effect.signature.negligible:
             members.setdefault(candidate.effect_id, []).append(candidate)
     return [Hypothesis(c[0].effect, tuple(c), common=len(c) > 1) for c in members.values()]

@@ -49,8 +49,8 @@ def absorbed_pairs(
         return []
     there = [c for c in free if c.element == hypothesis.elements[0]]
     others = [c for c in there if c.effect_id != hypothesis.effect.id]
-    numbers = [c for c in others if c.effect.alter is not None]
-    effects = [c for c in others if c.effect.alter is None]
+    numbers = [c for c in others if c.effect.physics.alter is not None]
+    effects = [c for c in others if c.effect.physics.alter is None]
     own = evidence.columns_of(hypothesis.candidates)
     gained = float(sums.gains_beyond(base, [own])[0])
     shows = _most(evidence, sums, base, own)

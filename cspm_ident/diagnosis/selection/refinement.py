@@ -7,7 +7,6 @@ are mended in a few rounds in which only the named effects are fitted.
 from __future__ import annotations
 
 from collections.abc import Callable, Collection, Mapping, Sequence
-from dataclasses import replace
 from itertools import product
 from types import MappingProxyType
 
@@ -105,7 +104,7 @@ def spectra(
         cut: likewise.
         supposed: likewise.
     """
-    wanted = [c for c in found if c.effect.spectrum]
+    wanted = [c for c in found if c.effect.signature.spectrum]
     if not wanted:
         return {}
     longest = max(m.duration for m in searched)
@@ -152,7 +151,7 @@ def _is_settled(found: Weights) -> bool:
 
 def needs_refining(effect: Effect) -> bool:
     """Return whether an effect's columns depend on its parameters, or on what is corrected."""
-    return effect.is_correction or bool(effect.nonlinear)
+    return effect.is_correction or bool(effect.signature.nonlinear)
 
 
 def _unit_after(effect: Effect, applied: Array) -> Array:
@@ -160,7 +159,7 @@ def _unit_after(effect: Effect, applied: Array) -> Array:
 
     A factor of the file, or of a reading, multiplies what there is by now.
     """
-    if effect.coefficients:
+    if effect.signature.coefficients:
         return np.ones_like(applied)
     factors = np.array([parameter.absent == 1.0 for parameter in effect.linear])
     return np.where(factors, 1.0 + applied, 1.0)
@@ -173,7 +172,7 @@ def _near(effect: Effect, shape: Mapping[str, float], factor: float) -> Effect:
         name: tuple(sorted({float(np.clip(value * f, *bounds[name])) for f in _steps(factor)}))
         for name, value in shape.items()
     }
-    return replace(effect, nonlinear=grid)
+    return effect.with_grid(grid)
 
 
 def _steps(factor: float) -> tuple[float, ...]:

@@ -29,7 +29,7 @@ class Safeguards:
     @property
     def effects(self) -> list[Effect]:
         """What is looked for."""
-        return [e for e in catalogue().values() if self.joint_refit or e.alter is None]
+        return [e for e in catalogue().values() if self.joint_refit or e.physics.alter is None]
 
     @property
     def sums(self) -> Callable[[Evidence], Sums]:

@@ -90,7 +90,7 @@ class Search:
     def retuned(self) -> dict[Candidate, Array]:
         """Return the weights of the file's own parameters, fitted where it helps, nothing added."""
         narrow = copy(self)
-        narrow._look_for([c for c in self._effects if c.effect.alter is not None])
+        narrow._look_for([c for c in self._effects if c.effect.physics.alter is not None])
         own = [c for h in narrow._chosen() for c in h.candidates]
         return self.evidence.parted(own, self.sums.weights(self.evidence.with_nuisance(own)))
 

@@ -107,7 +107,11 @@ def _of_winches(search: Search, hypotheses: Iterable[Hypothesis]) -> dict[Candid
     """Return the weights of what winches add to torques all the time."""
     lasting = [h for h in hypotheses if not h.onset]
     weights = search.fits.values(lasting) if lasting else {}
-    return {c: own for c, own in weights.items() if c.effect.regression.channel is Channel.SHAFT}
+    return {
+        c: own
+        for c, own in weights.items()
+        if c.effect.signature.regression.channel is Channel.SHAFT
+    }
 
 
 def _look(

@@ -48,7 +48,11 @@ def detection_limits(search: Search, kept: Sequence[Named]) -> tuple[Limit, ...]
     best: dict[tuple[str, str], Limit] = {}
     for candidate in search.heard:
         columns = search.evidence.columns_of([candidate])
-        if len(columns) != 1 or candidate.effect.coefficients or np.isin(columns, base).any():
+        if (
+            len(columns) != 1
+            or candidate.effect.signature.coefficients
+            or np.isin(columns, base).any()
+        ):
             continue
         limit = _limit(candidate, _least(search, candidate, base))
         key = limit.effect, limit.element

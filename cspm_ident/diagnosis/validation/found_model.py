@@ -190,8 +190,8 @@ def _is_unsure(hypothesis: Hypothesis, weights: Weights) -> bool:
     reading's zero is the mean of what drifts in it, which is there as well.
     """
     effect, own = hypothesis.effect, {c: weights[c] for c in members_of(weights, hypothesis)}
-    drifts = effect.sense is not None and is_constant(effect)
-    return may_be_none(own) and not effect.saturates and not drifts
+    drifts = effect.physics.sense is not None and is_constant(effect)
+    return may_be_none(own) and not effect.signature.saturates and not drifts
 
 
 def _harms(

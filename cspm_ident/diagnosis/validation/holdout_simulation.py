@@ -153,8 +153,12 @@ def worth_of(
         found: weights of all that was found.
         own: the effect's.
     """
-    kinds = {r.channel for c in own for r in (c.effect.regression, *c.effect.partners)}
-    sensed = any(c.effect.sense is not None for c in own)
+    kinds = {
+        r.channel
+        for c in own
+        for r in (c.effect.signature.regression, *c.effect.signature.partners)
+    }
+    sensed = any(c.effect.physics.sense is not None for c in own)
     fewer = {c: weights for c, weights in found.items() if c not in own}
     before = {f.output: (0.0, f.before) for f in fits}
     if fewer:

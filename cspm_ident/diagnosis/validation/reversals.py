@@ -69,7 +69,11 @@ def _reversing(hypothesis: Hypothesis, parts: Parts) -> list[list[Equation]]:
     Without free functions.
     """
     effect = hypothesis.effect
-    if effect.regression.channel is not Channel.SHAFT or is_number(hypothesis) or hypothesis.onset:
+    if (
+        effect.signature.regression.channel is not Channel.SHAFT
+        or is_number(hypothesis)
+        or hypothesis.onset
+    ):
         return []
     own = [
         [

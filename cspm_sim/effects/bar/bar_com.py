@@ -9,9 +9,12 @@ from cspm_sim.effects.effect import (
     Array,
     Block,
     Channel,
+    Description,
     Effect,
     EffectParameter,
+    Physics,
     Regression,
+    Signature,
     Values,
 )
 from cspm_sim.effects.signals import BarSignal
@@ -38,16 +41,18 @@ def _columns(signals: Array) -> Array:
 
 EFFECT = Effect(
     id="bar_com",
-    noun="centre of mass",
     block=Block.BAR,
     parameters=tuple(
         EffectParameter(axis, "m", -1.0, 1.0, meaning="added to com, in bar axes") for axis in "xyz"
     ),
-    alter=_alter,
-    regression=Regression(Channel.WRENCH, _columns),
-    equation="the bar's centre of mass = com + (x, y, z) in bar_ned; inertia about it stays",
-    shows="bar wrench residual is a moment, the weight times an arm that turns with the bar",
-    twins=("bar_constant_wrench", "pose_offset"),
-    separating_experiment="hold still at two pitches or rolls and at two tension levels",
-    reference="thesis (2-11), (2-12)",
+    physics=Physics(alter=_alter),
+    signature=Signature(regression=Regression(Channel.WRENCH, _columns)),
+    description=Description(
+        noun="centre of mass",
+        equation="the bar's centre of mass = com + (x, y, z) in bar_ned; inertia about it stays",
+        shows="bar wrench residual is a moment, the weight times an arm that turns with the bar",
+        confounded_with=("bar_constant_wrench", "pose_offset"),
+        separating_experiment="hold still at two pitches or rolls and at two tension levels",
+        reference="thesis (2-11), (2-12)",
+    ),
 )

@@ -3,7 +3,18 @@
 import numpy as np
 
 from cspm_msgs_py.dofs import DOFS
-from cspm_sim.effects.effect import Array, Block, Channel, Effect, EffectParameter, Hook, Regression
+from cspm_sim.effects.effect import (
+    Array,
+    Block,
+    Channel,
+    Description,
+    Effect,
+    EffectParameter,
+    Hook,
+    Physics,
+    Regression,
+    Signature,
+)
 from cspm_sim.kernels.bar_effects import WRENCH
 
 
@@ -18,16 +29,18 @@ def _columns(signals: Array) -> Array:
 
 EFFECT = Effect(
     id="bar_constant_wrench",
-    noun="a constant wrench from outside",
     block=Block.BAR,
     parameters=tuple(
         EffectParameter(axis, "N" if i < 3 else "N·m", -200.0, 200.0) for i, axis in enumerate(DOFS)
     ),
-    kernels={Hook.BAR: _kernel},
-    regression=Regression(Channel.WRENCH, _columns),
-    equation="wrench on the bar in world_ned = the six numbers",
-    shows="bar wrench residual is shifted by a constant at all poses and speeds",
-    twins=("bar_mass", "bar_com", "tension_bias"),
-    separating_experiment="hold still at three poses, turned and unturned, then accelerate",
-    reference="a steady wind or a cable that drags; Newton and Euler, thesis (2-12)",
+    physics=Physics(kernels={Hook.BAR: _kernel}),
+    signature=Signature(regression=Regression(Channel.WRENCH, _columns)),
+    description=Description(
+        noun="a constant wrench from outside",
+        equation="wrench on the bar in world_ned = the six numbers",
+        shows="bar wrench residual is shifted by a constant at all poses and speeds",
+        confounded_with=("bar_mass", "bar_com", "tension_bias"),
+        separating_experiment="hold still at three poses, turned and unturned, then accelerate",
+        reference="a steady wind or a cable that drags; Newton and Euler, thesis (2-12)",
+    ),
 )

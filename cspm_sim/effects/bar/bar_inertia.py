@@ -9,9 +9,12 @@ from cspm_sim.effects.effect import (
     Array,
     Block,
     Channel,
+    Description,
     Effect,
     EffectParameter,
+    Physics,
     Regression,
+    Signature,
     Values,
 )
 
@@ -62,18 +65,26 @@ def _columns(signals: Array) -> Array:
 
 EFFECT = Effect(
     id="bar_inertia",
-    noun="inertia",
     block=Block.BAR,
     parameters=tuple(
         EffectParameter(name, "kg·m²", -10.0, 10.0, meaning="added to the same entry of inertia")
         for name in _MOMENTS
     ),
-    alter=_alter,
-    nearest=_nearest,
-    regression=Regression(Channel.WRENCH, _columns),
-    equation="the bar's inertia about its centre of mass, bar axes = that of the file + diagonal",
-    shows="bar wrench residual is a moment in proportion to angular acceleration",
-    twins=("payload_swing",),
-    separating_experiment="turn the bar to and fro at two frequencies; held still it shows nothing",
-    reference="thesis (2-12)",
+    physics=Physics(
+        alter=_alter,
+        nearest=_nearest,
+    ),
+    signature=Signature(regression=Regression(Channel.WRENCH, _columns)),
+    description=Description(
+        noun="inertia",
+        equation=(
+            "the bar's inertia about its centre of mass, bar axes = that of the file + diagonal"
+        ),
+        shows="bar wrench residual is a moment in proportion to angular acceleration",
+        confounded_with=("payload_swing",),
+        separating_experiment=(
+            "turn the bar to and fro at two frequencies; held still it shows nothing"
+        ),
+        reference="thesis (2-12)",
+    ),
 )

@@ -9,9 +9,12 @@ from cspm_sim.effects.effect import (
     Array,
     Block,
     Channel,
+    Description,
     Effect,
     EffectParameter,
+    Physics,
     Regression,
+    Signature,
     Values,
 )
 
@@ -31,14 +34,19 @@ def _columns(signals: Array) -> Array:
 
 EFFECT = Effect(
     id="bar_mass",
-    noun="mass",
     block=Block.BAR,
     parameters=(EffectParameter("mass", "kg", -100.0, 100.0, meaning="added to the bar's mass"),),
-    alter=_alter,
-    regression=Regression(Channel.WRENCH, _columns),
-    equation="the bar's mass = that of the file + mass; its centre and inertia about it stay",
-    shows="bar wrench residual is in proportion to gravity less acceleration of the centre of mass",
-    twins=("bar_constant_wrench", "payload_swing", "tension_gain", "cable_sag"),
-    separating_experiment="weigh the bar, or shake it up and down above the cables' modes",
-    reference="thesis (2-10) to (2-12)",
+    physics=Physics(alter=_alter),
+    signature=Signature(regression=Regression(Channel.WRENCH, _columns)),
+    description=Description(
+        noun="mass",
+        equation="the bar's mass = that of the file + mass; its centre and inertia about it stay",
+        shows=(
+            "bar wrench residual is in proportion to gravity less acceleration of the centre of"
+            " mass"
+        ),
+        confounded_with=("bar_constant_wrench", "payload_swing", "tension_gain", "cable_sag"),
+        separating_experiment="weigh the bar, or shake it up and down above the cables' modes",
+        reference="thesis (2-10) to (2-12)",
+    ),
 )

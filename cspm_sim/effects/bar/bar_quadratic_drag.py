@@ -5,7 +5,18 @@ from math import sqrt
 import numpy as np
 
 from cspm_msgs_py.dofs import DOFS
-from cspm_sim.effects.effect import Array, Block, Channel, Effect, EffectParameter, Hook, Regression
+from cspm_sim.effects.effect import (
+    Array,
+    Block,
+    Channel,
+    Description,
+    Effect,
+    EffectParameter,
+    Hook,
+    Physics,
+    Regression,
+    Signature,
+)
 from cspm_sim.effects.signals import BarSignal
 from cspm_sim.kernels.bar_effects import VELOCITY, WRENCH
 
@@ -26,23 +37,27 @@ def _columns(signals: Array) -> Array:
 
 EFFECT = Effect(
     id="bar_quadratic_drag",
-    noun="drag with the square of speed",
     block=Block.BAR,
     parameters=tuple(
         EffectParameter(axis, "N·s²/m²" if i < 3 else "N·m·s²/rad²", 0.0, 100.0)
         for i, axis in enumerate(DOFS)
     ),
-    kernels={Hook.BAR: _kernel},
-    regression=Regression(Channel.WRENCH, _columns),
-    equation=(
-        "force on the bar = −coefficient·|v|·v and moment = −coefficient·|ω|·ω in world_ned, a"
-        " coefficient per axis, |v| and |ω| being those of all three axes together"
+    physics=Physics(kernels={Hook.BAR: _kernel}),
+    signature=Signature(regression=Regression(Channel.WRENCH, _columns)),
+    description=Description(
+        noun="drag with the square of speed",
+        equation=(
+            "force on the bar = −coefficient·|v|·v and moment = −coefficient·|ω|·ω in world_ned, a"
+            " coefficient per axis, |v| and |ω| being those of all three axes together"
+        ),
+        shows=(
+            "bar wrench residual is a parabola of both signs against the same axis's velocity,"
+            " steeper while the other axes move"
+        ),
+        confounded_with=("bar_linear_damping", "cable_transverse_damping"),
+        separating_experiment=(
+            "free decay at two amplitudes: the decrement grows with the amplitude"
+        ),
+        reference="Morison drag without added mass, DNV-RP-C205 chapter 6",
     ),
-    shows=(
-        "bar wrench residual is a parabola of both signs against the same axis's velocity, steeper"
-        " while the other axes move"
-    ),
-    twins=("bar_linear_damping", "cable_transverse_damping"),
-    separating_experiment="free decay at two amplitudes: the decrement grows with the amplitude",
-    reference="Morison drag without added mass, DNV-RP-C205 chapter 6",
 )

@@ -14,10 +14,13 @@ from cspm_sim.effects.effect import (
     Array,
     Block,
     Channel,
+    Description,
     Effect,
     EffectParameter,
     Hook,
+    Physics,
     Regression,
+    Signature,
     Values,
 )
 from cspm_sim.effects.linear_response import linear_response
@@ -92,7 +95,6 @@ def _values(weights: Sequence[float], nonlinear: Values) -> dict[str, float]:
 
 EFFECT = Effect(
     id="payload_swing",
-    noun="a swinging payload",
     block=Block.BAR,
     parameters=(
         EffectParameter("mass", "kg", 0.0, 100.0),
@@ -101,18 +103,27 @@ EFFECT = Effect(
             "damping", "N·s/m", 0.0, 100.0, absent=None, meaning="drag of still air on the mass"
         ),
     ),
-    kernels={Hook.PENDANT: _kernel},
-    states=4,
-    regression=Regression(Channel.WRENCH, _columns),
-    nonlinear={"length": (0.1, 0.2, 0.4, 0.8, 1.6), "damping": (0.0, 0.3)},
-    coefficients=_weights,
-    from_coefficients=_values,
-    equation=(
-        "point mass on a massless rod of that length, hinged at the bar frame's origin, with the"
-        " drag −damping·(its velocity)"
+    physics=Physics(
+        kernels={Hook.PENDANT: _kernel},
+        states=4,
     ),
-    shows="bar force residual with a line at sqrt(g/length), and the weight of the mass",
-    twins=("bar_mass", "bar_inertia", "frame_flexibility"),
-    separating_experiment="stop abruptly and watch the decay; repeat with the payload taken off",
-    reference="spherical pendulum, Goldstein, Poole, Safko, Classical Mechanics, chapter 2",
+    signature=Signature(
+        regression=Regression(Channel.WRENCH, _columns),
+        nonlinear={"length": (0.1, 0.2, 0.4, 0.8, 1.6), "damping": (0.0, 0.3)},
+        coefficients=_weights,
+        from_coefficients=_values,
+    ),
+    description=Description(
+        noun="a swinging payload",
+        equation=(
+            "point mass on a massless rod of that length, hinged at the bar frame's origin, with"
+            " the drag −damping·(its velocity)"
+        ),
+        shows="bar force residual with a line at sqrt(g/length), and the weight of the mass",
+        confounded_with=("bar_mass", "bar_inertia", "frame_flexibility"),
+        separating_experiment=(
+            "stop abruptly and watch the decay; repeat with the payload taken off"
+        ),
+        reference="spherical pendulum, Goldstein, Poole, Safko, Classical Mechanics, chapter 2",
+    ),
 )

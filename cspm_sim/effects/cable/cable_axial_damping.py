@@ -8,9 +8,12 @@ from cspm_sim.effects.effect import (
     Array,
     Block,
     Channel,
+    Description,
     Effect,
     EffectParameter,
+    Physics,
     Regression,
+    Signature,
     Values,
 )
 from cspm_sim.effects.signals import CableSignal
@@ -30,24 +33,28 @@ def _columns(signals: Array) -> Array:
 
 EFFECT = Effect(
     id="cable_axial_damping",
-    noun="damping along it",
     block=Block.CABLE,
     parameters=(
         EffectParameter(
             "scale", "1", 0.0, 100.0, absent=1.0, meaning="multiplies; 1 is the law of the file"
         ),
     ),
-    alter=_alter,
-    regression=Regression(Channel.TENSION, _columns),
-    equation="damper of the cable = scale·factor·(constant − slope·l)",
-    shows="tension residual is in proportion to the rate of elongation, loops grow with frequency",
-    twins=(
-        "winch_viscous_friction",
-        "cable_hysteresis",
-        "pose_delay",
-        "tension_delay",
-        "bar_linear_damping",
+    physics=Physics(alter=_alter),
+    signature=Signature(regression=Regression(Channel.TENSION, _columns)),
+    description=Description(
+        noun="damping along it",
+        equation="damper of the cable = scale·factor·(constant − slope·l)",
+        shows=(
+            "tension residual is in proportion to the rate of elongation, loops grow with frequency"
+        ),
+        confounded_with=(
+            "winch_viscous_friction",
+            "cable_hysteresis",
+            "pose_delay",
+            "tension_delay",
+            "bar_linear_damping",
+        ),
+        separating_experiment="pluck the bar with winches locked, at three frequencies or more",
+        reference="thesis (3-13) and its factor of section 4-2",
     ),
-    separating_experiment="pluck the bar with winches locked, at three frequencies or more",
-    reference="thesis (3-13) and its factor of section 4-2",
 )

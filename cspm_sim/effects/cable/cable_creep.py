@@ -4,7 +4,18 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from cspm_sim.effects.effect import Array, Block, Channel, Effect, EffectParameter, Hook, Regression
+from cspm_sim.effects.effect import (
+    Array,
+    Block,
+    Channel,
+    Description,
+    Effect,
+    EffectParameter,
+    Hook,
+    Physics,
+    Regression,
+    Signature,
+)
 from cspm_sim.effects.signals import CableSignal
 from cspm_sim.kernels.affected_cables import ELASTIC_TENSION, ELONGATION_ADDED, UNSTRETCHED
 from cspm_sim.kernels.memory import relaxed
@@ -45,21 +56,33 @@ def _columns(signals: Array, time_constant: float) -> Array:
 
 EFFECT = Effect(
     id="cable_creep",
-    noun="creep",
     block=Block.CABLE,
     parameters=(
         EffectParameter("compliance", "m/N", 0.0, 0.1, meaning="of the cable at the start"),
         EffectParameter("time_constant", "s", 0.01, 1e5, absent=None),
     ),
-    kernels={Hook.CABLE: _stretch, Hook.LOADED_CABLE: _creep},
-    states=2,
-    rest=_rest,
-    regression=Regression(Channel.TENSION, _columns),
-    nonlinear={"time_constant": (0.1, 0.3, 1.0, 3.0, 10.0, 30.0, 100.0, 300.0)},
-    spectrum="time_constant",
-    equation="t = law(ε − e·l0/l0(0)), time_constant·de/dt = compliance·t − e, t without damping",
-    shows="tension at fixed length falls slowly after a load step, and recovers after unloading",
-    twins=("cable_hysteresis", "cable_stiffness"),
-    separating_experiment="hold for several time constants after a step of load up, then down",
-    reference="Findley, Lai, Onaran, Creep and Relaxation, 1976: a Kelvin-Voigt element in series",
+    physics=Physics(
+        kernels={Hook.CABLE: _stretch, Hook.LOADED_CABLE: _creep},
+        states=2,
+        rest=_rest,
+    ),
+    signature=Signature(
+        regression=Regression(Channel.TENSION, _columns),
+        nonlinear={"time_constant": (0.1, 0.3, 1.0, 3.0, 10.0, 30.0, 100.0, 300.0)},
+        spectrum="time_constant",
+    ),
+    description=Description(
+        noun="creep",
+        equation=(
+            "t = law(ε − e·l0/l0(0)), time_constant·de/dt = compliance·t − e, t without damping"
+        ),
+        shows=(
+            "tension at fixed length falls slowly after a load step, and recovers after unloading"
+        ),
+        confounded_with=("cable_hysteresis", "cable_stiffness"),
+        separating_experiment="hold for several time constants after a step of load up, then down",
+        reference=(
+            "Findley, Lai, Onaran, Creep and Relaxation, 1976: a Kelvin-Voigt element in series"
+        ),
+    ),
 )

@@ -2,7 +2,18 @@
 
 import numpy as np
 
-from cspm_sim.effects.effect import Array, Block, Channel, Effect, EffectParameter, Hook, Regression
+from cspm_sim.effects.effect import (
+    Array,
+    Block,
+    Channel,
+    Description,
+    Effect,
+    EffectParameter,
+    Hook,
+    Physics,
+    Regression,
+    Signature,
+)
 from cspm_sim.effects.signals import CableSignal
 from cspm_sim.kernels.affected_cables import ELONGATION_RATE, FORCE_ADDED
 from cspm_sim.kernels.memory import relaxed
@@ -29,20 +40,26 @@ def _columns(signals: Array, displacement: float) -> Array:
 
 EFFECT = Effect(
     id="cable_hysteresis",
-    noun="hysteresis",
     block=Block.CABLE,
     parameters=(
         EffectParameter("force", "N", 0.0, 50.0),
         EffectParameter("displacement", "m", 1e-5, 0.1, absent=None),
     ),
-    kernels={Hook.CABLE: _force, Hook.LOADED_CABLE: _slide},
-    states=1,
-    regression=Regression(Channel.TENSION, _columns),
-    nonlinear={"displacement": (1e-4, 3e-4, 1e-3, 3e-3, 1e-2, 3e-2)},
-    saturates=True,
-    equation="t = law + force·z, dz/dt = (ε̇ − |ε̇|·z)/displacement",
-    shows="tension residual loops with an area per cycle that does not depend on the frequency",
-    twins=("cable_axial_damping", "cable_creep", "winch_backlash"),
-    separating_experiment="one amplitude at three frequencies a decade apart, then another one",
-    reference="Dahl, AIAA Journal 14(12), 1976, with exponent 1",
+    physics=Physics(
+        kernels={Hook.CABLE: _force, Hook.LOADED_CABLE: _slide},
+        states=1,
+    ),
+    signature=Signature(
+        regression=Regression(Channel.TENSION, _columns),
+        nonlinear={"displacement": (1e-4, 3e-4, 1e-3, 3e-3, 1e-2, 3e-2)},
+        saturates=True,
+    ),
+    description=Description(
+        noun="hysteresis",
+        equation="t = law + force·z, dz/dt = (ε̇ − |ε̇|·z)/displacement",
+        shows="tension residual loops with an area per cycle that does not depend on the frequency",
+        confounded_with=("cable_axial_damping", "cable_creep", "winch_backlash"),
+        separating_experiment="one amplitude at three frequencies a decade apart, then another one",
+        reference="Dahl, AIAA Journal 14(12), 1976, with exponent 1",
+    ),
 )

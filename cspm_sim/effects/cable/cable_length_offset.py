@@ -8,9 +8,12 @@ from cspm_sim.effects.effect import (
     Array,
     Block,
     Channel,
+    Description,
     Effect,
     EffectParameter,
+    Physics,
     Regression,
+    Signature,
     Values,
 )
 from cspm_sim.effects.signals import CableSignal
@@ -27,16 +30,18 @@ def _columns(signals: Array) -> Array:
 
 EFFECT = Effect(
     id="cable_length_offset",
-    noun="length",
     block=Block.CABLE,
     parameters=(
         EffectParameter("offset", "m", -10.0, 10.0, meaning="added to offset_length", usual=0.01),
     ),
-    alter=_alter,
-    regression=Regression(Channel.TENSION, _columns),
-    equation="elastic length = l0 + offset_length + offset",
-    shows="tension residual grows with elongation, less so the longer the cable",
-    twins=("cable_stiffness",),
-    separating_experiment="slow tension ramps at the shortest and the longest cable",
-    reference="thesis (3-7): the stiffness falls with the elastic length",
+    physics=Physics(alter=_alter),
+    signature=Signature(regression=Regression(Channel.TENSION, _columns)),
+    description=Description(
+        noun="length",
+        equation="elastic length = l0 + offset_length + offset",
+        shows="tension residual grows with elongation, less so the longer the cable",
+        confounded_with=("cable_stiffness",),
+        separating_experiment="slow tension ramps at the shortest and the longest cable",
+        reference="thesis (3-7): the stiffness falls with the elastic length",
+    ),
 )

@@ -13,10 +13,13 @@ from cspm_sim.effects.effect import (
     Array,
     Block,
     Channel,
+    Description,
     Effect,
     EffectParameter,
     Hook,
+    Physics,
     Regression,
+    Signature,
     Values,
 )
 from cspm_sim.effects.signals import CableSignal, EndSignal
@@ -82,22 +85,30 @@ def _values(weights: Sequence[float], _: Values) -> dict[str, float]:
 
 EFFECT = Effect(
     id="cable_sag",
-    noun="sag under its own weight",
     block=Block.CABLE,
     parameters=(EffectParameter("linear_density", "kg/m", 0.0, 1.0),),
-    kernels={Hook.CABLE: _hang, Hook.ATTACHMENT: _pull},
-    regression=Regression(Channel.TENSION, _tension),
-    partners=(Regression(Channel.WRENCH, _wrench),),
-    coefficients=_weights,
-    from_coefficients=_values,
-    equation=(
-        "t = law(ε + (w·l)²·l/(24·t²)) + W·d, t in the law without damping,"
-        " w = linear_density·g·(horizontal share of the direction), W = linear_density·g·l/2,"
-        " d the direction's share downwards;"
-        " force on the bar W downwards, and W·d off what t pulls"
+    physics=Physics(kernels={Hook.CABLE: _hang, Hook.ATTACHMENT: _pull}),
+    signature=Signature(
+        regression=Regression(Channel.TENSION, _tension),
+        partners=(Regression(Channel.WRENCH, _wrench),),
+        coefficients=_weights,
+        from_coefficients=_values,
     ),
-    shows="tension residual as 1/t², largest in long, horizontal, lightly loaded cables",
-    twins=("cable_stiffness", "bar_mass"),
-    separating_experiment="tension ramps down to the least, in a horizontal and a vertical cable",
-    reference="Irvine, Cable Structures, 1981: the parabola, for a sag below an eighth of the span",
+    description=Description(
+        noun="sag under its own weight",
+        equation=(
+            "t = law(ε + (w·l)²·l/(24·t²)) + W·d, t in the law without damping,"
+            " w = linear_density·g·(horizontal share of the direction), W = linear_density·g·l/2,"
+            " d the direction's share downwards;"
+            " force on the bar W downwards, and W·d off what t pulls"
+        ),
+        shows="tension residual as 1/t², largest in long, horizontal, lightly loaded cables",
+        confounded_with=("cable_stiffness", "bar_mass"),
+        separating_experiment=(
+            "tension ramps down to the least, in a horizontal and a vertical cable"
+        ),
+        reference=(
+            "Irvine, Cable Structures, 1981: the parabola, for a sag below an eighth of the span"
+        ),
+    ),
 )

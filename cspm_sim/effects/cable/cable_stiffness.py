@@ -8,9 +8,12 @@ from cspm_sim.effects.effect import (
     Array,
     Block,
     Channel,
+    Description,
     Effect,
     EffectParameter,
+    Physics,
     Regression,
+    Signature,
     Values,
 )
 from cspm_sim.effects.signals import CableSignal
@@ -34,7 +37,6 @@ def _columns(signals: Array) -> Array:
 
 EFFECT = Effect(
     id="cable_stiffness",
-    noun="stiffness",
     block=Block.CABLE,
     parameters=(
         EffectParameter(
@@ -47,18 +49,23 @@ EFFECT = Effect(
             usual=0.05,
         ),
     ),
-    alter=_alter,
-    regression=Regression(Channel.TENSION, _columns),
-    equation="dt/dε = scale·k(l, t), cap included",
-    shows="tension residual grows with elongation, the same in motion either way",
-    twins=(
-        "tension_gain",
-        "cable_sag",
-        "cable_length_offset",
-        "cable_creep",
-        "encoder_scale",
-        "frame_flexibility",
+    physics=Physics(alter=_alter),
+    signature=Signature(regression=Regression(Channel.TENSION, _columns)),
+    description=Description(
+        noun="stiffness",
+        equation="dt/dε = scale·k(l, t), cap included",
+        shows="tension residual grows with elongation, the same in motion either way",
+        confounded_with=(
+            "tension_gain",
+            "cable_sag",
+            "cable_length_offset",
+            "cable_creep",
+            "encoder_scale",
+            "frame_flexibility",
+        ),
+        separating_experiment=(
+            "slow tension ramps at two lengths, with a known mass hung on the bar"
+        ),
+        reference="thesis (3-7), (3-10)",
     ),
-    separating_experiment="slow tension ramps at two lengths, with a known mass hung on the bar",
-    reference="thesis (3-7), (3-10)",
 )

@@ -2,7 +2,18 @@
 
 import numpy as np
 
-from cspm_sim.effects.effect import Array, Block, Channel, Effect, EffectParameter, Hook, Regression
+from cspm_sim.effects.effect import (
+    Array,
+    Block,
+    Channel,
+    Description,
+    Effect,
+    EffectParameter,
+    Hook,
+    Physics,
+    Regression,
+    Signature,
+)
 from cspm_sim.effects.signals import EndSignal
 from cspm_sim.kernels.bar_effects import END_DIRECTION, END_EXIT_VELOCITY, END_FORCE, END_VELOCITY
 
@@ -31,7 +42,6 @@ def _columns(signals: Array, exit_share: float) -> Array:
 
 EFFECT = Effect(
     id="cable_transverse_damping",
-    noun="damping across it",
     block=Block.CABLE,
     parameters=(
         EffectParameter("coefficient", "N·s/m", 0.0, 100.0),
@@ -46,16 +56,26 @@ EFFECT = Effect(
             " rope that drags through still air",
         ),
     ),
-    kernels={Hook.ATTACHMENT: _kernel},
-    regression=Regression(Channel.WRENCH, _columns),
-    nonlinear={"exit_share": (-0.5, 1.0)},
-    equation=(
-        "force on the bar at the attachment = −coefficient·(velocity − exit_share·velocity of the"
-        " exit, less its part along the cable)"
+    physics=Physics(kernels={Hook.ATTACHMENT: _kernel}),
+    signature=Signature(
+        regression=Regression(Channel.WRENCH, _columns),
+        nonlinear={"exit_share": (-0.5, 1.0)},
     ),
-    shows="bar wrench residual in proportion to velocity across a cable; torque and tension silent",
-    twins=("bar_linear_damping", "bar_quadratic_drag"),
-    separating_experiment="free decay along and across the cables, at two poses of the bar",
-    reference="thesis chapter 4, where damping across the cables is named as what the model lacks;"
-    " −0.5 is a straight rope's drag in proportion to its speed, shared between its ends",
+    description=Description(
+        noun="damping across it",
+        equation=(
+            "force on the bar at the attachment = −coefficient·(velocity − exit_share·velocity of"
+            " the exit, less its part along the cable)"
+        ),
+        shows=(
+            "bar wrench residual in proportion to velocity across a cable; torque and tension"
+            " silent"
+        ),
+        confounded_with=("bar_linear_damping", "bar_quadratic_drag"),
+        separating_experiment="free decay along and across the cables, at two poses of the bar",
+        reference=(
+            "thesis chapter 4, where damping across the cables is named as what the model lacks;"
+            " −0.5 is a straight rope's drag in proportion to its speed, shared between its ends"
+        ),
+    ),
 )

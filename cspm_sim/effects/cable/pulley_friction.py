@@ -9,10 +9,13 @@ from cspm_sim.effects.effect import (
     Array,
     Block,
     Channel,
+    Description,
     Effect,
     EffectParameter,
     Hook,
+    Physics,
     Regression,
+    Signature,
     Values,
 )
 from cspm_sim.effects.signals import WinchSignal
@@ -44,7 +47,6 @@ def _values(weights: Sequence[float], nonlinear: Values) -> dict[str, float]:
 
 EFFECT = Effect(
     id="pulley_friction",
-    noun="friction at its pulley",
     block=Block.CABLE,
     parameters=(
         EffectParameter("coefficient", "1", 0.0, 1.0),
@@ -57,15 +59,22 @@ EFFECT = Effect(
             meaning="from geometry; only the product shows",
         ),
     ),
-    kernels={Hook.WINCH: _kernel},
-    regression=Regression(Channel.SHAFT, _columns),
-    nonlinear={"wrap": (0.5 * pi,)},
-    coefficients=_weights,
-    from_coefficients=_values,
-    tied=True,
-    equation="tension on the winch's side = t·exp(coefficient·wrap·sign(q̇)); at rest between both",
-    shows="winch torque residual steps at each reversal, in proportion to the tension there",
-    twins=("winch_load_friction", "winch_coulomb_friction"),
-    separating_experiment="slow reversals at one tension and two wraps of the pulley",
-    reference="Euler-Eytelwein capstan equation",
+    physics=Physics(kernels={Hook.WINCH: _kernel}),
+    signature=Signature(
+        regression=Regression(Channel.SHAFT, _columns),
+        nonlinear={"wrap": (0.5 * pi,)},
+        coefficients=_weights,
+        from_coefficients=_values,
+        tied=True,
+    ),
+    description=Description(
+        noun="friction at its pulley",
+        equation=(
+            "tension on the winch's side = t·exp(coefficient·wrap·sign(q̇)); at rest between both"
+        ),
+        shows="winch torque residual steps at each reversal, in proportion to the tension there",
+        confounded_with=("winch_load_friction", "winch_coulomb_friction"),
+        separating_experiment="slow reversals at one tension and two wraps of the pulley",
+        reference="Euler-Eytelwein capstan equation",
+    ),
 )

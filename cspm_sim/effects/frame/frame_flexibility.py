@@ -9,7 +9,18 @@ from math import pi
 
 import numpy as np
 
-from cspm_sim.effects.effect import Array, Block, Channel, Effect, EffectParameter, Hook, Regression
+from cspm_sim.effects.effect import (
+    Array,
+    Block,
+    Channel,
+    Description,
+    Effect,
+    EffectParameter,
+    Hook,
+    Physics,
+    Regression,
+    Signature,
+)
 from cspm_sim.effects.linear_response import linear_response
 from cspm_sim.effects.signals import FrameSignal
 from cspm_sim.kernels.affected_cables import FRAME_FORCE, FRAME_SHIFT, FRAME_SHIFT_RATE
@@ -50,24 +61,36 @@ def _columns(signals: Array, frequency: float, damping: float) -> Array:
 
 EFFECT = Effect(
     id="frame_flexibility",
-    noun="flexibility",
     block=Block.FRAME,
     parameters=(
         EffectParameter("frequency", "Hz", 0.1, 100.0, absent=None),
         EffectParameter("damping", "1", 0.0, 1.0, absent=None, meaning="share of critical"),
         EffectParameter("compliance", "m/N", 0.0, 1e-2),
     ),
-    kernels={Hook.FRAME: _shift, Hook.LOADED_FRAME: _ring},
-    states=6,
-    rest=_rest,
-    regression=Regression(Channel.TENSION, _columns),
-    nonlinear={"frequency": (1.0, 2.0, 4.0, 8.0, 16.0, 32.0), "damping": (0.02, 0.1, 0.5)},
-    equation=(
-        "shift d of all exits: d̈ + 2·damping·ω·ḋ + ω²·d = ω²·compliance·(force of all cables), ω ="
-        " 2π·frequency"
+    physics=Physics(
+        kernels={Hook.FRAME: _shift, Hook.LOADED_FRAME: _ring},
+        states=6,
+        rest=_rest,
     ),
-    shows="cable length residuals of all cables at once, with the total force and with one line",
-    twins=("frame_pose_offset", "cable_stiffness", "payload_swing"),
-    separating_experiment="measure the frame's pose at the exits while the bar's load is stepped",
-    reference="one mode of a structure, Craig, Kurdila, Fundamentals of Structural Dynamics, 2006",
+    signature=Signature(
+        regression=Regression(Channel.TENSION, _columns),
+        nonlinear={"frequency": (1.0, 2.0, 4.0, 8.0, 16.0, 32.0), "damping": (0.02, 0.1, 0.5)},
+    ),
+    description=Description(
+        noun="flexibility",
+        equation=(
+            "shift d of all exits: d̈ + 2·damping·ω·ḋ + ω²·d = ω²·compliance·(force of all"
+            " cables), ω = 2π·frequency"
+        ),
+        shows=(
+            "cable length residuals of all cables at once, with the total force and with one line"
+        ),
+        confounded_with=("frame_pose_offset", "cable_stiffness", "payload_swing"),
+        separating_experiment=(
+            "measure the frame's pose at the exits while the bar's load is stepped"
+        ),
+        reference=(
+            "one mode of a structure, Craig, Kurdila, Fundamentals of Structural Dynamics, 2006"
+        ),
+    ),
 )

@@ -10,9 +10,12 @@ from cspm_sim.effects.effect import (
     Array,
     Block,
     Channel,
+    Description,
     Effect,
     EffectParameter,
+    Physics,
     Regression,
+    Signature,
     Values,
 )
 from cspm_sim.effects.signals import FrameSignal
@@ -40,16 +43,22 @@ def _columns(signals: Array) -> Array:
 
 EFFECT = Effect(
     id="frame_pose_offset",
-    noun="place relative to its markers",
     block=Block.FRAME,
     parameters=tuple(
         EffectParameter(dof, "m" if i < 3 else "rad", -1.0, 1.0) for i, dof in enumerate(DOFS)
     ),
-    alter=_alter,
-    regression=Regression(Channel.TENSION, _columns),
-    equation="true pose of the winch frame = measured pose, followed by the offset in its own axes",
-    shows="cable length residuals of all cables at once, in the pattern of one small displacement",
-    twins=("pose_offset", "frame_flexibility"),
-    separating_experiment="hold the bar at several poses, then turn the winch frame and repeat",
-    reference="thesis (2-2): exits p_a + R_a·a",
+    physics=Physics(alter=_alter),
+    signature=Signature(regression=Regression(Channel.TENSION, _columns)),
+    description=Description(
+        noun="place relative to its markers",
+        equation=(
+            "true pose of the winch frame = measured pose, followed by the offset in its own axes"
+        ),
+        shows=(
+            "cable length residuals of all cables at once, in the pattern of one small displacement"
+        ),
+        confounded_with=("pose_offset", "frame_flexibility"),
+        separating_experiment="hold the bar at several poses, then turn the winch frame and repeat",
+        reference="thesis (2-2): exits p_a + R_a·a",
+    ),
 )

@@ -10,11 +10,14 @@ from cspm_sim.effects.effect import (
     Array,
     Block,
     Channel,
+    Description,
     Effect,
     EffectParameter,
     Elements,
+    Physics,
     Regression,
     Sense,
+    Signature,
 )
 from cspm_sim.effects.signals import PoseSignal
 
@@ -30,17 +33,21 @@ def _columns(signals: Array) -> Array:
 
 EFFECT = Effect(
     id="clock_skew",
-    noun="a clock of another rate",
     block=Block.SENSOR,
     parameters=(EffectParameter("skew", "1", -0.01, 0.01, meaning="of the stamps, less one"),),
-    sense=Sense(("/{}/pose", "/{}/twist"), lateness=_lateness, one_system=True),
     elements=Elements.BODIES,
-    regression=Regression(Channel.READING, _columns),
-    # What two free clocks do.
-    negligible={"skew": 2e-5},
-    equation="pose and twist stamped τ = those at τ/(1 + skew), τ from the run's start",
-    shows="pose lags behind the winches' motion, the more the longer the recording lasts",
-    twins=("pose_delay",),
-    separating_experiment="the same motion at the beginning and the end of a long recording",
-    reference="drift of quartz clocks, Mills, IEEE Trans. Comm. 39(10), 1991",
+    physics=Physics(sense=Sense(("/{}/pose", "/{}/twist"), lateness=_lateness, one_system=True)),
+    signature=Signature(
+        regression=Regression(Channel.READING, _columns),
+        # What two free clocks do.
+        negligible={"skew": 2e-5},
+    ),
+    description=Description(
+        noun="a clock of another rate",
+        equation="pose and twist stamped τ = those at τ/(1 + skew), τ from the run's start",
+        shows="pose lags behind the winches' motion, the more the longer the recording lasts",
+        confounded_with=("pose_delay",),
+        separating_experiment="the same motion at the beginning and the end of a long recording",
+        reference="drift of quartz clocks, Mills, IEEE Trans. Comm. 39(10), 1991",
+    ),
 )

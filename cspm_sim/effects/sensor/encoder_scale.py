@@ -6,10 +6,13 @@ from cspm_sim.effects.effect import (
     Array,
     Block,
     Channel,
+    Description,
     Effect,
     EffectParameter,
+    Physics,
     Regression,
     Sense,
+    Signature,
 )
 from cspm_sim.effects.signals import ReadingSignal
 
@@ -29,19 +32,23 @@ def _columns(signals: Array) -> Array:
 
 EFFECT = Effect(
     id="encoder_scale",
-    noun="a scale error of its encoder",
     block=Block.SENSOR,
     parameters=(
         EffectParameter(
             "scale", "1", 0.5, 2.0, absent=1.0, meaning="multiplies; 1 is an encoder without error"
         ),
     ),
-    sense=Sense(("/winches/state",), _reading),
-    regression=Regression(Channel.READING, _columns),
-    equation="measured angle and speed = scale·angle, scale·speed",
-    shows="cable length residual is in proportion to the motor angle, torque residual silent, as of"
-    " a wrong drum radius whose torque a wrong gain of torque or tension makes up for",
-    twins=("winch_drum_radius", "cable_stiffness"),
-    separating_experiment="wind several metres at constant tension and hold known weights",
-    reference="counts per turn of an incremental encoder set wrong",
+    physics=Physics(sense=Sense(("/winches/state",), _reading)),
+    signature=Signature(regression=Regression(Channel.READING, _columns)),
+    description=Description(
+        noun="a scale error of its encoder",
+        equation="measured angle and speed = scale·angle, scale·speed",
+        shows=(
+            "cable length residual is in proportion to the motor angle, torque residual silent, as"
+            " of a wrong drum radius whose torque a wrong gain of torque or tension makes up for"
+        ),
+        confounded_with=("winch_drum_radius", "cable_stiffness"),
+        separating_experiment="wind several metres at constant tension and hold known weights",
+        reference="counts per turn of an incremental encoder set wrong",
+    ),
 )

@@ -6,11 +6,14 @@ from cspm_sim.effects.effect import (
     Array,
     Block,
     Channel,
+    Description,
     Effect,
     EffectParameter,
     Elements,
+    Physics,
     Regression,
     Sense,
+    Signature,
 )
 from cspm_sim.effects.signals import PoseSignal
 
@@ -25,17 +28,25 @@ def _columns(signals: Array) -> Array:
 
 EFFECT = Effect(
     id="pose_delay",
-    noun="a delay",
     block=Block.SENSOR,
     parameters=(EffectParameter("delay", "s", -0.01, 1.0, meaning="below 0: too new"),),
-    sense=Sense(("/{}/pose", "/{}/twist"), lateness=_lateness, one_system=True),
     elements=Elements.BODIES,
-    regression=Regression(Channel.READING, _columns),
-    # As well as clocks are set to each other.
-    negligible={"delay": 2.5e-4},
-    equation="pose and twist stamped τ = those at τ − delay",
-    shows="tension residuals as of a damper stiffness·delay; pose lags behind the winches' motion",
-    twins=("cable_axial_damping", "winch_torque_lag", "clock_skew", "tension_delay"),
-    separating_experiment="sweep the frequency: a phase in proportion to it, alike in all cables",
-    reference="latency of optical motion capture; first order of the shift in time",
+    physics=Physics(sense=Sense(("/{}/pose", "/{}/twist"), lateness=_lateness, one_system=True)),
+    signature=Signature(
+        regression=Regression(Channel.READING, _columns),
+        # As well as clocks are set to each other.
+        negligible={"delay": 2.5e-4},
+    ),
+    description=Description(
+        noun="a delay",
+        equation="pose and twist stamped τ = those at τ − delay",
+        shows=(
+            "tension residuals as of a damper stiffness·delay; pose lags behind the winches' motion"
+        ),
+        confounded_with=("cable_axial_damping", "winch_torque_lag", "clock_skew", "tension_delay"),
+        separating_experiment=(
+            "sweep the frequency: a phase in proportion to it, alike in all cables"
+        ),
+        reference="latency of optical motion capture; first order of the shift in time",
+    ),
 )

@@ -8,11 +8,14 @@ from cspm_sim.effects.effect import (
     Array,
     Block,
     Channel,
+    Description,
     Effect,
     EffectParameter,
     Elements,
+    Physics,
     Regression,
     Sense,
+    Signature,
 )
 from cspm_sim.effects.signals import PoseSignal
 
@@ -45,17 +48,19 @@ def _columns(signals: Array) -> Array:
 
 EFFECT = Effect(
     id="pose_offset",
-    noun="an offset",
     block=Block.SENSOR,
     parameters=tuple(
         EffectParameter(dof, "m" if i < 3 else "rad", -1.0, 1.0) for i, dof in enumerate(DOFS)
     ),
-    sense=Sense(("/{}/pose",), _reading),
     elements=Elements.BODIES,
-    regression=Regression(Channel.READING, _columns),
-    equation="measured pose = pose, followed by the offset in the body's own axes",
-    shows="cable length residuals in the pattern of one displacement that turns with the body",
-    twins=("frame_pose_offset", "bar_com"),
-    separating_experiment="turn the body about two axes: the offset turns with it",
-    reference="marker frame against body frame, thesis (2-3), (2-4)",
+    physics=Physics(sense=Sense(("/{}/pose",), _reading)),
+    signature=Signature(regression=Regression(Channel.READING, _columns)),
+    description=Description(
+        noun="an offset",
+        equation="measured pose = pose, followed by the offset in the body's own axes",
+        shows="cable length residuals in the pattern of one displacement that turns with the body",
+        confounded_with=("frame_pose_offset", "bar_com"),
+        separating_experiment="turn the body about two axes: the offset turns with it",
+        reference="marker frame against body frame, thesis (2-3), (2-4)",
+    ),
 )

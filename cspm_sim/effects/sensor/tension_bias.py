@@ -6,10 +6,13 @@ from cspm_sim.effects.effect import (
     Array,
     Block,
     Channel,
+    Description,
     Effect,
     EffectParameter,
+    Physics,
     Regression,
     Sense,
+    Signature,
 )
 
 
@@ -25,14 +28,16 @@ def _columns(signals: Array) -> Array:
 
 EFFECT = Effect(
     id="tension_bias",
-    noun="a zero offset",
     block=Block.SENSOR,
     parameters=(EffectParameter("bias", "N", -100.0, 100.0),),
-    sense=Sense(("/cables/tension",), _reading),
-    regression=Regression(Channel.READING, _columns),
-    equation="measured tension = tension + bias",
-    shows="the same constant in torque, tension and wrench residuals of one cable",
-    twins=("winch_torque_offset", "bar_constant_wrench"),
-    separating_experiment="read the cell with its cable slack, and at three tension levels",
-    reference="zero balance of strain-gauge load cells, OIML R 60",
+    physics=Physics(sense=Sense(("/cables/tension",), _reading)),
+    signature=Signature(regression=Regression(Channel.READING, _columns)),
+    description=Description(
+        noun="a zero offset",
+        equation="measured tension = tension + bias",
+        shows="the same constant in torque, tension and wrench residuals of one cable",
+        confounded_with=("winch_torque_offset", "bar_constant_wrench"),
+        separating_experiment="read the cell with its cable slack, and at three tension levels",
+        reference="zero balance of strain-gauge load cells, OIML R 60",
+    ),
 )

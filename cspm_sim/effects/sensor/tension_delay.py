@@ -6,11 +6,14 @@ from cspm_sim.effects.effect import (
     Array,
     Block,
     Channel,
+    Description,
     Effect,
     EffectParameter,
     Elements,
+    Physics,
     Regression,
     Sense,
+    Signature,
 )
 from cspm_sim.effects.signals import ReadingSignal
 
@@ -25,20 +28,24 @@ def _columns(signals: Array) -> Array:
 
 EFFECT = Effect(
     id="tension_delay",
-    noun="a delay",
     block=Block.SENSOR,
     parameters=(EffectParameter("delay", "s", -0.01, 1.0, meaning="below 0: too new"),),
-    sense=Sense(("/cables/tension",), lateness=_lateness),
     elements=Elements.CELLS,
-    regression=Regression(Channel.READING, _columns),
-    # As well as clocks are set to each other.
-    negligible={"delay": 2.5e-4},
-    equation="tensions stamped τ = those at τ − delay",
-    shows=(
-        "torque residual of each winch in proportion to the rate of its tension, as of viscous"
-        " friction where tension follows the angle; a damper of −stiffness·delay in all cables"
+    physics=Physics(sense=Sense(("/cables/tension",), lateness=_lateness)),
+    signature=Signature(
+        regression=Regression(Channel.READING, _columns),
+        # As well as clocks are set to each other.
+        negligible={"delay": 2.5e-4},
     ),
-    twins=("winch_viscous_friction", "cable_axial_damping", "pose_delay"),
-    separating_experiment="sweep the frequency with the winch locked: friction is silent then",
-    reference="group delay of a carrier-frequency amplifier's low-pass filter",
+    description=Description(
+        noun="a delay",
+        equation="tensions stamped τ = those at τ − delay",
+        shows=(
+            "torque residual of each winch in proportion to the rate of its tension, as of viscous"
+            " friction where tension follows the angle; a damper of −stiffness·delay in all cables"
+        ),
+        confounded_with=("winch_viscous_friction", "cable_axial_damping", "pose_delay"),
+        separating_experiment="sweep the frequency with the winch locked: friction is silent then",
+        reference="group delay of a carrier-frequency amplifier's low-pass filter",
+    ),
 )

@@ -6,10 +6,13 @@ from cspm_sim.effects.effect import (
     Array,
     Block,
     Channel,
+    Description,
     Effect,
     EffectParameter,
+    Physics,
     Regression,
     Sense,
+    Signature,
 )
 from cspm_sim.effects.signals import ReadingSignal
 
@@ -26,18 +29,20 @@ def _columns(signals: Array) -> Array:
 
 EFFECT = Effect(
     id="tension_gain",
-    noun="a scale error",
     block=Block.SENSOR,
     parameters=(
         EffectParameter(
             "gain", "1", 0.5, 2.0, absent=1.0, meaning="multiplies; 1 is a cell without error"
         ),
     ),
-    sense=Sense(("/cables/tension",), _reading),
-    regression=Regression(Channel.READING, _columns),
-    equation="measured tension = gain·tension",
-    shows="the same share of the tension in torque, tension and wrench residuals of one cable",
-    twins=("winch_torque_gain", "winch_drum_radius", "cable_stiffness", "bar_mass"),
-    separating_experiment="hang a known mass on the bar, and hold it with known torques",
-    reference="rated output of strain-gauge load cells, OIML R 60",
+    physics=Physics(sense=Sense(("/cables/tension",), _reading)),
+    signature=Signature(regression=Regression(Channel.READING, _columns)),
+    description=Description(
+        noun="a scale error",
+        equation="measured tension = gain·tension",
+        shows="the same share of the tension in torque, tension and wrench residuals of one cable",
+        confounded_with=("winch_torque_gain", "winch_drum_radius", "cable_stiffness", "bar_mass"),
+        separating_experiment="hang a known mass on the bar, and hold it with known torques",
+        reference="rated output of strain-gauge load cells, OIML R 60",
+    ),
 )

@@ -7,7 +7,18 @@ it where it is until the motor's other flank takes it along.
 
 import numpy as np
 
-from cspm_sim.effects.effect import Array, Block, Channel, Effect, EffectParameter, Hook, Regression
+from cspm_sim.effects.effect import (
+    Array,
+    Block,
+    Channel,
+    Description,
+    Effect,
+    EffectParameter,
+    Hook,
+    Physics,
+    Regression,
+    Signature,
+)
 from cspm_sim.effects.signals import CableSignal
 from cspm_sim.kernels.affected_cables import (
     CABLE_STEP,
@@ -44,21 +55,30 @@ def _columns(signals: Array, width: float) -> Array:
 
 EFFECT = Effect(
     id="winch_backlash",
-    noun="backlash",
     block=Block.WINCH,
     parameters=(EffectParameter("width", "rad", 0.0, 0.5),),
-    kernels={Hook.CABLE: _kernel},
-    states=1,
-    regression=Regression(Channel.TENSION, _columns),
-    nonlinear={"width": (0.002, 0.005, 0.01, 0.02, 0.05, 0.1)},
-    coefficients=lambda values: (values["width"],),
-    from_coefficients=lambda weights, _: {"width": float(weights[0])},
-    equation=(
-        "drum angle·gear ratio = q + lead, 0 ≤ lead ≤ width; lead → 0 while the cable is taut,"
-        " otherwise the drum stands until a flank moves it"
+    physics=Physics(
+        kernels={Hook.CABLE: _kernel},
+        states=1,
     ),
-    shows="after slack the motor turns by up to width before the cable follows; nothing while taut",
-    twins=("cable_hysteresis",),
-    separating_experiment="reverse a winch with its cable slack, then draw it taut slowly",
-    reference="Nordin, Gutman, Automatica 38(10), 2002: backlash as play of a massless load",
+    signature=Signature(
+        regression=Regression(Channel.TENSION, _columns),
+        nonlinear={"width": (0.002, 0.005, 0.01, 0.02, 0.05, 0.1)},
+        coefficients=lambda values: (values["width"],),
+        from_coefficients=lambda weights, _: {"width": float(weights[0])},
+    ),
+    description=Description(
+        noun="backlash",
+        equation=(
+            "drum angle·gear ratio = q + lead, 0 ≤ lead ≤ width; lead → 0 while the cable is taut,"
+            " otherwise the drum stands until a flank moves it"
+        ),
+        shows=(
+            "after slack the motor turns by up to width before the cable follows; nothing while"
+            " taut"
+        ),
+        confounded_with=("cable_hysteresis",),
+        separating_experiment="reverse a winch with its cable slack, then draw it taut slowly",
+        reference="Nordin, Gutman, Automatica 38(10), 2002: backlash as play of a massless load",
+    ),
 )

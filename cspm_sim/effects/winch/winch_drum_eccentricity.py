@@ -9,10 +9,13 @@ from cspm_sim.effects.effect import (
     Array,
     Block,
     Channel,
+    Description,
     Effect,
     EffectParameter,
     Hook,
+    Physics,
     Regression,
+    Signature,
     Values,
 )
 from cspm_sim.effects.signals import CableSignal, WinchSignal
@@ -52,23 +55,27 @@ def _values(weights: Sequence[float], _: Values) -> dict[str, float]:
 
 EFFECT = Effect(
     id="winch_drum_eccentricity",
-    noun="an eccentric drum",
     block=Block.WINCH,
     parameters=(
         EffectParameter("eccentricity", "m", 0.0, 0.01),
         EffectParameter("phase", "rad", -pi, pi, absent=None),
     ),
-    kernels={Hook.CABLE: _kernel},
-    regression=Regression(Channel.SHAFT, _torque),
-    partners=(Regression(Channel.TENSION, _tension),),
-    coefficients=_weights,
-    from_coefficients=_values,
-    equation="winding radius = r + eccentricity·cos(q/n + phase), in torque and cable alike",
-    shows=(
-        "a line at one per turn of the drum in torque, in proportion to tension, and a quarter turn"
-        " behind it in the cable's length"
+    physics=Physics(kernels={Hook.CABLE: _kernel}),
+    signature=Signature(
+        regression=Regression(Channel.SHAFT, _torque),
+        partners=(Regression(Channel.TENSION, _tension),),
+        coefficients=_weights,
+        from_coefficients=_values,
     ),
-    twins=("winch_torque_ripple",),
-    separating_experiment="several turns of the drum at constant speed, at two tension levels",
-    reference="geometry; thesis (2-16) and (2-21) with a radius that changes",
+    description=Description(
+        noun="an eccentric drum",
+        equation="winding radius = r + eccentricity·cos(q/n + phase), in torque and cable alike",
+        shows=(
+            "a line at one per turn of the drum in torque, in proportion to tension, and a quarter"
+            " turn behind it in the cable's length"
+        ),
+        confounded_with=("winch_torque_ripple",),
+        separating_experiment="several turns of the drum at constant speed, at two tension levels",
+        reference="geometry; thesis (2-16) and (2-21) with a radius that changes",
+    ),
 )

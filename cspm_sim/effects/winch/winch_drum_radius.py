@@ -8,9 +8,12 @@ from cspm_sim.effects.effect import (
     Array,
     Block,
     Channel,
+    Description,
     Effect,
     EffectParameter,
+    Physics,
     Regression,
+    Signature,
     Values,
 )
 from cspm_sim.effects.signals import CableSignal, WinchSignal
@@ -37,15 +40,24 @@ def _tension(signals: Array) -> Array:
 
 EFFECT = Effect(
     id="winch_drum_radius",
-    noun="drum radius",
     block=Block.WINCH,
     parameters=(EffectParameter("radius", "m", -0.1, 0.1, meaning="added to drum_radius"),),
-    alter=_alter,
-    regression=Regression(Channel.SHAFT, _torque),
-    partners=(Regression(Channel.TENSION, _tension),),
-    equation="winding radius = drum_radius + radius, in torque and cable alike",
-    shows="torque residual in proportion to tension and cable length residual to motor angle",
-    twins=("winch_torque_gain", "tension_gain", "winch_torque_offset", "encoder_scale"),
-    separating_experiment="wind several metres at constant tension, then hold known weights",
-    reference="thesis (2-16), (2-21)",
+    physics=Physics(alter=_alter),
+    signature=Signature(
+        regression=Regression(Channel.SHAFT, _torque),
+        partners=(Regression(Channel.TENSION, _tension),),
+    ),
+    description=Description(
+        noun="drum radius",
+        equation="winding radius = drum_radius + radius, in torque and cable alike",
+        shows="torque residual in proportion to tension and cable length residual to motor angle",
+        confounded_with=(
+            "winch_torque_gain",
+            "tension_gain",
+            "winch_torque_offset",
+            "encoder_scale",
+        ),
+        separating_experiment="wind several metres at constant tension, then hold known weights",
+        reference="thesis (2-16), (2-21)",
+    ),
 )

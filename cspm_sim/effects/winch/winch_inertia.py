@@ -8,9 +8,12 @@ from cspm_sim.effects.effect import (
     Array,
     Block,
     Channel,
+    Description,
     Effect,
     EffectParameter,
+    Physics,
     Regression,
+    Signature,
     Values,
 )
 from cspm_sim.effects.signals import WinchSignal
@@ -27,14 +30,18 @@ def _columns(signals: Array) -> Array:
 
 EFFECT = Effect(
     id="winch_inertia",
-    noun="inertia",
     block=Block.WINCH,
     parameters=(EffectParameter("inertia", "kg·m²", -1.0, 1.0, meaning="added to rotor_inertia"),),
-    alter=_alter,
-    regression=Regression(Channel.SHAFT, _columns),
-    equation="all that turns at the motor shaft has rotor_inertia + inertia",
-    shows="winch torque residual is in proportion to the motor's acceleration",
-    twins=("winch_torque_lag",),
-    separating_experiment="sweep the frequency with slack cable: lag grows with it, inertia not",
-    reference="thesis (2-20)",
+    physics=Physics(alter=_alter),
+    signature=Signature(regression=Regression(Channel.SHAFT, _columns)),
+    description=Description(
+        noun="inertia",
+        equation="all that turns at the motor shaft has rotor_inertia + inertia",
+        shows="winch torque residual is in proportion to the motor's acceleration",
+        confounded_with=("winch_torque_lag",),
+        separating_experiment=(
+            "sweep the frequency with slack cable: lag grows with it, inertia not"
+        ),
+        reference="thesis (2-20)",
+    ),
 )

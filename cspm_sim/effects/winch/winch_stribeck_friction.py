@@ -8,10 +8,13 @@ from cspm_sim.effects.effect import (
     Array,
     Block,
     Channel,
+    Description,
     Effect,
     EffectParameter,
     Hook,
+    Physics,
     Regression,
+    Signature,
     Values,
 )
 from cspm_sim.effects.signals import WinchSignal
@@ -41,26 +44,35 @@ def _falls(values: Values) -> bool:
 
 EFFECT = Effect(
     id="winch_stribeck_friction",
-    noun="dry friction with a larger breakaway torque",
     block=Block.WINCH,
     parameters=(
         EffectParameter("breakaway_torque", "N·m", 0.0, 1.0),
         EffectParameter("coulomb_torque", "N·m", 0.0, 1.0),
         EffectParameter("stribeck_speed", "rad/s", 1e-3, 100.0, absent=None),
     ),
-    kernels={Hook.WINCH: _kernel},
-    regression=Regression(Channel.SHAFT, _columns),
-    nonlinear={"stribeck_speed": (0.03, 0.1, 0.3, 1.0, 3.0, 10.0)},
-    plausible=_falls,
-    equation=(
-        "resisting torque = (coulomb + (breakaway − coulomb)·exp(−(q̇/stribeck_speed)²))·sign(q̇);"
-        " at q̇ = 0 whatever holds, up to breakaway"
+    physics=Physics(
+        kernels={Hook.WINCH: _kernel},
+        plausible=_falls,
     ),
-    shows=(
-        "winch torque residual peaks on both sides of each reversal and falls to a constant; to"
-        " less than half is not called dry friction"
+    signature=Signature(
+        regression=Regression(Channel.SHAFT, _columns),
+        nonlinear={"stribeck_speed": (0.03, 0.1, 0.3, 1.0, 3.0, 10.0)},
     ),
-    twins=("winch_coulomb_friction", "winch_viscous_friction"),
-    separating_experiment="slow reversals with speeds from well below to above stribeck_speed",
-    reference="Armstrong-Hélouvry, Dupont, Canudas de Wit, Automatica 30(7), 1994 (Gaussian form)",
+    description=Description(
+        noun="dry friction with a larger breakaway torque",
+        equation=(
+            "resisting torque = (coulomb + (breakaway −"
+            " coulomb)·exp(−(q̇/stribeck_speed)²))·sign(q̇); at q̇ = 0 whatever holds, up to"
+            " breakaway"
+        ),
+        shows=(
+            "winch torque residual peaks on both sides of each reversal and falls to a constant; to"
+            " less than half is not called dry friction"
+        ),
+        confounded_with=("winch_coulomb_friction", "winch_viscous_friction"),
+        separating_experiment="slow reversals with speeds from well below to above stribeck_speed",
+        reference=(
+            "Armstrong-Hélouvry, Dupont, Canudas de Wit, Automatica 30(7), 1994 (Gaussian form)"
+        ),
+    ),
 )

@@ -2,7 +2,18 @@
 
 import numpy as np
 
-from cspm_sim.effects.effect import Array, Block, Channel, Effect, EffectParameter, Hook, Regression
+from cspm_sim.effects.effect import (
+    Array,
+    Block,
+    Channel,
+    Description,
+    Effect,
+    EffectParameter,
+    Hook,
+    Physics,
+    Regression,
+    Signature,
+)
 from cspm_sim.kernels.winch import RESISTANCE
 
 
@@ -16,14 +27,18 @@ def _columns(signals: Array) -> Array:
 
 EFFECT = Effect(
     id="winch_torque_offset",
-    noun="a constant torque",
     block=Block.WINCH,
     parameters=(EffectParameter("torque", "N·m", -1.0, 1.0),),
-    kernels={Hook.WINCH: _kernel},
-    regression=Regression(Channel.SHAFT, _columns),
-    equation="torque at the shaft = reported torque + torque: a resisting torque of −torque",
-    shows="winch torque residual is shifted by a constant, at rest and in motion either way",
-    twins=("winch_torque_gain", "tension_bias", "winch_drum_radius"),
-    separating_experiment="hold still at three tension levels: the offset is the same at all",
-    reference="Janot, Gautier, Brunot, EMPS data set, nonlinearbenchmark.org, 2019 (drive offset)",
+    physics=Physics(kernels={Hook.WINCH: _kernel}),
+    signature=Signature(regression=Regression(Channel.SHAFT, _columns)),
+    description=Description(
+        noun="a constant torque",
+        equation="torque at the shaft = reported torque + torque: a resisting torque of −torque",
+        shows="winch torque residual is shifted by a constant, at rest and in motion either way",
+        confounded_with=("winch_torque_gain", "tension_bias", "winch_drum_radius"),
+        separating_experiment="hold still at three tension levels: the offset is the same at all",
+        reference=(
+            "Janot, Gautier, Brunot, EMPS data set, nonlinearbenchmark.org, 2019 (drive offset)"
+        ),
+    ),
 )

@@ -9,10 +9,13 @@ from cspm_sim.effects.effect import (
     Array,
     Block,
     Channel,
+    Description,
     Effect,
     EffectParameter,
     Hook,
+    Physics,
     Regression,
+    Signature,
     Values,
 )
 from cspm_sim.effects.signals import WinchSignal
@@ -40,21 +43,29 @@ def _values(weights: Sequence[float], nonlinear: Values) -> dict[str, float]:
 
 EFFECT = Effect(
     id="winch_torque_ripple",
-    noun="torque ripple",
     block=Block.WINCH,
     parameters=(
         EffectParameter("amplitude", "N·m", 0.0, 1.0),
         EffectParameter("order", "1", 0.0, 1000.0, absent=None),
         EffectParameter("phase", "rad", -pi, pi, absent=None),
     ),
-    kernels={Hook.WINCH: _kernel},
-    regression=Regression(Channel.SHAFT, _columns),
-    nonlinear={"order": (1, 2, 3, 4, 5, 6, 7, 8, 9, 10, 12, 14, 16, 18, 20, 24, 30, 36, 42, 48)},
-    coefficients=_weights,
-    from_coefficients=_values,
-    equation="torque at the shaft = reported torque + amplitude·sin(order·q + phase)",
-    shows="winch torque residual has a line at a fixed order of the motor angle, none in tension",
-    twins=("winch_drum_eccentricity",),
-    separating_experiment="several turns at constant speed, at two tension levels",
-    reference="Holtz, Springob, IEEE Trans. Industrial Electronics 43(2), 1996",
+    physics=Physics(kernels={Hook.WINCH: _kernel}),
+    signature=Signature(
+        regression=Regression(Channel.SHAFT, _columns),
+        nonlinear={
+            "order": (1, 2, 3, 4, 5, 6, 7, 8, 9, 10, 12, 14, 16, 18, 20, 24, 30, 36, 42, 48)
+        },
+        coefficients=_weights,
+        from_coefficients=_values,
+    ),
+    description=Description(
+        noun="torque ripple",
+        equation="torque at the shaft = reported torque + amplitude·sin(order·q + phase)",
+        shows=(
+            "winch torque residual has a line at a fixed order of the motor angle, none in tension"
+        ),
+        confounded_with=("winch_drum_eccentricity",),
+        separating_experiment="several turns at constant speed, at two tension levels",
+        reference="Holtz, Springob, IEEE Trans. Industrial Electronics 43(2), 1996",
+    ),
 )

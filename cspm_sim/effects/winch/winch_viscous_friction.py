@@ -2,7 +2,18 @@
 
 import numpy as np
 
-from cspm_sim.effects.effect import Array, Block, Channel, Effect, EffectParameter, Hook, Regression
+from cspm_sim.effects.effect import (
+    Array,
+    Block,
+    Channel,
+    Description,
+    Effect,
+    EffectParameter,
+    Hook,
+    Physics,
+    Regression,
+    Signature,
+)
 from cspm_sim.effects.signals import WinchSignal
 from cspm_sim.kernels.winch import RESISTANCE, SPEED
 
@@ -17,19 +28,23 @@ def _columns(signals: Array) -> Array:
 
 EFFECT = Effect(
     id="winch_viscous_friction",
-    noun="viscous friction",
     block=Block.WINCH,
     parameters=(EffectParameter("coefficient", "N·m·s/rad", 0.0, 0.1),),
-    kernels={Hook.WINCH: _kernel},
-    regression=Regression(Channel.SHAFT, _columns),
-    equation="resisting torque = coefficient·q̇",
-    shows="winch torque residual is a straight line through zero against motor speed",
-    twins=(
-        "winch_coulomb_friction",
-        "winch_stribeck_friction",
-        "cable_axial_damping",
-        "tension_delay",
+    physics=Physics(kernels={Hook.WINCH: _kernel}),
+    signature=Signature(regression=Regression(Channel.SHAFT, _columns)),
+    description=Description(
+        noun="viscous friction",
+        equation="resisting torque = coefficient·q̇",
+        shows="winch torque residual is a straight line through zero against motor speed",
+        confounded_with=(
+            "winch_coulomb_friction",
+            "winch_stribeck_friction",
+            "cable_axial_damping",
+            "tension_delay",
+        ),
+        separating_experiment="constant speeds over at least one decade at constant tension",
+        reference=(
+            "thesis (2-21); Armstrong-Hélouvry, Dupont, Canudas de Wit, Automatica 30(7), 1994"
+        ),
     ),
-    separating_experiment="constant speeds over at least one decade at constant tension",
-    reference="thesis (2-21); Armstrong-Hélouvry, Dupont, Canudas de Wit, Automatica 30(7), 1994",
 )

@@ -40,7 +40,7 @@ def test_without_joint_refit_no_number_of_the_file_is_looked_for():
     known = list(catalogue().values())
     assert ALL_SAFEGUARDS.effects == known
     left = Safeguards(joint_refit=False).effects
-    assert left == [effect for effect in known if effect.alter is None]
+    assert left == [effect for effect in known if effect.physics.alter is None]
     assert 0 < len(left) < len(known)
 
 

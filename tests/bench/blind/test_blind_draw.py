@@ -88,7 +88,7 @@ def test_all_that_the_catalogue_calls_twins_keep_company():
     twins = {
         frozenset((effect.id, twin))
         for effect in catalogue().values()
-        for twin in effect.twins
+        for twin in effect.description.confounded_with
         if effect.id in known and twin in known
     }
     assert len(twins) >= 32

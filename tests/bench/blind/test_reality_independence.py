@@ -41,7 +41,7 @@ def test_names_for_the_truth_are_those_of_the_catalogue(name):
         return
     effect = catalogue()[phenomenon.effect]
     assert effect.block.value == phenomenon.block
-    assert (effect.alter is not None) == (phenomenon.kind == "parameter")
+    assert (effect.physics.alter is not None) == (phenomenon.kind == "parameter")
     if phenomenon.parameter is not None:
         (parameter,) = (p for p in effect.parameters if p.name == phenomenon.parameter)
         assert (parameter.absent or 0.0) == phenomenon.base

@@ -348,7 +348,7 @@ def test_columns_of_a_cable_with_memory_are_what_its_law_leaves_over(effect, par
     machine = line([entry(effect, **parameters)])
     signals = rested(signals_of_cable(*locked_run(machine, swing(0.002, 0.4), 1.2)))
     found = catalogue()[effect]
-    point = {name: parameters[name] for name in found.nonlinear}
+    point = {name: parameters[name] for name in found.signature.nonlinear}
     model = (found.regressors(signals, **point) @ found.weights(parameters))[:, 0]
     left = left_over(signals)
     assert np.abs(left).max() > 0.1
@@ -379,7 +379,7 @@ def test_columns_of_a_flexible_frame_are_what_the_law_leaves_over():
     signals[:, FrameSignal.FORCE + 2] = tensions
     signals[:, FrameSignal.STIFFNESS] = stiffness_of(machine, plant.unstretched_lengths[0])
     found = catalogue()["frame_flexibility"]
-    point = {name: parameters[name] for name in found.nonlinear}
+    point = {name: parameters[name] for name in found.signature.nonlinear}
     model = (found.regressors(signals, **point) @ found.weights(parameters))[:, 0]
     # The length as measured: from the frame as it is measured, without its giving way.
     law = signals[:, FrameSignal.STIFFNESS] * (LENGTH_M - np.array(moved))

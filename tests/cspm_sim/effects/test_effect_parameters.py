@@ -47,7 +47,7 @@ ALTERED = [
 
 
 def test_all_that_alter_are_tested_here():
-    alter = {effect.id for effect in catalogue().values() if effect.alter}
+    alter = {effect.id for effect in catalogue().values() if effect.physics.alter}
     assert {with_effect["effect"] for with_effect, _ in ALTERED} == alter
 
 
@@ -81,7 +81,7 @@ def modest(effect):
     """Parameters near the effect's absence, and in the middle of the grid where it has one."""
     values = {}
     for p in effect.parameters:
-        grid = effect.nonlinear.get(p.name)
+        grid = effect.signature.nonlinear.get(p.name)
         if grid:
             values[p.name] = grid[len(grid) // 2]
         elif p.absent is None:
@@ -102,7 +102,7 @@ def test_a_machine_with_all_effects_at_once_starts_at_rest(every):
     plant = Plant(build(content), STILL, MS, bar_pose=POSE, locked=True)
     tensions = plant.tensions.copy()
     assert len(plant.state) == 36 + sum(
-        catalogue()[e["effect"]].states
+        catalogue()[e["effect"]].physics.states
         * (8 if catalogue()[e["effect"]].acts_on is Elements.CABLES else 1)
         for e in MODEST[::every]
     )

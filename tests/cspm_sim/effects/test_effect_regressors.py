@@ -77,7 +77,7 @@ def shrunk(effect, values, share):
 
 def residual_and_model(snapshots, effect, regression, values, cable):
     """What the nominal machine leaves over of a residual, and what the columns say of it."""
-    point = {name: values[name] for name in effect.nonlinear}
+    point = {name: values[name] for name in effect.signature.nonlinear}
     weights = effect.weights(values)
     channel = regression.channel
     if channel is Channel.SHAFT:
@@ -98,8 +98,8 @@ def residual_and_model(snapshots, effect, regression, values, cable):
 
 
 def regressions(effect):
-    partners = () if effect.id in INSTANT else effect.partners
-    return (effect.regression, *partners)
+    partners = () if effect.id in INSTANT else effect.signature.partners
+    return (effect.signature.regression, *partners)
 
 
 def test_the_nominal_machine_leaves_nothing_over():
@@ -112,7 +112,7 @@ def test_the_nominal_machine_leaves_nothing_over():
 
 
 def test_every_effect_without_memory_is_tested_here():
-    memoryless = {e.id for e in ALL if not e.states and e.block.value != "sensor"}
+    memoryless = {e.id for e in ALL if not e.physics.states and e.block.value != "sensor"}
     assert set(EXACT) | set(FIRST_ORDER) == memoryless
 
 
@@ -148,7 +148,7 @@ def test_columns_are_the_first_order_of_what_is_left_over(name):
 @pytest.mark.parametrize("effect", ALL, ids=lambda e: e.id)
 def test_weights_and_parameters_are_two_ways_of_saying_the_same(effect):
     values = {p.name: p.minimum + 0.7 * (p.maximum - p.minimum) for p in effect.parameters}
-    point = {name: values[name] for name in effect.nonlinear}
+    point = {name: values[name] for name in effect.signature.nonlinear}
     weights = effect.weights(values)
     found = effect.values(weights, **point)
     if effect.id == "payload_swing":
@@ -167,16 +167,16 @@ def test_weights_and_parameters_are_two_ways_of_saying_the_same(effect):
 @pytest.mark.parametrize("effect", ALL, ids=lambda e: e.id)
 def test_grids_are_of_parameters_and_within_bounds(effect):
     parameters = {p.name: p for p in effect.parameters}
-    for name, grid in effect.nonlinear.items():
+    for name, grid in effect.signature.nonlinear.items():
         assert list(grid) == sorted(set(grid))
         assert parameters[name].minimum <= grid[0] <= grid[-1] <= parameters[name].maximum
 
 
-@pytest.mark.parametrize("effect", [e for e in ALL if e.saturates], ids=lambda e: e.id)
+@pytest.mark.parametrize("effect", [e for e in ALL if e.signature.saturates], ids=lambda e: e.id)
 @pytest.mark.parametrize("stroke", [0.1, 10.0])
 def test_what_saturates_has_columns_up_to_one_where_all_of_it_acts(effect, stroke):
     """Swings by a tenth of the grid's displacement, and by ten times as much."""
-    ((name, grid),) = effect.nonlinear.items()
+    ((name, grid),) = effect.signature.nonlinear.items()
     swing = np.sin(np.linspace(0.0, 20.0, 4001))
     for displacement in grid:
         rows = np.zeros((len(swing), len(CableSignal)))

@@ -78,7 +78,7 @@ def test_the_bar_is_pulled_by_what_the_exit_carries_less_the_weight_between(dire
     signals = np.zeros((1, len(EndSignal) + 6))
     signals[0, EndSignal.DIRECTION : EndSignal.DIRECTION + 3] = along
     signals[0, EndSignal.LENGTH], signals[0, EndSignal.GRAVITY] = LENGTH_M, 9.81
-    (partner,) = catalogue()["cable_sag"].partners
+    (partner,) = catalogue()["cable_sag"].signature.partners
     force = partner.columns(signals)[0, :3, 1]
     share = down @ along
     expected = weight * share * along + 0.5 * weight * (down - share * along)

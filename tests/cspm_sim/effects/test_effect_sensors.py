@@ -15,7 +15,7 @@ from cspm_sim.sensors import SensorModel
 DOFS = ("surge", "sway", "heave", "roll", "pitch", "yaw")
 OFFSET = dict(zip(DOFS, (0.02, -0.03, 0.05, 0.1, -0.2, 0.3), strict=True))
 NOISES = {"/winches/state": 3, "/cables/tension": 1}
-READINGS = [e for e in catalogue().values() if e.regression.channel is Channel.READING]
+READINGS = [e for e in catalogue().values() if e.signature.regression.channel is Channel.READING]
 
 
 def machine(*effects):
@@ -230,7 +230,7 @@ def small(effect):
 @pytest.mark.parametrize("effect", READINGS, ids=lambda e: e.id)
 def test_columns_are_what_the_reading_has_too_much(effect):
     """A body or winch on a smooth path, read by a faulty sensor: the reading less the truth."""
-    values, sense = small(effect), effect.sense
+    values, sense = small(effect), effect.physics.sense
     parameters = np.array(list(values.values()))
     times = np.linspace(0.2, 2.0, 50)
 

@@ -79,7 +79,7 @@ OUTPUTS = {
     Hook.BAR: range(bar_hooks.WRENCH, bar_hooks.WRENCH + 6),
     Hook.PENDANT: range(bar_hooks.WRENCH, bar_hooks.WRENCH + 6),
 }
-KERNELS = [(effect, hook) for effect in EFFECTS for hook in effect.kernels]
+KERNELS = [(effect, hook) for effect in EFFECTS for hook in effect.physics.kernels]
 
 
 def bench(entries, **winch):
@@ -94,9 +94,9 @@ def middle(effect):
 
 def called(effect, hook, signals, states):
     """Signals and rates after the effect's kernel."""
-    after, rates = signals.copy(), np.zeros(effect.states)
-    memory = (states, rates) if effect.states else ()
-    effect.kernels[hook](middle(effect), after, *memory)
+    after, rates = signals.copy(), np.zeros(effect.physics.states)
+    memory = (states, rates) if effect.physics.states else ()
+    effect.physics.kernels[hook](middle(effect), after, *memory)
     return after, rates
 
 
@@ -127,19 +127,20 @@ def test_an_effect_declares_all_that_its_readers_need(effect):
         assert parameter.unit in UNITS
         assert np.isfinite([parameter.minimum, parameter.maximum]).all()
         assert parameter.minimum < parameter.maximum
-    for text in (effect.equation, effect.shows, effect.separating_experiment, effect.reference):
+    words = effect.description
+    for text in (words.equation, words.shows, words.separating_experiment, words.reference):
         assert len(text) > 10
         assert "\n" not in text
-    assert effect.twins
-    assert effect.id not in effect.twins
-    assert len(set(effect.twins)) == len(effect.twins)
+    assert words.confounded_with
+    assert effect.id not in words.confounded_with
+    assert len(set(words.confounded_with)) == len(words.confounded_with)
 
 
 @pytest.mark.parametrize("effect", EFFECTS, ids=lambda e: e.id)
-def test_twins_in_the_catalogue_name_each_other(effect):
-    for twin in effect.twins:
-        if twin in catalogue():
-            assert effect.id in catalogue()[twin].twins
+def test_confounded_effects_name_each_other(effect):
+    for other in effect.description.confounded_with:
+        if other in catalogue():
+            assert effect.id in catalogue()[other].description.confounded_with
 
 
 def test_the_catalogue_is_the_contract():
@@ -150,11 +151,12 @@ def test_the_catalogue_is_the_contract():
 @pytest.mark.parametrize("effect", EFFECTS, ids=lambda e: e.id)
 def test_an_effect_acts_in_one_way(effect):
     """As kernels, as other parameters or on sensors; with memory only as kernels."""
-    ways = [bool(effect.kernels), effect.alter is not None, effect.sense is not None]
+    physics = effect.physics
+    ways = [bool(physics.kernels), physics.alter is not None, physics.sense is not None]
     assert sum(ways) == 1
-    assert (effect.block is Block.SENSOR) == (effect.sense is not None)
-    assert effect.kernels or not effect.states
-    assert effect.regression.channel in Channel
+    assert (effect.block is Block.SENSOR) == (effect.physics.sense is not None)
+    assert effect.physics.kernels or not effect.physics.states
+    assert effect.signature.regression.channel in Channel
 
 
 @pytest.mark.parametrize(
@@ -163,7 +165,7 @@ def test_an_effect_acts_in_one_way(effect):
 def test_a_kernel_adds_to_what_others_added(effect, hook):
     """Two effects on one element add up, and a kernel changes nothing that is only to be read."""
     rng = np.random.default_rng(4)
-    signals, states = np.abs(rng.normal(size=30)) + 0.1, 0.3 * np.ones(effect.states)
+    signals, states = np.abs(rng.normal(size=30)) + 0.1, 0.3 * np.ones(effect.physics.states)
     once, rates = called(effect, hook, signals, states)
     twice, same_rates = called(effect, hook, once, states)
     outputs = list(OUTPUTS[hook])
@@ -179,14 +181,14 @@ def test_a_kernel_adds_to_what_others_added(effect, hook):
 @pytest.mark.parametrize("seed", range(3))
 @pytest.mark.parametrize(
     "effect",
-    [e for e in EFFECTS if e.kernels and any(w in e.id for w in WORDS)],
+    [e for e in EFFECTS if e.physics.kernels and any(w in e.id for w in WORDS)],
     ids=lambda e: e.id,
 )
 def test_friction_and_damping_take_energy_from_any_motion(effect, seed):
     values = {p.name: p.minimum + 0.2 * (p.maximum - p.minimum) for p in effect.parameters}
     on = EffectEntry(effect=effect.id, parameters=values)
     seen = Snapshots(build(general_content()), [on], seed=seed, frame_moves=0.0)
-    if effect.regression.channel is Channel.SHAFT:
+    if effect.signature.regression.channel is Channel.SHAFT:
         for i in range(8):
             assert (seen.shaft_residual(i)[:, 0] * seen.winch(i)[:, WinchSignal.SPEED] > 0.0).all()
         return

@@ -29,16 +29,18 @@ def test_page_holds_all_that_an_effect_declares(effect) -> None:
             + ("" if parameter.default is None else f"; {parameter.default:g} where a file")
         )
         assert row in page
-    for name, grid in effect.nonlinear.items():
+    for name, grid in effect.signature.nonlinear.items():
         assert f"`{name}` {', '.join(f'{value:g}' for value in grid)}" in page
-    for text in (effect.equation, effect.shows, effect.separating_experiment, effect.reference):
+    words = effect.description
+    for text in (words.equation, words.shows, words.separating_experiment, words.reference):
         assert f": {text}.\n" in page
-    assert all(f"`{twin}`" in page for twin in effect.twins)
+    assert all(f"`{other}`" in page for other in words.confounded_with)
 
 
-def test_effect_without_twins_says_so() -> None:
+def test_an_effect_that_is_confounded_with_none_is_described_so() -> None:
     effect = next(iter(catalogue().values()))
-    assert "- Twins: none known.\n" in effects_page({effect.id: replace(effect, twins=())})
+    lonely = replace(effect, description=replace(effect.description, confounded_with=()))
+    assert "- Confounded with: none known.\n" in effects_page({effect.id: lonely})
     assert "none known" not in effects_page({effect.id: effect})
 
 

@@ -129,6 +129,33 @@ def test_a_file_that_is_no_effect_is_refused(own, text, message):
         catalogue()
 
 
+@pytest.mark.parametrize(
+    ("old", "part"),
+    [
+        ("kernels={}", "physics=Physics(kernels=…)"),
+        ("regression=None", "signature=Signature(regression=…)"),
+        ("noun='oil'", "description=Description(noun=…)"),
+        ("twins=()", "description=Description(confounded_with=…)"),
+    ],
+)
+def test_a_file_in_the_form_of_version_0_1_is_refused_with_what_moved(own, cspm, old, part):
+    text = block("python")
+    path = own(text[: text.index("    physics=")] + f"    {old},\n)\n")
+    code, out, err = cspm("diagnose", "--explain", "bar_mass")
+    name = old.split("=")[0]
+    assert (code, out) == (2, "")
+    assert err == (
+        f"cspm: {VARIABLE}: {path}: '{name}' is no argument of Effect since version 0.2, allowed:"
+        f" {part}; Effect takes id, block, parameters, elements, physics, signature, description\n"
+    )
+
+
+def test_an_argument_that_never_was_is_pythons_error(own):
+    own(block("python").replace("    physics=", "    colour=1,\n    physics="))
+    with pytest.raises(InputError, match=r"TypeError: Effect.__init__\(\) got an .*'colour', allo"):
+        catalogue()
+
+
 def test_a_taken_id_is_refused(own):
     own(block("python").replace('id="winch_churning"', 'id="bar_mass"'))
     with pytest.raises(InputError, match=r"^CSPM_EFFECTS: bar_mass is there already, allowed: ano"):

@@ -81,22 +81,22 @@ def test_of_one_part_there_is_hardly_more(seed):
 
 
 def test_parts_are_those_of_the_grid_that_a_recording_can_show():
-    (grid,) = with_spectrum(CREEP, {"time_constant": 2.3}, 42.0).nonlinear.values()
+    (grid,) = with_spectrum(CREEP, {"time_constant": 2.3}, 42.0).signature.nonlinear.values()
     coarse = np.array([0.1, 0.3, 1.0, 3.0, 10.0, 30.0])
     between = np.sqrt(coarse[1:] * coarse[:-1])
     np.testing.assert_allclose(grid, np.sort([2.3, *coarse, *between]))
     other = catalogue()["cable_hysteresis"]
-    assert not other.spectrum
-    (grid,) = with_spectrum(other, {"displacement": 2e-3}, 42.0).nonlinear.values()
+    assert not other.signature.spectrum
+    (grid,) = with_spectrum(other, {"displacement": 2e-3}, 42.0).signature.nonlinear.values()
     assert grid == (2e-3,)
 
 
 def test_no_time_constant_is_told_that_outlasts_the_recording():
     short = told_within(CREEP, 42.0)
-    assert short.nonlinear["time_constant"] == (0.1, 0.3, 1.0, 3.0, 10.0, 30.0)
+    assert short.signature.nonlinear["time_constant"] == (0.1, 0.3, 1.0, 3.0, 10.0, 30.0)
     bounds = {p.name: (p.minimum, p.maximum) for p in short.parameters}
     assert bounds == {"compliance": (0.0, 0.1), "time_constant": (0.01, 42.0)}
-    assert told_within(CREEP, 0.05).nonlinear["time_constant"] == (0.1,)
+    assert told_within(CREEP, 0.05).signature.nonlinear["time_constant"] == (0.1,)
     other = catalogue()["cable_hysteresis"]
     assert told_within(other, 42.0) is other
 

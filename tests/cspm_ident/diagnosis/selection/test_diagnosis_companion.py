@@ -19,7 +19,7 @@ SHAFT, TENSION = Place(Channel.SHAFT, "a"), Place(Channel.TENSION, "a")
 
 def only(effect_id):
     effect = catalogue()[effect_id]
-    shape = tuple((name, grid[0]) for name, grid in effect.nonlinear.items())
+    shape = tuple((name, grid[0]) for name, grid in effect.signature.nonlinear.items())
     return Hypothesis(effect, (Candidate(effect, "a", shape),))
 
 

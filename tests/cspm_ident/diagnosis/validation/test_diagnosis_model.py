@@ -114,7 +114,7 @@ def test_of_what_may_be_none_the_least_goes_then_what_harms_most():
     ],
 )
 def test_what_may_be_none_is_unsure(effect, half, unsure):
-    shape = tuple((name, grid[0]) for name, grid in catalogue()[effect].nonlinear.items())
+    shape = tuple((name, grid[0]) for name, grid in catalogue()[effect].signature.nonlinear.items())
     candidate = Candidate(catalogue()[effect], "surge_2", shape)
     weights = {candidate: (np.array([-0.02]), np.array([half]))}
     assert _is_unsure(Hypothesis(candidate.effect, (candidate,)), weights) is unsure

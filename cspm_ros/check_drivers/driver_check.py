@@ -24,7 +24,7 @@ from cspm_ros.check_drivers.driver_values import check_units
 
 # What makes a topic's numbers useless for judging other topics.
 _SPOILING = ("units", "quaternion")
-# What tells why nodes would refuse a message.
+# Reports why nodes would refuse a message.
 _EXPLAINING = ("message", "names", "parts", "finite", "quaternion")
 _MOST_HINTS = 3
 
@@ -123,7 +123,7 @@ def _presence(topic: Topic, observation: Observation) -> list[Finding]:
 def _with_hint(
     topic: Topic, finding: Finding, observations: Sequence[Observation], testbed: Testbed
 ) -> Finding:
-    """Name topics of the wanted type that nothing in the contract asks for."""
+    """Name topics of the wanted type that nothing in the contract uses."""
     others = [
         observation.topic_name
         for observation in observations

@@ -18,7 +18,7 @@ def on_ros_clock(
 
     Args:
         samples: wall time of reception [ns], and the message's bytes.
-        ticks: wall time of reception [ns], and the time that the clock told [ns]; at least
+        ticks: wall time of reception [ns], and the time that the clock showed [ns]; at least
             `LEAST_TICKS` of them, in order of reception.
     """
     walls, times = np.array(ticks, dtype=np.int64).T

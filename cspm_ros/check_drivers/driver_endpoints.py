@@ -16,8 +16,8 @@ class Endpoint:
     Attributes:
         node: the node that has it, with its namespace.
         ros_type: of its messages.
-        reliable: whether it offers, or asks for, reliable transport.
-        transient_local: whether it keeps messages for, or asks for those from before, its time.
+        reliable: whether it offers, or requests, reliable transport.
+        transient_local: whether it keeps messages for, or requests those from before, its time.
     """
 
     node: str
@@ -90,7 +90,7 @@ def _misfits(topic: Topic, subscriptions: Sequence[Endpoint]) -> list[Finding]:
             text = f"{each.node} expects {each.ros_type}, sent is {topic.ros_type}"
             findings.append(Finding(topic.name, "type", False, text))
         elif each.transient_local:
-            text = f"{each.node} asks for transient local, expected volatile: it hears nothing"
+            text = f"{each.node} requests transient local, expected volatile: it hears nothing"
             findings.append(Finding(topic.name, "qos", False, text))
     return findings
 

@@ -39,7 +39,7 @@ class DriverListener:
     """Hears the measured topics with whatever quality of service their publishers offer.
 
     The nodes of a run hear reliable publishers only. Here one that offers no more than best effort
-    is heard as well, so that it can be told from one that is silent.
+    is heard as well, so that it can be distinguished from one that is silent.
     """
 
     def __init__(self, session: Session, testbed: Testbed, *, sim_time: bool = False) -> None:
@@ -141,7 +141,7 @@ class DriverListener:
         return found + check_brake(self._subscriptions(BRAKE.name), needed=braked)
 
     def _ticks(self) -> list[tuple[int, int]]:
-        """Return wall time and time told [ns] of `/clock`'s messages, empty if they are too few."""
+        """Return wall and published times [ns] of `/clock`, empty if they are too few."""
         ear, decode = self._ears.get(CLOCK.name), WireReader(CLOCK).decode
         ticks = []
         for wall_ns, payload in ear.samples if ear else []:

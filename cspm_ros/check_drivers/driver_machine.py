@@ -62,7 +62,7 @@ def check_machine(
             findings += list(_twist(heard, unsound, body))
     if testbed.bar is not None and testbed.gravity:
         findings += _hanging(testbed, heard, unsound)
-    # Where no weight tells the tensions' unit, the torques may.
+    # Where no weight shows the tensions' unit, the torques may.
     comparable = TENSION not in unsound or testbed.bar is None
     if WINCHES in heard and TENSION in heard and comparable:
         findings += _torques(testbed, heard[WINCHES], heard[TENSION])
@@ -73,7 +73,7 @@ def _obstacle(names: list[str], heard: Mapping[str, Heard], unsound: Collection[
     """Return why these topics cannot be compared, empty if they can."""
     for name in names:
         if name not in heard or name in unsound:
-            return f"cannot tell without a sound {name}"
+            return f"cannot tell without a usable {name}"
     starts = [int(heard[name].value_stamp_ns[0]) for name in names]
     ends = [int(heard[name].value_stamp_ns[-1]) for name in names]
     shortest = min(end - start for start, end in zip(starts, ends, strict=True))
@@ -202,7 +202,7 @@ def _torques(testbed: Testbed, winches: Heard, tension: Heard) -> list[Finding]:
 
 
 def _spin(winches: Heard) -> Array:
-    """Return the mean acceleration of each motor (n,) [rad/s²], 0 where speeds are not told."""
+    """Return the mean acceleration of each motor (n,) [rad/s²], 0 without speeds."""
     speeds, times = winches.part("velocity"), winches.value_times
     if speeds is None:
         return np.zeros(len(winches.topic.joint_names))

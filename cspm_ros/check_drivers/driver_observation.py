@@ -207,7 +207,7 @@ def _numbers(topic: Topic, found: Topic, message: Any) -> list[float]:  # noqa: 
 
 
 def _frame_problems(topic: Topic, found: Topic) -> Iterator[_Problem]:
-    # A JointState's frame has no meaning, whatever stands there.
+    # A JointState's frame has no meaning, whatever its value.
     if topic.frame_id and found.frame_id != topic.frame_id:
         hint = "" if found.frame_id.endswith("_ned") else "; z must point down"
         frame = found.frame_id[:_MOST_CHARACTERS]

@@ -34,7 +34,7 @@ TENSION_UNITS = {
     1.0 / 4.448222: "in pounds",
 }
 TORQUE_UNITS = {1000.0: "in millinewton metres", 100.0: "in newton centimetres"}
-# Of a torque held against a tension of which nothing else tells the unit.
+# Of a torque held against a tension of which nothing else shows the unit.
 HELD_UNITS = {
     9.80665e-3: "with the tension in grams",
     9.80665: "with the tension in kilograms",

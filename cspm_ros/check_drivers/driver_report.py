@@ -16,7 +16,7 @@ from cspm_ros.check_drivers.pull_response import PullVerdict
 
 OK, WARNING, ERROR = "ok", "warning", "error"
 _COLOURS = {OK: "green", WARNING: "yellow", ERROR: "red"}
-# What is told of a topic with which all is well.
+# The text of a topic without faults.
 _TELLING = ("rate", "delay", "qos", "hearers", "publishers", "ticks")
 _PIPE_WIDTH = 1000
 
@@ -28,7 +28,7 @@ def drivers_console() -> Console:
 
 
 def verdict_of(findings: Iterable[Finding]) -> str:
-    """Return `error` if anything is wrong, `warning` if anything is odd or cannot be told."""
+    """Return `error` if anything is wrong, `warning` if anything is odd or cannot be decided."""
     found = [finding.ok for finding in findings]
     return ERROR if False in found else WARNING if None in found else OK
 

@@ -183,8 +183,8 @@ def _delay(clocks: _Clocks, expected: float) -> Finding:
 def _drift(clocks: _Clocks) -> Finding:
     """Judge the slope of the messages' age over the whole window and over its halves.
 
-    Delays are one-sided, so the least age of each block tells the clocks apart; the slope is the
-    median of all slopes between two blocks (Theil, Sen).
+    Delays are one-sided, so the least age of each block shows the clocks' difference; the slope is
+    the median of all slopes between two blocks (Theil, Sen).
     """
     name = clocks.name
     count = min(DRIFT_BLOCKS, len(clocks.stamps) // 4)
@@ -203,9 +203,9 @@ def _drift(clocks: _Clocks) -> Finding:
     if max(abs(low), abs(high)) <= LARGEST_DRIFT:
         return Finding(name, "drift", True, text)
     # A queue that fills makes a slope as well, but not the same one all the time.
-    surely = min(low, low1, low2) > LARGEST_DRIFT or max(high, high1, high2) < -LARGEST_DRIFT
-    hint = "" if surely else "; listen longer to tell"
-    return Finding(name, "drift", False if surely else None, text + hint)
+    significant = min(low, low1, low2) > LARGEST_DRIFT or max(high, high1, high2) < -LARGEST_DRIFT
+    hint = "" if significant else "; listen longer to tell"
+    return Finding(name, "drift", False if significant else None, text + hint)
 
 
 def _speed_up(at: Array, ages: Array) -> tuple[float, float, float]:

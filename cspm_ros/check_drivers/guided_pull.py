@@ -78,7 +78,7 @@ class GuidedPull:
         self._keys, self._console, self._seconds = keys, console, seconds
 
     def run(self, cables: Sequence[str]) -> Pulls:
-        """Ask for a pull at each of these cables, and judge it."""
+        """Request a pull at each of these cables, and judge it."""
         verdicts = []
         for number, cable in enumerate(cables, start=1):
             self._say(f"\n{number} of {len(cables)}: {instruction(cable, self._seconds)}")

@@ -104,7 +104,7 @@ class PullVerdict:
 
 
 def instruction(cable: str, seconds: float) -> str:
-    """Return what to tell the person at the machine."""
+    """Return the text for the person at the machine."""
     return (
         f"let all drives hold and stop all controllers; then pull cable {cable} by hand, outwards"
         f" of its winch, for {seconds:g} s"

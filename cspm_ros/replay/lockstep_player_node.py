@@ -182,5 +182,5 @@ class LockstepPlayerNode:
 
 
 def _present(bag: BagStream, wanted: Mapping[str, object]) -> list[str]:
-    """Return the topics to read; what is missing among them is told once it is missed."""
+    """Return the topics to read; what is missing among them is reported once it is missed."""
     return [name for name in (*wanted, DIAGNOSTICS.name) if name in bag.topics]

@@ -112,7 +112,7 @@ class Player:
             self._next = next(self._found, None)
 
     def pause(self, now_s: float) -> None:
-        """Stop; time stands still."""
+        """Stop the time."""
         self._anchor(now_s)
         self.paused = True
 

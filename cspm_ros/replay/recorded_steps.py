@@ -45,7 +45,7 @@ def recorded_steps(
         if missing:
             cut = InputError(
                 f"{source}: no {', '.join(missing)} at {instant.log_ns * 1e-9:.6f} s, allowed: all"
-                " that the scenario's rates ask for"
+                " that the scenario's rates require"
             )
             continue
         yield instant

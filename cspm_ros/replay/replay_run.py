@@ -26,7 +26,7 @@ from cspm_run.recorded_bundle import recorded_bundle
 from cspm_run.recorded_run import new_recording
 
 REPLAY = "replay"
-# Readers tell what they have at least every three seconds.
+# Readers report what they have at least every three seconds.
 _ACKNOWLEDGED_S = 4.0
 _LOOK_OFTEN_S = 0.05
 Look = Callable[[Player], None]
@@ -165,7 +165,7 @@ def run_player(session: Session, node: ContractNode, parameters: NodeParameters)
 
 def _in_time(rate: float) -> float:
     if rate == UNLIMITED:
-        raise InputError("rate 0: allowed with nodes in step, which tell how far they are")
+        raise InputError("rate 0: allowed with nodes in step, which report how far they are")
     return check_rate(rate)
 
 

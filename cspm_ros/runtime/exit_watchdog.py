@@ -11,7 +11,7 @@ IN_ORDER = frozenset({0, -signal.SIGALRM})
 
 
 @contextmanager
-def farewell(seconds: float) -> Iterator[Callable[[], None]]:
+def exit_watchdog(seconds: float) -> Iterator[Callable[[], None]]:
     """Yield what gives the rest of the block so long [s]: then the system ends the process.
 
     A participant of Fast DDS 2.14 that leaves while another does may wait for itself without end,

@@ -53,7 +53,7 @@ class _Inlet:
         self._rows += row.tobytes()
 
     def take_block(self, payloads: list[bytes], numbers: list[int | None]) -> bool:
-        """Keep messages if each is sound and the next one; else keep none and return False."""
+        """Keep messages if each is intact and the next one; else keep none and return False."""
         decoded = self._decode_block(payloads)
         if decoded is None or not self.sequence.take_block(decoded[0], numbers):
             return False
@@ -124,7 +124,7 @@ class TopicReceiver:
             self.receive_other(payload, number)
 
 
-class Gatherer:
+class LockstepRecorder:
     """Gathers a lockstep run.
 
     Attributes:
@@ -142,7 +142,7 @@ class Gatherer:
         complain: Callable[[str, str], None] = lambda _topic, _reason: None,
         reporting: Collection[str] = (),
     ) -> None:
-        """Take what is to come, where it goes, and whom to tell how far all is there.
+        """Take what is to come, where it goes, and whom to report progress to.
 
         `complain` gets topic and reason of each message that is refused. The nodes in `reporting`
         send their statuses themselves, and nothing else on `/diagnostics`.
@@ -198,7 +198,8 @@ class Gatherer:
     def receive_diagnostics(self, payload: bytes, _: int, number: int | None = None) -> None:
         """Take a message of `/diagnostics`; `number` is its sender's, None where not known."""
         if number is not None and self._numbered and number - 1 not in self._reports.values():
-            # Told before it is decoded: whoever floods the topic sends more than can be decoded.
+            # Reported before it is decoded: whoever floods the topic sends more than can be
+            # decoded.
             due = sorted({each + 1 for each in self._reports.values()})
             self._refuse(
                 DIAGNOSTICS.name,

@@ -25,7 +25,7 @@ from cspm_msgs_py.testbed import load_testbed
 from cspm_msgs_py.topics import DIAGNOSTICS
 from cspm_run.library import find_scenario
 
-# The cascade stands from left to right above the plant, which is as wide as all of it.
+# The cascade runs from left to right above the plant, which is as wide as all of it.
 COLUMNS = {
     WAVE_TRAJECTORY: 0.0,
     MOTION_CONTROLLER: 1.0,

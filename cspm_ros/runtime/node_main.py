@@ -1,4 +1,4 @@
-"""One node as a program of its own, told everything by ROS 2 parameters."""
+"""One node as a program of its own, set by ROS 2 parameters."""
 
 from __future__ import annotations
 

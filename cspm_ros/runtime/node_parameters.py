@@ -1,4 +1,4 @@
-"""What a node is told by ROS 2 parameters."""
+"""A node's settings as ROS 2 parameters."""
 
 from __future__ import annotations
 
@@ -123,10 +123,10 @@ def _declare(node: Node, each: Field[Any]) -> Any:  # noqa: ANN401 - of the fiel
 
 
 def write_parameters(path: Path, parameters: NodeParameters) -> None:
-    """Write a ROS 2 parameter file that tells all nodes these parameters."""
-    told = {
+    """Write a ROS 2 parameter file with these parameters for all nodes."""
+    parameters_by_name = {
         each.name: list(value) if isinstance(value, tuple) else value
         for each in fields(NodeParameters)
         if (value := getattr(parameters, each.name)) != each.default
     }
-    path.write_text(dump_yaml({"/**": {"ros__parameters": told}}), encoding="utf-8")
+    path.write_text(dump_yaml({"/**": {"ros__parameters": parameters_by_name}}), encoding="utf-8")

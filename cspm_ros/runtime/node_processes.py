@@ -16,7 +16,7 @@ from cspm_ros.runtime.background import put_behind
 from cspm_ros.runtime.stall_watchdog import STANDSTILL
 
 LEAVING_S = 5.0
-# How long a node may be gone, or silent, before it is told that it is.
+# How long a node may be gone, or silent, before that is reported.
 SILENCE_S = 2.0
 _TAIL = 4000
 _WARNING = re.compile(r"\[(?:WARN|ERROR|FATAL)\] \[[\d.]+\] \[(.+?)\]: (.+)\n")

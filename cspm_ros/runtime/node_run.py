@@ -16,7 +16,7 @@ from cspm_msgs_py.ros.leader import Leader
 from cspm_msgs_py.ros.session import FAREWELL_S, Session
 from cspm_msgs_py.schedule import PLANT, Schedule, schedule_of
 from cspm_ros.replay.replay_run import run_player
-from cspm_ros.runtime.exit_watchdog import farewell
+from cspm_ros.runtime.exit_watchdog import exit_watchdog
 from cspm_ros.runtime.lockstep_nodes import LockstepRun
 from cspm_ros.runtime.node_parameters import REALTIME, NodeParameters, read_parameters
 from cspm_ros.runtime.progress_file import Report
@@ -45,9 +45,9 @@ def run_node(name: str, args: Sequence[str]) -> None:
     if name not in NODES:
         raise InputError(f"node {name}: allowed: {', '.join(NODES)}")
     with ExitStack() as stack:
-        begin_farewell = stack.enter_context(farewell(_LEAVING_S))
+        start_exit_watchdog = stack.enter_context(exit_watchdog(_LEAVING_S))
         session = stack.enter_context(Session(args))
-        stack.callback(begin_farewell)
+        stack.callback(start_exit_watchdog)
         node = session.node(name)
         parameters = read_parameters(node.node)
         if parameters.until_stdin_closes:

@@ -14,7 +14,7 @@ class Report:
     Attributes:
         simulated: time simulated [s].
         elapsed: wall time that took [s], without start-up.
-        waiting: what has to come before the run goes on, if it stands still.
+        waiting: what has to come before the run goes on, if it has stopped.
         failure: what ended it, in one line, if anything did.
         ended: whether no step follows; others may leave before the leader then.
         finished: whether moreover everybody has all of it.

@@ -16,7 +16,7 @@ from cspm_msgs_py.ros.leader import Leader
 from cspm_msgs_py.ros.rendezvous import FollowerSide
 from cspm_msgs_py.schedule import DIAGNOSTICS_RATE
 from cspm_msgs_py.topics import DIAGNOSTICS, Topic
-from cspm_ros.runtime.topic_buffer import Bucket
+from cspm_ros.runtime.topic_buffer import TopicBuffer
 
 _TAKE_EVERY_S = 0.002
 _WRITE_EVERY_S = 0.02
@@ -39,7 +39,7 @@ class RealtimeRecorderNode:
         """Connect the recording to its topics; `period_ns` is the plant's."""
         self._writer = writer
         self._intake = Intake(node.node)
-        self._buckets: dict[str, Bucket] = {}
+        self._buffers: dict[str, TopicBuffer] = {}
         self._came: set[str] = set()
         self.refused = (0, "")
         for name, topic in topics.items():
@@ -48,8 +48,8 @@ class RealtimeRecorderNode:
         self._node, self._period_ns = node, period_ns
         node.every(_TAKE_EVERY_S, self._intake.take)
         # One topic after the other: all at once would keep other nodes of the process waiting.
-        self._next = cycle(self._buckets.values())
-        node.every(_WRITE_EVERY_S / len(self._buckets), self._write_next)
+        self._next = cycle(self._buffers.values())
+        node.every(_WRITE_EVERY_S / len(self._buffers), self._write_next)
         self._publish_status = node.status_publisher()
         node.every(1.0 / DIAGNOSTICS_RATE, self._tell)
 
@@ -76,8 +76,8 @@ class RealtimeRecorderNode:
     def close(self) -> None:
         """Write what came, and leave the topics."""
         self._intake.take()
-        for bucket in self._buckets.values():
-            bucket.write(len(bucket.payloads))
+        for buffer in self._buffers.values():
+            buffer.write(len(buffer.payloads))
         self._intake.close()
 
     def _subscribe(self, name: str, topic: Topic) -> None:
@@ -91,13 +91,13 @@ class RealtimeRecorderNode:
 
             self._intake.subscribe(topic, message_class, keep, numbered=False)
             return
-        bucket = Bucket(topic, self._writer.channel(name), self._refuse)
-        self._buckets[name] = bucket
+        buffer = TopicBuffer(topic, self._writer.channel(name), self._refuse)
+        self._buffers[name] = buffer
 
         def take(payload: bytes, log_ns: int, _: int | None) -> None:
             self._came.add(name)
-            bucket.payloads.append(payload)
-            bucket.logs.append(log_ns)
+            buffer.payloads.append(payload)
+            buffer.logs.append(log_ns)
 
         self._intake.subscribe(topic, message_class, take)
 
@@ -110,8 +110,8 @@ class RealtimeRecorderNode:
         self._publish_status(self._node.now_ns(), status)
 
     def _write_next(self) -> None:
-        bucket = next(self._next)
-        bucket.write(len(bucket.payloads))
+        buffer = next(self._next)
+        buffer.write(len(buffer.payloads))
 
     def _looks_right(self, payload: bytes) -> bool:
         try:

@@ -12,7 +12,7 @@ from cspm_msgs_py.ros.rendezvous import FollowerSide
 from cspm_msgs_py.schedule import CLOCK, Schedule
 from cspm_msgs_py.stepping.lockstep import RECORDED_EVERY
 from cspm_msgs_py.topics import DIAGNOSTICS, Topic
-from cspm_ros.runtime.lockstep_recorder import Gatherer
+from cspm_ros.runtime.lockstep_recorder import LockstepRecorder
 
 _LOOK_EVERY_S = 0.004
 
@@ -31,22 +31,22 @@ class RecorderNode:
         """Connect the recording to the run's topics; `reporting` nodes send their own statuses."""
         self._node = node
         self._plant = FollowerSide(node, schedule.period_ns, self._end)
-        self._gatherer = Gatherer(
+        self._recorder = LockstepRecorder(
             schedule, dict(topics), writer, self._plant.report, node.complain, reporting
         )
         self._intake = Intake(node.node)
         for name in schedule.topics:
             if name != CLOCK:
-                receiver = self._gatherer.receiver(name)
+                receiver = self._recorder.receiver(name)
                 self._intake.subscribe_due(topics[name], ros_class(topics[name].ros_type), receiver)
         self._intake.subscribe(
             DIAGNOSTICS,
             ros_class(DIAGNOSTICS.ros_type),
-            self._gatherer.receive_diagnostics,
+            self._recorder.receive_diagnostics,
             numbered=False,
             depth=None,
         )
-        self._receive_clock = self._gatherer.receiver(CLOCK).receive
+        self._receive_clock = self._recorder.receiver(CLOCK).receive
         self._ticks: list[bytes] = []
         self._numbers: list[int | None] = []
         self._ticked = self._looked = 0
@@ -57,17 +57,17 @@ class RecorderNode:
     @property
     def ended(self) -> bool:
         """Whether the run ended and all of it is written."""
-        return self._gatherer.done
+        return self._recorder.done
 
     @property
     def progress(self) -> int:
         """The plant step through which everything came."""
-        return self._gatherer.completed
+        return self._recorder.completed
 
     @property
     def refused(self) -> tuple[int, str]:
         """How many messages were unusable, and why the last was."""
-        return self._gatherer.refused
+        return self._recorder.refused
 
     def _tick(self, payloads: list[bytes], numbers: list[int | None]) -> None:
         """Count the steps by the clock, and take all else in blocks of many steps."""
@@ -78,7 +78,7 @@ class RecorderNode:
             self._take_all()
 
     def _look(self) -> None:
-        """Take what there is of a block when the clock stands still."""
+        """Take what there is of a block while the clock is stopped."""
         self._clock.take()
         if self._ticked == self._looked:
             self._take_all()
@@ -100,11 +100,11 @@ class RecorderNode:
         self._take_all()
         self._clock.close()
         self._intake.close()
-        self._gatherer.write_whole()
+        self._recorder.write_whole()
 
     def waiting(self) -> str:
         """Return what the recorder waits for."""
-        return f"recorder waits for {', '.join(self._gatherer.missing())}"
+        return f"recorder waits for {', '.join(self._recorder.missing())}"
 
     def _end(self, last_step: int) -> None:
-        self._gatherer.end(last_step)
+        self._recorder.end(last_step)

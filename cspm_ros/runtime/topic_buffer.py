@@ -16,7 +16,7 @@ from cspm_msgs_py.topics import Topic
 from cspm_msgs_py.wire import WireReader
 
 
-class Bucket:
+class TopicBuffer:
     """Collects payloads, and hands them to the recording's channel in blocks.
 
     Attributes:
@@ -25,7 +25,7 @@ class Bucket:
     """
 
     def __init__(self, topic: Topic, channel: Channel, refuse: Callable[[str], None]) -> None:
-        """Take the topic, its channel, and whom to tell of a message that is unusable."""
+        """Take the topic, its channel, and what reports a message that is unusable."""
         self.topic = topic
         self._layout: Layout = layout_of(topic)
         self._reader = WireReader(topic)

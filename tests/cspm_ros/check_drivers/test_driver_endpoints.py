@@ -93,7 +93,7 @@ class TestTorqueCommand:
 
     def test_a_drive_that_asks_for_the_past_hears_nothing(self, torque, drive):
         other = replace(drive, transient_local=True)
-        text = "rack/drive asks for transient local, expected volatile: it hears nothing"
+        text = "rack/drive requests transient local, expected volatile: it hears nothing"
         found = told(check_torque_command(torque, [], [other, drive]))
         assert found[:2] == [("qos", False, text), ("hearers", True, "heard by rack/drive")]
 

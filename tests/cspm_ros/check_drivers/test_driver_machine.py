@@ -89,7 +89,7 @@ class TestWhatIsMissing:
     @pytest.mark.parametrize("name", [BAR, FRAME])
     def test_without_a_pose_nothing_is_said_of_the_geometry(self, hanging, name):
         findings = hanging.without(name).findings()
-        assert said(findings, BAR, "axes") == [(None, f"cannot tell without a sound {name}")]
+        assert said(findings, BAR, "axes") == [(None, f"cannot tell without a usable {name}")]
         assert said(findings, TENSION, "balance") == []
 
     def test_topics_of_different_times_are_not_compared(self, hanging):
@@ -168,7 +168,7 @@ class TestWhatIsMissing:
         twist = steady_feed(hanging.testbed.topics["/bar/twist"], 100, 2.0)
         lab = replace(hanging.without(BAR), feeds={**hanging.feeds, "/bar/twist": twist})
         found = said(lab.without(BAR).findings(), "/bar/twist", "speed")
-        assert found == [(None, f"cannot tell without a sound {BAR}")]
+        assert found == [(None, f"cannot tell without a usable {BAR}")]
 
 
 NEEDING = {

@@ -482,7 +482,7 @@ def test_messages_that_are_missing_inside_are_refused(lockstep):
     for topic in ("/clock", "/wrench_command", "/bar/pose"):
         told = refused(steps_of, lockstep, without(lockstep[2], 20, topic))
         assert told == (
-            f"bag: no {topic} at 0.020000 s, allowed: all that the scenario's rates ask for"
+            f"bag: no {topic} at 0.020000 s, allowed: all that the scenario's rates require"
         )
 
 

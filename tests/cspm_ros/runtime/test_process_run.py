@@ -140,9 +140,9 @@ def test_a_plant_that_cannot_leave_does_not_keep_the_run(tmp_path, monkeypatch):
 # Has nothing left to compute, but keeps the run: as on a machine that is full.
 _SLOW_RECORDER = """
 import time
-from cspm_ros.runtime.lockstep_recorder import Gatherer
-end = Gatherer.end
-Gatherer.end = lambda self, last_step: (time.sleep(4), end(self, last_step))
+from cspm_ros.runtime.lockstep_recorder import LockstepRecorder
+end = LockstepRecorder.end
+LockstepRecorder.end = lambda self, last_step: (time.sleep(4), end(self, last_step))
 """
 
 

@@ -7,8 +7,8 @@ import sys
 # `PyDLL` keeps Python's lock, as the middleware does when it waits for itself.
 _PROGRAM = """
 import ctypes, time
-from cspm_ros.runtime.exit_watchdog import farewell
-with farewell(0.2) as begin:
+from cspm_ros.runtime.exit_watchdog import exit_watchdog
+with exit_watchdog(0.2) as begin:
     {inside}
 {after}
 """

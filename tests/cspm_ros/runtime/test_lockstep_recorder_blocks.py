@@ -21,7 +21,7 @@ def deliver_blocks(intake, sent, rng, share):
     Returns how many were spoilt.
     """
     schedule = [name for name in sent if not isinstance(name, tuple)]
-    receive = {name: intake.gatherer.receiver(name).receive for name in schedule}
+    receive = {name: intake.recorder.receiver(name).receive for name in schedule}
     left, added = {name: list(payloads) for name, payloads in sent.items()}, 0
     while left:
         queue = rng.choice(list(left))
@@ -49,10 +49,10 @@ def test_blocks_make_the_same_file(case, tmp_path, seed, share):
     intake = Intake(case.bundle, tmp_path / "bag")
     with intake.writer:
         added = deliver_blocks(intake, case.sent, random.Random(seed), share)
-        intake.gatherer.end(STEPS - 1)
-        assert intake.gatherer.done
+        intake.recorder.end(STEPS - 1)
+        assert intake.recorder.done
     assert content(tmp_path / "bag") == content(case.expected)
-    assert intake.gatherer.refused[0] == added == len(intake.rate_limited_warnings)
+    assert intake.recorder.refused[0] == added == len(intake.rate_limited_warnings)
     assert (added > 20) == (share > 0.0)
     assert intake.told[-1] == STEPS - 1
 
@@ -60,7 +60,7 @@ def test_blocks_make_the_same_file(case, tmp_path, seed, share):
 def test_rows_that_are_due_make_the_same_file(case, tmp_path):
     intake, rng = Intake(case.bundle, tmp_path / "bag"), random.Random(3)
     topics = case.bundle.testbed.testbed.topics
-    receivers = {name: intake.gatherer.receiver(name) for name in topics if name in case.sent}
+    receivers = {name: intake.recorder.receiver(name) for name in topics if name in case.sent}
     left = {queue: list(payloads) for queue, payloads in case.sent.items()}
     with intake.writer:
         while queues := [queue for queue, payloads in left.items() if payloads]:
@@ -74,20 +74,20 @@ def test_rows_that_are_due_make_the_same_file(case, tmp_path):
             first, step, _ = receivers[queue].due
             assert stamps == list(range(first, first + len(block) * step, step))
             receivers[queue].receive_rows(rows)
-        intake.gatherer.end(STEPS - 1)
-        assert intake.gatherer.done
+        intake.recorder.end(STEPS - 1)
+        assert intake.recorder.done
     assert content(tmp_path / "bag") == content(case.expected)
     assert intake.told[-1] == STEPS - 1
 
 
 def test_a_second_sender_in_a_block_is_an_error(case, tmp_path):
     intake = Intake(case.bundle, tmp_path / "bag")
-    take = intake.gatherer.receiver("/cables/tension").receive
+    take = intake.recorder.receiver("/cables/tension").receive
     first, second, third, *_ = case.sent["/cables/tension"]
     with intake.writer:
         take([first, second], [1, 2])
         with pytest.raises(CspmError, match=r"^/cables/tension: two senders sent their message 2 "):
             take([second, third], [2, 3])
-        intake.gatherer.refused = (0, "")
+        intake.recorder.refused = (0, "")
         take([third], [3])
-    assert intake.gatherer.refused == (0, "")
+    assert intake.recorder.refused == (0, "")

@@ -32,7 +32,7 @@ LATE = late(REST, bar__pose=23, cables__tension=3)
 
 @pytest.fixture(scope="module", params=[REST, LATE], ids=["ideal", "late"])
 def case(request, tmp_path_factory):
-    return Case(request.param, tmp_path_factory.mktemp("gatherer") / "expected")
+    return Case(request.param, tmp_path_factory.mktemp("recorder") / "expected")
 
 
 def deliver(intake, sent, seed):
@@ -56,11 +56,11 @@ def test_any_delivery_makes_the_same_file(case, tmp_path_factory, seed):
     intake = Intake(case.bundle, folder)
     with intake.writer:
         deliver(intake, case.sent, seed)
-        assert intake.gatherer.completed <= STEPS - 1
-        intake.gatherer.end(STEPS - 1)
-        assert intake.gatherer.done
+        assert intake.recorder.completed <= STEPS - 1
+        intake.recorder.end(STEPS - 1)
+        assert intake.recorder.done
     assert content(folder) == content(case.expected)
-    assert intake.gatherer.refused == (0, "")
+    assert intake.recorder.refused == (0, "")
     assert intake.told[-1] == STEPS - 1
     assert intake.told == sorted(intake.told)
 
@@ -75,7 +75,7 @@ def test_recorded_while_it_runs(case, tmp_path_factory, seed):
 
     def make_recorder(acknowledge):
         intakes.append(Intake(case.bundle, folder, acknowledge))
-        return intakes[0].gatherer
+        return intakes[0].recorder
 
     testbed = case.bundle.testbed.testbed
     network = Network(case.bundle.scenario, testbed, STEPS, make_recorder)
@@ -102,8 +102,8 @@ def test_a_run_that_ends_early_is_recorded_to_its_end(case, tmp_path, end):
     intake = Intake(case.bundle, tmp_path / "bag")
     with intake.writer:
         deliver_through(intake, case, end + 3, until=end)
-        intake.gatherer.end(end)
-        assert intake.gatherer.done
+        intake.recorder.end(end)
+        assert intake.recorder.done
     assert difference(tmp_path / "expected", tmp_path / "bag") is None
     assert content(tmp_path / "expected") == content(tmp_path / "bag")
 
@@ -126,8 +126,8 @@ def test_a_run_that_ends_without_a_word_keeps_its_whole_steps(case, tmp_path):
     intake = Intake(case.bundle, tmp_path / "bag")
     with intake.writer:
         deliver_through(intake, case, 70, until=57)
-        assert not intake.gatherer.done
-        intake.gatherer.write_whole()
+        assert not intake.recorder.done
+        intake.recorder.write_whole()
     assert difference(tmp_path / "expected", tmp_path / "bag") is None
 
 
@@ -136,14 +136,14 @@ def test_nothing_is_acknowledged_before_all_of_it_is_there(case, tmp_path):
     with intake.writer:
         deliver_through(intake, case, 40, until=-1)
         assert intake.told == []
-        assert intake.gatherer.missing() == ["/clock"]
+        assert intake.recorder.missing() == ["/clock"]
         clock = count()
         for payload in case.sent["/clock"][:41]:
             intake.take("/clock", payload)
             step = next(clock)
             assert not intake.told or intake.told[-1] <= step
             assert step - max(intake.told, default=-1) <= RECORDED_EVERY
-        assert intake.gatherer.completed >= 40 - RECORDED_EVERY
+        assert intake.recorder.completed >= 40 - RECORDED_EVERY
 
 
 def test_a_silent_node_is_missed(case, tmp_path):
@@ -153,23 +153,23 @@ def test_a_silent_node_is_missed(case, tmp_path):
             key: value for key, value in case.sent.items() if key != ("/diagnostics", "plant")
         }
         deliver(intake, silent, 0)
-        assert intake.gatherer.completed == -1
-        assert intake.gatherer.missing() == ["/diagnostics of plant"]
+        assert intake.recorder.completed == -1
+        assert intake.recorder.missing() == ["/diagnostics of plant"]
 
 
 def test_an_end_that_cannot_be_is_refused(case, tmp_path):
     intake = Intake(case.bundle, tmp_path / "bag")
     with intake.writer:
         with pytest.raises(InputError, match=r"^the last step is 5000, allowed: -1 to "):
-            intake.gatherer.end(5000)
+            intake.recorder.end(5000)
         deliver_through(intake, case, 60)
-        reached = intake.gatherer.completed
+        reached = intake.recorder.completed
         for last in (reached - 1, -1, reached + RECORDER_WINDOW + 3):
             with pytest.raises(InputError, match=rf"^the last step is {last}, allowed: {reached} "):
-                intake.gatherer.end(last)
-        assert not intake.gatherer.done
-        intake.gatherer.end(60)
-        assert intake.gatherer.done
+                intake.recorder.end(last)
+        assert not intake.recorder.done
+        intake.recorder.end(60)
+        assert intake.recorder.done
 
 
 # What does not belong
@@ -203,9 +203,9 @@ def test_what_does_not_belong_changes_nothing(case, tmp_path_factory, seed):
                     added += 1
             intake.take(queue, payloads[i])
             at[queue] += 1
-        intake.gatherer.end(STEPS - 1)
+        intake.recorder.end(STEPS - 1)
     assert content(folder) == content(case.expected)
-    assert intake.gatherer.refused[0] == added == len(intake.rate_limited_warnings)
+    assert intake.recorder.refused[0] == added == len(intake.rate_limited_warnings)
     assert added > 100
     assert all(reason.startswith(f"{topic}: ") for topic, reason in intake.rate_limited_warnings)
 
@@ -224,16 +224,16 @@ def test_a_broken_message_with_the_right_stamp_does_not_take_the_genuine_ones_pl
     names = good.replace(b"hoist_1", b"hoist_9")
     for payload in (encode(0, np.full(8, np.nan)), names, good[:-8]):
         fresh.take("/cables/tension", payload)
-    assert fresh.gatherer.refused[0] == 3
+    assert fresh.recorder.refused[0] == 3
     assert [reason.split(", allowed")[0] for _, reason in fresh.rate_limited_warnings] == [
         "/cables/tension: effort of hoist_1 is nan",
         "/cables/tension: name 1 is 'hoist_9'",
         f"/cables/tension: {len(good) - 8} bytes that are no sensor_msgs/msg/JointState",
     ]
     fresh.take("/cables/tension", good)
-    assert fresh.gatherer.refused[0] == 3
+    assert fresh.recorder.refused[0] == 3
     fresh.take("/cables/tension", good)
-    assert fresh.gatherer.refused == (
+    assert fresh.recorder.refused == (
         4,
         "/cables/tension: stamp 0.000000 s came already: a restarted clock or a second sender,"
         " allowed: 0.001000 s",
@@ -258,30 +258,30 @@ def test_a_broken_message_with_the_right_stamp_does_not_take_the_genuine_ones_pl
     ],
 )
 def test_other_diagnostics_are_refused(fresh, payload, reason):
-    fresh.gatherer.receive_diagnostics(payload, 0)
-    assert fresh.gatherer.refused == (1, f"/diagnostics: {reason}")
+    fresh.recorder.receive_diagnostics(payload, 0)
+    assert fresh.recorder.refused == (1, f"/diagnostics: {reason}")
     assert fresh.rate_limited_warnings == [("/diagnostics", f"/diagnostics: {reason}")]
-    fresh.gatherer.receive_diagnostics(encode_diagnostics(0, [(0, "plant", "ok", {})]), 0)
-    assert fresh.gatherer.refused[0] == 1
+    fresh.recorder.receive_diagnostics(encode_diagnostics(0, [(0, "plant", "ok", {})]), 0)
+    assert fresh.recorder.refused[0] == 1
 
 
 def test_a_status_is_known_by_its_senders_number(tmp_path):
     """Of nodes that speak for themselves; who speaks for others has other numbers."""
     intake = Intake(REST, tmp_path / "bag", reporting=["plant"])
     with intake.writer:
-        take, period = intake.gatherer.receive_diagnostics, 100 * MS
+        take, period = intake.recorder.receive_diagnostics, 100 * MS
         status = {name: (0, name, "ok", {}) for name in ("plant", "force_controller")}
         take(encode_diagnostics(0, [status["plant"]]), 0, 2)
-        assert intake.gatherer.refused == (
+        assert intake.recorder.refused == (
             1,
             "/diagnostics: plant at 0 ns is its sender's message 2, allowed: 1; a second sender",
         )
         take(encode_diagnostics(0, [status["plant"]]), 0, 1)
         take(encode_diagnostics(period, [status["plant"]]), 0, 1)
-        assert intake.gatherer.refused[0] == 2
+        assert intake.recorder.refused[0] == 2
         take(encode_diagnostics(period, [status["plant"]]), 0, 2)
         take(encode_diagnostics(0, [status["force_controller"]]), 0, 77)
-        assert intake.gatherer.refused[0] == 2
+        assert intake.recorder.refused[0] == 2
 
 
 def test_a_number_that_no_node_has_next_is_refused_unread(tmp_path, monkeypatch):
@@ -289,38 +289,38 @@ def test_a_number_that_no_node_has_next_is_refused_unread(tmp_path, monkeypatch)
     everybody = ["plant", *schedule_of(REST.scenario, REST.testbed.testbed).nodes]
     intake = Intake(REST, tmp_path / "bag", reporting=everybody)
     with intake.writer:
-        take = intake.gatherer.receive_diagnostics
+        take = intake.recorder.receive_diagnostics
         take(encode_diagnostics(0, [(0, "plant", "ok", {})]), 0, 1)
         decoded = []
         monkeypatch.setattr("cspm_ros.runtime.lockstep_recorder.decode_diagnostics", decoded.append)
         take(b"anything", 0, 9)
         assert decoded == []
-        assert intake.gatherer.refused == (
+        assert intake.recorder.refused == (
             1,
             "/diagnostics: its sender's message 9, allowed: 1, 2; a second sender",
         )
         monkeypatch.undo()
         take(encode_diagnostics(100 * MS, [(0, "plant", "ok", {})]), 0, 2)
-        assert intake.gatherer.refused[0] == 1
+        assert intake.recorder.refused[0] == 1
 
 
 def test_two_senders_of_a_topic_are_an_error(fresh):
     encode = WireWriter(REST.testbed.testbed.topics["/cables/tension"]).encode
-    take = fresh.gatherer.receive("/cables/tension")
+    take = fresh.recorder.receive("/cables/tension")
     take(encode(0, np.arange(8.0)), 0, 1)
     with pytest.raises(CspmError, match=r"^/cables/tension: two senders"):
         take(encode(0, np.ones(8)), 0, 1)
 
 
 def test_ten_thousand_statuses_are_refused(fresh):
-    fresh.gatherer.receive_diagnostics(encode_diagnostics(0, [(0, "plant", "ok", {})] * 10_000), 0)
-    assert fresh.gatherer.refused[0] == 1
+    fresh.recorder.receive_diagnostics(encode_diagnostics(0, [(0, "plant", "ok", {})] * 10_000), 0)
+    assert fresh.recorder.refused[0] == 1
 
 
 def test_a_status_with_text_that_is_none_is_refused(fresh):
     payload = encode_diagnostics(0, [(0, "plant", "okay", {})])
-    fresh.gatherer.receive_diagnostics(payload.replace(b"okay", b"\xff\xfe\xfd\xfc"), 0)
-    assert fresh.gatherer.refused[0] == 1
+    fresh.recorder.receive_diagnostics(payload.replace(b"okay", b"\xff\xfe\xfd\xfc"), 0)
+    assert fresh.recorder.refused[0] == 1
 
 
 def test_the_same_message_of_another_sender_is_recorded_in_the_contracts_form(fresh, tmp_path):
@@ -330,8 +330,8 @@ def test_the_same_message_of_another_sender_is_recorded_in_the_contracts_form(fr
         header_of(0, "lab"), list(topic.joint_names), np.ones(8), np.zeros(0), np.arange(8.0)
     )
     fresh.take("/cables/tension", serialize(message))
-    assert fresh.gatherer.refused == (0, "")
-    fresh.gatherer._write(1)
+    assert fresh.recorder.refused == (0, "")
+    fresh.recorder._write(1)
     fresh.writer.close()
     with Recording(tmp_path / "bag") as recording:
         [payload] = recording.payloads("/cables/tension").payloads

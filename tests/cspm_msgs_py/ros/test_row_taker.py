@@ -5,7 +5,7 @@ from contextlib import contextmanager
 
 import numpy as np
 import pytest
-from gathered_runs import spoilt
+from recorded_lockstep_runs import spoilt
 from ros_graph import load_ros, new_domain
 from wire_rows import TOPICS, rows_of
 

@@ -11,8 +11,8 @@ from importlib.util import find_spec
 
 import numpy as np
 import pytest
-from gathered_runs import late
 from loops import WILD
+from recorded_lockstep_runs import late
 from ros_graph import assert_same, content, difference, done, load_ros, new_domain
 from run_samples import bundle_of, recorded
 

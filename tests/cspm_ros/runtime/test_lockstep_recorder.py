@@ -5,10 +5,10 @@ from itertools import count
 
 import numpy as np
 import pytest
-from gathered_runs import MS, REST, STEPS, Case, Intake, late, spoilt
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from lockstep_network import Network, chooser
+from recorded_lockstep_runs import MS, REST, STEPS, Case, Intake, late, spoilt
 from ros_graph import content, difference, hashes
 from run_samples import bundle_of
 

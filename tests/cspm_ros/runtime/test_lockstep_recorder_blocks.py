@@ -3,7 +3,7 @@
 import random
 
 import pytest
-from gathered_runs import REST, STEPS, Case, Intake, spoilt
+from recorded_lockstep_runs import REST, STEPS, Case, Intake, spoilt
 from ros_graph import content
 
 from cspm_msgs_py.errors import CspmError

@@ -8,7 +8,7 @@ from schedules import delayed
 from cspm_msgs_py.diagnostics import encode_diagnostics
 from cspm_msgs_py.schedule import schedule_of
 from cspm_msgs_py.wire import WireWriter
-from cspm_ros.runtime.lockstep_recorder import Gatherer
+from cspm_ros.runtime.lockstep_recorder import LockstepRecorder
 from cspm_run.recorded_run import new_recording, run
 
 MS = 1_000_000
@@ -45,13 +45,13 @@ class Case:
 
 
 class Intake:
-    """A gatherer that records to a folder, with what it told."""
+    """A recorder that records to a folder, with what it told."""
 
     def __init__(self, bundle, folder, acknowledge=None, reporting=()):
         self.told, self.rate_limited_warnings = [], []
         schedule = schedule_of(bundle.scenario, bundle.testbed.testbed)
         self.writer = new_recording(bundle, folder, "graph")
-        self.gatherer = Gatherer(
+        self.recorder = LockstepRecorder(
             schedule,
             bundle.testbed.testbed.topics,
             self.writer,
@@ -59,11 +59,11 @@ class Intake:
             lambda topic, reason: self.rate_limited_warnings.append((topic, reason)),
             reporting,
         )
-        self._receive = {name: self.gatherer.receive(name) for name in schedule.topics}
+        self._receive = {name: self.recorder.receive(name) for name in schedule.topics}
 
     def take(self, queue, payload):
         if isinstance(queue, tuple):
-            self.gatherer.receive_diagnostics(payload, 0)
+            self.recorder.receive_diagnostics(payload, 0)
         else:
             self._receive[queue](payload, 0)
 

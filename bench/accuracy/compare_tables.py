@@ -104,7 +104,7 @@ def ratios(found: Comparison) -> dict[str, str]:
         shares = [
             c.rms / c.floor for c in found.channels if c.block == block and c.name.startswith(stem)
         ]
-        texts[title] = f"{min(shares):.2f}–{max(shares):.2f}" if shares else "stands still"
+        texts[title] = f"{min(shares):.2f}–{max(shares):.2f}" if shares else "at rest"
     return texts
 
 

@@ -1,7 +1,7 @@
 """Effects planted one at a time, and what `cspm diagnose` says of each: a table for development.
 
 Most recordings come from the plant whose equations the catalogue shares, so that the table shows
-what the method can see, not what it is worth on a real machine; those from MuJoCo are marked.
+what the method can see, not how it does on a real machine; those from MuJoCo are marked.
 """
 
 from __future__ import annotations
@@ -75,11 +75,11 @@ def main() -> None:
     )
     parser.add_argument("--only", metavar="EFFECT", help="cases of one effect alone")
     parser.add_argument("--without-cells", action="store_true", help="those without load cells")
-    asked = parser.parse_args()
+    options = parser.parse_args()
     cases = [
         case
         for case in CASES
-        if asked.only in (None, case.effect) and case.cells is not asked.without_cells
+        if options.only in (None, case.effect) and case.cells is not options.without_cells
     ]
     print("| planted | plant, capture | verdict | found | seconds |\n|---|---|---|---|---:|")
     with tempfile.TemporaryDirectory() as folder:
@@ -129,8 +129,10 @@ def judge(case: Case, folder: Path) -> tuple[str, str, str]:
 
 def number_words(number: Number) -> str:
     """Return a parameter with its interval, if anything bounds it."""
-    told = f"{number.name} {number.value:.4g}"
-    return told if number.ci95 is None else f"{told} ({number.low:.4g} to {number.high:.4g})"
+    reported = f"{number.name} {number.value:.4g}"
+    return (
+        reported if number.ci95 is None else f"{reported} ({number.low:.4g} to {number.high:.4g})"
+    )
 
 
 def _planted(case: Case) -> str:

@@ -91,7 +91,7 @@ def drawn_wrenches(testbed: Testbed, count: int, seed: int) -> Wrenches:
 
 
 def reference_wrenches(bundle: Bundle) -> Wrenches:
-    """Return the wrenches that a scenario's reference asks for, one per millisecond."""
+    """Return the wrenches of a scenario's reference, one per millisecond."""
     testbed = bundle.testbed.testbed
     assert testbed.bar is not None
     bar = bar_parameters(testbed.bar, testbed.gravity)
@@ -154,10 +154,10 @@ def distribution_rows(count: int, duration: float) -> list[list[str]]:
     """Return the table's rows, one per method."""
     bundle = Case("worst_case", (f"duration={duration}",)).bundle()
     testbed = bundle.testbed.testbed
-    drawn, asked = drawn_wrenches(testbed, count, seed=1), reference_wrenches(bundle)
+    drawn, options = drawn_wrenches(testbed, count, seed=1), reference_wrenches(bundle)
     rows = []
     for method in METHODS:
-        whole, along = score(testbed, method, drawn), score(testbed, method, asked)
+        whole, along = score(testbed, method, drawn), score(testbed, method, options)
         times = np.concatenate([whole.times, along.times])
         rows.append(
             [
@@ -192,14 +192,14 @@ def main() -> None:
     parser = argparse.ArgumentParser(prog="python -m bench.accuracy.tension_distribution")
     parser.add_argument("--count", type=int, default=20000, help="drawn wrenches")
     parser.add_argument("--duration", type=float, default=60.0, help="of the worst case [s]")
-    asked = parser.parse_args()
+    options = parser.parse_args()
     console = Console()
     for key, value in describe_machine().items():
         console.print(f"{key}: {value}", highlight=False, soft_wrap=True)
     if is_busy():
         console.print("other programs are at work: the times will be too long")
     table = Table(*HEADINGS)
-    for row in distribution_rows(asked.count, asked.duration):
+    for row in distribution_rows(options.count, options.duration):
         table.add_row(*row)
     console.print(table)
 

@@ -18,7 +18,7 @@ Tell = Callable[[str, int, int], None]
 
 
 class BlankRuns(NamedTuple):
-    """What runs without any phenomenon tell.
+    """What runs without any phenomenon show.
 
     Attributes:
         limits: detection limits by scenario and phenomenon.
@@ -44,7 +44,7 @@ class BlankRuns(NamedTuple):
 
 
 def run_blank(items: Sequence[Item], duration: float, tell: Tell) -> BlankRuns:
-    """Run each scenario without any phenomenon, and return what that tells of the items' own.
+    """Run each scenario without any phenomenon, and return what that shows of the items' own.
 
     Args:
         items: the recordings to be made.

@@ -51,9 +51,9 @@ def make_command(
     from bench.blind.strata import STRATA
 
     console = make_console()
-    asked = Request(folder, truth, seed, count, split, strata or tuple(STRATA), duration, sensors)
+    options = Request(folder, truth, seed, count, split, strata or tuple(STRATA), duration, sensors)
     with _bar(console) as show:
-        make(asked, show, jobs)
+        make(options, show, jobs)
 
 
 def run_command(folder: Path, methods: Sequence[str], jobs: int | None) -> None:

@@ -68,12 +68,12 @@ def main() -> None:
     bench = Methods(Path(recording))
     for name in methods:
         try:
-            told, seconds = bench.diagnosis_by(name)
+            reported, seconds = bench.diagnosis_by(name)
         except Exception:
             # Other methods go on.
             Path(f"{name}.txt").write_text(traceback.format_exc(), encoding="utf-8")
             continue
-        content = json.dumps({"diagnosis": told, "cpu_s": seconds})
+        content = json.dumps({"diagnosis": reported, "cpu_s": seconds})
         Path(f"{name}.json").write_text(content, encoding="utf-8")
 
 

@@ -142,8 +142,8 @@ def _keep(room: Path, method: str, place: Path, said: str, wall: float) -> None:
     if report.exists():
         content = json.loads(report.read_text(encoding="utf-8"))
         times["cpu_s"] = content["cpu_s"]
-        told = json.dumps(content["diagnosis"], indent=2)
-        (part / DIAGNOSIS).write_text(told, encoding="utf-8")
+        reported = json.dumps(content["diagnosis"], indent=2)
+        (part / DIAGNOSIS).write_text(reported, encoding="utf-8")
     else:
         why = reason.read_text(encoding="utf-8") if reason.exists() else said
         (part / FAILURE).write_text(f"{why.strip()}\n", encoding="utf-8")

@@ -80,9 +80,9 @@ def draw_case(path: Path, recording: Path, found: Diagnosis) -> None:
     """Draw what an engineer sees, what the diagnosis sees, and what the model then does."""
     figure = Figure(figsize=(12, 3.8), layout="constrained")
     FigureCanvasAgg(figure)
-    seen, told, fit = figure.subplots(1, 3)
+    seen, reported, fit = figure.subplots(1, 3)
     _draw_tracking(seen, recording)
-    _draw_residual(told, found)
+    _draw_residual(reported, found)
     _draw_fit(fit, found)
     figure.legend(*fit.get_legend_handles_labels(), loc="outside lower center", ncols=4)
     figure.savefig(path, dpi=_DPI)
@@ -146,13 +146,13 @@ def _text(k: int, stratum: str, item: Mapping[str, Any], found: Diagnosis) -> st
         f" {c['multiple']:g} × its detection limit"
         for c in item["concealed"]
     )
-    told = [
+    reported = [
         *_named(found, doubtful=False),
         *(unknown_statement(found, i) for i in range(len(found.shapes))),
         *(line_statement(line) for line in found.lines),
         *_named(found, doubtful=True),
     ]
-    lines = "\n".join(f"- {sentence}" for sentence in told) or "- nothing"
+    lines = "\n".join(f"- {sentence}" for sentence in reported) or "- nothing"
     return (
         f"## {k}. {stratum}, `{item['scenario']}`\n\n"
         f"Concealed: {concealed or 'nothing'}.\n\n"

@@ -26,13 +26,13 @@ from cspm_msgs_py.errors import DivergenceError, InputError
 SHORTEST, LONGEST = 15.0, 200.0  # [s]
 # Of a number of the file, more is not taken over by an effect: it stays positive.
 MOST_ABSORBED = 0.8
-_TOLD = ("seed", "count", "split", "duration", "sensors")
-_ONE_DATE = 1_000_000_000  # of all files, so that it tells no order [s]
+_PUBLISHED = ("seed", "count", "split", "duration", "sensors")
+_ONE_DATE = 1_000_000_000  # of all files, so that it shows no order [s]
 
 
 @dataclass(frozen=True)
 class Request:
-    """What was asked for.
+    """A benchmark as it was requested.
 
     Attributes:
         folder: for the recordings.
@@ -54,10 +54,10 @@ class Request:
     duration: float
     sensors: str = REAL
 
-    def told(self) -> dict[str, Any]:
+    def published(self) -> dict[str, Any]:
         """Return what the truth file keeps of it."""
-        asked = {key: getattr(self, key) for key in _TOLD}
-        return {**asked, "strata": list(self.strata)}
+        published = {key: getattr(self, key) for key in _PUBLISHED}
+        return {**published, "strata": list(self.strata)}
 
 
 def make(
@@ -78,7 +78,7 @@ def make(
     if not request.truth.exists():
         _write_truth(request, tell)
     truth = json.loads(request.truth.read_text(encoding="utf-8"))
-    if truth.get("asked") != request.told():
+    if truth.get("asked") != request.published():
         raise InputError(
             f"{request.truth}: of another benchmark ({truth.get('asked')}), allowed: the same"
             " options, to go on with it, or a new file"
@@ -86,12 +86,12 @@ def make(
     digest = truth_sha256(request.truth)
     tell(f"truth {request.truth}, SHA-256 {digest}", 0, request.count)
     items = _items(request)
-    if [item.name for item in items] != [told["name"] for told in truth["items"]]:
+    if [item.name for item in items] != [each["name"] for each in truth["items"]]:
         raise InputError(
             f"{request.truth}: drawn by another version of cspm, allowed: to be gone on with by"
             " that, or a new file"
         )
-    amounts = [told["amounts"] for told in truth["items"]]
+    amounts = [each["amounts"] for each in truth["items"]]
     tell("recording", 0, request.count)
     for done in _recorded(request, items, amounts, processes):
         tell(f"recording, {done} made", done, request.count)
@@ -152,13 +152,20 @@ def _write_truth(request: Request, tell: Tell) -> None:
     """Fix the limits and the truth before anything is recorded."""
     items = _items(request)
     blank = run_blank(items, request.duration, tell)
-    told = []
+    reported = []
     for item in items:
         machine = machine_of(item.scenario)
         amounts = amounts_of(item, blank.limits[item.scenario], len(machine.cables))
         amounts |= _absorbed(item, amounts, blank.shares)
-        told.append({**truth_of(item, blank.likened(item, amounts), machine), "amounts": amounts})
-    content = {"schema": SCHEMA, "asked": request.told(), "limits": blank.limits, "items": told}
+        reported.append(
+            {**truth_of(item, blank.likened(item, amounts), machine), "amounts": amounts}
+        )
+    content = {
+        "schema": SCHEMA,
+        "asked": request.published(),
+        "limits": blank.limits,
+        "items": reported,
+    }
     request.truth.parent.mkdir(parents=True, exist_ok=True)
     part = request.truth.with_suffix(".part")
     part.write_text(json.dumps(content, indent=1, ensure_ascii=False), encoding="utf-8")

@@ -1,10 +1,10 @@
-"""Could a blind benchmark's misses be told at all? `python -m bench.blind.misses DIR TRUTH`.
+"""Could a blind benchmark's misses be found at all? `python -m bench.blind.misses DIR TRUTH`.
 
 DIR is a benchmark that `python -m bench.blind` has diagnosed and scored (`run`, `score`). Every
 clear case that is not first, or not among the ties, is searched again, and what is concealed is
 held against what was found, on the same residuals, block by block, each fitted to other blocks.
 Where what is concealed explains no more, nothing in the recording speaks for it, and whoever
-tells it has guessed.
+reports it has guessed.
 """
 
 from __future__ import annotations
@@ -41,15 +41,15 @@ from cspm_sim.effects import catalogue
 
 PAGE = Path(__file__).resolve().parents[2] / "docs" / "blind-misses.md"
 # Standard errors of the scatter between blocks.
-SURELY = 2.0
+SIGNIFICANT_ERRORS = 2.0
 NO_COLUMN, GIVEN_UP, MORE, SIMPLER, NO_MORE = REASONS = (
     "the recording has no trace of it",
-    "found, and not told so",
-    "explains surely more than what was found",
+    "found, but not reported",
+    "explains significantly more than what was found",
     "explains as much with fewer numbers",
     "explains no more than what was found",
 )
-# Those of which a recording tells nothing.
+# Those of which a recording shows nothing.
 HIDDEN = (NO_COLUMN, NO_MORE)
 _MEASURES = {
     "block": "block found",
@@ -83,16 +83,16 @@ def main() -> None:
     parser.add_argument("folder", type=Path, help="a blind benchmark with its results")
     parser.add_argument("truth", type=Path, help="its truth file")
     parser.add_argument("--page", action="store_true", help="renew docs/blind-misses.md")
-    asked, console = parser.parse_args(), Console()
-    items = {item["name"]: item for item in read_truth(asked.truth)["items"]}
-    results = read_results(asked.folder, list(items))
+    options, console = parser.parse_args(), Console()
+    items = {item["name"]: item for item in read_truth(options.truth)["items"]}
+    results = read_results(options.folder, list(items))
     outcomes = [judge(items[name], results[name], {}) for name in results]
     clear = [o for o in outcomes if is_clear(o.kind, o.multiple)]
     missed = [o for o in clear if not (o.block and o.first and o.tied)]
     misses = []
     with ProcessPoolExecutor() as pool:
         tasks = [
-            pool.submit(miss_of, o, items[o.name], asked.folder / RECORDINGS / o.name)
+            pool.submit(miss_of, o, items[o.name], options.folder / RECORDINGS / o.name)
             for o in missed
         ]
         for done, task in enumerate(tasks, start=1):
@@ -100,7 +100,7 @@ def main() -> None:
             console.print(f"{done} of {len(missed)}: {misses[-1].outcome.name}", markup=False)
     for name, text in {"reach": reach_table(clear, misses), "misses": miss_table(misses)}.items():
         console.print(text, markup=False, soft_wrap=True)
-        if asked.page:
+        if options.page:
             into_page(PAGE, name, text)
 
 
@@ -112,7 +112,7 @@ def miss_of(outcome: Outcome, item: Data, recording: Path) -> Miss:
 
 
 def compared(outcome: Outcome, item: Data, search: Search, found: Sequence[Hypothesis]) -> Miss:
-    """Return what speaks for what is concealed, beside what sound clocks do.
+    """Return what speaks for what is concealed, beside what healthy clocks do.
 
     Args:
         outcome: how the case was scored.
@@ -122,25 +122,25 @@ def compared(outcome: Outcome, item: Data, search: Search, found: Sequence[Hypot
     """
     fits = search.fits
     sound = [h for h in found if fits.is_negligible(h, found)]
-    told = fits.sums.held_out(fits.columns(found))
-    squares = float(np.sum(fits.sums.held_out(fits.columns(sound)) - told))
+    reported = fits.sums.held_out(fits.columns(found))
+    squares = float(np.sum(fits.sums.held_out(fits.columns(sound)) - reported))
     true = nearest_truth(search, item, sound)
     if true is None:
         return Miss(outcome, None, squares, NO_COLUMN)
-    gain = gain_of(told - _left(search, true, sound))
+    gain = gain_of(reported - _left(search, true, sound))
     names = {(h.effect.id, e) for h in found for e in h.elements}
     if {(h.effect.id, e) for h in true for e in h.elements} <= names:
         return Miss(outcome, gain, squares, GIVEN_UP)
-    told_numbers = _numbers([h for h in found if h not in sound])
-    return Miss(outcome, gain, squares, reason_of(gain, _numbers(true), told_numbers))
+    reported_numbers = _numbers([h for h in found if h not in sound])
+    return Miss(outcome, gain, squares, reason_of(gain, _numbers(true), reported_numbers))
 
 
-def reason_of(gain: Gain, true: int, told: int) -> str:
+def reason_of(gain: Gain, true: int, reported: int) -> str:
     """Return what speaks for the truth, by what it explains more and by the numbers of both."""
-    if gain.total > SURELY * gain.error:
+    if gain.total > SIGNIFICANT_ERRORS * gain.error:
         return MORE
-    alike = gain.total >= -SURELY * gain.error
-    return SIMPLER if alike and true < told else NO_MORE
+    alike = gain.total >= -SIGNIFICANT_ERRORS * gain.error
+    return SIMPLER if alike and true < reported else NO_MORE
 
 
 def nearest_truth(
@@ -167,8 +167,8 @@ def nearest_truth(
 def _forms(search: Search, concealed: Data) -> list[Hypothesis]:
     """Return an effect on its elements, in every shape that it has on all of them."""
     effect = catalogue()[concealed["effect"]]
-    asked = tuple(Candidate(effect, element) for element in concealed["elements"])
-    return shapes_of(Hypothesis(effect, asked), search.heard)
+    places = tuple(Candidate(effect, element) for element in concealed["elements"])
+    return shapes_of(Hypothesis(effect, places), search.heard)
 
 
 def _left(search: Search, true: Sequence[Hypothesis], beside: Sequence[Hypothesis]) -> Array:
@@ -210,7 +210,7 @@ def miss_table(misses: Sequence[Miss]) -> str:
         )
         for m in sorted(misses, key=lambda m: (REASONS.index(m.reason), m.outcome.stratum))
     ]
-    heads = ("recording", "stratum", "concealed", "told", "missed", "explains more by", "it")
+    heads = ("recording", "stratum", "concealed", "reported", "missed", "explains more by", "it")
     return markdown_table(heads, rows)
 
 

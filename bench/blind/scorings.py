@@ -22,7 +22,7 @@ def enter_scoring(
 ) -> list[dict[str, Any]]:
     """Enter that results are scored against a sealed truth; return all scorings so far.
 
-    The same results may be scored again, which tells nothing new, and with them those of further
+    The same results may be scored again, which shows nothing new, and with them those of further
     recordings, which had not been scored.
 
     Args:

@@ -83,10 +83,10 @@ def read_part(page: Path, folder: Path = DOCS) -> Part:
         ValueError: it does not say of which truth it is.
     """
     text = page.read_text(encoding="utf-8")
-    told = _TRUTH.search(text)
-    if told is None:
+    reported = _TRUTH.search(text)
+    if reported is None:
         raise ValueError(
-            f"{page}: no truth file told, allowed: a page of `python -m bench.blind score`"
+            f"{page}: no truth file named, allowed: a page of `python -m bench.blind score`"
         )
     sections = dict(each.split("\n", 1) for each in text.split("\n## ")[1:])
     heads, *amounts = _table(sections["By amount"])
@@ -94,8 +94,8 @@ def read_part(page: Path, folder: Path = DOCS) -> Part:
     _, *recordings = _table(sections["Every recording"])
     return Part(
         str(page.relative_to(folder)),
-        told.group(1),
-        told.group(2),
+        reported.group(1),
+        reported.group(2),
         recordings=tuple(row[0] for row in recordings),
         found={label: found for label, found, _ in targets},
         targets={label: target for label, _, target in targets},
@@ -122,7 +122,7 @@ def verdict(value: float, interval: Range, target: str) -> str:
     (low, high), (least, most) = interval, allowed(target)
     word = "met" if least <= value <= most else "missed"
     sure = (least <= low and high <= most) if word == "met" else (high < least or most < low)
-    return word if sure else f"{word}, not surely"
+    return word if sure else f"{word}, not significantly"
 
 
 def tables(parts: Sequence[Part]) -> dict[str, str]:
@@ -177,8 +177,8 @@ def _mean_ties(parts: Sequence[Part]) -> float:
 def _summary(parts: Sequence[Part], rows: Sequence[tuple[str, ...]]) -> str:
     count = sum(len(part.recordings) for part in parts)
     judged = {word: [row[0] for row in rows if row[3] == word] for word in _VERDICTS}
-    told = (f"{word.capitalize()}: {', '.join(own)}." for word, own in judged.items() if own)
-    return f"{count} recordings in {len(parts)} parts. {' '.join(told)}"
+    reported = (f"{word.capitalize()}: {', '.join(own)}." for word, own in judged.items() if own)
+    return f"{count} recordings in {len(parts)} parts. {' '.join(reported)}"
 
 
 def _amounts(parts: Sequence[Part]) -> tuple[list[str], list[list[str]]]:
@@ -192,7 +192,7 @@ def _amounts(parts: Sequence[Part]) -> tuple[list[str], list[list[str]]]:
     return ["detection limits", "cases", *columns], rows
 
 
-_VERDICTS = ("met", "met, not surely", "missed, not surely", "missed")
+_VERDICTS = ("met", "met, not significantly", "missed, not significantly", "missed")
 
 
 if __name__ == "__main__":

@@ -65,18 +65,20 @@ def main() -> None:
     parser.add_argument("--work", type=Path, required=True, help="folder for runs and diagnoses")
     parser.add_argument("--names", nargs="*", help="of recordings; otherwise all")
     parser.add_argument("--page", action="store_true", help="renew docs/experiments.md")
-    asked = parser.parse_args()
+    options = parser.parse_args()
     console, cases = Console(), []
-    items = read_truth(asked.truth)["items"]
-    items = [item for item in items if not asked.names or item["name"] in asked.names]
+    items = read_truth(options.truth)["items"]
+    items = [item for item in items if not options.names or item["name"] in options.names]
     for item in items:
         with console.status(item["name"]):
-            case = _case(item, asked.folder / RECORDINGS / item["name"], asked.work / item["name"])
+            case = _case(
+                item, options.folder / RECORDINGS / item["name"], options.work / item["name"]
+            )
         if case is not None:
             cases.append(case)
             console.print(f"{item['name']}: {_words(case.before)} → {_words(case.after)}")
-    if asked.page:
-        into_page(PAGE, "cases", separating_table(cases, truth_sha256(asked.truth), len(items)))
+    if options.page:
+        into_page(PAGE, "cases", separating_table(cases, truth_sha256(options.truth), len(items)))
 
 
 def _case(item: Data, recording: Path, work: Path) -> Case | None:
@@ -86,14 +88,18 @@ def _case(item: Data, recording: Path, work: Path) -> Case | None:
     """
     kept = work / "case.json"
     if kept.exists():
-        told = json.loads(kept.read_text(encoding="utf-8"))
-        return None if told is None else Case(**{**told, "experiments": tuple(told["experiments"])})
+        reported = json.loads(kept.read_text(encoding="utf-8"))
+        return (
+            None
+            if reported is None
+            else Case(**{**reported, "experiments": tuple(reported["experiments"])})
+        )
     if not (recording / "metadata.yaml").exists():
         return None
     work.mkdir(parents=True, exist_ok=True)
     case = _separated(item, recording, work)
-    told = None if case is None else case._asdict()
-    kept.write_text(json.dumps(told), encoding="utf-8")
+    reported = None if case is None else case._asdict()
+    kept.write_text(json.dumps(reported), encoding="utf-8")
     return case
 
 
@@ -156,7 +162,10 @@ def separating_table(cases: Sequence[Case], sha256: str, recordings: int) -> str
     rows = [
         (
             stage,
-            *(share_words(share(holds(*told) for told in pairs)) for holds in _COUNTED.values()),
+            *(
+                share_words(share(holds(*reported) for reported in pairs))
+                for holds in _COUNTED.values()
+            ),
         )
         for stage, pairs in stages.items()
     ]
@@ -166,7 +175,7 @@ def separating_table(cases: Sequence[Case], sha256: str, recordings: int) -> str
         (c.item["name"], _concealed(c.item), _words(c.before), *_ran(c), _words(c.after))
         for c in cases
     ]
-    heads = ("recording", "concealed", "told before", "experiment", "told with it")
+    heads = ("recording", "concealed", "reported before", "experiment", "reported with it")
     lines.append(markdown_table(heads, cells))
     return "\n\n".join(lines)
 
@@ -192,8 +201,8 @@ def _is_right(item: Data, diagnosis: Data) -> bool:
 
 
 def _is_among(item: Data, diagnosis: Data) -> bool:
-    told = {e for f in diagnosis["findings"][:1] for e in tie_set(f)}
-    return any(c["effect"] in told for c in item["concealed"])
+    reported = {e for f in diagnosis["findings"][:1] for e in tie_set(f)}
+    return any(c["effect"] in reported for c in item["concealed"])
 
 
 def _is_tied(diagnosis: Data) -> bool:

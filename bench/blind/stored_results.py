@@ -1,4 +1,4 @@
-"""What diagnoses of a benchmark said."""
+"""Stored diagnoses of a benchmark."""
 
 from __future__ import annotations
 

@@ -39,7 +39,7 @@ def finish(child: subprocess.Popen[str]) -> None:
 
 
 def watched(child: subprocess.Popen[str], look: Callable[[psutil.Process], T]) -> Iterator[T]:
-    """Yield what a look at a child tells, every `SAMPLE_S`, until it ends.
+    """Yield what a child's process shows, every `SAMPLE_S`, until it ends.
 
     Raises:
         RuntimeError: it failed.

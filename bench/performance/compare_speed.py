@@ -26,17 +26,17 @@ def main() -> None:
     parser.add_argument("--scenario", default="calm", help="with all sensors at 1 kHz: calm")
     parser.add_argument("--duration", type=float, default=600.0, metavar="SECONDS")
     parser.add_argument("--recording", type=Path, help="compare this one instead of a new one")
-    asked = parser.parse_args()
+    options = parser.parse_args()
     console = Console()
     for key, value in describe_machine().items():
         console.print(f"{key}: {value}", highlight=False, soft_wrap=True)
     if is_busy():
         console.print("other programs are at work: the wall clock will show too much")
     with tempfile.TemporaryDirectory(prefix="cspm-bench-") as place:
-        recording = asked.recording or Path(place) / "recording"
-        if asked.recording is None:
-            settings = ["--set", f"duration={asked.duration}", "--out", str(recording)]
-            _cspm("run", asked.scenario, *settings)
+        recording = options.recording or Path(place) / "recording"
+        if options.recording is None:
+            settings = ["--set", f"duration={options.duration}", "--out", str(recording)]
+            _cspm("run", options.scenario, *settings)
         begin, spent = time.perf_counter(), _children_cpu()
         _cspm("compare", str(recording), "--out", f"{place}/report")
         wall, cpu = time.perf_counter() - begin, _children_cpu() - spent

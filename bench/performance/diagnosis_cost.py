@@ -1,6 +1,6 @@
 """Time and memory of `cspm diagnose --no-closed-loop`, watched from outside.
 
-Processor time is told beside time by the clock, which other programs make longer.
+Processor time is given beside time by the clock, which other programs make longer.
 """
 
 from __future__ import annotations

@@ -16,7 +16,7 @@ class Figure:
     """A figure of the table.
 
     Attributes:
-        group: heading it stands under.
+        group: its heading.
         what: what was measured.
         unit: of the samples.
         samples: one per repetition.
@@ -40,14 +40,14 @@ class Figure:
 
     @property
     def reached(self) -> bool | None:
-        """Whether the median is where it should be; None where nothing is asked."""
+        """Whether the median is where it should be; None without a target."""
         if self.at_least is not None:
             return self.median >= self.at_least
         return self.median <= self.at_most if self.at_most is not None else None
 
     @property
     def reach(self) -> str:
-        """What is asked, in words."""
+        """The target, in words."""
         if self.at_least is not None:
             return f"≥ {self.at_least:g}"
         return f"≤ {self.at_most:g}" if self.at_most is not None else ""

@@ -48,6 +48,6 @@ def _watch(arguments: list[str]) -> tuple[np.ndarray, np.ndarray]:
     began = time.perf_counter()
     looks = watched(start_cspm(arguments, {}), lambda process: process.memory_info().rss / 1e6)
     samples = [(time.perf_counter() - began, size) for size in looks]
-    # A process that has ended and was not yet asked for has no memory left.
+    # A process that has ended and was not yet collected has no memory left.
     found = np.array([sample for sample in samples if sample[1] > 0.0])
     return found[:, 0], found[:, 1]

@@ -1,4 +1,4 @@
-"""How long the winches are without a safe command when a node dies or stands still."""
+"""How long the winches are without a safe command when a node dies or stops."""
 
 from __future__ import annotations
 
@@ -134,7 +134,7 @@ class _Strike:
 
 
 def _alarms(folder: Path, guard: str) -> Iterator[float]:
-    """Yield when a guard entered its safe state, as it told [s]."""
+    """Yield when a guard entered its safe state, as it reported [s]."""
     with Recording(folder) as recording:
         payloads = recording.payloads(DIAGNOSTICS.name).payloads
     for payload in payloads:

@@ -36,21 +36,21 @@ def main() -> int:
     parser.add_argument("--keep", type=Path, metavar="DIR", default=KEEP, help="default: .results")
     parser.add_argument("--workers", type=int, default=os.cpu_count() or 1, help="processes")
     parser.add_argument("--only", nargs="+", default=[], metavar="BLOCK", help="renew only these")
-    asked = parser.parse_args()
-    store, blocks, console = Store(asked.keep), blocks_of(asked.seeds), Console()
+    options = parser.parse_args()
+    store, blocks, console = Store(options.keep), blocks_of(options.seeds), Console()
     names = [MACHINE, *blocks, PICTURES]
-    unknown = [name for name in asked.only if name not in names]
+    unknown = [name for name in options.only if name not in names]
     if unknown:
         parser.error(f"--only: {', '.join(unknown)}, allowed: {', '.join(names)}")
-    if asked.workers < 1:
-        parser.error(f"--workers: {asked.workers}, allowed: 1 or more")
-    chosen = asked.only or names
+    if options.workers < 1:
+        parser.error(f"--workers: {options.workers}, allowed: 1 or more")
+    chosen = options.only or names
     sources = {name: block.measurements for name, block in blocks.items()} | {PICTURES: pictured()}
     wanted = [each for name in chosen for each in sources.get(name, {}).values()]
     try:
-        work_off(store, wanted, asked.workers, lambda line: console.print(line, highlight=False))
+        work_off(store, wanted, options.workers, lambda line: console.print(line, highlight=False))
     except KeyboardInterrupt:
-        console.print(f"stopped; what was measured is in {asked.keep}, the same command goes on")
+        console.print(f"stopped; what was measured is in {options.keep}, the same command goes on")
         return 1
     for name in chosen:
         if name in blocks:
@@ -67,7 +67,7 @@ def main() -> int:
         into_page(
             PAGE,
             f"results: {MACHINE}",
-            _machine_block(_kept(store, every), len(every), asked.seeds),
+            _machine_block(_kept(store, every), len(every), options.seeds),
         )
     return 0
 

@@ -38,7 +38,14 @@ from bench.results.result_measures import (
     possible_share,
     tracking,
 )
-from bench.results.result_robust_cases import ADAPTED, MASSES, PAYLOADS, TOLD_OF, changed, corrected
+from bench.results.result_robust_cases import (
+    ADAPTED,
+    ESTIMATED_OF,
+    MASSES,
+    PAYLOADS,
+    changed,
+    corrected,
+)
 from bench.results.result_sentences import (
     ROUGHEST_PLAN,
     ROUGHEST_SEED,
@@ -111,12 +118,14 @@ def blocks_of(seeds: int) -> dict[str, Block]:
         "changes": Block({"worst case": _limit("worst case", LIMITED["worst case"])}, touched_said),
         "robust": _tracked("robust", changed(PAST), _and(late_said)),
         "moved_on": _moved_on(),
-        "told": _tracked("told", TOLD_OF),
+        "told": _tracked("told", ESTIMATED_OF),
         "corrected": _tracked("corrected", corrected(), _and(corrected_said)),
-        "adapted": _tracked("adapted", with_and_without(MASSES, ADAPTED, "told from its heave")),
+        "adapted": _tracked(
+            "adapted", with_and_without(MASSES, ADAPTED, "estimated from its heave")
+        ),
         "payload": _tracked(
             "payload",
-            with_and_without(PAYLOADS, ADAPTED, "told from its heave"),
+            with_and_without(PAYLOADS, ADAPTED, "estimated from its heave"),
             _and(payload_said),
         ),
         "robust_thesis": _tracked("robust thesis", changed("worst_case")),

@@ -215,7 +215,7 @@ LIMITED = {
     BLOWN: Case(PAST, (ROBUST, KNOWN_WIND)),
 }
 ROUGHEST = "worst case, all six coordinates, seed 9"
-# Cases and the lower limits of tension [N] for which the least error is asked.
+# Cases and the lower limits of tension [N] for which the least error is computed.
 POSSIBLE: dict[str, tuple[Case, float]] = {
     "worst case": (LIMITED["worst case"], 0.0),
     "worst case, all six coordinates": (LIMITED["worst case, all six coordinates"], 0.0),

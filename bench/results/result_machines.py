@@ -16,7 +16,7 @@ from cspm_msgs_py.dofs import Dof
 from cspm_msgs_py.errors import InputError
 from cspm_msgs_py.testbed import Testbed
 
-# Fast enough for the bandwidth that the thesis asks for, and slow enough for its margins [rad/s].
+# Fast enough for the bandwidth that the thesis requires, and slow enough for its margins [rad/s].
 SLOWEST = 8
 # How far below the frame the bars hang where controllers are designed, and where the thesis's
 # loop goes unstable [m].

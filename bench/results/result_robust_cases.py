@@ -21,7 +21,7 @@ CHANGES: dict[str, Effects] = {
     "hoist_1's drive at half torque": (("winch_torque_gain", ("hoist_1",), {"gain": 0.5}),),
     "wind of 2 N in sway and 1 N in surge": (("bar_constant_wrench", (), WIND),),
 }
-FRICTION_CHANGES = {"friction as told": 1.0, "friction +20 %": 1.2, "friction −20 %": 0.8}
+FRICTION_CHANGES = {"friction as described": 1.0, "friction +20 %": 1.2, "friction −20 %": 0.8}
 SURGE, SWAY, HOIST = ("surge_1",), ("sway_1",), ("hoist_1",)
 CORRECTED: dict[str, Effects] = {
     "nothing": (),
@@ -34,14 +34,14 @@ CORRECTED: dict[str, Effects] = {
     ),
     "hoist_1's drive at half torque": (("winch_torque_gain", HOIST, {"gain": 0.5}),),
 }
-# What the machine has and its controllers are told, by the test-bed's file or by the scenario.
-TOLD_OF = {
+# What the machine has and its controllers know, by the test-bed's file or by the scenario.
+ESTIMATED_OF = {
     "poses 5 ms late": Case(PAST, (ROBUST,), pose_delay=0.005),
     "wind of 2 N in sway and 1 N in surge": Case(
         PAST, (ROBUST, KNOWN_WIND), (("bar_constant_wrench", (), WIND),)
     ),
 }
-TOLD = "control.force.load_cell_bias={largest: 2.0}"
+ESTIMATED = "control.force.load_cell_bias={largest: 2.0}"
 HEAVY: Effects = (("bar_mass", (), {"mass": 0.812}),)
 LIGHT: Effects = (("bar_mass", (), {"mass": -0.812}),)
 PULLED: Effects = (
@@ -81,12 +81,12 @@ ADAPTED = "control.motion.mass_adaptation={}"
 
 def corrected() -> dict[str, Case]:
     """Return the worst case past the thesis with load cells that are off, and corrected."""
-    return {name: Case(PAST, (ROBUST, TOLD), effects) for name, effects in CORRECTED.items()}
+    return {name: Case(PAST, (ROBUST, ESTIMATED), effects) for name, effects in CORRECTED.items()}
 
 
 def changed(scenario: str) -> dict[str, Case]:
     """Return a scenario on machines that are not what the controllers think."""
     cases = {name: Case(scenario, (ROBUST,), effects) for name, effects in CHANGES.items()}
     for name, share in FRICTION_CHANGES.items():
-        cases[name] = Case(scenario, (ROBUST, AHEAD), rubbing(share), told=rubbing(1.0))
+        cases[name] = Case(scenario, (ROBUST, AHEAD), rubbing(share), reported=rubbing(1.0))
     return cases

@@ -63,8 +63,8 @@ def beam_said(found: Found) -> str:
     fastest, stiffest = (_rms(found[name]) for name in STEPS_OF_SWAY)
     sway, heave = thesis[SWAY], thesis[HEAVE]
     return (
-        f"That tells the thesis's pitch and yaw errors, of {1e6 * thesis[PITCH]:.0f} and"
-        f" {1e6 * thesis[YAW]:.0f} µrad: they are hardly asked to move. It leaves open what moves"
+        f"That explains the thesis's pitch and yaw errors, of {1e6 * thesis[PITCH]:.0f} and"
+        f" {1e6 * thesis[YAW]:.0f} µrad: their references hardly move. It leaves open what moves"
         f" its surge, by {thesis[SURGE]:.2f} mm RMS. With its longest waves alone heave is"
         f" {fastest[HEAVE] / heave:.1f} times and sway {fastest[SWAY] / sway:.0f} times as large as"
         " the thesis's with the gains that its margins allow. The stiff sway loop of the worst"
@@ -115,16 +115,16 @@ def touched_said(found: Found) -> str:
     (least,) = found.values()
     first = LIMIT_PERIOD * int(np.argmax(np.array(least) < 0.3))
     return (
-        "The machine is changed, the controllers are not told; the first 20 s of the worst case, in"
-        f" which tensions from 0.3 N on do not exist for the first time after {first:.0f} s. The"
+        "The machine is changed, the controllers' model is not; the first 20 s of the worst case,"
+        f" in which tensions from 0.3 N on do not exist for the first time after {first:.0f} s. The"
         " machine of the rows with friction has 10 mN·m of dry and 0.1 mN·m·s of viscous friction"
-        " at every motor, fed forward as its file tells it; *+20 %* and *−20 %* are what it really"
+        " at every motor, fed forward as its file has it; *+20 %* and *−20 %* are what it really"
         " has. Past the thesis:"
     )
 
 
 def late_said(found: Found) -> str:
-    """Return what poses that come late without being told cost."""
+    """Return what poses that come late without being known to be late cost."""
     beyond = 1.0 - found["poses 5 ms late"]["within"]
     return (
         "Poses 5 ms late that nobody knows of take the bar beyond the requirement for"
@@ -140,7 +140,7 @@ def corrected_said(found: Found) -> str:
     ended = sum(bool(each["failure"]) for each in found.values())
     return (
         f"Of {len(found)} runs {ended} end early. All load cells off at once cost"
-        f" {all_off - plain:.2f} mm RMS in heave while it is being told."
+        f" {all_off - plain:.2f} mm RMS in heave while it is being estimated."
     )
 
 
@@ -173,17 +173,19 @@ def payload_said(found: Found) -> str:
     """Return where telling a load's mass pays."""
     fixed, swinging = "0.8 kg taken up at 50 s", "0.4 kg swinging 0.3 m below"
 
-    def told(name: str, dof: int) -> str:
-        steps = (name, f"{name}, told from its heave")
+    def steps_of(name: str, dof: int) -> str:
+        steps = (name, f"{name}, estimated from its heave")
         return " to ".join(f"{_rms(found[each])[dof]:.2f}" for each in steps)
 
     plain, adapted = (
-        f"{found[name]['not_met']:.1%}" for name in (swinging, f"{swinging}, told from its heave")
+        f"{found[name]['not_met']:.1%}"
+        for name in (swinging, f"{swinging}, estimated from its heave")
     )
     return (
-        f"A load that is fixed to the bar is told like a mass of its own: heave goes from"
-        f" {told(fixed, HEAVE)} mm RMS. One that swings is not a mass: with 0.4 kg heave goes from"
-        f" {told(swinging, HEAVE)} mm, surge from {told(swinging, SURGE)} mm. Its pull takes the"
-        f" tensions that the wanted wrench needs for {plain} of the time, {adapted} where a mass is"
-        " told: of that neither the governor's plan nor the distribution knows."
+        f"A load that is fixed to the bar is estimated like a mass of its own: heave goes from"
+        f" {steps_of(fixed, HEAVE)} mm RMS. One that swings is not a mass: with 0.4 kg heave goes"
+        f" from {steps_of(swinging, HEAVE)} mm, surge from {steps_of(swinging, SURGE)} mm. Its"
+        f" pull takes the tensions that the wanted wrench needs for {plain} of the time, {adapted}"
+        " where a mass is"
+        " estimated: of that neither the governor's plan nor the distribution knows."
     )

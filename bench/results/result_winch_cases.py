@@ -37,7 +37,7 @@ WINCHES = {
     "force controllers at 200 rad/s": Case(PAST, SLOW),
     "200 rad/s, 100 Hz": Case(PAST, (*SLOW, *CAMERA_100_HZ)),
     "200 rad/s, cables 4 times softer": Case(PAST, SLOW, cables=SOFT),
-    "200 rad/s, dry friction 10 mN·m as told": Case(PAST, (*SLOW, AHEAD), DRY_10),
+    "200 rad/s, dry friction 10 mN·m as described": Case(PAST, (*SLOW, AHEAD), DRY_10),
     "all six coordinates": Case(SIX, (SHORT,)),
     "the thesis's controllers": Case("worst_case", (SHORT,)),
 }

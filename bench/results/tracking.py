@@ -49,7 +49,7 @@ class Case:
     plant: str = "sim"
     pose_delay: float = 0.0
     cables: tuple[float, float] = (1.0, 1.0)
-    told: Effects | None = None
+    reported: Effects | None = None
     loads: tuple[tuple[float, float], ...] = ()
 
     def bundle(self) -> Bundle:
@@ -75,10 +75,10 @@ class Case:
     def run(self) -> Run:
         """Run it; as `follow`."""
         bundle, believed = self.bundle(), None
-        if self.told is not None:
+        if self.reported is not None:
             machine = bundle.testbed.testbed
             kept = machine.effects[: len(machine.effects) - len(self.effects)]
-            believed = machine.model_copy(update={"effects": (*kept, *_entries(self.told))})
+            believed = machine.model_copy(update={"effects": (*kept, *_entries(self.reported))})
         return follow(bundle, believed, self.loads)
 
 

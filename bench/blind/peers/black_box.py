@@ -19,7 +19,7 @@ from cspm_sim.effects import Block, Channel
 
 Array = NDArray[np.float64]
 
-# Less of the squares that were not fitted is not told.
+# Less of the squares that were not fitted is not reported.
 MATERIAL_SHARE = 0.1
 _FITTED_SHARE = 0.75
 _BLOCKS = {
@@ -33,12 +33,12 @@ _BLOCKS = {
 def diagnosis_of(library: Library) -> dict[str, Any]:
     """Return where trees learn something that holds later on as well (Friedman 2001)."""
     searched, judge = _by_place(library.searched), _by_place(library.judge)
-    told = {place: _learnt(*rows) for place, rows in searched.items()}
-    ranked = sorted(told, key=lambda place: -told[place])
+    reported = {place: _learnt(*rows) for place, rows in searched.items()}
+    ranked = sorted(reported, key=lambda place: -reported[place])
     findings = [
         unknown_finding(_BLOCKS[place.channel].value, place.element, "signals")
         for place in ranked
-        if told[place] >= MATERIAL_SHARE
+        if reported[place] >= MATERIAL_SHARE
     ]
     after = {
         place: _after(*searched[place], *rows) for place, rows in judge.items() if place in searched

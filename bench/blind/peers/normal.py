@@ -19,7 +19,7 @@ _RANK = 1e-9
 
 
 class Normal(NamedTuple):
-    """Products of columns of length 1, what is never told projected out.
+    """Products of columns of length 1, what is never reported projected out.
 
     Attributes:
         gram: XᵀX, shape (m, m).

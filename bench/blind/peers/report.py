@@ -21,13 +21,13 @@ Weights = Mapping[Candidate, Array]
 def report_of(library: Library, support: NDArray[np.intp], intervals: bool) -> dict[str, Any]:
     """Return what a regression found that kept some columns.
 
-    Weights are those of least squares on these columns alone. What a sound machine has as well is
-    taken into account and not told, as the diagnosis does.
+    Weights are those of least squares on these columns alone. What a healthy machine has as well is
+    taken into account and not reported, as the diagnosis does.
 
     Args:
         library: residuals and columns.
         support: indices of the columns kept, of the evidence.
-        intervals: tell the intervals that white residuals would have.
+        intervals: report the intervals that white residuals would have.
     """
     nuisance = library.evidence.nuisance
     columns = np.concatenate([nuisance, support])
@@ -40,17 +40,17 @@ def report_of(library: Library, support: NDArray[np.intp], intervals: bool) -> d
     groups: dict[str, list[Candidate]] = {}
     for candidate in kept:
         groups.setdefault(candidate.effect_id, []).append(candidate)
-    told = [g for g in groups.values() if not is_negligible({c: weights[c] for c in g})]
-    ranked = sorted(told, key=lambda group: -_worth(library, columns, group))
+    reported = [g for g in groups.values() if not is_negligible({c: weights[c] for c in g})]
+    ranked = sorted(reported, key=lambda group: -_worth(library, columns, group))
     findings = [_finding(group, weights, widths) for group in ranked]
     return report(_verdict(ranked), findings, fits(library, left_with(library, weights)))
 
 
 def report(
-    verdict: Verdict, findings: Sequence[Mapping[str, Any]], told: Sequence[Mapping[str, Any]]
+    verdict: Verdict, findings: Sequence[Mapping[str, Any]], reported: Sequence[Mapping[str, Any]]
 ) -> dict[str, Any]:
     """Return the parts of `diagnosis.json` that are scored."""
-    return {"verdict": verdict.value, "findings": list(findings), "residuals": list(told)}
+    return {"verdict": verdict.value, "findings": list(findings), "residuals": list(reported)}
 
 
 def left_with(library: Library, weights: Weights) -> dict[Place, float]:
@@ -142,8 +142,8 @@ def _parameters(candidate: Candidate, weights: Array, half: Array | None) -> lis
     ]
 
 
-def _verdict(told: Sequence[Sequence[Candidate]]) -> Verdict:
-    if not told:
+def _verdict(reported: Sequence[Sequence[Candidate]]) -> Verdict:
+    if not reported:
         return Verdict.CONSISTENT
-    numbers = all(group[0].effect.physics.alter is not None for group in told)
+    numbers = all(group[0].effect.physics.alter is not None for group in reported)
     return Verdict.PARAMETER if numbers else Verdict.EFFECT

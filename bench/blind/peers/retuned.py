@@ -16,7 +16,7 @@ _CHANCE = 0.01
 def diagnosis_of(library: Library) -> dict[str, Any]:
     """Return the numbers that least squares say are wrong, by white errors and Bonferroni.
 
-    The fit is that of all numbers, told or not.
+    The fit is that of all numbers, reported or not.
     """
     own = [c for c in library.candidates if c.effect.physics.alter is not None]
     nuisance, numbers = library.evidence.nuisance, library.evidence.columns_of(own)
@@ -24,6 +24,6 @@ def diagnosis_of(library: Library) -> dict[str, Any]:
     # Half the width of a 95 % interval is 1.96 standard errors.
     errors = library.sums.half_width(nuisance, numbers) / norm.isf(0.025)
     sure = norm.isf(0.5 * _CHANCE / max(1, len(numbers)))
-    told = report_of(library, numbers[np.abs(weights) > sure * errors], intervals=True)
+    reported = report_of(library, numbers[np.abs(weights) > sure * errors], intervals=True)
     after = left_with(library, retuned_weights(library))
-    return told | {"residuals": fits(library, after)}
+    return reported | {"residuals": fits(library, after)}

@@ -1,7 +1,7 @@
 """How much of a phenomenon is as large as the noise of one reading.
 
 A run without any phenomenon is looked at afterwards: what a unit of each would have added to the
-torque that a shaft's equation asks for, to a cable's tension, to the force on the bar or to a
+torque of a shaft's equation, to a cable's tension, to the force on the bar or to a
 reading, as root mean square over the part that is searched, against the standard deviation of one
 reading of the same quantity. The limit is the amount at which both are equal, in the quantity that
 shows the phenomenon best.
@@ -30,7 +30,7 @@ _STILL = 1e-9
 _HELD = 1e-3
 # By this much clocks run apart that nothing disciplines: quartz, without being a fault.
 _QUARTZ = 25e-6
-# By this much the clocks of a sound machine lie apart [s]: offsets, and what they drift in a run.
+# By this much the clocks of a healthy machine differ [s]: offsets, and what they drift in a run.
 _APART = 0.25e-3
 
 

@@ -1,4 +1,4 @@
-"""What markers that sit beside where the file says make of the geometry that is worked out.
+"""The geometry computed from markers that are displaced from where the file has them.
 
 Attachments and the bar's origin are taken to be beside where they are by the same vector in the
 bar's axes, exits are not. All is per metre of shift along the bar's own y, as

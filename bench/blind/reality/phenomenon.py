@@ -41,7 +41,7 @@ class Phenomenon:
         base: the parameter's value where the amount is 0.
         signed: whether the amount may be negative as well.
         driver: of what signal it is a function, as a diagnosis calls it, where the catalogue does
-            not have it and one signal tells it; None: no such thing.
+            not have it and one signal determines it; None: no such thing.
     """
 
     name: str

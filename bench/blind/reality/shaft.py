@@ -67,7 +67,7 @@ class TorqueOffset(_Forgetful):
 
 
 class TorqueGain(_Forgetful):
-    """A drive that delivers a share more than it says."""
+    """A drive that delivers a share more than it reports."""
 
     def __init__(self, excess: Array) -> None:
         """Take the shares (n,)."""

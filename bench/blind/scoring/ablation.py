@@ -1,4 +1,4 @@
-"""The diagnosis without one of its safeguards, to measure what each is worth."""
+"""The diagnosis without one of its safeguards, to measure what each adds."""
 
 from __future__ import annotations
 

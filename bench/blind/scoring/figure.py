@@ -104,7 +104,7 @@ def _by_stratum(card: Data) -> list[dict[str, Any]]:
 
 
 def _draw_calibration(axes: Axes, rows: Sequence[Data]) -> None:
-    axes.plot([0.0, 1.0], [0.0, 1.0], color="black", linewidth=0.8, label="as told")
+    axes.plot([0.0, 1.0], [0.0, 1.0], color="black", linewidth=0.8, label="as reported")
     for row in rows:
         if row["right"][1]:
             _draw_share(axes, row["said"], row["right"], "C0", upright=True)
@@ -112,7 +112,7 @@ def _draw_calibration(axes: Axes, rows: Sequence[Data]) -> None:
             place = row["said"] - 0.01, high
             axes.annotate(f"{cases:g} findings", place, ha="right", fontsize=7)
     axes.set(xlim=(0.0, 1.02), ylim=(-0.02, 1.02))
-    axes.set(xlabel="probability told, mean", ylabel="share that was right")
+    axes.set(xlabel="reported probability, mean", ylabel="share that was right")
     axes.set_title("Probabilities")
     axes.legend(loc="upper left")
 

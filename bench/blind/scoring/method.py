@@ -75,8 +75,8 @@ class Methods:
         library = self._library if name in _PEERS else None
         begun = process_time()
         if library is not None:
-            told: dict[str, Any] = import_module(_PEERS[name][0]).diagnosis_of(library)
-            return told, self._before + self._library_cost + process_time() - begun
+            reported: dict[str, Any] = import_module(_PEERS[name][0]).diagnosis_of(library)
+            return reported, self._before + self._library_cost + process_time() - begun
         if name == CSPM:
             found = diagnose([self._measurement])
         else:

@@ -1,4 +1,4 @@
-"""Where in a machine's range something concealed acts, and whether a finding tells that."""
+"""Where in a machine's range something concealed acts, and whether a finding reports that."""
 
 from __future__ import annotations
 
@@ -83,30 +83,30 @@ ACTS: Mapping[str, tuple[Acts, ...]] = {
 
 
 def region_right(phenomenon: str, onset: float, finding: Data) -> bool | None:
-    """Return whether all that a finding tells of where it acts is so; None: it tells nothing.
+    """Return whether all that a finding reports of where it acts is right; None: nothing.
 
     Args:
         phenomenon: what the finding names, by the truth's name.
         onset: when that begins [s]; 0: it is there from the start.
         finding: as `diagnosis.json` has it.
     """
-    told = finding.get("region") or {}
+    reported = finding.get("region") or {}
     claims: list[bool] = []
     if finding.get("onset_s") is not None:
         low, high = finding["onset_ci95_s"]
         claims.append(onset > 0.0 and low <= onset <= high)
-    if told:
+    if reported:
         late = (Acts(TIME, onset),) if onset > 0.0 else ()
-        claims.append(any(_holds(told, acts) for acts in (*ACTS[phenomenon], *late)))
+        claims.append(any(_holds(reported, acts) for acts in (*ACTS[phenomenon], *late)))
     return all(claims) if claims else None
 
 
-def _holds(told: Data, acts: Acts) -> bool:
+def _holds(reported: Data, acts: Acts) -> bool:
     # "time, in sway [s]": each of the bar's components has its own.
-    signal = str(told["driver"]).split(" [")[0].split(", in ")[0]
+    signal = str(reported["driver"]).split(" [")[0].split(", in ")[0]
     if signal != acts.signal:
         return False
-    ends = _ends(told)
+    ends = _ends(reported)
     if ends is None:
         return True
     low, high = ends
@@ -114,9 +114,9 @@ def _holds(told: Data, acts: Acts) -> bool:
     return inside and (low < 0.0 < high or not acts.both_ways)
 
 
-def _ends(told: Data) -> tuple[float, float] | None:
-    """Return the values that are told; None: a function over all that were recorded."""
-    if "low" in told:
-        return told["low"], told["high"]
-    at: Sequence[float] = told.get("at", ())
+def _ends(reported: Data) -> tuple[float, float] | None:
+    """Return the values that are reported; None: a function over all that were recorded."""
+    if "low" in reported:
+        return reported["low"], reported["high"]
+    at: Sequence[float] = reported.get("at", ())
     return (at[0], at[0]) if len(at) == 1 else None

@@ -47,12 +47,12 @@ class Beginning:
 
     Attributes:
         true: [s]; 0: it was there from the start.
-        told: [s]; None: as of something that acts all the time.
-        held: whether the 95 % interval told holds the truth; None without one.
+        reported: [s]; None: as of something that acts all the time.
+        held: whether the reported 95 % interval holds the truth; None without one.
     """
 
     true: float
-    told: float | None
+    reported: float | None
     held: bool | None
 
 
@@ -79,11 +79,11 @@ class Outcome:
         tie_sizes: of the sets that hold a truth.
         wrong: number of findings whose tie set holds no truth.
         unknown: whether something unknown was reported.
-        driver: whether what the catalogue lacks was said to be a function of the right signal, on
+        driver: whether what the catalogue lacks was reported as a function of the right signal, on
             its elements; None where none is right, or nothing unknown was reported.
         beginnings: of what was named.
-        regions: of what was named, unknown or not, whether all that was told of where in the
-            machine's range it acts is so; None: nothing was told of that.
+        regions: of what was named, unknown or not, whether all that was reported of where in the
+            machine's range it acts is right; None: nothing was reported of that.
         estimates: of the parameters named.
         probabilities: of the findings named, with whether they are right.
         fit: held-out errors in units of the noise floor: before, re-tuned, after, of the concealed
@@ -222,13 +222,13 @@ def _driver(concealed: Sequence[Data], findings: Sequence[Data]) -> bool | None:
 
 
 def _beginnings(item: Data, concealed: Data, findings: Sequence[Data]) -> list[Beginning]:
-    """Return when a concealed effect was said to begin, where it was named."""
+    """Return when a concealed effect was reported to begin, where it was named."""
     true, found = _onset(item), []
     for finding in findings:
         if concealed["effect"] and _names(finding, concealed):
-            told, interval = finding.get("onset_s"), finding.get("onset_ci95_s")
+            reported, interval = finding.get("onset_s"), finding.get("onset_ci95_s")
             held = None if interval is None else interval[0] <= true <= interval[1]
-            found.append(Beginning(true, told, held))
+            found.append(Beginning(true, reported, held))
     return found
 
 

@@ -61,9 +61,9 @@ def scorecard_page(card: Data, sha256: str, machine: str, figure: str | None = N
                 for kind, row in card["confusion"].items()
             ),
         ),
-        "## What was said first",
+        "## What was named first",
         markdown_table(
-            ("concealed", "said first", "cases"),
+            ("concealed", "named first", "cases"),
             ((row["concealed"], row["named_first"], str(row["cases"])) for row in card["effects"]),
         ),
         "## Parameters, fit, probabilities, time",
@@ -89,16 +89,16 @@ def scorecard_page(card: Data, sha256: str, machine: str, figure: str | None = N
 
 
 def _about(card: Data, sha256: str, machine: str) -> str:
-    asked = card["asked"]
+    request = card["asked"]
     # Whoever knows the seed can draw what is still to be scored.
-    open_yet = asked["split"] == "sealed" and card["scored"] < card["drawn"]
+    open_yet = request["split"] == "sealed" and card["scored"] < card["drawn"]
     silent = {"strata", "seed"} if open_yet else {"strata"}
-    options = ", ".join(f"{key} {value}" for key, value in asked.items() if key not in silent)
+    options = ", ".join(f"{key} {value}" for key, value in request.items() if key not in silent)
     return (
         f"{card['scored']} of {card['drawn']} recordings; drawn with {options}; truth file SHA-256"
         f" `{sha256}`."
         f" Scored {machine}."
-        f" {_STANDING[asked['split']]} How it is made and what the words mean:"
+        f" {_STANDING[request['split']]} How it is made and what the words mean:"
         " [blind.md](blind.md). Written by `python -m bench.blind score DIR --page FILE`."
     )
 
@@ -111,7 +111,7 @@ def _targets(card: Data) -> str:
         ("one-sided upper bound of alarms", upper, "≤ 6 %"),
         ("mean size of the ties", _number(shares["mean_tie_size"]), "≤ 1.5"),
         ("beginning right, of what was named", share_words(card["onsets"]["right"]), ""),
-        ("operating region right, where one was told", _region(shares), ""),
+        ("operating region right, where one was given", _region(shares), ""),
         *_words(numbers_judged(card)),
     ]
     return markdown_table(("", "found", "target"), rows)
@@ -139,9 +139,9 @@ def _methods(title: str, words: str, rows: Sequence[Data]) -> list[str]:
         ),
     )
     heads = ("parameter error", *_WORTH.values(), "held-out", "CPU s")
-    worth = markdown_table(("method", *heads), map(_worth, rows))
+    measured = markdown_table(("method", *heads), map(_worth, rows))
     about = f"{words} {rows[0]['scored']} recordings, the same for all. {_COLUMNS}"
-    return [title, about, found, worth]
+    return [title, about, found, measured]
 
 
 def _worth(row: Data) -> tuple[str, ...]:
@@ -179,22 +179,22 @@ _PEERS = (
     "Others' ways on the same residuals, see [blind.md](blind.md#peers); `retuned` is what a"
     " laboratory does today."
 )
-_ABLATIONS = "What each safeguard is worth, see [blind.md](blind.md#without-one-safeguard)."
+_ABLATIONS = "What each safeguard adds, see [blind.md](blind.md#without-one-safeguard)."
 _COLUMNS = (
     "Hits and cases are those of the targets; the bound is the one-sided one of alarms; wrong"
     " findings are per recording; the parameter error is the median of relative ones; held-out is"
-    " the worst residual in units of a sound machine's, before, re-tuned and after, median of known"
-    " effects and numbers at 2 limits and more, named or not."
+    " the worst residual in units of a healthy machine's, before, re-tuned and after, median of"
+    " known effects and numbers at 2 limits and more, named or not."
 )
 
 
 def _onsets(found: Data, driver: Sequence[float]) -> str:
     error = found["median_error_s"]
     return (
-        "Of what was named and began late, a beginning was told for"
+        "Of what was named and began late, an onset was given for"
         f" {share_words(found['told'])}, with a median error of"
         f" {'—' if error is None else f'{error:.1f} s'}, and its interval held the truth for"
-        f" {share_words(found['held'])}; of what was there from the start, one was told for"
+        f" {share_words(found['held'])}; of what was there from the start, one was given for"
         f" {share_words(found['false'])}. Of the unknown that was recognised, the signal that it"
         f" depends on was right, on its elements, for {share_words(driver)}."
     )
@@ -218,8 +218,8 @@ def _strata(rows: Sequence[Data]) -> str:
 
 
 def _region(shares: Data) -> str:
-    told, named, *_ = shares["region_told"]
-    return f"{share_words(shares['region'])}; nothing told of {named - told}"
+    reported, named, *_ = shares["region_told"]
+    return f"{share_words(shares['region'])}; none given for {named - reported}"
 
 
 def _numbers(card: Data) -> str:
@@ -229,7 +229,7 @@ def _numbers(card: Data) -> str:
         f"{parameters['estimates']} parameters were estimated, with a median relative error of"
         f" {'—' if error is None else f'{100 * error:.1f} %'};"
         f" {share_words(parameters['within_a_tenth'])} within a tenth. Held-out error of the worst"
-        f" residual in units of a sound machine's, median of {fit['cases']} named:"
+        f" residual in units of a healthy machine's, median of {fit['cases']} named:"
         f" {_number(fit['before'])} before, {_number(fit['retuned'])} re-tuned,"
         f" {_number(fit['after'])} after. Processor time of a diagnosis:"
         f" {_number(seconds['median'])} s median, {_number(seconds['max'])} s at most."
@@ -237,11 +237,11 @@ def _numbers(card: Data) -> str:
 
 
 def _calibration(rows: Sequence[Data]) -> str:
-    told = (
+    reported = (
         (f"{row['from']:g} to {row['to']:g}", _number(row["said"]), share_words(row["right"]))
         for row in rows
     )
-    return markdown_table(("probability told", "mean", "effect right"), told)
+    return markdown_table(("reported probability", "mean", "effect right"), reported)
 
 
 def _recordings(outcomes: Sequence[Data]) -> str:
@@ -262,11 +262,11 @@ def _recordings(outcomes: Sequence[Data]) -> str:
 
 def listed(pairs: Sequence[tuple[str, Sequence[str]]]) -> str:
     """Return effects and their elements for a cell of a table, a line each."""
-    told = []
+    reported = []
     for effect, elements in pairs:
         many = len(elements) > 3
-        told.append(f"{effect}: {f'{len(elements)} elements' if many else ', '.join(elements)}")
-    return "<br>".join(told)
+        reported.append(f"{effect}: {f'{len(elements)} elements' if many else ', '.join(elements)}")
+    return "<br>".join(reported)
 
 
 def _short(found: Sequence[float]) -> str:

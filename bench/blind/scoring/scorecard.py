@@ -76,7 +76,7 @@ def _shares(outcomes: Sequence[Outcome], clear: Sequence[Outcome]) -> dict[str, 
     outside = [o for o in outcomes if o.kind == OUTSIDE]
     inside = [o for o in outcomes if o.kind != OUTSIDE]
     alarms = sum(o.detected for o in blank)
-    regions = [told for o in outcomes for told in o.regions]
+    regions = [reported for o in outcomes for reported in o.regions]
     return {
         "detected": share(o.detected for o in clear),
         "block": share(o.block for o in clear),
@@ -94,8 +94,8 @@ def _shares(outcomes: Sequence[Outcome], clear: Sequence[Outcome]) -> dict[str, 
         "driver": share(o.driver for o in outside if o.driver is not None),
         "false_unknown": share(o.unknown for o in inside),
         "failed": share(o.verdict == FAILED for o in outcomes),
-        "region_told": share(told is not None for told in regions),
-        "region": share(told for told in regions if told is not None),
+        "region_told": share(reported is not None for reported in regions),
+        "region": share(reported for reported in regions if reported is not None),
         "mean_tie_size": _mean([float(s) for o in clear for s in o.tie_sizes]),
     }
 
@@ -129,7 +129,9 @@ def _by_stratum(outcomes: Sequence[Outcome]) -> list[dict[str, Any]]:
                 "element": sum(o.element for o in these),
                 "tied": sum(o.tied for o in these),
                 "named": sum(o.named for o in these),
-                "region": share(told for o in these for told in o.regions if told is not None),
+                "region": share(
+                    reported for o in these for reported in o.regions if reported is not None
+                ),
                 "wrong": sum(o.wrong for o in these),
                 "failed": sum(o.verdict == FAILED for o in these),
             }
@@ -182,20 +184,20 @@ def _by_effect(estimates: Sequence[Estimate]) -> dict[str, list[Estimate]]:
 
 
 def _onsets(outcomes: Sequence[Outcome]) -> dict[str, Any]:
-    told = [b for o in outcomes for b in o.beginnings]
-    late = [b for b in told if b.true > 0.0]
-    errors = [abs(b.told - b.true) for b in late if b.told is not None]
+    reported = [b for o in outcomes for b in o.beginnings]
+    late = [b for b in reported if b.true > 0.0]
+    errors = [abs(b.reported - b.true) for b in late if b.reported is not None]
     return {
-        "told": share(b.told is not None for b in late),
+        "told": share(b.reported is not None for b in late),
         "held": share(b.held for b in late if b.held is not None),
         "median_error_s": median(errors) if errors else None,
-        "false": share(b.told is not None for b in told if b.true == 0.0),
-        "right": share(bool(b.held) if b.true > 0.0 else b.told is None for b in told),
+        "false": share(b.reported is not None for b in reported if b.true == 0.0),
+        "right": share(bool(b.held) if b.true > 0.0 else b.reported is None for b in reported),
     }
 
 
 def _fit(outcomes: Sequence[Outcome]) -> dict[str, Any]:
-    # What is told as unknown adds nothing to the model.
+    # What is reported as unknown adds nothing to the model.
     named = [o.fit for o in outcomes if o.named and o.fit is not None and o.kind != OUTSIDE]
     # A wrong number is what re-tuning mends as well.
     effects = [o.fit for o in outcomes if o.named and o.fit is not None and o.kind == EFFECT]

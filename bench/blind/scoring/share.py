@@ -46,7 +46,7 @@ def upper_bound(hits: int, cases: int) -> float:
 
 
 def share_words(found: Sequence[float]) -> str:
-    """Return a share, as its fields or a list of them, as pages tell it."""
+    """Return a share, as its fields or a list of them, as pages show it."""
     hits, cases, low, high = found
     if not cases:
         return "no cases"

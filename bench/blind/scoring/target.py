@@ -15,7 +15,7 @@ class Judged(NamedTuple):
     Attributes:
         label: what it is of.
         found: hits, cases and the ends of the interval, as `Share` or a list.
-        target: what it is to reach, in words; empty where nothing was asked.
+        target: what it is to reach, in words; empty where there is no target.
     """
 
     label: str

@@ -1,4 +1,4 @@
-"""By company: two things at once that are easily confused."""
+"""By combination: two faults at once that are easily confused."""
 
 from bench.blind.stratum import MOVING, Case, Stratum
 

@@ -75,7 +75,7 @@ def _weights(values: Values) -> tuple[float, float]:
 
 
 def _values(weights: Sequence[float], _: Values) -> dict[str, float]:
-    """Return the density that the weight tells, which swinging does not change as it does sag.
+    """Return the density of the weight's share, which swinging does not change as it does sag.
 
     Only a level cable that ends at a wall shows no weight.
     """

@@ -1,6 +1,6 @@
 """Play between a winch's motor and its drum.
 
-The drum has neither inertia nor friction worth the name: a taut cable draws it against the flank on
+The drum has neither inertia nor noticeable friction: a taut cable draws it against the flank on
 which the cable pulls, so that the play shows only where the cable goes slack. A slack cable leaves
 it where it is until the motor's other flank takes it along.
 """

@@ -73,10 +73,10 @@ class Coin:
 
     names = ("side",)
     truth = np.array([0.5])
-    asked = 0
+    options = 0
 
     def intervals(self, rng):
-        self.asked += 1
+        self.options += 1
         low = rng.uniform(0.0, 1.0)
         yield "coin", np.array([[low, np.inf]])
 
@@ -91,14 +91,14 @@ def test_runs_that_were_kept_are_not_made_again(tmp_path):
     file = tmp_path / "runs.jsonl"
     measure_coverage(first, 4, seed=1, kept=file)
     found = measure_coverage(second, 10, seed=1, kept=file)
-    assert (first.asked, second.asked) == (4, 6)
+    assert (first.options, second.options) == (4, 6)
     assert found == measure_coverage(Coin(), 10, seed=1)
     assert 0 < found[0].inside < 10
     measure_coverage(other, 2, seed=2, kept=file)
-    assert other.asked == 2
+    assert other.options == 2
     third = Dice()
     measure_coverage(third, 3, seed=1, kept=file)
-    assert third.asked == 3
+    assert third.options == 3
 
 
 def test_a_table_of_many_parameters_fits_a_narrow_terminal():

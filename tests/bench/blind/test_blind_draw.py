@@ -110,15 +110,15 @@ def test_amounts_are_the_multiple_of_each_cables_limit():
         amounts = amounts_of(item, limits, 8)
         (each,) = item.concealed
         assert amounts[each.phenomenon] == [each.multiple * 0.1 * (k + 1) for k in range(8)]
-        told = truth_of(item, amounts, MACHINE)["concealed"][0]
-        assert list(told["values"]) == list(MACHINE.cable_names)
+        reported = truth_of(item, amounts, MACHINE)["concealed"][0]
+        assert list(reported["values"]) == list(MACHINE.cable_names)
     single = next(i for i in draw() if i.concealed and len(i.concealed[0].cables) == 1)
     amounts = amounts_of(single, limits, 8)[single.concealed[0].phenomenon]
     assert sum(amount != 0.0 for amount in amounts) == 1
 
 
 def request(folder, **changed):
-    asked = {
+    options = {
         "folder": folder / "bench",
         "truth": folder / "truth.json",
         "seed": 1,
@@ -127,7 +127,7 @@ def request(folder, **changed):
         "strata": ("nothing",),
         "duration": 15.0,
     }
-    return Request(**{**asked, **changed})
+    return Request(**{**options, **changed})
 
 
 @pytest.mark.parametrize(

@@ -64,8 +64,8 @@ def test_what_has_no_target_or_no_cases_is_not_drawn():
     labels = set(colours(found))
     assert "anything found" not in labels
     assert "held-out error below re-tuned" not in labels
-    told = {r.label for r in (*findings_judged(found), *numbers_judged(found)) if r.target}
-    assert labels == told - {"held-out error below re-tuned"}
+    reported = {r.label for r in (*findings_judged(found), *numbers_judged(found)) if r.target}
+    assert labels == reported - {"held-out error below re-tuned"}
 
 
 def test_bars_have_their_length_and_say_of_how_many():

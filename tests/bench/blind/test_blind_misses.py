@@ -55,16 +55,16 @@ def item(*effects, onset=0.0, absorbed_by=None):
         | {"kind": "effect", "parameter": None, "values": {}, "base": 0.0, "driver": None}
         for e in effects
     ]
-    told = {"name": "a", "stratum": "noise", "scenario": "calm", "concealed": concealed}
-    return told | {"absorbed_by": absorbed_by, "onset_s": onset}
+    reported = {"name": "a", "stratum": "noise", "scenario": "calm", "concealed": concealed}
+    return reported | {"absorbed_by": absorbed_by, "onset_s": onset}
 
 
-def outcome_of(told):
-    return judge(told, {"diagnosis": None, "times": {"cpu_s": 0.0}}, {})
+def outcome_of(reported):
+    return judge(reported, {"diagnosis": None, "times": {"cpu_s": 0.0}}, {})
 
 
-def reason(search, told, *found):
-    return compared(outcome_of(told), told, search, [hypothesis(c) for c in found]).reason
+def reason(search, reported, *found):
+    return compared(outcome_of(reported), reported, search, [hypothesis(c) for c in found]).reason
 
 
 def test_what_the_residuals_show_and_was_not_found_could_have_been_told():
@@ -98,8 +98,8 @@ def test_what_a_wrong_number_hides_is_held_against_with_that_number():
     assert reason(search, hidden, DRY) == NO_MORE
     assert reason(search, item("winch_torque_gain"), DRY) == NO_MORE
     alone, both = (
-        compared(outcome_of(told), told, search, [hypothesis(DRY)]).gain.total
-        for told in (item("winch_torque_gain"), hidden)
+        compared(outcome_of(reported), reported, search, [hypothesis(DRY)]).gain.total
+        for reported in (item("winch_torque_gain"), hidden)
     )
     assert both > alone + 100.0
 
@@ -123,7 +123,7 @@ def test_what_has_no_column_leaves_no_trace():
 
 
 @pytest.mark.parametrize(
-    ("gain", "true", "told", "expected"),
+    ("gain", "true", "reported", "expected"),
     [
         (Gain(2.1, 1.0), 3, 1, MORE),
         (Gain(1.9, 1.0), 3, 1, NO_MORE),
@@ -133,8 +133,8 @@ def test_what_has_no_column_leaves_no_trace():
         (Gain(-2.1, 1.0), 1, 2, NO_MORE),
     ],
 )
-def test_what_speaks_for_the_truth(gain, true, told, expected):
-    assert reason_of(gain, true, told) == expected
+def test_what_speaks_for_the_truth(gain, true, reported, expected):
+    assert reason_of(gain, true, reported) == expected
 
 
 def test_the_truth_acts_from_its_beginning_on():
@@ -156,8 +156,8 @@ def test_of_several_shapes_the_one_that_explains_most_is_held_against():
 
 
 def misses_of(reasons):
-    told = outcome_of(item("winch_coulomb_friction"))
-    return [Miss(told, None if r == NO_COLUMN else Gain(1.0, 2.0), 9.0, r) for r in reasons]
+    reported = outcome_of(item("winch_coulomb_friction"))
+    return [Miss(reported, None if r == NO_COLUMN else Gain(1.0, 2.0), 9.0, r) for r in reasons]
 
 
 def test_what_is_hidden_is_what_there_is_not_to_reach():

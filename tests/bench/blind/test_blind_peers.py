@@ -61,8 +61,8 @@ SPARSE = ("stepwise", "lasso", "sindy")
 
 @pytest.mark.parametrize("name", SPARSE)
 def test_sparse_regressions_find_the_largest_term_first_and_its_size(name):
-    told = peer(name)(library((2.0, 0.0, 0.0)))
-    first = told["findings"][0]
+    reported = peer(name)(library((2.0, 0.0, 0.0)))
+    first = reported["findings"][0]
     assert (first["effect"], first["elements"], first["subsystem"]) == (
         "winch_coulomb_friction",
         ["only"],
@@ -70,7 +70,7 @@ def test_sparse_regressions_find_the_largest_term_first_and_its_size(name):
     )
     (value,) = (p["value"] for p in first["parameters"] if p["name"] == "torque")
     assert value == pytest.approx(2.0, rel=0.1)
-    (fit,) = told["residuals"]
+    (fit,) = reported["residuals"]
     held_out = fit["held_out"]
     assert held_out["nrmse_after"] == pytest.approx(1.0, abs=0.06)
     assert held_out["nrmse_before"] > 2.0
@@ -79,10 +79,10 @@ def test_sparse_regressions_find_the_largest_term_first_and_its_size(name):
 
 @pytest.mark.parametrize("name", ["retuned", *SPARSE])
 def test_white_noise_alone_is_mostly_nothing_to_them(name):
-    told = peer(name)(library((0.0, 0.0, 0.0)))
+    reported = peer(name)(library((0.0, 0.0, 0.0)))
     # What suits the last quarter by chance is kept by SINDy, which tests nothing.
-    assert len(told["findings"]) <= (2 if name == "sindy" else 1)
-    assert told["residuals"][0]["held_out"]["nrmse_after"] == pytest.approx(1.0, abs=0.06)
+    assert len(reported["findings"]) <= (2 if name == "sindy" else 1)
+    assert reported["residuals"][0]["held_out"]["nrmse_after"] == pytest.approx(1.0, abs=0.06)
 
 
 def test_coloured_noise_misleads_errors_of_white_rows_and_not_those_of_blocks():
@@ -136,9 +136,9 @@ def test_normal_equations_are_those_of_rows_without_what_is_never_told():
 
 
 def test_a_retuned_number_is_told_and_friction_makes_one_wrong():
-    (told,) = retuned.diagnosis_of(library((0.0, 0.0, 1.0)))["findings"]
-    assert told["effect"] == "winch_inertia"
-    (number,) = told["parameters"]
+    (reported,) = retuned.diagnosis_of(library((0.0, 0.0, 1.0)))["findings"]
+    assert reported["effect"] == "winch_inertia"
+    (number,) = reported["parameters"]
     assert number["ci95"][0] < 1.0 < number["ci95"][1]
     report = retuned.diagnosis_of(library((2.0, 0.0, 0.0)))
     assert report["residuals"][0]["held_out"]["nrmse_after"] > 2.0
@@ -146,8 +146,8 @@ def test_a_retuned_number_is_told_and_friction_makes_one_wrong():
 
 def test_the_most_important_finding_comes_first():
     lib = library((2.0, 0.1, 0.0))
-    told = report_of(lib, lib.evidence.columns_of([VISCOUS, COULOMB]), intervals=True)
-    assert [f["effect"] for f in told["findings"]] == [
+    reported = report_of(lib, lib.evidence.columns_of([VISCOUS, COULOMB]), intervals=True)
+    assert [f["effect"] for f in reported["findings"]] == [
         "winch_coulomb_friction",
         "winch_viscous_friction",
     ]
@@ -155,14 +155,14 @@ def test_the_most_important_finding_comes_first():
 
 
 def test_a_black_box_says_where_and_not_what():
-    told = peer("black_box")(library((2.0, 0.0, 0.0)))
-    (found,) = told["findings"]
+    reported = peer("black_box")(library((2.0, 0.0, 0.0)))
+    (found,) = reported["findings"]
     assert (found["effect"], found["elements"], found["subsystem"]) == (
         "unknown",
         ["only"],
         "winch",
     )
-    held_out = told["residuals"][0]["held_out"]
+    held_out = reported["residuals"][0]["held_out"]
     assert held_out["nrmse_after"] < 0.7 * held_out["nrmse_before"]
     assert peer("black_box")(library((0.0, 0.0, 0.0)))["findings"] == []
 
@@ -181,8 +181,8 @@ def test_methods_are_named_and_others_refused(monkeypatch):
 
 
 def test_what_a_sound_machine_has_as_well_is_not_told():
-    told = report_of(skewed(5e-6), np.array([0]), intervals=False)
-    assert (told["verdict"], told["findings"]) == ("consistent", [])
+    reported = report_of(skewed(5e-6), np.array([0]), intervals=False)
+    assert (reported["verdict"], reported["findings"]) == ("consistent", [])
     (finding,) = report_of(skewed(5e-4), np.array([0]), intervals=False)["findings"]
     assert finding["effect"] == "clock_skew"
 

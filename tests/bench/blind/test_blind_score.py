@@ -68,8 +68,8 @@ TORQUE = "winches/torque/surge_1"
 FLOORS = {("calm", TORQUE): 2.0, ("calm", "cables/tension/surge_1"): 1.0}
 
 
-def judged(hidden, told):
-    return judge(hidden, told, FLOORS)
+def judged(hidden, reported):
+    return judge(hidden, reported, FLOORS)
 
 
 def test_a_diagnosis_that_is_right_in_everything():
@@ -112,8 +112,8 @@ def test_an_interval_holds_the_truth_or_not_or_there_is_none(interval, covered):
     ],
 )
 def test_a_block_may_be_tied_with_what_is_said_first(said, alternatives, there, tied):
-    told = finding("pulley_friction", alternatives=alternatives) | {"subsystem": said}
-    outcome = judged(item("a", concealed()), result("tie", told))
+    reported = finding("pulley_friction", alternatives=alternatives) | {"subsystem": said}
+    outcome = judged(item("a", concealed()), result("tie", reported))
     assert (outcome.block, outcome.block_tied) == (there, tied)
 
 
@@ -132,16 +132,16 @@ def test_errors_are_those_of_the_residual_that_shows_the_effect(effect, channel)
 
     Nor does a ripple act in what a drive says of its command, which may be worse by chance.
     """
-    told = result("effect")
+    reported = result("effect")
     sides = {"cables/tension/surge_1": 0.3, "bar/wrench": 0.4}
     sides |= {TORQUE: 0.2, "winches/torque_command/surge_1": 0.35}
-    told["diagnosis"]["residuals"] = [
+    reported["diagnosis"]["residuals"] = [
         {"channel": name, "held_out": FIT | {"nrmse_before": before, "noise_floor": 0.01}}
         for name, before in sides.items()
     ]
     floors = {("calm", name): 1.0 for name in sides}
     hidden = item("a", concealed() | {"effect": effect})
-    assert judge(hidden, told, floors).fit == pytest.approx((100 * sides[channel], 8.0, 1.2))
+    assert judge(hidden, reported, floors).fit == pytest.approx((100 * sides[channel], 8.0, 1.2))
 
 
 def test_errors_are_told_in_units_of_what_sound_machines_of_the_scenario_leave():
@@ -172,8 +172,8 @@ def test_the_right_effect_on_another_element_is_not_named():
 
 
 def test_a_truth_among_the_alternatives_is_tied_and_not_named():
-    told = finding("winch_load_friction", alternatives=(FRICTION, "pulley_friction"))
-    outcome = judged(item("a", concealed()), result("tie", told))
+    reported = finding("winch_load_friction", alternatives=(FRICTION, "pulley_friction"))
+    outcome = judged(item("a", concealed()), result("tie", reported))
     assert outcome.tied
     assert not outcome.named
     assert outcome.tie_sizes == (3,)
@@ -182,8 +182,8 @@ def test_a_truth_among_the_alternatives_is_tied_and_not_named():
 
 
 def test_a_finding_that_holds_no_truth_is_wrong():
-    told = result("effect", finding("tension_gain"), finding(FRICTION))
-    outcome = judged(item("a", concealed()), told)
+    reported = result("effect", finding("tension_gain"), finding(FRICTION))
+    outcome = judged(item("a", concealed()), reported)
     assert outcome.named
     assert not outcome.first
     assert outcome.wrong == 1
@@ -194,15 +194,15 @@ def test_company_is_named_when_all_of_it_is():
     half = judged(pair, result("effect", finding(FRICTION)))
     assert not half.named
     assert not half.tied
-    told = result("effect", finding(FRICTION), finding("winch_viscous_friction", "sway_1"))
-    both = judged(pair, told)
+    reported = result("effect", finding(FRICTION), finding("winch_viscous_friction", "sway_1"))
+    both = judged(pair, reported)
     assert both.named
 
 
 def test_the_number_that_took_an_effect_over_is_no_wrong_finding():
-    told = result("effect", finding(FRICTION), finding("winch_drum_radius"))
-    assert judged(item("a", concealed(), absorbed_by="radius"), told).wrong == 0
-    assert judged(item("a", concealed()), told).wrong == 1
+    reported = result("effect", finding(FRICTION), finding("winch_drum_radius"))
+    assert judged(item("a", concealed(), absorbed_by="radius"), reported).wrong == 0
+    assert judged(item("a", concealed()), reported).wrong == 1
 
 
 def test_what_the_catalogue_lacks_is_named_unknown():
@@ -217,10 +217,10 @@ def test_what_the_catalogue_lacks_is_named_unknown():
 )
 def test_only_what_was_named_by_an_effect_has_an_error_to_mend(effect, kind, cases):
     hidden = item("a", concealed(effect=effect, kind=kind))
-    told = result(kind, finding(effect or "unknown", probability=None))
+    reported = result(kind, finding(effect or "unknown", probability=None))
     blank = [item(name) for name in "bc"]
     truth = {"asked": {}, "items": [hidden, *blank]}
-    results = {"a": told, "b": result("consistent"), "c": result("consistent")}
+    results = {"a": reported, "b": result("consistent"), "c": result("consistent")}
     fit = scorecard(truth, results)["fit"]
     assert (fit["cases"], fit["near_floor"][1]) == (cases, cases)
 
@@ -344,9 +344,9 @@ def test_the_seed_of_a_sealed_split_is_kept_back_while_recordings_are_left():
     assert "8 of 8 recordings; drawn with seed 1" in scorecard_page(whole, "ab" * 32, "today")
 
 
-def begun(onset, told, interval):
+def begun(onset, reported, interval):
     hidden = item("a", concealed()) | {"onset_s": onset}
-    said = finding(FRICTION) | {"onset_s": told, "onset_ci95_s": interval}
+    said = finding(FRICTION) | {"onset_s": reported, "onset_ci95_s": interval}
     (found,) = judged(hidden, result("effect", said)).beginnings
     return found
 
@@ -399,7 +399,7 @@ def test_regions_of_what_was_named_are_counted_and_what_tells_nothing_apart():
     assert row["region"][:2] == (1, 2)
     page = card() | {key: found[key] for key in ("shares", "by_stratum")}
     text = scorecard_page(page, "ab" * 32, "today")
-    assert "where one was told | 50 % (1 of 2; 1 to 99); nothing told of 1 |" in text
+    assert "where one was given | 50 % (1 of 2; 1 to 99); none given for 1 |" in text
     assert "| noise | 3 | 3 | 3 | 3 | 3 | 3 | 1 of 2 | 3 | 0 |" in text
 
 
@@ -416,13 +416,13 @@ def test_the_region_of_something_unknown_counts_and_is_no_beginning():
 def test_the_signal_of_the_unknown_has_to_be_the_right_one_on_the_right_element():
     hidden = item("a", concealed(effect=None, kind="unknown") | {"driver": "speed"})
 
-    def told(driver, element="surge_1"):
+    def reported(driver, element="surge_1"):
         said = finding("unknown", element, probability=None) | {"region": {"driver": driver}}
         return judged(hidden, result("unknown", said)).driver
 
-    assert told("speed [rad/s]") is True
-    assert told("time [s]") is False
-    assert told("speed [rad/s]", "sway_1") is False
+    assert reported("speed [rad/s]") is True
+    assert reported("time [s]") is False
+    assert reported("speed [rad/s]", "sway_1") is False
     assert judged(hidden, result("consistent")).driver is None
     assert judged(item("a", concealed()), result("unknown", finding("unknown"))).driver is None
 

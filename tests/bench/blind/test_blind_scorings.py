@@ -57,9 +57,9 @@ def test_a_further_method_is_entered_beside_the_first(tmp_path):
 def sealed(place, split):
     """A benchmark of one recording with nothing, which was diagnosed."""
     folder, truth = place / split, place / f"{split}.truth.json"
-    asked = {"seed": 1, "count": 1, "split": split, "duration": 15.0, "strata": ["nothing"]}
+    options = {"seed": 1, "count": 1, "split": split, "duration": 15.0, "strata": ["nothing"]}
     hidden = {"name": "a", "stratum": "nothing", "absorbed_by": None, "concealed": []}
-    truth.write_text(json.dumps({"schema": SCHEMA, "asked": asked, "items": [hidden]}))
+    truth.write_text(json.dumps({"schema": SCHEMA, "asked": options, "items": [hidden]}))
     (folder / "results" / "a").mkdir(parents=True)
     (folder / "results" / "a" / "times.json").write_text('{"wall_s": 1.0, "cpu_s": 1.0}')
     return folder, truth

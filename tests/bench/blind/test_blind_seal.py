@@ -38,10 +38,12 @@ def bench(tmp_path_factory):
     patch.setattr(making, "STRATA", {"nothing": NOTHING, "noise": LOUD})
     limits = {name: [5e-4] * 8 for name in PHENOMENA}
     patch.setattr(making, "run_blank", lambda *_: blank({"worst_case": limits}))
-    asked = Request(place / "bench", place / "truth.json", 3, 2, "dev", ("nothing", "noise"), 15.0)
+    options = Request(
+        place / "bench", place / "truth.json", 3, 2, "dev", ("nothing", "noise"), 15.0
+    )
     said = []
-    digest = make(asked, lambda *told: said.append(told))
-    yield asked, digest, said
+    digest = make(options, lambda *reported: said.append(reported))
+    yield options, digest, said
     patch.undo()
 
 
@@ -50,19 +52,19 @@ def blank(limits):
     return BlankRuns(limits, {}, {(name, each): [1.0] * 8 for name in limits for each in PHENOMENA})
 
 
-def recordings(asked):
-    return sorted((asked.folder / "recordings").iterdir())
+def recordings(options):
+    return sorted((options.folder / "recordings").iterdir())
 
 
-def stratum_of(asked):
-    truth = json.loads(asked.truth.read_text())
+def stratum_of(options):
+    truth = json.loads(options.truth.read_text())
     return {item["name"]: item["stratum"] for item in truth["items"]}
 
 
 @pytest.mark.slow
 def test_the_hash_is_told_before_anything_is_recorded(bench):
-    asked, digest, said = bench
-    assert digest == truth_sha256(asked.truth)
+    options, digest, said = bench
+    assert digest == truth_sha256(options.truth)
     assert digest in said[0][0]
     assert [(text, done) for text, done, _ in said[-3:]] == [
         ("recording, 1 made", 1),
@@ -73,9 +75,9 @@ def test_the_hash_is_told_before_anything_is_recorded(bench):
 
 @pytest.mark.slow
 def test_what_surrounds_the_signals_is_the_same_in_all(bench):
-    asked, _, _ = bench
+    options, _, _ = bench
     found = []
-    for path in recordings(asked):
+    for path in recordings(options):
         assert sorted(p.name for p in path.iterdir()) == [f"{path.name}_0.mcap", "metadata.yaml"]
         dates = {os.stat(p).st_mtime_ns for p in (path, *path.iterdir())}
         with Recording(path) as recording:
@@ -95,10 +97,10 @@ def test_what_surrounds_the_signals_is_the_same_in_all(bench):
 @pytest.mark.slow
 def test_sizes_do_not_part_the_strata(bench):
     """Were they told by size, either stratum's recordings would be all the larger ones."""
-    asked, _, _ = bench
-    strata = stratum_of(asked)
+    options, _, _ = bench
+    strata = stratum_of(options)
     sizes = [
-        (sum(f.stat().st_size for f in p.iterdir()), strata[p.name]) for p in recordings(asked)
+        (sum(f.stat().st_size for f in p.iterdir()), strata[p.name]) for p in recordings(options)
     ]
     values = np.array([size for size, _ in sizes], dtype=float)
     assert np.ptp(values) < 0.01 * values.mean()
@@ -118,13 +120,13 @@ def test_an_interrupted_make_goes_on_where_it_was(tmp_path, monkeypatch):
     monkeypatch.setattr(making, "record_concealed", record)
     monkeypatch.setattr(making, "run_blank", lambda *_: blank({"worst_case": {}}))
     monkeypatch.setattr(making, "STRATA", {"nothing": NOTHING})
-    asked = Request(tmp_path / "bench", tmp_path / "t.json", 3, 3, "dev", ("nothing",), 15.0)
+    options = Request(tmp_path / "bench", tmp_path / "t.json", 3, 3, "dev", ("nothing",), 15.0)
     with pytest.raises(KeyboardInterrupt):
-        make(asked, jobs=1)
-    digest = truth_sha256(asked.truth)
-    assert len(recordings(asked)) == 1
-    assert make(asked, jobs=1) == digest
-    assert [p.name for p in recordings(asked)] == [made[0], *made[2:]]
+        make(options, jobs=1)
+    digest = truth_sha256(options.truth)
+    assert len(recordings(options)) == 1
+    assert make(options, jobs=1) == digest
+    assert [p.name for p in recordings(options)] == [made[0], *made[2:]]
     assert len(set(made)) == 4
 
 
@@ -144,9 +146,9 @@ def test_a_recording_that_is_cut_short_is_not_taken_for_whole(tmp_path):
 
 
 def test_recordings_are_made_at_least_one_at_a_time(tmp_path):
-    asked = Request(tmp_path / "bench", tmp_path / "t.json", 3, 3, "dev", ("nothing",), 15.0)
+    options = Request(tmp_path / "bench", tmp_path / "t.json", 3, 3, "dev", ("nothing",), 15.0)
     with pytest.raises(InputError, match=r"^--jobs 0: allowed: 1 or more$"):
-        make(asked, jobs=0)
+        make(options, jobs=0)
 
 
 def test_the_command_line_tells_the_hash_and_keeps_the_truth_beside(tmp_path, monkeypatch, capsys):
@@ -164,9 +166,9 @@ def test_the_command_line_tells_the_hash_and_keeps_the_truth_beside(tmp_path, mo
         cli.main()
     assert not caught.value.code
     truth = tmp_path / "bench.truth.json"
-    told = capsys.readouterr().out
-    assert f"truth {truth}, SHA-256 {truth_sha256(truth)}" in told
-    assert told.index("SHA-256") < told.index("1 made")
+    reported = capsys.readouterr().out
+    assert f"truth {truth}, SHA-256 {truth_sha256(truth)}" in reported
+    assert reported.index("SHA-256") < reported.index("1 made")
     assert len(list((out / "recordings").iterdir())) == 1
 
 
@@ -180,11 +182,11 @@ def test_what_diverges_is_an_empty_folder_and_is_not_tried_again(tmp_path, monke
     monkeypatch.setattr(making, "record_concealed", record)
     monkeypatch.setattr(making, "run_blank", lambda *_: blank({"worst_case": {}}))
     monkeypatch.setattr(making, "STRATA", {"nothing": NOTHING})
-    asked = Request(tmp_path / "bench", tmp_path / "t.json", 3, 1, "dev", ("nothing",), 15.0)
-    make(asked)
-    make(asked)
+    options = Request(tmp_path / "bench", tmp_path / "t.json", 3, 1, "dev", ("nothing",), 15.0)
+    make(options)
+    make(options)
     assert len(tried) == 1
-    assert [list(p.iterdir()) for p in recordings(asked)] == [[]]
+    assert [list(p.iterdir()) for p in recordings(options)] == [[]]
 
 
 @pytest.mark.slow
@@ -193,9 +195,9 @@ def test_a_slice_is_diagnosed_and_scored(bench, tmp_path):
 
     Every one of these numbers is a count of two recordings.
     """
-    asked, digest, _ = bench
-    assert run(asked.folder) == {}
-    score_command(asked.folder, asked.truth, digest, tmp_path / "p.md", tmp_path / "s.json")
+    options, digest, _ = bench
+    assert run(options.folder) == {}
+    score_command(options.folder, options.truth, digest, tmp_path / "p.md", tmp_path / "s.json")
     card = json.loads((tmp_path / "s.json").read_text())
     assert card["scored"] == 2
     assert card["truth_sha256"] == digest
@@ -203,11 +205,11 @@ def test_a_slice_is_diagnosed_and_scored(bench, tmp_path):
     assert card["shares"]["tied"][:2] == [1, 1]
     assert card["shares"]["false_alarm"][:2] == [0, 1]
     assert (tmp_path / "p.md").read_text().startswith("# Blind results")
-    done = {p: os.stat(p).st_ino for p in (asked.folder / "results").iterdir()}
-    assert run(asked.folder) == {}
-    assert {p: os.stat(p).st_ino for p in (asked.folder / "results").iterdir()} == done
+    done = {p: os.stat(p).st_ino for p in (options.folder / "results").iterdir()}
+    assert run(options.folder) == {}
+    assert {p: os.stat(p).st_ino for p in (options.folder / "results").iterdir()} == done
     with pytest.raises(InputError, match=r"SHA-256 .*, allowed: that of --sha256, 00$"):
-        score_command(asked.folder, asked.truth, "00", None, None)
+        score_command(options.folder, options.truth, "00", None, None)
 
 
 STAND_IN = """#!{python}

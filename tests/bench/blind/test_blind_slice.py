@@ -69,16 +69,16 @@ def blank():
 def card(tmp_path_factory):
     place = tmp_path_factory.mktemp("slice")
     strata = {name: Stratum(name, float(len(own)), own) for name, own in STRATA.items()}
-    asked = Request(
+    options = Request(
         place / "set", place / "truth.json", SEED, COUNT, "dev", tuple(strata), DURATION_S
     )
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr(making, "STRATA", strata)
         patch.setattr(making, "run_blank", lambda *_: blank())
-        make(asked)
-    assert run(asked.folder) == {}
-    truth = json.loads(asked.truth.read_text())
-    return scorecard(truth, read_results(asked.folder, [item["name"] for item in truth["items"]]))
+        make(options)
+    assert run(options.folder) == {}
+    truth = json.loads(options.truth.read_text())
+    return scorecard(truth, read_results(options.folder, [item["name"] for item in truth["items"]]))
 
 
 pytestmark = pytest.mark.slow

@@ -44,9 +44,9 @@ def test_the_committed_page_is_what_the_command_writes(tmp_path):
 
 
 def test_there_is_a_page_for_each_part_that_is_told():
-    _, told = PAGE.read_text(encoding="utf-8").split("\n## The sets\n")
+    _, reported = PAGE.read_text(encoding="utf-8").split("\n## The sets\n")
     assert len(PARTS) >= 7
-    assert all(f"]({part.page})" in told for part in PARTS)
+    assert all(f"]({part.page})" in reported for part in PARTS)
 
 
 @pytest.mark.parametrize("part", PARTS, ids=lambda part: part.page)
@@ -105,13 +105,13 @@ def test_targets_are_read_as_they_are_told(target, ends):
     ("value", "interval", "target", "word"),
     [
         (0.98, (0.975, 0.99), "≥ 97 %", "met"),
-        (0.98, (0.95, 0.99), "≥ 97 %", "met, not surely"),
-        (0.96, (0.95, 0.99), "≥ 97 %", "missed, not surely"),
+        (0.98, (0.95, 0.99), "≥ 97 %", "met, not significantly"),
+        (0.96, (0.95, 0.99), "≥ 97 %", "missed, not significantly"),
         (0.90, (0.85, 0.95), "≥ 97 %", "missed"),
         (0.93, (0.91, 0.96), "90 to 97 %", "met"),
         (0.99, (0.98, 1.0), "90 to 97 %", "missed"),
         (0.10, (0.06, 0.17), "≤ 3 %", "missed"),
-        (1.0, (0.95, 1.0), "all", "met, not surely"),
+        (1.0, (0.95, 1.0), "all", "met, not significantly"),
     ],
 )
 def test_a_target_is_met_surely_only_where_the_whole_interval_meets_it(
@@ -132,5 +132,5 @@ def test_no_recording_counts_twice(tmp_path):
 
 
 def test_a_page_of_something_else_is_refused():
-    with pytest.raises(ValueError, match="no truth file told"):
+    with pytest.raises(ValueError, match="no truth file named"):
         read_part(DOCS / "gallery.md")

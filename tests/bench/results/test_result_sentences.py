@@ -88,9 +88,9 @@ def test_feed_forward_is_told_for_each_of_its_steps():
 def test_payloads_are_told_with_and_without():
     fixed, swinging = "0.8 kg taken up at 50 s", "0.4 kg swinging 0.3 m below"
     found = {fixed: run(heave=0.3), swinging: run(2.0, heave=0.7, not_met=0.04)}
-    found[f"{fixed}, told from its heave"] = run(heave=0.1)
-    found[f"{swinging}, told from its heave"] = run(2.5, heave=0.6, not_met=0.03)
+    found[f"{fixed}, estimated from its heave"] = run(heave=0.1)
+    found[f"{swinging}, estimated from its heave"] = run(2.5, heave=0.6, not_met=0.03)
     said = payload_said(found)
     assert "heave goes from 0.30 to 0.10 mm" in said
     assert "from 0.70 to 0.60 mm, surge from 2.00 to 2.50 mm" in said
-    assert "for 4.0% of the time, 3.0% where a mass is told" in said
+    assert "for 4.0% of the time, 3.0% where a mass is estimated" in said

@@ -33,7 +33,7 @@ from bench.results.result_cases import (
 )
 from bench.results.result_machines import fastest_crossover
 from bench.results.result_measures import tracking
-from bench.results.result_robust_cases import TOLD_OF, changed, corrected
+from bench.results.result_robust_cases import ESTIMATED_OF, changed, corrected
 from bench.results.result_store import Measurement, Store, spoken
 from bench.results.result_tables import (
     calm_block,
@@ -66,7 +66,7 @@ def test_every_case_is_a_run_that_can_be_made():
         CORNERS,
         LIMITED,
     )
-    groups += (ROUGH_CORNERS, TOLD_OF, changed(PAST), corrected(), seeded(2, CAMERA_100_HZ))
+    groups += (ROUGH_CORNERS, ESTIMATED_OF, changed(PAST), corrected(), seeded(2, CAMERA_100_HZ))
     for case in {case.scenario: case for group in groups for case in group.values()}.values():
         assert case.bundle().testbed.testbed.bar is not None
     for case in SWITCHED_4M.values():
@@ -141,16 +141,16 @@ def counted(number, more=0):
 
 def test_what_was_measured_is_kept_until_what_decides_it_changes(tmp_path, monkeypatch):
     COUNTS.clear()
-    store, told = Store(tmp_path), []
+    store, reported = Store(tmp_path), []
     first = Measurement("a, b", counted, (1,))
     second = Measurement("c", counted, (20,), needs=(first,))
     timed = Measurement("d", counted, (3,), alone=True)
-    work_off(store, [second, timed], 1, told.append)
+    work_off(store, [second, timed], 1, reported.append)
     # What measures time comes first, what needs others last.
     assert COUNTS == [3, 1, 20]
     assert store.find(second).found == 21
-    assert told[2] == "3 of 3: c, 0 s of the processor"
-    work_off(store, [second, timed, first], 1, told.append)
+    assert reported[2] == "3 of 3: c, 0 s of the processor"
+    work_off(store, [second, timed, first], 1, reported.append)
     assert COUNTS == [3, 1, 20]
     assert store.find(replace(first, arguments=(2,))) is None
     # Another first one is another second one.
@@ -210,8 +210,8 @@ def test_one_block_is_renewed_alone(tmp_path, monkeypatch, capsys):
     page.write_text(blocks + blocks.replace("machine", "past"))
     monkeypatch.setattr("bench.results.__main__.PAGE", page)
     nothing = str(tmp_path / "kept")
-    asked = ["results", "--seeds", "3", "--only", "machine", "--keep", nothing]
-    monkeypatch.setattr(sys, "argv", asked)
+    options = ["results", "--seeds", "3", "--only", "machine", "--keep", nothing]
+    monkeypatch.setattr(sys, "argv", options)
     assert main() == 0
     renewed, kept = page.read_text().split("<!-- end -->\n")[:2]
     assert "; 3 seeds. 0 of " in renewed

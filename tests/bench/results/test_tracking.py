@@ -28,12 +28,14 @@ def test_a_load_is_taken_up_and_set_down_in_mid_run():
 
 def test_controllers_may_be_told_of_another_friction_than_the_plant_has():
     plain = Case("worst_case", ("duration=0.3", AHEAD), rubbing(1.2))
-    found = [replace(plain, told=told).run() for told in (None, rubbing(1.2), rubbing(1.0))]
+    found = [
+        replace(plain, reported=reported).run() for reported in (None, rubbing(1.2), rubbing(1.0))
+    ]
     np.testing.assert_array_equal(found[0][1], found[1][1])
     assert np.abs(found[0][1] - found[2][1]).max() > 1e-3
     # The plant rubs alike in both.
     assert changed("worst_case")["friction −20 %"].effects == rubbing(0.8)
-    assert changed("worst_case")["friction −20 %"].told == rubbing(1.0)
+    assert changed("worst_case")["friction −20 %"].reported == rubbing(1.0)
 
 
 def test_cables_are_scaled_in_the_file_that_controllers_read():

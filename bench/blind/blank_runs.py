@@ -9,7 +9,7 @@ from bench.blind.concealed_run import believed, watch
 from bench.blind.item import Item
 from bench.blind.reality.detection_limit import absorbed_share, detection_limits, likeness
 from bench.blind.reality.reality import conceal
-from cspm_ident.diagnosis.residuals.data_split import SEARCHED_SHARE
+from cspm_ident.diagnosis.thresholds import DEFAULT_THRESHOLDS
 
 _SEED = 1
 
@@ -64,7 +64,8 @@ def run_blank(items: Sequence[Item], duration: float, tell: Tell) -> BlankRuns:
         tell(f"detection limits in {scenario}", done, len(scenarios))
         bundle = believed(scenario, duration, _SEED)
         machine = bundle.testbed.testbed
-        scenes = watch(bundle, conceal(machine, {}, 0.0, _SEED), SEARCHED_SHARE * duration)
+        searched = DEFAULT_THRESHOLDS.searched_share * duration
+        scenes = watch(bundle, conceal(machine, {}, 0.0, _SEED), searched)
         blank.limits[scenario] = detection_limits(scenes, machine)
         for where, name in names:
             if where == scenario:

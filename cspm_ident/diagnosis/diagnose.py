@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
+from functools import partial
 from itertools import compress
 from typing import NamedTuple
 
@@ -32,6 +33,7 @@ from cspm_ident.diagnosis.selection.search_pass import (
     hums_of,
     searched_for,
 )
+from cspm_ident.diagnosis.thresholds import DEFAULT_THRESHOLDS, Thresholds
 from cspm_ident.diagnosis.validation.acceptance import Standing, standing_of
 from cspm_ident.diagnosis.validation.detection_limits import Limit, detection_limits
 from cspm_ident.diagnosis.validation.found_model import Data, Model, modelled
@@ -100,6 +102,7 @@ class Diagnosis:
         noise: of each residual, what differs from row to row, one number per channel.
         spectra: of candidates of which there may be more at other time constants, the upper end of
             the interval of the weights of all together.
+        thresholds: that decided it.
     """
 
     searched: Sequence[Measurement]
@@ -120,6 +123,7 @@ class Diagnosis:
     curves: tuple[Curve, ...]
     noise: dict[Place, Array]
     spectra: Mapping[Candidate, Array] = field(default_factory=dict)
+    thresholds: Thresholds = DEFAULT_THRESHOLDS
 
 
 def diagnose(
@@ -127,6 +131,7 @@ def diagnose(
     held_out: Sequence[Measurement] = (),
     progress: Progress = lambda _: None,
     safeguards: Safeguards = ALL_SAFEGUARDS,
+    thresholds: Thresholds = DEFAULT_THRESHOLDS,
 ) -> Diagnosis:
     """Look for what the described machine lacks.
 
@@ -135,17 +140,22 @@ def diagnose(
         held_out: others on which to judge what was found; none: the last part of each searched one.
         progress: called with what is being done.
         safeguards: all of them, but for comparisons.
+        thresholds: that decide what is reported.
 
     Raises:
         InputError: the recordings have no residual that could be looked at, or are too short.
     """
-    searched, held_out = ([on_drives_clock(each) for each in own] for own in (searched, held_out))
+    searched, held_out = (
+        [on_drives_clock(each, thresholds) for each in own] for own in (searched, held_out)
+    )
     # No name for the look itself: its columns go as soon as they are not needed.
     (search_parts, judge_parts, hums, noise, block, search, knots, supposed), found = searched_for(
-        Recordings(searched, held_out), progress, safeguards
+        Recordings(searched, held_out), progress, safeguards, thresholds
     )
     evidence = search.evidence
-    found = with_wider(found, in_noise(search_parts, noise), block, safeguards.sums)
+    found = with_wider(
+        found, in_noise(search_parts, noise), block, lambda e: safeguards.sums(e, thresholds)
+    )
     progress("held-out data")
     judge = _judge(in_noise(judge_parts, noise), found, block)
     search_parts, judge_parts = _found_only(search_parts, found), _found_only(judge_parts, found)
@@ -156,7 +166,7 @@ def diagnose(
     retuned = search.retuned()
     progress("parameters, and simulation of held-out data")
     baselines = baselines_of(held_out or searched, starts, retuned)
-    cut: Cut = whole_part if held_out else first_part
+    cut: Cut = whole_part if held_out else partial(first_part, thresholds=thresholds)
     unseen = standing.faint, standing.plain
     data = Data(searched, cut, baselines, rows, noise, block, supposed, *unseen)
     standing, model = _useful(search, standing, data, safeguards)
@@ -164,9 +174,11 @@ def diagnose(
     values = {c: w for c, (w, _) in model.weights.items()}
     first = search.fits.values([each.hypothesis for each in kept])
     told = _told(search, standing, model)
-    regions = [region_of(data.rows, kept[k].hypothesis.candidates, first) for k in told]
+    regions = [region_of(data.rows, kept[k].hypothesis.candidates, first, thresholds) for k in told]
     free = free_functions(evidence, judge)
-    chatters = tuple(line for each in (*searched, *held_out) for line in chatters_of(each))
+    chatters = tuple(
+        line for each in (*searched, *held_out) for line in chatters_of(each, thresholds)
+    )
     return Diagnosis(
         searched=searched,
         held_out=held_out,
@@ -183,10 +195,10 @@ def diagnose(
         rejected=(*standing.rejected, *standing.fed_back),
         negligible=tuple(compress(kept, model.negligible)),
         weights=model.weights,
-        fit=judged(held_out or searched, starts, retuned, values, noise, free),
+        fit=judged(held_out or searched, starts, retuned, values, noise, free, thresholds),
         simulated=model.simulated,
         shapes=_shapes(search, standing.sure, knots, [each[0] for each in unknown]),
-        lines=(*chatters, *_lasting(hums, searched, search_parts, values)),
+        lines=(*chatters, *_lasting(hums, searched, search_parts, values, thresholds)),
         limits=detection_limits(search, kept),
         silent=_silent(search, safeguards.effects),
         places=tuple(place.place for place in evidence.places),
@@ -194,6 +206,7 @@ def diagnose(
         curves=held_out_curves(steady(judge_parts), first),
         noise=noise,
         spectra=model.spectra,
+        thresholds=thresholds,
     )
 
 
@@ -228,12 +241,13 @@ def _lasting(
     searched: Sequence[Measurement],
     parts: Parts,
     weights: Mapping[Candidate, Array],
+    thresholds: Thresholds,
 ) -> tuple[Line, ...]:
     """Return the lines that are there still, now that all else is known."""
     found = []
     for own, measurement, part in zip(lines, searched, parts, strict=True):
-        now = hums_of(measurement, part, weights) if own else ()
-        found += [line for line in now if any(line.is_same(before) for before in own)]
+        now = hums_of(measurement, part, weights, thresholds) if own else ()
+        found += [line for line in now if any(line.is_same(before, thresholds) for before in own)]
     return tuple(found)
 
 

@@ -7,9 +7,9 @@ from collections.abc import Mapping, Sequence
 import numpy as np
 from numpy.typing import NDArray
 
-from cspm_ident.diagnosis.regression.collinearity import UNTRUE_SHARE
 from cspm_ident.diagnosis.residuals.regressors import Candidate, Place
 from cspm_ident.diagnosis.residuals.residual_equation import Equation, in_noise
+from cspm_ident.diagnosis.thresholds import DEFAULT_THRESHOLDS
 from cspm_sim.effects import Effect
 
 Array = NDArray[np.float64]
@@ -62,7 +62,8 @@ def decided(
     """
     left = separation(equations, noise, truth, rivals)
     alone = separation(equations, noise, truth, ())
-    return float(np.sqrt(max(0.0, left**2 - UNTRUE_SHARE * alone**2)))
+    form_error = DEFAULT_THRESHOLDS.model_form_error_share
+    return float(np.sqrt(max(0.0, left**2 - form_error * alone**2)))
 
 
 def _acting(equation: Equation, truth: Mapping[Candidate, Array]) -> Array:

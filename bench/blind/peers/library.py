@@ -11,7 +11,8 @@ from cspm_ident.diagnosis.residuals.data_split import first_part, last_part, spa
 from cspm_ident.diagnosis.residuals.recorded_equations import equations_of
 from cspm_ident.diagnosis.residuals.regressors import Candidate
 from cspm_ident.diagnosis.residuals.residual_equation import Equation, in_noise, steady
-from cspm_ident.diagnosis.selection.search_pass import BLOCKS, noise_of
+from cspm_ident.diagnosis.selection.search_pass import noise_of
+from cspm_ident.diagnosis.thresholds import DEFAULT_THRESHOLDS
 from cspm_ident.signals.measurement import Measurement
 from cspm_msgs_py.errors import InputError
 from cspm_sim.effects import catalogue
@@ -58,6 +59,6 @@ def library_of(measurement: Measurement) -> Library:
     noise = noise_of(first)
     (searched,), (judge,) = in_noise(first, noise), in_noise(last, noise)
     start, end = span_of(searched)
-    block = (end - start) / BLOCKS
+    block = (end - start) / DEFAULT_THRESHOLDS.block_count
     evidence = gather([searched], block)
     return Library(searched, judge, evidence, WhiteSums(evidence), gather([judge], block))

@@ -15,13 +15,13 @@ from scipy.stats import t as t_distribution
 
 from cspm_ident.diagnosis.regression.block_gram import Evidence, silence, squares_by_block
 from cspm_ident.diagnosis.regression.jackknife import RANK, LeftOut, left_out, pseudo_inverse
+from cspm_ident.diagnosis.thresholds import DEFAULT_THRESHOLDS, Thresholds
 
 Array = NDArray[np.float64]
 Index = NDArray[np.intp]
 
+# Of the cross-validation.
 FOLDS = 6
-# Effective blocks beyond the first, below which a single one tells a weight.
-_ALONE = 0.1
 
 
 class Gain(NamedTuple):
@@ -39,8 +39,9 @@ class Gain(NamedTuple):
 class Sums:
     """All columns' products, scaled so that each column has length 1."""
 
-    def __init__(self, evidence: Evidence) -> None:
+    def __init__(self, evidence: Evidence, thresholds: Thresholds = DEFAULT_THRESHOLDS) -> None:
         """Take the products of all residuals, and sum them."""
+        self.thresholds = thresholds
         width = evidence.width
         squares, self._at = np.zeros((evidence.blocks, width + 1)), []
         for place in evidence.places:
@@ -258,7 +259,7 @@ class Sums:
         which is not too small for few blocks; the weights of the base are held.
         """
         scale = self._lengths[columns]
-        covariance = left_out(self._beyond(base, columns)).covariance
+        covariance = self._left_out(self._beyond(base, columns)).covariance
         return np.asarray(covariance / np.outer(scale, scale))
 
     def half_width(self, base: Index, columns: Index) -> Array:
@@ -267,9 +268,10 @@ class Sums:
         From pairs of blocks, for what a model leaves is alike for longer than a block, and by what
         pairs in turn have in common. Infinite where a single pair tells a weight.
         """
-        errors, free = left_out(paired(self._beyond(base, columns))).spread()
+        errors, free = self._left_out(paired(self._beyond(base, columns))).spread()
         factor = np.full(len(free), np.inf)
-        factor[free > _ALONE] = t_distribution.ppf(0.975, free[free > _ALONE])
+        known = free > self.thresholds.interval_least_freedom
+        factor[known] = t_distribution.ppf(0.975, free[known])
         return np.asarray(factor * errors / self._lengths[columns])
 
     def p_value(self, base: Index, columns: Index) -> float:
@@ -291,14 +293,17 @@ class Sums:
         What is left without one may be ruled by another, as where a rope is first pulled taut.
         """
         heard = np.arange(self.blocks)
-        found = left_out(self._beyond(base, columns))
-        while (most := found.dominant()) is not None:
+        found = self._left_out(self._beyond(base, columns))
+        while (most := found.dominant(self.thresholds.dominant_block_share)) is not None:
             heard = np.delete(heard, most)
             others = self._beyond(base, columns, heard)
             if np.trace(others.sum(axis=0)[:-1, :-1]) <= RANK:
                 break
-            found = left_out(others)
+            found = self._left_out(others)
         return found
+
+    def _left_out(self, parts: Array) -> LeftOut:
+        return left_out(parts, self.thresholds.block_correlation_limit)
 
     def _beyond(self, base: Index, columns: Index, blocks: Index | None = None) -> Array:
         """Return blocks' products of columns and target less what a base spans of them."""

@@ -11,23 +11,13 @@ from cspm_ident.diagnosis.regression.block_gram import Evidence
 from cspm_ident.diagnosis.regression.block_regression import Sums, behind, paired
 from cspm_ident.diagnosis.residuals.free_shapes import Driver
 from cspm_ident.diagnosis.residuals.regressors import Candidate, Place
+from cspm_ident.diagnosis.thresholds import DEFAULT_THRESHOLDS, Thresholds
 
 Array = NDArray[np.float64]
 Index = NDArray[np.intp]
 
-# Of the gain: what loses more is no rival, however the rest scatters.
-RIVAL_SHARE = 0.5
-# Standard deviations: what is no farther behind explains as well.
-TIED = 2.0
-# Of the gain: no model is so true, 7 % of its amplitude, that a smaller difference decides.
-UNTRUE_SHARE = 0.005
-# Of the squares of columns: what spans more of them says nearly the same, or is a wider form of it.
-SPANNED = 0.95
-# Of the gain: for less no beginning is told, nor anything of more numbers kept.
-SIMPLER_SHARE = 0.1
-# Pairs of blocks. More of them make no further number less likely: how true models are decides
-# then, and not noise.
-_PAIRS = 20
+
+RIVAL_SHARE = DEFAULT_THRESHOLDS.rival_gain_share
 
 
 def overlap(sums: Sums, base: Index, own: Index, other: Index) -> bool:
@@ -35,15 +25,17 @@ def overlap(sums: Sums, base: Index, own: Index, other: Index) -> bool:
     parts = (own, other, np.union1d(own, other))
     without = sums.squares_of(base)
     gains = [without - sums.squares_of(np.concatenate([base, part])) for part in parts]
-    return gains[0] + gains[1] - gains[2] >= RIVAL_SHARE * gains[0]
+    return gains[0] + gains[1] - gains[2] >= sums.thresholds.rival_gain_share * gains[0]
 
 
 def contains(sums: Sums, base: Index, wide: Index, narrow: Index) -> bool:
     """Return whether `narrow` is a case of `wide`, as Coulomb's friction of Stribeck's."""
-    return bool(np.all(sums.spanned(base, wide, narrow) > 0.999))
+    return bool(np.all(sums.spanned(base, wide, narrow) > sums.thresholds.nested_share))
 
 
-def distance(worse: Array, undecided: float, wider: int) -> float:
+def distance(
+    worse: Array, undecided: float, wider: int, thresholds: Thresholds = DEFAULT_THRESHOLDS
+) -> float:
     """Return by how many standard deviations of a normal something explains less.
 
     Args:
@@ -51,12 +43,15 @@ def distance(worse: Array, undecided: float, wider: int) -> float:
         undecided: what decides nothing, models being as untrue as they are.
         wider: how many numbers it has more; each counts as in Schwarz's criterion, but for no more
             in a long recording than in a short one.
+        thresholds: `tie_sigma` and `schwarz_most_pairs`.
     """
     worse = paired(worse)
     apart = max(0.0, behind(worse))
     if worse.sum() < undecided:
-        apart = min(apart, TIED) * max(0.0, worse.sum() / undecided)
-    return float(np.hypot(apart, np.sqrt(wider * np.log(min(len(worse), _PAIRS)))))
+        apart = min(apart, thresholds.tie_sigma) * max(0.0, worse.sum() / undecided)
+    return float(
+        np.hypot(apart, np.sqrt(wider * np.log(min(len(worse), thresholds.schwarz_most_pairs))))
+    )
 
 
 def chance(sums: Sums, base: Index, parts: Sequence[Index]) -> float:

@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 from cspm_ident.diagnosis.regression.block_regression import Gain
 from cspm_ident.diagnosis.residuals.free_shapes import Driver
 from cspm_ident.diagnosis.residuals.regressors import Candidate
+from cspm_ident.diagnosis.thresholds import DEFAULT_THRESHOLDS, Thresholds
 from cspm_sim.effects import Effect
 
 Array = NDArray[np.float64]
@@ -21,11 +22,6 @@ Unknown = tuple[Driver, Gain, float]
 # Of what a finding explains. In blind recordings no finding was right (of 7) beside so much that
 # nothing explained.
 DOUBTFUL_SHARE = 0.1
-# Standard errors by which a beginning has to explain more than an effect that was always there: the
-# largest of some 48 by chance; and an unlikely extent more than a likely one.
-_SIGMAS_OF_ONSET, _SIGMAS_OF_EXTENT = 3.0, 2.0
-# Of the longest time constant that can be told: what ends is shorter.
-_ENDED = 0.99
 # Whose equation every tension enters.
 _FED_BY_ALL = frozenset({"bar", "winch_frame"})
 # More signals than any block of the machine has.
@@ -195,7 +191,9 @@ def is_seen_to_begin(
     return not hypothesis.onset or any(surely)
 
 
-def is_seen_to_end(candidates: Iterable[Candidate]) -> bool:
+def is_seen_to_end(
+    candidates: Iterable[Candidate], thresholds: Thresholds = DEFAULT_THRESHOLDS
+) -> bool:
     """Return whether a recording shows the ends of all memories, of which time constants tell.
 
     One that is as long as can be told goes on growing like much else that is not in the catalogue.
@@ -205,8 +203,9 @@ def is_seen_to_end(candidates: Iterable[Candidate]) -> bool:
         for c in candidates
         if c.effect.signature.spectrum
     }
+    share = thresholds.spectrum_end_share
     return all(
-        c.nonlinear[c.effect.signature.spectrum] < _ENDED * most for c, most in longest.items()
+        c.nonlinear[c.effect.signature.spectrum] < share * most for c, most in longest.items()
     )
 
 
@@ -295,18 +294,20 @@ def is_wider(one: Hypothesis, other: Hypothesis) -> bool:
     return one.causes > other.causes
 
 
-def boldness(one: Hypothesis, other: Hypothesis | None = None) -> float:
+def boldness(
+    one: Hypothesis, other: Hypothesis | None = None, thresholds: Thresholds = DEFAULT_THRESHOLDS
+) -> float:
     """Return by how many standard errors one has to explain more than another, or than nothing.
 
     For a beginning, chosen among many, and for an unlikely extent, where the other has none: one
     number for all elements is unlikely unless one system reads them; then it is for a part of them.
     """
     if one.onset and (other is None or not other.onset):
-        return _SIGMAS_OF_ONSET
+        return thresholds.onset_sigma
     if other is None:
         return 0.0
     unlikely = one.common != other.common and one.common is not has_one_system(one.effect)
-    return _SIGMAS_OF_EXTENT if unlikely else 0.0
+    return thresholds.extent_sigma if unlikely else 0.0
 
 
 def unusual(weights: Mapping[Candidate, Array], hypothesis: Hypothesis) -> float:
@@ -339,14 +340,17 @@ def is_early(weights: Mapping[Candidate, Array], hypothesis: Hypothesis) -> bool
     return min(sense.lateness(0.0, each) for each in own.values()) < 0.0 and not is_negligible(own)
 
 
-def is_spread(one: Hypothesis, whole: Hypothesis) -> bool:
+def is_spread(
+    one: Hypothesis, whole: Hypothesis, thresholds: Thresholds = DEFAULT_THRESHOLDS
+) -> bool:
     """Return whether one has the same effect on half of several elements at least.
 
     Then it is as likely on all of them, which is one cause, as on those alone.
     """
     same = one.effect.id == whole.effect.id and one.candidates[0].shape == whole.candidates[0].shape
     elements = len(whole.elements)
-    return same and elements > 2 and 2 * len(one.elements) >= elements
+    least = thresholds.spread_element_share * elements
+    return same and elements > 2 and len(one.elements) >= least
 
 
 def members_of(candidates: Iterable[Candidate], hypothesis: Hypothesis) -> list[Candidate]:

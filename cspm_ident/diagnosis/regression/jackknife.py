@@ -10,11 +10,8 @@ from scipy.stats import f as f_distribution
 
 Array = NDArray[np.float64]
 
+# Of the largest eigenvalue: what is smaller is rounding.
 RANK = 1e-9
-# What tells more of the weights than all other blocks together shows once, whatever it shows.
-DOMINANT = 0.5
-# Few blocks tell no longer memory than this.
-_MOST_ALIKE = 0.8
 
 
 class LeftOut(NamedTuple):
@@ -48,14 +45,14 @@ class LeftOut(NamedTuple):
         errors = np.sqrt(np.maximum(np.diag(self.covariance), 1e-300) * more)
         return errors, np.maximum(self.blocks_of / more, np.minimum(self.blocks_of, 2.0)) - 1.0
 
-    def dominant(self) -> int | None:
-        """Return which block tells more of the weights than all others, None where none does.
+    def dominant(self, share: float) -> int | None:
+        """Return the block that has more than a share of the information, None where none has.
 
         A violent start tells nearly all of a recording's speeds; that what it shows goes on
         afterwards is seen only without it.
         """
         most = int(np.argmax(self.shares))
-        return most if self.shares[most] > DOMINANT else None
+        return most if self.shares[most] > share else None
 
     def chance(self) -> float:
         """Return the probability of weights as large by chance, by Wald's test."""
@@ -68,11 +65,12 @@ class LeftOut(NamedTuple):
         return float(f_distribution.sf(wald / count, count, self.blocks - count))
 
 
-def left_out(parts: Array) -> LeftOut:
+def left_out(parts: Array, most_alike: float) -> LeftOut:
     """Return how the weights scatter (Bell and McCaffrey, Surv. Methodol. 28(2), 2002).
 
     Args:
         parts: each block's products of columns and target, shape (blocks, m + 1, m + 1).
+        most_alike: largest correlation of successive blocks that is allowed for.
     """
     whole, count = parts.sum(axis=0), parts.shape[1] - 1
     inverse = pseudo_inverse(whole[:-1, :-1])
@@ -89,7 +87,8 @@ def left_out(parts: Array) -> LeftOut:
     apart, blocks = without - weights, max(1, int(np.count_nonzero(heard)))
     covariance = (blocks - 1) / blocks * apart.T @ apart
     together = 1.0 / max(float(np.sum(shares**2)), RANK)
-    return LeftOut(weights, covariance, together, _telling(told, inverse), shares, _alike(apart))
+    alike = _alike(apart, most_alike)
+    return LeftOut(weights, covariance, together, _telling(told, inverse), shares, alike)
 
 
 def _telling(told: Array, inverse: Array) -> Array:
@@ -108,11 +107,11 @@ def _telling(told: Array, inverse: Array) -> Array:
     return np.asarray(1.0 / np.maximum(np.sum(shares**2, axis=0), RANK))
 
 
-def _alike(apart: Array) -> Array:
-    """Return the correlation of rows (blocks, m) with the next, from 0 to `_MOST_ALIKE`."""
+def _alike(apart: Array, most: float) -> Array:
+    """Return the correlation of rows (blocks, m) with the next, from 0 to `most`."""
     squares = np.maximum(np.sum(apart**2, axis=0), 1e-300)
     alike = np.sum(apart[1:] * apart[:-1], axis=0) / squares
-    return np.asarray(np.clip(alike, 0.0, _MOST_ALIKE))
+    return np.asarray(np.clip(alike, 0.0, most))
 
 
 def pseudo_inverse(gram: Array) -> Array:

@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from cspm_ident.diagnosis.regression.block_gram import Evidence
 from cspm_ident.diagnosis.regression.block_regression import Gain, Sums
 from cspm_ident.diagnosis.regression.coefficients import Weights, at_once, values_of, weights_of
-from cspm_ident.diagnosis.regression.collinearity import UNTRUE_SHARE, freely_gained_at
+from cspm_ident.diagnosis.regression.collinearity import freely_gained_at
 from cspm_ident.diagnosis.regression.hypothesis import (
     Hypothesis,
     bounded,
@@ -25,12 +25,10 @@ from cspm_ident.diagnosis.regression.hypothesis import (
     parts_of,
 )
 from cspm_ident.diagnosis.residuals.regressors import Candidate, Place
+from cspm_ident.diagnosis.thresholds import Thresholds
 
 Array = NDArray[np.float64]
 Index = NDArray[np.intp]
-
-# Of the squares of columns, readings being as noisy as they are.
-_SAME = 0.9
 
 
 class Fits:
@@ -39,6 +37,11 @@ class Fits:
     def __init__(self, evidence: Evidence, sums: Sums) -> None:
         """Take both."""
         self.evidence, self.sums = evidence, sums
+
+    @property
+    def thresholds(self) -> Thresholds:
+        """Those of the sums."""
+        return self.sums.thresholds
 
     def columns(self, hypotheses: Iterable[Hypothesis]) -> Index:
         """Return indices of the nuisance and of some hypotheses' columns."""
@@ -126,6 +129,7 @@ class Fits:
         machine; what a constant leaves is a function of time.
         """
         taken = [self._taken(h, chosen) for h in chosen]
+        share = self.thresholds.model_form_error_share
         laws = [
             k
             for k, h in enumerate(chosen)
@@ -133,8 +137,7 @@ class Fits:
         ]
         return [
             all(
-                taken[k][place]
-                <= UNTRUE_SHARE * sum(max(0.0, taken[i][place]) for i in laws if i != k)
+                taken[k][place] <= share * sum(max(0.0, taken[i][place]) for i in laws if i != k)
                 for place in self.evidence.places_of(self.own_columns(h))
             )
             for k, h in enumerate(chosen)
@@ -172,7 +175,8 @@ class Fits:
     def _undecided(self, candidate: Candidate, weights: Array) -> Array:
         """Return by how much each weight may be off and decide nothing."""
         lengths = self.sums.lengths[self.evidence.columns_of([candidate])]
-        return np.asarray(np.sqrt(UNTRUE_SHARE) * np.linalg.norm(lengths * weights) / lengths)
+        share = np.sqrt(self.thresholds.model_form_error_share)
+        return np.asarray(share * np.linalg.norm(lengths * weights) / lengths)
 
     def are_early(self, hypotheses: Sequence[Hypothesis]) -> bool:
         """Return whether with them some readings would be newer than their stamps say."""
@@ -190,7 +194,8 @@ class Fits:
             return False
         known = np.concatenate([self.own_columns(h) for h in late])
         own = self.sums.spanned(self.columns([]), known, self.own_columns(hypothesis))
-        return bool(np.all(own > _SAME)) and self.are_early([*others, hypothesis])
+        same = bool(np.all(own > self.thresholds.timing_collinear_share))
+        return same and self.are_early([*others, hypothesis])
 
     def is_negligible(self, hypothesis: Hypothesis, chosen: Sequence[Hypothesis]) -> bool:
         """Return whether a sound machine has as much of it, so that it counts for no effect."""

@@ -9,17 +9,22 @@ import numpy as np
 from cspm_ident.diagnosis.regression.block_gram import gather
 from cspm_ident.diagnosis.regression.block_regression import Sums
 from cspm_ident.diagnosis.regression.coefficients import Weights, weights_of
-from cspm_ident.diagnosis.regression.collinearity import UNTRUE_SHARE
 from cspm_ident.diagnosis.residuals.drive_torque import time_constant
 from cspm_ident.diagnosis.residuals.regressors import Candidate, Place
 from cspm_ident.diagnosis.residuals.residual_equation import Equation, steady
+from cspm_ident.diagnosis.thresholds import DEFAULT_THRESHOLDS, Thresholds
 from cspm_model.robust_statistics import huber_fit
 from cspm_sim.effects import Channel
 
 Parts = Sequence[Sequence[Equation]]
 
 
-def of_shafts(weights: Weights, parts: Parts, block_s: float) -> Weights:
+def of_shafts(
+    weights: Weights,
+    parts: Parts,
+    block_s: float,
+    thresholds: Thresholds = DEFAULT_THRESHOLDS,
+) -> Weights:
     """Return the weights with those of winches' effects fitted to suit their rows.
 
     Near a reversal a shaft may stick, which no regressor of its speed says. Rows in which it turns
@@ -31,6 +36,7 @@ def of_shafts(weights: Weights, parts: Parts, block_s: float) -> Weights:
         weights: as found.
         parts: all rows, in units of their noise.
         block_s: length of the blocks [s].
+        thresholds: of intervals.
     """
     found = dict(weights)
     for winch in {e.place.element for part in parts for e in part if e.turning.any()}:
@@ -39,11 +45,11 @@ def of_shafts(weights: Weights, parts: Parts, block_s: float) -> Weights:
         if not own:
             continue
         rows = [[e.only(own) for e in part if e.place == place] for part in parts]
-        plain = _fitted(steady(rows), own, block_s)
-        calm = _fitted(_calmed(steady(rows), own), own, block_s)
+        plain = _fitted(steady(rows), own, block_s, thresholds)
+        calm = _fitted(_calmed(steady(rows), own), own, block_s, thresholds)
         # Rows that stand out are no noise: what they move is uncertain as well.
         safe = {c: (w, np.hypot(half, w - plain[c][0])) for c, (w, half) in calm.items()}
-        whole = _fitted(rows, own, block_s)
+        whole = _fitted(rows, own, block_s, thresholds)
         agree = all(np.all(np.abs(whole[c][0] - safe[c][0]) <= safe[c][1]) for c in own)
         found |= whole if agree else safe
     return found
@@ -83,7 +89,11 @@ def of_clocks(weights: Weights) -> Weights:
     return found
 
 
-def of_forms(weights: Weights, untrue: Mapping[Candidate, float]) -> Weights:
+def of_forms(
+    weights: Weights,
+    untrue: Mapping[Candidate, float],
+    thresholds: Thresholds = DEFAULT_THRESHOLDS,
+) -> Weights:
     """Return the weights, of which none is surer than the form of its law.
 
     Noise alone makes the interval of a straight line through a curve as narrow as one likes; what
@@ -93,10 +103,11 @@ def of_forms(weights: Weights, untrue: Mapping[Candidate, float]) -> Weights:
     Args:
         weights: as found.
         untrue: of each, by what share of its amplitude the law is seen to be off.
+        thresholds: `model_form_error_share`.
     """
-    found = dict(weights)
+    found, form_error = dict(weights), float(np.sqrt(thresholds.model_form_error_share))
     for candidate, (values, half) in weights.items():
-        least = 0.0 if candidate.effect.is_correction else np.sqrt(UNTRUE_SHARE)
+        least = 0.0 if candidate.effect.is_correction else form_error
         share = max(untrue[candidate], least)
         found[candidate] = values, np.hypot(half, share * np.abs(values))
     return found
@@ -127,9 +138,11 @@ def _reach(candidate: Candidate, parts: Parts) -> float:
     return max((min(1.0, 0.5 * float(np.ptp(own))) for own in rows if len(own)), default=0.0)
 
 
-def _fitted(parts: Parts, candidates: Sequence[Candidate], block_s: float) -> Weights:
+def _fitted(
+    parts: Parts, candidates: Sequence[Candidate], block_s: float, thresholds: Thresholds
+) -> Weights:
     evidence = gather(parts, block_s)
-    return weights_of(evidence, Sums(evidence), candidates)
+    return weights_of(evidence, Sums(evidence, thresholds), candidates)
 
 
 def _calmed(parts: Parts, candidates: Sequence[Candidate]) -> Parts:

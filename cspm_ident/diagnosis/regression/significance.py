@@ -13,13 +13,13 @@ from cspm_ident.diagnosis.regression.collinearity import chance
 from cspm_ident.diagnosis.regression.hypothesis import Hypothesis
 from cspm_ident.diagnosis.regression.joint_fit import Fits
 from cspm_ident.diagnosis.residuals.regressors import Candidate
+from cspm_ident.diagnosis.thresholds import DEFAULT_THRESHOLDS
 from cspm_sim.effects import Effect
 
 Index = NDArray[np.intp]
 
-# Less than this share of what is left of the residuals it acts on is not worth a word.
-MATERIAL_SHARE = 0.05
-FALSE_ALARMS = 0.01
+
+MATERIAL_SHARE = DEFAULT_THRESHOLDS.material_share
 
 
 class Sureness:
@@ -42,7 +42,8 @@ class Sureness:
             effect: of the candidate.
             known: how many others are told.
         """
-        return (1 + known) * FALSE_ALARMS / (self._tried[effect.id] * len(self._tried))
+        rate = self._fits.thresholds.false_alarm_rate
+        return (1 + known) * rate / (self._tried[effect.id] * len(self._tried))
 
     def share(self, base: Index, columns: Index) -> float:
         """Return the largest share of a place's squares that columns take beyond a base."""
@@ -53,9 +54,10 @@ class Sureness:
 
     def counts(self, base: Index, hypothesis: Hypothesis, gain: Gain, known: int = 0) -> bool:
         """Return whether a hypothesis is surely there beside a base and worth a word."""
+        own, least = self._fits.own_columns(hypothesis), self._fits.thresholds.material_share
         return (
             gain.total > 0.0
-            and self.share(base, self._evidence.columns_of(hypothesis.candidates)) >= MATERIAL_SHARE
+            and self.share(base, own) >= least
             and self._is_sure(base, hypothesis, known)
         )
 

@@ -17,8 +17,8 @@ from numpy.typing import NDArray
 
 from cspm_ident.diagnosis.regression.block_gram import Evidence
 from cspm_ident.diagnosis.regression.block_regression import Sums, behind, paired
-from cspm_ident.diagnosis.regression.collinearity import TIED
 from cspm_ident.diagnosis.residuals.regressors import Candidate
+from cspm_ident.diagnosis.thresholds import DEFAULT_THRESHOLDS, Thresholds
 from cspm_sim.effects import Effect
 
 Array = NDArray[np.float64]
@@ -80,7 +80,10 @@ def with_spectrum(effect: Effect, shape: Mapping[str, float], longest: float) ->
 
 
 def most_in_all(
-    evidence: Evidence, candidate: Candidate, others: Sequence[Candidate]
+    evidence: Evidence,
+    candidate: Candidate,
+    others: Sequence[Candidate],
+    thresholds: Thresholds = DEFAULT_THRESHOLDS,
 ) -> Array | None:
     """Return how large the sum of two parts may be, of all pairs that explain as well as the best.
 
@@ -91,14 +94,16 @@ def most_in_all(
         evidence: of columns about what was found, with the effect's spectrum.
         candidate: the part that was found.
         others: what else was.
+        thresholds: `tie_sigma`, and those of intervals.
     """
-    sums, base = Sums(evidence), evidence.with_nuisance(others)
+    sums, base = Sums(evidence, thresholds), evidence.with_nuisance(others)
     parts = [evidence.columns_of([c]) for c in _spectrum(evidence, candidate)]
     fitted = (_form(sums, base, np.concatenate(pair)) for pair in combinations(parts, 2))
     forms = [form for form in fitted if form is not None]
     left = sums.held_out(np.concatenate([base, evidence.columns_of([candidate])]))
     best = min([left, *(form.left for form in forms)], key=np.sum)
-    alike = [form for form in forms if behind(paired(form.left - best)) <= TIED]
+    most = thresholds.tie_sigma
+    alike = [form for form in forms if behind(paired(form.left - best)) <= most]
     return np.array([max(form.total + form.half for form in alike)]) if alike else None
 
 

@@ -9,6 +9,7 @@ from scipy.stats import t as t_distribution
 
 from cspm_ident.diagnosis.regression.block_gram import Evidence
 from cspm_ident.diagnosis.regression.block_regression import Sums
+from cspm_ident.diagnosis.thresholds import DEFAULT_THRESHOLDS, Thresholds
 
 Array = NDArray[np.float64]
 Index = NDArray[np.intp]
@@ -17,9 +18,9 @@ Index = NDArray[np.intp]
 class WhiteSums(Sums):
     """Sums that take each row for independent of all others, to show what blocks are good for."""
 
-    def __init__(self, evidence: Evidence) -> None:
+    def __init__(self, evidence: Evidence, thresholds: Thresholds = DEFAULT_THRESHOLDS) -> None:
         """Assemble the products, and count the rows."""
-        super().__init__(evidence)
+        super().__init__(evidence, thresholds)
         self._rows = int(sum(place.rows.sum() for place in evidence.places))
 
     def covariance(self, base: Index, columns: Index) -> Array:

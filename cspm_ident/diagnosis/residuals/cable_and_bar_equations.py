@@ -26,6 +26,7 @@ from cspm_ident.diagnosis.residuals.sensor_readings import (
     small_step,
 )
 from cspm_ident.diagnosis.residuals.virtual_load_cell import DrawnTension
+from cspm_ident.diagnosis.thresholds import DEFAULT_THRESHOLDS, Thresholds
 from cspm_ident.signals.measurement import TENSION, WINCHES, Measurement
 from cspm_ident.signals.timeline import Timeline
 from cspm_ident.winch.weak_form import Make, maker, weigh
@@ -41,8 +42,6 @@ Array = NDArray[np.float64]
 
 # As far as smoothing spreads a torque that was lost.
 _SPREAD_S = 0.1
-# Of an acceleration's square: what has to be common to tensions and poses.
-_COMMON = 0.7
 _TENSION = "tension [N]"
 _DRIVERS = {
     _TENSION: CableSignal.TENSION,
@@ -60,6 +59,7 @@ def suspension_equations(
     knots: Knots | None = None,
     *,
     drawn: DrawnTension | None = None,
+    thresholds: Thresholds = DEFAULT_THRESHOLDS,
 ) -> list[Equation]:
     """Return the equations of all cables and of the bar, one set for each stretch without hole.
 
@@ -71,20 +71,25 @@ def suspension_equations(
         known: effects that the test-bed file has.
         knots: of the free functions; None: without these.
         drawn: where no load cell but torques told the tensions.
+        thresholds: those of residuals.
     """
     measured = timeline.measurement
-    make, dofs = maker(measured.pointwise), moving(measured.bar_pose)
+    make = maker(measured.pointwise)
+    dofs = moving(measured.bar_pose, thresholds.moving_pose_noise_ratio)
     return [
         equation.compact
         for stretch in machine_signals(timeline)
         for equation in _Stretch(
-            stretch, measured.machine, timeline.pose_band, make, dofs, drawn=drawn
+            stretch, measured.machine, timeline.pose_band, make, dofs, thresholds, drawn=drawn
         ).equations(effects, known, knots)
     ]
 
 
 def fine_equations(
-    stretches: Sequence[MachineSignals], measurement: Measurement, known: Sequence[Action]
+    stretches: Sequence[MachineSignals],
+    measurement: Measurement,
+    known: Sequence[Action],
+    thresholds: Thresholds,
 ) -> list[Equation]:
     """Return the equations under the shortest windows, whatever the noise, without columns.
 
@@ -92,14 +97,15 @@ def fine_equations(
         stretches: signals without hole.
         measurement: which they are of.
         known: effects that the test-bed file has.
+        thresholds: those of residuals.
     """
     make = maker(measurement.pointwise)
     return [
         equation
         for stretch in stretches
-        for equation in _Stretch(stretch, measurement.machine, None, make, ()).equations(
-            (), known, None
-        )
+        for equation in _Stretch(
+            stretch, measurement.machine, None, make, (), thresholds
+        ).equations((), known, None)
     ]
 
 
@@ -113,6 +119,7 @@ class _Stretch:
         band: float | None,
         make: Make,
         dofs: Sequence[str],
+        thresholds: Thresholds,
         *,
         drawn: DrawnTension | None = None,
     ) -> None:
@@ -120,7 +127,7 @@ class _Stretch:
 
         Without a band windows are the shortest. Tensions may be drawn from the winches' torques.
         """
-        self._drawn = drawn
+        self._drawn, self._thresholds = drawn, thresholds
         self._signals, self._machine, self._dofs = signals, machine, dofs
         self._parameters: PlantParameters = nominal_parameters(machine)
         self._here = Suspension(signals, machine, self._parameters)
@@ -174,7 +181,9 @@ class _Stretch:
             columns = columns | knots.columns(place, drivers)
         target, start = weighed(missing), weighed(self._here.start_column(i))
         drawn, at = self._drawn, self._signals.times
-        untold = [] if drawn is None else [weighed(each) for each in drawn.untold(i, at)]
+        untold = (
+            [] if drawn is None else [weighed(e) for e in drawn.untold(i, at, self._thresholds)]
+        )
         # Of the order of its noise also where a fold that is left out holds the whole stretch.
         target = target - start * (start @ target) / (start @ start)
         return Equation(
@@ -203,9 +212,10 @@ class _Stretch:
         if self._drawn is None:
             return equation
         drawn, here, at = self._drawn, self._here, self._signals.times
+        limits = self._thresholds
         every = range(len(self._machine.cables))
         late = np.asarray(sum(here.pulled(i, drawn.late(i, at)) for i in every))
-        free = [late, *(here.pulled(i, drawn.turning(i, at)) for i in every)]
+        free = [late, *(here.pulled(i, drawn.turning(i, at, limits)) for i in every)]
         nuisance = np.stack([weighed(each) for each in free], axis=2)
         return replace(equation, nuisance=nuisance, shared=len(free))
 
@@ -294,7 +304,8 @@ class _Stretch:
         common = np.einsum("kij,kij->j", by_tension, by_pose)
         told, posed = (np.sum(way**2, axis=(0, 1)) for way in (by_tension, by_pose))
         quieter = np.where(told <= posed, ways[0], ways[1])
-        return np.where(common >= _COMMON * np.minimum(told, posed), quieter, 0.0)
+        least = self._thresholds.common_acceleration_share * np.minimum(told, posed)
+        return np.where(common >= least, quieter, 0.0)
 
     def _read(self, effect: Effect, i: int, name: str) -> Iterator[tuple[Place, Array]]:
         """Yield how a sensor's fault changes the weighed residuals, by differences of readings."""

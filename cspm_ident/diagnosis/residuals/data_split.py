@@ -7,12 +7,9 @@ from collections.abc import Sequence
 import numpy as np
 
 from cspm_ident.diagnosis.residuals.residual_equation import Equation
+from cspm_ident.diagnosis.thresholds import DEFAULT_THRESHOLDS, Thresholds
 
 Parts = Sequence[Sequence[Equation]]
-
-# Of a recording that has to serve as its own held-out data.
-SEARCHED_SHARE = 0.7
-GAP_SHARE = 0.02
 
 
 def whole_part(parts: Parts) -> Parts:
@@ -20,19 +17,25 @@ def whole_part(parts: Parts) -> Parts:
     return parts
 
 
-def first_part(parts: Sequence[Sequence[Equation]]) -> list[list[Equation]]:
+def first_part(
+    parts: Sequence[Sequence[Equation]], thresholds: Thresholds = DEFAULT_THRESHOLDS
+) -> list[list[Equation]]:
     """Return what is searched where nothing else is held out."""
-    return [[e.within(-np.inf, _cut(part, 0.0)) for e in part] for part in parts]
+    share = thresholds.searched_share
+    return [[e.within(-np.inf, _cut(part, share)) for e in part] for part in parts]
 
 
-def last_part(parts: Sequence[Sequence[Equation]]) -> list[list[Equation]]:
+def last_part(
+    parts: Sequence[Sequence[Equation]], thresholds: Thresholds = DEFAULT_THRESHOLDS
+) -> list[list[Equation]]:
     """Return the rest, after a gap."""
-    return [[e.within(_cut(part, GAP_SHARE), np.inf) for e in part] for part in parts]
+    share = thresholds.searched_share + thresholds.gap_share
+    return [[e.within(_cut(part, share), np.inf) for e in part] for part in parts]
 
 
-def _cut(equations: Sequence[Equation], beyond: float) -> float:
+def _cut(equations: Sequence[Equation], share: float) -> float:
     start, end = span_of(equations)
-    return start + (SEARCHED_SHARE + beyond) * (end - start)
+    return start + share * (end - start)
 
 
 def span_of(equations: Sequence[Equation]) -> tuple[float, float]:

@@ -8,6 +8,7 @@ from numpy.typing import NDArray
 from cspm_ident.diagnosis.residuals.corrected_measurement import settled
 from cspm_ident.diagnosis.residuals.residual_equation import Equation
 from cspm_ident.diagnosis.residuals.winch_torque import PULL, SPEED, shaft_equations
+from cspm_ident.diagnosis.thresholds import DEFAULT_THRESHOLDS, Thresholds
 from cspm_ident.estimation import Parameter, Record, fit_linear
 from cspm_ident.signals.clock_drift import ClockDrift, without_drifts
 from cspm_ident.signals.measurement import TENSION, Measurement
@@ -16,16 +17,16 @@ from cspm_sim.effects import Effect, Elements, catalogue
 
 Array = NDArray[np.float64]
 
-# Of clocks that nothing disciplines; what runs away faster is a fault.
-_SOUND = 2.5e-5
-# What clocks do to a rope's torque in a recording is no more than this is long [s].
-_LEAST_S = 2e-6
+# Scale of the drift in its fit.
+_SCALE = 2.5e-5
 _NOTHING, _RANK = 1e-300, 1e-9
 # Rows that tell a drift beside the rest.
 _FEWEST = 16
 
 
-def on_drives_clock(measurement: Measurement) -> Measurement:
+def on_drives_clock(
+    measurement: Measurement, thresholds: Thresholds = DEFAULT_THRESHOLDS
+) -> Measurement:
     """Return a rig's measurement with stamps of load cells that drift no more.
 
     What is late at the beginning stays. Where a bar hangs on the cables tensions change too slowly
@@ -33,13 +34,15 @@ def on_drives_clock(measurement: Measurement) -> Measurement:
     """
     if measurement.machine.bar is not None or measurement.tension is None:
         return measurement
-    drift = cell_drift(measurement)
-    if drift is None or not _is_sound(drift):
+    drift = cell_drift(measurement, thresholds)
+    if drift is None or not _is_sound(drift, thresholds):
         return measurement
     return without_drifts(measurement, [drift])
 
 
-def cell_drift(measurement: Measurement) -> ClockDrift | None:
+def cell_drift(
+    measurement: Measurement, thresholds: Thresholds = DEFAULT_THRESHOLDS
+) -> ClockDrift | None:
     """Return how fast load cells become late in the winches' torque equations, None without any.
 
     Late readings miss lateness times the rate of the tension. Beside it all are late by as much
@@ -47,12 +50,13 @@ def cell_drift(measurement: Measurement) -> ClockDrift | None:
     """
     own = settled(measurement)
     names = own.machine.cable_names
-    equations = shaft_equations(own, [_lateness()], read_actions(own.machine), None, names)
+    late, known = [_lateness()], read_actions(own.machine)
+    equations = shaft_equations(own, late, known, None, names, thresholds)
     rows = [each.steady for each in equations]
     records = [_record(each) for each in rows if len(each.times) >= _FEWEST]
     if not records:
         return None
-    estimate = fit_linear(records, [Parameter("drift", "1", scale=_SOUND)], whiten=False).estimate
+    estimate = fit_linear(records, [Parameter("drift", "1", scale=_SCALE)], whiten=False).estimate
     low, high = estimate.ci95[0]
     rate = float(estimate.values[0])
     return ClockDrift(TENSION, rate, (float(low), float(high)), measurement.duration)
@@ -75,7 +79,8 @@ def _record(equation: Equation) -> Record:
     return Record(left[:, :1], left[:, 1:])
 
 
-def _is_sound(drift: ClockDrift) -> bool:
+def _is_sound(drift: ClockDrift, thresholds: Thresholds) -> bool:
     low, high = drift.interval
-    told = not low <= 0.0 <= high and abs(drift.rate) * drift.apart > _LEAST_S
-    return told and abs(drift.rate) <= _SOUND
+    least = thresholds.least_clock_shift_s
+    told = not low <= 0.0 <= high and abs(drift.rate) * drift.apart > least
+    return told and abs(drift.rate) <= thresholds.healthy_clock_drift

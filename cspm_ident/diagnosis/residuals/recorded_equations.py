@@ -16,6 +16,7 @@ from cspm_ident.diagnosis.residuals.regressors import Candidate
 from cspm_ident.diagnosis.residuals.residual_equation import Equation
 from cspm_ident.diagnosis.residuals.virtual_load_cell import drawn_tension
 from cspm_ident.diagnosis.residuals.winch_torque import shaft_equations
+from cspm_ident.diagnosis.thresholds import DEFAULT_THRESHOLDS, Thresholds
 from cspm_ident.signals.measurement import Measurement
 from cspm_ident.signals.timeline import Timeline
 from cspm_sim.effect_entries import read_actions
@@ -31,6 +32,7 @@ def equations_of(
     progress: Callable[[str], None] = lambda _: None,
     touched: Sequence[Candidate] | None = None,
     supposed: Mapping[Candidate, Array] = MappingProxyType({}),
+    thresholds: Thresholds = DEFAULT_THRESHOLDS,
 ) -> list[Equation]:
     """Return every residual that the sensors allow, less what the machine's effects add.
 
@@ -42,6 +44,7 @@ def equations_of(
         touched: by these; other winches, and cables and bar if need be, may be left out.
         supposed: weights about which residuals are taken to first order, where tensions are drawn
             from torques that the faults of winches add to. They stay in the residuals.
+        thresholds: those of residuals.
 
     Raises:
         InputError: the machine's effects cannot be used.
@@ -56,10 +59,12 @@ def equations_of(
         drawn = None if measurement.tension else drawn_tension(measurement, known)
         drawn = drawn and drawn.less(supposed)
         told = measurement if drawn is None else drawn.measurement
-        late = suspension_equations(Timeline(told), effects, known, knots, drawn=drawn)
+        late = suspension_equations(
+            Timeline(told), effects, known, knots, drawn=drawn, thresholds=thresholds
+        )
     progress("torque equations of the winches")
     found = drive_equations(measurement, effects, known, knots)
-    found += shaft_equations(measurement, effects, known, knots, winches)
+    found += shaft_equations(measurement, effects, known, knots, winches, thresholds)
     return found + late
 
 

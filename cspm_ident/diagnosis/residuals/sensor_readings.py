@@ -12,9 +12,6 @@ from cspm_sim.effects.signals import ReadingSignal
 
 Array = NDArray[np.float64]
 
-# Of what differs from reading to reading; coloured noise alone spreads by 1.2 to 1.5 of it.
-_MOVES = 2.5
-
 
 def reading_rows(times: Array, values: Array) -> Array:
     """Return `ReadingSignal` columns of readings (k,) at times (k,) [s]."""
@@ -30,12 +27,12 @@ def pose_rows(times: Array, poses: Array, rates: Array) -> Array:
     return np.column_stack([times, poses, rates])
 
 
-def moving(poses: Samples | None) -> list[str]:
+def moving(poses: Samples | None, noise_ratio: float) -> list[str]:
     """Return the coordinates that move by more than their noise, which the residual has as well."""
     if poses is None or len(poses.times) < 5:
         return []
     spread, noise = poses.values.std(axis=0), difference_noise(poses.values)
-    return [dof for dof, moves in zip(DOFS, spread > _MOVES * noise, strict=True) if moves]
+    return [dof for dof, moves in zip(DOFS, spread > noise_ratio * noise, strict=True) if moves]
 
 
 _READING_STEP = 1e-6  # m, rad or N

@@ -20,25 +20,17 @@ from cspm_ident.diagnosis.residuals.corrected_measurement import as_found
 from cspm_ident.diagnosis.residuals.machine_signals import MachineSignals, machine_signals
 from cspm_ident.diagnosis.residuals.regressors import Candidate, Place
 from cspm_ident.diagnosis.residuals.residual_equation import Equation
+from cspm_ident.diagnosis.thresholds import DEFAULT_THRESHOLDS, Thresholds
 from cspm_ident.signals.measurement import Measurement
 from cspm_ident.signals.timeline import Timeline
 from cspm_sim.effect_entries import read_actions
 
 Array = NDArray[np.float64]
 
-HIGHEST_HZ = 10.0
-# Of the squares of angles and poses: what lies above so much is not driven.
-_DRIVEN_SHARE = 0.99
-# Times the median of a spectrum: below that is noise.
-_ABOVE_NOISE = 10.0
-_FALSE_ALARMS = 1e-3
 # Of frequencies beside a line, whose median is what noise has there.
 _BESIDE = 101
 # In which a force from outside keeps phase and size; what rings down does not.
 _PIECES = 8
-_COHERENCE = 0.8
-# Lines closer to one another are one.
-_ONE_HZ = 0.1
 
 
 class Line(NamedTuple):
@@ -60,48 +52,62 @@ class Line(NamedTuple):
     chance: float
     alternates: bool = False
 
-    def is_same(self, other: Line) -> bool:
+    def is_same(self, other: Line, thresholds: Thresholds = DEFAULT_THRESHOLDS) -> bool:
         """Return whether two lines are one, found twice."""
-        return self.place == other.place and abs(self.frequency - other.frequency) <= _ONE_HZ
+        near = abs(self.frequency - other.frequency) <= thresholds.line_width_hz
+        return self.place == other.place and near
 
 
-def lines_of(measurement: Measurement, weights: Mapping[Candidate, Array]) -> tuple[Line, ...]:
+def lines_of(
+    measurement: Measurement,
+    weights: Mapping[Candidate, Array],
+    thresholds: Thresholds = DEFAULT_THRESHOLDS,
+) -> tuple[Line, ...]:
     """Return the lines that a recording's bar and cables have beyond what was found, best first.
 
     Args:
         measurement: what was recorded.
         weights: of what was found.
+        thresholds: those of lines.
     """
     fitted = as_found(measurement, weights)
-    stretches = machine_signals(Timeline(fitted, pose_band=HIGHEST_HZ))
-    equations = fine_equations(stretches, fitted, read_actions(fitted.machine))
-    lowest = _driven_up_to(stretches)
+    stretches = machine_signals(Timeline(fitted, pose_band=thresholds.line_highest_hz))
+    equations = fine_equations(stretches, fitted, read_actions(fitted.machine), thresholds)
+    lowest = _driven_up_to(stretches, thresholds)
     series = [(e.place, c, e.times, e.target[:, c]) for e in equations for c in _channels(e)]
     found = [
-        line for each in series if (line := highest_line(*each, lowest, len(series))) is not None
+        line
+        for each in series
+        if (line := highest_line(*each, lowest, len(series), thresholds)) is not None
     ]
-    return tuple(_apart(sorted(found, key=lambda line: line.chance)))
+    return tuple(_apart(sorted(found, key=lambda line: line.chance), thresholds))
 
 
 def _channels(equation: Equation) -> range:
     return range(equation.target.shape[1])
 
 
-def _driven_up_to(stretches: Sequence[MachineSignals]) -> float:
+def _driven_up_to(stretches: Sequence[MachineSignals], thresholds: Thresholds) -> float:
     """Return the frequency above which neither winches nor frame are moved [Hz]."""
     highest = 0.0
     for signals in stretches:
         for moved in (signals.frame.poses, signals.angles):
             frequencies, power = periodogram(moved, 1.0 / signals.step, "hann", axis=0)
-            power[power < _ABOVE_NOISE * np.median(power, axis=0)] = 0.0
+            power[power < thresholds.line_noise_ratio * np.median(power, axis=0)] = 0.0
             summed = np.cumsum(power.sum(axis=1))
-            edge = np.searchsorted(summed, _DRIVEN_SHARE * summed[-1])
+            edge = np.searchsorted(summed, thresholds.line_driven_share * summed[-1])
             highest = max(highest, float(frequencies[edge]))
     return highest
 
 
 def highest_line(
-    place: Place, channel: int, times: Array, values: Array, lowest: float, tried: int
+    place: Place,
+    channel: int,
+    times: Array,
+    values: Array,
+    lowest: float,
+    tried: int,
+    thresholds: Thresholds = DEFAULT_THRESHOLDS,
 ) -> Line | None:
     """Return a series' highest line, if noise hardly makes one as high and it keeps its phase.
 
@@ -112,21 +118,22 @@ def highest_line(
         values: (k,).
         lowest: frequency above which to look [Hz].
         tried: how many series are looked at.
+        thresholds: those of lines.
     """
     frequencies, power = periodogram(
         values, 1.0 / float(np.median(np.diff(times))), "hann", detrend="linear"
     )
     floor = median_filter(power, _BESIDE, mode="nearest") / np.log(2.0)
-    looked = (frequencies > lowest) & (frequencies < HIGHEST_HZ)
+    looked = (frequencies > lowest) & (frequencies < thresholds.line_highest_hz)
     if not looked.any():
         return None
     height = np.where(looked, power / np.maximum(floor, 1e-300), 0.0)
     best = int(np.argmax(height))
     chance = float(np.exp(-height[best])) * int(looked.sum()) * tried
-    if chance > _FALSE_ALARMS:
+    if chance > thresholds.line_false_alarm_rate:
         return None
     frequency = _refined(times, values, float(frequencies[best]), float(frequencies[1]))
-    if _coherence(times, values, frequency) < _COHERENCE:
+    if _coherence(times, values, frequency) < thresholds.line_coherence:
         return None
     amplitude = 2.0 * abs(_demodulated(times, values, frequency))
     return Line(place, channel, frequency, amplitude, chance)
@@ -151,11 +158,11 @@ def _coherence(times: Array, values: Array, frequency: float) -> float:
     return float(abs(found.mean()) ** 2 / np.mean(np.abs(found) ** 2))
 
 
-def _apart(lines: Iterable[Line]) -> Iterable[Line]:
+def _apart(lines: Iterable[Line], thresholds: Thresholds) -> Iterable[Line]:
     """Yield of lines of the same frequency in one residual the most certain."""
     kept: list[Line] = []
     for line in lines:
-        if not any(line.is_same(other) for other in kept):
+        if not any(line.is_same(other, thresholds) for other in kept):
             kept.append(line)
             yield line
 

@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from scipy.ndimage import minimum_filter1d
 
 from cspm_ident.diagnosis.residuals.regressors import Candidate, shapes_of
-from cspm_ident.diagnosis.residuals.winch_torque import STILL_SHARE
+from cspm_ident.diagnosis.thresholds import DEFAULT_THRESHOLDS, Thresholds
 from cspm_ident.signals.measurement import Measurement
 from cspm_ident.signals.samples import Samples
 from cspm_ident.signals.smoothing import filtered, smooth
@@ -109,7 +109,7 @@ class DrawnTension:
         torque = self._smooth(rows[:, [WinchSignal.TORQUE]], times)[:, 0]
         return np.asarray(np.gradient(torque, times) / rows[0, WinchSignal.RADIUS])
 
-    def turning(self, i: int, times: Array) -> Array:
+    def turning(self, i: int, times: Array, thresholds: Thresholds = DEFAULT_THRESHOLDS) -> Array:
         """Return what dry friction adds to the tension while the shaft turns round, shape (k,).
 
         By the newton metre of it. The shaft may stick there, and then holds with any torque.
@@ -117,18 +117,21 @@ class DrawnTension:
         rows = self._rows[i]
         speeds = rows[:, WinchSignal.SPEED]
         width = 2 * round(HALF_WIDTH_S / float(np.median(np.diff(self.times)))) + 1
-        near = minimum_filter1d(np.abs(speeds), width) < STILL_SHARE * np.sqrt(np.mean(speeds**2))
+        slow = thresholds.reversal_speed_share * np.sqrt(np.mean(speeds**2))
+        near = minimum_filter1d(np.abs(speeds), width) < slow
         held = near * np.sign(speeds) / rows[:, WinchSignal.RADIUS]
         return self._smooth(held[:, None], times)[:, 0]
 
-    def untold(self, i: int, times: Array) -> list[Array]:
+    def untold(
+        self, i: int, times: Array, thresholds: Thresholds = DEFAULT_THRESHOLDS
+    ) -> list[Array]:
         """Return what no recording tells of winch i's tension, each of shape (len(times),).
 
         What its shaft holds while it turns round, and of a drive of which nothing is known how late
         it tells its torque.
         """
         late = [] if self.measurement.torque_age > 0.0 else [self.late(i, times)]
-        return [self.turning(i, times), *late]
+        return [self.turning(i, times, thresholds), *late]
 
     @cached_property
     def _rows(self) -> list[Array]:

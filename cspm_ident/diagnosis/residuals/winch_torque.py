@@ -11,6 +11,7 @@ from cspm_ident.diagnosis.residuals.free_shapes import Driver, Knots
 from cspm_ident.diagnosis.residuals.regressors import Candidate, Place, elements_of, shapes_of
 from cspm_ident.diagnosis.residuals.residual_equation import Equation
 from cspm_ident.diagnosis.residuals.sensor_readings import reading_rows
+from cspm_ident.diagnosis.thresholds import DEFAULT_THRESHOLDS, Thresholds
 from cspm_ident.signals.measurement import TENSION, WINCHES, Measurement
 from cspm_ident.signals.samples import Samples
 from cspm_ident.signals.winch_motion import winch_motion
@@ -24,9 +25,7 @@ from cspm_sim.effects.signals import WinchSignal
 
 Array = NDArray[np.float64]
 
-# Of the usual speed: below it a shaft may stick, and its direction is noise.
-STILL_SHARE = 0.05
-_MOVES = 3.0
+# Encoder noise is taken for no less than this.
 _STEP_RAD = 1e-6
 SPEED, PULL = "speed [rad/s]", "tension [N]"
 _DRIVERS = {
@@ -43,6 +42,7 @@ def shaft_equations(
     known: Sequence[Action],
     knots: Knots | None,
     winches: Collection[str],
+    thresholds: Thresholds = DEFAULT_THRESHOLDS,
 ) -> list[Equation]:
     """Return the equation of every winch, of those asked for, whose signals were recorded.
 
@@ -55,6 +55,7 @@ def shaft_equations(
         known: effects that the test-bed file has.
         knots: of the free functions; None: without these.
         winches: names of those asked for.
+        thresholds: `moving_shaft_noise_ratio` and `reversal_speed_share`.
     """
     found: list[Equation] = []
     for i, cable in enumerate(measurement.machine.cables):
@@ -70,21 +71,22 @@ def shaft_equations(
                 rows[:, WinchSignal.ANGLE] = moved.angles[:, 0]
                 rows[:, WinchSignal.SPEED] = moved.speeds[:, 0]
             half = max(2, round(HALF_WIDTH_S / signals.angle.interval))
-            if len(rows) < 2 * half + 1 or not _turns(rows[:, WinchSignal.ANGLE], signals.angle):
+            angles, ratio = rows[:, WinchSignal.ANGLE], thresholds.moving_shaft_noise_ratio
+            if len(rows) < 2 * half + 1 or not _turns(angles, signals.angle, ratio):
                 continue
             sensors = (WINCHES,) if signals.tension is None else (WINCHES, TENSION)
             lost = _lost(signals.torque, measurement.torque_age, times)
-            make = maker(measurement.pointwise)
-            table = _Shaft(rows, cable, half, times, lost, sensors, make)
+            make, still = maker(measurement.pointwise), thresholds.reversal_speed_share
+            table = _Shaft(rows, cable, half, times, lost, sensors, make, still)
             own = [action for action in known if action.element == i]
             found.append(table.equation(effects, own, knots).compact)
     return found
 
 
-def _turns(angles: Array, samples: Samples) -> bool:
+def _turns(angles: Array, samples: Samples, ratio: float) -> bool:
     """Return whether a shaft moves by more than its encoder's noise; a brake takes any torque."""
     noise = float(np.std(samples.values[:, 0] - np.interp(samples.times, *_halves(samples))))
-    return bool(np.std(angles) > _MOVES * max(noise, _STEP_RAD))
+    return bool(np.std(angles) > ratio * max(noise, _STEP_RAD))
 
 
 def _halves(samples: Samples) -> tuple[Array, Array]:
@@ -110,6 +112,7 @@ class _Shaft:
         lost: NDArray[np.bool_],
         sensors: tuple[str, ...],
         make: Make,
+        still_share: float,
     ) -> None:
         self._sensors, inertia, name = sensors, winch.rotor_inertia, winch.name
         self._rows, self._inertia, self._name = rows, inertia, name
@@ -118,7 +121,7 @@ class _Shaft:
         speed = np.abs(rows[:, WinchSignal.SPEED])
         view, width = np.lib.stride_tricks.sliding_window_view, len(self._window.weights)
         windows = view(speed, width)[:: self._stride]
-        slow = STILL_SHARE * np.sqrt(np.mean(speed**2))
+        slow = still_share * np.sqrt(np.mean(speed**2))
         whole = ~view(lost, width)[:: self._stride].any(axis=1)
         self._moving = (windows.max(axis=1) >= slow) & whole
         self._turning = windows.min(axis=1)[self._moving] < slow

@@ -7,9 +7,6 @@ from collections.abc import Iterator, Sequence
 import numpy as np
 
 from cspm_ident.diagnosis.regression.collinearity import (
-    RIVAL_SHARE,
-    TIED,
-    UNTRUE_SHARE,
     contains,
     distance,
     freely_gained,
@@ -44,7 +41,8 @@ def alternatives_of(
     reference = fits.held_out(hypothesis, base)
     gained = float(np.sum(sums.held_out(base) - reference))
     free_gain = freely_gained(fits.evidence, sums, base, own)
-    undecided = max(UNTRUE_SHARE * gained, free_gain)
+    limits = fits.thresholds
+    undecided = max(limits.model_form_error_share * gained, free_gain)
     for rival, *beside in _alike(fits, free, hypothesis, others):
         supposed = [rival, *beside]
         columns = fits.evidence.columns_of(c for h in supposed for c in h.candidates)
@@ -54,10 +52,10 @@ def alternatives_of(
             continue
         with sums.delayed(np.setdiff1d(columns, own), hypothesis.onset):
             worse = fits.held_out(rival, fits.beside(base, *beside)) - reference
-        if worse.sum() > RIVAL_SHARE * gained:
+        if worse.sum() > limits.rival_gain_share * gained:
             continue
-        apart = distance(worse, undecided, wider)
-        if apart <= TIED:
+        apart = distance(worse, undecided, wider, limits)
+        if apart <= limits.tie_sigma:
             yield Rival(rival, apart, *beside)
 
 

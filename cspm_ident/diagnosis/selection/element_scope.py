@@ -17,9 +17,6 @@ from cspm_ident.diagnosis.residuals.regressors import Candidate
 Array = NDArray[np.float64]
 Index = NDArray[np.intp]
 
-# Half intervals within which one of several numbers may lie from that of all.
-_AGREES = 1.5
-
 
 class Scopes:
     """Hypotheses of one effect on more elements, or on fewer."""
@@ -61,7 +58,7 @@ class Scopes:
         if not there.any():
             return hypothesis
         kept = replace(hypothesis, candidates=tuple(compress(members, there)))
-        if is_spread(kept, self._everywhere(hypothesis)):
+        if is_spread(kept, self._everywhere(hypothesis), self._fits.thresholds):
             there |= np.all(np.abs(each - np.median(each[there], axis=0)) <= half, axis=1)
         kept = replace(hypothesis, candidates=tuple(compress(members, there)))
         gone = replace(hypothesis, candidates=tuple(compress(members, ~there)))
@@ -77,7 +74,7 @@ class Scopes:
         each, half = self._each(hypothesis, base)
         sums, kept, own = self._fits.shared(base, hypothesis)
         same = sums.weights(np.concatenate([kept, own]))[len(kept) :]
-        near = np.abs(each - same) <= _AGREES * half
+        near = np.abs(each - same) <= self._fits.thresholds.agreement_half_widths * half
         there = np.any(np.abs(each) > half, axis=1)
         return bool(np.all(near) and np.count_nonzero(there) > 1)
 

@@ -16,9 +16,6 @@ from cspm_ident.diagnosis.residuals.regressors import Candidate
 Index = NDArray[np.intp]
 Pair = tuple[Hypothesis, Hypothesis]
 
-# That are worth a closer look.
-_MOST = 8
-
 
 def best_pairs(
     evidence: Evidence, sums: Sums, base: Index, free: Sequence[Candidate]
@@ -35,7 +32,8 @@ def best_pairs(
     own = sorted(best.values(), key=lambda candidate: candidate.element)
     pairs = [pair for pair in combinations(own, 2) if pair[0].element == pair[1].element]
     gains = sums.gains_beyond(base, [evidence.columns_of(pair) for pair in pairs])
+    most = sums.thresholds.screened_pairs
     return [
         (Hypothesis(one.effect, (one,)), Hypothesis(other.effect, (other,)))
-        for one, other in (pairs[k] for k in np.argsort(-gains)[:_MOST])
+        for one, other in (pairs[k] for k in np.argsort(-gains)[:most])
     ]

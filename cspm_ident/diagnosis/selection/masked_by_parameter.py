@@ -15,13 +15,6 @@ from cspm_ident.diagnosis.residuals.regressors import Candidate
 
 Index = NDArray[np.intp]
 
-# Of the gain: what two things leave of it is no more than models are untrue by.
-_ALIKE = 0.99
-# Of the squares: what the number has to be like in the residual in which the finding shows most.
-_SAME = 0.99
-# Above which either of the two may as well be absent.
-_NEEDLESS = 0.01
-
 
 def absorbed_pairs(
     evidence: Evidence,
@@ -54,14 +47,14 @@ def absorbed_pairs(
     own = evidence.columns_of(hypothesis.candidates)
     gained = float(sums.gains_beyond(base, [own])[0])
     shows = _most(evidence, sums, base, own)
-    most = (1.0 - _SAME) * _left(shows, base, own)
+    most = (1.0 - sums.thresholds.masked_collinear_share) * _left(shows, base, own)
     beside = {n: np.concatenate([base, evidence.columns_of([n])]) for n in numbers}
     hiding = [n for n in numbers if _left(shows, beside[n], own) <= most]
     pairs = list(product(effects, hiding))
     gains = sums.gains_beyond(base, [evidence.columns_of(pair) for pair in pairs])
     best: dict[tuple[str, str], tuple[Candidate, Candidate]] = {}
     for k in np.argsort(-gains):
-        if gains[k] >= _ALIKE * gained:
+        if gains[k] >= sums.thresholds.masked_gain_share * gained:
             effect, number = pairs[k]
             best.setdefault((effect.effect_id, number.effect_id), pairs[k])
     return [
@@ -96,6 +89,6 @@ def _needed(evidence: Evidence, sums: Sums, base: Index, one: Candidate, other: 
     """Return whether neither of two explains as much without the other."""
     first, second = evidence.columns_of([one]), evidence.columns_of([other])
     return all(
-        sums.p_value(np.concatenate([base, beside]), own) < _NEEDLESS
+        sums.p_value(np.concatenate([base, beside]), own) < sums.thresholds.masked_significance
         for beside, own in ((first, second), (second, first))
     )

@@ -8,7 +8,6 @@ from itertools import combinations
 import numpy as np
 
 from cspm_ident.diagnosis.regression.block_regression import gain_of
-from cspm_ident.diagnosis.regression.collinearity import TIED, UNTRUE_SHARE
 from cspm_ident.diagnosis.regression.hypothesis import Hypothesis, freedom
 from cspm_ident.diagnosis.regression.joint_fit import Fits
 from cspm_ident.diagnosis.regression.significance import Sureness
@@ -41,7 +40,7 @@ def one_instead(
         others = [h for h in chosen if h not in few]
         base = fits.columns(others)
         gained = gain_of(fits.sums.held_out(base) - left)
-        undecided = UNTRUE_SHARE * gained.total
+        undecided = fits.thresholds.model_form_error_share * gained.total
         together = np.concatenate([fits.own_columns(h) for h in few])
         *gains, most = fits.sums.gains_beyond(base, [*columns, together])
         for k in np.argsort(gains)[::-1]:
@@ -50,7 +49,8 @@ def one_instead(
             less = gain_of(fits.sums.held_out(np.concatenate([base, columns[k]])) - left)
             wider = freedom(singles[k]) - sum(map(freedom, few))
             # A further fault counts for a number, which `freedom` knows of a single finding.
-            allowed = min(undecided, TIED * less.error) if wider < 0 else 0.0
+            noise = fits.thresholds.tie_sigma * less.error
+            allowed = min(undecided, noise) if wider < 0 else 0.0
             if (
                 wider < len(few)
                 and less.total <= allowed

@@ -10,14 +10,13 @@ from numpy.typing import NDArray
 
 from cspm_ident.diagnosis.regression.block_gram import gather
 from cspm_ident.diagnosis.regression.block_regression import Sums
-from cspm_ident.diagnosis.regression.collinearity import SIMPLER_SHARE
 from cspm_ident.diagnosis.residuals.regressors import Candidate
 from cspm_ident.diagnosis.residuals.residual_equation import Equation
+from cspm_ident.diagnosis.thresholds import DEFAULT_THRESHOLDS, Thresholds
 
 Index = NDArray[np.intp]
+# Length of the blocks in which an onset is looked for more closely.
 FINE_S = 0.1
-# Of the scatter between fine blocks: so much more is left at times that are none.
-_SIGMAS = 3.0
 
 
 class Onset(NamedTuple):
@@ -41,7 +40,7 @@ def first_block(sums: Sums, base: Index, own: Index) -> tuple[int, float]:
     left = sums.left_from(base, own)[:-2]
     best = int(np.argmin(left))
     gained = sums.squares_of(base) - left[0]
-    if left[best] < left[0] - SIMPLER_SHARE * max(gained, 0.0):
+    if left[best] < left[0] - sums.thresholds.parsimony_gain_share * max(gained, 0.0):
         return best, float(left[best])
     return 0, float(left[0])
 
@@ -52,6 +51,7 @@ def onset_of(
     others: Mapping[Candidate, float],
     low: float,
     high: float,
+    thresholds: Thresholds = DEFAULT_THRESHOLDS,
 ) -> Onset:
     """Return when an effect began.
 
@@ -64,13 +64,14 @@ def onset_of(
         others: everything else that was found, with when it began [s].
         low: earliest time to look at [s].
         high: latest.
+        thresholds: `onset_interval_sigma`.
     """
     terms = [*own, *others]
     places = {term: [e for e in equations if term in e.columns] for term in own}
     concerned = {e.place for found in places.values() for e in found}
     rows = [e.only(terms) for e in equations if e.place in concerned]
     evidence = gather([rows], FINE_S)
-    sums, edges = Sums(evidence), evidence.times
+    sums, edges = Sums(evidence, thresholds), evidence.times
     others = {term: time for term, time in others.items() if term in evidence.slices}
     for term, time in others.items():
         sums.delay(evidence.columns_of([term]), int(np.searchsorted(edges, time)))
@@ -82,6 +83,6 @@ def onset_of(
     sums.delay(columns, int(blocks[best]))
     both = np.concatenate([base, columns])
     scatter = float(np.std(sums.held_out(both)))
-    possible = edges[blocks[left <= left[best] + _SIGMAS * scatter]]
+    possible = edges[blocks[left <= left[best] + thresholds.onset_interval_sigma * scatter]]
     step = edges[1] - edges[0]
     return Onset(float(edges[blocks[best]]), float(possible[0] - step), float(possible[-1] + step))

@@ -8,12 +8,6 @@ import numpy as np
 from numpy.typing import NDArray
 
 from cspm_ident.diagnosis.regression.block_regression import gain_of
-from cspm_ident.diagnosis.regression.collinearity import (
-    RIVAL_SHARE,
-    SIMPLER_SHARE,
-    SPANNED,
-    UNTRUE_SHARE,
-)
 from cspm_ident.diagnosis.regression.hypothesis import Hypothesis, freedom
 from cspm_ident.diagnosis.regression.joint_fit import Fits
 from cspm_ident.diagnosis.regression.significance import Sureness
@@ -21,9 +15,6 @@ from cspm_ident.diagnosis.residuals.regressors import Candidate
 from cspm_ident.diagnosis.selection.joint_pairs import Pair, best_pairs
 
 Index = NDArray[np.intp]
-
-# Standard errors by which a pair has to explain more than what is simpler.
-_SIGMAS = 2.0
 
 
 def pair_instead(
@@ -68,7 +59,7 @@ def _says_else(
     if any(not set(hypothesis.candidates).isdisjoint(h.candidates) for h in instead):
         return False
     others = [h for h in chosen if h is not hypothesis]
-    least = RIVAL_SHARE * fits.gain(hypothesis, fits.columns(others)).total
+    least = fits.thresholds.rival_gain_share * fits.gain(hypothesis, fits.columns(others)).total
     return fits.gain(hypothesis, fits.columns(instead)).total > least
 
 
@@ -76,14 +67,15 @@ def _is_better(
     fits: Fits, pair: Pair, replaced: Sequence[Hypothesis], beside: Sequence[Hypothesis]
 ) -> bool:
     """Return whether a pair explains surely more than others, or as much with fewer numbers."""
-    base = fits.columns(beside)
+    base, limits = fits.columns(beside), fits.thresholds
     left = fits.sums.held_out(fits.beside(base, *replaced))
     better = gain_of(left - fits.sums.held_out(fits.beside(base, *pair)))
     if sum(map(freedom, pair)) < sum(map(freedom, replaced)):
-        return bool(better.total > -UNTRUE_SHARE * (fits.sums.held_out(base) - left).sum())
+        gained = (fits.sums.held_out(base) - left).sum()
+        return bool(better.total > -limits.model_form_error_share * gained)
     both, own = (np.concatenate([fits.own_columns(h) for h in each]) for each in (pair, replaced))
-    wider = np.all(fits.sums.spanned(base, both, own) > SPANNED)
-    return bool(better.total > _SIGMAS * better.error and not wider)
+    wider = np.all(fits.sums.spanned(base, both, own) > limits.collinear_share)
+    return bool(better.total > limits.tie_sigma * better.error and not wider)
 
 
 def _are_both_needed(
@@ -91,7 +83,8 @@ def _are_both_needed(
 ) -> bool:
     """Return whether each is surely there beside the other, and no small part of both."""
     both = np.concatenate([fits.own_columns(h) for h in pair])
-    least = SIMPLER_SHARE * fits.sums.gain(fits.columns(beside), both).total
+    gained = fits.sums.gain(fits.columns(beside), both).total
+    least = fits.thresholds.parsimony_gain_share * gained
     for one, other in (pair, pair[::-1]):
         base = fits.columns([*beside, other])
         gain = fits.gain(one, base)

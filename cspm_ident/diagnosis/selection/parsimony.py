@@ -9,7 +9,6 @@ import numpy as np
 from numpy.typing import NDArray
 
 from cspm_ident.diagnosis.regression.block_regression import behind, gain_of, paired
-from cspm_ident.diagnosis.regression.collinearity import SIMPLER_SHARE, TIED, UNTRUE_SHARE
 from cspm_ident.diagnosis.regression.hypothesis import (
     Hypothesis,
     freedom,
@@ -45,7 +44,8 @@ def simplest(
     """
     reference = left = fits.held_out(best, base)
     gained = gain_of(fits.sums.held_out(base) - reference)
-    fewest = best
+    fewest, sigma = best, fits.thresholds.tie_sigma
+    little = min(sigma * gained.error, fits.thresholds.parsimony_gain_share * gained.total)
     for rival in rivals:
         if not fits.is_plausible([*chosen, rival]) or fits.contradicts(rival, chosen):
             continue
@@ -53,8 +53,7 @@ def simplest(
             leaves = fits.held_out(rival, base)
         worse, wider = gain_of(leaves - reference), freedom(rival) - freedom(fewest)
         fewer = wider < 0 or (wider == 0 and is_wider(fewest, rival))
-        more = leaves.sum() < left.sum() and behind(paired(leaves - left)) <= -TIED
-        little = min(2.0 * gained.error, SIMPLER_SHARE * gained.total)
+        more = leaves.sum() < left.sum() and behind(paired(leaves - left)) <= -sigma
         if (wider <= 0 and more) or (fewer and worse.total <= little):
             fewest, left = replace(rival, onset=best.onset), leaves
         elif wider == 0 and worse.total <= gained.total * _allowed(fits, rival, fewest, chosen):
@@ -68,14 +67,16 @@ def _allowed(fits: Fits, one: Hypothesis, other: Hypothesis, chosen: Sequence[Hy
     Sound clocks lie as far apart; a wrong number of the file adds no physics, and of two such it is
     the one less out of the usual.
     """
+    limits = fits.thresholds
+    simpler, form_error = limits.parsimony_gain_share, limits.model_form_error_share
     sound = [fits.is_negligible(each, [*chosen, each]) for each in (one, other)]
     if sound[0] != sound[1]:
-        return SIMPLER_SHARE if sound[0] else -np.inf
+        return simpler if sound[0] else -np.inf
     if fits.are_early([*chosen, other]) and not fits.are_early([*chosen, one]):
-        return SIMPLER_SHARE
+        return simpler
     if is_number(one) != is_number(other):
-        return UNTRUE_SHARE if is_number(one) else -np.inf
+        return form_error if is_number(one) else -np.inf
     if not is_number(one):
         return -np.inf
     sizes = [unusual(fits.values([*chosen, each]), each) for each in (one, other)]
-    return UNTRUE_SHARE if sizes[0] < sizes[1] else -np.inf
+    return form_error if sizes[0] < sizes[1] else -np.inf

@@ -23,6 +23,7 @@ from cspm_ident.diagnosis.residuals.corrected_measurement import settled, with_f
 from cspm_ident.diagnosis.residuals.recorded_equations import equations_of
 from cspm_ident.diagnosis.residuals.regressors import Candidate, Place
 from cspm_ident.diagnosis.residuals.residual_equation import Equation, in_noise, steady
+from cspm_ident.diagnosis.thresholds import DEFAULT_THRESHOLDS, Thresholds
 from cspm_ident.signals.measurement import Measurement
 from cspm_msgs_py.errors import InputError
 from cspm_sim.effects import Effect
@@ -44,6 +45,7 @@ def refine(
     block_s: float,
     cut: Cut,
     supposed: Mapping[Candidate, Array] = MappingProxyType({}),
+    thresholds: Thresholds = DEFAULT_THRESHOLDS,
 ) -> Weights:
     """Return weights, with half the widths of their 95 % intervals, of candidates of better shapes.
 
@@ -54,6 +56,7 @@ def refine(
         block_s: length of the blocks [s].
         cut: what of the equations was searched.
         supposed: weights about which residuals are taken to first order.
+        thresholds: of residuals and intervals.
     """
     candidates, common = parts_of(hypotheses)
     shapes = {c.effect_id: dict(c.shape) for c in candidates}
@@ -67,12 +70,12 @@ def refine(
         near = [_near(effects[name], shape, factor) for name, shape in shapes.items()]
         try:
             values = {c: own for c, (own, _) in applied.items()}
-            parts = cut(_about(searched, near, candidates, values, supposed))
+            parts = cut(_about(searched, near, candidates, values, supposed, thresholds))
         except InputError:
             # Such a machine cannot be; what was found before stays, with its interval.
             break
         evidence = gather(in_noise(steady(parts), noise), block_s)
-        shapes, found = _fitted(evidence, shapes, wanted, common)
+        shapes, found = _fitted(evidence, shapes, wanted, common, thresholds)
         for candidate, (weights, half) in found.items():
             if candidate.effect.is_correction:
                 before = values.get(candidate, np.zeros_like(weights))
@@ -92,6 +95,7 @@ def spectra(
     block_s: float,
     cut: Cut,
     supposed: Mapping[Candidate, Array] = MappingProxyType({}),
+    thresholds: Thresholds = DEFAULT_THRESHOLDS,
 ) -> dict[Candidate, Array]:
     """Return how large effects that have a spectrum may be in all, where it can be told.
 
@@ -103,6 +107,7 @@ def spectra(
         block_s: likewise.
         cut: likewise.
         supposed: likewise.
+        thresholds: likewise, and `tie_sigma`.
     """
     wanted = [c for c in found if c.effect.signature.spectrum]
     if not wanted:
@@ -115,11 +120,11 @@ def spectra(
     ]
     values = {c: own for c, (own, _) in found.items() if c.effect.is_correction}
     try:
-        parts = cut(_about(searched, effects, list(found), values, supposed))
+        parts = cut(_about(searched, effects, list(found), values, supposed, thresholds))
     except InputError:
         return {}
     evidence = gather(in_noise(steady(parts), noise), block_s)
-    most = {c: most_in_all(evidence, c, [o for o in found if o != c]) for c in wanted}
+    most = {c: most_in_all(evidence, c, [o for o in found if o != c], thresholds) for c in wanted}
     return {c: own for c, own in most.items() if own is not None}
 
 
@@ -129,6 +134,7 @@ def _about(
     candidates: Sequence[Candidate],
     applied: Mapping[Candidate, Array],
     supposed: Mapping[Candidate, Array],
+    thresholds: Thresholds,
 ) -> list[Sequence[Equation]]:
     """Return the equations of machines and readings that are corrected.
 
@@ -137,7 +143,10 @@ def _about(
     """
     moved = [settled(with_found(m, applied)) for m in searched]
     about = {c: own for c, own in supposed.items() if not c.effect.is_correction}
-    return [equations_of(m, effects, touched=candidates, supposed=about) for m in moved]
+    return [
+        equations_of(m, effects, touched=candidates, supposed=about, thresholds=thresholds)
+        for m in moved
+    ]
 
 
 def _is_settled(found: Weights) -> bool:
@@ -184,9 +193,10 @@ def _fitted(
     shapes: dict[str, dict[str, float]],
     wanted: Sequence[tuple[str, str]],
     common: Collection[str],
+    thresholds: Thresholds,
 ) -> tuple[dict[str, dict[str, float]], Weights]:
     """Return the best shapes and the weights there; those of `common` effects are shared."""
-    sums = Sums(evidence)
+    sums = Sums(evidence, thresholds)
     grids = {name: _shapes(evidence, name) for name in shapes}
     best: tuple[float, dict[str, tuple[tuple[str, float], ...]]] | None = None
     for point in product(*grids.values()):

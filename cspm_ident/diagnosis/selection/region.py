@@ -11,17 +11,12 @@ from numpy.typing import NDArray
 from cspm_ident.diagnosis.residuals.free_shapes import Driver
 from cspm_ident.diagnosis.residuals.regressors import Candidate
 from cspm_ident.diagnosis.residuals.residual_equation import Equation
+from cspm_ident.diagnosis.thresholds import DEFAULT_THRESHOLDS, Thresholds
 
 Array = NDArray[np.float64]
 
-# Of what a finding takes from the squared residual, that a region has to hold.
-HELD = 0.9
-# Of the data: what shows in more of it shows everywhere.
-_WIDEST = 0.5
 # Of a signal's values, each of equally many.
 _BINS = 50
-# Of the gain: where bins lose more than that, chance decides which ones gain.
-_LOST = 0.1
 
 
 class Region(NamedTuple):
@@ -45,6 +40,7 @@ def region_of(
     parts: Sequence[Sequence[Equation]],
     own: Sequence[Candidate],
     weights: Mapping[Candidate, Array],
+    thresholds: Thresholds = DEFAULT_THRESHOLDS,
 ) -> Region | None:
     """Return the narrowest region that holds most of a finding; None where it shows everywhere.
 
@@ -52,6 +48,7 @@ def region_of(
         parts: equations of what was searched, in units of their noise.
         own: the finding's candidates.
         weights: of all that was found.
+        thresholds: those of regions.
     """
     gains: dict[str, list[Array]] = {}
     values: dict[str, list[Array]] = {}
@@ -69,10 +66,16 @@ def region_of(
     regions = [
         region
         for name in gains
-        if (region := _narrowest(name, np.concatenate(values[name]), np.concatenate(gains[name])))
+        if (
+            region := _narrowest(
+                name, np.concatenate(values[name]), np.concatenate(gains[name]), thresholds
+            )
+        )
     ]
     narrowest = min(regions, key=lambda region: region.share, default=None)
-    return narrowest if narrowest is not None and narrowest.share <= _WIDEST else None
+    if narrowest is None or narrowest.share > thresholds.region_widest_share:
+        return None
+    return narrowest
 
 
 def _taken(
@@ -88,15 +91,15 @@ def _taken(
     return np.asarray(((left + sum(added)) ** 2 - left**2).sum(axis=1))
 
 
-def _narrowest(driver: str, values: Array, gains: Array) -> Region | None:
+def _narrowest(driver: str, values: Array, gains: Array, thresholds: Thresholds) -> Region | None:
     """Return the fewest neighbouring bins of a signal that hold most of the gain."""
     order = np.array_split(np.argsort(values), _BINS)
     sums = np.array([gains[rows].sum() for rows in order])
     held = np.concatenate([[0.0], np.cumsum(sums)])
-    if -sums[sums < 0.0].sum() >= _LOST * held[-1]:
+    if -sums[sums < 0.0].sum() >= thresholds.region_loss_share * held[-1]:
         return None
     between = (held[None, :] - held[:, None]) / held[-1]
-    starts, ends = np.nonzero(np.triu(between >= HELD))
+    starts, ends = np.nonzero(np.triu(between >= thresholds.region_gain_share))
     best = int(np.argmin(ends - starts))
     first, last = int(starts[best]), int(ends[best])
     low, high = values[order[first][0]], values[order[last - 1][-1]]

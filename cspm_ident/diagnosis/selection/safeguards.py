@@ -8,6 +8,7 @@ from dataclasses import dataclass
 from cspm_ident.diagnosis.regression.block_gram import Evidence
 from cspm_ident.diagnosis.regression.block_regression import Sums
 from cspm_ident.diagnosis.regression.white_regression import WhiteSums
+from cspm_ident.diagnosis.thresholds import Thresholds
 from cspm_sim.effects import Effect, catalogue
 
 
@@ -32,7 +33,7 @@ class Safeguards:
         return [e for e in catalogue().values() if self.joint_refit or e.physics.alter is None]
 
     @property
-    def sums(self) -> Callable[[Evidence], Sums]:
+    def sums(self) -> Callable[[Evidence, Thresholds], Sums]:
         """What tells what is sure."""
         return Sums if self.block_null else WhiteSums
 

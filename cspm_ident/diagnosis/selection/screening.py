@@ -11,14 +11,12 @@ from cspm_ident.diagnosis.residuals.regressors import Candidate
 
 Array = NDArray[np.float64]
 
-_LENGTH = 12
 
-
-def short_list(candidates: Sequence[Candidate], gains: Array) -> list[Candidate]:
-    """Return the best point and element of each effect, of the effects that gain most."""
+def short_list(candidates: Sequence[Candidate], gains: Array, most: int) -> list[Candidate]:
+    """Return the best point and element of each effect, of the `most` effects that gain most."""
     best: dict[str, tuple[float, Candidate]] = {}
     for candidate, gain in zip(candidates, gains, strict=True):
         if candidate.effect_id not in best or gain > best[candidate.effect_id][0]:
             best[candidate.effect_id] = float(gain), candidate
     ranked = sorted(best.values(), key=lambda each: -each[0])
-    return [candidate for _, candidate in ranked[:_LENGTH]]
+    return [candidate for _, candidate in ranked[:most]]

@@ -11,7 +11,6 @@ from numpy.typing import NDArray
 
 from cspm_ident.diagnosis.regression.block_gram import Evidence
 from cspm_ident.diagnosis.regression.block_regression import Gain, Sums, gain_of
-from cspm_ident.diagnosis.regression.collinearity import SPANNED
 from cspm_ident.diagnosis.regression.hypothesis import (
     Findings,
     Hypothesis,
@@ -41,13 +40,10 @@ from cspm_ident.diagnosis.selection.parsimony import simplest
 from cspm_ident.diagnosis.selection.rivals import rivals_of
 from cspm_ident.diagnosis.selection.screening import short_list
 from cspm_ident.diagnosis.selection.unexplained import unexplained
+from cspm_ident.diagnosis.thresholds import DEFAULT_THRESHOLDS, Thresholds
 
 Array = NDArray[np.float64]
 Index = NDArray[np.intp]
-
-MOST_EFFECTS = 3
-# In which an effect has to act to be told, and to be absent if it is to begin later.
-_FEWEST_BLOCKS, _FEWEST_WITHOUT = 10, 5
 
 
 class Search:
@@ -57,10 +53,12 @@ class Search:
         self,
         evidence: Evidence,
         progress: Callable[[str], None] = lambda _: None,
-        sums: Callable[[Evidence], Sums] = Sums,
+        sums: Callable[[Evidence, Thresholds], Sums] = Sums,
+        thresholds: Thresholds = DEFAULT_THRESHOLDS,
     ) -> None:
         """Take the sums of all residuals, of which `sums` tells what is sure."""
-        self.evidence, self.sums = evidence, sums(evidence)
+        self.evidence, self.sums = evidence, sums(evidence, thresholds)
+        self.thresholds = thresholds
         self.fits = Fits(evidence, self.sums)
         self._progress = progress
         self._look_for([c for c in evidence.terms if isinstance(c, Candidate) and self._shows(c)])
@@ -96,7 +94,8 @@ class Search:
 
     def _chosen(self) -> list[Hypothesis]:
         chosen = self._clocks()
-        while sum(not self.fits.is_negligible(h, chosen) for h in chosen) < MOST_EFFECTS:
+        most = self.thresholds.most_effects
+        while sum(not self.fits.is_negligible(h, chosen) for h in chosen) < most:
             self._progress(f"effect {len(chosen) + 1}")
             best = self._best(chosen)
             found = self._beside_clocks(chosen) if best is None else (best,)
@@ -190,7 +189,7 @@ class Search:
         others = [self.fits.own_columns(h) for h in chosen if h is not hypothesis]
         own = self.fits.own_columns(hypothesis)
         spanned = self.sums.spanned(self.evidence.nuisance, np.concatenate(others), own)
-        return bool(np.any(spanned > SPANNED))
+        return bool(np.any(spanned > self.thresholds.collinear_share))
 
     def _is_there(
         self, hypothesis: Hypothesis, base: Index, gain: Gain, chosen: Sequence[Hypothesis]
@@ -230,7 +229,8 @@ class Search:
         base = self.fits.columns(chosen)
         free = self._free(chosen)
         gains = self.sums.gains_beyond(base, [self._of(c) for c in free])
-        scopes = [h for c in short_list(free, gains) for h in self.scopes.of(c, free, base)]
+        likely = short_list(free, gains, self.thresholds.screened_effects)
+        scopes = [h for c in likely for h in self.scopes.of(c, free, base)]
         late = [d for h in scopes for d in self._late(h, free, base)]
         best = self._surest([*scopes, *late], chosen, base)
         if best is None:
@@ -258,18 +258,19 @@ class Search:
 
         More elements, and a beginning, have to be worth it.
         """
-        before = self.sums.held_out(base)
+        before, limits = self.sums.held_out(base), self.thresholds
         best: tuple[Array, Hypothesis] | None = None
         for hypothesis in hypotheses:
             with self.fits.delayed(hypothesis):
                 gained = self._sure_gain(hypothesis, chosen, base, before)
             if gained is None:
                 continue
-            needed = boldness(hypothesis) * gain_of(gained).error
+            needed = boldness(hypothesis, thresholds=limits) * gain_of(gained).error
             if best is not None:
-                wider = is_wider(hypothesis, best[1]) and not is_spread(best[1], hypothesis)
-                least = best[0].sum() + 3.0 * gain_of(gained).error * wider
-                sigmas = boldness(hypothesis, best[1])
+                spread = is_spread(best[1], hypothesis, limits)
+                wider = is_wider(hypothesis, best[1]) and not spread
+                least = best[0].sum() + limits.wider_scope_sigma * gain_of(gained).error * wider
+                sigmas = boldness(hypothesis, best[1], limits)
                 if sigmas:
                     least = best[0].sum() + sigmas * gain_of(gained - best[0]).error
                 needed = max(needed, least)
@@ -287,10 +288,12 @@ class Search:
         # A wrong number of the file is always one.
         if is_number(hypothesis):
             return
+        first = self.thresholds.blocks_before_onset
+        last = self.sums.blocks - self.thresholds.blocks_after_onset
         late: list[tuple[float, Hypothesis]] = []
         for shape in shapes_of(hypothesis, free):
             onset, left = first_block(self.sums, base, self.fits.own_columns(shape))
-            if _FEWEST_WITHOUT <= onset <= self.sums.blocks - _FEWEST_BLOCKS:
+            if first <= onset <= last:
                 late.append((left, replace(shape, onset=onset)))
         if late:
             yield min(late, key=lambda each: each[0])[1]

@@ -20,6 +20,7 @@ from cspm_ident.diagnosis.residuals.residual_equation import Equation, in_noise,
 from cspm_ident.diagnosis.residuals.spectral_lines import Line, lines_of, with_lines
 from cspm_ident.diagnosis.selection.safeguards import Safeguards
 from cspm_ident.diagnosis.selection.search import Search
+from cspm_ident.diagnosis.thresholds import DEFAULT_THRESHOLDS, Thresholds
 from cspm_ident.signals.measurement import Measurement
 from cspm_msgs_py.errors import InputError
 from cspm_sim.effects import Channel
@@ -27,9 +28,6 @@ from cspm_sim.effects import Channel
 Array = NDArray[np.float64]
 Progress = Callable[[str], None]
 Parts = Sequence[Sequence[Equation]]
-
-BLOCKS = 48
-SHORTEST_BLOCK_S = 0.5
 
 
 class Recordings(NamedTuple):
@@ -69,7 +67,10 @@ class Look(NamedTuple):
 
 
 def searched_for(
-    recordings: Recordings, progress: Progress, safeguards: Safeguards
+    recordings: Recordings,
+    progress: Progress,
+    safeguards: Safeguards,
+    thresholds: Thresholds = DEFAULT_THRESHOLDS,
 ) -> tuple[Look, Findings]:
     """Return what a search finds, and the search.
 
@@ -81,24 +82,25 @@ def searched_for(
         recordings: what to look in.
         progress: called with what is being done.
         safeguards: all of them, but for comparisons.
+        thresholds: of the diagnosis.
 
     Raises:
         InputError: the recordings have no residual that could be looked at, or are too short.
     """
-    look = _look(recordings, {}, progress, safeguards)
+    look = _look(recordings, {}, progress, safeguards, thresholds)
     if recordings.are_drawn:
         first = look.search.first()
         supposed = _of_winches(look.search, () if first is None else (first,))
         if supposed:
             # Before the next is made: columns are most of the memory.
             del look
-            look = _look(recordings, supposed, progress, safeguards)
+            look = _look(recordings, supposed, progress, safeguards, thresholds)
     found = look.search.run()
     if recordings.are_drawn:
         supposed = _of_winches(look.search, [each.hypothesis for each in found.named])
         if not supposed.keys() <= look.supposed.keys():
             del look
-            look = _look(recordings, supposed, progress, safeguards)
+            look = _look(recordings, supposed, progress, safeguards, thresholds)
             found = look.search.run()
     return look, found
 
@@ -119,31 +121,40 @@ def _look(
     supposed: Mapping[Candidate, Array],
     progress: Progress,
     safeguards: Safeguards,
+    thresholds: Thresholds,
 ) -> Look:
     searched, held_out = recordings
     longest = max(m.duration for m in searched)
     effects, knots = [told_within(e, longest) for e in safeguards.effects], Knots()
 
     def equations(measurements: Sequence[Measurement]) -> Parts:
-        return [equations_of(m, effects, knots, progress, supposed=supposed) for m in measurements]
+        return [
+            equations_of(m, effects, knots, progress, supposed=supposed, thresholds=thresholds)
+            for m in measurements
+        ]
 
     found = equations(searched)
     _check(searched, found)
-    parts = found if held_out else first_part(found)
-    hums = [hums_of(m, part, {}) for m, part in zip(searched, parts, strict=True)]
+    parts = found if held_out else first_part(found, thresholds)
+    hums = [hums_of(m, part, {}, thresholds) for m, part in zip(searched, parts, strict=True)]
     parts = _beside(parts, hums)
-    judged = equations(held_out) if held_out else _beside(last_part(found), hums)
+    judged = equations(held_out) if held_out else _beside(last_part(found, thresholds), hums)
     noise = noise_of(steady(parts))
-    spans = [span_of(part) for part in parts]
-    block = max(SHORTEST_BLOCK_S, sum(b - a for a, b in spans) / BLOCKS)
+    seconds = sum(b - a for a, b in map(span_of, parts))
+    block = max(thresholds.shortest_block_s, seconds / thresholds.block_count)
     evidence = gather(in_noise(steady(parts), noise), block)
     if evidence.blocks < FOLDS:
-        raise InputError(
-            f"{searched[0].path}: {sum(b - a for a, b in spans):.1f} s to search, allowed:"
-            f" {FOLDS * SHORTEST_BLOCK_S:g} s or more; without --held-out seven tenths are searched"
-        )
-    search = Search(evidence, progress, safeguards.sums)
+        raise _too_short(searched[0], seconds, thresholds)
+    search = Search(evidence, progress, safeguards.sums, thresholds)
     return Look(parts, judged, hums, noise, block, search, knots, supposed)
+
+
+def _too_short(measurement: Measurement, seconds: float, thresholds: Thresholds) -> InputError:
+    least, share = FOLDS * thresholds.shortest_block_s, 100.0 * thresholds.searched_share
+    return InputError(
+        f"{measurement.path}: {seconds:.1f} s to search, allowed: {least:g} s or more; without"
+        f" --held-out {share:.3g} % of a recording are searched"
+    )
 
 
 def _check(searched: Sequence[Measurement], found: Parts) -> None:
@@ -156,13 +167,16 @@ def _check(searched: Sequence[Measurement], found: Parts) -> None:
 
 
 def hums_of(
-    measurement: Measurement, part: Sequence[Equation], weights: Mapping[Candidate, Array]
+    measurement: Measurement,
+    part: Sequence[Equation],
+    weights: Mapping[Candidate, Array],
+    thresholds: Thresholds,
 ) -> tuple[Line, ...]:
     """Return the lines in what was searched of a recording, beyond what was found."""
     if measurement.machine.bar is None:
         return ()
     start, end = span_of(part)
-    return lines_of(measurement.within(start, end), weights)
+    return lines_of(measurement.within(start, end), weights, thresholds)
 
 
 def _beside(parts: Parts, lines: Sequence[Sequence[Line]]) -> Parts:

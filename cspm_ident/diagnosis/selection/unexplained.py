@@ -9,20 +9,14 @@ from numpy.typing import NDArray
 
 from cspm_ident.diagnosis.regression.block_gram import Evidence
 from cspm_ident.diagnosis.regression.block_regression import Gain, Sums
-from cspm_ident.diagnosis.regression.collinearity import UNTRUE_SHARE
-from cspm_ident.diagnosis.regression.hypothesis import DOUBTFUL_SHARE, Hypothesis, Unknown
-from cspm_ident.diagnosis.regression.jackknife import DOMINANT
-from cspm_ident.diagnosis.regression.significance import FALSE_ALARMS, Sureness
+from cspm_ident.diagnosis.regression.hypothesis import Hypothesis, Unknown
+from cspm_ident.diagnosis.regression.significance import Sureness
 from cspm_ident.diagnosis.residuals.free_shapes import Driver
+from cspm_ident.diagnosis.thresholds import DEFAULT_THRESHOLDS
 
 Index = NDArray[np.intp]
 
-UNKNOWN_SHARE = 0.15
-# Standard errors. In blind recordings of which the catalogue lacks something what is gained was 1.6
-# and more (of 20), in the one sound one that looked otherwise 1.4 and less.
-_SIGMAS = 1.5
-# Of fewer blocks one may well hold half.
-_BLOCKS = 8
+UNKNOWN_SHARE = DEFAULT_THRESHOLDS.unknown_share
 _LEAST = 1e-300
 
 
@@ -46,13 +40,14 @@ def unexplained(
     supposed = [*chosen, *sound]
     base = _columns(evidence, supposed)
     found: dict[Driver, Unknown] = {}
+    limits, chance = sums.thresholds, sums.thresholds.false_alarm_rate / max(1, len(drivers))
     for driver in drivers:
         own = evidence.columns_of([driver])
         gained = sums.gain_within if driver.of_time else sums.gain
         gain, p_value = gained(base, own), sums.p_value(base, own)
-        if gain.total > _SIGMAS * gain.error and p_value < FALSE_ALARMS / len(drivers):
+        if gain.total > limits.unknown_sigma * gain.error and p_value < chance:
             share = sureness.share(base, own)
-            if share >= UNKNOWN_SHARE:
+            if share >= limits.unknown_share:
                 found[driver] = driver, gain, share
     found |= {each[0]: each for each in _drifting(evidence, sums, sureness, chosen, sound)}
     began = [h.onset for h in supposed if h.onset]
@@ -67,14 +62,15 @@ def _once(evidence: Evidence, sums: Sums, base: Index, began: Sequence[int]) -> 
     What shows once has no other block to be tested on, but is not consistent for that. What begins
     does so within a block, which is no block of either state.
     """
-    within = [k for onset in began for k in (onset - 1, onset)]
+    within, limits = [k for onset in began for k in (onset - 1, onset)], sums.thresholds
     for place, squares in evidence.left_by_block(base, sums.weights(base)).items():
         squares = np.delete(squares, within)
         most = float(squares.max(initial=0.0))
         share = most / max(float(squares.sum()), _LEAST)
         drivers = [d for d in evidence.terms if isinstance(d, Driver) and d.place == place]
         gains = {d: sums.gain_within(base, evidence.columns_of([d])) for d in drivers if d.of_time}
-        if gains and len(squares) >= _BLOCKS and share > DOMINANT:
+        several = len(squares) >= limits.unknown_fewest_blocks
+        if gains and several and share > limits.dominant_block_share:
             excess = most - float(np.median(squares))
             yield max(gains, key=lambda d: gains[d].total), Gain(excess, excess), share
 
@@ -88,7 +84,7 @@ def _untold(evidence: Evidence, sums: Sums, chosen: Sequence[Hypothesis], driver
         if np.isin(own, place.columns).any():
             base = _columns(evidence, [h for h in chosen if h is not hypothesis])
             taken += max(0.0, sums.gain(base, own).total)
-    return UNTRUE_SHARE * taken
+    return sums.thresholds.model_form_error_share * taken
 
 
 def _drifting(
@@ -106,8 +102,8 @@ def _drifting(
         base = _columns(evidence, [h for h in (*chosen, *sound) if h is not hypothesis])
         own = evidence.columns_of(hypothesis.candidates)
         drift, p_value = sums.drift(base, own)
-        held = drift.total <= DOUBTFUL_SHARE * sums.gain(base, own).total
-        if held or p_value >= FALSE_ALARMS / len(chosen):
+        held = drift.total <= sums.thresholds.doubtful_share * sums.gain(base, own).total
+        if held or p_value >= sums.thresholds.false_alarm_rate / len(chosen):
             continue
         times = [d for d in _concerned(evidence, hypothesis, own) if d.of_time]
         gains = [sums.gain_within(base, evidence.columns_of([d])) for d in times]

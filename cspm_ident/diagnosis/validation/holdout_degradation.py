@@ -13,16 +13,13 @@ from numpy.typing import NDArray
 
 from cspm_ident.diagnosis.regression.block_regression import gain_of
 from cspm_ident.diagnosis.residuals.regressors import Candidate, Place
+from cspm_ident.diagnosis.thresholds import DEFAULT_THRESHOLDS, Thresholds
 from cspm_ident.diagnosis.validation.holdout_residuals import residuals_of, without_nuisance
 from cspm_ident.diagnosis.validation.holdout_simulation import LONGEST_S, Baselines
-from cspm_ident.diagnosis.validation.holdout_test import PLAIN_SHARE
 
 Array = NDArray[np.float64]
 # Of each residual, by block.
 Squares = Mapping[Place, Array]
-
-# Standard errors of the blocks.
-_SURELY = 3.0
 
 
 def squares_left(
@@ -30,6 +27,7 @@ def squares_left(
     found: Mapping[Candidate, Array],
     noise: Mapping[Place, Array],
     block_s: float,
+    thresholds: Thresholds = DEFAULT_THRESHOLDS,
 ) -> dict[Place, Array]:
     """Return what weights leave of what was not searched, in squares of the noise, by block.
 
@@ -38,11 +36,13 @@ def squares_left(
         found: weights of a machine's effects.
         noise: of each residual, its unit.
         block_s: length of the blocks [s].
+        thresholds: those of residuals.
     """
     blocks = int(np.ceil(LONGEST_S / block_s))
     left: dict[Place, Array] = {}
     for part, since in zip(baselines.parts, baselines.since, strict=True):
-        for place, equations in residuals_of([(part, since)], found, noise).items():
+        residuals = residuals_of([(part, since)], found, noise, thresholds)
+        for place, equations in residuals.items():
             own = np.zeros(blocks)
             for equation in equations:
                 rows = np.sum(without_nuisance(equation) ** 2, axis=1)
@@ -52,7 +52,7 @@ def squares_left(
     return left
 
 
-def harm(without: Squares, with_it: Squares) -> float:
+def harm(without: Squares, with_it: Squares, thresholds: Thresholds = DEFAULT_THRESHOLDS) -> float:
     """Return by how many squares something makes worse what was not searched; 0 if it is there.
 
     It surely adds to all residuals together, or more than doubles one; unless it takes most of
@@ -61,13 +61,15 @@ def harm(without: Squares, with_it: Squares) -> float:
     Args:
         without: what is left without it.
         with_it: what is left with it.
+        thresholds: of held-out data.
     """
     both = [place for place in without if place in with_it]
     before = np.array([without[place].sum() for place in both])
     taken = np.array([without[place] - with_it[place] for place in both])
     by_place = taken.sum(axis=1) if both else np.zeros(0)
-    if not both or np.any(by_place > PLAIN_SHARE * before):
+    if not both or np.any(by_place > thresholds.majority_residual_share * before):
         return 0.0
     whole = gain_of(taken.sum(axis=0))
-    worse = whole.total < -_SURELY * whole.error or np.any(by_place < -before)
+    surely = whole.total < -thresholds.holdout_sigma * whole.error
+    worse = surely or np.any(by_place < -thresholds.degraded_residual_ratio * before)
     return float(np.sum(np.maximum(-by_place, 0.0))) if worse else 0.0

@@ -14,6 +14,7 @@ from cspm_ident.diagnosis.residuals.free_shapes import Driver
 from cspm_ident.diagnosis.residuals.recorded_equations import equations_of
 from cspm_ident.diagnosis.residuals.regressors import Candidate, Place
 from cspm_ident.diagnosis.residuals.residual_equation import Equation, in_noise
+from cspm_ident.diagnosis.thresholds import DEFAULT_THRESHOLDS, Thresholds
 from cspm_ident.diagnosis.validation.holdout_simulation import LEAD_S
 from cspm_ident.signals.measurement import Measurement
 from cspm_model.robust_statistics import difference_noise
@@ -57,6 +58,7 @@ def judged(
     found: Mapping[Candidate, Array],
     noise: Mapping[Place, Array],
     free: Mapping[Place, float],
+    thresholds: Thresholds = DEFAULT_THRESHOLDS,
 ) -> tuple[HeldOut, ...]:
     """Return every residual of recordings as described, re-tuned and with what was found.
 
@@ -68,11 +70,12 @@ def judged(
         found: weights of what was found.
         noise: of each residual, its unit.
         free: what free functions leave, root mean square in units of the noise.
+        thresholds: those of residuals.
     """
     parts = list(zip(measurements, starts, strict=True))
-    described = residuals_of(parts, {}, noise)
-    tuned = residuals_of(parts, retuned, noise) if retuned else described
-    after = residuals_of(parts, found, noise) if found else described
+    described = residuals_of(parts, {}, noise, thresholds)
+    tuned = residuals_of(parts, retuned, noise, thresholds) if retuned else described
+    after = residuals_of(parts, found, noise, thresholds) if found else described
     out = []
     for place, equations in described.items():
         unit = float(noise[place][0]) if len(noise[place]) == 1 else 1.0
@@ -144,6 +147,7 @@ def residuals_of(
     measurements: Sequence[tuple[Measurement, float]],
     weights: Mapping[Candidate, Array],
     noise: Mapping[Place, Array],
+    thresholds: Thresholds = DEFAULT_THRESHOLDS,
 ) -> dict[Place, list[Equation]]:
     """Return the residuals of recordings from some instant each on, where there are any rows.
 
@@ -151,11 +155,14 @@ def residuals_of(
         measurements: each with the instant [s].
         weights: of what the machine has.
         noise: of each residual, its unit.
+        thresholds: those of residuals.
     """
     parts = [
         [
             equation.within(start, np.inf)
-            for equation in equations_of(as_found(m.within(start - LEAD_S, np.inf), weights), ())
+            for equation in equations_of(
+                as_found(m.within(start - LEAD_S, np.inf), weights), (), thresholds=thresholds
+            )
         ]
         for m, start in measurements
     ]

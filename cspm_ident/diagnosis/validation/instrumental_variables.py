@@ -15,6 +15,7 @@ from numpy.typing import NDArray
 
 from cspm_ident.diagnosis.residuals.regressors import Candidate
 from cspm_ident.diagnosis.residuals.residual_equation import Equation
+from cspm_ident.diagnosis.thresholds import DEFAULT_THRESHOLDS, Thresholds
 from cspm_ident.signals.measurement import Measurement
 from cspm_ident.signals.samples import Samples
 from cspm_model.robust_statistics import difference_noise
@@ -22,17 +23,7 @@ from cspm_sim.effects import Block, Effect
 
 Array = NDArray[np.float64]
 
-# Standard errors by which a finding has to show, and may fall short of what was told.
-_SIGMAS = 3.0
-# Of it: so much may be short even where it is known well, for noise that is fed back adds to it.
-_SHORT = 0.4
-# Of a finding's squares: what was asked for has to move it (weak instruments: Staiger, Stock,
-# Econometrica 65(3), 1997).
-_MOVED = 0.1
-# Times its noise: what moves less stands still, and what moves more does not follow noise.
-_STILL, _DRIVEN = 5.0, 10.0
-# Of the bar's motion: as much has another cause than controllers, such as a hand.
-_UNASKED = 0.1
+# Of the largest singular value: what is smaller is rounding.
 _LEAST = 1e-9
 # Of each recording or equation: more say no more of motion that was planned, and take memory.
 _ROWS = 20_000
@@ -46,7 +37,9 @@ def is_proportional(effect: Effect) -> bool:
     return effect.is_correction or effect.block is Block.FRAME
 
 
-def instruments_of(measurement: Measurement) -> Samples | None:
+def instruments_of(
+    measurement: Measurement, thresholds: Thresholds = DEFAULT_THRESHOLDS
+) -> Samples | None:
     """Return what was asked of the machine.
 
     None where that is not known, nothing is fed back, or something else moves the bar.
@@ -54,13 +47,14 @@ def instruments_of(measurement: Measurement) -> Samples | None:
     angle = measurement.angle
     if angle is None or measurement.wanted is None:
         return None
-    moves = np.std(angle.values, axis=0) > _STILL * difference_noise(angle.values)
-    if not moves.any() or _is_driven(measurement.bar_pose, measurement.wanted):
+    least = thresholds.still_noise_ratio * difference_noise(angle.values)
+    moves = np.std(angle.values, axis=0) > least
+    if not moves.any() or _is_driven(measurement.bar_pose, measurement.wanted, thresholds):
         return None
     return measurement.wanted
 
 
-def _is_driven(bar: Samples | None, wanted: Samples) -> bool:
+def _is_driven(bar: Samples | None, wanted: Samples, thresholds: Thresholds) -> bool:
     """Return whether the bar moves otherwise than it was asked to, and more than noise makes it."""
     if bar is None:
         return False
@@ -69,8 +63,8 @@ def _is_driven(bar: Samples | None, wanted: Samples) -> bool:
     basis = _basis(_at(wanted, bar.times[thin]))
     unasked = np.std(position - basis @ (basis.T @ position), axis=0)
     share = np.sum(unasked**2) / np.sum(np.var(position, axis=0))
-    far = np.any(unasked > _DRIVEN * noise)
-    return bool(far and share > _UNASKED)
+    far = np.any(unasked > thresholds.driven_noise_ratio * noise)
+    return bool(far and share > thresholds.undemanded_motion_share)
 
 
 def shows_in_what_was_asked(
@@ -79,6 +73,7 @@ def shows_in_what_was_asked(
     own: Collection[Candidate],
     weights: Mapping[Candidate, Array],
     block_s: float,
+    thresholds: Thresholds = DEFAULT_THRESHOLDS,
 ) -> bool:
     """Return whether a finding surely shows in the motion that was asked for.
 
@@ -92,6 +87,7 @@ def shows_in_what_was_asked(
         own: the finding's candidates.
         weights: of all that was found.
         block_s: length of blocks that are as good as independent [s].
+        thresholds: those of instruments.
     """
     mine = frozenset(own)
     found = [
@@ -106,11 +102,13 @@ def shows_in_what_was_asked(
     if not found:
         return True
     explained, predicted, squares = np.array(found).T
-    if predicted.sum() <= _MOVED * squares.sum():
+    if predicted.sum() <= thresholds.instrument_relevance_share * squares.sum():
         return False
     scale = explained.sum() / predicted.sum()
     error = np.linalg.norm(explained - scale * predicted) / predicted.sum()
-    return bool(scale > _SIGMAS * error and scale >= 1.0 - max(_SIGMAS * error, _SHORT))
+    doubt = thresholds.instrument_sigma * error
+    least = 1.0 - max(doubt, thresholds.instrument_shortfall_share)
+    return bool(scale > doubt and scale >= least)
 
 
 def _moments(

@@ -7,8 +7,8 @@ import pytest
 from run_samples import SCENARIOS, bundle_of
 
 from cspm_ident.diagnosis.diagnose import diagnose
-from cspm_ident.diagnosis.regression.collinearity import UNTRUE_SHARE
 from cspm_ident.diagnosis.reporting.verdict import Verdict, verdict_of
+from cspm_ident.diagnosis.thresholds import DEFAULT_THRESHOLDS
 from cspm_ident.signals.measurement import read_measurement
 from cspm_msgs_py.testbed import EffectEntry
 from cspm_run.recorded_run import run
@@ -49,4 +49,5 @@ def test_friction_of_one_winch_is_all_that_is_told(tmp_path):
     ((value, half),) = found.weights.values()
     assert value[0] == pytest.approx(PLANTED, rel=0.02)
     # What noise leaves, beside what the form of a law does.
-    assert np.sqrt(half[0] ** 2 - UNTRUE_SHARE * value[0] ** 2) < 0.02 * PLANTED
+    form_error = DEFAULT_THRESHOLDS.model_form_error_share
+    assert np.sqrt(half[0] ** 2 - form_error * value[0] ** 2) < 0.02 * PLANTED

@@ -16,17 +16,19 @@ from cspm_ident.diagnosis.regression.hypothesis import (
     unusual,
 )
 from cspm_ident.diagnosis.regression.joint_fit import Fits
-from cspm_ident.diagnosis.regression.significance import FALSE_ALARMS, Sureness
+from cspm_ident.diagnosis.regression.significance import Sureness
 from cspm_ident.diagnosis.residuals.free_shapes import Driver, Knots
 from cspm_ident.diagnosis.residuals.regressors import Candidate, Place
 from cspm_ident.diagnosis.residuals.residual_equation import Equation
 from cspm_ident.diagnosis.selection.search import Search
+from cspm_ident.diagnosis.thresholds import DEFAULT_THRESHOLDS
 from cspm_sim.effects import Channel, catalogue
 
 ROWS, STEP, BLOCK_S = 2400, 0.01, 0.5
 DRY, WET = (catalogue()[f"winch_{name}_friction"] for name in ("coulomb", "viscous"))
 LATE = catalogue()["pose_delay"]
 NAMES = ("one", "two")
+RATE = DEFAULT_THRESHOLDS.false_alarm_rate
 
 
 def winches(second, hum=2.0, effect=DRY, noise=0.05, seed=3):
@@ -48,11 +50,11 @@ def test_every_effect_has_an_equal_part_of_the_false_alarms():
     candidates = [Candidate(DRY, "one"), *(Candidate(WET, name) for name in NAMES)]
     evidence = gather([winches(0.0)], BLOCK_S)
     sureness = Sureness(Fits(evidence, Sums(evidence)), candidates)
-    assert sureness.below(DRY) == pytest.approx(FALSE_ALARMS / 2)
-    assert sureness.below(WET) == pytest.approx(FALSE_ALARMS / 4)
-    assert sureness.below(WET, known=2) == pytest.approx(3.0 * FALSE_ALARMS / 4)
+    assert sureness.below(DRY) == pytest.approx(RATE / 2)
+    assert sureness.below(WET) == pytest.approx(RATE / 4)
+    assert sureness.below(WET, known=2) == pytest.approx(3.0 * RATE / 4)
     spent = sum(sureness.below(candidate.effect) for candidate in candidates)
-    assert spent == pytest.approx(FALSE_ALARMS)
+    assert spent == pytest.approx(RATE)
 
 
 @pytest.mark.parametrize(("second", "elements"), [(0.3, NAMES), (0.0, NAMES[:1])])

@@ -6,7 +6,6 @@ import numpy as np
 import pytest
 from run_samples import bundle_of
 
-from cspm_ident.diagnosis.regression.collinearity import UNTRUE_SHARE
 from cspm_ident.diagnosis.regression.hypothesis import Hypothesis
 from cspm_ident.diagnosis.regression.parameter_estimates import of_clocks, of_forms, of_reach
 from cspm_ident.diagnosis.residuals.recorded_equations import equations_of
@@ -14,6 +13,7 @@ from cspm_ident.diagnosis.residuals.regressors import Candidate, Place
 from cspm_ident.diagnosis.residuals.residual_equation import Equation, steady
 from cspm_ident.diagnosis.selection.refinement import refine
 from cspm_ident.diagnosis.selection.search_pass import noise_of
+from cspm_ident.diagnosis.thresholds import DEFAULT_THRESHOLDS
 from cspm_ident.signals.measurement import read_measurement
 from cspm_run.recorded_run import run
 from cspm_sim.effects import Channel, catalogue
@@ -76,7 +76,7 @@ def test_no_delay_is_surer_than_the_clocks_of_a_sound_machine():
 
 def test_no_weight_is_surer_than_the_form_of_its_law():
     """Be it seen to be off or not; a number of the file or of a reading has none."""
-    unseen = np.sqrt(UNTRUE_SHARE)
+    unseen = np.sqrt(DEFAULT_THRESHOLDS.model_form_error_share)
     cases = (
         ("winch_coulomb_friction", 0.1, 0.1),
         ("winch_viscous_friction", 0.0, unseen),

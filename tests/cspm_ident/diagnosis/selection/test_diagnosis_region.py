@@ -5,7 +5,8 @@ import pytest
 
 from cspm_ident.diagnosis.residuals.regressors import Candidate, Place
 from cspm_ident.diagnosis.residuals.residual_equation import Equation
-from cspm_ident.diagnosis.selection.region import HELD, region_of
+from cspm_ident.diagnosis.selection.region import region_of
+from cspm_ident.diagnosis.thresholds import DEFAULT_THRESHOLDS
 from cspm_sim.effects import Channel, catalogue
 
 PLACE = Place(Channel.SHAFT, "only")
@@ -39,7 +40,7 @@ def test_an_effect_of_some_speeds_is_found_there(low, high):
     a_bin = 0.04
     assert low - a_bin <= found.low < found.high <= high + a_bin
     assert found.share == pytest.approx((high - low) / 2.0, abs=0.03)
-    assert found.held >= HELD
+    assert found.held >= DEFAULT_THRESHOLDS.region_gain_share
 
 
 def test_when_a_machine_moved_is_no_region():

@@ -5,7 +5,7 @@ import pytest
 
 from cspm_ident.diagnosis.regression.block_gram import gather
 from cspm_ident.diagnosis.regression.block_regression import Sums
-from cspm_ident.diagnosis.regression.collinearity import TIED, chance, distance
+from cspm_ident.diagnosis.regression.collinearity import chance, distance
 from cspm_ident.diagnosis.regression.hypothesis import Hypothesis, bounded, is_allowed
 from cspm_ident.diagnosis.residuals.free_shapes import Knots
 from cspm_ident.diagnosis.residuals.regressors import Candidate, Place
@@ -13,6 +13,7 @@ from cspm_ident.diagnosis.residuals.residual_equation import Equation
 from cspm_ident.diagnosis.selection.alternatives import alternatives_of
 from cspm_ident.diagnosis.selection.rivals import rivals_of
 from cspm_ident.diagnosis.selection.search import Search
+from cspm_ident.diagnosis.thresholds import DEFAULT_THRESHOLDS
 from cspm_ident.diagnosis.validation.acceptance import unknown_beside
 from cspm_sim.effects import Channel, catalogue
 
@@ -222,7 +223,7 @@ def test_what_explains_the_same_with_a_number_more_is_tied_however_long_is_measu
 ):
     apart = distance(np.zeros(blocks), 1.0, 1)
     assert apart == pytest.approx(np.sqrt(np.log(counted)))
-    assert apart < TIED < distance(np.zeros(blocks), 1.0, 2)
+    assert apart < DEFAULT_THRESHOLDS.tie_sigma < distance(np.zeros(blocks), 1.0, 2)
 
 
 def test_an_effect_on_more_elements_than_blocks_tell_of_is_found():

@@ -17,10 +17,10 @@ from cspm_model.kernels.cable import RADIUS
 from cspm_model.kinematics import geometry
 from cspm_msgs_py.errors import InputError
 from cspm_msgs_py.testbed import Testbed
-from cspm_sim.driven_plant import Driven, DrivenPlant
 from cspm_sim.effect_entries import read_actions
 from cspm_sim.effects import Hook, catalogue
 from cspm_sim.parameters import plant_parameters
+from cspm_sim.plant_blocks import BlockResponse, PlantBlocks
 from cspm_sim.rest import memory_at_rest
 
 Array = NDArray[np.float64]
@@ -33,8 +33,8 @@ _OFFSET_MOST_M = 5e-3
 _OFFSET_LONGEST_S = 60.0
 
 
-class Drive(Enum):
-    """Which measured signals drive the simulation.
+class Input(Enum):
+    """Which measured signals a simulation takes as its input.
 
     `winch`: motor angles and the frame's pose; bar and cables are simulated. `torque`: torques and
     the frame's pose; everything is. `tension`: tensions and the frame's pose; the bar is. `cable`:
@@ -49,7 +49,7 @@ class Drive(Enum):
     SHAFT = "shaft"
 
 
-_WITHOUT_CABLES = (Drive.TENSION, Drive.SHAFT)
+_WITHOUT_CABLES = (Input.TENSION, Input.SHAFT)
 
 
 class Simulated(NamedTuple):
@@ -83,21 +83,21 @@ class BlockSimulation:
         self.testbed = _as_reported(testbed)
         self.parameters = plant_parameters(self.testbed)
         self._actions = read_actions(self.testbed)
-        self._plant = DrivenPlant(self.parameters, timeline.motion, timeline.period_ns)
+        self._plant = PlantBlocks(self.parameters, timeline.motion, timeline.period_ns)
         self._states: dict[int, Array] = {}
         self._offsets: dict[Window, Array] = {}
         self._lock = Lock()
 
-    def check(self, drive: Drive) -> None:
-        """Refuse a drive for which a sensor is missing.
+    def check(self, given: Input) -> None:
+        """Refuse an input for which a sensor is missing.
 
         Raises:
             InputError: naming the topics that the recording lacks.
         """
-        missing = self.missing(drive)
+        missing = self.missing(given)
         if missing:
             raise InputError(
-                f"{self.timeline.measurement.path}: --drive {drive.value} needs"
+                f"{self.timeline.measurement.path}: --drive {given.value} needs"
                 f" {', '.join(missing)}, allowed: a recording that has them"
             )
 
@@ -106,19 +106,19 @@ class BlockSimulation:
         """Whether any winch has a cable."""
         return any(cable.has_cable for cable in self.testbed.cables)
 
-    def missing(self, drive: Drive) -> list[str]:
-        """Return the topics that a drive needs and the recording lacks."""
-        return [name for name, signal in self._needs(drive).items() if signal is None]
+    def missing(self, given: Input) -> list[str]:
+        """Return the topics that an input needs and the recording lacks."""
+        return [name for name, signal in self._needs(given).items() if signal is None]
 
-    def windows(self, drive: Drive, horizon: float | None) -> list[Window]:
+    def windows(self, given: Input, horizon: float | None) -> list[Window]:
         """Return first and last step of each window.
 
         Args:
-            drive: what must have been measured throughout.
+            given: what must have been measured throughout.
             horizon: longest window [s]; None for as long as nothing is missing.
         """
-        columns = [signal for signal in self._needs(drive).values() if signal is not None]
-        if drive is not Drive.SHAFT:
+        columns = [signal for signal in self._needs(given).values() if signal is not None]
+        if given is not Input.SHAFT:
             columns.append(self.timeline.frame_poses)
         stretches = whole_stretches(columns, 2)
         if horizon is None:
@@ -130,22 +130,22 @@ class BlockSimulation:
             found += [(a, b) for a, b in pairwise(edges) if b - a >= 2]
         return found
 
-    def run(self, drive: Drive, windows: list[Window], offsets: Array | None = None) -> Simulated:
+    def run(self, given: Input, windows: list[Window], offsets: Array | None = None) -> Simulated:
         """Simulate each window from the state that was measured at its start.
 
         Args:
-            drive: what is given.
+            given: the input.
             windows: first and last steps.
             offsets: as from `offsets`, for all windows; absent: found for each.
         """
-        widths = self._widths(drive)
+        widths = self._widths(given)
         steps, first, n = len(self.timeline.times), self._plant.first, len(self.testbed.cables)
         found = [np.full((steps, width), np.nan) for width in widths]
         bars, tensions, angles, speeds = found
         failed = []
         for start, end in windows:
-            shift = self.offsets((start, end), drive) if offsets is None else offsets
-            driven = self._drive(drive, start, end, shift)
+            shift = self.offsets((start, end), given) if offsets is None else offsets
+            driven = self._simulate(given, start, end, shift)
             rows = slice(start, end + 1)
             bars[rows] = driven.states[:, : widths[0]]
             tensions[rows] = driven.tensions[:, : widths[1]]
@@ -155,30 +155,30 @@ class BlockSimulation:
                 failed.append((start, end))
         return Simulated(bars, tensions, angles, speeds, failed)
 
-    def _widths(self, drive: Drive) -> tuple[int, int, int, int]:
-        """Return how many columns of bar, tensions, angles and speeds come out of a drive."""
+    def _widths(self, given: Input) -> tuple[int, int, int, int]:
+        """Return how many columns of bar, tensions, angles and speeds an input leads to."""
         n, bar = len(self.testbed.cables), 6 if self.testbed.bar is not None else 0
         return {
-            Drive.WINCH: (bar, n, 0, 0),
-            Drive.TORQUE: (bar, n, n, 0),
-            Drive.TENSION: (bar, 0, 0, 0),
-            Drive.CABLE: (0, n, 0, 0),
-            Drive.SHAFT: (0, 0, n, n),
-        }[drive]
+            Input.WINCH: (bar, n, 0, 0),
+            Input.TORQUE: (bar, n, n, 0),
+            Input.TENSION: (bar, 0, 0, 0),
+            Input.CABLE: (0, n, 0, 0),
+            Input.SHAFT: (0, 0, n, n),
+        }[given]
 
-    def offsets(self, window: Window, drive: Drive = Drive.WINCH) -> Array:
+    def offsets(self, window: Window, given: Input = Input.WINCH) -> Array:
         """Return what to add to the unstretched lengths of `state_at`, (n,) [m], for a window.
 
         Encoders count from an arbitrary zero, so one length per cable is unknown. It is the one at
         which the cables under measured winch and bar motion carry the mean tension measured in the
         window, or in its first minute; a single noisy sample at its start would determine it badly.
         Without load cells it is the one at which the bar under measured winch motion is on average
-        where it was measured. Zero for a drive that does not simulate cables.
+        where it was measured. Zero for an input that does not simulate cables.
         """
         line, n = self.timeline, len(self.testbed.cables)
-        if drive in _WITHOUT_CABLES or line.angles is None:
+        if given in _WITHOUT_CABLES or line.angles is None:
             return np.zeros(n)
-        if line.tensions is None and (drive is not Drive.WINCH or line.bars is None):
+        if line.tensions is None and (given is not Input.WINCH or line.bars is None):
             return np.zeros(n)
         # Drives that are simulated side by side share what the first one found.
         with self._lock:
@@ -197,7 +197,7 @@ class BlockSimulation:
         lengthening = geometry(self.parameters.cables, np.nanmean(measured, axis=0), frame).bar
         out = np.zeros(len(self.testbed.cables))
         for _ in range(_OFFSET_ROUNDS):
-            simulated = self._drive(Drive.WINCH, start, end, out).states[:, :6]
+            simulated = self._simulate(Input.WINCH, start, end, out).states[:, :6]
             whole = np.isfinite(simulated).all(axis=1)
             if whole.any():
                 missing = (measured - simulated)[whole].mean(axis=0)
@@ -209,8 +209,8 @@ class BlockSimulation:
         out = np.zeros(len(self.testbed.cables))
         measured = tensions[start : end + 1]
         for _ in range(_OFFSET_ROUNDS):
-            simulated = self._drive(Drive.CABLE, start, end, out).tensions
-            shifted = self._drive(Drive.CABLE, start, end, out + _OFFSET_STEP_M).tensions
+            simulated = self._simulate(Input.CABLE, start, end, out).tensions
+            shifted = self._simulate(Input.CABLE, start, end, out + _OFFSET_STEP_M).tensions
             slope = np.nanmean(shifted - simulated, axis=0) / _OFFSET_STEP_M
             missing = np.nanmean(measured - simulated, axis=0)
             change = np.divide(missing, slope, out=np.zeros(len(out)), where=slope < 0.0)
@@ -301,24 +301,24 @@ class BlockSimulation:
         state[first : first + len(offsets)] += offsets
         return state
 
-    def _drive(self, drive: Drive, start: int, end: int, offsets: Array) -> Driven:
+    def _simulate(self, given: Input, start: int, end: int, offsets: Array) -> BlockResponse:
         line, rows = self.timeline, slice(start, end + 1)
-        if drive is Drive.TENSION:
+        if given is Input.TENSION:
             state, tensions = self._motion_at(start), np.asarray(line.tensions)[rows]
             return self._plant.by_tensions(start, state, tensions)
-        if drive is Drive.SHAFT:
+        if given is Input.SHAFT:
             torques = np.asarray(line.torques)[start:end]
             none = np.zeros((end - start + 1, len(offsets)))
             tensions = none if line.tensions is None else line.tensions[rows]
             return self._plant.shafts(self._motion_at(start), torques, tensions)
         state = self._offset_state(start, offsets)
-        if drive is Drive.TORQUE:
+        if given is Input.TORQUE:
             return self._plant.by_torques(start, state, np.asarray(line.torques)[start:end])
-        bars = line.bars[rows] if drive is Drive.CABLE and line.bars is not None else None
+        bars = line.bars[rows] if given is Input.CABLE and line.bars is not None else None
         angles, speeds = np.asarray(line.angles)[rows], np.asarray(line.speeds)[rows]
         return self._plant.by_winches(start, state, angles, speeds, bars)
 
-    def _needs(self, drive: Drive) -> dict[str, Array | None]:
+    def _needs(self, given: Input) -> dict[str, Array | None]:
         line = self.timeline
         bar = {"/bar/pose": line.bars} if self.testbed.bar is not None else {}
         frame: dict[str, Array | None] = {}
@@ -327,11 +327,11 @@ class BlockSimulation:
             frame = {"/winch_frame/pose": line.frame_poses if measured else None}
         angle = {"/winches/state position": line.angles}
         torque = {"/winches/state effort": line.torques}
-        if drive is Drive.TENSION:
+        if given is Input.TENSION:
             return frame | {"/bar/pose": line.bars, "/cables/tension": line.tensions}
-        if drive is Drive.TORQUE:
+        if given is Input.TORQUE:
             return frame | bar | angle | torque
-        if drive is Drive.SHAFT:
+        if given is Input.SHAFT:
             pull = {"/cables/tension": line.tensions} if self.has_cables else {}
             return angle | torque | pull
         return frame | bar | angle

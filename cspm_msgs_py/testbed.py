@@ -179,8 +179,6 @@ class EffectEntry(StrictModel):
 class Testbed(StrictModel):
     """A whole machine. Build it with `load_testbed` or `parse_testbed`."""
 
-    __test__ = False  # not a test class, whatever its name begins with
-
     name: Name
     gravity: NonNegativeFloat = 9.81
     bar: Bar | None = None
@@ -241,8 +239,6 @@ class TestbedFile:
         text: the file's text, as recorded with every run.
         provenance: where each number comes from, by key path (`bar.mass`).
     """
-
-    __test__ = False  # not a test class, whatever its name begins with
 
     testbed: Testbed
     text: str

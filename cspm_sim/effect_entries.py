@@ -81,7 +81,19 @@ def first_states(actions: Sequence[Action], n_states: int) -> list[int]:
 
 
 def hook_rows(actions: Sequence[Action], n_states: int) -> tuple[NDArray[np.int64], Array]:
-    """Return `effects` and `effect_parameters` of `PlantParameters`."""
+    """Return `effects` and `effect_parameters` of `PlantParameters`.
+
+    Args:
+        actions: in any order.
+        n_states: the plant's own states, before those of effects.
+
+    Returns:
+        Rows (m, ROW_COLUMNS), ascending by hook and element as the kernels need them, and the
+        parameters of each, (m, widest).
+
+    Raises:
+        InputError: a kernel does not compile.
+    """
     first = first_states(actions, n_states)
     calls = sorted(
         (int(hook), action.element, k)

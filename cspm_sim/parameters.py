@@ -6,6 +6,7 @@ from cspm_model.kernels.machine import PlantParameters
 from cspm_model.parameters import nominal_parameters, plant_states
 from cspm_msgs_py.testbed import Testbed
 from cspm_sim.effect_entries import altered_testbed, hook_rows, read_actions
+from cspm_sim.kernels.hooks import check_order
 
 
 def plant_parameters(testbed: Testbed) -> PlantParameters:
@@ -17,4 +18,5 @@ def plant_parameters(testbed: Testbed) -> PlantParameters:
     actions = read_actions(testbed)
     nominal = nominal_parameters(altered_testbed(testbed, actions))
     effects, effect_parameters = hook_rows(actions, plant_states(testbed))
+    check_order(effects)
     return nominal._replace(effects=effects, effect_parameters=effect_parameters)

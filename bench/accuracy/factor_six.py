@@ -19,7 +19,7 @@ from rich.console import Console
 from scipy.optimize import minimize_scalar
 
 from bench.page import into_page
-from cspm_ident.block_simulation import BlockSimulation, Drive
+from cspm_ident.block_simulation import BlockSimulation, Input
 from cspm_ident.signals.measurement import Measurement, read_measurement
 from cspm_ident.signals.timeline import Timeline
 from cspm_ident.system.choice import choose
@@ -108,14 +108,14 @@ def fit_factor(machine: Testbed, recordings: Sequence[Measurement]) -> float:
     prepared = []
     for line in lines:
         simulation = BlockSimulation(line, machine)
-        windows = simulation.windows(Drive.WINCH, None)
+        windows = simulation.windows(Input.WINCH, None)
         prepared.append((line, windows, simulation.offsets(windows[0])))
 
     def missing(logarithm: float) -> float:
         moved = machine_with(machine, chosen, [float(np.exp(logarithm))])
         total = 0.0
         for line, windows, offsets in prepared:
-            bars = BlockSimulation(line, moved).run(Drive.WINCH, windows, offsets).bars
+            bars = BlockSimulation(line, moved).run(Input.WINCH, windows, offsets).bars
             whole = np.isfinite(bars[:, 0])
             total += 100.0 - vaf(line.bar_poses[whole, 0], bars[whole, 0])
         return total

@@ -91,10 +91,10 @@ def compare(
 ) -> None:
     """Simulate a recording from its own measured inputs, and tell where both differ.
 
-    The whole, then cables and bar alone, each driven by what was measured.
+    The whole, then cables and bar alone, each from what was measured.
     """
     from cspm.commands.compare_command import CompareRequest, compare_command
-    from cspm_ident.block_simulation import Drive
+    from cspm_ident.block_simulation import Input
 
     if drive not in DRIVES:
         raise InputError(f"--drive {drive}: allowed: {', '.join(DRIVES)}")
@@ -102,5 +102,5 @@ def compare(
         raise InputError(f"--horizon {horizon:g}: allowed: 0.01 to 3600 s")
     delays = _delays(delay)
     compare_command(
-        CompareRequest(recording, testbed, Drive(drive), horizon, delays, repeat, out), json
+        CompareRequest(recording, testbed, Input(drive), horizon, delays, repeat, out), json
     )

@@ -10,7 +10,7 @@ from rich import box
 from rich.console import Console
 from rich.table import Table
 
-from cspm_ident.block_simulation import Drive
+from cspm_ident.block_simulation import Input
 from cspm_ident.comparison.channel import Channel
 from cspm_ident.comparison.compare import Comparison, compare
 from cspm_ident.signals.measurement import read_measurement
@@ -35,7 +35,7 @@ class CompareRequest:
 
     recording: Path
     testbed: Path | None
-    drive: Drive
+    drive: Input
     horizon: float | None
     delays: Mapping[str, float] | None
     repeat: Path | None
@@ -84,10 +84,10 @@ def print_comparison(console: Console, found: Comparison) -> None:
     for line in found.clocks:
         say(console, line)
     titles = {
-        "whole": f"whole, driven by {found.drive.value}",
-        "winch": "winches alone, driven by measured torques and tensions",
-        "cable": "cables alone, driven by measured winch and bar motion",
-        "bar": "bar alone, driven by measured tensions",
+        "whole": f"whole, from measured {found.drive.value}",
+        "winch": "winches alone, from measured torques and tensions",
+        "cable": "cables alone, from measured winch and bar motion",
+        "bar": "bar alone, from measured tensions",
     }
     for block, title in titles.items():
         channels = [channel for channel in found.channels if channel.block == block]

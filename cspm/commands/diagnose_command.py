@@ -240,7 +240,7 @@ def _print_fits(console: Console, found: Diagnosis) -> None:
     _print_table(console, f"residuals of the equations, {judged}", ("black box", "noise"), rows)
     rows = [
         (
-            f"{f.output.name}, driven by {drive_of(f)}",
+            f"{f.output.name}, from measured {drive_of(f)}",
             (f.before, f.retuned, f.after, f.floor),
             f.output.unit,
         )

@@ -82,7 +82,7 @@ def sample(a: Array, b: Array, c: Array, period: float) -> SampledSystem:
 
 
 def series(first: SampledSystem, second: SampledSystem) -> SampledSystem:
-    """Return `second` driven by the outputs of `first`."""
+    """Return `second` with the outputs of `first` as its input."""
     a = block_diag(first.A, second.A)
     a[len(first.A) :, : len(first.A)] = second.B @ first.C
     return SampledSystem(

@@ -11,7 +11,7 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from cspm_ident.block_simulation import BlockSimulation, Drive, Simulated, Window
+from cspm_ident.block_simulation import BlockSimulation, Input, Simulated, Window
 from cspm_ident.comparison.channel import Channel
 from cspm_ident.comparison.floor import lasting_rms, propagated
 from cspm_ident.comparison.metrics import error_bins
@@ -29,13 +29,13 @@ Progress = Callable[[str], None]
 
 # How long a drive's errors may grow [s].
 HORIZONS = {
-    Drive.WINCH: None,
-    Drive.CABLE: None,
-    Drive.TORQUE: 0.5,
-    Drive.TENSION: 0.5,
-    Drive.SHAFT: 0.5,
+    Input.WINCH: None,
+    Input.CABLE: None,
+    Input.TORQUE: 0.5,
+    Input.TENSION: 0.5,
+    Input.SHAFT: 0.5,
 }
-BLOCKS = {"winch": Drive.SHAFT, "cable": Drive.CABLE, "bar": Drive.TENSION}
+BLOCKS = {"winch": Input.SHAFT, "cable": Input.CABLE, "bar": Input.TENSION}
 
 
 @dataclass(frozen=True, eq=False)
@@ -46,7 +46,7 @@ class Comparison:
         measurement: what was recorded.
         drive: what drove the whole.
         horizon: longest window of it [s], None for as long as nothing is missing.
-        channels: the whole's, then those of the blocks, each driven by measured signals alone.
+        channels: the whole's, then those of the blocks, each from measured signals alone.
         delays: of the sensors, as found.
         applied: delays that were taken out, by topic [s].
         drifts: of the sensors' clocks, taken out as well; the delays are those at the beginning.
@@ -57,7 +57,7 @@ class Comparison:
     """
 
     measurement: Measurement
-    drive: Drive
+    drive: Input
     horizon: float | None
     channels: list[Channel]
     delays: list[Delay]
@@ -123,7 +123,7 @@ class _Run(NamedTuple):
 
 def compare(
     measurement: Measurement,
-    drive: Drive = Drive.WINCH,
+    drive: Input = Input.WINCH,
     *,
     horizon: float | None = None,
     delays: Mapping[str, float] | None = None,
@@ -185,7 +185,7 @@ def compare(
     )
 
 
-def _blocks(simulation: BlockSimulation, drive: Drive) -> tuple[dict[str, Drive], dict[str, str]]:
+def _blocks(simulation: BlockSimulation, drive: Input) -> tuple[dict[str, Input], dict[str, str]]:
     """Return the whole and each block whose sensors are there; and why others are left out.
 
     Raises:
@@ -196,7 +196,7 @@ def _blocks(simulation: BlockSimulation, drive: Drive) -> tuple[dict[str, Drive]
     for block, each in BLOCKS.items():
         if each is drive or (simulation.testbed.bar is None and block != "winch"):
             continue
-        if each is Drive.SHAFT and drive is Drive.TORQUE and not simulation.has_cables:
+        if each is Input.SHAFT and drive is Input.TORQUE and not simulation.has_cables:
             continue
         missing = simulation.missing(each)
         if missing:
@@ -208,8 +208,8 @@ def _blocks(simulation: BlockSimulation, drive: Drive) -> tuple[dict[str, Drive]
 
 def _runs(
     simulation: BlockSimulation,
-    blocks: Mapping[str, Drive],
-    horizons: Mapping[Drive, float | None],
+    blocks: Mapping[str, Input],
+    horizons: Mapping[Input, float | None],
     noise: Mapping[str, Array],
 ) -> dict[str, _Run]:
     """Return each block's run; the kernels let Python go on, so that they share processors."""
@@ -222,7 +222,7 @@ def _runs(
 
 
 def _run(
-    simulation: BlockSimulation, drive: Drive, horizon: float | None, noise: Mapping[str, Array]
+    simulation: BlockSimulation, drive: Input, horizon: float | None, noise: Mapping[str, Array]
 ) -> _Run:
     windows = simulation.windows(drive, horizon)
     simulated = simulation.run(drive, windows)

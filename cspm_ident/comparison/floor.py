@@ -7,7 +7,7 @@ from collections.abc import Mapping
 import numpy as np
 from numpy.typing import NDArray
 
-from cspm_ident.block_simulation import BlockSimulation, Drive, Simulated, Window
+from cspm_ident.block_simulation import BlockSimulation, Input, Simulated, Window
 from cspm_ident.signals.measurement import BAR, FRAME, SPEED, TENSION, TORQUE, WINCHES
 from cspm_ident.signals.noise import with_more_noise
 from cspm_ident.signals.timeline import Timeline
@@ -25,18 +25,18 @@ _POSES = {FRAME: "frame_pose", BAR: "bar_pose"}
 _MOTION = {WINCHES: "angle", SPEED: "speed"}
 # What noise goes to, by drive and topic: attributes of the measurement.
 _INPUTS = {
-    Drive.WINCH: {**_POSES, **_MOTION},
-    Drive.CABLE: {**_POSES, **_MOTION},
-    Drive.TORQUE: {**_POSES, **_MOTION, TORQUE: "torque"},
-    Drive.TENSION: {**_POSES, TENSION: "tension"},
-    Drive.SHAFT: {**_MOTION, TORQUE: "torque", TENSION: "tension"},
+    Input.WINCH: {**_POSES, **_MOTION},
+    Input.CABLE: {**_POSES, **_MOTION},
+    Input.TORQUE: {**_POSES, **_MOTION, TORQUE: "torque"},
+    Input.TENSION: {**_POSES, TENSION: "tension"},
+    Input.SHAFT: {**_MOTION, TORQUE: "torque", TENSION: "tension"},
 }
 
 
 def propagated(
     timeline: Timeline,
     machine: Testbed,
-    drive: Drive,
+    drive: Input,
     windows: list[Window],
     noise: Mapping[str, Array],
 ) -> Simulated:
@@ -66,10 +66,10 @@ def propagated(
     return Simulated(bars, tensions, angles, speeds, failed)
 
 
-def _draws(drive: Drive, windows: list[Window]) -> int:
+def _draws(drive: Input, windows: list[Window]) -> int:
     """Return how many draws show what starts leave behind: each window has one in each draw."""
     # Cables between given ends swing nowhere.
-    return 1 if drive is Drive.CABLE else max(1, _STARTS // len(windows))
+    return 1 if drive is Input.CABLE else max(1, _STARTS // len(windows))
 
 
 def lasting_rms(scatter: Array, steps: int) -> float:
@@ -85,7 +85,7 @@ def lasting_rms(scatter: Array, steps: int) -> float:
     return float(np.sqrt(total / (len(squares) + more)))
 
 
-def _noisier(timeline: Timeline, drive: Drive, noise: Mapping[str, Array], seed: int) -> Timeline:
+def _noisier(timeline: Timeline, drive: Input, noise: Mapping[str, Array], seed: int) -> Timeline:
     """Return the timeline with the noise of what a drive takes once more."""
     start, end = timeline.times[0] - _MARGIN_S, timeline.times[-1] + _MARGIN_S
     measurement = timeline.measurement.within(start, end)

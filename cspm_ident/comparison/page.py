@@ -28,10 +28,10 @@ _ROW_PIXELS = 130
 _ENTRY_PIXELS = 20
 _MODEBAR_PIXELS = 35
 _BLOCKS = {
-    "whole": "The whole, driven by {drive}",
-    "winch": "Winches alone, driven by measured torques and tensions",
-    "cable": "Cables alone, driven by measured winch and bar motion",
-    "bar": "Bar alone, driven by measured tensions",
+    "whole": "The whole, from measured {drive}",
+    "winch": "Winches alone, from measured torques and tensions",
+    "cable": "Cables alone, from measured winch and bar motion",
+    "bar": "Bar alone, from measured tensions",
 }
 _QUANTITIES = {
     "time_s": "time [s]",

@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from cspm_ident.block_simulation import BlockSimulation, Drive
+from cspm_ident.block_simulation import BlockSimulation, Input
 from cspm_ident.signals.measurement import BAR, Measurement
 from cspm_ident.signals.noise_source import noise_of
 from cspm_ident.signals.timeline import Timeline
@@ -86,8 +86,8 @@ def judge(
     simulated, shares = {}, {}
     for label, machine in machines.items():
         simulation = BlockSimulation(line, machine)
-        simulation.check(Drive.WINCH)
-        bars = simulation.run(Drive.WINCH, simulation.windows(Drive.WINCH, None)).bars
+        simulation.check(Input.WINCH)
+        bars = simulation.run(Input.WINCH, simulation.windows(Input.WINCH, None)).bars
         columns = [np.interp(times, line.times, column) for column in bars.T]
         simulated[label] = np.stack(columns, axis=1)
         shares[label] = _shares(measured, simulated[label], noise)

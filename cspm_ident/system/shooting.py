@@ -8,7 +8,7 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from cspm_ident.block_simulation import BlockSimulation, Drive, Window
+from cspm_ident.block_simulation import BlockSimulation, Input, Window
 from cspm_ident.signals.measurement import BAR, FRAME, TENSION, WINCHES, Measurement
 from cspm_ident.signals.noise import noise_above_band, with_more_noise
 from cspm_ident.signals.noise_source import noise_of
@@ -16,7 +16,7 @@ from cspm_ident.signals.timeline import Timeline
 from cspm_ident.system.lateness import delays_to_remove
 from cspm_msgs_py.errors import InputError
 from cspm_msgs_py.testbed import Testbed
-from cspm_sim.driven_plant import DrivenPlant
+from cspm_sim.plant_blocks import PlantBlocks
 
 Array = NDArray[np.float64]
 
@@ -74,7 +74,7 @@ class Shooting:
     def raw_residuals(self, machine: Testbed) -> list[dict[str, Array]]:
         """Return the same with the initial states as they are."""
         simulation = BlockSimulation(self.timeline, machine)
-        plant = DrivenPlant(simulation.parameters, self.timeline.motion, self.timeline.period_ns)
+        plant = PlantBlocks(simulation.parameters, self.timeline.motion, self.timeline.period_ns)
         return [
             self._window(plant, window, _started(simulation, window[0], start))
             for window, start in zip(self.windows, self.starts, strict=True)
@@ -132,7 +132,7 @@ class Shooting:
         rows = np.split(row, ends)
         return {k: r.reshape(part[k].shape) for k, r in zip(self.kinds, rows, strict=True)}
 
-    def _window(self, plant: DrivenPlant, window: Window, state: Array) -> dict[str, Array]:
+    def _window(self, plant: PlantBlocks, window: Window, state: Array) -> dict[str, Array]:
         start, end = window
         rows, line = slice(start, end + 1), self.timeline
         angles, speeds = np.asarray(line.angles)[rows], np.asarray(line.speeds)[rows]
@@ -166,7 +166,7 @@ def make_shooting(
             long enough.
     """
     line = Timeline(measurement)
-    BlockSimulation(line, measurement.machine).check(Drive.WINCH)
+    BlockSimulation(line, measurement.machine).check(Input.WINCH)
     noise, _ = noise_of(measurement, None)
     duration = float(line.times[-1] - line.times[0])
     _check_band(line, noise, duration)
@@ -174,7 +174,7 @@ def make_shooting(
         delays = delays_to_remove(line, measurement.machine)
     line = line.delayed(delays)
     least = 0.5 * horizon / line.period
-    windows = BlockSimulation(line, measurement.machine).windows(Drive.WINCH, horizon)
+    windows = BlockSimulation(line, measurement.machine).windows(Input.WINCH, horizon)
     windows = [w for w in windows if w[1] - w[0] >= least]
     if not windows:
         raise InputError(

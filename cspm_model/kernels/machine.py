@@ -29,7 +29,8 @@ class PlantParameters(NamedTuple):
             order in memory, so that a processor takes several cables at a time.
         tables: shape (n, points, 2): tension and its slope along the stiffness law.
         effects: shape (m, ROW_COLUMNS): hook, element (cable index, 0 for bar and winch frame),
-            kernel address, first state; see `cspm_sim.kernels.hooks`.
+            kernel address, first state, number of states; see `cspm_sim.kernels.hooks`. Rows
+            ascend by hook and within a hook by element: kernels walk them once, without search.
         effect_parameters: shape (m, widest).
     """
 

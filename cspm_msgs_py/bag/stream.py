@@ -7,14 +7,12 @@ from contextlib import ExitStack
 from dataclasses import dataclass
 from functools import partial
 from pathlib import Path
-from types import TracebackType
 from typing import NamedTuple
-
-from typing_extensions import Self
 
 from cspm_msgs_py.bag.conversion import Convert, converter, ros2_type
 from cspm_msgs_py.bag.files import open_files
 from cspm_msgs_py.bag.run import BagMessage, Run, StoredFile, StoredMessage, StoredRun, in_order
+from cspm_msgs_py.closing import Closing
 from cspm_msgs_py.errors import InputError
 
 _EARLIEST_NS = -(2**63)
@@ -29,7 +27,7 @@ class BagTopic:
     count: int
 
 
-class BagStream:
+class BagStream(Closing):
     """A bag whose messages are read one after the other, never all at once.
 
     Memory holds the chunks that overlap in time, one by one in the bags of most writers.
@@ -106,17 +104,6 @@ class BagStream:
     def close(self) -> None:
         """Close the files."""
         self._stack.close()
-
-    def __enter__(self) -> Self:
-        return self
-
-    def __exit__(
-        self,
-        kind: type[BaseException] | None,
-        error: BaseException | None,
-        trace: TracebackType | None,
-    ) -> None:
-        self.close()
 
 
 def open_bag(path: Path) -> BagStream:

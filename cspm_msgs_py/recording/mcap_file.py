@@ -5,7 +5,6 @@ from __future__ import annotations
 import struct
 import zlib
 from pathlib import Path
-from types import TracebackType
 
 from mcap.records import (
     Attachment,
@@ -20,8 +19,8 @@ from mcap.records import (
     Statistics,
 )
 from mcap.records import ChunkIndex as ChunkIndexRecord
-from typing_extensions import Self
 
+from cspm_msgs_py.closing import Closing
 from cspm_msgs_py.errors import InputError
 from cspm_msgs_py.recording.chunk import (
     ChunkHead,
@@ -51,7 +50,7 @@ _HEAD_SIZE = 256
 _RUN = 1 << 22
 
 
-class McapFile:
+class McapFile(Closing):
     """The content of one MCAP file.
 
     A file that was closed is read by its summary, any other by walking over its records: all
@@ -369,17 +368,6 @@ class McapFile:
     def close(self) -> None:
         """Close the file."""
         self._file.close()
-
-    def __enter__(self) -> Self:
-        return self
-
-    def __exit__(
-        self,
-        kind: type[BaseException] | None,
-        error: BaseException | None,
-        trace: TracebackType | None,
-    ) -> None:
-        self.close()
 
 
 def _reason(err: OSError) -> str:

@@ -7,14 +7,13 @@ from collections.abc import Iterable, Iterator
 from dataclasses import dataclass
 from functools import cached_property
 from pathlib import Path
-from types import TracebackType
 from typing import NamedTuple
 
 import numpy as np
 from mcap.records import Channel
 from numpy.typing import NDArray
-from typing_extensions import Self
 
+from cspm_msgs_py.closing import Closing
 from cspm_msgs_py.errors import InputError
 from cspm_msgs_py.message import carries_row
 from cspm_msgs_py.recording.chunk import ChunkPlace, Messages
@@ -45,7 +44,7 @@ class Payloads(NamedTuple):
     payloads: list[bytes]
 
 
-class Recording:
+class Recording(Closing):
     """A rosbag2 folder with MCAP files, or one MCAP file.
 
     Attributes:
@@ -247,17 +246,6 @@ class Recording:
         """Close all files."""
         for file in self.files:
             file.close()
-
-    def __enter__(self) -> Self:
-        return self
-
-    def __exit__(
-        self,
-        kind: type[BaseException] | None,
-        error: BaseException | None,
-        trace: TracebackType | None,
-    ) -> None:
-        self.close()
 
 
 def _span_of(file: McapFile, place: ChunkPlace) -> tuple[int, int]:

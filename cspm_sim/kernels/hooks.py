@@ -1,7 +1,8 @@
 """Where effects take part in the plant's rates, and how they are called there.
 
 The rows of `PlantParameters.effects` are in the order of the hooks, and within a hook in the order
-of the elements, so that a cursor that only moves on finds each element's effects.
+of the elements, so that a cursor that only moves on finds each element's effects. `check_order`
+refuses any other order, in which a kernel would pass over effects without an error.
 """
 
 from numba import njit
@@ -32,6 +33,19 @@ ADDRESS = 2
 FIRST_STATE = 3  # index in the plant's state, -1 without memory
 STATES = 4  # how many
 ROW_COLUMNS = EFFECT_COLUMNS
+
+
+def check_order(effects: Rows) -> None:
+    """Check that effects' rows (m, ROW_COLUMNS) ascend by hook, within a hook by element.
+
+    Raises:
+        ValueError: they do not, so that kernels would pass over some of them.
+    """
+    keys = [(int(row[HOOK]), int(row[ELEMENT])) for row in effects]
+    if keys != sorted(keys):
+        raise ValueError(
+            f"effects: rows of hook and element {keys}, allowed: ascending, as `hook_rows` gives"
+        )
 
 
 @njit(cache=True, error_model="numpy", _nrt=False)

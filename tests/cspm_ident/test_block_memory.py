@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from run_samples import bundle_of
 
-from cspm_ident.block_simulation import BlockSimulation, Drive
+from cspm_ident.block_simulation import BlockSimulation, Input
 from cspm_ident.comparison.compare import compare
 from cspm_ident.signals.measurement import read_measurement
 from cspm_ident.signals.timeline import Timeline
@@ -74,8 +74,8 @@ def test_settled_memory_leaves_no_transient(measurement, tmp_path):
 
 
 def test_no_memory_at_the_start_would_show(simulation):
-    window = simulation.windows(Drive.CABLE, None)[0]
-    settled = simulation.run(Drive.CABLE, [window]).tensions[window[0] :, 0]
+    window = simulation.windows(Input.CABLE, None)[0]
+    settled = simulation.run(Input.CABLE, [window]).tensions[window[0] :, 0]
     kept, state_at = simulation.offsets(window), simulation.state_at
 
     def blank(step):
@@ -85,7 +85,7 @@ def test_no_memory_at_the_start_would_show(simulation):
 
     simulation.state_at = blank
     try:
-        emptied = simulation.run(Drive.CABLE, [window], kept).tensions[window[0] :, 0]
+        emptied = simulation.run(Input.CABLE, [window], kept).tensions[window[0] :, 0]
     finally:
         del simulation.state_at
     # A creep of 2e-4 m/N under 8 N at 3 kN/m.

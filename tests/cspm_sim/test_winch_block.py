@@ -9,7 +9,7 @@ from emps_samples import recorded as emps_needed
 from import_samples import imported
 from run_samples import run_to
 
-from cspm_ident.block_simulation import Drive
+from cspm_ident.block_simulation import Input
 from cspm_ident.comparison.compare import compare
 from cspm_ident.comparison.floor import lasting_rms
 from cspm_ident.signals.measurement import Measurement, read_measurement
@@ -60,7 +60,7 @@ def test_a_winch_whose_torque_has_the_wrong_sign_turns_the_other_way(single):
 
 def test_without_load_cells_the_winch_block_is_left_out(single):
     bare = replace(single, tension=None)
-    found = compare(bare, Drive.TORQUE)
+    found = compare(bare, Input.TORQUE)
     assert {c.block for c in found.channels} == {"whole"}
     assert found.left_out == {"winch": "/cables/tension not recorded"}
 
@@ -91,7 +91,7 @@ def test_a_machine_without_cable_needs_no_load_cell(tmp_path):
     assert channel.vaf > 99.9
     # What the published model leaves out, a constant force among it, is no noise.
     assert channel.rms > 10.0 * channel.floor
-    alone = compare(measured, Drive.TORQUE)
+    alone = compare(measured, Input.TORQUE)
     assert [c.block for c in alone.channels] == ["whole"]
 
 

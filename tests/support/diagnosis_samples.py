@@ -3,7 +3,7 @@
 import numpy as np
 from run_samples import SCENARIOS
 
-from cspm_ident.block_simulation import Drive
+from cspm_ident.block_simulation import Input
 from cspm_ident.diagnosis.diagnose import Detail, Diagnosis, Shape
 from cspm_ident.diagnosis.regression.block_regression import Gain
 from cspm_ident.diagnosis.regression.hypothesis import (
@@ -43,7 +43,7 @@ def equation(seed=1):
     )
 
 
-OUTPUT = Output(Drive.SHAFT, "winches/angle/surge_2", "rad", "surge_2", Channel.SHAFT)
+OUTPUT = Output(Input.SHAFT, "winches/angle/surge_2", "rad", "surge_2", Channel.SHAFT)
 
 
 def diagnosis(named=True, alternatives=(), unknown=(), rejected=(), lines=(), region=None):

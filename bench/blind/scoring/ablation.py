@@ -8,7 +8,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from cspm_ident.block_simulation import BlockSimulation, Drive
+from cspm_ident.block_simulation import BlockSimulation, Input
 from cspm_ident.diagnosis.diagnose import Diagnosis, diagnose
 from cspm_ident.diagnosis.selection.safeguards import ALL_SAFEGUARDS, Safeguards
 from cspm_ident.signals.measurement import Measurement
@@ -32,13 +32,13 @@ def with_modelled_tensions(measurement: Measurement) -> Measurement:
     """Return the measurement with tensions that the model computes instead of the load cells.
 
     Cables and bar are simulated from motor angles and the frame's pose; blocks are then no longer
-    driven by what was measured between them. Left as it is where sensors do not allow that.
+    with what was measured as input between them. Left as it is where sensors do not allow that.
     """
     timeline = Timeline(measurement)
     simulation = BlockSimulation(timeline, measurement.machine)
-    if measurement.tension is None or simulation.missing(Drive.WINCH):
+    if measurement.tension is None or simulation.missing(Input.WINCH):
         return measurement
-    simulated = simulation.run(Drive.WINCH, simulation.windows(Drive.WINCH, None))
+    simulated = simulation.run(Input.WINCH, simulation.windows(Input.WINCH, None))
     rows = np.isfinite(simulated.tensions).all(axis=1)
     times = timeline.times[rows]
     stamps = measurement.tension.times

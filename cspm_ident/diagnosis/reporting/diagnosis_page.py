@@ -273,7 +273,7 @@ def _simulated(found: Diagnosis, data: dict[str, Any]) -> str:
     """Return errors of simulations of held-out data, and of the closed loop where it was run."""
     if not found.simulated:
         return ""
-    heads = ("quantity", "driven by", "before", "re-tuned", "after", "noise", "unit")
+    heads = ("quantity", "input", "before", "re-tuned", "after", "noise", "unit")
     rows = []
     for fit in found.simulated:
         numbers = (fit.before, fit.retuned, fit.after, fit.floor)

@@ -7,7 +7,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from cspm_ident.block_simulation import Drive
+from cspm_ident.block_simulation import Input
 from cspm_ident.diagnosis.diagnose import Diagnosis, Shape
 from cspm_ident.diagnosis.reporting.formula_hint import is_even, sketch
 from cspm_ident.diagnosis.residuals.free_shapes import Driver
@@ -186,7 +186,7 @@ def channel_of(fit: HeldOut | Power) -> str:
 
 def drive_of(fit: SimulatedFit) -> str:
     """Return the public name of what drove a simulation."""
-    return "torque" if fit.output.drive is Drive.SHAFT else fit.output.drive.value
+    return "torque" if fit.output.drive is Input.SHAFT else fit.output.drive.value
 
 
 def unit_of(fit: HeldOut) -> str:

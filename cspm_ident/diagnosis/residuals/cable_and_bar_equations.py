@@ -1,4 +1,4 @@
-"""The cables' law and the bar's equation of motion, driven by measured signals."""
+"""The cables' law and the bar's equation of motion, with measured signals as input."""
 
 from __future__ import annotations
 

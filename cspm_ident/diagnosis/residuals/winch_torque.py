@@ -1,4 +1,4 @@
-"""The winches' torque equation (2-21), driven by measured torque, tension and angle."""
+"""The winches' torque equation (2-21), with measured torque, tension and angle."""
 
 from __future__ import annotations
 

@@ -8,7 +8,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from cspm_ident.block_simulation import BlockSimulation, Drive, Simulated
+from cspm_ident.block_simulation import BlockSimulation, Input, Simulated
 from cspm_ident.comparison.floor import lasting_rms, propagated
 from cspm_ident.diagnosis.residuals.corrected_measurement import as_found
 from cspm_ident.diagnosis.residuals.regressors import Candidate
@@ -23,7 +23,7 @@ Array = NDArray[np.float64]
 Weights = Mapping[Candidate, Array]
 
 # How long errors may grow where a drive is integrated twice or more [s].
-HORIZONS: dict[Drive, float | None] = {Drive.SHAFT: 0.5, Drive.WINCH: None, Drive.TENSION: 0.5}
+HORIZONS: dict[Input, float | None] = {Input.SHAFT: 0.5, Input.WINCH: None, Input.TENSION: 0.5}
 LONGEST_S = 30.0
 # In which what a cable remembers of before fades.
 LEAD_S = 10.0
@@ -40,7 +40,7 @@ class Output(NamedTuple):
         kind: the residual that the same block has.
     """
 
-    drive: Drive
+    drive: Input
     name: str
     unit: str
     element: str
@@ -108,7 +108,7 @@ def baselines_of(
 def simulate_held_out(baselines: Baselines, found: Weights) -> tuple[SimulatedFit, ...]:
     """Simulate winches, cables and bar from measured signals with what was found.
 
-    Winches are driven by torques and tensions in windows of half a second, the bar by tensions
+    Winches take torques and tensions as input in windows of half a second, the bar by tensions
     likewise, cables and bar by motor angles throughout. What sensors do not allow is left out.
 
     Args:
@@ -178,7 +178,7 @@ def _is_told(output: Output, kinds: Collection[Channel]) -> bool:
     Motor angles drive cables and bar together, so that what either does moves both.
     """
     together = {Channel.TENSION, Channel.WRENCH}
-    both = output.drive is Drive.WINCH and not together.isdisjoint(kinds)
+    both = output.drive is Input.WINCH and not together.isdisjoint(kinds)
     return both or output.kind in kinds
 
 
@@ -207,12 +207,12 @@ def _errors(parts: Sequence[Measurement], since: Sequence[float], weights: Weigh
     }
 
 
-def _drives(simulation: BlockSimulation) -> list[Drive]:
+def _drives(simulation: BlockSimulation) -> list[Input]:
     bar = simulation.testbed.bar is not None
     return [
         drive
         for drive in HORIZONS
-        if (bar or drive is Drive.SHAFT) and not simulation.missing(drive)
+        if (bar or drive is Input.SHAFT) and not simulation.missing(drive)
     ]
 
 
@@ -235,7 +235,7 @@ def _floors(parts: Sequence[Measurement], weights: Weights) -> dict[Output, floa
 
 
 def _outputs(
-    measurement: Measurement, drive: Drive, simulated: Simulated
+    measurement: Measurement, drive: Input, simulated: Simulated
 ) -> list[tuple[Output, Samples, Array, int]]:
     """Return what a drive simulates and a sensor measured, with sensor and column."""
     cables, kinds = measurement.machine.cable_names, Channel

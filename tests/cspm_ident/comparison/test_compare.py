@@ -12,7 +12,7 @@ from machines import THESIS
 from run_samples import run_to
 
 from cspm.cli import main as cli
-from cspm_ident.block_simulation import BlockSimulation, Drive
+from cspm_ident.block_simulation import BlockSimulation, Input
 from cspm_ident.comparison import floor
 from cspm_ident.comparison.compare import compare
 from cspm_ident.comparison.metrics import best_lag, coherence_of, error_bins, nrmse
@@ -108,7 +108,7 @@ def test_a_late_camera_is_found(measurement, late):
 def test_a_recording_without_cameras_says_what_is_missing(measurement):
     blind = replace(measurement, bar_pose=None)
     with pytest.raises(InputError, match=r"--drive tension needs /bar/pose, allowed: a recording"):
-        compare(blind, Drive.TENSION)
+        compare(blind, Input.TENSION)
 
 
 def test_without_load_cells_the_bar_is_simulated_all_the_same(measurement, comparison):
@@ -155,7 +155,7 @@ def test_windows_begin_anew_and_leave_holes_out(measurement):
     seen = (samples.times < 4.0) | (samples.times > 6.0)
     torn = replace(measurement, bar_pose=type(samples)(samples.times[seen], samples.values[seen]))
     simulation = BlockSimulation(Timeline(torn), torn.machine)
-    windows = simulation.windows(Drive.TENSION, 0.5)
+    windows = simulation.windows(Input.TENSION, 0.5)
     line = simulation.timeline
     assert len(windows) >= 20
     for start, end in windows:
@@ -223,7 +223,7 @@ def test_one_start_is_drawn_several_times_and_many_once(measurement, monkeypatch
     for count, draws in ((1, 4), (2, 2), (5, 1)):
         seeds.clear()
         windows = [(100 * i, 100 * (i + 1)) for i in range(count)]
-        scatter = floor.propagated(timeline, machine, Drive.WINCH, windows, noise)
+        scatter = floor.propagated(timeline, machine, Input.WINCH, windows, noise)
         assert len(set(seeds)) == len(seeds) == draws
         assert np.isfinite(scatter.bars).all()
 
@@ -253,7 +253,7 @@ def test_the_command_prints_writes_and_reports(command, folder, tmp_path):
         "compare", folder, "--out", tmp_path / "report", "--json", tmp_path / "found.json"
     )
     assert code == 0
-    assert "whole, driven by winch" in out
+    assert "whole, from measured winch" in out
     assert "winch: left out, all winches stand still" in out
     assert "/bar/pose: " in out.splitlines()[0]
     assert out.splitlines()[0].endswith("; too small to matter, left in")

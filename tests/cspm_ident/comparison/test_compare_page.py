@@ -6,7 +6,7 @@ import pytest
 from browser import look
 from run_samples import run_to
 
-from cspm_ident.block_simulation import Drive
+from cspm_ident.block_simulation import Input
 from cspm_ident.comparison.compare import compare
 from cspm_ident.comparison.page import write_page
 from cspm_ident.signals.measurement import read_measurement
@@ -22,7 +22,7 @@ def measurement(tmp_path_factory):
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("drive", list(Drive)[:3])
+@pytest.mark.parametrize("drive", list(Input)[:3])
 def test_no_part_of_the_page_but_tables_is_wider_than_the_screen(measurement, drive, tmp_path):
     page = tmp_path / "report.html"
     found = compare(measurement, drive=drive)

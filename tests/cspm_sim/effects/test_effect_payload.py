@@ -6,10 +6,10 @@ from machines import build, changed, entry, general_content
 
 from cspm_model.kinematics import rotation
 from cspm_model.motion import Motion
-from cspm_sim.driven_plant import DrivenPlant
 from cspm_sim.effects import catalogue
 from cspm_sim.effects.signals import BarSignal
 from cspm_sim.plant import Plant
+from cspm_sim.plant_blocks import PlantBlocks
 
 STILL = Motion.still(np.zeros(6))
 MS = 1_000_000
@@ -159,7 +159,7 @@ def test_a_payload_swings_along_under_a_bar_that_recorded_tensions_drive(mass):
         plant.step(np.zeros(8))
         states.append(plant.bar_state.copy())
         tensions.append(plant.tensions.copy())
-    driven = DrivenPlant(plant.parameters, motion, MS)
+    driven = PlantBlocks(plant.parameters, motion, MS)
     found = driven.by_tensions(0, start, np.array(tensions)).states
     moved = np.abs(np.array(states) - states[0]).max()
     assert np.abs(found - np.array(states)).max() < 0.02 * moved

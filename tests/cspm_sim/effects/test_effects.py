@@ -9,6 +9,7 @@ from machines import WINCH, build, changed, entry, general_content, rig_content
 
 import cspm_sim.effects as effects_package
 from cspm_model.motion import Motion
+from cspm_msgs_py.dofs import DOFS
 from cspm_msgs_py.errors import InputError
 from cspm_msgs_py.testbed import EffectEntry
 from cspm_sim.effect_entries import read_actions
@@ -20,6 +21,7 @@ from cspm_sim.kernels import winch as winch_kernel
 from cspm_sim.kernels.plant import state_count
 from cspm_sim.parameters import plant_parameters
 from cspm_sim.plant import Plant
+from cspm_sim.plant_blocks import PlantBlocks
 
 STILL = Motion.still(np.zeros(6))
 UNITS = {
@@ -339,6 +341,34 @@ def test_elements_are_those_named_and_all_when_none_is_named():
         )
     ]
     assert plant_parameters(build(content)).effects[:, :2].tolist() == [[Hook.BAR, 0]]
+
+
+def test_rows_are_in_the_kernels_order_however_a_file_lists_effects():
+    entries = [
+        entry("bar_linear_damping", **dict.fromkeys(DOFS, 1.0)),
+        entry("winch_viscous_friction", ["c5", "c2"], coefficient=0.01),
+        entry("pulley_friction", ["c1"], coefficient=0.02, wrap=1.5),
+        entry("winch_coulomb_friction", ["c2", "c0"], torque=0.01),
+    ]
+    found = [
+        plant_parameters(build({**general_content(), "effects": list(order)}))
+        for order in (entries, entries[::-1])
+    ]
+    for parameters in found:
+        keys = [tuple(row) for row in parameters.effects[:, :2].tolist()]
+        assert keys == sorted(keys)
+    one, other = ({tuple(row) for row in p.effects[:, :3].tolist()} for p in found)
+    assert one == other
+    assert len(one) == 6
+
+
+def test_rows_in_another_order_are_refused():
+    content = {**general_content(), "effects": [entry("winch_coulomb_friction", torque=0.01)]}
+    parameters = plant_parameters(build(content))
+    PlantBlocks(parameters, STILL, 1_000_000)
+    wrong = parameters._replace(effects=parameters.effects[::-1].copy())
+    with pytest.raises(ValueError, match=r"^effects: rows of .*, allowed: ascending, as"):
+        PlantBlocks(wrong, STILL, 1_000_000)
 
 
 def test_an_effect_acts_on_its_element_alone():

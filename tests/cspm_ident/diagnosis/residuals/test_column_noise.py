@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from run_samples import run_to
 
-from cspm_ident.block_simulation import BlockSimulation, Drive
+from cspm_ident.block_simulation import BlockSimulation, Input
 from cspm_ident.diagnosis.residuals.cable_and_bar import Suspension
 from cspm_ident.diagnosis.residuals.machine_signals import machine_signals
 from cspm_ident.diagnosis.residuals.recorded_equations import equations_of
@@ -87,5 +87,5 @@ def test_a_lost_reading_is_no_torque(calm):
     assert empty[0] < lost < empty[-1]
     assert empty[-1] - empty[0] < 0.03
     simulation = BlockSimulation(line, torn.machine)
-    for start, end in simulation.windows(Drive.SHAFT, 0.5):
+    for start, end in simulation.windows(Input.SHAFT, 0.5):
         assert line.times[end] <= lost or line.times[start] >= lost

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from run_samples import SCENARIOS
 
-from cspm_ident.block_simulation import Drive
+from cspm_ident.block_simulation import Input
 from cspm_ident.diagnosis.regression.block_regression import Gain
 from cspm_ident.diagnosis.regression.hypothesis import Findings, Hypothesis, Named
 from cspm_ident.diagnosis.reporting.statement import numbers_of
@@ -20,7 +20,7 @@ from cspm_msgs_py.testbed import load_testbed
 from cspm_sim.effects import Channel, catalogue
 
 THESIS = load_testbed(SCENARIOS / "testbeds" / "thesis.yaml")
-OUTPUT = Output(Drive.SHAFT, "winches/angle/surge_2", "rad", "surge_2", Channel.SHAFT)
+OUTPUT = Output(Input.SHAFT, "winches/angle/surge_2", "rad", "surge_2", Channel.SHAFT)
 
 
 def model(shares, possible=None, wanted=None, unsure=(), harm=()):

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from run_samples import bundle_of
 
-from cspm_ident.block_simulation import Drive
+from cspm_ident.block_simulation import Input
 from cspm_ident.diagnosis.residuals.regressors import Candidate
 from cspm_ident.diagnosis.validation.holdout_simulation import (
     Baselines,
@@ -43,10 +43,10 @@ def test_only_what_was_not_searched_is_judged(recording, start):
 @pytest.mark.parametrize(
     ("effect", "element", "drive", "told"),
     [
-        ("cable_stiffness", "sway_1", Drive.WINCH, True),
-        ("cable_stiffness", "sway_1", Drive.TENSION, False),
-        ("winch_coulomb_friction", "sway_1", Drive.WINCH, False),
-        ("bar_mass", "bar", Drive.TENSION, True),
+        ("cable_stiffness", "sway_1", Input.WINCH, True),
+        ("cable_stiffness", "sway_1", Input.TENSION, False),
+        ("winch_coulomb_friction", "sway_1", Input.WINCH, False),
+        ("bar_mass", "bar", Input.TENSION, True),
     ],
 )
 def test_a_pose_tells_of_cables_where_motor_angles_drive_both(effect, element, drive, told):

@@ -1,4 +1,4 @@
-"""Blocks driven by given signals, against the plant that made the signals."""
+"""Blocks with given inputs, against the plant that made the signals."""
 
 from dataclasses import dataclass
 
@@ -10,8 +10,8 @@ from run_samples import SCENARIOS
 from cspm_model.kernels.cable import RADIUS
 from cspm_model.motion import Motion
 from cspm_msgs_py.testbed import load_testbed
-from cspm_sim.driven_plant import DrivenPlant
 from cspm_sim.plant import Plant
+from cspm_sim.plant_blocks import PlantBlocks
 
 PERIOD_NS = 1_000_000
 STEPS = 1500
@@ -54,8 +54,8 @@ def simulated():
 
 
 @pytest.fixture
-def driven(simulated):
-    return DrivenPlant(simulated.plant.parameters, simulated.motion, PERIOD_NS)
+def blocks(simulated):
+    return PlantBlocks(simulated.plant.parameters, simulated.motion, PERIOD_NS)
 
 
 def parts(simulated, start=0):
@@ -66,46 +66,46 @@ def parts(simulated, start=0):
 
 
 @pytest.mark.parametrize("start", [0, 700])
-def test_driven_by_torques_it_is_the_plant_itself(simulated, driven, start):
-    found = driven.by_torques(start, simulated.states[start], simulated.torques[start:])
+def test_from_torques_it_is_the_plant_itself(simulated, blocks, start):
+    found = blocks.by_torques(start, simulated.states[start], simulated.torques[start:])
     assert found.good == STEPS - start + 1
     np.testing.assert_array_equal(found.states, simulated.states[start:])
     np.testing.assert_array_equal(found.tensions, simulated.tensions[start:])
 
 
-def test_driven_by_winches_the_bar_follows(simulated, driven):
-    found = driven.by_winches(0, simulated.states[0], *parts(simulated))
+def test_from_winches_the_bar_follows(simulated, blocks):
+    found = blocks.by_winches(0, simulated.states[0], *parts(simulated))
     # Between samples the angle is a cubic; its error falls with the fourth power of 1 ms.
     np.testing.assert_allclose(found.states[:, :12], simulated.states[:, :12], atol=1e-6)
     np.testing.assert_allclose(found.tensions, simulated.tensions, atol=1e-5)
 
 
-def test_winches_that_wind_the_other_way_lead_elsewhere(simulated, driven):
+def test_winches_that_wind_the_other_way_lead_elsewhere(simulated, blocks):
     angles, speeds = parts(simulated)
     mirrored = 2 * angles[0] - angles
-    found = driven.by_winches(0, simulated.states[0], mirrored, -speeds)
+    found = blocks.by_winches(0, simulated.states[0], mirrored, -speeds)
     assert np.abs(found.tensions - simulated.tensions).max() > 0.1
 
 
-def test_cables_alone_follow_winches_and_bar(simulated, driven):
+def test_cables_alone_follow_winches_and_bar(simulated, blocks):
     angles, speeds = parts(simulated)
     bars = simulated.states[:, :12]
-    found = driven.by_winches(0, simulated.states[0], angles, speeds, bars)
+    found = blocks.by_winches(0, simulated.states[0], angles, speeds, bars)
     # The bar goes in straight lines between steps, with 5 m/s² at most: micrometres.
     np.testing.assert_allclose(found.tensions, simulated.tensions, atol=5e-3)
     still = np.repeat(bars[:1], len(bars), axis=0)
-    resting = driven.by_winches(0, simulated.states[0], angles, speeds, still)
+    resting = blocks.by_winches(0, simulated.states[0], angles, speeds, still)
     assert np.abs(resting.tensions - simulated.tensions).max() > 0.1
 
 
-def test_driven_by_tensions_the_bar_moves_as_it_did(simulated, driven):
-    found = driven.by_tensions(0, simulated.states[0], simulated.tensions)
+def test_from_tensions_the_bar_moves_as_it_did(simulated, blocks):
+    found = blocks.by_tensions(0, simulated.states[0], simulated.tensions)
     np.testing.assert_allclose(found.states[:, :12], simulated.states[:, :12], atol=1e-4)
 
 
-def test_without_tension_the_bar_falls(simulated, driven):
+def test_without_tension_the_bar_falls(simulated, blocks):
     none = np.zeros((501, len(simulated.tensions[0])))
-    found = driven.by_tensions(0, simulated.states[0], none)
+    found = blocks.by_tensions(0, simulated.states[0], none)
     fallen = found.states[-1, 2] - found.states[0, 2]
     assert fallen == pytest.approx(0.5 * 9.81 * 0.5**2, rel=1e-6)
 
@@ -131,28 +131,28 @@ def test_winches_alone_turn_as_they_did(effects):
         plant.step(torques[-1])
         states.append(plant.state.copy())
         tensions.append(plant.tensions.copy())
-    driven = DrivenPlant(plant.parameters, plant.frame_motion, PERIOD_NS)
-    found = driven.shafts(states[0], np.array(torques), np.array(tensions)).states
+    blocks = PlantBlocks(plant.parameters, plant.frame_motion, PERIOD_NS)
+    found = blocks.shafts(states[0], np.array(torques), np.array(tensions)).states
     turned = np.array(states)[:, 20:36]
     moved = np.abs(turned - turned[0]).max(axis=0)
     # Tensions are joined by straight lines, and sampled at the ends of each step.
     assert (np.abs(found[:, 20:36] - turned).max(axis=0) < 0.01 * moved.max()).all()
-    other = driven.shafts(states[0], -np.array(torques), np.array(tensions)).states
+    other = blocks.shafts(states[0], -np.array(torques), np.array(tensions)).states
     assert np.abs(other[:, 20:36] - turned).max() > moved.max()
 
 
-def test_a_window_in_the_middle_sees_the_frame_where_it_is_then(simulated, driven):
+def test_a_window_in_the_middle_sees_the_frame_where_it_is_then(simulated, blocks):
     start = 900
     angles, speeds = parts(simulated, start)
-    found = driven.by_winches(start, simulated.states[start], angles, speeds)
+    found = blocks.by_winches(start, simulated.states[start], angles, speeds)
     np.testing.assert_allclose(found.tensions, simulated.tensions[start:], atol=1e-5)
-    early = driven.by_winches(0, simulated.states[start], angles, speeds)
+    early = blocks.by_winches(0, simulated.states[start], angles, speeds)
     assert np.abs(early.tensions - simulated.tensions[start:]).max() > 0.1
 
 
-def test_rows_after_a_divergence_are_not_numbers(simulated, driven):
+def test_rows_after_a_divergence_are_not_numbers(simulated, blocks):
     state = simulated.states[0].copy()
     state[6] = np.inf
-    found = driven.by_torques(0, state, simulated.torques[:10])
+    found = blocks.by_torques(0, state, simulated.torques[:10])
     assert found.good == 0
     assert np.isnan(found.states).all()

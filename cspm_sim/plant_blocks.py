@@ -1,4 +1,4 @@
-"""The plant's blocks driven by given signals: winch motion, torques, or tensions."""
+"""The plant's blocks with given inputs: winch motion, torques, or tensions."""
 
 from __future__ import annotations
 
@@ -9,18 +9,19 @@ from numpy.typing import NDArray
 
 from cspm_model.kernels.machine import BAR_STATES, PlantParameters
 from cspm_model.motion import Motion
-from cspm_sim.kernels.driven import (
-    drive_by_tensions,
-    drive_by_torques,
-    drive_by_winches,
-    drive_shafts,
+from cspm_sim.kernels.blocks import (
+    simulate_from_tensions,
+    simulate_from_torques,
+    simulate_from_winches,
+    simulate_shafts,
 )
+from cspm_sim.kernels.hooks import check_order
 from cspm_sim.kernels.plant import make_scratch, state_count
 
 Array = NDArray[np.float64]
 
 
-class Driven(NamedTuple):
+class BlockResponse(NamedTuple):
     """What came out, at each step from the start's on; rows after the first bad one are NaN.
 
     Attributes:
@@ -34,7 +35,7 @@ class Driven(NamedTuple):
     good: int
 
 
-class DrivenPlant:
+class PlantBlocks:
     """A machine on a moving winch frame, whose blocks are run window by window.
 
     Time is a count of steps from the frame motion's first knot. The states are the plant's:
@@ -43,7 +44,12 @@ class DrivenPlant:
     """
 
     def __init__(self, parameters: PlantParameters, frame_motion: Motion, period_ns: int) -> None:
-        """Take machine, frame motion and step [ns]."""
+        """Take machine, frame motion and step [ns].
+
+        Raises:
+            ValueError: the effects' rows are out of order.
+        """
+        check_order(parameters.effects)
         self.parameters = parameters
         self.frame_motion = frame_motion
         self.period = period_ns * 1e-9
@@ -53,7 +59,7 @@ class DrivenPlant:
 
     def by_winches(
         self, start: int, state: Array, angles: Array, speeds: Array, bars: Array | None = None
-    ) -> Driven:
+    ) -> BlockResponse:
         """Return bar and tensions under given winch motion.
 
         Args:
@@ -64,7 +70,7 @@ class DrivenPlant:
             bars: the bar's states, (steps + 1, 12), where the cables alone are to be run.
         """
         out = np.full((len(angles), self.size + self.cables), np.nan)
-        good = drive_by_winches(
+        good = simulate_from_winches(
             state.copy(),
             np.ascontiguousarray(angles),
             np.ascontiguousarray(speeds),
@@ -78,10 +84,10 @@ class DrivenPlant:
         )
         return self._result(out, good)
 
-    def by_torques(self, start: int, state: Array, torques: Array) -> Driven:
+    def by_torques(self, start: int, state: Array, torques: Array) -> BlockResponse:
         """Return the whole plant's motion under given torques, (steps, n) [N·m], each held."""
         out = np.full((len(torques) + 1, self.size + self.cables), np.nan)
-        good = drive_by_torques(
+        good = simulate_from_torques(
             state.copy(),
             np.ascontiguousarray(torques),
             *self._motion(start),
@@ -93,13 +99,13 @@ class DrivenPlant:
         )
         return self._result(out, good)
 
-    def by_tensions(self, start: int, state: Array, tensions: Array) -> Driven:
+    def by_tensions(self, start: int, state: Array, tensions: Array) -> BlockResponse:
         """Return the bar's motion under given tensions, (steps + 1, n) [N].
 
         Of `state`, the plant's, the bar's 12 and the effects' memory are used.
         """
         out = np.full((len(tensions), BAR_STATES), np.nan)
-        good = drive_by_tensions(
+        good = simulate_from_tensions(
             state.copy(),
             np.ascontiguousarray(tensions),
             *self._motion(start),
@@ -109,9 +115,9 @@ class DrivenPlant:
             out,
         )
         out[good:] = np.nan
-        return Driven(out, tensions, good)
+        return BlockResponse(out, tensions, good)
 
-    def shafts(self, state: Array, torques: Array, tensions: Array) -> Driven:
+    def shafts(self, state: Array, torques: Array, tensions: Array) -> BlockResponse:
         """Return the winches' motion under torques and tensions, whatever bar and frame do.
 
         Args:
@@ -120,7 +126,7 @@ class DrivenPlant:
             tensions: (steps + 1, n) [N].
         """
         out = np.full((len(tensions), self.size), np.nan)
-        good = drive_shafts(
+        good = simulate_shafts(
             state.copy(),
             np.ascontiguousarray(torques),
             np.ascontiguousarray(tensions),
@@ -130,11 +136,11 @@ class DrivenPlant:
             out,
         )
         out[good:] = np.nan
-        return Driven(out, tensions, good)
+        return BlockResponse(out, tensions, good)
 
     def _motion(self, start: int) -> tuple[Array, float, int, float]:
         return self.frame_motion.knots, self.frame_motion.spacing, start, self.period
 
-    def _result(self, out: Array, good: int) -> Driven:
+    def _result(self, out: Array, good: int) -> BlockResponse:
         out[good:] = np.nan
-        return Driven(out[:, : self.size], out[:, self.size :], good)
+        return BlockResponse(out[:, : self.size], out[:, self.size :], good)

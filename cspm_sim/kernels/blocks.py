@@ -1,8 +1,8 @@
-"""Parts of the plant driven by what was measured instead of by what is simulated.
+"""Parts of the plant that take measured signals as input instead of simulated ones.
 
-Winch-driven: motor angles given, bar and cables simulated. Torque-driven: the whole plant.
-Tension-driven: tensions given, the bar alone simulated. Shaft-driven: torques and tensions given,
-the winches alone simulated. All take the classical Runge-Kutta step of `plant_step`. Time begins
+From winches: motor angles given, bar and cables simulated. From torques: the whole plant.
+From tensions: tensions given, the bar alone simulated. Shafts: torques and tensions given, the
+winches alone simulated. All take the classical Runge-Kutta step of `plant_step`. Time begins
 with the motion's first knot; a window begins at a step of it.
 """
 
@@ -96,7 +96,7 @@ def _note(
 
 
 @njit(cache=True, error_model="numpy", nogil=True, _nrt=False)
-def drive_by_winches(
+def simulate_from_winches(
     state: Array,
     angles: Array,
     speeds: Array,
@@ -155,7 +155,7 @@ def drive_by_winches(
 
 
 @njit(cache=True, error_model="numpy", nogil=True, _nrt=False)
-def drive_by_torques(
+def simulate_from_torques(
     state: Array,
     torques: Array,
     knots: Array,
@@ -171,7 +171,7 @@ def drive_by_torques(
     """Simulate the whole plant under measured torques; return how many rows are good.
 
     `torques`: (steps, n) [N·m] at the motor shafts, each held over its step; the rest as in
-    `drive_by_winches`.
+    `simulate_from_winches`.
     """
     steps = torques.shape[0]
     _begin_frames(start, period, knots, spacing, frames)
@@ -214,7 +214,7 @@ def _bar_rate_under(
 
 
 @njit(cache=True, error_model="numpy", nogil=True, _nrt=False)
-def drive_by_tensions(
+def simulate_from_tensions(
     state: Array,
     tensions: Array,
     knots: Array,
@@ -230,7 +230,7 @@ def drive_by_tensions(
 
     `state`: the plant's, of which the bar's 12 and the effects' memory are used; `tensions`:
     (steps + 1, n) [N], joined by straight lines; `out`: (steps + 1, 12); the rest as in
-    `drive_by_winches`.
+    `simulate_from_winches`.
     """
     steps = tensions.shape[0] - 1
     stage, rate, total = scratch.stages[0], scratch.stages[1], scratch.stages[2]
@@ -290,7 +290,7 @@ def _shaft_rates_under(
 
 
 @njit(cache=True, error_model="numpy", nogil=True, _nrt=False)
-def drive_shafts(
+def simulate_shafts(
     state: Array,
     torques: Array,
     tensions: Array,

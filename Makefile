@@ -21,7 +21,7 @@ export PYTEST_ADDOPTS := -p pytest_cov -p xdist
 endif
 endif
 
-.PHONY: help run test test-fast test-slow kernels lint bench results coverage clean
+.PHONY: help run test test-fast test-slow kernels lint bench validate results coverage clean
 
 help: ## show this list
 	@grep -hE '^[a-z-]+:.*## ' Makefile | sed -E 's/:.*## /\t/' | expand -t 12
@@ -49,6 +49,9 @@ coverage: $(VENV)/test.stamp ## line coverage with the kernels uncompiled
 
 bench: $(VENV)/test.stamp ## measure speed, start-up and memory; prints a table
 	$(BIN)/python -m bench
+
+validate: $(VENV)/test.stamp ## measure over many runs what tests hold over few, and write docs/validation-runs.md; half an hour
+	OMP_NUM_THREADS=1 $(BIN)/python -m bench.validation
 
 results: $(VENV)/test.stamp ## every number and picture of docs/results.md: what .results does not keep is measured, at most two hours
 	OMP_NUM_THREADS=1 $(BIN)/python -m bench.results

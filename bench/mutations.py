@@ -102,8 +102,8 @@ MUTATIONS = (
     Mutation(
         "threshold: chance counts as certain on what was held out",
         "cspm_ident/diagnosis/validation/holdout_degradation.py",
-        "_SURELY = 3.0",
-        "_SURELY = 0.0",
+        "< -thresholds.holdout_sigma * whole.error",
+        "< 0.0 * whole.error",
         "tests/cspm_ident/diagnosis/validation/test_diagnosis_harm.py",
     ),
     Mutation(

@@ -39,6 +39,11 @@ def generate_launch_description() -> LaunchDescription:
                 default_value="",
                 description="a new folder; empty for recordings/SCENARIO-DATE-TIME",
             ),
+            DeclareLaunchArgument(
+                "patience",
+                default_value="30.0",
+                description="lockstep: give up when nothing moves for so long, s",
+            ),
             OpaqueFunction(function=nodes),
         ]
     )
@@ -46,12 +51,18 @@ def generate_launch_description() -> LaunchDescription:
 
 def nodes(context: LaunchContext) -> list[Node]:
     """Return the nodes that the arguments ask for; an external plant is not ours to start."""
-    scenario, pace, plant, record = (
+    scenario, pace, plant, record, patience = (
         LaunchConfiguration(name).perform(context)
-        for name in ("scenario", "pace", "plant", "record")
+        for name in ("scenario", "pace", "plant", "record", "patience")
     )
     dated = f"recordings/{Path(scenario).stem}-{datetime.now():%Y%m%d-%H%M%S}"
-    parameters = {"scenario": scenario, "pace": pace, "folder": record or dated}
+    # Launch reads texts as YAML, so that the nodes get a number.
+    parameters = {
+        "scenario": scenario,
+        "pace": pace,
+        "folder": record or dated,
+        "patience": patience,
+    }
     if plant == EXTERNAL:
         return [node(name, parameters) for name in OTHERS]
     parameters["plant"] = plant

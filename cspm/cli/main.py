@@ -112,6 +112,15 @@ def run(
             show_default="one process",
         ),
     ] = None,
+    patience: Annotated[
+        float | None,
+        typer.Option(
+            metavar="SECONDS",
+            help="With ROS: give up when nothing moves for so long in lockstep, once the run is"
+            " under way; ten times as long, or more where starting takes long, while it starts.",
+            show_default="30",
+        ),
+    ] = None,
     testbed: Annotated[
         Path | None,
         typer.Option(
@@ -169,5 +178,5 @@ def run(
     path = find_scenario(scenario)
     place = folder if record else None
     settings = [*(overrides or []), *settings]
-    finished = run_command(path, settings, place, json, plant, mode, testbed, one_process)
+    finished = run_command(path, settings, place, json, plant, mode, testbed, one_process, patience)
     raise typer.Exit(0 if finished else RUN_FAILED)

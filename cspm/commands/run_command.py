@@ -22,6 +22,7 @@ from cspm_msgs_py.recording.run_record import EXTERNAL, RECORD_NAME
 from cspm_msgs_py.scenario import load_scenario
 from cspm_msgs_py.testbed import TestbedFile, load_testbed
 from cspm_ros.runtime.ros_install import find_ros
+from cspm_ros.runtime.stall_watchdog import PATIENCE_S, check_patience
 from cspm_run.assembly import resolve
 from cspm_run.bundle import Bundle, make_bundle
 from cspm_run.console import make_console, say
@@ -45,6 +46,7 @@ def run_command(
     mode: str = INPROCESS,
     machine: Path | None = None,
     one_process: bool | None = None,
+    patience: float | None = None,
 ) -> bool:
     """Run a scenario file, show the result, and return whether it ran to its end.
 
@@ -57,11 +59,18 @@ def run_command(
         mode: how to run.
         machine: a test-bed file instead of the scenario's.
         one_process: in real time, whether all nodes are to share a process; None: they do.
+        patience: with ROS, how long nothing may move [s]; None: the usual time.
 
     Raises:
         CspmError: it diverged, or a node failed; what was recorded and drawn up to then is kept.
     """
     console = Console()
+    if patience is not None:
+        check_patience(patience)
+        if mode == INPROCESS:
+            raise InputError(
+                f"--patience --mode {mode}: allowed: --mode graph, processes or {REALTIME}"
+            )
     scenario = load_scenario(path, overrides)
     testbed_path = machine or path.parent / scenario.testbed
     testbed = load_testbed(testbed_path)
@@ -77,7 +86,8 @@ def run_command(
     bundle = dataclasses.replace(bundle, plant=SIM if external else plant)
     runner = None
     if mode != INPROCESS:
-        runner = _ros_runner(mode, console, external, apart=one_process is False)
+        patience_s = PATIENCE_S if patience is None else patience
+        runner = _ros_runner(mode, console, external, patience_s, apart=one_process is False)
     result = _run_with_progress(bundle, folder, console, runner)
     requirement = scenario.requirement
     print_summary(console, result, requirement)
@@ -215,13 +225,15 @@ def _run_with_progress(
             return dataclasses.replace(result, folder=None)
 
 
-def _ros_runner(mode: str, console: Console, external: bool, *, apart: bool) -> Runner:
+def _ros_runner(
+    mode: str, console: Console, external: bool, patience_s: float, *, apart: bool
+) -> Runner:
     """Return what runs a scenario in a mode that needs ROS; only now is ROS loaded."""
     find_ros(f"--mode {mode}")
     if mode == "graph":
         from cspm_ros.runtime.graph_run import run_graph
 
-        return run_graph
+        return partial(run_graph, patience_s=patience_s)
 
     def tell(waiting: str) -> None:
         say(console, waiting or "all is there")
@@ -229,10 +241,10 @@ def _ros_runner(mode: str, console: Console, external: bool, *, apart: bool) -> 
     if mode == REALTIME and not apart:
         from cspm_ros.runtime.realtime_run import run_realtime
 
-        return partial(run_realtime, external=external, tell=tell)
+        return partial(run_realtime, external=external, tell=tell, patience_s=patience_s)
     from cspm_ros.runtime.process_run import run_processes
 
-    return partial(run_processes, mode=mode, external=external, tell=tell)
+    return partial(run_processes, mode=mode, external=external, tell=tell, patience_s=patience_s)
 
 
 def _progress(console: Console) -> Progress:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import time
 from collections.abc import Callable, Collection, Sequence
 from contextlib import ExitStack
 from dataclasses import dataclass
@@ -20,7 +21,7 @@ from cspm_ros.replay.player_node import PlayerNode
 from cspm_ros.replay.reproduction import Reproduction
 from cspm_ros.runtime.lockstep_nodes import LockstepRun
 from cspm_ros.runtime.node_parameters import NodeParameters
-from cspm_ros.runtime.stall_watchdog import LOOK_EVERY_S, PATIENCE_S, Waiting, Watch
+from cspm_ros.runtime.stall_watchdog import LOOK_EVERY_S, PATIENCE_S, Patience, Waiting, Watch
 from cspm_run.bundle import Bundle
 from cspm_run.recorded_bundle import recorded_bundle
 from cspm_run.recorded_run import new_recording
@@ -110,12 +111,13 @@ def replay_through(
         overrides: values put over the recorded scenario's, `key.path=value`.
         folder: where to record what the nodes make of it; None records nothing.
         domain_id: instead of `ROS_DOMAIN_ID`.
-        patience_s: give up when nothing moves for so long [s].
+        patience_s: give up when nothing moves for so long [s], once the replay is under way.
 
     Raises:
         InputError: no recording of a run in lockstep, or no such nodes.
-        CspmError: nothing moved for `patience_s`.
+        CspmError: nothing moved for `patience_s`, or for longer while it started.
     """
+    began = time.perf_counter()
     bundle = recorded_bundle(path, overrides)
     live = _checked_nodes(bundle, through)
     run = LockstepRun(bundle, (PLAYER, *live, *([RECORDER] if folder else [])))
@@ -131,7 +133,8 @@ def replay_through(
             recorder = run.recorder(session.node(RECORDER), writer)
             stack.callback(recorder.close)
             others.append(recorder)
-        return _play_in_step(session, node, others, look, patience_s)
+        patience = Patience(patience_s, time.perf_counter() - began)
+        return _play_in_step(session, node, others, look, patience)
 
 
 def nodes_of(path: Path) -> tuple[str, ...]:
@@ -144,8 +147,12 @@ def nodes_of(path: Path) -> tuple[str, ...]:
     return tuple(schedule_of(bundle.scenario, bundle.testbed.testbed).nodes)
 
 
-def run_player(session: Session, node: ContractNode, parameters: NodeParameters) -> None:
+def run_player(
+    session: Session, node: ContractNode, parameters: NodeParameters, began: float
+) -> None:
     """Run the player's node as its parameters say, until all is played or a signal comes.
+
+    `began` is when the program did, on `time.perf_counter` [s].
 
     Raises:
         InputError: parameters that cannot be used, or a damaged bag.
@@ -156,7 +163,7 @@ def run_player(session: Session, node: ContractNode, parameters: NodeParameters)
     path, rate, paused = Path(parameters.bag), parameters.rate, parameters.paused
     with open_bag(path) as bag:
         if parameters.lockstep:
-            _run_in_step(session, node, bag, parameters)
+            _run_in_step(session, node, bag, parameters, began)
             return
         selection = Selection(parameters.topics, parameters.left_out, parameters.start)
         player = PlayerNode(node, bag, selection, _in_time(rate), paused=paused)
@@ -181,7 +188,11 @@ def _checked_nodes(bundle: Bundle, through: Collection[str]) -> tuple[str, ...]:
 
 
 def _run_in_step(
-    session: Session, node: ContractNode, bag: BagStream, parameters: NodeParameters
+    session: Session,
+    node: ContractNode,
+    bag: BagStream,
+    parameters: NodeParameters,
+    began: float,
 ) -> None:
     bundle = parameters.bundle()
     schedule = schedule_of(bundle.scenario, bundle.testbed.testbed)
@@ -195,7 +206,8 @@ def _run_in_step(
         check_rate(parameters.rate),
         paused=parameters.paused,
     )
-    found = _play_in_step(session, player, [], lambda _: None, parameters.patience)
+    patience = Patience(parameters.patience, time.perf_counter() - began)
+    found = _play_in_step(session, player, [], lambda _: None, patience)
     different = [str(each) for each in found.reproductions.values() if not each.identical]
     if different:
         raise CspmError("; ".join(different))
@@ -222,18 +234,16 @@ def _play_in_step(
     node: LockstepPlayerNode,
     others: list[Waiting],
     look: Look,
-    patience_s: float,
+    patience: Patience,
 ) -> Replayed:
-    nodes: list[Waiting] = [node, *others]
-    watch = Watch(nodes, patience_s, session.warn)
+    watch = Watch([node, *others], patience, session.warn)
     player = node.controls.player
 
     def watched() -> None:
-        nonlocal watch
         if session.stopped:
             node.stop()
         if node.waits_for_time:
-            watch = Watch(nodes, patience_s, session.warn)
+            watch.rest()
         watch.look()
 
     session.every(LOOK_EVERY_S, watched)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import time
 from collections.abc import Callable
 from contextlib import ExitStack
 from pathlib import Path
@@ -11,7 +12,7 @@ from cspm_msgs_py.graph import RECORDER
 from cspm_msgs_py.ros.session import Session
 from cspm_msgs_py.schedule import PLANT, schedule_of
 from cspm_ros.runtime.lockstep_nodes import LockstepRun
-from cspm_ros.runtime.stall_watchdog import LOOK_EVERY_S, PATIENCE_S, Watch
+from cspm_ros.runtime.stall_watchdog import LOOK_EVERY_S, PATIENCE_S, Patience, Watch
 from cspm_run.bundle import Bundle
 from cspm_run.recorded_result import recorded_result
 from cspm_run.recorded_run import new_recording
@@ -37,13 +38,14 @@ def run_graph(
         progress: called now and then with the time simulated so far [s].
         steps: end after so many plant steps; None runs the scenario's duration.
         domain_id: instead of `ROS_DOMAIN_ID`.
-        patience_s: give up when nothing moves for so long [s].
+        patience_s: give up when nothing moves for so long [s], once the run is under way.
 
     Raises:
         InputError: scenario and test-bed do not fit, or the folder exists.
         ConvergenceError: the bar cannot hang where the scenario starts.
-        CspmError: nothing moved for `patience_s`.
+        CspmError: nothing moved for `patience_s`, or for longer while it started.
     """
+    began = time.perf_counter()
     scenario, testbed = bundle.scenario, bundle.testbed.testbed
     schedule = schedule_of(scenario, testbed)
     run = LockstepRun(bundle, (PLANT, *schedule.nodes, RECORDER))
@@ -55,7 +57,8 @@ def run_graph(
         writer = stack.enter_context(new_recording(bundle, folder, GRAPH))
         recorder = run.recorder(session.node(RECORDER), writer)
         stack.callback(recorder.close)
-        watch = Watch([plant, *others, recorder], patience_s, session.warn)
+        patience = Patience(patience_s, time.perf_counter() - began)
+        watch = Watch([plant, *others, recorder], patience, session.warn)
 
         def look() -> None:
             if session.stopped:

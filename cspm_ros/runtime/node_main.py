@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import sys
+import time
 from collections.abc import Sequence
 
 from cspm_msgs_py.errors import CspmError, InputError
@@ -35,6 +36,7 @@ def start_node(name: str, args: Sequence[str]) -> None:
         InputError: no such node, no ROS, or arguments that cannot be used.
         CspmError: the run failed.
     """
+    began = time.perf_counter()
     if name not in NODES:
         raise InputError(f"node {name}: allowed: {', '.join(NODES)}")
     if args and args[0] != ROS_ARGS:
@@ -45,7 +47,7 @@ def start_node(name: str, args: Sequence[str]) -> None:
     # Loading ROS comes after looking for it.
     from cspm_ros.runtime.node_run import run_node
 
-    run_node(name, [name, *args])
+    run_node(name, [name, *args], began)
 
 
 def main(name: str, args: Sequence[str]) -> int:

@@ -17,6 +17,7 @@ from cspm_msgs_py.scenario import load_scenario
 from cspm_msgs_py.schedule import PLANT, Schedule
 from cspm_msgs_py.testbed import load_testbed
 from cspm_msgs_py.yaml_file import dump_yaml
+from cspm_ros.runtime.stall_watchdog import LEAST_PATIENCE_S, PATIENCE_S
 from cspm_run.assembly import resolve
 from cspm_run.bundle import Bundle, make_bundle
 from cspm_run.library import find_scenario
@@ -43,7 +44,11 @@ class NodeParameters:
     folder: str = _told("", "recorder: a new folder for the recording")
     mode: str = _told("processes", "recorder: the mode named in the recording")
     report: str = _told("", "plant or leader: a file that it keeps up to date with how far it is")
-    patience: float = _told(30.0, "give up when nothing moves for so long [s]", least=0.1)
+    patience: float = _told(
+        PATIENCE_S,
+        "give up when nothing moves for so long, once the run is under way [s]",
+        least=LEAST_PATIENCE_S,
+    )
     until_stdin_closes: bool = _told(False, "stop when standard input is closed")
     bag: str = _told("", "player: what to play; others: a recording that names the scenario")
     rate: float = _told(1.0, "player: bag time per wall time; 0, in lockstep: as nodes can")

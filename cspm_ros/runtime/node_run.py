@@ -5,6 +5,7 @@ from __future__ import annotations
 import os
 import sys
 import threading
+import time
 from collections.abc import Callable, Sequence
 from contextlib import ExitStack
 from pathlib import Path
@@ -21,7 +22,7 @@ from cspm_ros.runtime.lockstep_nodes import LockstepRun
 from cspm_ros.runtime.node_parameters import REALTIME, NodeParameters, read_parameters
 from cspm_ros.runtime.progress_file import Report
 from cspm_ros.runtime.realtime_nodes import RealtimeRun
-from cspm_ros.runtime.stall_watchdog import LOOK_EVERY_S, Watch
+from cspm_ros.runtime.stall_watchdog import LOOK_EVERY_S, Patience, Waiting, Watch
 from cspm_run.recorded_run import new_recording
 
 # Where nobody is in a hurry: longer than lost packets take.
@@ -31,16 +32,17 @@ _STDIN_BYTES = 4096
 _LEAVING_S = 3.0
 
 
-def run_node(name: str, args: Sequence[str]) -> None:
+def run_node(name: str, args: Sequence[str], began: float) -> None:
     """Run a node until its run ends or a signal comes.
 
     Args:
         name: one of `NODES`.
         args: command line, ROS style: `--ros-args -p scenario:=calm`.
+        began: when the program did, on `time.perf_counter` [s].
 
     Raises:
         InputError: no such node, or parameters that cannot be used.
-        CspmError: the run stood still, or the plant diverged.
+        CspmError: not all nodes joined, the run stood still, or the plant diverged.
     """
     if name not in NODES:
         raise InputError(f"node {name}: allowed: {', '.join(NODES)}")
@@ -53,31 +55,42 @@ def run_node(name: str, args: Sequence[str]) -> None:
         if parameters.until_stdin_closes:
             _stop_when_stdin_closes(session)
         if name == PLAYER:
-            run_player(session, node, parameters)
-            return
-        pace = _run_realtime if parameters.pace == REALTIME else _run_lockstep
-        pace(session, node, parameters, stack)
+            run_player(session, node, parameters, began)
+        elif parameters.pace == REALTIME:
+            _run_realtime(session, node, parameters, stack)
+        else:
+            _run_lockstep(session, node, parameters, stack, began)
+
+
+def _watch(part: Waiting, node: ContractNode, parameters: NodeParameters, began: float) -> Watch:
+    patience = Patience(parameters.patience, time.perf_counter() - began)
+    # Who holds standard input open sees all nodes of the run, and ends them if one does not join.
+    return Watch([part], patience, node.warn, guarded=parameters.until_stdin_closes)
 
 
 def _run_lockstep(
-    session: Session, node: ContractNode, parameters: NodeParameters, stack: ExitStack
+    session: Session,
+    node: ContractNode,
+    parameters: NodeParameters,
+    stack: ExitStack,
+    began: float,
 ) -> None:
     bundle = parameters.bundle()
     schedule = schedule_of(bundle.scenario, bundle.testbed.testbed)
     run = LockstepRun(bundle, parameters.members(schedule))
     if node.name == PLANT:
-        _run_plant(session, node, parameters, run)
+        _run_plant(session, node, parameters, run, began)
         return
     if node.name == RECORDER:
         folder = Path(parameters.folder or f"recordings/{bundle.scenario.name}")
         writer = stack.enter_context(new_recording(bundle, folder, parameters.mode))
         recorder = run.recorder(node, writer)
         stack.callback(recorder.close)
-        _spin(session, Watch([recorder], parameters.patience, node.warn), lambda: recorder.ended)
+        _spin(session, _watch(recorder, node, parameters, began), lambda: recorder.ended)
         return
     _check_part(node, bundle.scenario.name, schedule)
     stage = run.stage(node)
-    _spin(session, Watch([stage], parameters.patience, node.warn), lambda: stage.ended)
+    _spin(session, _watch(stage, node, parameters, began), lambda: stage.ended)
 
 
 def _run_realtime(
@@ -146,11 +159,15 @@ def _spin(session: Session, watch: Watch, ended: Callable[[], bool]) -> None:
 
 
 def _run_plant(
-    session: Session, node: ContractNode, parameters: NodeParameters, run: LockstepRun
+    session: Session,
+    node: ContractNode,
+    parameters: NodeParameters,
+    run: LockstepRun,
+    began: float,
 ) -> None:
     scenario = run.bundle.scenario
     plant = run.plant(node, parameters.steps or round(scenario.duration * scenario.rates.plant))
-    watch = Watch([plant], parameters.patience, node.warn)
+    watch = _watch(plant, node, parameters, began)
     path = Path(parameters.report) if parameters.report else None
 
     def report() -> None:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 import os
 import tempfile
 import time
@@ -18,7 +19,7 @@ from cspm_ros.runtime.exit_watchdog import IN_ORDER
 from cspm_ros.runtime.node_parameters import LOCKSTEP, REALTIME, NodeParameters, write_parameters
 from cspm_ros.runtime.node_processes import LEAVING_S, SILENCE_S, NodeProcesses
 from cspm_ros.runtime.progress_file import Report, read_report
-from cspm_ros.runtime.stall_watchdog import PATIENCE_S, StartWatch
+from cspm_ros.runtime.stall_watchdog import PATIENCE_S, Patience, StartWatch
 from cspm_run.bundle import SCENARIO, Bundle
 from cspm_run.recorded_result import recorded_result
 from cspm_run.run_result import RunResult
@@ -55,12 +56,14 @@ def run_processes(
             the nodes warn of.
         steps: end after so many plant steps; None runs the scenario's duration.
         domain_id: instead of `ROS_DOMAIN_ID`.
-        patience_s: give up when nothing moves for so long [s]; lockstep only.
+        patience_s: give up when nothing moves for so long [s]; in real time it bounds the start
+            alone, and not where somebody's drivers are waited for.
 
     Raises:
         InputError: scenario and test-bed do not fit, or inputs that come in time would count as
             late.
-        CspmError: a node ended before the run did; in real time, before it began.
+        CspmError: a node ended before the run did, in real time before it began; or not all nodes
+            joined.
     """
     scenario, testbed = bundle.scenario, bundle.testbed.testbed
     schedule = schedule_of(scenario, testbed)
@@ -92,7 +95,13 @@ def run_processes(
             NodeProcesses(names, place / "parameters.yaml", place, behind) as processes,
         ):
             leader = RECORDER if external else PLANT
-            follower = _Follower(processes, leader, place / "report.json", mode == REALTIME)
+            follower = _Follower(
+                processes,
+                leader,
+                place / "report.json",
+                mode == REALTIME,
+                Patience(math.inf if external else patience_s),
+            )
             report = follower.follow(progress, tell, stop_wanted)
             interrupted = stop_wanted()
     return recorded_result(
@@ -114,10 +123,18 @@ class _Follower:
         failure: the node that ended before the run did, in real time, or that did not end.
     """
 
-    def __init__(self, processes: NodeProcesses, leader: str, report: Path, realtime: bool) -> None:
+    def __init__(
+        self,
+        processes: NodeProcesses,
+        leader: str,
+        report: Path,
+        realtime: bool,
+        patience: Patience,
+    ) -> None:
         self._processes, self._leader = processes, leader
-        self._path, self._realtime = report, realtime
+        self._path, self._realtime, self._patience = report, realtime, patience
         self._stop_at: float | None = None
+        self._leaving_s = LEAVING_S
         self._gone: dict[str, float] = {}
         self._last, self._moved = Report(), time.monotonic()
         self.failure: str | None = None
@@ -131,17 +148,18 @@ class _Follower:
         """Return the leader's last report, once the leader has ended.
 
         Raises:
-            CspmError: a node ended too early; in real time the others first show what they do.
+            CspmError: not all nodes joined; or a node ended too early, after which in real time
+                the others first show what they do.
         """
-        processes, start = self._processes, StartWatch(tell)
+        processes, start = self._processes, StartWatch(tell, self._patience)
         while self._leader not in (ended := processes.ended()):
             report = read_report(self._path)
             progress(report.simulated)
-            if not report.simulated:
-                start.look(report.waiting)
             for warning in processes.warnings():
                 tell(warning)
             self._look_for_dead(self._dead(ended, report))
+            if not report.simulated:
+                self._look_at_start(start, report.waiting)
             if stop_wanted() and self._stop_at is None:
                 self._stop_at = time.monotonic()
             if self._stuck(report):
@@ -151,7 +169,7 @@ class _Follower:
             time.sleep(_LOOK_EVERY_S)
         report = read_report(self._path)
         if report.finished or report.failure is not None or stop_wanted():
-            if not processes.wait(LEAVING_S):
+            if not processes.wait(self._leaving_s):
                 ended = processes.ended()
                 stubborn = ", ".join(name for name in processes.by_name if name not in ended)
                 self.failure = self.failure or f"{stubborn} did not end with the run"
@@ -162,12 +180,25 @@ class _Follower:
             self._note_dead(self._leader, report)
         return report
 
+    def _look_at_start(self, start: StartWatch, waiting: str) -> None:
+        """Tell who has not joined; give the start up if that takes too long."""
+        if self._path.exists():
+            start.note_cost()
+            start.look(waiting)
+        else:
+            start.look(f"waits for {self._leader}")
+        if start.stuck is not None:
+            raise CspmError(start.stuck)
+        # Where processes start slowly they end slowly; but drivers come when somebody wants.
+        if math.isfinite(self._patience.seconds):
+            self._leaving_s = max(LEAVING_S, start.elapsed)
+
     def _stuck(self, report: Report) -> bool:
         """Return whether the leader neither goes on nor ends, as if it had been stopped."""
         now = time.monotonic()
         if report != self._last:
             self._last, self._moved = report, now
-        told = self._stop_at is not None and now - self._stop_at > LEAVING_S
+        told = self._stop_at is not None and now - self._stop_at > self._leaving_s
         silent = self._realtime and report.simulated > 0.0 and now - self._moved > _STUCK_S
         if (told or silent) and self.failure is None:
             length = now - self._moved

@@ -7,15 +7,18 @@ which two cores cannot do at 1 kHz.
 
 from __future__ import annotations
 
+import math
+import time
 from collections.abc import Callable
 from contextlib import ExitStack
 from pathlib import Path
 
+from cspm_msgs_py.errors import CspmError
 from cspm_msgs_py.graph import RECORDER
 from cspm_msgs_py.ros.session import FAREWELL_S, Session
 from cspm_msgs_py.schedule import PLANT, schedule_of
 from cspm_ros.runtime.realtime_nodes import RealtimeRun
-from cspm_ros.runtime.stall_watchdog import LOOK_EVERY_S, StartWatch
+from cspm_ros.runtime.stall_watchdog import LOOK_EVERY_S, PATIENCE_S, Patience, StartWatch
 from cspm_run.bundle import Bundle
 from cspm_run.recorded_result import recorded_result
 from cspm_run.run_result import RunResult
@@ -32,6 +35,7 @@ def run_realtime(
     tell: Callable[[str], None] = lambda _: None,
     steps: int | None = None,
     domain_id: int | None = None,
+    patience_s: float = PATIENCE_S,
 ) -> RunResult:
     """Run a scenario by the wall clock, as ROS 2 nodes in this process.
 
@@ -43,12 +47,16 @@ def run_realtime(
         tell: called with what the start waits for, in one line, when that changes.
         steps: end after so many plant steps; None runs the scenario's duration.
         domain_id: instead of `ROS_DOMAIN_ID`.
+        patience_s: bounds the start [s], as in lockstep, but not where somebody's drivers are
+            waited for.
 
     Raises:
         InputError: scenario and test-bed do not fit, the folder exists, or inputs that come in
             time would count as late.
         ConvergenceError: the bar cannot hang where the scenario starts.
+        CspmError: the nodes did not find each other.
     """
+    began = time.perf_counter()
     scenario, testbed = bundle.scenario, bundle.testbed.testbed
     stages = schedule_of(scenario, testbed).nodes
     run = RealtimeRun(bundle, (PLANT, *stages, RECORDER)[external:])
@@ -63,7 +71,8 @@ def run_realtime(
         stack.callback(recorder.close)
         leader = leading if plant is None else plant.leader
         assert leader is not None
-        start = StartWatch(tell)
+        patience = Patience(math.inf if external else patience_s, time.perf_counter() - began)
+        start = StartWatch(tell, patience)
 
         def look() -> None:
             if not leader.elapsed:
@@ -71,7 +80,11 @@ def run_realtime(
             progress(leader.elapsed)
 
         session.every(LOOK_EVERY_S, look)
-        session.spin_until(lambda: leader.end_ns is not None or session.stopped)
+        session.spin_until(
+            lambda: leader.end_ns is not None or session.stopped or start.stuck is not None
+        )
+        if start.stuck is not None:
+            raise CspmError(start.stuck)
         leader.end()
         # Nobody hears of the end from nodes that have left.
         session.deliver(FAREWELL_S)

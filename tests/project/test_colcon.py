@@ -219,7 +219,7 @@ def test_the_launch_files_parameters_are_those_that_nodes_declare():
         for node in ast.walk(start)
         if isinstance(node, ast.Subscript) and isinstance(node.slice, ast.Constant)
     }
-    assert keys == {"scenario", "pace", "folder", "plant"}
+    assert keys == {"scenario", "pace", "folder", "plant", "patience"}
     assert keys <= declared
 
 
@@ -244,8 +244,14 @@ def test_the_launch_file_starts_the_nodes_that_its_arguments_ask_for(plant, node
         for entity in module.generate_launch_description().entities
         if isinstance(entity, launch.DeclareLaunchArgument)
     ]
-    assert [argument.name for argument in arguments] == ["scenario", "pace", "plant", "record"]
-    wanted = {"scenario": "calm", "pace": "lockstep", "plant": plant, "record": "/tmp/bag"}
+    wanted = {
+        "scenario": "calm",
+        "pace": "lockstep",
+        "plant": plant,
+        "record": "/tmp/bag",
+        "patience": "60",
+    }
+    assert [argument.name for argument in arguments] == list(wanted)
     context.launch_configurations.update(wanted)
     started = module.nodes(context)
     assert all(isinstance(node, launch_ros.Node) for node in started)

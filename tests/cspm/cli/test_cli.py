@@ -118,6 +118,17 @@ REST = f"{SCENARIOS}/rest.yaml"
             ["--mode", "graph", "--process-per-node"],
             "--process-per-node --mode graph: allowed: --mode realtime",
         ),
+        (
+            ["--patience", "5"],
+            "--patience --mode inprocess: allowed: --mode graph, processes or re",
+        ),
+        *[
+            (
+                ["--mode", "processes", "--patience", seconds],
+                f"--patience {seconds}: allowed: 0.1 s or more, finite",
+            )
+            for seconds in ("0", "-2", "nan", "inf")
+        ],
         (["--one-process"], "--one-process --mode inprocess: allowed: --mode realtime"),
         (["--duration", "-1"], f"{REST}: duration: -1.0, allowed: greater than 0"),
         (["--duration", "0"], f"{REST}: duration: 0.0, allowed: greater than 0"),

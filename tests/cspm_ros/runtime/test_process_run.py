@@ -30,6 +30,7 @@ from run_samples import bundle_of
 from cspm_msgs_py.errors import CspmError
 from cspm_msgs_py.recording import Recording, overview
 from cspm_msgs_py.recording.recover import recover
+from cspm_ros.runtime import stall_watchdog as watch
 from cspm_run.recorded_run import run
 from cspm_run.resim import resimulate
 
@@ -43,6 +44,8 @@ pytestmark = pytest.mark.compiled
 # Reading the calm sea's waves takes longer than hanging at rest, and says no more here.
 LONG = bundle_of("rest", "duration=3600")
 LOST_S = 0.2
+# Nobody waits for ever; on a machine with six times its load such a run takes four minutes.
+LONGEST_S = 600.0
 
 
 def processes(bundle, folder, *arguments, **options):
@@ -159,7 +162,9 @@ def test_who_leaves_in_order_before_all_is_written_is_not_missed(tmp_path, monke
 def test_a_divergence_ends_the_run_and_keeps_its_recording(tmp_path):
     settings = [word for override in WILD for word in ("--set", override)]
     folder = tmp_path / "bag"
-    code, _, err = done("run", "rest", "--mode", "processes", "--out", folder, *settings)
+    code, _, err = done(
+        "run", "rest", "--mode", "processes", "--out", folder, *settings, timeout=LONGEST_S
+    )
     assert code == 1
     kept = run(bundle_of("rest", *WILD), tmp_path / "inprocess")
     begin, _, end = kept.failure.partition("; before it: ")
@@ -231,7 +236,7 @@ def test_interrupting_the_command_leaves_a_complete_recording(tmp_path, mode, nu
         nodes = node_processes(process.pid)
         assert set(nodes) == (set(NODES) if mode == "processes" else set())
         process.send_signal(number)
-        out, err = process.communicate(timeout=30)
+        out, err = process.communicate(timeout=LONGEST_S)
     finally:
         process.kill()
     assert (process.returncode, err) == (1, "")
@@ -276,7 +281,7 @@ def test_the_nodes_end_with_a_launcher_that_is_killed(tmp_path, when):
         shutil.rmtree(place)
 
 
-def wait_for(condition, process, seconds=60.0):
+def wait_for(condition, process, seconds=LONGEST_S):
     end = time.monotonic() + seconds
     while not condition():
         assert process.poll() is None, process.communicate()
@@ -354,6 +359,42 @@ def test_what_a_node_cannot_do_is_told_as_its_last_words(tmp_path):
         f" {tmp_path}/bag: exists, allowed: a new folder"
     )
     assert list((tmp_path / "bag").iterdir()) == []
+
+
+# What a process does of which the others never hear, once Python runs it as this node.
+_AT_START = """
+import os, sys, time
+if "motion_controller" in sys.orig_argv:
+    {act}
+"""
+
+
+def test_a_node_that_dies_while_the_run_starts_is_named(tmp_path, monkeypatch):
+    use_site(tmp_path, monkeypatch, _AT_START.format(act="os._exit(7)"))
+    with pytest.raises(CspmError) as caught:
+        processes(bundle_of("rest"), tmp_path / "bag", steps=10)
+    assert str(caught.value) == "motion_controller ended with exit code 7 before the run did"
+
+
+def test_a_node_that_never_joins_ends_the_start_with_its_name(tmp_path, monkeypatch):
+    use_site(tmp_path, monkeypatch, _AT_START.format(act="time.sleep(3600)"))
+    monkeypatch.setattr(watch, "GRACE_S", 0.0)
+    told = []
+
+    def tell(text):
+        told.append(text)
+        if text == "plant waits for motion_controller":
+            monkeypatch.setattr(watch, "START_FACTOR", 0.0)
+
+    with pytest.raises(CspmError) as caught:
+        processes(bundle_of("rest"), tmp_path / "bag", tell=tell, steps=10)
+    assert told[0] == "waits for plant"
+    assert re.match(
+        r"not all nodes joined within 0 s: plant waits for motion_controller; allowed: 0 times the"
+        r" longer of patience \(20 s\) and what this start cost \(\S+ s\); for more use --patience",
+        str(caught.value),
+    )
+    assert caught.value.exit_code == 1
 
 
 @pytest.mark.slow

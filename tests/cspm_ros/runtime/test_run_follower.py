@@ -1,5 +1,6 @@
 """How a run in real time is followed from outside: who died, who hangs, who does not end."""
 
+import math
 import signal
 
 import pytest
@@ -14,6 +15,7 @@ from cspm_ros.runtime import process_run  # noqa: E402 - after ROS is known to b
 from cspm_ros.runtime import stall_watchdog as watch  # noqa: E402
 from cspm_ros.runtime.process_run import _Follower  # noqa: E402
 from cspm_ros.runtime.progress_file import Report  # noqa: E402
+from cspm_ros.runtime.stall_watchdog import PATIENCE_S, Patience  # noqa: E402
 
 NAMES = (PLANT, FORCE_CONTROLLER, RECORDER)
 
@@ -69,10 +71,12 @@ class Processes:
         return set(self.codes) == set(NAMES)
 
 
-def follow(path, processes, *, realtime=True, stop=lambda: False, leader=PLANT):
+def follow(
+    path, processes, *, realtime=True, stop=lambda: False, leader=PLANT, patience=PATIENCE_S
+):
     """Follow to the end; return the follower, its report, and what it told and showed."""
     told, shown = [], []
-    follower = _Follower(processes, leader, path, realtime)
+    follower = _Follower(processes, leader, path, realtime, Patience(patience))
     report = follower.follow(shown.append, told.append, stop)
     return follower, report, told, shown
 
@@ -109,6 +113,35 @@ def test_who_dies_before_the_start_ends_it_at_once(tmp_path, realtime):
     with pytest.raises(CspmError) as error:
         follow(path, processes, realtime=realtime)
     assert str(error.value) == "recorder ended with 2"
+
+
+def test_a_leader_that_has_not_joined_is_waited_for_and_named(tmp_path):
+    path = tmp_path / "report.json"
+    processes = Processes(path, {}, {}, Report(1.0, 1.0, finished=True), ALL)
+    _, _, told, _ = follow(path, processes)
+    assert told == ["waits for plant"]
+
+
+@pytest.mark.parametrize("realtime", [True, False])
+@pytest.mark.parametrize(
+    ("plot", "missing"),
+    [([], "waits for plant"), ([Report(waiting="waits for recorder")], "waits for recorder")],
+)
+def test_a_start_that_never_completes_is_given_up(tmp_path, monkeypatch, realtime, plot, missing):
+    monkeypatch.setattr(watch, "START_FACTOR", 0.1)
+    path = tmp_path / "report.json"
+    with pytest.raises(CspmError) as error:
+        follow(path, Processes(path, *plot), realtime=realtime, patience=0.5)
+    assert str(error.value).startswith(f"not all nodes joined within 0.1 s: {missing}; allowed: ")
+    assert error.value.exit_code == 1
+
+
+def test_a_dead_node_is_named_before_one_that_is_late(tmp_path, monkeypatch):
+    monkeypatch.setattr(watch, "START_FACTOR", 0.0)
+    path = tmp_path / "report.json"
+    with pytest.raises(CspmError) as error:
+        follow(path, Processes(path, {RECORDER: 3}))
+    assert str(error.value) == "recorder ended with 3"
 
 
 def test_in_lockstep_a_dead_node_ends_the_run_at_once(tmp_path):
@@ -223,6 +256,22 @@ def test_who_does_not_end_with_the_run_is_named(tmp_path):
     follower, report, _, _ = follow(path, processes)
     assert follower.failure == "force_controller, recorder did not end with the run"
     assert report.finished
+
+
+@pytest.mark.parametrize(
+    ("took", "patience", "wanted"), [(0.1, 20.0, 0.2), (60.0, 20.0, 60.0), (60.0, math.inf, 0.2)]
+)
+def test_nodes_may_take_as_long_to_leave_as_they_took_to_start(
+    tmp_path, monkeypatch, took, patience, wanted
+):
+    """But not as long as somebody's drivers took to come."""
+    monkeypatch.setattr(watch.StartWatch, "elapsed", took)
+    path, allowed = tmp_path / "report.json", []
+    starting = Report(waiting="waits for recorder")
+    processes = Processes(path, starting, Report(1.0, 1.0, finished=True), ALL)
+    processes.wait = lambda seconds: allowed.append(seconds) or True
+    follow(path, processes, patience=patience)
+    assert allowed == [wanted]
 
 
 def test_a_node_is_asked_to_end_once(tmp_path):

@@ -25,7 +25,7 @@ from cspm_ros.runtime.realtime_nodes import RealtimeRun
 from cspm_ros.runtime.stall_watchdog import LOOK_EVERY_S, Patience, Waiting, Watch
 from cspm_run.recorded_run import new_recording
 
-# Where nobody is in a hurry: longer than lost packets take.
+# Where nobody is in a hurry: longer than lost packets take; or as long as starting took.
 _DELIVERY_S = 3.0
 _STDIN_BYTES = 4096
 # To destroy what the node has takes a tenth of a second; the processor may be full.
@@ -155,7 +155,7 @@ def _spin(session: Session, watch: Watch, ended: Callable[[], bool]) -> None:
     if watch.stuck is not None:
         raise CspmError(watch.stuck)
     if ended():
-        session.deliver(FAREWELL_S if session.stopped else _DELIVERY_S)
+        session.deliver(FAREWELL_S if session.stopped else max(_DELIVERY_S, watch.cost))
 
 
 def _run_plant(
@@ -191,7 +191,7 @@ def _run_plant(
         session.spin_until(lambda: plant.finished, FAREWELL_S)
     report()
     if plant.finished and not session.stopped:
-        session.deliver(_DELIVERY_S)
+        session.deliver(max(_DELIVERY_S, watch.cost))
     if watch.stuck is not None or plant.failure is not None:
         raise CspmError(watch.stuck or plant.failure or "")
 

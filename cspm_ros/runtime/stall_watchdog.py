@@ -117,6 +117,11 @@ class Watch:
         self.stuck: str | None = None
 
     @property
+    def cost(self) -> float:
+        """Wall time that this process took until it could join [s]."""
+        return self._patience.cost
+
+    @property
     def elapsed(self) -> float:
         """Wall time since the first step [s]."""
         return self._moved - self._began if self._began is not None else 0.0

@@ -9,6 +9,7 @@ from cspm_msgs_py.ros.contract_node import ros_class  # noqa: E402 - after ROS i
 from cspm_msgs_py.ros.qos import contract_qos  # noqa: E402
 from cspm_msgs_py.ros.rendezvous import END, START, FollowerSide, PlantSide  # noqa: E402
 from cspm_msgs_py.ros.session import Session  # noqa: E402
+from cspm_msgs_py.topics import DIAGNOSTICS  # noqa: E402
 
 PERIOD_NS = 1_000_000
 PATIENCE_S = 20.0
@@ -33,3 +34,21 @@ def test_a_node_announces_itself_whoever_says_that_the_run_began_or_ended(topic)
         assert session.spin_until(told, PATIENCE_S)
         plant = PlantSide(session.node("plant"), PERIOD_NS, ["recorder"], lambda *_: None)
         assert session.spin_until(lambda: not plant.absent, PATIENCE_S), plant.absent
+
+
+def test_who_is_not_there_is_named_before_those_who_wait_for_it():
+    with Session(domain_id=new_domain()) as session:
+
+        def join(name, reader):
+            """Add a node that announces itself once a reader is there."""
+            node = session.node(name)
+            node.raw_publisher(DIAGNOSTICS, [reader])
+            return FollowerSide(node, PERIOD_NS)
+
+        names = ["motion_controller", "wave_trajectory"]
+        plant = PlantSide(session.node("plant"), PERIOD_NS, names, lambda *_: None)
+        assert plant.unmatched() == names
+        join("wave_trajectory", "motion_controller")
+        assert session.spin_until(lambda: plant.unmatched() == names[:1], PATIENCE_S)
+        join("motion_controller", "nobody")
+        assert session.spin_until(lambda: plant.unmatched() == names, PATIENCE_S)

@@ -15,6 +15,7 @@ import psutil
 import pytest
 from cspm_process import child, grown
 from loops import WILD
+from process_runs import processes, use_site
 from ros_graph import (
     NODES,
     assert_same,
@@ -30,14 +31,12 @@ from run_samples import bundle_of
 from cspm_msgs_py.errors import CspmError
 from cspm_msgs_py.recording import Recording, overview
 from cspm_msgs_py.recording.recover import recover
-from cspm_ros.runtime import stall_watchdog as watch
 from cspm_run.recorded_run import run
 from cspm_run.resim import resimulate
 
 load_ros()
 
 from cspm_ros.runtime.graph_run import run_graph  # noqa: E402
-from cspm_ros.runtime.process_run import run_processes  # noqa: E402
 
 pytestmark = pytest.mark.compiled
 
@@ -46,13 +45,6 @@ LONG = bundle_of("rest", "duration=3600")
 LOST_S = 0.2
 # Nobody waits for ever; on a machine with six times its load such a run takes four minutes.
 LONGEST_S = 600.0
-
-
-def processes(bundle, folder, *arguments, **options):
-    """Run in the domain of nobody else, and wait no longer than a test may."""
-    return run_processes(
-        bundle, folder, *arguments, **{"domain_id": new_domain(), "patience_s": 20.0} | options
-    )
 
 
 def gone(found, seconds=10.0):
@@ -113,13 +105,6 @@ def test_only_a_recorder_in_lockstep_gives_way(tmp_path, mode, behind):
     processes(bundle_of("rest", "duration=1"), tmp_path / "run", Witness(look), mode=mode)
     assert set(found) == set(NODES)
     assert {name for name, policy in found.items() if policy == os.SCHED_BATCH} == behind
-
-
-def use_site(folder, monkeypatch, code):
-    """Have each Python that a test starts run some code first."""
-    (folder / "sitecustomize.py").write_text(code)
-    path = os.pathsep.join([str(folder), *filter(None, [os.environ.get("PYTHONPATH")])])
-    monkeypatch.setenv("PYTHONPATH", path)
 
 
 # Keeps Python's lock for ever, as the middleware does at times when two nodes leave at once.
@@ -359,42 +344,6 @@ def test_what_a_node_cannot_do_is_told_as_its_last_words(tmp_path):
         f" {tmp_path}/bag: exists, allowed: a new folder"
     )
     assert list((tmp_path / "bag").iterdir()) == []
-
-
-# What a process does of which the others never hear, once Python runs it as this node.
-_AT_START = """
-import os, sys, time
-if "motion_controller" in sys.orig_argv:
-    {act}
-"""
-
-
-def test_a_node_that_dies_while_the_run_starts_is_named(tmp_path, monkeypatch):
-    use_site(tmp_path, monkeypatch, _AT_START.format(act="os._exit(7)"))
-    with pytest.raises(CspmError) as caught:
-        processes(bundle_of("rest"), tmp_path / "bag", steps=10)
-    assert str(caught.value) == "motion_controller ended with exit code 7 before the run did"
-
-
-def test_a_node_that_never_joins_ends_the_start_with_its_name(tmp_path, monkeypatch):
-    use_site(tmp_path, monkeypatch, _AT_START.format(act="time.sleep(3600)"))
-    monkeypatch.setattr(watch, "GRACE_S", 0.0)
-    told = []
-
-    def tell(text):
-        told.append(text)
-        if text == "plant waits for motion_controller":
-            monkeypatch.setattr(watch, "START_FACTOR", 0.0)
-
-    with pytest.raises(CspmError) as caught:
-        processes(bundle_of("rest"), tmp_path / "bag", tell=tell, steps=10)
-    assert told[0] == "waits for plant"
-    assert re.match(
-        r"not all nodes joined within 0 s: plant waits for motion_controller; allowed: 0 times the"
-        r" longer of patience \(20 s\) and what this start cost \(\S+ s\); for more use --patience",
-        str(caught.value),
-    )
-    assert caught.value.exit_code == 1
 
 
 @pytest.mark.slow

@@ -119,6 +119,7 @@ def diagnosis_data(diagnosis: Diagnosis, testbed: Path | None = None) -> dict[st
             "sha256": first.testbed.sha256,
         },
         "verdict": verdict_of(diagnosis).value,
+        "thresholds": diagnosis.thresholds.values,
         "findings": _findings(diagnosis),
         "not_excited": [
             {"effect": name, "elements": list(elements)} for name, elements in diagnosis.silent

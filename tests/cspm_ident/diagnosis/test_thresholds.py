@@ -3,7 +3,9 @@
 from dataclasses import fields, replace
 
 import pytest
+from diagnosis_samples import diagnosis
 
+from cspm_ident.diagnosis.reporting.verdict import diagnosis_data
 from cspm_ident.diagnosis.thresholds import DEFAULT_THRESHOLDS, GROUPS, Thresholds
 from cspm_msgs_py.errors import InputError
 
@@ -55,3 +57,10 @@ def test_the_ends_of_a_range_are_allowed_and_what_is_beyond_is_not(each):
         assert getattr(replace(DEFAULT_THRESHOLDS, **{each.name: end}), each.name) == end
     with pytest.raises(InputError, match=each.name):
         replace(DEFAULT_THRESHOLDS, **{each.name: ends[0] - 1})
+
+
+def test_a_diagnosis_tells_the_thresholds_that_it_was_given():
+    moved = replace(DEFAULT_THRESHOLDS, unknown_share=0.3)
+    assert diagnosis_data(diagnosis())["thresholds"] == DEFAULT_THRESHOLDS.values
+    assert diagnosis_data(replace(diagnosis(), thresholds=moved))["thresholds"] == moved.values
+    assert moved.values["unknown_share"] == 0.3

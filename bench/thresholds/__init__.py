@@ -1,0 +1,1 @@
+"""What moving each threshold of the diagnosis changes on a fixed set of development recordings."""

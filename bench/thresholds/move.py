@@ -1,0 +1,72 @@
+"""Thresholds moved one at a time, and which of them a diagnosis reads."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import fields, replace
+from typing import Any, NamedTuple
+
+from cspm_ident.diagnosis.thresholds import DEFAULT_THRESHOLDS, Thresholds
+
+SHARE = 0.5
+
+
+class Move(NamedTuple):
+    """One threshold at another value.
+
+    Attributes:
+        name: of the threshold.
+        value: other than its default.
+    """
+
+    name: str
+    value: float
+
+    @property
+    def thresholds(self) -> Thresholds:
+        """All thresholds, this one moved."""
+        moved: dict[str, Any] = {self.name: self.value}
+        return replace(DEFAULT_THRESHOLDS, **moved)
+
+    @property
+    def is_up(self) -> bool:
+        """Whether the value is larger than the default."""
+        return self.value > DEFAULT_THRESHOLDS.values[self.name]
+
+
+def moves(share: float = SHARE) -> Iterator[Move]:
+    """Yield every threshold down and up by a share of its value, clipped to its allowed range.
+
+    A count moves by one at least. What is at the end of its range moves one way only.
+    """
+    for each in fields(Thresholds):
+        own, whole = DEFAULT_THRESHOLDS.values[each.name], each.metadata["unit"] == "count"
+        for sign in (-1.0, 1.0):
+            value = own + sign * max(share * own, 1.0 if whole else 0.0)
+            value = min(max(value, each.metadata["low"]), each.metadata["high"])
+            moved = round(value) if whole else value
+            if moved != own:
+                yield Move(each.name, moved)
+
+
+class WatchedThresholds(Thresholds):
+    """Thresholds that remember which of them were read; `read` is the set of names."""
+
+    read: set[str]
+
+    def __getattribute__(self, name: str) -> float:
+        """Return an attribute, and remember that it was read."""
+        own: dict[str, object] = object.__getattribute__(self, "__dict__")
+        if name in own and "read" in own:
+            read = own["read"]
+            assert isinstance(read, set)
+            read.add(name)
+        found: float = object.__getattribute__(self, name)
+        return found
+
+
+def watched() -> tuple[WatchedThresholds, set[str]]:
+    """Return the default thresholds, and the set to which names of those read are added."""
+    thresholds, read = WatchedThresholds(), set[str]()
+    object.__setattr__(thresholds, "read", read)
+    return thresholds, read

@@ -3,25 +3,22 @@
 from __future__ import annotations
 
 import time
-from collections.abc import Mapping
 from functools import partial
 
 import numpy as np
 from numpy.typing import NDArray
 
 from cspm_msgs_py.errors import InputError
-from cspm_msgs_py.graph import Edges, followers
+from cspm_msgs_py.graph import followers
 from cspm_msgs_py.ros.contract_node import ContractNode, ros_class
 from cspm_msgs_py.ros.outbox import Outbox
 from cspm_msgs_py.ros.qos import contract_qos
 from cspm_msgs_py.ros.rendezvous import PROGRESS, PlantSide
-from cspm_msgs_py.schedule import PLANT, TORQUE_COMMAND, Schedule
+from cspm_msgs_py.schedule import TORQUE_COMMAND
 from cspm_msgs_py.stepping.lockstep import WINDOW
 from cspm_msgs_py.topics import BRAKE, DIAGNOSTICS
-from cspm_sim.any_plant import AnyPlant
 from cspm_sim.lockstep_plant import LockstepPlant
-from cspm_sim.sensors import AnySensor
-from cspm_sim.simulator import Simulator
+from cspm_sim.plant_run import PlantRun
 
 Array = NDArray[np.float64]
 _LOOK_EVERY_S = 0.02
@@ -37,53 +34,28 @@ class PlantNode:
         refused: how many messages were unusable, and why the last was.
     """
 
-    def __init__(
-        self,
-        node: ContractNode,
-        plant: AnyPlant,
-        sensors: Mapping[str, AnySensor],
-        schedule: Schedule,
-        steps: int,
-        edges: Mapping[str, Edges],
-        nodes: tuple[str, ...],
-        *,
-        controlled: bool,
-    ) -> None:
-        """Connect the plant.
-
-        Args:
-            node: the ROS node.
-            plant: the machine.
-            sensors: by topic.
-            schedule: of the run.
-            steps: how many plant steps to make.
-            edges: who reads what in this run.
-            nodes: the nodes of this run.
-            controlled: whether a closed loop is to keep the bar upright.
-        """
-        topics = plant.testbed.topics
+    def __init__(self, node: ContractNode, run: PlantRun) -> None:
+        """Connect the plant to the ROS node."""
+        topics, edges, schedule = run.topics, run.edges, run.schedule
         self._outbox = Outbox(node)
-        publish = {
-            name: self._outbox.publisher(topics[name], edge.readers)
-            for name, edge in edges.items()
-            if edge.senders == (PLANT,) and name != DIAGNOSTICS.name
-        }
-        simulator = Simulator(
-            plant, sensors, publish, period_ns=schedule.period_ns, controlled=controlled
+        simulator = run.simulator(
+            {
+                name: self._outbox.publisher(topics[name], edge.readers)
+                for name, edge in run.published.items()
+            }
         )
         status = node.status_publisher(edges[DIAGNOSTICS.name].readers)
-        waited_for = followers(schedule, nodes, WINDOW)
+        waited_for = followers(schedule, run.nodes, WINDOW)
         self._node, self._simulator, self._period_ns = node, simulator, schedule.period_ns
-        self._plant = LockstepPlant(simulator, schedule, steps, waited_for, status)
-        others = [name for name in nodes if name != PLANT]
-        self._others = PlantSide(node, schedule.period_ns, others, self._progress)
+        self._plant = LockstepPlant(simulator, schedule, run.steps, waited_for, status)
+        self._others = PlantSide(node, schedule.period_ns, run.others, self._progress)
         if TORQUE_COMMAND in schedule.topics:
             refuse = partial(self._refuse, TORQUE_COMMAND)
             node.subscribe_numbered_rows(topics[TORQUE_COMMAND], self._torque, refuse)
         node.node.create_subscription(
             ros_class(BRAKE.ros_type), BRAKE.name, self._brake, contract_qos()
         )
-        self._brakes_at_start = plant.locked
+        self._brakes_at_start = run.plant.locked
         self._timer = node.every(_LOOK_EVERY_S, self._look_around)
         self._alone = 0.0
         self._told_end = False

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable
 
 import numpy as np
 from numpy.typing import NDArray
@@ -10,12 +10,11 @@ from numpy.typing import NDArray
 from cspm_msgs_py.graph import Edges
 from cspm_msgs_py.ros.contract_node import ContractNode, ros_class
 from cspm_msgs_py.ros.leader import Leader
-from cspm_msgs_py.schedule import CLOCK, PLANT, TORQUE_COMMAND, Schedule
+from cspm_msgs_py.schedule import CLOCK, PLANT, TORQUE_COMMAND
 from cspm_msgs_py.topics import BRAKE, DIAGNOSTICS, QOS_DEPTH, Topic
-from cspm_sim.any_plant import AnyPlant
+from cspm_sim.plant_run import PlantRun
 from cspm_sim.realtime_plant import RealtimePlant
-from cspm_sim.sensors import AnySensor
-from cspm_sim.simulator import Publish, Simulator
+from cspm_sim.simulator import Publish
 from cspm_sim.watchdog import Watchdog
 
 Array = NDArray[np.float64]
@@ -25,39 +24,26 @@ RESET = "~/reset"
 class RealtimePlantNode:
     """Steps the plant by the wall; it leads the run."""
 
-    def __init__(
-        self,
-        node: ContractNode,
-        plant: AnyPlant,
-        sensors: Mapping[str, AnySensor],
-        schedule: Schedule,
-        steps: int,
-        edges: Mapping[str, Edges],
-        nodes: tuple[str, ...],
-        watchdog: Watchdog,
-        *,
-        controlled: bool,
-    ) -> None:
-        """Connect the plant; arguments as `cspm_sim.plant_node.PlantNode`, and its watchdog."""
-        topics = plant.testbed.topics
+    def __init__(self, node: ContractNode, run: PlantRun, watchdog: Watchdog) -> None:
+        """Connect the plant to the ROS node; its watchdog releases or holds it."""
+        topics, edges, schedule = run.topics, run.edges, run.schedule
         self._node, self._watchdog = node, watchdog
         self._start_ns = 0
-        publish = {
-            name: self._on_wall_clock(node, topics[name], edge)
-            for name, edge in edges.items()
-            if edge.senders == (PLANT,) and name not in (CLOCK, DIAGNOSTICS.name)
-        }
-        self._simulator = Simulator(
-            plant, sensors, publish, period_ns=schedule.period_ns, controlled=controlled
+        self._simulator = run.simulator(
+            {
+                name: self._on_wall_clock(node, topics[name], edge)
+                for name, edge in run.published.items()
+                if name != CLOCK
+            }
         )
         status = node.status_publisher(edges[DIAGNOSTICS.name].readers)
-        self._plant = RealtimePlant(self._simulator, schedule, steps, watchdog, status)
+        self._plant = RealtimePlant(self._simulator, schedule, run.steps, watchdog, status)
         self.leader = Leader(
             node,
             schedule.period_ns,
-            [name for name in nodes if name != PLANT],
+            run.others,
             # One period more, in which the last step is made.
-            (steps + 1) * schedule.period_ns,
+            (run.steps + 1) * schedule.period_ns,
             on_start=self._start,
         )
         if TORQUE_COMMAND in schedule.topics:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from pathlib import Path
 
 from cspm_control.safety import GuardedStage, check_real_time
@@ -10,40 +10,25 @@ from cspm_control.stages.angle_stage import AngleStage
 from cspm_control.stages.motion_stage import MotionStage
 from cspm_control.stages.torque_stage import TorqueStage
 from cspm_msgs_py.errors import InputError
-from cspm_msgs_py.graph import RECORDER, graph_of
+from cspm_msgs_py.graph import RECORDER
 from cspm_msgs_py.recording.run_record import EXTERNAL
 from cspm_msgs_py.recording.writer import RecordingWriter
 from cspm_msgs_py.ros.contract_node import ContractNode
 from cspm_msgs_py.ros.leader import Leader
 from cspm_msgs_py.ros.realtime_node import RealtimeNode, RealtimeWaveNode
-from cspm_msgs_py.scenario import ClosedLoop
-from cspm_msgs_py.schedule import CLOCK, PLANT, WAVE_TRAJECTORY, Schedule, schedule_of
+from cspm_msgs_py.schedule import CLOCK, PLANT, WAVE_TRAJECTORY
 from cspm_msgs_py.topics import BRAKE, DIAGNOSTICS, EMERGENCY_STOP, SAFE, Topic
+from cspm_ros.runtime.nodes_of_run import NodesOfRun
 from cspm_ros.runtime.realtime_recorder_node import RealtimeRecorderNode
 from cspm_ros.runtime.warm_up import warm_up
-from cspm_run.assembly import assemble_simulator, assemble_stage
-from cspm_run.bundle import Bundle
+from cspm_run.assembly import assemble_stage
 from cspm_run.plant_guard import make_watchdog
 from cspm_run.recorded_run import recording_of
 from cspm_sim.realtime_plant_node import RealtimePlantNode
 
 
-@dataclass(frozen=True)
-class RealtimeRun:
-    """A run whose nodes are to be made.
-
-    Attributes:
-        bundle: what to run, resolved.
-        members: names of the nodes that take part; without the plant, hardware is in its place.
-    """
-
-    bundle: Bundle
-    members: tuple[str, ...]
-
-    @property
-    def schedule(self) -> Schedule:
-        """The run's schedule, of which real time takes rates and delays."""
-        return schedule_of(self.bundle.scenario, self.bundle.testbed.testbed)
+class RealtimeRun(NodesOfRun):
+    """A run in real time; attributes as `NodesOfRun`. Hardware may be in the plant's place."""
 
     @property
     def leader(self) -> str:
@@ -60,7 +45,7 @@ class RealtimeRun:
     def topics(self) -> dict[str, Topic]:
         """Return what such a run publishes, in contract order."""
         schedule = self.schedule
-        all_topics = self.bundle.testbed.testbed.topics
+        all_topics = self.testbed_topics
         found = {
             name: all_topics[name]
             for name in schedule.topics
@@ -76,30 +61,17 @@ class RealtimeRun:
 
     def plant(self, node: ContractNode, steps: int) -> RealtimePlantNode:
         """Return the plant's node; `steps` is how many plant steps to make."""
-        bundle, schedule = self.bundle, self.schedule
-        check_real_time(bundle.scenario.safety, schedule)
+        bundle = self.bundle
+        check_real_time(bundle.scenario.safety, self.schedule)
         with bundle.unpacked() as place:
             warm_up(PLANT, bundle, place)
-            plant, sensors = assemble_simulator(
-                bundle.scenario, bundle.testbed.testbed, place, bundle.plant
-            )
-        return RealtimePlantNode(
-            node,
-            plant,
-            sensors,
-            schedule,
-            steps,
-            graph_of(schedule, self.members),
-            self.members,
-            make_watchdog(bundle.scenario, plant),
-            controlled=isinstance(bundle.scenario.control, ClosedLoop),
-        )
+            run = self.plant_run(steps, place)
+        return RealtimePlantNode(node, run, make_watchdog(bundle.scenario, run.plant))
 
     def stage(self, node: ContractNode) -> RealtimeNode | RealtimeWaveNode:
         """Return the node of the controller that `node` is named after."""
         bundle, schedule = self.bundle, self.schedule
-        topics = bundle.testbed.testbed.topics
-        edges = graph_of(schedule, self.members)
+        topics, edges = self.testbed_topics, self.edges
         safety = bundle.scenario.safety
         check_real_time(safety, schedule)
         with bundle.unpacked() as place:

@@ -1,0 +1,62 @@
+"""What the nodes of a run have in common, in lockstep and in real time."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from pathlib import Path
+
+from cspm_msgs_py.graph import Edges, graph_of
+from cspm_msgs_py.scenario import ClosedLoop
+from cspm_msgs_py.schedule import Schedule, schedule_of
+from cspm_msgs_py.topics import Topic
+from cspm_run.assembly import assemble_simulator
+from cspm_run.bundle import Bundle
+from cspm_sim.plant_run import PlantRun
+
+
+@dataclass(frozen=True)
+class NodesOfRun:
+    """A run whose nodes are to be made.
+
+    Attributes:
+        bundle: what to run, resolved.
+        members: names of the nodes that take part.
+    """
+
+    bundle: Bundle
+    members: tuple[str, ...]
+
+    @property
+    def schedule(self) -> Schedule:
+        """The run's schedule, of which real time takes rates and delays."""
+        return schedule_of(self.bundle.scenario, self.bundle.testbed.testbed)
+
+    @property
+    def edges(self) -> Mapping[str, Edges]:
+        """Who sends and reads what, by topic."""
+        return graph_of(self.schedule, self.members)
+
+    @property
+    def testbed_topics(self) -> dict[str, Topic]:
+        """All topics of the machine, by name."""
+        return self.bundle.testbed.testbed.topics
+
+    def plant_run(self, steps: int, place: Path) -> PlantRun:
+        """Return what the plant's node is made of.
+
+        Args:
+            steps: how many plant steps to make.
+            place: where the bundle is unpacked.
+        """
+        scenario, testbed = self.bundle.scenario, self.bundle.testbed.testbed
+        plant, sensors = assemble_simulator(scenario, testbed, place, self.bundle.plant)
+        return PlantRun(
+            plant=plant,
+            sensors=sensors,
+            schedule=self.schedule,
+            steps=steps,
+            edges=self.edges,
+            nodes=self.members,
+            controlled=isinstance(scenario.control, ClosedLoop),
+        )

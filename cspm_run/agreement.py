@@ -27,7 +27,7 @@ Array = NDArray[np.float64]
 
 
 @dataclass(frozen=True)
-class Case:
+class AgreementCase:
     """One comparison.
 
     Attributes:
@@ -46,14 +46,14 @@ class Case:
 MINUTE = "duration=60"
 IDEAL = "sensors=ideal"
 CASES = (
-    Case("calm", "", (MINUTE,)),
-    Case("worst_case", "", (MINUTE,)),
-    Case("calm", "ideal sensors", (MINUTE, IDEAL)),
-    Case("worst_case", "ideal sensors", (MINUTE, IDEAL)),
-    Case("worst_case", "ideal sensors, ours at 0.25 ms", (MINUTE, IDEAL), finer=4),
-    Case("verification_short"),
-    Case("verification_mid"),
-    Case("verification_long"),
+    AgreementCase("calm", "", (MINUTE,)),
+    AgreementCase("worst_case", "", (MINUTE,)),
+    AgreementCase("calm", "ideal sensors", (MINUTE, IDEAL)),
+    AgreementCase("worst_case", "ideal sensors", (MINUTE, IDEAL)),
+    AgreementCase("worst_case", "ideal sensors, ours at 0.25 ms", (MINUTE, IDEAL), finer=4),
+    AgreementCase("verification_short"),
+    AgreementCase("verification_mid"),
+    AgreementCase("verification_long"),
 )
 
 
@@ -112,7 +112,7 @@ def trace(scenario: str, overrides: Sequence[str], plant: str) -> Trace:
     return Trace(poses, tensions, loaded.duration / elapsed)
 
 
-def compare(case: Case) -> Agreement:
+def compare(case: AgreementCase) -> Agreement:
     """Run a case on both plants."""
     finer = (*case.overrides, f"rates.plant={1000 * case.finer}")
     ours = trace(case.scenario, finer, SIM)
@@ -172,7 +172,7 @@ _CAUSES = """
 """
 
 
-def agreement_page(found: Sequence[tuple[Case, Agreement]]) -> str:
+def agreement_page(found: Sequence[tuple[AgreementCase, Agreement]]) -> str:
     """Return the page in Markdown."""
     columns = [*DOFS, "tension", "largest"]
     lines = [

@@ -49,7 +49,7 @@ ROWS = (
 
 
 @dataclass(frozen=True)
-class Case:
+class TableCase:
     """A recording to be made.
 
     Attributes:
@@ -72,10 +72,10 @@ class Case:
 
 
 CASES = (
-    Case("verification_mid", 40.0, "winches locked, 100 Hz"),
-    Case("calm", 50.0, "1 kHz"),
-    Case("worst_case", 60.0, "1 kHz"),
-    Case("worst_case", 20.0, "1 kHz", "mujoco"),
+    TableCase("verification_mid", 40.0, "winches locked, 100 Hz"),
+    TableCase("calm", 50.0, "1 kHz"),
+    TableCase("worst_case", 60.0, "1 kHz"),
+    TableCase("worst_case", 20.0, "1 kHz", "mujoco"),
 )
 
 
@@ -108,7 +108,7 @@ def ratios(found: Comparison) -> dict[str, str]:
     return texts
 
 
-def _record(folder: Path, case: Case) -> Measurement:
+def _record(folder: Path, case: TableCase) -> Measurement:
     path = SCENARIOS / f"{case.scenario}.yaml"
     scenario = load_scenario(path, [f"duration={case.seconds}"])
     testbed = load_testbed(path.parent / scenario.testbed)
@@ -117,7 +117,7 @@ def _record(folder: Path, case: Case) -> Measurement:
     return read_measurement(folder)
 
 
-def _delay_row(case: Case, measurement: Measurement) -> str:
+def _delay_row(case: TableCase, measurement: Measurement) -> str:
     errors, held = {BAR: [0.0], FRAME: [0.0]}, 0
     for bar, frame in SHIFTS:
         shifted = replace(

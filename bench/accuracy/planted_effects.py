@@ -29,7 +29,7 @@ FIRST_SEED = 100
 
 
 @dataclass(frozen=True)
-class Case:
+class PlantedCase:
     """What is planted where, and how it is recorded; without load cells if not `cells`."""
 
     effect: str = ""
@@ -41,30 +41,30 @@ class Case:
 
 
 CASES = (
-    Case(),
-    Case(capture=100),
-    Case(plant="mujoco"),
-    Case("winch_coulomb_friction", ("surge_2",), {"torque": 0.031}),
-    Case("winch_coulomb_friction", ("surge_2",), {"torque": 0.02}, capture=100),
-    Case("winch_coulomb_friction", ("sway_1",), {"torque": 0.01}, plant="mujoco"),
-    Case("winch_viscous_friction", ("hoist_2",), {"coefficient": 2e-5}, plant="mujoco"),
-    Case("winch_torque_gain", ("surge_1",), {"gain": 0.97}),
-    Case("winch_drum_eccentricity", ("sway_2",), {"eccentricity": 2e-4, "phase": 0.5}),
-    Case("tension_gain", ("sway_3",), {"gain": 1.03}),
-    Case("tension_bias", ("hoist_1",), {"bias": 0.3}),
-    Case("cable_stiffness", ("hoist_1",), {"scale": 0.8}),
-    Case("cable_hysteresis", ("surge_1",), {"force": 0.5, "displacement": 0.002}),
-    Case("cable_transverse_damping", (), {"coefficient": 0.5}),
-    Case("pose_delay", ("bar",), {"delay": 0.004}),
-    Case("bar_mass", (), {"mass": 0.1}),
-    Case(cells=False),
-    Case("winch_coulomb_friction", ("surge_2",), {"torque": 0.031}, cells=False),
-    Case("winch_viscous_friction", ("hoist_2",), {"coefficient": 4e-4}, cells=False),
-    Case("winch_torque_gain", ("surge_1",), {"gain": 0.97}, cells=False),
-    Case("winch_drum_radius", ("sway_2",), {"radius": 5e-4}, cells=False),
-    Case("cable_stiffness", ("hoist_1",), {"scale": 0.8}, cells=False),
-    Case("cable_axial_damping", ("surge_1",), {"scale": 0.5}, cells=False),
-    Case("bar_mass", (), {"mass": 0.1}, cells=False),
+    PlantedCase(),
+    PlantedCase(capture=100),
+    PlantedCase(plant="mujoco"),
+    PlantedCase("winch_coulomb_friction", ("surge_2",), {"torque": 0.031}),
+    PlantedCase("winch_coulomb_friction", ("surge_2",), {"torque": 0.02}, capture=100),
+    PlantedCase("winch_coulomb_friction", ("sway_1",), {"torque": 0.01}, plant="mujoco"),
+    PlantedCase("winch_viscous_friction", ("hoist_2",), {"coefficient": 2e-5}, plant="mujoco"),
+    PlantedCase("winch_torque_gain", ("surge_1",), {"gain": 0.97}),
+    PlantedCase("winch_drum_eccentricity", ("sway_2",), {"eccentricity": 2e-4, "phase": 0.5}),
+    PlantedCase("tension_gain", ("sway_3",), {"gain": 1.03}),
+    PlantedCase("tension_bias", ("hoist_1",), {"bias": 0.3}),
+    PlantedCase("cable_stiffness", ("hoist_1",), {"scale": 0.8}),
+    PlantedCase("cable_hysteresis", ("surge_1",), {"force": 0.5, "displacement": 0.002}),
+    PlantedCase("cable_transverse_damping", (), {"coefficient": 0.5}),
+    PlantedCase("pose_delay", ("bar",), {"delay": 0.004}),
+    PlantedCase("bar_mass", (), {"mass": 0.1}),
+    PlantedCase(cells=False),
+    PlantedCase("winch_coulomb_friction", ("surge_2",), {"torque": 0.031}, cells=False),
+    PlantedCase("winch_viscous_friction", ("hoist_2",), {"coefficient": 4e-4}, cells=False),
+    PlantedCase("winch_torque_gain", ("surge_1",), {"gain": 0.97}, cells=False),
+    PlantedCase("winch_drum_radius", ("sway_2",), {"radius": 5e-4}, cells=False),
+    PlantedCase("cable_stiffness", ("hoist_1",), {"scale": 0.8}, cells=False),
+    PlantedCase("cable_axial_damping", ("surge_1",), {"scale": 0.5}, cells=False),
+    PlantedCase("bar_mass", (), {"mass": 0.1}, cells=False),
 )
 
 
@@ -92,7 +92,7 @@ def main() -> None:
             print(f"| {' | '.join(row)} |", flush=True)
 
 
-def record(case: Case, seed: int, folder: Path, duration: float = DURATION_S) -> None:
+def record(case: PlantedCase, seed: int, folder: Path, duration: float = DURATION_S) -> None:
     """Run the worst sea for `duration` [s] with an effect planted."""
     path = SCENARIOS / "worst_case.yaml"
     capture = f"rates.motion_capture={case.capture}"
@@ -109,7 +109,7 @@ def record(case: Case, seed: int, folder: Path, duration: float = DURATION_S) ->
     run(replace(bundle, plant=case.plant), folder)
 
 
-def judge(case: Case, folder: Path) -> tuple[str, str, str]:
+def judge(case: PlantedCase, folder: Path) -> tuple[str, str, str]:
     """Return verdict, what was found, and how long it took, the file without the effect given."""
     begun = time.perf_counter()
     measurement = read_measurement(folder, SCENARIOS / "testbeds" / "thesis.yaml")
@@ -135,7 +135,7 @@ def number_words(number: Number) -> str:
     )
 
 
-def _planted(case: Case) -> str:
+def _planted(case: PlantedCase) -> str:
     if not case.effect:
         return "nothing"
     values = ", ".join(f"{name} {value:g}" for name, value in case.parameters.items())

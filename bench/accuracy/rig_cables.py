@@ -19,7 +19,7 @@ RADIUS = 0.025  # m
 SHA = "ab" * 32
 
 
-class Truth(NamedTuple):
+class SpecimenTruth(NamedTuple):
     """A cable: dt/dε = min(a/l0^b (e^{ct} − e^{dt}), E·A/l0) with its damper and Dahl's hysteresis.
 
     Below `floor` the slope stays, as a cable cannot start from a slope of zero.
@@ -71,7 +71,7 @@ class Truth(NamedTuple):
         return found
 
 
-def described(length: float, truth: Truth, label: str = "only", **changes: Any) -> Cable:
+def described(length: float, truth: SpecimenTruth, label: str = "only", **changes: Any) -> Cable:
     """Return the cable as a test-bed file that knows its sizes and not its law would give it."""
     law = {
         "law": "exponential",
@@ -104,7 +104,7 @@ def _unstretched(wound: np.ndarray, length: float, stretch: float) -> np.ndarray
 
 
 def tension_on(
-    truth: Truth, wound: np.ndarray, length: float, stretch: float, highest: float
+    truth: SpecimenTruth, wound: np.ndarray, length: float, stretch: float, highest: float
 ) -> np.ndarray:
     """Return the elastic tension for cable wound in from an elongation `stretch` on."""
     knots = np.linspace(wound.min(), wound.max(), 600)
@@ -113,7 +113,7 @@ def tension_on(
     return np.interp(wound, knots, values)
 
 
-def stretch_at(truth: Truth, tension: float, length: float) -> float:
+def stretch_at(truth: SpecimenTruth, tension: float, length: float) -> float:
     """Return the elongation at a tension, of a cable whose unstretched length is near `length`."""
     grid = np.linspace(0.0, tension, 4001)
     slack = length
@@ -123,7 +123,7 @@ def stretch_at(truth: Truth, tension: float, length: float) -> float:
     return length - slack
 
 
-def dahl(truth: Truth, wound: np.ndarray) -> np.ndarray:
+def dahl(truth: SpecimenTruth, wound: np.ndarray) -> np.ndarray:
     """Return the hysteresis' force: dF = F_c/x_c·(dx − F/F_c·|dx|), from zero on."""
     force, found = 0.0, np.zeros(len(wound))
     stiffness = truth.dahl_force / truth.dahl_scale
@@ -141,7 +141,7 @@ def noise(rng: np.random.Generator, count: int) -> np.ndarray:
 
 
 def specimen(
-    truth: Truth,
+    truth: SpecimenTruth,
     length: float,
     wound: np.ndarray,
     tension: np.ndarray,
@@ -169,7 +169,7 @@ def specimen(
 
 
 def ramps(
-    truth: Truth,
+    truth: SpecimenTruth,
     length: float,
     *,
     seed: int,
@@ -188,7 +188,7 @@ def ramps(
 # What noise is drawn for again and again.
 @lru_cache(maxsize=16)
 def _pulled(
-    truth: Truth, length: float, highest: float, lowest: float, ramp: float, cycles: int
+    truth: SpecimenTruth, length: float, highest: float, lowest: float, ramp: float, cycles: int
 ) -> tuple[np.ndarray, np.ndarray]:
     """Return cable wound in [m] and tension [N], without noise."""
     stretch = stretch_at(truth, lowest, length)
@@ -205,7 +205,7 @@ def _pulled(
 
 
 def multisine(
-    truth: Truth,
+    truth: SpecimenTruth,
     length: float,
     *,
     seed: int,

@@ -41,7 +41,7 @@ _EXPERIMENT = "separating_experiment"
 Data = Mapping[str, Any]
 
 
-class Case(NamedTuple):
+class SeparationCase(NamedTuple):
     """A tie, and what became of it.
 
     Attributes:
@@ -81,7 +81,7 @@ def main() -> None:
         into_page(PAGE, "cases", separating_table(cases, truth_sha256(options.truth), len(items)))
 
 
-def _case(item: Data, recording: Path, work: Path) -> Case | None:
+def _case(item: Data, recording: Path, work: Path) -> SeparationCase | None:
     """Return what experiments make of a recording; None where it is no tie, or lost the bar.
 
     What is there already is not made again.
@@ -92,7 +92,7 @@ def _case(item: Data, recording: Path, work: Path) -> Case | None:
         return (
             None
             if reported is None
-            else Case(**{**reported, "experiments": tuple(reported["experiments"])})
+            else SeparationCase(**{**reported, "experiments": tuple(reported["experiments"])})
         )
     if not (recording / "metadata.yaml").exists():
         return None
@@ -103,7 +103,7 @@ def _case(item: Data, recording: Path, work: Path) -> Case | None:
     return case
 
 
-def _separated(item: Data, recording: Path, work: Path) -> Case | None:
+def _separated(item: Data, recording: Path, work: Path) -> SeparationCase | None:
     measured = read_measurement(recording)
     found = diagnose([measured])
     before = diagnosis_data(found)
@@ -114,7 +114,9 @@ def _separated(item: Data, recording: Path, work: Path) -> Case | None:
     files = dict.fromkeys(a[_EXPERIMENT] for a in first if a[_EXPERIMENT])
     run = [read_measurement(folder) for folder in _run(item, work, list(files))]
     after = diagnosis_data(diagnose([measured, *run])) if run else None
-    return Case(item, before, tuple(load_scenario(work / name).name for name in files), after)
+    return SeparationCase(
+        item, before, tuple(load_scenario(work / name).name for name in files), after
+    )
 
 
 def _run(item: Data, work: Path, files: Sequence[str]) -> Iterator[Path]:
@@ -148,7 +150,7 @@ def _words(diagnosis: Data | None) -> str:
     return f"{first} on {on}" + (f" (or {', '.join(others)})" if others else "")
 
 
-def separating_table(cases: Sequence[Case], sha256: str, recordings: int) -> str:
+def separating_table(cases: Sequence[SeparationCase], sha256: str, recordings: int) -> str:
     """Return the counts and a table of all ties."""
     run = [case for case in cases if case.after is not None]
     lines = [
@@ -180,7 +182,7 @@ def separating_table(cases: Sequence[Case], sha256: str, recordings: int) -> str
     return "\n\n".join(lines)
 
 
-def _ran(case: Case) -> tuple[str]:
+def _ran(case: SeparationCase) -> tuple[str]:
     return (", ".join(case.experiments) or "none",)
 
 

@@ -11,12 +11,12 @@ import time
 from pathlib import Path
 from typing import NamedTuple
 
-from bench.accuracy.planted_effects import Case, record
+from bench.accuracy.planted_effects import PlantedCase, record
 from bench.performance.child import start_cspm, watched
 from bench.performance.thesis_machine import SCENARIOS
 
 SEED = 100
-PLANTED = Case("winch_coulomb_friction", ("surge_2",), {"torque": 0.031})
+PLANTED = PlantedCase("winch_coulomb_friction", ("surge_2",), {"torque": 0.031})
 
 
 class Cost(NamedTuple):

@@ -53,7 +53,7 @@ SIGNALS = (signal.SIGKILL, signal.SIGSTOP)
 STATES = ("hold", "brake")
 
 
-class Case(NamedTuple):
+class ReactionCase(NamedTuple):
     """Who is struck by what, and the machine's safe state."""
 
     node: str
@@ -73,7 +73,7 @@ def print_reactions(console: Console, repetitions: int) -> None:
     for node, (guard, waits) in REACTS.items():
         for number in SIGNALS:
             for state in STATES:
-                found = [_reaction(Case(node, number, state)) for _ in range(repetitions)]
+                found = [_reaction(ReactionCase(node, number, state)) for _ in range(repetitions)]
                 times = [each * 1e3 for each in found if each is not None]
                 shown = [f"{median(times):.0f}", f"{max(times):.0f}"] if times else ["", ""]
                 runs = f"{len(times)} of {repetitions}"
@@ -86,7 +86,7 @@ def print_reactions(console: Console, repetitions: int) -> None:
     console.print(f"period {PERIOD_S * 1e3:g} ms; load after: {loads} (1, 5, 15 min)")
 
 
-def _reaction(case: Case) -> float | None:
+def _reaction(case: ReactionCase) -> float | None:
     """Return the time from the signal to the safe state [s]; None if that was before, or never."""
     from cspm_ros.runtime.node_parameters import REALTIME
     from cspm_ros.runtime.process_run import run_processes

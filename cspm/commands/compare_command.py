@@ -11,7 +11,7 @@ from rich.console import Console
 from rich.table import Table
 
 from cspm_ident.block_simulation import Input
-from cspm_ident.comparison.channel import Channel
+from cspm_ident.comparison.channel_fit import ChannelFit
 from cspm_ident.comparison.compare import Comparison, compare
 from cspm_ident.signals.measurement import read_measurement
 from cspm_msgs_py.new_folder import refuse_existing
@@ -100,7 +100,7 @@ def print_comparison(console: Console, found: Comparison) -> None:
         say(console, f"{found.windows[1]} of {found.windows[0]} windows diverged and are left out")
 
 
-def _table(channels: list[Channel]) -> Table:
+def _table(channels: list[ChannelFit]) -> Table:
     table = Table(box=box.SIMPLE_HEAD, show_edge=False, padding=(0, 1, 0, 0))
     table.add_column("channel", no_wrap=True)
     for column in ("VAF %", "NRMSE", "RMS error", "floor", "bias", "lag ms"):

@@ -19,7 +19,7 @@ _MOVES = 3.0
 
 
 @dataclass(frozen=True, eq=False)
-class Channel:
+class ChannelFit:
     """A quantity at its sensor's own samples.
 
     Attributes:

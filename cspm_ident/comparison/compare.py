@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from cspm_ident.block_simulation import BlockSimulation, Input, Simulated, Window
-from cspm_ident.comparison.channel import Channel
+from cspm_ident.comparison.channel_fit import ChannelFit
 from cspm_ident.comparison.floor import lasting_rms, propagated
 from cspm_ident.comparison.metrics import error_bins
 from cspm_ident.signals.clock_drift import ClockDrift, on_one_clock
@@ -59,7 +59,7 @@ class Comparison:
     measurement: Measurement
     drive: Input
     horizon: float | None
-    channels: list[Channel]
+    channels: list[ChannelFit]
     delays: list[Delay]
     applied: dict[str, float]
     drifts: list[ClockDrift]
@@ -231,8 +231,8 @@ def _run(
 
 
 def _turning(
-    channels: list[Channel], measurement: Measurement, noise: Mapping[str, Array]
-) -> list[Channel]:
+    channels: list[ChannelFit], measurement: Measurement, noise: Mapping[str, Array]
+) -> list[ChannelFit]:
     """Return the channels of winches that turn: at rest a brake may hold against any torque."""
     if measurement.angle is None:
         return channels
@@ -244,7 +244,7 @@ def _turning(
 
 def _channels(
     timeline: Timeline, run: _Run, block: str, noise: Mapping[str, Array]
-) -> list[Channel]:
+) -> list[ChannelFit]:
     measurement = timeline.measurement
     cables = measurement.machine.cable_names
     steps = sum(end - start for start, end in run.windows)
@@ -288,14 +288,14 @@ def _channel(
     simulated: Array,
     i: int,
     floor: float,
-) -> Channel | None:
+) -> ChannelFit | None:
     times = samples.times - timeline.delays.get(topic, 0.0)
     inside = (times >= timeline.times[0]) & (times <= timeline.times[-1])
     at = np.interp(times[inside], timeline.times, simulated[:, i])
     whole = np.isfinite(at)
     if whole.sum() < 4:
         return None
-    channel = Channel(
+    channel = ChannelFit(
         name,
         unit,
         block,
@@ -307,7 +307,7 @@ def _channel(
     return replace(channel, bins=_bins(timeline, channel, topic, i))
 
 
-def _bins(timeline: Timeline, channel: Channel, topic: str, i: int) -> dict[str, list[Any]]:
+def _bins(timeline: Timeline, channel: ChannelFit, topic: str, i: int) -> dict[str, list[Any]]:
     """Return the error against time and what is likely to drive it."""
 
     def at(signal: Array | None, column: int) -> Array | None:

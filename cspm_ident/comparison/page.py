@@ -10,7 +10,7 @@ import plotly.graph_objects as go
 from numpy.typing import NDArray
 from plotly.subplots import make_subplots
 
-from cspm_ident.comparison.channel import Channel
+from cspm_ident.comparison.channel_fit import ChannelFit
 from cspm_ident.comparison.compare import Comparison
 from cspm_ident.offline_page import (
     BELOW,
@@ -102,7 +102,7 @@ def _about(comparison: Comparison) -> str:
     return "<ul>" + "".join(f"<li>{escape(line)}</li>" for line in lines) + "</ul>"
 
 
-def _table(channels: list[Channel]) -> str:
+def _table(channels: list[ChannelFit]) -> str:
     heads = ("channel", "VAF %", "NRMSE", "RMS error", "noise floor", "bias", "lag ms", "unit")
     rows = []
     for c in channels:
@@ -120,7 +120,7 @@ def _table(channels: list[Channel]) -> str:
     return table_html(heads, rows, "accuracy by channel")
 
 
-def _lines(channels: list[Channel]) -> go.Figure:
+def _lines(channels: list[ChannelFit]) -> go.Figure:
     """Return two rows per channel, both signals and their difference, on one time axis."""
     figure = make_subplots(
         rows=2 * len(channels), cols=1, shared_xaxes=True, vertical_spacing=0.08 / len(channels)
@@ -153,7 +153,7 @@ def _lines(channels: list[Channel]) -> go.Figure:
     return figure
 
 
-def _spectra(channels: list[Channel]) -> go.Figure:
+def _spectra(channels: list[ChannelFit]) -> go.Figure:
     figure = go.Figure()
     for i, channel in enumerate(channels):
         frequencies, values = channel.coherence
@@ -166,7 +166,7 @@ def _spectra(channels: list[Channel]) -> go.Figure:
     return figure
 
 
-def _bins(channels: list[Channel]) -> go.Figure:
+def _bins(channels: list[ChannelFit]) -> go.Figure:
     """Return bias and RMS of the error against each quantity, in multiples of the floor."""
     names = list(dict.fromkeys(name for channel in channels for name in channel.bins))
     rows, titles = max(1, len(names)), [_QUANTITIES[name] for name in names]

@@ -49,7 +49,7 @@ class PlannedTopic:
 
 
 @dataclass(frozen=True)
-class Plan:
+class ImportPlan:
     """All topics, and the clocks by name."""
 
     topics: tuple[PlannedTopic, ...]
@@ -68,7 +68,7 @@ class Plan:
         return list(dict.fromkeys(found))
 
 
-def plan_import(mapping: MappingFile, testbed: Testbed, source: Source) -> Plan:
+def plan_import(mapping: MappingFile, testbed: Testbed, source: Source) -> ImportPlan:
     """Return what an import will do.
 
     Raises:
@@ -102,7 +102,7 @@ def plan_import(mapping: MappingFile, testbed: Testbed, source: Source) -> Plan:
         )
         if all(field.column is None for field in planned[-1].fields):
             raise InputError(f"{key}: constants only, allowed: at least one column")
-    return Plan(tuple(planned), clocks)
+    return ImportPlan(tuple(planned), clocks)
 
 
 def importable(testbed: Testbed) -> dict[str, Topic]:

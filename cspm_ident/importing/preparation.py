@@ -10,13 +10,13 @@ import numpy as np
 
 from cspm_ident.importing.column_store import ColumnStore
 from cspm_ident.importing.fingerprint import fingerprint
+from cspm_ident.importing.import_plan import ImportPlan, PlannedTopic, plan_import
 from cspm_ident.importing.mapping import MappingFile
-from cspm_ident.importing.plan import Plan, PlannedTopic, plan_import
 from cspm_ident.importing.report import ImportReport, suspicions_of, topic_report
 from cspm_ident.importing.sources.opening import open_source
 from cspm_ident.importing.sources.source import Progress, Source
 from cspm_ident.importing.time_base import Times, times_of
-from cspm_ident.importing.topic_messages import Series, TopicMessages, gather
+from cspm_ident.importing.topic_messages import ColumnSeries, TopicMessages, gather
 from cspm_ident.importing.unwrapping import Unwrapped
 from cspm_msgs_py.errors import InputError
 from cspm_msgs_py.testbed import TestbedFile
@@ -85,7 +85,7 @@ def _about(path: Path, mapping: MappingFile, testbed: TestbedFile) -> dict[str, 
     }
 
 
-def _unused(source: Source, plan: Plan) -> list[str]:
+def _unused(source: Source, plan: ImportPlan) -> list[str]:
     used = {*plan.numbers, *plan.times}
     if source.stamped:
         topics = {name.rpartition(":")[0] for name in used}
@@ -94,7 +94,7 @@ def _unused(source: Source, plan: Plan) -> list[str]:
 
 
 def _all_times(
-    plan: Plan, store: ColumnStore, mapping: MappingFile
+    plan: ImportPlan, store: ColumnStore, mapping: MappingFile
 ) -> dict[tuple[str, str | None, int], Times]:
     """Return the stamps of each clock, by its name, its column and its number of rows."""
     found: dict[tuple[str, str | None, int], Times] = {}
@@ -121,13 +121,13 @@ def _all_times(
 
 def _series(
     planned: PlannedTopic, times: dict[tuple[str, str | None, int], Times], store: ColumnStore
-) -> tuple[dict[str, Series], dict[str, Unwrapped]]:
+) -> tuple[dict[str, ColumnSeries], dict[str, Unwrapped]]:
     """Return the columns of a topic in SI, and what unwrapping found."""
-    series: dict[str, Series] = {}
+    series: dict[str, ColumnSeries] = {}
     unwrapped = {}
     for field in planned.fields:
         if field.conversion is None or field.column is None:
-            series[field.name] = Series(np.array(field.constant), None)
+            series[field.name] = ColumnSeries(np.array(field.constant), None)
             continue
         raw = store.column(field.column)
         values, found = field.conversion.apply(np.asarray(raw))
@@ -135,7 +135,7 @@ def _series(
             unwrapped[field.name] = found
         name = f"{planned.topic.name} {field.name}"
         store.append(name, values)
-        series[field.name] = Series(
+        series[field.name] = ColumnSeries(
             store.column(name), times[(field.clock, field.stamps, len(raw))]
         )
     return series, unwrapped

@@ -12,7 +12,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from cspm_ident.importing.robust_line import Line, robust_line
+from cspm_ident.importing.robust_line import RobustLine, robust_line
 from cspm_ident.importing.suspicion import Suspicion
 from cspm_ident.importing.time_base import GAP
 from cspm_ident.importing.topic_messages import TopicMessages
@@ -43,7 +43,7 @@ _LIKELY = {
 }
 
 
-class Signal(NamedTuple):
+class SensorSeries(NamedTuple):
     """A channel without NaN: instants [s] and values [SI], both shape (n,)."""
 
     time: Array
@@ -74,7 +74,7 @@ def relation_suspicions(messages: Mapping[str, TopicMessages], testbed: Testbed)
 
 def _position_pairs(
     messages: Mapping[str, TopicMessages], origin_ns: int
-) -> Iterator[tuple[str, Signal, Signal]]:
+) -> Iterator[tuple[str, SensorSeries, SensorSeries]]:
     """Yield name, position and velocity of what has both."""
     for topic in messages.values():
         if {"position", "velocity"} <= set(topic.topic.parts):
@@ -95,15 +95,17 @@ def _position_pairs(
                 )
 
 
-def _signal(topic: TopicMessages, field: str, origin_ns: int) -> Signal:
+def _signal(topic: TopicMessages, field: str, origin_ns: int) -> SensorSeries:
     values = topic.values(field)
     order = np.argsort(topic.stamp_ns, kind="stable")
     order = order[~np.isnan(values[order])]
     time = np.asarray((topic.stamp_ns[order] - origin_ns) * 1e-9, dtype=np.float64)
-    return Signal(time, values[order])
+    return SensorSeries(time, values[order])
 
 
-def velocity_suspicions(where: str, position: Signal, velocity: Signal) -> list[Suspicion]:
+def velocity_suspicions(
+    where: str, position: SensorSeries, velocity: SensorSeries
+) -> list[Suspicion]:
     """Return whether the integral of a velocity is not the position.
 
     Regression of position over windows on integrated velocity, with a constant bias of velocity.
@@ -127,14 +129,14 @@ def velocity_suspicions(where: str, position: Signal, velocity: Signal) -> list[
     return [Suspicion(where, "velocity", text, numbers)]
 
 
-def _told(line: Line) -> str:
+def _told(line: RobustLine) -> str:
     factor = abs(line.slope)
     likely = [text for value, text in _LIKELY.items() if abs(factor / value - 1) < _HINT_TOLERANCE]
     hint = f" ({likely[0]})" if likely else ""
     return f"{factor:.4g}, sign {'−' if line.slope < 0 else '+'}{hint}"
 
 
-def _windows(position: Signal, velocity: Signal) -> tuple[Array, Array, Array]:
+def _windows(position: SensorSeries, velocity: SensorSeries) -> tuple[Array, Array, Array]:
     """Return over windows without gaps: change of position, integral of velocity, duration."""
     integral = np.concatenate(
         [
@@ -156,7 +158,7 @@ def _windows(position: Signal, velocity: Signal) -> tuple[Array, Array, Array]:
     return change[inside], moved[inside], duration[inside]
 
 
-def power_suspicions(where: str, angle: Signal, torque: Signal) -> list[Suspicion]:
+def power_suspicions(where: str, angle: SensorSeries, torque: SensorSeries) -> list[Suspicion]:
     """Return whether a winch gives energy where friction must take it.
 
     Without its mean, which hoists and lowers, torque times change of angle sums up to what is
@@ -175,7 +177,7 @@ def power_suspicions(where: str, angle: Signal, torque: Signal) -> list[Suspicio
 
 
 def torque_suspicions(
-    where: str, torque: Signal, tension: Signal, radius: float
+    where: str, torque: SensorSeries, tension: SensorSeries, radius: float
 ) -> list[Suspicion]:
     """Return whether torque and tension times drum radius over gear ratio [m] are far apart."""
     if len(torque.values) < _WINDOW or len(tension.values) < _WINDOW:

@@ -9,12 +9,12 @@ from typing import Any
 
 import numpy as np
 
-from cspm_ident.importing.plan import PlannedTopic
+from cspm_ident.importing.import_plan import PlannedTopic
 from cspm_ident.importing.relations import relation_suspicions
 from cspm_ident.importing.suspicion import Suspicion
 from cspm_ident.importing.time_base import Pace, pace_of
 from cspm_ident.importing.time_suspicions import held_suspicions, time_suspicions
-from cspm_ident.importing.topic_messages import LeftOut, TopicMessages
+from cspm_ident.importing.topic_messages import SkippedMessages, TopicMessages
 from cspm_ident.importing.unwrapping import Unwrapped
 from cspm_ident.importing.value_suspicions import (
     quaternion_suspicions,
@@ -70,7 +70,7 @@ class TopicReport:
     pace: Pace
     first_s: list[float]
     fields: list[FieldReport]
-    left_out: LeftOut
+    left_out: SkippedMessages
 
 
 @dataclass(frozen=True)

@@ -16,7 +16,7 @@ _ROUNDS = 30
 _EXACT = 1e-12
 
 
-class Line(NamedTuple):
+class RobustLine(NamedTuple):
     """y = slope·x + other·z.
 
     Attributes:
@@ -30,7 +30,7 @@ class Line(NamedTuple):
     explained: float
 
 
-def robust_line(x: Array, y: Array, z: Array) -> Line | None:
+def robust_line(x: Array, y: Array, z: Array) -> RobustLine | None:
     """Return the line through points by Huber's weights; None where x does not vary beside z.
 
     Args:
@@ -51,4 +51,6 @@ def robust_line(x: Array, y: Array, z: Array) -> Line | None:
     whole = float(np.sum(weights * (y - alone * z) ** 2))
     covariance = np.linalg.inv((columns * weights[:, None]).T @ columns) * left / (len(x) - 2)
     explained = 1.0 - left / whole if whole > 0.0 else 1.0
-    return Line(float(solution[0] / size[0]), float(np.sqrt(covariance[0, 0]) / size[0]), explained)
+    return RobustLine(
+        float(solution[0] / size[0]), float(np.sqrt(covariance[0, 0]) / size[0]), explained
+    )

@@ -15,8 +15,8 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.spatial.transform import Rotation
 
+from cspm_ident.importing.import_plan import ANGLES, PlannedTopic
 from cspm_ident.importing.mapping import Mapping, Segment
-from cspm_ident.importing.plan import ANGLES, PlannedTopic
 from cspm_ident.importing.time_base import Times, later_than_all_before
 from cspm_msgs_py.errors import InputError
 from cspm_msgs_py.topics import Topic
@@ -27,7 +27,7 @@ _QUATERNION = ("qx", "qy", "qz", "qw")
 
 
 @dataclass(frozen=True)
-class Series:
+class ColumnSeries:
     """One column in SI with its stamps; several may share the same `times`.
 
     Attributes:
@@ -40,7 +40,7 @@ class Series:
 
 
 @dataclass(frozen=True)
-class LeftOut:
+class SkippedMessages:
     """How many messages were not made, and why."""
 
     no_time: int = 0
@@ -69,9 +69,9 @@ class TopicMessages:
 
     topic: Topic
     stamp_ns: Index
-    series: dict[str, Series]
+    series: dict[str, ColumnSeries]
     places: dict[str, Index | None]
-    left_out: LeftOut
+    left_out: SkippedMessages
 
     def values(self, field: str, chosen: slice = slice(None)) -> Array:
         """Return a field of the chosen messages, shape (n,) [SI]."""
@@ -92,7 +92,7 @@ class TopicMessages:
 
 def gather(
     planned: PlannedTopic,
-    series: dict[str, Series],
+    series: dict[str, ColumnSeries],
     mapping: Mapping,
     origin_ns: int,
     where: str,
@@ -127,11 +127,11 @@ def gather(
     if not keep.any():
         raise InputError(f"{where}: no message is left, allowed: at least one")
     places = {name: None if at is None else at[keep] for name, at in places.items()}
-    return TopicMessages(planned.topic, stamps[keep], series, places, LeftOut(**left))
+    return TopicMessages(planned.topic, stamps[keep], series, places, SkippedMessages(**left))
 
 
 def _paired(
-    series: dict[str, Series], mapping: Mapping, where: str
+    series: dict[str, ColumnSeries], mapping: Mapping, where: str
 ) -> tuple[Index, dict[str, Index | None], int, int]:
     """Return stamps, places by field, and how many rows had no time or no partner."""
     clocks: dict[int, tuple[Times, list[str]]] = {}
@@ -192,7 +192,7 @@ def _inside(segment: Segment, topic: str, stamps: Index, origin_ns: int) -> NDAr
 def _complete(
     stamps: Index,
     keep: NDArray[np.bool_],
-    series: dict[str, Series],
+    series: dict[str, ColumnSeries],
     places: dict[str, Index | None],
     mapping: Mapping,
     where: str,
@@ -213,7 +213,7 @@ def _complete(
 
 
 def _absent(
-    series: dict[str, Series], places: dict[str, Index | None], count: int
+    series: dict[str, ColumnSeries], places: dict[str, Index | None], count: int
 ) -> NDArray[np.bool_]:
     absent = np.zeros(count, dtype=bool)
     for name, at in places.items():
@@ -225,7 +225,7 @@ def _absent(
 def _in_order(
     stamps: Index,
     keep: NDArray[np.bool_],
-    series: dict[str, Series],
+    series: dict[str, ColumnSeries],
     where: str,
     origin_ns: int,
     *,

@@ -113,7 +113,7 @@ class PayloadRecords:
             out[start : start + len(record)] = np.frombuffer(record, dtype=np.uint8)
 
 
-class Part(NamedTuple):
+class BlockPart(NamedTuple):
     """The batch of one channel, its id, the messages it had before, and its record maker."""
 
     channel: int
@@ -123,7 +123,7 @@ class Part(NamedTuple):
     records: RowRecords | PayloadRecords
 
 
-def merge(parts: Sequence[Part]) -> tuple[bytes, dict[int, Index]]:
+def merge(parts: Sequence[BlockPart]) -> tuple[bytes, dict[int, Index]]:
     """Return a chunk's content, ordered by log time, and the index of each channel.
 
     Messages of one log time are ordered by channel, those of one channel by arrival: the content
@@ -188,7 +188,7 @@ def _times(name: str, times: list[int]) -> Times:
         raise InputError(f"{name}: a time beyond ±{2**63 - 1} ns") from None
 
 
-def _log_times(part: Part) -> Times:
+def _log_times(part: BlockPart) -> Times:
     logs = _times(part.name, part.batch.logs)
     if logs.min() < 0:
         raise InputError(f"{part.name}: log time {logs.min()} ns, allowed: 0 or later")

@@ -1,4 +1,4 @@
-"""The side of a recording that the caller's loop sees: one object per topic, made to be quick."""
+"""What a recording collects of each topic, for the loop that fills it: made to be quick."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ from cspm_msgs_py.recording.block import Batch
 _FLOAT = np.dtype(np.float64)
 
 
-class Channel:
+class ChannelBuffer:
     """Collects what one topic receives during a block of log time.
 
     Plain lists are filled: measured against preallocated arrays they cost a third of the time.

@@ -21,8 +21,15 @@ from typing_extensions import Self
 from cspm_msgs_py.errors import CspmError, InputError
 from cspm_msgs_py.layout import layout_of
 from cspm_msgs_py.message import carries_row
-from cspm_msgs_py.recording.block import Batch, Part, PayloadRecords, RowRecords, compress, merge
-from cspm_msgs_py.recording.channel import Channel
+from cspm_msgs_py.recording.block import (
+    Batch,
+    BlockPart,
+    PayloadRecords,
+    RowRecords,
+    compress,
+    merge,
+)
+from cspm_msgs_py.recording.channel_buffer import ChannelBuffer
 from cspm_msgs_py.recording.rosbag2_metadata import (
     ROS_DISTRO,
     FileEntry,
@@ -76,7 +83,7 @@ class RecordingWriter:
         self._hashes = [type_hash(topic.ros_type) for topic in self._topics]
         self._records = [_records(topic, i + 1) for i, topic in enumerate(self._topics)]
         self._block_ns = block_ns
-        self._channels = [Channel(topic.name, self._turn) for topic in self._topics]
+        self._channels = [ChannelBuffer(topic.name, self._turn) for topic in self._topics]
         self._by_name = {channel.name: channel for channel in self._channels}
         self._counts = [0] * len(self._topics)
         try:
@@ -95,7 +102,7 @@ class RecordingWriter:
         self._thread = threading.Thread(target=self._run, name="recording", daemon=True)
         self._thread.start()
 
-    def channel(self, name: str) -> Channel:
+    def channel(self, name: str) -> ChannelBuffer:
         """Return the channel of a topic; keep it, looking it up costs time.
 
         Raises:
@@ -118,7 +125,7 @@ class RecordingWriter:
             raise InputError(f"{name}: carries a row of numbers, allowed: channel({name!r}).append")
         channel.append_payload(log_ns, payload)
 
-    def _declared(self, name: str) -> Channel:
+    def _declared(self, name: str) -> ChannelBuffer:
         try:
             return self._by_name[name]
         except KeyError:
@@ -163,7 +170,7 @@ class RecordingWriter:
 
     def _write_block(self, block: _Block, compressor: zstandard.ZstdCompressor) -> None:
         parts = [
-            Part(i + 1, self._topics[i].name, self._counts[i], batch, self._records[i])
+            BlockPart(i + 1, self._topics[i].name, self._counts[i], batch, self._records[i])
             for i, batch in enumerate(block)
             if batch.logs
         ]

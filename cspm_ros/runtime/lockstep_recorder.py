@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 
 from cspm_msgs_py.diagnostics import decode_diagnostics, encode_diagnostics
 from cspm_msgs_py.errors import InputError
-from cspm_msgs_py.recording.channel import Channel
+from cspm_msgs_py.recording.channel_buffer import ChannelBuffer
 from cspm_msgs_py.recording.writer import BLOCK_NS, RecordingWriter
 from cspm_msgs_py.schedule import PLANT, Schedule
 from cspm_msgs_py.stepping.lockstep import RECORDED_EVERY, RECORDER_WINDOW, Sequence, check_end
@@ -30,7 +30,7 @@ _ACKNOWLEDGED = RECORDED_EVERY // 2
 class _Inlet:
     """One topic: the stamps that it must bring, and what waits to be written."""
 
-    def __init__(self, topic: Topic, channel: Channel, schedule: Schedule) -> None:
+    def __init__(self, topic: Topic, channel: ChannelBuffer, schedule: Schedule) -> None:
         self.sequence = Sequence(topic.name, schedule)
         self._delay_ns = schedule.topics[topic.name].delay * schedule.period_ns
         reader = WireReader(topic)

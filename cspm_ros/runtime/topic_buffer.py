@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from cspm_msgs_py.errors import InputError
 from cspm_msgs_py.layout import Layout, layout_of
-from cspm_msgs_py.recording.channel import Channel
+from cspm_msgs_py.recording.channel_buffer import ChannelBuffer
 from cspm_msgs_py.recording.writer import BLOCK_NS
 from cspm_msgs_py.topics import Topic
 from cspm_msgs_py.wire import WireReader
@@ -24,7 +24,7 @@ class TopicBuffer:
         logs: log time of each [ns].
     """
 
-    def __init__(self, topic: Topic, channel: Channel, refuse: Callable[[str], None]) -> None:
+    def __init__(self, topic: Topic, channel: ChannelBuffer, refuse: Callable[[str], None]) -> None:
         """Take the topic, its channel, and what reports a message that is unusable."""
         self.topic = topic
         self._layout: Layout = layout_of(topic)

@@ -1,6 +1,6 @@
 """What the bench of separating experiments counts."""
 
-from bench.blind.separating import Case, separating_table
+from bench.blind.separating import SeparationCase, separating_table
 
 CONCEALED = {"effect": "winch_coulomb_friction", "elements": ["sway_1"]}
 ITEM = {"name": "0a1b2c3d", "concealed": [CONCEALED], "absorbed_by": None}
@@ -13,7 +13,7 @@ def reported(effect, *others, element="sway_1"):
 
 
 def counts(before, after):
-    case = Case(ITEM, before, ("quick_sea",), after)
+    case = SeparationCase(ITEM, before, ("quick_sea",), after)
     lines = separating_table([case], "ab" * 32, 7).splitlines()
     rows = [line for line in lines if line.startswith(("| before", "| with the"))]
     return [["1 of 1" in cell for cell in row.split("|")[2:6]] for row in rows]
@@ -37,7 +37,7 @@ def test_what_is_unknown_or_consistent_misleads_nobody():
 
 
 def test_a_tie_without_an_experiment_is_told_and_not_counted():
-    case = Case(ITEM, reported("pulley_friction", "winch_coulomb_friction"), (), None)
+    case = SeparationCase(ITEM, reported("pulley_friction", "winch_coulomb_friction"), (), None)
     table = separating_table([case], "ab" * 32, 7)
     assert "1 are tied in what is found first; for 0 an experiment" in table
     assert (

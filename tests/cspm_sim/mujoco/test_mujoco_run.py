@@ -15,7 +15,7 @@ from cspm_msgs_py.errors import InputError
 from cspm_msgs_py.recording import Recording
 from cspm_msgs_py.recording.run_record import RECORD_NAME
 from cspm_msgs_py.testbed import load_testbed
-from cspm_run.agreement import CASES, Agreement, Case, agreement_page, compare
+from cspm_run.agreement import CASES, Agreement, AgreementCase, agreement_page, compare
 from cspm_run.assembly import assemble
 from cspm_run.plants import PLANTS
 from cspm_run.resim import resimulate
@@ -95,7 +95,7 @@ def test_an_old_mujoco_is_one_line(monkeypatch):
 @pytest.mark.slow
 @pytest.mark.compiled
 def test_both_plants_agree_in_closed_loop():
-    case = Case("worst_case", "", ("duration=6", "sensors=ideal", "target.motion.ramp=2"))
+    case = AgreementCase("worst_case", "", ("duration=6", "sensors=ideal", "target.motion.ramp=2"))
     found = compare(case)
     assert (found.motion[:3] > 5e-3).all()
     assert (found.pose < 1e-7).all()
@@ -105,7 +105,7 @@ def test_both_plants_agree_in_closed_loop():
 @pytest.mark.slow
 @pytest.mark.compiled
 def test_rounding_sensors_set_them_apart_within_the_sensors_resolution():
-    found = compare(Case("worst_case", "", ("duration=3",)))
+    found = compare(AgreementCase("worst_case", "", ("duration=3",)))
     assert (found.pose < 1e-4).all()
     assert 1e-6 < found.tension < 0.01
 
@@ -122,7 +122,7 @@ def test_noise_without_rounding_does_not_set_them_apart(monkeypatch):
         return replace(found, testbed=found.testbed.model_copy(update={"sensors": sensors}))
 
     monkeypatch.setattr("cspm_run.agreement.load_testbed", unrounded)
-    found = compare(Case("worst_case", "", ("duration=3",)))
+    found = compare(AgreementCase("worst_case", "", ("duration=3",)))
     assert (found.pose < 1e-9).all()
     assert found.tension < 1e-7
 
@@ -157,7 +157,7 @@ def test_the_page_says_that_they_agree():
 @pytest.mark.slow
 @pytest.mark.compiled
 def test_the_pages_numbers_are_those_that_the_code_gives():
-    found = compare(Case("verification_short"))
+    found = compare(AgreementCase("verification_short"))
     numbers = dict(rows())["`verification_short`"]
     # The last bits of a processor decide between zero and 10⁻¹⁵.
     for value, printed in zip([*found.pose, found.tension], numbers, strict=False):

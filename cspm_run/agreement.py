@@ -1,6 +1,6 @@
 """How far the two plants differ, and the page that shows it.
 
-Run `python -m cspm_run.agreement > docs/agreement.md` after a change in either plant.
+Run `python -m cspm_run.agreement > docs/measured/agreement.md` after a change in either plant.
 """
 
 from __future__ import annotations
@@ -141,7 +141,7 @@ The table has the RMS of *MuJoCo − ours* over all steps of 1 ms, of true value
 surge, sway and heave in m, angles in rad, tension over all cables in N, and the largest difference
 of any tension. Below stands the RMS of the motion itself about its mean.
 
-This page is generated: `python -m cspm_run.agreement > docs/agreement.md`.
+This page is generated: `python -m cspm_run.agreement > docs/measured/agreement.md`.
 """
 
 _CAUSES = """

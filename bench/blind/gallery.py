@@ -1,4 +1,4 @@
-"""Three concealed machines in pictures: `python -m bench.blind.gallery` writes docs/gallery.md.
+"""Three concealed machines in pictures, by `python -m bench.blind.gallery`: docs/blind/gallery.md.
 
 They are the first ones that a seed draws in three strata of the blind benchmark, whatever the
 diagnosis says of them.
@@ -31,7 +31,7 @@ from cspm_msgs_py.recording.reader import Recording
 from cspm_sim.effects import catalogue
 
 ROOT = Path(__file__).resolve().parents[2]
-PAGE, FIGURES = ROOT / "docs" / "gallery.md", ROOT / "docs" / "figures"
+PAGE, FIGURES = ROOT / "docs" / "blind" / "gallery.md", ROOT / "docs" / "figures"
 STRATA = ("feedback", "company", "outside")
 SEED, DURATION_S = 3, 30.0
 _DPI = 90
@@ -69,9 +69,9 @@ def main() -> None:
 
 _HEAD = """# Three concealed machines
 
-The first machines that seed {seed} draws in three strata of the [blind benchmark](blind.md), shown
-whatever the diagnosis says of them; 30 s each, sensors with coloured noise, jitter, dropouts and
-clocks of their own. Made by `python -m bench.blind.gallery`.
+The first machines that seed {seed} draws in three strata of the [blind benchmark](../blind.md),
+shown whatever the diagnosis says of them; 30 s each, sensors with coloured noise, jitter, dropouts
+and clocks of their own. Made by `python -m bench.blind.gallery`.
 
 """
 
@@ -157,7 +157,7 @@ def _text(k: int, stratum: str, item: Mapping[str, Any], found: Diagnosis) -> st
         f"## {k}. {stratum}, `{item['scenario']}`\n\n"
         f"Concealed: {concealed or 'nothing'}.\n\n"
         f"Verdict: **{verdict_of(found).value}**.\n\n{lines}\n\n"
-        f"![{stratum}](figures/gallery_{k}.png)\n"
+        f"![{stratum}](../figures/gallery_{k}.png)\n"
     )
 
 

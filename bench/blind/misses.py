@@ -39,7 +39,7 @@ from cspm_ident.diagnosis.selection.search_pass import Recordings, searched_for
 from cspm_ident.signals.measurement import read_measurement
 from cspm_sim.effects import catalogue
 
-PAGE = Path(__file__).resolve().parents[2] / "docs" / "blind-misses.md"
+PAGE = Path(__file__).resolve().parents[2] / "docs" / "blind" / "misses.md"
 # Standard errors of the scatter between blocks.
 SIGNIFICANT_ERRORS = 2.0
 NO_COLUMN, GIVEN_UP, MORE, SIMPLER, NO_MORE = REASONS = (
@@ -82,7 +82,7 @@ def main() -> None:
     parser = argparse.ArgumentParser(prog="python -m bench.blind.misses", description=__doc__)
     parser.add_argument("folder", type=Path, help="a blind benchmark with its results")
     parser.add_argument("truth", type=Path, help="its truth file")
-    parser.add_argument("--page", action="store_true", help="renew docs/blind-misses.md")
+    parser.add_argument("--page", action="store_true", help="renew docs/blind/misses.md")
     options, console = parser.parse_args(), Console()
     items = {item["name"]: item for item in read_truth(options.truth)["items"]}
     results = read_results(options.folder, list(items))

@@ -1,7 +1,7 @@
-"""All sealed recordings in one table: `python -m bench.blind.sealed` renews docs/blind-sealed.md.
+"""All sealed recordings in one table: `python -m bench.blind.sealed` renews docs/blind/sealed.md.
 
 It counts what the pages of the parts say, each written when its part was scored, once: those of
-docs/sealed, and docs/blind-results.md, of the last set of which all recordings were scored.
+docs/blind/sealed, and docs/blind/results.md, of the last set of which all recordings were scored.
 """
 
 from __future__ import annotations
@@ -16,8 +16,8 @@ from bench.blind.scoring.target import Range, allowed
 from bench.markdown import markdown_table
 from bench.page import into_page
 
-DOCS = Path(__file__).resolve().parents[2] / "docs"
-PAGE, EARLIER, LAST = DOCS / "blind-sealed.md", "sealed", "blind-results.md"
+DOCS = Path(__file__).resolve().parents[2] / "docs" / "blind"
+PAGE, EARLIER, LAST = DOCS / "sealed.md", "sealed", "results.md"
 ALARMS, BOUND = "alarm where there is nothing", "one-sided upper bound of alarms"
 TIED, TIES = "truth among the ties", "mean size of the ties"
 _COUNTS = re.compile(r"\((\d+) of (\d+);")
@@ -28,7 +28,7 @@ class Part(NamedTuple):
     """What the page of one part says.
 
     Attributes:
-        page: its file, from the documentation's folder.
+        page: its file, from `docs/blind`.
         truth: SHA-256 of its set's truth file.
         date: when it was scored.
         recordings: their names.
@@ -53,10 +53,10 @@ def main() -> None:
 
 
 def read_parts(folder: Path) -> list[Part]:
-    """Return the parts, those of docs/sealed in the order in which they were scored.
+    """Return the parts, those of docs/blind/sealed in the order in which they were scored.
 
     Args:
-        folder: the documentation's.
+        folder: that of the page of all parts.
 
     Raises:
         ValueError: a recording is in two parts.

@@ -99,7 +99,7 @@ def _about(card: Data, sha256: str, machine: str) -> str:
         f" `{sha256}`."
         f" Scored {machine}."
         f" {_STANDING[request['split']]} How it is made and what the words mean:"
-        " [blind.md](blind.md). Written by `python -m bench.blind score DIR --page FILE`."
+        " [blind.md](../blind.md). Written by `python -m bench.blind score DIR --page FILE`."
     )
 
 
@@ -176,10 +176,10 @@ _WORTH = {
     "below_retuned": "below re-tuned",
 }
 _PEERS = (
-    "Others' ways on the same residuals, see [blind.md](blind.md#peers); `retuned` is what a"
+    "Others' ways on the same residuals, see [blind.md](../blind.md#peers); `retuned` is what a"
     " laboratory does today."
 )
-_ABLATIONS = "What each safeguard adds, see [blind.md](blind.md#without-one-safeguard)."
+_ABLATIONS = "What each safeguard adds, see [blind.md](../blind.md#without-one-safeguard)."
 _COLUMNS = (
     "Hits and cases are those of the targets; the bound is the one-sided one of alarms; wrong"
     " findings are per recording; the parameter error is the median of relative ones; held-out is"

@@ -125,7 +125,7 @@ def test_no_recording_counts_twice(tmp_path):
     shutil.copy(DOCS / PARTS[1].page, tmp_path / LAST)
     shutil.copy(DOCS / PARTS[0].page, tmp_path / EARLIER / "part-01.md")
     first, last = read_parts(tmp_path)
-    assert (first.page, last.page) == ("sealed/part-01.md", "blind-results.md")
+    assert (first.page, last.page) == ("sealed/part-01.md", "results.md")
     shutil.copy(DOCS / PARTS[0].page, tmp_path / LAST)
     with pytest.raises(ValueError, match=r"results\.md: 190 recordings are in an earlier part"):
         read_parts(tmp_path)

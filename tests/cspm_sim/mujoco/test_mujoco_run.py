@@ -22,7 +22,7 @@ from cspm_run.resim import resimulate
 
 pytest.importorskip("mujoco", minversion="4.0", reason="the MuJoCo plant needs MuJoCo 4")
 
-PAGE = Path(__file__).resolve().parents[3] / "docs" / "agreement.md"
+PAGE = Path(__file__).resolve().parents[3] / "docs" / "measured" / "agreement.md"
 NUMBER = re.compile(r"\d\.\de[-+]\d\d")
 
 

@@ -52,7 +52,7 @@ def numbers_in(text: str) -> Mapping[str, str]:
 
 def measure() -> list[Finding]:
     """Write the pages anew and compare."""
-    sys.path.insert(0, str(DOCS / "figures"))
+    sys.path.insert(0, str(DOCS / "scripts"))
     import model_numbers
     import winding_energy
 

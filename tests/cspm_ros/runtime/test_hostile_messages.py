@@ -21,7 +21,7 @@ from cspm_ros.runtime.process_run import run_processes  # noqa: E402
 
 pytestmark = [pytest.mark.compiled, pytest.mark.slow, pytest.mark.alone]
 
-STRANGER = Path(__file__).resolve().parents[2] / "support" / "hostile_stranger.py"
+STRANGER = Path(__file__).resolve().parents[2] / "support" / "graph" / "hostile_stranger.py"
 STEPS = 600
 PATIENCE_S = 6.0
 STANDSTILL = rf"nothing moved for {PATIENCE_S:g} s|the first steps stood still for \S+ s"

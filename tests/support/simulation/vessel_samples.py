@@ -8,7 +8,7 @@ from scipy.io import savemat
 from cspm_control.waves.sea import wave_number
 from cspm_control.waves.small_body import small_body_response
 
-SUPPLY = Path(__file__).resolve().parents[3] / "shared" / "data" / "vessel_rao" / "supply.mat"
+SUPPLY = Path(__file__).resolve().parents[4] / "shared" / "data" / "vessel_rao" / "supply.mat"
 GRAVITY = 9.81
 HEADINGS = np.radians(np.arange(0, 360, 10))
 

@@ -44,7 +44,8 @@ START_S = 90.0
 # What the run's leader says is none of the hardware's business, nor the other way round.
 OWN_RUN = {f"/run/{name}": f"/hardware/{name}" for name in ("start", "end", "progress")}
 
-TESTS = Path(__file__).resolve().parent
+SUPPORT = Path(__file__).resolve().parents[1]
+FOLDERS = (str(SUPPORT / "graph"), str(SUPPORT))
 # Long enough for a machine that has much else to do.
 PATIENCE_S = 30.0
 STALE_AFTER = 0.5
@@ -61,7 +62,7 @@ def warm_processes():
     context = multiprocessing.get_context("forkserver")
     context.set_forkserver_preload(["realtime_child"])
     before = os.environ.get("PYTHONPATH")
-    os.environ["PYTHONPATH"] = os.pathsep.join([str(TESTS)] + [before] * bool(before))
+    os.environ["PYTHONPATH"] = os.pathsep.join([*FOLDERS, *([before] if before else [])])
     try:
         multiprocessing.forkserver.ensure_running()
     finally:

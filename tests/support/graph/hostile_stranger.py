@@ -26,7 +26,7 @@ from cspm_msgs_py.testbed import load_testbed
 from cspm_msgs_py.topics import CLOCK, DIAGNOSTICS, POSE
 from cspm_msgs_py.wire import WireReader
 
-THESIS = Path(__file__).resolve().parents[2] / "scenarios" / "testbeds" / "thesis.yaml"
+THESIS = Path(__file__).resolve().parents[3] / "scenarios" / "testbeds" / "thesis.yaml"
 MS, SECOND = 1_000_000, 1_000_000_000
 LATEST_NS = (2**31 - 1) * SECOND
 TURN_S, LONGEST_S = 0.01, 300.0

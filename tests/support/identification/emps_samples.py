@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from run_samples import SCENARIOS
 
-DATA = Path(__file__).resolve().parents[3] / "shared" / "data" / "emps"
+DATA = Path(__file__).resolve().parents[4] / "shared" / "data" / "emps"
 TESTBED = SCENARIOS / "testbeds" / "emps.yaml"
 MAPPING = SCENARIOS / "mappings" / "emps.yaml"
 STATE = "/winches/state"

@@ -14,6 +14,7 @@ from numpy.typing import NDArray
 from cspm_ident.importing.column_store import ColumnStore
 from cspm_ident.importing.mapping import CsvFormat
 from cspm_ident.importing.sources.source import Progress, check_columns
+from cspm_ident.importing.sources.table_source import TableSource
 from cspm_msgs_py.errors import InputError
 
 PIECE = 1 << 23  # characters read at once
@@ -23,7 +24,7 @@ Lines = list[str]
 Table = NDArray[Any]
 
 
-class CsvSource:
+class CsvSource(TableSource):
     """A text table with a column per quantity; see `Source`."""
 
     kind = "text table"
@@ -48,13 +49,6 @@ class CsvSource:
         cells = [cell.strip() for cell in self._cells(head)]
         self._width = len(cells)
         self.columns = tuple(cells if form.names_line else (str(i + 1) for i in range(len(cells))))
-
-    def stamp_column(self, column: str, stamp: str) -> str:
-        """Refuse: rows of a table have no stamps of their own."""
-        raise InputError(f"{self.path}: stamp {stamp}, allowed: with bags; here column or rate")
-
-    def close(self) -> None:
-        """Do nothing: no file is open between calls."""
 
     def read(
         self,

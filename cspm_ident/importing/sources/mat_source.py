@@ -11,12 +11,13 @@ from numpy.typing import NDArray
 
 from cspm_ident.importing.column_store import ColumnStore
 from cspm_ident.importing.sources.source import Progress, check_columns
+from cspm_ident.importing.sources.table_source import TableSource
 from cspm_msgs_py.errors import InputError
 
 _LARGEST_SIDE = 1000  # columns of a matrix that are given names
 
 
-class MatSource:
+class MatSource(TableSource):
     """The vectors of a MATLAB file; see `Source`.
 
     Vectors have the name that MATLAB has for them, such as `log.q`; columns of a matrix have their
@@ -52,13 +53,6 @@ class MatSource:
             self.notes.append(f"single numbers in the file: {', '.join(scalars)}")
         if not self.columns:
             raise InputError(f"{path}: holds no vector of numbers, allowed: at least one")
-
-    def stamp_column(self, column: str, stamp: str) -> str:
-        """Refuse: vectors have no stamps of their own."""
-        raise InputError(f"{self.path}: stamp {stamp}, allowed: with bags; here column or rate")
-
-    def close(self) -> None:
-        """Do nothing: no file is open between calls."""
 
     def read(
         self,

@@ -9,14 +9,13 @@ from dataclasses import dataclass
 from math import isfinite
 from typing import Any
 
-from ruamel.yaml import YAML
 from ruamel.yaml.comments import CommentedMap
 
 from cspm_msgs_py.errors import InputError
 from cspm_msgs_py.testbed import TestbedFile, parse_testbed
+from cspm_msgs_py.yaml_file import round_trip
 
 DIGITS = 8
-WIDEST = 10_000
 BLOCKS = ("stiffness", "damping", "rotor_inertia")
 
 
@@ -63,15 +62,6 @@ class FittedNumber:
 
 Numbers = Mapping[str, "FittedNumber | float | str"]
 Changes = Mapping[str, Mapping[str, "Numbers | FittedNumber"]]
-
-
-def round_trip() -> YAML:
-    """Return what reads and writes a file so that comments, anchors and quotes stay."""
-    yaml = YAML()
-    yaml.preserve_quotes = True
-    yaml.width = WIDEST
-    yaml.indent(mapping=2, sequence=4, offset=2)
-    return yaml
 
 
 def with_fitted(text: str, source: str, changes: Changes) -> TestbedFile:

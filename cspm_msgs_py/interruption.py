@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import signal
+import threading
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from types import FrameType
@@ -10,7 +11,13 @@ from types import FrameType
 
 @contextmanager
 def interruptible() -> Iterator[Callable[[], bool]]:
-    """Return whether SIGINT or SIGTERM came, as a function; a second one ends the program."""
+    """Return whether SIGINT or SIGTERM came, as a function; a second one ends the program.
+
+    Only the main thread receives signals; in another the function is always false.
+    """
+    if threading.current_thread() is not threading.main_thread():
+        yield lambda: False
+        return
     seen: list[int] = []
 
     def note(number: int, _: FrameType | None) -> None:

@@ -8,7 +8,7 @@ are at the motor shaft unless the name says drum.
 from __future__ import annotations
 
 import hashlib
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from functools import lru_cache
 from pathlib import Path
 from typing import Annotated, Literal
@@ -232,17 +232,30 @@ class Testbed(StrictModel):
 
 @dataclass(frozen=True)
 class TestbedFile:
-    """A test-bed with the text it came from.
+    """A test-bed with the text that it follows from.
+
+    Only text and source are given, so that the description, the provenance and the hash can never
+    be those of another machine. A changed machine is a changed text; see `cspm_msgs_py.edited`.
 
     Attributes:
-        testbed: the checked description.
         text: the file's text, as recorded with every run.
+        source: names the file in errors.
+        testbed: the checked description.
         provenance: where each number comes from, by key path (`bar.mass`).
+
+    Raises:
+        InputError: naming source, key, value and what is allowed.
     """
 
-    testbed: Testbed
     text: str
-    provenance: dict[str, Provenance]
+    source: str = field(default="test-bed", compare=False)
+    testbed: Testbed = field(init=False, compare=False)
+    provenance: dict[str, Provenance] = field(init=False, compare=False)
+
+    def __post_init__(self) -> None:
+        content, provenance = unwrap_provenance(parse_yaml(self.text, self.source), self.source)
+        object.__setattr__(self, "testbed", validate(Testbed, content, self.source))
+        object.__setattr__(self, "provenance", provenance)
 
     @property
     def sha256(self) -> str:
@@ -267,5 +280,4 @@ def parse_testbed(text: str, source: str) -> TestbedFile:
     Raises:
         InputError: naming source, key, value and what is allowed.
     """
-    content, provenance = unwrap_provenance(parse_yaml(text, source), source)
-    return TestbedFile(validate(Testbed, content, source), text, provenance)
+    return TestbedFile(text, source)

@@ -16,6 +16,7 @@ from cspm_msgs_py.errors import InputError
 from cspm_msgs_py.model_fault import fault_line
 
 DEEPEST = 50
+WIDEST = 10_000
 DEPTH_ALLOWED = f"allowed: at most {DEEPEST} levels"
 KINDS = {type(None): "an empty file", list: "a list", str: "a text", int: "a number"}
 
@@ -90,6 +91,15 @@ def dump_yaml(content: Any) -> str:  # noqa: ANN401 - any plain data
     stream = io.StringIO()
     yaml.dump(content, stream)
     return stream.getvalue()
+
+
+def round_trip() -> YAML:
+    """Return what reads and writes a file so that comments, anchors and quotes stay."""
+    yaml = YAML()
+    yaml.preserve_quotes = True
+    yaml.width = WIDEST
+    yaml.indent(mapping=2, sequence=4, offset=2)
+    return yaml
 
 
 def validate(model: type[Model], content: object, source: str) -> Model:

@@ -5,14 +5,15 @@ from __future__ import annotations
 import tempfile
 from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 
+from cspm_msgs_py.edited import file_of
 from cspm_msgs_py.errors import InputError
 from cspm_msgs_py.motion_spec import FileMotion, VesselMotion
 from cspm_msgs_py.recording.attached_testbed import TESTBED, attached_testbed
 from cspm_msgs_py.scenario import Body, Scenario, parse_scenario
-from cspm_msgs_py.testbed import TestbedFile
+from cspm_msgs_py.testbed import Testbed, TestbedFile
 from cspm_msgs_py.yaml_file import dump_yaml
 from cspm_run.plants import SIM
 
@@ -21,17 +22,43 @@ SCENARIO = "scenario.yaml"
 
 @dataclass(frozen=True)
 class Bundle:
-    """A resolved scenario, its test-bed, files that its motions read, by name, and its plant."""
+    """What is run, and what its recording says that was run.
+
+    Attributes:
+        scenario: resolved.
+        testbed: the machine that is simulated.
+        files: what the scenario's motions read, by name.
+        plant: whose equations are simulated.
+        attached: the file that the recording carries where the simulated machine is concealed;
+            None: that of the simulated machine.
+    """
 
     scenario: Scenario
     testbed: TestbedFile
     files: dict[str, bytes]
     plant: str = SIM
+    attached: TestbedFile | None = None
+
+    @property
+    def described(self) -> TestbedFile:
+        """The file that the recording carries."""
+        return self.testbed if self.attached is None else self.attached
+
+    def concealing(self, machine: Testbed) -> Bundle:
+        """Return a run of another machine whose recording goes on carrying this one's file.
+
+        For tests of a diagnosis, which is to find the difference.
+
+        Raises:
+            InputError: the description is no machine's.
+        """
+        hidden = file_of(machine, f"{machine.name}, concealed")
+        return replace(self, testbed=hidden, attached=self.described)
 
     def attachments(self) -> dict[str, bytes]:
         """Return the recording's attachments by name."""
         text = dump_yaml(self.scenario.model_dump(mode="json"))
-        described = {SCENARIO: text.encode(), TESTBED: self.testbed.text.encode()}
+        described = {SCENARIO: text.encode(), TESTBED: self.described.text.encode()}
         return described | self.files
 
     @contextmanager

@@ -1,7 +1,8 @@
-"""The scenarios that come with the package, and how a name on the command line finds one."""
+"""The scenarios and test-beds that come with the package, and how a name finds one."""
 
 from __future__ import annotations
 
+from collections.abc import Callable, Iterable
 from pathlib import Path
 
 from cspm_msgs_py.errors import InputError
@@ -23,18 +24,38 @@ def scenario_names() -> list[str]:
     return sorted({path.stem for folder in scenario_folders() for path in folder.glob("*.yaml")})
 
 
+def testbed_names() -> list[str]:
+    """Return the names of all test-beds that come with the package."""
+    folders = [folder / "testbeds" for folder in scenario_folders()]
+    return sorted({path.stem for folder in folders for path in folder.glob("*.yaml")})
+
+
 def find_scenario(name: str) -> Path:
     """Return the scenario file that `name` means: a path, or a name from the library.
 
     Raises:
         InputError: there is none; the line lists the library.
     """
+    return _find(name, "scenario", scenario_folders(), scenario_names)
+
+
+def find_testbed(name: str) -> Path:
+    """Return the test-bed file that `name` means: a path, or a name from the library.
+
+    Raises:
+        InputError: there is none; the line lists the library.
+    """
+    folders = [folder / "testbeds" for folder in scenario_folders()]
+    return _find(name, "test-bed", folders, testbed_names)
+
+
+def _find(name: str, kind: str, folders: Iterable[Path], names: Callable[[], list[str]]) -> Path:
     path = Path(name)
     if path.suffix in {".yaml", ".yml"} or path.is_file():
         if path.is_file():
             return path
-        raise InputError(f"{name}: no such file, allowed: a scenario file")
-    for folder in scenario_folders():
+        raise InputError(f"{name}: no such file, allowed: a {kind} file")
+    for folder in folders:
         if (folder / f"{name}.yaml").is_file():
             return folder / f"{name}.yaml"
-    raise InputError(f"{name}: no such scenario, allowed: {', '.join(scenario_names())} or a file")
+    raise InputError(f"{name}: no such {kind}, allowed: {', '.join(names())} or a file")

@@ -6,6 +6,7 @@ import time
 from collections.abc import Callable, Mapping
 from importlib.metadata import version
 from pathlib import Path
+from typing import Protocol
 
 import numpy as np
 
@@ -27,6 +28,35 @@ PROGRESS_STEPS = 50
 INPROCESS = "inprocess"
 
 
+class Recorder(Protocol):
+    """What takes a run's messages: a recording, or memory."""
+
+    @property
+    def folder(self) -> Path | None:
+        """Where the recording is, if there is one."""
+
+    @property
+    def counts(self) -> dict[str, int]:
+        """How many messages were taken, by topic; complete once closed."""
+
+    def channel(self, name: str) -> TakesRows:
+        """Return what takes the messages of a topic with rows."""
+
+    def append_payload(self, name: str, log_ns: int, payload: bytes) -> None:
+        """Take a message of a topic without rows."""
+
+    def close(self) -> None:
+        """Take no more."""
+
+
+class TakesRows(Protocol):
+    """What takes the messages of one topic."""
+
+    @property
+    def append(self) -> Publish:
+        """Takes log time and stamp [ns], and the row."""
+
+
 def run(
     bundle: Bundle,
     folder: Path | None,
@@ -46,14 +76,28 @@ def run(
         InputError: scenario and test-bed do not fit, or the folder exists.
         ConvergenceError: the bar cannot hang where the scenario starts.
     """
-    with bundle.unpacked() as place:
-        parts = assemble(bundle.scenario, bundle.testbed.testbed, place, bundle.plant)
-    scenario = bundle.scenario
-    steps = steps or round(scenario.duration * scenario.rates.plant)
+    parts = parts_of(bundle)
+    steps = steps or steps_of(bundle)
     if folder is None:
         return simulate(parts, None, progress, steps)
     with new_recording(bundle, folder, INPROCESS) as writer:
         return simulate(parts, writer, progress, steps)
+
+
+def parts_of(bundle: Bundle) -> Assembly:
+    """Return what a run steps.
+
+    Raises:
+        InputError: scenario and test-bed do not fit.
+        ConvergenceError: the bar cannot hang where the scenario starts.
+    """
+    with bundle.unpacked() as place:
+        return assemble(bundle.scenario, bundle.testbed.testbed, place, bundle.plant)
+
+
+def steps_of(bundle: Bundle) -> int:
+    """Return how many steps of the plant the scenario lasts."""
+    return round(bundle.scenario.duration * bundle.scenario.rates.plant)
 
 
 def new_recording(bundle: Bundle, folder: Path, mode: str) -> RecordingWriter:
@@ -93,14 +137,14 @@ def metadata(bundle: Bundle, mode: str) -> dict[str, str]:
         "mode": mode,
         "plant": bundle.plant,
         "package_version": version("cspm"),
-        "testbed": bundle.testbed.testbed.name,
-        "testbed_sha256": bundle.testbed.sha256,
+        "testbed": bundle.described.testbed.name,
+        "testbed_sha256": bundle.described.sha256,
     }
 
 
 def simulate(
     parts: Assembly,
-    writer: RecordingWriter | None,
+    writer: Recorder | None,
     progress: Callable[[float], None],
     steps: int,
 ) -> RunResult:
@@ -108,7 +152,7 @@ def simulate(
 
     Args:
         parts: what to step.
-        writer: of a recording that has the topics of the parts' schedule; None records nothing.
+        writer: takes the topics of the parts' schedule; None records nothing.
         progress: called now and then with the time simulated so far [s].
         steps: of the plant.
     """

@@ -11,7 +11,7 @@ from pathlib import Path
 from cspm_msgs_py.errors import InputError
 from cspm_msgs_py.recording.difference import Difference, first_difference
 from cspm_msgs_py.recording.reader import Recording
-from cspm_msgs_py.recording.run_record import RECORD_NAME, simulated_plant
+from cspm_msgs_py.recording.run_record import RECORD_NAME, own_controllers, simulated_plant
 from cspm_run.bundle import read_bundle
 from cspm_run.plants import SIM
 from cspm_run.recorded_run import run
@@ -57,6 +57,12 @@ def _repeat(
     recording: Recording, path: Path, progress: Callable[[float, float], None]
 ) -> Resimulation:
     record = recording.metadata.get(RECORD_NAME, {})
+    own = own_controllers(recording)
+    if own is not None:
+        raise InputError(
+            f"{path}: was made with controllers that it does not carry ({own}), allowed: one made"
+            " with those of its scenario"
+        )
     plant = simulated_plant(recording) or SIM
     bundle = replace(read_bundle(recording.attachments, str(path)), plant=plant)
     clock = recording.topics.get("/clock")

@@ -151,10 +151,8 @@ def record(
     scenario = load_scenario(SCENARIOS / f"{name}.yaml")
     if name.startswith("verification"):
         scenario = _slightly_angular(scenario, slower)
-    recorded = replace(described, testbed=hidden)
-    bundle = make_bundle(resolve(scenario, hidden), recorded, SCENARIOS)
-    run(replace(bundle, plant=plant), folder)
-    # The recording carries the text of the described machine.
+    bundle = make_bundle(resolve(scenario, hidden), described, SCENARIOS)
+    run(replace(bundle.concealing(hidden), plant=plant), folder)
     return read_measurement(folder)
 
 

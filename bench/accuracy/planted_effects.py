@@ -104,9 +104,8 @@ def record(case: PlantedCase, seed: int, folder: Path, duration: float = DURATIO
             effect=case.effect, elements=case.elements, parameters=dict(case.parameters)
         )
         machine = machine.model_copy(update={"effects": (*machine.effects, entry)})
-    described = replace(file, testbed=machine)
-    bundle = make_bundle(resolve(scenario, machine), described, path.parent)
-    run(replace(bundle, plant=case.plant), folder)
+    bundle = make_bundle(resolve(scenario, machine), file, path.parent)
+    run(replace(bundle.concealing(machine), plant=case.plant), folder)
 
 
 def judge(case: PlantedCase, folder: Path) -> tuple[str, str, str]:

@@ -61,7 +61,7 @@ def main() -> None:
 def record(described: TestbedFile, machine: Testbed) -> Measurement:
     """Return the scenario on the MuJoCo plant of a machine, said to be the described one."""
     scenario = resolve(load_scenario(SCENARIOS / f"{SCENARIO}.yaml"), described.testbed)
-    bundle = make_bundle(scenario, replace(described, testbed=machine), SCENARIOS)
+    bundle = make_bundle(scenario, described, SCENARIOS).concealing(machine)
     with tempfile.TemporaryDirectory(prefix="cspm-recovery-") as place:
         folder = Path(place) / SCENARIO
         run(replace(bundle, plant="mujoco"), folder)

@@ -50,7 +50,7 @@ class System:
         other = machine_with(machine, choose(machine, self.names[::2]), [mass, surge])
         other = _silent(damped(other, axial))
         scenario = load_scenario(SCENARIOS / f"{SCENARIO}.yaml", [f"duration={seconds}"])
-        bundle = make_bundle(resolve(scenario, other), replace(described, testbed=other), SCENARIOS)
+        bundle = make_bundle(resolve(scenario, other), described, SCENARIOS).concealing(other)
         with tempfile.TemporaryDirectory(prefix="cspm-coverage-") as place:
             folder = Path(place) / SCENARIO
             run(replace(bundle, plant="mujoco"), folder)

@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 
 from cspm_model.kernels.bar import MASS
 from cspm_model.motion import Motion
+from cspm_msgs_py.edited import file_of
 from cspm_msgs_py.errors import DivergenceError
 from cspm_msgs_py.scenario import load_scenario
 from cspm_msgs_py.schedule import WAVE_TRAJECTORY
@@ -68,8 +69,7 @@ class Case:
                 for name, sensor in file.testbed.sensors.items()
             }
         machine = file.testbed.model_copy(update=changes)
-        described = replace(file, testbed=machine)
-        bundle = make_bundle(resolve(scenario, machine), described, path.parent)
+        bundle = make_bundle(resolve(scenario, machine), file_of(machine), path.parent)
         return replace(bundle, plant=self.plant)
 
     def run(self) -> Run:

@@ -13,7 +13,7 @@ from cspm.cli.app import Json, app
 from cspm_msgs_py.errors import InputError
 
 if TYPE_CHECKING:
-    from cspm.commands.identify_rig import RigRequest
+    from cspm.rig import RigRequest
     from cspm_ident.estimation import Prior
 
 RigCommand: TypeAlias = "Callable[[RigRequest, Path | None], None]"
@@ -103,7 +103,7 @@ def _rig_request(
     cutoff: Cutoff = None,
     out: Out = None,
 ) -> RigRequest:
-    from cspm.commands.identify_rig import RigRequest
+    from cspm.rig import RigRequest
 
     if cutoff is not None and not cutoff > 0.0:
         raise InputError(f"--cutoff {cutoff:g}: allowed: a frequency above 0 Hz")

@@ -3,15 +3,14 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 from rich import box
 from rich.console import Console
 from rich.table import Table
 
-from cspm.commands.analyzed_machine import AnalyzedMachine
-from cspm_control.analysis.cable_groups import cable_groups
+from cspm.analysis.design import design_of
+from cspm.analysis.machine import AnalyzedMachine
 from cspm_control.analysis.loop_view import LoopView
 from cspm_control.analysis.loops import (
     CASCADE,
@@ -19,24 +18,20 @@ from cspm_control.analysis.loops import (
     LATE,
     SAMPLED,
     LoopAnalysis,
-    analyse_loops,
     pid_law,
 )
-from cspm_control.analysis.sampled_loops import LoopTiming, loop_timing
+from cspm_control.analysis.sampled_loops import LoopTiming
 from cspm_control.design.gains import (
     GAIN_MARGIN,
     LOW_FREQUENCY_GAIN,
     MOTION_BANDWIDTH,
     PHASE_MARGIN,
 )
-from cspm_msgs_py.errors import InputError
 from cspm_msgs_py.new_folder import refuse_existing
 from cspm_msgs_py.scenario import ClosedLoop
-from cspm_run.assembly import resolve
 from cspm_run.console import make_console, say
 from cspm_run.summary import write_json
 
-PICTURES = ("motion_loops.png", "force_loops.png")
 WAYS = {
     DESIGNED: "designed",
     SAMPLED: "sampled",
@@ -70,40 +65,12 @@ def analyze_design_command(
     """
     refuse_existing(folder)
     console = make_console()
-    control, timing = _closed_loop(machine, computing)
-    found = analyse_loops(machine.testbed, control, timing)
-    names = machine.testbed.cable_names
-    groups = {name: names[members[0]] for name, members in cable_groups(names).items()}
-    _show(console, machine, control, found, timing, groups)
+    found = design_of(machine, computing)
+    _show(console, machine, found.control, found.result, found.timing, found.groups)
     if folder is not None:
-        from cspm.plots.loop_figure import draw_force_loops, draw_motion_loops
-
-        folder.mkdir(parents=True)
-        draw_motion_loops(folder / PICTURES[0], found)
-        draw_force_loops(folder / PICTURES[1], found, list(groups.values()))
-        say(console, f"written {', '.join(str(folder / name) for name in PICTURES)}")
+        say(console, f"written {', '.join(map(str, found.write(folder)))}")
     if json is not None:
-        write_json(json, _data(machine, control, found, timing))
-
-
-def _closed_loop(
-    machine: AnalyzedMachine, computing: float | None
-) -> tuple[ClosedLoop, LoopTiming]:
-    scenario = machine.scenario
-    if not isinstance(scenario.control, ClosedLoop):
-        raise InputError(
-            f"scenario {scenario.name}: control.mode {scenario.control.mode}, allowed: closed_loop"
-        )
-    designed = resolve(scenario, machine.testbed).control
-    assert isinstance(designed, ClosedLoop)
-    pid_law(designed)
-    # The gains are those of the design pose; how they do is asked here.
-    motion = designed.motion.model_copy(update={"design_pose": machine.pose})
-    control = designed.model_copy(update={"motion": motion})
-    ideal = scenario.sensors == "ideal"
-    delays = {} if ideal else {name: each.delay for name, each in machine.testbed.sensors.items()}
-    late = 1.0 / scenario.rates.force_controller if computing is None else computing
-    return control, loop_timing(scenario.rates, delays, late)
+        write_json(json, found.data())
 
 
 def _show(
@@ -207,35 +174,3 @@ def meets_requirements(view: LoopView) -> bool:
         and found.low_frequency_gain >= LOW_FREQUENCY_GAIN
         and found.bandwidth >= MOTION_BANDWIDTH
     )
-
-
-def _data(
-    machine: AnalyzedMachine, control: ClosedLoop, found: LoopAnalysis, timing: LoopTiming
-) -> dict[str, Any]:
-    return {
-        "scenario": machine.scenario.name,
-        "testbed": machine.testbed.name,
-        "pose": list(machine.pose),
-        "timing": vars(timing),
-        "gains": {
-            "motion": {d: g.model_dump() for d, g in (pid_law(control).gains or {}).items()},
-            "force": {n: g.model_dump() for n, g in (control.force.gains or {}).items()},
-        },
-        "motion": {way: _views_data(views) for way, views in found.motion.items()},
-        "force": {way: _views_data(views) for way, views in found.force.items()},
-        "growth": {
-            way: {"rate": rate, "frequency": frequency}
-            for way, (rate, frequency) in found.growth.items()
-        },
-    }
-
-
-def _views_data(views: dict[str, LoopView]) -> dict[str, Any]:
-    def plain(value: float) -> float | None:
-        return float(value) if np.isfinite(value) else None
-
-    return {
-        name: {key: plain(value) for key, value in view.margins._asdict().items()}
-        | {"settling_time": plain(view.settling_time)}
-        for name, view in views.items()
-    }

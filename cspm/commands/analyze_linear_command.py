@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from math import tau
 from pathlib import Path
 from typing import Any
@@ -10,7 +11,8 @@ from rich import box
 from rich.console import Console
 from rich.table import Table
 
-from cspm.commands.analyzed_machine import AnalyzedMachine
+from cspm.analysis.linear import linear_of
+from cspm.analysis.machine import AnalyzedMachine
 from cspm.commands.claim_table import claim_table
 from cspm_control.analysis.claim import Claim
 from cspm_control.analysis.gain import condition
@@ -19,16 +21,12 @@ from cspm_control.analysis.linear import (
     LinearAnalyses,
     LinearAnalysis,
     SubsystemAnalysis,
-    analyse_linear,
 )
-from cspm_control.analysis.published_linear import EXACT, FROZEN, linear_claims
-from cspm_model.linearisation import StateSpace
+from cspm_control.analysis.published_linear import EXACT, FROZEN
 from cspm_msgs_py.new_folder import refuse_existing
 from cspm_run.console import make_console, say
 from cspm_run.summary import write_json
 
-PICTURE = "linear.png"
-MODEL = "model.json"
 HEADINGS = {FROZEN: "ours, directions held", EXACT: "ours, exact"}
 
 
@@ -42,23 +40,17 @@ def analyze_linear_command(
     """
     refuse_existing(folder)
     console = make_console()
-    found = analyse_linear(machine.testbed, machine.pose)
-    names = machine.testbed.cable_names
-    claims = linear_claims(found, names) if machine.is_published else []
-    _show(console, machine, found, claims)
+    found = linear_of(machine)
+    _show(console, machine, found.result, found.claims)
     if folder is not None:
-        from cspm.plots.linear_figure import draw_linear
-
-        folder.mkdir(parents=True)
-        draw_linear(folder / PICTURE, found, names)
-        write_json(folder / MODEL, _models_data(found))
-        say(console, f"written {folder / PICTURE}, {folder / MODEL}")
+        picture, model = found.write(folder)
+        say(console, f"written {picture}, {model}")
     if json is not None:
-        write_json(json, _data(machine, found, claims))
+        write_json(json, found.data())
 
 
 def _show(
-    console: Console, machine: AnalyzedMachine, found: LinearAnalyses, claims: list[Claim]
+    console: Console, machine: AnalyzedMachine, found: LinearAnalyses, claims: Sequence[Claim]
 ) -> None:
     pose = ", ".join(f"{value:.4g}" for value in found.point.bar_pose)
     say(console, f"{machine.testbed.name} at rest at [{pose}] (m, rad); rank of Jᵀ {found.rank}")
@@ -110,61 +102,3 @@ def _direction(part: SubsystemAnalysis, i: int) -> str:
     return (
         f"{largest(system.inputs, low.inputs[:, i])} → {largest(system.outputs, low.outputs[:, i])}"
     )
-
-
-def _models_data(found: LinearAnalyses) -> dict[str, Any]:
-    return {
-        way: {
-            name: _model_data(model)
-            for name, model in (
-                ("plant", analysis.model),
-                ("motion", analysis.motion.system),
-                ("tension", analysis.tension.system),
-            )
-        }
-        for way, analysis in ((FROZEN, found.frozen), (EXACT, found.exact))
-    }
-
-
-def _model_data(model: StateSpace) -> dict[str, Any]:
-    matrices = {name: getattr(model, name).tolist() for name in "ABCD"}
-    return {**matrices, "states": model.states, "inputs": model.inputs, "outputs": model.outputs}
-
-
-def _data(machine: AnalyzedMachine, found: LinearAnalyses, claims: list[Claim]) -> dict[str, Any]:
-    point = found.point
-    return {
-        "testbed": machine.testbed.name,
-        "pose": point.bar_pose.tolist(),
-        "tensions": dict(zip(machine.testbed.cable_names, point.tensions.tolist(), strict=True)),
-        "rank": found.rank,
-        FROZEN: _analysis_data(found.frozen),
-        EXACT: _analysis_data(found.exact),
-        "claims": [claim.data() for claim in claims],
-    }
-
-
-def _analysis_data(analysis: LinearAnalysis) -> dict[str, Any]:
-    return {
-        "modes": [
-            {
-                "pole": [mode.pole.real, mode.pole.imag],
-                "frequency": mode.frequency,
-                "damping": mode.damping,
-                "shape": mode.words,
-            }
-            for mode in analysis.modes
-        ],
-        "poles_at_zero": analysis.drifting,
-        "motion": _subsystem_data(analysis.motion),
-        "tension": _subsystem_data(analysis.tension),
-    }
-
-
-def _subsystem_data(part: SubsystemAnalysis) -> dict[str, Any]:
-    return {
-        "at_rad_s": LOW,
-        "singular_values": part.low.gains.tolist(),
-        "condition": condition(part.low.gains),
-        "relative_gains": part.relative[0].real.tolist(),
-    }

@@ -10,20 +10,18 @@ from rich import box
 from rich.console import Console
 from rich.table import Table
 
-from cspm.commands.analyzed_machine import AnalyzedMachine
-from cspm_control.analysis.cable_structure import cable_structure
+from cspm.analysis.machine import AnalyzedMachine
+from cspm.analysis.manipulability import manipulability_of
 from cspm_control.analysis.manipulability import (
     Ellipsoid,
     Manipulability,
     gyration_radius,
-    manipulability,
 )
 from cspm_model.parameters import nominal_parameters
 from cspm_msgs_py.new_folder import refuse_existing
 from cspm_run.console import make_console, say
 from cspm_run.summary import write_json
 
-PICTURE = "manipulability.png"
 UNITS = {
     "force": ("N per N", "N·m per N"),
     "acceleration": ("m/s² per N", "rad/s² per N"),
@@ -41,20 +39,13 @@ def analyze_manipulability_command(
     """
     refuse_existing(folder)
     console = make_console()
-    cables, parameters = (
-        cable_structure(machine.testbed, machine.pose),
-        nominal_parameters(machine.testbed),
-    )
-    found = manipulability(cables, parameters, machine.pose)
-    _show(console, machine, found, gyration_radius(parameters))
+    found = manipulability_of(machine)
+    radius = gyration_radius(nominal_parameters(machine.testbed))
+    _show(console, machine, found.result, radius)
     if folder is not None:
-        from cspm.plots.manipulability_figure import draw_manipulability
-
-        folder.mkdir(parents=True)
-        draw_manipulability(folder / PICTURE, cables, parameters, machine.pose)
-        say(console, f"written {folder / PICTURE}")
+        say(console, f"written {found.write(folder)}")
     if json is not None:
-        write_json(json, _data(machine, found))
+        write_json(json, found.data())
 
 
 def _show(console: Console, machine: AnalyzedMachine, found: Manipulability, radius: float) -> None:
@@ -93,26 +84,3 @@ def _available_table(found: Manipulability) -> Table:
             dof, *("none" if np.isnan(value) else f"{value:.4g} {unit}" for value in ends)
         )
     return table
-
-
-def _data(machine: AnalyzedMachine, found: Manipulability) -> dict[str, Any]:
-    def ellipsoids(both: tuple[Ellipsoid, Ellipsoid]) -> list[dict[str, Any]]:
-        return [
-            {"dofs": each.dofs, "axes": each.axes.T.tolist(), "lengths": each.lengths.tolist()}
-            for each in both
-        ]
-
-    return {
-        "testbed": machine.testbed.name,
-        "pose": list(machine.pose),
-        "rank": found.rank,
-        "measure": found.measure,
-        "condition": found.condition,
-        "scaled_condition": found.scaled_condition,
-        "force_ellipsoids": ellipsoids(found.force),
-        "acceleration_ellipsoids": ellipsoids(found.acceleration),
-        "available_acceleration": {
-            dof: [None if np.isnan(value) else value for value in ends]
-            for dof, ends in found.available.items()
-        },
-    }

@@ -2,33 +2,29 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
 from pathlib import Path
-from typing import Any
 
-import numpy as np
 import typer
-from numpy.typing import NDArray
 from rich import box
 from rich.console import Console
 from rich.progress import BarColumn, Progress, TaskProgressColumn, TextColumn, TimeRemainingColumn
 from rich.table import Table
 
-from cspm.commands.analyzed_machine import AnalyzedMachine
+from cspm.analysis.machine import AnalyzedMachine
+from cspm.analysis.workspace import workspace_of
 from cspm.commands.claim_table import claim_table
 from cspm_control.analysis.claim import Claim
 from cspm_control.analysis.pose_grid import GRIDS
-from cspm_control.analysis.published_workspace import OURS, workspace_claims
+from cspm_control.analysis.published_workspace import OURS
 from cspm_control.analysis.workspace import ALGORITHMS
 from cspm_control.analysis.workspace_limits import LIMITED
 from cspm_control.analysis.workspace_result import (
     ACCELERATED,
     FEASIBLE,
     WorkspaceResult,
-    analyse_workspace,
 )
-from cspm_control.waves.build import build_motion
 from cspm_msgs_py.interruption import interruptible
 from cspm_msgs_py.new_folder import refuse_existing
 from cspm_run.console import make_console, say
@@ -41,7 +37,6 @@ WAYS = {
     ACCELERATED: "any, t ≥ t_min, accelerating",
 }
 UNITS = {"surge": "m", "sway": "m", "pitch": "rad", "yaw": "rad"}
-PICTURES = ("workspace.png", "maps.png")
 
 
 def analyze_workspace_command(
@@ -66,36 +61,15 @@ def analyze_workspace_command(
     """
     refuse_existing(folder)
     console = make_console()
-    required = np.array(acceleration or reference_acceleration(machine))
     with interruptible() as stopped, _bars(console, coarse) as advance:
-        found = analyse_workspace(machine.testbed, machine.pose, required, coarse, advance, stopped)
+        found = workspace_of(machine, acceleration, coarse, advance, stopped)
     if found is None:
         raise typer.Abort
-    claims = workspace_claims(found) if machine.is_published else []
-    _show(console, found, claims)
+    _show(console, found.result, found.claims)
     if folder is not None:
-        from cspm.plots.workspace_figure import draw_maps, draw_workspace
-
-        folder.mkdir(parents=True)
-        draw_workspace(folder / PICTURES[0], found)
-        draw_maps(folder / PICTURES[1], found)
-        say(console, f"written {', '.join(str(folder / name) for name in PICTURES)}")
+        say(console, f"written {', '.join(map(str, found.write(folder)))}")
     if json is not None:
-        write_json(json, _data(machine, found, claims, coarse))
-
-
-def reference_acceleration(machine: AnalyzedMachine) -> NDArray[np.float64]:
-    """Return the RMS acceleration of the scenario's reference of the bar, (6,) [m/s², rad/s²]."""
-    scenario = machine.scenario
-    motion = build_motion(
-        scenario.target.motion,
-        scenario.bar_mean_pose,
-        seed=scenario.seed,
-        duration=scenario.duration,
-        gravity=machine.testbed.gravity,
-        folder=machine.folder,
-    )
-    return np.asarray(np.sqrt(np.mean(motion.knots[:, 12:] ** 2, axis=0)))
+        write_json(json, found.data())
 
 
 @contextmanager
@@ -115,7 +89,7 @@ def _bars(console: Console, coarse: int) -> Iterator[Callable[[str, int], None]]
         yield lambda name, count: bar.advance(tasks[name], count)
 
 
-def _show(console: Console, found: WorkspaceResult, claims: list[Claim]) -> None:
+def _show(console: Console, found: WorkspaceResult, claims: Sequence[Claim]) -> None:
     pose = ", ".join(f"{value:g}" for value in found.pose)
     console.print(_limit_table(f"how far the bar goes from [{pose}] in one DOF alone", found))
     required = ", ".join(f"{value:.3g}" for value in found.acceleration)
@@ -148,21 +122,3 @@ def _limit_table(title: str, found: WorkspaceResult) -> Table:
         cells = ["nowhere" if value is None else f"{value:g} {UNITS[dof]}" for value in values]
         table.add_row(dof, *cells)
     return table
-
-
-def _data(
-    machine: AnalyzedMachine, found: WorkspaceResult, claims: list[Claim], coarse: int
-) -> dict[str, Any]:
-    return {
-        "testbed": machine.testbed.name,
-        "pose": list(found.pose),
-        "limits": {name: found.limits[name] for name in ALGORITHMS},
-        "limits_with_lowest_tension": found.limits[FEASIBLE],
-        "limits_accelerating": found.limits[ACCELERATED],
-        "required_acceleration": found.acceleration.tolist(),
-        "acceleration_factor": found.factor if np.isfinite(found.factor) else None,
-        "coarse": coarse,
-        "whole": {name: whole._asdict() for name, whole in found.whole.items()},
-        "largest_condition": found.largest_condition,
-        "claims": [claim.data() for claim in claims],
-    }

@@ -1,44 +1,18 @@
-"""The machine and the pose that an analysis is asked for."""
+"""The machine and the pose that an analysis is asked for on the command line."""
 
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
 
+from cspm.analysis.machine import AnalyzedMachine, analyzed_machine
+from cspm.scenario import load_scenario
 from cspm_msgs_py.dofs import DOFS
 from cspm_msgs_py.errors import InputError
-from cspm_msgs_py.scenario import ORIGIN, ClosedLoop, Pose, Scenario, load_scenario
-from cspm_msgs_py.testbed import Testbed, load_testbed
-from cspm_run.library import find_scenario
-
-# The pose at which the thesis analyses its machine, and the name of its test-bed file.
-THESIS_POSE: Pose = (0.0, 0.0, 2.0, 0.0, 0.0, 0.0)
-THESIS_MACHINE = "thesis"
-
-
-@dataclass(frozen=True)
-class AnalyzedMachine:
-    """What to analyse.
-
-    Attributes:
-        testbed: the machine.
-        scenario: where it comes from, unless a test-bed file was named.
-        folder: of the scenario file.
-        pose: of the bar, x y z φ θ ψ in world_ned [m, rad]; the winch frame is at the origin.
-    """
-
-    testbed: Testbed
-    scenario: Scenario
-    folder: Path
-    pose: Pose
-
-    @property
-    def is_published(self) -> bool:
-        """Whether the thesis's figures are of this machine at this pose."""
-        return self.testbed.name == THESIS_MACHINE and bool(np.allclose(self.pose, THESIS_POSE))
+from cspm_msgs_py.scenario import ORIGIN, Pose
+from cspm_msgs_py.testbed import load_testbed
 
 
 def read_machine(scenario: str, testbed: Path | None, pose: str | None) -> AnalyzedMachine:
@@ -53,20 +27,15 @@ def read_machine(scenario: str, testbed: Path | None, pose: str | None) -> Analy
     Raises:
         InputError: naming file, key or option, and what is allowed.
     """
-    path = find_scenario(scenario)
-    described = load_scenario(path)
-    machine = load_testbed(testbed or path.parent / described.testbed).testbed
-    if machine.bar is None:
+    described = load_scenario(scenario)
+    file = load_testbed(testbed) if testbed else described.testbed_file
+    if file.testbed.bar is None:
         raise InputError(
-            f"{testbed or scenario}: machine {machine.name} has no bar, allowed: one with a bar"
+            f"{testbed or scenario}: machine {file.testbed.name} has no bar, allowed: one with a"
+            " bar"
         )
-    control = described.control
-    wanted = described.bar_mean_pose
-    if isinstance(control, ClosedLoop):
-        wanted = control.motion.design_pose
-    if pose is not None:
-        wanted = _six(pose, "--pose", "m, rad")
-    return AnalyzedMachine(machine, described, path.parent, wanted)
+    wanted = None if pose is None else _six(pose, "--pose", "m, rad")
+    return analyzed_machine(described, file, wanted)
 
 
 def read_acceleration(text: str) -> Pose:

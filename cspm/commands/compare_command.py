@@ -10,11 +10,12 @@ from rich import box
 from rich.console import Console
 from rich.table import Table
 
+from cspm.comparison import compare
 from cspm_ident.block_simulation import Input
 from cspm_ident.comparison.channel_fit import ChannelFit
-from cspm_ident.comparison.compare import Comparison, compare
-from cspm_ident.signals.measurement import read_measurement
+from cspm_ident.comparison.compare import Comparison
 from cspm_msgs_py.new_folder import refuse_existing
+from cspm_msgs_py.testbed import load_testbed
 from cspm_run.console import make_console, say
 from cspm_run.summary import write_json
 
@@ -51,32 +52,21 @@ def compare_command(asked: CompareRequest, json: Path | None) -> None:
     console = make_console()
     refuse_existing(asked.out)
     with console.status("reading") as status:
-        measurement = read_measurement(asked.recording, asked.testbed)
-        repeat = None if asked.repeat is None else read_measurement(asked.repeat, asked.testbed)
-        found = compare(
-            measurement,
-            asked.drive,
+        compared = compare(
+            asked.recording,
+            testbed=None if asked.testbed is None else load_testbed(asked.testbed),
+            drive=asked.drive.value,
             horizon=asked.horizon,
             delays=asked.delays,
-            repeat=repeat,
-            progress=status.update,
+            repeat=asked.repeat,
+            progress=lambda _, what: status.update(what),
         )
-        written = None if asked.out is None else _write(asked.out, found)
-    print_comparison(console, found)
+        written = None if asked.out is None else compared.write(asked.out)
+    print_comparison(console, compared.result)
     if written is not None:
         say(console, f"report {written}")
     if json is not None:
-        write_json(json, found.data() | {"report": None if written is None else str(written)})
-
-
-def _write(folder: Path, found: Comparison) -> Path:
-    # Loading plotly takes a second that a table alone need not wait for.
-    from cspm_ident.comparison.page import write_page
-
-    folder.mkdir(parents=True)
-    write_json(folder / "comparison.json", found.data())
-    write_page(folder / "report.html", found)
-    return folder / "report.html"
+        write_json(json, compared.data() | {"report": None if written is None else str(written)})
 
 
 def print_comparison(console: Console, found: Comparison) -> None:

@@ -11,10 +11,9 @@ from rich import box
 from rich.console import Console
 from rich.table import Table
 
-from cspm_ident.diagnosis.diagnose import Diagnosis, diagnose
-from cspm_ident.diagnosis.reporting.experiment_files import write_experiments
+from cspm.diagnosis import diagnose
+from cspm_ident.diagnosis.diagnose import Diagnosis
 from cspm_ident.diagnosis.reporting.finding_statement import statement_of
-from cspm_ident.diagnosis.reporting.improved_file import improved_testbed
 from cspm_ident.diagnosis.reporting.statement import (
     channel_of,
     drive_of,
@@ -24,25 +23,18 @@ from cspm_ident.diagnosis.reporting.statement import (
     unknown_statement,
 )
 from cspm_ident.diagnosis.reporting.verdict import (
-    IMPROVED,
     SENTENCES,
-    diagnosis_data,
     named_in,
     verdict_of,
 )
-from cspm_ident.diagnosis.validation.closed_loop import ClosedLoopFit, simulate_closed_loop
-from cspm_ident.diagnosis.validation.controller_parity import Parity, controller_parity
-from cspm_ident.signals.measurement import Measurement, read_measurement
+from cspm_ident.diagnosis.validation.closed_loop import ClosedLoopFit
+from cspm_ident.diagnosis.validation.controller_parity import Parity
 from cspm_msgs_py.errors import InputError
 from cspm_msgs_py.new_folder import refuse_existing
+from cspm_msgs_py.testbed import load_testbed
 from cspm_run.console import make_console, say
 from cspm_run.summary import write_json
 from cspm_sim.effects import catalogue
-
-REPORT = "diagnosis.json"
-PICTURE = "diagnosis.png"
-PAGE = "diagnosis.html"
-_SEARCHED = "--held-out {}: is searched as well, allowed: recordings that are not"
 
 
 @dataclass(frozen=True)
@@ -72,48 +64,28 @@ def diagnose_command(asked: DiagnoseRequest, json: Path | None) -> None:
     """
     console = make_console()
     refuse_existing(asked.out)
-    twice = set(asked.recordings) & set(asked.held_out)
-    if twice:
-        raise InputError(_SEARCHED.format(twice.pop()))
     with console.status("reading") as status:
-        searched = [read_measurement(path, asked.testbed) for path in asked.recordings]
-        held_out = [read_measurement(path, asked.testbed) for path in asked.held_out]
-        _refuse_twice(searched, held_out)
-        found = diagnose(searched, held_out, status.update)
-        loop: tuple[ClosedLoopFit, ...] = ()
-        if asked.closed_loop and found.findings.named:
-            improved = improved_testbed(found, IMPROVED)
-            loop = simulate_closed_loop((held_out or searched)[0], improved, status.update)
-        status.update("controllers")
-        parity = controller_parity(asked.recordings[0])
-        data = diagnosis_data(found, asked.testbed) | {
-            "closed_loop": [each._asdict() for each in loop],
-            "controllers": [each._asdict() for each in parity],
-        }
+
+        def show(_: float, what: str) -> None:
+            status.update(what)
+
+        found = diagnose(
+            asked.recordings,
+            testbed=None if asked.testbed is None else load_testbed(asked.testbed),
+            held_out=asked.held_out,
+            closed_loop=asked.closed_loop,
+            progress=show,
+        )
         if asked.out is not None:
-            asked.out.mkdir(parents=True)
-            write_experiments(asked.out, found, data, status.update)
-            _write(asked.out, found, data)
-    print_diagnosis(console, found, data, asked.out)
-    _print_parity(console, parity)
-    if loop:
-        console.print(_loop_table(loop))
+            found.write(asked.out, show)
+    print_diagnosis(console, found.result, found.data, asked.out)
+    _print_parity(console, found.parity)
+    if found.closed_loop:
+        console.print(_loop_table(found.closed_loop))
     if asked.out is not None:
         say(console, f"written {asked.out}")
     if json is not None:
-        write_json(json, data)
-
-
-def _refuse_twice(searched: Sequence[Measurement], held_out: Sequence[Measurement]) -> None:
-    """Refuse what would count twice, or be judged on what it was found in, under whatever name."""
-    seen: dict[str, Path] = {}
-    for measured in searched:
-        if (other := seen.get(measured.sha256)) is not None:
-            raise InputError(f"{measured.path}: the same recording as {other}, allowed: each once")
-        seen[measured.sha256] = measured.path
-    for measured in held_out:
-        if measured.sha256 in seen:
-            raise InputError(_SEARCHED.format(measured.path))
+        write_json(json, found.data)
 
 
 def _print_cut_short(console: Console, found: Diagnosis) -> None:
@@ -286,16 +258,3 @@ def _loop_table(loop: Sequence[ClosedLoopFit]) -> Table:
     for fit in loop:
         table.add_row(fit.name, f"{fit.before:.3g}", f"{fit.after:.3g}", fit.unit)
     return table
-
-
-def _write(folder: Path, found: Diagnosis, data: dict[str, object]) -> None:
-    # Drawing takes a second to load that a verdict alone need not wait for.
-    from cspm.plots.diagnosis_figure import draw_diagnosis
-    from cspm_ident.diagnosis.reporting.diagnosis_page import write_diagnosis_page
-
-    write_json(folder / REPORT, data)
-    draw_diagnosis(folder / PICTURE, found)
-    write_diagnosis_page(folder / PAGE, found, data)
-    if found.findings.named:
-        improved = improved_testbed(found, str(folder / IMPROVED))
-        (folder / IMPROVED).write_text(improved.text, encoding="utf-8")

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from functools import partial
 from pathlib import Path
 
 from rich import box
@@ -10,10 +9,10 @@ from rich.console import Console
 from rich.markup import escape
 from rich.table import Table
 
-from cspm.commands.identify_outcome import hand_out
-from cspm.commands.identify_rig import RigRequest, interval_text, provenance
-from cspm_ident.fitted_testbed import FittedNumber
-from cspm_ident.rig.damping import CUTOFF, DAMPING, DampingResult, LinearDamping, identify_damping
+from cspm.commands.identify_outcome import hand_out, interval_text
+from cspm.identification import identified_damping
+from cspm.rig import RigRequest
+from cspm_ident.rig.damping import DAMPING, DampingResult
 from cspm_run.console import say
 
 
@@ -23,8 +22,7 @@ def identify_damping_command(asked: RigRequest, json: Path | None) -> None:
     Raises:
         InputError: naming what is wrong in recordings, test-bed or options.
     """
-    result = identify_damping(asked.specimens(), asked.verify, asked.cutoff or CUTOFF)
-    hand_out(result, print_damping, partial(_write, asked), asked.out, json)
+    hand_out(identified_damping(asked), print_damping, asked.out, json)
 
 
 def print_damping(console: Console, result: DampingResult) -> None:
@@ -61,30 +59,3 @@ def _specimen_table(result: DampingResult) -> Table:
             f"{one.vaf:.4f}",
         )
     return table
-
-
-def _write(asked: RigRequest, folder: Path, result: DampingResult) -> dict[str, str]:
-    from cspm.plots.damping_figure import draw_damping
-
-    folder.mkdir(parents=True)
-    picture = folder / "damping.png"
-    draw_damping(picture, result)
-    written = {"damping": str(picture)}
-    if result.law is not None:
-        specimens = [one.specimen for one in result.specimens]
-        numbers = fitted_numbers(result, result.law)
-        written["testbed"] = str(asked.write_fitted(folder, specimens, "damping", numbers))
-    return written
-
-
-def fitted_numbers(
-    result: DampingResult, law: LinearDamping
-) -> dict[str, FittedNumber | float | str]:
-    """Return the block `damping` of a test-bed file; what was fitted needs no factor."""
-    recordings, windows = provenance([one.specimen for one in result.specimens if one.fitted])
-    return {
-        "law": "linear_in_length",
-        "constant": FittedNumber(law.constant, law.constant_interval, recordings, windows),
-        "slope": FittedNumber(law.slope, law.slope_interval, recordings, windows),
-        "factor": 1.0,
-    }

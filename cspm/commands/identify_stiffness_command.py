@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from functools import partial
 from pathlib import Path
 
 from rich import box
@@ -10,11 +9,11 @@ from rich.console import Console
 from rich.markup import escape
 from rich.table import Table
 
-from cspm.commands.identify_outcome import hand_out
-from cspm.commands.identify_rig import RigRequest, interval_text, provenance
-from cspm_ident.fitted_testbed import FittedNumber
+from cspm.commands.identify_outcome import hand_out, interval_text
+from cspm.identification import identified_stiffness
+from cspm.rig import RigRequest
 from cspm_ident.rig.flanks import DOWN, UP
-from cspm_ident.rig.stiffness import CUTOFF, MEAN, StiffnessResult, identify_stiffness
+from cspm_ident.rig.stiffness import MEAN, StiffnessResult
 from cspm_ident.rig.stiffness_fit import NAMES
 from cspm_run.console import say
 
@@ -27,8 +26,7 @@ def identify_stiffness_command(asked: RigRequest, json: Path | None) -> None:
     Raises:
         InputError: naming what is wrong in recordings, test-bed or options.
     """
-    result = identify_stiffness(asked.specimens(), asked.verify, asked.cutoff or CUTOFF)
-    hand_out(result, print_stiffness, partial(_write, asked), asked.out, json)
+    hand_out(identified_stiffness(asked), print_stiffness, asked.out, json)
 
 
 def print_stiffness(console: Console, result: StiffnessResult) -> None:
@@ -129,35 +127,3 @@ def _hysteresis_table(result: StiffnessResult) -> Table:
             verdict,
         )
     return table
-
-
-def _write(asked: RigRequest, folder: Path, result: StiffnessResult) -> dict[str, str]:
-    from cspm.plots.stiffness_figure import draw_hysteresis, draw_stiffness
-
-    folder.mkdir(parents=True)
-    pictures = {"stiffness": folder / "stiffness.png", "hysteresis": folder / "hysteresis.png"}
-    draw_stiffness(pictures["stiffness"], result)
-    draw_hysteresis(pictures["hysteresis"], result)
-    specimens = [one.specimen for one in result.specimens]
-    testbed = asked.write_fitted(folder, specimens, "stiffness", fitted_numbers(result))
-    return {name: str(path) for name, path in pictures.items()} | {"testbed": str(testbed)}
-
-
-def fitted_numbers(result: StiffnessResult) -> dict[str, FittedNumber | float | str]:
-    """Return the block `stiffness` of a test-bed file as far as it was fitted."""
-    recordings, windows = provenance([one.specimen for one in result.specimens if one.fitted])
-    estimate = result.both.estimate
-    found: dict[str, FittedNumber | float | str] = {"law": "exponential"}
-    for name in NAMES[:-1]:
-        if name in estimate.frozen:
-            found[name] = estimate.value(name)
-            continue
-        interval = estimate.interval(name)
-        found[name] = FittedNumber(estimate.value(name), interval, recordings, windows)
-    if result.both.asymptote:
-        low, high = (end / result.area for end in estimate.interval("rigidity"))
-        modulus = estimate.value("rigidity") / result.area
-        found["youngs_modulus"] = FittedNumber(
-            modulus, (low, high), recordings, windows, "k l/A on the asymptote"
-        )
-    return found

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from functools import partial
 from math import isfinite
 from pathlib import Path
 
@@ -13,17 +12,14 @@ from rich.console import Console
 from rich.markup import escape
 from rich.table import Table
 
-from cspm.commands.identify_outcome import hand_out
-from cspm.commands.identify_rig import FITTED, interval_text
+from cspm.commands.identify_outcome import hand_out, interval_text
+from cspm.identification import identify_system
 from cspm_ident.estimation import Prior
-from cspm_ident.signals.measurement import Measurement, read_measurement
-from cspm_ident.system.choice import choose
-from cspm_ident.system.fitted_file import fitted_testbed
-from cspm_ident.system.identification import HORIZON, SystemResult, identify_system
+from cspm_ident.system.identification import SystemResult
 from cspm_ident.system.prediction_test import Judgement
 from cspm_msgs_py.dofs import DOFS
-from cspm_msgs_py.errors import InputError
 from cspm_msgs_py.new_folder import refuse_existing
+from cspm_msgs_py.testbed import load_testbed
 from cspm_run.console import make_console, say
 
 
@@ -64,21 +60,20 @@ def identify_system_command(asked: SystemRequest, json: Path | None) -> None:
     """
     console = make_console()
     refuse_existing(asked.out)
-    searched, held_out = (_read(paths, asked) for paths in (asked.recordings, asked.held_out))
-    chosen = choose(searched[0].machine, asked.names, asked.frozen, asked.priors, asked.bounds)
-    for name in asked.profiled:
-        if name not in {each.name for each in chosen if not each.parameter.frozen}:
-            raise InputError(f"--profile {name}: is not fitted, allowed: a name that is")
     with console.status("") as status:
-        result = identify_system(
-            searched,
-            chosen,
-            held_out=held_out,
+        found = identify_system(
+            asked.recordings,
+            held_out=asked.held_out,
+            testbed=None if asked.testbed is None else load_testbed(asked.testbed),
+            names=asked.names,
+            frozen=asked.frozen,
+            priors=asked.priors,
+            bounds=asked.bounds,
             profiled=asked.profiled,
-            horizon=HORIZON if asked.horizon is None else asked.horizon,
-            progress=lambda text: status.update(escape(text)),
+            horizon=asked.horizon,
+            progress=lambda _, what: status.update(escape(what)),
         )
-    hand_out(result, print_system, partial(_write, asked.testbed), asked.out, json)
+    hand_out(found, print_system, asked.out, json)
 
 
 def print_system(console: Console, result: SystemResult) -> None:
@@ -129,20 +124,3 @@ def judgement_table(judgements: Sequence[Judgement]) -> Table:
             cells = ["still" if v is None else f"{v:.2f}" for v in shares.values()]
             table.add_row(name, label, *cells)
     return table
-
-
-def _read(paths: Sequence[Path], asked: SystemRequest) -> list[Measurement]:
-    return [read_measurement(path, asked.testbed) for path in paths]
-
-
-def _write(testbed: Path | None, folder: Path, result: SystemResult) -> dict[str, str]:
-    from cspm.plots.system_figure import draw_system
-
-    file = result.searched[0].testbed
-    source = str(testbed or result.searched[0].path)
-    fitted = fitted_testbed(result, file, source)
-    folder.mkdir(parents=True)
-    path, picture = folder / FITTED, folder / "system.png"
-    path.write_text(fitted.text, encoding="utf-8")
-    draw_system(picture, result.judgements)
-    return {"testbed": str(path), "system": str(picture)}

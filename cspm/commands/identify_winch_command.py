@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from functools import partial
 from math import isfinite
 from pathlib import Path
 
@@ -12,18 +11,14 @@ from rich.console import Console
 from rich.markup import escape
 from rich.table import Table
 
-from cspm.commands.identify_outcome import hand_out
-from cspm.commands.identify_rig import FITTED, interval_text
-from cspm_ident.signals.measurement import read_measurement
-from cspm_ident.winch.fitted_file import fitted_testbed
+from cspm.commands.identify_outcome import hand_out, interval_text
+from cspm.identification import identify_winch
 from cspm_ident.winch.identify_winches import (
-    BAND_HZ,
-    EFFECTS,
     IdentifiedWinch,
     WinchesResult,
-    identify_winches,
 )
 from cspm_msgs_py.new_folder import refuse_existing
+from cspm_msgs_py.testbed import load_testbed
 from cspm_run.console import make_console, say
 
 # From a parameter's unit at the shaft to that at the drum's rim, and the power of the radius.
@@ -64,21 +59,19 @@ def identify_winch_command(asked: WinchRequest, json: Path | None) -> None:
         InputError: naming what is wrong in recordings, test-bed or options.
     """
     refuse_existing(asked.out)
-    searched = [read_measurement(path, asked.testbed) for path in asked.recordings]
-    held_out = [read_measurement(path, asked.testbed) for path in asked.held_out]
-    age = searched[0].torque_age if asked.torque_age is None else asked.torque_age
     with make_console().status("") as status:
-        result = identify_winches(
-            searched,
-            asked.winches,
-            asked.effects or EFFECTS,
-            held_out=held_out,
-            torque_age=age,
+        found = identify_winch(
+            asked.recordings,
+            held_out=asked.held_out,
+            testbed=None if asked.testbed is None else load_testbed(asked.testbed),
+            winches=asked.winches,
+            effects=asked.effects,
+            torque_age=asked.torque_age,
             reversals=asked.reversals,
-            band=BAND_HZ if asked.band is None else asked.band,
-            progress=lambda text: status.update(escape(text)),
+            band=asked.band,
+            progress=lambda _, what: status.update(escape(what)),
         )
-    hand_out(result, print_winches, partial(_write, asked.testbed), asked.out, json)
+    hand_out(found, print_winches, asked.out, json)
 
 
 def print_winches(console: Console, result: WinchesResult) -> None:
@@ -135,19 +128,3 @@ def _error_table(result: WinchesResult) -> Table:
             shares = (f"{found.percent:.2f}" for found in each.errors.values())
             table.add_row(winch.name, name, *shares)
     return table
-
-
-def _write(testbed: Path | None, folder: Path, result: WinchesResult) -> dict[str, str]:
-    from cspm.plots.winch_figure import draw_winch
-
-    first = result.searched[0]
-    fitted = fitted_testbed(result, first.testbed, str(testbed or first.path))
-    folder.mkdir(parents=True)
-    path = folder / FITTED
-    path.write_text(fitted.text, encoding="utf-8")
-    written = {"testbed": str(path)}
-    for winch in result.winches:
-        picture = folder / f"winch_{winch.name}.png"
-        draw_winch(picture, winch)
-        written[f"winch_{winch.name}"] = str(picture)
-    return written

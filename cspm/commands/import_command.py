@@ -5,27 +5,20 @@ from __future__ import annotations
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass
-from importlib.metadata import version
 from pathlib import Path
 
 from rich.console import Console
 from rich.progress import BarColumn, Progress, TaskProgressColumn, TextColumn, TimeRemainingColumn
 
 from cspm.commands.import_tables import print_report
+from cspm.importing import write_import
 from cspm_ident.importing.column_store import ColumnStore
-from cspm_ident.importing.mapping import MappingFile, load_mapping
-from cspm_ident.importing.preparation import Prepared, prepare
-from cspm_ident.importing.write import write_messages
+from cspm_ident.importing.mapping import load_mapping
+from cspm_ident.importing.preparation import prepare
 from cspm_msgs_py.new_folder import refuse_existing
-from cspm_msgs_py.recording.attached_testbed import TESTBED
-from cspm_msgs_py.testbed import TestbedFile, load_testbed
-from cspm_msgs_py.yaml_file import dump_yaml
+from cspm_msgs_py.testbed import load_testbed
 from cspm_run.console import make_console, say
-from cspm_run.recorded_run import CONTRACT_VERSION
 from cspm_run.summary import write_json
-
-MAPPING, REPORT = "mapping.yaml", "import.yaml"
-MODE = "import"
 
 
 @dataclass(frozen=True)
@@ -56,34 +49,13 @@ def import_command(asked: Import, json: Path | None) -> None:
         counts: dict[str, int] = {}
         if asked.out is not None:
             with _progress(console, f"writing {asked.out.name}") as progress:
-                counts = _write(asked.out, prepared, mapping, testbed, progress)
+                counts = write_import(asked.out, prepared, mapping, testbed, progress)
             say(console, f"recording {asked.out}: {sum(counts.values())} messages")
         else:
             say(console, "trial: nothing was written")
     if json is not None:
         written = {"recording": str(asked.out) if asked.out else None, "messages": counts}
         write_json(json, prepared.report.data() | written)
-
-
-def _write(
-    folder: Path,
-    prepared: Prepared,
-    mapping: MappingFile,
-    testbed: TestbedFile,
-    progress: Callable[[float], None],
-) -> dict[str, int]:
-    attachments = {
-        TESTBED: testbed.text.encode(),
-        MAPPING: mapping.text.encode(),
-        REPORT: dump_yaml(prepared.report.data()).encode(),
-    }
-    about = {
-        "contract_version": CONTRACT_VERSION,
-        "mode": MODE,
-        "package_version": version("cspm"),
-        **prepared.report.about,
-    }
-    return write_messages(folder, prepared.messages, attachments, about, progress)
 
 
 @contextmanager

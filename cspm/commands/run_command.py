@@ -4,8 +4,7 @@ from __future__ import annotations
 
 import dataclasses
 import tempfile
-from collections.abc import Callable, Sequence
-from functools import partial
+from collections.abc import Sequence
 from pathlib import Path
 
 from rich import box
@@ -14,27 +13,23 @@ from rich.markup import escape
 from rich.progress import BarColumn, Progress, TaskID, TextColumn, TimeRemainingColumn
 from rich.table import Table
 
+from cspm.scenario import Scenario
+from cspm.simulation import REALTIME, Runner, bundle_of, ros_runner
 from cspm_msgs_py.errors import CspmError, InputError
 from cspm_msgs_py.new_folder import refuse_existing
 from cspm_msgs_py.recording.overview import overview
 from cspm_msgs_py.recording.recover import recover
 from cspm_msgs_py.recording.run_record import EXTERNAL, RECORD_NAME
 from cspm_msgs_py.scenario import load_scenario
-from cspm_msgs_py.testbed import TestbedFile, load_testbed
-from cspm_ros.runtime.ros_install import find_ros
+from cspm_msgs_py.testbed import load_testbed
 from cspm_ros.runtime.stall_watchdog import PATIENCE_S, check_patience
-from cspm_run.assembly import resolve
-from cspm_run.bundle import Bundle, make_bundle
+from cspm_run.bundle import Bundle
 from cspm_run.console import make_console, say
 from cspm_run.plants import SIM
 from cspm_run.recorded_run import INPROCESS, run
 from cspm_run.resim import resimulate
 from cspm_run.run_result import RunResult
 from cspm_run.summary import print_summary, summary_data, write_json
-from cspm_sim.parameters import plant_parameters
-
-REALTIME = "realtime"
-Runner = Callable[[Bundle, Path, Callable[[float], None]], RunResult]
 
 
 def run_command(
@@ -71,11 +66,8 @@ def run_command(
             raise InputError(
                 f"--patience --mode {mode}: allowed: --mode graph, processes or {REALTIME}"
             )
-    scenario = load_scenario(path, overrides)
-    testbed_path = machine or path.parent / scenario.testbed
-    testbed = load_testbed(testbed_path)
-    _check_effects(testbed, testbed_path)
-    bundle = make_bundle(resolve(scenario, testbed.testbed), testbed, path.parent)
+    scenario = Scenario(path, load_scenario(path, overrides))
+    bundle = bundle_of(scenario, load_testbed(machine) if machine else None, plant)
     external = plant == EXTERNAL
     if external and mode != REALTIME:
         raise InputError(f"--plant {EXTERNAL} --mode {mode}: allowed: --mode {REALTIME}")
@@ -83,13 +75,19 @@ def run_command(
         option = "--one-process" if one_process else "--process-per-node"
         raise InputError(f"{option} --mode {mode}: allowed: --mode {REALTIME}")
     refuse_existing(folder)
-    bundle = dataclasses.replace(bundle, plant=SIM if external else plant)
     runner = None
     if mode != INPROCESS:
+
+        def tell(waiting: str) -> None:
+            say(console, waiting or "all is there")
+
         patience_s = PATIENCE_S if patience is None else patience
-        runner = _ros_runner(mode, console, external, patience_s, apart=one_process is False)
+        apart, asked = one_process is False, f"--mode {mode}"
+        runner = ros_runner(
+            mode, tell, external=external, apart=apart, patience_s=patience_s, asked=asked
+        )
     result = _run_with_progress(bundle, folder, console, runner)
-    requirement = scenario.requirement
+    requirement = bundle.scenario.requirement
     print_summary(console, result, requirement)
     if json is not None:
         write_json(json, summary_data(result))
@@ -98,8 +96,8 @@ def run_command(
         from cspm.plots.run_figure import draw_run
 
         write_json(result.folder / "summary.json", summary_data(result))
-        period = 1.0 / scenario.rates.plant
-        names = testbed.testbed.cable_names
+        period = 1.0 / bundle.scenario.rates.plant
+        names = bundle.testbed.testbed.cable_names
         draw_run(result.folder / "run.png", result, requirement, names, period)
         say(console, f"recording {result.folder}, picture {result.folder.name}/run.png")
     if result.failure:
@@ -109,14 +107,6 @@ def run_command(
         kept = "; the recording is complete so far" if result.folder else ""
         say(console, f"interrupted after {result.simulated:g} s{kept}")
     return not result.interrupted
-
-
-def _check_effects(testbed: TestbedFile, path: Path) -> None:
-    """Let a fault among the effects, which only the model can see, name the test-bed's file."""
-    try:
-        plant_parameters(testbed.testbed)
-    except InputError as err:
-        raise InputError(f"{path}: {err}") from None
 
 
 def info_command(bag: Path, json: Path | None) -> None:
@@ -223,28 +213,6 @@ def _run_with_progress(
         with tempfile.TemporaryDirectory(prefix="cspm-run-") as place:
             result = runner(bundle, Path(place) / scenario.name, show)
             return dataclasses.replace(result, folder=None)
-
-
-def _ros_runner(
-    mode: str, console: Console, external: bool, patience_s: float, *, apart: bool
-) -> Runner:
-    """Return what runs a scenario in a mode that needs ROS; only now is ROS loaded."""
-    find_ros(f"--mode {mode}")
-    if mode == "graph":
-        from cspm_ros.runtime.graph_run import run_graph
-
-        return partial(run_graph, patience_s=patience_s)
-
-    def tell(waiting: str) -> None:
-        say(console, waiting or "all is there")
-
-    if mode == REALTIME and not apart:
-        from cspm_ros.runtime.realtime_run import run_realtime
-
-        return partial(run_realtime, external=external, tell=tell, patience_s=patience_s)
-    from cspm_ros.runtime.process_run import run_processes
-
-    return partial(run_processes, mode=mode, external=external, tell=tell, patience_s=patience_s)
 
 
 def _progress(console: Console) -> Progress:

@@ -58,6 +58,7 @@ class Measurement:
         pointwise: whether equations hold at single samples instead of under windows, for
             comparison.
         complete: whether whatever wrote the recording closed it.
+        assumed: a machine that is assumed instead of the described one; None: the described one.
     """
 
     path: Path
@@ -74,11 +75,12 @@ class Measurement:
     torque_age: float = 0.0
     pointwise: bool = False
     complete: bool = True
+    assumed: Testbed | None = None
 
     @property
     def machine(self) -> Testbed:
-        """The machine as it was described."""
-        return self.testbed.testbed
+        """The machine as it was described, or as it is assumed to be."""
+        return self.testbed.testbed if self.assumed is None else self.assumed
 
     @property
     def sensors(self) -> dict[str, Samples]:
@@ -110,26 +112,26 @@ class Measurement:
 
     def with_testbed(self, testbed: TestbedFile) -> Measurement:
         """Return the same, said to be of another description of the machine."""
-        return replace(self, testbed=testbed)
+        return replace(self, testbed=testbed, assumed=None)
+
+    def with_machine(self, machine: Testbed) -> Measurement:
+        """Return the same, its machine assumed to be another than the described one."""
+        return replace(self, assumed=machine)
 
 
-def read_measurement(path: Path, testbed: Path | None = None) -> Measurement:
+def read_measurement(path: Path, testbed: Path | TestbedFile | None = None) -> Measurement:
     """Read what a recording measured.
 
     Args:
         path: the recording.
-        testbed: the machine's file, instead of the one that the recording carries.
+        testbed: the machine or its file, instead of the one that the recording carries.
 
     Raises:
         InputError: no recording, no test-bed, other cables than the test-bed's, or no samples.
     """
     with ThreadPoolExecutor(1) as pool, Recording(path) as recording:
         digest = pool.submit(recording_sha256, path)
-        machine = (
-            load_testbed(testbed)
-            if testbed is not None
-            else attached_testbed(recording.attachments, path)
-        )
+        machine = _described(recording, testbed)
         topics = machine.testbed.topics
         wanted = (FRAME, BAR, WINCHES, TENSION, COMMAND)
         names = [n for n in wanted if n in topics and _count(recording, n)]
@@ -157,7 +159,14 @@ def read_measurement(path: Path, testbed: Path | None = None) -> Measurement:
         torque_age=age,
         pointwise=False,
         complete=closed,
+        assumed=None,
     )
+
+
+def _described(recording: Recording, testbed: Path | TestbedFile | None) -> TestbedFile:
+    if testbed is None:
+        return attached_testbed(recording.attachments, recording.path)
+    return load_testbed(testbed) if isinstance(testbed, Path) else testbed
 
 
 def _count(recording: Recording, name: str) -> int:

@@ -8,7 +8,7 @@ from typing import Any
 
 from ruamel.yaml.comments import CommentedMap, CommentedSeq
 
-from cspm_ident.fitted_testbed import FittedNumber, round_trip
+from cspm_ident.fitted_testbed import FittedNumber
 from cspm_ident.system.choice import (
     AXES,
     BarPlace,
@@ -22,6 +22,7 @@ from cspm_ident.system.choice import (
 from cspm_ident.system.identification import SystemResult
 from cspm_ident.system.machine import bar_values
 from cspm_msgs_py.testbed import Bar, Testbed, TestbedFile, parse_testbed
+from cspm_msgs_py.yaml_file import round_trip
 
 Content = Any
 

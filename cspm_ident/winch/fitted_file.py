@@ -9,11 +9,12 @@ from typing import Any
 
 from ruamel.yaml.comments import CommentedMap, CommentedSeq
 
-from cspm_ident.fitted_testbed import FittedNumber, round_trip, with_fitted
+from cspm_ident.fitted_testbed import FittedNumber, with_fitted
 from cspm_ident.winch.identification import INERTIA
 from cspm_ident.winch.identify_winches import IdentifiedWinch, WinchesResult
 from cspm_msgs_py.errors import InputError
 from cspm_msgs_py.testbed import TestbedFile, parse_testbed
+from cspm_msgs_py.yaml_file import round_trip
 from cspm_sim.effect_entries import read_actions
 from cspm_sim.effects import catalogue
 

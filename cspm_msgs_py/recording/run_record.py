@@ -7,6 +7,13 @@ from cspm_msgs_py.recording.reader import Recording
 RECORD_NAME = "cspm"
 # In the plant's place: somebody's drivers, not a simulation.
 EXTERNAL = "external"
+# The key under which controllers of somebody's own are told of, which no recording carries.
+OWN_CONTROLLERS = "own_controllers"
+
+
+def own_controllers(recording: Recording) -> str | None:
+    """Return which controllers were somebody's own, by stage; None: those of the scenario ran."""
+    return recording.metadata.get(RECORD_NAME, {}).get(OWN_CONTROLLERS)
 
 
 def simulated_plant(recording: Recording) -> str | None:

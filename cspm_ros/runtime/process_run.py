@@ -11,7 +11,7 @@ from contextlib import contextmanager
 from pathlib import Path
 
 from cspm_control.safety import check_real_time
-from cspm_msgs_py.errors import CspmError
+from cspm_msgs_py.errors import CspmError, InputError
 from cspm_msgs_py.graph import RECORDER
 from cspm_msgs_py.interruption import interruptible
 from cspm_msgs_py.schedule import PLANT, schedule_of
@@ -65,6 +65,8 @@ def run_processes(
         CspmError: a node ended before the run did, in real time before it began; or not all nodes
             joined.
     """
+    if bundle.attached is not None:
+        raise InputError("a concealed machine in processes, allowed: in one process")
     scenario, testbed = bundle.scenario, bundle.testbed.testbed
     schedule = schedule_of(scenario, testbed)
     names = (PLANT, *schedule.nodes, RECORDER)[external:]

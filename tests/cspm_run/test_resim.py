@@ -1,6 +1,7 @@
 """A run repeated from its recording, whole, cut or tampered with."""
 
 import random
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -12,9 +13,12 @@ from rosbags.rosbag2 import Writer
 from rosbags.rosbag2.enums import StoragePlugin
 from run_samples import bundle_of
 
+from cspm_msgs_py.edited import with_effect
 from cspm_msgs_py.errors import InputError
 from cspm_msgs_py.recording import Recording, recover
+from cspm_msgs_py.recording.attached_testbed import attached_testbed
 from cspm_msgs_py.recording.mcap_file import McapFile
+from cspm_msgs_py.testbed import EffectEntry
 from cspm_run.recorded_run import run
 from cspm_run.resim import resimulate
 
@@ -215,3 +219,31 @@ def test_a_recording_cut_anywhere_repeats_itself(folder, tmp_path):
         recover(broken)
         found = again(broken)
         assert found.difference is None, size
+
+
+def test_a_planted_effect_travels_with_its_recording(tmp_path):
+    bundle = bundle_of("worst_case", "rates.motion_controller=100")
+    entry = EffectEntry(
+        effect="winch_coulomb_friction", elements=("sway_3",), parameters={"torque": 0.03}
+    )
+    planted = replace(bundle, testbed=with_effect(bundle.testbed, entry))
+    run(planted, tmp_path / "planted", steps=STEPS)
+    with Recording(tmp_path / "planted") as recording:
+        attached = attached_testbed(recording.attachments, "planted")
+        assert recording.metadata["cspm"]["testbed_sha256"] == attached.sha256
+    assert entry in attached.testbed.effects
+    assert again(tmp_path / "planted").difference is None
+
+
+def test_a_concealed_machine_is_what_the_recording_does_not_carry(folder, tmp_path):
+    bundle = bundle_of("worst_case", "rates.motion_controller=100")
+    machine = bundle.testbed.testbed
+    heavy = machine.model_copy(update={"bar": machine.bar.model_copy(update={"mass": 4.5})})
+    concealed = bundle.concealing(heavy)
+    assert concealed.testbed.testbed == heavy
+    assert concealed.described is bundle.testbed
+    run(concealed, tmp_path / "concealed", steps=STEPS)
+    with Recording(tmp_path / "concealed") as recording, Recording(folder) as open_run:
+        assert recording.attachments == open_run.attachments
+        assert recording.metadata == open_run.metadata
+    assert again(tmp_path / "concealed").difference is not None

@@ -32,8 +32,7 @@ def with_inertia(measurement, factor):
         cable.model_copy(update={"rotor_inertia": cable.rotor_inertia * factor})
         for cable in machine.cables
     )
-    described = replace(measurement.testbed, testbed=machine.model_copy(update={"cables": cables}))
-    return measurement.with_testbed(described)
+    return measurement.with_machine(machine.model_copy(update={"cables": cables}))
 
 
 def speed_of(comparison):

@@ -5,14 +5,14 @@ from __future__ import annotations
 import io
 
 import numpy as np
-from ruamel.yaml import YAML
 from ruamel.yaml.comments import CommentedMap, CommentedSeq
 
 from cspm_ident.diagnosis.diagnose import Diagnosis
 from cspm_ident.diagnosis.regression.hypothesis import members_of
 from cspm_ident.diagnosis.reporting.statement import numbers_of
-from cspm_ident.fitted_testbed import WIDEST, FittedNumber
+from cspm_ident.fitted_testbed import FittedNumber
 from cspm_msgs_py.testbed import TestbedFile, parse_testbed
+from cspm_msgs_py.yaml_file import round_trip
 
 _UNBOUNDED = (-np.inf, np.inf)
 
@@ -29,10 +29,7 @@ def improved_testbed(diagnosis: Diagnosis, source: str) -> TestbedFile:
     Raises:
         InputError: the numbers are no machine's.
     """
-    yaml = YAML()
-    yaml.preserve_quotes = True
-    yaml.width = WIDEST
-    yaml.indent(mapping=2, sequence=4, offset=2)
+    yaml = round_trip()
     content = yaml.load(diagnosis.searched[0].testbed.text)
     entries = content.setdefault("effects", CommentedSeq())
     hashes = tuple(measurement.sha256 for measurement in diagnosis.searched)

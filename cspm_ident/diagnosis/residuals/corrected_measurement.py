@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -38,7 +37,7 @@ def with_found(measurement: Measurement, weights: Mapping[Candidate, Array]) -> 
     ]
     machine = measurement.machine
     machine = machine.model_copy(update={"effects": (*machine.effects, *entries)})
-    return measurement.with_testbed(replace(measurement.testbed, testbed=machine))
+    return measurement.with_machine(machine)
 
 
 def settled(measurement: Measurement) -> Measurement:
@@ -63,7 +62,7 @@ def settled(measurement: Measurement) -> Measurement:
         if a.effect.physics.alter is None and a.effect.physics.sense is None
     )
     left = numbers.model_copy(update={"effects": kept})
-    return measurement.with_testbed(replace(measurement.testbed, testbed=left))
+    return measurement.with_machine(left)
 
 
 def as_found(measurement: Measurement, weights: Mapping[Candidate, Array]) -> Measurement:

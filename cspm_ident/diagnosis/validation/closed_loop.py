@@ -15,6 +15,8 @@ from cspm_ident.signals.measurement import BAR, TENSION, Measurement, read_measu
 from cspm_ident.signals.samples import Samples
 from cspm_msgs_py.dofs import DOFS
 from cspm_msgs_py.errors import CspmError
+from cspm_msgs_py.recording.reader import Recording
+from cspm_msgs_py.recording.run_record import own_controllers
 from cspm_msgs_py.scenario import ClosedLoop
 from cspm_msgs_py.testbed import TestbedFile
 from cspm_run.plants import SIM
@@ -60,7 +62,11 @@ def simulate_closed_loop(
     """
     try:
         bundle = replace(recorded_bundle(recorded.path), plant=SIM)
+        with Recording(recorded.path) as recording:
+            own = own_controllers(recording)
     except CspmError:
+        return ()
+    if own is not None:
         return ()
     if not isinstance(bundle.scenario.control, ClosedLoop) or recorded.bar_pose is None:
         return ()

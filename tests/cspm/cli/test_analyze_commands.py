@@ -5,7 +5,7 @@ import re
 
 import pytest
 
-from cspm.commands import analyze_workspace_command as workspace_command
+from cspm.analysis import workspace
 from cspm.commands.analyzed_machine import read_machine
 from cspm_control.analysis.pose_grid import GRIDS
 
@@ -35,7 +35,7 @@ def test_workspace_prints_draws_and_writes(cspm, tmp_path):
 
 
 def test_an_interrupted_workspace_writes_nothing(cspm, tmp_path, monkeypatch):
-    monkeypatch.setattr(workspace_command, "analyse_workspace", lambda *_: None)
+    monkeypatch.setattr(workspace, "analyse_workspace", lambda *_: None)
     code, out, _ = cspm("analyze", "workspace", "--out", "found", "--json", "found.json")
     assert (code, out) == (130, "")
     assert list(tmp_path.iterdir()) == []
@@ -43,11 +43,11 @@ def test_an_interrupted_workspace_writes_nothing(cspm, tmp_path, monkeypatch):
 
 def test_the_required_acceleration_is_what_the_scenarios_reference_has():
     machine = read_machine("worst_case", None, None)
-    found = workspace_command.reference_acceleration(machine)
+    found = workspace.reference_acceleration(machine)
     # A sea at the peak, by its amplitudes: σ·ω² with σ about a third of the largest.
     for value, amplitude in zip(found[:3], (0.1105, 0.0865, 0.318), strict=True):
         assert value == pytest.approx(amplitude / 3.0 * 2.72**2, rel=0.6)
-    assert not workspace_command.reference_acceleration(read_machine("rest", None, None)).any()
+    assert not workspace.reference_acceleration(read_machine("rest", None, None)).any()
 
 
 @pytest.mark.parametrize(

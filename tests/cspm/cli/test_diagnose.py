@@ -3,7 +3,6 @@
 import json
 import shutil
 import sys
-from dataclasses import replace
 
 import pytest
 from emps_samples import DATA, ESTIMATION, MAPPING, PULSES, TESTBED
@@ -133,7 +132,7 @@ def emps(cspm):
         kept = tuple(entry for entry in machine.effects if entry.effect not in deleted)
         more = (EffectEntry(effect=n, parameters={"torque": PUBLISHED[n]}) for n in added)
         bare = machine.model_copy(update={"effects": (*kept, *more)})
-        searched, judged = (m.with_testbed(replace(m.testbed, testbed=bare)) for m in measured)
+        searched, judged = (m.with_machine(bare) for m in measured)
         return diagnosis_data(diagnose([searched], [judged]))
 
     return call

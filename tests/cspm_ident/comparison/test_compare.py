@@ -66,8 +66,7 @@ def of(comparison, name, block="whole"):
 def heavier(measurement, factor):
     machine = measurement.machine
     bar = machine.bar.model_copy(update={"mass": machine.bar.mass * factor})
-    described = replace(measurement.testbed, testbed=machine.model_copy(update={"bar": bar}))
-    return measurement.with_testbed(described)
+    return measurement.with_machine(machine.model_copy(update={"bar": bar}))
 
 
 def test_the_machine_itself_is_at_the_noise_floor(comparison):

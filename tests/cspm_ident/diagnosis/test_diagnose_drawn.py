@@ -21,7 +21,7 @@ def diagnosed(folder, *entries):
     described = bundle_of("worst_case", "duration=30", "seed=7")
     machine = described.testbed.testbed
     machine = machine.model_copy(update={"effects": (*machine.effects, *entries)})
-    run(replace(described, testbed=replace(described.testbed, testbed=machine)), folder)
+    run(described.concealing(machine), folder)
     measured = read_measurement(folder, SCENARIOS / "testbeds" / "thesis.yaml")
     return diagnose([replace(measured, tension=None)])
 

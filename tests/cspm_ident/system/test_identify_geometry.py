@@ -35,8 +35,8 @@ def recorded(folder, beside, scenario, *overrides):
     """Record a machine whose frame is beside its sensor; return it as the described one's."""
     pytest.importorskip("mujoco", minversion="4.0", reason="the MuJoCo plant needs MuJoCo 4")
     bundle = bundle_of(scenario, "seed=5", *overrides)
-    moved = dataclasses.replace(FILE, testbed=with_frame_beside(MACHINE, beside))
-    changed = dataclasses.replace(bundle, testbed=moved, plant="mujoco")
+    moved = bundle.concealing(with_frame_beside(MACHINE, beside))
+    changed = dataclasses.replace(moved, plant="mujoco")
     assert not run(changed, folder, lambda now: None).failure
     return read_measurement(folder).with_testbed(FILE)
 

@@ -2,7 +2,6 @@
 
 import re
 import sys
-from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -11,6 +10,7 @@ from run_samples import bundle_of
 
 from cspm.cli import main as cli
 from cspm_msgs_py.dofs import DOFS
+from cspm_msgs_py.edited import file_of
 from cspm_msgs_py.errors import InputError
 from cspm_msgs_py.recording import Recording
 from cspm_msgs_py.recording.run_record import RECORD_NAME
@@ -119,7 +119,7 @@ def test_noise_without_rounding_does_not_set_them_apart(monkeypatch):
             name: sensor.model_copy(update={"resolution": (0.0,) * len(sensor.resolution)})
             for name, sensor in found.testbed.sensors.items()
         }
-        return replace(found, testbed=found.testbed.model_copy(update={"sensors": sensors}))
+        return file_of(found.testbed.model_copy(update={"sensors": sensors}))
 
     monkeypatch.setattr("cspm_run.agreement.load_testbed", unrounded)
     found = compare(AgreementCase("worst_case", "", ("duration=3",)))

@@ -43,7 +43,7 @@ def described(measurement, name, element, **values):
     machine = measurement.machine
     index = machine.cable_names.index(element) if element in machine.cable_names else 0
     other = altered_testbed(machine, [Action(effect, index, element, values)])
-    return measurement.with_testbed(replace(measurement.testbed, testbed=other))
+    return measurement.with_machine(other)
 
 
 def rms(values):
@@ -191,7 +191,7 @@ def test_a_drive_that_lags_leaves_its_column(tmp_path):
     )
     slow = THESIS.testbed.model_copy(update={"effects": (*THESIS.testbed.effects, lag)})
     bundle = bundle_of("worst_case", "duration=4", "sensors=ideal")
-    run(replace(bundle, testbed=replace(bundle.testbed, testbed=slow)), tmp_path / "bag")
+    run(bundle.concealing(slow), tmp_path / "bag")
     plain = read_measurement(tmp_path / "bag")
     effect = catalogue()["winch_torque_lag"]
     for cable, expected in (("sway_1", 0.004), ("sway_2", 0.0)):

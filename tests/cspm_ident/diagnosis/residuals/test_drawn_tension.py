@@ -50,7 +50,7 @@ def rubbing(tmp_path_factory):
     entry = EffectEntry(effect=COULOMB.id, elements=("surge_2",), parameters={"torque": RUBBED})
     machine = machine.model_copy(update={"effects": (*machine.effects, entry)})
     folder = tmp_path_factory.mktemp("rubbing") / "bag"
-    run(replace(described, testbed=replace(described.testbed, testbed=machine)), folder)
+    run(described.concealing(machine), folder)
     return read_measurement(folder, SCENARIOS / "testbeds" / "thesis.yaml")
 
 

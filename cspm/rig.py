@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
+from typing import TypeAlias
 
 from cspm_ident.fitted_testbed import FittedNumber, with_fitted
 from cspm_ident.rig.specimen import Specimen, read_specimens, recorded_testbed, with_stiffness
@@ -12,6 +13,7 @@ from cspm_msgs_py.new_folder import refuse_existing
 from cspm_msgs_py.testbed import TestbedFile, load_testbed
 
 FITTED = "fitted_testbed.yaml"
+AnyFile: TypeAlias = Path | TestbedFile
 
 
 @dataclass(frozen=True)
@@ -31,11 +33,11 @@ class RigRequest:
     """
 
     recordings: tuple[Path, ...]
-    testbed: Path | None
+    testbed: AnyFile | None
     cables: tuple[str, ...]
     verify: tuple[str, ...]
-    stiffness: Path | None
-    into: Path | None
+    stiffness: AnyFile | None
+    into: AnyFile | None
     into_cables: tuple[str, ...]
     cutoff: float | None
     out: Path | None
@@ -47,34 +49,34 @@ class RigRequest:
             InputError: the folder to write to exists, or see `read_specimens`.
         """
         refuse_existing(self.out)
-        given = load_testbed(self.testbed) if self.testbed else None
+        given = None if self.testbed is None else _file(self.testbed)
         found = read_specimens(self.recordings, given, self.cables)
-        return with_stiffness(found, load_testbed(self.stiffness)) if self.stiffness else found
+        return found if self.stiffness is None else with_stiffness(found, _file(self.stiffness))
 
     def _target(self) -> tuple[TestbedFile, str]:
-        path = self.into or self.stiffness or self.testbed
-        if path is not None:
-            return load_testbed(path), str(path)
+        given = self.into or self.stiffness or self.testbed
+        if given is not None:
+            return _file(given), _file(given).source
         return recorded_testbed(self.recordings[0]), str(self.recordings[0])
 
-    def write_fitted(
+    def fitted(
         self,
-        folder: Path,
         specimens: Sequence[Specimen],
         block: str,
         numbers: Mapping[str, FittedNumber | float | str],
-    ) -> Path:
-        """Write the test-bed file with the law in every cable of the kind; return its path.
+    ) -> TestbedFile:
+        """Return the test-bed file with the law in every cable of the kind.
 
         Raises:
             InputError: the file has no such cables.
         """
         target, source = self._target()
         names = self.into_cables or tuple(dict.fromkeys(one.cable.name for one in specimens))
-        changed = with_fitted(target.text, source, {name: {block: numbers} for name in names})
-        path = folder / FITTED
-        path.write_text(changed.text, encoding="utf-8")
-        return path
+        return with_fitted(target.text, source, {name: {block: numbers} for name in names})
+
+
+def _file(given: AnyFile) -> TestbedFile:
+    return load_testbed(given) if isinstance(given, Path) else given
 
 
 def provenance(
@@ -83,9 +85,3 @@ def provenance(
     """Return the recordings' SHA-256, and the window of time used of each."""
     windows = {one.sha256: one.window for one in specimens}
     return tuple(windows), tuple(windows.values())
-
-
-def interval_text(value: float, interval: tuple[float, float], digits: int = 6) -> str:
-    """Return a number and its interval as a table writes them."""
-    low, high = (f"{end:.{digits}g}" for end in interval)
-    return f"{value:.{digits}g} ({low} … {high})"

@@ -1,0 +1,143 @@
+"""Controllers of one's own in place of the cascade's."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import Protocol
+
+import numpy as np
+from numpy.typing import NDArray
+
+from cspm_msgs_py.diagnostics import Level, Status
+from cspm_msgs_py.errors import InputError
+from cspm_msgs_py.schedule import WAVE_TRAJECTORY, Schedule
+from cspm_msgs_py.stepping.stage import Send, Stage
+from cspm_msgs_py.testbed import Testbed
+
+Array = NDArray[np.float64]
+Output = Array | Mapping[str, Array]
+
+
+class Controller(Protocol):
+    """What takes the place of one stage: any object with `step`.
+
+    It is called once per period of its stage, in simulated time, with the latest rows of the
+    topics that the stage reads, and returns the row that the stage sends:
+
+    - `wave_trajectory` reads `/clock`; it returns rows by topic: `/bar/reference` and
+      `/winch_frame/reference`, (19,) each. What it leaves out stays as the scenario has it.
+    - `motion_controller` reads `/bar/pose` (7,) and `/bar/reference` (19,); it returns the wrench
+      on the bar in world_ned (6,).
+    - `tension_distribution` reads `/wrench_command` (6,), `/bar/pose` (7,), `/winch_frame/pose`
+      (7,); it returns tensions (n,).
+    - `force_controller` reads `/tension_command` (n,), `/cables/tension` (n,), `/winches/state`
+      (3n,); it returns motor torques (n,).
+
+    n cables in the order of the test-bed; N, N·m, m, rad, s. A pose is x y z and a quaternion x y z
+    w in world_ned, a reference a pose, a twist and an acceleration, `/winches/state` angles, speeds
+    and torques at the motor shafts. Nothing limits tensions and torques after the controller, and
+    there is no safe state.
+
+    An object that has `start(period, testbed)` is given its period [s] and the machine before the
+    first step.
+
+    Example:
+        >>> import cspm
+        >>> class Proportional:
+        ...     def step(self, time, inputs):
+        ...         return 0.004 * (inputs["/tension_command"] - inputs["/cables/tension"])
+        >>> own = {"force_controller": Proportional()}
+        >>> cspm.simulate("rest", duration=0.1, controllers=own).failure is None
+        True
+    """
+
+    def step(self, time: float, inputs: Mapping[str, Array]) -> Output:
+        """Return the stage's output at `time` [s] from the latest rows by topic."""
+
+
+class OwnStage:
+    """A stage of the cascade that a controller of one's own computes."""
+
+    def __init__(
+        self, node: str, controller: Controller, replaced: Stage, sizes: Mapping[str, int]
+    ) -> None:
+        """Take the place of a stage.
+
+        Args:
+            node: the stage's name.
+            controller: what computes.
+            replaced: the stage whose place it takes.
+            sizes: of the rows that it has to return, by topic.
+        """
+        self.node = node
+        self._controller, self._replaced, self._sizes = controller, replaced, sizes
+
+    def step(self, now_ns: int, inputs: Mapping[str, Array], send: Send) -> None:
+        """Send what the controller returns.
+
+        Raises:
+            InputError: it is no row of the topic's length, or has numbers that are not finite.
+        """
+        found = self._controller.step(now_ns / 1e9, inputs)
+        rows = found if isinstance(found, Mapping) else dict.fromkeys(self._sizes, found)
+        rows = {topic: self._checked(topic, row) for topic, row in rows.items()}
+        if self.node == WAVE_TRAJECTORY:
+            # What it leaves out stays as the scenario has it.
+            scenarios: dict[str, Array] = {}
+            self._replaced.step(now_ns, inputs, scenarios.__setitem__)
+            rows = scenarios | rows
+        for topic, row in rows.items():
+            send(topic, row)
+
+    def status(self) -> Status:
+        """Return that it computed."""
+        return Status(Level.OK, self.node, "ok", {"controller": type(self._controller).__name__})
+
+    def _checked(self, topic: str, row: object) -> Array:
+        name = f"{self.node}: {type(self._controller).__name__}"
+        if topic not in self._sizes:
+            raise InputError(f"{name} returned {topic}, allowed: {', '.join(self._sizes)}")
+        try:
+            found = np.array(row, dtype=np.float64)
+        except (TypeError, ValueError):
+            found = np.empty(0)
+        if found.shape != (self._sizes[topic],):
+            raise InputError(
+                f"{name} returned {topic} of shape {found.shape}, allowed: ({self._sizes[topic]},)"
+            )
+        if not np.isfinite(found).all():
+            raise InputError(f"{name} returned {topic} {found.tolist()}, allowed: finite numbers")
+        return found
+
+
+def with_own(
+    stages: list[Stage], controllers: Mapping[str, Controller], testbed: Testbed, parts: Schedule
+) -> list[Stage]:
+    """Return the stages, those replaced that have a controller of one's own.
+
+    Raises:
+        InputError: the scenario has no such stage, or a controller has no `step`.
+    """
+    for node, controller in controllers.items():
+        if node not in parts.nodes:
+            raise InputError(f"controllers: {node}, allowed: {', '.join(parts.nodes) or 'none'}")
+        if not callable(getattr(controller, "step", None)):
+            raise InputError(
+                f"controllers: {node}: {type(controller).__name__} has no step, allowed: an object"
+                " with step(time, inputs)"
+            )
+        start = getattr(controller, "start", None)
+        if start is not None:
+            start(parts.nodes[node].divider * parts.period_ns * 1e-9, testbed)
+    sizes = {name: topic.width for name, topic in testbed.topics.items()}
+    return [
+        OwnStage(
+            stage.node,
+            controllers[stage.node],
+            stage,
+            {name: sizes[name] for name in parts.nodes[stage.node].outputs},
+        )
+        if stage.node in controllers
+        else stage
+        for stage in stages
+    ]

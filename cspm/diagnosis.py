@@ -1,0 +1,270 @@
+"""Diagnosing recordings: what the described machine lacks."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import dataclass, field
+from functools import cached_property
+from pathlib import Path
+from typing import Any
+
+from cspm.measured import listed, measured
+from cspm.parameters import Parameter, Parameters
+from cspm.progress import Progress, by_steps, silent
+from cspm.recorded import AnyRecording, path_of
+from cspm.testbed import AnyTestbed, Testbed, as_file
+from cspm_ident.diagnosis.diagnose import Diagnosis as Result
+from cspm_ident.diagnosis.diagnose import diagnose as diagnose_measurements
+from cspm_ident.diagnosis.regression.hypothesis import Named
+from cspm_ident.diagnosis.reporting.experiment_files import write_experiments
+from cspm_ident.diagnosis.reporting.improved_file import improved_testbed
+from cspm_ident.diagnosis.reporting.verdict import IMPROVED, UNKNOWN, diagnosis_data
+from cspm_ident.diagnosis.validation.closed_loop import ClosedLoopFit, simulate_closed_loop
+from cspm_ident.diagnosis.validation.controller_parity import Parity, controller_parity
+from cspm_ident.signals.measurement import Measurement
+from cspm_msgs_py.errors import InputError
+from cspm_msgs_py.new_folder import refuse_existing
+from cspm_run.summary import write_json
+
+REPORT = "diagnosis.json"
+PICTURE = "diagnosis.png"
+PAGE = "diagnosis.html"
+_SEARCHED = "--held-out {}: is searched as well, allowed: recordings that are not"
+
+REPORTED, TIED, DOUBTFUL = "reported", "tied", "doubtful"
+REJECTED, NEGLIGIBLE = "rejected", "negligible"
+
+
+@dataclass(frozen=True)
+class Alternative:
+    """What explains the data as well as a finding does.
+
+    Attributes:
+        effect: its id.
+        elements: the cables or bodies that it is on.
+        probability: of it, as far as the data tell.
+        experiment: scenario file that tells it from the finding; None before `write`.
+    """
+
+    effect: str
+    elements: tuple[str, ...]
+    probability: float
+    experiment: str | None
+
+
+@dataclass(frozen=True)
+class Finding:
+    """Something that the described machine lacks, or was suspected of.
+
+    Attributes:
+        status: `reported`; `tied`, alternatives explain the data as well; `doubtful`, something
+            unknown is beside it; `rejected`, held-out data do not confirm it; `negligible`, it is
+            there, but too small to matter.
+        effect: id from the catalogue, or `unknown`.
+        elements: the cables or bodies that have it.
+        subsystem: `winch`, `cable`, `bar`, `frame` or `sensor`.
+        probability: that it is right; None where nothing is known of that.
+        statement: what it is, in one sentence.
+        parameters: its numbers, `parameters["torque"].value`; of several elements
+            `parameters["torque", "sway_3"]`.
+        alternatives: what explains the data as well.
+        onset: when it began [s]; None where it was there all the time.
+        region: where in the signals it shows; empty where it does everywhere.
+    """
+
+    status: str
+    effect: str
+    elements: tuple[str, ...]
+    subsystem: str
+    probability: float | None = None
+    statement: str = ""
+    parameters: Parameters = field(default_factory=Parameters)
+    alternatives: tuple[Alternative, ...] = ()
+    onset: float | None = None
+    region: Mapping[str, Any] | None = None
+
+
+@dataclass(frozen=True, eq=False)
+class Diagnosis:
+    """What recordings say of the described machine.
+
+    Attributes:
+        result: the diagnosis itself, internal.
+        data: what `diagnosis.json` holds; see `docs/contract.md`.
+        closed_loop: differences of the closed loop simulated again, before and after.
+        parity: commands against what the described controllers make of the measurements.
+    """
+
+    result: Result
+    data: dict[str, Any]
+    closed_loop: tuple[ClosedLoopFit, ...]
+    parity: tuple[Parity, ...]
+
+    @property
+    def verdict(self) -> str:
+        """In a word: consistent, effect, parameter, tie, unknown or not_excited."""
+        return str(self.data["verdict"])
+
+    @property
+    def findings(self) -> tuple[Finding, ...]:
+        """What the machine lacks, the most important first."""
+        doubtful = {
+            (each.hypothesis.effect.id, tuple(each.hypothesis.elements))
+            for each in self.result.findings.named
+            if self.result.findings.is_doubtful(each)
+        }
+        return tuple(_finding(each, doubtful) for each in self.data["findings"])
+
+    @property
+    def rejected(self) -> tuple[Finding, ...]:
+        """What was suspected and is not confirmed on held-out data."""
+        return tuple(_without_numbers(each, REJECTED) for each in self.result.rejected)
+
+    @property
+    def negligible(self) -> tuple[Finding, ...]:
+        """What is there, too small to matter."""
+        return tuple(_without_numbers(each, NEGLIGIBLE) for each in self.result.negligible)
+
+    @cached_property
+    def improved_testbed(self) -> Testbed | None:
+        """The machine with all that was found; None where nothing was named."""
+        if not self.result.findings.named:
+            return None
+        return Testbed(improved_testbed(self.result, IMPROVED))
+
+    def write(self, folder: str | Path, progress: Progress = silent) -> Path:
+        """Write diagnosis.json, .html and .png, experiments and the improved test-bed.
+
+        Args:
+            folder: a new one.
+            progress: called now and then with an estimate of the share and what is being done.
+
+        Raises:
+            InputError: the folder exists.
+        """
+        place = Path(folder)
+        refuse_existing(place)
+        place.mkdir(parents=True)
+        write_experiments(place, self.result, self.data, by_steps(progress))
+        # Drawing takes a second to load that a verdict alone need not wait for.
+        from cspm.plots.diagnosis_figure import draw_diagnosis
+        from cspm_ident.diagnosis.reporting.diagnosis_page import write_diagnosis_page
+
+        write_json(place / REPORT, self.data)
+        draw_diagnosis(place / PICTURE, self.result)
+        write_diagnosis_page(place / PAGE, self.result, self.data)
+        if self.result.findings.named:
+            improved = improved_testbed(self.result, str(place / IMPROVED))
+            (place / IMPROVED).write_text(improved.text, encoding="utf-8")
+        return place
+
+
+def diagnose(
+    recordings: AnyRecording | Iterable[AnyRecording],
+    *,
+    testbed: AnyTestbed | None = None,
+    held_out: AnyRecording | Iterable[AnyRecording] = (),
+    closed_loop: bool = True,
+    progress: Progress = silent,
+) -> Diagnosis:
+    """Find what the described machine lacks: `cspm diagnose`.
+
+    Every residual is driven by what was measured, so that feedback cannot hide an effect. What is
+    found is judged on data that was not searched.
+
+    Args:
+        recordings: one or several of one machine, in which to look.
+        testbed: the machine as it is believed to be: a name, a file or a `Testbed`; None: the one
+            that the recordings carry.
+        held_out: on which to judge what was found; none: the last three tenths of each recording.
+        closed_loop: whether to simulate the recorded closed loop again with what was found.
+        progress: called now and then with an estimate of the share that is done and what is done.
+
+    Raises:
+        InputError: naming what is wrong in recordings or test-bed.
+
+    Example:
+        >>> import cspm
+        >>> verdict = cspm.diagnose("friction_30", testbed="thesis")  # doctest: +SKIP
+        >>> verdict.findings[0].parameters["torque"].ci95  # doctest: +SKIP
+        (0.0297, 0.0304)
+    """
+    searched, judges = listed(recordings), listed(held_out)
+    twice = {path_of(each) for each in searched} & {path_of(each) for each in judges}
+    if twice:
+        raise InputError(_SEARCHED.format(twice.pop()))
+    step = by_steps(progress)
+    step("reading")
+    looked, judged = measured(searched, testbed), measured(judges, testbed)
+    _refuse_twice(looked, judged)
+    found = diagnose_measurements(looked, judged, step)
+    loop: tuple[ClosedLoopFit, ...] = ()
+    if closed_loop and found.findings.named:
+        improved = improved_testbed(found, IMPROVED)
+        loop = simulate_closed_loop((judged or looked)[0], improved, step)
+    step("controllers")
+    parity = tuple(controller_parity(path_of(searched[0])))
+    data = diagnosis_data(found, _path(testbed)) | {
+        "closed_loop": [each._asdict() for each in loop],
+        "controllers": [each._asdict() for each in parity],
+    }
+    progress(1.0, "done")
+    return Diagnosis(found, data, loop, parity)
+
+
+def _path(testbed: AnyTestbed | None) -> Path | None:
+    """Return where a given test-bed comes from, as `diagnosis.json` names it."""
+    if isinstance(testbed, Path) or testbed is None:
+        return testbed
+    return Path(as_file(testbed).source)
+
+
+def _refuse_twice(searched: Sequence[Measurement], held_out: Sequence[Measurement]) -> None:
+    """Refuse what would count twice, or be judged on what it was found in, under whatever name."""
+    seen: dict[str, Path] = {}
+    for each in searched:
+        if (other := seen.get(each.sha256)) is not None:
+            raise InputError(f"{each.path}: the same recording as {other}, allowed: each once")
+        seen[each.sha256] = each.path
+    for each in held_out:
+        if each.sha256 in seen:
+            raise InputError(_SEARCHED.format(each.path))
+
+
+def _finding(entry: Mapping[str, Any], doubtful: set[tuple[str, tuple[str, ...]]]) -> Finding:
+    """Return one finding of `diagnosis.json`."""
+    elements = tuple(entry["elements"])
+    status = TIED if entry["alternatives"] else REPORTED
+    if entry["effect"] != UNKNOWN and (entry["effect"], elements) in doubtful:
+        status = DOUBTFUL
+    return Finding(
+        status,
+        entry["effect"],
+        elements,
+        entry["subsystem"],
+        entry["probability"],
+        entry["statement"],
+        Parameters(
+            Parameter(
+                p["name"],
+                p["element"],
+                p["value"],
+                p["unit"],
+                None if p["ci95"] is None else (p["ci95"][0], p["ci95"][1]),
+            )
+            for p in entry["parameters"]
+        ),
+        tuple(
+            Alternative(
+                a["effect"], tuple(a["elements"]), a["probability"], a["separating_experiment"]
+            )
+            for a in entry["alternatives"]
+        ),
+        entry["onset_s"],
+        entry["region"],
+    )
+
+
+def _without_numbers(named: Named, status: str) -> Finding:
+    effect = named.hypothesis.effect
+    return Finding(status, effect.id, tuple(named.hypothesis.elements), effect.block.value)

@@ -1,0 +1,39 @@
+"""Recordings as identification and diagnosis read them."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Sequence
+from pathlib import Path
+
+from cspm.recorded import AnyRecording, Recording, path_of
+from cspm.testbed import AnyTestbed, as_file
+from cspm_ident.signals.measurement import Measurement, read_measurement
+from cspm_msgs_py.errors import InputError
+
+
+def measured(recordings: Iterable[AnyRecording], testbed: AnyTestbed | None) -> list[Measurement]:
+    """Return what was measured, said to be of a test-bed, or of those that the recordings carry.
+
+    Raises:
+        InputError: no recording, no test-bed, or other cables than the test-bed's.
+    """
+    file = None if testbed is None else as_file(testbed)
+    return [read_measurement(path_of(each), file) for each in recordings]
+
+
+def listed(recordings: AnyRecording | Iterable[AnyRecording]) -> Sequence[AnyRecording]:
+    """Return one recording or several as a sequence.
+
+    Raises:
+        InputError: something else.
+    """
+    if isinstance(recordings, (Recording, str, Path)):
+        return [recordings]
+    found = list(recordings) if isinstance(recordings, Iterable) else [recordings]
+    for each in found:
+        if not isinstance(each, (Recording, str, Path)):
+            raise InputError(
+                f"{each!r}: is no recording, allowed: one that cspm.open or Run.save returns, or a"
+                " path"
+            )
+    return found

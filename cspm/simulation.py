@@ -1,0 +1,319 @@
+"""Simulating a scenario: arrays at once, a recording on demand."""
+
+from __future__ import annotations
+
+import shutil
+import tempfile
+import warnings
+from collections.abc import Callable, Mapping
+from dataclasses import replace
+from functools import partial
+from pathlib import Path
+from typing import Any, TypeAlias
+
+from cspm.controller import Controller, with_own
+from cspm.progress import Progress, silent
+from cspm.recorded import Recording
+from cspm.reference import Reference, with_reference
+from cspm.scenario import AnyScenario, Scenario, as_scenario, with_changes
+from cspm.signals import Signals
+from cspm.testbed import AnyTestbed, Testbed, as_file
+from cspm_msgs_py.errors import InputError
+from cspm_msgs_py.new_folder import refuse_existing
+from cspm_msgs_py.recording.rows import Rows
+from cspm_msgs_py.recording.run_record import EXTERNAL, OWN_CONTROLLERS
+from cspm_msgs_py.recording.writer import RecordingWriter
+from cspm_msgs_py.testbed import TestbedFile
+from cspm_msgs_py.topics import Topic
+from cspm_run.assembly import resolve
+from cspm_run.bundle import Bundle, make_bundle
+from cspm_run.memory_recorder import MemoryRecorder
+from cspm_run.plants import PLANTS, SIM
+from cspm_run.recorded_run import (
+    INPROCESS,
+    metadata,
+    parts_of,
+    recorded_topics,
+    steps_of,
+)
+from cspm_run.recorded_run import simulate as step_through
+from cspm_run.run_result import RunResult
+from cspm_run.summary import summary_data, write_json
+from cspm_sim.parameters import plant_parameters
+
+GRAPH, PROCESSES, REALTIME = "graph", "processes", "realtime"
+MODES = (INPROCESS, GRAPH, PROCESSES, REALTIME)
+Runner: TypeAlias = Callable[[Bundle, Path, Callable[[float], None]], RunResult]
+
+
+class Run(Signals):
+    """What was simulated, as arrays; `save` makes a recording of it.
+
+    Example:
+        >>> import cspm
+        >>> run = cspm.simulate("rest", duration=0.1)
+        >>> run.tension["sway_3"].shape, run.bar_pose["heave"].shape, run.bar_pose.time.shape
+        ((100,), (10,), (10,))
+
+    Attributes:
+        testbed: the machine that was simulated.
+        failure: what went wrong, in one line: the run ended there. None: nothing did.
+        interrupted: whether Ctrl-C ended it early.
+    """
+
+    def __init__(
+        self,
+        bundle: Bundle,
+        result: RunResult,
+        source: MemoryRecorder | Recording,
+        about: Mapping[str, str],
+        place: tempfile.TemporaryDirectory[str] | None = None,
+    ) -> None:
+        """Take what was run, what it amounted to, its messages, and its metadata record.
+
+        `place` is where the messages are on disk, as long as the run is of use.
+        """
+        self.testbed = Testbed(bundle.testbed)
+        self.failure = result.failure
+        self.interrupted = result.interrupted
+        self._bundle, self._result, self._source = bundle, result, source
+        self._about, self._place = about, place
+
+    @property
+    def duration(self) -> float:
+        """Time that was simulated [s]."""
+        return self._result.simulated
+
+    @property
+    def summary(self) -> dict[str, Any]:
+        """Return what `summary.json` holds; see `docs/contract.md`."""
+        return summary_data(self._result)
+
+    @property
+    def errors(self) -> dict[str, dict[str, float]]:
+        """Pose errors of the bar against its reference, `max` and `rms` by DOF [m, rad]."""
+        found: dict[str, dict[str, float]] = self.summary["errors"]
+        return found
+
+    def save(self, folder: str | Path) -> Recording:
+        """Write a recording, with its `summary.json`, and return it.
+
+        Args:
+            folder: a new one; its name becomes the recording's.
+
+        Raises:
+            InputError: the folder exists or cannot be written.
+        """
+        place = Path(folder)
+        refuse_existing(place)
+        if isinstance(self._source, Recording):
+            shutil.copytree(self._source.path, place)
+        else:
+            topics, attachments = self._source.topics, self._bundle.attachments()
+            with RecordingWriter(
+                place, topics, attachments=attachments, metadata=self._about
+            ) as writer:
+                self._source.write_to(writer)
+        write_json(place / "summary.json", self.summary)
+        return Recording(place)
+
+    def draw(self, path: str | Path) -> None:
+        """Draw errors and tensions over time into a new picture.
+
+        Raises:
+            InputError: the file exists.
+        """
+        refuse_existing(Path(path))
+        from cspm.plots.run_figure import draw_run
+
+        scenario = self._bundle.scenario
+        period = 1.0 / scenario.rates.plant
+        draw_run(Path(path), self._result, scenario.requirement, self.testbed.cables, period)
+
+    def _topics(self) -> tuple[str, ...]:
+        if isinstance(self._source, Recording):
+            return self._source.topics
+        return tuple(name for name, count in self._source.counts.items() if count)
+
+    def _read(self, name: str) -> tuple[Topic, Rows]:
+        if isinstance(self._source, Recording):
+            return self._source._read(name)
+        rows = self._source.rows(name)
+        return self._source.topics[name], rows
+
+    def _start_ns(self) -> int:
+        return self._source._start_ns() if isinstance(self._source, Recording) else 0
+
+    def __repr__(self) -> str:
+        end = "" if self.failure is None else f", failed: {self.failure}"
+        return f"Run({self._bundle.scenario.name!r}, {self.duration:g} s{end})"
+
+
+def simulate(
+    scenario: AnyScenario,
+    *,
+    testbed: AnyTestbed | None = None,
+    duration: float | None = None,
+    seed: int | None = None,
+    controllers: Mapping[str, Controller] | None = None,
+    reference: Reference | None = None,
+    plant: str = SIM,
+    mode: str = INPROCESS,
+    progress: Progress = silent,
+) -> Run:
+    """Simulate a scenario and return its signals.
+
+    The same scenario, seed and machine give the same run, bit for bit.
+
+    Args:
+        scenario: a name such as `calm`, a file, or a `Scenario`.
+        testbed: another machine than the scenario's: a name, a file, or a `Testbed`.
+        duration: simulated time [s] instead of the scenario's.
+        seed: of waves and sensor noise, instead of the scenario's.
+        controllers: of one's own, by stage; see `Controller`. In this process only.
+        reference: another motion for the bar to follow: a function of time [s] that returns a pose
+            x y z φ θ ψ in world_ned [m, rad], or times (n,) and poses (n, 6).
+        plant: whose equations: `sim`, or `mujoco`, a second implementation; in real time also
+            `external`, somebody's drivers.
+        mode: `inprocess`, without ROS; `graph`, ROS 2 nodes in one process; `processes`, a process
+            per node; these three give the same messages. `realtime`: nodes paced by the clock.
+        progress: called now and then with the share that is done and what is being done.
+
+    Raises:
+        InputError: no such scenario or test-bed, a value that is not allowed, or scenario and
+            test-bed that do not fit.
+        CspmError: the bar cannot hang where the scenario starts, or a node failed.
+
+    Warns:
+        RuntimeWarning: the run failed on its way, as `Run.failure` has it; what there is up to then
+            is returned.
+
+    Example:
+        >>> import cspm
+        >>> run = cspm.simulate("calm", duration=0.5, seed=2)
+        >>> float(run.time[-1])
+        0.499
+    """
+    _check_choices(plant, mode, bool(controllers))
+    chosen = with_changes(as_scenario(scenario), duration=duration, seed=seed)
+    with tempfile.TemporaryDirectory(prefix="cspm-reference-") as place:
+        if reference is not None:
+            chosen = with_reference(chosen, reference, Path(place))
+        bundle = bundle_of(chosen, None if testbed is None else as_file(testbed), plant)
+    total = bundle.scenario.duration
+
+    def tell(now: float) -> None:
+        progress(min(1.0, now / total), "simulating")
+
+    if mode == INPROCESS:
+        run = _in_memory(bundle, controllers or {}, tell)
+    else:
+        run = _by_nodes(bundle, mode, plant == EXTERNAL, tell, progress)
+    if run.failure is not None:
+        warnings.warn(f"{bundle.scenario.name}: {run.failure}", RuntimeWarning, stacklevel=2)
+    return run
+
+
+def bundle_of(scenario: Scenario, testbed: TestbedFile | None, plant: str) -> Bundle:
+    """Return the self-contained description of a run.
+
+    Args:
+        scenario: as asked for.
+        testbed: a machine instead of the scenario's.
+        plant: one of `PLANTS`, or `external`.
+
+    Raises:
+        InputError: scenario and test-bed do not fit, or an effect is not possible.
+    """
+    machine = scenario.testbed_file if testbed is None else testbed
+    try:
+        plant_parameters(machine.testbed)
+    except InputError as err:
+        # Only the model sees such a fault, which is one of the test-bed's file.
+        raise InputError(f"{machine.source}: {err}") from None
+    resolved = resolve(scenario.description, machine.testbed)
+    bundle = make_bundle(resolved, machine, scenario.path.parent)
+    return replace(bundle, plant=SIM if plant == EXTERNAL else plant)
+
+
+def ros_runner(
+    mode: str,
+    tell: Callable[[str], None],
+    *,
+    external: bool,
+    apart: bool,
+    patience_s: float,
+    asked: str,
+) -> Runner:
+    """Return what runs a scenario in a mode that needs ROS; only now is ROS loaded.
+
+    Args:
+        mode: one of `MODES` but the first.
+        tell: called with what is being waited for, and with nothing once all is there.
+        external: whether somebody's drivers take the plant's place.
+        apart: in real time, whether each node has a process of its own.
+        patience_s: how long nothing may move [s].
+        asked: what needs ROS, for the error.
+
+    Raises:
+        InputError: ROS is not installed.
+    """
+    from cspm_ros.runtime.ros_install import find_ros
+
+    find_ros(asked)
+    if mode == GRAPH:
+        from cspm_ros.runtime.graph_run import run_graph
+
+        return partial(run_graph, patience_s=patience_s)
+    if mode == REALTIME and not apart:
+        from cspm_ros.runtime.realtime_run import run_realtime
+
+        return partial(run_realtime, external=external, tell=tell, patience_s=patience_s)
+    from cspm_ros.runtime.process_run import run_processes
+
+    return partial(run_processes, mode=mode, external=external, tell=tell, patience_s=patience_s)
+
+
+def _check_choices(plant: str, mode: str, own: bool) -> None:
+    if mode not in MODES:
+        raise InputError(f"mode {mode}: allowed: {', '.join(MODES)}")
+    if plant not in (*PLANTS, EXTERNAL):
+        raise InputError(f"plant {plant}: allowed: {', '.join((*PLANTS, EXTERNAL))}")
+    if plant == EXTERNAL and mode != REALTIME:
+        raise InputError(f"plant {EXTERNAL} in mode {mode}: allowed: mode {REALTIME}")
+    if own and mode != INPROCESS:
+        raise InputError(f"controllers in mode {mode}: allowed: mode {INPROCESS}")
+
+
+def _in_memory(
+    bundle: Bundle, controllers: Mapping[str, Controller], tell: Callable[[float], None]
+) -> Run:
+    parts = parts_of(bundle)
+    stages = with_own(parts.stages, controllers, parts.testbed, parts.schedule)
+    recorder = MemoryRecorder(recorded_topics(bundle))
+    result = step_through(replace(parts, stages=stages), recorder, tell, steps_of(bundle))
+    about = metadata(bundle, INPROCESS)
+    if controllers:
+        names = [f"{node}: {type(each).__name__}" for node, each in controllers.items()]
+        about[OWN_CONTROLLERS] = ", ".join(names)
+    return Run(bundle, result, recorder, about)
+
+
+def _by_nodes(
+    bundle: Bundle, mode: str, external: bool, tell: Callable[[float], None], progress: Progress
+) -> Run:
+    """Run nodes, which record; the recording lives as long as the run that is returned."""
+
+    def wait(what: str) -> None:
+        progress(0.0, what or "all is there")
+
+    from cspm_ros.runtime.stall_watchdog import PATIENCE_S
+
+    runner = ros_runner(
+        mode, wait, external=external, apart=False, patience_s=PATIENCE_S, asked=f"mode {mode}"
+    )
+    place = tempfile.TemporaryDirectory(prefix="cspm-run-")
+    folder = Path(place.name) / bundle.scenario.name
+    result = runner(bundle, folder, tell)
+    source = Recording(folder)
+    return Run(bundle, replace(result, folder=None), source, {}, place)

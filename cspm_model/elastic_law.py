@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 import numpy as np
+import scipy
 from numpy.typing import NDArray
-from scipy.interpolate import RegularGridInterpolator
 
 from cspm_model.kernels.cable import OFFSET_LENGTH
 from cspm_model.kernels.cable_law import law_tensions
@@ -72,7 +72,7 @@ def tabulated_elongation(parameters: PlantParameters, tensions: Array, lengths: 
         grid = np.linspace(elastic.min() - 1e-6, elastic.max() + 1e-6, _LENGTHS)
         levels = np.linspace(0.0, pull.max() + 1e-6, _LEVELS) ** 2 / (pull.max() + 1e-6)
         table = np.stack([_inverse(parameters, i, length, levels) for length in grid])
-        look = RegularGridInterpolator((grid, levels), table)
+        look = scipy.interpolate.RegularGridInterpolator((grid, levels), table)
         out[whole, i] = look(np.column_stack([elastic, pull]))
     return out
 

@@ -5,9 +5,8 @@ from __future__ import annotations
 from typing import NamedTuple
 
 import numpy as np
+import scipy
 from numpy.typing import ArrayLike, NDArray
-from scipy.linalg import null_space
-from scipy.optimize import brentq, lsq_linear, nnls, root_scalar
 
 from cspm_model.kernels import bar as bar_kernel
 from cspm_model.kernels.cable import OFFSET_LENGTH, elastic_tension, law_scale
@@ -72,7 +71,7 @@ def find_equilibrium(
 
     start = float(pose[3])
     if not _balanced(parameters, pose, frame_pose, load):
-        found = root_scalar(imbalance, x0=start, x1=start + 1e-3, xtol=1e-14)
+        found = scipy.optimize.root_scalar(imbalance, x0=start, x1=start + 1e-3, xtol=1e-14)
         pose[3] = found.root if found.converged else start
     tensions = _hold(parameters, pose, frame_pose, limits, load)
     lengths = geometry(parameters.cables, pose, frame_pose).lengths
@@ -85,7 +84,11 @@ def unstretched_lengths(parameters: PlantParameters, lengths: Array, tensions: A
     for i, (length, tension) in enumerate(zip(lengths, tensions, strict=True)):
         bounds = (0.5 * length, length)
         args = (length, tension, parameters, i)
-        out[i] = brentq(_excess_tension, *bounds, args, xtol=1e-15) if tension > 0 else length
+        out[i] = (
+            scipy.optimize.brentq(_excess_tension, *bounds, args, xtol=1e-15)
+            if tension > 0
+            else length
+        )
     return out
 
 
@@ -141,14 +144,14 @@ def least_tensions(structure: Array, wrench: Array, limits: Array) -> Array:
     """
     low, high = limits[:, 0], limits[:, 1]
     base: Array = np.linalg.pinv(structure, rcond=RANK_TOLERANCE) @ wrench
-    null = null_space(structure, rcond=RANK_TOLERANCE)
+    null = scipy.linalg.null_space(structure, rcond=RANK_TOLERANCE)
     rows = np.vstack([np.hstack([null.T, -null.T]), np.concatenate([low - base, base - high])])
     goal = np.zeros(len(rows))
     goal[-1] = 1.0
     try:
-        gap = rows @ nnls(rows, goal)[0] - goal
+        gap = rows @ scipy.optimize.nnls(rows, goal)[0] - goal
     except RuntimeError as err:
         raise ConvergenceError(f"least tensions within the limits: {err}") from None
     if np.linalg.norm(gap) < RESIDUAL_TOLERANCE:
-        return np.asarray(lsq_linear(structure, wrench, (low, high), tol=1e-14).x)
+        return np.asarray(scipy.optimize.lsq_linear(structure, wrench, (low, high), tol=1e-14).x)
     return np.clip(base - null @ (gap[:-1] / gap[-1]), low, high)

@@ -15,8 +15,8 @@ from dataclasses import dataclass
 from typing import NamedTuple
 
 import numpy as np
+import scipy
 from numpy.typing import ArrayLike, NDArray
-from scipy.optimize import brentq
 
 from cspm_model.equilibrium import find_equilibrium, gravity_wrench
 from cspm_model.kernels import bar as bar_kernel
@@ -248,7 +248,7 @@ def _elongation_below_cap(
 
     if excess(elongation) <= 0.0:
         return elongation
-    return float(brentq(excess, 0.0, elongation, xtol=1e-15))
+    return float(scipy.optimize.brentq(excess, 0.0, elongation, xtol=1e-15))
 
 
 def _tension_rows(point: OperatingPoint, radii: Array, *, exact: bool) -> Array:

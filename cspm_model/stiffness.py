@@ -14,8 +14,8 @@ from __future__ import annotations
 from functools import lru_cache
 
 import numpy as np
+import scipy
 from numpy.typing import NDArray
-from scipy.integrate import solve_ivp
 
 from cspm_msgs_py.testbed import ExponentialStiffness
 
@@ -46,7 +46,7 @@ def law_table(law: ExponentialStiffness, tension_limit: float) -> tuple[Array, f
     end_tension = _end_tension(law, tension_limit)
     scaled_end = _scaled_elongation(law, end_tension)
     s = np.linspace(0.0, scaled_end, POINTS)
-    solution = solve_ivp(
+    solution = scipy.integrate.solve_ivp(
         lambda _, t: law_slope(law, t),
         (0.0, scaled_end),
         [law.floor_tension],

@@ -5,8 +5,8 @@ from __future__ import annotations
 from pathlib import Path
 
 import numpy as np
+import scipy
 from numpy.typing import NDArray
-from scipy.spatial.transform import Rotation
 
 from cspm_msgs_py.diagnostics import decode_diagnostics
 from cspm_msgs_py.recording.reader import Recording
@@ -69,7 +69,7 @@ def _held(at_ns: NDArray[np.int64], rows: Rows) -> Array:
 
 def _values(rows: Array) -> Array:
     """Return x y z φ θ ψ (n, 6) of pose rows."""
-    yaw_pitch_roll = Rotation.from_quat(rows[:, 3:7]).as_euler("ZYX")
+    yaw_pitch_roll = scipy.spatial.transform.Rotation.from_quat(rows[:, 3:7]).as_euler("ZYX")
     return np.hstack([rows[:, :3], yaw_pitch_roll[:, ::-1]])
 
 

@@ -5,8 +5,8 @@ from __future__ import annotations
 from dataclasses import dataclass, replace
 
 import numpy as np
+import scipy
 from numpy.typing import ArrayLike, NDArray
-from scipy.linalg import block_diag, expm
 
 Array = NDArray[np.float64]
 ComplexArray = NDArray[np.complex128]
@@ -75,7 +75,7 @@ def sample(a: Array, b: Array, c: Array, period: float) -> SampledSystem:
     states, inputs = b.shape
     both = np.zeros((states + inputs,) * 2)
     both[:states] = np.hstack([a, b])
-    stepped = expm(period * both)[:states]
+    stepped = scipy.linalg.expm(period * both)[:states]
     return SampledSystem(
         stepped[:, :states], stepped[:, states:], c, np.zeros((len(c), inputs)), period
     )
@@ -83,7 +83,7 @@ def sample(a: Array, b: Array, c: Array, period: float) -> SampledSystem:
 
 def series(first: SampledSystem, second: SampledSystem) -> SampledSystem:
     """Return `second` with the outputs of `first` as its input."""
-    a = block_diag(first.A, second.A)
+    a = scipy.linalg.block_diag(first.A, second.A)
     a[len(first.A) :, : len(first.A)] = second.B @ first.C
     return SampledSystem(
         a,
@@ -102,7 +102,9 @@ def closed(plant: SampledSystem, controller: SampledSystem) -> SampledSystem:
 
 def diagonal(systems: list[SampledSystem]) -> SampledSystem:
     """Return independent systems side by side."""
-    a, b, c, d = (block_diag(*(getattr(each, name) for each in systems)) for name in "ABCD")
+    a, b, c, d = (
+        scipy.linalg.block_diag(*(getattr(each, name) for each in systems)) for name in "ABCD"
+    )
     return SampledSystem(a, b, c, d, systems[0].period)
 
 

@@ -13,8 +13,8 @@ from typing import NamedTuple
 
 import clarabel
 import numpy as np
+import scipy
 from numpy.typing import NDArray
-from scipy import sparse
 
 from cspm_control.allocation.analytic_centre import analytic_centre
 from cspm_control.allocation.tension_distribution import RESIDUAL_TOLERANCE
@@ -177,10 +177,10 @@ def _least_deviation(
     scales = [tolerance, tolerance / SPACING, tolerance / SPACING**2]
     counted = np.flatnonzero(excess)
     wrenches, right = _wrenches(demand, planned[:, 12 + axes], scales[2])
-    equal = sparse.vstack([_integration(count, m, n), _at_ends(count, m, n, ends), wrenches])
+    equal = scipy.sparse.vstack([_integration(count, m, n), _at_ends(count, m, n, ends), wrenches])
     unequal, most = _bounds(machine.limits, count, m, counted)
     linear = np.concatenate([np.zeros(equal.shape[1]), excess[counted]])
-    equal = sparse.hstack([equal, sparse.csc_matrix((equal.shape[0], len(counted)))])
+    equal = scipy.sparse.hstack([equal, scipy.sparse.csc_matrix((equal.shape[0], len(counted)))])
     zeros = np.zeros(equal.shape[0] - size)
     right = np.concatenate([zeros, right])
     solution = _solve(_cost(count, m, n, len(counted)), linear, (equal, right), (unequal, most))
@@ -191,28 +191,29 @@ def _least_deviation(
     return rows
 
 
-def _cost(count: int, m: int, n: int, counted: int) -> sparse.spmatrix:
+def _cost(count: int, m: int, n: int, counted: int) -> scipy.sparse.spmatrix:
     """Return what squares cost: of deviations, their changes of acceleration, and tensions."""
     size = count * m
-    change = sparse.eye(count - 1, count, k=1) - sparse.eye(count - 1, count)
-    smooth = SMOOTH * sparse.kron(change.T @ change, sparse.eye(m))
-    nothing, free = sparse.csc_matrix((size, size)), sparse.csc_matrix((counted, counted))
-    return sparse.block_diag(
-        [sparse.eye(size), nothing, smooth, LIGHT * sparse.eye(count * n), free]
+    change = scipy.sparse.eye(count - 1, count, k=1) - scipy.sparse.eye(count - 1, count)
+    smooth = SMOOTH * scipy.sparse.kron(change.T @ change, scipy.sparse.eye(m))
+    nothing = scipy.sparse.csc_matrix((size, size))
+    free = scipy.sparse.csc_matrix((counted, counted))
+    return scipy.sparse.block_diag(
+        [scipy.sparse.eye(size), nothing, smooth, LIGHT * scipy.sparse.eye(count * n), free]
     )
 
 
 def _wrenches(
     demand: _Demand, before: Array, scale: Array
-) -> tuple[sparse.spmatrix, NDArray[np.float64]]:
+) -> tuple[scipy.sparse.spmatrix, NDArray[np.float64]]:
     """Return rows and right side of: tensions give what the deviation's acceleration requires."""
     size = before.size
     right = demand.wrench - np.einsum("kij,kj->ki", demand.mass, before)
-    rows = sparse.hstack(
+    rows = scipy.sparse.hstack(
         [
-            sparse.csc_matrix((size, 2 * size)),
-            -sparse.block_diag(list(demand.mass * scale)),
-            sparse.block_diag(list(demand.structure)),
+            scipy.sparse.csc_matrix((size, 2 * size)),
+            -scipy.sparse.block_diag(list(demand.mass * scale)),
+            scipy.sparse.block_diag(list(demand.structure)),
         ]
     )
     return rows, right.ravel()
@@ -220,34 +221,36 @@ def _wrenches(
 
 def _bounds(
     limits: Array, count: int, m: int, counted: NDArray[np.int64]
-) -> tuple[sparse.spmatrix, Array]:
+) -> tuple[scipy.sparse.spmatrix, Array]:
     """Return rows and what they may be at most: tensions, and deviations less their excess."""
     size, bounded = count * m, count * len(limits)
     width = 3 * size + bounded + len(counted)
-    tensions = sparse.eye(bounded, width, k=3 * size)
+    tensions = scipy.sparse.eye(bounded, width, k=3 * size)
     picked = (counted[:, None] * m + np.arange(m)).ravel()
-    deviations = sparse.eye(size, width).tocsr()[picked]
-    own = sparse.eye(len(counted), width, k=3 * size + bounded)
-    shared = sparse.kron(own, np.ones((m, 1)))
-    rows = sparse.vstack([tensions, -tensions, deviations - shared, -deviations - shared, -own])
+    deviations = scipy.sparse.eye(size, width).tocsr()[picked]
+    own = scipy.sparse.eye(len(counted), width, k=3 * size + bounded)
+    shared = scipy.sparse.kron(own, np.ones((m, 1)))
+    rows = scipy.sparse.vstack(
+        [tensions, -tensions, deviations - shared, -deviations - shared, -own]
+    )
     low, high = np.tile(limits[:, 0], count), np.tile(limits[:, 1], count)
     room = np.full(2 * len(picked), ROOM)
     return rows, np.concatenate([high, -low, room, np.zeros(len(counted))])
 
 
-def _integration(count: int, m: int, n: int) -> sparse.csc_matrix:
+def _integration(count: int, m: int, n: int) -> scipy.sparse.csc_matrix:
     """Return rows that say: between knots the acceleration is linear in time."""
-    here, there = sparse.eye(count - 1, count), sparse.eye(count - 1, count, k=1)
-    empty = sparse.csc_matrix((count - 1, count))
+    here, there = scipy.sparse.eye(count - 1, count), scipy.sparse.eye(count - 1, count, k=1)
+    empty = scipy.sparse.csc_matrix((count - 1, count))
     blocks = [
         [there - here, -here, -here / 3.0 - there / 6.0],
         [empty, there - here, -0.5 * (here + there)],
     ]
-    states = sparse.kron(sparse.bmat(blocks), sparse.eye(m))
-    return sparse.hstack([states, sparse.csc_matrix((states.shape[0], count * n))])
+    states = scipy.sparse.kron(scipy.sparse.bmat(blocks), scipy.sparse.eye(m))
+    return scipy.sparse.hstack([states, scipy.sparse.csc_matrix((states.shape[0], count * n))])
 
 
-def _at_ends(count: int, m: int, n: int, ends: tuple[bool, bool]) -> sparse.csc_matrix:
+def _at_ends(count: int, m: int, n: int, ends: tuple[bool, bool]) -> scipy.sparse.csc_matrix:
     """Return rows that pick place, rate and acceleration at both ends, where they are to be zero.
 
     A run begins on its reference, whatever comes; it may end elsewhere.
@@ -259,23 +262,23 @@ def _at_ends(count: int, m: int, n: int, ends: tuple[bool, bool]) -> sparse.csc_
     columns = np.concatenate(picked)
     width = count * (3 * m + n)
     rows = np.arange(len(columns))
-    return sparse.csc_matrix((np.ones(len(columns)), (rows, columns)), (len(columns), width))
+    return scipy.sparse.csc_matrix((np.ones(len(columns)), (rows, columns)), (len(columns), width))
 
 
 def _solve(
-    cost: sparse.spmatrix,
+    cost: scipy.sparse.spmatrix,
     linear: Array,
-    equal: tuple[sparse.spmatrix, Array],
-    unequal: tuple[sparse.spmatrix, Array],
+    equal: tuple[scipy.sparse.spmatrix, Array],
+    unequal: tuple[scipy.sparse.spmatrix, Array],
 ) -> Array:
     """Return the x with least ½xᵀ·cost·x + linearᵀ·x, `equal` and not above `unequal`."""
     cones = [clarabel.ZeroConeT(len(equal[1])), clarabel.NonnegativeConeT(len(unequal[1]))]
     settings = clarabel.DefaultSettings()
     settings.verbose = False
     solver = clarabel.DefaultSolver(
-        sparse.triu(cost).tocsc(),
+        scipy.sparse.triu(cost).tocsc(),
         linear,
-        sparse.vstack([equal[0], unequal[0]]).tocsc(),
+        scipy.sparse.vstack([equal[0], unequal[0]]).tocsc(),
         np.concatenate([equal[1], unequal[1]]),
         cones,
         settings,

@@ -9,8 +9,8 @@ from collections.abc import Callable, Mapping
 from typing import NamedTuple, TypeVar
 
 import numpy as np
+import scipy
 from numpy.typing import ArrayLike, NDArray
-from scipy.optimize import brentq
 
 from cspm_model.kernels.machine import PlantParameters
 from cspm_model.kinematics import RANK_TOLERANCE
@@ -252,7 +252,7 @@ def _refine(
     ends = at(low), at(high)
     if ends[0] * ends[1] > 0.0:  # a root on the grid itself, rounded to either side of it
         return low if abs(ends[0]) < abs(ends[1]) else high
-    return float(brentq(at, low, high, xtol=1e-10 * low))
+    return float(scipy.optimize.brentq(at, low, high, xtol=1e-10 * low))
 
 
 def motion_plant(

@@ -13,7 +13,7 @@ from math import ceil, isfinite, pi
 from pathlib import Path
 
 import numpy as np
-from scipy.interpolate import CubicSpline
+import scipy
 
 from cspm_control.waves.realisation import checked_count
 from cspm_control.waves.sea import Array
@@ -53,7 +53,7 @@ def motion_knots(rows: Array, rate: float | None) -> tuple[Array, float]:
     intervals = max(1, ceil(end / step - 1e-6))
     checked_count(intervals + 1)
     instants = np.linspace(0.0, end, intervals + 1)
-    spline = CubicSpline(time, pose, axis=0)
+    spline = scipy.interpolate.CubicSpline(time, pose, axis=0)
     return np.hstack([spline(instants, order) for order in (0, 1, 2)]), end / intervals
 
 

@@ -13,8 +13,8 @@ from fractions import Fraction
 from math import ceil, floor
 
 import numpy as np
+import scipy
 from numpy.typing import NDArray
-from scipy.special import betaincinv
 
 Array = NDArray[np.float64]
 Complex = NDArray[np.complex128]
@@ -91,7 +91,7 @@ def spreading_offset(probability: Array, spreading: float) -> Array:
         spreading: s ≥ 0.
     """
     side = 2.0 * probability - 1.0
-    square = betaincinv(0.5, spreading + 0.5, np.abs(side))
+    square = scipy.special.betaincinv(0.5, spreading + 0.5, np.abs(side))
     return np.asarray(2.0 * np.sign(side) * np.arcsin(np.sqrt(square)))
 
 

@@ -9,8 +9,8 @@ from math import exp, log
 from typing import Literal
 
 import numpy as np
+import scipy
 from numpy.typing import NDArray
-from scipy.integrate import quad
 
 Array = NDArray[np.float64]
 Normalisation = Literal["height", "fitted"]
@@ -61,8 +61,8 @@ def enhancement_gain(peak_enhancement: float) -> float:
         return float(_enhancement(ratio, peak_enhancement))
 
     peak = exp(-1.25)
-    below, _ = quad(integrand, 0.0, peak, epsabs=1e-11, epsrel=1e-11, limit=200)
-    above, _ = quad(integrand, peak, 1.0, epsabs=1e-11, epsrel=1e-11, limit=200)
+    below, _ = scipy.integrate.quad(integrand, 0.0, peak, epsabs=1e-11, epsrel=1e-11, limit=200)
+    above, _ = scipy.integrate.quad(integrand, peak, 1.0, epsabs=1e-11, epsrel=1e-11, limit=200)
     return 1.0 / (float(below) + float(above))
 
 

@@ -16,8 +16,7 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from scipy.interpolate import RegularGridInterpolator
-from scipy.io import loadmat
+import scipy
 
 from cspm_control.waves.sea import Array, Complex
 from cspm_msgs_py.errors import InputError
@@ -63,7 +62,9 @@ class VesselResponse:
         operator = np.concatenate(
             [self.operator[:, -1:], self.operator, self.operator[:, :1]], axis=1
         )
-        table = RegularGridInterpolator((self.angular_frequency, heading), operator)
+        table = scipy.interpolate.RegularGridInterpolator(
+            (self.angular_frequency, heading), operator
+        )
         response = table(np.stack([full_scale, np.mod(relative, 2.0 * np.pi)], axis=1))
         return np.asarray(response * np.array([1.0, 1.0, 1.0, scale, scale, scale]))
 
@@ -108,7 +109,7 @@ def _load(path: Path) -> dict[str, Any]:
     try:
         with warnings.catch_warnings():
             warnings.simplefilter("ignore")
-            content = loadmat(path, squeeze_me=True, struct_as_record=False)
+            content = scipy.io.loadmat(path, squeeze_me=True, struct_as_record=False)
     except Exception as err:  # whatever the reader meets in bytes that are no MATLAB file
         reason = " ".join(str(err).split())[:80]
         raise InputError(

@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 import numpy as np
+import scipy
 from numpy.typing import NDArray
-from scipy.optimize import brentq, newton
 
 from cspm_msgs_py.errors import ConvergenceError
 from cspm_msgs_py.testbed import Bar
@@ -49,7 +49,7 @@ def hanging_roll(bar: Bar, attachments: Array, angles: Array) -> float:
     if abs(moment(start)) <= BALANCED * max(1.0, float(np.linalg.norm(arm))):
         return start
     try:
-        return float(newton(moment, start, tol=1e-14, maxiter=100))
+        return float(scipy.optimize.newton(moment, start, tol=1e-14, maxiter=100))
     except RuntimeError:
         return start
 
@@ -126,7 +126,9 @@ def resting_lengths(lengths: Array, tensions: Array, rows: Array) -> Array:
     out = np.zeros(len(lengths))
     for i, (length, tension, row) in enumerate(zip(lengths, tensions, rows, strict=True)):
         if row[HAS_CABLE] and tension > 0.0:
-            out[i] = brentq(_gap, 0.5 * length, length, (length, tension, row), xtol=1e-15)
+            out[i] = scipy.optimize.brentq(
+                _gap, 0.5 * length, length, (length, tension, row), xtol=1e-15
+            )
         elif row[HAS_CABLE]:
             out[i] = length
     return out

@@ -143,3 +143,15 @@ def test_the_command_line_and_a_run_in_process_bring_no_ros_in():
     )
     done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=False)
     assert done.stderr.strip() == "[]"
+
+
+def test_a_node_starts_without_any_part_of_scipy():
+    """They take a third of a node's start, and are loaded where something needs one of them."""
+    pytest.importorskip("rclpy", reason="ROS 2 is not installed")
+    code = (
+        "import sys, cspm_ros.runtime.node_run;"
+        "sys.exit([name for name in sys.modules if name in"
+        " ('scipy.optimize', 'scipy.linalg', 'scipy.sparse', 'scipy.special')])"
+    )
+    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=False)
+    assert done.stderr.strip() == "[]"

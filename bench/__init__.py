@@ -1,1 +1,1 @@
-"""Speed, start-up and memory, measured on the machine at hand; `python -m bench`."""
+"""Measurements of the project itself, not installed: diagnosis, accuracy, speed, results."""

@@ -1,1 +1,1 @@
-"""From recordings to a model: bring recordings in, compare them, identify parameters."""
+"""From recordings to a model: bring recordings in, compare, identify parameters, diagnose."""

@@ -13,12 +13,13 @@ from cspm.parameters import Parameter, Parameters
 from cspm.progress import Progress, by_steps, silent
 from cspm.recorded import AnyRecording, path_of
 from cspm.testbed import AnyTestbed, Testbed, as_file
-from cspm_ident.diagnosis.diagnose import Diagnosis as Result
 from cspm_ident.diagnosis.diagnose import diagnose as diagnose_measurements
-from cspm_ident.diagnosis.regression.hypothesis import Named
+from cspm_ident.diagnosis.diagnosis import Diagnosis as Result
+from cspm_ident.diagnosis.finding import Finding as FoundEffect
+from cspm_ident.diagnosis.finding import Status
 from cspm_ident.diagnosis.reporting.experiment_files import write_experiments
 from cspm_ident.diagnosis.reporting.improved_file import improved_testbed
-from cspm_ident.diagnosis.reporting.verdict import IMPROVED, UNKNOWN, diagnosis_data
+from cspm_ident.diagnosis.reporting.verdict import IMPROVED, diagnosis_data
 from cspm_ident.diagnosis.validation.closed_loop import ClosedLoopFit, simulate_closed_loop
 from cspm_ident.diagnosis.validation.controller_parity import Parity, controller_parity
 from cspm_ident.signals.measurement import Measurement
@@ -30,9 +31,6 @@ REPORT = "diagnosis.json"
 PICTURE = "diagnosis.png"
 PAGE = "diagnosis.html"
 _SEARCHED = "--held-out {}: is searched as well, allowed: recordings that are not"
-
-REPORTED, TIED, DOUBTFUL = "reported", "tied", "doubtful"
-REJECTED, NEGLIGIBLE = "rejected", "negligible"
 
 
 @dataclass(frozen=True)
@@ -70,6 +68,7 @@ class Finding:
         alternatives: what explains the data as well.
         onset: when it began [s]; None where it was there all the time.
         region: where in the signals it shows; empty where it does everywhere.
+        reason: why it is rejected; empty where it is not.
     """
 
     status: str
@@ -82,6 +81,7 @@ class Finding:
     alternatives: tuple[Alternative, ...] = ()
     onset: float | None = None
     region: Mapping[str, Any] | None = None
+    reason: str = ""
 
 
 @dataclass(frozen=True, eq=False)
@@ -108,27 +108,26 @@ class Diagnosis:
     @property
     def findings(self) -> tuple[Finding, ...]:
         """What the machine lacks, the most important first."""
-        doubtful = {
-            (each.hypothesis.effect.id, tuple(each.hypothesis.elements))
-            for each in self.result.findings.named
-            if self.result.findings.is_doubtful(each)
-        }
-        return tuple(_finding(each, doubtful) for each in self.data["findings"])
+        status = {(each.effect, each.elements): each.status for each in self.result.reported}
+        return tuple(
+            _finding(each, status.get((each["effect"], tuple(each["elements"])), Status.REPORTED))
+            for each in self.data["findings"]
+        )
 
     @property
     def rejected(self) -> tuple[Finding, ...]:
         """What was suspected and is not confirmed on held-out data."""
-        return tuple(_without_numbers(each, REJECTED) for each in self.result.rejected)
+        return tuple(_without_numbers(each) for each in self.result.rejected)
 
     @property
     def negligible(self) -> tuple[Finding, ...]:
         """What is there, too small to matter."""
-        return tuple(_without_numbers(each, NEGLIGIBLE) for each in self.result.negligible)
+        return tuple(_without_numbers(each) for each in self.result.negligible)
 
     @cached_property
     def improved_testbed(self) -> Testbed | None:
         """The machine with all that was found; None where nothing was named."""
-        if not self.result.findings.named:
+        if not self.result.reported:
             return None
         return Testbed(improved_testbed(self.result, IMPROVED))
 
@@ -153,7 +152,7 @@ class Diagnosis:
         write_json(place / REPORT, self.data)
         draw_diagnosis(place / PICTURE, self.result)
         write_diagnosis_page(place / PAGE, self.result, self.data)
-        if self.result.findings.named:
+        if self.result.reported:
             improved = improved_testbed(self.result, str(place / IMPROVED))
             (place / IMPROVED).write_text(improved.text, encoding="utf-8")
         return place
@@ -199,7 +198,7 @@ def diagnose(
     _refuse_twice(looked, judged)
     found = diagnose_measurements(looked, judged, step)
     loop: tuple[ClosedLoopFit, ...] = ()
-    if closed_loop and found.findings.named:
+    if closed_loop and found.reported:
         improved = improved_testbed(found, IMPROVED)
         loop = simulate_closed_loop((judged or looked)[0], improved, step)
     step("controllers")
@@ -231,16 +230,12 @@ def _refuse_twice(searched: Sequence[Measurement], held_out: Sequence[Measuremen
             raise InputError(_SEARCHED.format(each.path))
 
 
-def _finding(entry: Mapping[str, Any], doubtful: set[tuple[str, tuple[str, ...]]]) -> Finding:
+def _finding(entry: Mapping[str, Any], status: Status) -> Finding:
     """Return one finding of `diagnosis.json`."""
-    elements = tuple(entry["elements"])
-    status = TIED if entry["alternatives"] else REPORTED
-    if entry["effect"] != UNKNOWN and (entry["effect"], elements) in doubtful:
-        status = DOUBTFUL
     return Finding(
-        status,
+        status.value,
         entry["effect"],
-        elements,
+        tuple(entry["elements"]),
         entry["subsystem"],
         entry["probability"],
         entry["statement"],
@@ -265,6 +260,7 @@ def _finding(entry: Mapping[str, Any], doubtful: set[tuple[str, tuple[str, ...]]
     )
 
 
-def _without_numbers(named: Named, status: str) -> Finding:
-    effect = named.hypothesis.effect
-    return Finding(status, effect.id, tuple(named.hypothesis.elements), effect.block.value)
+def _without_numbers(found: FoundEffect) -> Finding:
+    reason = "" if found.rejection is None else found.rejection.value
+    subsystem = found.hypothesis.effect.block.value
+    return Finding(found.status.value, found.effect, found.elements, subsystem, reason=reason)

@@ -14,8 +14,7 @@ from pathlib import Path
 
 from bench.performance.thesis_machine import SCENARIOS
 from cspm_ident.diagnosis.diagnose import diagnose
-from cspm_ident.diagnosis.regression.hypothesis import members_of
-from cspm_ident.diagnosis.reporting.statement import Number, numbers_of
+from cspm_ident.diagnosis.parameter import Parameter
 from cspm_ident.diagnosis.reporting.verdict import verdict_of
 from cspm_ident.signals.measurement import read_measurement
 from cspm_msgs_py.scenario import load_scenario
@@ -117,16 +116,16 @@ def judge(case: PlantedCase, folder: Path) -> tuple[str, str, str]:
     found = diagnose([measurement])
     took = time.perf_counter() - begun
     lines = []
-    for named in found.findings.named:
-        for candidate in members_of(found.weights, named.hypothesis):
-            numbers = ", ".join(map(number_words, numbers_of(found, candidate)))
-            lines.append(f"{candidate.effect_id} {candidate.element}: {numbers}")
-        lines += [f"or {rival.words}" for rival in named.alternatives]
-    lines += [f"unknown, {d.place.element}: {d.signal}" for d, _, _ in found.findings.unknown]
+    for finding in found.reported:
+        for own in finding.coefficients:
+            numbers = ", ".join(map(number_words, finding.parameters_on(own)))
+            lines.append(f"{finding.effect} {own.candidate.element}: {numbers}")
+        lines += [f"or {rival.words}" for rival in finding.alternatives]
+    lines += [f"unknown, {d.place.element}: {d.signal}" for d, *_ in found.unexplained]
     return verdict_of(found).value, "<br>".join(lines), f"{took:.0f}"
 
 
-def number_words(number: Number) -> str:
+def number_words(number: Parameter) -> str:
     """Return a parameter with its interval, if anything bounds it."""
     reported = f"{number.name} {number.value:.4g}"
     return (

@@ -21,7 +21,8 @@ from rich.console import Console
 
 from bench.blind.make import Request, make
 from bench.blind.truth import RECORDINGS
-from cspm_ident.diagnosis.diagnose import Diagnosis, diagnose
+from cspm_ident.diagnosis.diagnose import diagnose
+from cspm_ident.diagnosis.diagnosis import Diagnosis
 from cspm_ident.diagnosis.reporting.finding_statement import statement_of
 from cspm_ident.diagnosis.reporting.statement import line_statement, unknown_statement
 from cspm_ident.diagnosis.reporting.verdict import verdict_of
@@ -102,7 +103,7 @@ def _draw_tracking(axes: Axes, recording: Path) -> None:
 
 def _draw_residual(axes: Axes, found: Diagnosis) -> None:
     """Draw the residual on held-out data that a finding lowers most, else the largest unknown."""
-    unknown = [driver.place for driver, _, _ in found.findings.unknown[:1]]
+    unknown = [each.driver.place for each in found.unexplained[:1]]
 
     def rank(curve: Curve) -> tuple[bool, bool, float]:
         size = curve.gained if curve.touched else _size(curve)
@@ -148,7 +149,7 @@ def _text(k: int, stratum: str, item: Mapping[str, Any], found: Diagnosis) -> st
     )
     reported = [
         *_named(found, doubtful=False),
-        *(unknown_statement(found, i) for i in range(len(found.shapes))),
+        *(unknown_statement(found, each) for each in found.unexplained),
         *(line_statement(line) for line in found.lines),
         *_named(found, doubtful=True),
     ]
@@ -163,10 +164,10 @@ def _text(k: int, stratum: str, item: Mapping[str, Any], found: Diagnosis) -> st
 
 def _named(found: Diagnosis, *, doubtful: bool) -> Iterator[str]:
     """Yield what is said of the findings that are doubtful, or of the others, and their rivals."""
-    for i, named in enumerate(found.findings.named):
-        if found.findings.is_doubtful(named) == doubtful:
-            yield statement_of(found, i)
-            yield from (f"as well explained by {rival.words}" for rival in named.alternatives)
+    for finding in found.reported:
+        if finding.is_doubtful == doubtful:
+            yield statement_of(found, finding)
+            yield from (f"as well explained by {rival.words}" for rival in finding.alternatives)
 
 
 def _amounts(concealed: Mapping[str, Any]) -> str:

@@ -108,7 +108,7 @@ def miss_of(outcome: Outcome, item: Data, recording: Path) -> Miss:
     """Search a recording again and hold what is concealed against what was found."""
     given = Recordings([read_measurement(recording)], [])
     look, found = searched_for(given, lambda _: None, ALL_SAFEGUARDS)
-    return compared(outcome, item, look.search, [each.hypothesis for each in found.named])
+    return compared(outcome, item, look.search, [each.hypothesis for each in found.findings])
 
 
 def compared(outcome: Outcome, item: Data, search: Search, found: Sequence[Hypothesis]) -> Miss:

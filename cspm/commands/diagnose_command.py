@@ -12,7 +12,7 @@ from rich.console import Console
 from rich.table import Table
 
 from cspm.diagnosis import diagnose
-from cspm_ident.diagnosis.diagnose import Diagnosis
+from cspm_ident.diagnosis.diagnosis import Diagnosis
 from cspm_ident.diagnosis.reporting.finding_statement import statement_of
 from cspm_ident.diagnosis.reporting.statement import (
     channel_of,
@@ -126,11 +126,11 @@ def explain_command(name: str) -> None:
 def _print_named(
     console: Console, found: Diagnosis, experiments: Sequence[Sequence[str]], *, doubtful: bool
 ) -> None:
-    for k, named in enumerate(found.findings.named):
-        if found.findings.is_doubtful(named) != doubtful:
+    for finding, own in zip(found.reported, experiments, strict=True):
+        if finding.is_doubtful != doubtful:
             continue
-        say(console, f"• {statement_of(found, k)}")
-        for rival, experiment in zip(named.alternatives, experiments[k], strict=True):
+        say(console, f"• {statement_of(found, finding)}")
+        for rival, experiment in zip(finding.alternatives, own, strict=True):
             say(console, f"  as well explained by {rival.words}; to tell: {experiment}")
 
 
@@ -141,9 +141,9 @@ def _experiments(found: Diagnosis, data: Mapping[str, Any], folder: Path | None)
             f"cspm run {folder / entry['separating_experiment']}"
             if folder is not None and entry["separating_experiment"]
             else rival.hypothesis.effect.description.separating_experiment
-            for rival, entry in zip(named.alternatives, finding["alternatives"], strict=True)
+            for rival, entry in zip(finding.alternatives, told["alternatives"], strict=True)
         ]
-        for named, finding in zip(found.findings.named, named_in(data), strict=True)
+        for finding, told in zip(found.reported, named_in(data), strict=True)
     ]
 
 
@@ -165,32 +165,31 @@ def print_diagnosis(
     experiments = _experiments(found, data, folder)
     _print_cut_short(console, found)
     _print_named(console, found, experiments, doubtful=False)
-    for k in range(len(found.shapes)):
-        say(console, f"• {unknown_statement(found, k)}")
+    for each in found.unexplained:
+        say(console, f"• {unknown_statement(found, each)}")
     for line in found.lines:
         say(console, f"• {line_statement(line)}")
     _print_named(console, found, experiments, doubtful=True)
-    for named in found.rejected:
+    for finding in found.rejected:
         say(
             console,
-            f"not kept: {named.hypothesis.effect.id} on {', '.join(named.hypothesis.elements)}"
+            f"not kept: {finding.hypothesis.words}"
             " did not help on held-out data, or is noise that controllers feed back",
         )
-    for named in found.negligible:
+    for finding in found.negligible:
         say(
             console,
-            f"taken into account, too small to matter: {named.hypothesis.effect.id} on"
-            f" {', '.join(named.hypothesis.elements)}",
+            f"taken into account, too small to matter: {finding.hypothesis.words}",
         )
     drawn = tension_statement(found)
     if drawn is not None:
         say(console, drawn)
     _print_fits(console, found)
-    for name, elements in found.silent:
+    for name, elements in found.not_excited:
         if elements:
             shown = catalogue()[name].description.separating_experiment
             say(console, f"not testable here: {name} on {', '.join(elements)}; would show: {shown}")
-    without = ", ".join(name for name, elements in found.silent if not elements)
+    without = ", ".join(name for name, elements in found.not_excited if not elements)
     if without:
         say(console, f"not testable with the sensors and parts of these recordings: {without}")
     told = sorted({limit.effect for limit in found.limits if limit.possible})

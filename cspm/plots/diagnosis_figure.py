@@ -8,7 +8,7 @@ import numpy as np
 from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.figure import Figure
 
-from cspm_ident.diagnosis.diagnose import Diagnosis
+from cspm_ident.diagnosis.diagnosis import Diagnosis
 from cspm_ident.diagnosis.reporting.statement import channel_of
 from cspm_ident.diagnosis.reporting.verdict import verdict_of
 
@@ -43,10 +43,7 @@ def draw_diagnosis(path: Path, found: Diagnosis) -> None:
     axes.set_yticks(height, [channel_of(fit) for fit in found.fit])
     axes.invert_yaxis()
     axes.set_xlabel("held-out residual, RMS over what differs from row to row (black line)")
-    names = [
-        f"{each.hypothesis.effect.id} on {', '.join(each.hypothesis.elements)}"
-        for each in found.findings.named
-    ]
+    names = [f"{each.effect} on {', '.join(each.elements)}" for each in found.reported]
     axes.set_title("\n".join([f"verdict: {verdict_of(found).value}", *names]), fontsize="medium")
     axes.grid(axis="x", alpha=0.3)
     figure.legend(loc="outside lower center", ncols=3, fontsize="small")

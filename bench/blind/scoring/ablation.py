@@ -9,7 +9,8 @@ from typing import NamedTuple
 import numpy as np
 
 from cspm_ident.block_simulation import BlockSimulation, Input
-from cspm_ident.diagnosis.diagnose import Diagnosis, diagnose
+from cspm_ident.diagnosis.diagnose import diagnose
+from cspm_ident.diagnosis.diagnosis import Diagnosis
 from cspm_ident.diagnosis.selection.safeguards import ALL_SAFEGUARDS, Safeguards
 from cspm_ident.signals.measurement import Measurement
 from cspm_ident.signals.samples import Samples

@@ -1,4 +1,4 @@
-"""What a search says: hypotheses, how they stand, and what nothing explains."""
+"""Hypotheses of effects on elements, and what their coefficients allow."""
 
 from __future__ import annotations
 
@@ -9,21 +9,15 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from cspm_ident.diagnosis.regression.block_regression import Gain
-from cspm_ident.diagnosis.residuals.free_shapes import Driver
 from cspm_ident.diagnosis.residuals.regressors import Candidate
 from cspm_ident.diagnosis.thresholds import DEFAULT_THRESHOLDS, Thresholds
 from cspm_sim.effects import Effect
 
 Array = NDArray[np.float64]
-# A free function, what it gains and its share of the squares of its residual.
-Unknown = tuple[Driver, Gain, float]
 
 # Of what a finding explains. In blind recordings no finding was right (of 7) beside so much that
 # nothing explained.
 DOUBTFUL_SHARE = 0.1
-# Whose equation every tension enters.
-_FED_BY_ALL = frozenset({"bar", "winch_frame"})
 # More signals than any block of the machine has.
 _SIGNALS = 128
 
@@ -85,55 +79,6 @@ class Rival(NamedTuple):
         """What it says, for people."""
         beside = "" if self.beside is None else f" beside a wrong {self.beside.effect.id}"
         return f"{self.hypothesis.words}{beside}"
-
-
-class Named(NamedTuple):
-    """A hypothesis that was chosen.
-
-    Attributes:
-        hypothesis: what it says.
-        gain: of it in blocks that were not fitted, beyond all others that were chosen.
-        share: of the squared residual, in the places it acts on, that it takes away.
-        alternatives: what explains it nearly as well.
-    """
-
-    hypothesis: Hypothesis
-    gain: Gain
-    share: float
-    alternatives: tuple[Rival, ...]
-
-
-class Findings(NamedTuple):
-    """What a search found.
-
-    Attributes:
-        named: effects, the most important first.
-        unknown: free shapes that explain what no effect does, with their gain and share.
-        candidates: how many hypotheses were looked at.
-        chattering: cables whose tensions alternate from one reading to the next.
-    """
-
-    named: tuple[Named, ...]
-    unknown: tuple[Unknown, ...]
-    candidates: int
-    chattering: frozenset[str] = frozenset()
-
-    def is_doubtful(self, named: Named) -> bool:
-        """Return whether what nothing explains is no small part of what a finding does.
-
-        What is the same at all times is the mean of whatever function of the machine's motion is
-        there beside it, and no part of that; but it may have been drifting, or be the lesser. Nor
-        is anything sure of what is told by tensions that alternate from one reading to the next.
-        """
-        misread = self.chattering | _FED_BY_ALL if self.chattering else frozenset()
-        if misread & set(named.hypothesis.elements):
-            return True
-        gained = named.gain.total
-        constant = is_constant(named.hypothesis.effect)
-        return any(
-            gain.total > gained * (1.0 if constant and not driver.of_time else DOUBTFUL_SHARE)
-            for driver, gain, _ in self.unknown
-        )
 
 
 def is_constant(effect: Effect) -> bool:

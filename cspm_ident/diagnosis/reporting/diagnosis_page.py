@@ -10,8 +10,9 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from cspm_ident.diagnosis.diagnose import Diagnosis
-from cspm_ident.diagnosis.regression.hypothesis import Hypothesis, Named
+from cspm_ident.diagnosis.diagnosis import Diagnosis
+from cspm_ident.diagnosis.finding import Finding
+from cspm_ident.diagnosis.regression.hypothesis import Hypothesis
 from cspm_ident.diagnosis.reporting.evidence_figure import caption_of, driver_figure, overlay_figure
 from cspm_ident.diagnosis.reporting.machine_drawing import drawing
 from cspm_ident.diagnosis.reporting.machine_part import Part, part_behind, parts_of
@@ -133,11 +134,11 @@ def _where(found: Diagnosis) -> str:
 
 def _parts(found: Diagnosis) -> Iterable[Part]:
     cables = found.searched[0].machine.cable_names
-    for named in found.findings.named:
-        for element in named.hypothesis.elements:
-            yield from parts_of(named.hypothesis.effect, element, cables)
-    for driver, _, _ in found.findings.unknown:
-        yield part_behind(driver.place)
+    for finding in found.reported:
+        for element in finding.elements:
+            yield from parts_of(finding.hypothesis.effect, element, cables)
+    for each in found.unexplained:
+        yield part_behind(each.driver.place)
     for line in found.lines:
         yield part_behind(line.place)
 
@@ -165,19 +166,19 @@ def _evidence(found: Diagnosis) -> str:
 
 def _subjects(found: Diagnosis) -> Iterable[tuple[str, Sequence[Curve], str]]:
     """Yield headings, what to draw, and against which signal; empty: that which explains most."""
-    for named in found.findings.named:
-        own = [c for c in found.curves if _touches(named.hypothesis, c)]
+    for finding in found.reported:
+        own = [c for c in found.curves if _touches(finding.hypothesis, c)]
         own.sort(key=lambda curve: -curve.gained)
         shown = [c for k, c in enumerate(own[:_MOST_CURVES]) if k == 0 or c.gained > _GAINED]
-        yield named.hypothesis.words, shown, ""
-    for driver, _, _ in found.findings.unknown:
+        yield finding.hypothesis.words, shown, ""
+    for driver, *_ in found.unexplained:
         own = [c for c in found.curves if c.place == driver.place and driver.signal in c.signals]
         yield (
             f"unknown, a function of {driver.signal} of {driver.place.element}",
             own[:1],
             driver.signal,
         )
-    if not found.findings.named and not found.findings.unknown and found.curves:
+    if not found.reported and not found.unexplained and found.curves:
         largest = max(found.curves, key=_size)
         yield "nothing found; the residual that is largest against what was measured", [largest], ""
 
@@ -209,12 +210,12 @@ def _parameters(data: dict[str, Any]) -> str:
 
 def _hypotheses(found: Diagnosis, data: dict[str, Any]) -> str:
     rows: list[tuple[str, ...]] = []
-    for named, finding in zip(found.findings.named, named_in(data), strict=True):
-        rows += _ranked(named, finding)
-    for named in found.rejected:
-        size = _in_errors(named.gain.total, named.gain.error)
-        rows.append((named.hypothesis.words, "not kept", "", size, "no help on held-out data"))
-    for driver, gain, share in found.findings.unknown:
+    for finding, entry in zip(found.reported, named_in(data), strict=True):
+        rows += _ranked(finding, entry)
+    for finding in found.rejected:
+        size = _in_errors(finding.gain.total, finding.gain.error)
+        rows.append((finding.hypothesis.words, "not kept", "", size, "no help on held-out data"))
+    for driver, gain, share, _ in found.unexplained:
         name = f"a function of {driver.signal}, {driver.place.element}"
         size = _in_errors(gain.total, gain.error)
         rows.append((name, "unknown", "", size, f"{100 * share:.0f} %"))
@@ -222,29 +223,29 @@ def _hypotheses(found: Diagnosis, data: dict[str, Any]) -> str:
         name = f"periodic, {line.frequency:.2f} Hz, {line.place.element}"
         rows.append((name, "unknown", "", f"by chance {line.chance:.1g}", ""))
     if not rows:
-        return f"<p>None of {found.findings.candidates} stood.</p>"
+        return f"<p>None of {found.tested} stood.</p>"
     heads = ("hypothesis", "verdict", "probability", "gain in standard errors", "residual taken")
     count = (
-        f"<p>{found.findings.candidates} hypotheses were looked at. Probabilities are those among"
+        f"<p>{found.tested} hypotheses were looked at. Probabilities are those among"
         f" what explains the same, times {TRUSTED:g}: the share of findings without a rival that"
         " were right in blind recordings; a tenth of it beside as much that nothing explains.</p>"
     )
     return count + table_html(heads, rows, "hypotheses and their evidence")
 
 
-def _ranked(named: Named, finding: dict[str, Any]) -> Iterable[tuple[str, ...]]:
+def _ranked(finding: Finding, entry: dict[str, Any]) -> Iterable[tuple[str, ...]]:
     """Yield a finding's row and those of its alternatives, the best first."""
-    verdict = "tied" if named.alternatives else "found"
-    size = _in_errors(named.gain.total, named.gain.error)
-    likely, taken = f"{finding['probability']:.2f}", f"{100 * named.share:.0f} %"
-    yield named.hypothesis.words, verdict, likely, size, taken
-    rivals = zip(named.alternatives, finding["alternatives"], strict=True)
-    for rival, entry in sorted(rivals, key=lambda each: each[0].behind):
+    verdict = "tied" if finding.alternatives else "found"
+    size = _in_errors(finding.gain.total, finding.gain.error)
+    likely, taken = f"{entry['probability']:.2f}", f"{100 * finding.share:.0f} %"
+    yield finding.hypothesis.words, verdict, likely, size, taken
+    rivals = zip(finding.alternatives, entry["alternatives"], strict=True)
+    for rival, told in sorted(rivals, key=lambda each: each[0].behind):
         behind = f"{rival.behind:.1f} behind"
         yield (
             rival.words,
             "explains it as well",
-            f"{entry['probability']:.2f}",
+            f"{told['probability']:.2f}",
             behind,
             "",
         )
@@ -342,7 +343,7 @@ def _next(found: Diagnosis, data: dict[str, Any]) -> str:
             shown.setdefault(each["separating_experiment"], []).append(each["effect"])
     for name, effects in shown.items():
         steps.append(_experiment(f"To make {', '.join(effects)} testable", name, ""))
-    if found.findings.unknown:
+    if found.unexplained:
         steps.append("Describe what was found as unknown as an effect of your own.")
     if not steps:
         steps.append("Nothing has to be done. What was not testable needs other recordings.")

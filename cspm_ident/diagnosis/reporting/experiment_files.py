@@ -6,8 +6,7 @@ from collections.abc import Callable, Iterator
 from pathlib import Path
 from typing import Any
 
-from cspm_ident.diagnosis.diagnose import Diagnosis
-from cspm_ident.diagnosis.regression.hypothesis import members_of
+from cspm_ident.diagnosis.diagnosis import Diagnosis
 from cspm_ident.diagnosis.reporting.verdict import IMPROVED, named_in
 from cspm_ident.experiment.choice import Question, best_answer, most_showing, safe_plans
 from cspm_msgs_py.scenario import Scenario
@@ -87,9 +86,8 @@ def _scenario_text(scenario: Scenario) -> str:
 
 def _ties(found: Diagnosis, data: dict[str, Any]) -> Iterator[tuple[dict[str, Any], Question, str]]:
     """Yield every alternative's entry, what would tell it apart, and that in words."""
-    for named, finding in zip(found.findings.named, named_in(data), strict=True):
-        members = members_of(found.weights, named.hypothesis)
-        truth = {candidate: found.weights[candidate][0] for candidate in members}
-        for rival, entry in zip(named.alternatives, finding["alternatives"], strict=True):
-            title = f"Tells {named.hypothesis.words} from {rival.words}"
+    for finding, told in zip(found.reported, named_in(data), strict=True):
+        truth = {own.candidate: own.values for own in finding.coefficients}
+        for rival, entry in zip(finding.alternatives, told["alternatives"], strict=True):
+            title = f"Tells {finding.hypothesis.words} from {rival.words}"
             yield entry, Question(truth, rival.candidates), title

@@ -4,16 +4,13 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
-from cspm_ident.diagnosis.diagnose import Diagnosis
-from cspm_ident.diagnosis.regression.hypothesis import Named, members_of
+from cspm_ident.diagnosis.diagnosis import Diagnosis
+from cspm_ident.diagnosis.finding import Finding, Improvement, Onset, Region
+from cspm_ident.diagnosis.parameter import Coefficients, Parameter
 from cspm_ident.diagnosis.reporting.machine_part import Kind, kind_of
 from cspm_ident.diagnosis.reporting.quantity import amount_words
-from cspm_ident.diagnosis.reporting.statement import Number, channel_of, numbers_of
-from cspm_ident.diagnosis.residuals.regressors import Candidate
-from cspm_ident.diagnosis.selection.onset import Onset
-from cspm_ident.diagnosis.selection.region import Region
+from cspm_ident.diagnosis.reporting.statement import channel_of
 from cspm_ident.diagnosis.validation.holdout_residuals import HeldOut
-from cspm_ident.diagnosis.validation.holdout_simulation import Worth
 from cspm_sim.effects import Block, Effect, Elements
 
 _DOUBT = (
@@ -27,17 +24,16 @@ _AT_NOISE = 1.5
 _AWAY = 0.8
 
 
-def statement_of(diagnosis: Diagnosis, k: int) -> str:
-    """Return the k-th finding: what has what, how much, since when, where, and what it is worth."""
-    named, detail = diagnosis.findings.named[k], diagnosis.details[k]
-    effect = named.hypothesis.effect
-    doubt = _FAINT if detail.faint else ""
-    doubt += _DOUBT if diagnosis.findings.is_doubtful(named) else ""
-    where = f" It shows where {region_words(detail.region)}." if detail.region is not None else ""
+def statement_of(diagnosis: Diagnosis, finding: Finding) -> str:
+    """Return what has what, how much, since when, where, and how far it improves the model."""
+    effect, region = finding.hypothesis.effect, finding.region
+    doubt = _FAINT if finding.is_faint else ""
+    doubt += _DOUBT if finding.is_doubtful else ""
+    where = f" It shows where {region_words(region)}." if region is not None else ""
     return (
-        f"{_subject(effect, named.hypothesis.elements)} {_difference(effect)}:"
-        f" {_sizes(diagnosis, named)}.{_since(named, detail.onset)}{_elsewhere(diagnosis, named)}"
-        f" {_worth(diagnosis, named, detail.worth)}{where}{doubt}"
+        f"{_subject(effect, finding.elements)} {_difference(effect)}:"
+        f" {_sizes(finding)}.{_since(finding)}{_elsewhere(diagnosis, finding)}"
+        f" {_improvement(diagnosis, finding)}{where}{doubt}"
     )
 
 
@@ -63,21 +59,20 @@ def _difference(effect: Effect) -> str:
     return f"{effect.words} that the model does not have"
 
 
-def _sizes(diagnosis: Diagnosis, named: Named) -> str:
+def _sizes(finding: Finding) -> str:
     """Return the parameters of every element, once where all have the same."""
-    members = members_of(diagnosis.weights, named.hypothesis)
-    told = {c.element: _size(diagnosis, c) for c in members}
+    told = {own.candidate.element: _size(finding, own) for own in finding.coefficients}
     if len(set(told.values())) == 1:
         return next(iter(told.values()))
     return "; ".join(f"{element} {size}" for element, size in told.items())
 
 
-def _size(diagnosis: Diagnosis, candidate: Candidate) -> str:
+def _size(finding: Finding, own: Coefficients) -> str:
     """Return the parameters of one element, of those searched on a grid only where all are.
 
     Of several those that may as well be nothing are listed without a number.
     """
-    effect, numbers = candidate.effect, numbers_of(diagnosis, candidate)
+    effect, numbers = own.candidate.effect, finding.parameters_on(own)
     known = [n for n in numbers if n.low < n.high] or numbers
     if all(n.is_open for n in known):
         told = ", ".join(f"{_name(effect, n)} {amount_words(n.value, n.unit)}" for n in known)
@@ -90,38 +85,38 @@ def _size(diagnosis: Diagnosis, candidate: Candidate) -> str:
     return f"{told}, {rest} not surely" if rest else told
 
 
-def _may_be_absent(effect: Effect, number: Number) -> bool:
+def _may_be_absent(effect: Effect, number: Parameter) -> bool:
     """Return whether a parameter's interval holds the value at which it does nothing."""
     (absent,) = (p.absent for p in effect.parameters if p.name == number.name)
     return absent is not None and number.low <= absent <= number.high
 
 
-def _name(effect: Effect, number: Number) -> str:
+def _name(effect: Effect, number: Parameter) -> str:
     """Return a parameter's name; of one that is added to the file's number, that it is."""
     (absent,) = (p.absent for p in effect.parameters if p.name == number.name)
     added = effect.physics.alter is not None and absent == 0.0
     return f"{number.name.replace('_', ' ')}{' off by' if added else ''}"
 
 
-def _since(named: Named, onset: Onset | None) -> str:
+def _since(finding: Finding) -> str:
     """Return when it began, where a beginning was looked for."""
+    onset: Onset | None = finding.onset
     if onset is not None:
         return f" It begins at {onset.time:.1f} s ({onset.low:.1f} to {onset.high:.1f} s)."
-    block = named.hypothesis.onset
+    block = finding.hypothesis.onset
     if block:
         return f" It begins with block {block} of the recordings."
     # A number of the file is wrong all the time: no beginning is looked for.
-    return (
-        "" if named.hypothesis.effect.physics.alter is not None else " It is there from the start."
-    )
+    number_of_file = finding.hypothesis.effect.physics.alter is not None
+    return "" if number_of_file else " It is there from the start."
 
 
-def _elsewhere(diagnosis: Diagnosis, named: Named) -> str:
+def _elsewhere(diagnosis: Diagnosis, finding: Finding) -> str:
     """Return that no other element has it, where at least as much of it would have been told."""
-    effect = named.hypothesis.effect
+    effect = finding.hypothesis.effect
     if effect.block not in (Block.WINCH, Block.CABLE) or len(effect.linear) != 1:
         return ""
-    others = set(diagnosis.searched[0].machine.cable_names) - set(named.hypothesis.elements)
+    others = set(diagnosis.searched[0].machine.cable_names) - set(finding.elements)
     limits = {
         each.element: each.least
         for each in diagnosis.limits
@@ -131,8 +126,7 @@ def _elsewhere(diagnosis: Diagnosis, named: Named) -> str:
         return ""
     (parameter,) = effect.linear
     absent = parameter.absent or 0.0
-    members = members_of(diagnosis.weights, named.hypothesis)
-    numbers = [n for c in members for n in numbers_of(diagnosis, c) if n.name == parameter.name]
+    numbers = [n for n in finding.parameters if n.name == parameter.name]
     least = max(limits[name] for name in others)
     if least > min(abs(n.value - absent) for n in numbers):
         return ""
@@ -144,15 +138,15 @@ def _suspected(diagnosis: Diagnosis, effect: Effect) -> set[str]:
     """Return the elements on which an effect was found, or explains what was found as well."""
     hypotheses = [
         each
-        for named in diagnosis.findings.named
-        for each in (named.hypothesis, *(rival.hypothesis for rival in named.alternatives))
+        for finding in diagnosis.reported
+        for each in (finding.hypothesis, *(rival.hypothesis for rival in finding.alternatives))
     ]
     return {name for each in hypotheses if each.effect.id == effect.id for name in each.elements}
 
 
-def _worth(diagnosis: Diagnosis, named: Named, worth: Worth | None) -> str:
+def _improvement(diagnosis: Diagnosis, finding: Finding) -> str:
     """Return what it does to held-out data, in its own residual and simulated."""
-    best = max(_concerned(diagnosis, named), key=lambda fit: fit.before / max(fit.after, 1e-300))
+    best = max(_concerned(diagnosis, finding), key=lambda fit: fit.before / max(fit.after, 1e-300))
     noise = "at the noise floor"
     if best.after > _AT_NOISE * best.noise:
         noise = f"where noise is {_share(best, best.noise)}"
@@ -162,11 +156,11 @@ def _worth(diagnosis: Diagnosis, named: Named, worth: Worth | None) -> str:
     before, after = _share(best, best.before), _share(best, best.after)
     moves = "falls" if best.after < best.before else "rises"
     course = f"stays at {after}" if before == after else f"{moves} from {before} to {after}"
-    together = sum(best in _concerned(diagnosis, each) for each in diagnosis.findings.named) > 1
+    together = sum(best in _concerned(diagnosis, each) for each in diagnosis.reported) > 1
     return (
         f"With {'all that was found' if together else 'it'} the held-out error of"
         f" {channel_of(best)} {course} of what was measured{away}, {noise};"
-        f" {_simulated_worth(worth)}."
+        f" {_simulated(finding.improvement)}."
     )
 
 
@@ -175,14 +169,14 @@ def _share(fit: HeldOut, value: float) -> str:
     return f"{percent:.2g} %" if percent < 100.0 else f"{percent:.0f} %"
 
 
-def _simulated_worth(worth: Worth | None) -> str:
-    if worth is None:
+def _simulated(improvement: Improvement | None) -> str:
+    if improvement is None:
         return "what was recorded does not allow to simulate it"
-    if worth.with_it >= worth.without:
+    if improvement.with_it >= improvement.without:
         return "simulations of the held-out data do not improve with it"
-    unit, both = worth.output.unit, (worth.without, worth.with_it)
-    before, after = (amount_words(each, unit) for each in both)
-    return f"simulated, the error of {worth.output.name} falls from {before} to {after}"
+    both = improvement.without, improvement.with_it
+    before, after = (amount_words(each, improvement.unit) for each in both)
+    return f"simulated, the error of {improvement.channel} falls from {before} to {after}"
 
 
 def region_words(region: Region) -> str:
@@ -195,13 +189,11 @@ def region_words(region: Region) -> str:
     )
 
 
-def _concerned(diagnosis: Diagnosis, named: Named) -> Sequence[HeldOut]:
+def _concerned(diagnosis: Diagnosis, finding: Finding) -> Sequence[HeldOut]:
     """Return the residuals of a finding's own elements that it changes, else all that it may."""
-    effect, elements = named.hypothesis.effect, named.hypothesis.elements
-    places = {
-        regression.channel
-        for regression in (effect.signature.regression, *effect.signature.partners)
-    }
+    effect, elements = finding.hypothesis.effect, finding.elements
+    signature = effect.signature
+    places = {r.channel for r in (signature.regression, *signature.partners)}
     fits = [f for f in diagnosis.fit if f.place.element in (*elements, "bar")]
     fits = [f for f in fits if f.place.channel in places] or fits or list(diagnosis.fit)
     own = [f for f in fits if f.place.element in elements and f.after < f.before]

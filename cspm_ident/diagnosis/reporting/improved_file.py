@@ -7,9 +7,7 @@ import io
 import numpy as np
 from ruamel.yaml.comments import CommentedMap, CommentedSeq
 
-from cspm_ident.diagnosis.diagnose import Diagnosis
-from cspm_ident.diagnosis.regression.hypothesis import members_of
-from cspm_ident.diagnosis.reporting.statement import numbers_of
+from cspm_ident.diagnosis.diagnosis import Diagnosis
 from cspm_ident.fitted_testbed import FittedNumber
 from cspm_msgs_py.testbed import TestbedFile, parse_testbed
 from cspm_msgs_py.yaml_file import round_trip
@@ -33,13 +31,14 @@ def improved_testbed(diagnosis: Diagnosis, source: str) -> TestbedFile:
     content = yaml.load(diagnosis.searched[0].testbed.text)
     entries = content.setdefault("effects", CommentedSeq())
     hashes = tuple(measurement.sha256 for measurement in diagnosis.searched)
-    for named in diagnosis.findings.named:
-        for candidate in members_of(diagnosis.weights, named.hypothesis):
-            entry = CommentedMap({"effect": candidate.effect_id, "elements": [candidate.element]})
+    for finding in diagnosis.reported:
+        for own in finding.coefficients:
+            elements = [own.candidate.element]
+            entry = CommentedMap({"effect": finding.effect, "elements": elements})
             entry["parameters"] = CommentedMap(
                 {
                     n.name: FittedNumber(n.value, n.ci95 or _UNBOUNDED, hashes).content()
-                    for n in numbers_of(diagnosis, candidate)
+                    for n in finding.parameters_on(own)
                 }
             )
             entries.append(entry)

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import Any
 
-from cspm_ident.diagnosis.diagnose import Diagnosis
+from cspm_ident.diagnosis.diagnosis import Diagnosis
 from cspm_ident.diagnosis.reporting.statement import channel_of
 from cspm_ident.diagnosis.validation.residual_power import Power, lost_powers
 from cspm_ident.offline_page import table_html

@@ -2,116 +2,29 @@
 
 from __future__ import annotations
 
-from typing import NamedTuple
-
 import numpy as np
 from numpy.typing import NDArray
 
 from cspm_ident.block_simulation import Input
-from cspm_ident.diagnosis.diagnose import Diagnosis, Shape
+from cspm_ident.diagnosis.diagnosis import Diagnosis
+from cspm_ident.diagnosis.finding import Shape, Unexplained
 from cspm_ident.diagnosis.reporting.formula_hint import is_even, sketch
 from cspm_ident.diagnosis.residuals.free_shapes import Driver
-from cspm_ident.diagnosis.residuals.regressors import Candidate
 from cspm_ident.diagnosis.residuals.spectral_lines import Line
 from cspm_ident.diagnosis.validation.holdout_residuals import HeldOut
 from cspm_ident.diagnosis.validation.holdout_simulation import SimulatedFit
 from cspm_ident.diagnosis.validation.residual_power import Power
 from cspm_msgs_py.dofs import DOFS
-from cspm_sim.effects import Channel, EffectParameter
+from cspm_sim.effects import Channel
 
 Array = NDArray[np.float64]
 
 
-class Number(NamedTuple):
-    """A parameter of a finding.
-
-    Attributes:
-        name: public name.
-        value: in `unit`.
-        unit: SI.
-        low, high: ends of its 95 % interval as far as the catalogue allows; equal to the value
-            where it was searched on a grid, or is doubtful.
-        is_open: whether they are all that the catalogue allows, the data telling nothing of it.
-    """
-
-    name: str
-    value: float
-    unit: str
-    low: float
-    high: float
-    is_open: bool = False
-
-    @property
-    def ci95(self) -> tuple[float, float] | None:
-        """Its 95 % interval, if it has one."""
-        return (self.low, self.high) if self.low < self.high and not self.is_open else None
-
-
-def numbers_of(diagnosis: Diagnosis, candidate: Candidate) -> list[Number]:
-    """Return the parameters of an effect on one element.
-
-    What is doubtful has no interval: noise says how far others would come with the same law, and
-    not by how much what is unknown beside it moves them all.
-    """
-    weights, widths = diagnosis.weights[candidate]
-    effect = candidate.effect
-    values = effect.values(weights.tolist(), **candidate.nonlinear)
-    if _is_doubtful(diagnosis, candidate):
-        own = ((p, values[p.name]) for p in effect.parameters)
-        return [Number(p.name, value, p.unit, value, value) for p, value in own]
-    if not np.all(np.isfinite(widths)):
-        return [_number(p, values[p.name], p.minimum, p.maximum) for p in effect.parameters]
-    most = np.maximum(weights + widths, diagnosis.spectra.get(candidate, -np.inf))
-    ends = _ends(candidate, weights, weights - widths, most)
-    return [
-        _number(p, values[p.name], max(p.minimum, low), min(p.maximum, high))
-        for p, (low, high) in zip(effect.parameters, ends, strict=True)
-    ]
-
-
-def _ends(
-    candidate: Candidate, weights: Array, low: Array, high: Array
-) -> list[tuple[float, float]]:
-    """Return the intervals of an effect's parameters from those of its weights.
-
-    What each weight moves a parameter down and up within its own interval, in squares (GUM, JCGM
-    100:2008, 5.1.2): an amplitude is as sure whatever its phase is.
-    """
-    names = [p.name for p in candidate.effect.parameters]
-
-    def values(moved: Array) -> Array:
-        found = candidate.effect.values(moved.tolist(), **candidate.nonlinear)
-        return np.array([found[name] for name in names])
-
-    told = values(weights)
-    squares = np.zeros((2, len(names)))
-    for k in range(len(weights)):
-        ends = [low[k], high[k], np.clip(0.0, low[k], high[k])]
-        moved = [values(np.where(np.arange(len(weights)) == k, end, weights)) for end in ends]
-        apart = np.array([told, *moved]) - told
-        squares += np.square([apart.min(axis=0), apart.max(axis=0)])
-    return list(zip(told - np.sqrt(squares[0]), told + np.sqrt(squares[1]), strict=True))
-
-
-def _number(own: EffectParameter, value: float, low: float, high: float) -> Number:
-    return Number(own.name, value, own.unit, low, high, own.is_open(low, high))
-
-
-def _is_doubtful(diagnosis: Diagnosis, candidate: Candidate) -> bool:
-    """Return whether the finding that a candidate is part of is doubtful."""
-    findings = diagnosis.findings
-    return any(
-        candidate.effect_id == named.hypothesis.effect.id
-        and candidate.element in named.hypothesis.elements
-        and findings.is_doubtful(named)
-        for named in findings.named
-    )
-
-
-def unknown_statement(diagnosis: Diagnosis, k: int) -> str:
-    """Return the k-th thing that is missing and cannot be named as one sentence."""
-    shape, (driver, _, share) = diagnosis.shapes[k], diagnosis.findings.unknown[k]
-    formula = formula_of(shape)
+def unknown_statement(diagnosis: Diagnosis, unexplained: Unexplained) -> str:
+    """Return one sentence on something that is missing and that no effect explains."""
+    driver, _, share, shape = unexplained
+    assert shape is not None
+    formula = formula_of(driver, shape)
     hint = f"; as a hint, it runs like {formula}" if formula else ""
     size = "".join(
         f", {100.0 * np.sqrt(share) * fit.after / max(fit.measured, 1e-300):.2g} % of what was"
@@ -124,7 +37,7 @@ def unknown_statement(diagnosis: Diagnosis, k: int) -> str:
         f" that nothing in the catalogue explains: a function of {driver.signal}, from"
         f" {shape.values.min():.3g} to {shape.values.max():.3g}"
         f" {_unit_in(driver)}, takes {100 * share:.0f} % of the squared"
-        f" residual{size}{hint}{_by_direction(shape)}."
+        f" residual{size}{hint}{_by_direction(driver, shape)}."
     )
 
 
@@ -134,9 +47,8 @@ def _unit_in(driver: Driver) -> str:
     return _UNITS.get(driver.place.channel, "N·m" if turns else "N")
 
 
-def _by_direction(shape: Shape) -> str:
+def _by_direction(driver: Driver, shape: Shape) -> str:
     """Return what an even function of a shaft's speed means: friction itself is odd."""
-    driver = shape.driver
     of_speed = driver.place.channel is Channel.SHAFT and driver.signal.startswith("speed ")
     if not of_speed or not is_even(shape.knots, shape.values):
         return ""
@@ -174,9 +86,9 @@ def line_statement(line: Line) -> str:
     )
 
 
-def formula_of(shape: Shape) -> str | None:
-    """Return a formula that a shape follows, if a simple one does."""
-    return sketch(shape.knots, shape.values, shape.driver.signal.split(" [")[0])
+def formula_of(driver: Driver, shape: Shape) -> str | None:
+    """Return a formula that a free function of a signal follows, if a simple one does."""
+    return sketch(shape.knots, shape.values, driver.signal.split(" [")[0])
 
 
 def channel_of(fit: HeldOut | Power) -> str:

@@ -8,19 +8,18 @@ from math import exp
 from pathlib import Path
 from typing import Any
 
-from cspm_ident.diagnosis.diagnose import Diagnosis
-from cspm_ident.diagnosis.regression.hypothesis import Findings, Named, Rival, members_of
+from cspm_ident.diagnosis.diagnosis import Diagnosis
+from cspm_ident.diagnosis.finding import Finding, Region, Unexplained
+from cspm_ident.diagnosis.regression.hypothesis import Rival
 from cspm_ident.diagnosis.reporting.finding_statement import statement_of
 from cspm_ident.diagnosis.reporting.statement import (
     channel_of,
     drive_of,
     formula_of,
     line_statement,
-    numbers_of,
     unknown_statement,
 )
 from cspm_ident.diagnosis.residuals.spectral_lines import Line
-from cspm_ident.diagnosis.selection.region import Region
 from cspm_ident.diagnosis.validation.holdout_residuals import HeldOut
 from cspm_ident.diagnosis.validation.holdout_simulation import SimulatedFit
 from cspm_ident.diagnosis.validation.residual_power import Power, lost_powers
@@ -61,26 +60,25 @@ SENTENCES = {
 
 def verdict_of(diagnosis: Diagnosis) -> Verdict:
     """Return the verdict in one word; findings that are doubtful count for nothing."""
-    found = diagnosis.findings
-    named = [each for each in found.named if not found.is_doubtful(each)]
-    if not named:
-        if diagnosis.findings.unknown or diagnosis.lines:
+    certain = [each for each in diagnosis.reported if not each.is_doubtful]
+    if not certain:
+        if diagnosis.unexplained or diagnosis.lines:
             return Verdict.UNKNOWN
         return Verdict.CONSISTENT if diagnosis.places else Verdict.NOT_EXCITED
-    if any(each.alternatives for each in named):
+    if any(each.alternatives for each in certain):
         return Verdict.TIE
-    if all(each.hypothesis.effect.physics.alter is not None for each in named):
+    if all(each.hypothesis.effect.physics.alter is not None for each in certain):
         return Verdict.PARAMETER
     return Verdict.EFFECT
 
 
-def probability_of(found: Findings, named: Named) -> float:
+def probability_of(finding: Finding) -> float:
     """Return how probable a finding is, beside what explains the same and what nobody thought of.
 
     A rival's odds are those of a normal deviate of as many standard deviations as it lies behind.
     """
-    trusted = TRUSTED * DOUBTED if found.is_doubtful(named) else TRUSTED
-    return trusted / (1.0 + sum(_odds(rival) for rival in named.alternatives))
+    trusted = TRUSTED * DOUBTED if finding.is_doubtful else TRUSTED
+    return trusted / (1.0 + sum(_odds(rival) for rival in finding.alternatives))
 
 
 def _odds(rival: Rival) -> float:
@@ -122,13 +120,13 @@ def diagnosis_data(diagnosis: Diagnosis, testbed: Path | None = None) -> dict[st
         "thresholds": diagnosis.thresholds.values,
         "findings": _findings(diagnosis),
         "not_excited": [
-            {"effect": name, "elements": list(elements)} for name, elements in diagnosis.silent
+            {"effect": name, "elements": list(elements)} for name, elements in diagnosis.not_excited
         ],
         "detection_limits": [limit._asdict() for limit in diagnosis.limits],
         "fit": [_simulated_fit(each) for each in diagnosis.simulated],
         "residuals": [_equation_fit(each) for each in diagnosis.fit],
         "energy": [_power(each) for each in lost_powers(diagnosis.curves)],
-        "model": IMPROVED if diagnosis.findings.named else None,
+        "model": IMPROVED if diagnosis.reported else None,
     }
 
 
@@ -143,14 +141,14 @@ def _findings(diagnosis: Diagnosis) -> list[dict[str, Any]]:
     What is doubtful does not come first: it stands behind the unknown that makes it so, unless
     something sure is told before and the unknown is the lesser.
     """
-    found = diagnosis.findings
-    named = [_finding(diagnosis, k) for k in range(len(found.named))]
+    found = diagnosis.reported
+    named = [_finding(diagnosis, each) for each in found]
     # They are in the order of their gains.
-    ahead = next((k for k, e in enumerate(found.named) if found.is_doubtful(e)), len(named))
+    ahead = next((k for k, each in enumerate(found) if each.is_doubtful), len(found))
     if ahead:
-        most = max((gain.total for _, gain, _ in found.unknown), default=0.0)
-        ahead = sum(each.gain.total >= most for each in found.named)
-    unknown = [_unknown(diagnosis, k) for k in range(len(diagnosis.shapes))]
+        most = max((each.gain.total for each in diagnosis.unexplained), default=0.0)
+        ahead = sum(each.gain.total >= most for each in found)
+    unknown = [_unknown(diagnosis, each) for each in diagnosis.unexplained]
     return [*named[:ahead], *unknown, *map(_line, diagnosis.lines), *named[ahead:]]
 
 
@@ -163,29 +161,26 @@ def _recording(role: str, measurement: Measurement) -> dict[str, Any]:
     }
 
 
-def _finding(diagnosis: Diagnosis, k: int) -> dict[str, Any]:
-    named, detail = diagnosis.findings.named[k], diagnosis.details[k]
-    onset = detail.onset
-    hypothesis, probability = named.hypothesis, probability_of(diagnosis.findings, named)
+def _finding(diagnosis: Diagnosis, finding: Finding) -> dict[str, Any]:
+    onset, probability = finding.onset, probability_of(finding)
     return {
-        "subsystem": hypothesis.effect.block.value,
-        "elements": list(hypothesis.elements),
-        "effect": hypothesis.effect.id,
+        "subsystem": finding.hypothesis.effect.block.value,
+        "elements": list(finding.elements),
+        "effect": finding.effect,
         "probability": probability,
-        "statement": statement_of(diagnosis, k),
+        "statement": statement_of(diagnosis, finding),
         "onset_s": onset.time if onset is not None else None,
         "onset_ci95_s": [onset.low, onset.high] if onset is not None else None,
-        "region": _region(detail.region),
+        "region": _region(finding.region),
         "parameters": [
             {
-                "element": candidate.element,
+                "element": n.element,
                 "name": n.name,
                 "value": n.value,
                 "unit": n.unit,
                 "ci95": None if n.ci95 is None else list(n.ci95),
             }
-            for candidate in members_of(diagnosis.weights, hypothesis)
-            for n in numbers_of(diagnosis, candidate)
+            for n in finding.parameters
         ],
         "alternatives": [
             {
@@ -195,7 +190,7 @@ def _finding(diagnosis: Diagnosis, k: int) -> dict[str, Any]:
                 "probability": probability * _odds(rival),
                 "separating_experiment": None,
             }
-            for rival in named.alternatives
+            for rival in finding.alternatives
         ],
     }
 
@@ -223,21 +218,21 @@ def _line(line: Line) -> dict[str, Any]:
     }
 
 
-def _unknown(diagnosis: Diagnosis, k: int) -> dict[str, Any]:
-    shape = diagnosis.shapes[k]
-    driver = shape.driver
+def _unknown(diagnosis: Diagnosis, unexplained: Unexplained) -> dict[str, Any]:
+    driver, _, _, shape = unexplained
+    assert shape is not None
     return {
         "subsystem": _BLOCKS[driver.place.channel].value,
         "elements": [driver.place.element],
         "effect": UNKNOWN,
         "probability": None,
-        "statement": unknown_statement(diagnosis, k),
+        "statement": unknown_statement(diagnosis, unexplained),
         "onset_s": None,
         "region": {
             "driver": driver.signal,
             "at": shape.knots.tolist(),
             "adds": shape.values.tolist(),
-            "hint": formula_of(shape),
+            "hint": formula_of(driver, shape),
         },
         "parameters": [],
         "alternatives": [],

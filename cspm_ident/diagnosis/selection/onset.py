@@ -3,11 +3,11 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
+from cspm_ident.diagnosis.finding import Onset
 from cspm_ident.diagnosis.regression.block_gram import gather
 from cspm_ident.diagnosis.regression.block_regression import Sums
 from cspm_ident.diagnosis.residuals.regressors import Candidate
@@ -17,14 +17,6 @@ from cspm_ident.diagnosis.thresholds import DEFAULT_THRESHOLDS, Thresholds
 Index = NDArray[np.intp]
 # Length of the blocks in which an onset is looked for more closely.
 FINE_S = 0.1
-
-
-class Onset(NamedTuple):
-    """When an effect began [s], and from when to when it may have."""
-
-    time: float
-    low: float
-    high: float
 
 
 def first_block(sums: Sums, base: Index, own: Index) -> tuple[int, float]:

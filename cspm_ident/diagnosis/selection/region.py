@@ -3,11 +3,11 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
+from cspm_ident.diagnosis.finding import Region
 from cspm_ident.diagnosis.residuals.free_shapes import Driver
 from cspm_ident.diagnosis.residuals.regressors import Candidate
 from cspm_ident.diagnosis.residuals.residual_equation import Equation
@@ -17,23 +17,6 @@ Array = NDArray[np.float64]
 
 # Of a signal's values, each of equally many.
 _BINS = 50
-
-
-class Region(NamedTuple):
-    """Values of a signal at which a finding shows.
-
-    Attributes:
-        driver: the signal, with its unit.
-        low, high: ends of the interval.
-        share: of the data that lies in it.
-        held: share of what the finding takes from the squared residual that lies in it.
-    """
-
-    driver: str
-    low: float
-    high: float
-    share: float
-    held: float
 
 
 def region_of(

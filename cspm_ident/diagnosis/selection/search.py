@@ -9,13 +9,11 @@ from dataclasses import replace
 import numpy as np
 from numpy.typing import NDArray
 
+from cspm_ident.diagnosis.finding import Finding, Unexplained
 from cspm_ident.diagnosis.regression.block_gram import Evidence
 from cspm_ident.diagnosis.regression.block_regression import Gain, Sums, gain_of
 from cspm_ident.diagnosis.regression.hypothesis import (
-    Findings,
     Hypothesis,
-    Named,
-    Unknown,
     boldness,
     has_one_system,
     is_number,
@@ -39,6 +37,7 @@ from cspm_ident.diagnosis.selection.pair_exchange import pair_instead
 from cspm_ident.diagnosis.selection.parsimony import simplest
 from cspm_ident.diagnosis.selection.rivals import rivals_of
 from cspm_ident.diagnosis.selection.screening import short_list
+from cspm_ident.diagnosis.selection.search_result import SearchResult
 from cspm_ident.diagnosis.selection.unexplained import unexplained
 from cspm_ident.diagnosis.thresholds import DEFAULT_THRESHOLDS, Thresholds
 
@@ -68,13 +67,13 @@ class Search:
         self.sureness = Sureness(self.fits, candidates)
         self.scopes = Scopes(self.fits, self.sureness, candidates)
 
-    def run(self) -> Findings:
+    def run(self) -> SearchResult:
         """Choose effects one by one, each with all elements on which it surely acts."""
         chosen = self._chosen()
-        named = [self._judged(hypothesis, chosen) for hypothesis in chosen]
-        named.sort(key=lambda each: -each.gain.total)
+        found = [self._judged(hypothesis, chosen) for hypothesis in chosen]
+        found.sort(key=lambda each: -each.gain.total)
         self._progress("what is left")
-        return Findings(tuple(named), self.unknown(chosen), len(self._effects))
+        return SearchResult(tuple(found), self.unexplained(chosen), len(self._effects))
 
     def first(self) -> Hypothesis | None:
         """Return what explains most, if anything surely is there."""
@@ -314,30 +313,31 @@ class Search:
     ) -> list[Hypothesis]:
         return rivals_of(self.evidence, self.sums, base, hypothesis, free)
 
-    def judged_again(self, named: Named, chosen: Sequence[Hypothesis]) -> Named:
+    def judged_again(self, finding: Finding, chosen: Sequence[Hypothesis]) -> Finding:
         """Return a finding beside what is left of what was found, with what explains the same now.
 
         What was given up says no more what the finding is, and may be what it is.
         """
-        again = self._judged(named.hypothesis, chosen)
-        known = {rival.words for rival in named.alternatives}
+        again = self._judged(finding.hypothesis, chosen)
+        known = {rival.words for rival in finding.alternatives}
         further = (rival for rival in again.alternatives if rival.words not in known)
-        return again._replace(alternatives=(*named.alternatives, *further))
+        alternatives = (*finding.alternatives, *further)
+        return replace(finding, gain=again.gain, share=again.share, alternatives=alternatives)
 
-    def _judged(self, hypothesis: Hypothesis, chosen: Sequence[Hypothesis]) -> Named:
+    def _judged(self, hypothesis: Hypothesis, chosen: Sequence[Hypothesis]) -> Finding:
         others = [h for h in chosen if h is not hypothesis]
         base, own = self.fits.columns(others), self.fits.own_columns(hypothesis)
         gain = self.sums.gain(base, own)
-        return Named(
+        return Finding(
             hypothesis,
             gain,
             self.sureness.share(base, own),
             tuple(alternatives_of(self.fits, self._effects, hypothesis, others)),
         )
 
-    def unknown(
+    def unexplained(
         self, chosen: Sequence[Hypothesis], sound: Sequence[Hypothesis] = ()
-    ) -> tuple[Unknown, ...]:
+    ) -> tuple[Unexplained, ...]:
         """Return free functions of what hypotheses leave; see `unexplained`.
 
         Nor is what sound clocks may have done beside them unknown, though it be no gain elsewhere:
@@ -354,7 +354,7 @@ class Search:
 
     def _unexplained(
         self, chosen: Sequence[Hypothesis], sound: Sequence[Hypothesis]
-    ) -> tuple[Unknown, ...]:
+    ) -> tuple[Unexplained, ...]:
         clocks = [h for h in chosen if self.fits.is_negligible(h, [*chosen, *sound])]
         told = [h for h in chosen if h not in clocks]
         return unexplained(self.evidence, self.sums, self.sureness, told, [*clocks, *sound])

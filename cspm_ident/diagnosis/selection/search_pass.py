@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from cspm_ident.diagnosis.regression.block_gram import gather
 from cspm_ident.diagnosis.regression.block_regression import FOLDS
-from cspm_ident.diagnosis.regression.hypothesis import Findings, Hypothesis
+from cspm_ident.diagnosis.regression.hypothesis import Hypothesis
 from cspm_ident.diagnosis.regression.time_constants import told_within
 from cspm_ident.diagnosis.residuals.data_split import first_part, last_part, span_of
 from cspm_ident.diagnosis.residuals.free_shapes import Knots
@@ -20,6 +20,7 @@ from cspm_ident.diagnosis.residuals.residual_equation import Equation, in_noise,
 from cspm_ident.diagnosis.residuals.spectral_lines import Line, lines_of, with_lines
 from cspm_ident.diagnosis.selection.safeguards import Safeguards
 from cspm_ident.diagnosis.selection.search import Search
+from cspm_ident.diagnosis.selection.search_result import SearchResult
 from cspm_ident.diagnosis.thresholds import DEFAULT_THRESHOLDS, Thresholds
 from cspm_ident.signals.measurement import Measurement
 from cspm_msgs_py.errors import InputError
@@ -71,7 +72,7 @@ def searched_for(
     progress: Progress,
     safeguards: Safeguards,
     thresholds: Thresholds = DEFAULT_THRESHOLDS,
-) -> tuple[Look, Findings]:
+) -> tuple[Look, SearchResult]:
     """Return what a search finds, and the search.
 
     The law of a cable holds to first order about its tension. One that was drawn from a torque has
@@ -97,7 +98,7 @@ def searched_for(
             look = _look(recordings, supposed, progress, safeguards, thresholds)
     found = look.search.run()
     if recordings.are_drawn:
-        supposed = _of_winches(look.search, [each.hypothesis for each in found.named])
+        supposed = _of_winches(look.search, [each.hypothesis for each in found.findings])
         if not supposed.keys() <= look.supposed.keys():
             del look
             look = _look(recordings, supposed, progress, safeguards, thresholds)

@@ -7,9 +7,10 @@ from collections.abc import Iterable, Iterator, Sequence
 import numpy as np
 from numpy.typing import NDArray
 
+from cspm_ident.diagnosis.finding import Unexplained
 from cspm_ident.diagnosis.regression.block_gram import Evidence
 from cspm_ident.diagnosis.regression.block_regression import Gain, Sums
-from cspm_ident.diagnosis.regression.hypothesis import Hypothesis, Unknown
+from cspm_ident.diagnosis.regression.hypothesis import Hypothesis
 from cspm_ident.diagnosis.regression.significance import Sureness
 from cspm_ident.diagnosis.residuals.free_shapes import Driver
 from cspm_ident.diagnosis.thresholds import DEFAULT_THRESHOLDS
@@ -26,7 +27,7 @@ def unexplained(
     sureness: Sureness,
     chosen: Sequence[Hypothesis],
     sound: Sequence[Hypothesis] = (),
-) -> tuple[Unknown, ...]:
+) -> tuple[Unexplained, ...]:
     """Return free functions that explain what some hypotheses do not, the most important first.
 
     Args:
@@ -39,7 +40,7 @@ def unexplained(
     drivers = [d for d in evidence.terms if isinstance(d, Driver)]
     supposed = [*chosen, *sound]
     base = _columns(evidence, supposed)
-    found: dict[Driver, Unknown] = {}
+    found: dict[Driver, Unexplained] = {}
     limits, chance = sums.thresholds, sums.thresholds.false_alarm_rate / max(1, len(drivers))
     for driver in drivers:
         own = evidence.columns_of([driver])
@@ -48,15 +49,17 @@ def unexplained(
         if gain.total > limits.unknown_sigma * gain.error and p_value < chance:
             share = sureness.share(base, own)
             if share >= limits.unknown_share:
-                found[driver] = driver, gain, share
-    found |= {each[0]: each for each in _drifting(evidence, sums, sureness, chosen, sound)}
+                found[driver] = Unexplained(driver, gain, share)
+    found |= {each.driver: each for each in _drifting(evidence, sums, sureness, chosen, sound)}
     began = [h.onset for h in supposed if h.onset]
-    found |= {each[0]: each for each in _once(evidence, sums, base, began)}
-    told = [e for e in found.values() if e[1].total > _untold(evidence, sums, supposed, e[0])]
-    return tuple(sorted(told, key=lambda each: -each[1].total))
+    found |= {each.driver: each for each in _once(evidence, sums, base, began)}
+    told = [e for e in found.values() if e.gain.total > _untold(evidence, sums, supposed, e.driver)]
+    return tuple(sorted(told, key=lambda each: -each.gain.total))
 
 
-def _once(evidence: Evidence, sums: Sums, base: Index, began: Sequence[int]) -> Iterator[Unknown]:
+def _once(
+    evidence: Evidence, sums: Sums, base: Index, began: Sequence[int]
+) -> Iterator[Unexplained]:
     """Yield functions of time of residuals that are left in one block more than in all others.
 
     What shows once has no other block to be tested on, but is not consistent for that. What begins
@@ -72,7 +75,8 @@ def _once(evidence: Evidence, sums: Sums, base: Index, began: Sequence[int]) -> 
         several = len(squares) >= limits.unknown_fewest_blocks
         if gains and several and share > limits.dominant_block_share:
             excess = most - float(np.median(squares))
-            yield max(gains, key=lambda d: gains[d].total), Gain(excess, excess), share
+            driver = max(gains, key=lambda d: gains[d].total)
+            yield Unexplained(driver, Gain(excess, excess), share)
 
 
 def _untold(evidence: Evidence, sums: Sums, chosen: Sequence[Hypothesis], driver: Driver) -> float:
@@ -93,7 +97,7 @@ def _drifting(
     sureness: Sureness,
     chosen: Sequence[Hypothesis],
     sound: Sequence[Hypothesis],
-) -> Iterator[Unknown]:
+) -> Iterator[Unexplained]:
     """Yield functions of time instead of hypotheses whose amount does not stay what it is.
 
     A load cell that warms up has no constant bias, though a bias explains most of it.
@@ -109,7 +113,8 @@ def _drifting(
         gains = [sums.gain_within(base, evidence.columns_of([d])) for d in times]
         if times:
             k = int(np.argmax([gain.total for gain in gains]))
-            yield times[k], gains[k], sureness.share(base, evidence.columns_of([times[k]]))
+            share = sureness.share(base, evidence.columns_of([times[k]]))
+            yield Unexplained(times[k], gains[k], share)
 
 
 def _concerned(evidence: Evidence, hypothesis: Hypothesis, own: Index) -> list[Driver]:

@@ -1,18 +1,27 @@
-"""Which findings stand before data that were not searched, and what is unknown beside them."""
+"""Which findings are accepted on held-out data, and what is unexplained beside them."""
 
 from __future__ import annotations
 
-from collections.abc import Collection, Iterator, Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
 from itertools import compress
 
+from cspm_ident.diagnosis.finding import (
+    Finding,
+    HoldOut,
+    Rejection,
+    Status,
+    Unexplained,
+    is_doubtful,
+)
 from cspm_ident.diagnosis.regression.block_gram import Evidence
 from cspm_ident.diagnosis.regression.collinearity import RIVAL_SHARE
-from cspm_ident.diagnosis.regression.hypothesis import Findings, Hypothesis, Named, Unknown
+from cspm_ident.diagnosis.regression.hypothesis import Hypothesis
 from cspm_ident.diagnosis.residuals.residual_equation import Equation
 from cspm_ident.diagnosis.selection.search import Search
+from cspm_ident.diagnosis.selection.search_result import SearchResult
 from cspm_ident.diagnosis.selection.unexplained import UNKNOWN_SHARE
-from cspm_ident.diagnosis.validation.holdout_test import Confirmed, confirmed
+from cspm_ident.diagnosis.validation.holdout_test import holdout_tested
 from cspm_ident.diagnosis.validation.instrumental_variables import (
     instruments_of,
     is_proportional,
@@ -24,118 +33,142 @@ Parts = Sequence[Sequence[Equation]]
 
 
 @dataclass(frozen=True)
-class Standing:
-    """Findings by what data say that were not searched.
+class Acceptance:
+    """Findings after the hold-out test.
 
     Attributes:
-        kept: what is told.
-        faint: of that, of which these data show little.
-        plain: of that, what takes most of one of their residuals.
-        doubted: of that, what is told as doubtful, though they say nothing of it.
-        rejected: what does not stand.
-        fed_back: what the motion that was asked for does not show, and controllers feed back.
+        findings: those that are kept, then the rejected ones in the order in which they were.
     """
 
-    kept: tuple[Named, ...]
-    faint: tuple[Named, ...]
-    plain: tuple[Named, ...]
-    doubted: tuple[Named, ...]
-    rejected: tuple[Named, ...]
-    fed_back: tuple[Named, ...]
+    findings: tuple[Finding, ...]
 
     @property
-    def sure(self) -> tuple[Named, ...]:
-        """What is told and not doubtful."""
-        return tuple(each for each in self.kept if each not in self.doubted)
+    def kept(self) -> tuple[Finding, ...]:
+        """What is not rejected."""
+        return tuple(each for each in self.findings if each.status is not Status.REJECTED)
 
     @property
-    def has_given_up(self) -> bool:
-        """Whether anything that was found is not told."""
-        return bool(self.rejected or self.fed_back)
+    def tested(self) -> tuple[Finding, ...]:
+        """Of that, what held-out data do not leave open."""
+        return tuple(each for each in self.kept if each.holdout is not HoldOut.SILENT)
 
-    def without(self, useless: Collection[int]) -> Standing:
-        """Return the same with some of what was kept rejected, by where they are there."""
-        gone = tuple(self.kept[k] for k in useless)
-        kept = tuple(each for k, each in enumerate(self.kept) if k not in useless)
-        return replace(self, kept=kept, rejected=(*self.rejected, *gone))
+    @property
+    def rejected(self) -> tuple[Finding, ...]:
+        """What explains nothing, fed back noise excepted."""
+        gone = (each for each in self.findings if each.status is Status.REJECTED)
+        return tuple(each for each in gone if each.rejection is not Rejection.FED_BACK)
 
-    def unknown(self, search: Search, found: Findings) -> tuple[Unknown, ...]:
-        """Return what nothing explains beside what is sure, of all that was found."""
-        if not (self.has_given_up or self.doubted):
-            return found.unknown
-        return unknown_beside(search, self.sure, (*self.rejected, *self.doubted), self.fed_back)
+    @property
+    def fed_back(self) -> tuple[Finding, ...]:
+        """What the reference motion does not show, and controllers feed back."""
+        return tuple(each for each in self.findings if each.rejection is Rejection.FED_BACK)
+
+    @property
+    def has_rejected(self) -> bool:
+        """Whether anything that was found is rejected."""
+        return any(each.status is Status.REJECTED for each in self.findings)
+
+    def rejecting(self, gone: Sequence[Finding]) -> Acceptance:
+        """Return the same with some of what was kept rejected.
+
+        Args:
+            gone: what goes, each with the reason.
+        """
+        hypotheses = [each.hypothesis for each in gone]
+        rest = (each for each in self.findings if each.hypothesis not in hypotheses)
+        return Acceptance((*rest, *gone))
+
+    def unexplained(self, search: Search, found: SearchResult) -> tuple[Unexplained, ...]:
+        """Return what nothing explains beside what held-out data confirm, of all that was found."""
+        left_open = tuple(each for each in self.kept if each not in self.tested)
+        if not (self.has_rejected or left_open):
+            return found.unexplained
+        return unexplained_beside(search, self.tested, (*self.rejected, *left_open), self.fed_back)
 
 
-def standing_of(
+def accepted(
     search: Search,
-    found: Findings,
+    found: SearchResult,
     judge: Evidence | None,
     searched: Sequence[Measurement],
     rows: Parts,
     block: float,
-) -> Standing:
-    """Part what was found by whether it stands.
+) -> Acceptance:
+    """Accept or reject what was found.
 
     Args:
         search: in which it was found.
         found: that.
-        judge: sums of what was not searched; None: nothing is judged by it.
+        judge: Gram matrices of held-out data; None: nothing is tested on these.
         searched: the recordings.
         rows: their equations, in units of their noise.
         block: length of the blocks [s].
     """
-    stood = Confirmed(found.named) if judge is None else _confirmed(search, judge, found.named)
-    kept, fed_back = _asked_for(search, stood.kept, searched, rows, block)
-    doubted = _doubted(search, kept, stood, fed_back)
-    rejected = (*stood.rejected, *(each for each in stood.untold if each not in doubted))
-    kept, faint = (*kept, *doubted), (*stood.faint, *doubted)
-    # Unknown would be told instead, of which held-out data say as little; with it nothing is.
-    if doubted and not unknown_beside(search, kept, rejected, fed_back):
-        doubted = ()
-    return Standing(kept, faint, stood.plain, doubted, rejected, fed_back)
+    tested = found.findings if judge is None else _tested(search, judge, found.findings)
+    confirmed = [e for e in tested if e.status is not Status.REJECTED and not _is_silent(e)]
+    contradicted = [e for e in tested if e.status is Status.REJECTED]
+    silent = [e for e in tested if _is_silent(e)]
+    kept, fed_back = _shown_by_reference(search, confirmed, searched, rows, block)
+    left_open = _left_open(search, kept, contradicted, silent, fed_back)
+    untestable = [
+        replace(e, status=Status.REJECTED, rejection=Rejection.NOT_TESTABLE)
+        for e in silent
+        if e not in left_open
+    ]
+    rejected = (*contradicted, *untestable)
+    # Otherwise a residual would be called unexplained, of which held-out data show as little.
+    if left_open and not unexplained_beside(search, (*kept, *left_open), rejected, fed_back):
+        left_open = tuple(replace(each, holdout=HoldOut.FAINT) for each in left_open)
+    return Acceptance((*kept, *left_open, *rejected, *fed_back))
 
 
-def _confirmed(search: Search, judge: Evidence, found: Sequence[Named]) -> Confirmed:
-    """Part what was found by whether it stands, or what explains the same does in its place.
+def _is_silent(finding: Finding) -> bool:
+    return finding.holdout is HoldOut.SILENT
+
+
+def _tested(search: Search, judge: Evidence, found: Sequence[Finding]) -> tuple[Finding, ...]:
+    """Return findings tested on held-out data, a rejected one replaced by a rival that passes.
 
     A bar that comes to rest contradicts drag in proportion to its speed, and not to its square.
     """
-    stood = confirmed(search.fits, judge, found)
-    for each in stood.rejected:
-        for instead in _instead(search, each, found):
-            others = [instead if other is each else other for other in found]
-            if instead not in confirmed(search.fits, judge, others).rejected:
-                return _confirmed(search, judge, others)
-    return stood
+    tested = holdout_tested(search.fits, judge, found)
+    for k, each in enumerate(tested):
+        if each.status is not Status.REJECTED:
+            continue
+        for rival in _rivals(search, found[k], found):
+            others = [*found[:k], rival, *found[k + 1 :]]
+            if holdout_tested(search.fits, judge, others)[k].status is not Status.REJECTED:
+                return _tested(search, judge, others)
+    return tested
 
 
-def _instead(search: Search, named: Named, found: Sequence[Named]) -> Iterator[Named]:
+def _rivals(search: Search, finding: Finding, found: Sequence[Finding]) -> Iterator[Finding]:
     """Yield what explains the same as a finding by itself, nearest first."""
-    others = [h for h in _hypotheses(found) if h is not named.hypothesis]
+    others = [h for h in _hypotheses(found) if h is not finding.hypothesis]
     base = search.fits.columns(others)
-    alone = [a for a in named.alternatives if a.beside is None]
+    alone = [a for a in finding.alternatives if a.beside is None]
     for rival in sorted(alone, key=lambda each: each.behind):
         if not search.fits.is_plausible([*others, rival.hypothesis]):
             continue
         gain = search.fits.gain(rival.hypothesis, base)
         share = search.sureness.share(base, search.fits.own_columns(rival.hypothesis))
-        rest = tuple(a for a in named.alternatives if a is not rival)
-        yield Named(replace(rival.hypothesis, onset=named.hypothesis.onset), gain, share, rest)
+        rest = tuple(a for a in finding.alternatives if a is not rival)
+        yield Finding(replace(rival.hypothesis, onset=finding.hypothesis.onset), gain, share, rest)
 
 
-def _asked_for(
+def _shown_by_reference(
     search: Search,
-    kept: Sequence[Named],
+    kept: Sequence[Finding],
     searched: Sequence[Measurement],
     rows: Parts,
     block: float,
-) -> tuple[tuple[Named, ...], tuple[Named, ...]]:
-    """Part what was found by whether the motion that was asked for shows it, if it has to."""
+) -> tuple[tuple[Finding, ...], tuple[Finding, ...]]:
+    """Return findings that the reference motion shows, if it has to, and the rejected others."""
     hypotheses, wanted = _hypotheses(kept), [instruments_of(each) for each in searched]
     values = search.fits.values(hypotheses)
 
-    def stays(named: Named) -> bool:
-        own = named.hypothesis
+    def is_shown(finding: Finding) -> bool:
+        own = finding.hypothesis
         return (
             not is_proportional(own.effect)
             or own.onset > 0
@@ -143,56 +176,60 @@ def _asked_for(
             or shows_in_what_was_asked(rows, wanted, own.candidates, values, block)
         )
 
-    told = [stays(each) for each in kept]
-    gone = (each for each, stay in zip(kept, told, strict=True) if not stay)
-    return tuple(compress(kept, told)), tuple(gone)
+    shown = [is_shown(each) for each in kept]
+    fed_back = (each for each, stays in zip(kept, shown, strict=True) if not stays)
+    return tuple(compress(kept, shown)), tuple(
+        replace(each, status=Status.REJECTED, rejection=Rejection.FED_BACK) for each in fed_back
+    )
 
 
-def _doubted(
+def _left_open(
     search: Search,
-    kept: Sequence[Named],
-    stood: Confirmed,
-    fed_back: Sequence[Named],
-) -> tuple[Named, ...]:
-    """Return what is told as doubtful, though data that were not searched say nothing of it.
+    kept: Sequence[Finding],
+    contradicted: Sequence[Finding],
+    silent: Sequence[Finding],
+    fed_back: Sequence[Finding],
+) -> tuple[Finding, ...]:
+    """Return what is reported as doubtful, though held-out data are silent on it.
 
-    It explains as much as what without it is unknown, of which they say nothing either.
+    It explains as much as what is unexplained without it, on which they are silent too.
     """
-    if not stood.untold:
+    if not silent:
         return ()
-    unknown = unknown_beside(search, kept, (*stood.rejected, *stood.untold), fed_back)
-    if not unknown:
-        return tuple(e for e in stood.untold if _would_be_unknown(search, e, kept))
-    most = RIVAL_SHARE * max(gain.total for _, gain, _ in unknown)
-    beside = Findings((), unknown, 0)
-    return tuple(e for e in stood.untold if e.gain.total >= most and beside.is_doubtful(e))
+    unexplained = unexplained_beside(search, kept, (*contradicted, *silent), fed_back)
+    if not unexplained:
+        return tuple(e for e in silent if _would_be_unexplained(search, e, kept))
+    most = RIVAL_SHARE * max(each.gain.total for each in unexplained)
+    return tuple(e for e in silent if e.gain.total >= most and is_doubtful(e, unexplained))
 
 
-def _would_be_unknown(search: Search, named: Named, kept: Sequence[Named]) -> bool:
-    """Return whether a finding takes as much as is told as unknown, though no free function does.
+def _would_be_unexplained(search: Search, finding: Finding, kept: Sequence[Finding]) -> bool:
+    """Return whether a finding takes as large a share as what is called unexplained.
 
-    Nor may it be what a sound machine has as well.
+    It may do so where no free function does. A healthy machine must not have as much of it.
     """
-    every = _hypotheses([*kept, named])
-    return named.share >= UNKNOWN_SHARE and not search.fits.is_negligible(named.hypothesis, every)
+    every = _hypotheses([*kept, finding])
+    return finding.share >= UNKNOWN_SHARE and not search.fits.is_negligible(
+        finding.hypothesis, every
+    )
 
 
-def unknown_beside(
+def unexplained_beside(
     search: Search,
-    kept: Sequence[Named],
-    rejected: Sequence[Named],
-    fed_back: Sequence[Named] = (),
-) -> tuple[Unknown, ...]:
+    kept: Sequence[Finding],
+    rejected: Sequence[Finding],
+    fed_back: Sequence[Finding] = (),
+) -> tuple[Unexplained, ...]:
     """Return what nothing explains beside what was kept.
 
-    What was rejected explains nothing, but for what a sound machine has as well: clocks drift, so
-    that what they did in the part that was searched may be gone in the other, and controllers feed
-    noise back.
+    What was rejected explains nothing, but for what a healthy machine has as well: clocks drift, so
+    that what they did in the searched part may be gone in the other, and controllers feed noise
+    back.
     """
     every = _hypotheses([*kept, *rejected])
-    sound = [h for h in _hypotheses(rejected) if search.fits.is_negligible(h, every)]
-    return search.unknown(_hypotheses(kept), [*sound, *_hypotheses(fed_back)])
+    healthy = [h for h in _hypotheses(rejected) if search.fits.is_negligible(h, every)]
+    return search.unexplained(_hypotheses(kept), [*healthy, *_hypotheses(fed_back)])
 
 
-def _hypotheses(named: Sequence[Named]) -> list[Hypothesis]:
-    return [each.hypothesis for each in named]
+def _hypotheses(findings: Sequence[Finding]) -> list[Hypothesis]:
+    return [each.hypothesis for each in findings]

@@ -9,8 +9,8 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.stats import t as t_distribution
 
+from cspm_ident.diagnosis.finding import Finding
 from cspm_ident.diagnosis.regression.block_gram import Evidence
-from cspm_ident.diagnosis.regression.hypothesis import Named
 from cspm_ident.diagnosis.regression.significance import MATERIAL_SHARE
 from cspm_ident.diagnosis.residuals.regressors import Candidate
 from cspm_ident.diagnosis.selection.search import Search
@@ -38,7 +38,7 @@ class Limit(NamedTuple):
     possible: bool
 
 
-def detection_limits(search: Search, kept: Sequence[Named]) -> tuple[Limit, ...]:
+def detection_limits(search: Search, kept: Sequence[Finding]) -> tuple[Limit, ...]:
     """Return the limit of every effect of one coefficient on every element that shows it.
 
     So large that its test over blocks is as sure as the search asks and that it takes as large a

@@ -3,17 +3,17 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Mapping, Sequence
-from itertools import compress
-from types import MappingProxyType
+from dataclasses import replace
 from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
+from cspm_ident.diagnosis.finding import Finding, HoldOut, Onset, Rejection, Status
+from cspm_ident.diagnosis.parameter import Coefficients
 from cspm_ident.diagnosis.regression.coefficients import Weights
 from cspm_ident.diagnosis.regression.hypothesis import (
     Hypothesis,
-    Named,
     bounded,
     is_constant,
     is_number,
@@ -32,23 +32,22 @@ from cspm_ident.diagnosis.regression.parameter_estimates import (
 from cspm_ident.diagnosis.residuals.corrected_measurement import is_possible, nearest_possible
 from cspm_ident.diagnosis.residuals.regressors import Candidate, Place
 from cspm_ident.diagnosis.residuals.residual_equation import Equation, steady
-from cspm_ident.diagnosis.selection.onset import Onset, onset_of
+from cspm_ident.diagnosis.selection.onset import onset_of
 from cspm_ident.diagnosis.selection.refinement import Cut, needs_refining, refine, spectra
 from cspm_ident.diagnosis.selection.search import Search
 from cspm_ident.diagnosis.validation.holdout_degradation import harm, squares_left
 from cspm_ident.diagnosis.validation.holdout_simulation import (
     Baselines,
     SimulatedFit,
-    Worth,
+    improvement_by,
     simulate_held_out,
-    worth_of,
 )
 from cspm_ident.signals.measurement import Measurement
 
 Array = NDArray[np.float64]
 Parts = Sequence[Sequence[Equation]]
 
-# A finding stands if a simulated error falls below this share of what it is without the finding.
+# A finding is kept if a simulated error falls below this share of what it is without the finding.
 WORTH_IT = 0.99
 
 
@@ -63,8 +62,6 @@ class Data(NamedTuple):
         noise: of each residual.
         block: length of the blocks [s].
         supposed: about what they were taken to first order.
-        faint: findings of which what was not searched shows little.
-        plain: findings that take most of a residual of that.
     """
 
     searched: Sequence[Measurement]
@@ -74,64 +71,81 @@ class Data(NamedTuple):
     noise: dict[Place, Array]
     block: float
     supposed: Mapping[Candidate, Array]
-    faint: Sequence[Named] = ()
-    plain: Sequence[Named] = ()
+
+
+class Assessment(NamedTuple):
+    """A finding in a model, and what speaks against it.
+
+    Attributes:
+        finding: with its coefficients, onset, and improvement of simulations; negligible where it
+            may be no larger than in a healthy machine.
+        is_possible: whether a machine can have it, it is seen to begin where it does not act all
+            the time, and its memory is seen to end.
+        is_insignificant: whether all its coefficients may be zero, and it is not negligible.
+        needed: below which share of its value without the finding a simulated error has to fall.
+        degradation: squares by which it raises held-out residuals; 0 where it does not.
+    """
+
+    finding: Finding
+    is_possible: bool = True
+    is_insignificant: bool = False
+    needed: float = WORTH_IT
+    degradation: float = 0.0
+
+    @property
+    def excess(self) -> float:
+        """By how much the simulated error is larger than needed; −∞ where none depends on it."""
+        gained = self.finding.improvement
+        return -np.inf if gained is None else gained.with_it / gained.without - self.needed
+
+    def rejected(self, reason: Rejection) -> Finding:
+        """Return the finding, rejected."""
+        return replace(self.finding, status=Status.REJECTED, rejection=reason)
 
 
 class Model(NamedTuple):
-    """What was found as a model: parameters, beginnings, simulations, what each is worth.
+    """What was found as a model.
 
     Attributes:
-        weights: as of a diagnosis.
-        onsets: likewise.
-        simulated: likewise.
-        worth: of each finding; None where they cannot tell, or it is negligible.
-        possible: whether a machine can have each, it is seen to begin where it does not act all
-            the time, and its memory is seen to end.
-        negligible: whether each may be no more than in a sound machine.
-        wanted: below which share of what it is without each a simulated error has to fall.
-        unsure: whether each may be none, as far as noise tells, and is no sound machine's.
-        harm: squares by which each makes worse what was not searched; 0 where it does not.
-        spectra: as of a diagnosis.
+        assessments: of the findings, in their order.
+        weights: of all candidates, with half the widths of their 95 % intervals.
+        simulated: held-out data with it, quantity by quantity; empty if a finding is untenable.
     """
 
+    assessments: tuple[Assessment, ...]
     weights: Weights
-    onsets: tuple[Onset | None, ...]
-    simulated: tuple[SimulatedFit, ...]
-    worth: tuple[Worth | None, ...]
-    possible: tuple[bool, ...]
-    negligible: tuple[bool, ...]
-    wanted: tuple[float, ...]
-    unsure: tuple[bool, ...] = ()
-    harm: tuple[float, ...] = ()
-    spectra: Mapping[Candidate, Array] = MappingProxyType({})
+    simulated: tuple[SimulatedFit, ...] = ()
 
     @property
-    def untenable(self) -> list[int]:
-        """Findings that go whatever held-out data say: what is not possible, else the least unsure.
+    def findings(self) -> tuple[Finding, ...]:
+        """What it consists of."""
+        return tuple(each.finding for each in self.assessments)
+
+    @property
+    def untenable(self) -> list[Finding]:
+        """What goes whatever held-out data show: what is impossible, else the least significant.
 
         With any of them there is no simulation.
         """
-        if not all(self.possible):
-            return [k for k, possible in enumerate(self.possible) if not possible]
-        return [max(compress(range(len(self.unsure)), self.unsure))] if any(self.unsure) else []
+        impossible = [each for each in self.assessments if not each.is_possible]
+        if impossible:
+            return [each.rejected(Rejection.IMPOSSIBLE) for each in impossible]
+        unsure = [each for each in self.assessments if each.is_insignificant]
+        return [each.rejected(Rejection.INSIGNIFICANT) for each in unsure[-1:]]
 
     @property
-    def useless(self) -> list[int]:
-        """Findings that have to go: what is untenable, else the worst of harm, else of no use.
-
-        Of no use is with what no simulation of held-out data comes nearer to what was measured.
-        """
-        if self.untenable:
+    def useless(self) -> list[Finding]:
+        """What goes: what is untenable, else what degrades most, else what improves nothing."""
+        if self.untenable or not self.assessments:
             return self.untenable
-        if any(self.harm):
-            return [max(range(len(self.harm)), key=lambda k: self.harm[k])]
-        shares = {k: worth.with_it / worth.without for k, worth in enumerate(self.worth) if worth}
-        worst = max(shares, key=lambda k: shares[k] - self.wanted[k], default=None)
-        return [worst] if worst is not None and shares[worst] > self.wanted[worst] else []
+        worst = max(self.assessments, key=lambda each: each.degradation)
+        if worst.degradation:
+            return [worst.rejected(Rejection.DEGRADES_HOLDOUT)]
+        worst = max(self.assessments, key=lambda each: each.excess)
+        return [worst.rejected(Rejection.NO_IMPROVEMENT)] if worst.excess > 0.0 else []
 
 
-def modelled(search: Search, kept: Sequence[Named], data: Data) -> Model:
+def modelled(search: Search, kept: Sequence[Finding], data: Data) -> Model:
     """Return the model that findings make.
 
     Args:
@@ -141,49 +155,79 @@ def modelled(search: Search, kept: Sequence[Named], data: Data) -> Model:
     """
     onsets = _onsets(kept, steady(data.rows), search.evidence.times)
     since = max((onset.time for onset in onsets if onset is not None), default=-np.inf)
+    weights, upper_ends = _fitted(search, kept, data, since)
+    negligible = [_may_be_negligible(each, weights) for each in kept]
+    weights = of_clocks(of_drives(weights, 2.0 * data.searched[0].torque_age))
+    weights = {
+        c: (_allowed(data.searched[0], c, own, half), half) for c, (own, half) in weights.items()
+    }
+    zero = [_is_insignificant(each.hypothesis, weights) for each in kept]
+    weights = of_forms(weights, _untrue(search, kept, weights))
+    assessments = []
+    for each, onset, small, none in zip(kept, onsets, negligible, zero, strict=True):
+        own = {c: weights[c] for c in members_of(weights, each.hypothesis)}
+        status = Status.NEGLIGIBLE if small else each.status
+        fitted = tuple(Coefficients(c, *of, upper_ends.get(c)) for c, of in own.items())
+        finding = replace(each, status=status, onset=onset, coefficients=fitted)
+        possible = _is_possible(each.hypothesis, own, data.searched[0])
+        assessments.append(Assessment(finding, possible, none and not small, _needed(each)))
+    if any(each.is_insignificant or not each.is_possible for each in assessments):
+        return Model(tuple(assessments), weights)
+    return _simulated(assessments, weights, data)
+
+
+def _fitted(
+    search: Search, kept: Sequence[Finding], data: Data, since: float
+) -> tuple[Weights, dict[Candidate, Array]]:
+    """Return weights from some instant [s] on, and upper ends over all time constants."""
 
     def cut(parts: Parts) -> Parts:
         return [[e.within(since, np.inf) for e in part] for part in data.searched_part(parts)]
 
     rows = [[e.within(since, np.inf) for e in part] for part in data.rows]
     weights = _parameters(search, kept, data, cut, rows)
-    most = _in_all(kept, weights, data, cut)
-    negligible = tuple(
-        may_be_negligible({c: weights[c] for c in members_of(weights, each.hypothesis)})
-        for each in kept
-    )
-    weights = of_clocks(of_drives(weights, 2.0 * data.searched[0].torque_age))
-    weights = {
-        c: (_allowed(data.searched[0], c, own, half), half) for c, (own, half) in weights.items()
-    }
-    unsure = tuple(
-        not sound and _is_unsure(each.hypothesis, weights)
-        for each, sound in zip(kept, negligible, strict=True)
-    )
-    weights = of_forms(weights, _untrue(search, kept, weights))
-    values = {c: w for c, (w, _) in weights.items()}
-    members = [{c: values[c] for c in members_of(values, each.hypothesis)} for each in kept]
-    possible = tuple(
-        is_possible(data.searched[0], own)
-        and is_seen_to_begin(each.hypothesis, {c: weights[c] for c in own})
+    return weights, _in_all(kept, weights, data, cut)
+
+
+def _may_be_negligible(finding: Finding, weights: Weights) -> bool:
+    own = members_of(weights, finding.hypothesis)
+    return may_be_negligible({c: weights[c] for c in own})
+
+
+def _is_possible(hypothesis: Hypothesis, own: Weights, measured: Measurement) -> bool:
+    """Return whether a machine can have such weights, and data show where they begin and end."""
+    return (
+        is_possible(measured, {c: weights for c, (weights, _) in own.items()})
+        and is_seen_to_begin(hypothesis, own)
         and is_seen_to_end(own)
-        for each, own in zip(kept, members, strict=True)
     )
-    wanted = tuple(_wanted(each, data) for each in kept)
-    if any(unsure) or not all(possible):
-        return Model(weights, onsets, (), (), possible, negligible, wanted, unsure, spectra=most)
+
+
+def _simulated(assessments: Sequence[Assessment], weights: Weights, data: Data) -> Model:
+    """Return a model of tenable findings with what simulations of held-out data show of each.
+
+    What a healthy machine has too is too small to improve any, and there nevertheless.
+    """
+    values = {c: w for c, (w, _) in weights.items()}
     simulated = simulate_held_out(data.baselines, values)
-    # What a sound machine has too is too little to be of use, and there nevertheless.
-    worth = tuple(
-        None if sound else worth_of(data.baselines, simulated, values, own)
-        for own, sound in zip(members, negligible, strict=True)
-    )
-    harms = _harms(data, values, members, negligible)
-    given = possible, negligible, wanted, unsure, harms
-    return Model(weights, onsets, simulated, worth, *given, most)
+
+    def left(found: Mapping[Candidate, Array]) -> dict[Place, Array]:
+        return squares_left(data.baselines, found, data.noise, data.block)
+
+    every = left(values)
+    judged = []
+    for each in assessments:
+        if each.finding.status is not Status.NEGLIGIBLE:
+            own = {own.candidate for own in each.finding.coefficients}
+            improvement = improvement_by(data.baselines, simulated, values, own)
+            worse = harm(left({c: w for c, w in values.items() if c not in own}), every)
+            finding = replace(each.finding, improvement=improvement)
+            each = each._replace(finding=finding, degradation=worse)
+        judged.append(each)
+    return Model(tuple(judged), weights, simulated)
 
 
-def _is_unsure(hypothesis: Hypothesis, weights: Weights) -> bool:
+def _is_insignificant(hypothesis: Hypothesis, weights: Weights) -> bool:
     """Return whether all numbers of a finding may be zero, together with what else was found.
 
     What saturates and has hardly acted is there, though nothing is known of where it ends; and a
@@ -194,37 +238,16 @@ def _is_unsure(hypothesis: Hypothesis, weights: Weights) -> bool:
     return may_be_none(own) and not effect.signature.saturates and not drifts
 
 
-def _harms(
-    data: Data,
-    values: Mapping[Candidate, Array],
-    members: Sequence[Mapping[Candidate, Array]],
-    negligible: Sequence[bool],
-) -> tuple[float, ...]:
-    """Return by how many squares each finding makes worse what was not searched.
-
-    None does that is no more than in a sound machine.
-    """
-
-    def left(found: Mapping[Candidate, Array]) -> dict[Place, Array]:
-        return squares_left(data.baselines, found, data.noise, data.block)
-
-    every = left(values)
-    return tuple(
-        0.0 if sound else harm(left({c: w for c, w in values.items() if c not in own}), every)
-        for own, sound in zip(members, negligible, strict=True)
-    )
-
-
-def _wanted(named: Named, data: Data) -> float:
-    """Return below which share of what it is without a finding a simulated error has to fall.
+def _needed(finding: Finding) -> float:
+    """Return below which share of its value without a finding a simulated error has to fall.
 
     A simulation from motor angles hardly feels a number of the file that is off by little, and it
     may be ruled by something else that is not right, as where an open loop resonates: what takes
     most of a residual need not show there as well.
     """
-    if named in data.plain:
+    if finding.holdout is HoldOut.DOMINANT:
         return np.inf
-    return 1.0 if named in data.faint or is_number(named.hypothesis) else WORTH_IT
+    return 1.0 if finding.is_faint or is_number(finding.hypothesis) else WORTH_IT
 
 
 def _allowed(measured: Measurement, candidate: Candidate, weights: Array, half: Array) -> Array:
@@ -234,7 +257,7 @@ def _allowed(measured: Measurement, candidate: Candidate, weights: Array, half: 
 
 def _parameters(
     search: Search,
-    kept: Sequence[Named],
+    kept: Sequence[Finding],
     data: Data,
     cut: Cut,
     rows: Parts,
@@ -247,7 +270,7 @@ def _parameters(
 
 
 def _in_all(
-    kept: Sequence[Named], weights: Weights, data: Data, cut: Cut
+    kept: Sequence[Finding], weights: Weights, data: Data, cut: Cut
 ) -> dict[Candidate, Array]:
     """Return how large findings may be that have parts with other time constants."""
     hypotheses = [each.hypothesis for each in kept]
@@ -255,7 +278,7 @@ def _in_all(
 
 
 def _untrue(
-    search: Search, kept: Sequence[Named], found: Iterable[Candidate]
+    search: Search, kept: Sequence[Finding], found: Iterable[Candidate]
 ) -> dict[Candidate, float]:
     """Return by what share of its amplitude each candidate is seen to be off, of final shapes."""
     hypotheses, final = [each.hypothesis for each in kept], list(found)
@@ -267,7 +290,7 @@ def _untrue(
     return shares
 
 
-def _onsets(kept: Sequence[Named], rows: Parts, starts: Array) -> tuple[Onset | None, ...]:
+def _onsets(kept: Sequence[Finding], rows: Parts, starts: Array) -> tuple[Onset | None, ...]:
     """Return when each finding began; None where it acts all the time, or in which recording."""
     times = {
         c: float(starts[each.hypothesis.onset]) if each.hypothesis.onset else -np.inf

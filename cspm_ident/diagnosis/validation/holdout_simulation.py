@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 
 from cspm_ident.block_simulation import BlockSimulation, Input, Simulated
 from cspm_ident.comparison.floor import lasting_rms, propagated
+from cspm_ident.diagnosis.finding import Improvement
 from cspm_ident.diagnosis.residuals.corrected_measurement import as_found
 from cspm_ident.diagnosis.residuals.regressors import Candidate
 from cspm_ident.signals.measurement import BAR, TENSION, WINCHES, Measurement
@@ -125,27 +126,15 @@ def simulate_held_out(baselines: Baselines, found: Weights) -> tuple[SimulatedFi
     )
 
 
-class Worth(NamedTuple):
-    """What one effect is worth in a simulation.
-
-    Attributes:
-        output: the quantity that gains most, of those in the blocks that it acts on.
-        without: RMS error with everything else that was found.
-        with_it: with everything that was found.
-    """
-
-    output: Output
-    without: float
-    with_it: float
-
-
-def worth_of(
+def improvement_by(
     baselines: Baselines,
     fits: Sequence[SimulatedFit],
     found: Weights,
     own: Collection[Candidate],
-) -> Worth | None:
-    """Return what an effect is worth; None where nothing that it acts on can be simulated.
+) -> Improvement | None:
+    """Return what an effect does to simulations; None where nothing that it acts on is simulated.
+
+    Of the quantity that improves most, of those in the blocks that it acts on.
 
     Args:
         baselines: of the recordings that were simulated.
@@ -164,12 +153,12 @@ def worth_of(
     if fewer:
         before = _errors(baselines.parts, baselines.since, fewer)
     shown = [
-        Worth(fit.output, before[fit.output][1], fit.after)
+        Improvement(fit.output.name, fit.output.unit, before[fit.output][1], fit.after)
         for fit in fits
         if fit.output in before and (sensed or _is_told(fit.output, kinds))
     ]
-    shown = [worth for worth in shown if worth.without > 0.0 and np.isfinite(worth.with_it)]
-    return min(shown, key=lambda worth: worth.with_it / worth.without, default=None)
+    shown = [each for each in shown if each.without > 0.0 and np.isfinite(each.with_it)]
+    return min(shown, key=lambda each: each.with_it / each.without, default=None)
 
 
 def _is_told(output: Output, kinds: Collection[Channel]) -> bool:

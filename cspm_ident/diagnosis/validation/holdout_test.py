@@ -3,14 +3,14 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from typing import NamedTuple
+from dataclasses import replace
 
 import numpy as np
 from numpy.typing import NDArray
 
+from cspm_ident.diagnosis.finding import Finding, HoldOut, Rejection, Status
 from cspm_ident.diagnosis.regression.block_gram import Evidence
 from cspm_ident.diagnosis.regression.block_regression import gain_of
-from cspm_ident.diagnosis.regression.hypothesis import Named
 from cspm_ident.diagnosis.regression.joint_fit import Fits
 from cspm_ident.diagnosis.regression.significance import MATERIAL_SHARE
 from cspm_ident.diagnosis.residuals.regressors import Candidate
@@ -27,51 +27,31 @@ PLAIN_SHARE = 0.5
 _LEAST_EXPECTED = 3.0
 
 
-class Confirmed(NamedTuple):
-    """What was found, parted by what data that were not searched say.
+def holdout_tested(fits: Fits, judge: Evidence, found: Sequence[Finding]) -> tuple[Finding, ...]:
+    """Return findings with what held-out data show of them, rejected where they fail the test.
 
-    Attributes:
-        kept: what stands.
-        faint: of that, what they show too little of to say how much better they are explained.
-        rejected: what does not stand.
-        untold: what they can say nothing of, as where a plucked bar has come to rest.
-        plain: of what stands, what takes most of one of their residuals.
-    """
-
-    kept: tuple[Named, ...]
-    faint: tuple[Named, ...] = ()
-    rejected: tuple[Named, ...] = ()
-    untold: tuple[Named, ...] = ()
-    plain: tuple[Named, ...] = ()
-
-
-def confirmed(fits: Fits, judge: Evidence, found: Sequence[Named]) -> Confirmed:
-    """Part what was found by whether it lowers residuals that were not searched.
-
-    One of them by a share worth a word; or, where a machine that moves less there shows less of it,
-    all together by what it should.
+    A finding has to lower a residual by a material share; or, where a machine that moves less shows
+    less of it, all residuals together by what it predicts. One of which held-out data show nothing
+    is not rejected here.
 
     Args:
-        fits: of what was searched.
-        judge: sums of what was not.
-        found: the findings.
+        fits: of the searched data.
+        judge: Gram matrices of the held-out data.
+        found: the findings; one that fails counts no longer for those behind it.
     """
-    kept, faint, untold, plain = list(found), [], [], []
+    kept, tested = list(found), []
     for each in found:
         whole = fits.values([other.hypothesis for other in kept])
         own = set(each.hypothesis.candidates)
-        lowered = _Lowered(judge, whole, own)
-        if lowered.any_or_none and lowered.much:
-            if lowered.most:
-                plain.append(each)
-        elif lowered.as_expected:
-            faint.append(each)
-        else:
+        outcome = _Lowered(judge, whole, own).outcome
+        if outcome in (None, HoldOut.SILENT):
             kept.remove(each)
-            if lowered.says_nothing:
-                untold.append(each)
-    rejected = tuple(each for each in found if each not in kept and each not in untold)
-    return Confirmed(tuple(kept), tuple(faint), rejected, tuple(untold), tuple(plain))
+        tested.append(
+            replace(each, status=Status.REJECTED, rejection=Rejection.HOLDOUT_TEST)
+            if outcome is None
+            else replace(each, holdout=outcome)
+        )
+    return tuple(tested)
 
 
 class _Lowered:
@@ -93,6 +73,15 @@ class _Lowered:
         self._taken, self._error = (without - left).sum(axis=1), by_block.error
         # Of a square in the weight: what it would take if all of it were there.
         self._expected = 0.5 * (left + against).sum(axis=1) - self._without
+
+    @property
+    def outcome(self) -> HoldOut | None:
+        """What these data show of the finding; None where they contradict it."""
+        if self.any_or_none and self.much:
+            return HoldOut.DOMINANT if self.most else HoldOut.CONFIRMED
+        if self.as_expected:
+            return HoldOut.FAINT
+        return HoldOut.SILENT if self.says_nothing else None
 
     @property
     def any_or_none(self) -> bool:

@@ -15,12 +15,11 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from cspm_ident.diagnosis.finding import Finding
 from cspm_ident.diagnosis.regression.block_gram import Evidence, gather
 from cspm_ident.diagnosis.regression.block_regression import Sums
 from cspm_ident.diagnosis.regression.hypothesis import (
-    Findings,
     Hypothesis,
-    Named,
     Rival,
     freedom,
     is_number,
@@ -28,6 +27,7 @@ from cspm_ident.diagnosis.regression.hypothesis import (
 from cspm_ident.diagnosis.regression.joint_fit import Fits
 from cspm_ident.diagnosis.residuals.regressors import Candidate
 from cspm_ident.diagnosis.residuals.residual_equation import Equation
+from cspm_ident.diagnosis.selection.search_result import SearchResult
 from cspm_sim.effects import Channel
 
 Parts = Sequence[Sequence[Equation]]
@@ -42,8 +42,8 @@ _TOLD = 0.5
 
 
 def with_wider(
-    found: Findings, parts: Parts, block_s: float, summed: Callable[[Evidence], Sums]
-) -> Findings:
+    found: SearchResult, parts: Parts, block_s: float, summed: Callable[[Evidence], Sums]
+) -> SearchResult:
     """Return findings, with wider forms that reversals leave open among their alternatives.
 
     Args:
@@ -52,15 +52,15 @@ def with_wider(
         block_s: length of the blocks [s].
         summed: makes sums that tell what is sure.
     """
-    chosen = [each.hypothesis for each in found.named]
-    named = []
-    for each in found.named:
+    chosen = [each.hypothesis for each in found.findings]
+    findings = []
+    for each in found.findings:
         told = {rival.hypothesis.effect.id for rival in each.alternatives}
         rows = _reversing(each.hypothesis, parts)
         wider = _wider(each, chosen, rows, block_s, summed) if rows else ()
         rivals = tuple(Rival(h, 0.0) for h in wider if h.effect.id not in told)
-        named.append(each._replace(alternatives=each.alternatives + rivals))
-    return found._replace(named=tuple(named))
+        findings.append(replace(each, alternatives=each.alternatives + rivals))
+    return found._replace(findings=tuple(findings))
 
 
 def _reversing(hypothesis: Hypothesis, parts: Parts) -> list[list[Equation]]:
@@ -87,14 +87,15 @@ def _reversing(hypothesis: Hypothesis, parts: Parts) -> list[list[Equation]]:
 
 
 def _wider(
-    named: Named,
+    finding: Finding,
     chosen: Sequence[Hypothesis],
     rows: Parts,
     block_s: float,
     summed: Callable[[Evidence], Sums],
 ) -> Iterator[Hypothesis]:
     """Yield wider forms of a finding that are left open, of each effect what explains most."""
-    own, others = named.hypothesis, [h for h in chosen if h is not named.hypothesis]
+    own = finding.hypothesis
+    others = [h for h in chosen if h is not own]
     evidence = gather(rows, block_s)
     if any(candidate not in evidence.slices for candidate in own.candidates):
         return

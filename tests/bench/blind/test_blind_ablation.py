@@ -102,8 +102,8 @@ RUBBING = """  - effect: winch_coulomb_friction
 def test_without_held_out_data_what_is_found_is_told_unjudged(tmp_path):
     measured = measured_with(RUBBING, tmp_path / "bag", "worst_case", "duration=16")
     found = diagnose_without(measured, "held-out")
-    (named,) = found.findings.named
-    assert (named.hypothesis.effect.id, named.hypothesis.elements) == (
+    (finding,) = found.reported
+    assert (finding.effect, finding.elements) == (
         "winch_coulomb_friction",
         ("surge_2",),
     )

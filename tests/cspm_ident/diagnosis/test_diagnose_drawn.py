@@ -31,8 +31,8 @@ def diagnosed(folder, *entries):
 def test_a_sound_machine_is_consistent(tmp_path):
     found = diagnosed(tmp_path / "bag")
     assert verdict_of(found) is Verdict.CONSISTENT
-    assert not found.findings.named
-    assert not found.findings.unknown
+    assert not found.reported
+    assert not found.unexplained
 
 
 @pytest.mark.slow
@@ -42,11 +42,11 @@ def test_friction_of_one_winch_is_all_that_is_told(tmp_path):
         effect="winch_coulomb_friction", elements=("surge_2",), parameters={"torque": PLANTED}
     )
     found = diagnosed(tmp_path / "bag", entry)
-    (named,) = found.findings.named
-    assert named.hypothesis.effect.id == entry.effect
-    assert named.hypothesis.elements == entry.elements
-    assert not found.findings.unknown
-    ((value, half),) = found.weights.values()
+    (finding,) = found.reported
+    assert finding.effect == entry.effect
+    assert finding.elements == entry.elements
+    assert not found.unexplained
+    ((_, value, half, _),) = finding.coefficients
     assert value[0] == pytest.approx(PLANTED, rel=0.02)
     # What noise leaves, beside what the form of a law does.
     form_error = DEFAULT_THRESHOLDS.model_form_error_share

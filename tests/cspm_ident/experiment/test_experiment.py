@@ -6,9 +6,11 @@ import numpy as np
 import pytest
 from run_samples import SCENARIOS
 
-from cspm_ident.diagnosis.diagnose import Detail, Diagnosis
+from cspm_ident.diagnosis.diagnosis import Diagnosis
+from cspm_ident.diagnosis.finding import Finding, Status
+from cspm_ident.diagnosis.parameter import Coefficients
 from cspm_ident.diagnosis.regression.block_regression import Gain
-from cspm_ident.diagnosis.regression.hypothesis import Findings, Hypothesis, Named, Rival
+from cspm_ident.diagnosis.regression.hypothesis import Hypothesis, Rival
 from cspm_ident.diagnosis.reporting import experiment_files
 from cspm_ident.diagnosis.reporting.verdict import diagnosis_data
 from cspm_ident.diagnosis.residuals.recorded_equations import equations_of
@@ -219,26 +221,27 @@ def tied(measurement):
     # So little was recorded that any motion tells more.
     short = measurement.within(0.0, 2.5)
     rival = Rival(Hypothesis(LOADED.effect, (LOADED,)), 0.1)
-    named = Named(Hypothesis(RUBBING.effect, (RUBBING,)), Gain(9.0, 1.0), 0.9, (rival,))
-    weights = {RUBBING: (np.array([0.03]), np.array([0.001]))}
+    finding = Finding(
+        Hypothesis(RUBBING.effect, (RUBBING,)),
+        Gain(9.0, 1.0),
+        0.9,
+        (rival,),
+        Status.TIED,
+        coefficients=(Coefficients(RUBBING, np.array([0.03]), np.array([0.001])),),
+    )
     fit = HeldOut(Place(Channel.SHAFT, "surge_2"), 0.1, 0.03, 0.03, 0.001, 0.001, 0.001)
-    findings = Findings((named,), (), 1)
     return Diagnosis(
         searched=(short,),
         held_out=(),
-        findings=findings,
-        details=(Detail(None, None, None),),
-        rejected=(),
-        negligible=(),
-        weights=weights,
+        findings=(finding,),
+        unexplained=(),
+        tested=1,
         fit=(fit,),
         simulated=(),
-        shapes=(),
         lines=(),
         limits=(),
-        silent=(),
+        not_excited=(),
         places=(),
-        starts=np.zeros(1),
         curves=(),
         noise=noise,
     )

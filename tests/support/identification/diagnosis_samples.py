@@ -1,21 +1,28 @@
 """A diagnosis whose numbers are given, not computed."""
 
+from dataclasses import replace
+
 import numpy as np
 from run_samples import SCENARIOS
 
 from cspm_ident.block_simulation import Input
-from cspm_ident.diagnosis.diagnose import Detail, Diagnosis, Shape
-from cspm_ident.diagnosis.regression.block_regression import Gain
-from cspm_ident.diagnosis.regression.hypothesis import (
-    Findings,
-    Hypothesis,
-    Named,
+from cspm_ident.diagnosis.diagnosis import Diagnosis
+from cspm_ident.diagnosis.finding import (
+    Finding,
+    HoldOut,
+    Improvement,
+    Shape,
+    Unexplained,
+    reported_status,
 )
+from cspm_ident.diagnosis.parameter import Coefficients
+from cspm_ident.diagnosis.regression.block_regression import Gain
+from cspm_ident.diagnosis.regression.hypothesis import Hypothesis
 from cspm_ident.diagnosis.residuals.regressors import Candidate, Place
 from cspm_ident.diagnosis.residuals.residual_equation import Equation
 from cspm_ident.diagnosis.validation.detection_limits import Limit
 from cspm_ident.diagnosis.validation.holdout_residuals import HeldOut
-from cspm_ident.diagnosis.validation.holdout_simulation import Output, SimulatedFit, Worth
+from cspm_ident.diagnosis.validation.holdout_simulation import Output, SimulatedFit
 from cspm_ident.diagnosis.validation.residual_curves import held_out_curves
 from cspm_ident.signals.measurement import Measurement
 from cspm_ident.signals.samples import Samples
@@ -50,29 +57,47 @@ def diagnosis(named=True, alternatives=(), unknown=(), rejected=(), lines=(), re
     part = equation()
     poses = Samples(np.array([0.0, 1.0]), np.array([BAR_POSE, BAR_POSE]))
     measured = Measurement(SCENARIOS / "today", "ab" * 32, THESIS, bar_pose=poses)
-    weights = {RUBBING: (np.array([TORQUE]), np.array([0.001]))} if named else {}
-    hypothesis = Hypothesis(RUBBING.effect, (RUBBING,))
-    found = (Named(hypothesis, Gain(900.0, 10.0), 0.99, tuple(alternatives)),) if named else ()
-    return Diagnosis(
+    weights = {RUBBING: np.array([TORQUE])} if named else {}
+    finding = Finding(
+        Hypothesis(RUBBING.effect, (RUBBING,)),
+        Gain(900.0, 10.0),
+        0.99,
+        tuple(alternatives),
+        holdout=HoldOut.CONFIRMED,
+        coefficients=(Coefficients(RUBBING, np.array([TORQUE]), np.array([0.001])),),
+        region=region,
+        improvement=Improvement(OUTPUT.name, OUTPUT.unit, 1.46, 0.0071),
+    )
+    shape = Shape(np.linspace(0.0, 1.0, 7), np.arange(7.0) - 3.0)
+    unexplained = tuple(Unexplained(*each, shape) for each in unknown)
+    found = Diagnosis(
         searched=(measured,),
         held_out=(),
-        findings=Findings(found, tuple(unknown), 485),
-        details=(Detail(None, region, Worth(OUTPUT, 1.46, 0.0071)),) * len(found),
-        rejected=tuple(rejected),
-        negligible=(),
-        weights=weights,
+        findings=(*((finding,) if named else ()), *rejected),
+        unexplained=unexplained,
+        tested=485,
         fit=(HeldOut(PLACE, 0.15, TORQUE, TORQUE, NOISE, NOISE, NOISE),),
         simulated=(SimulatedFit(OUTPUT, 3.5, 1.46, 1.45, 0.0071, 0.0049),),
-        shapes=tuple(
-            Shape(d, np.linspace(0.0, 1.0, 7), np.arange(7.0) - 3.0) for d, _, _ in unknown
-        ),
         lines=tuple(lines),
         limits=(
             Limit("winch_viscous_friction", "sway_1", "coefficient", 2.1e-6, "N·m·s/rad", True),
         ),
-        silent=(("winch_backlash", ("sway_1",)),),
+        not_excited=(("winch_backlash", ("sway_1",)),),
         places=(PLACE,),
-        starts=np.zeros(1),
-        curves=held_out_curves([[part]], {c: w for c, (w, _) in weights.items()}),
+        curves=held_out_curves([[part]], weights),
         noise={PLACE: np.array([NOISE])},
+    )
+    return judged(found, found.findings)
+
+
+def judged(found, findings, aliased=()):
+    """Return a diagnosis with other findings, those that are reported with their status."""
+    return replace(
+        found,
+        findings=tuple(
+            replace(each, status=reported_status(each, found.unexplained, aliased))
+            if each.is_reported
+            else each
+            for each in findings
+        ),
     )

@@ -1,19 +1,16 @@
 """Of creep with several time constants the interval holds all, of which a recording shows some."""
 
-from dataclasses import replace
-
 import numpy as np
 import pytest
-from diagnosis_samples import diagnosis
 from measured_samples import measured_with
 from scipy.signal import butter, lfilter
 
+from cspm_ident.diagnosis.parameter import Coefficients, parameters_of
 from cspm_ident.diagnosis.regression.block_gram import gather
 from cspm_ident.diagnosis.regression.block_regression import Sums
 from cspm_ident.diagnosis.regression.coefficients import weights_of
 from cspm_ident.diagnosis.regression.hypothesis import Hypothesis, is_seen_to_end
 from cspm_ident.diagnosis.regression.time_constants import most_in_all, told_within, with_spectrum
-from cspm_ident.diagnosis.reporting.statement import numbers_of
 from cspm_ident.diagnosis.residuals.recorded_equations import equations_of
 from cspm_ident.diagnosis.residuals.regressors import Candidate, Place, shapes_of
 from cspm_ident.diagnosis.residuals.residual_equation import Equation, steady
@@ -111,11 +108,11 @@ def test_a_memory_that_is_as_long_as_can_be_told_is_not_seen_to_end(time_constan
 
 
 def test_a_spectrum_widens_upwards_only_what_is_told():
-    told = replace(diagnosis(), weights={FOUND: (np.array([1e-3]), np.array([1e-4]))})
-    plain = numbers_of(told, FOUND)
+    told = Coefficients(FOUND, np.array([1e-3]), np.array([1e-4]))
+    plain = parameters_of(told)
     assert [plain[0].low, plain[0].high] == pytest.approx([9e-4, 1.1e-3])
     for most, high in ((2e-3, 2e-3), (1e-3, 1.1e-3), (np.inf, 0.1)):
-        wide = numbers_of(replace(told, spectra={FOUND: np.array([most])}), FOUND)
+        wide = parameters_of(told._replace(upper_ends=np.array([most])))
         assert (wide[0].value, wide[0].low) == (plain[0].value, plain[0].low)
         assert wide[0].high == pytest.approx(high)
         assert wide[1] == plain[1]

@@ -66,7 +66,7 @@ def test_what_is_little_on_one_element_is_told_of_all_where_one_number_is_better
     beside = np.append(search.fits.columns([]), evidence.columns_of([one]))
     gain = search.sums.gain(beside, evidence.columns_of([two]))
     assert not search.sureness.counts(beside, Hypothesis(DRY, (two,)), gain)
-    (named,) = search.run().named
+    (named,) = search.run().findings
     assert named.hypothesis.elements == elements
     assert named.hypothesis.common is (elements == NAMES)
 
@@ -75,7 +75,7 @@ def test_what_is_little_on_one_element_is_told_of_all_where_one_number_is_better
 def test_what_one_system_reads_has_one_number_unless_data_say_otherwise(second, hum, common):
     """Under a great hum nothing tells; under a lesser one the other body does not have it."""
     late, dry = (
-        Search(gather([winches(second, hum, effect)], BLOCK_S)).run().named[0].hypothesis
+        Search(gather([winches(second, hum, effect)], BLOCK_S)).run().findings[0].hypothesis
         for effect in (LATE, DRY)
     )
     assert late.common is common
@@ -170,18 +170,18 @@ def curved(amount, dry=0.3):
 def test_what_is_left_of_a_great_finding_is_no_unknown(amount, told):
     """Findings are no truer than 7 % of their amplitude."""
     found = Search(gather([[curved(amount)]], BLOCK_S)).run()
-    assert [named.hypothesis.effect for named in found.named] == [DRY]
-    assert bool(found.unknown) is told
+    assert [named.hypothesis.effect for named in found.findings] == [DRY]
+    assert bool(found.unexplained) is told
     alone = Search(gather([[curved(amount, dry=0.0)]], BLOCK_S)).run()
-    assert alone.unknown
+    assert alone.unexplained
 
 
 @pytest.mark.parametrize(("errors", "told"), [(1.6, True), (1.4, False)])
 def test_what_scatters_as_much_as_it_gains_is_no_unknown(monkeypatch, errors, told):
     search = Search(gather([[curved(0.06, dry=0.0)]], BLOCK_S))
-    gained = search.unknown([])[0][1].total
+    gained = search.unexplained([])[0][1].total
     monkeypatch.setattr(Sums, "gain", lambda *_: Gain(gained, gained / errors))
-    assert bool(search.unknown([])) is told
+    assert bool(search.unexplained([])) is told
 
 
 def warming(amount):
@@ -198,9 +198,9 @@ def warming(amount):
 @pytest.mark.parametrize(("amount", "told"), [(1.0, True), (0.2, False)])
 def test_a_finding_whose_amount_drifts_is_doubtful(amount, told):
     found = Search(gather([[warming(amount)]], BLOCK_S)).run()
-    assert any(named.hypothesis.effect is DRY for named in found.named)
+    assert any(named.hypothesis.effect is DRY for named in found.findings)
     time = Driver(Place(Channel.SHAFT, "one"), "time [s]")
-    assert (time in [driver for driver, _, _ in found.unknown]) is told
+    assert (time in [driver for driver, *_ in found.unexplained]) is told
 
 
 def jerked(height):
@@ -217,8 +217,8 @@ def jerked(height):
 def test_what_shows_once_is_unknown_and_not_consistent(height, told):
     """Unknown where it leaves more than all other blocks."""
     found = jerked(height).run()
-    assert not found.named
-    assert [driver.signal for driver, _, _ in found.unknown] == ["time [s]"] * told
+    assert not found.findings
+    assert [driver.signal for driver, *_ in found.unexplained] == ["time [s]"] * told
 
 
 @pytest.mark.parametrize(("onset", "told"), [(1, True), (2, False), (3, False), (4, True)])
@@ -227,7 +227,7 @@ def test_a_block_within_which_something_begins_tells_of_nothing_unknown(onset, t
     (candidate,) = (c for c in search.heard if c.effect is DRY)
     begun = Hypothesis(DRY, (candidate,), onset=onset)
     with search.fits.delayed(begun):
-        assert bool(search.unknown([begun])) is told
+        assert bool(search.unexplained([begun])) is told
 
 
 @pytest.mark.parametrize(("amount", "elements"), [(0.3, MANY), (0.0, ("a",))])
@@ -268,8 +268,8 @@ def test_of_two_wrong_numbers_that_do_the_same_the_usual_one_is_told(metres, eff
     stiff, long = Candidate(STIFFNESS, "a"), Candidate(LENGTH, "a")
     columns = {stiff: 10.0 * waves, long: waves / metres}
     found = Search(explained_by(columns, {stiff: -0.1})).run()
-    assert [named.hypothesis.effect for named in found.named] == [effect]
-    assert found.named[0].alternatives
+    assert [named.hypothesis.effect for named in found.findings] == [effect]
+    assert found.findings[0].alternatives
 
 
 def test_how_unusual_a_wrong_number_is():
@@ -291,7 +291,7 @@ def test_an_effect_has_one_shape_on_all_elements():
         for share, shape in shapes.items()
     }
     truth = {Candidate(effect, "a", shapes[1.0]): 2.0, Candidate(effect, "b", shapes[-0.5]): 1.0}
-    (named,) = Search(explained_by(columns, truth)).run().named
+    (named,) = Search(explained_by(columns, truth)).run().findings
     assert sorted(named.hypothesis.elements) == ["a", "b"]
     assert {c.shape for c in named.hypothesis.candidates} == {shapes[1.0]}
 
@@ -303,7 +303,7 @@ def test_clocks_as_of_a_sound_machine_come_before_what_explains_a_little_more(de
     late = {Candidate(LATE, body): 3e3 * wave for body in ("bar", "winch_frame")}
     wet = Candidate(WET, "a")
     columns = {**late, wet: 1e2 * (6e3 * delay * wave + 0.005 * more)}
-    found = Search(explained_by(columns, {wet: 0.01})).run().named
+    found = Search(explained_by(columns, {wet: 0.01})).run().findings
     assert [named.hypothesis.effect for named in found] == [effect]
 
 

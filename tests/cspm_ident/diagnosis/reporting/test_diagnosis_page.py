@@ -15,14 +15,16 @@ from diagnosis_samples import (
     TORQUE,
     diagnosis,
     equation,
+    judged,
 )
 
-from cspm_ident.diagnosis.regression.block_regression import Gain
-from cspm_ident.diagnosis.regression.hypothesis import (
-    Hypothesis,
-    Rival,
-    is_constant,
+from cspm_ident.diagnosis.finding import (
+    HoldOut,
+    Region,
+    is_doubtful,
 )
+from cspm_ident.diagnosis.regression.block_regression import Gain
+from cspm_ident.diagnosis.regression.hypothesis import Hypothesis, Rival, is_constant
 from cspm_ident.diagnosis.reporting.diagnosis_page import write_diagnosis_page
 from cspm_ident.diagnosis.reporting.evidence_figure import caption_of
 from cspm_ident.diagnosis.reporting.verdict import (
@@ -37,7 +39,6 @@ from cspm_ident.diagnosis.residuals.free_shapes import Driver
 from cspm_ident.diagnosis.residuals.regressors import Candidate, Place
 from cspm_ident.diagnosis.residuals.residual_equation import Equation
 from cspm_ident.diagnosis.residuals.spectral_lines import Line
-from cspm_ident.diagnosis.selection.region import Region
 from cspm_ident.diagnosis.validation.residual_curves import explained_by, held_out_curves
 from cspm_ident.signals.samples import Samples
 from cspm_sim.effects import Channel, catalogue
@@ -245,17 +246,18 @@ def test_a_finding_beside_much_that_nothing_explains_is_doubtful(left, doubtful,
 @pytest.mark.parametrize("faint", [True, False])
 def test_a_finding_that_held_out_data_hardly_show_says_so(faint):
     found = diagnosis()
-    found = replace(found, details=tuple(d._replace(faint=faint) for d in found.details))
+    holdout = HoldOut.FAINT if faint else HoldOut.CONFIRMED
+    found = judged(found, [replace(each, holdout=holdout) for each in found.findings])
     (finding,) = named_in(diagnosis_data(found))
     assert ("What was not searched moves so little" in finding["statement"]) is faint
 
 
 def doubted(effect, signal, left):
     """Whether a finding that gains 900 is doubtful beside a function that gains `left`."""
-    found = diagnosis(unknown=[(Driver(PLACE, signal), Gain(left, 1.0), 0.2)]).findings
+    found = diagnosis(unknown=[(Driver(PLACE, signal), Gain(left, 1.0), 0.2)])
     candidate = Candidate(catalogue()[effect], "surge_2")
     hypothesis = Hypothesis(candidate.effect, (candidate,))
-    return found.is_doubtful(found.named[0]._replace(hypothesis=hypothesis))
+    return is_doubtful(replace(found.findings[0], hypothesis=hypothesis), found.unexplained)
 
 
 @pytest.mark.parametrize(
@@ -284,10 +286,8 @@ def test_what_the_catalogue_has_as_constants():
 def test_the_doubtful_stands_behind_a_greater_unknown_though_another_is_sure(gain, behind):
     """The sure one gains 9000, the unknown 200: no tenth of that, and much of the other."""
     found = diagnosis(unknown=[(Driver(PLACE, "tension [N]"), Gain(200.0, 1.0), 0.2)])
-    (one,) = found.findings.named
-    two = tuple(one._replace(gain=Gain(total, 1.0)) for total in (9000.0, gain))
-    findings = found.findings._replace(named=two)
-    found = replace(found, findings=findings, details=2 * found.details)
+    (one,) = found.findings
+    found = judged(found, [replace(one, gain=Gain(total, 1.0)) for total in (9000.0, gain)])
     effects = [f["effect"] for f in diagnosis_data(found)["findings"]]
     coulomb = "winch_coulomb_friction"
     assert effects == [coulomb, *(("unknown", coulomb) if behind else (coulomb, "unknown"))]
@@ -298,7 +298,7 @@ def test_what_alternates_comes_first_and_the_rest_is_doubtful():
     """The finding gains more than all that is unknown."""
     swing = Line(Place(Channel.TENSION, "surge_2"), 0, 500.0, 5.6, 0.0, alternates=True)
     found = diagnosis(lines=[swing])
-    found = replace(found, findings=found.findings._replace(chattering=frozenset({"surge_2"})))
+    found = judged(found, found.findings, {"surge_2"})
     first, second = diagnosis_data(found)["findings"]
     assert (first["effect"], first["region"]["at"]) == ("unknown", [500.0])
     assert second["probability"] == pytest.approx(TRUSTED * DOUBTED)

@@ -5,9 +5,10 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from diagnosis_samples import NOISE, PLACE, RUBBING, THESIS, TORQUE, diagnosis
+from diagnosis_samples import NOISE, PLACE, RUBBING, THESIS, TORQUE, diagnosis, judged
 
-from cspm_ident.diagnosis.diagnose import Shape
+from cspm_ident.diagnosis.finding import Onset, Shape
+from cspm_ident.diagnosis.parameter import Coefficients
 from cspm_ident.diagnosis.regression.block_regression import Gain
 from cspm_ident.diagnosis.regression.hypothesis import Hypothesis, Rival
 from cspm_ident.diagnosis.reporting.formula_hint import is_even
@@ -15,7 +16,6 @@ from cspm_ident.diagnosis.reporting.quantity import amount_words
 from cspm_ident.diagnosis.reporting.verdict import diagnosis_data
 from cspm_ident.diagnosis.residuals.free_shapes import Driver
 from cspm_ident.diagnosis.residuals.regressors import Candidate, Place
-from cspm_ident.diagnosis.selection.onset import Onset
 from cspm_ident.diagnosis.validation.detection_limits import Limit
 from cspm_ident.diagnosis.validation.holdout_residuals import HeldOut
 from cspm_sim.effects import Channel, catalogue
@@ -84,8 +84,7 @@ def test_of_an_effect_that_may_be_elsewhere_that_is_not_told():
 def test_a_beginning_is_told(low):
     onset = None if low is None else Onset(12.3, low, 12.5)
     found = diagnosis()
-    (detail,) = found.details
-    found = replace(found, details=(detail._replace(onset=onset),))
+    found = judged(found, [replace(each, onset=onset) for each in found.findings])
     (finding,) = diagnosis_data(found)["findings"]
     assert ("It begins at 12.3 s (12.1 to 12.5 s)." in finding["statement"]) is (low is not None)
     assert ("from the start" in finding["statement"]) is (low is None)
@@ -120,7 +119,8 @@ def test_what_is_even_in_speed_differs_by_direction(shape, even):
     values = shape(speeds) - np.mean(shape(speeds))
     driver = Driver(PLACE, "speed [rad/s]")
     found = diagnosis(named=False, unknown=[(driver, Gain(50.0, 5.0), 0.4)])
-    found = replace(found, shapes=(Shape(driver, speeds, values),))
+    (unexplained,) = found.unexplained
+    found = replace(found, unexplained=(unexplained._replace(shape=Shape(speeds, values)),))
     (told,) = diagnosis_data(found)["findings"]
     words = "it is the same in both directions, so that friction differs by direction"
     assert (words in told["statement"]) is even
@@ -145,15 +145,14 @@ def test_of_several_numbers_those_that_may_be_nothing_have_none():
     pushed = Candidate(catalogue()["bar_constant_wrench"], "bar")
     weights = np.array([0.0004, 0.3, -0.0003, 0.0, 0.0, 0.0])
     found = diagnosis()
-    named = found.findings.named[0]._replace(hypothesis=Hypothesis(pushed.effect, (pushed,)))
+    hypothesis = Hypothesis(pushed.effect, (pushed,))
     for half, told in (
         (0.001, "sway 0.3000 ± 0.0010 N, surge, heave, roll, pitch, yaw not surely"),
         (np.inf, "sway 0.3 N, heave -0.3 mN"),
     ):
-        changed = replace(
-            found,
-            findings=found.findings._replace(named=(named,)),
-            weights={pushed: (weights, np.full(6, half))},
+        own = (Coefficients(pushed, weights, np.full(6, half)),)
+        changed = judged(
+            found, [replace(found.findings[0], hypothesis=hypothesis, coefficients=own)]
         )
         (finding,) = diagnosis_data(changed)["findings"]
         assert told in finding["statement"]
@@ -171,8 +170,10 @@ def test_of_several_numbers_those_that_may_be_nothing_have_none():
 )
 def test_an_interval_of_all_that_is_allowed_is_none(half, told, ends):
     """Dry friction may be from 0 to 1 N·m."""
-    weights = {RUBBING: (np.array([TORQUE]), np.array([half]))}
-    (finding,) = diagnosis_data(replace(diagnosis(), weights=weights))["findings"]
+    own = (Coefficients(RUBBING, np.array([TORQUE]), np.array([half])),)
+    found = diagnosis()
+    changed = judged(found, [replace(each, coefficients=own) for each in found.findings])
+    (finding,) = diagnosis_data(changed)["findings"]
     assert told in finding["statement"]
     (number,) = finding["parameters"]
     assert number["ci95"] == (None if ends is None else pytest.approx(ends))

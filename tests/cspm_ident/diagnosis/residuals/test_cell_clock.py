@@ -72,8 +72,8 @@ def test_too_short_a_recording_tells_no_drift(rig):
 @pytest.mark.slow
 def test_a_sound_rig_with_clocks_of_its_own_is_consistent(rig):
     found = diagnose([drifting(rig, 6e-6)])
-    assert not found.findings.named
-    assert not found.findings.unknown
+    assert not found.reported
+    assert not found.unexplained
 
 
 def test_the_jerk_of_a_rope_pulled_taut_leaves_nothing_in_a_sound_rig(tmp_path):

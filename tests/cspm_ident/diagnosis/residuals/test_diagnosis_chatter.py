@@ -4,8 +4,9 @@ import numpy as np
 import pytest
 from run_samples import SCENARIOS
 
+from cspm_ident.diagnosis.finding import Finding, is_doubtful
 from cspm_ident.diagnosis.regression.block_regression import Gain
-from cspm_ident.diagnosis.regression.hypothesis import Findings, Hypothesis, Named
+from cspm_ident.diagnosis.regression.hypothesis import Hypothesis
 from cspm_ident.diagnosis.reporting.statement import line_statement
 from cspm_ident.diagnosis.residuals.aliased_tension import chatters_of
 from cspm_ident.diagnosis.residuals.regressors import Candidate
@@ -77,6 +78,6 @@ def test_without_load_cells_nothing_alternates():
 )
 def test_what_is_told_by_readings_that_alternate_is_doubtful(effect, element, doubtful):
     own = catalogue()[effect]
-    named = Named(Hypothesis(own, (Candidate(own, element),)), Gain(9000.0, 10.0), 0.9, ())
-    assert Findings((named,), (), 1, frozenset({"hoist_1"})).is_doubtful(named) is doubtful
-    assert not Findings((named,), (), 1).is_doubtful(named)
+    finding = Finding(Hypothesis(own, (Candidate(own, element),)), Gain(9000.0, 10.0), 0.9)
+    assert is_doubtful(finding, (), {"hoist_1"}) is doubtful
+    assert not is_doubtful(finding, ())

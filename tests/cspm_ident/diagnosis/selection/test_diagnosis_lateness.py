@@ -40,7 +40,7 @@ def cable(delay, apart=0.0, noise=0.05, seed=5):
 
 
 def named(equation):
-    return [each.hypothesis for each in Search(gather([[equation]], BLOCK_S)).run().named]
+    return [each.hypothesis for each in Search(gather([[equation]], BLOCK_S)).run().findings]
 
 
 @pytest.mark.parametrize("apart", [0.0, 0.1])
@@ -123,4 +123,4 @@ def test_what_sound_clocks_may_have_done_is_nothing_unknown(delay, told):
     columns = {POSE: rate[:, None, None], **Knots().columns(place, {"time [s]": times})}
     search = Search(gather([[Equation(place, times, target, columns, target)]], BLOCK_S))
     assert search._unexplained([], [])
-    assert bool(search.unknown([])) is told
+    assert bool(search.unexplained([])) is told

@@ -55,13 +55,13 @@ def test_the_pair_that_explains_most_is_the_first_and_of_one_element():
 
 @pytest.mark.parametrize("drive", [0.1, 0.09])
 def test_zeros_that_hide_each_other_are_found_together(drive):
-    named = Search(machine(0.1, drive)).run().named
+    named = Search(machine(0.1, drive)).run().findings
     found = {(n.hypothesis.effect.id, n.hypothesis.elements) for n in named}
     assert found == {(CELL.id, (WINCH,)), (DRIVE.id, (WINCH,))}
 
 
 def test_one_fault_is_not_taken_for_two():
-    (named,) = Search(machine(0.0, 0.1)).run().named
+    (named,) = Search(machine(0.0, 0.1)).run().findings
     assert (named.hypothesis.effect, named.hypothesis.elements) == (DRIVE, (WINCH,))
 
 

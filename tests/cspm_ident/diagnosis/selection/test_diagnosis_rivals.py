@@ -14,7 +14,7 @@ from cspm_ident.diagnosis.selection.alternatives import alternatives_of
 from cspm_ident.diagnosis.selection.rivals import rivals_of
 from cspm_ident.diagnosis.selection.search import Search
 from cspm_ident.diagnosis.thresholds import DEFAULT_THRESHOLDS
-from cspm_ident.diagnosis.validation.acceptance import unknown_beside
+from cspm_ident.diagnosis.validation.acceptance import unexplained_beside
 from cspm_sim.effects import Channel, catalogue
 
 ROWS, STEP, BLOCK_S = 4800, 0.01, 1.0
@@ -40,7 +40,7 @@ def equation(place, target, columns, noise=0.05):
 
 
 def named_in(*equations):
-    return Search(gather([list(equations)], BLOCK_S)).run().named
+    return Search(gather([list(equations)], BLOCK_S)).run().findings
 
 
 def winch(target, noise=0.05):
@@ -261,9 +261,9 @@ def test_what_is_not_kept_explains_nothing():
     columns = {viscous: -speed[:, None]} | {d: c[:, 0] for d, c in shape.items()}
     search = Search(gather([[equation(place, -0.05 * speed, columns, noise=0.0025)]], BLOCK_S))
     found = search.run()
-    assert [n.hypothesis.effect.id for n in found.named] == ["winch_viscous_friction"]
-    assert found.unknown == ()
-    ((driver, gain, share),) = search.unknown([])
+    assert [n.hypothesis.effect.id for n in found.findings] == ["winch_viscous_friction"]
+    assert found.unexplained == ()
+    ((driver, gain, share, _),) = search.unexplained([])
     assert driver.signal == "speed [rad/s]"
     assert gain.total > 0.0
     assert share > 0.9
@@ -293,7 +293,7 @@ def test_what_a_sound_machine_has_as_well_is_no_unknown_though_it_is_rejected(de
     shape = Knots().columns(place, {"speed [rad/s]": waves})
     columns = {cells: waves / delay} | {d: c[:, 0] for d, c in shape.items()}
     search = Search(gather([[equation(place, waves, columns)]], BLOCK_S))
-    assert bool(unknown_beside(search, (), search.run().named)) is unknown
+    assert bool(unexplained_beside(search, (), search.run().findings)) is unknown
 
 
 SCALE, RADIUS, DRIVE = (

@@ -51,19 +51,19 @@ def found(equation):
 
 
 def test_an_effect_is_named_with_what_it_is_worth():
-    (named,) = found(turning()).named
+    (named,) = found(turning()).findings
     assert (named.hypothesis.effect.id, named.hypothesis.elements) == (
         "winch_coulomb_friction",
         ("only",),
     )
     assert named.hypothesis.onset == 0
     assert named.share > 0.9
-    assert found(turning()).unknown == ()
+    assert found(turning()).unexplained == ()
 
 
 def test_an_effect_that_begins_late_is_named_with_when_it_began():
     equation = turning(start=3000)
-    (named,) = found(equation).named
+    (named,) = found(equation).findings
     assert named.hypothesis.effect.id == "winch_coulomb_friction"
     assert named.hypothesis.onset == round(3000 * STEP / BLOCK_S)
     onset = onset_of([equation], [COULOMB], {}, 28.0, 32.0)
@@ -73,18 +73,18 @@ def test_an_effect_that_begins_late_is_named_with_when_it_began():
 
 
 def test_what_shows_at_the_very_end_only_is_not_told():
-    assert found(turning(start=ROWS - 500)).named == ()
+    assert found(turning(start=ROWS - 500)).findings == ()
 
 
 def test_nothing_is_named_in_noise():
     noise = np.random.default_rng(5).standard_normal((ROWS, 1))
-    assert found(Equation(PLACE, turning().times, noise, turning().columns, noise)).named == ()
+    assert found(Equation(PLACE, turning().times, noise, turning().columns, noise)).findings == ()
 
 
 def test_what_no_effect_does_is_a_free_function_of_its_driver():
     result = found(turning(missing=lambda speed: 0.1 * speed**2))
-    assert [named.hypothesis.effect.id for named in result.named] == ["winch_coulomb_friction"]
-    driver, _, share = result.unknown[0]
+    assert [named.hypothesis.effect.id for named in result.findings] == ["winch_coulomb_friction"]
+    driver, _, share, _ = result.unexplained[0]
     assert driver == Driver(PLACE, "speed [rad/s]")
     assert share > 0.5
 
@@ -131,7 +131,7 @@ def test_an_effect_below_its_limit_is_not_told_and_one_above_it_is():
     for factor, told in ((0.5, False), (2.0, True)):
         less = factor * limit.least - TORQUE
         found_here = found(turning(missing=lambda speed, less=less: less * np.sign(speed)))
-        assert bool(found_here.named) is told
+        assert bool(found_here.findings) is told
 
 
 def test_what_is_never_told_is_fitted_before_a_residual_counts():
@@ -171,7 +171,7 @@ def drifting(times):
 
 def test_what_only_time_tells_is_unknown_though_no_other_block_foretells_it():
     equation = turning(missing=lambda speed: drifting(STEP * np.arange(ROWS)))
-    told = {driver.signal for driver, _, _ in found(equation).unknown}
+    told = {driver.signal for driver, *_ in found(equation).unexplained}
     assert told == {"time [s]"}
 
 
@@ -185,7 +185,7 @@ def test_a_wrong_number_of_the_file_does_not_begin():
     target = 0.3 * column * (times > 24.0) + 0.05 * rng.standard_normal(ROWS)
     for term, begins in ((stiffness, False), (friction, True)):
         shaped = {term: column[:, None, None]}
-        (named,) = found(Equation(place, times, target[:, None], shaped, target[:, None])).named
+        (named,) = found(Equation(place, times, target[:, None], shaped, target[:, None])).findings
         assert (named.hypothesis.onset > 0) is begins
 
 
@@ -210,9 +210,11 @@ def several(elements, weights, seed=3, noise=0.05):
 
 def test_more_elements_have_to_be_worth_it_whichever_effect_is_theirs():
     elements = ("surge_1", "surge_2", "sway_1", "sway_2")
-    (named,) = Search(gather([several(elements, (0.3, 0.004, 0.004, 0.004))], BLOCK_S)).run().named
+    (named,) = (
+        Search(gather([several(elements, (0.3, 0.004, 0.004, 0.004))], BLOCK_S)).run().findings
+    )
     assert named.hypothesis.elements == ("surge_1",)
-    (named,) = Search(gather([several(elements, (0.3, 0.3, 0.3, 0.3))], BLOCK_S)).run().named
+    (named,) = Search(gather([several(elements, (0.3, 0.3, 0.3, 0.3))], BLOCK_S)).run().findings
     assert named.hypothesis.elements == elements
 
 
@@ -239,7 +241,7 @@ def mixed(own):
     ],
 )
 def test_elements_that_another_effect_explains_are_left_out(own, expected):
-    named = found(mixed(own)).named
+    named = found(mixed(own)).findings
     assert {(n.hypothesis.effect.id, n.hypothesis.elements) for n in named} == expected
 
 

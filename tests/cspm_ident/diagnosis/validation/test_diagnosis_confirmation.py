@@ -7,12 +7,13 @@ import pytest
 from measured_samples import measured_with
 
 from cspm_ident.diagnosis.diagnose import diagnose
+from cspm_ident.diagnosis.finding import HoldOut, Rejection, Status
 from cspm_ident.diagnosis.regression.block_gram import gather
 from cspm_ident.diagnosis.reporting.verdict import diagnosis_data
 from cspm_ident.diagnosis.residuals.regressors import Candidate, Place
 from cspm_ident.diagnosis.residuals.residual_equation import Equation
 from cspm_ident.diagnosis.selection.search import Search
-from cspm_ident.diagnosis.validation.holdout_test import confirmed
+from cspm_ident.diagnosis.validation.holdout_test import holdout_tested
 from cspm_sim.effects import Channel, catalogue
 
 ROWS, STEP, BLOCK_S = 2400, 0.01, 0.5
@@ -35,39 +36,45 @@ def winch(weight, loud=1.0, rows=ROWS, seed=1):
 
 
 @pytest.mark.parametrize(
-    ("weight", "loud", "kept", "faint", "untold", "plain"),
+    ("weight", "loud", "holdout"),
     [
-        (1.0, 1.0, True, False, False, False),
+        (1.0, 1.0, HoldOut.CONFIRMED),
         # There it takes most.
-        (1.0, 2.0, True, False, False, True),
+        (1.0, 2.0, HoldOut.DOMINANT),
         # Where it moves a fifth as much it takes two hundredths, which is what it should.
-        (1.0, 0.2, True, True, False, False),
+        (1.0, 0.2, HoldOut.FAINT),
         # There it takes none though it should.
-        (0.0, 0.2, False, False, False, False),
-        (0.0, 1.0, False, False, False, False),
+        (0.0, 0.2, None),
+        (0.0, 1.0, None),
         # It moves so little that what it takes says nothing.
-        (1.0, 0.02, False, False, True, False),
+        (1.0, 0.02, HoldOut.SILENT),
     ],
 )
-def test_a_finding_stands_by_what_it_should_take(weight, loud, kept, faint, untold, plain):
+def test_a_finding_is_accepted_by_what_it_should_take(weight, loud, holdout):
     search = Search(winch(1.0))
-    found = search.run().named
-    stood = confirmed(search.fits, winch(weight, loud, seed=2), found)
-    assert [len(each) for each in stood] == [kept, faint, not kept and not untold, untold, plain]
+    (found,) = search.run().findings
+    (tested,) = holdout_tested(search.fits, winch(weight, loud, seed=2), [found])
+    if holdout is None:
+        assert (tested.status, tested.rejection) == (Status.REJECTED, Rejection.HOLDOUT_TEST)
+    else:
+        assert (tested.status, tested.holdout) == (Status.REPORTED, holdout)
+    assert tested.hypothesis is found.hypothesis
 
 
 def test_of_several_findings_those_stand_that_are_confirmed():
     search = Search(winch(1.0))
-    (found,) = search.run().named
-    assert confirmed(search.fits, winch(-1.0, seed=2), [found]).rejected == (found,)
-    assert confirmed(search.fits, winch(1.0, seed=2), []).kept == ()
+    (found,) = search.run().findings
+    (tested,) = holdout_tested(search.fits, winch(-1.0, seed=2), [found])
+    assert tested.rejection is Rejection.HOLDOUT_TEST
+    assert holdout_tested(search.fits, winch(1.0, seed=2), []) == ()
 
 
 def test_data_without_any_residual_say_nothing():
     search = Search(winch(1.0))
-    (found,) = search.run().named
+    (found,) = search.run().findings
     nothing = replace(winch(1.0), places=())
-    assert confirmed(search.fits, nothing, [found]).untold == (found,)
+    (tested,) = holdout_tested(search.fits, nothing, [found])
+    assert tested.holdout is HoldOut.SILENT
 
 
 @pytest.mark.slow

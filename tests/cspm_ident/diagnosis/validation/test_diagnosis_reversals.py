@@ -42,7 +42,7 @@ def shaft(law, seed=3, still=STILL, noise=0.3):
 def told(equation):
     parts = [[equation]]
     found = Search(gather(steady(parts), BLOCK_S)).run()
-    (named,) = with_wider(found, parts, BLOCK_S, Sums).named
+    (named,) = with_wider(found, parts, BLOCK_S, Sums).findings
     assert named.hypothesis.effect is DRY
     return [rival.hypothesis.effect for rival in named.alternatives]
 
@@ -92,7 +92,7 @@ def test_what_is_no_dry_friction_is_none_with_a_larger_breakaway():
     found = Search(
         gather(steady([[replace(equation, columns={churning: columns[churning]})]]), BLOCK_S)
     ).run()
-    assert [each.hypothesis.effect.id for each in found.named] == ["winch_churning"]
+    assert [each.hypothesis.effect.id for each in found.findings] == ["winch_churning"]
     assert with_wider(found, parts, BLOCK_S, Sums) == found
 
 

@@ -5,14 +5,14 @@ import pytest
 from run_samples import bundle_of
 
 from cspm_ident.block_simulation import Input
+from cspm_ident.diagnosis.finding import Improvement
 from cspm_ident.diagnosis.residuals.regressors import Candidate
 from cspm_ident.diagnosis.validation.holdout_simulation import (
     Baselines,
     Output,
     SimulatedFit,
-    Worth,
     baselines_of,
-    worth_of,
+    improvement_by,
 )
 from cspm_ident.signals.measurement import read_measurement
 from cspm_msgs_py.dofs import DOFS
@@ -53,5 +53,5 @@ def test_a_pose_tells_of_cables_where_motor_angles_drive_both(effect, element, d
     pose = Output(drive, "bar/pose/yaw", "rad", "bar", Channel.WRENCH)
     fit = SimulatedFit(pose, 1.0, before=0.4, retuned=0.4, after=0.3, floor=0.1)
     own = {Candidate(catalogue()[effect], element): np.array([0.1])}
-    found = worth_of(Baselines((), (), {}, {}), [fit], own, own)
-    assert found == (Worth(pose, 0.4, 0.3) if told else None)
+    found = improvement_by(Baselines((), (), {}, {}), [fit], own, own)
+    assert found == (Improvement(pose.name, pose.unit, 0.4, 0.3) if told else None)

@@ -1,70 +1,83 @@
 """Findings parted by what data say that were not searched."""
 
 from dataclasses import replace
-from types import SimpleNamespace
 
 import numpy as np
 import pytest
 
-from cspm_ident.diagnosis.diagnose import _told
+from cspm_ident.diagnosis.diagnose import _reported
+from cspm_ident.diagnosis.finding import Finding, HoldOut, Rejection, Status
 from cspm_ident.diagnosis.regression.block_gram import gather
 from cspm_ident.diagnosis.regression.block_regression import Gain
-from cspm_ident.diagnosis.regression.hypothesis import Findings, Hypothesis, Named, Rival
+from cspm_ident.diagnosis.regression.hypothesis import Hypothesis, Rival
 from cspm_ident.diagnosis.residuals.regressors import Candidate, Place
 from cspm_ident.diagnosis.residuals.residual_equation import Equation
 from cspm_ident.diagnosis.selection.search import Search
+from cspm_ident.diagnosis.selection.search_result import SearchResult
 from cspm_ident.diagnosis.validation import acceptance as module
-from cspm_ident.diagnosis.validation.acceptance import Standing
+from cspm_ident.diagnosis.validation.acceptance import Acceptance
+from cspm_ident.diagnosis.validation.found_model import Assessment, Model
 from cspm_sim.effects import Channel, catalogue
 
 
-def named(effect_id, element):
+def finding(effect_id, element):
     effect = catalogue()[effect_id]
     hypothesis = Hypothesis(effect, (Candidate(effect, element),))
-    return Named(hypothesis, Gain(100.0, 1.0), 0.5, ())
+    return Finding(hypothesis, Gain(100.0, 1.0), 0.5)
 
 
 DRY, WET, MASS = (
-    named(*each)
+    finding(*each)
     for each in (
         ("winch_coulomb_friction", "surge"),
         ("winch_viscous_friction", "surge"),
         ("bar_mass", "bar"),
     )
 )
-STANDING = Standing((DRY, WET, MASS), (WET,), (), (WET,), (), ())
+OPEN = replace(WET, holdout=HoldOut.SILENT)
 
 
-def test_what_is_doubted_is_told_and_not_sure():
-    assert STANDING.sure == (DRY, MASS)
-    assert replace(STANDING, doubted=()).sure == STANDING.kept
+def gone(finding, reason=Rejection.HOLDOUT_TEST):
+    return replace(finding, status=Status.REJECTED, rejection=reason)
 
 
-def test_what_is_useless_is_rejected_with_what_was():
-    once = STANDING.without([0])
-    assert (once.kept, once.rejected) == ((WET, MASS), (DRY,))
-    twice = once.without([0, 1])
-    assert (twice.kept, twice.rejected) == ((), (DRY, WET, MASS))
+def test_what_held_out_data_leave_open_is_kept_and_not_counted_on():
+    both = Acceptance((DRY, OPEN, MASS))
+    assert (both.kept, both.tested) == ((DRY, OPEN, MASS), (DRY, MASS))
+    assert Acceptance((DRY, WET)).tested == (DRY, WET)
+    assert not both.has_rejected
+
+
+def test_what_is_useless_is_rejected_behind_what_was():
+    fed_back = gone(MASS, Rejection.FED_BACK)
+    before = Acceptance((DRY, WET, fed_back))
+    once = before.rejecting([gone(DRY, Rejection.IMPOSSIBLE)])
+    assert (once.kept, once.fed_back) == ((WET,), (fed_back,))
+    assert [each.rejection for each in once.rejected] == [Rejection.IMPOSSIBLE]
+    twice = once.rejecting([gone(WET)])
+    assert twice.kept == ()
+    assert [each.effect for each in twice.rejected] == [DRY.effect, WET.effect]
 
 
 @pytest.mark.parametrize(
-    "less", [{"doubted": (WET,)}, {"rejected": (WET,)}, {"fed_back": (WET,)}, {}]
+    "less",
+    [{"left_open": OPEN}, {"rejected": gone(WET)}, {"fed_back": gone(WET, Rejection.FED_BACK)}, {}],
 )
-def test_what_is_unknown_is_asked_again_where_less_is_sure_than_was_found(monkeypatch, less):
-    """Beside what is sure, of all that is not."""
+def test_what_is_unexplained_is_asked_again_where_less_is_counted_on_than_was_found(
+    monkeypatch, less
+):
+    """Beside what is certain, of all that is not."""
     asked = []
-    monkeypatch.setattr(module, "unknown_beside", lambda *given: asked.append(given) or ("again",))
-    found = Findings((DRY, WET, MASS), ("first",), 9)
-    stands = Standing(
-        (DRY, *less.get("doubted", ())),
-        (),
-        (),
-        **({"doubted": (), "rejected": (), "fed_back": ()} | less),
+    monkeypatch.setattr(
+        module, "unexplained_beside", lambda *given: asked.append(given) or ("again",)
     )
-    unknown = stands.unknown(None, found)
-    gone = (*stands.rejected, *stands.doubted)
-    assert (unknown, asked) == (
-        (("again",), [(None, (DRY,), gone, stands.fed_back)]) if less else (("first",), [])
+    found = SearchResult((DRY, WET, MASS), ("first",), 9)
+    acceptance = Acceptance((DRY, *less.values()))
+    unexplained = acceptance.unexplained(None, found)
+    others = tuple(less[name] for name in ("rejected", "left_open") if name in less)
+    fed_back = tuple(less[name] for name in ("fed_back",) if name in less)
+    assert (unexplained, asked) == (
+        (("again",), [(None, (DRY,), others, fed_back)]) if less else (("first",), [])
     )
 
 
@@ -96,7 +109,7 @@ def shaft(loud, seed=1, weight=1.0):
 def found_in(search, hypothesis, *rivals):
     base, own = search.fits.columns([]), search.fits.own_columns(hypothesis)
     gain, share = search.fits.gain(hypothesis, base), search.sureness.share(base, own)
-    return Named(hypothesis, gain, share, tuple(Rival(h, 1.0) for h in rivals))
+    return Finding(hypothesis, gain, share, tuple(Rival(h, 1.0) for h in rivals))
 
 
 def test_what_explains_the_same_and_is_not_contradicted_stands_instead():
@@ -104,24 +117,25 @@ def test_what_explains_the_same_and_is_not_contradicted_stands_instead():
     search = Search(shaft(2.0))
     still = shaft(0.2, seed=2)
     line = found_in(search, LINE, SQUARE)
-    assert module.confirmed(search.fits, still, [line]).rejected == (line,)
-    stood = module._confirmed(search, still, [line])
-    (square,) = stood.untold
+    (alone,) = module.holdout_tested(search.fits, still, [line])
+    assert alone.status is Status.REJECTED
+    (square,) = module._tested(search, still, [line])
+    assert (square.status, square.holdout) == (Status.REPORTED, HoldOut.SILENT)
     assert (square.hypothesis, square.alternatives) == (SQUARE, ())
     assert square.gain.total > line.gain.total
-    alone = found_in(search, LINE)
-    assert module._confirmed(search, still, [alone]).rejected == (alone,)
     other_way = shaft(2.0, seed=2, weight=-1.0)
-    assert module._confirmed(search, other_way, [line]).rejected == (line,)
+    for judge, found in ((still, found_in(search, LINE)), (other_way, line)):
+        (tested,) = module._tested(search, judge, [found])
+        assert (tested.hypothesis, tested.status) == (LINE, Status.REJECTED)
 
 
 def test_what_takes_as_much_as_the_unknown_is_told_though_no_free_function_does():
     search = Search(shaft(2.0))
     square, late = found_in(search, SQUARE), found_in(search, LATE)
     assert square.share > 0.5
-    assert module._would_be_unknown(search, square, ())
-    assert not module._would_be_unknown(search, square._replace(share=0.14), ())
-    assert not module._would_be_unknown(search, late, ())
+    assert module._would_be_unexplained(search, square, ())
+    assert not module._would_be_unexplained(search, replace(square, share=0.14), ())
+    assert not module._would_be_unexplained(search, late, ())
 
 
 def test_what_was_given_up_says_no_more_what_a_finding_is_and_may_be_what_it_is():
@@ -135,20 +149,23 @@ def test_what_was_given_up_says_no_more_what_a_finding_is_and_may_be_what_it_is(
     assert [rival.hypothesis for rival in again.alternatives] == [LINE, late.hypothesis]
 
 
-@pytest.mark.parametrize("gone", [(), (WET,)])
-def test_what_is_told_is_judged_once_more_only_where_something_was_given_up(gone):
-    """The most important first, what is doubted last, and no clock of a sound machine."""
-    doubted = MASS._replace(gain=Gain(900.0, 1.0))
-    clock = Named(LATE, Gain(5.0, 1.0), 0.1, ())
-    stands = Standing((clock, DRY, WET, doubted), (), (), (doubted,), gone, ())
+@pytest.mark.parametrize("others", [(), (gone(WET),)])
+def test_findings_are_judged_once_more_only_where_something_was_rejected(others):
+    """The most important first, what is left open last, and no clock of a healthy machine."""
+    left_open = replace(MASS, gain=Gain(900.0, 1.0), holdout=HoldOut.SILENT)
+    clock = Finding(LATE, Gain(5.0, 1.0), 0.1, status=Status.NEGLIGIBLE)
+    kept = (clock, DRY, WET, left_open)
     more = {"winch_coulomb_friction": 10.0, "winch_viscous_friction": 20.0, "bar_mass": 30.0}
 
     class Again:
         def judged_again(self, each, chosen):
-            assert chosen == [kept.hypothesis for kept in stands.kept]
-            return each._replace(gain=Gain(more[each.hypothesis.effect.id], 1.0))
+            assert chosen == [finding.hypothesis for finding in kept]
+            return replace(each, gain=Gain(more[each.effect], 1.0))
 
-    model = SimpleNamespace(negligible=(True, False, False, False))
-    told = _told(Again(), stands, model)
-    assert list(told) == ([2, 1, 3] if gone else [1, 2, 3])
-    assert told[1].gain.total == (10.0 if gone else DRY.gain.total)
+    other = replace(DRY, hypothesis=replace(DRY.hypothesis, onset=3))
+    acceptance = Acceptance((*kept, *(gone(other) for _ in others)))
+    told = _reported(Again(), acceptance, Model(tuple(map(Assessment, kept)), {}))
+    order = [WET, DRY, MASS] if others else [DRY, WET, MASS]
+    assert [each.effect for each in told] == [each.effect for each in order]
+    dry = next(each for each in told if each.effect == DRY.effect)
+    assert dry.gain.total == (10.0 if others else DRY.gain.total)

@@ -1,0 +1,73 @@
+"""The result of a diagnosis."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from cspm_ident.diagnosis.finding import Finding, Status, Unexplained
+from cspm_ident.diagnosis.residuals.regressors import Place
+from cspm_ident.diagnosis.residuals.spectral_lines import Line
+from cspm_ident.diagnosis.thresholds import DEFAULT_THRESHOLDS, Thresholds
+from cspm_ident.diagnosis.validation.detection_limits import Limit
+from cspm_ident.diagnosis.validation.holdout_residuals import HeldOut
+from cspm_ident.diagnosis.validation.holdout_simulation import SimulatedFit
+from cspm_ident.diagnosis.validation.residual_curves import Curve
+from cspm_ident.signals.measurement import Measurement
+
+Array = NDArray[np.float64]
+
+
+@dataclass(frozen=True, eq=False, kw_only=True)
+class Diagnosis:
+    """The result of a diagnosis.
+
+    Attributes:
+        searched: recordings that were searched.
+        held_out: those that findings were tested on; empty where the end of each searched one was.
+        findings: all that were selected: first the reported ones, the most important first.
+        unexplained: residuals that no effect explains, the largest first.
+        tested: number of hypotheses that were tested.
+        fit: residual by residual.
+        simulated: quantity by quantity, by simulation.
+        lines: periodic forces from outside, and before them tensions that alternate.
+        limits: from which size on effects would have been reported.
+        not_excited: effects and elements that these recordings cannot show.
+        places: the residuals that there are.
+        curves: the residuals on held-out data, over time.
+        noise: of each residual, from row to row, one number per channel.
+        thresholds: that decided what is reported.
+    """
+
+    searched: Sequence[Measurement]
+    held_out: Sequence[Measurement]
+    findings: tuple[Finding, ...]
+    unexplained: tuple[Unexplained, ...]
+    tested: int
+    fit: tuple[HeldOut, ...]
+    simulated: tuple[SimulatedFit, ...]
+    lines: tuple[Line, ...]
+    limits: tuple[Limit, ...]
+    not_excited: tuple[tuple[str, tuple[str, ...]], ...]
+    places: tuple[Place, ...]
+    curves: tuple[Curve, ...]
+    noise: dict[Place, Array]
+    thresholds: Thresholds = DEFAULT_THRESHOLDS
+
+    @property
+    def reported(self) -> tuple[Finding, ...]:
+        """Findings in the report, tied and doubtful ones included, the most important first."""
+        return tuple(each for each in self.findings if each.is_reported)
+
+    @property
+    def negligible(self) -> tuple[Finding, ...]:
+        """Findings that are no larger than in a healthy machine."""
+        return tuple(each for each in self.findings if each.status is Status.NEGLIGIBLE)
+
+    @property
+    def rejected(self) -> tuple[Finding, ...]:
+        """Findings that are not in the model."""
+        return tuple(each for each in self.findings if each.status is Status.REJECTED)

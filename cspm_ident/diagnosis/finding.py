@@ -1,0 +1,230 @@
+"""A finding: an effect on some elements, from the search that selects it to the report."""
+
+from __future__ import annotations
+
+from collections.abc import Collection, Sequence
+from dataclasses import dataclass, field
+from enum import Enum
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from cspm_ident.diagnosis.parameter import Coefficients, Parameter, parameters_of
+from cspm_ident.diagnosis.regression.block_regression import Gain
+from cspm_ident.diagnosis.regression.hypothesis import (
+    DOUBTFUL_SHARE,
+    Hypothesis,
+    Rival,
+    is_constant,
+)
+from cspm_ident.diagnosis.residuals.free_shapes import Driver
+
+Array = NDArray[np.float64]
+
+# Whose equation every tension enters.
+_FED_BY_ALL = frozenset({"bar", "winch_frame"})
+
+
+class Status(Enum):
+    """What becomes of a finding.
+
+    Reported, tied and doubtful ones are in the report: a tied one has alternatives that explain the
+    data equally well, a doubtful one large unexplained residuals beside it. A negligible one is in
+    the model but no larger than in a healthy machine. A rejected one is in neither.
+    """
+
+    REPORTED = "reported"
+    TIED = "tied"
+    DOUBTFUL = "doubtful"
+    NEGLIGIBLE = "negligible"
+    REJECTED = "rejected"
+
+
+class Rejection(Enum):
+    """Why a finding is rejected."""
+
+    HOLDOUT_TEST = "does not lower the residuals of held-out data"
+    NOT_TESTABLE = "held-out data cannot test it, and no unexplained residual is as large"
+    FED_BACK = "is noise that controllers feed back"
+    IMPOSSIBLE = "has parameters that no such machine has"
+    INSIGNIFICANT = "has only parameters whose 95 % intervals contain zero"
+    DEGRADES_HOLDOUT = "raises the residuals of held-out data"
+    NO_IMPROVEMENT = "lowers the error of no simulation of held-out data"
+
+
+class HoldOut(Enum):
+    """What the hold-out test shows of a finding."""
+
+    NOT_TESTED = "not tested"
+    CONFIRMED = "lowers a residual"
+    DOMINANT = "takes more than half of a squared residual"
+    FAINT = "moves too little for a single residual, and lowers all together as predicted"
+    SILENT = "moves too little to say anything"
+
+
+class Onset(NamedTuple):
+    """When an effect began [s], with its 95 % interval from `low` to `high`."""
+
+    time: float
+    low: float
+    high: float
+
+
+class Region(NamedTuple):
+    """Values of a signal at which a finding shows.
+
+    Attributes:
+        driver: the signal, with its unit.
+        low, high: ends of the interval.
+        share: of the data that lies in it.
+        held: share of what the finding takes from the squared residual that lies in it.
+    """
+
+    driver: str
+    low: float
+    high: float
+    share: float
+    held: float
+
+
+class Improvement(NamedTuple):
+    """What a finding does to a simulation of held-out data.
+
+    Attributes:
+        channel: the quantity that improves most, such as `cables/tension/surge_2`.
+        unit: of it.
+        without: root mean square error with all other findings.
+        with_it: with all findings.
+    """
+
+    channel: str
+    unit: str
+    without: float
+    with_it: float
+
+
+class Shape(NamedTuple):
+    """A free function of a signal.
+
+    Attributes:
+        knots: in the signal's unit, shape (k,).
+        values: what it adds there, less their mean, in the residual's unit, (k,).
+    """
+
+    knots: Array
+    values: Array
+
+
+class Unexplained(NamedTuple):
+    """A part of a residual that no effect of the catalogue explains.
+
+    Attributes:
+        driver: the signal that explains most of it, and the residual.
+        gain: what a free function of that signal takes from the squares.
+        share: of the residual's squares.
+        shape: that function, once it is fitted beside what is reported.
+    """
+
+    driver: Driver
+    gain: Gain
+    share: float
+    shape: Shape | None = None
+
+
+@dataclass(frozen=True)
+class Finding:
+    """An effect on some elements, and what is known of it so far.
+
+    Attributes:
+        hypothesis: the effect and its elements.
+        gain: of it in blocks that were not fitted, beside all others that were selected.
+        share: largest share of a residual's squares that it takes.
+        alternatives: hypotheses that explain the same equally well.
+        status: what becomes of it.
+        rejection: why it is rejected; None if it is not.
+        holdout: what the hold-out test shows.
+        coefficients: as fitted, one entry per element.
+        onset: when it began; None where it acts all the time, or between recordings.
+        region: where it shows; None where it does everywhere.
+        improvement: of simulations of held-out data; None where none depends on it.
+    """
+
+    hypothesis: Hypothesis
+    gain: Gain
+    share: float
+    alternatives: tuple[Rival, ...] = ()
+    status: Status = Status.REPORTED
+    rejection: Rejection | None = None
+    holdout: HoldOut = HoldOut.NOT_TESTED
+    coefficients: tuple[Coefficients, ...] = field(default=(), compare=False)
+    onset: Onset | None = None
+    region: Region | None = None
+    improvement: Improvement | None = None
+
+    @property
+    def effect(self) -> str:
+        """The effect's id in the catalogue."""
+        return self.hypothesis.effect.id
+
+    @property
+    def elements(self) -> tuple[str, ...]:
+        """What it acts on."""
+        return self.hypothesis.elements
+
+    @property
+    def is_reported(self) -> bool:
+        """Whether it is in the report, be it tied or doubtful."""
+        return self.status in (Status.REPORTED, Status.TIED, Status.DOUBTFUL)
+
+    @property
+    def is_doubtful(self) -> bool:
+        """Whether large unexplained residuals beside it make it doubtful."""
+        return self.status is Status.DOUBTFUL
+
+    @property
+    def is_faint(self) -> bool:
+        """Whether held-out data show too little of it to confirm it by a single residual."""
+        return self.holdout in (HoldOut.FAINT, HoldOut.SILENT)
+
+    @property
+    def parameters(self) -> tuple[Parameter, ...]:
+        """All parameters, element by element."""
+        return tuple(p for own in self.coefficients for p in self.parameters_on(own))
+
+    def parameters_on(self, own: Coefficients) -> list[Parameter]:
+        """Return the parameters on the element that some of its coefficients are of."""
+        return parameters_of(own, doubtful=self.is_doubtful)
+
+
+def reported_status(
+    finding: Finding, unexplained: Sequence[Unexplained], aliased: Collection[str] = ()
+) -> Status:
+    """Return the status of a finding that is reported; see `is_doubtful`."""
+    if is_doubtful(finding, unexplained, aliased):
+        return Status.DOUBTFUL
+    return Status.TIED if finding.alternatives else Status.REPORTED
+
+
+def is_doubtful(
+    finding: Finding, unexplained: Sequence[Unexplained], aliased: Collection[str] = ()
+) -> bool:
+    """Return whether what nothing explains is no small part of what a finding does.
+
+    A constant is the mean of whatever function of the machine's motion is there beside it, and no
+    part of that; but it may have been drifting, or be the smaller of both.
+
+    Args:
+        finding: which.
+        unexplained: by any effect.
+        aliased: cables whose tensions alternate from one reading to the next; nothing that depends
+            on these is certain.
+    """
+    misread = {*aliased, *_FED_BY_ALL} if aliased else set()
+    if misread & set(finding.elements):
+        return True
+    gained, constant = finding.gain.total, is_constant(finding.hypothesis.effect)
+    return any(
+        each.gain.total > gained * (1.0 if constant and not each.driver.of_time else DOUBTFUL_SHARE)
+        for each in unexplained
+    )

@@ -1,0 +1,116 @@
+"""A finding's parameters in public names and SI units, with their 95 % intervals."""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from cspm_ident.diagnosis.residuals.regressors import Candidate
+from cspm_sim.effects import EffectParameter
+
+Array = NDArray[np.float64]
+
+
+class Coefficients(NamedTuple):
+    """The fitted coefficients of an effect on one element, of m columns.
+
+    Attributes:
+        candidate: the effect, its element and its nonlinear parameters.
+        values: shape (m,).
+        half_widths: half the widths of their 95 % intervals, (m,); infinite where the data give
+            none.
+        upper_ends: where the effect may also act at other time constants, the upper ends of the
+            intervals of the sum over all of them, (m,); None elsewhere.
+    """
+
+    candidate: Candidate
+    values: Array
+    half_widths: Array
+    upper_ends: Array | None = None
+
+
+class Parameter(NamedTuple):
+    """A parameter of an effect on one element.
+
+    Attributes:
+        element: on which the effect acts.
+        name: public name.
+        value: in `unit`.
+        unit: SI.
+        low, high: ends of its 95 % interval as far as the catalogue allows; equal to the value
+            where it was searched on a grid, or the finding is doubtful.
+        is_open: whether they are all that the catalogue allows, since the data bound nothing.
+    """
+
+    element: str
+    name: str
+    value: float
+    unit: str
+    low: float
+    high: float
+    is_open: bool = False
+
+    @property
+    def ci95(self) -> tuple[float, float] | None:
+        """Its 95 % interval, if it has one."""
+        return (self.low, self.high) if self.low < self.high and not self.is_open else None
+
+
+def parameters_of(own: Coefficients, *, doubtful: bool = False) -> list[Parameter]:
+    """Return the parameters of an effect on one element.
+
+    A doubtful finding has no intervals: measurement noise bounds a parameter for a given law, and
+    not what unexplained residuals beside it add to all of them.
+
+    Args:
+        own: the effect's coefficients.
+        doubtful: whether the finding that they belong to is.
+    """
+    effect, weights, widths = own.candidate.effect, own.values, own.half_widths
+    values = effect.values(weights.tolist(), **own.candidate.nonlinear)
+    element = own.candidate.element
+    if doubtful:
+        told = ((p, values[p.name]) for p in effect.parameters)
+        return [Parameter(element, p.name, value, p.unit, value, value) for p, value in told]
+    if not np.all(np.isfinite(widths)):
+        return [
+            _parameter(element, p, values[p.name], p.minimum, p.maximum) for p in effect.parameters
+        ]
+    upper = -np.inf if own.upper_ends is None else own.upper_ends
+    ends = _ends(own.candidate, weights, weights - widths, np.maximum(weights + widths, upper))
+    return [
+        _parameter(element, p, values[p.name], max(p.minimum, low), min(p.maximum, high))
+        for p, (low, high) in zip(effect.parameters, ends, strict=True)
+    ]
+
+
+def _ends(
+    candidate: Candidate, weights: Array, low: Array, high: Array
+) -> list[tuple[float, float]]:
+    """Return the intervals of an effect's parameters from those of its weights.
+
+    What each weight moves a parameter down and up within its own interval, in squares (GUM, JCGM
+    100:2008, 5.1.2): an amplitude is as sure whatever its phase is.
+    """
+    names = [p.name for p in candidate.effect.parameters]
+
+    def values(moved: Array) -> Array:
+        found = candidate.effect.values(moved.tolist(), **candidate.nonlinear)
+        return np.array([found[name] for name in names])
+
+    told = values(weights)
+    squares = np.zeros((2, len(names)))
+    for k in range(len(weights)):
+        ends = [low[k], high[k], np.clip(0.0, low[k], high[k])]
+        moved = [values(np.where(np.arange(len(weights)) == k, end, weights)) for end in ends]
+        apart = np.array([told, *moved]) - told
+        squares += np.square([apart.min(axis=0), apart.max(axis=0)])
+    return list(zip(told - np.sqrt(squares[0]), told + np.sqrt(squares[1]), strict=True))
+
+
+def _parameter(
+    element: str, own: EffectParameter, value: float, low: float, high: float
+) -> Parameter:
+    return Parameter(element, own.name, value, own.unit, low, high, own.is_open(low, high))

@@ -79,9 +79,7 @@ def diagnose(
         Recordings(searched, held_out), progress, safeguards, thresholds
     )
     evidence = search.evidence
-    found = with_wider(
-        found, in_noise(search_parts, noise), block, lambda e: safeguards.sums(e, thresholds)
-    )
+    found = with_wider(found, in_noise(search_parts, noise), block, safeguards.sums, thresholds)
     progress("held-out data")
     judge = _judge(in_noise(judge_parts, noise), found, block)
     search_parts, judge_parts = _found_only(search_parts, found), _found_only(judge_parts, found)
@@ -108,7 +106,7 @@ def diagnose(
             *(
                 replace(
                     each,
-                    status=reported_status(each, unexplained, aliased),
+                    status=reported_status(each, unexplained, aliased, thresholds),
                     region=region_of(rows, each.hypothesis.candidates, first, thresholds),
                 )
                 for each in _reported(search, acceptance, model)

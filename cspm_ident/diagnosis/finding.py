@@ -12,13 +12,9 @@ from numpy.typing import NDArray
 
 from cspm_ident.diagnosis.parameter import Coefficients, Parameter, parameters_of
 from cspm_ident.diagnosis.regression.block_regression import Gain
-from cspm_ident.diagnosis.regression.hypothesis import (
-    DOUBTFUL_SHARE,
-    Hypothesis,
-    Rival,
-    is_constant,
-)
+from cspm_ident.diagnosis.regression.hypothesis import Hypothesis, Rival, is_constant
 from cspm_ident.diagnosis.residuals.free_shapes import Driver
+from cspm_ident.diagnosis.thresholds import DEFAULT_THRESHOLDS, Thresholds
 
 Array = NDArray[np.float64]
 
@@ -198,16 +194,22 @@ class Finding:
 
 
 def reported_status(
-    finding: Finding, unexplained: Sequence[Unexplained], aliased: Collection[str] = ()
+    finding: Finding,
+    unexplained: Sequence[Unexplained],
+    aliased: Collection[str] = (),
+    thresholds: Thresholds = DEFAULT_THRESHOLDS,
 ) -> Status:
     """Return the status of a finding that is reported; see `is_doubtful`."""
-    if is_doubtful(finding, unexplained, aliased):
+    if is_doubtful(finding, unexplained, aliased, thresholds):
         return Status.DOUBTFUL
     return Status.TIED if finding.alternatives else Status.REPORTED
 
 
 def is_doubtful(
-    finding: Finding, unexplained: Sequence[Unexplained], aliased: Collection[str] = ()
+    finding: Finding,
+    unexplained: Sequence[Unexplained],
+    aliased: Collection[str] = (),
+    thresholds: Thresholds = DEFAULT_THRESHOLDS,
 ) -> bool:
     """Return whether what nothing explains is no small part of what a finding does.
 
@@ -219,12 +221,14 @@ def is_doubtful(
         unexplained: by any effect.
         aliased: cables whose tensions alternate from one reading to the next; nothing that depends
             on these is certain.
+        thresholds: `doubtful_share`.
     """
     misread = {*aliased, *_FED_BY_ALL} if aliased else set()
     if misread & set(finding.elements):
         return True
     gained, constant = finding.gain.total, is_constant(finding.hypothesis.effect)
+    share = thresholds.doubtful_share
     return any(
-        each.gain.total > gained * (1.0 if constant and not each.driver.of_time else DOUBTFUL_SHARE)
+        each.gain.total > gained * (1.0 if constant and not each.driver.of_time else share)
         for each in unexplained
     )

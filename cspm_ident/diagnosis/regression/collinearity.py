@@ -17,9 +17,6 @@ Array = NDArray[np.float64]
 Index = NDArray[np.intp]
 
 
-RIVAL_SHARE = DEFAULT_THRESHOLDS.rival_gain_share
-
-
 def overlap(sums: Sums, base: Index, own: Index, other: Index) -> bool:
     """Return whether columns explain the same, rather than as much of something else."""
     parts = (own, other, np.union1d(own, other))

@@ -15,9 +15,6 @@ from cspm_sim.effects import Effect
 
 Array = NDArray[np.float64]
 
-# Of what a finding explains. In blind recordings no finding was right (of 7) beside so much that
-# nothing explained.
-DOUBTFUL_SHARE = 0.1
 # More signals than any block of the machine has.
 _SIGNALS = 128
 

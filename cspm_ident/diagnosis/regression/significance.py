@@ -13,13 +13,9 @@ from cspm_ident.diagnosis.regression.collinearity import chance
 from cspm_ident.diagnosis.regression.hypothesis import Hypothesis
 from cspm_ident.diagnosis.regression.joint_fit import Fits
 from cspm_ident.diagnosis.residuals.regressors import Candidate
-from cspm_ident.diagnosis.thresholds import DEFAULT_THRESHOLDS
 from cspm_sim.effects import Effect
 
 Index = NDArray[np.intp]
-
-
-MATERIAL_SHARE = DEFAULT_THRESHOLDS.material_share
 
 
 class Sureness:

@@ -26,7 +26,6 @@ from cspm_ident.diagnosis.reporting.statement import (
 from cspm_ident.diagnosis.reporting.verdict import (
     IMPROVED,
     SENTENCES,
-    TRUSTED,
     Verdict,
     named_in,
     verdict_of,
@@ -225,9 +224,10 @@ def _hypotheses(found: Diagnosis, data: dict[str, Any]) -> str:
     if not rows:
         return f"<p>None of {found.tested} stood.</p>"
     heads = ("hypothesis", "verdict", "probability", "gain in standard errors", "residual taken")
+    trusted = found.thresholds.trusted_probability
     count = (
         f"<p>{found.tested} hypotheses were looked at. Probabilities are those among"
-        f" what explains the same, times {TRUSTED:g}: the share of findings without a rival that"
+        f" what explains the same, times {trusted:g}: the share of findings without a rival that"
         " were right in blind recordings; a tenth of it beside as much that nothing explains.</p>"
     )
     return count + table_html(heads, rows, "hypotheses and their evidence")

@@ -18,10 +18,6 @@ _DOUBT = (
     " part, so that its numbers have no interval."
 )
 _FAINT = " What was not searched moves so little that it shows little of it."
-# Of the noise from row to row: windows overlap, and leave a sound machine 1.4 times as much.
-_AT_NOISE = 1.5
-# What is left apart from where shafts turn round is told where it is so much less.
-_AWAY = 0.8
 
 
 def statement_of(diagnosis: Diagnosis, finding: Finding) -> str:
@@ -147,11 +143,11 @@ def _suspected(diagnosis: Diagnosis, effect: Effect) -> set[str]:
 def _improvement(diagnosis: Diagnosis, finding: Finding) -> str:
     """Return what it does to held-out data, in its own residual and simulated."""
     best = max(_concerned(diagnosis, finding), key=lambda fit: fit.before / max(fit.after, 1e-300))
-    noise = "at the noise floor"
-    if best.after > _AT_NOISE * best.noise:
+    noise, limits = "at the noise floor", diagnosis.thresholds
+    if best.after > limits.noise_floor_ratio * best.noise:
         noise = f"where noise is {_share(best, best.noise)}"
     away = ""
-    if best.steady is not None and best.steady < _AWAY * best.after:
+    if best.steady is not None and best.steady < limits.steady_error_share * best.after:
         away = f" ({_share(best, best.steady)} apart from where the shaft turns round)"
     before, after = _share(best, best.before), _share(best, best.after)
     moves = "falls" if best.after < best.before else "rises"

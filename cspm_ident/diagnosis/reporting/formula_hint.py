@@ -7,12 +7,10 @@ from collections.abc import Callable
 import numpy as np
 from numpy.typing import NDArray
 
+from cspm_ident.diagnosis.thresholds import DEFAULT_THRESHOLDS, Thresholds
+
 Array = NDArray[np.float64]
 
-# A formula has to account for so much of the shape.
-_ENOUGH = 0.9
-# Of its larger side, that the smaller one has at least to be one.
-_BOTH = 0.5
 _FORMS: dict[str, Callable[[Array], Array]] = {
     "{x}": lambda x: x,
     "|{x}|": np.abs,
@@ -24,13 +22,16 @@ _FORMS: dict[str, Callable[[Array], Array]] = {
 }
 
 
-def sketch(knots: Array, values: Array, name: str) -> str | None:
+def sketch(
+    knots: Array, values: Array, name: str, thresholds: Thresholds = DEFAULT_THRESHOLDS
+) -> str | None:
     """Return the simplest formula that a shape follows, a constant beside it; None if none does.
 
     Args:
         knots: of the signal, shape (k,).
         values: of the shape there, (k,).
         name: of the signal, without unit.
+        thresholds: `formula_share`.
     """
     spread = float(np.sum((values - values.mean()) ** 2))
     if spread <= 0.0:
@@ -40,23 +41,25 @@ def sketch(knots: Array, values: Array, name: str) -> str | None:
         table = np.column_stack([function(knots), np.ones(len(knots))])
         found = np.linalg.lstsq(table, values, rcond=None)[0]
         share = 1.0 - float(np.sum((values - table @ found) ** 2)) / spread
-        if share >= _ENOUGH and (best is None or share > best[0]):
+        if share >= thresholds.formula_share and (best is None or share > best[0]):
             best = share, f"{found[0]:.3g}·{form.format(x=name)}"
     return None if best is None else best[1]
 
 
-def is_even(knots: Array, values: Array) -> bool:
+def is_even(knots: Array, values: Array, thresholds: Thresholds = DEFAULT_THRESHOLDS) -> bool:
     """Return whether a shape is the same on both sides of zero, as far as it has both.
 
     Args:
         knots: of the signal, ascending, shape (k,).
         values: of the shape there, (k,).
+        thresholds: `formula_share` and `formula_range_share`.
     """
     reach = min(-float(knots[0]), float(knots[-1]))
-    if reach < _BOTH * float(np.max(np.abs(knots))):
+    if reach < thresholds.formula_range_share * float(np.max(np.abs(knots))):
         return False
     points = np.linspace(-reach, reach, 41)
     whole = np.interp(points, knots, values)
     whole = whole - whole.mean()
     odd = 0.5 * (whole - whole[::-1])
-    return float(np.sum(odd**2)) <= (1.0 - _ENOUGH) * float(np.sum(whole**2))
+    most = (1.0 - thresholds.formula_share) * float(np.sum(whole**2))
+    return float(np.sum(odd**2)) <= most

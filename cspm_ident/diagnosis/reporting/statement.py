@@ -11,6 +11,7 @@ from cspm_ident.diagnosis.finding import Shape, Unexplained
 from cspm_ident.diagnosis.reporting.formula_hint import is_even, sketch
 from cspm_ident.diagnosis.residuals.free_shapes import Driver
 from cspm_ident.diagnosis.residuals.spectral_lines import Line
+from cspm_ident.diagnosis.thresholds import DEFAULT_THRESHOLDS, Thresholds
 from cspm_ident.diagnosis.validation.holdout_residuals import HeldOut
 from cspm_ident.diagnosis.validation.holdout_simulation import SimulatedFit
 from cspm_ident.diagnosis.validation.residual_power import Power
@@ -24,7 +25,7 @@ def unknown_statement(diagnosis: Diagnosis, unexplained: Unexplained) -> str:
     """Return one sentence on something that is missing and that no effect explains."""
     driver, _, share, shape = unexplained
     assert shape is not None
-    formula = formula_of(driver, shape)
+    formula = formula_of(driver, shape, diagnosis.thresholds)
     hint = f"; as a hint, it runs like {formula}" if formula else ""
     size = "".join(
         f", {100.0 * np.sqrt(share) * fit.after / max(fit.measured, 1e-300):.2g} % of what was"
@@ -37,7 +38,7 @@ def unknown_statement(diagnosis: Diagnosis, unexplained: Unexplained) -> str:
         f" that nothing in the catalogue explains: a function of {driver.signal}, from"
         f" {shape.values.min():.3g} to {shape.values.max():.3g}"
         f" {_unit_in(driver)}, takes {100 * share:.0f} % of the squared"
-        f" residual{size}{hint}{_by_direction(driver, shape)}."
+        f" residual{size}{hint}{_by_direction(driver, shape, diagnosis.thresholds)}."
     )
 
 
@@ -47,10 +48,10 @@ def _unit_in(driver: Driver) -> str:
     return _UNITS.get(driver.place.channel, "N·m" if turns else "N")
 
 
-def _by_direction(driver: Driver, shape: Shape) -> str:
+def _by_direction(driver: Driver, shape: Shape, thresholds: Thresholds) -> str:
     """Return what an even function of a shaft's speed means: friction itself is odd."""
     of_speed = driver.place.channel is Channel.SHAFT and driver.signal.startswith("speed ")
-    if not of_speed or not is_even(shape.knots, shape.values):
+    if not of_speed or not is_even(shape.knots, shape.values, thresholds):
         return ""
     return "; it is the same in both directions, so that friction differs by direction"
 
@@ -86,9 +87,12 @@ def line_statement(line: Line) -> str:
     )
 
 
-def formula_of(driver: Driver, shape: Shape) -> str | None:
+def formula_of(
+    driver: Driver, shape: Shape, thresholds: Thresholds = DEFAULT_THRESHOLDS
+) -> str | None:
     """Return a formula that a free function of a signal follows, if a simple one does."""
-    return sketch(shape.knots, shape.values, driver.signal.split(" [")[0])
+    name = driver.signal.split(" [")[0]
+    return sketch(shape.knots, shape.values, name, thresholds)
 
 
 def channel_of(fit: HeldOut | Power) -> str:

@@ -20,6 +20,7 @@ from cspm_ident.diagnosis.reporting.statement import (
     unknown_statement,
 )
 from cspm_ident.diagnosis.residuals.spectral_lines import Line
+from cspm_ident.diagnosis.thresholds import DEFAULT_THRESHOLDS, Thresholds
 from cspm_ident.diagnosis.validation.holdout_residuals import HeldOut
 from cspm_ident.diagnosis.validation.holdout_simulation import SimulatedFit
 from cspm_ident.diagnosis.validation.residual_power import Power, lost_powers
@@ -29,11 +30,6 @@ from cspm_sim.effects import Block, Channel
 SCHEMA = "cspm.diagnosis/1"
 IMPROVED = "testbed.improved.yaml"
 UNKNOWN = "unknown"
-# Of findings without a rival in sealed blind recordings, those that were right (268 of 297, parts 4
-# to 8): of the others the catalogue lacks what was there, or has two things that look like one.
-TRUSTED = 0.9
-# Of those that are doubtful, for what nothing explains beside them: 4 of 41 were right.
-DOUBTED = 0.1
 
 
 class Verdict(Enum):
@@ -72,12 +68,14 @@ def verdict_of(diagnosis: Diagnosis) -> Verdict:
     return Verdict.EFFECT
 
 
-def probability_of(finding: Finding) -> float:
+def probability_of(finding: Finding, thresholds: Thresholds = DEFAULT_THRESHOLDS) -> float:
     """Return how probable a finding is, beside what explains the same and what nobody thought of.
 
     A rival's odds are those of a normal deviate of as many standard deviations as it lies behind.
     """
-    trusted = TRUSTED * DOUBTED if finding.is_doubtful else TRUSTED
+    trusted = thresholds.trusted_probability
+    if finding.is_doubtful:
+        trusted *= thresholds.doubtful_factor
     return trusted / (1.0 + sum(_odds(rival) for rival in finding.alternatives))
 
 
@@ -162,7 +160,7 @@ def _recording(role: str, measurement: Measurement) -> dict[str, Any]:
 
 
 def _finding(diagnosis: Diagnosis, finding: Finding) -> dict[str, Any]:
-    onset, probability = finding.onset, probability_of(finding)
+    onset, probability = finding.onset, probability_of(finding, diagnosis.thresholds)
     return {
         "subsystem": finding.hypothesis.effect.block.value,
         "elements": list(finding.elements),
@@ -232,7 +230,7 @@ def _unknown(diagnosis: Diagnosis, unexplained: Unexplained) -> dict[str, Any]:
             "driver": driver.signal,
             "at": shape.knots.tolist(),
             "adds": shape.values.tolist(),
-            "hint": formula_of(driver, shape),
+            "hint": formula_of(driver, shape, diagnosis.thresholds),
         },
         "parameters": [],
         "alternatives": [],

@@ -13,11 +13,9 @@ from cspm_ident.diagnosis.regression.block_regression import Gain, Sums
 from cspm_ident.diagnosis.regression.hypothesis import Hypothesis
 from cspm_ident.diagnosis.regression.significance import Sureness
 from cspm_ident.diagnosis.residuals.free_shapes import Driver
-from cspm_ident.diagnosis.thresholds import DEFAULT_THRESHOLDS
 
 Index = NDArray[np.intp]
 
-UNKNOWN_SHARE = DEFAULT_THRESHOLDS.unknown_share
 _LEAST = 1e-300
 
 

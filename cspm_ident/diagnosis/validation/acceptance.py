@@ -15,12 +15,10 @@ from cspm_ident.diagnosis.finding import (
     is_doubtful,
 )
 from cspm_ident.diagnosis.regression.block_gram import Evidence
-from cspm_ident.diagnosis.regression.collinearity import RIVAL_SHARE
 from cspm_ident.diagnosis.regression.hypothesis import Hypothesis
 from cspm_ident.diagnosis.residuals.residual_equation import Equation
 from cspm_ident.diagnosis.selection.search import Search
 from cspm_ident.diagnosis.selection.search_result import SearchResult
-from cspm_ident.diagnosis.selection.unexplained import UNKNOWN_SHARE
 from cspm_ident.diagnosis.validation.holdout_test import holdout_tested
 from cspm_ident.diagnosis.validation.instrumental_variables import (
     instruments_of,
@@ -164,7 +162,8 @@ def _shown_by_reference(
     block: float,
 ) -> tuple[tuple[Finding, ...], tuple[Finding, ...]]:
     """Return findings that the reference motion shows, if it has to, and the rejected others."""
-    hypotheses, wanted = _hypotheses(kept), [instruments_of(each) for each in searched]
+    hypotheses, limits = _hypotheses(kept), search.thresholds
+    wanted = [instruments_of(each, limits) for each in searched]
     values = search.fits.values(hypotheses)
 
     def is_shown(finding: Finding) -> bool:
@@ -173,7 +172,7 @@ def _shown_by_reference(
             not is_proportional(own.effect)
             or own.onset > 0
             or search.fits.is_negligible(own, hypotheses)
-            or shows_in_what_was_asked(rows, wanted, own.candidates, values, block)
+            or shows_in_what_was_asked(rows, wanted, own.candidates, values, block, limits)
         )
 
     shown = [is_shown(each) for each in kept]
@@ -199,8 +198,10 @@ def _left_open(
     unexplained = unexplained_beside(search, kept, (*contradicted, *silent), fed_back)
     if not unexplained:
         return tuple(e for e in silent if _would_be_unexplained(search, e, kept))
-    most = RIVAL_SHARE * max(each.gain.total for each in unexplained)
-    return tuple(e for e in silent if e.gain.total >= most and is_doubtful(e, unexplained))
+    limits = search.thresholds
+    most = limits.rival_gain_share * max(each.gain.total for each in unexplained)
+    large = [each for each in silent if each.gain.total >= most]
+    return tuple(e for e in large if is_doubtful(e, unexplained, thresholds=limits))
 
 
 def _would_be_unexplained(search: Search, finding: Finding, kept: Sequence[Finding]) -> bool:
@@ -209,9 +210,8 @@ def _would_be_unexplained(search: Search, finding: Finding, kept: Sequence[Findi
     It may do so where no free function does. A healthy machine must not have as much of it.
     """
     every = _hypotheses([*kept, finding])
-    return finding.share >= UNKNOWN_SHARE and not search.fits.is_negligible(
-        finding.hypothesis, every
-    )
+    enough = finding.share >= search.thresholds.unknown_share
+    return enough and not search.fits.is_negligible(finding.hypothesis, every)
 
 
 def unexplained_beside(

@@ -11,7 +11,6 @@ from scipy.stats import t as t_distribution
 
 from cspm_ident.diagnosis.finding import Finding
 from cspm_ident.diagnosis.regression.block_gram import Evidence
-from cspm_ident.diagnosis.regression.significance import MATERIAL_SHARE
 from cspm_ident.diagnosis.residuals.regressors import Candidate
 from cspm_ident.diagnosis.selection.search import Search
 
@@ -67,13 +66,18 @@ def _least(search: Search, candidate: Candidate, base: NDArray[np.intp]) -> floa
     error = float(np.sqrt(sums.covariance(base, columns)[0, 0]))
     chance = search.sureness.below(candidate.effect)
     sure = error * float(t_distribution.ppf(1.0 - chance / 2.0, max(1, sums.blocks - 1)))
-    return max(sure, _material(search.evidence, base, sums.weights(base), columns))
+    share = search.thresholds.material_share
+    return max(sure, _material(search.evidence, base, sums.weights(base), columns, share))
 
 
 def _material(
-    evidence: Evidence, base: NDArray[np.intp], weights: Array, columns: NDArray[np.intp]
+    evidence: Evidence,
+    base: NDArray[np.intp],
+    weights: Array,
+    columns: NDArray[np.intp],
+    share: float,
 ) -> float:
-    """Return the weight that takes a share worth a word in the residual where it shows most."""
+    """Return the weight that takes a share of the squares of the residual where it shows most."""
     left = evidence.left(base, weights)
     least = np.inf
     for place in evidence.places:
@@ -85,8 +89,8 @@ def _material(
         inverse = np.linalg.pinv(place.whole[np.ix_(beside, beside)], hermitian=True)
         own = float(place.whole[at[0], at[0]] - (cross.T @ inverse @ cross)[0, 0])
         if own > 0.0:
-            share = MATERIAL_SHARE / (1.0 - MATERIAL_SHARE)
-            least = min(least, float(np.sqrt(share * max(left[place.place], 0.0) / own)))
+            ratio = share / (1.0 - share)
+            least = min(least, float(np.sqrt(ratio * max(left[place.place], 0.0) / own)))
     return least
 
 

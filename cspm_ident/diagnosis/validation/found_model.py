@@ -35,6 +35,7 @@ from cspm_ident.diagnosis.residuals.residual_equation import Equation, steady
 from cspm_ident.diagnosis.selection.onset import onset_of
 from cspm_ident.diagnosis.selection.refinement import Cut, needs_refining, refine, spectra
 from cspm_ident.diagnosis.selection.search import Search
+from cspm_ident.diagnosis.thresholds import Thresholds
 from cspm_ident.diagnosis.validation.holdout_degradation import harm, squares_left
 from cspm_ident.diagnosis.validation.holdout_simulation import (
     Baselines,
@@ -46,9 +47,6 @@ from cspm_ident.signals.measurement import Measurement
 
 Array = NDArray[np.float64]
 Parts = Sequence[Sequence[Equation]]
-
-# A finding is kept if a simulated error falls below this share of what it is without the finding.
-WORTH_IT = 0.99
 
 
 class Data(NamedTuple):
@@ -89,7 +87,7 @@ class Assessment(NamedTuple):
     finding: Finding
     is_possible: bool = True
     is_insignificant: bool = False
-    needed: float = WORTH_IT
+    needed: float = 1.0
     degradation: float = 0.0
 
     @property
@@ -153,7 +151,8 @@ def modelled(search: Search, kept: Sequence[Finding], data: Data) -> Model:
         kept: the findings.
         data: to which parameters are fitted and by which the model is judged.
     """
-    onsets = _onsets(kept, steady(data.rows), search.evidence.times)
+    limits = search.thresholds
+    onsets = _onsets(kept, steady(data.rows), search.evidence.times, limits)
     since = max((onset.time for onset in onsets if onset is not None), default=-np.inf)
     weights, upper_ends = _fitted(search, kept, data, since)
     negligible = [_may_be_negligible(each, weights) for each in kept]
@@ -162,18 +161,19 @@ def modelled(search: Search, kept: Sequence[Finding], data: Data) -> Model:
         c: (_allowed(data.searched[0], c, own, half), half) for c, (own, half) in weights.items()
     }
     zero = [_is_insignificant(each.hypothesis, weights) for each in kept]
-    weights = of_forms(weights, _untrue(search, kept, weights))
+    weights = of_forms(weights, _untrue(search, kept, weights), limits)
     assessments = []
     for each, onset, small, none in zip(kept, onsets, negligible, zero, strict=True):
         own = {c: weights[c] for c in members_of(weights, each.hypothesis)}
         status = Status.NEGLIGIBLE if small else each.status
         fitted = tuple(Coefficients(c, *of, upper_ends.get(c)) for c, of in own.items())
         finding = replace(each, status=status, onset=onset, coefficients=fitted)
-        possible = _is_possible(each.hypothesis, own, data.searched[0])
-        assessments.append(Assessment(finding, possible, none and not small, _needed(each)))
+        possible = _is_possible(each.hypothesis, own, data.searched[0], limits)
+        needed = _needed(each, limits)
+        assessments.append(Assessment(finding, possible, none and not small, needed))
     if any(each.is_insignificant or not each.is_possible for each in assessments):
         return Model(tuple(assessments), weights)
-    return _simulated(assessments, weights, data)
+    return _simulated(assessments, weights, data, limits)
 
 
 def _fitted(
@@ -186,7 +186,7 @@ def _fitted(
 
     rows = [[e.within(since, np.inf) for e in part] for part in data.rows]
     weights = _parameters(search, kept, data, cut, rows)
-    return weights, _in_all(kept, weights, data, cut)
+    return weights, _in_all(kept, weights, data, cut, search.thresholds)
 
 
 def _may_be_negligible(finding: Finding, weights: Weights) -> bool:
@@ -194,16 +194,20 @@ def _may_be_negligible(finding: Finding, weights: Weights) -> bool:
     return may_be_negligible({c: weights[c] for c in own})
 
 
-def _is_possible(hypothesis: Hypothesis, own: Weights, measured: Measurement) -> bool:
+def _is_possible(
+    hypothesis: Hypothesis, own: Weights, measured: Measurement, thresholds: Thresholds
+) -> bool:
     """Return whether a machine can have such weights, and data show where they begin and end."""
     return (
         is_possible(measured, {c: weights for c, (weights, _) in own.items()})
         and is_seen_to_begin(hypothesis, own)
-        and is_seen_to_end(own)
+        and is_seen_to_end(own, thresholds)
     )
 
 
-def _simulated(assessments: Sequence[Assessment], weights: Weights, data: Data) -> Model:
+def _simulated(
+    assessments: Sequence[Assessment], weights: Weights, data: Data, thresholds: Thresholds
+) -> Model:
     """Return a model of tenable findings with what simulations of held-out data show of each.
 
     What a healthy machine has too is too small to improve any, and there nevertheless.
@@ -212,7 +216,7 @@ def _simulated(assessments: Sequence[Assessment], weights: Weights, data: Data) 
     simulated = simulate_held_out(data.baselines, values)
 
     def left(found: Mapping[Candidate, Array]) -> dict[Place, Array]:
-        return squares_left(data.baselines, found, data.noise, data.block)
+        return squares_left(data.baselines, found, data.noise, data.block, thresholds)
 
     every = left(values)
     judged = []
@@ -220,7 +224,8 @@ def _simulated(assessments: Sequence[Assessment], weights: Weights, data: Data) 
         if each.finding.status is not Status.NEGLIGIBLE:
             own = {own.candidate for own in each.finding.coefficients}
             improvement = improvement_by(data.baselines, simulated, values, own)
-            worse = harm(left({c: w for c, w in values.items() if c not in own}), every)
+            without = left({c: w for c, w in values.items() if c not in own})
+            worse = harm(without, every, thresholds)
             finding = replace(each.finding, improvement=improvement)
             each = each._replace(finding=finding, degradation=worse)
         judged.append(each)
@@ -238,7 +243,7 @@ def _is_insignificant(hypothesis: Hypothesis, weights: Weights) -> bool:
     return may_be_none(own) and not effect.signature.saturates and not drifts
 
 
-def _needed(finding: Finding) -> float:
+def _needed(finding: Finding, thresholds: Thresholds) -> float:
     """Return below which share of its value without a finding a simulated error has to fall.
 
     A simulation from motor angles hardly feels a number of the file that is off by little, and it
@@ -247,7 +252,8 @@ def _needed(finding: Finding) -> float:
     """
     if finding.holdout is HoldOut.DOMINANT:
         return np.inf
-    return 1.0 if finding.is_faint or is_number(finding.hypothesis) else WORTH_IT
+    lenient = finding.is_faint or is_number(finding.hypothesis)
+    return 1.0 if lenient else thresholds.useful_error_share
 
 
 def _allowed(measured: Measurement, candidate: Candidate, weights: Array, half: Array) -> Array:
@@ -265,16 +271,18 @@ def _parameters(
     """Return the weights of what was kept, refined where columns depend on them."""
     hypotheses = [each.hypothesis for each in kept]
     if any(needs_refining(hypothesis.effect) for hypothesis in hypotheses):
-        return refine(data.searched, hypotheses, data.noise, data.block, cut, data.supposed)
-    return of_shafts(search.fits.weights(hypotheses), rows, data.block)
+        given = data.noise, data.block, cut, data.supposed, search.thresholds
+        return refine(data.searched, hypotheses, *given)
+    return of_shafts(search.fits.weights(hypotheses), rows, data.block, search.thresholds)
 
 
 def _in_all(
-    kept: Sequence[Finding], weights: Weights, data: Data, cut: Cut
+    kept: Sequence[Finding], weights: Weights, data: Data, cut: Cut, thresholds: Thresholds
 ) -> dict[Candidate, Array]:
     """Return how large findings may be that have parts with other time constants."""
     hypotheses = [each.hypothesis for each in kept]
-    return spectra(data.searched, hypotheses, weights, data.noise, data.block, cut, data.supposed)
+    given = data.noise, data.block, cut, data.supposed, thresholds
+    return spectra(data.searched, hypotheses, weights, *given)
 
 
 def _untrue(
@@ -290,7 +298,9 @@ def _untrue(
     return shares
 
 
-def _onsets(kept: Sequence[Finding], rows: Parts, starts: Array) -> tuple[Onset | None, ...]:
+def _onsets(
+    kept: Sequence[Finding], rows: Parts, starts: Array, thresholds: Thresholds
+) -> tuple[Onset | None, ...]:
     """Return when each finding began; None where it acts all the time, or in which recording."""
     times = {
         c: float(starts[each.hypothesis.onset]) if each.hypothesis.onset else -np.inf
@@ -305,5 +315,5 @@ def _onsets(kept: Sequence[Finding], rows: Parts, starts: Array) -> tuple[Onset 
             continue
         others = {c: time for c, time in times.items() if c not in own}
         low, high = starts[max(block - 2, 0)], starts[min(block + 2, len(starts) - 1)]
-        found.append(onset_of(rows[0], own, others, float(low), float(high)))
+        found.append(onset_of(rows[0], own, others, float(low), float(high), thresholds))
     return tuple(found)

@@ -12,19 +12,10 @@ from cspm_ident.diagnosis.finding import Finding, HoldOut, Rejection, Status
 from cspm_ident.diagnosis.regression.block_gram import Evidence
 from cspm_ident.diagnosis.regression.block_regression import gain_of
 from cspm_ident.diagnosis.regression.joint_fit import Fits
-from cspm_ident.diagnosis.regression.significance import MATERIAL_SHARE
 from cspm_ident.diagnosis.residuals.regressors import Candidate
+from cspm_ident.diagnosis.thresholds import Thresholds
 
 Array = NDArray[np.float64]
-
-# A finding must take this share of a held-out squared residual, or it does not stand.
-CONFIRMED_SHARE = 0.03
-# Of what it should take of all, where it should take less than is worth a word of each.
-_AS_EXPECTED = CONFIRMED_SHARE / MATERIAL_SHARE
-# Of a held-out squared residual: what takes more of it is there, whatever else is not right yet.
-PLAIN_SHARE = 0.5
-# What it should take to be judged by, in standard errors of what it takes.
-_LEAST_EXPECTED = 3.0
 
 
 def holdout_tested(fits: Fits, judge: Evidence, found: Sequence[Finding]) -> tuple[Finding, ...]:
@@ -43,7 +34,7 @@ def holdout_tested(fits: Fits, judge: Evidence, found: Sequence[Finding]) -> tup
     for each in found:
         whole = fits.values([other.hypothesis for other in kept])
         own = set(each.hypothesis.candidates)
-        outcome = _Lowered(judge, whole, own).outcome
+        outcome = _Lowered(judge, whole, own, fits.thresholds).outcome
         if outcome in (None, HoldOut.SILENT):
             kept.remove(each)
         tested.append(
@@ -58,9 +49,14 @@ class _Lowered:
     """What weights of one finding among others take of squared residuals, place by place."""
 
     def __init__(
-        self, judge: Evidence, whole: Mapping[Candidate, Array], own: set[Candidate]
+        self,
+        judge: Evidence,
+        whole: Mapping[Candidate, Array],
+        own: set[Candidate],
+        thresholds: Thresholds,
     ) -> None:
         """Take all weights, and which are the finding's."""
+        self._thresholds = thresholds
         fewer = {c: w for c, w in whole.items() if c not in own}
         opposite = {c: -w if c in own else w for c, w in whole.items()}
         places = [place.place for place in judge.places]
@@ -91,31 +87,33 @@ class _Lowered:
     @property
     def much(self) -> bool:
         """Whether it takes a share worth a word of one."""
-        return bool(np.any(self._taken >= CONFIRMED_SHARE * self._without))
+        return bool(np.any(self._taken >= self._thresholds.confirmed_share * self._without))
 
     @property
     def most(self) -> bool:
         """Whether it takes most of one."""
-        return bool(np.any(self._taken > PLAIN_SHARE * self._without))
+        share = self._thresholds.majority_residual_share
+        return bool(np.any(self._taken > share * self._without))
 
     @property
     def as_expected(self) -> bool:
         """Whether it could not take much of any, and surely takes of all what it should."""
         if self._could_take_much or not self._shows:
             return False
-        return bool(self._taken.sum() >= _AS_EXPECTED * self._expected.sum())
+        share = self._thresholds.confirmed_expected_share
+        return bool(self._taken.sum() >= share * self._expected.sum())
 
     @property
     def says_nothing(self) -> bool:
         """Whether it could surely take nothing of all, and does not surely add to it."""
-        against = self._taken.sum() < -_LEAST_EXPECTED * self._error
+        against = self._taken.sum() < -self._thresholds.holdout_sigma * self._error
         return not self._shows and not bool(against)
 
     @property
     def _could_take_much(self) -> bool:
-        return bool(np.any(self._expected > MATERIAL_SHARE * self._without))
+        return bool(np.any(self._expected > self._thresholds.material_share * self._without))
 
     @property
     def _shows(self) -> bool:
         """Whether blocks would tell what it should take from nothing, as they scatter."""
-        return bool(self._expected.sum() > _LEAST_EXPECTED * self._error)
+        return bool(self._expected.sum() > self._thresholds.holdout_sigma * self._error)

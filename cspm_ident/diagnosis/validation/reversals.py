@@ -28,6 +28,7 @@ from cspm_ident.diagnosis.regression.joint_fit import Fits
 from cspm_ident.diagnosis.residuals.regressors import Candidate
 from cspm_ident.diagnosis.residuals.residual_equation import Equation
 from cspm_ident.diagnosis.selection.search_result import SearchResult
+from cspm_ident.diagnosis.thresholds import DEFAULT_THRESHOLDS, Thresholds
 from cspm_sim.effects import Channel
 
 Parts = Sequence[Sequence[Equation]]
@@ -35,14 +36,14 @@ Array = NDArray[np.float64]
 
 # Of a column's length: what differs by less is the same.
 _ALIKE = 1e-4
-# Of dry friction while a shaft slides: by how much more it breaks away to be worth a word.
-_LARGER = 0.2
-# Likewise, half of an interval: what is told no better tells nothing.
-_TOLD = 0.5
 
 
 def with_wider(
-    found: SearchResult, parts: Parts, block_s: float, summed: Callable[[Evidence], Sums]
+    found: SearchResult,
+    parts: Parts,
+    block_s: float,
+    summed: Callable[[Evidence, Thresholds], Sums],
+    thresholds: Thresholds = DEFAULT_THRESHOLDS,
 ) -> SearchResult:
     """Return findings, with wider forms that reversals leave open among their alternatives.
 
@@ -51,13 +52,14 @@ def with_wider(
         parts: all rows of what was searched, in units of their noise.
         block_s: length of the blocks [s].
         summed: makes sums that tell what is sure.
+        thresholds: those of a breakaway.
     """
     chosen = [each.hypothesis for each in found.findings]
     findings = []
     for each in found.findings:
         told = {rival.hypothesis.effect.id for rival in each.alternatives}
         rows = _reversing(each.hypothesis, parts)
-        wider = _wider(each, chosen, rows, block_s, summed) if rows else ()
+        wider = _wider(each, chosen, rows, block_s, summed, thresholds) if rows else ()
         rivals = tuple(Rival(h, 0.0) for h in wider if h.effect.id not in told)
         findings.append(replace(each, alternatives=each.alternatives + rivals))
     return found._replace(findings=tuple(findings))
@@ -91,7 +93,8 @@ def _wider(
     chosen: Sequence[Hypothesis],
     rows: Parts,
     block_s: float,
-    summed: Callable[[Evidence], Sums],
+    summed: Callable[[Evidence, Thresholds], Sums],
+    thresholds: Thresholds,
 ) -> Iterator[Hypothesis]:
     """Yield wider forms of a finding that are left open, of each effect what explains most."""
     own = finding.hypothesis
@@ -99,17 +102,17 @@ def _wider(
     evidence = gather(rows, block_s)
     if any(candidate not in evidence.slices for candidate in own.candidates):
         return
-    fits = Fits(evidence, summed(evidence))
+    fits = Fits(evidence, summed(evidence, thresholds))
     beside = [h for h in (_within(evidence, h) for h in others) if h is not None]
     base = fits.columns(beside)
     forms: dict[str, list[tuple[Hypothesis, NearRest | None]]] = {}
     for form in _forms(evidence, own):
         if _is_case(own, form, rows):
             weights = fits.weights([*beside, form])
-            told = near_rest([weights[c] for c in form.candidates])
+            told = near_rest([weights[c] for c in form.candidates], thresholds)
             forms.setdefault(form.effect.id, []).append((form, told))
     for alike in forms.values():
-        if left_open := _left_open(alike):
+        if left_open := _left_open(alike, thresholds):
             yield min(left_open, key=lambda form: float(fits.held_out(form, base).sum()))
 
 
@@ -143,39 +146,45 @@ class NearRest(NamedTuple):
     sliding: Array
 
 
-def near_rest(weights: Sequence[tuple[Array, Array]]) -> NearRest | None:
+def near_rest(
+    weights: Sequence[tuple[Array, Array]], thresholds: Thresholds = DEFAULT_THRESHOLDS
+) -> NearRest | None:
     """Return what reversals say of friction near rest; None where one element's is not told.
 
     Args:
         weights: of each element near rest and while it slides, with half their intervals.
+        thresholds: `breakaway_half_width_share`.
     """
     found = np.array([own for own, _ in weights])
     half = np.array([own for _, own in weights])
     sliding = found[:, 1]
-    if not np.all(half <= _TOLD * sliding[:, None]):
+    if not np.all(half <= thresholds.breakaway_half_width_share * sliding[:, None]):
         return None
     return NearRest(found[:, 0], half[:, 0], sliding)
 
 
-def _left_open(forms: Sequence[tuple[Hypothesis, NearRest | None]]) -> list[Hypothesis]:
+def _left_open(
+    forms: Sequence[tuple[Hypothesis, NearRest | None]], thresholds: Thresholds
+) -> list[Hypothesis]:
     """Return the forms of one effect, ascending in reach, that nothing speaks against."""
     told = [(form, near) for form, near in forms if near is not None]
     if not told:
         return [form for form, _ in forms]
-    larger = [form for form, near in told if _is_larger(form, near)]
+    excess = thresholds.breakaway_excess_share
+    larger = [form for form, near in told if _is_larger(form, near, excess)]
     widest, near = told[-1]
-    hidden = np.all(near.values + near.half < (1.0 - _LARGER) * near.sliding)
+    hidden = np.all(near.values + near.half < (1.0 - excess) * near.sliding)
     return larger or ([widest] if hidden else [])
 
 
-def _is_larger(form: Hypothesis, near: NearRest) -> bool:
+def _is_larger(form: Hypothesis, near: NearRest, excess: float) -> bool:
     """Return whether friction near rest is nearer to a breakaway worth a word than to none.
 
     And may be dry friction.
     """
     effect, shape = form.effect, form.candidates[0].nonlinear
     least = np.maximum(near.values - near.half, near.sliding)
-    return bool(np.all(near.values >= (1.0 + 0.5 * _LARGER) * near.sliding)) and all(
+    return bool(np.all(near.values >= (1.0 + 0.5 * excess) * near.sliding)) and all(
         effect.is_plausible(effect.values(each, **shape))
         for each in np.column_stack([least, near.sliding]).tolist()
     )

@@ -1,6 +1,8 @@
 """All that decides what is reported has a name, a range and a basis, and is passed on."""
 
+import ast
 from dataclasses import fields, replace
+from pathlib import Path
 
 import pytest
 from diagnosis_samples import diagnosis
@@ -9,6 +11,7 @@ from cspm_ident.diagnosis.reporting.verdict import diagnosis_data
 from cspm_ident.diagnosis.thresholds import DEFAULT_THRESHOLDS, GROUPS, Thresholds
 from cspm_msgs_py.errors import InputError
 
+PACKAGE = Path(__file__).resolve().parents[3] / "cspm_ident" / "diagnosis"
 FIELDS = fields(Thresholds)
 
 
@@ -64,3 +67,58 @@ def test_a_diagnosis_tells_the_thresholds_that_it_was_given():
     assert diagnosis_data(diagnosis())["thresholds"] == DEFAULT_THRESHOLDS.values
     assert diagnosis_data(replace(diagnosis(), thresholds=moved))["thresholds"] == moved.values
     assert moved.values["unknown_share"] == 0.3
+
+
+def with_thresholds(tree):
+    """Names of the functions and classes of a module that take thresholds."""
+    for node in ast.walk(tree):
+        if isinstance(node, ast.FunctionDef) and node.name != "__init__" and takes(node):
+            yield node.name
+        if isinstance(node, ast.ClassDef):
+            made = [n for n in node.body if getattr(n, "name", "") == "__init__"]
+            if made and takes(made[0]):
+                yield node.name
+
+
+def takes(function):
+    arguments = function.args
+    return "thresholds" in {a.arg for a in (*arguments.args, *arguments.kwonlyargs)}
+
+
+def forgotten(tree, names):
+    """Calls in a module that leave out thresholds which the called one takes."""
+    for node in ast.walk(tree):
+        if isinstance(node, ast.Call):
+            name = getattr(node.func, "attr", getattr(node.func, "id", ""))
+            given = ast.unparse(node)
+            if name in names and not any(w in given for w in ("thresholds", "limits", "*given")):
+                yield f"line {node.lineno}: {given}"
+
+
+def test_no_function_of_the_diagnosis_forgets_to_pass_thresholds_on():
+    trees = {path: ast.parse(path.read_text()) for path in sorted(PACKAGE.rglob("*.py"))}
+    own = {path: set(with_thresholds(tree)) for path, tree in trees.items()}
+    public = {name for names in own.values() for name in names if not name.startswith("_")}
+    assert {"Sums", "equations_of", "Search", "searched_for", "highest_line"} <= public
+    found = [
+        f"{path.name} {each}"
+        for path, tree in trees.items()
+        for each in forgotten(tree, public | own[path])
+    ]
+    assert not found, "\n".join(found)
+
+
+def test_the_check_sees_a_call_that_forgets_thresholds():
+    tree = ast.parse("def f(a, thresholds=None): ...\nf(1)\nf(1, thresholds)\nf(1, limits)")
+    assert list(forgotten(tree, set(with_thresholds(tree)))) == ["line 2: f(1)"]
+
+
+def test_no_constant_that_decides_is_read_from_the_defaults_inside_the_diagnosis():
+    """A default argument is the only use of the defaults there."""
+    for path in sorted(PACKAGE.rglob("*.py")):
+        text = path.read_text()
+        uses = [line for line in text.splitlines() if "DEFAULT_THRESHOLDS" in line]
+        for line in uses:
+            allowed = ("import", "= DEFAULT_THRESHOLDS", "DEFAULT_THRESHOLDS = Thresholds()")
+            assert any(word in line for word in allowed), f"{path.name}: {line}"
+            assert "DEFAULT_THRESHOLDS." not in line, f"{path.name}: {line}"

@@ -28,8 +28,6 @@ from cspm_ident.diagnosis.regression.hypothesis import Hypothesis, Rival, is_con
 from cspm_ident.diagnosis.reporting.diagnosis_page import write_diagnosis_page
 from cspm_ident.diagnosis.reporting.evidence_figure import caption_of
 from cspm_ident.diagnosis.reporting.verdict import (
-    DOUBTED,
-    TRUSTED,
     Verdict,
     diagnosis_data,
     named_in,
@@ -39,12 +37,16 @@ from cspm_ident.diagnosis.residuals.free_shapes import Driver
 from cspm_ident.diagnosis.residuals.regressors import Candidate, Place
 from cspm_ident.diagnosis.residuals.residual_equation import Equation
 from cspm_ident.diagnosis.residuals.spectral_lines import Line
+from cspm_ident.diagnosis.thresholds import DEFAULT_THRESHOLDS
 from cspm_ident.diagnosis.validation.residual_curves import explained_by, held_out_curves
 from cspm_ident.signals.samples import Samples
 from cspm_sim.effects import Channel, catalogue
 
 LOADED = Candidate(catalogue()["winch_load_friction"], "surge_2")
 WIDER = Candidate(catalogue()["winch_drum_radius"], "surge_2")
+
+TRUSTED = DEFAULT_THRESHOLDS.trusted_probability
+DOUBTED = DEFAULT_THRESHOLDS.doubtful_factor
 
 
 HUM = Line(Place(Channel.WRENCH, "bar"), 1, 2.7, 0.314, 1e-9)

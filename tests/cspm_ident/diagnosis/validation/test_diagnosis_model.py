@@ -12,8 +12,8 @@ from cspm_ident.diagnosis.regression.hypothesis import Hypothesis
 from cspm_ident.diagnosis.residuals.corrected_measurement import is_possible, nearest_possible
 from cspm_ident.diagnosis.residuals.free_shapes import around
 from cspm_ident.diagnosis.residuals.regressors import Candidate
+from cspm_ident.diagnosis.thresholds import DEFAULT_THRESHOLDS
 from cspm_ident.diagnosis.validation.found_model import (
-    WORTH_IT,
     Assessment,
     Model,
     _is_insignificant,
@@ -26,8 +26,7 @@ from cspm_sim.effects import Channel, catalogue
 
 THESIS = load_testbed(SCENARIOS / "testbeds" / "thesis.yaml")
 OUTPUT = Output(Input.SHAFT, "winches/angle/surge_2", "rad", "surge_2", Channel.SHAFT)
-
-
+WORTH_IT = DEFAULT_THRESHOLDS.useful_error_share
 EFFECTS = ("winch_coulomb_friction", "winch_viscous_friction", "bar_mass")
 
 
@@ -96,7 +95,7 @@ def test_what_moves_too_little_to_lower_an_error_by_much_has_to_lower_it(share, 
     ],
 )
 def test_how_much_a_simulation_has_to_gain_by_what_else_is_known(effect, holdout, needed):
-    assert _needed(finding(effect, holdout=holdout)) == needed
+    assert _needed(finding(effect, holdout=holdout), DEFAULT_THRESHOLDS) == needed
 
 
 def test_what_takes_most_of_a_residual_stays_though_no_simulation_gains():

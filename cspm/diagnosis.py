@@ -20,6 +20,7 @@ from cspm_ident.diagnosis.finding import Status
 from cspm_ident.diagnosis.reporting.experiment_files import write_experiments
 from cspm_ident.diagnosis.reporting.improved_file import improved_testbed
 from cspm_ident.diagnosis.reporting.verdict import IMPROVED, diagnosis_data
+from cspm_ident.diagnosis.thresholds import thresholds_of
 from cspm_ident.diagnosis.validation.closed_loop import ClosedLoopFit, simulate_closed_loop
 from cspm_ident.diagnosis.validation.controller_parity import Parity, controller_parity
 from cspm_ident.signals.measurement import Measurement
@@ -164,6 +165,7 @@ def diagnose(
     testbed: AnyTestbed | None = None,
     held_out: AnyRecording | Iterable[AnyRecording] = (),
     closed_loop: bool = True,
+    thresholds: Mapping[str, float] | None = None,
     progress: Progress = silent,
 ) -> Diagnosis:
     """Find what the described machine lacks: `cspm diagnose`.
@@ -177,10 +179,12 @@ def diagnose(
             that the recordings carry.
         held_out: on which to judge what was found; none: the last three tenths of each recording.
         closed_loop: whether to simulate the recorded closed loop again with what was found.
+        thresholds: those that are not the defaults, by name, such as `{"material_share": 0.1}`;
+            `docs/thresholds.md` lists all with units and ranges.
         progress: called now and then with an estimate of the share that is done and what is done.
 
     Raises:
-        InputError: naming what is wrong in recordings or test-bed.
+        InputError: naming what is wrong in recordings, test-bed or thresholds.
 
     Example:
         >>> import cspm
@@ -188,6 +192,7 @@ def diagnose(
         >>> verdict.findings[0].parameters["torque"].ci95  # doctest: +SKIP
         (0.0297, 0.0304)
     """
+    limits = thresholds_of(thresholds or {})
     searched, judges = listed(recordings), listed(held_out)
     twice = {path_of(each) for each in searched} & {path_of(each) for each in judges}
     if twice:
@@ -196,7 +201,7 @@ def diagnose(
     step("reading")
     looked, judged = measured(searched, testbed), measured(judges, testbed)
     _refuse_twice(looked, judged)
-    found = diagnose_measurements(looked, judged, step)
+    found = diagnose_measurements(looked, judged, step, thresholds=limits)
     loop: tuple[ClosedLoopFit, ...] = ()
     if closed_loop and found.reported:
         improved = improved_testbed(found, IMPROVED)

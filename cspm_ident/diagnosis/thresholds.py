@@ -7,7 +7,8 @@ the code that uses them.
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import asdict, dataclass, fields
+from dataclasses import asdict, dataclass, fields, replace
+from difflib import get_close_matches
 from math import isfinite
 from typing import Any
 
@@ -71,3 +72,20 @@ def _check(name: str, value: float, known: Mapping[str, Any]) -> None:
 
 
 DEFAULT_THRESHOLDS = Thresholds()
+
+
+def thresholds_of(values: Mapping[str, float]) -> Thresholds:
+    """Return the default thresholds with some at other values.
+
+    Args:
+        values: by name.
+
+    Raises:
+        InputError: there is no such threshold, or its value is not allowed.
+    """
+    known = [each.name for each in fields(Thresholds)]
+    for name in values:
+        if name not in known:
+            near = get_close_matches(name, known) or ["those of docs/thresholds.md"]
+            raise InputError(f"thresholds: no {name}, allowed: {', '.join(near)}")
+    return replace(DEFAULT_THRESHOLDS, **dict[str, Any](values))

@@ -16,8 +16,9 @@ from cspm_ident.diagnosis.thresholds import GROUPS
 _HEAD = """\
 # Thresholds of the diagnosis
 
-Every constant that decides what a diagnosis reports. `cspm_ident.diagnosis.thresholds.Thresholds`
-has them as fields; `diagnose(…, thresholds=Thresholds(material_share=0.1))` takes others.
+Every constant that decides what a diagnosis reports; all are fields of
+`cspm_ident.diagnosis.thresholds.Thresholds`. Other values for one diagnosis:
+`cspm.diagnose("recording", thresholds={"material_share": 0.1})`.
 `diagnosis.json` lists those that were used under `thresholds`. Constants of the numerics alone,
 such as lengths of filters and numbers of iterations, stay beside the code that uses them.
 

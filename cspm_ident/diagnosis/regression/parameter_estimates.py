@@ -163,4 +163,5 @@ def _calmed(parts: Parts, candidates: Sequence[Candidate]) -> Parts:
 
 # Of the scale: what lies farther counts less.
 _HUBER = 3.0
+# Of reweighting.
 _ROUNDS = 20

@@ -14,6 +14,7 @@ from cspm_sim.effects import Channel
 
 Array = NDArray[np.float64]
 
+# Of a curve that is drawn.
 _POINTS = 1500
 _BEFORE, _AFTER, _MEASURED = "#c62828", "#1b7f3b", "#9ecae9"
 # A step so many times the usual one is a hole.

@@ -23,6 +23,7 @@ _NAMES, _LINE = 250.0, 26.0
 _DEPTH = np.array([0.40, -0.30])
 # A winch without a cable has no place; such winches stand in a row this far apart [m].
 _APART_M = 0.5
+# Of a drawn cable's length: where its load cell is.
 _CELL_SHARE = 0.15
 _PLAIN, _MARKED = "#667", "#c62828"
 _EDGES = (

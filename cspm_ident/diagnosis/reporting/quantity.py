@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from math import floor, isfinite, log10
 
+# Below it a quantity gets a prefix.
 _SMALL = 0.1
 # Powers of 1000; a unit of kilograms is told in grams before it gets a prefix.
 _PREFIXES = ("", "m", "µ", "n")

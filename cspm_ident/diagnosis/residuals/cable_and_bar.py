@@ -31,6 +31,8 @@ Array = NDArray[np.float64]
 
 # What `of_cable` takes over where it is known, one column per cable.
 _PER_CABLE = ("_near", "_steady_damper")
+# Widths of Gaussian windows: of the damper's force, and of elongations without false reversals; and
+# how long a dashpot's unknown start lasts.
 _STEADY_S, _CALM_S, _START_S = 0.01, 0.03, 0.5
 
 

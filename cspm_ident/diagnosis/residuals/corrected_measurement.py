@@ -17,6 +17,7 @@ from cspm_sim.effect_entries import Action, altered_testbed, read_actions
 
 Array = NDArray[np.float64]
 
+# Each makes what is left smaller by the share of the fault.
 _FIXED_POINTS = 4
 
 

@@ -12,6 +12,7 @@ from cspm_ident.diagnosis.residuals.regressors import Candidate, Place
 
 Array = NDArray[np.float64]
 
+# Of a free function of one signal, piecewise linear.
 KNOTS = 7
 
 

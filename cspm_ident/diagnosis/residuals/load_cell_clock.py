@@ -19,6 +19,7 @@ Array = NDArray[np.float64]
 
 # Scale of the drift in its fit.
 _SCALE = 2.5e-5
+# Least length of a column, and least relative singular value.
 _NOTHING, _RANK = 1e-300, 1e-9
 # Rows that tell a drift beside the rest.
 _FEWEST = 16

@@ -15,7 +15,9 @@ from cspm_model.kernels.trajectory import Motions, spans_along
 
 Array = NDArray[np.float64]
 
+# Between the rows of cables and bar.
 PERIOD_NS = 5_000_000
+# Shorter stretches without a hole hold little more than the start of a filter.
 _SHORTEST_S = 2.0
 
 

@@ -31,6 +31,7 @@ from cspm_sim.effects import Effect
 Array = NDArray[np.float64]
 Cut = Callable[[Sequence[Sequence[Equation]]], Sequence[Sequence[Equation]]]
 
+# Of correcting and fitting again.
 _ROUNDS = 4
 # Grid steps are about a factor of three; each round halves the step in the logarithm.
 _FIRST_FACTOR = 1.7

@@ -30,6 +30,9 @@ Array = NDArray[np.float64]
 Progress = Callable[[str], None]
 Parts = Sequence[Sequence[Equation]]
 
+# Below which differences of rows have no median to speak of.
+_FEWEST_ROWS = 8
+
 
 class Recordings(NamedTuple):
     """In which to look, and on which to judge what was found; see `diagnose`."""
@@ -190,6 +193,6 @@ def noise_of(parts: Parts) -> dict[Place, Array]:
     found: dict[Place, list[Array]] = {}
     for equations in parts:
         for equation in equations:
-            if len(equation.times) > 8:
+            if len(equation.times) > _FEWEST_ROWS:
                 found.setdefault(equation.place, []).append(equation.noise)
     return {place: np.median(noises, axis=0) for place, noises in found.items()}

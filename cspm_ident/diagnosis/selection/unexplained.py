@@ -16,6 +16,7 @@ from cspm_ident.diagnosis.residuals.free_shapes import Driver
 
 Index = NDArray[np.intp]
 
+# Keeps quotients finite.
 _LEAST = 1e-300
 
 

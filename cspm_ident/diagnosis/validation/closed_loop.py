@@ -25,6 +25,7 @@ from cspm_run.recorded_run import run
 
 Array = NDArray[np.float64]
 
+# Of the recording that is simulated again.
 LONGEST_S = 30.0
 
 

@@ -24,6 +24,7 @@ from cspm_run.recorded_bundle import recorded_bundle
 
 Array = NDArray[np.float64]
 
+# Of the recording whose commands are computed again.
 LONGEST_S = 10.0
 
 

@@ -25,6 +25,7 @@ Weights = Mapping[Candidate, Array]
 
 # How long errors may grow where a drive is integrated twice or more [s].
 HORIZONS: dict[Input, float | None] = {Input.SHAFT: 0.5, Input.WINCH: None, Input.TENSION: 0.5}
+# Of each recording that is simulated.
 LONGEST_S = 30.0
 # In which what a cable remembers of before fades.
 LEAD_S = 10.0

@@ -15,6 +15,7 @@ from cspm_sim.effects import Channel
 
 Array = NDArray[np.float64]
 
+# Of a signal's values, each of equally many.
 _BINS = 12
 
 

@@ -22,6 +22,7 @@ _RATES = {
     Channel.TENSION: ("rate of elongation [m/s]", 1.0),
     Channel.WRENCH: ("speed [", -1.0),
 }
+# Of time, whose means are as good as independent.
 _BATCHES = 24
 
 

@@ -17,12 +17,12 @@ from cspm_ident.diagnosis.diagnose import diagnose as diagnose_measurements
 from cspm_ident.diagnosis.diagnosis import Diagnosis as Result
 from cspm_ident.diagnosis.finding import Finding as FoundEffect
 from cspm_ident.diagnosis.finding import Status
-from cspm_ident.diagnosis.reporting.experiment_files import write_experiments
 from cspm_ident.diagnosis.reporting.improved_file import improved_testbed
 from cspm_ident.diagnosis.reporting.verdict import IMPROVED, diagnosis_data
 from cspm_ident.diagnosis.thresholds import thresholds_of
 from cspm_ident.diagnosis.validation.closed_loop import ClosedLoopFit, simulate_closed_loop
 from cspm_ident.diagnosis.validation.controller_parity import Parity, controller_parity
+from cspm_ident.experiment.experiment_files import write_experiments
 from cspm_ident.signals.measurement import Measurement
 from cspm_msgs_py.errors import InputError
 from cspm_msgs_py.new_folder import refuse_existing

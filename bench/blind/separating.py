@@ -25,8 +25,8 @@ from bench.blind.truth import RECORDINGS, read_truth, truth_sha256
 from bench.markdown import markdown_table
 from bench.page import into_page
 from cspm_ident.diagnosis.diagnose import diagnose
-from cspm_ident.diagnosis.reporting.experiment_files import write_experiments
 from cspm_ident.diagnosis.reporting.verdict import UNKNOWN, diagnosis_data
+from cspm_ident.experiment.experiment_files import write_experiments
 from cspm_ident.signals.measurement import read_measurement
 from cspm_msgs_py.errors import DivergenceError
 from cspm_msgs_py.scenario import load_scenario

@@ -11,12 +11,12 @@ from cspm_ident.diagnosis.finding import Finding, Status
 from cspm_ident.diagnosis.parameter import Coefficients
 from cspm_ident.diagnosis.regression.block_regression import Gain
 from cspm_ident.diagnosis.regression.hypothesis import Hypothesis, Rival
-from cspm_ident.diagnosis.reporting import experiment_files
 from cspm_ident.diagnosis.reporting.verdict import diagnosis_data
 from cspm_ident.diagnosis.residuals.recorded_equations import equations_of
 from cspm_ident.diagnosis.residuals.regressors import Candidate, Place
 from cspm_ident.diagnosis.residuals.residual_equation import Equation
 from cspm_ident.diagnosis.validation.holdout_residuals import HeldOut
+from cspm_ident.experiment import experiment_files
 from cspm_ident.experiment.choice import Question, best_answer, is_safe, most_showing, safe_plans
 from cspm_ident.experiment.envelope import reach_of
 from cspm_ident.experiment.excitations import DURATION_S, excitations

@@ -33,7 +33,6 @@ from bench.page import into_page
 from cspm_ident.diagnosis.regression.block_regression import Gain, gain_of
 from cspm_ident.diagnosis.regression.hypothesis import Hypothesis, freedom, shapes_of
 from cspm_ident.diagnosis.residuals.regressors import Candidate
-from cspm_ident.diagnosis.selection.safeguards import ALL_SAFEGUARDS
 from cspm_ident.diagnosis.selection.search import Search
 from cspm_ident.diagnosis.selection.search_pass import Recordings, searched_for
 from cspm_ident.signals.measurement import read_measurement
@@ -107,7 +106,7 @@ def main() -> None:
 def miss_of(outcome: Outcome, item: Data, recording: Path) -> Miss:
     """Search a recording again and hold what is concealed against what was found."""
     given = Recordings([read_measurement(recording)], [])
-    look, found = searched_for(given, lambda _: None, ALL_SAFEGUARDS)
+    look, found = searched_for(given, list(catalogue().values()), lambda _: None)
     return compared(outcome, item, look.search, [each.hypothesis for each in found.findings])
 
 

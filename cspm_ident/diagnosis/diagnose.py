@@ -28,7 +28,6 @@ from cspm_ident.diagnosis.residuals.residual_equation import in_noise, steady
 from cspm_ident.diagnosis.residuals.spectral_lines import Line
 from cspm_ident.diagnosis.selection.refinement import Cut
 from cspm_ident.diagnosis.selection.region import region_of
-from cspm_ident.diagnosis.selection.safeguards import ALL_SAFEGUARDS, Safeguards
 from cspm_ident.diagnosis.selection.search import Search
 from cspm_ident.diagnosis.selection.search_pass import (
     Parts,
@@ -47,7 +46,7 @@ from cspm_ident.diagnosis.validation.holdout_simulation import baselines_of
 from cspm_ident.diagnosis.validation.residual_curves import held_out_curves
 from cspm_ident.diagnosis.validation.reversals import with_wider
 from cspm_ident.signals.measurement import Measurement
-from cspm_sim.effects import Effect
+from cspm_sim.effects import Effect, catalogue
 
 Array = NDArray[np.float64]
 
@@ -56,8 +55,8 @@ def diagnose(
     searched: Sequence[Measurement],
     held_out: Sequence[Measurement] = (),
     progress: Progress = lambda _: None,
-    safeguards: Safeguards = ALL_SAFEGUARDS,
     thresholds: Thresholds = DEFAULT_THRESHOLDS,
+    effects: Sequence[Effect] | None = None,
 ) -> Diagnosis:
     """Look for what the described machine lacks.
 
@@ -65,8 +64,8 @@ def diagnose(
         searched: recordings in which to look; all of one machine.
         held_out: others on which to judge what was found; none: the last part of each searched one.
         progress: called with what is being done.
-        safeguards: all of them, but for comparisons.
         thresholds: that decide what is reported.
+        effects: that are looked for; None: the whole catalogue.
 
     Raises:
         InputError: the recordings have no residual that could be looked at, or are too short.
@@ -74,25 +73,25 @@ def diagnose(
     searched, held_out = (
         [on_drives_clock(each, thresholds) for each in own] for own in (searched, held_out)
     )
+    effects = list(catalogue().values()) if effects is None else effects
     # No name for the look itself: its columns go as soon as they are not needed.
     (search_parts, judge_parts, hums, noise, block, search, knots, supposed), found = searched_for(
-        Recordings(searched, held_out), progress, safeguards, thresholds
+        Recordings(searched, held_out), effects, progress, thresholds
     )
     evidence = search.evidence
-    found = with_wider(found, in_noise(search_parts, noise), block, safeguards.sums, thresholds)
+    found = with_wider(found, in_noise(search_parts, noise), block, thresholds)
     progress("held-out data")
     judge = _judge(in_noise(judge_parts, noise), found, block)
     search_parts, judge_parts = _found_only(search_parts, found), _found_only(judge_parts, found)
     rows = in_noise(search_parts, noise)
-    judge_by = judge if safeguards.held_out else None
-    acceptance = accepted(search, found, judge_by, searched, rows, block)
+    acceptance = accepted(search, found, judge, searched, rows, block)
     starts = [span_of(part)[0] for part in judge_parts]
     retuned = search.retuned()
     progress("parameters, and simulation of held-out data")
     baselines = baselines_of(held_out or searched, starts, retuned)
     cut: Cut = whole_part if held_out else partial(first_part, thresholds=thresholds)
     data = Data(searched, cut, baselines, rows, noise, block, supposed)
-    acceptance, model = _useful(search, acceptance, data, safeguards)
+    acceptance, model = _useful(search, acceptance, data)
     unexplained = acceptance.unexplained(search, found)
     lines = tuple(line for each in (*searched, *held_out) for line in chatters_of(each, thresholds))
     aliased = {line.place.element for line in lines}
@@ -121,7 +120,7 @@ def diagnose(
         simulated=model.simulated,
         lines=(*lines, *_lasting(hums, searched, search_parts, values, thresholds)),
         limits=detection_limits(search, acceptance.kept),
-        not_excited=_not_excited(search, safeguards.effects),
+        not_excited=_not_excited(search, effects),
         places=tuple(place.place for place in evidence.places),
         curves=held_out_curves(steady(judge_parts), first),
         noise=noise,
@@ -129,12 +128,10 @@ def diagnose(
     )
 
 
-def _useful(
-    search: Search, acceptance: Acceptance, data: Data, safeguards: Safeguards
-) -> tuple[Acceptance, Model]:
+def _useful(search: Search, acceptance: Acceptance, data: Data) -> tuple[Acceptance, Model]:
     """Return what is left once the model needs nothing rejected any more, and that model."""
     model = modelled(search, acceptance.kept, data)
-    while gone := model.useless if safeguards.held_out else model.untenable:
+    while gone := model.useless:
         acceptance = acceptance.rejecting(gone)
         model = modelled(search, acceptance.kept, data)
     return acceptance, model

@@ -55,8 +55,6 @@ class Measurement:
         torque_age: how long before its stamp the reported torque acted, on average [s]. A simulated
             drive reports what it held since the stamp before: half a period. Of others nothing is
             known, and 0 is taken.
-        pointwise: whether equations hold at single samples instead of under windows, for
-            comparison.
         complete: whether whatever wrote the recording closed it.
         assumed: a machine that is assumed instead of the described one; None: the described one.
     """
@@ -73,7 +71,6 @@ class Measurement:
     command: Samples | None = None
     wanted: Samples | None = None
     torque_age: float = 0.0
-    pointwise: bool = False
     complete: bool = True
     assumed: Testbed | None = None
 
@@ -157,7 +154,6 @@ def read_measurement(path: Path, testbed: Path | TestbedFile | None = None) -> M
         **parts,
         wanted=_wanted(rows, start) if reference_topics else None,
         torque_age=age,
-        pointwise=False,
         complete=closed,
         assumed=None,
     )

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from typing import NamedTuple
 
 import numpy as np
@@ -38,9 +37,6 @@ class Window(NamedTuple):
         return self.weights + step**2 / 12.0 * self.second
 
 
-Make = Callable[[int, float], Window]
-
-
 def make_window(half_width: int, step: float) -> Window:
     """Return φ = (1 − s²)⁴ on −1 < s < 1 (Messenger and Bortz, SIAM MMS 19(3), 2021).
 
@@ -55,26 +51,6 @@ def make_window(half_width: int, step: float) -> Window:
         window[1:-1],
         (window[2:] - 2.0 * window[1:-1] + window[:-2]) / step**2,
     )
-
-
-def make_point(half_width: int, step: float) -> Window:
-    """Return a window of one sample, with the second difference about it: no weak form at all.
-
-    Args:
-        half_width: samples that `make_window` would have beside its middle, so that as many places
-            fit.
-        step: time between samples [s].
-    """
-    point = np.zeros(2 * half_width + 1)
-    point[half_width] = 1.0
-    second = np.zeros(2 * half_width + 1)
-    second[half_width - 1 : half_width + 2] = (1.0, -2.0, 1.0)
-    return Window(point, second / step**2)
-
-
-def maker(pointwise: bool) -> Make:
-    """Return `make_point` or `make_window`."""
-    return make_point if pointwise else make_window
 
 
 def weigh(weights: Array, values: Array, stride: int) -> Array:

@@ -5,8 +5,8 @@ from __future__ import annotations
 from collections.abc import Sequence
 from typing import NamedTuple
 
+from bench.blind.white_regression import WhiteSums
 from cspm_ident.diagnosis.regression.block_gram import Evidence, gather
-from cspm_ident.diagnosis.regression.white_regression import WhiteSums
 from cspm_ident.diagnosis.residuals.data_split import first_part, last_part, span_of
 from cspm_ident.diagnosis.residuals.recorded_equations import equations_of
 from cspm_ident.diagnosis.residuals.regressors import Candidate

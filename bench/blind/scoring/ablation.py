@@ -1,20 +1,32 @@
-"""The diagnosis without one of its safeguards, to measure what each adds."""
+"""The diagnosis without one of its safeguards, to measure what each adds.
+
+The diagnosis itself has no switch for that: a safeguard is left out by replacing what it consists
+of while the diagnosis runs.
+"""
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
-from dataclasses import replace
-from typing import NamedTuple
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from contextlib import ExitStack, contextmanager
+from types import MappingProxyType
+from typing import Any, NamedTuple
+from unittest.mock import patch
 
 import numpy as np
 
+from bench.blind.scoring.point_window import make_point
+from bench.blind.white_regression import WhiteSums
 from cspm_ident.block_simulation import BlockSimulation, Input
 from cspm_ident.diagnosis.diagnose import diagnose
 from cspm_ident.diagnosis.diagnosis import Diagnosis
-from cspm_ident.diagnosis.selection.safeguards import ALL_SAFEGUARDS, Safeguards
+from cspm_ident.diagnosis.finding import Finding
+from cspm_ident.diagnosis.validation.found_model import Model
 from cspm_ident.signals.measurement import Measurement
 from cspm_ident.signals.samples import Samples
 from cspm_ident.signals.timeline import Timeline
+from cspm_sim.effects import Effect, catalogue
+
+_DIAGNOSIS = "cspm_ident.diagnosis"
 
 
 class Ablation(NamedTuple):
@@ -22,11 +34,35 @@ class Ablation(NamedTuple):
 
     Attributes:
         prepare: what it makes of a measurement.
-        safeguards: those that the search keeps.
+        replaced: names of what else stands in the diagnosis, by what is put there.
+        effects: those that are looked for.
     """
 
     prepare: Callable[[Measurement], Measurement] = lambda measurement: measurement
-    safeguards: Safeguards = ALL_SAFEGUARDS
+    replaced: Mapping[str, Any] = MappingProxyType({})
+    effects: Callable[[], Sequence[Effect]] = lambda: list(catalogue().values())
+
+    @contextmanager
+    def active(self) -> Iterator[None]:
+        """Put the replacements in place for a while.
+
+        Raises:
+            AttributeError: the diagnosis has no such part.
+        """
+        with ExitStack() as stack:
+            for name, new in self.replaced.items():
+                stack.enter_context(patch(f"{_DIAGNOSIS}.{name}", new))
+            yield
+
+
+def _untested(_: object, __: object, found: Sequence[Finding]) -> tuple[Finding, ...]:
+    """Return findings that no held-out data have rejected."""
+    return tuple(found)
+
+
+def _without_corrections() -> list[Effect]:
+    """Return the catalogue without wrong numbers of the file."""
+    return [effect for effect in catalogue().values() if effect.physics.alter is None]
 
 
 def with_modelled_tensions(measurement: Measurement) -> Measurement:
@@ -48,16 +84,29 @@ def with_modelled_tensions(measurement: Measurement) -> Measurement:
     return measurement.with_samples("tension", Samples(stamps, np.stack(columns, axis=1)))
 
 
-def _pointwise(measurement: Measurement) -> Measurement:
-    return replace(measurement, pointwise=True)
-
-
 ABLATIONS: Mapping[str, Ablation] = {
+    # Blocks take what the model computes between them as inputs, not what was measured.
     "measured-interfaces": Ablation(prepare=with_modelled_tensions),
-    "weak-form": Ablation(prepare=_pointwise),
-    "joint-refit": Ablation(safeguards=Safeguards(joint_refit=False)),
-    "block-null": Ablation(safeguards=Safeguards(block_null=False)),
-    "held-out": Ablation(safeguards=Safeguards(held_out=False)),
+    # Equations hold at single samples instead of under windows.
+    "weak-form": Ablation(
+        replaced={
+            f"residuals.{module}.make_window": make_point
+            for module in ("drive_torque", "residual_window", "winch_torque")
+        }
+    ),
+    # Numbers of the file stay, instead of being fitted together with effects.
+    "joint-refit": Ablation(effects=_without_corrections),
+    # Significance is that of white rows, not that of the scatter between blocks.
+    "block-null": Ablation(
+        replaced={"selection.search.Sums": WhiteSums, "validation.reversals.Sums": WhiteSums}
+    ),
+    # All findings are kept that a machine may have, whatever held-out data show.
+    "held-out": Ablation(
+        replaced={
+            "validation.acceptance.holdout_tested": _untested,
+            "validation.found_model.Model.useless": Model.untenable,
+        }
+    ),
 }
 
 
@@ -68,4 +117,5 @@ def diagnose_without(measurement: Measurement, safeguard: str) -> Diagnosis:
         InputError: the recording has no residual that could be looked at.
     """
     ablation = ABLATIONS[safeguard]
-    return diagnose([ablation.prepare(measurement)], safeguards=ablation.safeguards)
+    with ablation.active():
+        return diagnose([ablation.prepare(measurement)], effects=ablation.effects())

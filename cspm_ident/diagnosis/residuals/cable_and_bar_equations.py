@@ -29,7 +29,7 @@ from cspm_ident.diagnosis.residuals.virtual_load_cell import DrawnTension
 from cspm_ident.diagnosis.thresholds import DEFAULT_THRESHOLDS, Thresholds
 from cspm_ident.signals.measurement import TENSION, WINCHES, Measurement
 from cspm_ident.signals.timeline import Timeline
-from cspm_ident.winch.weak_form import Make, maker, weigh
+from cspm_ident.winch.weak_form import weigh
 from cspm_model.kernels.machine import PlantParameters
 from cspm_model.parameters import nominal_parameters
 from cspm_msgs_py.dofs import DOFS
@@ -74,13 +74,12 @@ def suspension_equations(
         thresholds: those of residuals.
     """
     measured = timeline.measurement
-    make = maker(measured.pointwise)
     dofs = moving(measured.bar_pose, thresholds.moving_pose_noise_ratio)
     return [
         equation.compact
         for stretch in machine_signals(timeline)
         for equation in _Stretch(
-            stretch, measured.machine, timeline.pose_band, make, dofs, thresholds, drawn=drawn
+            stretch, measured.machine, timeline.pose_band, dofs, thresholds, drawn=drawn
         ).equations(effects, known, knots)
     ]
 
@@ -99,13 +98,12 @@ def fine_equations(
         known: effects that the test-bed file has.
         thresholds: those of residuals.
     """
-    make = maker(measurement.pointwise)
     return [
         equation
         for stretch in stretches
-        for equation in _Stretch(
-            stretch, measurement.machine, None, make, (), thresholds
-        ).equations((), known, None)
+        for equation in _Stretch(stretch, measurement.machine, None, (), thresholds).equations(
+            (), known, None
+        )
     ]
 
 
@@ -117,7 +115,6 @@ class _Stretch:
         signals: MachineSignals,
         machine: Testbed,
         band: float | None,
-        make: Make,
         dofs: Sequence[str],
         thresholds: Thresholds,
         *,
@@ -136,8 +133,7 @@ class _Stretch:
             Channel.WRENCH: self._here.wrench_residuals,
         }
         self._windows = {
-            channel: quiet_window(values, band, signals.step, make)
-            for channel, values in missing.items()
+            channel: quiet_window(values, band, signals.step) for channel, values in missing.items()
         }
 
     def equations(

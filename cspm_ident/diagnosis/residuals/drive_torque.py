@@ -11,7 +11,7 @@ from cspm_ident.diagnosis.residuals.free_shapes import Driver, Knots
 from cspm_ident.diagnosis.residuals.regressors import Candidate, Place, shapes_of
 from cspm_ident.diagnosis.residuals.residual_equation import Equation
 from cspm_ident.signals.measurement import Measurement
-from cspm_ident.winch.weak_form import HALF_WIDTH_S, Make, maker, weigh
+from cspm_ident.winch.weak_form import HALF_WIDTH_S, make_window, weigh
 from cspm_sim.effect_entries import Action
 from cspm_sim.effects import Channel, Effect
 from cspm_sim.effects.signals import WinchSignal
@@ -80,8 +80,8 @@ def drive_equations(
             for a in known
             if a.element == i and a.effect.signature.regression.channel is Channel.DRIVE
         ]
-        missing, make = told - rows[:, WinchSignal.TORQUE], maker(measurement.pointwise)
-        equation = _equation(cable.name, missing, rows, effects, own, held, knots, make)
+        missing = told - rows[:, WinchSignal.TORQUE]
+        equation = _equation(cable.name, missing, rows, effects, own, held, knots)
         if equation is not None:
             found.append(equation)
     return found
@@ -95,7 +95,6 @@ def _equation(
     known: Sequence[Action],
     held: float,
     knots: Knots | None,
-    make: Make,
 ) -> Equation | None:
     whole = np.isfinite(missing)
     rows, missing = rows[whole], missing[whole]
@@ -103,7 +102,7 @@ def _equation(
     half = max(2, round(HALF_WIDTH_S / step)) if step > 0.0 else 0
     if not half or len(rows) < 2 * half + 1:
         return None
-    window, stride = make(half, step).weights, max(1, half // 2)
+    window, stride = make_window(half, step).weights, max(1, half // 2)
     for action in known:
         shape = {n: action.values[n] for n in action.effect.signature.nonlinear}
         columns = action.effect.regressors(rows, **shape)[:, 0]

@@ -16,7 +16,7 @@ from cspm_ident.signals.measurement import TENSION, WINCHES, Measurement
 from cspm_ident.signals.samples import Samples
 from cspm_ident.signals.winch_motion import winch_motion
 from cspm_ident.winch.recording import signal_rows, winch_signals
-from cspm_ident.winch.weak_form import HALF_WIDTH_S, Make, maker, weigh
+from cspm_ident.winch.weak_form import HALF_WIDTH_S, make_window, weigh
 from cspm_msgs_py.errors import InputError
 from cspm_msgs_py.testbed import Cable
 from cspm_sim.effect_entries import Action
@@ -76,8 +76,8 @@ def shaft_equations(
                 continue
             sensors = (WINCHES,) if signals.tension is None else (WINCHES, TENSION)
             lost = _lost(signals.torque, measurement.torque_age, times)
-            make, still = maker(measurement.pointwise), thresholds.reversal_speed_share
-            table = _Shaft(rows, cable, half, times, lost, sensors, make, still)
+            still = thresholds.reversal_speed_share
+            table = _Shaft(rows, cable, half, times, lost, sensors, still)
             own = [action for action in known if action.element == i]
             found.append(table.equation(effects, own, knots).compact)
     return found
@@ -111,13 +111,12 @@ class _Shaft:
         times: Array,
         lost: NDArray[np.bool_],
         sensors: tuple[str, ...],
-        make: Make,
         still_share: float,
     ) -> None:
         self._sensors, inertia, name = sensors, winch.rotor_inertia, winch.name
         self._rows, self._inertia, self._name = rows, inertia, name
         self._step = float(times[1] - times[0])
-        self._window, self._stride = make(half, self._step), max(1, half // 2)
+        self._window, self._stride = make_window(half, self._step), max(1, half // 2)
         speed = np.abs(rows[:, WinchSignal.SPEED])
         view, width = np.lib.stride_tricks.sliding_window_view, len(self._window.weights)
         windows = view(speed, width)[:: self._stride]

@@ -52,11 +52,10 @@ class Search:
         self,
         evidence: Evidence,
         progress: Callable[[str], None] = lambda _: None,
-        sums: Callable[[Evidence, Thresholds], Sums] = Sums,
         thresholds: Thresholds = DEFAULT_THRESHOLDS,
     ) -> None:
-        """Take the sums of all residuals, of which `sums` tells what is sure."""
-        self.evidence, self.sums = evidence, sums(evidence, thresholds)
+        """Take the Gram matrices of all residuals."""
+        self.evidence, self.sums = evidence, Sums(evidence, thresholds)
         self.thresholds = thresholds
         self.fits = Fits(evidence, self.sums)
         self._progress = progress

@@ -18,13 +18,12 @@ from cspm_ident.diagnosis.residuals.recorded_equations import equations_of
 from cspm_ident.diagnosis.residuals.regressors import Candidate, Place
 from cspm_ident.diagnosis.residuals.residual_equation import Equation, in_noise, steady
 from cspm_ident.diagnosis.residuals.spectral_lines import Line, lines_of, with_lines
-from cspm_ident.diagnosis.selection.safeguards import Safeguards
 from cspm_ident.diagnosis.selection.search import Search
 from cspm_ident.diagnosis.selection.search_result import SearchResult
 from cspm_ident.diagnosis.thresholds import DEFAULT_THRESHOLDS, Thresholds
 from cspm_ident.signals.measurement import Measurement
 from cspm_msgs_py.errors import InputError
-from cspm_sim.effects import Channel
+from cspm_sim.effects import Channel, Effect
 
 Array = NDArray[np.float64]
 Progress = Callable[[str], None]
@@ -72,8 +71,8 @@ class Look(NamedTuple):
 
 def searched_for(
     recordings: Recordings,
+    effects: Sequence[Effect],
     progress: Progress,
-    safeguards: Safeguards,
     thresholds: Thresholds = DEFAULT_THRESHOLDS,
 ) -> tuple[Look, SearchResult]:
     """Return what a search finds, and the search.
@@ -84,27 +83,27 @@ def searched_for(
 
     Args:
         recordings: what to look in.
+        effects: that are looked for.
         progress: called with what is being done.
-        safeguards: all of them, but for comparisons.
         thresholds: of the diagnosis.
 
     Raises:
         InputError: the recordings have no residual that could be looked at, or are too short.
     """
-    look = _look(recordings, {}, progress, safeguards, thresholds)
+    look = _look(recordings, {}, effects, progress, thresholds)
     if recordings.are_drawn:
         first = look.search.first()
         supposed = _of_winches(look.search, () if first is None else (first,))
         if supposed:
             # Before the next is made: columns are most of the memory.
             del look
-            look = _look(recordings, supposed, progress, safeguards, thresholds)
+            look = _look(recordings, supposed, effects, progress, thresholds)
     found = look.search.run()
     if recordings.are_drawn:
         supposed = _of_winches(look.search, [each.hypothesis for each in found.findings])
         if not supposed.keys() <= look.supposed.keys():
             del look
-            look = _look(recordings, supposed, progress, safeguards, thresholds)
+            look = _look(recordings, supposed, effects, progress, thresholds)
             found = look.search.run()
     return look, found
 
@@ -123,17 +122,17 @@ def _of_winches(search: Search, hypotheses: Iterable[Hypothesis]) -> dict[Candid
 def _look(
     recordings: Recordings,
     supposed: Mapping[Candidate, Array],
+    effects: Sequence[Effect],
     progress: Progress,
-    safeguards: Safeguards,
     thresholds: Thresholds,
 ) -> Look:
     searched, held_out = recordings
     longest = max(m.duration for m in searched)
-    effects, knots = [told_within(e, longest) for e in safeguards.effects], Knots()
+    visible, knots = [told_within(e, longest) for e in effects], Knots()
 
     def equations(measurements: Sequence[Measurement]) -> Parts:
         return [
-            equations_of(m, effects, knots, progress, supposed=supposed, thresholds=thresholds)
+            equations_of(m, visible, knots, progress, supposed=supposed, thresholds=thresholds)
             for m in measurements
         ]
 
@@ -149,7 +148,7 @@ def _look(
     evidence = gather(in_noise(steady(parts), noise), block)
     if evidence.blocks < FOLDS:
         raise _too_short(searched[0], seconds, thresholds)
-    search = Search(evidence, progress, safeguards.sums, thresholds)
+    search = Search(evidence, progress, thresholds)
     return Look(parts, judged, hums, noise, block, search, knots, supposed)
 
 

@@ -87,7 +87,7 @@ class Acceptance:
 def accepted(
     search: Search,
     found: SearchResult,
-    judge: Evidence | None,
+    judge: Evidence,
     searched: Sequence[Measurement],
     rows: Parts,
     block: float,
@@ -97,12 +97,12 @@ def accepted(
     Args:
         search: in which it was found.
         found: that.
-        judge: Gram matrices of held-out data; None: nothing is tested on these.
+        judge: Gram matrices of held-out data.
         searched: the recordings.
         rows: their equations, in units of their noise.
         block: length of the blocks [s].
     """
-    tested = found.findings if judge is None else _tested(search, judge, found.findings)
+    tested = _tested(search, judge, found.findings)
     confirmed = [e for e in tested if e.status is not Status.REJECTED and not _is_silent(e)]
     contradicted = [e for e in tested if e.status is Status.REJECTED]
     silent = [e for e in tested if _is_silent(e)]

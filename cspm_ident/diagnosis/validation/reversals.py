@@ -8,7 +8,7 @@ with a larger breakaway explains as well what dry friction does.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import replace
 from typing import NamedTuple
 
@@ -39,11 +39,7 @@ _ALIKE = 1e-4
 
 
 def with_wider(
-    found: SearchResult,
-    parts: Parts,
-    block_s: float,
-    summed: Callable[[Evidence, Thresholds], Sums],
-    thresholds: Thresholds = DEFAULT_THRESHOLDS,
+    found: SearchResult, parts: Parts, block_s: float, thresholds: Thresholds
 ) -> SearchResult:
     """Return findings, with wider forms that reversals leave open among their alternatives.
 
@@ -51,15 +47,14 @@ def with_wider(
         found: what a search found.
         parts: all rows of what was searched, in units of their noise.
         block_s: length of the blocks [s].
-        summed: makes sums that tell what is sure.
-        thresholds: those of a breakaway.
+        thresholds: of the diagnosis.
     """
     chosen = [each.hypothesis for each in found.findings]
     findings = []
     for each in found.findings:
         told = {rival.hypothesis.effect.id for rival in each.alternatives}
         rows = _reversing(each.hypothesis, parts)
-        wider = _wider(each, chosen, rows, block_s, summed, thresholds) if rows else ()
+        wider = _wider(each, chosen, rows, block_s, thresholds) if rows else ()
         rivals = tuple(Rival(h, 0.0) for h in wider if h.effect.id not in told)
         findings.append(replace(each, alternatives=each.alternatives + rivals))
     return found._replace(findings=tuple(findings))
@@ -93,7 +88,6 @@ def _wider(
     chosen: Sequence[Hypothesis],
     rows: Parts,
     block_s: float,
-    summed: Callable[[Evidence, Thresholds], Sums],
     thresholds: Thresholds,
 ) -> Iterator[Hypothesis]:
     """Yield wider forms of a finding that are left open, of each effect what explains most."""
@@ -102,7 +96,7 @@ def _wider(
     evidence = gather(rows, block_s)
     if any(candidate not in evidence.slices for candidate in own.candidates):
         return
-    fits = Fits(evidence, summed(evidence, thresholds))
+    fits = Fits(evidence, Sums(evidence, thresholds))
     beside = [h for h in (_within(evidence, h) for h in others) if h is not None]
     base = fits.columns(beside)
     forms: dict[str, list[tuple[Hypothesis, NearRest | None]]] = {}

@@ -1,21 +1,31 @@
 """The diagnosis without one safeguard: what is left out, and that nothing else is."""
 
-from dataclasses import fields, replace
+import importlib
+from dataclasses import replace
 
 import numpy as np
 import pytest
 from measured_samples import measured_with
 from run_samples import run_to
 
-from bench.blind.scoring.ablation import ABLATIONS, diagnose_without, with_modelled_tensions
+from bench.blind.scoring.ablation import (
+    ABLATIONS,
+    Ablation,
+    diagnose_without,
+    with_modelled_tensions,
+)
+from bench.blind.scoring.point_window import make_point
+from bench.blind.white_regression import WhiteSums
+from cspm_ident.diagnosis.regression.block_gram import gather
 from cspm_ident.diagnosis.regression.block_regression import Sums
-from cspm_ident.diagnosis.regression.white_regression import WhiteSums
 from cspm_ident.diagnosis.residuals.recorded_equations import equations_of
-from cspm_ident.diagnosis.selection.safeguards import ALL_SAFEGUARDS, Safeguards
+from cspm_ident.diagnosis.residuals.regressors import Candidate, Place
+from cspm_ident.diagnosis.residuals.residual_equation import Equation
+from cspm_ident.diagnosis.selection.search import Search
 from cspm_ident.signals.measurement import read_measurement
 from cspm_ident.signals.samples import Samples
-from cspm_ident.winch.weak_form import make_point, make_window, maker, weigh
-from cspm_sim.effects import catalogue
+from cspm_ident.winch.weak_form import make_window, weigh
+from cspm_sim.effects import Channel, catalogue
 
 
 @pytest.fixture(scope="module")
@@ -26,27 +36,60 @@ def measurement(tmp_path_factory):
     return read_measurement(folder)
 
 
+def now(name):
+    """What the diagnosis has under a name of `Ablation.replaced`."""
+    module, *inner = name.rsplit(".", 2) if ".Model." in name else name.rsplit(".", 1)
+    found = importlib.import_module(f"cspm_ident.diagnosis.{module}")
+    for each in inner:
+        found = getattr(found, each)
+    return found
+
+
 def test_each_ablation_leaves_out_one_thing():
-    switches = [field.name for field in fields(Safeguards)]
     for name, ablation in ABLATIONS.items():
-        off = [switch for switch in switches if not getattr(ablation.safeguards, switch)]
-        prepared = ablation.prepare is not type(ablation)().prepare
-        assert len(off) + prepared == 1, name
-        assert off in ([], [name.replace("-", "_")]), name
-    assert all(getattr(ALL_SAFEGUARDS, switch) for switch in switches)
+        prepared = ablation.prepare is not Ablation().prepare
+        fewer = ablation.effects is not Ablation().effects
+        assert prepared + fewer + bool(ablation.replaced) == 1, name
+    with Ablation().active():
+        assert all(now(k) is not v for each in ABLATIONS.values() for k, v in each.replaced.items())
+
+
+@pytest.mark.parametrize("name", [k for k, v in ABLATIONS.items() if v.replaced])
+def test_what_is_left_out_is_so_only_while_the_ablation_is_active(name):
+    replaced = ABLATIONS[name].replaced
+    before = {each: now(each) for each in replaced}
+    with ABLATIONS[name].active():
+        assert {each: now(each) for each in replaced} == dict(replaced)
+    assert {each: now(each) for each in replaced} == before
+    assert all(before[each] is not new for each, new in replaced.items())
+
+
+def test_a_part_that_the_diagnosis_does_not_have_is_no_ablation():
+    wrong = Ablation(replaced={"selection.search.Scatter": WhiteSums})
+    with pytest.raises(AttributeError, match="Scatter"), wrong.active():
+        pass
 
 
 def test_without_joint_refit_no_number_of_the_file_is_looked_for():
     known = list(catalogue().values())
-    assert ALL_SAFEGUARDS.effects == known
-    left = Safeguards(joint_refit=False).effects
+    assert ABLATIONS["held-out"].effects() == known
+    left = ABLATIONS["joint-refit"].effects()
     assert left == [effect for effect in known if effect.physics.alter is None]
     assert 0 < len(left) < len(known)
 
 
 def test_without_the_block_null_rows_count_as_independent():
-    assert ALL_SAFEGUARDS.sums is Sums
-    assert Safeguards(block_null=False).sums is WhiteSums
+    equation = Equation(
+        Place(Channel.SHAFT, "one"),
+        0.01 * np.arange(600),
+        np.random.default_rng(1).standard_normal((600, 1)),
+        {Candidate(catalogue()["winch_viscous_friction"], "one"): np.ones((600, 1, 1))},
+        np.zeros((600, 1)),
+    )
+    evidence = gather([[equation]], 0.5)
+    assert type(Search(evidence).sums) is Sums
+    with ABLATIONS["block-null"].active():
+        assert type(Search(evidence).sums) is WhiteSums
 
 
 def test_a_point_sees_one_sample_at_the_places_of_the_window():
@@ -57,14 +100,12 @@ def test_a_point_sees_one_sample_at_the_places_of_the_window():
     np.testing.assert_allclose(places, weigh(window.weights, np.arange(60.0), 5))
     np.testing.assert_array_equal(weigh(point.weights, curve, 5), curve[places.astype(int)])
     np.testing.assert_allclose(weigh(point.second, curve, 5), 2.5)
-    assert (maker(True), maker(False)) == (make_point, make_window)
 
 
 def test_equations_at_points_are_noisier_at_the_same_places(measurement):
-    windowed, pointed = (
-        {e.place: e for e in equations_of(m, [])}
-        for m in (measurement, replace(measurement, pointwise=True))
-    )
+    windowed = {e.place: e for e in equations_of(measurement, [])}
+    with ABLATIONS["weak-form"].active():
+        pointed = {e.place: e for e in equations_of(measurement, [])}
     assert windowed.keys() == pointed.keys()
     louder = [np.median(pointed[p].noise / windowed[p].noise) for p in windowed]
     assert np.median(louder) > 1.5

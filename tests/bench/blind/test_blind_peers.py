@@ -12,9 +12,9 @@ from bench.blind.peers.normal import normal_of
 from bench.blind.peers.report import left_with, report_of
 from bench.blind.scoring import method
 from bench.blind.scoring.method import ABLATED, CSPM, METHODS, PEERS, require_method
+from bench.blind.white_regression import WhiteSums
 from cspm_ident.diagnosis.regression.block_gram import gather
 from cspm_ident.diagnosis.regression.block_regression import Sums
-from cspm_ident.diagnosis.regression.white_regression import WhiteSums
 from cspm_ident.diagnosis.residuals.regressors import Candidate, Place
 from cspm_ident.diagnosis.residuals.residual_equation import Equation
 from cspm_msgs_py.errors import InputError

@@ -6,10 +6,10 @@ import numpy as np
 import pytest
 
 from cspm_ident.diagnosis.regression.block_gram import gather
-from cspm_ident.diagnosis.regression.block_regression import Sums
 from cspm_ident.diagnosis.residuals.regressors import Candidate, Place, shapes_of
 from cspm_ident.diagnosis.residuals.residual_equation import Equation, steady
 from cspm_ident.diagnosis.selection.search import Search
+from cspm_ident.diagnosis.thresholds import DEFAULT_THRESHOLDS
 from cspm_ident.diagnosis.validation.reversals import near_rest, with_wider
 from cspm_sim.effects import Channel, catalogue
 from cspm_sim.effects.signals import WinchSignal
@@ -42,7 +42,7 @@ def shaft(law, seed=3, still=STILL, noise=0.3):
 def told(equation):
     parts = [[equation]]
     found = Search(gather(steady(parts), BLOCK_S)).run()
-    (named,) = with_wider(found, parts, BLOCK_S, Sums).findings
+    (named,) = with_wider(found, parts, BLOCK_S, DEFAULT_THRESHOLDS).findings
     assert named.hypothesis.effect is DRY
     return [rival.hypothesis.effect for rival in named.alternatives]
 
@@ -93,10 +93,10 @@ def test_what_is_no_dry_friction_is_none_with_a_larger_breakaway():
         gather(steady([[replace(equation, columns={churning: columns[churning]})]]), BLOCK_S)
     ).run()
     assert [each.hypothesis.effect.id for each in found.findings] == ["winch_churning"]
-    assert with_wider(found, parts, BLOCK_S, Sums) == found
+    assert with_wider(found, parts, BLOCK_S, DEFAULT_THRESHOLDS) == found
 
 
 def test_without_reversals_nothing_is_added():
     fast = shaft(lambda v: 3.0 + 2.0 * np.exp(-(v**2)), still=0.0)
     found = Search(gather([[fast.within(0.0, 10.0)]], BLOCK_S)).run()
-    assert with_wider(found, [[fast.within(0.0, 10.0)]], BLOCK_S, Sums) == found
+    assert with_wider(found, [[fast.within(0.0, 10.0)]], BLOCK_S, DEFAULT_THRESHOLDS) == found

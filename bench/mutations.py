@@ -111,7 +111,7 @@ MUTATIONS = (
         "cspm_ident/diagnosis/regression/significance.py",
         "/ (self._tried[effect.id] * len(self._tried))",
         "/ len(self._tried)",
-        "tests/cspm_ident/diagnosis/regression/test_diagnosis_sureness.py",
+        "tests/cspm_ident/diagnosis/regression/test_diagnosis_significance.py",
     ),
 )
 

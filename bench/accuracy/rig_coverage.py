@@ -7,14 +7,14 @@ from dataclasses import replace
 
 import numpy as np
 
-from bench.accuracy.rig_cables import Truth, described, multisine, ramps
+from bench.accuracy.rig_cables import SpecimenTruth, described, multisine, ramps
 from cspm_ident.rig.damping import DAMPING, identify_damping
 from cspm_ident.rig.law import section_of
 from cspm_ident.rig.specimen import Specimen
 from cspm_ident.rig.stiffness import identify_stiffness
 
 LENGTHS = (1.25, 2.1, 3.0, 3.5)  # m, of the thesis's rig
-TRUTH = Truth()
+TRUTH = SpecimenTruth()
 
 
 class RigStiffness:

@@ -158,7 +158,7 @@ def nearest_truth(
     if not all(forms):
         return None
     start = float(item.get("onset_s", 0.0))
-    onset = int(np.argmin(np.abs(search.evidence.times - start))) if start else 0
+    onset = int(np.argmin(np.abs(search.gram.times - start))) if start else 0
     options = [[replace(h, onset=onset) for h in option] for option in product(*forms)]
     return min(options, key=lambda option: float(_left(search, option, beside).sum()))
 
@@ -173,7 +173,7 @@ def _forms(search: Search, concealed: Data) -> list[Hypothesis]:
 def _left(search: Search, true: Sequence[Hypothesis], beside: Sequence[Hypothesis]) -> Array:
     """Return Σ residual² of each block beside what is true, not fitted to it."""
     fits = search.fits
-    own = search.evidence.columns_of(c for h in true for c in h.candidates)
+    own = search.gram.columns_of(c for h in true for c in h.candidates)
     with fits.sums.delayed(own, max(h.onset for h in true)):
         return fits.sums.held_out(fits.columns([*true, *beside]))
 

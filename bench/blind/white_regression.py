@@ -7,21 +7,21 @@ from numpy.typing import NDArray
 from scipy.stats import f as f_distribution
 from scipy.stats import t as t_distribution
 
-from cspm_ident.diagnosis.regression.block_gram import Evidence
-from cspm_ident.diagnosis.regression.block_regression import Sums
+from cspm_ident.diagnosis.regression.block_gram import BlockGram
+from cspm_ident.diagnosis.regression.block_regression import BlockRegression
 from cspm_ident.diagnosis.thresholds import DEFAULT_THRESHOLDS, Thresholds
 
 Array = NDArray[np.float64]
 Index = NDArray[np.intp]
 
 
-class WhiteSums(Sums):
+class WhiteSums(BlockRegression):
     """Sums that take each row for independent of all others, to show what blocks are good for."""
 
-    def __init__(self, evidence: Evidence, thresholds: Thresholds = DEFAULT_THRESHOLDS) -> None:
+    def __init__(self, gram: BlockGram, thresholds: Thresholds = DEFAULT_THRESHOLDS) -> None:
         """Assemble the products, and count the rows."""
-        super().__init__(evidence, thresholds)
-        self._rows = int(sum(place.rows.sum() for place in evidence.places))
+        super().__init__(gram, thresholds)
+        self._rows = int(sum(place.rows.sum() for place in gram.places))
 
     def covariance(self, base: Index, columns: Index) -> Array:
         """Return σ²·(XᵀX)⁻¹, the columns' part."""

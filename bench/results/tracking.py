@@ -40,7 +40,7 @@ class Case:
         plant: by name.
         pose_delay: of the motion capture [s], which the test-bed's file says.
         cables: what the file's stiffnesses and dampers are multiplied by.
-        told: effects that controllers read instead of those that the plant has.
+        reported: effects that controllers read instead of those that the plant has.
         loads: (time [s], mass [kg]) that the bar takes up at its centre of mass, unknown to all.
     """
 

@@ -169,7 +169,7 @@ def check_drivers_command(asked: Asked, json: Path | None = None) -> bool:
 
 def drivers_data(asked: Asked, found: Heard) -> dict[str, Any]:
     """Return what the command prints, as plain data."""
-    told = {
+    reported = {
         "testbed": asked.machine.testbed.name,
         "scenario": asked.machine.scenario.name,
         "seconds": asked.seconds,
@@ -178,9 +178,9 @@ def drivers_data(asked: Asked, found: Heard) -> dict[str, Any]:
         "topics": topics_data(found.topics, found.observations),
     }
     if found.pulls is None:
-        return told
+        return reported
     pulls = pulls_data(found.pulls.verdicts)
-    return told | {"pulls": pulls, "swapped": findings_data(found.pulls.swapped)}
+    return reported | {"pulls": pulls, "swapped": findings_data(found.pulls.swapped)}
 
 
 def _listen(asked: Asked, listener: DriverListener, console: Console) -> Heard:

@@ -141,9 +141,9 @@ def _experiments(found: Diagnosis, data: Mapping[str, Any], folder: Path | None)
             f"cspm run {folder / entry['separating_experiment']}"
             if folder is not None and entry["separating_experiment"]
             else rival.hypothesis.effect.description.separating_experiment
-            for rival, entry in zip(finding.alternatives, told["alternatives"], strict=True)
+            for rival, entry in zip(finding.alternatives, reported["alternatives"], strict=True)
         ]
-        for finding, told in zip(found.reported, named_in(data), strict=True)
+        for finding, reported in zip(found.reported, named_in(data), strict=True)
     ]
 
 
@@ -192,12 +192,12 @@ def print_diagnosis(
     without = ", ".join(name for name, elements in found.not_excited if not elements)
     if without:
         say(console, f"not testable with the sensors and parts of these recordings: {without}")
-    told = sorted({limit.effect for limit in found.limits if limit.possible})
-    if told:
+    reported = sorted({limit.effect for limit in found.limits if limit.possible})
+    if reported:
         say(
             console,
-            f"{len(told)} effects would have been told from some size on, which diagnosis.json has"
-            " by element under detection_limits",
+            f"{len(reported)} effects would have been reported from some size on, which"
+            " diagnosis.json has by element under detection_limits",
         )
 
 

@@ -50,9 +50,9 @@ def _print_topic(console: Console, topic: TopicReport) -> None:
         "out of order": left.disorder,
         **{f"in drop[{i}]": count for i, count in enumerate(left.segments)},
     }
-    told = [f"{count} {reason}" for reason, count in reasons.items() if count]
-    if told:
-        say(console, f"left out: {', '.join(told)}")
+    reported = [f"{count} {reason}" for reason, count in reasons.items() if count]
+    if reported:
+        say(console, f"left out: {', '.join(reported)}")
     console.print(_conversions(topic.fields))
     console.print(_first_rows(topic))
 

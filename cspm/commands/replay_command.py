@@ -120,7 +120,7 @@ def _replay_through(asked: Replay, display: Display) -> Replayed:
 
 def replay_data(bag: Path, found: Replayed) -> dict[str, Any]:
     """Return what the command prints, as plain data."""
-    told = {
+    reported = {
         "bag": str(bag),
         "messages": found.messages,
         "played_s": found.played_s,
@@ -128,7 +128,7 @@ def replay_data(bag: Path, found: Replayed) -> dict[str, Any]:
         "unplayable": found.unplayable,
     }
     if not found.reproductions:
-        return told
+        return reported
     commands = {
         name: {
             "messages": each.compared,
@@ -138,7 +138,7 @@ def replay_data(bag: Path, found: Replayed) -> dict[str, Any]:
         }
         for name, each in found.reproductions.items()
     }
-    return told | {"identical": found.identical, "reproduced": commands}
+    return reported | {"identical": found.identical, "reproduced": commands}
 
 
 def _tell(console: Console, found: Replayed) -> None:

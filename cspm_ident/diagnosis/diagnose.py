@@ -18,7 +18,7 @@ from cspm_ident.diagnosis.finding import (
     Unexplained,
     reported_status,
 )
-from cspm_ident.diagnosis.regression.block_gram import Evidence, gather
+from cspm_ident.diagnosis.regression.block_gram import BlockGram, gather
 from cspm_ident.diagnosis.residuals.aliased_tension import chatters_of
 from cspm_ident.diagnosis.residuals.data_split import first_part, span_of, whole_part
 from cspm_ident.diagnosis.residuals.free_shapes import Driver, Knots
@@ -75,10 +75,10 @@ def diagnose(
     )
     effects = list(catalogue().values()) if effects is None else effects
     # No name for the look itself: its columns go as soon as they are not needed.
-    (search_parts, judge_parts, hums, noise, block, search, knots, supposed), found = searched_for(
+    (search_parts, judge_parts, hums, noise, block, search, knots, assumed), found = searched_for(
         Recordings(searched, held_out), effects, progress, thresholds
     )
-    evidence = search.evidence
+    gram = search.gram
     found = with_wider(found, in_noise(search_parts, noise), block, thresholds)
     progress("held-out data")
     judge = _judge(in_noise(judge_parts, noise), found, block)
@@ -90,14 +90,14 @@ def diagnose(
     progress("parameters, and simulation of held-out data")
     baselines = baselines_of(held_out or searched, starts, retuned)
     cut: Cut = whole_part if held_out else partial(first_part, thresholds=thresholds)
-    data = Data(searched, cut, baselines, rows, noise, block, supposed)
+    data = Data(searched, cut, baselines, rows, noise, block, assumed)
     acceptance, model = _useful(search, acceptance, data)
     unexplained = acceptance.unexplained(search, found)
     lines = tuple(line for each in (*searched, *held_out) for line in chatters_of(each, thresholds))
     aliased = {line.place.element for line in lines}
     values = {c: w for c, (w, _) in model.weights.items()}
     first = search.fits.values([each.hypothesis for each in acceptance.kept])
-    free = free_functions(evidence, judge)
+    free = free_functions(gram, judge)
     return Diagnosis(
         searched=searched,
         held_out=held_out,
@@ -121,7 +121,7 @@ def diagnose(
         lines=(*lines, *_lasting(hums, searched, search_parts, values, thresholds)),
         limits=detection_limits(search, acceptance.kept),
         not_excited=_not_excited(search, effects),
-        places=tuple(place.place for place in evidence.places),
+        places=tuple(place.place for place in gram.places),
         curves=held_out_curves(steady(judge_parts), first),
         noise=noise,
         thresholds=thresholds,
@@ -164,7 +164,7 @@ def _lasting(
     return tuple(found)
 
 
-def _judge(parts: Parts, found: SearchResult, block: float) -> Evidence:
+def _judge(parts: Parts, found: SearchResult, block: float) -> BlockGram:
     """Return the sums of held-out residuals beside what was found and all free functions."""
     terms = _candidates(found) | {
         t for part in parts for e in part for t in e.columns if isinstance(t, Driver)
@@ -191,7 +191,7 @@ def _with_shapes(
     base = search.fits.columns([each.hypothesis for each in kept])
     found = []
     for each in unexplained:
-        values = search.sums.weights_beyond(base, search.evidence.columns_of([each.driver]))
+        values = search.sums.weights_beyond(base, search.gram.columns_of([each.driver]))
         found.append(each._replace(shape=Shape(knots.of(each.driver), values - values.mean())))
     return tuple(found)
 
@@ -201,7 +201,7 @@ def _not_excited(
 ) -> tuple[tuple[str, tuple[str, ...]], ...]:
     """Return effects that have no column that is not zero, with the elements."""
     heard = {(c.effect_id, c.element) for c in search.heard}
-    seen = {(t.effect_id, t.element) for t in search.evidence.terms if isinstance(t, Candidate)}
+    seen = {(t.effect_id, t.element) for t in search.gram.terms if isinstance(t, Candidate)}
     found = []
     for effect in effects:
         deaf = sorted(element for name, element in seen - heard if name == effect.id)

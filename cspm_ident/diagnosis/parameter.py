@@ -72,8 +72,8 @@ def parameters_of(own: Coefficients, *, doubtful: bool = False) -> list[Paramete
     values = effect.values(weights.tolist(), **own.candidate.nonlinear)
     element = own.candidate.element
     if doubtful:
-        told = ((p, values[p.name]) for p in effect.parameters)
-        return [Parameter(element, p.name, value, p.unit, value, value) for p, value in told]
+        reported = ((p, values[p.name]) for p in effect.parameters)
+        return [Parameter(element, p.name, value, p.unit, value, value) for p, value in reported]
     if not np.all(np.isfinite(widths)):
         return [
             _parameter(element, p, values[p.name], p.minimum, p.maximum) for p in effect.parameters
@@ -100,14 +100,14 @@ def _ends(
         found = candidate.effect.values(moved.tolist(), **candidate.nonlinear)
         return np.array([found[name] for name in names])
 
-    told = values(weights)
+    reported = values(weights)
     squares = np.zeros((2, len(names)))
     for k in range(len(weights)):
         ends = [low[k], high[k], np.clip(0.0, low[k], high[k])]
         moved = [values(np.where(np.arange(len(weights)) == k, end, weights)) for end in ends]
-        apart = np.array([told, *moved]) - told
+        apart = np.array([reported, *moved]) - reported
         squares += np.square([apart.min(axis=0), apart.max(axis=0)])
-    return list(zip(told - np.sqrt(squares[0]), told + np.sqrt(squares[1]), strict=True))
+    return list(zip(reported - np.sqrt(squares[0]), reported + np.sqrt(squares[1]), strict=True))
 
 
 def _parameter(

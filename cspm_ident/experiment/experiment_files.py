@@ -86,8 +86,8 @@ def _scenario_text(scenario: Scenario) -> str:
 
 def _ties(found: Diagnosis, data: dict[str, Any]) -> Iterator[tuple[dict[str, Any], Question, str]]:
     """Yield every alternative's entry, what would tell it apart, and that in words."""
-    for finding, told in zip(found.reported, named_in(data), strict=True):
+    for finding, reported in zip(found.reported, named_in(data), strict=True):
         truth = {own.candidate: own.values for own in finding.coefficients}
-        for rival, entry in zip(finding.alternatives, told["alternatives"], strict=True):
+        for rival, entry in zip(finding.alternatives, reported["alternatives"], strict=True):
             title = f"Tells {finding.hypothesis.words} from {rival.words}"
             yield entry, Question(truth, rival.candidates), title

@@ -70,12 +70,12 @@ def test_a_planted_effect_is_simulated_and_attached(calm, tmp_path):
 
 
 def test_progress_grows_to_one_and_says_what_is_done():
-    told = []
-    cspm.simulate("rest", duration=0.2, progress=lambda *each: told.append(each))
-    shares = [share for share, _ in told]
+    reported = []
+    cspm.simulate("rest", duration=0.2, progress=lambda *each: reported.append(each))
+    shares = [share for share, _ in reported]
     assert shares == sorted(shares)
     assert shares[-1] == pytest.approx(1.0)
-    assert {what for _, what in told} == {"simulating"}
+    assert {what for _, what in reported} == {"simulating"}
 
 
 class Copy:

@@ -6,6 +6,7 @@ from run_samples import bundle_of
 from schedules import delayed
 
 from cspm_msgs_py.diagnostics import encode_diagnostics
+from cspm_msgs_py.edited import file_of
 from cspm_msgs_py.schedule import schedule_of
 from cspm_msgs_py.wire import WireWriter
 from cspm_ros.runtime.lockstep_recorder import LockstepRecorder
@@ -21,8 +22,7 @@ def late(bundle, **delays):
     testbed = delayed(
         bundle.testbed.testbed, {f"/{k.replace('__', '/')}": delays[k] for k in delays}
     )
-    file = type(bundle.testbed)(testbed, bundle.testbed.text, bundle.testbed.sha256)
-    return type(bundle)(bundle.scenario, file, bundle.files)
+    return type(bundle)(bundle.scenario, file_of(testbed), bundle.files)
 
 
 class Case:

@@ -25,4 +25,4 @@ def diagnosis_of(library: Library) -> dict[str, Any]:
         normal.cross, normal.gram, n_samples=normal.rows, method="lasso", max_iter=MOST_STEPS
     )
     best = path[:, int(np.argmin(normal.bic(path)))]
-    return report_of(library, library.evidence.columns_of(candidates)[best != 0.0], intervals=False)
+    return report_of(library, library.gram.columns_of(candidates)[best != 0.0], intervals=False)

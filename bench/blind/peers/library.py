@@ -6,7 +6,7 @@ from collections.abc import Sequence
 from typing import NamedTuple
 
 from bench.blind.white_regression import WhiteSums
-from cspm_ident.diagnosis.regression.block_gram import Evidence, gather
+from cspm_ident.diagnosis.regression.block_gram import BlockGram, gather
 from cspm_ident.diagnosis.residuals.data_split import first_part, last_part, span_of
 from cspm_ident.diagnosis.residuals.recorded_equations import equations_of
 from cspm_ident.diagnosis.residuals.regressors import Candidate
@@ -24,25 +24,24 @@ class Library(NamedTuple):
     Attributes:
         searched: what may be fitted to.
         judge: what may not.
-        evidence: the sums of what is searched.
+        gram: the sums of what is searched.
         sums: the same, with the errors of white residuals.
         judge_evidence: the sums of what is not searched.
     """
 
     searched: Sequence[Equation]
     judge: Sequence[Equation]
-    evidence: Evidence
+    gram: BlockGram
     sums: WhiteSums
-    judge_evidence: Evidence
+    judge_evidence: BlockGram
 
     @property
     def candidates(self) -> list[Candidate]:
         """Effects on elements whose columns are not zero."""
         return [
             term
-            for term in self.evidence.terms
-            if isinstance(term, Candidate)
-            and self.sums.excited[self.evidence.columns_of([term])].all()
+            for term in self.gram.terms
+            if isinstance(term, Candidate) and self.sums.excited[self.gram.columns_of([term])].all()
         ]
 
 
@@ -60,5 +59,5 @@ def library_of(measurement: Measurement) -> Library:
     (searched,), (judge,) = in_noise(first, noise), in_noise(last, noise)
     start, end = span_of(searched)
     block = (end - start) / DEFAULT_THRESHOLDS.block_count
-    evidence = gather([searched], block)
-    return Library(searched, judge, evidence, WhiteSums(evidence), gather([judge], block))
+    gram = gather([searched], block)
+    return Library(searched, judge, gram, WhiteSums(gram), gather([judge], block))

@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from bench.blind.peers.library import Library
-from cspm_ident.diagnosis.regression.block_gram import Evidence
+from cspm_ident.diagnosis.regression.block_gram import BlockGram
 from cspm_ident.diagnosis.residuals.regressors import Candidate
 
 Array = NDArray[np.float64]
@@ -63,24 +63,24 @@ def normal_of(
         candidates: whose columns are wanted.
         blocks: of the searched part.
     """
-    evidence = library.evidence
-    columns = evidence.columns_of(candidates)
-    whole, rows = _products(evidence, blocks)
+    gram = library.gram
+    columns = gram.columns_of(candidates)
+    whole, rows = _products(gram, blocks)
     both = np.append(columns, -1)
-    own, never = whole[np.ix_(both, both)], evidence.nuisance
+    own, never = whole[np.ix_(both, both)], gram.nuisance
     across = whole[np.ix_(both, never)]
     inverse = np.linalg.pinv(whole[np.ix_(never, never)], rcond=_RANK, hermitian=True)
     own = own - across @ inverse @ across.T
     # Every call scales alike, whatever its blocks.
-    length = np.append(np.sqrt(np.diag(_products(evidence, slice(None))[0])[columns]), 1.0)
+    length = np.append(np.sqrt(np.diag(_products(gram, slice(None))[0])[columns]), 1.0)
     own = own / (length[:, None] * length)
     return Normal(own[:-1, :-1], own[:-1, -1], float(own[-1, -1]), rows)
 
 
-def _products(evidence: Evidence, blocks: slice) -> tuple[Array, int]:
-    whole, rows = np.zeros((evidence.width + 1, evidence.width + 1)), 0
-    for place in evidence.places:
-        own = np.append(place.columns, evidence.width)
+def _products(gram: BlockGram, blocks: slice) -> tuple[Array, int]:
+    whole, rows = np.zeros((gram.width + 1, gram.width + 1)), 0
+    for place in gram.places:
+        own = np.append(place.columns, gram.width)
         whole[np.ix_(own, own)] += place.grams[blocks].sum(axis=0)
         rows += int(place.rows[blocks].sum())
     return whole, rows

@@ -29,9 +29,9 @@ def report_of(library: Library, support: NDArray[np.intp], intervals: bool) -> d
         support: indices of the columns kept, of the evidence.
         intervals: report the intervals that white residuals would have.
     """
-    nuisance = library.evidence.nuisance
+    nuisance = library.gram.nuisance
     columns = np.concatenate([nuisance, support])
-    full, half = np.zeros(library.evidence.width), np.zeros(library.evidence.width)
+    full, half = np.zeros(library.gram.width), np.zeros(library.gram.width)
     full[columns] = library.sums.weights(columns)
     half[support] = library.sums.half_width(nuisance, support)
     kept = [c for c in library.candidates if np.isin(_own(library, c), support).any()]
@@ -83,8 +83,8 @@ def fits(library: Library, after: Mapping[Place, float]) -> list[dict[str, Any]]
 def retuned_weights(library: Library) -> dict[Candidate, Array]:
     """Return the file's own numbers, all fitted to what was searched."""
     own = [c for c in library.candidates if c.effect.physics.alter is not None]
-    fitted = library.sums.weights(library.evidence.with_nuisance(own))
-    return library.evidence.parted(own, fitted)
+    fitted = library.sums.weights(library.gram.with_nuisance(own))
+    return library.gram.parted(own, fitted)
 
 
 def unknown_finding(block: str, element: str, driver: str) -> dict[str, Any]:
@@ -102,12 +102,12 @@ def unknown_finding(block: str, element: str, driver: str) -> dict[str, Any]:
 
 
 def _own(library: Library, candidate: Candidate) -> NDArray[np.intp]:
-    return library.evidence.columns_of([candidate])
+    return library.gram.columns_of([candidate])
 
 
 def _worth(library: Library, columns: NDArray[np.intp], group: Sequence[Candidate]) -> float:
     """Return by how much more is left without an effect."""
-    own = library.evidence.columns_of(group)
+    own = library.gram.columns_of(group)
     return library.sums.squares_of(columns[~np.isin(columns, own)])
 
 

@@ -19,8 +19,8 @@ def diagnosis_of(library: Library) -> dict[str, Any]:
     The fit is that of all numbers, reported or not.
     """
     own = [c for c in library.candidates if c.effect.physics.alter is not None]
-    nuisance, numbers = library.evidence.nuisance, library.evidence.columns_of(own)
-    weights = library.sums.weights(library.evidence.with_nuisance(own))[len(nuisance) :]
+    nuisance, numbers = library.gram.nuisance, library.gram.columns_of(own)
+    weights = library.sums.weights(library.gram.with_nuisance(own))[len(nuisance) :]
     # Half the width of a 95 % interval is 1.96 standard errors.
     errors = library.sums.half_width(nuisance, numbers) / norm.isf(0.025)
     sure = norm.isf(0.5 * _CHANCE / max(1, len(numbers)))

@@ -26,14 +26,14 @@ def diagnosis_of(library: Library) -> dict[str, Any]:
     The threshold is the one whose terms, fitted to the first three quarters of the searched part,
     leave least of the last.
     """
-    candidates, blocks = library.candidates, library.evidence.blocks
+    candidates, blocks = library.candidates, library.gram.blocks
     cut = round(_FITTED_SHARE * blocks)
     early = normal_of(library, candidates, slice(None, cut))
     late = normal_of(library, candidates, slice(cut, None))
     tried = np.stack([_thresholded(early, share) for share in THRESHOLDS], axis=1)
     share = THRESHOLDS[int(np.argmin(late.left(tried)))]
     best = _thresholded(normal_of(library, candidates), share)
-    return report_of(library, library.evidence.columns_of(candidates)[best != 0.0], intervals=False)
+    return report_of(library, library.gram.columns_of(candidates)[best != 0.0], intervals=False)
 
 
 def _thresholded(normal: Normal, share: float) -> Array:

@@ -24,4 +24,4 @@ def diagnosis_of(library: Library) -> dict[str, Any]:
     )
     path = np.hstack([np.zeros((len(normal.cross), 1)), path.reshape(len(normal.cross), -1)])
     best = path[:, int(np.argmin(normal.bic(path)))]
-    return report_of(library, library.evidence.columns_of(candidates)[best != 0.0], intervals=True)
+    return report_of(library, library.gram.columns_of(candidates)[best != 0.0], intervals=True)

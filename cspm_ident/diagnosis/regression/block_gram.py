@@ -22,7 +22,7 @@ Array = NDArray[np.float64]
 Index = NDArray[np.intp]
 
 
-class PlaceEvidence(NamedTuple):
+class PlaceGram(NamedTuple):
     """One residual's sums.
 
     Attributes:
@@ -41,7 +41,7 @@ class PlaceEvidence(NamedTuple):
 
 
 @dataclass(frozen=True, eq=False)
-class Evidence:
+class BlockGram:
     """All residuals of one or several recordings.
 
     Attributes:
@@ -55,7 +55,7 @@ class Evidence:
     slices: dict[Candidate | Driver, slice]
     width: int
     nuisance: Index
-    places: tuple[PlaceEvidence, ...]
+    places: tuple[PlaceGram, ...]
     times: Array
 
     @property
@@ -180,7 +180,7 @@ def silence(grams: Array, columns: Index, block: int) -> None:
     grams[:block, :, columns] = 0.0
 
 
-def gather(recordings: Sequence[Sequence[Equation]], block_s: float) -> Evidence:
+def gather(recordings: Sequence[Sequence[Equation]], block_s: float) -> BlockGram:
     """Return the sums of all equations, in blocks of `block_s` seconds.
 
     Args:
@@ -205,7 +205,7 @@ def gather(recordings: Sequence[Sequence[Equation]], block_s: float) -> Evidence
     gathered = tuple(
         _of_place(place, parts, slices, edges, recording) for place, parts in places.items()
     )
-    return Evidence(slices, first, np.array(nuisance, dtype=np.intp), gathered, edges)
+    return BlockGram(slices, first, np.array(nuisance, dtype=np.intp), gathered, edges)
 
 
 def _registry(equations: Sequence[Equation]) -> tuple[dict[Candidate | Driver, slice], int]:
@@ -238,7 +238,7 @@ def _of_place(
     slices: dict[Candidate | Driver, slice],
     edges: Array,
     recording: NDArray[np.intp],
-) -> PlaceEvidence:
+) -> PlaceGram:
     used: set[int] = set()
     for _, equation, own in parts:
         used.update(own)
@@ -256,7 +256,7 @@ def _of_place(
             part = table[home == block].reshape(-1, table.shape[2])
             grams[block] += part.T @ part
             rows[block] += len(part)
-    return PlaceEvidence(place, columns, grams, grams.sum(axis=0), rows)
+    return PlaceGram(place, columns, grams, grams.sum(axis=0), rows)
 
 
 def _table(

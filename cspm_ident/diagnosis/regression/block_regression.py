@@ -13,8 +13,8 @@ from numpy.typing import NDArray
 from scipy.stats import norm, wilcoxon
 from scipy.stats import t as t_distribution
 
-from cspm_ident.diagnosis.regression.block_gram import Evidence, silence, squares_by_block
-from cspm_ident.diagnosis.regression.jackknife import RANK, LeftOut, left_out, pseudo_inverse
+from cspm_ident.diagnosis.regression.block_gram import BlockGram, silence, squares_by_block
+from cspm_ident.diagnosis.regression.jackknife import RANK, Jackknife, left_out, pseudo_inverse
 from cspm_ident.diagnosis.thresholds import DEFAULT_THRESHOLDS, Thresholds
 
 Array = NDArray[np.float64]
@@ -36,15 +36,15 @@ class Gain(NamedTuple):
     error: float
 
 
-class Sums:
+class BlockRegression:
     """All columns' products, scaled so that each column has length 1."""
 
-    def __init__(self, evidence: Evidence, thresholds: Thresholds = DEFAULT_THRESHOLDS) -> None:
+    def __init__(self, gram: BlockGram, thresholds: Thresholds = DEFAULT_THRESHOLDS) -> None:
         """Take the products of all residuals, and sum them."""
         self.thresholds = thresholds
-        width = evidence.width
-        squares, self._at = np.zeros((evidence.blocks, width + 1)), []
-        for place in evidence.places:
+        width = gram.width
+        squares, self._at = np.zeros((gram.blocks, width + 1)), []
+        for place in gram.places:
             own = np.append(place.columns, width)
             squares[:, own] += np.einsum("bii->bi", place.grams)
             at = np.full(width + 1, -1, dtype=np.intp)
@@ -56,11 +56,11 @@ class Sums:
         scales = [lengths[at >= 0] for at in self._at]
         self._grams = [
             place.grams / (scale[:, None] * scale)
-            for place, scale in zip(evidence.places, scales, strict=True)
+            for place, scale in zip(gram.places, scales, strict=True)
         ]
         self._lengths = lengths[:-1]
         self._whole = self._summed(np.arange(width + 1), slice(None))
-        self._folds = np.array_split(np.arange(evidence.blocks), min(FOLDS, evidence.blocks))
+        self._folds = np.array_split(np.arange(gram.blocks), min(FOLDS, gram.blocks))
 
     def _of(self, rows: Index, columns: Index) -> Array:
         """Return each block's products of two sets of columns, (blocks, rows, columns)."""
@@ -81,7 +81,7 @@ class Sums:
                 found[down[:, None], across] += grams[blocks, at[rows[down]]].sum(axis=0)
         return found
 
-    def _alone(self, blocks: Array, lengths: Array) -> Sums:
+    def _alone(self, blocks: Array, lengths: Array) -> BlockRegression:
         """Return the sums of other products, (blocks, m + 1, m + 1), of columns so long."""
         other = copy(self)
         other._grams, other._at = [blocks], [np.arange(blocks.shape[1])]
@@ -90,13 +90,13 @@ class Sums:
             other.__dict__.pop(name, None)
         return other
 
-    def beside(self, combinations: Array) -> Sums:
+    def beside(self, combinations: Array) -> BlockRegression:
         """Return sums with further columns behind, combinations of these, shape (width, k)."""
         return self._turned(np.arange(len(self._lengths)), combinations)
 
     def combined(
         self, base: Index, columns: Index, combinations: Array
-    ) -> tuple[Sums, Index, Index]:
+    ) -> tuple[BlockRegression, Index, Index]:
         """Return sums of a base and of combinations of other columns.
 
         Args:
@@ -112,7 +112,7 @@ class Sums:
         own = len(kept) + np.arange(turn.shape[1])
         return self._turned(kept, turn), np.arange(first), own
 
-    def _turned(self, columns: Index, combinations: Array) -> Sums:
+    def _turned(self, columns: Index, combinations: Array) -> BlockRegression:
         """Return sums of some columns, and behind them of their combinations, (columns, k)."""
         width, count = combinations.shape
         turn = np.zeros((width + 1, width + count + 1))
@@ -287,7 +287,7 @@ class Sums:
         """
         return self._undominated(base, columns).chance()
 
-    def _undominated(self, base: Index, columns: Index) -> LeftOut:
+    def _undominated(self, base: Index, columns: Index) -> Jackknife:
         """Return how weights scatter over all blocks but dominant ones while the others tell any.
 
         What is left without one may be ruled by another, as where a rope is first pulled taut.
@@ -302,7 +302,7 @@ class Sums:
             found = self._left_out(others)
         return found
 
-    def _left_out(self, parts: Array) -> LeftOut:
+    def _left_out(self, parts: Array) -> Jackknife:
         return left_out(parts, self.thresholds.block_correlation_limit)
 
     def _beyond(self, base: Index, columns: Index, blocks: Index | None = None) -> Array:
@@ -340,12 +340,12 @@ class Sums:
         blocks = self._of(columns, table)
         # What the columns meet from a block on, themselves, the base and the target.
         met = blocks[::-1].cumsum(axis=0)[::-1]
-        crossed, products, told = met[:, :, : len(base)], met[:, :, own], met[:, :, -1]
+        crossed, products, reported = met[:, :, : len(base)], met[:, :, own], met[:, :, -1]
         turned = crossed @ pseudo_inverse(self._whole[np.ix_(base, base)])
         products = products - turned @ crossed.transpose(0, 2, 1)
-        told = told - turned @ self._whole[base, -1]
-        weights = np.linalg.pinv(products, rcond=RANK, hermitian=True) @ told[..., None]
-        gained = np.einsum("bi,bi->b", told, weights[..., 0])
+        reported = reported - turned @ self._whole[base, -1]
+        weights = np.linalg.pinv(products, rcond=RANK, hermitian=True) @ reported[..., None]
+        gained = np.einsum("bi,bi->b", reported, weights[..., 0])
         return np.asarray(self.squares_of(base) - gained)
 
     @cached_property

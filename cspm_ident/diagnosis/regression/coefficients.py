@@ -8,8 +8,8 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.stats import norm
 
-from cspm_ident.diagnosis.regression.block_gram import Evidence
-from cspm_ident.diagnosis.regression.block_regression import Sums
+from cspm_ident.diagnosis.regression.block_gram import BlockGram
+from cspm_ident.diagnosis.regression.block_regression import BlockRegression
 from cspm_ident.diagnosis.residuals.regressors import Candidate
 
 Array = NDArray[np.float64]
@@ -21,17 +21,20 @@ Weights = dict[Candidate, tuple[Array, Array]]
 
 
 def values_of(
-    evidence: Evidence, sums: Sums, candidates: Sequence[Candidate], common: Collection[str] = ()
+    gram: BlockGram,
+    sums: BlockRegression,
+    candidates: Sequence[Candidate],
+    common: Collection[str] = (),
 ) -> dict[Candidate, Array]:
     """Return the weights that `weights_of` does, without their intervals."""
     if not common:
-        return evidence.parted(candidates, sums.weights(evidence.with_nuisance(candidates)))
-    return {c: w for c, (w, _) in weights_of(evidence, sums, candidates, common).items()}
+        return gram.parted(candidates, sums.weights(gram.with_nuisance(candidates)))
+    return {c: w for c, (w, _) in weights_of(gram, sums, candidates, common).items()}
 
 
 def weights_of(
-    evidence: Evidence,
-    sums: Sums,
+    gram: BlockGram,
+    sums: BlockRegression,
     candidates: Sequence[Candidate],
     common: Collection[str] = (),
     base: Index | None = None,
@@ -39,19 +42,19 @@ def weights_of(
     """Return candidates' weights with half the widths of their 95 % intervals.
 
     Args:
-        evidence: of their columns.
+        gram: of their columns.
         sums: of these.
         candidates: that are fitted together.
         common: effects, by id, of which all candidates share their weights.
         base: columns that are fitted beside them; None: the nuisance.
     """
-    beside = evidence.nuisance if base is None else base
-    number = _numbers(evidence, candidates, common)
+    beside = gram.nuisance if base is None else base
+    number = _numbers(gram, candidates, common)
     causes = np.eye(number.max(initial=-1) + 1)[number]
-    sums, beside, own = sums.combined(beside, evidence.columns_of(candidates), causes)
+    sums, beside, own = sums.combined(beside, gram.columns_of(candidates), causes)
     free = sums.weights(np.concatenate([beside, own]))[len(beside) :]
-    values = evidence.parted(candidates, free[number])
-    widths = evidence.parted(candidates, sums.half_width(beside, own)[number])
+    values = gram.parted(candidates, free[number])
+    widths = gram.parted(candidates, sums.half_width(beside, own)[number])
     return {c: (values[c], widths[c]) for c in candidates}
 
 
@@ -63,13 +66,13 @@ def at_once(weights: Weights) -> Weights:
     return {c: (own, wider * half) for c, (own, half) in weights.items()}
 
 
-def _numbers(evidence: Evidence, candidates: Sequence[Candidate], common: Collection[str]) -> Index:
+def _numbers(gram: BlockGram, candidates: Sequence[Candidate], common: Collection[str]) -> Index:
     """Return which number to fit is each column's weight."""
     numbers: dict[tuple[str, str, int], int] = {}
     found = []
     for candidate in candidates:
         element = "" if candidate.effect_id in common else candidate.element
-        span = evidence.slices[candidate]
+        span = gram.slices[candidate]
         for k in range(span.stop - span.start):
             key = candidate.effect_id, element, k
             found.append(numbers.setdefault(key, len(numbers)))

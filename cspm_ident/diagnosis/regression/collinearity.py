@@ -7,8 +7,8 @@ from collections.abc import Sequence
 import numpy as np
 from numpy.typing import NDArray
 
-from cspm_ident.diagnosis.regression.block_gram import Evidence
-from cspm_ident.diagnosis.regression.block_regression import Sums, behind, paired
+from cspm_ident.diagnosis.regression.block_gram import BlockGram
+from cspm_ident.diagnosis.regression.block_regression import BlockRegression, behind, paired
 from cspm_ident.diagnosis.residuals.free_shapes import Driver
 from cspm_ident.diagnosis.residuals.regressors import Candidate, Place
 from cspm_ident.diagnosis.thresholds import DEFAULT_THRESHOLDS, Thresholds
@@ -17,7 +17,7 @@ Array = NDArray[np.float64]
 Index = NDArray[np.intp]
 
 
-def overlap(sums: Sums, base: Index, own: Index, other: Index) -> bool:
+def overlap(sums: BlockRegression, base: Index, own: Index, other: Index) -> bool:
     """Return whether columns explain the same, rather than as much of something else."""
     parts = (own, other, np.union1d(own, other))
     without = sums.squares_of(base)
@@ -25,7 +25,7 @@ def overlap(sums: Sums, base: Index, own: Index, other: Index) -> bool:
     return gains[0] + gains[1] - gains[2] >= sums.thresholds.rival_gain_share * gains[0]
 
 
-def contains(sums: Sums, base: Index, wide: Index, narrow: Index) -> bool:
+def contains(sums: BlockRegression, base: Index, wide: Index, narrow: Index) -> bool:
     """Return whether `narrow` is a case of `wide`, as Coulomb's friction of Stribeck's."""
     return bool(np.all(sums.spanned(base, wide, narrow) > sums.thresholds.nested_share))
 
@@ -51,7 +51,7 @@ def distance(
     )
 
 
-def chance(sums: Sums, base: Index, parts: Sequence[Index]) -> float:
+def chance(sums: BlockRegression, base: Index, parts: Sequence[Index]) -> float:
     """Return how probable weights as large are by chance: of all parts together, or of the surest.
 
     Where few blocks tell much, many parts leave no test of all together.
@@ -66,15 +66,17 @@ def chance(sums: Sums, base: Index, parts: Sequence[Index]) -> float:
     return min(1.0, 2.0 * min(together, len(parts) * surest))
 
 
-def freely_gained(evidence: Evidence, sums: Sums, base: Index, own: Index) -> float:
+def freely_gained(gram: BlockGram, sums: BlockRegression, base: Index, own: Index) -> float:
     """Return by how many squares columns are seen to be untrue, at least none.
 
     The most of `freely_gained_at`.
     """
-    return max(freely_gained_at(evidence, sums, base, own).values(), default=0.0)
+    return max(freely_gained_at(gram, sums, base, own).values(), default=0.0)
 
 
-def freely_gained_at(evidence: Evidence, sums: Sums, base: Index, own: Index) -> dict[Place, float]:
+def freely_gained_at(
+    gram: BlockGram, sums: BlockRegression, base: Index, own: Index
+) -> dict[Place, float]:
     """Return by how many squares columns are seen to be untrue in each residual they act on.
 
     The most that a free function of a measured signal gains beyond them there, at least none;
@@ -82,10 +84,10 @@ def freely_gained_at(evidence: Evidence, sums: Sums, base: Index, own: Index) ->
     """
     both = np.concatenate([base, own])
     left = sums.held_out(both).sum()
-    found = dict.fromkeys(evidence.places_of(own), 0.0)
-    for driver in evidence.terms:
+    found = dict.fromkeys(gram.places_of(own), 0.0)
+    for driver in gram.terms:
         if isinstance(driver, Driver) and driver.place in found and not driver.of_time:
-            free = sums.held_out(np.append(both, evidence.columns_of([driver]))).sum()
+            free = sums.held_out(np.append(both, gram.columns_of([driver]))).sum()
             found[driver.place] = max(found[driver.place], float(left - free))
     return found
 

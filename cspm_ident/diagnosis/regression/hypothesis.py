@@ -129,8 +129,8 @@ def is_seen_to_begin(
     A beginning is looked for in all blocks, so that something always begins somewhere; it may be
     told if any number is surely not zero from then on, which takes an interval.
     """
-    surely = (bool(np.any(np.abs(own) > half)) for own, half in weights.values())
-    return not hypothesis.onset or any(surely)
+    significant = (bool(np.any(np.abs(own) > half)) for own, half in weights.values())
+    return not hypothesis.onset or any(significant)
 
 
 def is_seen_to_end(

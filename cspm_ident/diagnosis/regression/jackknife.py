@@ -14,7 +14,7 @@ Array = NDArray[np.float64]
 RANK = 1e-9
 
 
-class LeftOut(NamedTuple):
+class Jackknife(NamedTuple):
     """What leaving out one block at a time does to weights, of columns of length 1.
 
     Attributes:
@@ -65,7 +65,7 @@ class LeftOut(NamedTuple):
         return float(f_distribution.sf(wald / count, count, self.blocks - count))
 
 
-def left_out(parts: Array, most_alike: float) -> LeftOut:
+def left_out(parts: Array, most_alike: float) -> Jackknife:
     """Return how the weights scatter (Bell and McCaffrey, Surv. Methodol. 28(2), 2002).
 
     Args:
@@ -74,8 +74,8 @@ def left_out(parts: Array, most_alike: float) -> LeftOut:
     """
     whole, count = parts.sum(axis=0), parts.shape[1] - 1
     inverse = pseudo_inverse(whole[:-1, :-1])
-    told = inverse @ parts[:, :-1, :-1]
-    shares = np.einsum("bii->b", told) / max(1, count)
+    reported = inverse @ parts[:, :-1, :-1]
+    shares = np.einsum("bii->b", reported) / max(1, count)
     heard = shares > RANK
     weights = inverse @ whole[:-1, -1]
     others = whole - parts[heard]
@@ -88,20 +88,22 @@ def left_out(parts: Array, most_alike: float) -> LeftOut:
     covariance = (blocks - 1) / blocks * apart.T @ apart
     together = 1.0 / max(float(np.sum(shares**2)), RANK)
     alike = _alike(apart, most_alike)
-    return LeftOut(weights, covariance, together, _telling(told, inverse), shares, alike)
+    return Jackknife(
+        weights, covariance, together, _informative_blocks(reported, inverse), shares, alike
+    )
 
 
-def _telling(told: Array, inverse: Array) -> Array:
+def _informative_blocks(reported: Array, inverse: Array) -> Array:
     """Return how many blocks tell each weight, (m,), by their shares in its variance.
 
     That of white noise (Satterthwaite, Biometrics Bull. 2(6), 1946), which none can have less than
     nothing of: of columns that resemble each other as well.
 
     Args:
-        told: the inverse times each block's products, (blocks, m, m).
+        reported: the inverse times each block's products, (blocks, m, m).
         inverse: of the products of all blocks, (m, m).
     """
-    variance = np.einsum("bij,ij->bi", told, inverse)
+    variance = np.einsum("bij,ij->bi", reported, inverse)
     whole = np.diag(inverse)
     shares = np.divide(variance, whole, out=np.zeros_like(variance), where=whole > RANK)
     return np.asarray(1.0 / np.maximum(np.sum(shares**2, axis=0), RANK))

@@ -9,8 +9,8 @@ from contextlib import contextmanager
 import numpy as np
 from numpy.typing import NDArray
 
-from cspm_ident.diagnosis.regression.block_gram import Evidence
-from cspm_ident.diagnosis.regression.block_regression import Gain, Sums
+from cspm_ident.diagnosis.regression.block_gram import BlockGram
+from cspm_ident.diagnosis.regression.block_regression import BlockRegression, Gain
 from cspm_ident.diagnosis.regression.coefficients import Weights, at_once, values_of, weights_of
 from cspm_ident.diagnosis.regression.collinearity import freely_gained_at
 from cspm_ident.diagnosis.regression.hypothesis import (
@@ -32,11 +32,11 @@ Index = NDArray[np.intp]
 
 
 class Fits:
-    """Evidence with its sums, asked in terms of hypotheses."""
+    """Block Gram matrices with their regression, in terms of hypotheses."""
 
-    def __init__(self, evidence: Evidence, sums: Sums) -> None:
+    def __init__(self, gram: BlockGram, sums: BlockRegression) -> None:
         """Take both."""
-        self.evidence, self.sums = evidence, sums
+        self.gram, self.sums = gram, sums
 
     @property
     def thresholds(self) -> Thresholds:
@@ -45,11 +45,11 @@ class Fits:
 
     def columns(self, hypotheses: Iterable[Hypothesis]) -> Index:
         """Return indices of the nuisance and of some hypotheses' columns."""
-        return self.evidence.with_nuisance(c for h in hypotheses for c in h.candidates)
+        return self.gram.with_nuisance(c for h in hypotheses for c in h.candidates)
 
     def own_columns(self, hypothesis: Hypothesis) -> Index:
         """Return indices of one hypothesis's columns."""
-        return self.evidence.columns_of(hypothesis.candidates)
+        return self.gram.columns_of(hypothesis.candidates)
 
     def beside(self, base: Index, *further: Hypothesis) -> Index:
         """Return a base with the columns of hypotheses."""
@@ -57,13 +57,13 @@ class Fits:
 
     def weights(self, hypotheses: Sequence[Hypothesis]) -> Weights:
         """Return the weights of hypotheses that are fitted together, with half their intervals."""
-        return weights_of(self.evidence, self.sums, *parts_of(hypotheses))
+        return weights_of(self.gram, self.sums, *parts_of(hypotheses))
 
     def values(self, hypotheses: Sequence[Hypothesis]) -> dict[Candidate, Array]:
         """Return the weights alone, which takes less time."""
-        return values_of(self.evidence, self.sums, *parts_of(hypotheses))
+        return values_of(self.gram, self.sums, *parts_of(hypotheses))
 
-    def shared(self, base: Index, hypothesis: Hypothesis) -> tuple[Sums, Index, Index]:
+    def shared(self, base: Index, hypothesis: Hypothesis) -> tuple[BlockRegression, Index, Index]:
         """Return sums in which all elements of a hypothesis share their weights.
 
         With the columns of the base and those of the hypothesis.
@@ -92,11 +92,11 @@ class Fits:
         own = self.own_columns(hypothesis)
         with (
             self.sums.delayed(own, hypothesis.onset),
-            self.evidence.delayed(own, hypothesis.onset),
+            self.gram.delayed(own, hypothesis.onset),
         ):
             yield
 
-    def untrue(
+    def model_form_error(
         self, hypothesis: Hypothesis, others: Sequence[Hypothesis]
     ) -> dict[Candidate, float]:
         """Return by what share of its amplitude each candidate is seen to be off, from 0 to 1.
@@ -109,9 +109,9 @@ class Fits:
         apart = [(c,) for c in hypothesis.candidates]
         causes = [hypothesis.candidates] if hypothesis.common else apart
         with self.delayed(hypothesis):
-            free = freely_gained_at(self.evidence, self.sums, base, own)
-            parts = {cause: self.evidence.columns_of(cause) for cause in causes}
-            where = {cause: self.evidence.places_of(mine) for cause, mine in parts.items()}
+            free = freely_gained_at(self.gram, self.sums, base, own)
+            parts = {cause: self.gram.columns_of(cause) for cause in causes}
+            where = {cause: self.gram.places_of(mine) for cause, mine in parts.items()}
             acting = Counter(place for places in where.values() for place in places)
             found: dict[Candidate, float] = {}
             for cause, mine in parts.items():
@@ -138,7 +138,7 @@ class Fits:
         return [
             all(
                 taken[k][place] <= share * sum(max(0.0, taken[i][place]) for i in laws if i != k)
-                for place in self.evidence.places_of(self.own_columns(h))
+                for place in self.gram.places_of(self.own_columns(h))
             )
             for k, h in enumerate(chosen)
         ]
@@ -148,7 +148,7 @@ class Fits:
         base = self.columns(h for h in chosen if h is not hypothesis)
         both = self.beside(base, hypothesis)
         without, left = (
-            self.evidence.left(columns, self.sums.weights(columns)) for columns in (base, both)
+            self.gram.left(columns, self.sums.weights(columns)) for columns in (base, both)
         )
         return {place: without[place] - left[place] for place in left}
 
@@ -174,7 +174,7 @@ class Fits:
 
     def _undecided(self, candidate: Candidate, weights: Array) -> Array:
         """Return by how much each weight may be off and decide nothing."""
-        lengths = self.sums.lengths[self.evidence.columns_of([candidate])]
+        lengths = self.sums.lengths[self.gram.columns_of([candidate])]
         share = np.sqrt(self.thresholds.model_form_error_share)
         return np.asarray(share * np.linalg.norm(lengths * weights) / lengths)
 

@@ -7,7 +7,7 @@ from collections.abc import Mapping, Sequence
 import numpy as np
 
 from cspm_ident.diagnosis.regression.block_gram import gather
-from cspm_ident.diagnosis.regression.block_regression import Sums
+from cspm_ident.diagnosis.regression.block_regression import BlockRegression
 from cspm_ident.diagnosis.regression.coefficients import Weights, weights_of
 from cspm_ident.diagnosis.residuals.drive_torque import time_constant
 from cspm_ident.diagnosis.residuals.regressors import Candidate, Place
@@ -91,7 +91,7 @@ def of_clocks(weights: Weights) -> Weights:
 
 def of_forms(
     weights: Weights,
-    untrue: Mapping[Candidate, float],
+    model_form_error: Mapping[Candidate, float],
     thresholds: Thresholds = DEFAULT_THRESHOLDS,
 ) -> Weights:
     """Return the weights, of which none is surer than the form of its law.
@@ -102,13 +102,13 @@ def of_forms(
 
     Args:
         weights: as found.
-        untrue: of each, by what share of its amplitude the law is seen to be off.
+        model_form_error: of each, by what share of its amplitude the law is seen to be off.
         thresholds: `model_form_error_share`.
     """
     found, form_error = dict(weights), float(np.sqrt(thresholds.model_form_error_share))
     for candidate, (values, half) in weights.items():
         least = 0.0 if candidate.effect.is_correction else form_error
-        share = max(untrue[candidate], least)
+        share = max(model_form_error[candidate], least)
         found[candidate] = values, np.hypot(half, share * np.abs(values))
     return found
 
@@ -141,8 +141,8 @@ def _reach(candidate: Candidate, parts: Parts) -> float:
 def _fitted(
     parts: Parts, candidates: Sequence[Candidate], block_s: float, thresholds: Thresholds
 ) -> Weights:
-    evidence = gather(parts, block_s)
-    return weights_of(evidence, Sums(evidence, thresholds), candidates)
+    gram = gather(parts, block_s)
+    return weights_of(gram, BlockRegression(gram, thresholds), candidates)
 
 
 def _calmed(parts: Parts, candidates: Sequence[Candidate]) -> Parts:

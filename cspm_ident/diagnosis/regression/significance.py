@@ -18,12 +18,12 @@ from cspm_sim.effects import Effect
 Index = NDArray[np.intp]
 
 
-class Sureness:
+class Significance:
     """What it takes for one of many candidates to be told."""
 
     def __init__(self, fits: Fits, candidates: Sequence[Candidate]) -> None:
         """Take all candidates that are looked at."""
-        self._fits, self._evidence, self._sums = fits, fits.evidence, fits.sums
+        self._fits, self._evidence, self._sums = fits, fits.gram, fits.sums
         self._tried = Counter(candidate.effect_id for candidate in candidates)
 
     def below(self, effect: Effect, known: int = 0) -> float:

@@ -15,8 +15,8 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from cspm_ident.diagnosis.regression.block_gram import Evidence
-from cspm_ident.diagnosis.regression.block_regression import Sums, behind, paired
+from cspm_ident.diagnosis.regression.block_gram import BlockGram
+from cspm_ident.diagnosis.regression.block_regression import BlockRegression, behind, paired
 from cspm_ident.diagnosis.residuals.regressors import Candidate
 from cspm_ident.diagnosis.thresholds import DEFAULT_THRESHOLDS, Thresholds
 from cspm_sim.effects import Effect
@@ -80,7 +80,7 @@ def with_spectrum(effect: Effect, shape: Mapping[str, float], longest: float) ->
 
 
 def most_in_all(
-    evidence: Evidence,
+    gram: BlockGram,
     candidate: Candidate,
     others: Sequence[Candidate],
     thresholds: Thresholds = DEFAULT_THRESHOLDS,
@@ -91,23 +91,23 @@ def most_in_all(
     pairs have a part that is less than nothing.
 
     Args:
-        evidence: of columns about what was found, with the effect's spectrum.
+        gram: of columns about what was found, with the effect's spectrum.
         candidate: the part that was found.
         others: what else was.
         thresholds: `tie_sigma`, and those of intervals.
     """
-    sums, base = Sums(evidence, thresholds), evidence.with_nuisance(others)
-    parts = [evidence.columns_of([c]) for c in _spectrum(evidence, candidate)]
+    sums, base = BlockRegression(gram, thresholds), gram.with_nuisance(others)
+    parts = [gram.columns_of([c]) for c in _spectrum(gram, candidate)]
     fitted = (_form(sums, base, np.concatenate(pair)) for pair in combinations(parts, 2))
     forms = [form for form in fitted if form is not None]
-    left = sums.held_out(np.concatenate([base, evidence.columns_of([candidate])]))
+    left = sums.held_out(np.concatenate([base, gram.columns_of([candidate])]))
     best = min([left, *(form.left for form in forms)], key=np.sum)
     most = thresholds.tie_sigma
     alike = [form for form in forms if behind(paired(form.left - best)) <= most]
     return np.array([max(form.total + form.half for form in alike)]) if alike else None
 
 
-def _form(sums: Sums, base: Index, parts: Index) -> _Form | None:
+def _form(sums: BlockRegression, base: Index, parts: Index) -> _Form | None:
     """Return the parts fitted beside a base; None where one of them is negative."""
     both = np.concatenate([base, parts])
     weights = sums.weights(both)[len(base) :]
@@ -121,8 +121,8 @@ def _form(sums: Sums, base: Index, parts: Index) -> _Form | None:
     return _Form(sums.held_out(both), float(weights.sum()), float(half[-1]))
 
 
-def _spectrum(evidence: Evidence, candidate: Candidate) -> list[Candidate]:
+def _spectrum(gram: BlockGram, candidate: Candidate) -> list[Candidate]:
     """Return the candidates of one effect on one element, of all shapes that there are."""
     own = candidate.effect_id, candidate.element
-    candidates = (term for term in evidence.terms if isinstance(term, Candidate))
+    candidates = (term for term in gram.terms if isinstance(term, Candidate))
     return [c for c in candidates if (c.effect_id, c.element) == own]

@@ -240,12 +240,12 @@ def _ranked(finding: Finding, entry: dict[str, Any]) -> Iterable[tuple[str, ...]
     likely, taken = f"{entry['probability']:.2f}", f"{100 * finding.share:.0f} %"
     yield finding.hypothesis.words, verdict, likely, size, taken
     rivals = zip(finding.alternatives, entry["alternatives"], strict=True)
-    for rival, told in sorted(rivals, key=lambda each: each[0].behind):
+    for rival, reported in sorted(rivals, key=lambda each: each[0].behind):
         behind = f"{rival.behind:.1f} behind"
         yield (
             rival.words,
             "explains it as well",
-            f"{told['probability']:.2f}",
+            f"{reported['probability']:.2f}",
             behind,
             "",
         )
@@ -278,8 +278,8 @@ def _simulated(found: Diagnosis, data: dict[str, Any]) -> str:
     rows = []
     for fit in found.simulated:
         numbers = (fit.before, fit.retuned, fit.after, fit.floor)
-        told = (f"{n:.3g}" for n in numbers)
-        rows.append((fit.output.name, drive_of(fit), *told, fit.output.unit))
+        reported = (f"{n:.3g}" for n in numbers)
+        rows.append((fit.output.name, drive_of(fit), *reported, fit.output.unit))
     text = (
         "<p>Root mean square errors of held-out data, each part simulated from measured signals:"
         " winches and bar in windows of half a second, cables and bar from motor angles"

@@ -57,10 +57,10 @@ def _difference(effect: Effect) -> str:
 
 def _sizes(finding: Finding) -> str:
     """Return the parameters of every element, once where all have the same."""
-    told = {own.candidate.element: _size(finding, own) for own in finding.coefficients}
-    if len(set(told.values())) == 1:
-        return next(iter(told.values()))
-    return "; ".join(f"{element} {size}" for element, size in told.items())
+    reported = {own.candidate.element: _size(finding, own) for own in finding.coefficients}
+    if len(set(reported.values())) == 1:
+        return next(iter(reported.values()))
+    return "; ".join(f"{element} {size}" for element, size in reported.items())
 
 
 def _size(finding: Finding, own: Coefficients) -> str:
@@ -71,14 +71,14 @@ def _size(finding: Finding, own: Coefficients) -> str:
     effect, numbers = own.candidate.effect, finding.parameters_on(own)
     known = [n for n in numbers if n.low < n.high] or numbers
     if all(n.is_open for n in known):
-        told = ", ".join(f"{_name(effect, n)} {amount_words(n.value, n.unit)}" for n in known)
-        return f"{told}, too few data for an interval"
+        reported = ", ".join(f"{_name(effect, n)} {amount_words(n.value, n.unit)}" for n in known)
+        return f"{reported}, too few data for an interval"
     sure = [n for n in known if not _may_be_absent(effect, n)] or known
-    told = ", ".join(
+    reported = ", ".join(
         f"{_name(effect, n)} {amount_words(n.value, n.unit, (n.low, n.high))}" for n in sure
     )
     rest = ", ".join(n.name for n in known if n not in sure)
-    return f"{told}, {rest} not surely" if rest else told
+    return f"{reported}, {rest} not surely" if rest else reported
 
 
 def _may_be_absent(effect: Effect, number: Parameter) -> bool:
@@ -126,8 +126,8 @@ def _elsewhere(diagnosis: Diagnosis, finding: Finding) -> str:
     least = max(limits[name] for name in others)
     if least > min(abs(n.value - absent) for n in numbers):
         return ""
-    told = amount_words(least, parameter.unit)
-    return f" No other {effect.block.value} has it: {told} would have shown."
+    reported = amount_words(least, parameter.unit)
+    return f" No other {effect.block.value} has it: {reported} would have shown."
 
 
 def _suspected(diagnosis: Diagnosis, effect: Effect) -> set[str]:

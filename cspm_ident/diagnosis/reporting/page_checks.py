@@ -16,8 +16,8 @@ def energy_table(found: Diagnosis) -> str:
     rows = []
     for power in lost_powers(found.curves):
         ends = f"{power.after - power.half:.2g} to {power.after + power.half:.2g}"
-        told = f"{power.before:.2g}", f"{power.after:.2g}", ends, _takes_or_gives(power)
-        rows.append((channel_of(power), *told))
+        reported = f"{power.before:.2g}", f"{power.after:.2g}", ends, _takes_or_gives(power)
+        rows.append((channel_of(power), *reported))
     text = (
         "<p>Mean power that the machine loses beyond the model, on held-out data: residuals times"
         " the measured rates that they act at. Friction, drag and dampers take energy; where what"

@@ -157,9 +157,9 @@ class Suspension:
         alone = elongation_at(self.parameters, tensions, lengths, self._near)
         stiffness = law_at(self.parameters, alone, lengths)[:, :, 1]
         inert = self._damping / self.signals.step
-        told = alone.copy()
-        relaxed(alone, inert / np.maximum(stiffness + inert, 1e-300), told)
-        return np.asarray(told)
+        reported = alone.copy()
+        relaxed(alone, inert / np.maximum(stiffness + inert, 1e-300), reported)
+        return np.asarray(reported)
 
     @cached_property
     def _told_rates(self) -> Array:

@@ -298,9 +298,9 @@ class _Stretch:
         ways = [columns(rows) for rows in (self._here.bar_rows, self._here.posed_bar_rows)]
         by_tension, by_pose = (self._weighed(way, Channel.WRENCH) for way in ways)
         common = np.einsum("kij,kij->j", by_tension, by_pose)
-        told, posed = (np.sum(way**2, axis=(0, 1)) for way in (by_tension, by_pose))
-        quieter = np.where(told <= posed, ways[0], ways[1])
-        least = self._thresholds.common_acceleration_share * np.minimum(told, posed)
+        reported, posed = (np.sum(way**2, axis=(0, 1)) for way in (by_tension, by_pose))
+        quieter = np.where(reported <= posed, ways[0], ways[1])
+        least = self._thresholds.common_acceleration_share * np.minimum(reported, posed)
         return np.where(common >= least, quieter, 0.0)
 
     def _read(self, effect: Effect, i: int, name: str) -> Iterator[tuple[Place, Array]]:

@@ -72,15 +72,15 @@ def drive_equations(
         rows[:, WinchSignal.TIME] = torque.times
         rows[:, WinchSignal.TORQUE] = torque.values[:, i]
         rows[1:, WinchSignal.TORQUE_RATE] = np.diff(torque.values[:, i]) / np.diff(torque.times)
-        told = command.values[np.maximum(last, 0), i]
+        reported = command.values[np.maximum(last, 0), i]
         # No drive delivers more than its limit.
-        told[(np.abs(told) >= cable.torque_limit) | ~known_from] = np.nan
+        reported[(np.abs(reported) >= cable.torque_limit) | ~known_from] = np.nan
         own = [
             a
             for a in known
             if a.element == i and a.effect.signature.regression.channel is Channel.DRIVE
         ]
-        missing = told - rows[:, WinchSignal.TORQUE]
+        missing = reported - rows[:, WinchSignal.TORQUE]
         equation = _equation(cable.name, missing, rows, effects, own, held, knots)
         if equation is not None:
             found.append(equation)

@@ -83,5 +83,5 @@ def _record(equation: Equation) -> Record:
 def _is_sound(drift: ClockDrift, thresholds: Thresholds) -> bool:
     low, high = drift.interval
     least = thresholds.least_clock_shift_s
-    told = not low <= 0.0 <= high and abs(drift.rate) * drift.apart > least
-    return told and abs(drift.rate) <= thresholds.healthy_clock_drift
+    reported = not low <= 0.0 <= high and abs(drift.rate) * drift.apart > least
+    return reported and abs(drift.rate) <= thresholds.healthy_clock_drift

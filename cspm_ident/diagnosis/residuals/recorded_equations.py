@@ -31,7 +31,7 @@ def equations_of(
     knots: Knots | None = None,
     progress: Callable[[str], None] = lambda _: None,
     touched: Sequence[Candidate] | None = None,
-    supposed: Mapping[Candidate, Array] = MappingProxyType({}),
+    assumed: Mapping[Candidate, Array] = MappingProxyType({}),
     thresholds: Thresholds = DEFAULT_THRESHOLDS,
 ) -> list[Equation]:
     """Return every residual that the sensors allow, less what the machine's effects add.
@@ -42,7 +42,7 @@ def equations_of(
         knots: of the free functions; None: without these.
         progress: called with what is being done.
         touched: by these; other winches, and cables and bar if need be, may be left out.
-        supposed: weights about which residuals are taken to first order, where tensions are drawn
+        assumed: weights about which residuals are taken to first order, where tensions are drawn
             from torques that the faults of winches add to. They stay in the residuals.
         thresholds: those of residuals.
 
@@ -57,10 +57,10 @@ def equations_of(
     if measurement.machine.bar is not None and suspended:
         progress("cables and bar")
         drawn = None if measurement.tension else drawn_tension(measurement, known)
-        drawn = drawn and drawn.less(supposed)
-        told = measurement if drawn is None else drawn.measurement
+        drawn = drawn and drawn.less(assumed)
+        reported = measurement if drawn is None else drawn.measurement
         late = suspension_equations(
-            Timeline(told), effects, known, knots, drawn=drawn, thresholds=thresholds
+            Timeline(reported), effects, known, knots, drawn=drawn, thresholds=thresholds
         )
     progress("torque equations of the winches")
     found = drive_equations(measurement, effects, known, knots)

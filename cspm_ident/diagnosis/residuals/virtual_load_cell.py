@@ -58,23 +58,23 @@ class DrawnTension:
         gaps = np.flatnonzero(self.measurement.torque.gaps)
         return np.asarray(0.5 * (times[gaps] + times[gaps + 1]))
 
-    def less(self, supposed: Mapping[Candidate, Array]) -> DrawnTension:
+    def less(self, assumed: Mapping[Candidate, Array]) -> DrawnTension:
         """Return tensions without what winches' supposed faults add to them.
 
         Laws of cables are then taken about what these carry, not about what friction looks like.
 
         Args:
-            supposed: weights by candidate, of winches or of anything else.
+            assumed: weights by candidate, of winches or of anything else.
         """
         names, taken = self.measurement.machine.cable_names, np.zeros_like(self.taken)
-        for candidate, weights in supposed.items():
+        for candidate, weights in assumed.items():
             if _is_of_shaft(candidate.effect):
                 i = names.index(candidate.element)
                 taken[:, i] += self._added(candidate.effect, candidate.nonlinear, i) @ weights
         assert self.measurement.tension is not None
         samples = Samples(self.times, self.measurement.tension.values - taken)
-        told = self.measurement.with_samples("tension", samples)
-        return replace(self, measurement=told, taken=self.taken + taken)
+        reported = self.measurement.with_samples("tension", samples)
+        return replace(self, measurement=reported, taken=self.taken + taken)
 
     def taken_at(self, times: Array) -> Array:
         """Return what was taken out, smoothed as the tensions are, (len(times), n) [N]."""

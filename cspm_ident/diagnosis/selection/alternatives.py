@@ -40,15 +40,15 @@ def alternatives_of(
     sums, base, own = fits.sums, fits.columns(others), fits.own_columns(hypothesis)
     reference = fits.held_out(hypothesis, base)
     gained = float(np.sum(sums.held_out(base) - reference))
-    free_gain = freely_gained(fits.evidence, sums, base, own)
+    free_gain = freely_gained(fits.gram, sums, base, own)
     limits = fits.thresholds
     undecided = max(limits.model_form_error_share * gained, free_gain)
     for rival, *beside in _alike(fits, free, hypothesis, others):
-        supposed = [rival, *beside]
-        columns = fits.evidence.columns_of(c for h in supposed for c in h.candidates)
-        wider = max(0, sum(map(freedom, supposed)) - freedom(hypothesis))
+        assumed = [rival, *beside]
+        columns = fits.gram.columns_of(c for h in assumed for c in h.candidates)
+        wider = max(0, sum(map(freedom, assumed)) - freedom(hypothesis))
         nested = wider and not beside and contains(sums, base, columns, own)
-        if nested or not fits.is_plausible([*others, *supposed], loosely=True):
+        if nested or not fits.is_plausible([*others, *assumed], loosely=True):
             continue
         with sums.delayed(np.setdiff1d(columns, own), hypothesis.onset):
             worse = fits.held_out(rival, fits.beside(base, *beside)) - reference
@@ -69,7 +69,7 @@ def _alike(
 
     What looks like a rival looks like what it rivals.
     """
-    given, base = (fits.evidence, fits.sums), fits.columns(others)
+    given, base = (fits.gram, fits.sums), fits.columns(others)
     rivals = rivals_of(*given, base, hypothesis, free)
     yield from ((rival,) for rival in rivals)
     alone = {hypothesis.effect.id, *(rival.effect.id for rival in rivals)}

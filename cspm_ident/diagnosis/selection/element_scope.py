@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from cspm_ident.diagnosis.regression.hypothesis import Hypothesis, has_one_system, is_spread
 from cspm_ident.diagnosis.regression.joint_fit import Fits
-from cspm_ident.diagnosis.regression.significance import Sureness
+from cspm_ident.diagnosis.regression.significance import Significance
 from cspm_ident.diagnosis.residuals.regressors import Candidate
 
 Array = NDArray[np.float64]
@@ -21,9 +21,11 @@ Index = NDArray[np.intp]
 class Scopes:
     """Hypotheses of one effect on more elements, or on fewer."""
 
-    def __init__(self, fits: Fits, sureness: Sureness, candidates: Sequence[Candidate]) -> None:
+    def __init__(
+        self, fits: Fits, significance: Significance, candidates: Sequence[Candidate]
+    ) -> None:
         """Take all candidates that are looked at."""
-        self._fits, self._sureness, self._candidates = fits, sureness, candidates
+        self._fits, self._significance, self._candidates = fits, significance, candidates
 
     def of(self, candidate: Candidate, free: Sequence[Candidate], base: Index) -> list[Hypothesis]:
         """Return the candidate's effect where it surely acts, and on all elements together.
@@ -67,7 +69,7 @@ class Scopes:
     def _act(self, hypothesis: Hypothesis, beside: Hypothesis, base: Index) -> bool:
         """Return whether a hypothesis surely is there beside another."""
         base = self._fits.beside(base, beside)
-        return self._sureness.counts(base, hypothesis, self._fits.gain(hypothesis, base))
+        return self._significance.counts(base, hypothesis, self._fits.gain(hypothesis, base))
 
     def agree(self, hypothesis: Hypothesis, base: Index) -> bool:
         """Return whether all elements may have the same numbers, and several surely have some."""
@@ -89,13 +91,13 @@ class Scopes:
         self, candidate: Candidate, alike: Sequence[Candidate], base: Index
     ) -> Hypothesis:
         """Return the candidate's effect on all elements where it surely acts beside the others."""
-        sums, evidence, found = self._fits.sums, self._fits.evidence, [candidate]
+        sums, gram, found = self._fits.sums, self._fits.gram, [candidate]
         others = [c for c in alike if c.element != candidate.element]
-        columns = [evidence.columns_of([c]) for c in others]
+        columns = [gram.columns_of([c]) for c in others]
         for k in np.argsort(-sums.gains_beyond(base, columns)):
-            beside = np.concatenate([base, evidence.columns_of(found)])
+            beside = np.concatenate([base, gram.columns_of(found)])
             further = Hypothesis(candidate.effect, (others[k],))
-            if self._sureness.counts(beside, further, sums.gain(beside, columns[k])):
+            if self._significance.counts(beside, further, sums.gain(beside, columns[k])):
                 found.append(others[k])
         return Hypothesis(candidate.effect, tuple(c for c in alike if c in found))
 

@@ -8,8 +8,8 @@ from itertools import combinations
 import numpy as np
 from numpy.typing import NDArray
 
-from cspm_ident.diagnosis.regression.block_gram import Evidence
-from cspm_ident.diagnosis.regression.block_regression import Sums
+from cspm_ident.diagnosis.regression.block_gram import BlockGram
+from cspm_ident.diagnosis.regression.block_regression import BlockRegression
 from cspm_ident.diagnosis.regression.hypothesis import Hypothesis
 from cspm_ident.diagnosis.residuals.regressors import Candidate
 
@@ -18,20 +18,20 @@ Pair = tuple[Hypothesis, Hypothesis]
 
 
 def best_pairs(
-    evidence: Evidence, sums: Sums, base: Index, free: Sequence[Candidate]
+    gram: BlockGram, sums: BlockRegression, base: Index, free: Sequence[Candidate]
 ) -> list[Pair]:
     """Return the pairs of effects on one element that take most beyond a base, the best first.
 
     Each effect with the shape with which it takes most alone. What is added one by one misses
     pairs that hide each other in one residual, as the zeros of load cell and drive at a shaft.
     """
-    alone = sums.gains_beyond(base, [evidence.columns_of([c]) for c in free])
+    alone = sums.gains_beyond(base, [gram.columns_of([c]) for c in free])
     best: dict[tuple[str, str], Candidate] = {}
     for k in np.argsort(-alone):
         best.setdefault((free[k].element, free[k].effect_id), free[k])
     own = sorted(best.values(), key=lambda candidate: candidate.element)
     pairs = [pair for pair in combinations(own, 2) if pair[0].element == pair[1].element]
-    gains = sums.gains_beyond(base, [evidence.columns_of(pair) for pair in pairs])
+    gains = sums.gains_beyond(base, [gram.columns_of(pair) for pair in pairs])
     most = sums.thresholds.screened_pairs
     return [
         (Hypothesis(one.effect, (one,)), Hypothesis(other.effect, (other,)))

@@ -8,8 +8,8 @@ from itertools import product
 import numpy as np
 from numpy.typing import NDArray
 
-from cspm_ident.diagnosis.regression.block_gram import Evidence, PlaceEvidence
-from cspm_ident.diagnosis.regression.block_regression import Sums
+from cspm_ident.diagnosis.regression.block_gram import BlockGram, PlaceGram
+from cspm_ident.diagnosis.regression.block_regression import BlockRegression
 from cspm_ident.diagnosis.regression.hypothesis import Hypothesis
 from cspm_ident.diagnosis.residuals.regressors import Candidate
 
@@ -17,8 +17,8 @@ Index = NDArray[np.intp]
 
 
 def absorbed_pairs(
-    evidence: Evidence,
-    sums: Sums,
+    gram: BlockGram,
+    sums: BlockRegression,
     base: Index,
     hypothesis: Hypothesis,
     free: Sequence[Candidate],
@@ -29,7 +29,7 @@ def absorbed_pairs(
     drum's radius fitted while the drive's gain was wrong is, to every sensor, an encoder's scale.
 
     Args:
-        evidence: of the columns.
+        gram: of the columns.
         sums: of these.
         base: columns that are fitted beside.
         hypothesis: what they are like.
@@ -44,14 +44,14 @@ def absorbed_pairs(
     others = [c for c in there if c.effect_id != hypothesis.effect.id]
     numbers = [c for c in others if c.effect.physics.alter is not None]
     effects = [c for c in others if c.effect.physics.alter is None]
-    own = evidence.columns_of(hypothesis.candidates)
+    own = gram.columns_of(hypothesis.candidates)
     gained = float(sums.gains_beyond(base, [own])[0])
-    shows = _most(evidence, sums, base, own)
+    shows = _most(gram, sums, base, own)
     most = (1.0 - sums.thresholds.masked_collinear_share) * _left(shows, base, own)
-    beside = {n: np.concatenate([base, evidence.columns_of([n])]) for n in numbers}
+    beside = {n: np.concatenate([base, gram.columns_of([n])]) for n in numbers}
     hiding = [n for n in numbers if _left(shows, beside[n], own) <= most]
     pairs = list(product(effects, hiding))
-    gains = sums.gains_beyond(base, [evidence.columns_of(pair) for pair in pairs])
+    gains = sums.gains_beyond(base, [gram.columns_of(pair) for pair in pairs])
     best: dict[tuple[str, str], tuple[Candidate, Candidate]] = {}
     for k in np.argsort(-gains):
         if gains[k] >= sums.thresholds.masked_gain_share * gained:
@@ -60,19 +60,19 @@ def absorbed_pairs(
     return [
         (Hypothesis(effect.effect, (effect,)), Hypothesis(number.effect, (number,)))
         for effect, number in best.values()
-        if _needed(evidence, sums, base, effect, number)
+        if _needed(gram, sums, base, effect, number)
     ]
 
 
-def _most(evidence: Evidence, sums: Sums, base: Index, own: Index) -> PlaceEvidence:
+def _most(gram: BlockGram, sums: BlockRegression, base: Index, own: Index) -> PlaceGram:
     """Return the residual from which columns take most."""
     both = np.concatenate([base, own])
-    before = evidence.left(base, sums.weights(base))
-    after = evidence.left(both, sums.weights(both))
-    return max(evidence.places, key=lambda each: before[each.place] - after[each.place])
+    before = gram.left(base, sums.weights(base))
+    after = gram.left(both, sums.weights(both))
+    return max(gram.places, key=lambda each: before[each.place] - after[each.place])
 
 
-def _left(place: PlaceEvidence, by: Index, own: Index) -> float:
+def _left(place: PlaceGram, by: Index, own: Index) -> float:
     """Return the squares of columns in one residual that others do not span."""
     known = np.flatnonzero(np.isin(place.columns, by))
     mine = np.flatnonzero(np.isin(place.columns, own))
@@ -85,9 +85,11 @@ def _left(place: PlaceEvidence, by: Index, own: Index) -> float:
     return float(np.trace(gram[np.ix_(mine, mine)] - spanned))
 
 
-def _needed(evidence: Evidence, sums: Sums, base: Index, one: Candidate, other: Candidate) -> bool:
+def _needed(
+    gram: BlockGram, sums: BlockRegression, base: Index, one: Candidate, other: Candidate
+) -> bool:
     """Return whether neither of two explains as much without the other."""
-    first, second = evidence.columns_of([one]), evidence.columns_of([other])
+    first, second = gram.columns_of([one]), gram.columns_of([other])
     return all(
         sums.p_value(np.concatenate([base, beside]), own) < sums.thresholds.masked_significance
         for beside, own in ((first, second), (second, first))

@@ -10,12 +10,12 @@ import numpy as np
 from cspm_ident.diagnosis.regression.block_regression import gain_of
 from cspm_ident.diagnosis.regression.hypothesis import Hypothesis, freedom
 from cspm_ident.diagnosis.regression.joint_fit import Fits
-from cspm_ident.diagnosis.regression.significance import Sureness
+from cspm_ident.diagnosis.regression.significance import Significance
 from cspm_ident.diagnosis.residuals.regressors import Candidate
 
 
 def one_instead(
-    fits: Fits, sureness: Sureness, chosen: Sequence[Hypothesis], free: Sequence[Candidate]
+    fits: Fits, significance: Significance, chosen: Sequence[Hypothesis], free: Sequence[Candidate]
 ) -> tuple[Hypothesis, ...] | None:
     """Return a hypothesis of one fault, and those of two and more that it stands for.
 
@@ -25,7 +25,7 @@ def one_instead(
 
     Args:
         fits: of what was searched.
-        sureness: of these.
+        significance: of these.
         chosen: what was found.
         free: what may be added to it.
     """
@@ -55,7 +55,7 @@ def one_instead(
                 wider < len(few)
                 and less.total <= allowed
                 and fits.is_plausible([*others, singles[k]])
-                and sureness.counts(base, singles[k], gained, len(others))
+                and significance.counts(base, singles[k], gained, len(others))
             ):
                 return singles[k], *few
     return None

@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 
 from cspm_ident.diagnosis.finding import Onset
 from cspm_ident.diagnosis.regression.block_gram import gather
-from cspm_ident.diagnosis.regression.block_regression import Sums
+from cspm_ident.diagnosis.regression.block_regression import BlockRegression
 from cspm_ident.diagnosis.residuals.regressors import Candidate
 from cspm_ident.diagnosis.residuals.residual_equation import Equation
 from cspm_ident.diagnosis.thresholds import DEFAULT_THRESHOLDS, Thresholds
@@ -19,7 +19,7 @@ Index = NDArray[np.intp]
 FINE_S = 0.1
 
 
-def first_block(sums: Sums, base: Index, own: Index) -> tuple[int, float]:
+def first_block(sums: BlockRegression, base: Index, own: Index) -> tuple[int, float]:
     """Return the block from which on columns act, and what is left of all squares then.
 
     The block is 0 unless a later one is surely better.
@@ -62,12 +62,12 @@ def onset_of(
     places = {term: [e for e in equations if term in e.columns] for term in own}
     concerned = {e.place for found in places.values() for e in found}
     rows = [e.only(terms) for e in equations if e.place in concerned]
-    evidence = gather([rows], FINE_S)
-    sums, edges = Sums(evidence, thresholds), evidence.times
-    others = {term: time for term, time in others.items() if term in evidence.slices}
+    gram = gather([rows], FINE_S)
+    sums, edges = BlockRegression(gram, thresholds), gram.times
+    others = {term: time for term, time in others.items() if term in gram.slices}
     for term, time in others.items():
-        sums.delay(evidence.columns_of([term]), int(np.searchsorted(edges, time)))
-    base, columns = evidence.with_nuisance(others), evidence.columns_of(own)
+        sums.delay(gram.columns_of([term]), int(np.searchsorted(edges, time)))
+    base, columns = gram.with_nuisance(others), gram.columns_of(own)
     first, last = np.searchsorted(edges, [low, high])
     blocks = np.arange(max(first, 1), max(min(last, len(edges) - 2), first + 2))
     left = sums.left_from(base, columns)[blocks]

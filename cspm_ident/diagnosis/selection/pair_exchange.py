@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 from cspm_ident.diagnosis.regression.block_regression import gain_of
 from cspm_ident.diagnosis.regression.hypothesis import Hypothesis, freedom
 from cspm_ident.diagnosis.regression.joint_fit import Fits
-from cspm_ident.diagnosis.regression.significance import Sureness
+from cspm_ident.diagnosis.regression.significance import Significance
 from cspm_ident.diagnosis.residuals.regressors import Candidate
 from cspm_ident.diagnosis.selection.joint_pairs import Pair, best_pairs
 
@@ -19,7 +19,7 @@ Index = NDArray[np.intp]
 
 def pair_instead(
     fits: Fits,
-    sureness: Sureness,
+    significance: Significance,
     chosen: Sequence[Hypothesis],
     kept: Sequence[Hypothesis],
     free: Sequence[Candidate],
@@ -31,7 +31,7 @@ def pair_instead(
 
     Args:
         fits: of what was searched.
-        sureness: of these.
+        significance: of these.
         chosen: what was found.
         kept: what of it stays in any case.
         free: what may be added to that.
@@ -39,14 +39,14 @@ def pair_instead(
     given_up = [h for h in chosen if h not in kept]
     if not given_up or any(h.onset for h in chosen):
         return None
-    for pair in best_pairs(fits.evidence, fits.sums, fits.columns(kept), free):
+    for pair in best_pairs(fits.gram, fits.sums, fits.columns(kept), free):
         stay = [h for h in given_up if _says_else(fits, h, chosen, [*kept, *pair])]
         beside, replaced = [*kept, *stay], [h for h in given_up if h not in stay]
         if (
             replaced
             and _is_better(fits, pair, replaced, beside)
             and fits.is_plausible([*beside, *pair])
-            and _are_both_needed(fits, sureness, pair, beside)
+            and _are_both_needed(fits, significance, pair, beside)
         ):
             return [*beside, *pair]
     return None
@@ -79,7 +79,7 @@ def _is_better(
 
 
 def _are_both_needed(
-    fits: Fits, sureness: Sureness, pair: Pair, beside: Sequence[Hypothesis]
+    fits: Fits, significance: Significance, pair: Pair, beside: Sequence[Hypothesis]
 ) -> bool:
     """Return whether each is surely there beside the other, and no small part of both."""
     both = np.concatenate([fits.own_columns(h) for h in pair])
@@ -88,6 +88,6 @@ def _are_both_needed(
     for one, other in (pair, pair[::-1]):
         base = fits.columns([*beside, other])
         gain = fits.gain(one, base)
-        if gain.total < least or not sureness.counts(base, one, gain, known=1):
+        if gain.total < least or not significance.counts(base, one, gain, known=1):
             return False
     return True

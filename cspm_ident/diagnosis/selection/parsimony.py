@@ -69,9 +69,9 @@ def _allowed(fits: Fits, one: Hypothesis, other: Hypothesis, chosen: Sequence[Hy
     """
     limits = fits.thresholds
     simpler, form_error = limits.parsimony_gain_share, limits.model_form_error_share
-    sound = [fits.is_negligible(each, [*chosen, each]) for each in (one, other)]
-    if sound[0] != sound[1]:
-        return simpler if sound[0] else -np.inf
+    healthy = [fits.is_negligible(each, [*chosen, each]) for each in (one, other)]
+    if healthy[0] != healthy[1]:
+        return simpler if healthy[0] else -np.inf
     if fits.are_early([*chosen, other]) and not fits.are_early([*chosen, one]):
         return simpler
     if is_number(one) != is_number(other):

@@ -13,8 +13,8 @@ from types import MappingProxyType
 import numpy as np
 from numpy.typing import NDArray
 
-from cspm_ident.diagnosis.regression.block_gram import Evidence, gather
-from cspm_ident.diagnosis.regression.block_regression import Sums
+from cspm_ident.diagnosis.regression.block_gram import BlockGram, gather
+from cspm_ident.diagnosis.regression.block_regression import BlockRegression
 from cspm_ident.diagnosis.regression.coefficients import Weights, values_of, weights_of
 from cspm_ident.diagnosis.regression.hypothesis import Hypothesis, parts_of
 from cspm_ident.diagnosis.regression.parameter_estimates import of_reach
@@ -45,7 +45,7 @@ def refine(
     noise: Mapping[Place, Array],
     block_s: float,
     cut: Cut,
-    supposed: Mapping[Candidate, Array] = MappingProxyType({}),
+    assumed: Mapping[Candidate, Array] = MappingProxyType({}),
     thresholds: Thresholds = DEFAULT_THRESHOLDS,
 ) -> Weights:
     """Return weights, with half the widths of their 95 % intervals, of candidates of better shapes.
@@ -56,7 +56,7 @@ def refine(
         noise: of each residual, its unit.
         block_s: length of the blocks [s].
         cut: what of the equations was searched.
-        supposed: weights about which residuals are taken to first order.
+        assumed: weights about which residuals are taken to first order.
         thresholds: of residuals and intervals.
     """
     candidates, common = parts_of(hypotheses)
@@ -71,12 +71,12 @@ def refine(
         near = [_near(effects[name], shape, factor) for name, shape in shapes.items()]
         try:
             values = {c: own for c, (own, _) in applied.items()}
-            parts = cut(_about(searched, near, candidates, values, supposed, thresholds))
+            parts = cut(_about(searched, near, candidates, values, assumed, thresholds))
         except InputError:
             # Such a machine cannot be; what was found before stays, with its interval.
             break
-        evidence = gather(in_noise(steady(parts), noise), block_s)
-        shapes, found = _fitted(evidence, shapes, wanted, common, thresholds)
+        gram = gather(in_noise(steady(parts), noise), block_s)
+        shapes, found = _fitted(gram, shapes, wanted, common, thresholds)
         for candidate, (weights, half) in found.items():
             if candidate.effect.is_correction:
                 before = values.get(candidate, np.zeros_like(weights))
@@ -95,7 +95,7 @@ def spectra(
     noise: Mapping[Place, Array],
     block_s: float,
     cut: Cut,
-    supposed: Mapping[Candidate, Array] = MappingProxyType({}),
+    assumed: Mapping[Candidate, Array] = MappingProxyType({}),
     thresholds: Thresholds = DEFAULT_THRESHOLDS,
 ) -> dict[Candidate, Array]:
     """Return how large effects that have a spectrum may be in all, where it can be told.
@@ -107,7 +107,7 @@ def spectra(
         noise: as of `refine`.
         block_s: likewise.
         cut: likewise.
-        supposed: likewise.
+        assumed: likewise.
         thresholds: likewise, and `tie_sigma`.
     """
     wanted = [c for c in found if c.effect.signature.spectrum]
@@ -121,11 +121,11 @@ def spectra(
     ]
     values = {c: own for c, (own, _) in found.items() if c.effect.is_correction}
     try:
-        parts = cut(_about(searched, effects, list(found), values, supposed, thresholds))
+        parts = cut(_about(searched, effects, list(found), values, assumed, thresholds))
     except InputError:
         return {}
-    evidence = gather(in_noise(steady(parts), noise), block_s)
-    most = {c: most_in_all(evidence, c, [o for o in found if o != c], thresholds) for c in wanted}
+    gram = gather(in_noise(steady(parts), noise), block_s)
+    most = {c: most_in_all(gram, c, [o for o in found if o != c], thresholds) for c in wanted}
     return {c: own for c, own in most.items() if own is not None}
 
 
@@ -134,7 +134,7 @@ def _about(
     effects: Sequence[Effect],
     candidates: Sequence[Candidate],
     applied: Mapping[Candidate, Array],
-    supposed: Mapping[Candidate, Array],
+    assumed: Mapping[Candidate, Array],
     thresholds: Thresholds,
 ) -> list[Sequence[Equation]]:
     """Return the equations of machines and readings that are corrected.
@@ -143,9 +143,9 @@ def _about(
         InputError: such a machine cannot be.
     """
     moved = [settled(with_found(m, applied)) for m in searched]
-    about = {c: own for c, own in supposed.items() if not c.effect.is_correction}
+    about = {c: own for c, own in assumed.items() if not c.effect.is_correction}
     return [
-        equations_of(m, effects, touched=candidates, supposed=about, thresholds=thresholds)
+        equations_of(m, effects, touched=candidates, assumed=about, thresholds=thresholds)
         for m in moved
     ]
 
@@ -190,32 +190,32 @@ def _steps(factor: float) -> tuple[float, ...]:
 
 
 def _fitted(
-    evidence: Evidence,
+    gram: BlockGram,
     shapes: dict[str, dict[str, float]],
     wanted: Sequence[tuple[str, str]],
     common: Collection[str],
     thresholds: Thresholds,
 ) -> tuple[dict[str, dict[str, float]], Weights]:
     """Return the best shapes and the weights there; those of `common` effects are shared."""
-    sums = Sums(evidence, thresholds)
-    grids = {name: _shapes(evidence, name) for name in shapes}
+    sums = BlockRegression(gram, thresholds)
+    grids = {name: _shapes(gram, name) for name in shapes}
     best: tuple[float, dict[str, tuple[tuple[str, float], ...]]] | None = None
     for point in product(*grids.values()):
         chosen = dict(zip(grids, point, strict=True))
-        left = sums.squares_of(evidence.with_nuisance(_members(evidence, chosen, wanted)))
+        left = sums.squares_of(gram.with_nuisance(_members(gram, chosen, wanted)))
         if best is None or left < best[0]:
             best = left, chosen
     assert best is not None
-    members = _members(evidence, best[1], wanted)
-    weights = values_of(evidence, sums, members, common)
-    turns = _turns(evidence, weights)
-    beside = np.append(evidence.nuisance, evidence.width + np.arange(turns.shape[1]))
-    widths = weights_of(evidence, sums.beside(turns), members, common, beside)
+    members = _members(gram, best[1], wanted)
+    weights = values_of(gram, sums, members, common)
+    turns = _turns(gram, weights)
+    beside = np.append(gram.nuisance, gram.width + np.arange(turns.shape[1]))
+    widths = weights_of(gram, sums.beside(turns), members, common, beside)
     found = {c: (weights[c], widths[c][1]) for c in members}
     return {name: dict(shape) for name, shape in best[1].items()}, found
 
 
-def _turns(evidence: Evidence, weights: Mapping[Candidate, Array]) -> Array:
+def _turns(gram: BlockGram, weights: Mapping[Candidate, Array]) -> Array:
     """Return how what was found changes with the logarithm of each shape, (width, shapes).
 
     As a combination of columns. A weight is no surer than its shape lets it be.
@@ -223,22 +223,22 @@ def _turns(evidence: Evidence, weights: Mapping[Candidate, Array]) -> Array:
     turns: dict[tuple[str, str], Array] = {}
     for candidate, own in weights.items():
         for name in candidate.nonlinear:
-            ends = _ends(evidence, candidate, name)
+            ends = _ends(gram, candidate, name)
             if len(ends) < 2:
                 continue
-            turn = turns.setdefault((candidate.effect_id, name), np.zeros(evidence.width))
+            turn = turns.setdefault((candidate.effect_id, name), np.zeros(gram.width))
             step = float(np.log(ends[-1].nonlinear[name] / ends[0].nonlinear[name]))
-            turn[evidence.slices[ends[-1]]] += own / step
-            turn[evidence.slices[ends[0]]] -= own / step
-    return np.column_stack([np.zeros((evidence.width, 0)), *turns.values()])
+            turn[gram.slices[ends[-1]]] += own / step
+            turn[gram.slices[ends[0]]] -= own / step
+    return np.column_stack([np.zeros((gram.width, 0)), *turns.values()])
 
 
-def _ends(evidence: Evidence, candidate: Candidate, name: str) -> list[Candidate]:
+def _ends(gram: BlockGram, candidate: Candidate, name: str) -> list[Candidate]:
     """Return the candidates that differ in one number of the shape only, ascending in it."""
     kept = {n: value for n, value in candidate.shape if n != name}
     alike = [
         term
-        for term in evidence.terms
+        for term in gram.terms
         if isinstance(term, Candidate)
         and (term.effect_id, term.element) == (candidate.effect_id, candidate.element)
         and {n: value for n, value in term.shape if n != name} == kept
@@ -246,19 +246,19 @@ def _ends(evidence: Evidence, candidate: Candidate, name: str) -> list[Candidate
     return sorted(alike, key=lambda term: term.nonlinear[name])
 
 
-def _shapes(evidence: Evidence, name: str) -> list[tuple[tuple[str, float], ...]]:
-    candidates = (term for term in evidence.terms if isinstance(term, Candidate))
+def _shapes(gram: BlockGram, name: str) -> list[tuple[tuple[str, float], ...]]:
+    candidates = (term for term in gram.terms if isinstance(term, Candidate))
     return sorted({c.shape for c in candidates if c.effect_id == name})
 
 
 def _members(
-    evidence: Evidence,
+    gram: BlockGram,
     shapes: Mapping[str, tuple[tuple[str, float], ...]],
     wanted: Sequence[tuple[str, str]],
 ) -> list[Candidate]:
     return [
         term
-        for term in evidence.terms
+        for term in gram.terms
         if isinstance(term, Candidate)
         and (term.effect_id, term.element) in wanted
         and term.shape == shapes[term.effect_id]

@@ -7,8 +7,8 @@ from collections.abc import Sequence
 import numpy as np
 from numpy.typing import NDArray
 
-from cspm_ident.diagnosis.regression.block_gram import Evidence
-from cspm_ident.diagnosis.regression.block_regression import Sums
+from cspm_ident.diagnosis.regression.block_gram import BlockGram
+from cspm_ident.diagnosis.regression.block_regression import BlockRegression
 from cspm_ident.diagnosis.regression.collinearity import overlap, where_alike
 from cspm_ident.diagnosis.regression.hypothesis import Hypothesis, has_one_system
 from cspm_ident.diagnosis.residuals.regressors import Candidate
@@ -17,8 +17,8 @@ Index = NDArray[np.intp]
 
 
 def rivals_of(
-    evidence: Evidence,
-    sums: Sums,
+    gram: BlockGram,
+    sums: BlockRegression,
     base: Index,
     hypothesis: Hypothesis,
     free: Sequence[Candidate],
@@ -39,7 +39,7 @@ def rivals_of(
         for own in where_alike(members, elements):
             effect = members[0].effect
             rival = Hypothesis(effect, own, common=len(own) > 1 and has_one_system(effect))
-            gain = float(sums.gains_beyond(base, [evidence.columns_of(own)])[0])
+            gain = float(sums.gains_beyond(base, [gram.columns_of(own)])[0])
             key = name, len(own) > 1
             if key not in best or gain > best[key][0]:
                 best[key] = gain, rival
@@ -48,5 +48,5 @@ def rivals_of(
         group = hypothesis.effect.id, hypothesis.candidates[0].shape
         alike = (c for c in groups.get(group, ()) if c.element not in elements)
         rivals += [Hypothesis(hypothesis.effect, (c,)) for c in alike]
-    columns = evidence.columns_of(hypothesis.candidates)
-    return [r for r in rivals if overlap(sums, base, columns, evidence.columns_of(r.candidates))]
+    columns = gram.columns_of(hypothesis.candidates)
+    return [r for r in rivals if overlap(sums, base, columns, gram.columns_of(r.candidates))]

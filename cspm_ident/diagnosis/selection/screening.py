@@ -12,7 +12,7 @@ from cspm_ident.diagnosis.residuals.regressors import Candidate
 Array = NDArray[np.float64]
 
 
-def short_list(candidates: Sequence[Candidate], gains: Array, most: int) -> list[Candidate]:
+def screened(candidates: Sequence[Candidate], gains: Array, most: int) -> list[Candidate]:
     """Return the best point and element of each effect, of the `most` effects that gain most."""
     best: dict[str, tuple[float, Candidate]] = {}
     for candidate, gain in zip(candidates, gains, strict=True):

@@ -10,8 +10,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from cspm_ident.diagnosis.finding import Finding, Unexplained
-from cspm_ident.diagnosis.regression.block_gram import Evidence
-from cspm_ident.diagnosis.regression.block_regression import Gain, Sums, gain_of
+from cspm_ident.diagnosis.regression.block_gram import BlockGram
+from cspm_ident.diagnosis.regression.block_regression import BlockRegression, Gain, gain_of
 from cspm_ident.diagnosis.regression.hypothesis import (
     Hypothesis,
     boldness,
@@ -25,7 +25,7 @@ from cspm_ident.diagnosis.regression.hypothesis import (
     shapes_of,
 )
 from cspm_ident.diagnosis.regression.joint_fit import Fits
-from cspm_ident.diagnosis.regression.significance import Sureness
+from cspm_ident.diagnosis.regression.significance import Significance
 from cspm_ident.diagnosis.residuals.free_shapes import Driver
 from cspm_ident.diagnosis.residuals.regressors import Candidate
 from cspm_ident.diagnosis.selection.alternatives import alternatives_of
@@ -36,7 +36,7 @@ from cspm_ident.diagnosis.selection.onset import first_block
 from cspm_ident.diagnosis.selection.pair_exchange import pair_instead
 from cspm_ident.diagnosis.selection.parsimony import simplest
 from cspm_ident.diagnosis.selection.rivals import rivals_of
-from cspm_ident.diagnosis.selection.screening import short_list
+from cspm_ident.diagnosis.selection.screening import screened
 from cspm_ident.diagnosis.selection.search_result import SearchResult
 from cspm_ident.diagnosis.selection.unexplained import unexplained
 from cspm_ident.diagnosis.thresholds import DEFAULT_THRESHOLDS, Thresholds
@@ -50,21 +50,21 @@ class Search:
 
     def __init__(
         self,
-        evidence: Evidence,
+        gram: BlockGram,
         progress: Callable[[str], None] = lambda _: None,
         thresholds: Thresholds = DEFAULT_THRESHOLDS,
     ) -> None:
         """Take the Gram matrices of all residuals."""
-        self.evidence, self.sums = evidence, Sums(evidence, thresholds)
+        self.gram, self.sums = gram, BlockRegression(gram, thresholds)
         self.thresholds = thresholds
-        self.fits = Fits(evidence, self.sums)
+        self.fits = Fits(gram, self.sums)
         self._progress = progress
-        self._look_for([c for c in evidence.terms if isinstance(c, Candidate) and self._shows(c)])
+        self._look_for([c for c in gram.terms if isinstance(c, Candidate) and self._shows(c)])
 
     def _look_for(self, candidates: Sequence[Candidate]) -> None:
         self._effects = candidates
-        self.sureness = Sureness(self.fits, candidates)
-        self.scopes = Scopes(self.fits, self.sureness, candidates)
+        self.significance = Significance(self.fits, candidates)
+        self.scopes = Scopes(self.fits, self.significance, candidates)
 
     def run(self) -> SearchResult:
         """Choose effects one by one, each with all elements on which it surely acts."""
@@ -88,7 +88,7 @@ class Search:
         narrow = copy(self)
         narrow._look_for([c for c in self._effects if c.effect.physics.alter is not None])
         own = [c for h in narrow._chosen() for c in h.candidates]
-        return self.evidence.parted(own, self.sums.weights(self.evidence.with_nuisance(own)))
+        return self.gram.parted(own, self.sums.weights(self.gram.with_nuisance(own)))
 
     def _chosen(self) -> list[Hypothesis]:
         chosen = self._clocks()
@@ -118,9 +118,9 @@ class Search:
             both = [*chosen, clock, found]
             with self.fits.delayed(found):
                 base, gain = self._others(clock, both), self._gain(clock, both)
-                surely = self.sureness.counts(base, clock, gain, len(chosen) + 1)
-                sound = self.fits.is_negligible(clock, both)
-            if surely and sound:
+                significant = self.significance.counts(base, clock, gain, len(chosen) + 1)
+                healthy = self.fits.is_negligible(clock, both)
+            if significant and healthy:
                 return clock, found
         return ()
 
@@ -139,7 +139,7 @@ class Search:
 
     def _merged(self, chosen: list[Hypothesis]) -> list[Hypothesis]:
         """Return one effect instead of several faults wherever it explains all of them."""
-        while merging := one_instead(self.fits, self.sureness, chosen, self._free(chosen)):
+        while merging := one_instead(self.fits, self.significance, chosen, self._free(chosen)):
             one, *few = merging
             chosen = joined([h for h in chosen if h not in few], one)
         return chosen
@@ -186,7 +186,7 @@ class Search:
         """Return whether others say nearly the same as a part of a hypothesis."""
         others = [self.fits.own_columns(h) for h in chosen if h is not hypothesis]
         own = self.fits.own_columns(hypothesis)
-        spanned = self.sums.spanned(self.evidence.nuisance, np.concatenate(others), own)
+        spanned = self.sums.spanned(self.gram.nuisance, np.concatenate(others), own)
         return bool(np.any(spanned > self.thresholds.collinear_share))
 
     def _is_there(
@@ -194,12 +194,12 @@ class Search:
     ) -> bool:
         """Return whether a hypothesis, or something that explains less of the same, surely is."""
         known = len(chosen) - 1
-        if self.sureness.counts(base, hypothesis, gain, known):
+        if self.significance.counts(base, hypothesis, gain, known):
             return True
         others = [h for h in chosen if h is not hypothesis]
         rivals = self._rivals(hypothesis, self._effects, base) if gain.total > 0.0 else []
         return any(
-            self.sureness.counts(base, rival, rival_gain, known)
+            self.significance.counts(base, rival, rival_gain, known)
             for rival in rivals
             if (rival_gain := self.fits.gain(rival, base)).total < gain.total
             and self.fits.is_plausible([*others, rival])
@@ -214,20 +214,20 @@ class Search:
     def _exchanged(self, chosen: list[Hypothesis]) -> list[Hypothesis]:
         """Return a pair on one element instead of what was chosen one by one, if it is better."""
         kept = [h for h in chosen if self.fits.is_negligible(h, chosen)]
-        return pair_instead(self.fits, self.sureness, chosen, kept, self._free(kept)) or chosen
+        return pair_instead(self.fits, self.significance, chosen, kept, self._free(kept)) or chosen
 
     def _begin(self, hypothesis: Hypothesis) -> None:
         """Let the hypothesis's columns act from its onset on henceforth."""
         if hypothesis.onset:
             own = self.fits.own_columns(hypothesis)
-            self.evidence.delay(own, hypothesis.onset)
+            self.gram.delay(own, hypothesis.onset)
             self.sums.delay(own, hypothesis.onset)
 
     def _best(self, chosen: Sequence[Hypothesis]) -> Hypothesis | None:
         base = self.fits.columns(chosen)
         free = self._free(chosen)
         gains = self.sums.gains_beyond(base, [self._of(c) for c in free])
-        likely = short_list(free, gains, self.thresholds.screened_effects)
+        likely = screened(free, gains, self.thresholds.screened_effects)
         scopes = [h for c in likely for h in self.scopes.of(c, free, base)]
         late = [d for h in scopes for d in self._late(h, free, base)]
         best = self._surest([*scopes, *late], chosen, base)
@@ -305,12 +305,14 @@ class Search:
             return None
         gained = before - self.fits.held_out(hypothesis, base)
         known = len(chosen)
-        return gained if self.sureness.counts(base, hypothesis, gain_of(gained), known) else None
+        return (
+            gained if self.significance.counts(base, hypothesis, gain_of(gained), known) else None
+        )
 
     def _rivals(
         self, hypothesis: Hypothesis, free: Sequence[Candidate], base: Index
     ) -> list[Hypothesis]:
-        return rivals_of(self.evidence, self.sums, base, hypothesis, free)
+        return rivals_of(self.gram, self.sums, base, hypothesis, free)
 
     def judged_again(self, finding: Finding, chosen: Sequence[Hypothesis]) -> Finding:
         """Return a finding beside what is left of what was found, with what explains the same now.
@@ -330,21 +332,21 @@ class Search:
         return Finding(
             hypothesis,
             gain,
-            self.sureness.share(base, own),
+            self.significance.share(base, own),
             tuple(alternatives_of(self.fits, self._effects, hypothesis, others)),
         )
 
     def unexplained(
-        self, chosen: Sequence[Hypothesis], sound: Sequence[Hypothesis] = ()
+        self, chosen: Sequence[Hypothesis], healthy: Sequence[Hypothesis] = ()
     ) -> tuple[Unexplained, ...]:
         """Return free functions of what hypotheses leave; see `unexplained`.
 
         Nor is what sound clocks may have done beside them unknown, though it be no gain elsewhere:
         clocks wander, and what they did in one part of a recording does not foretell another.
         """
-        beside = list(sound)
+        beside = list(healthy)
         left = self._unexplained(chosen, beside)
-        for clock in clocks_of(self._free([*chosen, *sound])) if left else ():
+        for clock in clocks_of(self._free([*chosen, *healthy])) if left else ():
             if self.fits.is_negligible(clock, [*chosen, *beside, clock]):
                 less = self._unexplained(chosen, [*beside, clock])
                 if len(less) < len(left):
@@ -352,14 +354,14 @@ class Search:
         return left
 
     def _unexplained(
-        self, chosen: Sequence[Hypothesis], sound: Sequence[Hypothesis]
+        self, chosen: Sequence[Hypothesis], healthy: Sequence[Hypothesis]
     ) -> tuple[Unexplained, ...]:
-        clocks = [h for h in chosen if self.fits.is_negligible(h, [*chosen, *sound])]
-        told = [h for h in chosen if h not in clocks]
-        return unexplained(self.evidence, self.sums, self.sureness, told, [*clocks, *sound])
+        clocks = [h for h in chosen if self.fits.is_negligible(h, [*chosen, *healthy])]
+        reported = [h for h in chosen if h not in clocks]
+        return unexplained(self.gram, self.sums, self.significance, reported, [*clocks, *healthy])
 
     def _shows(self, candidate: Candidate) -> bool:
         return bool(self.sums.excited[self._of(candidate)].all())
 
     def _of(self, term: Candidate | Driver) -> Index:
-        return self.evidence.columns_of([term])
+        return self.gram.columns_of([term])

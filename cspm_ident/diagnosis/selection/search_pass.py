@@ -45,7 +45,7 @@ class Recordings(NamedTuple):
         return any(m.tension is None and m.machine.bar is not None for m in self.searched)
 
 
-class Look(NamedTuple):
+class SearchPass(NamedTuple):
     """A search, and what it was done in.
 
     Attributes:
@@ -56,7 +56,7 @@ class Look(NamedTuple):
         block: length of the blocks [s].
         search: through the residuals.
         knots: of the free functions.
-        supposed: weights about which residuals were taken to first order.
+        assumed: weights about which residuals were taken to first order.
     """
 
     search_parts: Parts
@@ -66,7 +66,7 @@ class Look(NamedTuple):
     block: float
     search: Search
     knots: Knots
-    supposed: Mapping[Candidate, Array]
+    assumed: Mapping[Candidate, Array]
 
 
 def searched_for(
@@ -74,7 +74,7 @@ def searched_for(
     effects: Sequence[Effect],
     progress: Progress,
     thresholds: Thresholds = DEFAULT_THRESHOLDS,
-) -> tuple[Look, SearchResult]:
+) -> tuple[SearchPass, SearchResult]:
     """Return what a search finds, and the search.
 
     The law of a cable holds to first order about its tension. One that was drawn from a torque has
@@ -90,22 +90,22 @@ def searched_for(
     Raises:
         InputError: the recordings have no residual that could be looked at, or are too short.
     """
-    look = _look(recordings, {}, effects, progress, thresholds)
+    search_pass = _search_pass(recordings, {}, effects, progress, thresholds)
     if recordings.are_drawn:
-        first = look.search.first()
-        supposed = _of_winches(look.search, () if first is None else (first,))
-        if supposed:
+        first = search_pass.search.first()
+        assumed = _of_winches(search_pass.search, () if first is None else (first,))
+        if assumed:
             # Before the next is made: columns are most of the memory.
-            del look
-            look = _look(recordings, supposed, effects, progress, thresholds)
-    found = look.search.run()
+            del search_pass
+            search_pass = _search_pass(recordings, assumed, effects, progress, thresholds)
+    found = search_pass.search.run()
     if recordings.are_drawn:
-        supposed = _of_winches(look.search, [each.hypothesis for each in found.findings])
-        if not supposed.keys() <= look.supposed.keys():
-            del look
-            look = _look(recordings, supposed, effects, progress, thresholds)
-            found = look.search.run()
-    return look, found
+        assumed = _of_winches(search_pass.search, [each.hypothesis for each in found.findings])
+        if not assumed.keys() <= search_pass.assumed.keys():
+            del search_pass
+            search_pass = _search_pass(recordings, assumed, effects, progress, thresholds)
+            found = search_pass.search.run()
+    return search_pass, found
 
 
 def _of_winches(search: Search, hypotheses: Iterable[Hypothesis]) -> dict[Candidate, Array]:
@@ -119,20 +119,20 @@ def _of_winches(search: Search, hypotheses: Iterable[Hypothesis]) -> dict[Candid
     }
 
 
-def _look(
+def _search_pass(
     recordings: Recordings,
-    supposed: Mapping[Candidate, Array],
+    assumed: Mapping[Candidate, Array],
     effects: Sequence[Effect],
     progress: Progress,
     thresholds: Thresholds,
-) -> Look:
+) -> SearchPass:
     searched, held_out = recordings
     longest = max(m.duration for m in searched)
     visible, knots = [told_within(e, longest) for e in effects], Knots()
 
     def equations(measurements: Sequence[Measurement]) -> Parts:
         return [
-            equations_of(m, visible, knots, progress, supposed=supposed, thresholds=thresholds)
+            equations_of(m, visible, knots, progress, assumed=assumed, thresholds=thresholds)
             for m in measurements
         ]
 
@@ -145,11 +145,11 @@ def _look(
     noise = noise_of(steady(parts))
     seconds = sum(b - a for a, b in map(span_of, parts))
     block = max(thresholds.shortest_block_s, seconds / thresholds.block_count)
-    evidence = gather(in_noise(steady(parts), noise), block)
-    if evidence.blocks < FOLDS:
+    gram = gather(in_noise(steady(parts), noise), block)
+    if gram.blocks < FOLDS:
         raise _too_short(searched[0], seconds, thresholds)
-    search = Search(evidence, progress, thresholds)
-    return Look(parts, judged, hums, noise, block, search, knots, supposed)
+    search = Search(gram, progress, thresholds)
+    return SearchPass(parts, judged, hums, noise, block, search, knots, assumed)
 
 
 def _too_short(measurement: Measurement, seconds: float, thresholds: Thresholds) -> InputError:

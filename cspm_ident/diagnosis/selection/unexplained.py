@@ -8,10 +8,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from cspm_ident.diagnosis.finding import Unexplained
-from cspm_ident.diagnosis.regression.block_gram import Evidence
-from cspm_ident.diagnosis.regression.block_regression import Gain, Sums
+from cspm_ident.diagnosis.regression.block_gram import BlockGram
+from cspm_ident.diagnosis.regression.block_regression import BlockRegression, Gain
 from cspm_ident.diagnosis.regression.hypothesis import Hypothesis
-from cspm_ident.diagnosis.regression.significance import Sureness
+from cspm_ident.diagnosis.regression.significance import Significance
 from cspm_ident.diagnosis.residuals.free_shapes import Driver
 
 Index = NDArray[np.intp]
@@ -21,43 +21,45 @@ _LEAST = 1e-300
 
 
 def unexplained(
-    evidence: Evidence,
-    sums: Sums,
-    sureness: Sureness,
+    gram: BlockGram,
+    sums: BlockRegression,
+    significance: Significance,
     chosen: Sequence[Hypothesis],
-    sound: Sequence[Hypothesis] = (),
+    healthy: Sequence[Hypothesis] = (),
 ) -> tuple[Unexplained, ...]:
     """Return free functions that explain what some hypotheses do not, the most important first.
 
     Args:
-        evidence: of all free functions.
+        gram: of all free functions.
         sums: of its columns.
-        sureness: of these.
+        significance: of these.
         chosen: what was found.
-        sound: what a sound machine has as well, whose amount may drift.
+        healthy: what a sound machine has as well, whose amount may drift.
     """
-    drivers = [d for d in evidence.terms if isinstance(d, Driver)]
-    supposed = [*chosen, *sound]
-    base = _columns(evidence, supposed)
+    drivers = [d for d in gram.terms if isinstance(d, Driver)]
+    assumed = [*chosen, *healthy]
+    base = _columns(gram, assumed)
     found: dict[Driver, Unexplained] = {}
     limits, chance = sums.thresholds, sums.thresholds.false_alarm_rate / max(1, len(drivers))
     for driver in drivers:
-        own = evidence.columns_of([driver])
+        own = gram.columns_of([driver])
         gained = sums.gain_within if driver.of_time else sums.gain
         gain, p_value = gained(base, own), sums.p_value(base, own)
         if gain.total > limits.unknown_sigma * gain.error and p_value < chance:
-            share = sureness.share(base, own)
+            share = significance.share(base, own)
             if share >= limits.unknown_share:
                 found[driver] = Unexplained(driver, gain, share)
-    found |= {each.driver: each for each in _drifting(evidence, sums, sureness, chosen, sound)}
-    began = [h.onset for h in supposed if h.onset]
-    found |= {each.driver: each for each in _once(evidence, sums, base, began)}
-    told = [e for e in found.values() if e.gain.total > _untold(evidence, sums, supposed, e.driver)]
-    return tuple(sorted(told, key=lambda each: -each.gain.total))
+    found |= {each.driver: each for each in _drifting(gram, sums, significance, chosen, healthy)}
+    began = [h.onset for h in assumed if h.onset]
+    found |= {each.driver: each for each in _once(gram, sums, base, began)}
+    reported = [
+        e for e in found.values() if e.gain.total > _unreported(gram, sums, assumed, e.driver)
+    ]
+    return tuple(sorted(reported, key=lambda each: -each.gain.total))
 
 
 def _once(
-    evidence: Evidence, sums: Sums, base: Index, began: Sequence[int]
+    gram: BlockGram, sums: BlockRegression, base: Index, began: Sequence[int]
 ) -> Iterator[Unexplained]:
     """Yield functions of time of residuals that are left in one block more than in all others.
 
@@ -65,12 +67,12 @@ def _once(
     does so within a block, which is no block of either state.
     """
     within, limits = [k for onset in began for k in (onset - 1, onset)], sums.thresholds
-    for place, squares in evidence.left_by_block(base, sums.weights(base)).items():
+    for place, squares in gram.left_by_block(base, sums.weights(base)).items():
         squares = np.delete(squares, within)
         most = float(squares.max(initial=0.0))
         share = most / max(float(squares.sum()), _LEAST)
-        drivers = [d for d in evidence.terms if isinstance(d, Driver) and d.place == place]
-        gains = {d: sums.gain_within(base, evidence.columns_of([d])) for d in drivers if d.of_time}
+        drivers = [d for d in gram.terms if isinstance(d, Driver) and d.place == place]
+        gains = {d: sums.gain_within(base, gram.columns_of([d])) for d in drivers if d.of_time}
         several = len(squares) >= limits.unknown_fewest_blocks
         if gains and several and share > limits.dominant_block_share:
             excess = most - float(np.median(squares))
@@ -78,51 +80,53 @@ def _once(
             yield Unexplained(driver, Gain(excess, excess), share)
 
 
-def _untold(evidence: Evidence, sums: Sums, chosen: Sequence[Hypothesis], driver: Driver) -> float:
+def _unreported(
+    gram: BlockGram, sums: BlockRegression, chosen: Sequence[Hypothesis], driver: Driver
+) -> float:
     """Return the squares that tell nothing in a residual, findings there being not quite true."""
-    (place,) = (p for p in evidence.places if p.place == driver.place)
+    (place,) = (p for p in gram.places if p.place == driver.place)
     taken = 0.0
     for hypothesis in chosen:
-        own = evidence.columns_of(hypothesis.candidates)
+        own = gram.columns_of(hypothesis.candidates)
         if np.isin(own, place.columns).any():
-            base = _columns(evidence, [h for h in chosen if h is not hypothesis])
+            base = _columns(gram, [h for h in chosen if h is not hypothesis])
             taken += max(0.0, sums.gain(base, own).total)
     return sums.thresholds.model_form_error_share * taken
 
 
 def _drifting(
-    evidence: Evidence,
-    sums: Sums,
-    sureness: Sureness,
+    gram: BlockGram,
+    sums: BlockRegression,
+    significance: Significance,
     chosen: Sequence[Hypothesis],
-    sound: Sequence[Hypothesis],
+    healthy: Sequence[Hypothesis],
 ) -> Iterator[Unexplained]:
     """Yield functions of time instead of hypotheses whose amount does not stay what it is.
 
     A load cell that warms up has no constant bias, though a bias explains most of it.
     """
     for hypothesis in chosen:
-        base = _columns(evidence, [h for h in (*chosen, *sound) if h is not hypothesis])
-        own = evidence.columns_of(hypothesis.candidates)
+        base = _columns(gram, [h for h in (*chosen, *healthy) if h is not hypothesis])
+        own = gram.columns_of(hypothesis.candidates)
         drift, p_value = sums.drift(base, own)
         held = drift.total <= sums.thresholds.doubtful_share * sums.gain(base, own).total
         if held or p_value >= sums.thresholds.false_alarm_rate / len(chosen):
             continue
-        times = [d for d in _concerned(evidence, hypothesis, own) if d.of_time]
-        gains = [sums.gain_within(base, evidence.columns_of([d])) for d in times]
+        times = [d for d in _concerned(gram, hypothesis, own) if d.of_time]
+        gains = [sums.gain_within(base, gram.columns_of([d])) for d in times]
         if times:
             k = int(np.argmax([gain.total for gain in gains]))
-            share = sureness.share(base, evidence.columns_of([times[k]]))
+            share = significance.share(base, gram.columns_of([times[k]]))
             yield Unexplained(times[k], gains[k], share)
 
 
-def _concerned(evidence: Evidence, hypothesis: Hypothesis, own: Index) -> list[Driver]:
+def _concerned(gram: BlockGram, hypothesis: Hypothesis, own: Index) -> list[Driver]:
     """Return drivers of the residuals in which a hypothesis acts, of its own elements if any."""
-    places = evidence.places_of(own)
-    found = [d for d in evidence.terms if isinstance(d, Driver) and d.place in places]
+    places = gram.places_of(own)
+    found = [d for d in gram.terms if isinstance(d, Driver) and d.place in places]
     near = [d for d in found if d.place.element in hypothesis.elements]
     return near or found
 
 
-def _columns(evidence: Evidence, chosen: Iterable[Hypothesis]) -> Index:
-    return evidence.with_nuisance(c for h in chosen for c in h.candidates)
+def _columns(gram: BlockGram, chosen: Iterable[Hypothesis]) -> Index:
+    return gram.with_nuisance(c for h in chosen for c in h.candidates)

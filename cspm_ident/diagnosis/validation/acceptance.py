@@ -14,7 +14,7 @@ from cspm_ident.diagnosis.finding import (
     Unexplained,
     is_doubtful,
 )
-from cspm_ident.diagnosis.regression.block_gram import Evidence
+from cspm_ident.diagnosis.regression.block_gram import BlockGram
 from cspm_ident.diagnosis.regression.hypothesis import Hypothesis
 from cspm_ident.diagnosis.residuals.residual_equation import Equation
 from cspm_ident.diagnosis.selection.search import Search
@@ -87,7 +87,7 @@ class Acceptance:
 def accepted(
     search: Search,
     found: SearchResult,
-    judge: Evidence,
+    judge: BlockGram,
     searched: Sequence[Measurement],
     rows: Parts,
     block: float,
@@ -124,7 +124,7 @@ def _is_silent(finding: Finding) -> bool:
     return finding.holdout is HoldOut.SILENT
 
 
-def _tested(search: Search, judge: Evidence, found: Sequence[Finding]) -> tuple[Finding, ...]:
+def _tested(search: Search, judge: BlockGram, found: Sequence[Finding]) -> tuple[Finding, ...]:
     """Return findings tested on held-out data, a rejected one replaced by a rival that passes.
 
     A bar that comes to rest contradicts drag in proportion to its speed, and not to its square.
@@ -149,7 +149,7 @@ def _rivals(search: Search, finding: Finding, found: Sequence[Finding]) -> Itera
         if not search.fits.is_plausible([*others, rival.hypothesis]):
             continue
         gain = search.fits.gain(rival.hypothesis, base)
-        share = search.sureness.share(base, search.fits.own_columns(rival.hypothesis))
+        share = search.significance.share(base, search.fits.own_columns(rival.hypothesis))
         rest = tuple(a for a in finding.alternatives if a is not rival)
         yield Finding(replace(rival.hypothesis, onset=finding.hypothesis.onset), gain, share, rest)
 

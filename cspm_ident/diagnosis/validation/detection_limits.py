@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 from scipy.stats import t as t_distribution
 
 from cspm_ident.diagnosis.finding import Finding
-from cspm_ident.diagnosis.regression.block_gram import Evidence
+from cspm_ident.diagnosis.regression.block_gram import BlockGram
 from cspm_ident.diagnosis.residuals.regressors import Candidate
 from cspm_ident.diagnosis.selection.search import Search
 
@@ -46,7 +46,7 @@ def detection_limits(search: Search, kept: Sequence[Finding]) -> tuple[Limit, ..
     base = search.fits.columns(each.hypothesis for each in kept)
     best: dict[tuple[str, str], Limit] = {}
     for candidate in search.heard:
-        columns = search.evidence.columns_of([candidate])
+        columns = search.gram.columns_of([candidate])
         if (
             len(columns) != 1
             or candidate.effect.signature.coefficients
@@ -62,25 +62,25 @@ def detection_limits(search: Search, kept: Sequence[Finding]) -> tuple[Limit, ..
 
 def _least(search: Search, candidate: Candidate, base: NDArray[np.intp]) -> float:
     """Return the least weight that would be told."""
-    sums, columns = search.sums, search.evidence.columns_of([candidate])
+    sums, columns = search.sums, search.gram.columns_of([candidate])
     error = float(np.sqrt(sums.covariance(base, columns)[0, 0]))
-    chance = search.sureness.below(candidate.effect)
+    chance = search.significance.below(candidate.effect)
     sure = error * float(t_distribution.ppf(1.0 - chance / 2.0, max(1, sums.blocks - 1)))
     share = search.thresholds.material_share
-    return max(sure, _material(search.evidence, base, sums.weights(base), columns, share))
+    return max(sure, _material(search.gram, base, sums.weights(base), columns, share))
 
 
 def _material(
-    evidence: Evidence,
+    gram: BlockGram,
     base: NDArray[np.intp],
     weights: Array,
     columns: NDArray[np.intp],
     share: float,
 ) -> float:
     """Return the weight that takes a share of the squares of the residual where it shows most."""
-    left = evidence.left(base, weights)
+    left = gram.left(base, weights)
     least = np.inf
-    for place in evidence.places:
+    for place in gram.places:
         at = np.flatnonzero(np.isin(place.columns, columns))
         if not len(at):
             continue

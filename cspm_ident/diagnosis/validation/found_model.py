@@ -59,7 +59,7 @@ class Data(NamedTuple):
         rows: of what was searched, in units of their noise.
         noise: of each residual.
         block: length of the blocks [s].
-        supposed: about what they were taken to first order.
+        assumed: about what they were taken to first order.
     """
 
     searched: Sequence[Measurement]
@@ -68,7 +68,7 @@ class Data(NamedTuple):
     rows: Parts
     noise: dict[Place, Array]
     block: float
-    supposed: Mapping[Candidate, Array]
+    assumed: Mapping[Candidate, Array]
 
 
 class Assessment(NamedTuple):
@@ -152,7 +152,7 @@ def modelled(search: Search, kept: Sequence[Finding], data: Data) -> Model:
         data: to which parameters are fitted and by which the model is judged.
     """
     limits = search.thresholds
-    onsets = _onsets(kept, steady(data.rows), search.evidence.times, limits)
+    onsets = _onsets(kept, steady(data.rows), search.gram.times, limits)
     since = max((onset.time for onset in onsets if onset is not None), default=-np.inf)
     weights, upper_ends = _fitted(search, kept, data, since)
     negligible = [_may_be_negligible(each, weights) for each in kept]
@@ -271,7 +271,7 @@ def _parameters(
     """Return the weights of what was kept, refined where columns depend on them."""
     hypotheses = [each.hypothesis for each in kept]
     if any(needs_refining(hypothesis.effect) for hypothesis in hypotheses):
-        given = data.noise, data.block, cut, data.supposed, search.thresholds
+        given = data.noise, data.block, cut, data.assumed, search.thresholds
         return refine(data.searched, hypotheses, *given)
     return of_shafts(search.fits.weights(hypotheses), rows, data.block, search.thresholds)
 
@@ -281,7 +281,7 @@ def _in_all(
 ) -> dict[Candidate, Array]:
     """Return how large findings may be that have parts with other time constants."""
     hypotheses = [each.hypothesis for each in kept]
-    given = data.noise, data.block, cut, data.supposed, thresholds
+    given = data.noise, data.block, cut, data.assumed, thresholds
     return spectra(data.searched, hypotheses, weights, *given)
 
 
@@ -292,7 +292,7 @@ def _untrue(
     hypotheses, final = [each.hypothesis for each in kept], list(found)
     shares: dict[Candidate, float] = {}
     for each in hypotheses:
-        own = search.fits.untrue(each, [h for h in hypotheses if h is not each])
+        own = search.fits.model_form_error(each, [h for h in hypotheses if h is not each])
         by_element = {candidate.element: share for candidate, share in own.items()}
         shares |= {c: by_element[c.element] for c in members_of(final, each)}
     return shares

@@ -70,6 +70,6 @@ def harm(without: Squares, with_it: Squares, thresholds: Thresholds = DEFAULT_TH
     if not both or np.any(by_place > thresholds.majority_residual_share * before):
         return 0.0
     whole = gain_of(taken.sum(axis=0))
-    surely = whole.total < -thresholds.holdout_sigma * whole.error
-    worse = surely or np.any(by_place < -thresholds.degraded_residual_ratio * before)
+    significant = whole.total < -thresholds.holdout_sigma * whole.error
+    worse = significant or np.any(by_place < -thresholds.degraded_residual_ratio * before)
     return float(np.sum(np.maximum(-by_place, 0.0))) if worse else 0.0

@@ -8,7 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from cspm_ident.diagnosis.regression.block_gram import Evidence
+from cspm_ident.diagnosis.regression.block_gram import BlockGram
 from cspm_ident.diagnosis.residuals.corrected_measurement import as_found
 from cspm_ident.diagnosis.residuals.free_shapes import Driver
 from cspm_ident.diagnosis.residuals.recorded_equations import equations_of
@@ -90,7 +90,7 @@ def judged(
     return tuple(out)
 
 
-def free_functions(searched: Evidence, judge: Evidence) -> dict[Place, float]:
+def free_functions(searched: BlockGram, judge: BlockGram) -> dict[Place, float]:
     """Return what free functions of all drivers, fitted to what was searched, leave elsewhere.
 
     Root mean squares in units of the noise. They stand for a black box: what a model gets that

@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from cspm_ident.diagnosis.finding import Finding, HoldOut, Rejection, Status
-from cspm_ident.diagnosis.regression.block_gram import Evidence
+from cspm_ident.diagnosis.regression.block_gram import BlockGram
 from cspm_ident.diagnosis.regression.block_regression import gain_of
 from cspm_ident.diagnosis.regression.joint_fit import Fits
 from cspm_ident.diagnosis.residuals.regressors import Candidate
@@ -18,7 +18,7 @@ from cspm_ident.diagnosis.thresholds import Thresholds
 Array = NDArray[np.float64]
 
 
-def holdout_tested(fits: Fits, judge: Evidence, found: Sequence[Finding]) -> tuple[Finding, ...]:
+def holdout_tested(fits: Fits, judge: BlockGram, found: Sequence[Finding]) -> tuple[Finding, ...]:
     """Return findings with what held-out data show of them, rejected where they fail the test.
 
     A finding has to lower a residual by a material share; or, where a machine that moves less shows
@@ -50,7 +50,7 @@ class _Lowered:
 
     def __init__(
         self,
-        judge: Evidence,
+        judge: BlockGram,
         whole: Mapping[Candidate, Array],
         own: set[Candidate],
         thresholds: Thresholds,

@@ -140,8 +140,8 @@ def _moments(
         instrument = instrument - taken @ (taken.T @ instrument)
         for block in np.unique(home):
             rows = home == block
-            told, moved = instrument[rows], effect[rows]
-            yield float(told @ left[rows]), float(told @ moved), float(moved @ moved)
+            reported, moved = instrument[rows], effect[rows]
+            yield float(reported @ left[rows]), float(reported @ moved), float(moved @ moved)
 
 
 def _thinning(rows: int) -> slice:

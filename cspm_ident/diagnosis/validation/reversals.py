@@ -16,8 +16,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from cspm_ident.diagnosis.finding import Finding
-from cspm_ident.diagnosis.regression.block_gram import Evidence, gather
-from cspm_ident.diagnosis.regression.block_regression import Sums
+from cspm_ident.diagnosis.regression.block_gram import BlockGram, gather
+from cspm_ident.diagnosis.regression.block_regression import BlockRegression
 from cspm_ident.diagnosis.regression.hypothesis import (
     Hypothesis,
     Rival,
@@ -52,10 +52,10 @@ def with_wider(
     chosen = [each.hypothesis for each in found.findings]
     findings = []
     for each in found.findings:
-        told = {rival.hypothesis.effect.id for rival in each.alternatives}
+        reported = {rival.hypothesis.effect.id for rival in each.alternatives}
         rows = _reversing(each.hypothesis, parts)
         wider = _wider(each, chosen, rows, block_s, thresholds) if rows else ()
-        rivals = tuple(Rival(h, 0.0) for h in wider if h.effect.id not in told)
+        rivals = tuple(Rival(h, 0.0) for h in wider if h.effect.id not in reported)
         findings.append(replace(each, alternatives=each.alternatives + rivals))
     return found._replace(findings=tuple(findings))
 
@@ -93,18 +93,18 @@ def _wider(
     """Yield wider forms of a finding that are left open, of each effect what explains most."""
     own = finding.hypothesis
     others = [h for h in chosen if h is not own]
-    evidence = gather(rows, block_s)
-    if any(candidate not in evidence.slices for candidate in own.candidates):
+    gram = gather(rows, block_s)
+    if any(candidate not in gram.slices for candidate in own.candidates):
         return
-    fits = Fits(evidence, Sums(evidence, thresholds))
-    beside = [h for h in (_within(evidence, h) for h in others) if h is not None]
+    fits = Fits(gram, BlockRegression(gram, thresholds))
+    beside = [h for h in (_within(gram, h) for h in others) if h is not None]
     base = fits.columns(beside)
     forms: dict[str, list[tuple[Hypothesis, NearRest | None]]] = {}
-    for form in _forms(evidence, own):
+    for form in _forms(gram, own):
         if _is_case(own, form, rows):
             weights = fits.weights([*beside, form])
-            told = near_rest([weights[c] for c in form.candidates], thresholds)
-            forms.setdefault(form.effect.id, []).append((form, told))
+            reported = near_rest([weights[c] for c in form.candidates], thresholds)
+            forms.setdefault(form.effect.id, []).append((form, reported))
     for alike in forms.values():
         if left_open := _left_open(alike, thresholds):
             yield min(left_open, key=lambda form: float(fits.held_out(form, base).sum()))
@@ -161,12 +161,12 @@ def _left_open(
     forms: Sequence[tuple[Hypothesis, NearRest | None]], thresholds: Thresholds
 ) -> list[Hypothesis]:
     """Return the forms of one effect, ascending in reach, that nothing speaks against."""
-    told = [(form, near) for form, near in forms if near is not None]
-    if not told:
+    reported = [(form, near) for form, near in forms if near is not None]
+    if not reported:
         return [form for form, _ in forms]
     excess = thresholds.breakaway_excess_share
-    larger = [form for form, near in told if _is_larger(form, near, excess)]
-    widest, near = told[-1]
+    larger = [form for form, near in reported if _is_larger(form, near, excess)]
+    widest, near = reported[-1]
     hidden = np.all(near.values + near.half < (1.0 - excess) * near.sliding)
     return larger or ([widest] if hidden else [])
 
@@ -184,16 +184,16 @@ def _is_larger(form: Hypothesis, near: NearRest, excess: float) -> bool:
     )
 
 
-def _within(evidence: Evidence, hypothesis: Hypothesis) -> Hypothesis | None:
+def _within(gram: BlockGram, hypothesis: Hypothesis) -> Hypothesis | None:
     """Return what of a hypothesis has columns here."""
-    there = tuple(c for c in hypothesis.candidates if c in evidence.slices)
+    there = tuple(c for c in hypothesis.candidates if c in gram.slices)
     return replace(hypothesis, candidates=there) if there else None
 
 
-def _forms(evidence: Evidence, hypothesis: Hypothesis) -> Iterator[Hypothesis]:
+def _forms(gram: BlockGram, hypothesis: Hypothesis) -> Iterator[Hypothesis]:
     """Yield all effects of more numbers, with each shape, on the hypothesis's elements."""
     groups: dict[tuple[str, tuple[tuple[str, float], ...]], list[Candidate]] = {}
-    for term in evidence.terms:
+    for term in gram.terms:
         if isinstance(term, Candidate) and term.element in hypothesis.elements:
             groups.setdefault((term.effect_id, term.shape), []).append(term)
     for members in groups.values():

@@ -17,7 +17,7 @@ from bench.blind.scoring.ablation import (
 from bench.blind.scoring.point_window import make_point
 from bench.blind.white_regression import WhiteSums
 from cspm_ident.diagnosis.regression.block_gram import gather
-from cspm_ident.diagnosis.regression.block_regression import Sums
+from cspm_ident.diagnosis.regression.block_regression import BlockRegression
 from cspm_ident.diagnosis.residuals.recorded_equations import equations_of
 from cspm_ident.diagnosis.residuals.regressors import Candidate, Place
 from cspm_ident.diagnosis.residuals.residual_equation import Equation
@@ -86,10 +86,10 @@ def test_without_the_block_null_rows_count_as_independent():
         {Candidate(catalogue()["winch_viscous_friction"], "one"): np.ones((600, 1, 1))},
         np.zeros((600, 1)),
     )
-    evidence = gather([[equation]], 0.5)
-    assert type(Search(evidence).sums) is Sums
+    gram = gather([[equation]], 0.5)
+    assert type(Search(gram).sums) is BlockRegression
     with ABLATIONS["block-null"].active():
-        assert type(Search(evidence).sums) is WhiteSums
+        assert type(Search(gram).sums) is WhiteSums
 
 
 def test_a_point_sees_one_sample_at_the_places_of_the_window():

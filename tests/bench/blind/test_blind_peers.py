@@ -14,7 +14,7 @@ from bench.blind.scoring import method
 from bench.blind.scoring.method import ABLATED, CSPM, METHODS, PEERS, require_method
 from bench.blind.white_regression import WhiteSums
 from cspm_ident.diagnosis.regression.block_gram import gather
-from cspm_ident.diagnosis.regression.block_regression import Sums
+from cspm_ident.diagnosis.regression.block_regression import BlockRegression
 from cspm_ident.diagnosis.residuals.regressors import Candidate, Place
 from cspm_ident.diagnosis.residuals.residual_equation import Equation
 from cspm_msgs_py.errors import InputError
@@ -46,8 +46,8 @@ def equation(seed, weights, colour=0.0):
 
 def library(weights, colour=0.0):
     searched, judge = equation(1, weights, colour), equation(2, weights, colour)
-    evidence, other = (gather([[each]], BLOCK_S) for each in (searched, judge))
-    return Library([searched], [judge], evidence, WhiteSums(evidence), other)
+    gram, other = (gather([[each]], BLOCK_S) for each in (searched, judge))
+    return Library([searched], [judge], gram, WhiteSums(gram), other)
 
 
 def peer(name):
@@ -89,11 +89,11 @@ def test_coloured_noise_misleads_errors_of_white_rows_and_not_those_of_blocks():
     """Of thirty recordings without any effect; 5 % is what the intervals promise."""
     misled, sound = 0, 0
     for seed in range(30):
-        evidence = gather([[equation(seed, (0.0, 0.0, 0.0), colour=0.95)]], BLOCK_S)
-        columns = evidence.with_nuisance([VISCOUS])
+        gram = gather([[equation(seed, (0.0, 0.0, 0.0), colour=0.95)]], BLOCK_S)
+        columns = gram.with_nuisance([VISCOUS])
         white, blocks = (
             abs(sums.weights(columns)[-1]) > sums.half_width(columns[:-1], columns[-1:])[0]
-            for sums in (WhiteSums(evidence), Sums(evidence))
+            for sums in (WhiteSums(gram), BlockRegression(gram))
         )
         misled, sound = misled + white, sound + blocks
     assert misled >= 10
@@ -102,8 +102,8 @@ def test_coloured_noise_misleads_errors_of_white_rows_and_not_those_of_blocks():
 
 def test_errors_of_white_rows_are_the_textbook_s():
     made = equation(3, (2.0, 1.0, 0.0))
-    evidence = gather([[made]], BLOCK_S)
-    sums, columns = WhiteSums(evidence), evidence.with_nuisance([COULOMB, VISCOUS])
+    gram = gather([[made]], BLOCK_S)
+    sums, columns = WhiteSums(gram), gram.with_nuisance([COULOMB, VISCOUS])
     x = np.column_stack([np.ones(ROWS), *(made.columns[c][:, 0, 0] for c in (COULOMB, VISCOUS))])
     y = made.target[:, 0]
     weights, (left,), *_ = np.linalg.lstsq(x, y, rcond=None)
@@ -146,7 +146,7 @@ def test_a_retuned_number_is_told_and_friction_makes_one_wrong():
 
 def test_the_most_important_finding_comes_first():
     lib = library((2.0, 0.1, 0.0))
-    reported = report_of(lib, lib.evidence.columns_of([VISCOUS, COULOMB]), intervals=True)
+    reported = report_of(lib, lib.gram.columns_of([VISCOUS, COULOMB]), intervals=True)
     assert [f["effect"] for f in reported["findings"]] == [
         "winch_coulomb_friction",
         "winch_viscous_friction",
@@ -194,5 +194,5 @@ def skewed(skew):
     column = np.sin(times)
     target = skew * column[:, None]
     row = Equation(PLACE, times, target, {candidate: column[:, None, None]}, target)
-    evidence = gather([[row]], BLOCK_S)
-    return Library([row], [row], evidence, WhiteSums(evidence), evidence)
+    gram = gather([[row]], BLOCK_S)
+    return Library([row], [row], gram, WhiteSums(gram), gram)

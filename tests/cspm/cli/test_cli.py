@@ -234,16 +234,18 @@ def test_a_cut_recording_is_told_recovered_and_repeated(cspm, tmp_path):
     found = json.loads((tmp_path / "resim.json").read_text())
     assert (found["identical"], found["first_difference"]) == (True, None)
     assert found["cut_at_s"] is None or 0.1 < found["cut_at_s"] < 0.4
-    told = "" if found["cut_at_s"] is None else f", up to {found['cut_at_s']:g} s, where it was cut"
-    assert out.strip() == f"identical: all {found['messages']} messages, bit for bit{told}"
+    reported = (
+        "" if found["cut_at_s"] is None else f", up to {found['cut_at_s']:g} s, where it was cut"
+    )
+    assert out.strip() == f"identical: all {found['messages']} messages, bit for bit{reported}"
 
 
 def test_resim_tells_the_first_difference(cspm, tmp_path, monkeypatch):
     bundle = bundle_of("one_winch")
     run(bundle, tmp_path / "bag", steps=50)
     # The other bundle has one more sine digit: the recording was made by something else.
-    told = bundle_of("one_winch", "control.torque.surge.offset=0.7500000001")
-    monkeypatch.setattr("cspm_run.resim.read_bundle", lambda *_: told)
+    reported = bundle_of("one_winch", "control.torque.surge.offset=0.7500000001")
+    monkeypatch.setattr("cspm_run.resim.read_bundle", lambda *_: reported)
     code, out, err = cspm("resim", "bag", "--json", "resim.json")
     assert (code, err) == (1, "")
     assert out.strip().startswith("different: /")

@@ -7,11 +7,11 @@ from machines import THESIS
 from matplotlib.image import imread
 from rig_samples import record
 
-from bench.accuracy.rig_cables import Truth, multisine, ramps
+from bench.accuracy.rig_cables import SpecimenTruth, multisine, ramps
 from cspm_ident.recording_hash import recording_sha256
 from cspm_msgs_py.testbed import load_testbed
 
-TRUTH = Truth()
+TRUTH = SpecimenTruth()
 LENGTHS = {"short": 1.25, "middle": 2.1, "long": 3.5}
 
 

@@ -95,12 +95,12 @@ def test_the_recording_carries_where_it_comes_from(lab, tmp_path):
     assert about["testbed_sha256"] == hashlib.sha256(ONE_WINCH.read_bytes()).hexdigest()
     assert files["mapping.yaml"] == MAPPING.encode()
     assert files["testbed.yaml"] == ONE_WINCH.read_bytes()
-    told = json.loads((tmp_path / "told.json").read_text())
-    assert told["recording"] == "bag"
-    assert told["messages"] == {TENSION: 2000, STATE: 2000}
-    assert told["about"]["source_sha256"] == sha
-    assert {one["kind"] for one in told["suspicions"]} == {"velocity", "smoothed"}
-    assert told["topics"][1]["fields"][0]["converted"][1] == pytest.approx(np.sin(1e-3))
+    reported = json.loads((tmp_path / "told.json").read_text())
+    assert reported["recording"] == "bag"
+    assert reported["messages"] == {TENSION: 2000, STATE: 2000}
+    assert reported["about"]["source_sha256"] == sha
+    assert {one["kind"] for one in reported["suspicions"]} == {"velocity", "smoothed"}
+    assert reported["topics"][1]["fields"][0]["converted"][1] == pytest.approx(np.sin(1e-3))
     assert b"source_sha256: " + sha.encode() in files["import.yaml"]
 
 
@@ -130,7 +130,7 @@ def test_what_cannot_be_done_is_one_line_and_leaves_nothing(lab, tmp_path):
     for name, text in bad.items():
         (tmp_path / name).write_text(text)
     before = sorted(tmp_path.iterdir())
-    for arguments, how, told in (
+    for arguments, how, reported in (
         (["--out", "there"], {}, "there: exists, allowed: a new folder"),
         (["--out", "b", "--dry-run"], {}, "--out b --dry-run: allowed: one of both"),
         (["--out", "b"], {"source": "no.csv"}, "no.csv: no such file, allowed: a text table"),
@@ -148,7 +148,7 @@ def test_what_cannot_be_done_is_one_line_and_leaves_nothing(lab, tmp_path):
     ):
         code, _, err = lab(*arguments, **how)
         assert (code, err.count("\n")) == (2, 1)
-        assert err.startswith(f"cspm: {told}")
+        assert err.startswith(f"cspm: {reported}")
     assert sorted(tmp_path.iterdir()) == before
 
 

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from bench.accuracy.rig_cables import Truth, ramps
+from bench.accuracy.rig_cables import SpecimenTruth, ramps
 from cspm_ident.rig.branches import DOWN, UP, Branch
 from cspm_ident.rig.cycle_scatter import chance_of_misfit, deviations, score_covariance
 from cspm_ident.rig.flanks import find_ramps
@@ -12,7 +12,7 @@ from cspm_ident.rig.response import find_response
 from cspm_ident.rig.stiffness import identify_stiffness
 from cspm_ident.rig.stiffness_fit import NAMES, fit_law
 
-TRUTH = Truth()
+TRUTH = SpecimenTruth()
 LAW = Law(TRUTH.a, TRUTH.b, TRUTH.c, TRUTH.d, TRUTH.rigidity, TRUTH.floor)
 CYCLES, POINTS = 4, 60
 

@@ -5,11 +5,11 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from bench.accuracy.rig_cables import Truth, described, multisine
+from bench.accuracy.rig_cables import SpecimenTruth, described, multisine
 from cspm_ident.rig.damping import DAMPING, identify_damping
 from cspm_msgs_py.errors import InputError
 
-TRUTH = Truth()
+TRUTH = SpecimenTruth()
 
 
 def specimen(length, seed=3, law=TRUTH.law, truth=TRUTH, **options):
@@ -48,7 +48,7 @@ def test_a_length_not_fitted_is_predicted_from_its_first_value(found):
     assert [one.fitted for one in found.specimens] == [True] * 4 + [False]
     assert found.verified["l180"] > 99.9
     # With the line of a cable that is damped half as much the prediction is worse.
-    other = Truth(constant=0.5 * TRUTH.constant, slope=0.5 * TRUTH.slope)
+    other = SpecimenTruth(constant=0.5 * TRUTH.constant, slope=0.5 * TRUTH.slope)
     less = [specimen(x, truth=other) for x in (1.25, 3.5)]
     wrong = identify_damping([*less, specimen(1.8)], ["l180"])
     assert wrong.law.constant < 0.6 * TRUTH.constant

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from bench.accuracy import rig_cables
-from bench.accuracy.rig_cables import Truth, ramps, stretch_at, tension_on
+from bench.accuracy.rig_cables import SpecimenTruth, ramps, stretch_at, tension_on
 from cspm_ident.rig.distortion import centred, modelled, undistorted
 from cspm_ident.rig.flanks import DOWN, SAMPLES, UP, find_ramps
 from cspm_ident.rig.hysteresis import find_hysteresis
@@ -12,7 +12,7 @@ from cspm_ident.rig.law import Law
 from cspm_ident.rig.winding import Winding
 
 CUTOFF, LENGTH, LOWEST = 2.0, 1.25, 0.6
-TRUTH = Truth()
+TRUTH = SpecimenTruth()
 LAW = Law(TRUTH.a, TRUTH.b, TRUTH.c, TRUTH.d, TRUTH.rigidity, TRUTH.floor)
 
 

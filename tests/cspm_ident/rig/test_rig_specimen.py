@@ -9,7 +9,7 @@ from machines import THESIS, point_content
 from rig_samples import record
 from run_samples import bundle_of
 
-from bench.accuracy.rig_cables import Truth, multisine
+from bench.accuracy.rig_cables import SpecimenTruth, multisine
 from cspm_ident.recording_hash import recording_sha256
 from cspm_ident.rig.specimen import read_specimens
 from cspm_msgs_py.errors import InputError
@@ -17,7 +17,7 @@ from cspm_msgs_py.testbed import load_testbed, parse_testbed
 from cspm_msgs_py.yaml_file import dump_yaml
 from cspm_run.recorded_run import run
 
-TRUTH = Truth()
+TRUTH = SpecimenTruth()
 SAMPLES = [
     multisine(TRUTH, length, seed=1, duration=0.5, label=name)
     for length, name in ((1.25, "short"), (3.5, "long"))

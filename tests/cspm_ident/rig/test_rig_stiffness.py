@@ -5,7 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from bench.accuracy.rig_cables import Truth, described, ramps
+from bench.accuracy.rig_cables import SpecimenTruth, described, ramps
 from cspm_ident.rig.flanks import DOWN, UP, find_ramps
 from cspm_ident.rig.hysteresis import find_hysteresis
 from cspm_ident.rig.law import Law, law_of, tension_curve
@@ -13,7 +13,7 @@ from cspm_ident.rig.stiffness import MEAN, identify_stiffness
 from cspm_ident.vaf import vaf
 from cspm_msgs_py.errors import InputError
 
-TRUTH = Truth()
+TRUTH = SpecimenTruth()
 LENGTHS = (1.25, 2.1, 3.5)
 CUTOFF = 2.0
 

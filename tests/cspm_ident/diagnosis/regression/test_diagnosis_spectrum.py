@@ -7,7 +7,7 @@ from scipy.signal import butter, lfilter
 
 from cspm_ident.diagnosis.parameter import Coefficients, parameters_of
 from cspm_ident.diagnosis.regression.block_gram import gather
-from cspm_ident.diagnosis.regression.block_regression import Sums
+from cspm_ident.diagnosis.regression.block_regression import BlockRegression
 from cspm_ident.diagnosis.regression.coefficients import weights_of
 from cspm_ident.diagnosis.regression.hypothesis import Hypothesis, is_seen_to_end
 from cspm_ident.diagnosis.regression.time_constants import most_in_all, told_within, with_spectrum
@@ -36,7 +36,7 @@ def crept(tension, time_constant):
     return lfilter([a / (1 + a), a / (1 + a)], [1.0, -(1 - a) / (1 + a)], tension - tension[0])
 
 
-def evidence(parts, seed):
+def gram(parts, seed):
     """Sums of a cable's residual with creep, of time constants with their shares, in a swell."""
     rng = np.random.default_rng(seed)
     swell = lfilter(*butter(1, (0.05, 0.5), "bandpass", fs=1.0 / STEP), rng.normal(size=ROWS))
@@ -58,21 +58,21 @@ def evidence(parts, seed):
 
 def ends(found):
     """The upper ends of the interval of one part and of two, in units of the compliance."""
-    weight, half = weights_of(found, Sums(found), [FOUND])[FOUND]
+    weight, half = weights_of(found, BlockRegression(found), [FOUND])[FOUND]
     most = most_in_all(found, FOUND, ())
     return (weight + half)[0] / COMPLIANCE, most[0] / COMPLIANCE
 
 
 @pytest.mark.parametrize("seed", range(6))
 def test_all_of_two_parts_is_held_where_one_alone_says_less(seed):
-    one, two = ends(evidence(TWO, seed))
+    one, two = ends(gram(TWO, seed))
     assert one < 0.9
     assert 1.0 <= two < 2.0
 
 
 @pytest.mark.parametrize("seed", range(6))
 def test_of_one_part_there_is_hardly_more(seed):
-    one, two = ends(evidence(ONE, seed))
+    one, two = ends(gram(ONE, seed))
     assert 1.0 < one < 1.02
     assert two < 1.15
 
@@ -108,11 +108,11 @@ def test_a_memory_that_is_as_long_as_can_be_told_is_not_seen_to_end(time_constan
 
 
 def test_a_spectrum_widens_upwards_only_what_is_told():
-    told = Coefficients(FOUND, np.array([1e-3]), np.array([1e-4]))
-    plain = parameters_of(told)
+    reported = Coefficients(FOUND, np.array([1e-3]), np.array([1e-4]))
+    plain = parameters_of(reported)
     assert [plain[0].low, plain[0].high] == pytest.approx([9e-4, 1.1e-3])
     for most, high in ((2e-3, 2e-3), (1e-3, 1.1e-3), (np.inf, 0.1)):
-        wide = parameters_of(told._replace(upper_ends=np.array([most])))
+        wide = parameters_of(reported._replace(upper_ends=np.array([most])))
         assert (wide[0].value, wide[0].low) == (plain[0].value, plain[0].low)
         assert wide[0].high == pytest.approx(high)
         assert wide[1] == plain[1]

@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 
 from cspm_ident.diagnosis.regression.block_gram import gather
-from cspm_ident.diagnosis.regression.block_regression import Sums, paired
-from cspm_ident.diagnosis.regression.jackknife import LeftOut
+from cspm_ident.diagnosis.regression.block_regression import BlockRegression, paired
+from cspm_ident.diagnosis.regression.jackknife import Jackknife
 from cspm_ident.diagnosis.residuals.regressors import Candidate, Place
 from cspm_ident.diagnosis.residuals.residual_equation import Equation
 from cspm_sim.effects import Channel, catalogue
@@ -34,21 +34,21 @@ def made(seed=0, weights=(0.3, -2.0, 0.0), colour=0.9, start=0):
 
 
 def sums_of(equation):
-    evidence = gather([[equation]], BLOCK_S)
-    return evidence, Sums(evidence)
+    gram = gather([[equation]], BLOCK_S)
+    return gram, BlockRegression(gram)
 
 
 def test_weights_and_what_is_left_are_those_of_the_rows():
     equation, columns, target = made()
-    evidence, sums = sums_of(equation)
+    gram, sums = sums_of(equation)
     expected, left = np.linalg.lstsq(columns, target, rcond=None)[:2]
     own = np.arange(3)
     np.testing.assert_allclose(sums.weights(own), expected, rtol=1e-9)
     assert sums.squares_of(own) == pytest.approx(left[0], rel=1e-9)
     assert sums.squares == pytest.approx(target @ target)
-    assert evidence.left(own, expected)[PLACE] == pytest.approx(left[0], rel=1e-9)
+    assert gram.left(own, expected)[PLACE] == pytest.approx(left[0], rel=1e-9)
     given = {FIRST: expected[:1], SECOND: expected[1:2], THIRD: expected[2:]}
-    assert evidence.left_with(given)[PLACE] == pytest.approx(left[0], rel=1e-9)
+    assert gram.left_with(given)[PLACE] == pytest.approx(left[0], rel=1e-9)
 
 
 def test_gains_beyond_a_base_are_differences_of_fits():
@@ -197,21 +197,21 @@ def test_an_onset_leaves_least_where_it_is():
 
 
 def test_columns_act_from_a_block_on_while_they_are_delayed():
-    evidence, sums = sums_of(made(weights=(3.0, 0.0, 0.0), start=ROWS // 2)[0])
+    gram, sums = sums_of(made(weights=(3.0, 0.0, 0.0), start=ROWS // 2)[0])
     base, own, block = np.array([1]), np.array([0]), sums.blocks // 2
     both = np.concatenate([base, own])
     whole, held_out = sums.squares_of(both), sums.held_out(both).sum()
     fitted = sums.weights(both)
-    left = evidence.left(both, fitted)[PLACE]
-    with sums.delayed(own, block), evidence.delayed(own, block):
+    left = gram.left(both, fitted)[PLACE]
+    with sums.delayed(own, block), gram.delayed(own, block):
         assert sums.squares_of(both) == pytest.approx(sums.left_from(base, own)[block])
         assert sums.squares_of(both) < whole
         assert sums.held_out(both).sum() < held_out
-        late = evidence.left(both, sums.weights(both))[PLACE]
+        late = gram.left(both, sums.weights(both))[PLACE]
         assert late == pytest.approx(sums.squares_of(both))
     assert sums.squares_of(both) == pytest.approx(whole)
     assert sums.held_out(both).sum() == pytest.approx(held_out)
-    assert evidence.left(both, fitted)[PLACE] == pytest.approx(left)
+    assert gram.left(both, fitted)[PLACE] == pytest.approx(left)
 
 
 def test_weights_beyond_a_base_leave_the_base_as_it_is():
@@ -239,9 +239,9 @@ def test_nuisance_is_fitted_wherever_a_model_is_judged():
     shifted = Equation(
         PLACE, equation.times, equation.target + 50.0, equation.columns, equation.measured, start
     )
-    evidence = gather([[shifted]], BLOCK_S)
+    gram = gather([[shifted]], BLOCK_S)
     flat = target + 50.0
-    assert evidence.left_with({})[PLACE] == pytest.approx(np.sum((flat - flat.mean()) ** 2))
+    assert gram.left_with({})[PLACE] == pytest.approx(np.sum((flat - flat.mean()) ** 2))
 
 
 def test_combined_columns_are_as_if_they_had_been_there():
@@ -281,8 +281,10 @@ def test_what_a_single_block_tells_has_no_interval():
     [(0.0, 20.0, 19.0), (0.5, 20.0, 20.0 / 3.0 - 1.0), (0.8, 10.0, 1.0), (0.8, 1.5, 0.5)],
 )
 def test_blocks_that_are_alike_leave_one_degree_of_freedom_if_there_is_one(alike, blocks, free):
-    told = LeftOut(np.ones(1), np.eye(1), blocks, np.array([blocks]), np.ones(1), np.array([alike]))
-    errors, freedom = told.spread()
+    reported = Jackknife(
+        np.ones(1), np.eye(1), blocks, np.array([blocks]), np.ones(1), np.array([alike])
+    )
+    errors, freedom = reported.spread()
     assert freedom == pytest.approx([free])
     assert errors**2 == pytest.approx([(1.0 + alike) / (1.0 - alike)])
 

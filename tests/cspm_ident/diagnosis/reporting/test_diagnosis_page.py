@@ -118,9 +118,11 @@ def test_what_no_recording_tells_is_fitted_on_both_sides():
 def test_a_caption_tells_how_far_a_residual_depends_on_its_driver():
     """Friction of 0.03 N·m with a noise of 0.001: all before, of what is left chance alone."""
     (curve,) = held_out_curves([[equation()]], {RUBBING: np.array([TORQUE])})
-    told = caption_of(curve, "speed [rad/s]")
-    assert "root mean square is 0.03 N·m before and 0.001" in told
-    share, left = map(float, re.search(r"squares (\S+) % are.*and (\S+) % are left", told).groups())
+    reported = caption_of(curve, "speed [rad/s]")
+    assert "root mean square is 0.03 N·m before and 0.001" in reported
+    share, left = map(
+        float, re.search(r"squares (\S+) % are.*and (\S+) % are left", reported).groups()
+    )
     assert share > 90.0
     assert left < 0.01
     (unsolved,) = held_out_curves([[equation()]], {})
@@ -144,8 +146,8 @@ def test_the_page_says_all_that_was_found(tmp_path):
     twin = "As well explained by friction in proportion to tension (winch_load_friction on surge_2)"
     assert top < page.index(twin) < page.index("<section")
     simulated = section(page, "simulated")
-    for told in ("winches/angle/surge_2", "torque", "1.46", "0.0071", "0.0049"):
-        assert f">{told}<" in simulated
+    for reported in ("winches/angle/surge_2", "torque", "1.46", "0.0071", "0.0049"):
+        assert f">{reported}<" in simulated
     limits = section(page, "limits")
     assert ">winch_viscous_friction<" in limits
     assert ">2.1e-06<" in limits
@@ -172,9 +174,9 @@ def test_the_power_of_what_is_missing_is_told(tmp_path):
     assert power["lost_before_w"] == pytest.approx(TORQUE * 2.0 / np.pi, rel=0.02)
     low, high = power["ci95_after_w"]
     assert low < 0.0 < high < 1e-3
-    told = section(page_of(tmp_path, found), "energy")
-    assert ">0.019<" in told
-    assert ">neither, surely<" in told
+    reported = section(page_of(tmp_path, found), "energy")
+    assert ">0.019<" in reported
+    assert ">neither, surely<" in reported
     assert ">takes energy<" in section(page_of(tmp_path, diagnosis(named=False)), "energy")
 
 
@@ -190,14 +192,14 @@ def test_a_page_without_findings_says_so(tmp_path):
 
 
 @pytest.mark.parametrize(
-    ("channel", "measured", "told"),
+    ("channel", "measured", "reported"),
     [
         (Channel.TENSION, False, True),
         (Channel.TENSION, True, False),
         (Channel.SHAFT, False, False),
     ],
 )
-def test_the_page_says_where_tensions_come_from(tmp_path, channel, measured, told):
+def test_the_page_says_where_tensions_come_from(tmp_path, channel, measured, reported):
     found = diagnosis()
     cells = Samples(np.zeros(1), np.zeros((1, 8))) if measured else None
     found = replace(
@@ -205,7 +207,7 @@ def test_the_page_says_where_tensions_come_from(tmp_path, channel, measured, tol
         searched=(replace(found.searched[0], tension=cells),),
         places=(Place(channel, "surge_2"),),
     )
-    assert ("No load cell was recorded" in section(page_of(tmp_path, found), "where")) is told
+    assert ("No load cell was recorded" in section(page_of(tmp_path, found), "where")) is reported
 
 
 def test_a_periodic_force_from_outside_is_unknown(tmp_path):

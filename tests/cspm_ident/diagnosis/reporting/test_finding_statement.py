@@ -23,14 +23,14 @@ from cspm_sim.effects import Channel, catalogue
 
 def test_a_finding_says_what_how_much_since_when_and_what_it_is_worth():
     (finding,) = diagnosis_data(diagnosis())["findings"]
-    told = finding["statement"]
+    reported = finding["statement"]
     start = "Winch surge_2 has dry friction that the model does not have: torque 30.0 ± 1.0 mN·m."
-    assert told.startswith(f"{start} It is there from the start.")
+    assert reported.startswith(f"{start} It is there from the start.")
     # 0.03 and 0.001 N·m of 0.15, where noise is 0.001.
-    assert "winches/torque/surge_2 falls from 20 % to 0.67 % of what was measured" in told
-    assert "at the noise floor; simulated, the error of winches/angle/surge_2 falls" in told
-    assert "falls from 1.46 rad to 7.1 mrad" in told
-    assert "turns round" not in told
+    assert "winches/torque/surge_2 falls from 20 % to 0.67 % of what was measured" in reported
+    assert "at the noise floor; simulated, the error of winches/angle/surge_2 falls" in reported
+    assert "falls from 1.46 rad to 7.1 mrad" in reported
+    assert "turns round" not in reported
 
 
 @pytest.mark.parametrize(
@@ -61,14 +61,14 @@ def test_what_is_left_above_the_noise_is_told_and_where_it_is_not():
 
 
 @pytest.mark.parametrize(
-    ("least", "missing", "told"),
+    ("least", "missing", "reported"),
     [(0.002, (), True), (0.002, ("sway_4",), False), (0.04, (), False)],
 )
-def test_that_no_other_winch_has_it_is_told_where_it_would_have_shown(least, missing, told):
+def test_that_no_other_winch_has_it_is_told_where_it_would_have_shown(least, missing, reported):
     others = [n for n in THESIS.testbed.cable_names if n != "surge_2" and n not in missing]
     limits = tuple(Limit(RUBBING.effect_id, n, "torque", least, "N·m", True) for n in others)
     (finding,) = diagnosis_data(replace(diagnosis(), limits=limits))["findings"]
-    assert ("No other winch has it: 2 mN·m would have shown." in finding["statement"]) is told
+    assert ("No other winch has it: 2 mN·m would have shown." in finding["statement"]) is reported
 
 
 def test_of_an_effect_that_may_be_elsewhere_that_is_not_told():
@@ -121,9 +121,9 @@ def test_what_is_even_in_speed_differs_by_direction(shape, even):
     found = diagnosis(named=False, unknown=[(driver, Gain(50.0, 5.0), 0.4)])
     (unexplained,) = found.unexplained
     found = replace(found, unexplained=(unexplained._replace(shape=Shape(speeds, values)),))
-    (told,) = diagnosis_data(found)["findings"]
+    (reported,) = diagnosis_data(found)["findings"]
     words = "it is the same in both directions, so that friction differs by direction"
-    assert (words in told["statement"]) is even
+    assert (words in reported["statement"]) is even
 
 
 def test_one_direction_alone_is_not_even():
@@ -137,8 +137,8 @@ def test_one_direction_alone_is_not_even():
 def test_an_unknown_wrench_has_the_unit_of_its_component(signal, unit):
     driver = Driver(Place(Channel.WRENCH, "bar"), signal)
     found = diagnosis(named=False, unknown=[(driver, Gain(50.0, 5.0), 0.4)])
-    (told,) = diagnosis_data(found)["findings"]
-    assert unit in told["statement"]
+    (reported,) = diagnosis_data(found)["findings"]
+    assert unit in reported["statement"]
 
 
 def test_of_several_numbers_those_that_may_be_nothing_have_none():
@@ -146,7 +146,7 @@ def test_of_several_numbers_those_that_may_be_nothing_have_none():
     weights = np.array([0.0004, 0.3, -0.0003, 0.0, 0.0, 0.0])
     found = diagnosis()
     hypothesis = Hypothesis(pushed.effect, (pushed,))
-    for half, told in (
+    for half, reported in (
         (0.001, "sway 0.3000 ± 0.0010 N, surge, heave, roll, pitch, yaw not surely"),
         (np.inf, "sway 0.3 N, heave -0.3 mN"),
     ):
@@ -155,12 +155,12 @@ def test_of_several_numbers_those_that_may_be_nothing_have_none():
             found, [replace(found.findings[0], hypothesis=hypothesis, coefficients=own)]
         )
         (finding,) = diagnosis_data(changed)["findings"]
-        assert told in finding["statement"]
+        assert reported in finding["statement"]
         assert ("too few data for an interval" in finding["statement"]) is (half == np.inf)
 
 
 @pytest.mark.parametrize(
-    ("half", "told", "ends"),
+    ("half", "reported", "ends"),
     [
         (5.0, "torque 30 mN·m, too few data for an interval", None),
         (np.inf, "torque 30 mN·m, too few data for an interval", None),
@@ -168,12 +168,12 @@ def test_of_several_numbers_those_that_may_be_nothing_have_none():
         (0.001, "torque 30.0 ± 1.0 mN·m.", [0.029, 0.031]),
     ],
 )
-def test_an_interval_of_all_that_is_allowed_is_none(half, told, ends):
+def test_an_interval_of_all_that_is_allowed_is_none(half, reported, ends):
     """Dry friction may be from 0 to 1 N·m."""
     own = (Coefficients(RUBBING, np.array([TORQUE]), np.array([half])),)
     found = diagnosis()
     changed = judged(found, [replace(each, coefficients=own) for each in found.findings])
     (finding,) = diagnosis_data(changed)["findings"]
-    assert told in finding["statement"]
+    assert reported in finding["statement"]
     (number,) = finding["parameters"]
     assert number["ci95"] == (None if ends is None else pytest.approx(ends))

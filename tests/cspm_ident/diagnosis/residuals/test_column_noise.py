@@ -55,9 +55,9 @@ def columns_of(equations, place, name):
 
 def test_an_acceleration_that_neither_poses_nor_tensions_tell_is_none(equations, locked):
     """A bar that only swings does not turn about its length; both sensors see noise."""
-    told = columns_of(equations, BAR, "bar_inertia")
+    reported = columns_of(equations, BAR, "bar_inertia")
     untold = columns_of(equations_of(locked, EFFECTS), BAR, "bar_inertia")
-    assert np.ptp(told[:, :, 1:], axis=(0, 1)).min() > 0.0
+    assert np.ptp(reported[:, :, 1:], axis=(0, 1)).min() > 0.0
     assert not untold[:, :, 2].any()
 
 

@@ -26,10 +26,10 @@ def test_cut_scaled_and_weighted_columns_follow_their_target(equation):
     """Whatever is done to the rows, target and columns still say the same of the weights."""
     weights = np.array([0.4, -1.0, 2.0])
     solved = equation.columns[FIRST] @ weights
-    told = Equation(
+    reported = Equation(
         PLACE, equation.times, solved, equation.columns, solved, turning=equation.turning
     )
-    made = told.within(0.55, 3.05).steady.scaled(np.array([0.2]))
+    made = reported.within(0.55, 3.05).steady.scaled(np.array([0.2]))
     made = made.weighted(np.linspace(0.5, 2.0, len(made.times)))
     assert made.columns[FIRST].shape == (len(made.times), 1, 3)
     assert np.allclose(made.columns[FIRST] @ weights, made.target)

@@ -201,9 +201,9 @@ def test_a_drive_that_lags_leaves_its_column(tmp_path):
         assert time_constant(found, 1e-3) == pytest.approx(expected, abs=1e-4)
         assert sampled_constant(time_constant(found, 1e-3), 1e-3) == pytest.approx(found, abs=1e-6)
     known = with_found(plain, {Candidate(effect, "sway_1"): np.array([0.004])})
-    told = by_place(known, [])[Place(Channel.DRIVE, "sway_1")]
+    reported = by_place(known, [])[Place(Channel.DRIVE, "sway_1")]
     untold = by_place(plain, [])[Place(Channel.DRIVE, "sway_1")]
-    assert rms(told.target)[0] < 0.1 * rms(untold.target)[0]
+    assert rms(reported.target)[0] < 0.1 * rms(untold.target)[0]
 
 
 @pytest.mark.parametrize(

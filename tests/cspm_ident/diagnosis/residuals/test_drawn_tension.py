@@ -104,8 +104,8 @@ def test_laws_are_taken_about_tensions_without_the_friction_supposed(rubbing):
     """A law about what friction looks like takes a part of it for elongation."""
     blind = replace(rubbing, tension=None)
     candidate, found = Candidate(COULOMB, "surge_2"), []
-    for supposed in ({}, {candidate: np.array([RUBBED])}):
-        own = by_place(blind, COULOMB.id, supposed=supposed)[Place(Channel.TENSION, "surge_2")]
+    for assumed in ({}, {candidate: np.array([RUBBED])}):
+        own = by_place(blind, COULOMB.id, assumed=assumed)[Place(Channel.TENSION, "surge_2")]
         columns = own.columns[candidate][:, :, 0], *own.nuisance.transpose(2, 0, 1)
         found.append(weight_of(own.target, *columns)[0])
     assert found[0] < 0.97 * RUBBED
@@ -116,7 +116,7 @@ def test_what_a_shaft_holds_while_it_turns_round_is_never_told(rubbing):
     """Apart from it friction is what was planted; with it too little, for a shaft that sticks."""
     blind = replace(rubbing, tension=None)
     candidate = Candidate(COULOMB, "surge_2")
-    found = by_place(blind, COULOMB.id, supposed={candidate: np.array([RUBBED])})
+    found = by_place(blind, COULOMB.id, assumed={candidate: np.array([RUBBED])})
     for place in (BAR, Place(Channel.TENSION, "surge_2")):
         own = found[place]
         column, free = own.columns[candidate][:, :, 0], own.nuisance.transpose(2, 0, 1)

@@ -73,16 +73,16 @@ def rig(delay, drag=0.0, like=1.0, seed=7):
 
 
 @pytest.mark.parametrize(
-    ("delay", "drag", "like", "told"),
+    ("delay", "drag", "like", "reported"),
     [
         (-0.6 * CLOCK, 0.0, -1.0, [CELLS]),
         (0.0, -2.0 * CLOCK, -0.98, [DRAG]),
         (0.0, -0.6 * CLOCK, -0.5, [DRAG]),
     ],
 )
-def test_what_sound_clocks_explain_as_well_is_theirs(delay, drag, like, told):
+def test_what_sound_clocks_explain_as_well_is_theirs(delay, drag, like, reported):
     """Where they would have to lie farther apart, or explain less, it is friction."""
-    assert [h.effect for h in named(rig(delay, drag, like))] == told
+    assert [h.effect for h in named(rig(delay, drag, like))] == reported
 
 
 def test_only_effects_on_stamps_are_early_and_only_below_zero():
@@ -105,15 +105,15 @@ def test_early_readings_beside_late_ones_say_the_same_again():
     assert not search.fits.contradicts(drag, [late])
 
 
-@pytest.mark.parametrize(("half", "told"), [(0.2 * CLOCK, True), (0.7 * CLOCK, False)])
-def test_a_delay_counts_from_where_its_interval_leaves_what_clocks_may_be_apart(half, told):
+@pytest.mark.parametrize(("half", "reported"), [(0.2 * CLOCK, True), (0.7 * CLOCK, False)])
+def test_a_delay_counts_from_where_its_interval_leaves_what_clocks_may_be_apart(half, reported):
     for sign in (1.0, -1.0):
         found = {POSE: (np.array([sign * 1.5 * CLOCK]), np.array([half]))}
-        assert may_be_negligible(found) is not told
+        assert may_be_negligible(found) is not reported
 
 
-@pytest.mark.parametrize(("delay", "told"), [(0.5 * CLOCK, False), (4.0 * CLOCK, True)])
-def test_what_sound_clocks_may_have_done_is_nothing_unknown(delay, told):
+@pytest.mark.parametrize(("delay", "reported"), [(0.5 * CLOCK, False), (4.0 * CLOCK, True)])
+def test_what_sound_clocks_may_have_done_is_nothing_unknown(delay, reported):
     """A slow motion's delay is a function of time, of which clocks explain what clocks may do."""
     times = STEP * np.arange(ROWS)
     rate = 2000.0 * np.sin(0.5 * times)
@@ -123,4 +123,4 @@ def test_what_sound_clocks_may_have_done_is_nothing_unknown(delay, told):
     columns = {POSE: rate[:, None, None], **Knots().columns(place, {"time [s]": times})}
     search = Search(gather([[Equation(place, times, target, columns, target)]], BLOCK_S))
     assert search._unexplained([], [])
-    assert bool(search.unexplained([])) is told
+    assert bool(search.unexplained([])) is reported

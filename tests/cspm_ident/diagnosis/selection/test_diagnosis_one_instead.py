@@ -47,7 +47,7 @@ def of(*candidates):
 
 
 def instead(looked, chosen, *free):
-    return one_instead(looked.fits, looked.sureness, chosen, free)
+    return one_instead(looked.fits, looked.significance, chosen, free)
 
 
 def test_what_explains_both_stands_for_them():

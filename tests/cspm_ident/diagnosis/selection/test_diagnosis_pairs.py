@@ -47,7 +47,7 @@ def machine(cell, drive, other=0.0, seed=5):
 
 def test_the_pair_that_explains_most_is_the_first_and_of_one_element():
     search = Search(machine(0.1, 0.1))
-    pairs = best_pairs(search.evidence, search.sums, search.fits.columns([]), search.heard)
+    pairs = best_pairs(search.gram, search.sums, search.fits.columns([]), search.heard)
     assert {h.effect.id for h in pairs[0]} == {CELL.id, DRIVE.id}
     assert {h.elements for h in pairs[0]} == {(WINCH,)}
     assert all(one.elements == other.elements for one, other in pairs)
@@ -81,7 +81,7 @@ def test_a_pair_that_is_a_wider_form_of_a_finding_does_not_replace_it():
     place = Place(Channel.SHAFT, WINCH)
     search = Search(gather([[Equation(place, times, target, shaped, target)]], BLOCK_S))
     chosen = [Hypothesis(inertia.effect, (inertia,))]
-    better = search.sums.gain(search.fits.columns(chosen), search.evidence.columns_of([radius]))
+    better = search.sums.gain(search.fits.columns(chosen), search.gram.columns_of([radius]))
     assert better.total > 2.0 * better.error
     assert search._exchanged(chosen) == chosen
 

@@ -66,8 +66,8 @@ def test_no_delay_is_surer_than_the_clocks_of_a_sound_machine():
     )
     given = {c: (np.array([3e-3]), np.array([1e-4])) for c in (late, dry)}
     found = of_clocks(given)
-    (sound,) = catalogue()["tension_delay"].signature.negligible.values()
-    assert found[late][1] == pytest.approx(np.hypot(1e-4, sound))
+    (healthy,) = catalogue()["tension_delay"].signature.negligible.values()
+    assert found[late][1] == pytest.approx(np.hypot(1e-4, healthy))
     assert found[late][0] == given[late][0]
     assert found[dry][1] == given[dry][1]
 

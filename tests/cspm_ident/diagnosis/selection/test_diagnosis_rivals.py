@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from cspm_ident.diagnosis.regression.block_gram import gather
-from cspm_ident.diagnosis.regression.block_regression import Sums
+from cspm_ident.diagnosis.regression.block_regression import BlockRegression
 from cspm_ident.diagnosis.regression.collinearity import chance, distance
 from cspm_ident.diagnosis.regression.hypothesis import Hypothesis, bounded, is_allowed
 from cspm_ident.diagnosis.residuals.free_shapes import Knots
@@ -121,9 +121,9 @@ def test_a_simpler_rival_on_other_elements_is_the_best_of_them():
         Candidate(DRAG, "a", AGAINST_EXIT): -rng.standard_normal((ROWS, 1)),
         Candidate(DRAG, "b", AGAINST_EXIT): -speed[:, None],
     }
-    told = named_in(equation(BAR, -0.8 * speed - 0.004 * others[:, 0], columns))
-    assert told[0].hypothesis.effect.id == "cable_transverse_damping"
-    assert told[0].hypothesis.elements == ("b",)
+    reported = named_in(equation(BAR, -0.8 * speed - 0.004 * others[:, 0], columns))
+    assert reported[0].hypothesis.effect.id == "cable_transverse_damping"
+    assert reported[0].hypothesis.elements == ("b",)
 
 
 BODY = Candidate(AIR, "bar")
@@ -139,7 +139,7 @@ def test_a_weight_beyond_its_bound_by_chance_is_put_there_and_another_is_left():
     assert not is_allowed(BODY, np.zeros(6))
 
 
-def torque_of(untrue, rival=0.1):
+def torque_of(model_form_error, rival=0.1):
     """A drag by its speed, beside a rival that is nearly that, and a function of tension."""
     rng = np.random.default_rng(3)
     speed, other = np.sin(1.7 * TIMES), rng.standard_normal(ROWS)
@@ -149,7 +149,7 @@ def torque_of(untrue, rival=0.1):
         Candidate(catalogue()["winch_coulomb_friction"], "only"): -(speed + rival * other)[:, None],
     }
     shape = Knots().columns(place, {"tension [N]": LOAD})
-    target = 0.05 * (untrue * np.cos(3.0 * LOAD) - speed)
+    target = 0.05 * (model_form_error * np.cos(3.0 * LOAD) - speed)
     return equation(place, target, columns | {d: c[:, 0] for d, c in shape.items()}, noise=0.0025)
 
 
@@ -171,19 +171,19 @@ def test_less_than_a_model_is_untrue_by_decides_nothing():
     assert rival.behind == pytest.approx(2.0 / 4.0, rel=0.1)
 
 
-@pytest.mark.parametrize("untrue", [0.0, 0.14, 0.28])
-def test_a_form_is_off_by_the_amplitude_of_what_a_free_function_finds_beside_it(untrue):
-    fits = Search(gather([[torque_of(untrue)]], BLOCK_S)).fits
-    (share,) = fits.untrue(only("winch_viscous_friction"), []).values()
-    assert share == pytest.approx(untrue, rel=0.1, abs=0.01)
+@pytest.mark.parametrize("model_form_error", [0.0, 0.14, 0.28])
+def test_a_form_is_off_by_the_amplitude_of_what_a_free_function_finds_beside_it(model_form_error):
+    fits = Search(gather([[torque_of(model_form_error)]], BLOCK_S)).fits
+    (share,) = fits.model_form_error(only("winch_viscous_friction"), []).values()
+    assert share == pytest.approx(model_form_error, rel=0.1, abs=0.01)
 
 
 def test_a_form_that_explains_nothing_is_off_by_all_of_it():
     fits = Search(gather([[torque_of(0.28)]], BLOCK_S)).fits
     rubbing = only("winch_coulomb_friction")
-    (share,) = fits.untrue(rubbing, [only("winch_viscous_friction")]).values()
+    (share,) = fits.model_form_error(rubbing, [only("winch_viscous_friction")]).values()
     assert share == 1.0
-    (share,) = fits.untrue(rubbing, []).values()
+    (share,) = fits.model_form_error(rubbing, []).values()
     assert share < 0.5
 
 
@@ -245,11 +245,11 @@ def test_an_effect_on_more_elements_than_blocks_tell_of_is_found():
 
     (named,) = named_in(*drags(0.05))
     assert named.hypothesis.elements == tuple(names)
-    base, sums = np.zeros(0, dtype=int), Sums(gather([drags(0.05)], 2.0 * BLOCK_S))
+    base, sums = np.zeros(0, dtype=int), BlockRegression(gather([drags(0.05)], 2.0 * BLOCK_S))
     parts = [np.array([k]) for k in range(8)]
     assert sums.p_value(base, np.arange(8)) == 1.0
     assert chance(sums, base, parts) < 1e-6
-    still = Sums(gather([drags(0.0)], 2.0 * BLOCK_S))
+    still = BlockRegression(gather([drags(0.0)], 2.0 * BLOCK_S))
     assert chance(still, base, parts) > 0.01
 
 
@@ -279,9 +279,9 @@ def test_what_one_system_reads_is_a_rival_with_one_number_for_all(name, common):
     equations = [
         equation(Place(Channel.TENSION, c.element), speed, {cells: speed, c: speed}) for c in each
     ]
-    evidence = gather([equations], BLOCK_S)
-    base, told = np.zeros(0, dtype=int), Hypothesis(late, (cells,))
-    rivals = rivals_of(evidence, Sums(evidence), base, told, each)
+    gram = gather([equations], BLOCK_S)
+    base, reported = np.zeros(0, dtype=int), Hypothesis(late, (cells,))
+    rivals = rivals_of(gram, BlockRegression(gram), base, reported, each)
     assert [r.common for r in rivals if len(r.elements) == 2] == [common]
     assert not any(r.common for r in rivals if len(r.elements) == 1)
 
@@ -334,9 +334,9 @@ def test_nor_is_it_missed_where_the_number_itself_is_named():
     """The radius spoils so little elsewhere that it is named, and an encoder's scale beside it."""
     looked = Search(gather([wound(0.2 * LOAD, light=0.02)], BLOCK_S))
     radius = Hypothesis(RADIUS.effect, (RADIUS,))
-    told = {rival.words for rival in alternatives_of(looked.fits, looked.heard, radius, [])}
+    reported = {rival.words for rival in alternatives_of(looked.fits, looked.heard, radius, [])}
     pair = "winch_torque_gain on only beside a wrong winch_drum_radius"
-    assert told == {"encoder_scale on only", pair}
+    assert reported == {"encoder_scale on only", pair}
 
 
 def test_an_effect_is_an_alternative_beside_each_number_that_hides_it():
@@ -356,14 +356,14 @@ def test_an_effect_that_a_wrong_number_cannot_hide_is_no_alternative():
 
 
 @pytest.mark.parametrize(
-    ("untrue", "named_first"), [(0.0, "winch_drum_radius"), (0.3, "encoder_scale")]
+    ("model_form_error", "named_first"), [(0.0, "winch_drum_radius"), (0.3, "encoder_scale")]
 )
-def test_of_what_explains_the_same_a_wrong_number_is_named_first(untrue, named_first):
+def test_of_what_explains_the_same_a_wrong_number_is_named_first(model_form_error, named_first):
     """The encoder's column is the truth; the radius's is that, or a little beside it."""
     radius, scale = (
         Candidate(catalogue()[name], "only") for name in ("winch_drum_radius", "encoder_scale")
     )
-    beside = LOAD + untrue * np.sin(5.0 * TIMES)
+    beside = LOAD + model_form_error * np.sin(5.0 * TIMES)
     columns = {scale: LOAD[:, None], radius: beside[:, None]}
     (named,) = named_in(equation(Place(Channel.TENSION, "only"), 0.02 * LOAD, columns, 0.005))
     assert named.hypothesis.effect.id == named_first

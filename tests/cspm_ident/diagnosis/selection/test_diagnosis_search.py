@@ -5,7 +5,7 @@ import pytest
 from scipy.stats import norm
 
 from cspm_ident.diagnosis.regression.block_gram import gather
-from cspm_ident.diagnosis.regression.block_regression import Sums
+from cspm_ident.diagnosis.regression.block_regression import BlockRegression
 from cspm_ident.diagnosis.regression.coefficients import at_once, weights_of
 from cspm_ident.diagnosis.regression.parameter_estimates import of_shafts
 from cspm_ident.diagnosis.reporting.formula_hint import sketch
@@ -93,18 +93,18 @@ def test_rows_that_stick_do_not_mislead_and_others_are_all_used():
     for sticks in (False, True):
         equation = turning(sticks=sticks)
         steady = gather([[equation.steady]], BLOCK_S)
-        first = weights_of(steady, Sums(steady), [COULOMB])
+        first = weights_of(steady, BlockRegression(steady), [COULOMB])
         (value,), (half,) = of_shafts(first, [[equation]], BLOCK_S)[COULOMB]
         assert abs(value - TORQUE) < half
     whole = gather([[turning(sticks=True)]], BLOCK_S)
-    ((misled,), (half,)) = weights_of(whole, Sums(whole), [COULOMB])[COULOMB]
+    ((misled,), (half,)) = weights_of(whole, BlockRegression(whole), [COULOMB])[COULOMB]
     assert abs(misled - TORQUE) > half
 
 
 def test_free_functions_leave_what_is_no_function_of_a_driver():
     first, second = turning(seed=1), turning(seed=2)
-    evidence, judge = (gather([[each]], BLOCK_S) for each in (first, second))
-    left = free_functions(evidence, judge)[PLACE]
+    gram, judge = (gather([[each]], BLOCK_S) for each in (first, second))
+    left = free_functions(gram, judge)[PLACE]
     assert 0.05 < left < 0.5 * rms([second])
 
 
@@ -128,10 +128,10 @@ def test_an_effect_below_its_limit_is_not_told_and_one_above_it_is():
     assert (limit.element, limit.parameter, limit.unit) == ("only", "torque", "N·m")
     assert limit.possible
     assert set(limits) == {"winch_coulomb_friction", "winch_viscous_friction"}
-    for factor, told in ((0.5, False), (2.0, True)):
+    for factor, reported in ((0.5, False), (2.0, True)):
         less = factor * limit.least - TORQUE
         found_here = found(turning(missing=lambda speed, less=less: less * np.sign(speed)))
-        assert bool(found_here.findings) is told
+        assert bool(found_here.findings) is reported
 
 
 def test_what_is_never_told_is_fitted_before_a_residual_counts():
@@ -171,8 +171,8 @@ def drifting(times):
 
 def test_what_only_time_tells_is_unknown_though_no_other_block_foretells_it():
     equation = turning(missing=lambda speed: drifting(STEP * np.arange(ROWS)))
-    told = {driver.signal for driver, *_ in found(equation).unexplained}
-    assert told == {"time [s]"}
+    reported = {driver.signal for driver, *_ in found(equation).unexplained}
+    assert reported == {"time [s]"}
 
 
 def test_a_wrong_number_of_the_file_does_not_begin():

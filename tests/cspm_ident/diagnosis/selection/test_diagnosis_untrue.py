@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from cspm_ident.diagnosis.regression.block_gram import gather
-from cspm_ident.diagnosis.regression.block_regression import Sums
+from cspm_ident.diagnosis.regression.block_regression import BlockRegression
 from cspm_ident.diagnosis.regression.hypothesis import Hypothesis
 from cspm_ident.diagnosis.regression.joint_fit import Fits
 from cspm_ident.diagnosis.residuals.free_shapes import Driver
@@ -35,14 +35,14 @@ def equation(place, curved, *candidates):
     return Equation(place, TIMES, target, columns, target)
 
 
-def untrue(*equations, of=BOTH):
-    evidence = gather([equations], BLOCK_S)
-    return Fits(evidence, Sums(evidence)).untrue(of, [])
+def model_form_error(*equations, of=BOTH):
+    gram = gather([equations], BLOCK_S)
+    return Fits(gram, BlockRegression(gram)).model_form_error(of, [])
 
 
 def test_it_is_off_where_a_free_function_shows_it():
     """A curve of a fifth beside a line: rms 0.05 against 0.71."""
-    shares = untrue(
+    shares = model_form_error(
         equation(Place(Channel.SHAFT, "a"), 0.2, FIRST),
         equation(Place(Channel.SHAFT, "b"), 0.0, SECOND),
     )
@@ -53,14 +53,14 @@ def test_it_is_off_where_a_free_function_shows_it():
 
 def test_where_several_act_it_may_be_any_of_them():
     place = Place(Channel.WRENCH, "bar")
-    shares = untrue(equation(place, 0.2, FIRST, SECOND))
+    shares = model_form_error(equation(place, 0.2, FIRST, SECOND))
     bent = 0.2 * np.std(curve(SPEEDS[FIRST])) / np.std(SPEEDS[FIRST])
     assert list(shares.values()) == pytest.approx([bent / np.sqrt(2.0)] * 2, rel=0.05)
 
 
 def test_what_has_one_cause_is_off_as_one():
     place = Place(Channel.WRENCH, "bar")
-    shares = untrue(equation(place, 0.2, FIRST, SECOND), of=replace(BOTH, common=True))
+    shares = model_form_error(equation(place, 0.2, FIRST, SECOND), of=replace(BOTH, common=True))
     bent = 0.2 * np.std(curve(SPEEDS[FIRST])) / np.std(SPEEDS[FIRST])
     assert list(shares.values()) == pytest.approx([bent / np.sqrt(2.0)] * 2, rel=0.05)
     assert len(set(shares.values())) == 1

@@ -130,9 +130,9 @@ def test_a_sound_machine_whose_bar_stands_still_is_consistent(tmp_path):
     pytest.importorskip("mujoco", minversion="4.0", reason="the MuJoCo plant needs MuJoCo 4")
     scenario = resolve(alone(), THESIS.testbed)
     bundle = make_bundle(scenario, THESIS, SCENARIOS / "testbeds")
-    sound = conceal(THESIS.testbed, {}, 0.0, 6)
+    healthy = conceal(THESIS.testbed, {}, 0.0, 6)
     record_concealed(
-        bundle, sound, tmp_path / "sound", note="", without=(), progress=lambda now: None
+        bundle, healthy, tmp_path / "sound", note="", without=(), progress=lambda now: None
     )
     found = diagnose([read_measurement(tmp_path / "sound")])
     assert verdict_of(found) is Verdict.CONSISTENT

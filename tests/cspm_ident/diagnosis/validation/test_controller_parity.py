@@ -85,6 +85,6 @@ def test_only_the_first_seconds_are_stepped(recorded, monkeypatch):
 def test_the_page_has_the_controllers_where_there_are_any(recorded):
     data = {"controllers": [each._asdict() for each in controller_parity(recorded)]}
     table = controllers_table(data)
-    for told in ("force_controller", TORQUE_COMMAND, str(STEPS)):
-        assert f">{told}<" in table
+    for reported in ("force_controller", TORQUE_COMMAND, str(STEPS)):
+        assert f">{reported}<" in table
     assert controllers_table({"controllers": []}) == controllers_table({}) == ""

@@ -82,10 +82,10 @@ def test_drag_of_a_bar_that_has_come_to_rest_is_told_with_that_nothing_confirms_
     """In the last three tenths of a minute a plucked bar shows nothing, which confirms nothing."""
     measured = measured_with(AIR, tmp_path / "plucked", "verification_mid", "duration=60")
     found = diagnosis_data(diagnose([measured]))
-    (told,) = found["findings"]
-    assert (found["verdict"], told["effect"]) == ("effect", "bar_quadratic_drag")
-    assert told["statement"].endswith(
+    (reported,) = found["findings"]
+    assert (found["verdict"], reported["effect"]) == ("effect", "bar_quadratic_drag")
+    assert reported["statement"].endswith(
         "What was not searched moves so little that it shows little of it."
     )
-    surge = next(p for p in told["parameters"] if p["name"] == "surge")
+    surge = next(p for p in reported["parameters"] if p["name"] == "surge")
     assert surge["value"] == pytest.approx(40.0, rel=0.02)

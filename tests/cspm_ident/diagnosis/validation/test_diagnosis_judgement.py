@@ -19,9 +19,9 @@ def fits(measurement, start=START_S):
 
 def test_what_a_cable_remembers_at_the_start_is_what_it_was(crept, monkeypatch):
     fit = fits(crept)[CREPT]
-    sound = fits(crept)[SOUND]
-    assert fit.before > 5.0 * sound.before
-    assert fit.after < 1.5 * sound.after
+    healthy = fits(crept)[SOUND]
+    assert fit.before > 5.0 * healthy.before
+    assert fit.after < 1.5 * healthy.after
     # Were it at rest there, the right physics would leave far more.
     monkeypatch.setattr(judgement, "LEAD_S", 0.0)
     assert fits(crept)[CREPT].after > 2.0 * fit.after

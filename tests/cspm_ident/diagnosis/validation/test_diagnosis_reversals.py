@@ -39,7 +39,7 @@ def shaft(law, seed=3, still=STILL, noise=0.3):
     return Equation(place, times, target, columns, target, turning=turning)
 
 
-def told(equation):
+def reported(equation):
     parts = [[equation]]
     found = Search(gather(steady(parts), BLOCK_S)).run()
     (named,) = with_wider(found, parts, BLOCK_S, DEFAULT_THRESHOLDS).findings
@@ -59,21 +59,21 @@ def told(equation):
     ],
 )
 def test_more_torque_near_rest_makes_a_larger_breakaway_an_alternative(law, wider):
-    assert told(shaft(law)) == wider
+    assert reported(shaft(law)) == wider
 
 
 @pytest.mark.parametrize("seed", range(3))
 def test_what_reversals_do_not_tell_is_left_open(seed):
     """Beside noise of three times the friction all rows tell it, those near rest nothing."""
-    assert told(shaft(lambda v: 3.0 + 0.0 * v, seed, noise=8.0)) == [WIDER]
+    assert reported(shaft(lambda v: 3.0 + 0.0 * v, seed, noise=8.0)) == [WIDER]
 
 
-@pytest.mark.parametrize(("half", "told"), [(0.9, True), (1.1, False)])
-def test_friction_near_rest_is_told_where_half_of_it_would_show(half, told):
+@pytest.mark.parametrize(("half", "reported"), [(0.9, True), (1.1, False)])
+def test_friction_near_rest_is_told_where_half_of_it_would_show(half, reported):
     sure = np.array([2.5, 2.0]), np.array([0.3, 0.1])
     other = np.array([1.0, 2.0]), np.array([half, 0.1])
     near = near_rest([sure, other])
-    assert (near is not None) is told
+    assert (near is not None) is reported
     if near is not None:
         np.testing.assert_array_equal(near.values, [2.5, 1.0])
         np.testing.assert_array_equal(near.half, [0.3, half])

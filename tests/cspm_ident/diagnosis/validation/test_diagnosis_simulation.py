@@ -41,7 +41,7 @@ def test_only_what_was_not_searched_is_judged(recording, start):
 
 
 @pytest.mark.parametrize(
-    ("effect", "element", "drive", "told"),
+    ("effect", "element", "drive", "reported"),
     [
         ("cable_stiffness", "sway_1", Input.WINCH, True),
         ("cable_stiffness", "sway_1", Input.TENSION, False),
@@ -49,9 +49,9 @@ def test_only_what_was_not_searched_is_judged(recording, start):
         ("bar_mass", "bar", Input.TENSION, True),
     ],
 )
-def test_a_pose_tells_of_cables_where_motor_angles_drive_both(effect, element, drive, told):
+def test_a_pose_tells_of_cables_where_motor_angles_drive_both(effect, element, drive, reported):
     pose = Output(drive, "bar/pose/yaw", "rad", "bar", Channel.WRENCH)
     fit = SimulatedFit(pose, 1.0, before=0.4, retuned=0.4, after=0.3, floor=0.1)
     own = {Candidate(catalogue()[effect], element): np.array([0.1])}
     found = improvement_by(Baselines((), (), {}, {}), [fit], own, own)
-    assert found == (Improvement(pose.name, pose.unit, 0.4, 0.3) if told else None)
+    assert found == (Improvement(pose.name, pose.unit, 0.4, 0.3) if reported else None)

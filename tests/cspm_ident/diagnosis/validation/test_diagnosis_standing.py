@@ -108,7 +108,7 @@ def shaft(loud, seed=1, weight=1.0):
 
 def found_in(search, hypothesis, *rivals):
     base, own = search.fits.columns([]), search.fits.own_columns(hypothesis)
-    gain, share = search.fits.gain(hypothesis, base), search.sureness.share(base, own)
+    gain, share = search.fits.gain(hypothesis, base), search.significance.share(base, own)
     return Finding(hypothesis, gain, share, tuple(Rival(h, 1.0) for h in rivals))
 
 
@@ -164,8 +164,8 @@ def test_findings_are_judged_once_more_only_where_something_was_rejected(others)
 
     other = replace(DRY, hypothesis=replace(DRY.hypothesis, onset=3))
     acceptance = Acceptance((*kept, *(gone(other) for _ in others)))
-    told = _reported(Again(), acceptance, Model(tuple(map(Assessment, kept)), {}))
+    reported = _reported(Again(), acceptance, Model(tuple(map(Assessment, kept)), {}))
     order = [WET, DRY, MASS] if others else [DRY, WET, MASS]
-    assert [each.effect for each in told] == [each.effect for each in order]
-    dry = next(each for each in told if each.effect == DRY.effect)
+    assert [each.effect for each in reported] == [each.effect for each in order]
+    dry = next(each for each in reported if each.effect == DRY.effect)
     assert dry.gain.total == (10.0 if others else DRY.gain.total)

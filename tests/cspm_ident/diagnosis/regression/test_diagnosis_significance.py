@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from cspm_ident.diagnosis.regression.block_gram import gather
-from cspm_ident.diagnosis.regression.block_regression import Gain, Sums
+from cspm_ident.diagnosis.regression.block_regression import BlockRegression, Gain
 from cspm_ident.diagnosis.regression.hypothesis import (
     Hypothesis,
     boldness,
@@ -16,7 +16,7 @@ from cspm_ident.diagnosis.regression.hypothesis import (
     unusual,
 )
 from cspm_ident.diagnosis.regression.joint_fit import Fits
-from cspm_ident.diagnosis.regression.significance import Sureness
+from cspm_ident.diagnosis.regression.significance import Significance
 from cspm_ident.diagnosis.residuals.free_shapes import Driver, Knots
 from cspm_ident.diagnosis.residuals.regressors import Candidate, Place
 from cspm_ident.diagnosis.residuals.residual_equation import Equation
@@ -48,24 +48,24 @@ def winches(second, hum=2.0, effect=DRY, noise=0.05, seed=3):
 
 def test_every_effect_has_an_equal_part_of_the_false_alarms():
     candidates = [Candidate(DRY, "one"), *(Candidate(WET, name) for name in NAMES)]
-    evidence = gather([winches(0.0)], BLOCK_S)
-    sureness = Sureness(Fits(evidence, Sums(evidence)), candidates)
-    assert sureness.below(DRY) == pytest.approx(RATE / 2)
-    assert sureness.below(WET) == pytest.approx(RATE / 4)
-    assert sureness.below(WET, known=2) == pytest.approx(3.0 * RATE / 4)
-    spent = sum(sureness.below(candidate.effect) for candidate in candidates)
+    gram = gather([winches(0.0)], BLOCK_S)
+    significance = Significance(Fits(gram, BlockRegression(gram)), candidates)
+    assert significance.below(DRY) == pytest.approx(RATE / 2)
+    assert significance.below(WET) == pytest.approx(RATE / 4)
+    assert significance.below(WET, known=2) == pytest.approx(3.0 * RATE / 4)
+    spent = sum(significance.below(candidate.effect) for candidate in candidates)
     assert spent == pytest.approx(RATE)
 
 
 @pytest.mark.parametrize(("second", "elements"), [(0.3, NAMES), (0.0, NAMES[:1])])
 def test_what_is_little_on_one_element_is_told_of_all_where_one_number_is_better(second, elements):
     """In the hum of the other winch the same friction is a tenth of the squares and less."""
-    evidence = gather([winches(second)], BLOCK_S)
-    search = Search(evidence)
+    gram = gather([winches(second)], BLOCK_S)
+    search = Search(gram)
     one, two = (Candidate(DRY, name) for name in NAMES)
-    beside = np.append(search.fits.columns([]), evidence.columns_of([one]))
-    gain = search.sums.gain(beside, evidence.columns_of([two]))
-    assert not search.sureness.counts(beside, Hypothesis(DRY, (two,)), gain)
+    beside = np.append(search.fits.columns([]), gram.columns_of([one]))
+    gain = search.sums.gain(beside, gram.columns_of([two]))
+    assert not search.significance.counts(beside, Hypothesis(DRY, (two,)), gain)
     (named,) = search.run().findings
     assert named.hypothesis.elements == elements
     assert named.hypothesis.common is (elements == NAMES)
@@ -166,22 +166,22 @@ def curved(amount, dry=0.3):
     return Equation(equation.place, equation.times, target, columns, target)
 
 
-@pytest.mark.parametrize(("amount", "told"), [(0.06, True), (0.015, False)])
-def test_what_is_left_of_a_great_finding_is_no_unknown(amount, told):
+@pytest.mark.parametrize(("amount", "reported"), [(0.06, True), (0.015, False)])
+def test_what_is_left_of_a_great_finding_is_no_unknown(amount, reported):
     """Findings are no truer than 7 % of their amplitude."""
     found = Search(gather([[curved(amount)]], BLOCK_S)).run()
     assert [named.hypothesis.effect for named in found.findings] == [DRY]
-    assert bool(found.unexplained) is told
+    assert bool(found.unexplained) is reported
     alone = Search(gather([[curved(amount, dry=0.0)]], BLOCK_S)).run()
     assert alone.unexplained
 
 
-@pytest.mark.parametrize(("errors", "told"), [(1.6, True), (1.4, False)])
-def test_what_scatters_as_much_as_it_gains_is_no_unknown(monkeypatch, errors, told):
+@pytest.mark.parametrize(("errors", "reported"), [(1.6, True), (1.4, False)])
+def test_what_scatters_as_much_as_it_gains_is_no_unknown(monkeypatch, errors, reported):
     search = Search(gather([[curved(0.06, dry=0.0)]], BLOCK_S))
     gained = search.unexplained([])[0][1].total
-    monkeypatch.setattr(Sums, "gain", lambda *_: Gain(gained, gained / errors))
-    assert bool(search.unexplained([])) is told
+    monkeypatch.setattr(BlockRegression, "gain", lambda *_: Gain(gained, gained / errors))
+    assert bool(search.unexplained([])) is reported
 
 
 def warming(amount):
@@ -195,12 +195,12 @@ def warming(amount):
     return Equation(equation.place, equation.times, target, columns, target)
 
 
-@pytest.mark.parametrize(("amount", "told"), [(1.0, True), (0.2, False)])
-def test_a_finding_whose_amount_drifts_is_doubtful(amount, told):
+@pytest.mark.parametrize(("amount", "reported"), [(1.0, True), (0.2, False)])
+def test_a_finding_whose_amount_drifts_is_doubtful(amount, reported):
     found = Search(gather([[warming(amount)]], BLOCK_S)).run()
     assert any(named.hypothesis.effect is DRY for named in found.findings)
     time = Driver(Place(Channel.SHAFT, "one"), "time [s]")
-    assert (time in [driver for driver, *_ in found.unexplained]) is told
+    assert (time in [driver for driver, *_ in found.unexplained]) is reported
 
 
 def jerked(height):
@@ -213,21 +213,21 @@ def jerked(height):
     return Search(gather([[replace(equation, target=target, columns=columns)]], BLOCK_S))
 
 
-@pytest.mark.parametrize(("height", "told"), [(0.0, False), (0.5, False), (3.0, True)])
-def test_what_shows_once_is_unknown_and_not_consistent(height, told):
+@pytest.mark.parametrize(("height", "reported"), [(0.0, False), (0.5, False), (3.0, True)])
+def test_what_shows_once_is_unknown_and_not_consistent(height, reported):
     """Unknown where it leaves more than all other blocks."""
     found = jerked(height).run()
     assert not found.findings
-    assert [driver.signal for driver, *_ in found.unexplained] == ["time [s]"] * told
+    assert [driver.signal for driver, *_ in found.unexplained] == ["time [s]"] * reported
 
 
-@pytest.mark.parametrize(("onset", "told"), [(1, True), (2, False), (3, False), (4, True)])
-def test_a_block_within_which_something_begins_tells_of_nothing_unknown(onset, told):
+@pytest.mark.parametrize(("onset", "reported"), [(1, True), (2, False), (3, False), (4, True)])
+def test_a_block_within_which_something_begins_tells_of_nothing_unknown(onset, reported):
     search = jerked(3.0)
     (candidate,) = (c for c in search.heard if c.effect is DRY)
     begun = Hypothesis(DRY, (candidate,), onset=onset)
     with search.fits.delayed(begun):
-        assert bool(search.unexplained([begun])) is told
+        assert bool(search.unexplained([begun])) is reported
 
 
 @pytest.mark.parametrize(("amount", "elements"), [(0.3, MANY), (0.0, ("a",))])

@@ -1,1 +1,1 @@
-"""What hold-out data say of findings: tests, simulations, detection limits."""
+"""Validation of findings on held-out data: tests, simulations, detection limits."""

@@ -1,4 +1,4 @@
-"""From which size on recordings would have shown an effect."""
+"""Detection limits: the smallest size of an effect that the recordings would have shown."""
 
 from __future__ import annotations
 
@@ -18,15 +18,15 @@ Array = NDArray[np.float64]
 
 
 class Limit(NamedTuple):
-    """The least that would have been told of an effect on one element.
+    """The detection limit of an effect on one element.
 
     Attributes:
-        effect: its id.
-        element: on which.
-        parameter: which of its parameters.
-        least: how far this has to be from where the effect is absent, in `unit`.
-        unit: of the parameter.
-        possible: whether the catalogue allows so much; if not, the recordings cannot show it.
+        effect: id of the effect.
+        element: name of the element.
+        parameter: name of the parameter.
+        least: smallest detectable distance from the value without the effect, in `unit`.
+        unit: unit of the parameter.
+        possible: whether the catalogue allows this size; if not, the recordings cannot show it.
     """
 
     effect: str
@@ -38,10 +38,10 @@ class Limit(NamedTuple):
 
 
 def detection_limits(search: Search, kept: Sequence[Finding]) -> tuple[Limit, ...]:
-    """Return the limit of every effect of one coefficient on every element that shows it.
+    """Return the limit of every effect with one coefficient on every element that shows it.
 
-    So large that its test over blocks is as sure as the search asks and that it takes as large a
-    share of a residual, beside what was found. Of several shapes the one that shows best.
+    At the limit the effect, beside the findings, reaches the search's significance over blocks and
+    its material share of a residual. Of several shapes, the one with the lowest limit counts.
     """
     base = search.fits.columns(each.hypothesis for each in kept)
     best: dict[tuple[str, str], Limit] = {}
@@ -61,7 +61,7 @@ def detection_limits(search: Search, kept: Sequence[Finding]) -> tuple[Limit, ..
 
 
 def _least(search: Search, candidate: Candidate, base: NDArray[np.intp]) -> float:
-    """Return the least weight that would be told."""
+    """Return the smallest weight that would be reported."""
     sums, columns = search.sums, search.gram.columns_of([candidate])
     error = float(np.sqrt(sums.covariance(base, columns)[0, 0]))
     chance = search.significance.below(candidate.effect)
@@ -77,7 +77,7 @@ def _material(
     columns: NDArray[np.intp],
     share: float,
 ) -> float:
-    """Return the weight that takes a share of the squares of the residual where it shows most."""
+    """Return the smallest weight that explains a given share of the squares of one residual."""
     left = gram.left(base, weights)
     least = np.inf
     for place in gram.places:

@@ -1,7 +1,8 @@
-"""Whether something makes residuals worse that were not searched, with the numbers that are told.
+"""Whether a finding with its reported parameters degrades the hold-out residuals.
 
-What was found stands by columns of first order about the described machine. Its numbers are fitted
-anew to what was searched, about a machine that has it; with these it may explain less than nothing.
+Findings are accepted with regressors linearised about the described machine. Their parameters are
+then refitted to the searched data, linearised about a machine that has them. With the refitted
+values a finding may raise the hold-out residuals.
 """
 
 from __future__ import annotations
@@ -18,7 +19,7 @@ from cspm_ident.diagnosis.validation.holdout_residuals import residuals_of, with
 from cspm_ident.diagnosis.validation.holdout_simulation import LONGEST_S, Baselines
 
 Array = NDArray[np.float64]
-# Of each residual, by block.
+# Squares of each residual, shape (blocks,).
 Squares = Mapping[Place, Array]
 
 
@@ -29,12 +30,12 @@ def squares_left(
     block_s: float,
     thresholds: Thresholds = DEFAULT_THRESHOLDS,
 ) -> dict[Place, Array]:
-    """Return what weights leave of what was not searched, in squares of the noise, by block.
+    """Return the squared hold-out residuals by block, in squares of the noise.
 
     Args:
-        baselines: what is judged.
+        baselines: the held-out data.
         found: weights of a machine's effects.
-        noise: of each residual, its unit.
+        noise: noise of each residual, its unit.
         block_s: length of the blocks [s].
         thresholds: those of residuals.
     """
@@ -53,15 +54,16 @@ def squares_left(
 
 
 def harm(without: Squares, with_it: Squares, thresholds: Thresholds = DEFAULT_THRESHOLDS) -> float:
-    """Return by how many squares something makes worse what was not searched; 0 if it is there.
+    """Return the squares by which a finding raises the hold-out residuals; 0 if it does not.
 
-    It surely adds to all residuals together, or more than doubles one; unless it takes most of
-    another, for then it is there, whatever else is not right yet.
+    A finding degrades if it significantly raises all residuals together, or one by more than the
+    allowed ratio. It never does where it explains most of one residual: it is then present,
+    whatever else the model lacks.
 
     Args:
-        without: what is left without it.
-        with_it: what is left with it.
-        thresholds: of held-out data.
+        without: squares left without the finding, by residual and block.
+        with_it: squares left with it, likewise.
+        thresholds: those of held-out data.
     """
     both = [place for place in without if place in with_it]
     before = np.array([without[place].sum() for place in both])

@@ -1,4 +1,4 @@
-"""What was found, judged by residuals that were not searched."""
+"""Hold-out residuals of the findings."""
 
 from __future__ import annotations
 
@@ -24,21 +24,22 @@ Array = NDArray[np.float64]
 
 @dataclass(frozen=True)
 class HeldOut:
-    """One residual on data that was not searched.
+    """One residual on held-out data.
 
-    Root mean squares in its unit; of the bar's six channels together, in units of their noise.
+    All values are root mean squares in the residual's unit. Those of the bar's six channels
+    together are in units of their noise.
 
     Attributes:
         place: which residual.
         measured: standard deviation of the measured quantity.
         before: with the file's model.
         retuned: with the file's parameters fitted to the searched data, nothing added.
-        after: with what was found.
-        ceiling: with free functions of every driver fitted to the searched data: what a model
-            without physics gets.
-        noise: what differs from row to row with what was found, whose own course is then no noise.
-        steady: with what was found, without the rows in which a shaft turns round; None where none
-            does.
+        after: with the findings.
+        ceiling: with free functions of every driver fitted to the searched data, as a black-box
+            model.
+        noise: from differences of successive rows with the findings, so that explained signals do
+            not count as noise.
+        steady: with the findings, without the rows of a reversal; None where there is no reversal.
     """
 
     place: Place
@@ -60,16 +61,15 @@ def judged(
     free: Mapping[Place, float],
     thresholds: Thresholds = DEFAULT_THRESHOLDS,
 ) -> tuple[HeldOut, ...]:
-    """Return every residual of recordings as described, re-tuned and with what was found.
+    """Return every hold-out residual with the file's model, re-tuned, and with the findings.
 
     Args:
-        measurements: what is before the start, as far as there is any, lets memories such as creep
-            become what they were.
-        starts: from when on none of them was searched [s].
+        measurements: the recordings; rows before the start settle internal states such as creep.
+        starts: times from which each recording is held out [s].
         retuned: weights of the file's own parameters.
-        found: weights of what was found.
-        noise: of each residual, its unit.
-        free: what free functions leave, root mean square in units of the noise.
+        found: weights of the findings.
+        noise: noise of each residual, its unit.
+        free: residual after fitting free functions, root mean square in units of the noise.
         thresholds: those of residuals.
     """
     parts = list(zip(measurements, starts, strict=True))
@@ -91,10 +91,10 @@ def judged(
 
 
 def free_functions(searched: BlockGram, judge: BlockGram) -> dict[Place, float]:
-    """Return what free functions of all drivers, fitted to what was searched, leave elsewhere.
+    """Return hold-out residuals of free functions of all drivers, fitted to the searched data.
 
-    Root mean squares in units of the noise. They stand for a black box: what a model gets that
-    knows what may matter, but no physics.
+    Root mean squares in units of the noise. They are the reference of a black-box model, which has
+    the relevant signals but no physics.
     """
     weights: dict[Candidate | Driver, Array] = {}
     for place in searched.places:
@@ -112,7 +112,7 @@ def free_functions(searched: BlockGram, judge: BlockGram) -> dict[Place, float]:
 
 
 def rms(equations: Sequence[Equation]) -> float:
-    """Return the root mean square of residuals, what is never told fitted to each."""
+    """Return the root mean square of residuals, with the nuisance terms fitted to each."""
     squares, count = 0.0, 0
     for equation in equations:
         left = without_nuisance(equation)
@@ -121,20 +121,20 @@ def rms(equations: Sequence[Equation]) -> float:
 
 
 def _steady(equations: Sequence[Equation]) -> float | None:
-    """Return the root mean square of the rows in which no shaft turns round, if any turns."""
+    """Return the root mean square of the rows without a reversal; None if there is no reversal."""
     if not any(equation.turning.any() for equation in equations):
         return None
     return rms([equation.steady for equation in equations])
 
 
 def _floor(equations: Sequence[Equation]) -> float:
-    """Return what differs from row to row, root mean square over channels."""
+    """Return the noise from differences of successive rows, root mean square over channels."""
     noises = [difference_noise(without_nuisance(e)) for e in equations if len(e.times) > 3]
     return float(np.sqrt(np.mean(np.square(noises)))) if noises else float("nan")
 
 
 def without_nuisance(equation: Equation) -> Array:
-    """Return the residual less what no recording tells, shape (k, channels)."""
+    """Return the residual without its fitted nuisance terms, shape (k, channels)."""
     if not equation.nuisance.size:
         return equation.target
     columns = equation.nuisance.reshape(equation.target.size, -1)
@@ -149,12 +149,12 @@ def residuals_of(
     noise: Mapping[Place, Array],
     thresholds: Thresholds = DEFAULT_THRESHOLDS,
 ) -> dict[Place, list[Equation]]:
-    """Return the residuals of recordings from some instant each on, where there are any rows.
+    """Return the residuals of recordings, each from a given time on, where there are any rows.
 
     Args:
-        measurements: each with the instant [s].
-        weights: of what the machine has.
-        noise: of each residual, its unit.
+        measurements: each with the time [s].
+        weights: coefficients of the effects that the machine has.
+        noise: noise of each residual, its unit.
         thresholds: those of residuals.
     """
     parts = [

@@ -1,4 +1,4 @@
-"""Whether data that were not searched agree with what was found."""
+"""Hold-out test: whether held-out data agree with the findings."""
 
 from __future__ import annotations
 
@@ -19,16 +19,16 @@ Array = NDArray[np.float64]
 
 
 def holdout_tested(fits: Fits, judge: BlockGram, found: Sequence[Finding]) -> tuple[Finding, ...]:
-    """Return findings with what held-out data show of them, rejected where they fail the test.
+    """Return the findings with their hold-out outcome, rejected where they fail the test.
 
-    A finding has to lower a residual by a material share; or, where a machine that moves less shows
-    less of it, all residuals together by what it predicts. One of which held-out data show nothing
-    is not rejected here.
+    A finding passes if it lowers one residual by a material share. Where held-out data excite it
+    less, it has to lower all residuals together by the predicted amount. A finding that held-out
+    data do not excite is not rejected here.
 
     Args:
-        fits: of the searched data.
+        fits: those of the searched data.
         judge: Gram matrices of the held-out data.
-        found: the findings; one that fails counts no longer for those behind it.
+        found: the findings; one that fails is removed from the fit of those after it.
     """
     kept, tested = list(found), []
     for each in found:
@@ -46,7 +46,7 @@ def holdout_tested(fits: Fits, judge: BlockGram, found: Sequence[Finding]) -> tu
 
 
 class _Lowered:
-    """What weights of one finding among others take of squared residuals, place by place."""
+    """Reduction of the squared residuals by one finding beside the others, by place."""
 
     def __init__(
         self,
@@ -55,7 +55,7 @@ class _Lowered:
         own: set[Candidate],
         thresholds: Thresholds,
     ) -> None:
-        """Take all weights, and which are the finding's."""
+        """Take the weights of all findings, and the candidates of this one."""
         self._thresholds = thresholds
         fewer = {c: w for c, w in whole.items() if c not in own}
         opposite = {c: -w if c in own else w for c, w in whole.items()}
@@ -67,12 +67,12 @@ class _Lowered:
         self._without = without.sum(axis=1)
         by_block = gain_of((without - left).sum(axis=0))
         self._taken, self._error = (without - left).sum(axis=1), by_block.error
-        # Of a square in the weight: what it would take if all of it were there.
+        # The squares are quadratic in the weight: the reduction if the finding holds in full.
         self._expected = 0.5 * (left + against).sum(axis=1) - self._without
 
     @property
     def outcome(self) -> HoldOut | None:
-        """What these data show of the finding; None where they contradict it."""
+        """Outcome of the hold-out test; None where the data contradict the finding."""
         if self.any_or_none and self.much:
             return HoldOut.DOMINANT if self.most else HoldOut.CONFIRMED
         if self.as_expected:
@@ -81,23 +81,26 @@ class _Lowered:
 
     @property
     def any_or_none(self) -> bool:
-        """Whether all together are no larger with it."""
+        """Whether the finding does not raise the squares of all residuals together."""
         return bool(self._taken.sum() >= 0.0)
 
     @property
     def much(self) -> bool:
-        """Whether it takes a share worth a word of one."""
+        """Whether the finding lowers one residual by the share that confirms it."""
         return bool(np.any(self._taken >= self._thresholds.confirmed_share * self._without))
 
     @property
     def most(self) -> bool:
-        """Whether it takes most of one."""
+        """Whether the finding explains most of one residual."""
         share = self._thresholds.majority_residual_share
         return bool(np.any(self._taken > share * self._without))
 
     @property
     def as_expected(self) -> bool:
-        """Whether it could not take much of any, and surely takes of all what it should."""
+        """Whether a finding without a material share in any residual lowers all as predicted.
+
+        The predicted reduction has to be significant.
+        """
         if self._could_take_much or not self._shows:
             return False
         share = self._thresholds.confirmed_expected_share
@@ -105,7 +108,7 @@ class _Lowered:
 
     @property
     def says_nothing(self) -> bool:
-        """Whether it could surely take nothing of all, and does not surely add to it."""
+        """Whether the predicted reduction is insignificant, and so is any increase."""
         against = self._taken.sum() < -self._thresholds.holdout_sigma * self._error
         return not self._shows and not bool(against)
 
@@ -115,5 +118,5 @@ class _Lowered:
 
     @property
     def _shows(self) -> bool:
-        """Whether blocks would tell what it should take from nothing, as they scatter."""
+        """Whether the predicted reduction is significant against the scatter of blocks."""
         return bool(self._expected.sum() > self._thresholds.holdout_sigma * self._error)

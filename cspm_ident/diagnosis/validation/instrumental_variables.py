@@ -1,8 +1,8 @@
-"""Whether a finding shows in the motion that was asked for, and not in noise fed back alone.
+"""Test by instrumental variables whether a finding shows in the reference motion.
 
-Controllers turn the noise of sensors into motion and tensions. What is in proportion to these is
-then correlated with the same noise in the residuals, though nothing is missing. What was asked for
-knows of no noise: it serves as instrument (Söderström, Stoica, Instrumental variable methods for
+Controllers feed sensor noise back into motion and tensions. Regressors in proportion to these then
+correlate with the same noise in the residuals, even where nothing is missing. The reference motion
+is free of noise and serves as instrument (Söderström, Stoica, Instrumental variable methods for
 system identification, Springer 1983).
 """
 
@@ -23,16 +23,17 @@ from cspm_sim.effects import Block, Effect
 
 Array = NDArray[np.float64]
 
-# Of the largest singular value: what is smaller is rounding.
+# Smallest relative singular value that is not rounding.
 _LEAST = 1e-9
-# Of each recording or equation: more say no more of motion that was planned, and take memory.
+# Most rows of a recording or equation: more add nothing on a planned motion, and take memory.
 _ROWS = 20_000
 
 
 def is_proportional(effect: Effect) -> bool:
-    """Return whether an effect adds in proportion to smooth motion or tension, as noise does.
+    """Return whether an effect is proportional to smooth motion or tension, as fed-back noise is.
 
-    Numbers of the file, sensors and the frame; friction and play hang on a direction or a place.
+    This holds for parameters of the file, sensors and the frame. Friction and play depend on
+    direction or position instead.
     """
     return effect.is_correction or effect.block is Block.FRAME
 
@@ -40,9 +41,9 @@ def is_proportional(effect: Effect) -> bool:
 def instruments_of(
     measurement: Measurement, thresholds: Thresholds = DEFAULT_THRESHOLDS
 ) -> Samples | None:
-    """Return what was asked of the machine.
+    """Return the reference motion as instruments.
 
-    None where that is not known, nothing is fed back, or something else moves the bar.
+    None where it is not known, nothing is fed back, or something else moves the bar.
     """
     angle = measurement.angle
     if angle is None or measurement.wanted is None:
@@ -55,7 +56,7 @@ def instruments_of(
 
 
 def _is_driven(bar: Samples | None, wanted: Samples, thresholds: Thresholds) -> bool:
-    """Return whether the bar moves otherwise than it was asked to, and more than noise makes it."""
+    """Return whether the bar deviates from the reference motion by more than noise explains."""
     if bar is None:
         return False
     noise, thin = difference_noise(bar.values[:, :3]), _thinning(len(bar.times))
@@ -75,18 +76,18 @@ def shows_in_what_was_asked(
     block_s: float,
     thresholds: Thresholds = DEFAULT_THRESHOLDS,
 ) -> bool:
-    """Return whether a finding surely shows in the motion that was asked for.
+    """Return whether a finding is significant in the reference motion.
 
-    Its columns, with their weights, explain the residual s times over; by instruments s is one for
-    what is there, whatever the noise, and anything for what answers noise. True where no equation
-    has both.
+    The residual is regressed on the finding's weighted regressors with a scale s, by instrumental
+    variables. An effect of the machine gives s = 1 whatever the noise; fed-back noise gives any s.
+    True where no equation has both the finding and instruments.
 
     Args:
         parts: equations of each recording, in units of their noise.
         wanted: instruments of each recording.
         own: the finding's candidates.
-        weights: of all that was found.
-        block_s: length of blocks that are as good as independent [s].
+        weights: coefficients of all findings.
+        block_s: length of blocks that are nearly independent [s].
         thresholds: those of instruments.
     """
     mine = frozenset(own)
@@ -96,7 +97,7 @@ def shows_in_what_was_asked(
         if instruments is not None
         for equation in part
         if not mine.isdisjoint(equation.columns)
-        # One at a time: all steady ones would be a good part of the memory.
+        # One at a time, because all steady equations together take much memory.
         for pair in _moments(equation.steady, instruments, mine, weights, block_s)
     ]
     if not found:
@@ -118,7 +119,10 @@ def _moments(
     weights: Mapping[Candidate, Array],
     block_s: float,
 ) -> Iterator[tuple[float, float, float]]:
-    """Yield, by block, the instrument times residual and finding, and the finding's squares."""
+    """Yield, by block, three moments of each channel.
+
+    They are instrument times residual, instrument times finding, and the finding's squares.
+    """
     if not len(equation.times):
         return
     mine = [c for c in own if c in equation.columns]
@@ -149,13 +153,13 @@ def _thinning(rows: int) -> slice:
 
 
 def _at(wanted: Samples, times: Array) -> Array:
-    """Return instruments at some times, and a constant, (k, m)."""
+    """Return a constant and the instruments interpolated at k times, shape (k, m + 1)."""
     values = [np.interp(times, wanted.times, column) for column in wanted.values.T]
     return np.stack([np.ones(len(times)), *values], axis=1)
 
 
 def _basis(columns: Array) -> Array:
-    """Return an orthonormal basis of what columns span, (k, rank)."""
+    """Return an orthonormal basis of the column space, shape (k, rank)."""
     sizes = np.linalg.norm(columns, axis=0)
     columns = columns[:, sizes > 0.0] / sizes[sizes > 0.0]
     left, values, _ = np.linalg.svd(columns, full_matrices=False)

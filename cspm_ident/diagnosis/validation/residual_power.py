@@ -1,4 +1,4 @@
-"""The power that a model leaves open: residuals on held-out data times the rates they act at."""
+"""Residual power: hold-out residuals times the measured rates at which they act."""
 
 from __future__ import annotations
 
@@ -15,25 +15,25 @@ from cspm_sim.effects import Channel
 
 Array = NDArray[np.float64]
 
-# Of each residual the rate that it acts at, and its sign where the machine loses energy: a shaft
-# wants a torque and a cable gives a tension with the rate, drag pushes the bar against it.
+# Rate at which each residual acts, and the sign of a loss. Lost torque and tension act along the
+# rate; drag acts on the bar against it.
 _RATES = {
     Channel.SHAFT: ("speed [rad/s]", 1.0),
     Channel.TENSION: ("rate of elongation [m/s]", 1.0),
     Channel.WRENCH: ("speed [", -1.0),
 }
-# Of time, whose means are as good as independent.
+# Number of batches in time, whose means are nearly independent.
 _BATCHES = 24
 
 
 class Power(NamedTuple):
-    """Mean power that a part of the machine loses beyond what a model says, on held-out data.
+    """Mean power that a part of the machine loses beyond the model's, on held-out data.
 
     Attributes:
-        place: of which residual.
-        before: by the file's model [W]; below 0 the machine is given energy.
-        after: with what was found [W].
-        half: half the width of the 95 % interval of `after`, from the scatter of batches in time;
+        place: which residual.
+        before: with the file's model [W]; below 0 the machine gains energy.
+        after: with the findings [W].
+        half: half width of the 95 % interval of `after` [W], from the scatter of batches in time;
             infinite where there are fewer than two rows.
     """
 
@@ -44,15 +44,15 @@ class Power(NamedTuple):
 
     @property
     def gives(self) -> bool:
-        """Whether what is left surely gives energy, as no friction, drag or damper does."""
+        """Whether the residual significantly supplies energy, which no dissipative law can."""
         return self.after + self.half < 0.0
 
 
 def lost_powers(curves: Sequence[Curve]) -> tuple[Power, ...]:
     """Return the power of every residual that acts at a measured rate, in the order of places.
 
-    Residual torques by motor speeds, tensions by rates of elongation, the bar's six components
-    by its speeds. What stays open between drives' commands and reports is no energy of the machine.
+    Torques act at motor speeds, tensions at rates of elongation, and the bar's wrench at its six
+    velocities. Drive residuals, between commanded and reported torque, are no power of the machine.
     """
     groups: dict[Place, list[Curve]] = {}
     for curve in curves:
@@ -67,13 +67,13 @@ def lost_powers(curves: Sequence[Curve]) -> tuple[Power, ...]:
 
 
 def _rows(curves: Sequence[Curve], side: str) -> Array:
-    """Return a place's power row by row [W]; components of one stretch add up."""
+    """Return a place's power, shape (rows,) [W]; components of one stretch add up."""
     stretches: dict[int, Array] = {}
     for curve in curves:
         rate, sign = _rate(curve)
         if rate is not None:
             own = sign * np.asarray(getattr(curve, side)) * rate
-            # Components of one stretch have their times in common.
+            # Components of one stretch share one array of times.
             key = id(curve.times)
             stretches[key] = stretches.get(key, np.zeros(len(own))) + own
     return np.concatenate([np.zeros(0), *stretches.values()])
@@ -87,7 +87,7 @@ def _rate(curve: Curve) -> tuple[Array | None, float]:
 
 
 def _half_width(rows: Array) -> float:
-    """Return half the width of the 95 % interval of the mean of rows that hang together in time."""
+    """Return the half width of the 95 % interval of the mean of autocorrelated rows [W]."""
     means = [part.mean() for part in np.array_split(rows, min(_BATCHES, len(rows)))]
     if len(means) < 2:
         return np.inf

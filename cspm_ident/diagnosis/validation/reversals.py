@@ -1,9 +1,8 @@
-"""What rows in which shafts turn round say of a finding: whether it is a case of something wider.
+"""Alternatives of a friction finding from the rows with a reversal: laws that contain it.
 
-They are left out of the search, for a shaft that sticks takes any torque. But there alone shows
-whether dry friction is larger near rest. Where it looks so, where they do not tell it, and where
-bristles that yield before they slip take so much away near rest that they hide it, dry friction
-with a larger breakaway explains as well what dry friction does.
+The search leaves these rows out, because a stuck shaft balances any torque. Only they show whether
+dry friction is larger near rest. Dry friction with a larger breakaway is an alternative in three
+cases: the rows indicate it, they do not determine it, or LuGre presliding masks it.
 """
 
 from __future__ import annotations
@@ -34,20 +33,20 @@ from cspm_sim.effects import Channel
 Parts = Sequence[Sequence[Equation]]
 Array = NDArray[np.float64]
 
-# Of a column's length: what differs by less is the same.
+# Largest relative difference of two regressors that count as equal.
 _ALIKE = 1e-4
 
 
 def with_wider(
     found: SearchResult, parts: Parts, block_s: float, thresholds: Thresholds
 ) -> SearchResult:
-    """Return findings, with wider forms that reversals leave open among their alternatives.
+    """Return the findings, with wider laws that the reversals leave open added as alternatives.
 
     Args:
-        found: what a search found.
-        parts: all rows of what was searched, in units of their noise.
+        found: result of the search.
+        parts: all rows of the searched data, in units of their noise.
         block_s: length of the blocks [s].
-        thresholds: of the diagnosis.
+        thresholds: those of the diagnosis.
     """
     chosen = [each.hypothesis for each in found.findings]
     findings = []
@@ -61,9 +60,10 @@ def with_wider(
 
 
 def _reversing(hypothesis: Hypothesis, parts: Parts) -> list[list[Equation]]:
-    """Return the winches' equations that a finding acts in, if their shafts turn round.
+    """Return the shaft equations that a finding acts in, without free functions.
 
-    Without free functions.
+    Empty where no row has a reversal, and for a finding that is a parameter of the file, has an
+    onset or acts elsewhere.
     """
     effect = hypothesis.effect
     if (
@@ -90,7 +90,7 @@ def _wider(
     block_s: float,
     thresholds: Thresholds,
 ) -> Iterator[Hypothesis]:
-    """Yield wider forms of a finding that are left open, of each effect what explains most."""
+    """Yield, for each effect that contains a finding, the open form with the best hold-out fit."""
     own = finding.hypothesis
     others = [h for h in chosen if h is not own]
     gram = gather(rows, block_s)
@@ -111,7 +111,7 @@ def _wider(
 
 
 def _is_case(narrow: Hypothesis, wide: Hypothesis, rows: Parts) -> bool:
-    """Return whether one is the other with two numbers that are equal, near rest and sliding."""
+    """Return whether `narrow` equals `wide` with equal coefficients near rest and sliding."""
     if len(wide.effect.linear) != 2:
         return False
     by_element = {c.element: c for c in wide.candidates}
@@ -122,17 +122,17 @@ def _is_case(narrow: Hypothesis, wide: Hypothesis, rows: Parts) -> bool:
         for c in narrow.candidates
         if e.place.element == c.element
     )
-    # Columns are held in single precision.
+    # Regressors are stored in single precision.
     return all(np.linalg.norm(b - a) <= _ALIKE * np.linalg.norm(a) for a, b in pairs)
 
 
 class NearRest(NamedTuple):
-    """Dry friction near rest beside what it is while a shaft slides.
+    """Dry friction near rest and while a shaft slides.
 
     Attributes:
-        values: of each element, shape (elements,) [N·m].
-        half: half the widths of their 95 % intervals, likewise.
-        sliding: likewise, while it slides.
+        values: friction of each element near rest, shape (elements,) [N·m].
+        half: half widths of their 95 % intervals, shape (elements,) [N·m].
+        sliding: friction of each element while it slides, shape (elements,) [N·m].
     """
 
     values: Array
@@ -143,10 +143,11 @@ class NearRest(NamedTuple):
 def near_rest(
     weights: Sequence[tuple[Array, Array]], thresholds: Thresholds = DEFAULT_THRESHOLDS
 ) -> NearRest | None:
-    """Return what reversals say of friction near rest; None where one element's is not told.
+    """Return the friction near rest; None where one element's interval is too wide.
 
     Args:
-        weights: of each element near rest and while it slides, with half their intervals.
+        weights: of each element, the coefficients near rest and while sliding, and half widths of
+            their 95 % intervals.
         thresholds: `breakaway_half_width_share`.
     """
     found = np.array([own for own, _ in weights])
@@ -160,7 +161,12 @@ def near_rest(
 def _left_open(
     forms: Sequence[tuple[Hypothesis, NearRest | None]], thresholds: Thresholds
 ) -> list[Hypothesis]:
-    """Return the forms of one effect, ascending in reach, that nothing speaks against."""
+    """Return the forms of one effect that the reversals do not exclude.
+
+    Args:
+        forms: in ascending order of the range near rest, with friction near rest where determined.
+        thresholds: `breakaway_excess_share`.
+    """
     reported = [(form, near) for form, near in forms if near is not None]
     if not reported:
         return [form for form, _ in forms]
@@ -172,9 +178,9 @@ def _left_open(
 
 
 def _is_larger(form: Hypothesis, near: NearRest, excess: float) -> bool:
-    """Return whether friction near rest is nearer to a breakaway worth a word than to none.
+    """Return whether friction near rest is closer to a significant breakaway than to none.
 
-    And may be dry friction.
+    Its values must also be plausible for the effect.
     """
     effect, shape = form.effect, form.candidates[0].nonlinear
     least = np.maximum(near.values - near.half, near.sliding)
@@ -185,13 +191,13 @@ def _is_larger(form: Hypothesis, near: NearRest, excess: float) -> bool:
 
 
 def _within(gram: BlockGram, hypothesis: Hypothesis) -> Hypothesis | None:
-    """Return what of a hypothesis has columns here."""
+    """Return the hypothesis reduced to candidates with regressors in `gram`; None without any."""
     there = tuple(c for c in hypothesis.candidates if c in gram.slices)
     return replace(hypothesis, candidates=there) if there else None
 
 
 def _forms(gram: BlockGram, hypothesis: Hypothesis) -> Iterator[Hypothesis]:
-    """Yield all effects of more numbers, with each shape, on the hypothesis's elements."""
+    """Yield all effects with more coefficients, in each shape, on the hypothesis's elements."""
     groups: dict[tuple[str, tuple[tuple[str, float], ...]], list[Candidate]] = {}
     for term in gram.terms:
         if isinstance(term, Candidate) and term.element in hypothesis.elements:

@@ -1,4 +1,4 @@
-"""What explains nearly as much as what was chosen."""
+"""Alternatives: hypotheses that explain nearly as much as a selected one."""
 
 from __future__ import annotations
 
@@ -24,16 +24,16 @@ def alternatives_of(
     hypothesis: Hypothesis,
     others: Sequence[Hypothesis],
 ) -> Iterator[Rival]:
-    """Yield what explains the same nearly as well as a hypothesis, that taken out.
+    """Yield hypotheses that explain the same nearly as well as a selected one, in its place.
 
-    A difference that models are too untrue for counts as much less, and every further parameter
-    as in Schwarz's criterion, blocks being what there is to tell it from.
+    A difference within the model-form error does not separate two hypotheses. Each further
+    parameter counts as in Schwarz's criterion, with blocks as observations.
 
     Args:
         fits: of all columns.
-        candidates: what there is to choose from.
-        hypothesis: one that was chosen.
-        others: the rest of what was.
+        candidates: all candidates of the search.
+        hypothesis: the selected hypothesis to replace.
+        others: all other selected hypotheses.
     """
     taken = {(c.effect_id, c.element) for h in others for c in h.candidates}
     free = [c for c in candidates if (c.effect_id, c.element) not in taken]
@@ -65,9 +65,10 @@ def _alike(
     hypothesis: Hypothesis,
     others: Sequence[Hypothesis],
 ) -> Iterator[tuple[Hypothesis, ...]]:
-    """Yield what explains the same, alone or beside a wrong number of the file.
+    """Yield rivals, alone or with a wrong parameter of the test-bed file that masks them.
 
-    What looks like a rival looks like what it rivals.
+    Pairs masked by a parameter are searched for the hypothesis and for its rivals on the same
+    elements, because rivals are collinear with it.
     """
     given, base = (fits.gram, fits.sums), fits.columns(others)
     rivals = rivals_of(*given, base, hypothesis, free)

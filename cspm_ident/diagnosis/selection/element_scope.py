@@ -1,4 +1,4 @@
-"""On which elements an effect acts."""
+"""Element scope: the elements on which an effect acts."""
 
 from __future__ import annotations
 
@@ -19,19 +19,24 @@ Index = NDArray[np.intp]
 
 
 class Scopes:
-    """Hypotheses of one effect on more elements, or on fewer."""
+    """Candidate element scopes of one effect, wider and narrower."""
 
     def __init__(
         self, fits: Fits, significance: Significance, candidates: Sequence[Candidate]
     ) -> None:
-        """Take all candidates that are looked at."""
+        """Store the fits, the significance test and all candidates of the search."""
         self._fits, self._significance, self._candidates = fits, significance, candidates
 
     def of(self, candidate: Candidate, free: Sequence[Candidate], base: Index) -> list[Hypothesis]:
-        """Return the candidate's effect where it surely acts, and on all elements together.
+        """Return hypotheses of the candidate's effect over several element scopes.
 
-        What is too little to see in any one element may be plain in all of them, with the same
-        numbers or with others for each.
+        The scopes are the significant elements and all free elements. On all elements, parameters
+        are common or separate: an effect too weak on each element may be significant on all.
+
+        Args:
+            candidate: the effect, its shape and its first element.
+            free: candidates that may be added.
+            base: columns already selected.
         """
         alike = [
             c for c in free if c.effect_id == candidate.effect_id and c.shape == candidate.shape
@@ -43,14 +48,15 @@ class Scopes:
         one_system = has_one_system(own.effect)
         common = [replace(whole, common=True)] if one_system or self.agree(whole, base) else []
         wider = [whole] if len(own.candidates) < len(alike) else []
-        # What is taken later has to explain more.
+        # Order matters: a later hypothesis replaces an earlier one only if it explains more.
         return [*common, own, *wider] if one_system else [own, *common, *wider]
 
     def pruned(self, hypothesis: Hypothesis, base: Index) -> Hypothesis:
-        """Return the hypothesis without elements on which the effect may as well be absent.
+        """Return the hypothesis without elements whose 95 % intervals all contain zero.
 
-        But for those on which it may as well be what it is on most, and unless all that would go
-        surely act together, of which none tells that it is not the others.
+        If the rest is spread over half of the elements or more, an element stays where its
+        intervals contain the median. Nothing is removed if the removed elements are jointly
+        significant beside the rest, or if the parameters are common.
         """
         if hypothesis.common:
             return hypothesis
@@ -67,12 +73,12 @@ class Scopes:
         return hypothesis if gone.candidates and self._act(gone, kept, base) else kept
 
     def _act(self, hypothesis: Hypothesis, beside: Hypothesis, base: Index) -> bool:
-        """Return whether a hypothesis surely is there beside another."""
+        """Return whether a hypothesis is significant beside another."""
         base = self._fits.beside(base, beside)
         return self._significance.counts(base, hypothesis, self._fits.gain(hypothesis, base))
 
     def agree(self, hypothesis: Hypothesis, base: Index) -> bool:
-        """Return whether all elements may have the same numbers, and several surely have some."""
+        """Return whether common parameters fit all elements, and several are non-zero at 95 %."""
         each, half = self._each(hypothesis, base)
         sums, kept, own = self._fits.shared(base, hypothesis)
         same = sums.weights(np.concatenate([kept, own]))[len(kept) :]
@@ -81,7 +87,10 @@ class Scopes:
         return bool(np.all(near) and np.count_nonzero(there) > 1)
 
     def _each(self, hypothesis: Hypothesis, base: Index) -> tuple[Array, Array]:
-        """Return weights of each element, and half their intervals, (elements, columns)."""
+        """Return each element's weights and half widths of their 95 % intervals.
+
+        Both have the shape (elements, columns).
+        """
         sums, shape = self._fits.sums, (len(hypothesis.candidates), -1)
         weights = sums.weights(self._fits.beside(base, hypothesis))[len(base) :]
         half = sums.half_width(base, self._fits.own_columns(hypothesis))
@@ -90,7 +99,7 @@ class Scopes:
     def _extended(
         self, candidate: Candidate, alike: Sequence[Candidate], base: Index
     ) -> Hypothesis:
-        """Return the candidate's effect on all elements where it surely acts beside the others."""
+        """Return the effect on the elements where it is significant beside those already added."""
         sums, gram, found = self._fits.sums, self._fits.gram, [candidate]
         others = [c for c in alike if c.element != candidate.element]
         columns = [gram.columns_of([c]) for c in others]
@@ -102,7 +111,7 @@ class Scopes:
         return Hypothesis(candidate.effect, tuple(c for c in alike if c in found))
 
     def _everywhere(self, hypothesis: Hypothesis) -> Hypothesis:
-        """Return the hypothesis on all that its effect can act on."""
+        """Return the hypothesis on all elements that its effect can act on."""
         own = hypothesis.effect.id, hypothesis.candidates[0].shape
         alike = tuple(c for c in self._candidates if (c.effect_id, c.shape) == own)
         return replace(hypothesis, candidates=alike)

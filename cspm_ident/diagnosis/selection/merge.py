@@ -1,4 +1,4 @@
-"""One effect on one element instead of several faults that it explains all."""
+"""Merge: one effect on one element in place of several faults that it explains."""
 
 from __future__ import annotations
 
@@ -17,17 +17,17 @@ from cspm_ident.diagnosis.residuals.regressors import Candidate
 def one_instead(
     fits: Fits, significance: Significance, chosen: Sequence[Hypothesis], free: Sequence[Candidate]
 ) -> tuple[Hypothesis, ...] | None:
-    """Return a hypothesis of one fault, and those of two and more that it stands for.
+    """Return a hypothesis of one fault and the hypotheses that it replaces, or None.
 
-    A heavy rope pulls the bar down at one end: as much as a heavier bar whose centre of mass lies
-    elsewhere, which says the same with two faults. It has to explain as much as they do, as far as
-    models are true and blocks tell; where it has no fewer numbers, no less.
+    Example: a heavy rope pulls the bar down at one end. A heavier bar with a shifted centre of mass
+    explains the same with two faults. The merged hypothesis must explain as much, within model-form
+    error and block noise. Without fewer parameters, it must explain no less.
 
     Args:
-        fits: of what was searched.
-        significance: of these.
-        chosen: what was found.
-        free: what may be added to it.
+        fits: of the searched recordings.
+        significance: of hypotheses in these fits.
+        chosen: all selected hypotheses.
+        free: candidates that may be added.
     """
     found = [h for h in chosen if not fits.is_negligible(h, chosen)]
     if any(h.onset for h in found):
@@ -48,7 +48,7 @@ def one_instead(
                 break
             less = gain_of(fits.sums.held_out(np.concatenate([base, columns[k]])) - left)
             wider = freedom(singles[k]) - sum(map(freedom, few))
-            # A further fault counts for a number, which `freedom` knows of a single finding.
+            # A further fault counts as one parameter; `freedom` counts it within one hypothesis.
             noise = fits.thresholds.tie_sigma * less.error
             allowed = min(undecided, noise) if wider < 0 else 0.0
             if (

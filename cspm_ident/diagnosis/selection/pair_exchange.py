@@ -1,4 +1,4 @@
-"""Two effects on one element instead of findings that were chosen one by one."""
+"""Pair exchange: two effects on one element in place of hypotheses selected one by one."""
 
 from __future__ import annotations
 
@@ -24,17 +24,18 @@ def pair_instead(
     kept: Sequence[Hypothesis],
     free: Sequence[Candidate],
 ) -> list[Hypothesis] | None:
-    """Return what was chosen with a pair instead of some of it, if one is better.
+    """Return the selection with a better pair in place of some hypotheses, or None.
 
-    The pair has to explain surely more, other than as a wider form of the same, or as much with
-    fewer numbers, and neither may be absent. What explains something else than the pair stays.
+    The pair must explain significantly more without spanning the replaced columns, or as much with
+    fewer parameters. Both of its effects must be significant. Hypotheses that explain something
+    else than the pair stay.
 
     Args:
-        fits: of what was searched.
-        significance: of these.
-        chosen: what was found.
-        kept: what of it stays in any case.
-        free: what may be added to that.
+        fits: of the searched recordings.
+        significance: of hypotheses in these fits.
+        chosen: all selected hypotheses.
+        kept: those that stay in any case.
+        free: candidates that may be added.
     """
     given_up = [h for h in chosen if h not in kept]
     if not given_up or any(h.onset for h in chosen):
@@ -55,7 +56,7 @@ def pair_instead(
 def _says_else(
     fits: Fits, hypothesis: Hypothesis, chosen: Sequence[Hypothesis], instead: Sequence[Hypothesis]
 ) -> bool:
-    """Return whether most of what a hypothesis explains is not explained by others instead."""
+    """Return whether a hypothesis keeps most of its gain beside the hypotheses `instead`."""
     if any(not set(hypothesis.candidates).isdisjoint(h.candidates) for h in instead):
         return False
     others = [h for h in chosen if h is not hypothesis]
@@ -66,7 +67,7 @@ def _says_else(
 def _is_better(
     fits: Fits, pair: Pair, replaced: Sequence[Hypothesis], beside: Sequence[Hypothesis]
 ) -> bool:
-    """Return whether a pair explains surely more than others, or as much with fewer numbers."""
+    """Return whether a pair explains significantly more, or as much with fewer parameters."""
     base, limits = fits.columns(beside), fits.thresholds
     left = fits.sums.held_out(fits.beside(base, *replaced))
     better = gain_of(left - fits.sums.held_out(fits.beside(base, *pair)))
@@ -81,7 +82,7 @@ def _is_better(
 def _are_both_needed(
     fits: Fits, significance: Significance, pair: Pair, beside: Sequence[Hypothesis]
 ) -> bool:
-    """Return whether each is surely there beside the other, and no small part of both."""
+    """Return whether each is significant beside the other, and no small share of their gain."""
     both = np.concatenate([fits.own_columns(h) for h in pair])
     gained = fits.sums.gain(fits.columns(beside), both).total
     least = fits.thresholds.parsimony_gain_share * gained

@@ -1,4 +1,4 @@
-"""Which of several hypotheses that explain the same supposes least."""
+"""Parsimony: the choice among hypotheses that explain the same."""
 
 from __future__ import annotations
 
@@ -28,19 +28,22 @@ def simplest(
     base: Index,
     chosen: Sequence[Hypothesis],
 ) -> Hypothesis:
-    """Return the hypothesis of fewest numbers, or elements, that is no worse than the best one.
+    """Return the hypothesis of fewest parameters, or elements, that is no worse than the best.
 
-    One that explains more in most blocks is taken instead, though it be less sure by itself; of
-    what explains the same a wrong number of the file, for it adds no physics; for a reading that
-    would be newer than its stamp says another one that is older, for only clocks do that; and what
-    sound clocks do instead of a fault.
+    A rival with as many parameters replaces it in four cases:
+
+    1. It explains more in most blocks, even if its own gain is less significant. This holds for
+       fewer parameters too.
+    2. It is a wrong parameter of the test-bed file, which adds no physics.
+    3. It delays one reading where the other would put a reading before its stamp.
+    4. It is a clock error of healthy size, and the other is a fault.
 
     Args:
         fits: of all columns.
-        best: what gains most.
-        rivals: what explains the same.
-        base: columns of all that was chosen before.
-        chosen: that.
+        best: the hypothesis of the largest gain.
+        rivals: hypotheses that explain the same.
+        base: columns of all hypotheses selected before.
+        chosen: those hypotheses.
     """
     reference = left = fits.held_out(best, base)
     gained = gain_of(fits.sums.held_out(base) - reference)
@@ -62,10 +65,11 @@ def simplest(
 
 
 def _allowed(fits: Fits, one: Hypothesis, other: Hypothesis, chosen: Sequence[Hypothesis]) -> float:
-    """Return the share of the gain by which one may be worse, being likelier before any data.
+    """Return the share of the gain by which one may be worse, because it is likelier a priori.
 
-    Sound clocks lie as far apart; a wrong number of the file adds no physics, and of two such it is
-    the one less out of the usual.
+    Likelier are clock errors of healthy size, and wrong parameters of the test-bed file, which add
+    no physics. Of two wrong parameters, the one with the smaller relative error is likelier. The
+    share is -inf where one is not likelier.
     """
     limits = fits.thresholds
     simpler, form_error = limits.parsimony_gain_share, limits.model_form_error_share

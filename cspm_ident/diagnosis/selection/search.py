@@ -1,4 +1,7 @@
-"""Which effects explain the residuals, what else would, and what nothing in the catalogue does."""
+"""Stepwise selection of the effects that explain the residuals of some recordings.
+
+It also returns their alternatives and the residuals that no effect of the catalogue explains.
+"""
 
 from __future__ import annotations
 
@@ -46,7 +49,7 @@ Index = NDArray[np.intp]
 
 
 class Search:
-    """Looks through a catalogue for what explains the residuals of some recordings."""
+    """Searches a catalogue for the effects that explain the residuals of some recordings."""
 
     def __init__(
         self,
@@ -54,7 +57,7 @@ class Search:
         progress: Callable[[str], None] = lambda _: None,
         thresholds: Thresholds = DEFAULT_THRESHOLDS,
     ) -> None:
-        """Take the Gram matrices of all residuals."""
+        """Store the Gram matrices of all residuals; `progress` receives the name of each step."""
         self.gram, self.sums = gram, BlockRegression(gram, thresholds)
         self.thresholds = thresholds
         self.fits = Fits(gram, self.sums)
@@ -67,7 +70,7 @@ class Search:
         self.scopes = Scopes(self.fits, self.significance, candidates)
 
     def run(self) -> SearchResult:
-        """Choose effects one by one, each with all elements on which it surely acts."""
+        """Select effects one by one, each on all elements where it is significant."""
         chosen = self._chosen()
         found = [self._judged(hypothesis, chosen) for hypothesis in chosen]
         found.sort(key=lambda each: -each.gain.total)
@@ -75,7 +78,7 @@ class Search:
         return SearchResult(tuple(found), self.unexplained(chosen), len(self._effects))
 
     def first(self) -> Hypothesis | None:
-        """Return what explains most, if anything surely is there."""
+        """Return the significant hypothesis of the largest gain, or None."""
         return self._best(self._clocks())
 
     @property
@@ -84,7 +87,10 @@ class Search:
         return tuple(self._effects)
 
     def retuned(self) -> dict[Candidate, Array]:
-        """Return the weights of the file's own parameters, fitted where it helps, nothing added."""
+        """Return fitted weights of the test-bed file's own parameters, without any added effect.
+
+        Only significant corrections are included.
+        """
         narrow = copy(self)
         narrow._look_for([c for c in self._effects if c.effect.physics.alter is not None])
         own = [c for h in narrow._chosen() for c in h.candidates]
@@ -105,9 +111,9 @@ class Search:
         return self._merged(self._needed(self._exchanged(chosen)))
 
     def _beside_clocks(self, chosen: Sequence[Hypothesis]) -> tuple[Hypothesis, ...]:
-        """Return what shows only beside what clocks of a sound machine do, with that.
+        """Return a clock effect of healthy size and a hypothesis significant only beside it.
 
-        Looked for where something is left that nothing explains.
+        The result is empty without such a pair, or where no residual is unexplained.
         """
         if not self._unexplained(chosen, ()):
             return ()
@@ -125,9 +131,10 @@ class Search:
         return ()
 
     def _clocks(self) -> list[Hypothesis]:
-        """Return what clocks of a sound machine do to what one system reads, if it surely shows.
+        """Return the clock effect of healthy size, on signals that one system reads.
 
-        It is looked for first, lest something else that explains as much is taken for a fault.
+        The list is empty if none is significant. It is searched first, because a fault may explain
+        the same residual equally well.
         """
         late = (
             h
@@ -138,16 +145,16 @@ class Search:
         return [] if best is None else [best]
 
     def _merged(self, chosen: list[Hypothesis]) -> list[Hypothesis]:
-        """Return one effect instead of several faults wherever it explains all of them."""
+        """Return the selection after each merge of several faults into one effect."""
         while merging := one_instead(self.fits, self.significance, chosen, self._free(chosen)):
             one, *few = merging
             chosen = joined([h for h in chosen if h not in few], one)
         return chosen
 
     def _needed(self, chosen: Sequence[Hypothesis]) -> list[Hypothesis]:
-        """Return what was chosen less what is not needed beside the others, the weakest first.
+        """Return the selection without redundant hypotheses, removing the weakest first.
 
-        What was chosen first did not know of the others.
+        The first were selected without the later ones, so all scopes and tests are repeated.
         """
         kept = list(chosen)
         for k, hypothesis in enumerate(kept):
@@ -157,11 +164,15 @@ class Search:
         return kept
 
     def _needless(self, chosen: Sequence[Hypothesis]) -> int | None:
-        """Return which is the weakest that is not surely there beside the others, if any.
+        """Return the index of the weakest redundant hypothesis, or None.
 
-        Nor is what laws beside it may be untrue by as much, wherever it shows, nor what the others
-        hide, so that all its numbers may be none. What is late is needed where other readings would
-        be early without it.
+        Redundant is a hypothesis of one of three kinds:
+
+        1. Its gain is within the model-form error of the laws beside it, in every residual.
+        2. It is collinear with the others, and all its 95 % intervals contain zero.
+        3. It fails the significance test beside the others.
+
+        A delay stays if without it other readings would precede their stamps.
         """
         weights = self.fits.weights(chosen) if len(chosen) > 1 else {}
         gains = [self._gain(hypothesis, chosen) for hypothesis in chosen]
@@ -183,7 +194,7 @@ class Search:
         return None
 
     def _is_hidden(self, hypothesis: Hypothesis, chosen: Sequence[Hypothesis]) -> bool:
-        """Return whether others say nearly the same as a part of a hypothesis."""
+        """Return whether a column of a hypothesis is collinear with those of the others."""
         others = [self.fits.own_columns(h) for h in chosen if h is not hypothesis]
         own = self.fits.own_columns(hypothesis)
         spanned = self.sums.spanned(self.gram.nuisance, np.concatenate(others), own)
@@ -192,7 +203,7 @@ class Search:
     def _is_there(
         self, hypothesis: Hypothesis, base: Index, gain: Gain, chosen: Sequence[Hypothesis]
     ) -> bool:
-        """Return whether a hypothesis, or something that explains less of the same, surely is."""
+        """Return whether a hypothesis, or a plausible rival of smaller gain, is significant."""
         known = len(chosen) - 1
         if self.significance.counts(base, hypothesis, gain, known):
             return True
@@ -212,12 +223,12 @@ class Search:
         return self.fits.gain(hypothesis, self._others(hypothesis, chosen))
 
     def _exchanged(self, chosen: list[Hypothesis]) -> list[Hypothesis]:
-        """Return a pair on one element instead of what was chosen one by one, if it is better."""
+        """Return the selection after a pair exchange on one element, if that is better."""
         kept = [h for h in chosen if self.fits.is_negligible(h, chosen)]
         return pair_instead(self.fits, self.significance, chosen, kept, self._free(kept)) or chosen
 
     def _begin(self, hypothesis: Hypothesis) -> None:
-        """Let the hypothesis's columns act from its onset on henceforth."""
+        """Let the hypothesis's columns act from its onset only, from now on."""
         if hypothesis.onset:
             own = self.fits.own_columns(hypothesis)
             self.gram.delay(own, hypothesis.onset)
@@ -240,7 +251,7 @@ class Search:
             return self.scopes.pruned(found, base)
 
     def _free(self, chosen: Sequence[Hypothesis]) -> list[Candidate]:
-        """Return what may be added: no effect twice on an element, nor of two shapes."""
+        """Return candidates that may be added: no effect twice on an element or with two shapes."""
         taken = {(c.effect_id, c.element) for h in chosen for c in h.candidates}
         shapes = {c.effect_id: c.shape for h in chosen for c in h.candidates}
         return [
@@ -252,9 +263,9 @@ class Search:
     def _surest(
         self, hypotheses: Iterable[Hypothesis], chosen: Sequence[Hypothesis], base: Index
     ) -> Hypothesis | None:
-        """Return what gains most in blocks that were not fitted, of what is surely there.
+        """Return the significant hypothesis of the largest gain in hold-out blocks, or None.
 
-        More elements, and a beginning, have to be worth it.
+        A wider element scope and an onset must each gain more by a number of standard errors.
         """
         before, limits = self.sums.held_out(base), self.thresholds
         best: tuple[Array, Hypothesis] | None = None
@@ -279,11 +290,11 @@ class Search:
     def _late(
         self, hypothesis: Hypothesis, free: Sequence[Candidate], base: Index
     ) -> Iterable[Hypothesis]:
-        """Yield the hypothesis from its onset on, if it seems to have one.
+        """Yield the hypothesis with an onset, if one is better than acting all the time.
 
-        Of the effect's shapes the one that explains most from its onset on.
+        Its shape is the one that leaves the smallest sum of squares.
         """
-        # A wrong number of the file is always one.
+        # A wrong parameter of the test-bed file acts all the time.
         if is_number(hypothesis):
             return
         first = self.thresholds.blocks_before_onset
@@ -299,7 +310,10 @@ class Search:
     def _sure_gain(
         self, hypothesis: Hypothesis, chosen: Sequence[Hypothesis], base: Index, before: Array
     ) -> Array | None:
-        """Return what a hypothesis gains in each block, not fitted to it, if it surely does."""
+        """Return the gain of a hypothesis in each hold-out block, (blocks,).
+
+        It is None if the hypothesis is implausible, contradicts others or is not significant.
+        """
         together = [*chosen, hypothesis]
         if not self.fits.is_plausible(together) or self.fits.contradicts(hypothesis, chosen):
             return None
@@ -315,9 +329,9 @@ class Search:
         return rivals_of(self.gram, self.sums, base, hypothesis, free)
 
     def judged_again(self, finding: Finding, chosen: Sequence[Hypothesis]) -> Finding:
-        """Return a finding beside what is left of what was found, with what explains the same now.
+        """Return a finding with gain, share and alternatives beside the hypotheses that are kept.
 
-        What was given up says no more what the finding is, and may be what it is.
+        Rejected hypotheses no longer exclude alternatives, and may be alternatives themselves.
         """
         again = self._judged(finding.hypothesis, chosen)
         known = {rival.words for rival in finding.alternatives}
@@ -339,10 +353,10 @@ class Search:
     def unexplained(
         self, chosen: Sequence[Hypothesis], healthy: Sequence[Hypothesis] = ()
     ) -> tuple[Unexplained, ...]:
-        """Return free functions of what hypotheses leave; see `unexplained`.
+        """Return the residuals that hypotheses leave unexplained; see `unexplained`.
 
-        Nor is what sound clocks may have done beside them unknown, though it be no gain elsewhere:
-        clocks wander, and what they did in one part of a recording does not foretell another.
+        A residual that a clock error of healthy size explains is not unexplained. It need not gain
+        in hold-out blocks, because clocks wander from one part of a recording to another.
         """
         beside = list(healthy)
         left = self._unexplained(chosen, beside)

@@ -1,4 +1,4 @@
-"""Least squares, their errors under coloured residuals and their cross-validation, from sums."""
+"""Least squares from block Gram matrices: errors under coloured residuals, cross-validation."""
 
 from __future__ import annotations
 
@@ -20,12 +20,12 @@ from cspm_ident.diagnosis.thresholds import DEFAULT_THRESHOLDS, Thresholds
 Array = NDArray[np.float64]
 Index = NDArray[np.intp]
 
-# Of the cross-validation.
+# Number of folds of the cross-validation.
 FOLDS = 6
 
 
 class Gain(NamedTuple):
-    """What columns take from the squared residual, in blocks that were not fitted.
+    """Reduction of the hold-out Σ residual² by some regressors.
 
     Attributes:
         total: over all blocks.
@@ -37,10 +37,10 @@ class Gain(NamedTuple):
 
 
 class BlockRegression:
-    """All columns' products, scaled so that each column has length 1."""
+    """Gram matrices of all regressors by block, scaled so that each regressor has length 1."""
 
     def __init__(self, gram: BlockGram, thresholds: Thresholds = DEFAULT_THRESHOLDS) -> None:
-        """Take the products of all residuals, and sum them."""
+        """Take the Gram matrices of all residuals, and sum them."""
         self.thresholds = thresholds
         width = gram.width
         squares, self._at = np.zeros((gram.blocks, width + 1)), []
@@ -82,7 +82,7 @@ class BlockRegression:
         return found
 
     def _alone(self, blocks: Array, lengths: Array) -> BlockRegression:
-        """Return the sums of other products, (blocks, m + 1, m + 1), of columns so long."""
+        """Return a regression with given block Gram matrices, (blocks, m + 1, m + 1), and lengths."""
         other = copy(self)
         other._grams, other._at = [blocks], [np.arange(blocks.shape[1])]
         other._lengths, other._whole = lengths, blocks.sum(axis=0)
@@ -91,21 +91,21 @@ class BlockRegression:
         return other
 
     def beside(self, combinations: Array) -> BlockRegression:
-        """Return sums with further columns behind, combinations of these, shape (width, k)."""
+        """Return a regression with combinations of its columns appended, shape (width, k)."""
         return self._turned(np.arange(len(self._lengths)), combinations)
 
     def combined(
         self, base: Index, columns: Index, combinations: Array
     ) -> tuple[BlockRegression, Index, Index]:
-        """Return sums of a base and of combinations of other columns.
+        """Return a regression of a base and of combinations of other columns.
 
         Args:
-            base: columns that stay as they are.
-            columns: others.
-            combinations: of these, (columns, k).
+            base: indices of unchanged columns.
+            columns: indices of the columns to combine.
+            combinations: their weights, (columns, k).
 
         Returns:
-            The sums, and which of their columns are the base's and the combinations.
+            The regression, and its indices of the base and of the combinations.
         """
         kept, first = np.concatenate([base, columns]), len(base)
         turn = np.vstack([np.zeros((first, combinations.shape[1])), combinations])
@@ -113,28 +113,28 @@ class BlockRegression:
         return self._turned(kept, turn), np.arange(first), own
 
     def _turned(self, columns: Index, combinations: Array) -> BlockRegression:
-        """Return sums of some columns, and behind them of their combinations, (columns, k)."""
+        """Return a regression of some columns, followed by their combinations, (columns, k)."""
         width, count = combinations.shape
         turn = np.zeros((width + 1, width + count + 1))
         turn[:width, :width], turn[-1, -1] = np.eye(width), 1.0
         turn[:width, width:-1] = combinations * self._lengths[columns, None]
         table = np.append(columns, len(self._whole) - 1)
         grams = turn.T @ self._of(table, table) @ turn
-        # A combination of nothing has squares that are rounded, to less than none as well.
+        # The squares of a combination equal to zero are rounding errors, which may be negative.
         lengths = np.append(np.sqrt(np.maximum(np.einsum("bii->i", grams), 0.0))[:-1], 1.0)
         lengths[lengths == 0.0] = 1.0
         grams = grams / (lengths[:, None] * lengths)
         return self._alone(grams, lengths[:-1] * np.append(self._lengths[columns], np.ones(count)))
 
     def delay(self, columns: Index, block: int) -> None:
-        """Let columns act from a block on only."""
+        """Let columns act only from a block on."""
         for grams, at in zip(self._grams, self._at, strict=True):
             silence(grams, at[columns][at[columns] >= 0], block)
         self._sum_again(columns)
 
     @contextmanager
     def delayed(self, columns: Index, block: int) -> Iterator[None]:
-        """Let columns act from a block on only, for a while."""
+        """Let columns act only from a block on, inside the context only."""
         kept = []
         for grams, at in zip(self._grams, self._at, strict=True):
             own = at[columns][at[columns] >= 0]
@@ -168,7 +168,7 @@ class BlockRegression:
 
     @property
     def lengths(self) -> Array:
-        """Return how long each column is, (width,); 1 where it is zero."""
+        """Length of each column, (width,); 1 where it is zero."""
         return np.asarray(self._lengths)
 
     @property
@@ -178,7 +178,7 @@ class BlockRegression:
 
     @cached_property
     def excited(self) -> NDArray[np.bool_]:
-        """Which columns are not zero throughout."""
+        """Whether each column is non-zero anywhere, (width,)."""
         return np.asarray(np.diag(self._whole)[:-1] > 0.0)
 
     def weights(self, columns: Index) -> Array:
@@ -186,7 +186,7 @@ class BlockRegression:
         return np.asarray(self._weights(columns, self._whole) / self._lengths[columns])
 
     def weights_beyond(self, base: Index, columns: Index) -> Array:
-        """Return the weights of columns fitted to what a base leaves, its own weights held."""
+        """Return the weights of columns fitted to a base's residual, the base's weights held."""
         both = self._whole[np.ix_(columns, base)]
         left = self._whole[columns, -1] - both @ self._weights(base, self._whole)
         inverse = pseudo_inverse(self._whole[np.ix_(columns, columns)])
@@ -202,13 +202,16 @@ class BlockRegression:
                 self._whole[np.ix_(group, base)] @ explained[:, group]
             )
             cross = self._whole[group, -1] - self._whole[np.ix_(group, base)] @ explained[:, -1]
-            # What the base nearly spans leaves numbers of rounding only.
+            # Columns that the base nearly spans leave rounding errors only.
             left[np.diag_indices(len(left))] += RANK
             found[k] = cross @ np.linalg.solve(left, cross)
         return found
 
     def held_out(self, columns: Index) -> Array:
-        """Return Σ residual² of each block, fitted to the others without its neighbours."""
+        """Return the hold-out Σ residual² of each block, (blocks,).
+
+        The fit uses the blocks outside its fold, except those next to the fold.
+        """
         both = np.append(columns, len(self._whole) - 1)
         parts, out = self._of(both, both), np.zeros(self.blocks)
         for fold, others in zip(self._folds, self._others, strict=True):
@@ -216,15 +219,15 @@ class BlockRegression:
         return out
 
     def gain(self, base: Index, columns: Index) -> Gain:
-        """Return what columns gain beyond a base, in blocks that were not fitted."""
+        """Return the hold-out gain of columns beyond a base."""
         better = self.held_out(base) - self.held_out(np.concatenate([base, columns]))
         return gain_of(better)
 
     def gain_within(self, base: Index, columns: Index) -> Gain:
-        """Return what columns gain beyond a base in the blocks that they were fitted to.
+        """Return the gain of columns beyond a base in the blocks that they were fitted to.
 
-        For columns that are not the same in any two blocks, as functions of time: blocks that were
-        not fitted say nothing of them.
+        For columns that differ in every block, such as functions of time. Hold-out blocks have no
+        information on them.
         """
         both = np.concatenate([base, columns])
         before, after = self._fitted(base), self._fitted(both)
@@ -236,9 +239,10 @@ class BlockRegression:
         return squares_by_block(self._of(both, both), self._weights(columns, self._whole))
 
     def drift(self, base: Index, columns: Index) -> tuple[Gain, float]:
-        """Return what it gains to let weights change over the blocks, and by which chance.
+        """Return the gain, and its p-value, of letting weights change over the blocks.
 
-        In proportion to the block's number, beside a base and the columns themselves.
+        The change is proportional to the block's number. It is fitted beside a base and the
+        columns.
         """
         first, count = len(base), len(columns)
         kept = np.concatenate([base, columns, [len(self._whole) - 1]])
@@ -255,8 +259,8 @@ class BlockRegression:
     def covariance(self, base: Index, columns: Index) -> Array:
         """Return the covariance of the weights of columns beside a base.
 
-        From leaving out one block at a time (Bell and McCaffrey, Surv. Methodol. 28(2), 2002),
-        which is not too small for few blocks; the weights of the base are held.
+        By the block jackknife (Bell and McCaffrey, Surv. Methodol. 28(2), 2002), which is not too
+        small for few blocks. The weights of the base are held.
         """
         scale = self._lengths[columns]
         covariance = self._left_out(self._beyond(base, columns)).covariance
@@ -265,8 +269,9 @@ class BlockRegression:
     def half_width(self, base: Index, columns: Index) -> Array:
         """Return half the widths of 95 % intervals of the weights of columns beside a base.
 
-        From pairs of blocks, for what a model leaves is alike for longer than a block, and by what
-        pairs in turn have in common. Infinite where a single pair tells a weight.
+        The jackknife is over pairs of blocks, because residuals are correlated over more than a
+        block. The correlation of successive pairs is included. Infinite where a single pair
+        determines a weight.
         """
         errors, free = self._left_out(paired(self._beyond(base, columns))).spread()
         factor = np.full(len(free), np.inf)
@@ -275,11 +280,11 @@ class BlockRegression:
         return np.asarray(factor * errors / self._lengths[columns])
 
     def p_value(self, base: Index, columns: Index) -> float:
-        """Return the probability of so large weights by chance.
+        """Return the p-value of the weights under the hypothesis that all are 0.
 
-        By Wald's test with the covariance above, so that what a single block says counts for
-        nothing, while a few that agree may be enough. Blocks count by what they tell of the
-        columns; one that tells more than all others is left out, and they are tested, in turn.
+        By Wald's test with the block jackknife covariance. So a single block is never significant,
+        while a few that agree may be. Blocks count by their information on the columns. A block
+        with most of it is left out, and the others are tested; this is repeated.
 
         Args:
             base: columns beside them.
@@ -288,9 +293,10 @@ class BlockRegression:
         return self._undominated(base, columns).chance()
 
     def _undominated(self, base: Index, columns: Index) -> Jackknife:
-        """Return how weights scatter over all blocks but dominant ones while the others tell any.
+        """Return the jackknife over all blocks except dominant ones.
 
-        What is left without one may be ruled by another, as where a rope is first pulled taut.
+        Blocks are left out while the others have information. Without the first dominant block
+        another may dominate, for example where a rope is first pulled taut.
         """
         heard = np.arange(self.blocks)
         found = self._left_out(self._beyond(base, columns))
@@ -306,7 +312,7 @@ class BlockRegression:
         return left_out(parts, self.thresholds.block_correlation_limit)
 
     def _beyond(self, base: Index, columns: Index, blocks: Index | None = None) -> Array:
-        """Return blocks' products of columns and target less what a base spans of them."""
+        """Return blocks' products of columns and target, the part spanned by a base removed."""
         table = np.append(columns, len(self._whole) - 1)
         both = np.concatenate([base, table])
         products = self._of(both, both)
@@ -335,10 +341,10 @@ class BlockRegression:
         return np.asarray(1.0 - left(both) / np.maximum(left(base), RANK))
 
     def left_from(self, base: Index, columns: Index) -> Array:
-        """Return Σ residual² where `columns` act from each block on only, shape (blocks,)."""
+        """Return Σ residual² where `columns` act only from each block on, shape (blocks,)."""
         own, table = slice(len(base), -1), np.concatenate([base, columns, [len(self._whole) - 1]])
         blocks = self._of(columns, table)
-        # What the columns meet from a block on, themselves, the base and the target.
+        # Products of the columns with base, themselves and target, summed from each block on.
         met = blocks[::-1].cumsum(axis=0)[::-1]
         crossed, products, reported = met[:, :, : len(base)], met[:, :, own], met[:, :, -1]
         turned = crossed @ pseudo_inverse(self._whole[np.ix_(base, base)])
@@ -350,7 +356,7 @@ class BlockRegression:
 
     @cached_property
     def _others(self) -> list[Array]:
-        """Sums of all blocks but those of each fold and their neighbours."""
+        """Gram matrices of all blocks except each fold and its neighbours, summed."""
         everything = np.arange(len(self._whole))
         return [self._whole - self._summed(everything, self._near(f)) for f in self._folds]
 
@@ -365,9 +371,9 @@ def gain_of(better: Array) -> Gain:
 
 
 def behind(worse: Array) -> float:
-    """Return by how many standard deviations blocks are worse, whatever the size of a single one.
+    """Return the standard deviations of a normal by which blocks are worse.
 
-    By Wilcoxon's signed ranks, which no outlying block decides.
+    By Wilcoxon's signed-rank test, which no single outlying block decides.
     """
     if not np.any(worse):
         return 0.0
@@ -377,7 +383,7 @@ def behind(worse: Array) -> float:
 def paired(values: Array) -> Array:
     """Return sums over blocks two by two, (⌈blocks / 2⌉, …).
 
-    What a model leaves is alike for longer than a block, so that single ones would tell two models
-    apart that both are not quite true.
+    Model-form errors are correlated over more than a block. Single blocks would make a difference
+    between two imperfect models appear significant.
     """
     return np.add.reduceat(values, np.arange(0, len(values), 2), axis=0)

@@ -1,4 +1,4 @@
-"""Whether columns explain anything, or the same, and how far that is from the truth."""
+"""Tests of regressors: collinearity, nesting, significance and model-form error."""
 
 from __future__ import annotations
 
@@ -18,7 +18,16 @@ Index = NDArray[np.intp]
 
 
 def overlap(sums: BlockRegression, base: Index, own: Index, other: Index) -> bool:
-    """Return whether columns explain the same, rather than as much of something else."""
+    """Return whether two sets of regressors explain the same part of the residual.
+
+    This is not the case if they explain an equal amount of different parts.
+
+    Args:
+        sums: regression with all regressors.
+        base: indices of regressors fitted with both.
+        own: indices of the first set.
+        other: indices of the second set.
+    """
     parts = (own, other, np.union1d(own, other))
     without = sums.squares_of(base)
     gains = [without - sums.squares_of(np.concatenate([base, part])) for part in parts]
@@ -26,7 +35,7 @@ def overlap(sums: BlockRegression, base: Index, own: Index, other: Index) -> boo
 
 
 def contains(sums: BlockRegression, base: Index, wide: Index, narrow: Index) -> bool:
-    """Return whether `narrow` is a case of `wide`, as Coulomb's friction of Stribeck's."""
+    """Return whether `narrow` is a case of `wide`, as Coulomb friction is of Stribeck friction."""
     return bool(np.all(sums.spanned(base, wide, narrow) > sums.thresholds.nested_share))
 
 
@@ -36,10 +45,10 @@ def distance(
     """Return by how many standard deviations of a normal something explains less.
 
     Args:
-        worse: by how many squares, of each block, (blocks,).
-        undecided: what decides nothing, models being as untrue as they are.
-        wider: how many numbers it has more; each counts as in Schwarz's criterion, but for no more
-            in a long recording than in a short one.
+        worse: additional Σ residual² of each block, (blocks,).
+        undecided: total below which the model-form error leaves the comparison undecided.
+        wider: additional parameters. Each counts as in Schwarz's criterion, with a limit on the
+            number of block pairs, so that long recordings do not count more.
         thresholds: `tie_sigma` and `schwarz_most_pairs`.
     """
     worse = paired(worse)
@@ -52,9 +61,15 @@ def distance(
 
 
 def chance(sums: BlockRegression, base: Index, parts: Sequence[Index]) -> float:
-    """Return how probable weights as large are by chance: of all parts together, or of the surest.
+    """Return the p-value of all parts together, or of the most significant one.
 
-    Where few blocks tell much, many parts leave no test of all together.
+    Where few blocks hold most of the information, many parts leave too few degrees of freedom for a
+    joint test. The smaller of both p-values is corrected for the number of tests (Bonferroni).
+
+    Args:
+        sums: regression with all regressors.
+        base: indices of regressors fitted beside the parts.
+        parts: indices of each part.
     """
     together = sums.p_value(base, np.concatenate(parts))
     if len(parts) == 1:
@@ -67,9 +82,9 @@ def chance(sums: BlockRegression, base: Index, parts: Sequence[Index]) -> float:
 
 
 def freely_gained(gram: BlockGram, sums: BlockRegression, base: Index, own: Index) -> float:
-    """Return by how many squares columns are seen to be untrue, at least none.
+    """Return the largest model-form error of regressors, in squares; at least 0.
 
-    The most of `freely_gained_at`.
+    The maximum of `freely_gained_at` over all residuals.
     """
     return max(freely_gained_at(gram, sums, base, own).values(), default=0.0)
 
@@ -77,10 +92,10 @@ def freely_gained(gram: BlockGram, sums: BlockRegression, base: Index, own: Inde
 def freely_gained_at(
     gram: BlockGram, sums: BlockRegression, base: Index, own: Index
 ) -> dict[Place, float]:
-    """Return by how many squares columns are seen to be untrue in each residual they act on.
+    """Return the model-form error of regressors in each residual they act on, in squares.
 
-    The most that a free function of a measured signal gains beyond them there, at least none;
-    functions of time are left out, which gain what no other block tells.
+    It is the largest hold-out gain of a free function of a measured signal beyond them, at least 0.
+    Functions of time are excluded, because hold-out blocks have no information on them.
     """
     both = np.concatenate([base, own])
     left = sums.held_out(both).sum()
@@ -93,6 +108,9 @@ def freely_gained_at(
 
 
 def where_alike(members: Sequence[Candidate], elements: set[str]) -> list[tuple[Candidate, ...]]:
-    """Return on which members an effect may do what something on some elements does."""
+    """Return the members on which an effect may replace one on the given elements.
+
+    These are the members on those elements. Where there are none: each member alone, then all.
+    """
     same = tuple(c for c in members if c.element in elements)
     return [same] if same else list(dict.fromkeys([*((c,) for c in members), tuple(members)]))

@@ -1,4 +1,4 @@
-"""Hypotheses of effects on elements, and what their coefficients allow."""
+"""Hypotheses: an effect on some elements, and tests of the fitted coefficients."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ from cspm_sim.effects import Effect
 
 Array = NDArray[np.float64]
 
-# More signals than any block of the machine has.
+# Number of random signals, larger than any effect reads.
 _SIGNALS = 128
 
 
@@ -25,9 +25,9 @@ class Hypothesis:
 
     Attributes:
         effect: of the catalogue.
-        candidates: one per element, of the same nonlinear parameters.
-        onset: block from which on it acts, 0 for all the time.
-        common: whether all elements share its numbers, having one cause.
+        candidates: one per element, all with the same nonlinear parameters.
+        onset: first block in which it acts, 0 for the whole recording.
+        common: whether all elements share one set of parameters, having one cause.
     """
 
     effect: Effect
@@ -37,28 +37,28 @@ class Hypothesis:
 
     @property
     def elements(self) -> tuple[str, ...]:
-        """What it acts on."""
+        """The elements it acts on."""
         return tuple(candidate.element for candidate in self.candidates)
 
     @property
     def causes(self) -> int:
-        """How many faults it supposes: one for each element that has numbers of its own."""
+        """Number of faults it assumes: one for each element that has its own parameters."""
         return 1 if self.common else len(self.candidates)
 
     @property
     def words(self) -> str:
-        """What it says, for people."""
+        """Effect and elements, as readable text."""
         return f"{self.effect.id} on {', '.join(self.elements)}"
 
 
 class Rival(NamedTuple):
-    """A hypothesis that explains nearly as much as one that was chosen.
+    """A hypothesis that explains nearly as much as a chosen one.
 
     Attributes:
-        hypothesis: what it says.
-        behind: by how many standard deviations of a normal it is worse, over the blocks that were
-            not fitted, its further parameters counted; 0 where it is as good or better.
-        beside: a wrong number of the file that hides a part of it; None where it stands alone.
+        hypothesis: the alternative.
+        behind: standard deviations of a normal by which it is worse over hold-out blocks. Its
+            additional parameters are counted; 0 where it is as good or better.
+        beside: a wrong parameter of the file that masks a part of it; None where there is none.
     """
 
     hypothesis: Hypothesis
@@ -67,19 +67,19 @@ class Rival(NamedTuple):
 
     @property
     def candidates(self) -> tuple[Candidate, ...]:
-        """All that it supposes."""
+        """All candidates it assumes, those of the wrong parameter included."""
         beside = () if self.beside is None else self.beside.candidates
         return (*self.hypothesis.candidates, *beside)
 
     @property
     def words(self) -> str:
-        """What it says, for people."""
+        """Effects and elements, as readable text."""
         beside = "" if self.beside is None else f" beside a wrong {self.beside.effect.id}"
         return f"{self.hypothesis.words}{beside}"
 
 
 def is_constant(effect: Effect) -> bool:
-    """Return whether an effect adds the same to its main residual whatever the machine does."""
+    """Return whether an effect adds the same to its main residual whatever the motion."""
     signals = np.random.default_rng(0).normal(size=(16, _SIGNALS))
     shape = {name: grid[0] for name, grid in effect.signature.nonlinear.items()}
     with np.errstate(all="ignore"):
@@ -88,16 +88,20 @@ def is_constant(effect: Effect) -> bool:
 
 
 def is_exact(effect: Effect) -> bool:
-    """Return whether an effect has no form that may be untrue in its course over a recording.
+    """Return whether an effect has no model-form error in its time course.
 
-    It corrects a number of the file or of a reading, other than its time, or it is a constant, and
-    what that leaves is a function of time.
+    True for a correction of a parameter or a reading, except for timing corrections. Also true for
+    a constant, whose model-form error would be a function of time.
     """
     return (effect.is_correction and not is_timing(effect)) or is_constant(effect)
 
 
 def is_negligible(members: Mapping[Candidate, Array]) -> bool:
-    """Return whether weights of an effect on its elements are such as a sound machine has."""
+    """Return whether weights of an effect on its elements are within a healthy machine's range.
+
+    Args:
+        members: weights by candidate.
+    """
     return all(
         c.effect.is_negligible(c.effect.values(own.tolist(), **c.nonlinear))
         for c, own in members.items()
@@ -105,15 +109,20 @@ def is_negligible(members: Mapping[Candidate, Array]) -> bool:
 
 
 def may_be_negligible(weights: Mapping[Candidate, tuple[Array, Array]]) -> bool:
-    """Return whether weights with half their intervals may be such as a sound machine has."""
+    """Return whether the intervals reach into the range of a healthy machine.
+
+    Args:
+        weights: weights and half the widths of their intervals, by candidate.
+    """
     least = {c: np.sign(w) * np.maximum(np.abs(w) - half, 0.0) for c, (w, half) in weights.items()}
     return is_negligible(least)
 
 
 def may_be_none(weights: Mapping[Candidate, tuple[Array, Array]]) -> bool:
-    """Return whether weights with half their intervals all may be zero, where there are any.
+    """Return whether the intervals of all weights contain 0; False where there are no weights.
 
-    Of what nothing bounds, both ends being beyond what the catalogue allows, this says nothing.
+    False as well for an unbounded weight, where both ends of its interval are beyond the
+    catalogue's range.
     """
     return bool(weights) and all(
         bool(np.all(np.abs(w) <= half)) and any(is_allowed(c, w + end) for end in (half, -half))
@@ -124,10 +133,10 @@ def may_be_none(weights: Mapping[Candidate, tuple[Array, Array]]) -> bool:
 def is_seen_to_begin(
     hypothesis: Hypothesis, weights: Mapping[Candidate, tuple[Array, Array]]
 ) -> bool:
-    """Return whether weights with half their intervals allow a beginning, where there is one.
+    """Return whether the intervals support the hypothesis's onset; True where it has none.
 
-    A beginning is looked for in all blocks, so that something always begins somewhere; it may be
-    told if any number is surely not zero from then on, which takes an interval.
+    The onset search covers all blocks and so always finds one. It may be reported if at least one
+    weight is significant from the onset on, which requires an interval.
     """
     significant = (bool(np.any(np.abs(own) > half)) for own, half in weights.values())
     return not hypothesis.onset or any(significant)
@@ -136,9 +145,10 @@ def is_seen_to_begin(
 def is_seen_to_end(
     candidates: Iterable[Candidate], thresholds: Thresholds = DEFAULT_THRESHOLDS
 ) -> bool:
-    """Return whether a recording shows the ends of all memories, of which time constants tell.
+    """Return whether the recording covers all relaxations described by a time constant.
 
-    One that is as long as can be told goes on growing like much else that is not in the catalogue.
+    A time constant at the end of its range cannot be separated from steady growth, which many
+    causes outside the catalogue share.
     """
     longest = {
         c: next(p.maximum for p in c.effect.parameters if p.name == c.effect.signature.spectrum)
@@ -152,10 +162,10 @@ def is_seen_to_end(
 
 
 def bounded(candidate: Candidate, weights: Array, half: Array) -> Array:
-    """Return weights with those moved to their bound that lie beyond it by chance.
+    """Return weights, with those outside their range moved to its bound where noise explains it.
 
     Args:
-        candidate: of which they are.
+        candidate: that the weights belong to.
         weights: as fitted.
         half: half the widths of their 95 % intervals.
     """
@@ -169,19 +179,19 @@ def bounded(candidate: Candidate, weights: Array, half: Array) -> Array:
 
 
 def is_allowed(candidate: Candidate, weights: Array) -> bool:
-    """Return whether the catalogue allows such weights, and they do something."""
+    """Return whether the catalogue allows such weights, and they have an effect."""
     values = candidate.effect.values(weights.tolist(), **candidate.nonlinear)
     return candidate.effect.is_plausible(values) and not candidate.effect.is_absent(values)
 
 
 def is_tied(candidate: Candidate, weights: Array, half: Array) -> bool:
-    """Return whether weights that depend on one another are those of some parameters."""
+    """Return whether dependent weights agree, within their intervals, with a set of parameters."""
     values = candidate.effect.values(weights.tolist(), **candidate.nonlinear)
     return bool(np.all(np.abs(candidate.effect.weights(values) - weights) <= half))
 
 
 def joined(chosen: Sequence[Hypothesis], found: Hypothesis) -> list[Hypothesis]:
-    """Return hypotheses with a further one; the same effect on more elements is still one."""
+    """Return hypotheses with a further one; merge those of the same effect, shape and onset."""
     shape, out = found.candidates[0].shape, []
     for other in chosen:
         alike = other.effect.id == found.effect.id and other.candidates[0].shape == shape
@@ -206,43 +216,44 @@ def shapes_of(hypothesis: Hypothesis, candidates: Iterable[Candidate]) -> list[H
 
 
 def parts_of(hypotheses: Iterable[Hypothesis]) -> tuple[list[Candidate], set[str]]:
-    """Return the candidates of hypotheses, and the effects, by id, whose weights they share."""
+    """Return the candidates of hypotheses, and the ids of effects with common weights."""
     own = list(hypotheses)
     common = {h.effect.id for h in own if h.common}
     return [c for h in own for c in h.candidates], common
 
 
 def freedom(hypothesis: Hypothesis) -> int:
-    """Return how many numbers a hypothesis has that are not of a grid.
+    """Return the number of free parameters of a hypothesis, those on a grid excluded.
 
-    Those of its parameters for each fault, and one for each fault beyond the first.
+    Those of the effect for each fault, and one for each fault beyond the first.
     """
     effect, causes = hypothesis.effect, hypothesis.causes
     return causes * (len(effect.parameters) - len(effect.signature.nonlinear)) + causes - 1
 
 
 def has_one_system(effect: Effect) -> bool:
-    """Return whether one system reads all that an effect can act on."""
+    """Return whether one sensor system reads all elements that an effect can act on."""
     return effect.physics.sense is not None and effect.physics.sense.one_system
 
 
 def is_number(hypothesis: Hypothesis) -> bool:
-    """Return whether it is a wrong number of the file, rather than physics that is missing."""
+    """Return whether it is a wrong parameter of the file rather than missing physics."""
     return hypothesis.effect.physics.alter is not None
 
 
 def is_wider(one: Hypothesis, other: Hypothesis) -> bool:
-    """Return whether one supposes more faults, whatever the effects."""
+    """Return whether one hypothesis assumes more faults than the other, whatever the effects."""
     return one.causes > other.causes
 
 
 def boldness(
     one: Hypothesis, other: Hypothesis | None = None, thresholds: Thresholds = DEFAULT_THRESHOLDS
 ) -> float:
-    """Return by how many standard errors one has to explain more than another, or than nothing.
+    """Return the standard errors by which one must explain more than another, or than nothing.
 
-    For a beginning, chosen among many, and for an unlikely extent, where the other has none: one
-    number for all elements is unlikely unless one system reads them; then it is for a part of them.
+    Non-zero for an onset, which is selected among many, and for an unlikely element scope, where
+    the other has none. Common parameters on all elements are unlikely unless one system reads them.
+    If one does, separate parameters are unlikely.
     """
     if one.onset and (other is None or not other.onset):
         return thresholds.onset_sigma
@@ -253,7 +264,10 @@ def boldness(
 
 
 def unusual(weights: Mapping[Candidate, Array], hypothesis: Hypothesis) -> float:
-    """Return by how many times its usual error a wrong number is wrong; 0 where none is usual."""
+    """Return the largest error of a parameter of the file, in units of its usual error.
+
+    0 where no usual error is given.
+    """
     found = [0.0]
     for candidate in hypothesis.candidates:
         values = candidate.effect.values(weights[candidate].tolist(), **candidate.nonlinear)
@@ -266,14 +280,14 @@ def unusual(weights: Mapping[Candidate, Array], hypothesis: Hypothesis) -> float
 
 
 def is_timing(effect: Effect) -> bool:
-    """Return whether an effect is that readings are older than their stamps say."""
+    """Return whether an effect makes readings older than their stamps."""
     return effect.physics.sense is not None and effect.physics.sense.lateness is not None
 
 
 def is_early(weights: Mapping[Candidate, Array], hypothesis: Hypothesis) -> bool:
-    """Return whether readings would be newer than their stamps say, which only clocks can do.
+    """Return whether readings would be newer than their stamps by more than a healthy clock allows.
 
-    By more than those of a sound machine.
+    Only clock offsets can cause this.
     """
     sense = hypothesis.effect.physics.sense
     if sense is None or sense.lateness is None:
@@ -285,9 +299,9 @@ def is_early(weights: Mapping[Candidate, Array], hypothesis: Hypothesis) -> bool
 def is_spread(
     one: Hypothesis, whole: Hypothesis, thresholds: Thresholds = DEFAULT_THRESHOLDS
 ) -> bool:
-    """Return whether one has the same effect on half of several elements at least.
+    """Return whether one has the same effect on at least half of more than two elements.
 
-    Then it is as likely on all of them, which is one cause, as on those alone.
+    Then one cause on all elements is as likely as separate faults on those alone.
     """
     same = one.effect.id == whole.effect.id and one.candidates[0].shape == whole.candidates[0].shape
     elements = len(whole.elements)

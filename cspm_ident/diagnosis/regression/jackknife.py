@@ -1,4 +1,4 @@
-"""What leaving out one block at a time does to the weights of columns."""
+"""Block jackknife: how leaving out one block at a time changes the weights of regressors."""
 
 from __future__ import annotations
 
@@ -10,20 +10,21 @@ from scipy.stats import f as f_distribution
 
 Array = NDArray[np.float64]
 
-# Of the largest eigenvalue: what is smaller is rounding.
+# Share of the largest eigenvalue below which an eigenvalue is a rounding error.
 RANK = 1e-9
 
 
 class Jackknife(NamedTuple):
-    """What leaving out one block at a time does to weights, of columns of length 1.
+    """Weights with their block jackknife, of regressors scaled to length 1.
 
     Attributes:
         weights: from all blocks, shape (m,).
         covariance: of the weights, shape (m, m).
-        blocks: effective number of blocks that tell all of them.
-        blocks_of: those that tell each weight, shape (m,).
-        shares: of what is told, by block, shape (blocks,).
-        alike: correlation of what two blocks in turn do to each weight, 0 where it is less, (m,).
+        blocks: effective number of blocks with information on all weights together.
+        blocks_of: effective number of blocks with information on each weight, shape (m,).
+        shares: each block's share of the information, shape (blocks,).
+        alike: correlation of the changes that two successive blocks make to each weight, (m,).
+            Negative correlations count as 0.
     """
 
     weights: Array
@@ -34,28 +35,31 @@ class Jackknife(NamedTuple):
     alike: Array
 
     def spread(self) -> tuple[Array, Array]:
-        """Return standard errors (m,) and their degrees of freedom (m,), blocks being alike.
+        """Return standard errors (m,) and their degrees of freedom (m,) for correlated blocks.
 
-        As of a process of first order, whose mean scatters (1 + ρ)/(1 − ρ) times as much as that of
-        independent blocks: a wind that wanders for seconds is met in few states by a short
-        recording. How alike they are is seen roughly, so that it leaves one degree of freedom where
-        there are blocks for it: with less, Student's factor says that nothing is known of anything.
+        The mean of a first-order process has (1 + ρ)/(1 − ρ) times the variance of independent
+        blocks. This covers disturbances such as a slowly varying wind, of which a short recording
+        has few states. The estimate of ρ is rough. So one degree of freedom is kept where there are
+        blocks for it: with fewer, Student's factor would make every weight insignificant.
         """
         more = (1.0 + self.alike) / (1.0 - self.alike)
         errors = np.sqrt(np.maximum(np.diag(self.covariance), 1e-300) * more)
         return errors, np.maximum(self.blocks_of / more, np.minimum(self.blocks_of, 2.0)) - 1.0
 
     def dominant(self, share: float) -> int | None:
-        """Return the block that has more than a share of the information, None where none has.
+        """Return the index of the block with more than a share of the information, or None.
 
-        A violent start tells nearly all of a recording's speeds; that what it shows goes on
-        afterwards is seen only without it.
+        A violent start holds nearly all information on a recording's speeds. Only the other blocks
+        show whether the effect persists.
+
+        Args:
+            share: of the information, from 0 to 1.
         """
         most = int(np.argmax(self.shares))
         return most if self.shares[most] > share else None
 
     def chance(self) -> float:
-        """Return the probability of weights as large by chance, by Wald's test."""
+        """Return the p-value of the weights under the hypothesis that all are 0, by Wald's test."""
         count = len(self.weights)
         if self.blocks <= count:
             return 1.0
@@ -66,11 +70,11 @@ class Jackknife(NamedTuple):
 
 
 def left_out(parts: Array, most_alike: float) -> Jackknife:
-    """Return how the weights scatter (Bell and McCaffrey, Surv. Methodol. 28(2), 2002).
+    """Return the block jackknife of the weights (Bell and McCaffrey, Surv. Methodol. 28(2), 2002).
 
     Args:
-        parts: each block's products of columns and target, shape (blocks, m + 1, m + 1).
-        most_alike: largest correlation of successive blocks that is allowed for.
+        parts: Gram matrix of each block, of regressors and target, shape (blocks, m + 1, m + 1).
+        most_alike: upper limit of the correlation of successive blocks.
     """
     whole, count = parts.sum(axis=0), parts.shape[1] - 1
     inverse = pseudo_inverse(whole[:-1, :-1])
@@ -94,14 +98,14 @@ def left_out(parts: Array, most_alike: float) -> Jackknife:
 
 
 def _informative_blocks(reported: Array, inverse: Array) -> Array:
-    """Return how many blocks tell each weight, (m,), by their shares in its variance.
+    """Return the effective number of blocks with information on each weight, (m,).
 
-    That of white noise (Satterthwaite, Biometrics Bull. 2(6), 1946), which none can have less than
-    nothing of: of columns that resemble each other as well.
+    From each block's share in the weight's variance under white noise (Satterthwaite, Biometrics
+    Bull. 2(6), 1946). These shares are never negative, even for collinear regressors.
 
     Args:
-        reported: the inverse times each block's products, (blocks, m, m).
-        inverse: of the products of all blocks, (m, m).
+        reported: the inverse Gram matrix times that of each block, (blocks, m, m).
+        inverse: of the Gram matrix of all blocks, (m, m).
     """
     variance = np.einsum("bij,ij->bi", reported, inverse)
     whole = np.diag(inverse)
@@ -110,14 +114,14 @@ def _informative_blocks(reported: Array, inverse: Array) -> Array:
 
 
 def _alike(apart: Array, most: float) -> Array:
-    """Return the correlation of rows (blocks, m) with the next, from 0 to `most`."""
+    """Return the correlation of rows (blocks, m) with the next row, clipped to 0 … `most`."""
     squares = np.maximum(np.sum(apart**2, axis=0), 1e-300)
     alike = np.sum(apart[1:] * apart[:-1], axis=0) / squares
     return np.asarray(np.clip(alike, 0.0, most))
 
 
 def pseudo_inverse(gram: Array) -> Array:
-    """Return what `numpy.linalg.pinv` does of a symmetric matrix, in a third of its time."""
+    """Return the pseudo-inverse of a symmetric matrix in a third of `numpy.linalg.pinv`'s time."""
     values, vectors = np.linalg.eigh(gram)
     sizes = np.abs(values)
     kept = sizes > RANK * sizes.max(initial=0.0)

@@ -1,4 +1,4 @@
-"""What hypotheses leave of the residuals, fitted together."""
+"""Joint fits of hypotheses to the residuals."""
 
 from __future__ import annotations
 
@@ -32,60 +32,60 @@ Index = NDArray[np.intp]
 
 
 class Fits:
-    """Block Gram matrices with their regression, in terms of hypotheses."""
+    """Block Gram matrices with their regression, addressed by hypotheses."""
 
     def __init__(self, gram: BlockGram, sums: BlockRegression) -> None:
-        """Take both."""
+        """Take the Gram matrices and their regression."""
         self.gram, self.sums = gram, sums
 
     @property
     def thresholds(self) -> Thresholds:
-        """Those of the sums."""
+        """Those of the regression."""
         return self.sums.thresholds
 
     def columns(self, hypotheses: Iterable[Hypothesis]) -> Index:
-        """Return indices of the nuisance and of some hypotheses' columns."""
+        """Return indices of the nuisance regressors and those of some hypotheses."""
         return self.gram.with_nuisance(c for h in hypotheses for c in h.candidates)
 
     def own_columns(self, hypothesis: Hypothesis) -> Index:
-        """Return indices of one hypothesis's columns."""
+        """Return indices of one hypothesis's regressors."""
         return self.gram.columns_of(hypothesis.candidates)
 
     def beside(self, base: Index, *further: Hypothesis) -> Index:
-        """Return a base with the columns of hypotheses."""
+        """Return the indices of a base and of hypotheses' regressors."""
         return np.concatenate([base, *map(self.own_columns, further)])
 
     def weights(self, hypotheses: Sequence[Hypothesis]) -> Weights:
-        """Return the weights of hypotheses that are fitted together, with half their intervals."""
+        """Return the weights of hypotheses fitted together, with half their intervals' widths."""
         return weights_of(self.gram, self.sums, *parts_of(hypotheses))
 
     def values(self, hypotheses: Sequence[Hypothesis]) -> dict[Candidate, Array]:
-        """Return the weights alone, which takes less time."""
+        """Return the weights without intervals, which takes less time."""
         return values_of(self.gram, self.sums, *parts_of(hypotheses))
 
     def shared(self, base: Index, hypothesis: Hypothesis) -> tuple[BlockRegression, Index, Index]:
-        """Return sums in which all elements of a hypothesis share their weights.
+        """Return a regression in which all elements of a hypothesis share their weights.
 
-        With the columns of the base and those of the hypothesis.
+        Returned with the indices of the base and of the hypothesis in it.
         """
         columns, elements = self.own_columns(hypothesis), hypothesis.elements
         same = np.tile(np.eye(len(columns) // len(elements)), (len(elements), 1))
         return self.sums.combined(base, columns, same)
 
     def held_out(self, hypothesis: Hypothesis, base: Index) -> Array:
-        """Return Σ residual² of each block beside a hypothesis that was not fitted to it."""
+        """Return the hold-out Σ residual² of each block, fitted with a base and a hypothesis."""
         if not hypothesis.common:
             return self.sums.held_out(self.beside(base, hypothesis))
         sums, base, own = self.shared(base, hypothesis)
         return sums.held_out(np.concatenate([base, own]))
 
     def gain(self, hypothesis: Hypothesis, base: Index) -> Gain:
-        """Return what a hypothesis takes beyond a base."""
+        """Return the hold-out gain of a hypothesis beyond a base."""
         return self.sums.gain(base, self.own_columns(hypothesis))
 
     @contextmanager
     def delayed(self, hypothesis: Hypothesis) -> Iterator[None]:
-        """Let a hypothesis act from its onset on, for a while."""
+        """Let a hypothesis act from its onset on, inside the context only."""
         if not hypothesis.onset:
             yield
             return
@@ -99,11 +99,12 @@ class Fits:
     def model_form_error(
         self, hypothesis: Hypothesis, others: Sequence[Hypothesis]
     ) -> dict[Candidate, float]:
-        """Return by what share of its amplitude each candidate is seen to be off, from 0 to 1.
+        """Return the model-form error of each candidate as a share of its amplitude, from 0 to 1.
 
-        From the most that a free function gains beside the hypothesis in a residual that the
-        candidate acts on, in squares of what the candidate takes beside all others. Where several
-        act it may be any of them that is off.
+        It is the square root of a ratio of squares. Numerator: the largest gain of a free function
+        beside the hypothesis in a residual that the candidate acts on. Denominator: the candidate's
+        gain beyond all others. Where several candidates act on one residual, they share the error
+        equally.
         """
         base, own = self.columns(others), self.own_columns(hypothesis)
         apart = [(c,) for c in hypothesis.candidates]
@@ -123,10 +124,11 @@ class Fits:
         return found
 
     def may_be_untruth(self, chosen: Sequence[Hypothesis]) -> list[bool]:
-        """Return of each whether laws beside it may be untrue by all it takes, wherever it shows.
+        """Return for each hypothesis whether the model-form error of the others may explain it.
 
-        Numbers of the file and of readings have no form to be untrue, nor have clocks of a sound
-        machine; what a constant leaves is a function of time.
+        True where that error is as large as the hypothesis's gain in every residual it acts on.
+        Three kinds have no such error: corrections of the file or of readings, clock offsets of a
+        healthy machine, and constants, whose error is a function of time.
         """
         taken = [self._taken(h, chosen) for h in chosen]
         share = self.thresholds.model_form_error_share
@@ -144,7 +146,7 @@ class Fits:
         ]
 
     def _taken(self, hypothesis: Hypothesis, chosen: Sequence[Hypothesis]) -> dict[Place, float]:
-        """Return the squares that a hypothesis takes of each residual beside the others."""
+        """Return a hypothesis's gain in squares in each residual, beyond the others."""
         base = self.columns(h for h in chosen if h is not hypothesis)
         both = self.beside(base, hypothesis)
         without, left = (
@@ -153,12 +155,12 @@ class Fits:
         return {place: without[place] - left[place] for place in left}
 
     def is_plausible(self, hypotheses: Sequence[Hypothesis], loosely: bool = False) -> bool:
-        """Return whether parameters are what the catalogue allows, but for chance.
+        """Return whether the catalogue allows the parameters, within their intervals.
 
         Args:
             hypotheses: fitted together.
-            loosely: whether weights that depend on one another may be off by what decides nothing,
-                no model being truer: as an alternative, which nothing surely contradicts.
+            loosely: whether dependent weights may deviate by the model-form error as well. For
+                alternatives, which have to be kept unless clearly contradicted.
         """
         values = self.values(hypotheses)
         if all(is_allowed(c, own) and not c.effect.signature.tied for c, own in values.items()):
@@ -173,21 +175,22 @@ class Fits:
         )
 
     def _undecided(self, candidate: Candidate, weights: Array) -> Array:
-        """Return by how much each weight may be off and decide nothing."""
+        """Return the deviation of each weight that is within the model-form error."""
         lengths = self.sums.lengths[self.gram.columns_of([candidate])]
         share = np.sqrt(self.thresholds.model_form_error_share)
         return np.asarray(share * np.linalg.norm(lengths * weights) / lengths)
 
     def are_early(self, hypotheses: Sequence[Hypothesis]) -> bool:
-        """Return whether with them some readings would be newer than their stamps say."""
+        """Return whether some readings would then be newer than their stamps."""
         timing = [h for h in hypotheses if is_timing(h.effect)]
         values = self.values(hypotheses) if timing else {}
         return any(is_early(values, h) for h in timing)
 
     def contradicts(self, hypothesis: Hypothesis, others: Sequence[Hypothesis]) -> bool:
-        """Return whether it says again, as readings that are too new, that others are late.
+        """Return whether it restates that others are late, as readings that are too new.
 
-        Clocks tell times apart only: where nothing else tells which is right it is the same.
+        Clocks show differences of times only. So both hypotheses are equivalent where nothing else
+        identifies the late one.
         """
         late = [h for h in others if is_timing(h.effect) and not self.is_negligible(h, others)]
         if not late or not is_timing(hypothesis.effect):
@@ -198,6 +201,6 @@ class Fits:
         return same and self.are_early([*others, hypothesis])
 
     def is_negligible(self, hypothesis: Hypothesis, chosen: Sequence[Hypothesis]) -> bool:
-        """Return whether a sound machine has as much of it, so that it counts for no effect."""
+        """Return whether its weights are within a healthy machine's range, so it is no finding."""
         found = self.values(chosen)
         return is_negligible({c: found[c] for c in hypothesis.candidates})

@@ -1,4 +1,4 @@
-"""Parameters of what was named, with intervals."""
+"""Parameters of the findings, with intervals."""
 
 from __future__ import annotations
 
@@ -25,12 +25,13 @@ def of_shafts(
     block_s: float,
     thresholds: Thresholds = DEFAULT_THRESHOLDS,
 ) -> Weights:
-    """Return the weights with those of winches' effects fitted to suit their rows.
+    """Return the weights with those of winch effects fitted robustly, where needed.
 
-    Near a reversal a shaft may stick, which no regressor of its speed says. Rows in which it turns
-    round are left out and others that stand out count less (Huber, Ann. Math. Stat. 35(1), 1964).
-    Where least squares over all rows leave no weight's interval, they are taken instead: what is
-    efficient, unless what is safe contradicts (Hausman, Econometrica 46(6), 1978).
+    Near a reversal a shaft may stick, which no regressor of its speed describes. So rows with a
+    reversal are left out, and outliers count less (Huber, Ann. Math. Stat. 35(1), 1964). Where
+    least squares over all rows agree within every interval, they are used instead. That is, the
+    efficient estimate holds unless the robust one contradicts it (Hausman, Econometrica 46(6),
+    1978).
 
     Args:
         weights: as found.
@@ -47,7 +48,7 @@ def of_shafts(
         rows = [[e.only(own) for e in part if e.place == place] for part in parts]
         plain = _fitted(steady(rows), own, block_s, thresholds)
         calm = _fitted(_calmed(steady(rows), own), own, block_s, thresholds)
-        # Rows that stand out are no noise: what they move is uncertain as well.
+        # Outliers are not noise: the shift they cause adds to the uncertainty.
         safe = {c: (w, np.hypot(half, w - plain[c][0])) for c, (w, half) in calm.items()}
         whole = _fitted(rows, own, block_s, thresholds)
         agree = all(np.all(np.abs(whole[c][0] - safe[c][0]) <= safe[c][1]) for c in own)
@@ -56,11 +57,11 @@ def of_shafts(
 
 
 def of_drives(weights: Weights, period: float) -> Weights:
-    """Return the weights with those of drives as of continuous time, by how their samples arise.
+    """Return the weights with those of drives converted from sampled to continuous time.
 
     Args:
         weights: as found.
-        period: for which a command is held [s].
+        period: hold time of a command [s].
     """
     found = dict(weights)
     for candidate, (values, half) in weights.items():
@@ -73,9 +74,9 @@ def of_drives(weights: Weights, period: float) -> Weights:
 
 
 def of_clocks(weights: Weights) -> Weights:
-    """Return the weights, of which no part is surer than what a sound machine may have of it.
+    """Return the weights, with intervals at least as wide as a healthy machine's range.
 
-    A delay is told against clocks that lie apart themselves (GUM, JCGM 100:2008, 4.3).
+    A delay is measured against clocks that have offsets themselves (GUM, JCGM 100:2008, 4.3).
 
     Args:
         weights: as found.
@@ -94,15 +95,15 @@ def of_forms(
     model_form_error: Mapping[Candidate, float],
     thresholds: Thresholds = DEFAULT_THRESHOLDS,
 ) -> Weights:
-    """Return the weights, of which none is surer than the form of its law.
+    """Return the weights, with intervals that include the model-form error.
 
-    Noise alone makes the interval of a straight line through a curve as narrow as one likes; what
-    the law leaves of the curve may as well have moved the line (GUM, JCGM 100:2008, 4.3). What is
-    not seen of that no law is free of; a number of the file or of a reading has no form.
+    With noise alone, the interval of a straight line fitted to a curve becomes arbitrarily narrow.
+    What the law misses of the curve may have moved the line as well (GUM, JCGM 100:2008, 4.3).
+    Every law is given a least model-form error; corrections of the file or of readings have none.
 
     Args:
         weights: as found.
-        model_form_error: of each, by what share of its amplitude the law is seen to be off.
+        model_form_error: of each candidate, as a share of its amplitude.
         thresholds: `model_form_error_share`.
     """
     found, form_error = dict(weights), float(np.sqrt(thresholds.model_form_error_share))
@@ -114,11 +115,11 @@ def of_forms(
 
 
 def of_reach(weights: Weights, parts: Parts) -> Weights:
-    """Return the weights, of which none is surer than how much of it has acted.
+    """Return the weights, with intervals that include the unobserved part of a saturation.
 
-    What saturates and has not been seen to is told beyond what acted by the form of its law alone,
-    and others rise as far and end elsewhere: as much as is missing may be wrong (GUM, JCGM
-    100:2008, 4.3).
+    A saturating effect that was not observed to saturate is extrapolated by its law alone. Other
+    laws have the same rise and a different limit. So the missing share of the range counts as
+    uncertainty (GUM, JCGM 100:2008, 4.3).
 
     Args:
         weights: as found.
@@ -133,7 +134,10 @@ def of_reach(weights: Weights, parts: Parts) -> Weights:
 
 
 def _reach(candidate: Candidate, parts: Parts) -> float:
-    """Return half of the range of a saturating candidate's column, whatever it started from."""
+    """Return half the range of a saturating candidate's regressor, at most 1; 0 without rows.
+
+    Unlike the largest value, the range is independent of where the regressor starts.
+    """
     rows = (e.columns[candidate][:, 0, 0] for part in parts for e in part if candidate in e.columns)
     return max((min(1.0, 0.5 * float(np.ptp(own))) for own in rows if len(own)), default=0.0)
 
@@ -146,7 +150,7 @@ def _fitted(
 
 
 def _calmed(parts: Parts, candidates: Sequence[Candidate]) -> Parts:
-    """Return rows scaled so that least squares are Huber's estimate."""
+    """Return rows scaled so that least squares give Huber's estimate."""
     target = np.concatenate([e.target[:, 0] for part in parts for e in part])
     columns = np.concatenate(
         [
@@ -161,7 +165,7 @@ def _calmed(parts: Parts, candidates: Sequence[Candidate]) -> Parts:
     return [[e.weighted(next(roots)) for e in part] for part in parts]
 
 
-# Of the scale: what lies farther counts less.
+# Residuals beyond this multiple of the scale count less.
 _HUBER = 3.0
-# Of reweighting.
+# Number of reweighting rounds.
 _ROUNDS = 20

@@ -1,4 +1,4 @@
-"""Whether an effect is surely there, and worth a word."""
+"""Whether an effect is significant and large enough to be reported."""
 
 from __future__ import annotations
 
@@ -19,37 +19,44 @@ Index = NDArray[np.intp]
 
 
 class Significance:
-    """What it takes for one of many candidates to be told."""
+    """Criteria for one of many candidates to be reported: significance and effect size."""
 
     def __init__(self, fits: Fits, candidates: Sequence[Candidate]) -> None:
-        """Take all candidates that are looked at."""
+        """Take the fits and all candidates that are tested."""
         self._fits, self._evidence, self._sums = fits, fits.gram, fits.sums
         self._tried = Counter(candidate.effect_id for candidate in candidates)
 
     def below(self, effect: Effect, known: int = 0) -> float:
-        """Return how small the chance of a candidate's weights has to be for it to be sure.
+        """Return the p-value below which a candidate is significant.
 
-        Each effect has an equal part of the false alarms, whose candidates share it, so that those
-        of many shapes do not hide the others (Bonferroni, weighted). What is told beside others may
-        be false as often as a part of all that is told (Benjamini and Hochberg, J. R. Stat. Soc. B
-        57(1), 1995).
+        Each effect has an equal part of the false alarm rate, which its candidates share. So
+        effects with many shapes do not mask the others (weighted Bonferroni). The rate increases
+        with the number of findings, of which a share may be false (Benjamini and Hochberg, J. R.
+        Stat. Soc. B 57(1), 1995).
 
         Args:
             effect: of the candidate.
-            known: how many others are told.
+            known: number of other findings.
         """
         rate = self._fits.thresholds.false_alarm_rate
         return (1 + known) * rate / (self._tried[effect.id] * len(self._tried))
 
     def share(self, base: Index, columns: Index) -> float:
-        """Return the largest share of a place's squares that columns take beyond a base."""
+        """Return the largest share of a residual's squares that regressors take beyond a base."""
         both = np.concatenate([base, columns])
         before = self._evidence.left(base, self._sums.weights(base))
         after = self._evidence.left(both, self._sums.weights(both))
         return max(1.0 - after[place] / before[place] for place in before if before[place] > 0.0)
 
     def counts(self, base: Index, hypothesis: Hypothesis, gain: Gain, known: int = 0) -> bool:
-        """Return whether a hypothesis is surely there beside a base and worth a word."""
+        """Return whether a hypothesis is significant beside a base and large enough to report.
+
+        Args:
+            base: indices of the regressors beside it.
+            hypothesis: tested.
+            gain: of the hypothesis beyond the base.
+            known: number of other findings.
+        """
         own, least = self._fits.own_columns(hypothesis), self._fits.thresholds.material_share
         return (
             gain.total > 0.0
@@ -59,7 +66,7 @@ class Significance:
 
     def _is_sure(self, base: Index, hypothesis: Hypothesis, known: int) -> bool:
         parts = [self._evidence.columns_of([c]) for c in hypothesis.candidates]
-        # An onset was chosen among the blocks.
+        # The onset was selected among all blocks: Bonferroni correction by their number.
         tried = self._sums.blocks if hypothesis.onset else 1
         sums = self._sums
         if hypothesis.common:

@@ -1,8 +1,8 @@
-"""How much of an effect there may be in all, at other time constants than the one that fits best.
+"""Upper limit of an effect's total size, over time constants other than the best-fitting one.
 
-What is one number in the catalogue may be many in a machine: a rope creeps with all time constants
-from milliseconds to days. A recording shows those near its periods, and takes what is slower for a
-part of them (Ferry, Viscoelastic Properties of Polymers, 3rd ed., 1980, ch. 3).
+The catalogue has one time constant where a machine may have many: a rope creeps with all time
+constants from milliseconds to days. A recording identifies those near its own periods and takes
+slower ones for a part of them (Ferry, Viscoelastic Properties of Polymers, 3rd ed., 1980, ch. 3).
 """
 
 from __future__ import annotations
@@ -26,10 +26,10 @@ Index = NDArray[np.intp]
 
 
 class _Form(NamedTuple):
-    """Two parts of an effect, fitted.
+    """Two parts of an effect, fitted together.
 
     Attributes:
-        left: Σ residual² of each block that was not fitted, (blocks,).
+        left: hold-out Σ residual² of each block, (blocks,).
         total: sum of the parts' weights.
         half: half the width of its 95 % interval.
     """
@@ -40,14 +40,14 @@ class _Form(NamedTuple):
 
 
 def told_within(effect: Effect, longest: float) -> Effect:
-    """Return the effect with the time constants alone of which a recording shows the end.
+    """Return the effect with only those time constants that the recording covers.
 
-    What takes longer grows as the tension's integral does, and so does all that gives way: a rope
-    that slips on its drum would be told as one that creeps for ever.
+    Slower relaxations grow as the integral of the tension, as does slip. A rope that slips on its
+    drum would be reported as one with unlimited creep.
 
     Args:
         effect: of the catalogue.
-        longest: what the recording lasts [s].
+        longest: duration of the recording [s].
     """
     name = effect.signature.spectrum
     if not name:
@@ -64,12 +64,12 @@ def told_within(effect: Effect, longest: float) -> Effect:
 
 
 def with_spectrum(effect: Effect, shape: Mapping[str, float], longest: float) -> Effect:
-    """Return the effect with a shape and, twice as fine as its grid, other values of its spectrum.
+    """Return the effect with a shape and a spectrum grid of twice the resolution.
 
     Args:
         effect: of the catalogue.
-        shape: that was found.
-        longest: what the recording can show [s].
+        shape: nonlinear parameters that were found.
+        longest: time constant that the recording can show [s].
     """
     grid = {name: {value} for name, value in shape.items()}
     if effect.signature.spectrum:
@@ -85,15 +85,15 @@ def most_in_all(
     others: Sequence[Candidate],
     thresholds: Thresholds = DEFAULT_THRESHOLDS,
 ) -> Array | None:
-    """Return how large the sum of two parts may be, of all pairs that explain as well as the best.
+    """Return the upper limit of the sum of two parts, over all pairs that fit as well as the best.
 
-    As the upper end of 95 % intervals of the weight of the columns, shape (1,). None where all
-    pairs have a part that is less than nothing.
+    It is the upper end of the 95 % interval of the regressors' weight, shape (1,). None where every
+    pair has a part with a negative weight.
 
     Args:
         gram: of columns about what was found, with the effect's spectrum.
         candidate: the part that was found.
-        others: what else was.
+        others: the other findings' candidates.
         thresholds: `tie_sigma`, and those of intervals.
     """
     sums, base = BlockRegression(gram, thresholds), gram.with_nuisance(others)
@@ -113,7 +113,7 @@ def _form(sums: BlockRegression, base: Index, parts: Index) -> _Form | None:
     weights = sums.weights(both)[len(base) :]
     if np.any(weights < 0.0):
         return None
-    # As differences from the last, whose weight is then that of the sum.
+    # As differences from the last part, whose weight is then the sum's.
     turn = np.eye(len(parts))
     turn[-1, :-1] = -1.0
     turned, beside, own = sums.combined(base, parts, turn)
@@ -122,7 +122,7 @@ def _form(sums: BlockRegression, base: Index, parts: Index) -> _Form | None:
 
 
 def _spectrum(gram: BlockGram, candidate: Candidate) -> list[Candidate]:
-    """Return the candidates of one effect on one element, of all shapes that there are."""
+    """Return the candidates of one effect on one element, of all available shapes."""
     own = candidate.effect_id, candidate.element
     candidates = (term for term in gram.terms if isinstance(term, Candidate))
     return [c for c in candidates if (c.effect_id, c.element) == own]

@@ -1,4 +1,4 @@
-"""The report page of a diagnosis: verdict first, then where, why, how surely and what next."""
+"""The report page of a diagnosis: verdict, location, evidence, confidence and next experiments."""
 
 from __future__ import annotations
 
@@ -298,7 +298,7 @@ def _simulated(found: Diagnosis, data: dict[str, Any]) -> str:
 
 
 def _limits(found: Diagnosis) -> str:
-    """Return from which size on effects would have been told, over their elements."""
+    """Return the detection limits of effects, as the range over their elements."""
     sizes: dict[tuple[str, str, str], list[float]] = {}
     for limit in found.limits:
         if limit.possible:

@@ -91,7 +91,7 @@ def driver_figure(curve: Curve, name: str) -> go.Figure:
 
 
 def overlay_figure(curve: Curve) -> go.Figure:
-    """Return what was measured with what the model says of it, and the residuals, over time."""
+    """Return the measured and modelled quantity, and the residuals, over time."""
     figure = make_subplots(rows=2, cols=1, shared_xaxes=True, vertical_spacing=0.06)
     model, improved = curve.measured - curve.before, curve.measured - curve.after
     lines = [

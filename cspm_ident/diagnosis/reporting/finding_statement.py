@@ -1,4 +1,4 @@
-"""What a diagnosis says of one finding, in sentences that a person can act on."""
+"""The statement of one finding, in sentences for the report."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ _FAINT = " What was not searched moves so little that it shows little of it."
 
 
 def statement_of(diagnosis: Diagnosis, finding: Finding) -> str:
-    """Return what has what, how much, since when, where, and how far it improves the model."""
+    """Return a finding's elements, effect, size, onset, region and improvement, in sentences."""
     effect, region = finding.hypothesis.effect, finding.region
     doubt = _FAINT if finding.is_faint else ""
     doubt += _DOUBT if finding.is_doubtful else ""
@@ -34,7 +34,7 @@ def statement_of(diagnosis: Diagnosis, finding: Finding) -> str:
 
 
 def _subject(effect: Effect, elements: Sequence[str]) -> str:
-    """Return whose fault it is, and that it has something."""
+    """Return the faulty elements as the subject of a sentence, with its verb."""
     many = len(elements) > 1
     verb = "have" if many else "has"
     if effect.acts_on is Elements.CELLS:
@@ -56,7 +56,7 @@ def _difference(effect: Effect) -> str:
 
 
 def _sizes(finding: Finding) -> str:
-    """Return the parameters of every element, once where all have the same."""
+    """Return the parameters of every element, once where they are equal."""
     reported = {own.candidate.element: _size(finding, own) for own in finding.coefficients}
     if len(set(reported.values())) == 1:
         return next(iter(reported.values()))
@@ -64,9 +64,9 @@ def _sizes(finding: Finding) -> str:
 
 
 def _size(finding: Finding, own: Coefficients) -> str:
-    """Return the parameters of one element, of those searched on a grid only where all are.
+    """Return the parameters of one element; those searched on a grid only if there are no others.
 
-    Of several those that may as well be nothing are listed without a number.
+    Parameters whose interval contains the value without the effect are listed without a number.
     """
     effect, numbers = own.candidate.effect, finding.parameters_on(own)
     known = [n for n in numbers if n.low < n.high] or numbers
@@ -82,33 +82,33 @@ def _size(finding: Finding, own: Coefficients) -> str:
 
 
 def _may_be_absent(effect: Effect, number: Parameter) -> bool:
-    """Return whether a parameter's interval holds the value at which it does nothing."""
+    """Return whether a parameter's interval contains its value without the effect."""
     (absent,) = (p.absent for p in effect.parameters if p.name == number.name)
     return absent is not None and number.low <= absent <= number.high
 
 
 def _name(effect: Effect, number: Parameter) -> str:
-    """Return a parameter's name; of one that is added to the file's number, that it is."""
+    """Return a parameter's name, marked where it is an offset from the file's value."""
     (absent,) = (p.absent for p in effect.parameters if p.name == number.name)
     added = effect.physics.alter is not None and absent == 0.0
     return f"{number.name.replace('_', ' ')}{' off by' if added else ''}"
 
 
 def _since(finding: Finding) -> str:
-    """Return when it began, where a beginning was looked for."""
+    """Return the onset in words; empty for a parameter of the file without onset."""
     onset: Onset | None = finding.onset
     if onset is not None:
         return f" It begins at {onset.time:.1f} s ({onset.low:.1f} to {onset.high:.1f} s)."
     block = finding.hypothesis.onset
     if block:
         return f" It begins with block {block} of the recordings."
-    # A number of the file is wrong all the time: no beginning is looked for.
+    # A parameter of the file is wrong all the time, so no onset is searched.
     number_of_file = finding.hypothesis.effect.physics.alter is not None
     return "" if number_of_file else " It is there from the start."
 
 
 def _elsewhere(diagnosis: Diagnosis, finding: Finding) -> str:
-    """Return that no other element has it, where at least as much of it would have been told."""
+    """Return that no other element has the effect, where the same size was detectable on all."""
     effect = finding.hypothesis.effect
     if effect.block not in (Block.WINCH, Block.CABLE) or len(effect.linear) != 1:
         return ""
@@ -131,7 +131,7 @@ def _elsewhere(diagnosis: Diagnosis, finding: Finding) -> str:
 
 
 def _suspected(diagnosis: Diagnosis, effect: Effect) -> set[str]:
-    """Return the elements on which an effect was found, or explains what was found as well."""
+    """Return the elements on which an effect is a finding or an alternative of one."""
     hypotheses = [
         each
         for finding in diagnosis.reported
@@ -141,7 +141,7 @@ def _suspected(diagnosis: Diagnosis, effect: Effect) -> set[str]:
 
 
 def _improvement(diagnosis: Diagnosis, finding: Finding) -> str:
-    """Return what it does to held-out data, in its own residual and simulated."""
+    """Return the change of the held-out error, in the finding's own residual and simulated."""
     best = max(_concerned(diagnosis, finding), key=lambda fit: fit.before / max(fit.after, 1e-300))
     noise, limits = "at the noise floor", diagnosis.thresholds
     if best.after > limits.noise_floor_ratio * best.noise:
@@ -176,7 +176,7 @@ def _simulated(improvement: Improvement | None) -> str:
 
 
 def region_words(region: Region) -> str:
-    """Return where a finding shows."""
+    """Return the region in which a finding shows, in words."""
     signal, unit = region.driver.rstrip("]").split(" [")
     return (
         f"{signal} is {region.low:.3g} to {region.high:.3g} {unit}: {100 * region.held:.0f} % of"
@@ -186,7 +186,7 @@ def region_words(region: Region) -> str:
 
 
 def _concerned(diagnosis: Diagnosis, finding: Finding) -> Sequence[HeldOut]:
-    """Return the residuals of a finding's own elements that it changes, else all that it may."""
+    """Return the residuals of a finding's own elements that improve, else all it may affect."""
     effect, elements = finding.hypothesis.effect, finding.elements
     signature = effect.signature
     places = {r.channel for r in (signature.regression, *signature.partners)}

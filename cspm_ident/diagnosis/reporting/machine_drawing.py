@@ -21,7 +21,7 @@ _WIDTH, _HEIGHT, _EDGE = 480.0, 460.0, 36.0
 _NAMES, _LINE = 250.0, 26.0
 # Oblique: depth y runs up and to the right at half its length.
 _DEPTH = np.array([0.40, -0.30])
-# A winch without a cable has no place; such winches stand in a row this far apart [m].
+# Distance of winches without a cable, which have no position and are drawn in a row [m].
 _APART_M = 0.5
 # Of a drawn cable's length: where its load cell is.
 _CELL_SHARE = 0.15

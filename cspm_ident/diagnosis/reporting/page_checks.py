@@ -1,4 +1,4 @@
-"""Tables of the report page that check what was recorded: its energy, and its controllers."""
+"""Tables of the report page that check the recordings: energy balance and controller parity."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ from cspm_ident.offline_page import table_html
 
 
 def energy_table(found: Diagnosis) -> str:
-    """Return the power that every residual stands for, as HTML; empty without any."""
+    """Return the mean power of every residual as an HTML table; empty without any."""
     heads = ("residual", "before [W]", "after [W]", "95 % interval [W]", "what is left")
     rows = []
     for power in lost_powers(found.curves):
@@ -33,10 +33,10 @@ def _takes_or_gives(power: Power) -> str:
 
 
 def controllers_table(data: dict[str, Any]) -> str:
-    """Return what controllers make of the recorded measurements, as HTML; empty without any.
+    """Return recorded commands against the controllers' own, as HTML; empty without any.
 
     Args:
-        data: as `diagnosis.json` has it, with `controllers` where they could be stepped.
+        data: contents of `diagnosis.json`, with `controllers` where they could be stepped.
     """
     rows = [
         (

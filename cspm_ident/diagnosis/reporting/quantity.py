@@ -1,14 +1,14 @@
-"""A quantity with its interval, as an engineer writes it."""
+"""A quantity with its interval and unit, as text."""
 
 from __future__ import annotations
 
 from math import floor, isfinite, log10
 
-# Below it a quantity gets a prefix.
+# Smaller quantities get a prefix.
 _SMALL = 0.1
-# Powers of 1000; a unit of kilograms is told in grams before it gets a prefix.
+# Powers of 1000; kilograms are converted to grams before they get a prefix.
 _PREFIXES = ("", "m", "µ", "n")
-# Of an interval's width: ends that differ more in their distance are told apart.
+# Share of an interval's width by which an interval is asymmetric, and both ends are given.
 _ASLANT = 0.1
 
 
@@ -18,7 +18,7 @@ def amount_words(value: float, unit: str, ends: tuple[float, float] | None = Non
     Args:
         value: in `unit`.
         unit: SI; `1` for none.
-        ends: of its interval; told as `30.9 (30.2 to 34) mN·m` where they lie aslant.
+        ends: of its interval; an asymmetric one is given as `30.9 (30.2 to 34) mN·m`.
     """
     low, high = ends or (value, value)
     scale, name = _scaled(max(abs(value), abs(low), abs(high)), unit)
@@ -34,7 +34,7 @@ def amount_words(value: float, unit: str, ends: tuple[float, float] | None = Non
 
 
 def _scaled(size: float, unit: str) -> tuple[float, str]:
-    """Return the factor that gives a quantity of this size its usual prefix, and the unit then."""
+    """Return the factor for the usual prefix of a quantity of this size, and the prefixed unit."""
     if unit == "1" or not 0.0 < size < _SMALL or not isfinite(size):
         return 1.0, "" if unit == "1" else f" {unit}"
     base, scale = unit, 1.0

@@ -1,4 +1,4 @@
-"""What a diagnosis says, in words that a person can act on."""
+"""Statements of a diagnosis on unexplained residuals, tensions and spectral lines."""
 
 from __future__ import annotations
 
@@ -22,7 +22,7 @@ Array = NDArray[np.float64]
 
 
 def unknown_statement(diagnosis: Diagnosis, unexplained: Unexplained) -> str:
-    """Return one sentence on something that is missing and that no effect explains."""
+    """Return one sentence on a residual that no effect of the catalogue explains."""
     driver, _, share, shape = unexplained
     assert shape is not None
     formula = formula_of(driver, shape, diagnosis.thresholds)
@@ -43,13 +43,13 @@ def unknown_statement(diagnosis: Diagnosis, unexplained: Unexplained) -> str:
 
 
 def _unit_in(driver: Driver) -> str:
-    """Return the unit of what a driver adds; those of the bar's wrench name its component."""
+    """Return the unit of a driver's free function; for the wrench it depends on the component."""
     turns = any(dof in driver.signal for dof in DOFS[3:])
     return _UNITS.get(driver.place.channel, "N·m" if turns else "N")
 
 
 def _by_direction(driver: Driver, shape: Shape, thresholds: Thresholds) -> str:
-    """Return what an even function of a shaft's speed means: friction itself is odd."""
+    """Return the meaning of an even function of a shaft's speed, as friction itself is odd."""
     of_speed = driver.place.channel is Channel.SHAFT and driver.signal.startswith("speed ")
     if not of_speed or not is_even(shape.knots, shape.values, thresholds):
         return ""
@@ -57,7 +57,7 @@ def _by_direction(driver: Driver, shape: Shape, thresholds: Thresholds) -> str:
 
 
 def tension_statement(diagnosis: Diagnosis) -> str | None:
-    """Return where tensions come from if no load cell measured them, else None."""
+    """Return a note on virtual load cells if no load cell was recorded, else None."""
     measured = all(m.tension is not None for m in diagnosis.searched)
     if measured or not any(place.channel is Channel.TENSION for place in diagnosis.places):
         return None
@@ -65,7 +65,7 @@ def tension_statement(diagnosis: Diagnosis) -> str | None:
 
 
 def line_statement(line: Line) -> str:
-    """Return a periodic part of a residual, or what alternates in a reading, in words."""
+    """Return a spectral line of a residual, or an aliased tension, in words."""
     if line.alternates:
         return (
             f"The tension of cable {line.place.element} alternates from one reading to the next, by"
@@ -90,7 +90,7 @@ def line_statement(line: Line) -> str:
 def formula_of(
     driver: Driver, shape: Shape, thresholds: Thresholds = DEFAULT_THRESHOLDS
 ) -> str | None:
-    """Return a formula that a free function of a signal follows, if a simple one does."""
+    """Return a simple formula that fits a free function of a signal, or None."""
     name = driver.signal.split(" [")[0]
     return sketch(shape.knots, shape.values, name, thresholds)
 
@@ -101,12 +101,12 @@ def channel_of(fit: HeldOut | Power) -> str:
 
 
 def drive_of(fit: SimulatedFit) -> str:
-    """Return the public name of what drove a simulation."""
+    """Return the public name of a simulation's input."""
     return "torque" if fit.output.drive is Input.SHAFT else fit.output.drive.value
 
 
 def unit_of(fit: HeldOut) -> str:
-    """Return the unit of a residual; none where channels of several units were put together."""
+    """Return the unit of a residual; its noise where channels of several units are combined."""
     return _UNITS.get(fit.place.channel, "times its noise")
 
 

@@ -1,4 +1,4 @@
-"""What a diagnosis says in one word, and as `diagnosis.json`."""
+"""The verdict of a diagnosis, and its contents as `diagnosis.json`."""
 
 from __future__ import annotations
 
@@ -33,7 +33,7 @@ UNKNOWN = "unknown"
 
 
 class Verdict(Enum):
-    """What recordings say of a model, as the contract names it."""
+    """Result of comparing recordings with a model, with the names of the contract."""
 
     CONSISTENT = "consistent"
     EFFECT = "effect"
@@ -55,7 +55,7 @@ SENTENCES = {
 
 
 def verdict_of(diagnosis: Diagnosis) -> Verdict:
-    """Return the verdict in one word; findings that are doubtful count for nothing."""
+    """Return the verdict; doubtful findings are ignored."""
     certain = [each for each in diagnosis.reported if not each.is_doubtful]
     if not certain:
         if diagnosis.unexplained or diagnosis.lines:
@@ -69,9 +69,9 @@ def verdict_of(diagnosis: Diagnosis) -> Verdict:
 
 
 def probability_of(finding: Finding, thresholds: Thresholds = DEFAULT_THRESHOLDS) -> float:
-    """Return how probable a finding is, beside what explains the same and what nobody thought of.
+    """Return the probability of a finding against its alternatives and causes not considered.
 
-    A rival's odds are those of a normal deviate of as many standard deviations as it lies behind.
+    A rival's odds are exp(−k²/2), where it lies k standard deviations behind the finding.
     """
     trusted = thresholds.trusted_probability
     if finding.is_doubtful:
@@ -98,11 +98,11 @@ _DRIVES = {
 
 
 def diagnosis_data(diagnosis: Diagnosis, testbed: Path | None = None) -> dict[str, Any]:
-    """Return a diagnosis as `diagnosis.json` has it.
+    """Return the contents of `diagnosis.json`.
 
     Args:
-        diagnosis: what was found.
-        testbed: file of the machine as it is believed to be; None: the first recording's own.
+        diagnosis: the diagnosis.
+        testbed: test-bed file of the assumed machine; None for the first recording's own.
     """
     first = diagnosis.searched[0]
     roles = [("search", m) for m in diagnosis.searched]
@@ -129,19 +129,19 @@ def diagnosis_data(diagnosis: Diagnosis, testbed: Path | None = None) -> dict[st
 
 
 def named_in(data: Mapping[str, Any]) -> list[dict[str, Any]]:
-    """Return those findings of `diagnosis.json` that name an effect, the first first."""
+    """Return the findings of `diagnosis.json` that name an effect, in their order."""
     return [finding for finding in data["findings"] if finding["effect"] != UNKNOWN]
 
 
 def _findings(diagnosis: Diagnosis) -> list[dict[str, Any]]:
-    """Return what was found, the most important first.
+    """Return the findings, the most important first.
 
-    What is doubtful does not come first: it stands behind the unknown that makes it so, unless
-    something sure is told before and the unknown is the lesser.
+    A doubtful finding never comes first. It follows the unexplained residual that makes it
+    doubtful, unless a certain finding precedes it and the unexplained residual is smaller.
     """
     found = diagnosis.reported
     named = [_finding(diagnosis, each) for each in found]
-    # They are in the order of their gains.
+    # Findings are in descending order of gain.
     ahead = next((k for k, each in enumerate(found) if each.is_doubtful), len(found))
     if ahead:
         most = max((each.gain.total for each in diagnosis.unexplained), default=0.0)
@@ -269,9 +269,9 @@ def _fit(
     retuned: float,
     floor: float,
 ) -> dict[str, Any]:
-    """Return one entry; all RMS, told as shares of the measured quantity's spread.
+    """Return one entry, with every RMS as a share of the measured quantity's standard deviation.
 
-    Of a quantity that stands still, as shares of its noise.
+    Where the quantity is constant, they are shares of its noise.
     """
     spread = max(measured, floor, 1e-300)
     before, after, retuned, floor = (each / spread for each in (before, after, retuned, floor))
@@ -290,5 +290,5 @@ def _fit(
 
 
 def _vaf(share: float) -> float:
-    """Return the variance accounted for [%] of an error that is a share of the spread."""
+    """Return the variance accounted for [%] from an error relative to the standard deviation."""
     return 100.0 * (1.0 - min(1.0, share) ** 2)

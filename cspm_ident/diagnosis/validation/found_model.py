@@ -1,4 +1,4 @@
-"""What was found as a model: its parameters, its beginnings, and what simulation says of it."""
+"""The findings as a model: parameters, onsets, and validation by simulation."""
 
 from __future__ import annotations
 
@@ -50,16 +50,16 @@ Parts = Sequence[Sequence[Equation]]
 
 
 class Data(NamedTuple):
-    """What a model is fitted to and judged by.
+    """Data for fitting and validating a model.
 
     Attributes:
         searched: the recordings, of which `searched_part` was searched.
-        searched_part: cuts their equations.
-        baselines: simulations of what was not searched.
-        rows: of what was searched, in units of their noise.
-        noise: of each residual.
+        searched_part: cuts their equations to that part.
+        baselines: simulations of the held-out data.
+        rows: equations of the searched data, in units of their noise.
+        noise: noise of each residual.
         block: length of the blocks [s].
-        assumed: about what they were taken to first order.
+        assumed: weights about which the equations are linearised.
     """
 
     searched: Sequence[Measurement]
@@ -72,16 +72,16 @@ class Data(NamedTuple):
 
 
 class Assessment(NamedTuple):
-    """A finding in a model, and what speaks against it.
+    """A finding in a model, with the reasons against it.
 
     Attributes:
         finding: with its coefficients, onset, and improvement of simulations; negligible where it
             may be no larger than in a healthy machine.
-        is_possible: whether a machine can have it, it is seen to begin where it does not act all
-            the time, and its memory is seen to end.
+        is_possible: whether a machine can have it, and data show its onset, if it has one, and the
+            end of its memory.
         is_insignificant: whether all its coefficients may be zero, and it is not negligible.
-        needed: below which share of its value without the finding a simulated error has to fall.
-        degradation: squares by which it raises held-out residuals; 0 where it does not.
+        needed: ratio of simulated errors with and without the finding that it has to reach.
+        degradation: squares by which it raises hold-out residuals; 0 where it does not.
     """
 
     finding: Finding
@@ -92,7 +92,7 @@ class Assessment(NamedTuple):
 
     @property
     def excess(self) -> float:
-        """By how much the simulated error is larger than needed; −∞ where none depends on it."""
+        """Ratio of simulated errors less the needed one; −∞ where no simulation depends on it."""
         gained = self.finding.improvement
         return -np.inf if gained is None else gained.with_it / gained.without - self.needed
 
@@ -102,12 +102,12 @@ class Assessment(NamedTuple):
 
 
 class Model(NamedTuple):
-    """What was found as a model.
+    """The findings as a model.
 
     Attributes:
-        assessments: of the findings, in their order.
-        weights: of all candidates, with half the widths of their 95 % intervals.
-        simulated: held-out data with it, quantity by quantity; empty if a finding is untenable.
+        assessments: those of the findings, in their order.
+        weights: those of all candidates, with half widths of their 95 % intervals.
+        simulated: fits of the held-out data by quantity; empty if a finding is untenable.
     """
 
     assessments: tuple[Assessment, ...]
@@ -116,14 +116,14 @@ class Model(NamedTuple):
 
     @property
     def findings(self) -> tuple[Finding, ...]:
-        """What it consists of."""
+        """The findings of the model, assessed."""
         return tuple(each.finding for each in self.assessments)
 
     @property
     def untenable(self) -> list[Finding]:
-        """What goes whatever held-out data show: what is impossible, else the least significant.
+        """Rejected without held-out data: impossible findings, else the last insignificant one.
 
-        With any of them there is no simulation.
+        A model with any of them is not simulated.
         """
         impossible = [each for each in self.assessments if not each.is_possible]
         if impossible:
@@ -133,7 +133,7 @@ class Model(NamedTuple):
 
     @property
     def useless(self) -> list[Finding]:
-        """What goes: what is untenable, else what degrades most, else what improves nothing."""
+        """Rejected: untenable findings, else the most degrading one, else one of no improvement."""
         if self.untenable or not self.assessments:
             return self.untenable
         worst = max(self.assessments, key=lambda each: each.degradation)
@@ -144,12 +144,12 @@ class Model(NamedTuple):
 
 
 def modelled(search: Search, kept: Sequence[Finding], data: Data) -> Model:
-    """Return the model that findings make.
+    """Return the model of the findings, fitted and validated.
 
     Args:
-        search: in which they were found.
+        search: the search that found them.
         kept: the findings.
-        data: to which parameters are fitted and by which the model is judged.
+        data: for fitting the parameters and validating the model.
     """
     limits = search.thresholds
     onsets = _onsets(kept, steady(data.rows), search.gram.times, limits)
@@ -179,7 +179,7 @@ def modelled(search: Search, kept: Sequence[Finding], data: Data) -> Model:
 def _fitted(
     search: Search, kept: Sequence[Finding], data: Data, since: float
 ) -> tuple[Weights, dict[Candidate, Array]]:
-    """Return weights from some instant [s] on, and upper ends over all time constants."""
+    """Return weights fitted from a time [s] on, and upper ends over all time constants."""
 
     def cut(parts: Parts) -> Parts:
         return [[e.within(since, np.inf) for e in part] for part in data.searched_part(parts)]
@@ -197,7 +197,7 @@ def _may_be_negligible(finding: Finding, weights: Weights) -> bool:
 def _is_possible(
     hypothesis: Hypothesis, own: Weights, measured: Measurement, thresholds: Thresholds
 ) -> bool:
-    """Return whether a machine can have such weights, and data show where they begin and end."""
+    """Return whether a machine can have these weights, and data show their onset and end."""
     return (
         is_possible(measured, {c: weights for c, (weights, _) in own.items()})
         and is_seen_to_begin(hypothesis, own)
@@ -208,9 +208,9 @@ def _is_possible(
 def _simulated(
     assessments: Sequence[Assessment], weights: Weights, data: Data, thresholds: Thresholds
 ) -> Model:
-    """Return a model of tenable findings with what simulations of held-out data show of each.
+    """Return a model of tenable findings, each validated by simulations of held-out data.
 
-    What a healthy machine has too is too small to improve any, and there nevertheless.
+    Negligible findings are exempt: a healthy machine has them too, too small to improve any.
     """
     values = {c: w for c, (w, _) in weights.items()}
     simulated = simulate_held_out(data.baselines, values)
@@ -233,10 +233,10 @@ def _simulated(
 
 
 def _is_insignificant(hypothesis: Hypothesis, weights: Weights) -> bool:
-    """Return whether all numbers of a finding may be zero, together with what else was found.
+    """Return whether all coefficients of a finding may be zero beside the other findings.
 
-    What saturates and has hardly acted is there, though nothing is known of where it ends; and a
-    reading's zero is the mean of what drifts in it, which is there as well.
+    Two kinds are exempt. A saturating effect that has hardly acted is present, though its limit is
+    unknown. A sensor's offset is the mean of its drift, which is present as well.
     """
     effect, own = hypothesis.effect, {c: weights[c] for c in members_of(weights, hypothesis)}
     drifts = effect.physics.sense is not None and is_constant(effect)
@@ -244,11 +244,11 @@ def _is_insignificant(hypothesis: Hypothesis, weights: Weights) -> bool:
 
 
 def _needed(finding: Finding, thresholds: Thresholds) -> float:
-    """Return below which share of its value without a finding a simulated error has to fall.
+    """Return the ratio of simulated errors with and without a finding that it has to reach.
 
-    A simulation from motor angles hardly feels a number of the file that is off by little, and it
-    may be ruled by something else that is not right, as where an open loop resonates: what takes
-    most of a residual need not show there as well.
+    A simulation from motor angles is insensitive to small parameter errors. Another model-form
+    error may dominate it, such as an open loop that resonates. A finding that explains most of a
+    residual therefore need not improve a simulation.
     """
     if finding.holdout is HoldOut.DOMINANT:
         return np.inf
@@ -257,7 +257,7 @@ def _needed(finding: Finding, thresholds: Thresholds) -> float:
 
 
 def _allowed(measured: Measurement, candidate: Candidate, weights: Array, half: Array) -> Array:
-    """Return weights moved to what catalogue and machine allow, where chance took them off."""
+    """Return weights moved within the limits of catalogue and machine, as far as noise explains."""
     return nearest_possible(measured, candidate, bounded(candidate, weights, half), half)
 
 
@@ -268,7 +268,7 @@ def _parameters(
     cut: Cut,
     rows: Parts,
 ) -> Weights:
-    """Return the weights of what was kept, refined where columns depend on them."""
+    """Return the weights of the kept findings, refined where regressors depend on them."""
     hypotheses = [each.hypothesis for each in kept]
     if any(needs_refining(hypothesis.effect) for hypothesis in hypotheses):
         given = data.noise, data.block, cut, data.assumed, search.thresholds
@@ -279,7 +279,7 @@ def _parameters(
 def _in_all(
     kept: Sequence[Finding], weights: Weights, data: Data, cut: Cut, thresholds: Thresholds
 ) -> dict[Candidate, Array]:
-    """Return how large findings may be that have parts with other time constants."""
+    """Return upper ends of findings that may have parts with other time constants."""
     hypotheses = [each.hypothesis for each in kept]
     given = data.noise, data.block, cut, data.assumed, thresholds
     return spectra(data.searched, hypotheses, weights, *given)
@@ -288,7 +288,7 @@ def _in_all(
 def _untrue(
     search: Search, kept: Sequence[Finding], found: Iterable[Candidate]
 ) -> dict[Candidate, float]:
-    """Return by what share of its amplitude each candidate is seen to be off, of final shapes."""
+    """Return each candidate's model-form error, relative to its amplitude, for final shapes."""
     hypotheses, final = [each.hypothesis for each in kept], list(found)
     shares: dict[Candidate, float] = {}
     for each in hypotheses:
@@ -301,7 +301,7 @@ def _untrue(
 def _onsets(
     kept: Sequence[Finding], rows: Parts, starts: Array, thresholds: Thresholds
 ) -> tuple[Onset | None, ...]:
-    """Return when each finding began; None where it acts all the time, or in which recording."""
+    """Return each finding's onset; None where it acts from the start or among recordings."""
     times = {
         c: float(starts[each.hypothesis.onset]) if each.hypothesis.onset else -np.inf
         for each in kept

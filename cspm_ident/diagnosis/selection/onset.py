@@ -1,4 +1,4 @@
-"""When an effect began: its block, and more closely than blocks tell."""
+"""Onset of an effect: its block, and its time with a finer resolution."""
 
 from __future__ import annotations
 
@@ -15,19 +15,19 @@ from cspm_ident.diagnosis.residuals.residual_equation import Equation
 from cspm_ident.diagnosis.thresholds import DEFAULT_THRESHOLDS, Thresholds
 
 Index = NDArray[np.intp]
-# Length of the blocks in which an onset is looked for more closely.
+# Length of the fine blocks that resolve an onset [s].
 FINE_S = 0.1
 
 
 def first_block(sums: BlockRegression, base: Index, own: Index) -> tuple[int, float]:
-    """Return the block from which on columns act, and what is left of all squares then.
+    """Return the first block in which columns act, and the sum of squared residuals for it.
 
-    The block is 0 unless a later one is surely better.
+    The block is 0 unless a later one gains more by the share `parsimony_gain_share`.
 
     Args:
-        sums: of all columns.
+        sums: the block regression of all columns.
         base: columns that act all the time.
-        own: those that may begin.
+        own: columns that may have an onset.
     """
     left = sums.left_from(base, own)[:-2]
     best = int(np.argmin(left))
@@ -45,17 +45,17 @@ def onset_of(
     high: float,
     thresholds: Thresholds = DEFAULT_THRESHOLDS,
 ) -> Onset:
-    """Return when an effect began.
+    """Return the onset of an effect with its interval [s].
 
-    The squared residual is looked at for every fine block that it may begin with; times at which it
-    exceeds the least by no more than it scatters are possible as well.
+    The squared residual is computed for an onset at every fine block. The interval contains all
+    times at which it exceeds its minimum by no more than its scatter allows.
 
     Args:
-        equations: one recording's, in units of their noise.
+        equations: those of one recording, in units of their noise.
         own: the effect on its elements.
-        others: everything else that was found, with when it began [s].
-        low: earliest time to look at [s].
-        high: latest.
+        others: all other fitted candidates, with their onsets [s].
+        low: earliest possible time [s].
+        high: latest possible time [s].
         thresholds: `onset_interval_sigma`.
     """
     terms = [*own, *others]

@@ -1,7 +1,7 @@
-"""Parameters of what was named, model and readings corrected for it and looked at again.
+"""Refined parameters of selected effects, fitted about a corrected model and measurement.
 
-Columns hold to first order about the described machine, and shapes come from a coarse grid. Both
-are mended in a few rounds in which only the named effects are fitted.
+Regressors hold to first order about the machine of the test-bed file, and nonlinear parameters
+come from a coarse grid. A few rounds that fit only the selected effects reduce both errors.
 """
 
 from __future__ import annotations
@@ -31,11 +31,11 @@ from cspm_sim.effects import Effect
 Array = NDArray[np.float64]
 Cut = Callable[[Sequence[Sequence[Equation]]], Sequence[Sequence[Equation]]]
 
-# Of correcting and fitting again.
+# Maximum number of rounds of correction and fit.
 _ROUNDS = 4
 # Grid steps are about a factor of three; each round halves the step in the logarithm.
 _FIRST_FACTOR = 1.7
-# Of half an interval: a smaller correction is the last.
+# Share of the half width of a 95 % interval: a smaller correction is the last one.
 _SETTLED = 0.02
 
 
@@ -48,15 +48,15 @@ def refine(
     assumed: Mapping[Candidate, Array] = MappingProxyType({}),
     thresholds: Thresholds = DEFAULT_THRESHOLDS,
 ) -> Weights:
-    """Return weights, with half the widths of their 95 % intervals, of candidates of better shapes.
+    """Return weights of candidates with refined shapes, and half widths of their 95 % intervals.
 
     Args:
         searched: the recordings.
-        hypotheses: what was named.
-        noise: of each residual, its unit.
+        hypotheses: the selected hypotheses.
+        noise: standard deviation of each residual's noise, which is its unit.
         block_s: length of the blocks [s].
-        cut: what of the equations was searched.
-        assumed: weights about which residuals are taken to first order.
+        cut: selects the part of the equations that was searched.
+        assumed: weights about which residuals are linearised.
         thresholds: of residuals and intervals.
     """
     candidates, common = parts_of(hypotheses)
@@ -73,7 +73,7 @@ def refine(
             values = {c: own for c, (own, _) in applied.items()}
             parts = cut(_about(searched, near, candidates, values, assumed, thresholds))
         except InputError:
-            # Such a machine cannot be; what was found before stays, with its interval.
+            # The corrected machine is impossible: keep the last weights and intervals.
             break
         gram = gather(in_noise(steady(parts), noise), block_s)
         shapes, found = _fitted(gram, shapes, wanted, common, thresholds)
@@ -98,17 +98,19 @@ def spectra(
     assumed: Mapping[Candidate, Array] = MappingProxyType({}),
     thresholds: Thresholds = DEFAULT_THRESHOLDS,
 ) -> dict[Candidate, Array]:
-    """Return how large effects that have a spectrum may be in all, where it can be told.
+    """Return upper ends of the total weights, over all time constants, of effects with a spectrum.
+
+    Candidates without a bound are left out.
 
     Args:
         searched: the recordings.
-        hypotheses: what was named, with the catalogue's grids.
-        found: what `refine` returns.
-        noise: as of `refine`.
-        block_s: likewise.
-        cut: likewise.
-        assumed: likewise.
-        thresholds: likewise, and `tie_sigma`.
+        hypotheses: the selected hypotheses, with the catalogue's grids.
+        found: the result of `refine`.
+        noise: as in `refine`.
+        block_s: as in `refine` [s].
+        cut: as in `refine`.
+        assumed: as in `refine`.
+        thresholds: as in `refine`, and `tie_sigma`.
     """
     wanted = [c for c in found if c.effect.signature.spectrum]
     if not wanted:
@@ -137,10 +139,10 @@ def _about(
     assumed: Mapping[Candidate, Array],
     thresholds: Thresholds,
 ) -> list[Sequence[Equation]]:
-    """Return the equations of machines and readings that are corrected.
+    """Return the equations of corrected measurements, one list per recording.
 
     Raises:
-        InputError: such a machine cannot be.
+        InputError: the corrected machine is impossible.
     """
     moved = [settled(with_found(m, applied)) for m in searched]
     about = {c: own for c, own in assumed.items() if not c.effect.is_correction}
@@ -151,7 +153,7 @@ def _about(
 
 
 def _is_settled(found: Weights) -> bool:
-    """Return whether corrections have become small against what is not known of them."""
+    """Return whether no shape is fitted and corrections are small against their 95 % intervals."""
     return all(
         not c.shape and np.all(np.abs(weights) <= _SETTLED * half)
         for c, (weights, half) in found.items()
@@ -160,14 +162,14 @@ def _is_settled(found: Weights) -> bool:
 
 
 def needs_refining(effect: Effect) -> bool:
-    """Return whether an effect's columns depend on its parameters, or on what is corrected."""
+    """Return whether an effect's columns depend on its parameters or on a correction."""
     return effect.is_correction or bool(effect.signature.nonlinear)
 
 
 def _unit_after(effect: Effect, applied: Array) -> Array:
-    """Return what one more unit of each weight is worth, some of it being applied already.
+    """Return the correction per unit of each further weight, beside the one already applied.
 
-    A factor of the file, or of a reading, multiplies what there is by now.
+    A factor of the test-bed file or of a reading multiplies the value corrected so far.
     """
     if effect.signature.coefficients:
         return np.ones_like(applied)
@@ -196,7 +198,7 @@ def _fitted(
     common: Collection[str],
     thresholds: Thresholds,
 ) -> tuple[dict[str, dict[str, float]], Weights]:
-    """Return the best shapes and the weights there; those of `common` effects are shared."""
+    """Return the best shapes and the weights there; elements of `common` effects share weights."""
     sums = BlockRegression(gram, thresholds)
     grids = {name: _shapes(gram, name) for name in shapes}
     best: tuple[float, dict[str, tuple[tuple[str, float], ...]]] | None = None
@@ -216,9 +218,10 @@ def _fitted(
 
 
 def _turns(gram: BlockGram, weights: Mapping[Candidate, Array]) -> Array:
-    """Return how what was found changes with the logarithm of each shape, (width, shapes).
+    """Return derivatives of the fitted model with respect to each shape's logarithm.
 
-    As a combination of columns. A weight is no surer than its shape lets it be.
+    The result combines columns and has the shape (width, shapes). It widens the interval of a
+    weight by the uncertainty of its shape.
     """
     turns: dict[tuple[str, str], Array] = {}
     for candidate, own in weights.items():
@@ -234,7 +237,7 @@ def _turns(gram: BlockGram, weights: Mapping[Candidate, Array]) -> Array:
 
 
 def _ends(gram: BlockGram, candidate: Candidate, name: str) -> list[Candidate]:
-    """Return the candidates that differ in one number of the shape only, ascending in it."""
+    """Return the candidates that differ in one nonlinear parameter only, in ascending order."""
     kept = {n: value for n, value in candidate.shape if n != name}
     alike = [
         term

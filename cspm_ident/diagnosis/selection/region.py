@@ -1,4 +1,4 @@
-"""Where a finding shows: of which driver's values, and how little of the data has them."""
+"""Region of a finding: the range of a signal that holds most of its gain."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ from cspm_ident.diagnosis.thresholds import DEFAULT_THRESHOLDS, Thresholds
 
 Array = NDArray[np.float64]
 
-# Of a signal's values, each of equally many.
+# Number of bins of a signal, each with equally many values.
 _BINS = 50
 
 
@@ -25,12 +25,14 @@ def region_of(
     weights: Mapping[Candidate, Array],
     thresholds: Thresholds = DEFAULT_THRESHOLDS,
 ) -> Region | None:
-    """Return the narrowest region that holds most of a finding; None where it shows everywhere.
+    """Return the narrowest region that holds most of a finding's gain.
+
+    The result is None where the gain is spread over the whole range.
 
     Args:
-        parts: equations of what was searched, in units of their noise.
+        parts: equations of the searched data, in units of their noise.
         own: the finding's candidates.
-        weights: of all that was found.
+        weights: of all findings.
         thresholds: those of regions.
     """
     gains: dict[str, list[Array]] = {}
@@ -41,7 +43,7 @@ def region_of(
             if taken is None:
                 continue
             for name, signal in equation.signals.items():
-                # When it begins is told apart; times would tell when the machine moved.
+                # The onset is reported separately; time would only show when the machine moved.
                 if Driver(equation.place, name).of_time:
                     continue
                 gains.setdefault(name, []).append(taken)
@@ -64,7 +66,10 @@ def region_of(
 def _taken(
     equation: Equation, own: Sequence[Candidate], weights: Mapping[Candidate, Array]
 ) -> Array | None:
-    """Return by how much a finding lowers each row's squared residual, (k,)."""
+    """Return the reduction of each row's squared residual by a finding, (k,).
+
+    The result is None if the finding does not act in the equation.
+    """
     added = [equation.columns[c] @ weights[c] for c in own if c in equation.columns]
     if not added:
         return None
@@ -75,7 +80,10 @@ def _taken(
 
 
 def _narrowest(driver: str, values: Array, gains: Array, thresholds: Thresholds) -> Region | None:
-    """Return the fewest neighbouring bins of a signal that hold most of the gain."""
+    """Return the fewest adjacent bins of a signal that hold most of the gain, or None.
+
+    It is None if the loss in other bins is too large a share of the gain.
+    """
     order = np.array_split(np.argsort(values), _BINS)
     sums = np.array([gains[rows].sum() for rows in order])
     held = np.concatenate([[0.0], np.cumsum(sums)])

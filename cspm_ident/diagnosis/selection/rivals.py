@@ -1,4 +1,4 @@
-"""Other hypotheses that explain the same as one."""
+"""Rivals: other hypotheses that explain the same as a given one."""
 
 from __future__ import annotations
 
@@ -23,10 +23,18 @@ def rivals_of(
     hypothesis: Hypothesis,
     free: Sequence[Candidate],
 ) -> list[Hypothesis]:
-    """Return the best point of every other effect that explains the same.
+    """Return the best shape of every other effect that explains the same as a hypothesis.
 
-    On the same elements, or where it acts on others on the best one and on all, with the same
-    numbers if one system reads them; and the same effect on another single element.
+    Rivals act on the same elements. An effect on other elements is tried on its best element and on
+    all of them, with common parameters if one system reads them. For a single element, the same
+    effect on each other element is a rival too.
+
+    Args:
+        gram: Gram matrices of all columns.
+        sums: the block regression of its columns.
+        base: columns that are fitted beside.
+        hypothesis: the hypothesis to replace.
+        free: candidates that may be added.
     """
     elements = set(hypothesis.elements)
     groups: dict[tuple[str, tuple[tuple[str, float], ...]], list[Candidate]] = {}

@@ -1,4 +1,4 @@
-"""The effects that are worth a closer look."""
+"""Screening: the effects that a full search tests."""
 
 from __future__ import annotations
 
@@ -13,7 +13,13 @@ Array = NDArray[np.float64]
 
 
 def screened(candidates: Sequence[Candidate], gains: Array, most: int) -> list[Candidate]:
-    """Return the best point and element of each effect, of the `most` effects that gain most."""
+    """Return the best shape and element of each of the `most` effects of largest gain.
+
+    Args:
+        candidates: all candidates.
+        gains: of each candidate, (candidates,).
+        most: maximum number of effects.
+    """
     best: dict[str, tuple[float, Candidate]] = {}
     for candidate, gain in zip(candidates, gains, strict=True):
         if candidate.effect_id not in best or gain > best[candidate.effect_id][0]:

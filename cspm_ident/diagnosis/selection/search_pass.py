@@ -1,4 +1,4 @@
-"""Residuals and the search through them, about the best of what is known of drawn tensions."""
+"""Search passes: residuals and the search in them, about the best virtual load cell."""
 
 from __future__ import annotations
 
@@ -29,34 +29,34 @@ Array = NDArray[np.float64]
 Progress = Callable[[str], None]
 Parts = Sequence[Sequence[Equation]]
 
-# Below which differences of rows have no median to speak of.
+# An equation needs more rows for a usable median of their differences.
 _FEWEST_ROWS = 8
 
 
 class Recordings(NamedTuple):
-    """In which to look, and on which to judge what was found; see `diagnose`."""
+    """Recordings to search, and recordings for the hold-out test; see `diagnose`."""
 
     searched: Sequence[Measurement]
     held_out: Sequence[Measurement]
 
     @property
     def are_drawn(self) -> bool:
-        """Whether torques tell tensions that no load cell measured."""
+        """Whether a recording has virtual load cells: tensions estimated from winch torques."""
         return any(m.tension is None and m.machine.bar is not None for m in self.searched)
 
 
 class SearchPass(NamedTuple):
-    """A search, and what it was done in.
+    """A search with its input.
 
     Attributes:
-        search_parts: equations of what was searched.
-        judge_parts: of what was not.
-        hums: lines in what was searched of each recording.
-        noise: of each residual, its unit.
+        search_parts: equations of the searched data.
+        judge_parts: equations of the held-out data.
+        hums: spectral lines in the searched part of each recording.
+        noise: standard deviation of each residual's noise, which is its unit.
         block: length of the blocks [s].
-        search: through the residuals.
+        search: the search in these residuals.
         knots: of the free functions.
-        assumed: weights about which residuals were taken to first order.
+        assumed: weights about which residuals were linearised.
     """
 
     search_parts: Parts
@@ -75,27 +75,28 @@ def searched_for(
     progress: Progress,
     thresholds: Thresholds = DEFAULT_THRESHOLDS,
 ) -> tuple[SearchPass, SearchResult]:
-    """Return what a search finds, and the search.
+    """Return the last search pass and its result.
 
-    The law of a cable holds to first order about its tension. One that was drawn from a torque has
-    the winch's friction in it: what explains most is looked for first, and if it is a winch's, laws
-    are taken about the tensions without it; so again if more was found of winches in the end.
+    The law of a cable is linearised about its tension. A virtual load cell's tension contains the
+    winch's friction. If the effect of largest gain is a winch effect, a second pass linearises
+    about the tension without it. If the search then finds further winch effects, one more pass
+    follows.
 
     Args:
-        recordings: what to look in.
-        effects: that are looked for.
-        progress: called with what is being done.
+        recordings: the recordings to search.
+        effects: the effects to test.
+        progress: called with the name of each step.
         thresholds: of the diagnosis.
 
     Raises:
-        InputError: the recordings have no residual that could be looked at, or are too short.
+        InputError: the recordings have no residual to search, or are too short.
     """
     search_pass = _search_pass(recordings, {}, effects, progress, thresholds)
     if recordings.are_drawn:
         first = search_pass.search.first()
         assumed = _of_winches(search_pass.search, () if first is None else (first,))
         if assumed:
-            # Before the next is made: columns are most of the memory.
+            # Columns take most of the memory, so they are freed before the next pass.
             del search_pass
             search_pass = _search_pass(recordings, assumed, effects, progress, thresholds)
     found = search_pass.search.run()
@@ -109,7 +110,7 @@ def searched_for(
 
 
 def _of_winches(search: Search, hypotheses: Iterable[Hypothesis]) -> dict[Candidate, Array]:
-    """Return the weights of what winches add to torques all the time."""
+    """Return the weights of winch effects on the torque that have no onset."""
     lasting = [h for h in hypotheses if not h.onset]
     weights = search.fits.values(lasting) if lasting else {}
     return {
@@ -175,7 +176,7 @@ def hums_of(
     weights: Mapping[Candidate, Array],
     thresholds: Thresholds,
 ) -> tuple[Line, ...]:
-    """Return the lines in what was searched of a recording, beyond what was found."""
+    """Return spectral lines in the searched part of a recording, beyond the fitted effects."""
     if measurement.machine.bar is None:
         return ()
     start, end = span_of(part)
@@ -183,12 +184,12 @@ def hums_of(
 
 
 def _beside(parts: Parts, lines: Sequence[Sequence[Line]]) -> Parts:
-    """Return equations in which each recording's lines are fitted always."""
+    """Return equations in which each recording's spectral lines are always fitted."""
     return [with_lines(part, own) for part, own in zip(parts, lines, strict=True)]
 
 
 def noise_of(parts: Parts) -> dict[Place, Array]:
-    """Return the noise of every residual, the median over recordings and stretches."""
+    """Return the noise of every residual: the median over recordings and their equations."""
     found: dict[Place, list[Array]] = {}
     for equations in parts:
         for equation in equations:

@@ -1,4 +1,4 @@
-"""What no effect explains: free functions of what hypotheses leave, or of what they cannot hold."""
+"""Unexplained residuals: free functions of a signal or of time that no effect explains."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ from cspm_ident.diagnosis.residuals.free_shapes import Driver
 
 Index = NDArray[np.intp]
 
-# Keeps quotients finite.
+# Lower bound of a denominator.
 _LEAST = 1e-300
 
 
@@ -27,14 +27,14 @@ def unexplained(
     chosen: Sequence[Hypothesis],
     healthy: Sequence[Hypothesis] = (),
 ) -> tuple[Unexplained, ...]:
-    """Return free functions that explain what some hypotheses do not, the most important first.
+    """Return free functions that explain what some hypotheses do not, the largest gain first.
 
     Args:
-        gram: of all free functions.
-        sums: of its columns.
-        significance: of these.
-        chosen: what was found.
-        healthy: what a sound machine has as well, whose amount may drift.
+        gram: Gram matrices of all columns, free functions included.
+        sums: the block regression of its columns.
+        significance: of hypotheses in this regression.
+        chosen: the selected hypotheses.
+        healthy: hypotheses that hold for a healthy machine too, whose size may drift.
     """
     drivers = [d for d in gram.terms if isinstance(d, Driver)]
     assumed = [*chosen, *healthy]
@@ -61,10 +61,10 @@ def unexplained(
 def _once(
     gram: BlockGram, sums: BlockRegression, base: Index, began: Sequence[int]
 ) -> Iterator[Unexplained]:
-    """Yield functions of time of residuals that are left in one block more than in all others.
+    """Yield functions of time of residuals that one block dominates.
 
-    What shows once has no other block to be tested on, but is not consistent for that. What begins
-    does so within a block, which is no block of either state.
+    A disturbance in a single block has no other block for a hold-out test, and is inconsistent with
+    the model. Blocks at an onset are skipped, because the effect begins within one of them.
     """
     within, limits = [k for onset in began for k in (onset - 1, onset)], sums.thresholds
     for place, squares in gram.left_by_block(base, sums.weights(base)).items():
@@ -83,7 +83,7 @@ def _once(
 def _unreported(
     gram: BlockGram, sums: BlockRegression, chosen: Sequence[Hypothesis], driver: Driver
 ) -> float:
-    """Return the squares that tell nothing in a residual, findings there being not quite true."""
+    """Return the squares within the model-form error of the hypotheses that act in a residual."""
     (place,) = (p for p in gram.places if p.place == driver.place)
     taken = 0.0
     for hypothesis in chosen:
@@ -101,9 +101,9 @@ def _drifting(
     chosen: Sequence[Hypothesis],
     healthy: Sequence[Hypothesis],
 ) -> Iterator[Unexplained]:
-    """Yield functions of time instead of hypotheses whose amount does not stay what it is.
+    """Yield functions of time that replace hypotheses whose size drifts over the blocks.
 
-    A load cell that warms up has no constant bias, though a bias explains most of it.
+    Example: a load cell that warms up has no constant bias, yet a bias explains most of its error.
     """
     for hypothesis in chosen:
         base = _columns(gram, [h for h in (*chosen, *healthy) if h is not hypothesis])
@@ -121,7 +121,7 @@ def _drifting(
 
 
 def _concerned(gram: BlockGram, hypothesis: Hypothesis, own: Index) -> list[Driver]:
-    """Return drivers of the residuals in which a hypothesis acts, of its own elements if any."""
+    """Return drivers of the residuals where a hypothesis acts, on its own elements if possible."""
     places = gram.places_of(own)
     found = [d for d in gram.terms if isinstance(d, Driver) and d.place in places]
     near = [d for d in found if d.place.element in hypothesis.elements]

@@ -119,9 +119,9 @@ def test_only_the_command_lands_on_the_path(wheel, environment):
 
 def test_an_installation_runs_a_scenario_by_name_and_diagnoses_the_recording(environment, tmp_path):
     cspm = environment / "bin" / "cspm"
-    where = "import cspm_ident as package; print(package.__file__)"
-    module = run([environment / "bin" / "python", "-c", where], tmp_path)
-    assert Path(module.strip()).is_relative_to(environment)
+    script = "import cspm; print(cspm.__file__, cspm.load_testbed('thesis').file.source, sep='\\n')"
+    printed = run([environment / "bin" / "python", "-c", script], tmp_path).splitlines()
+    assert all(Path(path).is_relative_to(environment) for path in printed)
     run([cspm, "run", "one_winch", "--duration", "12", "--out", "one"], tmp_path)
     summary = json.loads((tmp_path / "one" / "summary.json").read_text(encoding="utf-8"))
     assert (summary["scenario"], summary["duration_s"]) == ("one_winch", 12.0)

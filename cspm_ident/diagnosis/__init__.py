@@ -1,1 +1,1 @@
-"""From recordings and a test-bed file to findings: which physics the file lacks, and how sure."""
+"""Diagnosis: from recordings and a test-bed file to the physics that the file lacks."""

@@ -1,4 +1,4 @@
-"""From recordings to a verdict: where the model misses, what is missing, and how well it helps."""
+"""The diagnosis of recordings: search, hold-out test, refined parameters and simulation."""
 
 from __future__ import annotations
 
@@ -58,23 +58,23 @@ def diagnose(
     thresholds: Thresholds = DEFAULT_THRESHOLDS,
     effects: Sequence[Effect] | None = None,
 ) -> Diagnosis:
-    """Look for what the described machine lacks.
+    """Return the effects that the test-bed file of some recordings lacks.
 
     Args:
-        searched: recordings in which to look; all of one machine.
-        held_out: others on which to judge what was found; none: the last part of each searched one.
-        progress: called with what is being done.
-        thresholds: that decide what is reported.
-        effects: that are looked for; None: the whole catalogue.
+        searched: recordings to search; all of one machine.
+        held_out: recordings for the hold-out test. If empty, the last part of each searched one.
+        progress: called with the name of each step.
+        thresholds: those that decide what is reported.
+        effects: the effects to test; None for the whole catalogue.
 
     Raises:
-        InputError: the recordings have no residual that could be looked at, or are too short.
+        InputError: the recordings have no residual to search, or are too short.
     """
     searched, held_out = (
         [on_drives_clock(each, thresholds) for each in own] for own in (searched, held_out)
     )
     effects = list(catalogue().values()) if effects is None else effects
-    # No name for the look itself: its columns go as soon as they are not needed.
+    # The search pass has no name here, so that its columns are freed once they are unused.
     (search_parts, judge_parts, hums, noise, block, search, knots, assumed), found = searched_for(
         Recordings(searched, held_out), effects, progress, thresholds
     )
@@ -129,7 +129,7 @@ def diagnose(
 
 
 def _useful(search: Search, acceptance: Acceptance, data: Data) -> tuple[Acceptance, Model]:
-    """Return what is left once the model needs nothing rejected any more, and that model."""
+    """Return the acceptance and the model after rejecting findings until none is useless."""
     model = modelled(search, acceptance.kept, data)
     while gone := model.useless:
         acceptance = acceptance.rejecting(gone)
@@ -138,9 +138,10 @@ def _useful(search: Search, acceptance: Acceptance, data: Data) -> tuple[Accepta
 
 
 def _reported(search: Search, acceptance: Acceptance, model: Model) -> list[Finding]:
-    """Return what is reported, the most important first; what held-out data leave open is last.
+    """Return the reported findings, the largest gain first.
 
-    Gains and alternatives are those beside what is kept.
+    Findings on which the hold-out test is silent come last. Gains and alternatives are those beside
+    the accepted findings.
     """
     hypotheses = [each.hypothesis for each in acceptance.kept]
     found = [each for each in model.findings if each.status is not Status.NEGLIGIBLE]
@@ -156,7 +157,7 @@ def _lasting(
     weights: Mapping[Candidate, Array],
     thresholds: Thresholds,
 ) -> tuple[Line, ...]:
-    """Return the lines that are there still, now that all else is known."""
+    """Return the spectral lines that remain beyond the final model."""
     found = []
     for own, measurement, part in zip(lines, searched, parts, strict=True):
         now = hums_of(measurement, part, weights, thresholds) if own else ()
@@ -165,7 +166,7 @@ def _lasting(
 
 
 def _judge(parts: Parts, found: SearchResult, block: float) -> BlockGram:
-    """Return the sums of held-out residuals beside what was found and all free functions."""
+    """Return Gram matrices of held-out residuals, findings, alternatives and free functions."""
     terms = _candidates(found) | {
         t for part in parts for e in part for t in e.columns if isinstance(t, Driver)
     }
@@ -179,7 +180,7 @@ def _candidates(found: SearchResult) -> set[Candidate | Driver]:
 
 
 def _found_only(parts: Parts, found: SearchResult) -> Parts:
-    """Return equations without the columns of all that was not found, which nothing needs more."""
+    """Return equations with the columns of findings and alternatives only, to free memory."""
     terms = _candidates(found)
     return [[equation.only(terms) for equation in part] for part in parts]
 
@@ -187,7 +188,7 @@ def _found_only(parts: Parts, found: SearchResult) -> Parts:
 def _with_shapes(
     search: Search, kept: Sequence[Finding], knots: Knots, unexplained: Sequence[Unexplained]
 ) -> tuple[Unexplained, ...]:
-    """Return the same with its free functions, each fitted to what is left by what was kept."""
+    """Return unexplained residuals with their free functions, fitted beside the findings `kept`."""
     base = search.fits.columns([each.hypothesis for each in kept])
     found = []
     for each in unexplained:
@@ -199,7 +200,7 @@ def _with_shapes(
 def _not_excited(
     search: Search, effects: Sequence[Effect]
 ) -> tuple[tuple[str, tuple[str, ...]], ...]:
-    """Return effects that have no column that is not zero, with the elements."""
+    """Return effects whose columns are zero on some or all elements, with those elements."""
     heard = {(c.effect_id, c.element) for c in search.heard}
     seen = {(t.effect_id, t.element) for t in search.gram.terms if isinstance(t, Candidate)}
     found = []

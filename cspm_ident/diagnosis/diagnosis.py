@@ -27,19 +27,19 @@ class Diagnosis:
 
     Attributes:
         searched: recordings that were searched.
-        held_out: those that findings were tested on; empty where the end of each searched one was.
+        held_out: recordings of the hold-out test; empty where it used the end of each searched one.
         findings: all that were selected: first the reported ones, the most important first.
         unexplained: residuals that no effect explains, the largest first.
         tested: number of hypotheses that were tested.
-        fit: residual by residual.
-        simulated: quantity by quantity, by simulation.
-        lines: periodic forces from outside, and before them tensions that alternate.
-        limits: from which size on effects would have been reported.
-        not_excited: effects and elements that these recordings cannot show.
-        places: the residuals that there are.
+        fit: hold-out errors of each residual.
+        simulated: hold-out errors of each simulated quantity.
+        lines: aliased tensions, then periodic forces from outside.
+        limits: detection limits: the smallest sizes at which effects would have been reported.
+        not_excited: effects, and their elements, that these recordings do not excite.
+        places: all residuals.
         curves: the residuals on held-out data, over time.
-        noise: of each residual, from row to row, one number per channel.
-        thresholds: that decided what is reported.
+        noise: standard deviation of each residual from row to row, one per channel.
+        thresholds: those that were used.
     """
 
     searched: Sequence[Measurement]

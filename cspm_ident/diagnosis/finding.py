@@ -18,16 +18,16 @@ from cspm_ident.diagnosis.thresholds import DEFAULT_THRESHOLDS, Thresholds
 
 Array = NDArray[np.float64]
 
-# Whose equation every tension enters.
+# Elements whose equations contain every tension.
 _FED_BY_ALL = frozenset({"bar", "winch_frame"})
 
 
 class Status(Enum):
-    """What becomes of a finding.
+    """The status of a finding.
 
     Reported, tied and doubtful ones are in the report: a tied one has alternatives that explain the
-    data equally well, a doubtful one large unexplained residuals beside it. A negligible one is in
-    the model but no larger than in a healthy machine. A rejected one is in neither.
+    data equally well, and a doubtful one has large unexplained residuals beside it. A negligible
+    one is in the model, but no larger than in a healthy machine. A rejected one is in neither.
     """
 
     REPORTED = "reported"
@@ -38,7 +38,7 @@ class Status(Enum):
 
 
 class Rejection(Enum):
-    """Why a finding is rejected."""
+    """The reason for the rejection of a finding."""
 
     HOLDOUT_TEST = "does not lower the residuals of held-out data"
     NOT_TESTABLE = "held-out data cannot test it, and no unexplained residual is as large"
@@ -50,7 +50,7 @@ class Rejection(Enum):
 
 
 class HoldOut(Enum):
-    """What the hold-out test shows of a finding."""
+    """The result of the hold-out test of a finding."""
 
     NOT_TESTED = "not tested"
     CONFIRMED = "lowers a residual"
@@ -68,13 +68,13 @@ class Onset(NamedTuple):
 
 
 class Region(NamedTuple):
-    """Values of a signal at which a finding shows.
+    """Range of a signal that holds most of a finding's gain.
 
     Attributes:
         driver: the signal, with its unit.
         low, high: ends of the interval.
-        share: of the data that lies in it.
-        held: share of what the finding takes from the squared residual that lies in it.
+        share: share of the data in the interval.
+        held: share of the finding's gain in the interval.
     """
 
     driver: str
@@ -85,13 +85,13 @@ class Region(NamedTuple):
 
 
 class Improvement(NamedTuple):
-    """What a finding does to a simulation of held-out data.
+    """Change of a simulation of held-out data by a finding.
 
     Attributes:
         channel: the quantity that improves most, such as `cables/tension/surge_2`.
-        unit: of it.
+        unit: of the quantity and both errors.
         without: root mean square error with all other findings.
-        with_it: with all findings.
+        with_it: root mean square error with all findings.
     """
 
     channel: str
@@ -105,7 +105,7 @@ class Shape(NamedTuple):
 
     Attributes:
         knots: in the signal's unit, shape (k,).
-        values: what it adds there, less their mean, in the residual's unit, (k,).
+        values: of the function at the knots, less their mean, in the residual's unit, (k,).
     """
 
     knots: Array
@@ -117,9 +117,9 @@ class Unexplained(NamedTuple):
 
     Attributes:
         driver: the signal that explains most of it, and the residual.
-        gain: what a free function of that signal takes from the squares.
-        share: of the residual's squares.
-        shape: that function, once it is fitted beside what is reported.
+        gain: reduction of the squared residuals by a free function of that signal.
+        share: share of the residual's squares.
+        shape: that function, fitted beside all reported findings; None before that fit.
     """
 
     driver: Driver
@@ -130,20 +130,20 @@ class Unexplained(NamedTuple):
 
 @dataclass(frozen=True)
 class Finding:
-    """An effect on some elements, and what is known of it so far.
+    """An effect on some elements, with the results known so far.
 
     Attributes:
         hypothesis: the effect and its elements.
-        gain: of it in blocks that were not fitted, beside all others that were selected.
-        share: largest share of a residual's squares that it takes.
+        gain: in hold-out blocks, beside all other selected hypotheses.
+        share: largest share of a residual's squares that it explains.
         alternatives: hypotheses that explain the same equally well.
-        status: what becomes of it.
-        rejection: why it is rejected; None if it is not.
-        holdout: what the hold-out test shows.
+        status: see `Status`.
+        rejection: the reason for its rejection; None if it is not rejected.
+        holdout: result of the hold-out test.
         coefficients: as fitted, one entry per element.
-        onset: when it began; None where it acts all the time, or between recordings.
-        region: where it shows; None where it does everywhere.
-        improvement: of simulations of held-out data; None where none depends on it.
+        onset: when it began; None where it acts all the time or began between recordings.
+        region: range of a signal that holds most of its gain; None where no range does.
+        improvement: of simulations of held-out data; None where no simulation depends on it.
     """
 
     hypothesis: Hypothesis
@@ -165,12 +165,12 @@ class Finding:
 
     @property
     def elements(self) -> tuple[str, ...]:
-        """What it acts on."""
+        """The elements on which it acts."""
         return self.hypothesis.elements
 
     @property
     def is_reported(self) -> bool:
-        """Whether it is in the report, be it tied or doubtful."""
+        """Whether it is in the report; tied and doubtful findings are."""
         return self.status in (Status.REPORTED, Status.TIED, Status.DOUBTFUL)
 
     @property
@@ -180,7 +180,7 @@ class Finding:
 
     @property
     def is_faint(self) -> bool:
-        """Whether held-out data show too little of it to confirm it by a single residual."""
+        """Whether it moves held-out data too little for the hold-out test of a single residual."""
         return self.holdout in (HoldOut.FAINT, HoldOut.SILENT)
 
     @property
@@ -189,7 +189,7 @@ class Finding:
         return tuple(p for own in self.coefficients for p in self.parameters_on(own))
 
     def parameters_on(self, own: Coefficients) -> list[Parameter]:
-        """Return the parameters on the element that some of its coefficients are of."""
+        """Return the parameters on the element of the coefficients `own`."""
         return parameters_of(own, doubtful=self.is_doubtful)
 
 
@@ -211,16 +211,16 @@ def is_doubtful(
     aliased: Collection[str] = (),
     thresholds: Thresholds = DEFAULT_THRESHOLDS,
 ) -> bool:
-    """Return whether what nothing explains is no small part of what a finding does.
+    """Return whether unexplained residuals are large relative to the gain of a finding.
 
-    A constant is the mean of whatever function of the machine's motion is there beside it, and no
-    part of that; but it may have been drifting, or be the smaller of both.
+    An unexplained function of a signal does not make a constant doubtful, unless it gains
+    more than the constant. An unexplained function of time does, as the constant may have drifted.
 
     Args:
-        finding: which.
-        unexplained: by any effect.
-        aliased: cables whose tensions alternate from one reading to the next; nothing that depends
-            on these is certain.
+        finding: the finding to judge.
+        unexplained: residuals that no effect explains.
+        aliased: cables with aliased tension, which alternates from one reading to the next. Any
+            finding that depends on these is doubtful.
         thresholds: `doubtful_share`.
     """
     misread = {*aliased, *_FED_BY_ALL} if aliased else set()

@@ -19,8 +19,7 @@ class Coefficients(NamedTuple):
     Attributes:
         candidate: the effect, its element and its nonlinear parameters.
         values: shape (m,).
-        half_widths: half the widths of their 95 % intervals, (m,); infinite where the data give
-            none.
+        half_widths: half widths of their 95 % intervals, (m,); infinite where the data give none.
         upper_ends: where the effect may also act at other time constants, the upper ends of the
             intervals of the sum over all of them, (m,); None elsewhere.
     """
@@ -35,13 +34,13 @@ class Parameter(NamedTuple):
     """A parameter of an effect on one element.
 
     Attributes:
-        element: on which the effect acts.
+        element: the element on which the effect acts.
         name: public name.
         value: in `unit`.
         unit: SI.
-        low, high: ends of its 95 % interval as far as the catalogue allows; equal to the value
-            where it was searched on a grid, or the finding is doubtful.
-        is_open: whether they are all that the catalogue allows, since the data bound nothing.
+        low, high: ends of its 95 % interval, within the catalogue's bounds. They equal the value
+            where it was searched on a grid, or where the finding is doubtful.
+        is_open: whether the ends are the catalogue's bounds, because the data give none.
     """
 
     element: str
@@ -54,19 +53,19 @@ class Parameter(NamedTuple):
 
     @property
     def ci95(self) -> tuple[float, float] | None:
-        """Its 95 % interval, if it has one."""
+        """Its 95 % interval (low, high), or None."""
         return (self.low, self.high) if self.low < self.high and not self.is_open else None
 
 
 def parameters_of(own: Coefficients, *, doubtful: bool = False) -> list[Parameter]:
     """Return the parameters of an effect on one element.
 
-    A doubtful finding has no intervals: measurement noise bounds a parameter for a given law, and
-    not what unexplained residuals beside it add to all of them.
+    A doubtful finding has no intervals: they cover measurement noise for a given law, but not the
+    bias from unexplained residuals.
 
     Args:
         own: the effect's coefficients.
-        doubtful: whether the finding that they belong to is.
+        doubtful: whether their finding is doubtful.
     """
     effect, weights, widths = own.candidate.effect, own.values, own.half_widths
     values = effect.values(weights.tolist(), **own.candidate.nonlinear)
@@ -91,8 +90,8 @@ def _ends(
 ) -> list[tuple[float, float]]:
     """Return the intervals of an effect's parameters from those of its weights.
 
-    What each weight moves a parameter down and up within its own interval, in squares (GUM, JCGM
-    100:2008, 5.1.2): an amplitude is as sure whatever its phase is.
+    Each weight moves a parameter down and up within its own interval; these changes add in squares
+    (GUM, JCGM 100:2008, 5.1.2). So the interval of an amplitude does not depend on its phase.
     """
     names = [p.name for p in candidate.effect.parameters]
 

@@ -1,1 +1,1 @@
-"""Which effects on which elements explain the residuals, and what else would."""
+"""Selection of the effects and elements that explain the residuals, with alternatives."""

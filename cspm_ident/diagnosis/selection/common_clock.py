@@ -1,4 +1,4 @@
-"""What clocks that are set to each other as well as clocks are do to readings."""
+"""Clock errors that a healthy machine may have too."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ from cspm_ident.diagnosis.residuals.regressors import Candidate
 
 
 def clocks_of(candidates: Iterable[Candidate]) -> list[Hypothesis]:
-    """Return, of every such effect among candidates, that it acts on all that it can."""
+    """Return each effect that may be negligible, on all its elements, with common parameters."""
     members: dict[str, list[Candidate]] = {}
     for candidate in candidates:
         if candidate.effect.signature.negligible:

@@ -1,4 +1,4 @@
-"""Two things at once on one element, of which neither shows by itself."""
+"""Pairs of effects on one element that mask each other."""
 
 from __future__ import annotations
 
@@ -20,10 +20,16 @@ Pair = tuple[Hypothesis, Hypothesis]
 def best_pairs(
     gram: BlockGram, sums: BlockRegression, base: Index, free: Sequence[Candidate]
 ) -> list[Pair]:
-    """Return the pairs of effects on one element that take most beyond a base, the best first.
+    """Return the pairs of effects on one element that gain most beyond a base, the best first.
 
-    Each effect with the shape with which it takes most alone. What is added one by one misses
-    pairs that hide each other in one residual, as the zeros of load cell and drive at a shaft.
+    Each effect has the shape of its largest gain alone. Stepwise selection misses pairs that mask
+    each other in one residual, such as the zero offsets of load cell and drive at a shaft.
+
+    Args:
+        gram: Gram matrices of all columns.
+        sums: the block regression of its columns.
+        base: columns that are fitted beside.
+        free: candidates that may be added.
     """
     alone = sums.gains_beyond(base, [gram.columns_of([c]) for c in free])
     best: dict[tuple[str, str], Candidate] = {}

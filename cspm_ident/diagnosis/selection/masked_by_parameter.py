@@ -1,4 +1,4 @@
-"""Effects that a wrong number of the file hides: together the two look like something else."""
+"""Effects masked by a wrong parameter of the test-bed file; together they resemble a third."""
 
 from __future__ import annotations
 
@@ -23,20 +23,22 @@ def absorbed_pairs(
     hypothesis: Hypothesis,
     free: Sequence[Candidate],
 ) -> list[tuple[Hypothesis, Hypothesis]]:
-    """Return effects that together with a wrong number explain what one thing on one element does.
+    """Return pairs of an effect and a wrong parameter that explain the same as one hypothesis.
 
-    The number would explain it but for what it spoils elsewhere, which the effect makes up for: a
-    drum's radius fitted while the drive's gain was wrong is, to every sensor, an encoder's scale.
+    The parameter alone explains the main residual but raises others, which the effect corrects.
+    Example: a drum radius fitted with a wrong drive gain resembles an encoder scale error in every
+    sensor.
 
     Args:
-        gram: of the columns.
-        sums: of these.
+        gram: Gram matrices of all columns.
+        sums: the block regression of its columns.
         base: columns that are fitted beside.
-        hypothesis: what they are like.
-        free: candidates that are not among what was chosen.
+        hypothesis: the hypothesis that pairs may replace; it acts on one element.
+        free: candidates that are not selected.
 
     Returns:
-        (effect, wrong number), of each two the best points; both are needed.
+        Pairs (effect, wrong parameter) with their best shapes, where both are significant. Empty
+        for a hypothesis on several elements.
     """
     if len(hypothesis.candidates) > 1:
         return []
@@ -65,7 +67,7 @@ def absorbed_pairs(
 
 
 def _most(gram: BlockGram, sums: BlockRegression, base: Index, own: Index) -> PlaceGram:
-    """Return the residual from which columns take most."""
+    """Return the residual whose squares the columns reduce most."""
     both = np.concatenate([base, own])
     before = gram.left(base, sums.weights(base))
     after = gram.left(both, sums.weights(both))
@@ -73,7 +75,7 @@ def _most(gram: BlockGram, sums: BlockRegression, base: Index, own: Index) -> Pl
 
 
 def _left(place: PlaceGram, by: Index, own: Index) -> float:
-    """Return the squares of columns in one residual that others do not span."""
+    """Return the summed squares of unit columns in one residual that others do not span."""
     known = np.flatnonzero(np.isin(place.columns, by))
     mine = np.flatnonzero(np.isin(place.columns, own))
     lengths = np.sqrt(np.diag(place.whole))
@@ -88,7 +90,7 @@ def _left(place: PlaceGram, by: Index, own: Index) -> float:
 def _needed(
     gram: BlockGram, sums: BlockRegression, base: Index, one: Candidate, other: Candidate
 ) -> bool:
-    """Return whether neither of two explains as much without the other."""
+    """Return whether each of two candidates is significant beside the other."""
     first, second = gram.columns_of([one]), gram.columns_of([other])
     return all(
         sums.p_value(np.concatenate([base, beside]), own) < sums.thresholds.masked_significance

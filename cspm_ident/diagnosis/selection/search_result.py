@@ -1,4 +1,4 @@
-"""What a search through the catalogue finds."""
+"""The result of a search in the catalogue."""
 
 from __future__ import annotations
 
@@ -8,11 +8,11 @@ from cspm_ident.diagnosis.finding import Finding, Unexplained
 
 
 class SearchResult(NamedTuple):
-    """What a search finds.
+    """The result of a search.
 
     Attributes:
-        findings: those of the largest gain first.
-        unexplained: residuals that no effect explains, likewise.
+        findings: the largest gain first.
+        unexplained: residuals that no effect explains, the largest gain first.
         tested: number of hypotheses of one effect on one element that were tested.
     """
 

@@ -1,7 +1,7 @@
-"""Sums of products of residuals and columns over blocks of time: all that selection needs.
+"""Block Gram matrices: products of residuals and regressors, summed over blocks of time.
 
-Every least-squares fit, its errors under coloured residuals and its cross-validation follow from
-them, so that hundreds of hypotheses cost no second look at the signals.
+Every least-squares fit follows from them, with its errors under coloured residuals and its
+cross-validation. So hundreds of hypotheses are tested with a single pass over the signals.
 """
 
 from __future__ import annotations
@@ -23,11 +23,11 @@ Index = NDArray[np.intp]
 
 
 class PlaceGram(NamedTuple):
-    """One residual's sums.
+    """One residual's block Gram matrices.
 
     Attributes:
-        place: which.
-        columns: indices of the columns that enter, ascending, shape (m,).
+        place: which residual.
+        columns: indices of its regressors, ascending, shape (m,).
         grams: Σ [columns, y]ᵀ[columns, y] per block, shape (blocks, m + 1, m + 1).
         whole: their sum over the blocks.
         rows: samples times channels per block, shape (blocks,).
@@ -60,7 +60,7 @@ class BlockGram:
 
     @property
     def terms(self) -> tuple[Candidate | Driver, ...]:
-        """Everything that has columns."""
+        """All candidates and drivers with columns."""
         return tuple(self.slices)
 
     def columns_of(self, terms: Iterable[Candidate | Driver]) -> Index:
@@ -74,14 +74,14 @@ class BlockGram:
         return np.concatenate([self.nuisance, self.columns_of(terms)])
 
     def parted(self, terms: Sequence[Candidate], values: Array) -> dict[Candidate, Array]:
-        """Return values in the order of `columns_of`, term by term; what precedes is left out."""
+        """Return values in the order of `columns_of`, split by term, without preceding values."""
         widths = [self.slices[term].stop - self.slices[term].start for term in terms]
         own = values[len(values) - sum(widths) :]
         parts = np.split(own, np.cumsum(widths, dtype=np.intp))
         return dict(zip(terms, parts[:-1], strict=True))
 
     def places_of(self, columns: Index) -> list[Place]:
-        """Return the residuals in which any of some columns acts."""
+        """Return the residuals that at least one of some columns acts on."""
         return [p.place for p in self.places if np.isin(columns, p.columns).any()]
 
     def left(self, columns: Index, weights: Array) -> dict[Place, float]:
@@ -133,7 +133,7 @@ class BlockGram:
         return found
 
     def delay(self, columns: Index, block: int) -> None:
-        """Let columns act from a block on only."""
+        """Let columns act only from a block on."""
         for place in self.places:
             own = np.flatnonzero(np.isin(place.columns, columns))
             silence(place.grams, own, block)
@@ -142,7 +142,7 @@ class BlockGram:
 
     @contextmanager
     def delayed(self, columns: Index, block: int) -> Iterator[None]:
-        """Let columns act from a block on only, for a while."""
+        """Let columns act only from a block on, inside the context only."""
         kept = [
             (place, own, place.grams[:block, own, :].copy(), place.grams[:block, :, own].copy())
             for place in self.places
@@ -175,17 +175,17 @@ def squares_by_block(grams: Array, weights: Array) -> Array:
 
 
 def silence(grams: Array, columns: Index, block: int) -> None:
-    """Set columns to zero in the sums (blocks, m, m) of the blocks before `block`."""
+    """Set columns to zero in the Gram matrices (blocks, m, m) of the blocks before `block`."""
     grams[:block, columns, :] = 0.0
     grams[:block, :, columns] = 0.0
 
 
 def gather(recordings: Sequence[Sequence[Equation]], block_s: float) -> BlockGram:
-    """Return the sums of all equations, in blocks of `block_s` seconds.
+    """Return the block Gram matrices of all equations, in blocks of about `block_s` seconds.
 
     Args:
         recordings: the equations of each.
-        block_s: longer than the residuals remember.
+        block_s: longer than the residuals' correlation time.
     """
     equations = [(r, e) for r, each in enumerate(recordings) for e in each]
     slices, width = _registry([e for _, e in equations])

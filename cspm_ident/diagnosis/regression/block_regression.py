@@ -82,7 +82,7 @@ class BlockRegression:
         return found
 
     def _alone(self, blocks: Array, lengths: Array) -> BlockRegression:
-        """Return a regression with given block Gram matrices, (blocks, m + 1, m + 1), and lengths."""
+        """Return a regression with given Gram matrices, (blocks, m + 1, m + 1), and lengths."""
         other = copy(self)
         other._grams, other._at = [blocks], [np.arange(blocks.shape[1])]
         other._lengths, other._whole = lengths, blocks.sum(axis=0)

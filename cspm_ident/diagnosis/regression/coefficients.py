@@ -1,4 +1,4 @@
-"""Weights of candidates with their intervals, where several elements may share theirs."""
+"""Weights of candidates with their intervals; several elements may share their weights."""
 
 from __future__ import annotations
 
@@ -14,9 +14,9 @@ from cspm_ident.diagnosis.residuals.regressors import Candidate
 
 Array = NDArray[np.float64]
 Index = NDArray[np.intp]
-# On either side of an interval of 95 %.
+# Probability on either side of a 95 % interval.
 _OUTSIDE = 0.025
-# Of each candidate the weights of its columns, and half the widths of their 95 % intervals.
+# By candidate: weights of its columns, and half the widths of their 95 % intervals.
 Weights = dict[Candidate, tuple[Array, Array]]
 
 
@@ -26,7 +26,7 @@ def values_of(
     candidates: Sequence[Candidate],
     common: Collection[str] = (),
 ) -> dict[Candidate, Array]:
-    """Return the weights that `weights_of` does, without their intervals."""
+    """Return the same weights as `weights_of`, without their intervals."""
     if not common:
         return gram.parted(candidates, sums.weights(gram.with_nuisance(candidates)))
     return {c: w for c, (w, _) in weights_of(gram, sums, candidates, common).items()}
@@ -42,10 +42,10 @@ def weights_of(
     """Return candidates' weights with half the widths of their 95 % intervals.
 
     Args:
-        gram: of their columns.
-        sums: of these.
-        candidates: that are fitted together.
-        common: effects, by id, of which all candidates share their weights.
+        gram: of their regressors.
+        sums: regression of these.
+        candidates: fitted together.
+        common: ids of effects whose candidates all share their weights.
         base: columns that are fitted beside them; None: the nuisance.
     """
     beside = gram.nuisance if base is None else base
@@ -59,7 +59,7 @@ def weights_of(
 
 
 def at_once(weights: Weights) -> Weights:
-    """Return weights with intervals that hold for all candidates together in 95 % (Bonferroni)."""
+    """Return weights with 95 % intervals for all candidates jointly (Bonferroni)."""
     if not weights:
         return weights
     wider = float(norm.isf(_OUTSIDE / len(weights)) / norm.isf(_OUTSIDE))
@@ -67,7 +67,7 @@ def at_once(weights: Weights) -> Weights:
 
 
 def _numbers(gram: BlockGram, candidates: Sequence[Candidate], common: Collection[str]) -> Index:
-    """Return which number to fit is each column's weight."""
+    """Return the index of each column's free parameter in the fit."""
     numbers: dict[tuple[str, str, int], int] = {}
     found = []
     for candidate in candidates:

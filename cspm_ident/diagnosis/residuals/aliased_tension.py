@@ -1,4 +1,4 @@
-"""Tensions that alternate from one reading to the next: what moves them is too fast to be read."""
+"""Aliased tensions: readings that alternate because the motion is too fast for their rate."""
 
 from __future__ import annotations
 
@@ -14,14 +14,14 @@ from cspm_sim.effects import Channel
 def chatters_of(
     measurement: Measurement, thresholds: Thresholds = DEFAULT_THRESHOLDS
 ) -> tuple[Line, ...]:
-    """Return the tensions of a recording that alternate, as lines at half of the rate of readings.
+    """Return the alternating tensions of a recording, as lines at half the sampling rate.
 
-    A force loop that is unstable swings as fast as its controller acts, and readings taken at the
-    same rate tell nothing of what the cable does between them: where it goes slack, their mean is
-    not that of the force.
+    An unstable force loop oscillates at its controller's rate. Readings at the same rate do not
+    show the cable's motion between them: where the cable goes slack, their mean is not the mean
+    force.
 
     Args:
-        measurement: what was recorded.
+        measurement: recorded signals.
         thresholds: those of aliased tensions.
     """
     tension = measurement.tension
@@ -30,7 +30,7 @@ def chatters_of(
     steps = np.diff(tension.values, axis=0)
     squares = np.sum(steps**2, axis=0)
     follows = np.sum(steps[1:] * steps[:-1], axis=0) / np.maximum(squares, 1e-300)
-    # Half of a step is the amplitude of what alternates.
+    # The amplitude of an alternating signal is half its step.
     amplitudes = 0.5 * np.sqrt(squares / len(steps))
     least = thresholds.aliased_amplitude_share * np.mean(np.abs(tension.values), axis=0)
     highest = 0.5 / float(np.median(np.diff(tension.times)))

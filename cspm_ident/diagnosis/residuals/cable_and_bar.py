@@ -1,4 +1,4 @@
-"""What measured poses, angles and tensions say of cables and bar, against the model of both."""
+"""Residuals of cables and bar: measured poses, angles and tensions against the model."""
 
 from __future__ import annotations
 
@@ -29,10 +29,10 @@ from cspm_sim.kernels.memory import relaxed
 Array = NDArray[np.float64]
 
 
-# What `of_cable` takes over where it is known, one column per cable.
+# Cached arrays that `of_cable` takes over, one column per cable.
 _PER_CABLE = ("_near", "_steady_damper")
-# Widths of Gaussian windows: of the damper's force, and of elongations without false reversals; and
-# how long a dashpot's unknown start lasts.
+# Widths of Gaussian windows for the damper force, and for elongations without reversals from noise;
+# duration of a dashpot's unknown initial state.
 _STEADY_S, _CALM_S, _START_S = 0.01, 0.03, 0.5
 
 
@@ -40,8 +40,8 @@ class Suspension:
     """Bar and cables along one stretch of measured signals.
 
     Attributes:
-        signals: what was measured.
-        parameters: of the machine as it is described.
+        signals: measured signals.
+        parameters: of the machine as described.
         start: unstretched lengths at the beginning, (n,) [m].
     """
 
@@ -52,7 +52,7 @@ class Suspension:
         parameters: PlantParameters,
         start: Array | None = None,
     ) -> None:
-        """Take a stretch without holes; `start` is found from the first tensions if not given."""
+        """Take a stretch without gaps; without `start`, the first tensions give the lengths."""
         self.signals, self.parameters, self._testbed = signals, parameters, testbed
         if start is None:
             tensions = np.maximum(signals.tensions[0], 0.0)
@@ -60,9 +60,10 @@ class Suspension:
         self.start = start
 
     def with_poses(self, signals: MachineSignals) -> Suspension:
-        """Return the same stretch with a little other poses, begun from the same lengths.
+        """Return the same stretch with slightly changed poses and the same initial lengths.
 
-        What tensions tell of the rates is kept: of the poses it has the length of the cables alone.
+        The elongation rates derived from tensions are kept. They depend on the poses only through
+        the length of the cables.
         """
         other = Suspension(signals, self._testbed, self.parameters, self.start)
         bar, frame = signals.bar is self.signals.bar, signals.frame is self.signals.frame
@@ -72,7 +73,7 @@ class Suspension:
         return other
 
     def of_cable(self, i: int) -> Suspension:
-        """Return cable i alone."""
+        """Return the same stretch with cable i only."""
         own = slice(i, i + 1)
         parts = self.parameters._replace(
             cables=self.parameters.cables[own], tables=self.parameters.tables[own]
@@ -84,7 +85,7 @@ class Suspension:
         return other
 
     def with_joints(self, signals: MachineSignals) -> Suspension:
-        """Return the same stretch with a little other angles, speeds and tensions."""
+        """Return the same stretch with slightly changed angles, speeds and tensions."""
         other = Suspension(signals, self._testbed, self.parameters, self.start)
         known = {name: getattr(self, name) for name in ("bar", "_frame", "_spans")}
         other.__dict__.update(known, _near=self._carrying)
@@ -117,7 +118,7 @@ class Suspension:
 
     @cached_property
     def _rates(self) -> Array:
-        """Of the elongation, (k, n) [m/s]."""
+        """Elongation rates, (k, n) [m/s]."""
         wound = self._wound / self._spans.lengths * self.parameters.cables[:, RADIUS]
         return np.asarray(self._spans.rates + wound * self.signals.speeds)
 
@@ -136,22 +137,22 @@ class Suspension:
 
     @cached_property
     def _steady_damper(self) -> Array:
-        """The damper's force without the poses' noise, about which the law is taken.
+        """Damper force without the poses' noise, about which the law is linearised.
 
-        In the stiffness that noise would meet itself in the residual: stiffness less its mean would
-        explain it.
+        Otherwise the noise would enter both stiffness and residual. A stiffness error would then
+        seem to explain the residual.
         """
         sigma, damper = _STEADY_S / self.signals.step, self._damping * self._told_rates
         return np.asarray(gaussian_filter1d(damper, sigma, axis=0, mode="nearest"))
 
     @cached_property
     def _told(self) -> Array:
-        """Elongations by law and measured tension alone, (k, n) [m].
+        """Elongations from law and measured tension alone, (k, n) [m].
 
-        For the columns of effects: a stiff cable's tension tells them far better than poses do,
-        whose noise stands in the residual already; in both it would look like a wrong damper or
-        like less hysteresis than none. Law and damper share a tension as spring and dashpot do,
-        solved by Euler's implicit steps.
+        For the regressors of effects: with a stiff cable, tensions give elongations far more
+        precisely than poses. The poses' noise is in the residual already. In both it would appear
+        as a wrong damper or as negative hysteresis. Law and damper share a tension as spring and
+        dashpot do; solved by the implicit Euler method.
         """
         tensions, lengths = self.signals.tensions, self._elastic_lengths
         alone = elongation_at(self.parameters, tensions, lengths, self._near)
@@ -163,27 +164,27 @@ class Suspension:
 
     @cached_property
     def _told_rates(self) -> Array:
-        """Of the elongation by law and measured tension alone, (k, n) [m/s]."""
+        """Elongation rates from law and measured tension alone, (k, n) [m/s]."""
         rates = np.gradient(self._told, self.signals.step, axis=0)
-        # What the dashpot had before the first sample is not told.
+        # The dashpot's state before the first sample is unknown.
         start, sigma = round(_START_S / self.signals.step), _STEADY_S / self.signals.step
         rates[:start] = gaussian_filter1d(self._rates, sigma, axis=0, mode="nearest")[:start]
         return np.asarray(rates)
 
     @cached_property
     def _calm_elongations(self) -> Array:
-        """Elongations without reversals that are none but noise, (k, n) [m]."""
+        """Elongations without reversals caused by noise, (k, n) [m]."""
         sigma = _CALM_S / self.signals.step
         return np.asarray(gaussian_filter1d(self._told, sigma, axis=0, mode="nearest"))
 
     @cached_property
     def _near(self) -> Array | None:
-        """Elongations that are nearly those of `_carrying`, where they are known, (k, n) [m]."""
+        """Approximate values of `_carrying`, (k, n) [m]; None where unknown."""
         return None
 
     @cached_property
     def _carrying(self) -> Array:
-        """The elongation at which law and damper give the measured tension, (k, n) [m]."""
+        """Elongations at which law and damper give the measured tension, (k, n) [m]."""
         elastic = self.signals.tensions - self._steady_damper
         return elongation_at(self.parameters, elastic, self._elastic_lengths, self._near)
 
@@ -196,8 +197,8 @@ class Suspension:
     def tension_residuals(self) -> Array:
         """Measured tensions less those of law and damper, (k, n) [N], thesis (2-19).
 
-        To first order about the measured tension: errors and noise of poses enter in proportion,
-        however large they are.
+        Linearised about the measured tension, so that errors and noise of poses enter in
+        proportion, whatever their size.
         """
         linear = self._law[:, :, 1] * (self._carrying - self._stretched)
         return np.asarray(linear - (self._damper - self._steady_damper))
@@ -217,7 +218,7 @@ class Suspension:
 
     @cached_property
     def needed(self) -> Array:
-        """Force and moment that the bar's motion needs beside its weight, (k, 6) [N, N·m]."""
+        """Force and moment for the bar's motion, its weight subtracted, (k, 6) [N, N·m]."""
         bar = self._testbed.bar
         assert bar is not None
         state, gravity = self.bar, np.array([0.0, 0.0, self._testbed.gravity])
@@ -229,7 +230,7 @@ class Suspension:
 
     @cached_property
     def wrench_residuals(self) -> Array:
-        """Force and moment that the bar's equation (2-13) misses, world axes, (k, 6) [N, N·m].
+        """Residual of the bar's equation of motion (2-13), world axes, (k, 6) [N, N·m].
 
         Moments about the bar frame's origin.
         """
@@ -250,8 +251,8 @@ class Suspension:
     def _told_acceleration(self) -> tuple[Array, Array]:
         """Acceleration of the bar's origin and α by (2-13) from the measured tensions, (k, 3) each.
 
-        For the columns of effects: the poses' own noise, twice differentiated, stands in the
-        residual already, and in both it would look like a wrong mass.
+        For the regressors of effects: the poses' noise, differentiated twice, is in the residual
+        already. In both it would appear as a wrong mass.
         """
         bar, state = self._testbed.bar, self.bar
         assert bar is not None
@@ -265,12 +266,12 @@ class Suspension:
         return np.asarray(acceleration), np.asarray(alpha)
 
     def start_column(self, i: int) -> Array:
-        """Return what a longer unstretched length at the start adds to the residual, (k,) [N/m]."""
+        """Return the residual's change by a longer unstretched length at the start, (k,) [N/m]."""
         return np.asarray(self._law[:, i, 1] * self._wound[:, i] / self._wound[0, i])
 
     @cached_property
     def _length_slopes(self) -> Array:
-        """Of the elastic tension by the elastic length, (k, n) [N/m]."""
+        """Derivative of the elastic tension by the elastic length, (k, n) [N/m]."""
         step = 1e-5
         longer = law_at(self.parameters, self._carrying, self._elastic_lengths + step)
         return np.asarray((longer - self._law)[:, :, 0] / step)
@@ -304,7 +305,7 @@ class Suspension:
 
     @cached_property
     def _velocities(self) -> tuple[Array, Array]:
-        """Of the attachments against the exits, and of the exits, (k, n, 3) [m/s]."""
+        """Velocities of attachments relative to exits, and of exits, (k, n, 3) [m/s]."""
         exits = self.parameters.cables[:, EXIT : EXIT + 3]
         return end_velocities(self._spans, self.bar, self._frame, exits)
 
@@ -317,12 +318,12 @@ class Suspension:
 
     @cached_property
     def bar_rows(self) -> Array:
-        """`BarSignal` columns, accelerations by the tensions."""
+        """`BarSignal` columns, with accelerations from the tensions."""
         return self._bar_rows(*self._told_acceleration)
 
     @cached_property
     def posed_bar_rows(self) -> Array:
-        """The same, accelerations by the poses."""
+        """`BarSignal` columns, with accelerations from the poses."""
         return self._bar_rows(self.bar.acceleration, self.bar.alpha)
 
     def _bar_rows(self, acceleration: Array, alpha: Array) -> Array:

@@ -1,4 +1,4 @@
-"""The cables' law and the bar's equation of motion, with measured signals as input."""
+"""Residual equations of the cables' law and the bar's motion, with measured signals as input."""
 
 from __future__ import annotations
 
@@ -40,7 +40,7 @@ from cspm_sim.effects.signals import CableSignal
 
 Array = NDArray[np.float64]
 
-# As far as smoothing spreads a torque that was lost.
+# Distance over which smoothing spreads a missing torque reading.
 _SPREAD_S = 0.1
 _TENSION = "tension [N]"
 _DRIVERS = {
@@ -61,16 +61,16 @@ def suspension_equations(
     drawn: DrawnTension | None = None,
     thresholds: Thresholds = DEFAULT_THRESHOLDS,
 ) -> list[Equation]:
-    """Return the equations of all cables and of the bar, one set for each stretch without hole.
+    """Return the equations of all cables and of the bar, one set for each stretch without gaps.
 
     Empty where poses of the bar, angles or tensions were not recorded.
 
     Args:
         timeline: of the recording.
         effects: the catalogue.
-        known: effects that the test-bed file has.
+        known: effects in the test-bed file.
         knots: of the free functions; None: without these.
-        drawn: where no load cell but torques told the tensions.
+        drawn: tensions from the virtual load cells, where there are no load cells.
         thresholds: those of residuals.
     """
     measured = timeline.measurement
@@ -90,12 +90,12 @@ def fine_equations(
     known: Sequence[Action],
     thresholds: Thresholds,
 ) -> list[Equation]:
-    """Return the equations under the shortest windows, whatever the noise, without columns.
+    """Return the equations with the shortest windows, whatever the noise, without regressors.
 
     Args:
-        stretches: signals without hole.
-        measurement: which they are of.
-        known: effects that the test-bed file has.
+        stretches: signals without gaps.
+        measurement: that they belong to.
+        known: effects in the test-bed file.
         thresholds: those of residuals.
     """
     return [
@@ -108,7 +108,7 @@ def fine_equations(
 
 
 class _Stretch:
-    """One stretch and the window that weighs it."""
+    """One stretch of signals and the windows that weight it."""
 
     def __init__(
         self,
@@ -120,9 +120,9 @@ class _Stretch:
         *,
         drawn: DrawnTension | None = None,
     ) -> None:
-        """Take what the poses were smoothed to [Hz] and which of the bar's coordinates move.
+        """Take the band of the smoothed poses [Hz] and the bar's coordinates that move.
 
-        Without a band windows are the shortest. Tensions may be drawn from the winches' torques.
+        Without a band, windows are the shortest. Tensions may come from virtual load cells.
         """
         self._drawn, self._thresholds = drawn, thresholds
         self._signals, self._machine, self._dofs = signals, machine, dofs
@@ -144,7 +144,7 @@ class _Stretch:
         for effect in effects:
             for candidate, place, found in self._columns(effect):
                 beside = columns.setdefault(place, {})
-                # A winch's fault may show in the cable as well as in the tension drawn from it.
+                # A winch fault may change the cable as well as the virtual load cell's tension.
                 beside[candidate] = beside[candidate] + found if candidate in beside else found
         out = [
             self._cable_equation(
@@ -156,7 +156,7 @@ class _Stretch:
         return out if self._drawn is None else [self._known(each, self._drawn) for each in out]
 
     def _known(self, equation: Equation, drawn: DrawnTension) -> Equation:
-        """Return the rows that no lost torque reaches."""
+        """Return the rows that no missing torque reading reaches."""
         half_s = 0.5 * len(self._windows[equation.place.channel][0]) * self._signals.step
         return equation.apart_from(drawn.lost, half_s + _SPREAD_S)
 
@@ -171,7 +171,8 @@ class _Stretch:
         place = Place(Channel.TENSION, self._machine.cable_names[i])
         rows = self._here.cable_rows(i)
         drivers = {key: weighed(rows[:, column]) for key, column in _DRIVERS.items()}
-        # The residual has the tension's own noise, of which it must not look like a function.
+        # The residual contains the tension's noise, so it would appear as a function of the
+        # tension.
         drivers[_TENSION] = around(drivers[_TENSION], self._apart(Channel.TENSION))
         if knots is not None:
             columns = columns | knots.columns(place, drivers)
@@ -180,7 +181,8 @@ class _Stretch:
         untold = (
             [] if drawn is None else [weighed(e) for e in drawn.untold(i, at, self._thresholds)]
         )
-        # Of the order of its noise also where a fold that is left out holds the whole stretch.
+        # Without the start's part, the target is as small as its noise even in a hold-out fold with
+        # the whole stretch.
         target = target - start * (start @ target) / (start @ start)
         return Equation(
             place,
@@ -216,7 +218,7 @@ class _Stretch:
         return replace(equation, nuisance=nuisance, shared=len(free))
 
     def _bar_signals(self) -> list[dict[str, Array]]:
-        """Return what each of the bar's six components may depend on, by name and unit."""
+        """Return signals that each of the bar's six components may depend on, by name and unit."""
         state, poses = self._here.bar, self._signals.bar.poses
         speeds = np.hstack([state.velocity, state.omega])
         found = []
@@ -253,7 +255,7 @@ class _Stretch:
         return tensions, wrench
 
     def _columns(self, effect: Effect) -> Iterator[tuple[Candidate, Place, Array]]:
-        """Yield what one unit of an effect adds to each residual, weighed."""
+        """Yield the change of each weighted residual per unit of an effect's weights."""
         for i, name in enumerate(elements_of(effect, self._machine.cable_names, (BAR, FRAME))):
             if effect.physics.sense is not None:
                 for place, found in self._read(effect, i, name):
@@ -277,7 +279,7 @@ class _Stretch:
                     yield shape, place, self._quieter(columns) if on_bar else columns(rows)
 
     def _rows_of(self, effect: Effect, channel: Channel, i: int) -> Iterator[tuple[Place, Array]]:
-        """Yield the residuals in which an effect on element i shows, with what it is told by."""
+        """Yield the residuals that an effect on element i changes, with its input signals."""
         names, here = self._machine.cable_names, self._here
         if channel is Channel.WRENCH:
             of_cable = effect.acts_on is Elements.CABLES
@@ -289,11 +291,11 @@ class _Stretch:
             yield Place(channel, names[i]), here.cable_rows(i)
 
     def _quieter(self, columns: Callable[[Array], Array]) -> Array:
-        """Return the bar's columns, each with accelerations by those sensors that tell it better.
+        """Return the bar's regressors, each with accelerations from the less noisy sensor.
 
-        Noise of either stands in the residual as well, of which a noisy column would look like a
-        part. What two sensors tell alike is no noise; columns of which neither tells enough are
-        zero.
+        The noise of both is in the residual as well, so a noisy regressor would appear significant.
+        What both sensors have in common is not noise. Regressors with too small a common part are
+        set to zero.
         """
         ways = [columns(rows) for rows in (self._here.bar_rows, self._here.posed_bar_rows)]
         by_tension, by_pose = (self._weighed(way, Channel.WRENCH) for way in ways)
@@ -304,7 +306,7 @@ class _Stretch:
         return np.where(common >= least, quieter, 0.0)
 
     def _read(self, effect: Effect, i: int, name: str) -> Iterator[tuple[Place, Array]]:
-        """Yield how a sensor's fault changes the weighed residuals, by differences of readings."""
+        """Yield a sensor fault's change of the weighted residuals, by finite differences."""
         assert effect.physics.sense is not None
         topic = effect.physics.sense.topics[0]
         if topic == TENSION and self._drawn is not None:
@@ -322,7 +324,7 @@ class _Stretch:
         yield Place(Channel.WRENCH, BAR), np.stack([c[1] for c in changes], axis=2)
 
     def _changed(self, moved: MachineSignals, step: float) -> tuple[Array, Array]:
-        """Return the change of the weighed residuals, one cable after the other to save memory."""
+        """Return the change of the weighted residuals, cable by cable to save memory."""
         there, here = self._here.with_poses(moved), self._here
         wrench, tensions = there.needed - here.wrench_residuals, []
         for i in range(len(self._machine.cable_names)):
@@ -333,7 +335,7 @@ class _Stretch:
         return np.stack(tensions, axis=1), self._weighed(wrench / step, Channel.WRENCH)
 
     def _misplaced(self, effect: Effect, name: str) -> Iterator[tuple[MachineSignals, float]]:
-        """Yield the signals with a little of each of a pose's faults, and how much."""
+        """Yield the signals with a small part of each fault of a pose, and its size."""
         body = "bar" if name == BAR else "frame"
         motion: BodyMotion = getattr(self._signals, body)
         rows = pose_rows(self._signals.times, motion.poses, motion.rates)
@@ -344,7 +346,7 @@ class _Stretch:
     def _read_joints(
         self, effect: Effect, cables: Iterable[int], topic: str
     ) -> Iterator[tuple[Place, Array]]:
-        """Yield how a fault of tensions or an angle changes the residuals of cables and bar."""
+        """Yield the change of cable and bar residuals by a fault of tensions or an angle."""
         wrench = np.zeros_like(self._here.wrench_residuals)
         for i in cables:
             column, change = self._read_joint(effect, i, topic)
@@ -355,7 +357,7 @@ class _Stretch:
             yield Place(Channel.WRENCH, BAR), self._weighed(wrench, Channel.WRENCH)[:, :, None]
 
     def _read_joint(self, effect: Effect, i: int, topic: str) -> tuple[Array, Array]:
-        """Return what a fault of a reading changes of its cable's residual, weighed, and of it."""
+        """Return a reading fault's change of its cable's weighted residual, and of the reading."""
         signals = self._signals
         readings = signals.tensions if topic == TENSION else signals.angles
         change = effect.regressors(reading_rows(signals.times, readings[:, i]))[:, 0, 0]
@@ -375,7 +377,7 @@ class _Stretch:
     def _misread(
         self, effect: Effect, i: int, drawn: DrawnTension
     ) -> Iterator[tuple[Candidate, Place, Array]]:
-        """Yield how a winch's fault changes the tension drawn from its torque, weighed."""
+        """Yield a winch fault's change of the virtual load cell's tension, weighted."""
         if effect.acts_on is not Elements.CABLES:
             return
         for candidate, taken in drawn.columns(effect, i, self._signals.times):
@@ -391,6 +393,6 @@ class _Stretch:
         return weigh(window, values, stride)
 
     def _apart(self, channel: Channel) -> int:
-        """Return how many rows lie between two windows that share no sample."""
+        """Return the number of rows between two windows that share no sample."""
         window, stride = self._windows[channel]
         return -(-len(window) // stride)

@@ -1,4 +1,4 @@
-"""A recording as it would be, were a machine as supposed and its sensors without their faults."""
+"""Corrected measurements: sensor faults and parameter errors removed."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ from cspm_sim.effect_entries import Action, altered_testbed, read_actions
 
 Array = NDArray[np.float64]
 
-# Each makes what is left smaller by the share of the fault.
+# Number of iterations; each reduces the error by the relative size of the fault.
 _FIXED_POINTS = 4
 
 
@@ -26,7 +26,7 @@ def with_found(measurement: Measurement, weights: Mapping[Candidate, Array]) -> 
 
     Args:
         measurement: what was recorded.
-        weights: of the effects' columns, by element.
+        weights: of the effects' regressors, by candidate.
     """
     entries = [
         EffectEntry(
@@ -42,13 +42,13 @@ def with_found(measurement: Measurement, weights: Mapping[Candidate, Array]) -> 
 
 
 def settled(measurement: Measurement) -> Measurement:
-    """Return the measurement with readings and numbers as the described effects make them.
+    """Return the corrected measurement, by the effects in the machine's description.
 
-    Sensors' faults are taken out of the readings, changes of the file's numbers are made in it;
-    missing physics stays among the machine's effects.
+    Sensor faults are removed from the readings, and parameter errors are corrected in the
+    description. Missing physics stays among the machine's effects.
 
     Raises:
-        InputError: an effect cannot be used, or no machine has such numbers.
+        InputError: an effect cannot be used, or the corrected parameters are impossible.
     """
     machine, actions = measurement.machine, read_actions(measurement.machine)
     if not any(action.effect.physics.alter or action.effect.physics.sense for action in actions):
@@ -67,9 +67,9 @@ def settled(measurement: Measurement) -> Measurement:
 
 
 def as_found(measurement: Measurement, weights: Mapping[Candidate, Array]) -> Measurement:
-    """Return the settled measurement of a machine that has what was found.
+    """Return the corrected measurement of a machine that has the findings.
 
-    Where no machine has such numbers, what was to be corrected stays as described.
+    If the corrected parameters are impossible, the findings are ignored.
     """
     try:
         return settled(with_found(measurement, weights))
@@ -78,7 +78,7 @@ def as_found(measurement: Measurement, weights: Mapping[Candidate, Array]) -> Me
 
 
 def is_possible(measurement: Measurement, weights: Mapping[Candidate, Array]) -> bool:
-    """Return whether the measured machine can have further effects of such weights."""
+    """Return whether the measured machine can have further effects with such weights."""
     try:
         settled(with_found(measurement, weights))
     except InputError:
@@ -89,11 +89,13 @@ def is_possible(measurement: Measurement, weights: Mapping[Candidate, Array]) ->
 def nearest_possible(
     measurement: Measurement, candidate: Candidate, weights: Array, half: Array
 ) -> Array:
-    """Return weights that the measured machine can have, if chance alone lies between.
+    """Return the nearest weights that the machine can have, if within the intervals.
+
+    Otherwise the weights are returned unchanged.
 
     Args:
         measurement: of the machine.
-        candidate: whose weights they are.
+        candidate: that the weights belong to.
         weights: as fitted.
         half: half the widths of their 95 % intervals.
     """
@@ -108,7 +110,7 @@ def nearest_possible(
 
 
 def _true_readings(measurement: Measurement, action: Action) -> Measurement:
-    """Return what a sensor would have read without a fault, to which a fixed point leads."""
+    """Return a sensor's readings without its fault, by fixed-point iteration."""
     effect = action.effect
     assert effect.physics.sense is not None
     topic = effect.physics.sense.topics[0]

@@ -1,4 +1,4 @@
-"""Which rows are searched and which are held out."""
+"""Split of the rows into a search part and a hold-out part."""
 
 from __future__ import annotations
 
@@ -13,14 +13,14 @@ Parts = Sequence[Sequence[Equation]]
 
 
 def whole_part(parts: Parts) -> Parts:
-    """Return what is searched where other recordings are held out."""
+    """Return the search part where other recordings are the hold-out."""
     return parts
 
 
 def first_part(
     parts: Sequence[Sequence[Equation]], thresholds: Thresholds = DEFAULT_THRESHOLDS
 ) -> list[list[Equation]]:
-    """Return what is searched where nothing else is held out."""
+    """Return the search part where there is no other recording as hold-out."""
     share = thresholds.searched_share
     return [[e.within(-np.inf, _cut(part, share)) for e in part] for part in parts]
 
@@ -28,7 +28,7 @@ def first_part(
 def last_part(
     parts: Sequence[Sequence[Equation]], thresholds: Thresholds = DEFAULT_THRESHOLDS
 ) -> list[list[Equation]]:
-    """Return the rest, after a gap."""
+    """Return the hold-out part, after a gap."""
     share = thresholds.searched_share + thresholds.gap_share
     return [[e.within(_cut(part, share), np.inf) for e in part] for part in parts]
 

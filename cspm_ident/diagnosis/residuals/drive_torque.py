@@ -1,4 +1,4 @@
-"""What a winch's drive reports against what it was told."""
+"""Residual of a winch's drive: commanded less reported torque."""
 
 from __future__ import annotations
 
@@ -25,10 +25,10 @@ _DRIVERS = {
 
 
 def sampled_constant(constant: Array, period: float) -> Array:
-    """Return by how much reports rise behind a held command, in rates of the torque [s].
+    """Return the lag of reports behind a held command, per rate of the torque [s].
 
-    A first-order lag of time constant T sampled with period h leaves command − report =
-    h/(exp(h/T) − 1) · (report − report before)/h; about T − h/2 where T is longer than h.
+    A first-order lag of time constant T sampled with period h leaves command − report = h/(exp(h/T)
+    − 1) · (report − report before)/h; about T − h/2 where T is longer than h.
     """
     if period <= 0.0:
         return constant
@@ -36,7 +36,7 @@ def sampled_constant(constant: Array, period: float) -> Array:
 
 
 def time_constant(sampled: Array, period: float) -> Array:
-    """Return the time constant of which `sampled_constant` is that of the samples [s]."""
+    """Return the time constant for a lag of samples: the inverse of `sampled_constant` [s]."""
     if period <= 0.0:
         return sampled
     return np.asarray(period / np.log1p(period / np.maximum(sampled, 1e-9)))
@@ -48,22 +48,22 @@ def drive_equations(
     known: Sequence[Action],
     knots: Knots | None = None,
 ) -> list[Equation]:
-    """Return commanded less reported torque of every winch, less what known effects add.
+    """Return commanded less reported torque of every winch, known effects subtracted.
 
-    A drive that applies a command from its stamp on reports it a period later, as the measurement's
-    `torque_age` says. Nothing is returned where commands or torques were not recorded.
+    A drive applies a command from its stamp on and reports it a period later, as given by the
+    measurement's `torque_age`. Empty where commands or torques were not recorded.
 
     Args:
-        measurement: what was recorded.
+        measurement: recorded signals.
         effects: the catalogue.
-        known: effects that the test-bed file has.
+        known: effects in the test-bed file.
         knots: of the free functions; None: without these.
     """
     command, torque = measurement.command, measurement.torque
     if command is None or torque is None:
         return []
     held = 2.0 * measurement.torque_age
-    # The command that held up to a stamp, whose scatter is less than half of a period.
+    # The command that was held up to a stamp; stamps scatter by less than half a period.
     last = np.searchsorted(command.times, torque.times - 0.5 * held, side="right") - 1
     known_from = last >= 0
     found = []
@@ -73,7 +73,7 @@ def drive_equations(
         rows[:, WinchSignal.TORQUE] = torque.values[:, i]
         rows[1:, WinchSignal.TORQUE_RATE] = np.diff(torque.values[:, i]) / np.diff(torque.times)
         reported = command.values[np.maximum(last, 0), i]
-        # No drive delivers more than its limit.
+        # A saturated drive does not follow its command.
         reported[(np.abs(reported) >= cable.torque_limit) | ~known_from] = np.nan
         own = [
             a

@@ -1,4 +1,4 @@
-"""What a residual may depend on when nothing in the catalogue explains it: free shapes."""
+"""Free functions of measured signals, for residuals that no effect of the catalogue explains."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ from cspm_ident.diagnosis.residuals.regressors import Candidate, Place
 
 Array = NDArray[np.float64]
 
-# Of a free function of one signal, piecewise linear.
+# Number of knots of a piecewise linear free function.
 KNOTS = 7
 
 
@@ -21,7 +21,7 @@ class Driver(NamedTuple):
 
     Attributes:
         place: the residual.
-        signal: what it is a function of, with its unit.
+        signal: name and unit of the function's argument.
     """
 
     place: Place
@@ -29,15 +29,15 @@ class Driver(NamedTuple):
 
     @property
     def of_time(self) -> bool:
-        """Whether it is a function of time, which no two blocks have in common."""
+        """Whether it is a function of time, of which no two blocks share a part."""
         return self.signal.startswith("time")
 
 
 class Knots:
-    """Where each driver's free function has its values, alike in all recordings."""
+    """Knots of each driver's free function, the same in all recordings."""
 
     def __init__(self) -> None:
-        """Know of none yet."""
+        """Start without knots."""
         self._found: dict[Driver, Array] = {}
 
     def of(self, driver: Driver) -> Array:
@@ -51,16 +51,16 @@ class Knots:
         channel: int = 0,
         channels: int = 1,
     ) -> dict[Candidate | Driver, Array]:
-        """Return hat functions of each signal; their weights are the shape at the knots.
+        """Return hat functions of each signal; their weights are the function's knot values.
 
-        Knots lie at equal shares of the samples of the first recording that has the signal.
-        Signals that stand still there are left out.
+        Knots are at equal quantiles of the samples of the first recording with the signal. Signals
+        that are constant there are left out.
 
         Args:
             place: the residual.
             signals: by name and unit, each of shape (k,).
-            channel: in which of the residual's channels they act.
-            channels: how many it has.
+            channel: of the residual that they act on.
+            channels: number of the residual's channels.
 
         Returns:
             Columns of shape (k, channels, KNOTS).
@@ -82,6 +82,6 @@ class Knots:
 
 
 def around(values: Array, apart: int) -> Array:
-    """Return the mean of what is measured `apart` rows before and after each row, (k,)."""
+    """Return the mean of the values `apart` rows before and after each row, (k,)."""
     padded = np.pad(values, apart, mode="edge")
     return 0.5 * (padded[: len(values)] + padded[2 * apart :])

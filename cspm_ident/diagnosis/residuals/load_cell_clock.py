@@ -1,4 +1,4 @@
-"""The clock of a rig's load cells, which runs away from that of its drives."""
+"""Clock drift of a test rig's load cells against the clock of its drives."""
 
 from __future__ import annotations
 
@@ -21,17 +21,17 @@ Array = NDArray[np.float64]
 _SCALE = 2.5e-5
 # Least length of a column, and least relative singular value.
 _NOTHING, _RANK = 1e-300, 1e-9
-# Rows that tell a drift beside the rest.
+# Least number of rows for a fit of a drift with the other regressors.
 _FEWEST = 16
 
 
 def on_drives_clock(
     measurement: Measurement, thresholds: Thresholds = DEFAULT_THRESHOLDS
 ) -> Measurement:
-    """Return a rig's measurement with stamps of load cells that drift no more.
+    """Return a rig's measurement with the drift of the load cells' stamps removed.
 
-    What is late at the beginning stays. Where a bar hangs on the cables tensions change too slowly
-    to tell a sound clock's drift, or to suffer from it.
+    The initial delay stays. With a bar, tensions change too slowly to identify the drift of a
+    healthy clock, or to be affected by it. The measurement is then returned unchanged.
     """
     if measurement.machine.bar is not None or measurement.tension is None:
         return measurement
@@ -44,10 +44,10 @@ def on_drives_clock(
 def cell_drift(
     measurement: Measurement, thresholds: Thresholds = DEFAULT_THRESHOLDS
 ) -> ClockDrift | None:
-    """Return how fast load cells become late in the winches' torque equations, None without any.
+    """Return the load cells' clock drift from the winches' torque equations, or None.
 
-    Late readings miss lateness times the rate of the tension. Beside it all are late by as much
-    from the beginning on, and winches may have friction, and scales and zeros that are wrong.
+    A late reading changes the residual by the delay times the tension's rate. Fitted with the
+    drift: an initial delay common to all load cells, friction, and errors of scale and zero.
     """
     own = settled(measurement)
     names = own.machine.cable_names
@@ -64,13 +64,13 @@ def cell_drift(
 
 
 def _lateness() -> Effect:
-    """Return the effect that load cells are late."""
+    """Return the effect of late load cells."""
     cells = (e for e in catalogue().values() if e.acts_on is Elements.CELLS)
     return next(e for e in cells if e.physics.sense and e.physics.sense.lateness)
 
 
 def _record(equation: Equation) -> Record:
-    """Return what drifting lateness explains beside all else (Frisch and Waugh, 1933)."""
+    """Return the partial regression of the drift (Frisch and Waugh, Econometrica 1(4), 1933)."""
     (late,) = (np.asarray(each[:, 0, 0], float) for each in equation.columns.values())
     speed, tension = (equation.signals[name] for name in (SPEED, PULL))
     others = np.stack([late, np.ones(len(late)), tension, speed, np.sign(speed)], axis=1)

@@ -1,4 +1,4 @@
-"""A machine's measured state on common steps, and what sensor faults change of it."""
+"""Measured signals of a machine at equal steps, and their changes by sensor faults."""
 
 from __future__ import annotations
 
@@ -15,9 +15,9 @@ from cspm_model.kernels.trajectory import Motions, spans_along
 
 Array = NDArray[np.float64]
 
-# Between the rows of cables and bar.
+# Step between the rows of cables and bar.
 PERIOD_NS = 5_000_000
-# Shorter stretches without a hole hold little more than the start of a filter.
+# Shorter stretches without gaps contain little more than a filter's transient.
 _SHORTEST_S = 2.0
 
 
@@ -35,7 +35,7 @@ class BodyMotion(NamedTuple):
     accelerations: Array
 
     def moved(self, change: Array, times: Array, step: float) -> BodyMotion:
-        """Return the motion with `step`·change (k, 6) added to its poses, derivatives alike."""
+        """Return the motion with `step`·change (k, 6) added to its poses and derivatives."""
         spline = CubicSpline(times, change)
         return BodyMotion(
             self.poses + step * change,
@@ -46,12 +46,12 @@ class BodyMotion(NamedTuple):
 
 @dataclass(frozen=True, eq=False)
 class MachineSignals:
-    """What was measured of a whole machine, at equal steps.
+    """Measured signals of a whole machine at equal steps.
 
     Attributes:
         times: shape (k,) [s].
         frame: the winch frame's motion.
-        bar: the bar's.
+        bar: the bar's motion.
         angles, speeds: of the motors, shape (k, n) [rad, rad/s].
         tensions: shape (k, n) [N].
     """
@@ -82,7 +82,7 @@ class MachineSignals:
 
 
 def machine_signals(timeline: Timeline) -> list[MachineSignals]:
-    """Return the measured signals at steps of 5 ms, one entry per stretch without hole."""
+    """Return the measured signals at steps of 5 ms, one entry per stretch without gaps."""
     measured = timeline.measurement
     if measured.bar_pose is None or measured.angle is None or measured.tension is None:
         return []
@@ -198,7 +198,7 @@ def _motions(motion: BodyMotion, state: BodyState) -> Motions:
 def end_velocities(
     spans: CableSpans, bar: BodyState, frame: BodyState, exits: Array
 ) -> tuple[Array, Array]:
-    """Return velocities of the attachments against the exits, and of the exits, (k, n, 3) [m/s].
+    """Return velocities of attachments relative to exits, and of exits, (k, n, 3) [m/s].
 
     Args:
         spans: the cables.

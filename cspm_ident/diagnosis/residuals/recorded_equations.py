@@ -34,16 +34,16 @@ def equations_of(
     assumed: Mapping[Candidate, Array] = MappingProxyType({}),
     thresholds: Thresholds = DEFAULT_THRESHOLDS,
 ) -> list[Equation]:
-    """Return every residual that the sensors allow, less what the machine's effects add.
+    """Return every residual that the sensors allow, less the known effects' part.
 
     Args:
         measurement: what was recorded, with the machine as it is described.
-        effects: whose columns are wanted, such as the whole catalogue.
+        effects: with regressors in the equations, such as the whole catalogue.
         knots: of the free functions; None: without these.
-        progress: called with what is being done.
-        touched: by these; other winches, and cables and bar if need be, may be left out.
-        assumed: weights about which residuals are taken to first order, where tensions are drawn
-            from torques that the faults of winches add to. They stay in the residuals.
+        progress: called with the name of the current step.
+        touched: candidates of interest; residuals that they do not change may be left out.
+        assumed: weights about which residuals are linearised, where virtual load cells are used,
+            which winch faults change. They stay in the residuals.
         thresholds: those of residuals.
 
     Raises:
@@ -52,7 +52,7 @@ def equations_of(
     measurement = settled(measurement)
     known = read_actions(measurement.machine)
     winches, suspended = _reached(measurement, touched)
-    # First what needs most memory.
+    # Cables and bar first, because they need most memory.
     late: list[Equation] = []
     if measurement.machine.bar is not None and suspended:
         progress("cables and bar")
@@ -71,9 +71,9 @@ def equations_of(
 def _reached(
     measurement: Measurement, touched: Sequence[Candidate] | None
 ) -> tuple[Collection[str], bool]:
-    """Return the winches that candidates may show at, and whether cables and bar may show them."""
+    """Return the winches that candidates may affect, and whether they may affect cables and bar."""
     names = measurement.machine.cable_names
-    # A winch without a load cell shows in what is drawn from its torque.
+    # Without load cells, winch faults change the virtual load cells' tensions.
     if touched is None or measurement.tension is None:
         return names, True
     kinds = {
@@ -81,7 +81,7 @@ def _reached(
         for c in touched
         for r in (c.effect.signature.regression, *c.effect.signature.partners)
     }
-    # Load cells that are late show at every winch.
+    # Late load cells change the residuals of all winches.
     everywhere = any(c.effect.elements is Elements.CELLS for c in touched)
     winches = names if everywhere else {c.element for c in touched if c.element in names}
     return winches, not kinds <= {Channel.SHAFT, Channel.DRIVE}

@@ -1,4 +1,4 @@
-"""What each effect adds to each residual, from measured signals."""
+"""Identity of residuals and regressors: places, candidates and their nonlinear parameters."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ class Place(NamedTuple):
     """One residual.
 
     Attributes:
-        channel: what kind.
+        channel: kind of residual.
         element: the cable's name, or `bar`.
     """
 
@@ -45,7 +45,7 @@ class Candidate:
     effect_id: str = field(init=False)
 
     def __post_init__(self) -> None:
-        """Stand for the effect by its id where candidates are compared."""
+        """Set the id that represents the effect where candidates are compared."""
         object.__setattr__(self, "effect_id", self.effect.id)
 
     @property
@@ -62,7 +62,7 @@ def shapes_of(effect: Effect) -> Iterator[tuple[tuple[str, float], ...]]:
 
 
 def elements_of(effect: Effect, cables: tuple[str, ...], bodies: tuple[str, ...]) -> list[str]:
-    """Return the names of what an effect can act on in a machine.
+    """Return the names of the elements that an effect can act on in a machine.
 
     Args:
         effect: of the catalogue.

@@ -1,4 +1,4 @@
-"""A residual beside everything that may explain it."""
+"""A residual and all regressors that may explain it."""
 
 from __future__ import annotations
 
@@ -18,13 +18,13 @@ Rows = slice | NDArray[np.bool_]
 
 
 class Made(Mapping[Term, Array]):
-    """Columns that are made of others when they are asked for, so that all are held once only.
+    """Regressors computed from others on access, so that only one copy is held in memory.
 
-    In a long recording they are most of what there is.
+    In a long recording they take most of the memory.
     """
 
     def __init__(self, source: Mapping[Term, Array], make: Callable[[Array], Array]) -> None:
-        """Take what they are made of, and how."""
+        """Take the source and the function that computes regressors from it."""
         self._source, self._make = source, make
 
     def __getitem__(self, term: Term) -> Array:
@@ -46,18 +46,20 @@ class Made(Mapping[Term, Array]):
 
 @dataclass(frozen=True, eq=False)
 class Equation:
-    """Measured less modelled, y = Σ columns·weights + what is left.
+    """A residual equation, measured less modelled: y = Σ columns·weights + remainder.
 
     Attributes:
         place: which residual.
         times: of the rows, ascending, shape (k,) [s].
         target: y, shape (k, channels).
-        columns: by candidate or driver, what one unit of each weight adds, (k, channels, weights).
-        measured: the measured quantity that the residual is part of, shape of `target`.
-        nuisance: what no recording tells, such as the length wound at its start, (k, channels, m).
-        shared: how many of the nuisance, the first, are the same in all stretches of a recording.
-        turning: rows in which a shaft turns round, (k,), or none: it may stick there, and dry
-            friction then holds with any torque.
+        columns: by candidate or driver, regressors per unit of each weight, (k, channels, weights).
+        measured: the measured quantity in the residual, shape of `target`.
+        nuisance: regressors of unknown quantities, such as the length wound at the start, (k,
+            channels, m).
+        shared: number of nuisance regressors, the first ones, common to all stretches of a
+            recording.
+        turning: rows with a reversal of the shaft, (k,), or empty. The shaft may stick there, and
+            dry friction then holds with any torque.
         signals: measured signals that it may depend on, by name and unit, each of shape (k,).
     """
 
@@ -73,7 +75,7 @@ class Equation:
 
     @property
     def noise(self) -> Array:
-        """What differs from row to row without connection, one sd per channel."""
+        """White noise of the target from differences between rows, one sd per channel."""
         return difference_noise(self.target)
 
     def scaled(self, noise: Array) -> Equation:
@@ -107,19 +109,19 @@ class Equation:
         return replace(self, target=self.target * rows, columns=columns, nuisance=nuisance)
 
     def only(self, terms: Container[Term]) -> Equation:
-        """Return the equation without the columns of all other terms."""
+        """Return the equation without the regressors of all other terms."""
         columns = {term: self.columns[term] for term in self.columns if term in terms}
         return replace(self, columns=columns)
 
     @property
     def compact(self) -> Equation:
-        """The same with columns in single precision; what is summed of them is in double."""
+        """The equation with regressors in single precision; their sums are in double."""
         columns = {term: found.astype("f4") for term, found in self.columns.items()}
         return replace(self, columns=columns)
 
     @property
     def steady(self) -> Equation:
-        """The rows in which no shaft turns round."""
+        """The rows without a reversal of the shaft."""
         return self._only(~self.turning) if self.turning.any() else self
 
     def _only(self, rows: Rows) -> Equation:
@@ -137,12 +139,12 @@ class Equation:
 
 
 def steady(parts: Sequence[Sequence[Equation]]) -> list[list[Equation]]:
-    """Return equations without the rows in which a shaft turns round."""
+    """Return equations without the rows in which a shaft reverses."""
     return [[equation.steady for equation in part] for part in parts]
 
 
 def in_noise(
     parts: Sequence[Sequence[Equation]], noise: Mapping[Place, Array]
 ) -> list[list[Equation]]:
-    """Return equations in units of their noise, without those whose noise is not known."""
+    """Return equations in units of their noise, without those of unknown noise."""
     return [[e.scaled(noise[e.place]) for e in part if e.place in noise] for part in parts]

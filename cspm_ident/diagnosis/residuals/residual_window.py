@@ -1,4 +1,4 @@
-"""The window under which residuals of cables and bar are looked at, as wide as noise asks for."""
+"""Windows that weight the residuals of cables and bar, as wide as their noise requires."""
 
 from __future__ import annotations
 
@@ -10,18 +10,18 @@ from cspm_model.robust_statistics import difference_noise
 
 Array = NDArray[np.float64]
 
-# Windows pass what lies well within the band of the smoothed poses, and they are doubled while that
-# takes more noise than of white one: then most lies above what they pass.
+# Windows pass frequencies well within the band of the smoothed poses. They are doubled while that
+# reduces the noise by more than it would reduce white noise: most noise is then above their band.
 _HALF_WIDTHS = (0.04, 0.32)
 _WHITE = 1.7
 
 
 def quiet_window(residuals: Array, band: float | None, step: float) -> tuple[Array, int]:
-    """Return a window's weights and the rows between two windows.
+    """Return a window's weights and the number of rows between two windows.
 
     Args:
-        residuals: what it weighs, shape (k, m).
-        band: to which poses were smoothed [Hz]; None: the shortest window, whatever the noise.
+        residuals: to be weighted, shape (k, m).
+        band: of the smoothed poses [Hz]; None: the shortest window, whatever the noise.
         step: between rows [s].
     """
     if band is None:

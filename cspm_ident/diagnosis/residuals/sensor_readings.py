@@ -1,4 +1,4 @@
-"""Measured readings in the form that sensor effects' regressors read."""
+"""Measured readings as signals for the regressors of sensor effects."""
 
 from __future__ import annotations
 
@@ -28,7 +28,10 @@ def pose_rows(times: Array, poses: Array, rates: Array) -> Array:
 
 
 def moving(poses: Samples | None, noise_ratio: float) -> list[str]:
-    """Return the coordinates that move by more than their noise, which the residual has as well."""
+    """Return the coordinates that move by more than a multiple of their noise.
+
+    The residual contains that noise as well.
+    """
     if poses is None or len(poses.times) < 5:
         return []
     spread, noise = poses.values.std(axis=0), difference_noise(poses.values)
@@ -39,5 +42,5 @@ _READING_STEP = 1e-6  # m, rad or N
 
 
 def small_step(change: Array) -> float:
-    """Return by what to multiply a change, so that it stays within what is linear."""
+    """Return the factor by which a change is small enough for linearisation."""
     return _READING_STEP / (float(np.max(np.abs(change))) + 1e-300)

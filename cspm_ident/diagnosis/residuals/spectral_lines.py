@@ -1,7 +1,7 @@
-"""Periodic forces from outside: lines in the spectrum of what is left, above the machine's motion.
+"""Periodic external forces: spectral lines of the residuals above the machine's motion.
 
-No effect of the catalogue makes them, and the windows that quiet the noise of poses hide them, so
-they are looked for in residuals that are hardly weighed.
+No effect of the catalogue causes them. The windows that suppress the poses' noise suppress them as
+well, so they are searched for in residuals with the shortest windows.
 """
 
 from __future__ import annotations
@@ -27,9 +27,9 @@ from cspm_sim.effect_entries import read_actions
 
 Array = NDArray[np.float64]
 
-# Of frequencies beside a line, whose median is what noise has there.
+# Number of frequencies near a line, whose median is the noise there.
 _BESIDE = 101
-# In which a force from outside keeps phase and size; what rings down does not.
+# Number of pieces in which an external force keeps its phase and size; a decaying one does not.
 _PIECES = 8
 
 
@@ -41,8 +41,8 @@ class Line(NamedTuple):
         channel: which of its channels.
         frequency: [Hz].
         amplitude: in the residual's unit.
-        chance: how probable noise makes it as high, among all frequencies that were looked at.
-        alternates: whether it is a reading that does so from one to the next, and no residual.
+        chance: p-value of its height under noise, for all frequencies searched.
+        alternates: whether it is an aliased reading rather than a line of a residual.
     """
 
     place: Place
@@ -53,7 +53,7 @@ class Line(NamedTuple):
     alternates: bool = False
 
     def is_same(self, other: Line, thresholds: Thresholds = DEFAULT_THRESHOLDS) -> bool:
-        """Return whether two lines are one, found twice."""
+        """Return whether two lines have the same residual and frequency, within the line width."""
         near = abs(self.frequency - other.frequency) <= thresholds.line_width_hz
         return self.place == other.place and near
 
@@ -63,11 +63,11 @@ def lines_of(
     weights: Mapping[Candidate, Array],
     thresholds: Thresholds = DEFAULT_THRESHOLDS,
 ) -> tuple[Line, ...]:
-    """Return the lines that a recording's bar and cables have beyond what was found, best first.
+    """Return the spectral lines of bar and cables beyond the findings, most significant first.
 
     Args:
         measurement: what was recorded.
-        weights: of what was found.
+        weights: of the findings.
         thresholds: those of lines.
     """
     fitted = as_found(measurement, weights)
@@ -88,7 +88,7 @@ def _channels(equation: Equation) -> range:
 
 
 def _driven_up_to(stretches: Sequence[MachineSignals], thresholds: Thresholds) -> float:
-    """Return the frequency above which neither winches nor frame are moved [Hz]."""
+    """Return the frequency above which neither winches nor frame move [Hz]."""
     highest = 0.0
     for signals in stretches:
         for moved in (signals.frame.poses, signals.angles):
@@ -109,15 +109,15 @@ def highest_line(
     tried: int,
     thresholds: Thresholds = DEFAULT_THRESHOLDS,
 ) -> Line | None:
-    """Return a series' highest line, if noise hardly makes one as high and it keeps its phase.
+    """Return a series' highest line, if it is significant and keeps its phase; else None.
 
     Args:
-        place: which residual it is of.
-        channel: which of its channels.
+        place: residual of the series.
+        channel: of the residual.
         times: at equal steps, shape (k,) [s].
         values: (k,).
-        lowest: frequency above which to look [Hz].
-        tried: how many series are looked at.
+        lowest: frequency above which to search [Hz].
+        tried: number of series searched.
         thresholds: those of lines.
     """
     frequencies, power = periodogram(
@@ -146,7 +146,7 @@ def _demodulated(times: Array, values: Array, frequency: float) -> complex:
 
 
 def _refined(times: Array, values: Array, frequency: float, step: float) -> float:
-    """Return the frequency within one step of the spectrum at which the line is highest."""
+    """Return the frequency of the highest amplitude, within one step of the spectrum."""
     near = frequency + step * np.linspace(-1.0, 1.0, 81)
     return float(near[np.argmax([abs(_demodulated(times, values, f)) for f in near])])
 
@@ -159,7 +159,7 @@ def _coherence(times: Array, values: Array, frequency: float) -> float:
 
 
 def _apart(lines: Iterable[Line], thresholds: Thresholds) -> Iterable[Line]:
-    """Yield of lines of the same frequency in one residual the most certain."""
+    """Yield the most significant line of those with the same frequency in one residual."""
     kept: list[Line] = []
     for line in lines:
         if not any(line.is_same(other, thresholds) for other in kept):
@@ -168,7 +168,7 @@ def _apart(lines: Iterable[Line], thresholds: Thresholds) -> Iterable[Line]:
 
 
 def with_lines(equations: Sequence[Equation], lines: Sequence[Line]) -> list[Equation]:
-    """Return equations in which lines are fitted always, so that no effect takes them."""
+    """Return equations with the lines as nuisance regressors, so that no effect explains them."""
     return [_with(e, [line for line in lines if line.place == e.place]) for e in equations]
 
 

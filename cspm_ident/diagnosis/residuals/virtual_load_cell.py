@@ -1,4 +1,4 @@
-"""The winches as load cells: what their torques say of tensions that nothing measures."""
+"""Virtual load cells: tensions from the winches' torques, where no load cell measures them."""
 
 from __future__ import annotations
 
@@ -24,21 +24,21 @@ from cspm_sim.effects.signals import WinchSignal
 
 Array = NDArray[np.float64]
 
-# Friction that depends on the tension that it hides.
+# Fixed-point iterations, because friction depends on the tension that is computed.
 _FIXED_POINTS = 3
 
 
 @dataclass(frozen=True, eq=False)
 class DrawnTension:
-    """Tensions by the winches' torque equation (2-21), and what winches' faults add to them.
+    """Tensions by the winches' torque equation (2-21), and the changes that winch faults make.
 
     Attributes:
-        measurement: what was recorded, with these tensions.
-        times: for which they were drawn, shape (k,) [s].
-        angles, speeds, accelerations: of the motors then, (k, n) [rad, rad/s, rad/s²].
-        torques: that they were drawn from, (k, n) [N·m].
+        measurement: recorded signals, with these tensions.
+        times: of the tensions, shape (k,) [s].
+        angles, speeds, accelerations: of the motors at these times, (k, n) [rad, rad/s, rad/s²].
+        torques: that the tensions are computed from, (k, n) [N·m].
         band: to which they are smoothed [Hz].
-        taken: what was taken out of them beyond what the file says, (k, n) [N].
+        taken: subtracted from them beyond the effects of the file, (k, n) [N].
     """
 
     measurement: Measurement
@@ -52,19 +52,19 @@ class DrawnTension:
 
     @cached_property
     def lost(self) -> Array:
-        """When readings of the torque are missing [s], so that none is known there."""
+        """Times at which readings of the torque are missing [s]."""
         assert self.measurement.torque is not None
         times = self.measurement.torque.times
         gaps = np.flatnonzero(self.measurement.torque.gaps)
         return np.asarray(0.5 * (times[gaps] + times[gaps + 1]))
 
     def less(self, assumed: Mapping[Candidate, Array]) -> DrawnTension:
-        """Return tensions without what winches' supposed faults add to them.
+        """Return the tensions without the part that assumed winch faults add.
 
-        Laws of cables are then taken about what these carry, not about what friction looks like.
+        The laws of cables are then linearised about the corrected tensions.
 
         Args:
-            assumed: weights by candidate, of winches or of anything else.
+            assumed: weights by candidate; only those of winches are used.
         """
         names, taken = self.measurement.machine.cable_names, np.zeros_like(self.taken)
         for candidate, weights in assumed.items():
@@ -77,13 +77,14 @@ class DrawnTension:
         return replace(self, measurement=reported, taken=self.taken + taken)
 
     def taken_at(self, times: Array) -> Array:
-        """Return what was taken out, smoothed as the tensions are, (len(times), n) [N]."""
+        """Return the subtracted tensions, smoothed in the same way, (len(times), n) [N]."""
         return self._smooth(self.taken, times)
 
     def columns(self, effect: Effect, i: int, times: Array) -> Iterator[tuple[Candidate, Array]]:
-        """Yield what one unit of an effect on winch i adds to the tension drawn from its torque.
+        """Yield the change of the tension by one unit of an effect on winch i.
 
-        Smoothed as the tension is: a shaft may turn round several times within a smoothed step.
+        Smoothed in the same way as the tension: a shaft may reverse several times within a
+        smoothing step.
 
         Yields:
             Pairs of candidate and tensions at `times`, shape (len(times), coefficients) [N].
@@ -101,18 +102,18 @@ class DrawnTension:
         return np.asarray(torques / rows[:, WinchSignal.RADIUS, None])
 
     def late(self, i: int, times: Array) -> Array:
-        """Return what a torque adds to the tension by the second that it is late, shape (k,).
+        """Return the tension's change per second of torque delay, shape (k,) [N/s].
 
-        Drives say how late they are to a period only.
+        The delay of a drive is known to one period only.
         """
         rows = self._rows[i]
         torque = self._smooth(rows[:, [WinchSignal.TORQUE]], times)[:, 0]
         return np.asarray(np.gradient(torque, times) / rows[0, WinchSignal.RADIUS])
 
     def turning(self, i: int, times: Array, thresholds: Thresholds = DEFAULT_THRESHOLDS) -> Array:
-        """Return what dry friction adds to the tension while the shaft turns round, shape (k,).
+        """Return the tension's change per newton metre of dry friction near reversals, shape (k,).
 
-        By the newton metre of it. The shaft may stick there, and then holds with any torque.
+        The shaft may stick there, and dry friction then holds with any torque.
         """
         rows = self._rows[i]
         speeds = rows[:, WinchSignal.SPEED]
@@ -125,10 +126,9 @@ class DrawnTension:
     def untold(
         self, i: int, times: Array, thresholds: Thresholds = DEFAULT_THRESHOLDS
     ) -> list[Array]:
-        """Return what no recording tells of winch i's tension, each of shape (len(times),).
+        """Return the unknown parts of winch i's tension, each of shape (len(times),).
 
-        What its shaft holds while it turns round, and of a drive of which nothing is known how late
-        it tells its torque.
+        Dry friction near reversals, and the delay of the torque where the drive's is unknown.
         """
         late = [] if self.measurement.torque_age > 0.0 else [self.late(i, times)]
         return [self.turning(i, times, thresholds), *late]
@@ -148,21 +148,21 @@ class DrawnTension:
         return found
 
     def _smooth(self, values: Array, times: Array) -> Array:
-        """Return values smoothed as tensions are; splines would take as long as all else."""
+        """Return values smoothed in the same way as tensions; splines would take too long."""
         assert self.measurement.tension is not None
         slow, _ = filtered(self.measurement.tension.of_others(values), self.band)
         return np.stack([np.interp(times, self.times, column) for column in slow.T], axis=1)
 
 
 def drawn_tension(measurement: Measurement, known: Sequence[Action]) -> DrawnTension | None:
-    """Return the tensions that the winches tell, if they do.
+    """Return the tensions from the winches' torques; None without angles or torques.
 
-    What the test-bed's own effects take of the torque is allowed for; what else takes some looks
-    like a fault of a load cell.
+    The torque that the test-bed's own effects take is subtracted. Any other loss of torque appears
+    as a load cell fault.
 
     Args:
-        measurement: what was recorded, without tensions.
-        known: effects that the test-bed file has.
+        measurement: recorded signals, without tensions.
+        known: effects in the test-bed file.
     """
     if measurement.angle is None or measurement.torque is None:
         return None
@@ -196,7 +196,7 @@ def drawn_tension(measurement: Measurement, known: Sequence[Action]) -> DrawnTen
 
 
 def _drawn(rows: Array, pulled: Array, own: Sequence[Action]) -> Array:
-    """Return tensions (k,) [N] of what is left of torques for the cable, friction allowed for."""
+    """Return tensions (k,) [N] from the torques left for the cable, known friction subtracted."""
     radius = rows[:, WinchSignal.RADIUS]
     rows[:, WinchSignal.TENSION] = pulled / radius
     for _ in range(_FIXED_POINTS if own else 0):

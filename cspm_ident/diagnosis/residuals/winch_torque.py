@@ -25,7 +25,7 @@ from cspm_sim.effects.signals import WinchSignal
 
 Array = NDArray[np.float64]
 
-# Encoder noise is taken for no less than this.
+# Lower limit of the encoder noise.
 _STEP_RAD = 1e-6
 SPEED, PULL = "speed [rad/s]", "tension [N]"
 _DRIVERS = {
@@ -44,17 +44,17 @@ def shaft_equations(
     winches: Collection[str],
     thresholds: Thresholds = DEFAULT_THRESHOLDS,
 ) -> list[Equation]:
-    """Return the equation of every winch, of those asked for, whose signals were recorded.
+    """Return the equations of the given winches whose signals were recorded.
 
-    The residual is torque − J·q̈ − (r/n)·t less what the test-bed's own effects add, weighted with
-    windows, so that nothing noisy is differentiated.
+    The residual is torque − J·q̈ − (r/n)·t less the part of the test-bed's own effects. It is
+    weighted with windows, so that no noisy signal is differentiated.
 
     Args:
         measurement: what was recorded, with the machine as it is described.
         effects: the catalogue.
-        known: effects that the test-bed file has.
+        known: effects in the test-bed file.
         knots: of the free functions; None: without these.
-        winches: names of those asked for.
+        winches: names of the winches.
         thresholds: `moving_shaft_noise_ratio` and `reversal_speed_share`.
     """
     found: list[Equation] = []
@@ -84,24 +84,30 @@ def shaft_equations(
 
 
 def _turns(angles: Array, samples: Samples, ratio: float) -> bool:
-    """Return whether a shaft moves by more than its encoder's noise; a brake takes any torque."""
+    """Return whether a shaft moves by more than its encoder's noise.
+
+    A shaft held by its brake does not: any torque may then act.
+    """
     noise = float(np.std(samples.values[:, 0] - np.interp(samples.times, *_halves(samples))))
     return bool(np.std(angles) > ratio * max(noise, _STEP_RAD))
 
 
 def _halves(samples: Samples) -> tuple[Array, Array]:
-    """Return every other sample, between which straight lines leave little but noise."""
+    """Return every other sample; linear interpolation between them leaves little but noise."""
     return samples.times[::2], samples.values[::2, 0]
 
 
 def _lost(torque: Samples, age: float, times: Array) -> NDArray[np.bool_]:
-    """Return at which times a reading is missing, so that a torque that chatters is not known."""
+    """Return the times at which a torque reading is missing.
+
+    A torque that changes between readings is unknown there.
+    """
     after = np.searchsorted(torque.times - age, times) - 1
     return np.asarray(torque.gaps[np.clip(after, 0, len(torque.gaps) - 1)])
 
 
 class _Shaft:
-    """One winch's rows and the window that weighs them."""
+    """One winch's rows and the window that weights them."""
 
     def __init__(
         self,
@@ -173,7 +179,7 @@ class _Shaft:
         return self._averaged(effect.regressors(self._rows, **shape)[:, 0])
 
     def _read(self, effect: Effect) -> Array:
-        """Return what a sensor's fault makes of the residual, by the reading's share in it."""
+        """Return a sensor fault's change of the residual, by the reading's part in it."""
         tension = effect.physics.sense is not None and effect.physics.sense.topics[0] == TENSION
         source = WinchSignal.TENSION if tension else WinchSignal.ANGLE
         reading = reading_rows(self._rows[:, WinchSignal.TIME], self._rows[:, source])

@@ -52,7 +52,7 @@ def analyze_design_command(
     folder: Path | None,
     json: Path | None,
 ) -> None:
-    """Look at all loops of a scenario, print, and write what was asked for.
+    """Analyse all loops of a scenario, print the results, and write the requested files.
 
     Args:
         machine: with its scenario.
@@ -166,7 +166,7 @@ def _cells(view: LoopView) -> list[str]:
 
 
 def meets_requirements(view: LoopView) -> bool:
-    """Return whether a motion loop has all that the thesis's section 7-1 asks for."""
+    """Return whether a motion loop meets all requirements of the thesis's section 7-1."""
     found = view.margins
     return bool(
         found.phase_margin >= PHASE_MARGIN

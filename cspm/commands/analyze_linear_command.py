@@ -33,7 +33,7 @@ HEADINGS = {FROZEN: "ours, directions held", EXACT: "ours, exact"}
 def analyze_linear_command(
     machine: AnalyzedMachine, folder: Path | None, json: Path | None
 ) -> None:
-    """Analyse, print, and write what was asked for.
+    """Analyse the linearised machine, print the results, and write the requested files.
 
     Raises:
         CspmError: the folder exists, or the bar cannot hang at this pose.

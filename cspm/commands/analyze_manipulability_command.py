@@ -32,7 +32,7 @@ LEAST_ENTRY = 0.05
 def analyze_manipulability_command(
     machine: AnalyzedMachine, folder: Path | None, json: Path | None
 ) -> None:
-    """Work out the manipulability at a pose, print, and write what was asked for.
+    """Compute the manipulability at a pose, print the results, and write the requested files.
 
     Raises:
         CspmError: the folder exists, or the cables span too few directions.

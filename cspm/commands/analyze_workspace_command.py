@@ -46,7 +46,7 @@ def analyze_workspace_command(
     folder: Path | None,
     json: Path | None,
 ) -> None:
-    """Find the workspace, print, and write what was asked for.
+    """Compute the workspace, print the results, and write the requested files.
 
     Args:
         machine: what to analyse, and where.

@@ -1,4 +1,4 @@
-"""The machine and the pose that an analysis is asked for on the command line."""
+"""The machine and the pose of an analysis, from the command line."""
 
 from __future__ import annotations
 

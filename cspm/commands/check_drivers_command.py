@@ -1,4 +1,4 @@
-"""The command `cspm check-drivers`: listens to somebody's drivers and says what is wrong."""
+"""The command `cspm check-drivers`: listens to drivers and reports what is wrong."""
 
 from __future__ import annotations
 
@@ -45,11 +45,11 @@ SHORTEST_S, LONGEST_S = 1.0, 300.0
 
 @dataclass(frozen=True)
 class Machine:
-    """What the drivers are held against.
+    """The machine and scenario that the drivers are checked against.
 
     Attributes:
         testbed: the machine.
-        scenario: what is to be run on it; says rates and safe state.
+        scenario: what is to be run on it, with its rates and safe state.
     """
 
     testbed: Testbed
@@ -68,11 +68,11 @@ class Machine:
 
 @dataclass(frozen=True)
 class Asked:
-    """What is asked for.
+    """Options of the command.
 
     Attributes:
-        machine: what the drivers are held against.
-        seconds: how long to listen, and how long each pull lasts [s].
+        machine: what the drivers are checked against.
+        seconds: duration of listening and of each pull [s].
         sim_time: whether stamps follow `/clock`.
         pull: cables to pull at, names with commas or `all`; None for no pull test.
     """
@@ -85,13 +85,13 @@ class Asked:
 
 @dataclass(frozen=True)
 class Heard:
-    """What came of it.
+    """Results of listening.
 
     Attributes:
         topics: findings by topic.
-        observations: what was heard.
+        observations: what was received.
         pulls: what the pull test showed, where there was one.
-        complete: whether nothing ended it early.
+        complete: whether it was not ended early.
     """
 
     topics: dict[str, list[Finding]]
@@ -109,13 +109,13 @@ class Heard:
 def machine_of(
     testbed: Path | None, scenario: str | None, overrides: Sequence[str] = ()
 ) -> Machine:
-    """Return the machine of a scenario, or of a test-bed file by itself.
+    """Return the machine of a scenario, or of a test-bed file alone.
 
-    By itself a machine has the rates of a scenario without `rates`, or its sensors' where those
-    are lower.
+    With a test-bed file alone, the rates are those of a scenario without `rates`, or its sensors'
+    where lower.
 
     Raises:
-        InputError: not one of both is given, or it cannot be used.
+        InputError: none or both are given, or the file cannot be used.
     """
     if (testbed is None) == (scenario is None):
         raise InputError("check-drivers: allowed: --testbed FILE or --scenario NAME, one of both")
@@ -135,10 +135,10 @@ def machine_of(
 
 
 def check_drivers_command(asked: Asked, json: Path | None = None) -> bool:
-    """Listen to drivers and tell what was found; return whether all was heard and nothing is wrong.
+    """Listen to drivers, print the findings, and return whether all was received without fault.
 
     Raises:
-        InputError: what is asked for is not possible.
+        InputError: an option is not possible.
     """
     if not SHORTEST_S <= asked.seconds <= LONGEST_S:
         raise InputError(f"--for {asked.seconds:g}: allowed: {SHORTEST_S:g} to {LONGEST_S:g} s")

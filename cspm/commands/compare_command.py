@@ -1,4 +1,4 @@
-"""What `cspm compare` does."""
+"""The command `cspm compare`."""
 
 from __future__ import annotations
 
@@ -22,16 +22,16 @@ from cspm_run.summary import write_json
 
 @dataclass(frozen=True)
 class CompareRequest:
-    """What was asked for.
+    """Options of the command.
 
     Attributes:
         recording: what to compare.
         testbed: the machine to simulate, instead of the recorded one.
         drive: which measured signals drive the simulation.
         horizon: longest window [s].
-        delays: of sensors, by topic [s]; None: find them.
+        delays: delays of sensors by topic [s]; None estimates them.
         repeat: a second recording of the same experiment.
-        out: a new folder for the report page; None: none.
+        out: a new folder for the report page; None writes nothing.
     """
 
     recording: Path
@@ -44,10 +44,10 @@ class CompareRequest:
 
 
 def compare_command(asked: CompareRequest, json: Path | None) -> None:
-    """Compare, print, and write what was asked for.
+    """Compare a recording with its simulation, print, and write the requested report.
 
     Raises:
-        InputError: naming what is wrong in recording, test-bed or options.
+        InputError: recording, test-bed or options cannot be used.
     """
     console = make_console()
     refuse_existing(asked.out)

@@ -1,4 +1,4 @@
-"""What `cspm diagnose` does."""
+"""The command `cspm diagnose`."""
 
 from __future__ import annotations
 
@@ -39,14 +39,14 @@ from cspm_sim.effects import catalogue
 
 @dataclass(frozen=True)
 class DiagnoseRequest:
-    """What was asked for.
+    """Options of the command.
 
     Attributes:
-        recordings: in which to look.
-        held_out: on which to judge; none: the last part of each recording.
-        testbed: the machine as it is believed to be, instead of the recorded one.
-        out: a new folder for what is written; None: nothing is.
-        closed_loop: simulate the closed loop again with what was found.
+        recordings: to search.
+        held_out: for the hold-out test; none for the last part of each recording.
+        testbed: file of the assumed machine, instead of the recorded one.
+        out: a new folder for the results; None writes nothing.
+        closed_loop: whether to simulate the closed loop again with the findings.
     """
 
     recordings: Sequence[Path]
@@ -57,10 +57,10 @@ class DiagnoseRequest:
 
 
 def diagnose_command(asked: DiagnoseRequest, json: Path | None) -> None:
-    """Diagnose, print, and write what was asked for.
+    """Diagnose, print the results, and write the requested files.
 
     Raises:
-        InputError: naming what is wrong in recordings, test-bed or options.
+        InputError: recordings, test-bed or options cannot be used.
     """
     console = make_console()
     refuse_existing(asked.out)
@@ -89,14 +89,14 @@ def diagnose_command(asked: DiagnoseRequest, json: Path | None) -> None:
 
 
 def _print_cut_short(console: Console, found: Diagnosis) -> None:
-    """Print which recordings end where their writer was killed."""
+    """Print which recordings were cut short because their writer was killed."""
     for each in (*found.searched, *found.held_out):
         if not each.complete:
             say(console, f"{each.path}: was not closed; of it {each.duration:.1f} s are left")
 
 
 def _print_parity(console: Console, parity: Sequence[Parity]) -> None:
-    """Print which commands are not those of the described controllers."""
+    """Print which recorded commands differ from those of the described controllers."""
     for each in parity:
         if each.different:
             say(
@@ -108,10 +108,10 @@ def _print_parity(console: Console, parity: Sequence[Parity]) -> None:
 
 
 def explain_command(name: str) -> None:
-    """Print what an effect is, how it shows and what it is confused with.
+    """Print an effect's description, its signature and the effects it is confounded with.
 
     Raises:
-        InputError: no such effect.
+        InputError: there is no such effect.
     """
     from rich.markdown import Markdown
 
@@ -135,7 +135,7 @@ def _print_named(
 
 
 def _experiments(found: Diagnosis, data: Mapping[str, Any], folder: Path | None) -> list[list[str]]:
-    """Return, of every alternative of every finding, what tells it apart."""
+    """Return the separating experiment of every alternative, by finding."""
     return [
         [
             f"cspm run {folder / entry['separating_experiment']}"
@@ -150,13 +150,13 @@ def _experiments(found: Diagnosis, data: Mapping[str, Any], folder: Path | None)
 def print_diagnosis(
     console: Console, found: Diagnosis, data: Mapping[str, Any], folder: Path | None
 ) -> None:
-    """Print verdict, findings and how the fit changes on data that was not searched.
+    """Print the verdict, the findings and the change of fit on held-out data.
 
     Args:
-        console: where.
+        console: where to print.
         found: the diagnosis.
-        data: the same as `diagnosis.json` has it.
-        folder: where planned experiments were written, if anywhere.
+        data: contents of its `diagnosis.json`.
+        folder: folder of the planned experiments; None if they were not written.
     """
     verdict = verdict_of(found)
     console.print(f"verdict: [bold]{verdict.value}[/]")
@@ -202,7 +202,7 @@ def print_diagnosis(
 
 
 def _print_fits(console: Console, found: Diagnosis) -> None:
-    """Print what changed, or is well above its noise; all else is a count."""
+    """Print fits that changed or are well above their noise, and the count of the others."""
     judged = "held-out recordings" if found.held_out else "the last part, not searched"
     rows: list[tuple[str, tuple[float, ...], str]] = [
         (channel_of(f), (f.before, f.retuned, f.after, f.ceiling, f.noise), unit_of(f))

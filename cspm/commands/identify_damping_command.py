@@ -17,7 +17,7 @@ from cspm_run.console import say
 
 
 def identify_damping_command(asked: RigRequest, json: Path | None) -> None:
-    """Identify, print, and write what was asked for.
+    """Identify the cable damping, print the results, and write the requested files.
 
     Raises:
         InputError: naming what is wrong in recordings, test-bed or options.

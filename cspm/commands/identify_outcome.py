@@ -21,7 +21,7 @@ def hand_out(
     folder: Path | None,
     json: Path | None,
 ) -> None:
-    """Print what was identified, and write what was asked for.
+    """Print the identified parameters, and write the requested files.
 
     Args:
         found: what was identified.

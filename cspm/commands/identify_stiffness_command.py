@@ -21,7 +21,7 @@ LAW = "k = min(a/l^b (e^(c t) - e^(d t)), E A/l)"
 
 
 def identify_stiffness_command(asked: RigRequest, json: Path | None) -> None:
-    """Identify, print, and write what was asked for.
+    """Identify the cable stiffness, print the results, and write the requested files.
 
     Raises:
         InputError: naming what is wrong in recordings, test-bed or options.

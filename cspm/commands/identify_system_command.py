@@ -1,4 +1,4 @@
-"""What `cspm identify system` does."""
+"""The command `cspm identify system`."""
 
 from __future__ import annotations
 
@@ -25,18 +25,18 @@ from cspm_run.console import make_console, say
 
 @dataclass(frozen=True)
 class SystemRequest:
-    """What was asked for on the command line.
+    """Options of the command line.
 
     Attributes:
         recordings: to fit.
-        held_out: to judge only.
-        testbed: the machine's file, instead of what the recordings carry.
-        names: parameters to fit; none for the usual ones.
-        frozen: names with the value that they keep, or None for the machine's.
+        held_out: for validation only.
+        testbed: the machine's file, instead of the recorded one.
+        names: parameters to fit; none for the default ones.
+        frozen: fixed values by name, None for the machine's.
         priors: by name.
         bounds: lowest and highest value, by name.
-        profiled: parameters whose profile likelihood is wanted.
-        horizon: of the windows [s]; None for the usual one.
+        profiled: parameters whose profile likelihood is computed.
+        horizon: length of the windows [s]; None for the default one.
         out: a new folder for picture and fitted test-bed; None writes nothing.
     """
 
@@ -53,10 +53,10 @@ class SystemRequest:
 
 
 def identify_system_command(asked: SystemRequest, json: Path | None) -> None:
-    """Identify, print, and write what was asked for.
+    """Identify the system, print the results, and write the requested files.
 
     Raises:
-        InputError: naming what is wrong in recordings, test-bed or options.
+        InputError: recordings, test-bed or options cannot be used.
     """
     console = make_console()
     refuse_existing(asked.out)
@@ -77,7 +77,7 @@ def identify_system_command(asked: SystemRequest, json: Path | None) -> None:
 
 
 def print_system(console: Console, result: SystemResult) -> None:
-    """Print values with intervals, what was not excited, and how well recordings are predicted."""
+    """Print parameters with intervals, directions not excited, and the fit of the recordings."""
     estimate = result.solution.estimate
     table = Table(title="output error, 95 % intervals", box=box.SIMPLE)
     for column in ("parameter", "unit", "nominal", "found", ""):

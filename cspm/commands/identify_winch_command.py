@@ -1,4 +1,4 @@
-"""What `cspm identify winch` does."""
+"""The command `cspm identify winch`."""
 
 from __future__ import annotations
 
@@ -21,23 +21,23 @@ from cspm_msgs_py.new_folder import refuse_existing
 from cspm_msgs_py.testbed import load_testbed
 from cspm_run.console import make_console, say
 
-# From a parameter's unit at the shaft to that at the drum's rim, and the power of the radius.
+# Unit at the shaft to unit at the drum's rim, and the power of the radius that converts them.
 _AT_RIM = {"kg·m²": ("kg", 2), "N·m·s/rad": ("N·s/m", 2), "N·m": ("N", 1)}
 
 
 @dataclass(frozen=True)
 class WinchRequest:
-    """What was asked for on the command line.
+    """Options of the command line.
 
     Attributes:
         recordings: to fit.
-        held_out: to judge only.
-        testbed: the machine's file, instead of what the recordings carry.
+        held_out: for validation only.
+        testbed: the machine's file, instead of the recorded one.
         winches: names of their cables; none for all.
-        effects: to fit beside the inertia; none for the usual ones.
-        torque_age: see `WinchSignals` [s]; None: as the first recording was made.
-        reversals: whether windows count in which the shaft turns round.
-        band: in which torque errors are counted [Hz]; None for the usual one.
+        effects: to fit beside the inertia; none for the default ones.
+        torque_age: see `WinchSignals` [s]; None for the first recording's.
+        reversals: whether windows with a reversal of the shaft count.
+        band: frequency band of the torque errors [Hz]; None for the default one.
         out: a new folder for pictures and fitted test-bed; None writes nothing.
     """
 
@@ -53,10 +53,10 @@ class WinchRequest:
 
 
 def identify_winch_command(asked: WinchRequest, json: Path | None) -> None:
-    """Identify, print, and write what was asked for.
+    """Identify winches, print the results, and write the requested files.
 
     Raises:
-        InputError: naming what is wrong in recordings, test-bed or options.
+        InputError: recordings, test-bed or options cannot be used.
     """
     refuse_existing(asked.out)
     with make_console().status("") as status:
@@ -75,7 +75,7 @@ def identify_winch_command(asked: WinchRequest, json: Path | None) -> None:
 
 
 def print_winches(console: Console, result: WinchesResult) -> None:
-    """Print values with intervals, what was not excited, and how well torques are said."""
+    """Print parameters with intervals, parameters not excited, and the fit of the torques."""
     for winch in result.winches:
         console.print(_table(winch))
         for direction in winch.fit.estimate.unexcited:

@@ -23,7 +23,7 @@ from cspm_run.summary import write_json
 
 @dataclass(frozen=True)
 class Import:
-    """What was asked for on the command line; without `out` nothing is written."""
+    """Options of the command line; without `out` nothing is written."""
 
     source: Path
     mapping: Path

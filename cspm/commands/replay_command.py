@@ -31,16 +31,16 @@ KEYS = "space: pause · s or →: one instant · + −: rate · q: end"
 
 @dataclass(frozen=True)
 class Replay:
-    """What is asked for.
+    """Options of the command.
 
     Attributes:
         bag: what to play.
         selection: which part of it.
-        rate: bag time per wall time; None for 1, or with nodes in step for as fast as they are.
+        rate: bag time per wall time; None for 1, or for unlimited with nodes in step.
         paused: whether to begin paused.
-        through: nodes to feed in step; `all` stands for those that the recording has.
-        overrides: values put over the recorded scenario's for those nodes.
-        out: where to record what they make of it.
+        through: nodes to feed in step; `all` means those that the recording has.
+        overrides: values that replace the recorded scenario's for those nodes.
+        out: where to record the output of those nodes.
     """
 
     bag: Path
@@ -52,10 +52,10 @@ class Replay:
     out: Path | None = None
 
     def check(self) -> None:
-        """Refuse what does not go together.
+        """Refuse options that exclude each other.
 
         Raises:
-            InputError: see above.
+            InputError: they do.
         """
         chosen = self.selection
         if not self.through:
@@ -70,11 +70,11 @@ class Replay:
 
 
 def replay_command(asked: Replay, json: Path | None = None) -> bool:
-    """Play a bag; return whether it was played to its end and, through nodes, found again.
+    """Play a bag; return whether it was played to its end and, through nodes, reproduced.
 
     Raises:
-        InputError: the bag, or what is asked of it, cannot be used.
-        CspmError: through nodes: nothing moved any more.
+        InputError: the bag, or an option, cannot be used.
+        CspmError: the replay through nodes stalled.
     """
     console = Console()
     asked.check()
@@ -149,7 +149,7 @@ def _tell(console: Console, found: Replayed) -> None:
 
 
 class Display:
-    """Shows how far a player is, and passes keys on to it, while it is a context."""
+    """Context that shows a player's progress and passes keys on to it."""
 
     def __init__(self, console: Console, asked: Replay, bag: BagStream) -> None:
         self._console = console
@@ -186,14 +186,14 @@ class Display:
 
 
 def state_of(player: Player) -> str:
-    """Return a player's rate, or that it is paused."""
+    """Return a player's rate as text, or `paused`."""
     if player.paused:
         return "paused"
     return "as fast as possible" if player.rate == UNLIMITED else f"× {player.rate:g}"
 
 
 def obey(key: str, player: Player, now_s: float) -> None:
-    """Do what a key stands for; others do nothing."""
+    """Execute the command of a key; ignore other keys."""
     if key == " ":
         (player.resume if player.paused else player.pause)(now_s)
     elif key in ("s", RIGHT):

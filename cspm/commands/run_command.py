@@ -156,7 +156,7 @@ def info_command(bag: Path, json: Path | None) -> None:
 
 
 def recover_command(bag: Path, out: Path | None, json: Path | None) -> None:
-    """Restore a recording, and say what came back."""
+    """Restore a recording, and print what was restored."""
     console = Console()
     report = recover(bag, out)
     if not report.restored:

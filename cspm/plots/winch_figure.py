@@ -1,4 +1,4 @@
-"""The picture of how well a winch's equation says its torque."""
+"""The figure of a winch's measured and predicted torque."""
 
 from __future__ import annotations
 
@@ -11,15 +11,15 @@ from matplotlib.figure import Figure
 from cspm_ident.winch.identify_winches import DESCRIBED, FITTED, IdentifiedWinch, WinchJudgement
 
 DPI = 100
-# As many samples as a picture can show.
+# Most samples that a figure shows.
 _MOST = 4000
 _COLOURS = {DESCRIBED: "C1", FITTED: "C0"}
 
 
 def draw_winch(path: Path, winch: IdentifiedWinch) -> None:
-    """Write measured and predicted torque, what is left over time and against speed.
+    """Write the figure of measured and predicted torque, with residuals over time and speed.
 
-    A column per recording.
+    It has one column per recording.
     """
     count = len(winch.judgements)
     figure = Figure(figsize=(7.5 * count, 10), layout="constrained")

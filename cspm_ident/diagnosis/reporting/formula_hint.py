@@ -1,4 +1,4 @@
-"""A free shape put into a formula, as a hint and no more."""
+"""A simple formula for a free function, as a hint only."""
 
 from __future__ import annotations
 
@@ -25,7 +25,7 @@ _FORMS: dict[str, Callable[[Array], Array]] = {
 def sketch(
     knots: Array, values: Array, name: str, thresholds: Thresholds = DEFAULT_THRESHOLDS
 ) -> str | None:
-    """Return the simplest formula that a shape follows, a constant beside it; None if none does.
+    """Return the simplest formula, plus a constant, that fits a shape; None if none does.
 
     Args:
         knots: of the signal, shape (k,).
@@ -47,7 +47,7 @@ def sketch(
 
 
 def is_even(knots: Array, values: Array, thresholds: Thresholds = DEFAULT_THRESHOLDS) -> bool:
-    """Return whether a shape is the same on both sides of zero, as far as it has both.
+    """Return whether a shape is even, over the range that both sides of zero share.
 
     Args:
         knots: of the signal, ascending, shape (k,).

@@ -16,16 +16,16 @@ _UNBOUNDED = (-np.inf, np.inf)
 
 
 def improved_testbed(diagnosis: Diagnosis, source: str) -> TestbedFile:
-    """Return the searched machine's file with an entry under `effects` for all that was found.
+    """Return the searched machine's file with an entry under `effects` for every finding.
 
-    Every number carries the recordings it comes from and its interval; all else stays as it was.
+    Every parameter carries its source recordings and its interval; all else is unchanged.
 
     Args:
-        diagnosis: what was found.
-        source: names the new file in errors.
+        diagnosis: the diagnosis.
+        source: name of the new file in errors.
 
     Raises:
-        InputError: the numbers are no machine's.
+        InputError: the parameters do not make a valid machine.
     """
     yaml = round_trip()
     content = yaml.load(diagnosis.searched[0].testbed.text)

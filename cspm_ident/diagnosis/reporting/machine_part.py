@@ -12,7 +12,7 @@ from cspm_sim.effects import Block, Channel, Effect, Elements
 
 
 class Kind(Enum):
-    """What a part is, as a person calls it."""
+    """Kind of a part, with its name in reports."""
 
     WINCH = "winch"
     CABLE = "cable"
@@ -22,11 +22,11 @@ class Kind(Enum):
 
 
 class Part(NamedTuple):
-    """One part.
+    """One part of a test-bed.
 
     Attributes:
-        kind: what it is.
-        element: name of the cable that it belongs to, or of the body.
+        kind: its kind.
+        element: name of its cable, or of the body.
     """
 
     kind: Kind
@@ -34,7 +34,7 @@ class Part(NamedTuple):
 
     @property
     def words(self) -> str:
-        """Its name for a person."""
+        """Name of the part in reports."""
         body = self.element.replace("_", " ")
         return body if self.kind is Kind.BODY else f"{self.kind.value} {body}"
 
@@ -49,14 +49,14 @@ _SENSORS = {WINCHES: Kind.WINCH, TENSION: Kind.LOAD_CELL}
 
 
 def parts_of(effect: Effect, element: str, cables: Sequence[str]) -> list[Part]:
-    """Return the parts in which an effect on an element sits, in a machine of some cables."""
+    """Return the parts that an effect on an element concerns, in a machine with given cables."""
     if effect.acts_on is Elements.CELLS:
         return [Part(Kind.LOAD_CELL, name) for name in cables]
     return [Part(kind_of(effect), element)]
 
 
 def kind_of(effect: Effect) -> Kind:
-    """Return what sort of part an effect sits in."""
+    """Return the kind of part that an effect concerns."""
     if effect.physics.sense is not None:
         return _SENSORS.get(effect.physics.sense.topics[0], Kind.MARKERS)
     return _BLOCKS.get(effect.block, Kind.BODY)

@@ -1,4 +1,4 @@
-"""Which findings are accepted on held-out data, and what is unexplained beside them."""
+"""Acceptance of findings on held-out data, and the unexplained residuals beside them."""
 
 from __future__ import annotations
 
@@ -35,49 +35,49 @@ class Acceptance:
     """Findings after the hold-out test.
 
     Attributes:
-        findings: those that are kept, then the rejected ones in the order in which they were.
+        findings: the kept ones, then the rejected ones in the order of their rejection.
     """
 
     findings: tuple[Finding, ...]
 
     @property
     def kept(self) -> tuple[Finding, ...]:
-        """What is not rejected."""
+        """Findings that are not rejected."""
         return tuple(each for each in self.findings if each.status is not Status.REJECTED)
 
     @property
     def tested(self) -> tuple[Finding, ...]:
-        """Of that, what held-out data do not leave open."""
+        """Kept findings that held-out data excite."""
         return tuple(each for each in self.kept if each.holdout is not HoldOut.SILENT)
 
     @property
     def rejected(self) -> tuple[Finding, ...]:
-        """What explains nothing, fed back noise excepted."""
+        """Rejected findings, except those of fed-back noise."""
         gone = (each for each in self.findings if each.status is Status.REJECTED)
         return tuple(each for each in gone if each.rejection is not Rejection.FED_BACK)
 
     @property
     def fed_back(self) -> tuple[Finding, ...]:
-        """What the reference motion does not show, and controllers feed back."""
+        """Findings rejected as fed-back noise, which the reference motion does not show."""
         return tuple(each for each in self.findings if each.rejection is Rejection.FED_BACK)
 
     @property
     def has_rejected(self) -> bool:
-        """Whether anything that was found is rejected."""
+        """Whether any finding is rejected."""
         return any(each.status is Status.REJECTED for each in self.findings)
 
     def rejecting(self, gone: Sequence[Finding]) -> Acceptance:
-        """Return the same with some of what was kept rejected.
+        """Return the acceptance with further findings rejected.
 
         Args:
-            gone: what goes, each with the reason.
+            gone: the rejected findings, each with its reason.
         """
         hypotheses = [each.hypothesis for each in gone]
         rest = (each for each in self.findings if each.hypothesis not in hypotheses)
         return Acceptance((*rest, *gone))
 
     def unexplained(self, search: Search, found: SearchResult) -> tuple[Unexplained, ...]:
-        """Return what nothing explains beside what held-out data confirm, of all that was found."""
+        """Return the residuals left unexplained by the findings that held-out data confirm."""
         left_open = tuple(each for each in self.kept if each not in self.tested)
         if not (self.has_rejected or left_open):
             return found.unexplained
@@ -92,12 +92,12 @@ def accepted(
     rows: Parts,
     block: float,
 ) -> Acceptance:
-    """Accept or reject what was found.
+    """Accept or reject the findings of a search.
 
     Args:
-        search: in which it was found.
-        found: that.
-        judge: Gram matrices of held-out data.
+        search: the search.
+        found: its result.
+        judge: Gram matrices of the held-out data.
         searched: the recordings.
         rows: their equations, in units of their noise.
         block: length of the blocks [s].
@@ -114,7 +114,7 @@ def accepted(
         if e not in left_open
     ]
     rejected = (*contradicted, *untestable)
-    # Otherwise a residual would be called unexplained, of which held-out data show as little.
+    # Otherwise a residual would be reported as unexplained that held-out data excite as little.
     if left_open and not unexplained_beside(search, (*kept, *left_open), rejected, fed_back):
         left_open = tuple(replace(each, holdout=HoldOut.FAINT) for each in left_open)
     return Acceptance((*kept, *left_open, *rejected, *fed_back))
@@ -127,7 +127,7 @@ def _is_silent(finding: Finding) -> bool:
 def _tested(search: Search, judge: BlockGram, found: Sequence[Finding]) -> tuple[Finding, ...]:
     """Return findings tested on held-out data, a rejected one replaced by a rival that passes.
 
-    A bar that comes to rest contradicts drag in proportion to its speed, and not to its square.
+    Example: a bar that comes to rest contradicts linear drag, but not quadratic drag.
     """
     tested = holdout_tested(search.fits, judge, found)
     for k, each in enumerate(tested):
@@ -141,7 +141,7 @@ def _tested(search: Search, judge: BlockGram, found: Sequence[Finding]) -> tuple
 
 
 def _rivals(search: Search, finding: Finding, found: Sequence[Finding]) -> Iterator[Finding]:
-    """Yield what explains the same as a finding by itself, nearest first."""
+    """Yield alternatives that replace a finding by a single effect, the closest first."""
     others = [h for h in _hypotheses(found) if h is not finding.hypothesis]
     base = search.fits.columns(others)
     alone = [a for a in finding.alternatives if a.beside is None]
@@ -161,7 +161,10 @@ def _shown_by_reference(
     rows: Parts,
     block: float,
 ) -> tuple[tuple[Finding, ...], tuple[Finding, ...]]:
-    """Return findings that the reference motion shows, if it has to, and the rejected others."""
+    """Return the findings that pass the test by instrumental variables, and the rejected ones.
+
+    Findings that are not proportional to motion or tension need no such test.
+    """
     hypotheses, limits = _hypotheses(kept), search.thresholds
     wanted = [instruments_of(each, limits) for each in searched]
     values = search.fits.values(hypotheses)
@@ -189,9 +192,10 @@ def _left_open(
     silent: Sequence[Finding],
     fed_back: Sequence[Finding],
 ) -> tuple[Finding, ...]:
-    """Return what is reported as doubtful, though held-out data are silent on it.
+    """Return the findings that are reported as doubtful, though held-out data do not excite them.
 
-    It explains as much as what is unexplained without it, on which they are silent too.
+    Each explains as much as the residual that is unexplained without it, which held-out data do
+    not excite either.
     """
     if not silent:
         return ()
@@ -205,9 +209,9 @@ def _left_open(
 
 
 def _would_be_unexplained(search: Search, finding: Finding, kept: Sequence[Finding]) -> bool:
-    """Return whether a finding takes as large a share as what is called unexplained.
+    """Return whether a finding explains the share from which a residual counts as unexplained.
 
-    It may do so where no free function does. A healthy machine must not have as much of it.
+    It may do so where no free function does. It must exceed what a healthy machine has.
     """
     every = _hypotheses([*kept, finding])
     enough = finding.share >= search.thresholds.unknown_share
@@ -220,11 +224,10 @@ def unexplained_beside(
     rejected: Sequence[Finding],
     fed_back: Sequence[Finding] = (),
 ) -> tuple[Unexplained, ...]:
-    """Return what nothing explains beside what was kept.
+    """Return the residuals that the kept findings leave unexplained.
 
-    What was rejected explains nothing, but for what a healthy machine has as well: clocks drift, so
-    that what they did in the searched part may be gone in the other, and controllers feed noise
-    back.
+    Rejected findings explain nothing, with two exceptions. Negligible ones occur in a healthy
+    machine and may vanish in held-out data, as clock drift does. Controllers feed noise back.
     """
     every = _hypotheses([*kept, *rejected])
     healthy = [h for h in _hypotheses(rejected) if search.fits.is_negligible(h, every)]

@@ -1,4 +1,4 @@
-"""A recorded closed loop simulated again, with the machine as described and as found."""
+"""Simulation of a recorded closed loop, with the file's model and with the findings."""
 
 from __future__ import annotations
 
@@ -25,7 +25,7 @@ from cspm_run.recorded_run import run
 
 Array = NDArray[np.float64]
 
-# Of the recording that is simulated again.
+# Longest simulated part of a recording [s].
 LONGEST_S = 30.0
 
 
@@ -34,10 +34,10 @@ class ClosedLoopFit(NamedTuple):
 
     Attributes:
         name: topic and column.
-        unit: of the values.
+        unit: unit of the values.
         measured: standard deviation of the recorded quantity.
-        before: RMS difference with the machine as described.
-        after: with what was found.
+        before: RMS difference with the file's model.
+        after: RMS difference with the findings.
     """
 
     name: str
@@ -50,16 +50,16 @@ class ClosedLoopFit(NamedTuple):
 def simulate_closed_loop(
     recorded: Measurement, improved: TestbedFile, progress: Callable[[str], None] = lambda _: None
 ) -> tuple[ClosedLoopFit, ...]:
-    """Return how the recorded scenario, run again under its controllers, differs from what was.
+    """Return the differences of a recording and its scenario simulated under its controllers.
 
-    Of at most half a minute from its start. Waves are those of the recorded seed, and so is the
-    sensors' noise if a simulation was recorded. Empty where the recording carries no closed loop
-    that a simulation can run.
+    At most half a minute from the start is simulated. Waves follow the recorded seed, and so does
+    the sensors' noise if the recording is of a simulation. Empty where the recording has no closed
+    loop that a simulation can run.
 
     Args:
-        recorded: with the machine as described.
-        improved: the machine with what was found.
-        progress: called with what is being done.
+        recorded: the recording, with the file's model.
+        improved: the test-bed with the findings.
+        progress: called with a text on each step.
     """
     try:
         bundle = replace(recorded_bundle(recorded.path), plant=SIM)

@@ -1,7 +1,7 @@
-"""Whether recorded commands are what the described controllers make of the recorded measurements.
+"""Controller parity: whether the described controllers reproduce the recorded commands.
 
-Each controller is fed with what was recorded, that of the controllers before it included, so that
-a difference is its own: other gains, another version, a stage that somebody replaced.
+Each controller receives recorded inputs, those from preceding controllers included. A difference is
+therefore its own: other gains, another version, or a replaced stage.
 """
 
 from __future__ import annotations
@@ -24,19 +24,19 @@ from cspm_run.recorded_bundle import recorded_bundle
 
 Array = NDArray[np.float64]
 
-# Of the recording whose commands are computed again.
+# Longest part of a recording whose commands are recomputed [s].
 LONGEST_S = 10.0
 
 
 class Parity(NamedTuple):
-    """One controller's commands beside those that were recorded.
+    """One controller's commands against the recorded ones.
 
     Attributes:
         node: the controller.
-        topic: what it sends.
+        topic: topic of its commands.
         compared: number of commands.
-        different: those that differ in any bit, or that only one of both sends.
-        largest: of all differences, in the topic's units.
+        different: number that differ in any bit, or are missing on one side.
+        largest: largest difference, in the topic's units.
     """
 
     node: str
@@ -47,10 +47,10 @@ class Parity(NamedTuple):
 
 
 def controller_parity(path: Path) -> tuple[Parity, ...]:
-    """Return how the controllers of a recording, stepped again, agree with what was recorded.
+    """Return the parity of a recording's controllers, each stepped again with recorded inputs.
 
-    Of at most ten seconds from its start. Empty where there is nothing to step: the recording
-    carries no closed loop, or its messages are not those of a run in lockstep from its beginning.
+    At most ten seconds from the start are compared. Empty where the recording has no closed loop,
+    or its messages are not those of a run in lockstep from the start.
 
     Args:
         path: the recording.
@@ -73,10 +73,10 @@ def controller_parity(path: Path) -> tuple[Parity, ...]:
 
 
 def _by_step(rows: Rows, schedule: Schedule, name: str) -> dict[int, Array]:
-    """Return the rows of the first seconds by the step that they came at.
+    """Return the rows of the first seconds by their step.
 
     Raises:
-        InputError: they did not come when a run in lockstep has them.
+        InputError: their stamps are not those of a run in lockstep.
     """
     timing, period = schedule.topics[name], schedule.period_ns
     last = round(LONGEST_S * 1e9) // period
@@ -99,7 +99,7 @@ def _stepped(
     }
     sent_by = {topic for _, topic in tallies}
     known: dict[str, Array] = {}
-    # Up to the first message that is not there.
+    # Up to the first missing message.
     end = min(max(rows) + schedule.topics[name].divider for name, rows in recorded.items())
     for step in range(end):
         arrived = {name: rows[step] for name, rows in recorded.items() if step in rows}
@@ -121,14 +121,14 @@ def _stepped(
 
 
 class _Tally:
-    """Commands that were compared so far."""
+    """Running counts of compared commands."""
 
     def __init__(self) -> None:
         self.compared = self.different = 0
         self.largest = 0.0
 
     def add(self, made: Array | None, recorded: Array | None) -> None:
-        """Compare what a controller sends with what was recorded; None where there is nothing."""
+        """Compare a controller's command with the recorded one; None where one is missing."""
         if made is None and recorded is None:
             return
         self.compared += 1

@@ -1,4 +1,4 @@
-"""What was found, judged by simulating recordings that were not searched."""
+"""Validation of findings by simulation of held-out data."""
 
 from __future__ import annotations
 
@@ -23,11 +23,11 @@ from cspm_sim.effects import Channel
 Array = NDArray[np.float64]
 Weights = Mapping[Candidate, Array]
 
-# How long errors may grow where a drive is integrated twice or more [s].
+# Length of simulation windows where an input is integrated twice or more [s]; None: unlimited.
 HORIZONS: dict[Input, float | None] = {Input.SHAFT: 0.5, Input.WINCH: None, Input.TENSION: 0.5}
-# Of each recording that is simulated.
+# Longest simulated part of each recording [s].
 LONGEST_S = 30.0
-# In which what a cable remembers of before fades.
+# Lead time before that part, in which a cable's initial internal states decay [s].
 LEAD_S = 10.0
 
 
@@ -39,7 +39,7 @@ class Output(NamedTuple):
         name: topic and column, such as `cables/tension/surge_2`.
         unit: of the values.
         element: name of cable or body.
-        kind: the residual that the same block has.
+        kind: channel of the same block's residual.
     """
 
     drive: Input
@@ -53,15 +53,15 @@ Errors = dict[Output, tuple[float, float]]
 
 
 class SimulatedFit(NamedTuple):
-    """One quantity of recordings that were not searched, against its simulation.
+    """One measured quantity of held-out data against its simulation, in the quantity's unit.
 
     Attributes:
-        output: which.
+        output: which quantity.
         measured: its standard deviation.
         before: RMS error of the simulation with the file's model.
         retuned: with the file's parameters fitted to the searched data, nothing added.
-        after: with what was found.
-        floor: RMS that noise of sensors and inputs leaves.
+        after: with the findings.
+        floor: RMS error due to noise of sensors and inputs.
     """
 
     output: Output
@@ -73,12 +73,12 @@ class SimulatedFit(NamedTuple):
 
 
 class Baselines(NamedTuple):
-    """Simulations without anything found, with which others are compared.
+    """Simulations without findings, as the reference of others.
 
     Attributes:
-        parts: what is simulated, of each recording half a minute and what leads up to it.
-        since: from when on each is judged [s].
-        described: spread and RMS error by output with the file's model.
+        parts: simulated parts, of each recording half a minute and its lead time.
+        since: time from which each part counts [s].
+        described: standard deviation and RMS error by output with the file's model.
         retuned: with the file's parameters fitted to the searched data.
     """
 
@@ -91,12 +91,12 @@ class Baselines(NamedTuple):
 def baselines_of(
     measurements: Sequence[Measurement], starts: Sequence[float], retuned: Weights
 ) -> Baselines:
-    """Simulate what was not searched, as described and re-tuned.
+    """Simulate the held-out data with the file's model, as it is and re-tuned.
 
     Args:
-        measurements: of each half a minute is judged; what is before it, as far as there is any,
-            lets memories such as creep become what they were.
-        starts: from when on none of them was searched [s].
+        measurements: the recordings, of which half a minute counts; rows before it settle
+            internal states such as creep.
+        starts: times from which each recording is held out [s].
         retuned: weights of the file's own parameters.
     """
     parts = [
@@ -108,14 +108,14 @@ def baselines_of(
 
 
 def simulate_held_out(baselines: Baselines, found: Weights) -> tuple[SimulatedFit, ...]:
-    """Simulate winches, cables and bar from measured signals with what was found.
+    """Simulate winches, cables and bar from measured signals with the findings.
 
-    Winches take torques and tensions as input in windows of half a second, the bar by tensions
-    likewise, cables and bar by motor angles throughout. What sensors do not allow is left out.
+    In windows of half a second, torques and tensions drive the winches, and tensions drive the bar.
+    Motor angles drive cables and bar throughout. A simulation is left out if a sensor is missing.
 
     Args:
-        baselines: of the recordings.
-        found: weights of what was found.
+        baselines: those of the recordings.
+        found: weights of the findings.
     """
     parts, since, described, tuned = baselines
     after = _errors(parts, since, found) if found else described
@@ -133,15 +133,15 @@ def improvement_by(
     found: Weights,
     own: Collection[Candidate],
 ) -> Improvement | None:
-    """Return what an effect does to simulations; None where nothing that it acts on is simulated.
+    """Return the improvement of simulations by an effect; None where none depends on it.
 
-    Of the quantity that improves most, of those in the blocks that it acts on.
+    It is that of the quantity that improves most, in the blocks that the effect acts on.
 
     Args:
-        baselines: of the recordings that were simulated.
-        fits: their simulation with everything that was found.
-        found: weights of all that was found.
-        own: the effect's.
+        baselines: those of the simulated recordings.
+        fits: their simulation with all findings.
+        found: weights of all findings.
+        own: the effect's candidates.
     """
     kinds = {
         r.channel
@@ -163,9 +163,9 @@ def improvement_by(
 
 
 def _is_told(output: Output, kinds: Collection[Channel]) -> bool:
-    """Return whether a simulated quantity depends on what shows in residuals of some kinds.
+    """Return whether a simulated quantity depends on effects in residuals of the given channels.
 
-    Motor angles drive cables and bar together, so that what either does moves both.
+    Motor angles drive cables and bar together, so that an effect in either changes both.
     """
     together = {Channel.TENSION, Channel.WRENCH}
     both = output.drive is Input.WINCH and not together.isdisjoint(kinds)
@@ -173,7 +173,7 @@ def _is_told(output: Output, kinds: Collection[Channel]) -> bool:
 
 
 def _errors(parts: Sequence[Measurement], since: Sequence[float], weights: Weights) -> Errors:
-    """Return spread and RMS error by output, over all recordings."""
+    """Return standard deviation and RMS error by output, over all recordings."""
     found: dict[Output, list[tuple[Array, Array]]] = {}
     for part, start in zip(parts, since, strict=True):
         measurement = as_found(part, weights)
@@ -207,7 +207,7 @@ def _drives(simulation: BlockSimulation) -> list[Input]:
 
 
 def _floors(parts: Sequence[Measurement], weights: Weights) -> dict[Output, float]:
-    """Return what noise leaves, from the first recording."""
+    """Return the RMS error due to noise by output, from the first recording."""
     measurement = as_found(parts[0], weights)
     noise, _ = noise_of(measurement, None)
     timeline = Timeline(measurement)
@@ -227,7 +227,7 @@ def _floors(parts: Sequence[Measurement], weights: Weights) -> dict[Output, floa
 def _outputs(
     measurement: Measurement, drive: Input, simulated: Simulated
 ) -> list[tuple[Output, Samples, Array, int]]:
-    """Return what a drive simulates and a sensor measured, with sensor and column."""
+    """Return the outputs of an input's simulation that were measured, with sensor and column."""
     cables, kinds = measurement.machine.cable_names, Channel
     tables = [
         ("winches/angle", measurement.angle, simulated.angles, cables, kinds.SHAFT),

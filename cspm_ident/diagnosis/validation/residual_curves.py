@@ -1,4 +1,4 @@
-"""Residuals on held-out data over time, before and after what was found: what a page draws."""
+"""Hold-out residuals over time, with the file's model and with the findings, for the report."""
 
 from __future__ import annotations
 
@@ -15,22 +15,22 @@ from cspm_sim.effects import Channel
 
 Array = NDArray[np.float64]
 
-# Of a signal's values, each of equally many.
+# Number of bins of a signal's values, each with equally many samples.
 _BINS = 12
 
 
 @dataclass(frozen=True, eq=False)
 class Curve:
-    """One component of a residual along one stretch of a recording that was not searched.
+    """One component of a residual along one stretch of held-out data.
 
     Attributes:
         place: which residual.
-        component: of the bar's wrench one degree of freedom; else empty.
+        component: one degree of freedom of the bar's wrench; else empty.
         times: shape (k,) [s].
-        measured: the measured quantity, (k,) [N·m for torques and moments, N].
-        before: residual with the file's model, (k,).
-        after: with what was found, (k,).
-        signals: measured signals that it may depend on, by name and unit, (k,) each.
+        measured: the measured quantity, shape (k,) [N·m for torques and moments, else N].
+        before: residual with the file's model, shape (k,).
+        after: residual with the findings, shape (k,).
+        signals: measured signals that it may depend on, by name and unit, shape (k,) each.
         touched: candidates that act on it.
     """
 
@@ -45,20 +45,20 @@ class Curve:
 
     @property
     def unit(self) -> str:
-        """Of residual and measured quantity."""
+        """Unit of the residual and the measured quantity."""
         moments = DOFS[3:]
         torque = self.place.channel in (Channel.DRIVE, Channel.SHAFT) or self.component in moments
         return "N·m" if torque else "N"
 
     @property
     def gained(self) -> float:
-        """Share of the squared residual that what was found takes away; below 0 if it harms."""
+        """Share of the squared residual that the findings explain; below 0 if they raise it."""
         before = float(np.sum(self.before**2))
         return 1.0 - float(np.sum(self.after**2)) / before if before > 0.0 else 0.0
 
     @property
     def main_signal(self) -> str:
-        """The signal whose bins explain most of the residual before; empty without signals."""
+        """Signal whose bins explain most of the residual `before`; empty without signals."""
         shares = {name: explained_by(values, self.before) for name, values in self.signals.items()}
         return max(shares, key=lambda name: shares[name]) if shares else ""
 
@@ -66,11 +66,11 @@ class Curve:
 def held_out_curves(
     parts: Sequence[Sequence[Equation]], weights: Mapping[Candidate, Array]
 ) -> tuple[Curve, ...]:
-    """Return every component of every residual, before and after.
+    """Return every component of every residual, with the file's model and with the findings.
 
     Args:
         parts: equations of each held-out recording, in their own units.
-        weights: of the candidates that were found.
+        weights: those of the findings' candidates.
     """
     return tuple(
         curve
@@ -102,7 +102,7 @@ def _curves(equation: Equation, weights: Mapping[Candidate, Array]) -> list[Curv
 
 
 def _without(nuisance: Array, values: Array) -> Array:
-    """Return values (k, channels) without what the nuisance (k, channels, m) explains."""
+    """Return values (k, channels) without their regression on the nuisance (k, channels, m)."""
     if not nuisance.size:
         return values
     table = nuisance.reshape(-1, nuisance.shape[2])

@@ -1,1 +1,1 @@
-"""What each command does: reads inputs, calls the package that works, prints and writes."""
+"""Implementation of each command: reads inputs, calls a package, prints and writes results."""

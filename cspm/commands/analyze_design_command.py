@@ -1,4 +1,4 @@
-"""What `cspm analyze design` does."""
+"""The command `cspm analyze design`."""
 
 from __future__ import annotations
 
@@ -56,12 +56,13 @@ def analyze_design_command(
 
     Args:
         machine: with its scenario.
-        computing: from a measurement to its torque [s]; None: one period of the force controllers.
-        folder: a new one for pictures; None draws none.
-        json: where to write what is printed; None writes none.
+        computing: delay from a measurement to its torque [s]; None for one period of the force
+            controllers.
+        folder: a new folder for figures; None draws none.
+        json: file for the printed results; None writes none.
 
     Raises:
-        CspmError: the folder exists, or the scenario has no loops that this can follow.
+        CspmError: the folder exists, or the scenario has no loops that can be analysed.
     """
     refuse_existing(folder)
     console = make_console()
@@ -130,7 +131,7 @@ def _force_table(found: LoopAnalysis, cables: list[str]) -> Table:
     table = _margin_table("force loops, one cable of a kind, other torques held")
     for name in cables:
         for way, loops in found.force.items():
-            # There is no cascade yet where only tensions are looked at.
+            # The force loops alone form no cascade, so the label does not name one.
             label = "sampled, computing" if way == LATE else WAYS[way]
             table.add_row(name if way == DESIGNED else "", label, *_cells(loops[name]))
     return table

@@ -1,4 +1,4 @@
-"""What `cspm analyze linear` does."""
+"""The command `cspm analyze linear`."""
 
 from __future__ import annotations
 
@@ -36,7 +36,7 @@ def analyze_linear_command(
     """Analyse the linearised machine, print the results, and write the requested files.
 
     Raises:
-        CspmError: the folder exists, or the bar cannot hang at this pose.
+        CspmError: the folder exists, or the bar has no equilibrium at this pose.
     """
     refuse_existing(folder)
     console = make_console()
@@ -91,7 +91,7 @@ def _mode_table(title: str, analysis: LinearAnalysis) -> Table:
 
 
 def _direction(part: SubsystemAnalysis, i: int) -> str:
-    """Return which input goes to which output, the largest entries in words."""
+    """Return the dominant inputs and outputs of a direction, in words."""
     system, low = part.system, part.low
 
     def largest(names: tuple[str, ...], column: Any) -> str:  # noqa: ANN401 - an array

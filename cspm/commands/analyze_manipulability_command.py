@@ -1,4 +1,4 @@
-"""What `cspm analyze manipulability` does."""
+"""The command `cspm analyze manipulability`."""
 
 from __future__ import annotations
 

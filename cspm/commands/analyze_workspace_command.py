@@ -1,4 +1,4 @@
-"""What `cspm analyze workspace` does."""
+"""The command `cspm analyze workspace`."""
 
 from __future__ import annotations
 
@@ -50,13 +50,14 @@ def analyze_workspace_command(
 
     Args:
         machine: what to analyse, and where.
-        acceleration: required either way [m/s², rad/s²]; None: the RMS of the scenario's reference.
-        coarse: take every so-manieth value of each DOF of the whole grids.
-        folder: a new one for pictures; None draws none.
-        json: where to write what is printed; None writes none.
+        acceleration: required in both directions [m/s², rad/s²]; None for the RMS of the scenario's
+            reference.
+        coarse: step of the values that are taken of each DOF of the whole grids.
+        folder: a new folder for figures; None draws none.
+        json: file for the printed results; None writes none.
 
     Raises:
-        CspmError: the folder exists, or the machine has no workspace to speak of.
+        CspmError: the folder exists, or the machine has no usable workspace.
         Abort: it was interrupted; nothing is written.
     """
     refuse_existing(folder)
@@ -74,7 +75,7 @@ def analyze_workspace_command(
 
 @contextmanager
 def _bars(console: Console, coarse: int) -> Iterator[Callable[[str, int], None]]:
-    """Give what moves one bar per algorithm; nothing is shown where nobody looks."""
+    """Yield a callback with one progress bar per algorithm; silent without a terminal."""
     with Progress(
         *(TextColumn("{task.description}"), BarColumn(), TaskProgressColumn()),
         TimeRemainingColumn(),

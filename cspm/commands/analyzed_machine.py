@@ -16,16 +16,16 @@ from cspm_msgs_py.testbed import load_testbed
 
 
 def read_machine(scenario: str, testbed: Path | None, pose: str | None) -> AnalyzedMachine:
-    """Return what is to be analysed.
+    """Return the machine and pose to analyse.
 
     Args:
         scenario: a scenario's name or file.
         testbed: a machine instead of the scenario's.
-        pose: of the bar, six numbers with commas; otherwise where the scenario's controllers are
-            designed, or where its bar is wanted.
+        pose: of the bar, six numbers with commas; None for the design pose of the scenario's
+            controllers, or its reference pose.
 
     Raises:
-        InputError: naming file, key or option, and what is allowed.
+        InputError: an input cannot be used; names file, key or option, and what is allowed.
     """
     described = load_scenario(scenario)
     file = load_testbed(testbed) if testbed else described.testbed_file
@@ -42,7 +42,7 @@ def read_acceleration(text: str) -> Pose:
     """Return an acceleration per DOF of six numbers with commas [m/s², rad/s²].
 
     Raises:
-        InputError: it is not six numbers that are not negative.
+        InputError: the text is not six non-negative numbers.
     """
     found = _six(text, "--acceleration", "m/s², rad/s²")
     if min(found) < 0.0:

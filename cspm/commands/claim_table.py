@@ -1,4 +1,4 @@
-"""The table that holds the thesis's figures against ours."""
+"""The table that compares the thesis's values with computed ones."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ from rich.table import Table
 
 from cspm_control.analysis.claim import Claim
 
-# Round-off, where nothing is meant.
+# Smaller numbers are round-off and shown as 0.
 NOTHING = 1e-9
 
 
@@ -20,7 +20,7 @@ def shown(value: float, published: str) -> str:
 
 
 def claim_table(title: str, claims: Sequence[Claim], headings: dict[str, str]) -> Table:
-    """Return a table: figure, published, and for each way, by its heading, ours and if it holds."""
+    """Return a table of published values and, by heading, computed ones and their agreement."""
     table = Table(title=title, box=box.SIMPLE_HEAD)
     table.add_column("figure")
     table.add_column("thesis", justify="right")

@@ -245,7 +245,7 @@ def _is_worth_showing(numbers: tuple[float, ...]) -> bool:
     return changed or after > _ABOVE * noise
 
 
-# Smaller changes of a root mean square, and less above the noise, are left out of what is printed.
+# Smaller changes of a root mean square, and smaller excesses over the noise, are not printed.
 _CHANGED = 1.05
 _ABOVE = 3.0
 

@@ -1,4 +1,4 @@
-"""What `cspm identify damping` does."""
+"""The command `cspm identify damping`."""
 
 from __future__ import annotations
 
@@ -20,13 +20,13 @@ def identify_damping_command(asked: RigRequest, json: Path | None) -> None:
     """Identify the cable damping, print the results, and write the requested files.
 
     Raises:
-        InputError: naming what is wrong in recordings, test-bed or options.
+        InputError: recordings, test-bed or options cannot be used.
     """
     hand_out(identified_damping(asked), print_damping, asked.out, json)
 
 
 def print_damping(console: Console, result: DampingResult) -> None:
-    """Print the damping of each specimen and the law, and how well it predicts the others."""
+    """Print each specimen's damping, the law, and its fit to specimens that were not fitted."""
     console.print(_specimen_table(result))
     law = result.law
     if law is None:

@@ -1,4 +1,4 @@
-"""What every `cspm identify` command does with its result."""
+"""Output of the results of every `cspm identify` command."""
 
 from __future__ import annotations
 
@@ -24,10 +24,10 @@ def hand_out(
     """Print the identified parameters, and write the requested files.
 
     Args:
-        found: what was identified.
-        show: prints it.
-        folder: a new one; None writes none.
-        json: where to write what is printed; None writes none.
+        found: the identified parameters.
+        show: prints them.
+        folder: a new folder for files; None writes none.
+        json: file for the printed results; None writes none.
     """
     console = make_console()
     show(console, found.result)
@@ -40,6 +40,6 @@ def hand_out(
 
 
 def interval_text(value: float, interval: tuple[float, float], digits: int = 6) -> str:
-    """Return a number and its interval as a table writes them."""
+    """Return a number and its interval as text for a table."""
     low, high = (f"{end:.{digits}g}" for end in interval)
     return f"{value:.{digits}g} ({low} … {high})"

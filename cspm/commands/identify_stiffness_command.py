@@ -1,4 +1,4 @@
-"""What `cspm identify stiffness` does."""
+"""The command `cspm identify stiffness`."""
 
 from __future__ import annotations
 
@@ -24,7 +24,7 @@ def identify_stiffness_command(asked: RigRequest, json: Path | None) -> None:
     """Identify the cable stiffness, print the results, and write the requested files.
 
     Raises:
-        InputError: naming what is wrong in recordings, test-bed or options.
+        InputError: recordings, test-bed or options cannot be used.
     """
     hand_out(identified_stiffness(asked), print_stiffness, asked.out, json)
 

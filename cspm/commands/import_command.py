@@ -1,4 +1,4 @@
-"""What `cspm import` does: show every conversion, then write the recording."""
+"""The command `cspm import`: shows every conversion, then writes the recording."""
 
 from __future__ import annotations
 
@@ -32,10 +32,10 @@ class Import:
 
 
 def import_command(asked: Import, json: Path | None) -> None:
-    """Show what an import gives, and write it unless it is a trial.
+    """Print the report of an import, and write the recording unless it is a trial.
 
     Raises:
-        InputError: naming what is wrong in the file, the mapping or the test-bed.
+        InputError: the file, the mapping or the test-bed cannot be used.
     """
     console = make_console()
     refuse_existing(asked.out)

@@ -1,4 +1,4 @@
-"""An import's report, for people."""
+"""The printed report of an import."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ from cspm_run.console import say
 
 
 def print_report(console: Console, report: ImportReport) -> None:
-    """Print each topic with its stamps, conversions and first rows, then what looks wrong."""
+    """Print each topic with its stamps, conversions and first rows, then the suspicions."""
     about = report.about
     say(console, f"{about['source']}, {report.kind}, SHA-256 {about['source_sha256']}")
     say(console, f"mapping {about['mapping']}, test-bed {about['testbed']}")
@@ -32,7 +32,7 @@ def print_report(console: Console, report: ImportReport) -> None:
 
 
 def _by_text(suspicions: list[Suspicion]) -> dict[str, list[str]]:
-    """Return where each thing was seen: what is wrong with one cable is often so with all."""
+    """Return the places of each suspicion, as one cable's fault often concerns all cables."""
     found: dict[str, list[str]] = {}
     for one in suspicions:
         found.setdefault(one.text, []).append(one.where)

@@ -1,4 +1,4 @@
-"""What the commands do, behind the command line."""
+"""The commands that run, show, restore and repeat recordings."""
 
 from __future__ import annotations
 
@@ -47,17 +47,17 @@ def run_command(
 
     Args:
         path: the scenario.
-        overrides: of its values, `KEY=VALUE`.
-        folder: a new one for the recording; None records nothing.
-        json: where to write what is printed.
-        plant: whose equations to simulate.
+        overrides: replaced values, `KEY=VALUE`.
+        folder: a new folder for the recording; None records nothing.
+        json: file for the printed results; None writes none.
+        plant: the plant's equations.
         mode: how to run.
         machine: a test-bed file instead of the scenario's.
-        one_process: in real time, whether all nodes are to share a process; None: they do.
-        patience: with ROS, how long nothing may move [s]; None: the usual time.
+        one_process: in real time, whether all nodes share a process; None for yes.
+        patience: with ROS, longest stall [s]; None for the default.
 
     Raises:
-        CspmError: it diverged, or a node failed; what was recorded and drawn up to then is kept.
+        CspmError: the run diverged, or a node failed; recording and figure are kept.
     """
     console = Console()
     if patience is not None:
@@ -110,7 +110,7 @@ def run_command(
 
 
 def info_command(bag: Path, json: Path | None) -> None:
-    """Show what a recording holds."""
+    """Print a summary of a recording."""
     console = make_console()
     found = overview(bag)
     table = Table(title=escape(str(found.path)), box=box.SIMPLE)
@@ -209,7 +209,7 @@ def _run_with_progress(
             return run(bundle, folder, show)
         if folder is not None:
             return runner(bundle, folder, show)
-        # What a graph amounts to is read from its recording.
+        # The result of a ROS graph is read from its recording.
         with tempfile.TemporaryDirectory(prefix="cspm-run-") as place:
             result = runner(bundle, Path(place) / scenario.name, show)
             return dataclasses.replace(result, folder=None)

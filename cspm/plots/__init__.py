@@ -1,1 +1,1 @@
-"""Pictures of runs, analyses, identifications and diagnoses, drawn with matplotlib."""
+"""Figures of runs, analyses, identifications and diagnoses, drawn with matplotlib."""

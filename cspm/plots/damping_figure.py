@@ -1,4 +1,4 @@
-"""The picture of an identified damping."""
+"""The figure of an identified damping."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""The picture of a diagnosis: every residual, on data that was not searched, before and after."""
+"""The figure of a diagnosis: every hold-out residual, before and after the findings."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""The picture of a linear analysis: singular values and relative gains over frequency."""
+"""The figure of a linear analysis: singular values and relative gains over frequency."""
 
 from __future__ import annotations
 

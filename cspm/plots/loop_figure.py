@@ -1,4 +1,4 @@
-"""Pictures of control loops: Bode lines and step responses."""
+"""Figures of control loops: Bode plots and step responses."""
 
 from __future__ import annotations
 
@@ -45,7 +45,7 @@ def _draw(
     names: Sequence[str],
     ways: dict[str, tuple[str, str | None]],
 ) -> None:
-    """Draw a column per loop; a way names where its Bode lines and its step come from."""
+    """Draw a column per loop; each way names the source of its Bode plot and step response."""
     figure = Figure(figsize=(3.4 * len(names) + 1.0, 8.5), layout="constrained")
     FigureCanvasAgg(figure)
     rows = figure.subplots(3, len(names), squeeze=False, sharey="row")
@@ -80,7 +80,7 @@ def _bode(gain: Axes, phase: Axes, view: LoopView, style: str, label: str) -> No
         decibels = 20.0 * np.log10(np.abs(values))
         gain.semilogx(view.frequencies, decibels, style, color=colour, label=f"{name}, {label}")
         degrees = np.degrees(np.unwrap(np.angle(values)))
-        # From where it begins, between −330° and 30°, phase goes on without a jump.
+        # The phase is unwrapped from its first value, between −330° and 30°.
         degrees -= 360.0 * np.ceil((degrees[0] - HIGHEST_PHASE) / 360.0)
         phase.semilogx(view.frequencies, degrees, style, color=colour)
     phase.set_xlim(LOWEST_FREQUENCY, HIGHEST_FREQUENCY)

@@ -1,4 +1,4 @@
-"""The picture of manipulability: ellipses over the workspace, accelerations along the depth."""
+"""The figure of manipulability: ellipses over the workspace, accelerations along the depth."""
 
 from __future__ import annotations
 
@@ -22,7 +22,7 @@ Array = NDArray[np.float64]
 DPI = 90
 PLACES = np.array([-0.2, 0.0, 0.2])
 DEPTHS = np.linspace(0.4, 4.0, 19)
-# Of ellipses of force, drawn at the pose they hold at [m per N/N].
+# Scale of the force ellipses, each drawn at its pose [m per N/N].
 SIZE = 0.12
 TURN = np.linspace(0.0, 2.0 * np.pi, 97)
 DOWN, UP = ":", "-"
@@ -31,7 +31,7 @@ DOWN, UP = ":", "-"
 def draw_manipulability(
     path: Path, machine: CableStructure, parameters: PlantParameters, pose: Sequence[float]
 ) -> None:
-    """Write ellipses of force in two planes, and what may be accelerated from rest by depth."""
+    """Write force ellipses in two planes, and the possible accelerations from rest over depth."""
     figure = Figure(figsize=(13, 8), layout="constrained")
     FigureCanvasAgg(figure)
     places = figure.subplot_mosaic(

@@ -25,7 +25,7 @@ def draw_run(
     cables: Sequence[str],
     period: float,
 ) -> None:
-    """Write the picture of a run as PNG: the envelope of every signal, so that no spike is lost.
+    """Write the figure of a run as PNG: the envelope of every signal, so that no spike is lost.
 
     Args:
         path: where to.

@@ -1,4 +1,4 @@
-"""Pictures of an identified stiffness."""
+"""Figures of an identified stiffness."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ DPI = 110
 
 
 def draw_stiffness(path: Path, result: StiffnessResult) -> None:
-    """Write k against t of each specimen, both branches and the law, and what the law leaves."""
+    """Write k against t of each specimen, both branches and the law, and the law's residuals."""
     figure = Figure(figsize=(11, 9), layout="constrained")
     FigureCanvasAgg(figure)
     above, below = figure.subplots(2, 1, sharex=True, height_ratios=(2, 1))

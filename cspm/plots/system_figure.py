@@ -1,4 +1,4 @@
-"""The picture of how well machines predict recordings."""
+"""The figure of measured and predicted poses."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Pictures of a workspace: where the bar can be, and how well it is held there."""
+"""Figures of a workspace: the feasible poses of the bar, and performance measures over them."""
 
 from __future__ import annotations
 
@@ -117,7 +117,7 @@ def _map(axes: Axes, each: PoseMap, values: Array, title: str) -> None:
 
 
 def _two(grid: Grid) -> tuple[int, int]:
-    """Return the two DOFs that a plane varies."""
+    """Return the two DOFs that vary in a plane."""
     first, second = (i for i, values in enumerate(grid) if len(values) > 1)
     return first, second
 

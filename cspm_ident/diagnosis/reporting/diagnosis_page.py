@@ -37,9 +37,9 @@ from cspm_sim.effects import catalogue
 
 Array = NDArray[np.float64]
 
-# Curves per finding: one effect on all of eight cables is seen in some of them.
+# Most curves per finding: for an effect on all eight cables, some are enough.
 _MOST_CURVES = 3
-# Of the squared residual: less than that is no picture of what was found.
+# Least explained share of the squared residual for a curve to illustrate a finding.
 _GAINED = 0.2
 _STYLE = """<style>
 .verdict {font-size: 1.15em; line-height: 1.5; border-left: 6px solid #c62828; padding: 0.2em 1em}
@@ -68,7 +68,7 @@ def write_diagnosis_page(path: Path, found: Diagnosis, data: dict[str, Any]) -> 
     Args:
         path: of the file.
         found: the diagnosis.
-        data: the same as `diagnosis.json` has it.
+        data: contents of its `diagnosis.json`.
 
     Raises:
         OSError: the file cannot be written.
@@ -147,7 +147,7 @@ def _mean_pose(samples: Samples | None) -> Array | None:
 
 
 def _evidence(found: Diagnosis) -> str:
-    """Return the figures of each finding, or of the largest residual where nothing was found."""
+    """Return the figures of each finding, or of the largest residual if there is no finding."""
     texts = []
     script = True
     for heading, curves, driver in _subjects(found):
@@ -164,7 +164,7 @@ def _evidence(found: Diagnosis) -> str:
 
 
 def _subjects(found: Diagnosis) -> Iterable[tuple[str, Sequence[Curve], str]]:
-    """Yield headings, what to draw, and against which signal; empty: that which explains most."""
+    """Yield headings, curves and their signal; an empty signal is the one that explains most."""
     for finding in found.reported:
         own = [c for c in found.curves if _touches(finding.hypothesis, c)]
         own.sort(key=lambda curve: -curve.gained)
@@ -271,7 +271,7 @@ def _fit(found: Diagnosis) -> str:
 
 
 def _simulated(found: Diagnosis, data: dict[str, Any]) -> str:
-    """Return errors of simulations of held-out data, and of the closed loop where it was run."""
+    """Return errors of hold-out simulations, and of the closed loop where it was simulated."""
     if not found.simulated:
         return ""
     heads = ("quantity", "input", "before", "re-tuned", "after", "noise", "unit")

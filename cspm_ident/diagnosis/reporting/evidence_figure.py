@@ -14,18 +14,18 @@ from cspm_sim.effects import Channel
 
 Array = NDArray[np.float64]
 
-# Of a curve that is drawn.
+# Most points of a drawn curve.
 _POINTS = 1500
 _BEFORE, _AFTER, _MEASURED = "#c62828", "#1b7f3b", "#9ecae9"
-# A step so many times the usual one is a hole.
+# Ratio to the usual step from which a step counts as a gap.
 _HOLE = 3.0
 _DOTS = {"mode": "markers", "opacity": 0.35}
-# Significant digits of what is drawn: more than a screen shows.
+# Significant digits of drawn values, more than a screen resolves.
 _DIGITS = 5
 
 
 def caption_of(curve: Curve, signal: str) -> str:
-    """Return how large a residual is, and how far it depends on a signal, before and after.
+    """Return a residual's size and its dependence on a signal, before and after the findings.
 
     Args:
         curve: the residual; its rows are those that are searched.
@@ -60,8 +60,8 @@ def _dependence(curve: Curve, signal: str) -> str:
 def driver_figure(curve: Curve, name: str) -> go.Figure:
     """Return the residual before and after against one of its signals.
 
-    Dots are samples, lines the means over bins that hold equally many. Where nothing that was
-    found acts on it there is no after.
+    Dots are samples; lines are means over bins with equally many samples. The curve after is
+    omitted where no finding acts on the residual.
     """
     figure = go.Figure()
     signal = curve.signals[name]
@@ -103,7 +103,7 @@ def overlay_figure(curve: Curve) -> go.Figure:
         lines += [(improved, "after", _AFTER, 1), (curve.after, "after", _AFTER, 2)]
     for values, name, colour, row in lines:
         times, shown = _line(curve.times, values)
-        # What was measured lies below and is wider, so that it shows where the model agrees.
+        # The measured curve lies below and is wider, so that it is visible where the model agrees.
         width = 4.0 if name == "measured" else 1.2
         figure.add_scatter(
             x=times,

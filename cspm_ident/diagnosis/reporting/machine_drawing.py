@@ -111,9 +111,9 @@ def _ends(
 
 
 def _placing(points: Array) -> tuple[Placed, Point]:
-    """Return the way from the world [m] to the picture [px], and its corner below to the right.
+    """Return the map from world [m] to picture [px], and the picture's lower right corner.
 
-    No machine is drawn larger than fits; a flat one has a low picture.
+    The scale fits the machine into the picture; a flat machine gets a lower picture.
     """
     flat = np.array([_flat(point) for point in points])
     low, size = flat.min(axis=0), np.ptp(flat, axis=0)
@@ -180,7 +180,7 @@ def _names(
 ) -> tuple[str, float]:
     """Return the marked parts' names in a column beside the machine, and where it ends [px].
 
-    Each is led to its part by a line; none lies upon another or upon the machine.
+    A line connects each name with its part; names do not overlap each other or the machine.
     """
     own = [(part, place) for part, _, place in shapes if part in marked]
     found, below = "", _EDGE

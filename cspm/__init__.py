@@ -26,6 +26,7 @@ if TYPE_CHECKING:
     from cspm.catalogue import use_effects as use_effects
     from cspm.comparison import compare as compare
     from cspm.controller import Controller as Controller
+    from cspm.controller import builtin_controller as builtin_controller
     from cspm.diagnosis import Diagnosis as Diagnosis
     from cspm.diagnosis import Finding as Finding
     from cspm.diagnosis import diagnose as diagnose
@@ -65,6 +66,7 @@ _PLACES = {
     "analyze_linear": "cspm.analysis.linear",
     "analyze_manipulability": "cspm.analysis.manipulability",
     "analyze_workspace": "cspm.analysis.workspace",
+    "builtin_controller": "cspm.controller",
     "compare": "cspm.comparison",
     "diagnose": "cspm.diagnosis",
     "effects": "cspm.catalogue",

@@ -6,13 +6,16 @@ from collections.abc import Mapping
 from typing import Protocol
 
 import numpy as np
-from numpy.typing import NDArray
+from numpy.typing import ArrayLike, NDArray
 
+from cspm.scenario import AnyScenario, as_scenario
+from cspm.testbed import AnyTestbed, as_file
 from cspm_msgs_py.diagnostics import Level, Status
 from cspm_msgs_py.errors import InputError
-from cspm_msgs_py.schedule import WAVE_TRAJECTORY, Schedule
+from cspm_msgs_py.schedule import WAVE_TRAJECTORY, Schedule, schedule_of
 from cspm_msgs_py.stepping.stage import Send, Stage
 from cspm_msgs_py.testbed import Testbed
+from cspm_run.assembly import assemble_stage, resolve
 
 Array = NDArray[np.float64]
 Output = Array | Mapping[str, Array]
@@ -53,6 +56,59 @@ class Controller(Protocol):
 
     def step(self, time: float, inputs: Mapping[str, Array]) -> Output:
         """Return the stage's output at `time` [s] from the latest rows by topic."""
+
+
+class BuiltIn:
+    """A stage of the cascade as a `Controller`."""
+
+    def __init__(self, stage: Stage) -> None:
+        """Take the stage."""
+        self._stage = stage
+
+    def step(self, time: float, inputs: Mapping[str, ArrayLike]) -> Output:
+        """Return the stage's output at `time` [s] from the latest rows by topic.
+
+        Raises:
+            InputError: a row that the stage needs is missing.
+        """
+        rows = {name: np.array(row, dtype=np.float64) for name, row in inputs.items()}
+        sent: dict[str, Array] = {}
+        try:
+            self._stage.step(round(time * 1e9), rows, sent.__setitem__)
+        except KeyError as err:
+            raise InputError(f"{self._stage.node}: needs {err.args[0]}") from None
+        return sent if self._stage.node == WAVE_TRAJECTORY else next(iter(sent.values()))
+
+
+def builtin_controller(
+    stage: str, scenario: AnyScenario, *, testbed: AnyTestbed | None = None
+) -> BuiltIn:
+    """Return a stage of a scenario's cascade, to use in a program of one's own or inside another.
+
+    Args:
+        stage: `wave_trajectory`, `motion_controller`, `tension_distribution` or
+            `force_controller`; see `Controller` for what each reads and returns.
+        scenario: with its controllers and rates.
+        testbed: another machine than the scenario's.
+
+    Raises:
+        InputError: no such scenario, test-bed or stage, or scenario and test-bed do not fit.
+
+    Example:
+        >>> import cspm
+        >>> distribution = cspm.builtin_controller("tension_distribution", "calm")
+        >>> pose = [0, 0, 1.8, 0, 0, 0, 1]
+        >>> wrench = [0, 0, -40, 0, 0, 0]
+        >>> distribution.step(0.0, {"/bar/pose": pose, "/wrench_command": wrench}).shape
+        (8,)
+    """
+    chosen = as_scenario(scenario)
+    machine = (chosen.testbed_file if testbed is None else as_file(testbed)).testbed
+    described = resolve(chosen.description, machine)
+    nodes = schedule_of(described, machine).nodes
+    if stage not in nodes:
+        raise InputError(f"stage {stage}: allowed: {', '.join(nodes) or 'none'}")
+    return BuiltIn(assemble_stage(stage, described, machine, chosen.path.parent))
 
 
 class OwnStage:

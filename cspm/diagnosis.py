@@ -248,9 +248,9 @@ def _finding(entry: Mapping[str, Any], status: Status) -> Finding:
             Parameter(
                 p["name"],
                 p["element"],
-                p["value"],
+                float(p["value"]),
                 p["unit"],
-                None if p["ci95"] is None else (p["ci95"][0], p["ci95"][1]),
+                None if p["ci95"] is None else (float(p["ci95"][0]), float(p["ci95"][1])),
             )
             for p in entry["parameters"]
         ),

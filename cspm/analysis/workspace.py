@@ -51,8 +51,8 @@ class Workspace:
     def limits(self) -> dict[str, dict[str, float | None]]:
         """How far the bar goes in one DOF alone [m, rad], by way; None: not even this pose.
 
-        Ways: `pseudo_inverse` and `general`, tensions not negative; `feasible`, above the lowest
-        tension; `accelerated`, with room for the acceleration.
+        Ways: `pseudo_inverse` and `general`, tensions not negative; `wrench_feasible`, above the
+        lowest tension; `accelerated`, with room for the acceleration.
         """
         return {way: dict(found) for way, found in self.result.limits.items()}
 

@@ -42,7 +42,7 @@ rclpy.spin(node)
 
 @pytest.fixture
 def examples_page(monkeypatch):
-    monkeypatch.syspath_prepend(str(ROOT / "docs" / "figures"))
+    monkeypatch.syspath_prepend(str(ROOT / "docs" / "scripts"))
     import examples_page
 
     return examples_page
@@ -55,7 +55,7 @@ def test_there_are_twelve_examples_and_the_driver(examples_page):
 
 
 def test_the_page_is_that_of_the_files(examples_page):
-    told = "run docs/figures/examples_page.py"
+    told = "run docs/scripts/examples_page.py"
     assert (ROOT / "docs" / "examples.md").read_text(encoding="utf-8") == examples_page.page(), told
 
 

@@ -1,6 +1,6 @@
 """The page of examples, made of their files.
 
-Run `python docs/figures/examples_page.py` after a change in `examples/`.
+Run `python docs/scripts/examples_page.py` after a change in `examples/`.
 """
 
 from __future__ import annotations
@@ -24,7 +24,7 @@ into the folder in which it is started. `import cspm` is all that they need; wha
 and returns is in its docstring, `help(cspm.simulate)`. All numbers are in SI units and radians, z
 points down.
 
-This page is generated: `python docs/figures/examples_page.py`.
+This page is generated: `python docs/scripts/examples_page.py`.
 """
 
 

@@ -7,8 +7,6 @@ SCENARIO ?= worst_case
 # One worker per processor. Each begins with its share of the files in order, and takes over from
 # the other what that has not begun: both end together, and few files are set up twice.
 SPREAD := -n logical --dist worksteal
-# Only these files are read for such tests: reading all takes longer than many of them.
-ALONE = $(shell grep -rlE --include='test_*.py' 'mark\.alone\b' tests)
 
 # ROS 2 Jazzy comes as wheels, unless a native one is sourced. Both at once would mix their libraries.
 ROS := wheels
@@ -30,11 +28,10 @@ run: $(VENV)/$(ROS).stamp ## build what a run needs and simulate the worst-case 
 	@$(BIN)/cspm run $(SCENARIO)
 
 test: lint kernels ## build what the tests need; then style, types and all tests
-	$(BIN)/python -m pytest $(SPREAD) -m "not alone"
-	$(BIN)/python -m pytest $(ALONE) -m alone
+	$(BIN)/python -m pytest $(SPREAD)
 
 test-fast: $(VENV)/test.stamp ## the tests without the slow ones
-	$(BIN)/python -m pytest $(SPREAD) -m "not slow and not alone"
+	$(BIN)/python -m pytest $(SPREAD) -m "not slow"
 
 kernels: $(VENV)/test.stamp ## compile what all runs share, so that no two tests do it at once
 	@$(BIN)/cspm run calm --duration 0.01 --no-record > /dev/null

@@ -92,7 +92,8 @@ def recorded(case: Development, folder: Path) -> Path:
     file = load_testbed(path.parent / scenario.testbed)
     effects = (*file.testbed.effects, *case.planted)
     machine = file.testbed.model_copy(update={"effects": effects})
-    bundle = make_bundle(resolve(scenario, machine), replace(file, testbed=machine), path.parent)
+    described = make_bundle(resolve(scenario, machine), file, path.parent)
+    bundle = described.concealing(machine)
     run(replace(bundle, plant=case.plant), unfinished)
     unfinished.rename(place)
     return place

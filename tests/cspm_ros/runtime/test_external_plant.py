@@ -35,7 +35,7 @@ from cspm_msgs_py.schedule import (
 from cspm_ros.runtime.progress_file import read_report
 
 load_ros()
-pytestmark = [pytest.mark.slow, pytest.mark.alone]
+pytestmark = pytest.mark.slow
 
 MS = 1_000_000
 MEASURED = (FRAME_POSE, BAR_POSE, WINCH_STATE, TENSION)

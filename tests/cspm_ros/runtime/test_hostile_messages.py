@@ -19,7 +19,7 @@ load_ros()
 from cspm_ros.runtime.graph_run import run_graph  # noqa: E402
 from cspm_ros.runtime.process_run import run_processes  # noqa: E402
 
-pytestmark = [pytest.mark.compiled, pytest.mark.slow, pytest.mark.alone]
+pytestmark = [pytest.mark.compiled, pytest.mark.slow]
 
 STRANGER = Path(__file__).resolve().parents[2] / "support" / "graph" / "hostile_stranger.py"
 STEPS = 600

@@ -21,7 +21,7 @@ from cspm_run.resim import resimulate
 
 load_ros()
 
-pytestmark = [pytest.mark.compiled, pytest.mark.slow, pytest.mark.alone]
+pytestmark = [pytest.mark.compiled, pytest.mark.slow]
 
 ON_BOARD = ("plant", "recorder")
 ASHORE = ("wave_trajectory", "motion_controller", "tension_distribution", "force_controller")

@@ -36,8 +36,8 @@ from cspm_msgs_py.ros.session import Session  # noqa: E402
 pytestmark = pytest.mark.compiled
 
 RIG = ("plant", "force_controller", "recorder")
-# Far more than a node takes to end; what it may take on a quiet machine is 1 s.
-SOON_S = 5.0
+# On a quiet machine a node takes a second to end; nobody waits for ever.
+SOON_S = 60.0
 
 
 def by_hand(names, *parameters, domain, seed=0, remap=()):
@@ -265,7 +265,6 @@ def present(session, names):
 
 
 @pytest.mark.slow
-@pytest.mark.alone
 @pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM])
 def test_a_signal_ends_every_node_that_waits(tmp_path, number):
     """The plant waits for somebody who never comes; the others for it."""
@@ -287,7 +286,6 @@ def test_a_signal_ends_every_node_that_waits(tmp_path, number):
 
 
 @pytest.mark.slow
-@pytest.mark.alone
 @pytest.mark.parametrize(
     ("first", "number"),
     [

@@ -307,7 +307,6 @@ def test_a_node_that_is_killed_is_named(tmp_path, node):
 
 
 @pytest.mark.slow
-@pytest.mark.alone
 @pytest.mark.parametrize("node", NODES)
 def test_a_node_that_is_stopped_is_named(tmp_path, node):
     witness = Witness(lambda nodes: nodes[node].suspend())

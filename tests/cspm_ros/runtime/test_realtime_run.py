@@ -31,7 +31,7 @@ from cspm_msgs_py.schedule import FORCE_CONTROLLER, PLANT, TENSION, TORQUE_COMMA
 from cspm_run.recorded_timing import timing_of
 
 load_ros()
-pytestmark = [pytest.mark.slow, pytest.mark.alone]
+pytestmark = pytest.mark.slow
 
 MS = 1_000_000
 
@@ -159,7 +159,7 @@ def test_on_a_busy_processor_deadlines_are_missed_and_told(warm, tmp_path):
     ]
     try:
         with (
-            Graph(warm, bundle, tmp_path) as graph,
+            Graph(warm, bundle, tmp_path, first=False) as graph,
             Witness(graph.domain, topics_of(bundle, TENSION)) as witness,
         ):
             graph.start()

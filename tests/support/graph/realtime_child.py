@@ -9,6 +9,8 @@ import traceback
 import warnings
 from pathlib import Path
 
+from first_in_line import go_first
+
 PR_SET_PDEATHSIG = 1
 
 
@@ -31,8 +33,10 @@ def load():
                 warm_up(name, bundle, Path(place))
 
 
-def run(name, arguments, domain, log):
-    """Be a node; what it prints goes to a file."""
+def run(name, arguments, domain, log, first):
+    """Be a node, `first` before other programs; what it prints goes to a file."""
+    if first:
+        go_first()
     # Whoever forked this process may be killed; no node is to outlive it.
     ctypes.CDLL(None).prctl(PR_SET_PDEATHSIG, signal.SIGKILL)
     output = os.open(log, os.O_WRONLY | os.O_CREAT | os.O_TRUNC)

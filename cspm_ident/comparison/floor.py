@@ -94,9 +94,13 @@ def _noisier(timeline: Timeline, drive: Input, noise: Mapping[str, Array], seed:
         for topic, name in _INPUTS[drive].items()
         if getattr(measurement, name) is not None and topic in noise
     }
-    noisy = Timeline(with_more_noise(measurement, more, seed), timeline.period_ns, timeline.delays)
+    noisy = Timeline(
+        with_more_noise(measurement, more, seed),
+        timeline.period_ns,
+        timeline.delays,
+        timeline.pose_band,
+    )
     noisy.times = timeline.times
-    noisy.__dict__["pose_band"] = timeline.pose_band
     return noisy
 
 

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from functools import cached_property
 from itertools import pairwise
 
@@ -24,27 +24,19 @@ _EXACT = 1e-6
 
 
 @dataclass(frozen=True, eq=False)
-class Samples:
-    """Values of one sensor.
+class Stamps:
+    """Times of samples, and what follows from these alone.
 
     Attributes:
-        times: when each is valid [s] after the recording's start, increasing, shape (n,); not to be
-            written to.
-        values: shape (n, width).
+        times: increasing, shape (n,) [s]; not to be written to.
     """
 
     times: Array
-    values: Array
 
     @cached_property
     def interval(self) -> float:
         """The usual time between two samples [s], their median; 0 with fewer than two."""
         return float(np.median(np.diff(self.times))) if len(self.times) > 1 else 0.0
-
-    @property
-    def rate(self) -> float:
-        """Samples per second; 0 with fewer than two."""
-        return 1.0 / self.interval if self.interval > 0 else 0.0
 
     @cached_property
     def gaps(self) -> NDArray[np.bool_]:
@@ -66,6 +58,63 @@ class Samples:
         """
         return [_clocked(self.times[span]) for span in self.spans]
 
+
+@dataclass(frozen=True, eq=False)
+class Samples:
+    """Values of one sensor.
+
+    Attributes:
+        times: when each is valid [s] after the recording's start, increasing, shape (n,); not to be
+            written to.
+        values: shape (n, width).
+        stamps: the same times, where what follows from them is shared with other values; made if
+            not given.
+
+    Raises:
+        ValueError: the stamps are of other times.
+    """
+
+    times: Array
+    values: Array
+    stamps: Stamps | None = field(default=None, repr=False)
+
+    def __post_init__(self) -> None:
+        """Refuse stamps of other times."""
+        if self.stamps is not None and self.stamps.times is not self.times:
+            raise ValueError("stamps of other times")
+
+    @cached_property
+    def _stamps(self) -> Stamps:
+        return Stamps(self.times) if self.stamps is None else self.stamps
+
+    @property
+    def interval(self) -> float:
+        """The usual time between two samples [s], their median; 0 with fewer than two."""
+        return self._stamps.interval
+
+    @property
+    def rate(self) -> float:
+        """Samples per second; 0 with fewer than two."""
+        return 1.0 / self.interval if self.interval > 0 else 0.0
+
+    @property
+    def gaps(self) -> NDArray[np.bool_]:
+        """After which samples, but the last, one has been lost, (n - 1,)."""
+        return self._stamps.gaps
+
+    @property
+    def spans(self) -> list[slice]:
+        """The stretches without a hole, as slices of the samples."""
+        return self._stamps.spans
+
+    @property
+    def clocks(self) -> list[tuple[Array, NDArray[np.intp]]]:
+        """Of each stretch the stamps without their scatter, and its samples' numbers by the clock.
+
+        Where stamps follow no even clock, they and the samples' order are returned.
+        """
+        return self._stamps.clocks
+
     @cached_property
     def even(self) -> Samples:
         """The same values at stamps without their scatter."""
@@ -78,10 +127,7 @@ class Samples:
 
     def of_others(self, values: Array) -> Samples:
         """Return other values, shape (n, any), at the same times."""
-        other = Samples(self.times, values)
-        # Of the times alone, and the same for all values.
-        other.__dict__.update(interval=self.interval, spans=self.spans, clocks=self.clocks)
-        return other
+        return Samples(self.times, values, self._stamps)
 
     def shifted(self, seconds: float) -> Samples:
         """Return the same values, valid `seconds` later."""

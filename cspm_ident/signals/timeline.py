@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 from functools import cached_property
 from types import MappingProxyType
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -28,6 +29,23 @@ _NEAR_S = 0.01
 _MARGIN_S = 3.0
 
 
+class Smoothed(NamedTuple):
+    """The smoothed signals of a timeline; None where a sensor is absent.
+
+    Attributes:
+        pose_band: to which poses are smoothed [Hz].
+        frame, bar: poses.
+        winches: angles and speeds at the steps.
+        tension: of the cables.
+    """
+
+    pose_band: float
+    frame: Smooth | None
+    bar: Smooth | None
+    winches: WinchMotion | None
+    tension: Smooth | None
+
+
 class Timeline:
     """All that a simulation can take from a measurement, at steps of one period.
 
@@ -48,6 +66,7 @@ class Timeline:
         period_ns: int = PERIOD_NS,
         delays: Mapping[str, float] = MappingProxyType({}),
         pose_band: float | None = None,
+        smoothed: Smoothed | None = None,
     ) -> None:
         """Lay the steps over the time in which all sensors deliver.
 
@@ -56,6 +75,7 @@ class Timeline:
             period_ns: the step [ns].
             delays: by topic, by how much its stamps are late [s].
             pose_band: to which poses are smoothed [Hz]; None: while they rise above their noise.
+            smoothed: its signals where they are known; None: they are smoothed where needed.
 
         Raises:
             InputError: the sensors never deliver together.
@@ -64,8 +84,7 @@ class Timeline:
         self.period_ns = period_ns
         self.delays = dict(delays)
         self.drifts: dict[str, float] = {}
-        if pose_band is not None:
-            self.__dict__["pose_band"] = pose_band
+        self._smoothed, self._given_band = smoothed, pose_band
         sensors = measurement.sensors.values()
         start = max(float(s.times[0]) for s in sensors)
         end = min(float(s.times[-1]) for s in sensors)
@@ -86,38 +105,47 @@ class Timeline:
         self, delays: Mapping[str, float], drifts: Mapping[str, float] = MappingProxyType({})
     ) -> Timeline:
         """Return the same signals with other delays and drifts, without smoothing them again."""
-        other = Timeline(self.measurement, self.period_ns, delays)
-        other.drifts = dict(drifts)
-        kept = ("_frame", "_bar", "_tension", "_winches", "pose_band")
-        other.__dict__.update({name: getattr(self, name) for name in kept})
-        other.times = self.times
+        return self._with(self.times, self._winches, delays, drifts)
+
+    def _with(
+        self,
+        times: Array,
+        winches: WinchMotion | None,
+        delays: Mapping[str, float],
+        drifts: Mapping[str, float],
+    ) -> Timeline:
+        smoothed = Smoothed(self.pose_band, self._frame, self._bar, winches, self._tension)
+        other = Timeline(self.measurement, self.period_ns, delays, smoothed=smoothed)
+        other.drifts, other.times = dict(drifts), times
         return other
 
     def slowly(self, period_ns: int, band: float) -> Timeline:
         """Return the same signals at longer steps, tensions and angles smoothed to `band` [Hz]."""
         start, end = self.times[0] - _MARGIN_S, self.times[-1] + _MARGIN_S
-        other = Timeline(self.measurement.within(start, end), period_ns, self.delays)
-        other.drifts = self.drifts
-        other.__dict__.update({n: getattr(self, n) for n in ("_frame", "_bar", "pose_band")})
-        tension, angle = other.measurement.tension, other.measurement.angle
-        other.__dict__["_tension"] = None if tension is None else smooth(tension, band)
+        measured = self.measurement.within(start, end)
+        # Its steps, at which angles are read.
+        times = Timeline(measured, period_ns, self.delays).times
+        tension, angle, winches = measured.tension, measured.angle, None
         if angle is not None:
             slow = smooth(angle, band)
-            moved = WinchMotion(slow.at(other.times), slow.at(other.times, 1), band)
-            other.__dict__["_winches"] = moved
+            winches = WinchMotion(slow.at(times), slow.at(times, 1), band)
+        smoothed = Smoothed(
+            self.pose_band,
+            self._frame,
+            self._bar,
+            winches,
+            None if tension is None else smooth(tension, band),
+        )
+        other = Timeline(measured, period_ns, self.delays, smoothed=smoothed)
+        other.drifts = self.drifts
         return other
 
     def within(self, first: int, last: int) -> Timeline:
         """Return the stretch from step `first` to `last`, without smoothing it again."""
-        other = self.delayed(self.delays, self.drifts)
-        other.times = self.times[first : last + 1]
-        if self._winches is not None:
-            cut = slice(first, last + 1)
-            moved = self._winches
-            other.__dict__["_winches"] = moved._replace(
-                angles=moved.angles[cut], speeds=moved.speeds[cut]
-            )
-        return other
+        cut, moved = slice(first, last + 1), self._winches
+        if moved is not None:
+            moved = moved._replace(angles=moved.angles[cut], speeds=moved.speeds[cut])
+        return self._with(self.times[cut], moved, self.delays, self.drifts)
 
     @cached_property
     def bands(self) -> dict[str, float]:
@@ -132,6 +160,10 @@ class Timeline:
     @cached_property
     def pose_band(self) -> float:
         """The band of both poses [Hz]: cables see their difference, so both are smoothed alike."""
+        if self._smoothed is not None:
+            return self._smoothed.pose_band
+        if self._given_band is not None:
+            return self._given_band
         poses = (self.measurement.frame_pose, self.measurement.bar_pose)
         return max((band_of(s) for s in poses if s is not None), default=float("inf"))
 
@@ -248,21 +280,29 @@ class Timeline:
 
     @cached_property
     def _frame(self) -> Smooth | None:
+        if self._smoothed is not None:
+            return self._smoothed.frame
         samples = self.measurement.frame_pose
         return None if samples is None else smooth(samples, self.pose_band)
 
     @cached_property
     def _bar(self) -> Smooth | None:
+        if self._smoothed is not None:
+            return self._smoothed.bar
         samples = self.measurement.bar_pose
         return None if samples is None else smooth(samples, self.pose_band)
 
     @cached_property
     def _winches(self) -> WinchMotion | None:
+        if self._smoothed is not None:
+            return self._smoothed.winches
         angle, speed = self.measurement.angle, self.measurement.speed
         return None if angle is None else winch_motion(angle, speed, self.times)
 
     @cached_property
     def _tension(self) -> Smooth | None:
+        if self._smoothed is not None:
+            return self._smoothed.tension
         samples = self.measurement.tension
         return None if samples is None else smooth(samples)
 

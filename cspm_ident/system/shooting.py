@@ -89,10 +89,9 @@ class Shooting:
         number = int(np.random.SeedSequence(seed).generate_state(1)[0])
         noise = {name: sign * own for name, own in self.noise.items()}
         noisy = with_more_noise(line.measurement, noise, number)
-        timeline = Timeline(noisy, line.period_ns, line.delays)
-        timeline.times = line.times
         # The same smoothing, so that the difference is that of the noise alone.
-        timeline.__dict__["pose_band"] = line.pose_band
+        timeline = Timeline(noisy, line.period_ns, line.delays, line.pose_band)
+        timeline.times = line.times
         return replace(self, timeline=timeline)
 
     def relinearise(self, machine: Testbed) -> None:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from functools import cached_property
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -29,11 +30,28 @@ from cspm_sim.kernels.memory import relaxed
 Array = NDArray[np.float64]
 
 
-# Cached arrays that `of_cable` takes over, one column per cable.
-_PER_CABLE = ("_near", "_steady_damper")
 # Widths of Gaussian windows for the damper force, and for elongations without reversals from noise;
 # duration of a dashpot's unknown initial state.
 _STEADY_S, _CALM_S, _START_S = 0.01, 0.03, 0.5
+
+
+class Known(NamedTuple):
+    """What is known of a stretch before anything is computed; None where it is not.
+
+    Attributes:
+        bar, frame: kinematics of both bodies.
+        spans: the cables between them.
+        needed: force and moment that the bar's motion needs beside its weight, (k, 6) [N, N·m].
+        steady_damper: the dampers' forces without the poses' noise, (k, n) [N].
+        near: elongations that nearly carry the tensions, from which they are searched, (k, n) [m].
+    """
+
+    bar: BodyState | None = None
+    frame: BodyState | None = None
+    spans: CableSpans | None = None
+    needed: Array | None = None
+    steady_damper: Array | None = None
+    near: Array | None = None
 
 
 class Suspension:
@@ -51,9 +69,11 @@ class Suspension:
         testbed: Testbed,
         parameters: PlantParameters,
         start: Array | None = None,
+        known: Known | None = None,
     ) -> None:
         """Take a stretch without gaps; without `start`, the first tensions give the lengths."""
         self.signals, self.parameters, self._testbed = signals, parameters, testbed
+        self._known = Known() if known is None else known
         if start is None:
             tensions = np.maximum(signals.tensions[0], 0.0)
             start = unstretched_lengths(parameters, self._spans.lengths[0], tensions)
@@ -65,12 +85,15 @@ class Suspension:
         The elongation rates derived from tensions are kept. They depend on the poses only through
         the length of the cables.
         """
-        other = Suspension(signals, self._testbed, self.parameters, self.start)
         bar, frame = signals.bar is self.signals.bar, signals.frame is self.signals.frame
-        kept = {"bar": bar, "needed": bar, "_frame": frame, "_steady_damper": True}
-        other.__dict__.update({name: getattr(self, name) for name, same in kept.items() if same})
-        other.__dict__["_near"] = self._carrying
-        return other
+        known = Known(
+            bar=self.bar if bar else None,
+            frame=self._frame if frame else None,
+            needed=self.needed if bar else None,
+            steady_damper=self._steady_damper,
+            near=self._carrying,
+        )
+        return Suspension(signals, self._testbed, self.parameters, self.start, known)
 
     def of_cable(self, i: int) -> Suspension:
         """Return the same stretch with cable i only."""
@@ -78,30 +101,37 @@ class Suspension:
         parts = self.parameters._replace(
             cables=self.parameters.cables[own], tables=self.parameters.tables[own]
         )
-        other = Suspension(self.signals.of_cable(i), self._testbed, parts, self.start[own])
-        known = {n: getattr(self, n)[:, own] for n in _PER_CABLE if n in self.__dict__}
-        spans = {"_spans": self._spans.only(i)} if "_spans" in self.__dict__ else {}
-        other.__dict__.update(known, **spans, bar=self.bar, _frame=self._frame)
-        return other
+        before = self._known
+        known = Known(
+            bar=self.bar,
+            frame=self._frame,
+            spans=None if before.spans is None else before.spans.only(i),
+            steady_damper=None if before.steady_damper is None else before.steady_damper[:, own],
+            near=None if before.near is None else before.near[:, own],
+        )
+        signals, start = self.signals.of_cable(i), self.start[own]
+        return Suspension(signals, self._testbed, parts, start, known)
 
     def with_joints(self, signals: MachineSignals) -> Suspension:
         """Return the same stretch with slightly changed angles, speeds and tensions."""
-        other = Suspension(signals, self._testbed, self.parameters, self.start)
-        known = {name: getattr(self, name) for name in ("bar", "_frame", "_spans")}
-        other.__dict__.update(known, _near=self._carrying)
-        return other
+        known = Known(bar=self.bar, frame=self._frame, spans=self._spans, near=self._carrying)
+        return Suspension(signals, self._testbed, self.parameters, self.start, known)
 
     @cached_property
     def bar(self) -> BodyState:
         """The bar's kinematics."""
-        return body_state(self.signals.bar)
+        known = self._known.bar
+        return body_state(self.signals.bar) if known is None else known
 
     @cached_property
     def _frame(self) -> BodyState:
-        return body_state(self.signals.frame)
+        known = self._known.frame
+        return body_state(self.signals.frame) if known is None else known
 
     @cached_property
     def _spans(self) -> CableSpans:
+        if self._known.spans is not None:
+            return self._known.spans
         return cable_spans(self.signals, self.bar, self._frame, self.parameters.cables)
 
     @cached_property
@@ -142,6 +172,8 @@ class Suspension:
         Otherwise the noise would enter both stiffness and residual. A stiffness error would then
         seem to explain the residual.
         """
+        if self._known.steady_damper is not None:
+            return self._known.steady_damper
         sigma, damper = _STEADY_S / self.signals.step, self._damping * self._told_rates
         return np.asarray(gaussian_filter1d(damper, sigma, axis=0, mode="nearest"))
 
@@ -155,7 +187,7 @@ class Suspension:
         dashpot do; solved by the implicit Euler method.
         """
         tensions, lengths = self.signals.tensions, self._elastic_lengths
-        alone = elongation_at(self.parameters, tensions, lengths, self._near)
+        alone = elongation_at(self.parameters, tensions, lengths, self._known.near)
         stiffness = law_at(self.parameters, alone, lengths)[:, :, 1]
         inert = self._damping / self.signals.step
         reported = alone.copy()
@@ -178,15 +210,10 @@ class Suspension:
         return np.asarray(gaussian_filter1d(self._told, sigma, axis=0, mode="nearest"))
 
     @cached_property
-    def _near(self) -> Array | None:
-        """Approximate values of `_carrying`, (k, n) [m]; None where unknown."""
-        return None
-
-    @cached_property
     def _carrying(self) -> Array:
         """Elongations at which law and damper give the measured tension, (k, n) [m]."""
         elastic = self.signals.tensions - self._steady_damper
-        return elongation_at(self.parameters, elastic, self._elastic_lengths, self._near)
+        return elongation_at(self.parameters, elastic, self._elastic_lengths, self._known.near)
 
     @cached_property
     def _law(self) -> Array:
@@ -219,6 +246,8 @@ class Suspension:
     @cached_property
     def needed(self) -> Array:
         """Force and moment for the bar's motion, its weight subtracted, (k, 6) [N, N·m]."""
+        if self._known.needed is not None:
+            return self._known.needed
         bar = self._testbed.bar
         assert bar is not None
         state, gravity = self.bar, np.array([0.0, 0.0, self._testbed.gravity])

@@ -174,8 +174,8 @@ def _left(search: Search, true: Sequence[Hypothesis], beside: Sequence[Hypothesi
     """Return Σ residual² of each block beside what is true, not fitted to it."""
     fits = search.fits
     own = search.gram.columns_of(c for h in true for c in h.candidates)
-    with fits.sums.delayed(own, max(h.onset for h in true)):
-        return fits.sums.held_out(fits.columns([*true, *beside]))
+    late = fits.sums.delayed(own, max(h.onset for h in true))
+    return late.held_out(fits.columns([*true, *beside]))
 
 
 def _numbers(hypotheses: Sequence[Hypothesis]) -> int:

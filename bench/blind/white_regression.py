@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from typing import TypeVar
+
 import numpy as np
 from numpy.typing import NDArray
 from scipy.stats import f as f_distribution
@@ -13,6 +15,7 @@ from cspm_ident.diagnosis.thresholds import DEFAULT_THRESHOLDS, Thresholds
 
 Array = NDArray[np.float64]
 Index = NDArray[np.intp]
+_Kind = TypeVar("_Kind", bound="WhiteSums")
 
 
 class WhiteSums(BlockRegression):
@@ -23,10 +26,16 @@ class WhiteSums(BlockRegression):
         super().__init__(gram, thresholds)
         self._rows = int(sum(place.rows.sum() for place in gram.places))
 
+    def _like(self: _Kind) -> _Kind:
+        """Return a regression of the same kind and rows, without Gram matrices."""
+        other = super()._like()
+        other._rows = self._rows
+        return other
+
     def covariance(self, base: Index, columns: Index) -> Array:
         """Return σ²·(XᵀX)⁻¹, the columns' part."""
         both = np.concatenate([base, columns])
-        bread = np.linalg.pinv(self._whole[np.ix_(both, both)], rcond=1e-9, hermitian=True)
+        bread = np.linalg.pinv(self._whole.at(both, both), rcond=1e-9, hermitian=True)
         own, scale = slice(len(base), None), self._lengths[columns]
         variance = self.squares_of(both) / self._free(both)
         return np.asarray(variance * bread[own, own] / np.outer(scale, scale))

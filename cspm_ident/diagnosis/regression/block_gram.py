@@ -6,10 +6,9 @@ cross-validation. So hundreds of hypotheses are tested with a single pass over t
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator, Mapping, Sequence
-from contextlib import contextmanager
-from dataclasses import dataclass
-from typing import NamedTuple
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import dataclass, replace
+from functools import cached_property
 
 import numpy as np
 from numpy.typing import NDArray
@@ -22,22 +21,46 @@ Array = NDArray[np.float64]
 Index = NDArray[np.intp]
 
 
-class PlaceGram(NamedTuple):
-    """One residual's block Gram matrices.
+@dataclass(frozen=True, eq=False)
+class PlaceGram:
+    """One residual's block Gram matrices, not to be written to.
 
     Attributes:
-        place: which residual.
-        columns: indices of its regressors, ascending, shape (m,).
-        grams: Σ [columns, y]ᵀ[columns, y] per block, shape (blocks, m + 1, m + 1).
-        whole: their sum over the blocks.
+        place: which.
+        columns: indices of the columns that enter, ascending, shape (m,).
+        every_gram: Σ [columns, y]ᵀ[columns, y] per block, shape (blocks, m + 1, m + 1), columns
+            acting all the time.
+        whole: the sum of `grams` over the blocks, (m + 1, m + 1).
         rows: samples times channels per block, shape (blocks,).
+        starts: from which block on each column and y act, shape (m + 1,); None: all the time.
     """
 
     place: Place
     columns: Index
-    grams: Array
+    every_gram: Array
     whole: Array
     rows: Array
+    starts: Index | None = None
+
+    @cached_property
+    def grams(self) -> Array:
+        """Σ [columns, y]ᵀ[columns, y] per block, shape (blocks, m + 1, m + 1)."""
+        if self.starts is None:
+            return self.every_gram
+        return silenced(self.every_gram.copy(), self.starts, self.starts)
+
+    def delayed(self, columns: Index, block: int) -> PlaceGram:
+        """Return the same with some columns acting only from a block on."""
+        own = np.flatnonzero(np.isin(self.columns, columns))
+        if not len(own):
+            return self
+        starts = np.zeros(len(self.whole), dtype=np.intp) if self.starts is None else self.starts
+        starts = starts.copy()
+        starts[own] = np.maximum(starts[own], block)
+        rows = silenced(self.every_gram[:, own], starts[own], starts).sum(axis=0)
+        whole = self.whole.copy()
+        whole[own], whole[:, own] = rows, rows.T
+        return replace(self, whole=whole, starts=starts)
 
 
 @dataclass(frozen=True, eq=False)
@@ -132,30 +155,9 @@ class BlockGram:
             found[place.place] = squares_by_block(place.grams, own)
         return found
 
-    def delay(self, columns: Index, block: int) -> None:
-        """Let columns act only from a block on."""
-        for place in self.places:
-            own = np.flatnonzero(np.isin(place.columns, columns))
-            silence(place.grams, own, block)
-            place.whole[own] = place.grams[:, own].sum(axis=0)
-            place.whole[:, own] = place.grams[:, :, own].sum(axis=0)
-
-    @contextmanager
-    def delayed(self, columns: Index, block: int) -> Iterator[None]:
-        """Let columns act only from a block on, inside the context only."""
-        kept = [
-            (place, own, place.grams[:block, own, :].copy(), place.grams[:block, :, own].copy())
-            for place in self.places
-            if len(own := np.flatnonzero(np.isin(place.columns, columns)))
-        ]
-        self.delay(columns, block)
-        try:
-            yield
-        finally:
-            for place, own, rows, sides in kept:
-                place.grams[:block, own, :] = rows
-                place.grams[:block, :, own] = sides
-            self.delay(columns, 0)
+    def delayed(self, columns: Index, block: int) -> BlockGram:
+        """Return the same with some columns acting only from a block on."""
+        return replace(self, places=tuple(p.delayed(columns, block) for p in self.places))
 
     @property
     def blocks(self) -> int:
@@ -174,10 +176,20 @@ def squares_by_block(grams: Array, weights: Array) -> Array:
     return np.asarray(np.einsum("i,bij,j->b", vector, grams, vector))
 
 
-def silence(grams: Array, columns: Index, block: int) -> None:
-    """Set columns to zero in the Gram matrices (blocks, m, m) of the blocks before `block`."""
-    grams[:block, columns, :] = 0.0
-    grams[:block, :, columns] = 0.0
+def silenced(products: Array, rows: Index, columns: Index) -> Array:
+    """Set products of columns to zero in the blocks before those from which on both act.
+
+    Args:
+        products: by block, shape (blocks, r, c); changed.
+        rows: from which block on the rows' columns act, (r,).
+        columns: likewise of the columns, (c,).
+
+    Returns:
+        The products.
+    """
+    blocks = np.arange(len(products))[:, None, None]
+    products[blocks < np.maximum(rows[:, None], columns)] = 0.0
+    return products
 
 
 def gather(recordings: Sequence[Sequence[Equation]], block_s: float) -> BlockGram:

@@ -2,23 +2,22 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
-from contextlib import contextmanager
-from copy import copy
 from functools import cached_property
-from typing import NamedTuple
+from typing import NamedTuple, TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
 from scipy.stats import norm, wilcoxon
 from scipy.stats import t as t_distribution
 
-from cspm_ident.diagnosis.regression.block_gram import BlockGram, silence, squares_by_block
+from cspm_ident.diagnosis.regression.block_gram import BlockGram, silenced, squares_by_block
 from cspm_ident.diagnosis.regression.jackknife import RANK, Jackknife, left_out, pseudo_inverse
+from cspm_ident.diagnosis.regression.symmetric_table import SymmetricTable
 from cspm_ident.diagnosis.thresholds import DEFAULT_THRESHOLDS, Thresholds
 
 Array = NDArray[np.float64]
 Index = NDArray[np.intp]
+_Kind = TypeVar("_Kind", bound="BlockRegression")
 
 # Number of folds of the cross-validation.
 FOLDS = 6
@@ -37,7 +36,10 @@ class Gain(NamedTuple):
 
 
 class BlockRegression:
-    """Gram matrices of all regressors by block, scaled so that each regressor has length 1."""
+    """Least squares from block Gram matrices, scaled so that each regressor has length 1.
+
+    It never changes: `delayed` returns another one that shares the matrices.
+    """
 
     def __init__(self, gram: BlockGram, thresholds: Thresholds = DEFAULT_THRESHOLDS) -> None:
         """Take the Gram matrices of all residuals, and sum them."""
@@ -59,7 +61,8 @@ class BlockRegression:
             for place, scale in zip(gram.places, scales, strict=True)
         ]
         self._lengths = lengths[:-1]
-        self._whole = self._summed(np.arange(width + 1), slice(None))
+        self._starts: Index = np.zeros(width + 1, dtype=np.intp)
+        self._undelayed: BlockRegression | None = None
         self._folds = np.array_split(np.arange(gram.blocks), min(FOLDS, gram.blocks))
 
     def _of(self, rows: Index, columns: Index) -> Array:
@@ -70,7 +73,8 @@ class BlockRegression:
             if len(down) and len(across):
                 own = grams[:, at[rows[down]][:, None], at[columns[across]]]
                 found[:, down[:, None], across] += own
-        return found
+        down, across = self._starts[rows], self._starts[columns]
+        return silenced(found, down, across) if down.any() or across.any() else found
 
     def _summed(self, rows: Index, blocks: slice) -> Array:
         """Return products of some columns with all over some blocks, (rows, width + 1)."""
@@ -78,16 +82,38 @@ class BlockRegression:
         for grams, at in zip(self._grams, self._at, strict=True):
             down, across = np.flatnonzero(at[rows] >= 0), np.flatnonzero(at >= 0)
             if len(down):
-                found[down[:, None], across] += grams[blocks, at[rows[down]]].sum(axis=0)
+                own = grams[blocks, at[rows[down]]]
+                if self._starts.any():
+                    first = blocks.start or 0
+                    own = silenced(
+                        own, self._starts[rows[down]] - first, self._starts[across] - first
+                    )
+                found[down[:, None], across] += own.sum(axis=0)
         return found
 
+    def _like(self: _Kind) -> _Kind:
+        """Return a regression of the same kind, without Gram matrices."""
+        other = object.__new__(type(self))
+        other.thresholds, other._folds = self.thresholds, self._folds
+        return other
+
     def _alone(self, blocks: Array, lengths: Array) -> BlockRegression:
-        """Return a regression with given Gram matrices, (blocks, m + 1, m + 1), and lengths."""
-        other = copy(self)
+        """Return the sums of other products, (blocks, m + 1, m + 1), of columns so long."""
+        other = self._like()
         other._grams, other._at = [blocks], [np.arange(blocks.shape[1])]
-        other._lengths, other._whole = lengths, blocks.sum(axis=0)
-        for name in ("_others", "excited"):
-            other.__dict__.pop(name, None)
+        other._lengths, other._undelayed = lengths, None
+        other._starts = np.zeros(blocks.shape[1], dtype=np.intp)
+        return other
+
+    def delayed(self, columns: Index, block: int) -> BlockRegression:
+        """Return the same with some columns acting only from a block on."""
+        if not block:
+            return self
+        other = self._like()
+        other._grams, other._at, other._lengths = self._grams, self._at, self._lengths
+        other._starts = self._starts.copy()
+        other._starts[columns] = np.maximum(self._starts[columns], block)
+        other._undelayed = self if self._undelayed is None else self._undelayed
         return other
 
     def beside(self, combinations: Array) -> BlockRegression:
@@ -118,7 +144,7 @@ class BlockRegression:
         turn = np.zeros((width + 1, width + count + 1))
         turn[:width, :width], turn[-1, -1] = np.eye(width), 1.0
         turn[:width, width:-1] = combinations * self._lengths[columns, None]
-        table = np.append(columns, len(self._whole) - 1)
+        table = np.append(columns, len(self._starts) - 1)
         grams = turn.T @ self._of(table, table) @ turn
         # The squares of a combination equal to zero are rounding errors, which may be negative.
         lengths = np.append(np.sqrt(np.maximum(np.einsum("bii->i", grams), 0.0))[:-1], 1.0)
@@ -126,36 +152,28 @@ class BlockRegression:
         grams = grams / (lengths[:, None] * lengths)
         return self._alone(grams, lengths[:-1] * np.append(self._lengths[columns], np.ones(count)))
 
-    def delay(self, columns: Index, block: int) -> None:
-        """Let columns act only from a block on."""
-        for grams, at in zip(self._grams, self._at, strict=True):
-            silence(grams, at[columns][at[columns] >= 0], block)
-        self._sum_again(columns)
+    @cached_property
+    def _whole(self) -> SymmetricTable:
+        """Sums of all blocks, (width + 1, width + 1)."""
+        if self._undelayed is None:
+            return SymmetricTable(self._summed(np.arange(len(self._starts)), slice(None)))
+        late = np.flatnonzero(self._starts)
+        return self._undelayed._whole.replacing(late, self._summed(late, slice(None)))
 
-    @contextmanager
-    def delayed(self, columns: Index, block: int) -> Iterator[None]:
-        """Let columns act only from a block on, inside the context only."""
-        kept = []
-        for grams, at in zip(self._grams, self._at, strict=True):
-            own = at[columns][at[columns] >= 0]
-            if len(own):
-                kept.append((grams, own, grams[:block, own].copy()))
-        self.delay(columns, block)
-        try:
-            yield
-        finally:
-            for grams, own, rows in kept:
-                grams[:block, own] = rows
-                grams[:block, :, own] = rows.transpose(0, 2, 1)
-            self._sum_again(columns)
-
-    def _sum_again(self, columns: Index) -> None:
-        whole = self._summed(columns, slice(None))
-        tables = [(self._whole, whole)]
-        for others, fold in zip(self._others, self._folds, strict=True):
-            tables.append((others, whole - self._summed(columns, self._near(fold))))
-        for table, rows in tables:
-            table[columns], table[:, columns] = rows, rows.T
+    @cached_property
+    def _others(self) -> list[SymmetricTable]:
+        """Sums of all blocks but those of each fold and their neighbours."""
+        if self._undelayed is None:
+            own = np.arange(len(self._starts))
+            return [
+                SymmetricTable(self._whole.base - self._summed(own, self._near(fold)))
+                for fold in self._folds
+            ]
+        late = self._whole.replaced
+        return [
+            table.replacing(late, self._whole.others - self._summed(late, self._near(fold)))
+            for table, fold in zip(self._undelayed._others, self._folds, strict=True)
+        ]
 
     def _near(self, fold: Index) -> slice:
         """Return the blocks of a fold and their neighbours."""
@@ -174,12 +192,12 @@ class BlockRegression:
     @property
     def squares(self) -> float:
         """Σ y²."""
-        return float(self._whole[-1, -1])
+        return float(self._whole.diagonal()[-1])
 
     @cached_property
     def excited(self) -> NDArray[np.bool_]:
         """Whether each column is non-zero anywhere, (width,)."""
-        return np.asarray(np.diag(self._whole)[:-1] > 0.0)
+        return np.asarray(self._whole.diagonal()[:-1] > 0.0)
 
     def weights(self, columns: Index) -> Array:
         """Return the least-squares weights of columns."""
@@ -187,21 +205,21 @@ class BlockRegression:
 
     def weights_beyond(self, base: Index, columns: Index) -> Array:
         """Return the weights of columns fitted to a base's residual, the base's weights held."""
-        both = self._whole[np.ix_(columns, base)]
-        left = self._whole[columns, -1] - both @ self._weights(base, self._whole)
-        inverse = pseudo_inverse(self._whole[np.ix_(columns, columns)])
+        both = self._whole.at(columns, base)
+        left = self._whole.last(columns) - both @ self._weights(base, self._whole)
+        inverse = pseudo_inverse(self._whole.at(columns, columns))
         return np.asarray(inverse @ left / self._lengths[columns])
 
     def gains_beyond(self, base: Index, groups: list[Index]) -> Array:
         """Return by how much each group of columns lowers Σ residual² beyond a base, (groups,)."""
-        inverse = pseudo_inverse(self._whole[np.ix_(base, base)])
-        explained = inverse @ self._whole[base]
+        inverse = pseudo_inverse(self._whole.at(base, base))
+        explained = inverse @ self._whole.rows(base)
         found = np.zeros(len(groups))
         for k, group in enumerate(groups):
-            left = self._whole[np.ix_(group, group)] - (
-                self._whole[np.ix_(group, base)] @ explained[:, group]
+            left = self._whole.at(group, group) - (
+                self._whole.at(group, base) @ explained[:, group]
             )
-            cross = self._whole[group, -1] - self._whole[np.ix_(group, base)] @ explained[:, -1]
+            cross = self._whole.last(group) - self._whole.at(group, base) @ explained[:, -1]
             # Columns that the base nearly spans leave rounding errors only.
             left[np.diag_indices(len(left))] += RANK
             found[k] = cross @ np.linalg.solve(left, cross)
@@ -212,7 +230,7 @@ class BlockRegression:
 
         The fit uses the blocks outside its fold, except those next to the fold.
         """
-        both = np.append(columns, len(self._whole) - 1)
+        both = np.append(columns, len(self._starts) - 1)
         parts, out = self._of(both, both), np.zeros(self.blocks)
         for fold, others in zip(self._folds, self._others, strict=True):
             out[fold] = squares_by_block(parts[fold], self._weights(columns, others))
@@ -235,7 +253,7 @@ class BlockRegression:
 
     def _fitted(self, columns: Index) -> Array:
         """Return Σ residual² of each block, fitted to all of them."""
-        both = np.append(columns, len(self._whole) - 1)
+        both = np.append(columns, len(self._starts) - 1)
         return squares_by_block(self._of(both, both), self._weights(columns, self._whole))
 
     def drift(self, base: Index, columns: Index) -> tuple[Gain, float]:
@@ -245,7 +263,7 @@ class BlockRegression:
         columns.
         """
         first, count = len(base), len(columns)
-        kept = np.concatenate([base, columns, [len(self._whole) - 1]])
+        kept = np.concatenate([base, columns, [len(self._starts) - 1]])
         turn = np.zeros((self.blocks, len(kept) + count, len(kept)))
         turn[:, np.arange(first + count), np.arange(first + count)] = 1.0
         number = np.linspace(-0.5, 0.5, self.blocks)[:, None]
@@ -313,7 +331,7 @@ class BlockRegression:
 
     def _beyond(self, base: Index, columns: Index, blocks: Index | None = None) -> Array:
         """Return blocks' products of columns and target, the part spanned by a base removed."""
-        table = np.append(columns, len(self._whole) - 1)
+        table = np.append(columns, len(self._starts) - 1)
         both = np.concatenate([base, table])
         products = self._of(both, both)
         if blocks is not None:
@@ -326,42 +344,36 @@ class BlockRegression:
     def squares_of(self, columns: Index) -> float:
         """Return Σ residual² after a fit of columns."""
         weights = self._weights(columns, self._whole)
-        return float(self.squares - self._whole[columns, -1] @ weights)
+        return float(self.squares - self._whole.last(columns) @ weights)
 
     def spanned(self, base: Index, wide: Index, narrow: Index) -> Array:
         """Return the share of each narrow column, beyond a base, that wide columns span."""
         both = np.concatenate([base, wide])
 
         def left(by: Index) -> Array:
-            inverse = pseudo_inverse(self._whole[np.ix_(by, by)])
-            cross = self._whole[np.ix_(by, narrow)]
+            inverse = pseudo_inverse(self._whole.at(by, by))
+            cross = self._whole.at(by, narrow)
             spanned = np.einsum("ij,ik,kj->j", cross, inverse, cross)
-            return np.asarray(np.diag(self._whole)[narrow] - spanned)
+            return np.asarray(self._whole.diagonal()[narrow] - spanned)
 
         return np.asarray(1.0 - left(both) / np.maximum(left(base), RANK))
 
     def left_from(self, base: Index, columns: Index) -> Array:
         """Return Σ residual² where `columns` act only from each block on, shape (blocks,)."""
-        own, table = slice(len(base), -1), np.concatenate([base, columns, [len(self._whole) - 1]])
+        own, table = slice(len(base), -1), np.concatenate([base, columns, [len(self._starts) - 1]])
         blocks = self._of(columns, table)
         # Products of the columns with base, themselves and target, summed from each block on.
         met = blocks[::-1].cumsum(axis=0)[::-1]
         crossed, products, reported = met[:, :, : len(base)], met[:, :, own], met[:, :, -1]
-        turned = crossed @ pseudo_inverse(self._whole[np.ix_(base, base)])
+        turned = crossed @ pseudo_inverse(self._whole.at(base, base))
         products = products - turned @ crossed.transpose(0, 2, 1)
-        reported = reported - turned @ self._whole[base, -1]
+        reported = reported - turned @ self._whole.last(base)
         weights = np.linalg.pinv(products, rcond=RANK, hermitian=True) @ reported[..., None]
         gained = np.einsum("bi,bi->b", reported, weights[..., 0])
         return np.asarray(self.squares_of(base) - gained)
 
-    @cached_property
-    def _others(self) -> list[Array]:
-        """Gram matrices of all blocks except each fold and its neighbours, summed."""
-        everything = np.arange(len(self._whole))
-        return [self._whole - self._summed(everything, self._near(f)) for f in self._folds]
-
-    def _weights(self, columns: Index, gram: Array) -> Array:
-        return np.asarray(pseudo_inverse(gram[np.ix_(columns, columns)]) @ gram[columns, -1])
+    def _weights(self, columns: Index, table: SymmetricTable) -> Array:
+        return np.asarray(pseudo_inverse(table.at(columns, columns)) @ table.last(columns))
 
 
 def gain_of(better: Array) -> Gain:

@@ -3,8 +3,7 @@
 from __future__ import annotations
 
 from collections import Counter
-from collections.abc import Iterable, Iterator, Sequence
-from contextlib import contextmanager
+from collections.abc import Iterable, Sequence
 
 import numpy as np
 from numpy.typing import NDArray
@@ -83,18 +82,16 @@ class Fits:
         """Return the hold-out gain of a hypothesis beyond a base."""
         return self.sums.gain(base, self.own_columns(hypothesis))
 
-    @contextmanager
-    def delayed(self, hypothesis: Hypothesis) -> Iterator[None]:
-        """Let a hypothesis act from its onset on, inside the context only."""
+    def delayed(self, hypothesis: Hypothesis) -> Fits:
+        """Return the same with a hypothesis acting only from its onset on."""
         if not hypothesis.onset:
-            yield
-            return
-        own = self.own_columns(hypothesis)
-        with (
-            self.sums.delayed(own, hypothesis.onset),
-            self.gram.delayed(own, hypothesis.onset),
-        ):
-            yield
+            return self
+        own, onset = self.own_columns(hypothesis), hypothesis.onset
+        return Fits(self.gram.delayed(own, onset), self.sums.delayed(own, onset))
+
+    def delayed_columns(self, columns: Index, block: int) -> Fits:
+        """Return the same with the regression's columns acting only from a block on."""
+        return Fits(self.gram, self.sums.delayed(columns, block))
 
     def model_form_error(
         self, hypothesis: Hypothesis, others: Sequence[Hypothesis]
@@ -109,18 +106,18 @@ class Fits:
         base, own = self.columns(others), self.own_columns(hypothesis)
         apart = [(c,) for c in hypothesis.candidates]
         causes = [hypothesis.candidates] if hypothesis.common else apart
-        with self.delayed(hypothesis):
-            free = freely_gained_at(self.gram, self.sums, base, own)
-            parts = {cause: self.gram.columns_of(cause) for cause in causes}
-            where = {cause: self.gram.places_of(mine) for cause, mine in parts.items()}
-            acting = Counter(place for places in where.values() for place in places)
-            found: dict[Candidate, float] = {}
-            for cause, mine in parts.items():
-                rest = np.concatenate([base, np.setdiff1d(own, mine)])
-                gained = float(self.sums.gains_beyond(rest, [mine])[0])
-                most = max(free[place] / acting[place] for place in where[cause])
-                share = float(np.sqrt(most / max(gained, most))) if most else 0.0
-                found |= dict.fromkeys(cause, share)
+        late = self.delayed(hypothesis)
+        free = freely_gained_at(late.gram, late.sums, base, own)
+        parts = {cause: self.gram.columns_of(cause) for cause in causes}
+        where = {cause: self.gram.places_of(mine) for cause, mine in parts.items()}
+        acting = Counter(place for places in where.values() for place in places)
+        found: dict[Candidate, float] = {}
+        for cause, mine in parts.items():
+            rest = np.concatenate([base, np.setdiff1d(own, mine)])
+            gained = float(late.sums.gains_beyond(rest, [mine])[0])
+            most = max(free[place] / acting[place] for place in where[cause])
+            share = float(np.sqrt(most / max(gained, most))) if most else 0.0
+            found |= dict.fromkeys(cause, share)
         return found
 
     def may_be_untruth(self, chosen: Sequence[Hypothesis]) -> list[bool]:

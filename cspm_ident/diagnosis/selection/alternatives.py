@@ -50,8 +50,8 @@ def alternatives_of(
         nested = wider and not beside and contains(sums, base, columns, own)
         if nested or not fits.is_plausible([*others, *assumed], loosely=True):
             continue
-        with sums.delayed(np.setdiff1d(columns, own), hypothesis.onset):
-            worse = fits.held_out(rival, fits.beside(base, *beside)) - reference
+        late = fits.delayed_columns(np.setdiff1d(columns, own), hypothesis.onset)
+        worse = late.held_out(rival, fits.beside(base, *beside)) - reference
         if worse.sum() > limits.rival_gain_share * gained:
             continue
         apart = distance(worse, undecided, wider, limits)

@@ -66,13 +66,13 @@ def onset_of(
     sums, edges = BlockRegression(gram, thresholds), gram.times
     others = {term: time for term, time in others.items() if term in gram.slices}
     for term, time in others.items():
-        sums.delay(gram.columns_of([term]), int(np.searchsorted(edges, time)))
+        sums = sums.delayed(gram.columns_of([term]), int(np.searchsorted(edges, time)))
     base, columns = gram.with_nuisance(others), gram.columns_of(own)
     first, last = np.searchsorted(edges, [low, high])
     blocks = np.arange(max(first, 1), max(min(last, len(edges) - 2), first + 2))
     left = sums.left_from(base, columns)[blocks]
     best = int(np.argmin(left))
-    sums.delay(columns, int(blocks[best]))
+    sums = sums.delayed(columns, int(blocks[best]))
     both = np.concatenate([base, columns])
     scatter = float(np.std(sums.held_out(both)))
     possible = edges[blocks[left <= left[best] + thresholds.onset_interval_sigma * scatter]]

@@ -52,8 +52,8 @@ def simplest(
     for rival in rivals:
         if not fits.is_plausible([*chosen, rival]) or fits.contradicts(rival, chosen):
             continue
-        with fits.sums.delayed(fits.own_columns(rival), best.onset):
-            leaves = fits.held_out(rival, base)
+        late = fits.delayed_columns(fits.own_columns(rival), best.onset)
+        leaves = late.held_out(rival, base)
         worse, wider = gain_of(leaves - reference), freedom(rival) - freedom(fewest)
         fewer = wider < 0 or (wider == 0 and is_wider(fewest, rival))
         more = leaves.sum() < left.sum() and behind(paired(leaves - left)) <= -sigma

@@ -58,16 +58,32 @@ class Search:
         thresholds: Thresholds = DEFAULT_THRESHOLDS,
     ) -> None:
         """Store the Gram matrices of all residuals; `progress` receives the name of each step."""
-        self.gram, self.sums = gram, BlockRegression(gram, thresholds)
-        self.thresholds = thresholds
-        self.fits = Fits(gram, self.sums)
-        self._progress = progress
+        self.thresholds, self._progress = thresholds, progress
+        self.fits = Fits(gram, BlockRegression(gram, thresholds))
         self._look_for([c for c in gram.terms if isinstance(c, Candidate) and self._shows(c)])
 
     def _look_for(self, candidates: Sequence[Candidate]) -> None:
         self._effects = candidates
         self.significance = Significance(self.fits, candidates)
         self.scopes = Scopes(self.fits, self.significance, candidates)
+
+    @property
+    def gram(self) -> BlockGram:
+        """Block Gram matrices, in which selected effects act from their onsets on."""
+        return self.fits.gram
+
+    @property
+    def sums(self) -> BlockRegression:
+        """The regression on these."""
+        return self.fits.sums
+
+    def delayed(self, hypothesis: Hypothesis) -> Search:
+        """Return the same search with a hypothesis acting only from its onset on."""
+        if not hypothesis.onset:
+            return self
+        other = copy(self)
+        other._begin(hypothesis)
+        return other
 
     def run(self) -> SearchResult:
         """Select effects one by one, each on all elements where it is significant."""
@@ -122,10 +138,10 @@ class Search:
             if found is None:
                 continue
             both = [*chosen, clock, found]
-            with self.fits.delayed(found):
-                base, gain = self._others(clock, both), self._gain(clock, both)
-                significant = self.significance.counts(base, clock, gain, len(chosen) + 1)
-                healthy = self.fits.is_negligible(clock, both)
+            late = self.delayed(found)
+            base, gain = self._others(clock, both), late._gain(clock, both)
+            significant = late.significance.counts(base, clock, gain, len(chosen) + 1)
+            healthy = late.fits.is_negligible(clock, both)
             if significant and healthy:
                 return clock, found
         return ()
@@ -230,9 +246,8 @@ class Search:
     def _begin(self, hypothesis: Hypothesis) -> None:
         """Let the hypothesis's columns act from its onset only, from now on."""
         if hypothesis.onset:
-            own = self.fits.own_columns(hypothesis)
-            self.gram.delay(own, hypothesis.onset)
-            self.sums.delay(own, hypothesis.onset)
+            self.fits = self.fits.delayed(hypothesis)
+            self._look_for(self._effects)
 
     def _best(self, chosen: Sequence[Hypothesis]) -> Hypothesis | None:
         base = self.fits.columns(chosen)
@@ -244,11 +259,10 @@ class Search:
         best = self._surest([*scopes, *late], chosen, base)
         if best is None:
             return None
-        with self.fits.delayed(best):
-            rivals = self._rivals(best, free, base)
-            found = simplest(self.fits, best, rivals, base, chosen)
-        with self.fits.delayed(found):
-            return self.scopes.pruned(found, base)
+        begun = self.delayed(best)
+        rivals = begun._rivals(best, free, base)
+        found = simplest(begun.fits, best, rivals, base, chosen)
+        return self.delayed(found).scopes.pruned(found, base)
 
     def _free(self, chosen: Sequence[Hypothesis]) -> list[Candidate]:
         """Return candidates that may be added: no effect twice on an element or with two shapes."""
@@ -270,8 +284,7 @@ class Search:
         before, limits = self.sums.held_out(base), self.thresholds
         best: tuple[Array, Hypothesis] | None = None
         for hypothesis in hypotheses:
-            with self.fits.delayed(hypothesis):
-                gained = self._sure_gain(hypothesis, chosen, base, before)
+            gained = self.delayed(hypothesis)._sure_gain(hypothesis, chosen, base, before)
             if gained is None:
                 continue
             needed = boldness(hypothesis, thresholds=limits) * gain_of(gained).error

@@ -226,8 +226,7 @@ def test_a_block_within_which_something_begins_tells_of_nothing_unknown(onset, r
     search = jerked(3.0)
     (candidate,) = (c for c in search.heard if c.effect is DRY)
     begun = Hypothesis(DRY, (candidate,), onset=onset)
-    with search.fits.delayed(begun):
-        assert bool(search.unexplained([begun])) is reported
+    assert bool(search.delayed(begun).unexplained([begun])) is reported
 
 
 @pytest.mark.parametrize(("amount", "elements"), [(0.3, MANY), (0.0, ("a",))])

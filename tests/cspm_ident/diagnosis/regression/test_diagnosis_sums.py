@@ -196,22 +196,42 @@ def test_an_onset_leaves_least_where_it_is():
     assert left[0] == pytest.approx(sums.squares_of(np.array([0, 1])), rel=1e-9)
 
 
-def test_columns_act_from_a_block_on_while_they_are_delayed():
+def test_delayed_columns_act_from_a_block_on():
     gram, sums = sums_of(made(weights=(3.0, 0.0, 0.0), start=ROWS // 2)[0])
     base, own, block = np.array([1]), np.array([0]), sums.blocks // 2
     both = np.concatenate([base, own])
-    whole, held_out = sums.squares_of(both), sums.held_out(both).sum()
-    fitted = sums.weights(both)
-    left = gram.left(both, fitted)[PLACE]
-    with sums.delayed(own, block), gram.delayed(own, block):
-        assert sums.squares_of(both) == pytest.approx(sums.left_from(base, own)[block])
-        assert sums.squares_of(both) < whole
-        assert sums.held_out(both).sum() < held_out
-        late = gram.left(both, sums.weights(both))[PLACE]
-        assert late == pytest.approx(sums.squares_of(both))
-    assert sums.squares_of(both) == pytest.approx(whole)
-    assert sums.held_out(both).sum() == pytest.approx(held_out)
-    assert gram.left(both, fitted)[PLACE] == pytest.approx(left)
+    later, known = sums.delayed(own, block), gram.delayed(own, block)
+    assert later.squares_of(both) == pytest.approx(sums.left_from(base, own)[block])
+    assert later.squares_of(both) < sums.squares_of(both)
+    assert later.held_out(both).sum() < sums.held_out(both).sum()
+    left = known.left(both, later.weights(both))[PLACE]
+    assert left == pytest.approx(later.squares_of(both))
+    assert left == pytest.approx(known.left_by_block(both, later.weights(both))[PLACE].sum())
+
+
+def test_what_is_delayed_is_a_regression_of_its_own():
+    """As if the column had been zero before, in all that follows from the sums."""
+    equation = made(weights=(3.0, 0.0, 0.0), start=ROWS // 2)[0]
+    gram, sums = sums_of(equation)
+    blocks, both = sums.blocks, np.array([0, 1, 2])
+    before = [sums.weights(both), sums.held_out(both), sums.covariance(both[:1], both[1:])]
+    twice = sums.delayed(both[:1], 3).delayed(both[1:2], blocks // 2).delayed(both[:1], 5)
+    term, *others = equation.columns
+    begins = {term: 5} | {other: blocks // 2 * (k == 0) for k, other in enumerate(others)}
+    edge = np.arange(ROWS) * blocks // ROWS
+    cut = {
+        each: np.where((edge >= begins[each])[:, None, None], values, 0.0)
+        for each, values in equation.columns.items()
+    }
+    alone = sums_of(replace(equation, columns=cut))[1]
+    np.testing.assert_allclose(twice.weights(both), alone.weights(both), rtol=1e-9)
+    np.testing.assert_allclose(twice.held_out(both), alone.held_out(both), rtol=1e-9)
+    assert twice.squares_of(both) == pytest.approx(alone.squares_of(both), rel=1e-9)
+    after = [sums.weights(both), sums.held_out(both), sums.covariance(both[:1], both[1:])]
+    for one, other in zip(before, after, strict=True):
+        np.testing.assert_array_equal(one, other)
+    assert sums.delayed(both, 0) is sums
+    assert gram.delayed(np.array([], dtype=int), 4).places == gram.places
 
 
 def test_weights_beyond_a_base_leave_the_base_as_it_is():

@@ -98,7 +98,10 @@ ABLATIONS: Mapping[str, Ablation] = {
     "joint-refit": Ablation(effects=_without_corrections),
     # Significance is that of white rows, not that of the scatter between blocks.
     "block-null": Ablation(
-        replaced={"selection.search.Sums": WhiteSums, "validation.reversals.Sums": WhiteSums}
+        replaced={
+            "selection.search.BlockRegression": WhiteSums,
+            "validation.reversals.BlockRegression": WhiteSums,
+        }
     ),
     # All findings are kept that a machine may have, whatever held-out data show.
     "held-out": Ablation(

@@ -98,22 +98,19 @@ def diagnose(
     values = {c: w for c, (w, _) in model.weights.items()}
     first = search.fits.values([each.hypothesis for each in acceptance.kept])
     free = free_functions(gram, judge)
+    reported = _reported(search, acceptance, model)
+    negligible = (each for each in model.findings if each.status is Status.NEGLIGIBLE)
+    gone = (*acceptance.rejected, *acceptance.fed_back)
+
+    def described(finding: Finding) -> Finding:
+        status = reported_status(finding, unexplained, aliased, thresholds)
+        region = region_of(rows, finding.hypothesis.candidates, first, thresholds)
+        return replace(finding, status=status, region=region)
+
     return Diagnosis(
         searched=searched,
         held_out=held_out,
-        findings=(
-            *(
-                replace(
-                    each,
-                    status=reported_status(each, unexplained, aliased, thresholds),
-                    region=region_of(rows, each.hypothesis.candidates, first, thresholds),
-                )
-                for each in _reported(search, acceptance, model)
-            ),
-            *(each for each in model.findings if each.status is Status.NEGLIGIBLE),
-            *acceptance.rejected,
-            *acceptance.fed_back,
-        ),
+        findings=(*map(described, reported), *negligible, *gone),
         unexplained=_with_shapes(search, acceptance.tested, knots, unexplained),
         tested=found.tested,
         fit=judged(held_out or searched, starts, retuned, values, noise, free, thresholds),

@@ -84,10 +84,8 @@ class BlockRegression:
             if len(down):
                 own = grams[blocks, at[rows[down]]]
                 if self._starts.any():
-                    first = blocks.start or 0
-                    own = silenced(
-                        own, self._starts[rows[down]] - first, self._starts[across] - first
-                    )
+                    starts = self._starts - (blocks.start or 0)
+                    own = silenced(own, starts[rows[down]], starts[across])
                 found[down[:, None], across] += own.sum(axis=0)
         return found
 

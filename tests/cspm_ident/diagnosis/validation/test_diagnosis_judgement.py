@@ -41,8 +41,8 @@ def test_a_residual_without_rows_there_is_left_out(crept, monkeypatch):
     """As of a cable that hangs slack in the end."""
     whole = judgement.equations_of
 
-    def slack(measurement, effects):
-        found = whole(measurement, effects)
+    def slack(measurement, effects, **given):
+        found = whole(measurement, effects, **given)
         return [e.within(0.0, START_S) if e.place == SOUND else e for e in found]
 
     monkeypatch.setattr(judgement, "equations_of", slack)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import hashlib
 import shutil
 from dataclasses import dataclass, replace
 from pathlib import Path
@@ -20,7 +21,7 @@ class Development:
     """A recording whose effects are known.
 
     Attributes:
-        name: of it, and of its folder.
+        name: of it.
         scenario: name of a scenario file.
         seed: of sea and sensors.
         planted: effects of the plant that the test-bed file does not have.
@@ -39,18 +40,34 @@ class Development:
     capture: int | None = 100
     cells: bool = True
 
+    @property
+    def key(self) -> str:
+        """Name of its folders: another as soon as anything of it is another."""
+        return f"{self.name}-{hashlib.sha256(repr(self).encode()).hexdigest()[:8]}"
+
 
 def _effect(effect: str, elements: tuple[str, ...] = (), **parameters: float) -> EffectEntry:
     return EffectEntry(effect=effect, elements=elements, parameters=parameters)
 
 
+DRY_ALL = _effect("winch_coulomb_friction", torque=0.02)
 DRY = _effect("winch_coulomb_friction", ("surge_2",), torque=0.02)
 SET = (
+    Development("winch", "one_winch", 47, duration=15.0, capture=None),
+    Development("winch_friction", "one_winch", 48, (DRY_ALL,), duration=15.0, capture=None),
+    Development(
+        "winch_two",
+        "one_winch",
+        49,
+        (DRY_ALL, _effect("tension_gain", gain=1.03)),
+        duration=15.0,
+        capture=None,
+    ),
     Development(
         "rig",
         "rig_damping_surge",
         41,
-        (_effect("winch_coulomb_friction", torque=0.02), _effect("tension_gain", gain=1.02)),
+        (DRY_ALL, _effect("tension_gain", gain=1.02)),
         duration=24.0,
         capture=None,
     ),
@@ -72,6 +89,12 @@ SET = (
 )
 
 
+def case_of(name: str) -> Development:
+    """Return the case of `SET` with a name."""
+    (case,) = (each for each in SET if each.name == name)
+    return case
+
+
 def recorded(case: Development, folder: Path) -> Path:
     """Return the recording of a case in a folder, made if it is not there yet.
 
@@ -79,10 +102,10 @@ def recorded(case: Development, folder: Path) -> Path:
         case: of `SET`.
         folder: of all recordings.
     """
-    place = folder / case.name
+    place = folder / case.key
     if place.is_dir():
         return place
-    unfinished = folder / f".{case.name}"
+    unfinished = folder / f".{case.key}"
     shutil.rmtree(unfinished, ignore_errors=True)
     folder.mkdir(parents=True, exist_ok=True)
     path = SCENARIOS / f"{case.scenario}.yaml"

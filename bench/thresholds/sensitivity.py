@@ -13,11 +13,12 @@ from pathlib import Path
 from typing import Any, NamedTuple
 
 from bench.results.result_store import spoken
-from bench.thresholds.development_set import SET, Development, measured
+from bench.thresholds.development_set import Development, case_of, measured
 from bench.thresholds.move import Move, moves, watched
 from cspm_ident.diagnosis.diagnose import diagnose
 from cspm_ident.diagnosis.reporting.verdict import diagnosis_data
 from cspm_ident.diagnosis.threshold_groups.reporting_thresholds import ReportingThresholds
+from cspm_ident.signals.measurement import Measurement
 from cspm_msgs_py.errors import CspmError
 
 ROOT = Path(__file__).resolve().parents[2]
@@ -46,9 +47,10 @@ class Task(NamedTuple):
         return f"{self.case}/{name}.json"
 
 
+@cache
 def fingerprint() -> str:
-    """Return a hash of the code and the set that decide what a diagnosis finds."""
-    digest = hashlib.sha256(repr(SET).encode())
+    """Return a hash of the code that decides what a diagnosis finds."""
+    digest = hashlib.sha256()
     for path in sorted(path for name in MADE_WITH for path in (ROOT / name).rglob("*.py")):
         digest.update(spoken(path.read_text(encoding="utf-8")).encode())
     return digest.hexdigest()[:12]
@@ -86,7 +88,8 @@ def diagnose_all(
 def _run(
     pool: ProcessPoolExecutor, tasks: Sequence[Task], folder: Path, tell: Tell
 ) -> dict[str, dict[str, Any]]:
-    begun = {pool.submit(kept, task, str(folder), fingerprint()): task for task in tasks}
+    code = fingerprint()
+    begun = {pool.submit(kept, task, str(folder), code): task for task in tasks}
     found = {}
     for done, each in enumerate(as_completed(begun), start=1):
         found[begun[each].file] = each.result()
@@ -102,7 +105,7 @@ def kept(task: Task, folder: str, code: str) -> dict[str, Any]:
         folder: of recordings and results.
         code: what `fingerprint` returns.
     """
-    place = Path(folder) / code / task.file
+    place = Path(folder) / code / case_of(task.case).key / Path(task.file).name
     if place.exists():
         stored: dict[str, Any] = json.loads(place.read_text(encoding="utf-8"))
         return stored
@@ -141,9 +144,8 @@ def diagnosed(task: Task, recordings: Path) -> dict[str, Any]:
 
 
 @cache
-def _measured(name: str, recordings: Path) -> Any:
-    (case,) = (each for each in SET if each.name == name)
-    return measured(case, recordings)
+def _measured(name: str, recordings: Path) -> Measurement:
+    return measured(case_of(name), recordings)
 
 
 def _plain(data: Data) -> dict[str, Any]:

@@ -434,7 +434,7 @@ def test_the_command_plays_to_nobody(cspm, domain, recording, tmp_path):
 @pytest.mark.parametrize(
     ("arguments", "line"),
     [
-        (["--rate", "0"], "rate 0: allowed with nodes in step, which tell how far they are"),
+        (["--rate", "0"], "rate 0: allowed with nodes in step, which report how far they are"),
         (["--rate", "-1"], "rate -1: allowed: 0.001 to 1000, or 0 with nodes in step"),
         (["--remap", "/bar/pose"], "--remap /bar/pose: allowed: OLD=NEW, such as "),
         (["--out", "x"], "--out without --through: allowed: with it"),

@@ -14,7 +14,9 @@ EFFECTS = Path(__file__).resolve().parents[2] / "examples" / "effects"
 
 @pytest.fixture(autouse=True)
 def _as_it_was(monkeypatch):
-    monkeypatch.delenv(VARIABLE, raising=False)
+    # A variable that is set first is one that `undo` takes away again.
+    monkeypatch.setenv(VARIABLE, "")
+    monkeypatch.delenv(VARIABLE)
     catalogue.cache_clear()
     yield
     monkeypatch.undo()

@@ -22,4 +22,4 @@ def test_the_cache_lies_where_the_user_wants_it(tmp_path, monkeypatch):
     assert config.CACHE_DIR.startswith(f"{tmp_path}/kernels-")
     monkeypatch.delenv("NUMBA_CACHE_DIR")
     use_kernel_cache()
-    assert "/cspm_sim/kernels/__pycache__/kernels-" in config.CACHE_DIR
+    assert "/cspm_model/kernels/__pycache__/kernels-" in config.CACHE_DIR

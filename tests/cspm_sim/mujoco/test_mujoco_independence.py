@@ -24,7 +24,9 @@ def test_it_shares_no_code_with_the_plant():
         text = path.read_text(encoding="utf-8")
         assert set(imported(text)) <= ALLOWED, path.name
         # Nor by a name at run time, or as a file.
-        own = text.replace("cspm_sim.mujoco", "").replace("`cspm_sim", "")
+        own = (
+            text.replace("cspm_sim.mujoco", "").replace("`cspm_sim", "").replace("`cspm_model", "")
+        )
         assert not any(name in own for name in ("cspm_sim", "cspm_model")), path.name
     others = [path for path in (ROOT / "cspm_sim").rglob("*.py") if path not in sources]
     for path in (*others, *(ROOT / "cspm_model").rglob("*.py")):

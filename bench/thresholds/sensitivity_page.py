@@ -22,6 +22,7 @@ diagnosis of that recording never uses the threshold. *Refused* means one line o
 
 Written by `python -m bench.thresholds`.
 """
+_SAME = {"nothing", "not read"}
 Changes = Mapping[str, Mapping[Move, str]]
 
 
@@ -54,11 +55,13 @@ def _silent(changes: Changes) -> str:
         for move, words in own.items():
             by_name.setdefault(move.name, set()).add(words)
     unread = [name for name, words in by_name.items() if words == {"not read"}]
-    silent = [name for name, words in by_name.items() if words <= {"nothing", "not read"}]
+    silent = [name for name, words in by_name.items() if words <= _SAME]
     same = [name for name in silent if name not in unread]
     return (
         f"## No change on this set\n\n{len(same)} of {len(by_name)} thresholds, read and without"
-        f" effect within ±50 %: {_listed(same)}.\n\nNot read on this set: {_listed(unread)}.\n"
+        f" effect within ±50 %: {_listed(same)}.\n\nNot read on this set: {_listed(unread)}.\n\n"
+        "A rule whose threshold changes nothing here may still decide elsewhere: it can go only\n"
+        "where its removal leaves every development result as it is.\n"
     )
 
 
@@ -68,7 +71,11 @@ def _listed(names: Sequence[str]) -> str:
 
 def _table(cases: Sequence[Development], changes: Changes) -> str:
     names = [case.name for case in cases]
-    every = next(iter(changes.values()), {})
+    every = [
+        move
+        for move in next(iter(changes.values()), {})
+        if any(changes[name][move] not in _SAME for name in names)
+    ]
     rows = [
         f"| `{move.name}` | {DEFAULT_THRESHOLDS.values[move.name]:.4g} | {move.value:.4g} | "
         + " | ".join(changes[name][move] for name in names)
@@ -76,6 +83,5 @@ def _table(cases: Sequence[Development], changes: Changes) -> str:
         for move in every
     ]
     head = f"| threshold | default | moved to | {' | '.join(names)} |"
-    return "\n".join(
-        ["## Move by move\n", head, "|---|---:|---:|" + "---|" * len(names), *rows, ""]
-    )
+    line = "|---|---:|---:|" + "---|" * len(names)
+    return "\n".join(["## Moves that change something\n", head, line, *rows, ""])

@@ -24,7 +24,8 @@ such as lengths of filters and numbers of iterations, stay beside the code that 
 
 A *share* is a number from 0 to 1. A *gain* is the sum of squared residuals that an effect takes in
 blocks of time that were not fitted. *Set by hand* means that neither statistics nor data gave the
-value. `python -m bench.thresholds` tables what moving each value by half changes.
+value. What moving each value by half changes is in
+[thresholds-sensitivity.md](thresholds-sensitivity.md).
 
 This page is generated: `python -m cspm_ident.diagnosis.thresholds_page > docs/thresholds.md`.
 """

@@ -105,6 +105,8 @@ def test_the_page_lists_what_changes_nothing_and_what_is_not_read():
     assert "`holdout_sigma`" in unread.splitlines()[0]
     other = sensitivity_page([rig], {"rig": dict(outcomes(found("rig", to_3=worse), "rig"))})
     assert "| `tie_sigma` | 2 | 3 | verdict: unknown |" in other
+    assert "| `tie_sigma` | 2 | 1 |" not in other
+    assert "| `tie_sigma`" not in page
     assert "`tie_sigma`" not in other.partition("Not read on this set: ")[0]
 
 

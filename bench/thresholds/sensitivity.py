@@ -190,7 +190,7 @@ def change(before: Data, after: Data) -> str:
 
 
 def _named(finding: Data) -> str:
-    return f"{finding['effect']} on {', '.join(finding['elements'])}"
+    return f"{finding['effect']} on {', '.join(sorted(finding['elements']))}"
 
 
 def _rivals(finding: Data) -> list[str]:

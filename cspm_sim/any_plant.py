@@ -22,6 +22,7 @@ class AnyPlant(Protocol):
     testbed: Testbed
     steps: int
     locked: bool
+    cut: tuple[str, ...]
     bar_state: Array
     angles: Array
     speeds: Array

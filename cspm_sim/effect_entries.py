@@ -11,7 +11,10 @@ from numpy.typing import NDArray
 
 from cspm_msgs_py.errors import InputError
 from cspm_msgs_py.testbed import EffectEntry, Testbed
+from cspm_msgs_py.testbed_keys.effect_table import EMPIRICAL
 from cspm_sim.effects import Block, Effect, Elements, Hook, catalogue
+from cspm_sim.effects.empirical import table_effect
+from cspm_sim.effects.winch_load import load_effects
 from cspm_sim.kernels.effect_call import kernel_address
 from cspm_sim.kernels.hooks import ROW_COLUMNS
 
@@ -34,6 +37,11 @@ class Action(NamedTuple):
     values: dict[str, float]
 
     @property
+    def numbers(self) -> list[float]:
+        """What the kernels take: the effect's constants, then its parameters."""
+        return [*self.effect.physics.constants, *self.values.values()]
+
+    @property
     def where(self) -> str:
         """The entry's place in error messages."""
         return f"effects: {self.effect.id}"
@@ -42,6 +50,8 @@ class Action(NamedTuple):
 def read_actions(testbed: Testbed) -> list[Action]:
     """Return a test-bed's effects one by one, without those whose parameters make them absent.
 
+    Loads of winches are among them, as effects that act alike; see `load_effects`.
+
     Raises:
         InputError: an effect, one of its elements or parameters is unknown or out of bounds, or an
             effect with memory is listed twice on one element.
@@ -49,10 +59,15 @@ def read_actions(testbed: Testbed) -> list[Action]:
     actions = [action for entry in testbed.effects for action in _of_entry(entry, testbed)]
     seen = set()
     for action in actions:
-        place = action.effect.id, action.name
+        place = action.effect.key, action.name
         if action.effect.physics.states and place in seen:
             raise InputError(f"{action.where}: twice on {action.name}, allowed: once per element")
         seen.add(place)
+    actions += [
+        Action(effect, i, cable.name, values)
+        for i, cable in enumerate(testbed.cables)
+        for effect, values in load_effects(cable, testbed.gravity)
+    ]
     return [action for action in actions if not action.effect.is_absent(action.values)]
 
 
@@ -100,13 +115,13 @@ def hook_rows(actions: Sequence[Action], n_states: int) -> tuple[NDArray[np.int6
         for k, action in enumerate(actions)
         for hook in action.effect.physics.kernels
     )
-    width = max((len(actions[k].values) for *_, k in calls), default=1)
+    width = max((len(actions[k].numbers) for *_, k in calls), default=1)
     effects = np.zeros((len(calls), ROW_COLUMNS), dtype=np.int64)
     parameters = np.zeros((len(calls), width))
     for row, (hook, element, k) in enumerate(calls):
-        effect, values = actions[k].effect, list(actions[k].values.values())
+        effect, values = actions[k].effect, actions[k].numbers
         address = _address(effect, Hook(hook))
-        effects[row] = hook, element, address, first[k], effect.physics.states
+        effects[row] = hook, element, address, first[k], effect.physics.states, 0, 0
         parameters[row, : len(values)] = values
     return effects, parameters
 
@@ -124,10 +139,11 @@ def _address(effect: Effect, hook: Hook) -> int:
 
 def _of_entry(entry: EffectEntry, testbed: Testbed) -> Iterator[Action]:
     where = f"effects: {entry.effect}"
-    effect = catalogue().get(entry.effect)
+    effect = catalogue().get(entry.effect) if entry.table is None else table_effect(entry.table)
     if effect is None:
-        raise InputError(f"{where}: no such effect, allowed: {', '.join(catalogue())}")
-    values = _ordered(effect, entry, where)
+        allowed = ", ".join((*catalogue(), EMPIRICAL))
+        raise InputError(f"{where}: no such effect, allowed: {allowed}")
+    values = _ordered(effect, entry, where) if entry.table is None else _tabled(effect)
     if effect.acts_on is Elements.CABLES:
         yield from _on_cables(effect, entry, testbed, values, where)
     else:
@@ -168,20 +184,26 @@ def _on_others(
         yield Action(effect, names.index(element), element, values)
 
 
+def _tabled(effect: Effect) -> dict[str, float]:
+    assert effect.table is not None
+    return dict(zip((p.name for p in effect.parameters), effect.table.values, strict=True))
+
+
 def _ordered(effect: Effect, entry: EffectEntry, where: str) -> dict[str, float]:
     names = [parameter.name for parameter in effect.parameters]
     defaults = {p.name: p.default for p in effect.parameters if p.default is not None}
-    given = {**defaults, **entry.parameters}
+    given = {**defaults, **entry.numbers}
     if set(given) != set(names):
         needed = [name for name in names if name not in defaults]
         further = f", and {', '.join(defaults)}" if defaults else ""
         raise InputError(
-            f"{where}: parameters {sorted(entry.parameters)}, allowed: exactly {needed}{further}"
+            f"{where}: parameters {sorted(entry.numbers)}, allowed: exactly {needed}{further}"
         )
     for parameter in effect.parameters:
-        if not parameter.minimum <= given[parameter.name] <= parameter.maximum:
+        low, high = parameter.allowed
+        if not low <= given[parameter.name] <= high:
             raise InputError(
                 f"{where}: {parameter.name} = {given[parameter.name]:g} {parameter.unit}, allowed:"
-                f" {parameter.minimum:g} to {parameter.maximum:g}"
+                f" {low:g} to {high:g}"
             )
     return {name: given[name] for name in names}

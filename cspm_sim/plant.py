@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping, Sequence
+
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
@@ -11,9 +13,11 @@ from cspm_model.equilibrium import (
     gravity_wrench,
     unstretched_lengths,
 )
-from cspm_model.kernels.cable import DIRECTION, TORQUE_LIMIT
+from cspm_model.kernels.cable import DIRECTION, HAS_CABLE, TORQUE_LIMIT
 from cspm_model.kernels.machine import BAR_STATES
+from cspm_model.kernels.native import address_of
 from cspm_model.motion import Motion
+from cspm_model.phase import Phase, make_phase
 from cspm_msgs_py.dofs import DOFS
 from cspm_msgs_py.errors import DivergenceError, InputError
 from cspm_msgs_py.testbed import Testbed
@@ -21,6 +25,18 @@ from cspm_sim.effect_entries import read_actions
 from cspm_sim.effects import Hook
 from cspm_sim.kernels.affected_cables import reported_torques
 from cspm_sim.kernels.hooks import HOOK
+from cspm_sim.kernels.phases import (
+    ADDRESS,
+    ADVANCE,
+    ADVANCE_INTEGERS,
+    BAD,
+    LOCKED,
+    NEXT_CUT,
+    PERIODIC,
+    TORQUE,
+    UPRIGHT,
+    advance_phase,
+)
 from cspm_sim.kernels.plant import make_scratch, plant_advance, plant_tensions, state_count
 from cspm_sim.parameters import plant_parameters
 from cspm_sim.rest import frame_shift, memory_at_rest, static_wrench
@@ -39,7 +55,8 @@ class Plant:
     Time is a count of steps of `period_ns`; `step` advances it by one. Read-only views of the
     current state: `bar_state` (12: position, Euler angles, velocity in world axes, ω in bar axes),
     `unstretched_lengths`, `angles`, `speeds` (n each), `tensions` (n) and `frame` (18). `locked`
-    may be set at any time: the brakes, which stop the motors at once.
+    may be set at any time: the brakes, which stop the motors at once. `cut` names the cables that
+    have parted.
     """
 
     def __init__(
@@ -51,6 +68,7 @@ class Plant:
         bar_pose: ArrayLike | None = None,
         tensions: ArrayLike | None = None,
         locked: bool = False,
+        cuts: Mapping[int, Sequence[int]] | None = None,
     ) -> None:
         """Put the machine at rest in equilibrium.
 
@@ -62,6 +80,7 @@ class Plant:
             tensions: what the cables carry at the start, (n,) [N], where there is no bar to hold;
                 absent: nothing.
             locked: hold all motors still.
+            cuts: indices of the cables that part, by the step from which they carry nothing.
 
         Raises:
             InputError: the test-bed has a bar and no pose for it, or a cable of length zero.
@@ -73,6 +92,8 @@ class Plant:
         self.period_ns = period_ns
         self.frame_motion = frame_motion
         self.steps = 0
+        self.cut: tuple[str, ...] = ()
+        self._cuts = dict(cuts or {})
         n = len(testbed.cables)
         first = BAR_STATES if testbed.bar else 0
         self.state: Array = np.zeros(state_count(self.parameters))
@@ -81,16 +102,17 @@ class Plant:
         self.angles = self.state[first + n : first + 2 * n]
         self.speeds = self.state[first + 2 * n : first + 3 * n]
         self._memory = self.state[first + 3 * n :]
-        self._has_drives = bool((self.parameters.effects[:, HOOK] == Hook.DRIVE).any())
+        self.has_drives = bool((self.parameters.effects[:, HOOK] == Hook.DRIVE).any())
         self.locked = locked
         self.frame: Array = frame_motion.at(0.0)
-        self._outputs = np.zeros((2, n))
-        self.tensions = self._outputs[0]
-        self.lengths = self._outputs[1]
+        self.outputs = np.zeros((2, n))
+        self.tensions = self.outputs[0]
+        self.lengths = self.outputs[1]
         self._frames = np.zeros((3, 18))
-        self._scratch = make_scratch(len(self.state), n)
+        self.scratch = make_scratch(len(self.state), n)
         self._place(bar_pose, tensions)
-        self._observe()
+        self._part()
+        self._own = self.advance_phase(0, upright=False)
 
     @property
     def time(self) -> float:
@@ -119,23 +141,22 @@ class Plant:
             raise InputError(
                 f"torque: shape {torque.shape}, allowed: {self.speeds.shape}, one per cable"
             )
-        bad = plant_advance(
-            self.state,
-            torque,
-            self.frame_motion.knots,
-            self.frame_motion.spacing,
-            self.frame_motion.periodic,
-            self.steps,
-            1,
-            self._locked,
-            self.period_ns * 1e-9,
-            self.parameters,
-            self._frames,
-            self._scratch,
-            self._outputs,
-        )
+        self._own.refresh()
+        # A cable parts only once the step is made.
+        self._own.arrays[0][NEXT_CUT] = -1
+        self._own.kernel(self.steps, np.ascontiguousarray(torque), self._own.places)
+        self.finish_step(int(self._own.arrays[0][BAD]))
+
+    def finish_step(self, bad: int) -> None:
+        """Count the step that the states have made, and look at what came of it.
+
+        Args:
+            bad: the first state that is not finite, −1 for none.
+
+        Raises:
+            DivergenceError: as `step`.
+        """
         self.steps += 1
-        self.frame[:] = self._frames[0]
         if bad >= 0:
             raise DivergenceError(f"t = {self.time:.3f} s: {self.state_name(bad)} is not finite")
         if self.testbed.bar and abs(self.bar_state[4]) > 0.5 * np.pi:
@@ -143,6 +164,38 @@ class Plant:
                 f"t = {self.time:.3f} s: pitch {self.bar_state[4]:.3f} rad passed ±π/2, where the"
                 " Euler angles end"
             )
+        if self.steps in self._cuts:
+            self._part()
+
+    def advance_phase(self, torque: int, *, upright: bool) -> Phase:
+        """Return the step as a compiled phase, which leaves a step with a cut to `step`.
+
+        Args:
+            torque: the first column of the torques in the row.
+            upright: whether a bar that has turned over is to be looked at.
+        """
+        integers = np.zeros(ADVANCE_INTEGERS, dtype=np.int64)
+        integers[TORQUE], integers[UPRIGHT] = torque, upright
+        integers[PERIODIC] = self.frame_motion.periodic
+        integers[ADDRESS] = address_of(plant_advance, ADVANCE)
+
+        def refresh() -> None:
+            integers[LOCKED] = self._locked
+            integers[NEXT_CUT] = min(self._cuts, default=-1)
+
+        return make_phase(
+            advance_phase,
+            integers,
+            np.array([self.frame_motion.spacing, self.period_ns * 1e-9]),
+            self.state,
+            self.frame,
+            self._frames,
+            self.outputs,
+            self.frame_motion.knots,
+            *self.parameters,
+            *self.scratch,
+            refresh=refresh,
+        )
 
     def state_name(self, index: int) -> str:
         """Return the name of a state, such as `speed of surge_2`."""
@@ -164,8 +217,8 @@ class Plant:
         """Return what the drives report for a torque command, (n,) [N·m]: limits and lags apply."""
         limits = self.parameters.cables[:, TORQUE_LIMIT]
         applied = np.minimum(limits, np.maximum(-limits, torque))
-        if self._has_drives:
-            p, scratch = self.parameters, self._scratch
+        if self.has_drives:
+            p, scratch = self.parameters, self.scratch
             reported_torques(
                 self.state,
                 torque,
@@ -180,7 +233,14 @@ class Plant:
         return applied
 
     def _observe(self) -> None:
-        plant_tensions(self.state, self.frame, self.parameters, self._scratch, self._outputs)
+        plant_tensions(self.state, self.frame, self.parameters, self.scratch, self.outputs)
+
+    def _part(self) -> None:
+        """Let the cables part whose step has come; what remains of them is not wound."""
+        for i in self._cuts.pop(self.steps, ()):
+            self.parameters.cables[i, HAS_CABLE] = 0.0
+            self.cut += (self.testbed.cable_names[i],)
+        self._observe()
 
     def _place(self, bar_pose: ArrayLike | None, tensions: ArrayLike | None) -> None:
         if self.testbed.bar is None:
@@ -191,7 +251,7 @@ class Plant:
             self.unstretched_lengths[:] = unstretched_lengths(
                 self.parameters, self.lengths.copy(), carried
             )
-            self._settle(carried, carried @ self._scratch.spans[:, DIRECTION : DIRECTION + 3])
+            self._settle(carried, carried @ self.scratch.spans[:, DIRECTION : DIRECTION + 3])
             return
         if bar_pose is None:
             raise InputError("plant: this test-bed has a bar, a pose to start from is required")
@@ -223,7 +283,7 @@ class Plant:
             self._memory[:] = memory_at_rest(
                 self._actions, self.parameters, tensions, lengths, force
             )
-            if not hooks & {Hook.CABLE, Hook.FRAME}:
+            if not hooks & {Hook.CABLE, Hook.LOADED_CABLE, Hook.FRAME}:
                 break
             excess = self._tensions_at_rest() - tensions
             if np.abs(excess[loaded]).max(initial=0.0) <= SETTLING_TOLERANCE:
@@ -238,5 +298,5 @@ class Plant:
 
     def _tensions_at_rest(self) -> Array:
         frame = np.concatenate([self.frame[:6], np.zeros(12)])
-        plant_tensions(self.state, frame, self.parameters, self._scratch, self._outputs)
+        plant_tensions(self.state, frame, self.parameters, self.scratch, self.outputs)
         return self.tensions.copy()

@@ -58,7 +58,7 @@ class PlantNode:
         self._brakes_at_start = run.plant.locked
         self._timer = node.every(_LOOK_EVERY_S, self._look_around)
         self._alone = 0.0
-        self._told_end = False
+        self._end_reported = False
         self.started = False
         self.refused = (0, "")
 
@@ -134,8 +134,8 @@ class PlantNode:
     def _send_rest(self) -> None:
         """Send what nobody computes from and, once it is over, that it is."""
         self._outbox.send_rest()
-        if self._plant.ended and not self._told_end:
-            self._told_end = True
+        if self._plant.ended and not self._end_reported:
+            self._end_reported = True
             self._others.tell_end(self._plant.last_step)
 
     def _refuse(self, topic: str, reason: str) -> None:

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import dataclass
 
+from cspm_model.motion import Motion
 from cspm_msgs_py.graph import Edges
 from cspm_msgs_py.schedule import PLANT, Schedule
 from cspm_msgs_py.topics import DIAGNOSTICS, Topic
@@ -25,6 +26,7 @@ class PlantRun:
         edges: who sends and reads what in this run, by topic.
         nodes: the nodes of this run.
         controlled: whether a closed loop is to keep the bar upright.
+        target: the motion of the target where it is measured.
     """
 
     plant: AnyPlant
@@ -34,6 +36,7 @@ class PlantRun:
     edges: Mapping[str, Edges]
     nodes: tuple[str, ...]
     controlled: bool
+    target: Motion | None = None
 
     @property
     def topics(self) -> dict[str, Topic]:
@@ -54,6 +57,11 @@ class PlantRun:
             if edge.senders == (PLANT,) and name != DIAGNOSTICS.name
         }
 
+    @property
+    def sent(self) -> list[Topic]:
+        """Topics that one node of this run sends, each alone."""
+        return [self.topics[name] for name, edge in self.edges.items() if len(edge.senders) == 1]
+
     def simulator(self, publish: Mapping[str, Publish]) -> Simulator:
         """Return plant and sensors; `publish` says where messages go, by topic."""
         return Simulator(
@@ -62,4 +70,5 @@ class PlantRun:
             publish,
             period_ns=self.schedule.period_ns,
             controlled=self.controlled,
+            target=self.target,
         )

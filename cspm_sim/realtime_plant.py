@@ -8,8 +8,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from cspm_msgs_py.diagnostics import Level, Status
-from cspm_msgs_py.errors import DivergenceError
+from cspm_msgs_py.errors import DivergenceError, InputError
 from cspm_msgs_py.schedule import TORQUE_COMMAND, Schedule
+from cspm_msgs_py.stepping.admission import Admission
+from cspm_msgs_py.stepping.publisher_binding import PublisherBinding
 from cspm_sim.simulator import Simulator
 from cspm_sim.watchdog import Watchdog
 
@@ -39,13 +41,28 @@ class RealtimePlant:
         steps: int,
         watchdog: Watchdog,
         publish_status: Callable[[int, Status], None],
+        *,
+        binding: PublisherBinding | None = None,
+        on_fault: Callable[[str], None] = lambda _: None,
     ) -> None:
-        """Take the plant, how many steps to make, and what looks after its drives."""
+        """Take the plant, how many steps to make, and what looks after its drives.
+
+        Args:
+            simulator: the plant with its sensors.
+            schedule: of the run.
+            steps: how many plant steps to make.
+            watchdog: what looks after the drives.
+            publish_status: where diagnostics go.
+            binding: whose torque commands count; None: anybody's.
+            on_fault: called with why the drives went to their safe state by a message.
+        """
         self._simulator = simulator
         self._schedule = schedule
         self._steps = steps
         self._watchdog = watchdog
         self._publish_status = publish_status
+        self._admission = Admission(TORQUE_COMMAND, binding)
+        self._on_fault = on_fault
         self._torque_timing = schedule.topics.get(TORQUE_COMMAND)
         self._start_ns: int | None = None
         self._step = -1
@@ -68,17 +85,29 @@ class RealtimePlant:
         """Begin at an instant [ns] on the ROS clock."""
         self._start_ns = start_ns
 
-    def receive_torque(self, stamp_ns: int, torque: Array, now_ns: int) -> None:
-        """Take a torque command."""
+    def receive_torque(
+        self, stamp_ns: int, torque: Array, now_ns: int, gid: bytes | None = None
+    ) -> None:
+        """Take a torque command.
+
+        Raises:
+            InputError: it is another publisher's, or its stamp is one that cannot be.
+        """
+        fault = self._admission.fault(stamp_ns, now_ns, gid, safe=self._watchdog.safe)
+        if fault is not None:
+            raise InputError(fault)
         self._watchdog.command(now_ns, torque)
         self._simulator.torque = torque
         period = self._schedule.period_ns
         if self._start_ns is not None and stamp_ns > self._start_ns + (self._step - 0.5) * period:
             self._commanded = True
 
-    def refuse(self, reason: str) -> None:
-        """Take note of an unusable message; commands that do not come trip the watchdog."""
+    def refuse(self, now_ns: int, reason: str) -> None:
+        """Take note of an unusable message; once the run has begun it trips the watchdog."""
         self.refused = (self.refused[0] + 1, reason)
+        if self._start_ns is not None:
+            self._watchdog.trip(now_ns, reason)
+            self._on_fault(reason)
 
     def receive_brake(self, wanted: bool) -> None:
         """Set or release the brakes."""

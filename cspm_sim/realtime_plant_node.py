@@ -3,15 +3,19 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from functools import partial
 
 import numpy as np
 from numpy.typing import NDArray
 
 from cspm_msgs_py.graph import Edges
+from cspm_msgs_py.ros.bound_flag import BoundFlag
 from cspm_msgs_py.ros.contract_node import ContractNode, ros_class
+from cspm_msgs_py.ros.fault_line import FaultLine
+from cspm_msgs_py.ros.graph_publishers import bind, census_of
 from cspm_msgs_py.ros.leader import Leader
-from cspm_msgs_py.schedule import CLOCK, PLANT, TORQUE_COMMAND
-from cspm_msgs_py.topics import BRAKE, DIAGNOSTICS, QOS_DEPTH, Topic
+from cspm_msgs_py.schedule import CLOCK, FORCE_CONTROLLER, PLANT, TORQUE_COMMAND
+from cspm_msgs_py.topics import BRAKE, DIAGNOSTICS, Topic
 from cspm_sim.plant_run import PlantRun
 from cspm_sim.realtime_plant import RealtimePlant
 from cspm_sim.simulator import Publish
@@ -28,6 +32,8 @@ class RealtimePlantNode:
         """Connect the plant to the ROS node; its watchdog releases or holds it."""
         topics, edges, schedule = run.topics, run.edges, run.schedule
         self._node, self._watchdog = node, watchdog
+        node.keep_time()
+        self._line = FaultLine(node)
         self._start_ns = 0
         self._simulator = run.simulator(
             {
@@ -37,18 +43,30 @@ class RealtimePlantNode:
             }
         )
         status = node.status_publisher(edges[DIAGNOSTICS.name].readers)
-        self._plant = RealtimePlant(self._simulator, schedule, run.steps, watchdog, status)
+        self._binding = bind(node, topics[TORQUE_COMMAND], edges)
+        self._plant = RealtimePlant(
+            self._simulator,
+            schedule,
+            run.steps,
+            watchdog,
+            status,
+            binding=self._binding,
+            on_fault=self._line.report,
+        )
         self.leader = Leader(
             node,
             schedule.period_ns,
             run.others,
             # One period more, in which the last step is made.
             (run.steps + 1) * schedule.period_ns,
+            missing=census_of(node, run.sent, edges),
             on_start=self._start,
         )
         if TORQUE_COMMAND in schedule.topics:
-            node.subscribe_rows(topics[TORQUE_COMMAND], self._torque, self._refuse)
-        node.subscribe_objects(BRAKE.name, ros_class(BRAKE.ros_type), self._brake, QOS_DEPTH)
+            refuse = partial(self._refuse, TORQUE_COMMAND)
+            node.subscribe_tagged_rows(topics[TORQUE_COMMAND], self._torque, refuse)
+        if FORCE_CONTROLLER in schedule.nodes:
+            BoundFlag(node, BRAKE, FORCE_CONTROLLER, self._plant.receive_brake, self._refuse)
         node.node.create_service(ros_class("std_srvs/srv/Trigger"), RESET, self._reset)
         # Twice as often as steps are due: a timer that is late skips calls.
         node.every(0.5e-9 * schedule.period_ns, self._tick)
@@ -86,19 +104,21 @@ class RealtimePlantNode:
         self._plant.start(start_ns)
 
     def _tick(self) -> None:
+        fault = self._node.clock_fault()
+        if fault is not None:
+            self._line.report(fault)
         self._plant.tick(self._node.now_ns())
         if self._plant.failure is not None:
             self.leader.end()
 
-    def _torque(self, stamp_ns: int, row: Array) -> None:
-        self._plant.receive_torque(stamp_ns, row, self._node.now_ns())
+    def _torque(self, stamp_ns: int, row: Array, gid: bytes | None) -> None:
+        self._plant.receive_torque(stamp_ns, row, self._node.now_ns(), gid)
 
-    def _refuse(self, reason: str) -> None:
-        self._plant.refuse(reason)
-        self._node.complain(TORQUE_COMMAND, reason)
-
-    def _brake(self, message: object) -> None:
-        self._plant.receive_brake(bool(message.data))  # type: ignore[attr-defined]
+    def _refuse(self, topic: str, reason: str) -> None:
+        if self.leader.start_ns is None and self._binding.bound is None:
+            return
+        self._plant.refuse(self._node.now_ns(), reason)
+        self._node.complain(topic, reason)
 
     def _reset(self, _: object, response: object) -> object:
         refusal = self._watchdog.reset()

@@ -25,12 +25,14 @@ def static_wrench(
     actions: Sequence[Action], parameters: PlantParameters, bar_pose: ArrayLike, frame: ArrayLike
 ) -> Array:
     """Return the wrench of all effects on a bar that is held still, (6,), world axes."""
-    signals = np.zeros(bar_hooks.PENDANT_SIGNALS)
-    signals[bar_hooks.PENDANT_GRAVITY] = parameters.bar[GRAVITY]
+    still, hanging = np.zeros(bar_hooks.BAR_SIGNALS), np.zeros(bar_hooks.PENDANT_SIGNALS)
+    still[bar_hooks.POSE : bar_hooks.POSE + 6] = bar_pose
+    hanging[bar_hooks.PENDANT_GRAVITY] = parameters.bar[GRAVITY]
     for action in actions:
-        for hook in (Hook.BAR, Hook.PENDANT):
+        for hook, signals in ((Hook.BAR, still), (Hook.PENDANT, hanging)):
             _call(action, hook, signals, np.zeros(action.effect.physics.states))
-    return signals[WRENCH : WRENCH + 6] + _end_wrench(actions, parameters, bar_pose, frame)
+    wrench = still[WRENCH : WRENCH + 6] + hanging[WRENCH : WRENCH + 6]
+    return wrench + _end_wrench(actions, parameters, bar_pose, frame)
 
 
 def _end_wrench(
@@ -114,15 +116,13 @@ def _states(action: Action, hook: Hook, signals: Array) -> Array:
     effect = action.effect
     if effect.physics.rest is None or hook not in effect.physics.kernels:
         return np.zeros(effect.physics.states)
-    return np.array(
-        effect.physics.rest(np.array(list(action.values.values())), signals), dtype=float
-    )
+    return np.array(effect.physics.rest(np.array(action.numbers), signals), dtype=float)
 
 
 def _call(action: Action, hook: Hook, signals: Array, states: Array) -> None:
     kernel = action.effect.physics.kernels.get(hook)
     if kernel is None:
         return
-    values = np.array(list(action.values.values()))
+    values = np.array(action.numbers)
     memory = (states, np.zeros(len(states))) if action.effect.physics.states else ()
     kernel(values, signals, *memory)

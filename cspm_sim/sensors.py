@@ -33,6 +33,17 @@ class SensorModel:
 
     It is offered the true values at every plant step. Poses are offered as x y z φ θ ψ: noise and
     resolution act on these six, and the message carries the quaternion.
+
+    Attributes:
+        divider: steps from one sample to the next.
+        delay_steps: steps from sample to arrival.
+        is_pose: whether it measures a pose.
+        width: how many numbers it measures.
+        deviation: of the noise of each, (width,).
+        resolution: of each, (width,); 0 for any value.
+        noise: standard normal numbers, a row per sample.
+        drawn: samples taken so far; sample i has row i modulo the rows of the noise drawn for it.
+        underway: samples that have not arrived: step of arrival, stamp [ns] and row.
     """
 
     def __init__(
@@ -65,23 +76,23 @@ class SensorModel:
                 f"rates: {topic.name} at {rate} Hz, allowed: at most {sensor.rate} Hz, the sensor's"
             )
         delay = 0.0 if ideal else sensor.delay
-        self._delay_steps = round(delay * 1e9 / period_ns)
-        if abs(self._delay_steps * period_ns - delay * 1e9) > 1.0:
+        self.delay_steps = round(delay * 1e9 / period_ns)
+        if abs(self.delay_steps * period_ns - delay * 1e9) > 1.0:
             raise InputError(
                 f"sensors.{topic.name}.delay: {delay:g} s, allowed: a multiple of the plant's"
                 f" period of {period_ns * 1e-9:g} s"
             )
-        self._divider = round(1e9 / period_ns) // rate
-        self._is_pose = topic.ros_type.endswith("PoseStamped")
-        self._width = 6 if self._is_pose else topic.width
-        repeats = self._width // len(quantities(topic))
+        self.divider = round(1e9 / period_ns) // rate
+        self.is_pose = topic.ros_type.endswith("PoseStamped")
+        self.width = 6 if self.is_pose else topic.width
+        repeats = self.width // len(quantities(topic))
         scale = 0.0 if ideal else 1.0
-        self._deviation = scale * np.repeat(np.array(sensor.noise, dtype=float), repeats)
-        self._resolution = scale * np.repeat(np.array(sensor.resolution, dtype=float), repeats)
+        self.deviation = scale * np.repeat(np.array(sensor.noise, dtype=float), repeats)
+        self.resolution = scale * np.repeat(np.array(sensor.resolution, dtype=float), repeats)
         self._generator = np.random.default_rng([seed, zlib.crc32(topic.name.encode())])
-        self._noise = np.zeros((_DRAWN_AT_ONCE, self._width))
-        self._drawn = 0
-        self._samples: deque[tuple[int, int, Array]] = deque()
+        self.noise = np.zeros((_DRAWN_AT_ONCE, self.width))
+        self.drawn = 0
+        self.underway: deque[tuple[int, int, Array]] = deque()
         self._faults = tuple(faults)
         self._past = Past() if any(fault.is_late for fault in faults) else None
 
@@ -89,13 +100,24 @@ class SensorModel:
         """Take a sample if one is due; return stamp [ns] and row of one that arrives, if any."""
         if self._past is not None:
             self._past.note(now_ns * 1e-9, values)
-        if step % self._divider == 0:
+        if step % self.divider == 0:
             sample = self._sample(self._faulty(now_ns * 1e-9, values))
-            self._samples.append((step + self._delay_steps, now_ns, sample))
-        if self._samples and self._samples[0][0] <= step:
-            _, stamp_ns, row = self._samples.popleft()
+            self.underway.append((step + self.delay_steps, now_ns, sample))
+        if self.underway and self.underway[0][0] <= step:
+            _, stamp_ns, row = self.underway.popleft()
             return stamp_ns, row
         return None
+
+    @property
+    def is_faulty(self) -> bool:
+        """Whether an effect changes its readings."""
+        return bool(self._faults)
+
+    def draw(self) -> Array:
+        """Return the next standard normal numbers, a row per sample; zeros where noise is none."""
+        if not self.deviation.any():
+            return self.noise
+        return self._generator.standard_normal((_DRAWN_AT_ONCE, self.width))
 
     def _faulty(self, time: float, values: Array) -> Array:
         if self._past is not None:
@@ -105,13 +127,13 @@ class SensorModel:
         return values
 
     def _sample(self, values: Array) -> Array:
-        index = self._drawn % _DRAWN_AT_ONCE
-        if index == 0 and self._deviation.any():
-            self._noise = self._generator.standard_normal((_DRAWN_AT_ONCE, self._width))
-        self._drawn += 1
-        measured = np.empty(self._width)
-        corrupt(values, self._noise[index], self._deviation, self._resolution, measured)
-        if not self._is_pose:
+        index = self.drawn % _DRAWN_AT_ONCE
+        if index == 0:
+            self.noise = self.draw()
+        self.drawn += 1
+        measured = np.empty(self.width)
+        corrupt(values, self.noise[index], self.deviation, self.resolution, measured)
+        if not self.is_pose:
             return measured
         row = np.empty(7)
         pose_row(measured, row)

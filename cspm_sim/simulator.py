@@ -8,10 +8,12 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from cspm_model.motion import Motion
 from cspm_msgs_py.diagnostics import Level, Status
 from cspm_msgs_py.errors import DivergenceError
 from cspm_msgs_py.schedule import CLOCK
 from cspm_sim.any_plant import AnyPlant
+from cspm_sim.kernels.phases import COUNTS, LAST_TAUT_NS, SLACK, SLACK_STEPS, STEPS
 from cspm_sim.sensors import AnySensor
 from cspm_sim.truth import Quantity, Truth
 
@@ -35,9 +37,15 @@ class Simulator:
     """A plant with its sensors.
 
     Attributes:
+        plant: the machine.
+        sensors: by topic.
+        period_ns: the plant's [ns].
+        controlled: whether a closed loop is to keep the bar upright.
+        truth: the true quantities.
+        slack_limit: tensions up to which a cable is slack, (n,) [N].
         torque: motor torques (n,) [N·m] that the plant holds.
         measured: the latest row of each sensor, by topic.
-        slack: whether any cable is slack in the state last observed.
+        counts: what was observed, as `cspm_sim.kernels.phases` has it.
     """
 
     def __init__(
@@ -48,6 +56,7 @@ class Simulator:
         *,
         period_ns: int,
         controlled: bool,
+        target: Motion | None = None,
     ) -> None:
         """Take the parts.
 
@@ -57,38 +66,43 @@ class Simulator:
             publish: where messages go, by topic; topics that are absent are not sent.
             period_ns: the plant's [ns].
             controlled: whether a closed loop is to keep the bar upright.
+            target: the motion of the target where the bar's reference is measured.
         """
         self.plant = plant
-        self._period_ns = period_ns
-        self._controlled = controlled
+        self.sensors = sensors
+        self.period_ns = period_ns
+        self.controlled = controlled
         cables = plant.testbed.cables
         # Where there is no cable nothing is slack.
-        self._slack_limit = np.array([0.0 if cable.has_cable else -1.0 for cable in cables])
+        self.slack_limit = np.array([0.0 if cable.has_cable else -1.0 for cable in cables])
         # Before anything is commanded the winches hold what hangs on them.
         radii = np.array([cable.drum_radius / cable.gear_ratio for cable in cables])
         self.torque: Array = radii * plant.tensions
         self._clock = publish.get(CLOCK)
-        self._truth = Truth(plant)
+        self.truth = Truth(plant, target)
         self._taps = [
             _Tap(q, publish.get("/truth" + q.topic), sensors.get(q.topic), publish.get(q.topic))
-            for q in self._truth.quantities
+            for q in self.truth.quantities
         ]
         self.measured: dict[str, Array] = {}
-        self.slack = False
-        self._slack_steps = self._steps = 0
-        self._last_taut = 0.0
+        self.counts = np.zeros(COUNTS, dtype=np.int64)
+
+    @property
+    def slack(self) -> bool:
+        """Whether any cable is slack in the state last observed."""
+        return bool(self.counts[SLACK])
 
     @property
     def now_ns(self) -> int:
         """The present instant [ns]."""
-        return self.plant.steps * self._period_ns
+        return self.plant.steps * self.period_ns
 
     def observe(self) -> None:
         """Publish the clock, the truth, and what the sensors make of it."""
         now, step = self.now_ns, self.plant.steps
         if self._clock is not None:
             self._clock(now, now, NO_ROW)
-        self._truth.update(self.torque)
+        self.truth.update(self.torque)
         for quantity, publish_truth, sensor, publish_measured in self._taps:
             if publish_truth is not None:
                 publish_truth(now, now, quantity.row)
@@ -98,11 +112,12 @@ class Simulator:
                 self.measured[quantity.topic] = measured
                 if publish_measured is not None:
                     publish_measured(now, stamp, measured)
-        self.slack = bool((self.plant.tensions <= self._slack_limit).any())
-        self._slack_steps += self.slack
-        self._steps += 1
-        if not self.slack:
-            self._last_taut = now * 1e-9
+        counts = self.counts
+        counts[SLACK] = (self.plant.tensions <= self.slack_limit).any()
+        counts[SLACK_STEPS] += counts[SLACK]
+        counts[STEPS] += 1
+        if not counts[SLACK]:
+            counts[LAST_TAUT_NS] = now
 
     def advance(self) -> None:
         """Move the plant by one period with `torque` held.
@@ -111,30 +126,42 @@ class Simulator:
             DivergenceError: the plant left the range of its equations, or the bar that is to be
                 controlled has turned over.
         """
+        self.plant.step(self.torque)
+        self.check_upright()
+
+    def check_upright(self) -> None:
+        """Check that a controlled bar is upright.
+
+        Raises:
+            DivergenceError: it has turned over.
+        """
         plant = self.plant
-        plant.step(self.torque)
-        if self._controlled and abs(plant.bar_state[3]) > np.pi:
+        if self.controlled and abs(plant.bar_state[3]) > np.pi:
             raise DivergenceError(
                 f"t = {plant.time:.3f} s: bar roll {plant.bar_state[3]:.3f} rad passed ±π, the bar"
                 " has turned over"
             )
 
     def status(self) -> Status:
-        """Return the share of steps with a slack cable since the last call."""
-        share = self._slack_steps / max(1, self._steps)
-        self._slack_steps = self._steps = 0
+        """Return the share of steps with a slack cable since the last call, and what was cut."""
+        share = int(self.counts[SLACK_STEPS]) / max(1, int(self.counts[STEPS]))
+        self.counts[SLACK_STEPS] = self.counts[STEPS] = 0
         level = Level.WARN if share else Level.OK
-        values = {"slack_share": f"{share:.3f}"}
-        return Status(level, "plant", "slack cable" if share else "ok", values)
+        values, message = {"slack_share": f"{share:.3f}"}, "slack cable" if share else "ok"
+        if self.plant.cut:
+            values["cut"] = ", ".join(self.plant.cut)
+            level, message = Level.WARN, "cable cut"
+        return Status(level, "plant", message, values)
 
     def history(self) -> list[str]:
         """Return what preceded the present instant, in words, for the report of a divergence."""
         plant = self.plant
         names = plant.testbed.cable_names
         slack = [n for n, t in zip(names, plant.tensions, strict=True) if t <= 0.0]
-        events = []
+        events = [f"{name} cut" for name in plant.cut]
         if self.slack:
-            events.append(f"slack since {self._last_taut:.3f} s ({', '.join(slack) or 'none now'})")
+            taut, now = int(self.counts[LAST_TAUT_NS]) * 1e-9, ", ".join(slack) or "none now"
+            events.append(f"slack since {taut:.3f} s ({now})")
         if plant.testbed.bar:
             pose = ", ".join(f"{value:.3g}" for value in plant.bar_state[:6])
             events.append(f"bar at [{pose}] (m, rad)")

@@ -45,6 +45,10 @@ class Watchdog:
         self._commanded_ns = now_ns
         self._latch.stand(now_ns, _COMMAND, self._fault(torque))
 
+    def trip(self, now_ns: int, reason: str) -> None:
+        """Go to the safe state for a reason that came and went."""
+        self._latch.trip(now_ns, reason)
+
     def brake(self, wanted: bool) -> None:
         """Set the plant's brakes, or release them as far as the safe state does not need them."""
         self._brake_wanted = wanted
@@ -55,9 +59,8 @@ class Watchdog:
 
         To be called in every period, on the clock of `command`.
         """
-        if self._commanded_ns is None:
-            return None
-        self._latch.stand(now_ns, _SILENCE, self._silence(now_ns, self._commanded_ns))
+        if self._commanded_ns is not None:
+            self._latch.stand(now_ns, _SILENCE, self._silence(now_ns, self._commanded_ns))
         if not self._latch.open:
             return None
         if not self._entered:

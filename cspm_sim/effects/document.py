@@ -1,6 +1,7 @@
-"""The page `docs/effects.md`, made from what each effect declares of itself.
+"""The page `docs/reference/effects.md`, made from what each effect declares of itself.
 
-Run `python -m cspm_sim.effects.document > docs/effects.md` after adding or changing an effect.
+Run `python -m cspm_sim.effects.document > docs/reference/effects.md` after adding or changing
+an effect.
 """
 
 from __future__ import annotations
@@ -14,19 +15,29 @@ _HEAD = """\
 # Effects
 
 Physics beyond the thesis's model. Each effect is one file in `cspm_sim/effects/`; a test-bed
-file switches it on under `effects:` (see [files.md](files.md)). Winch quantities are at the
+file switches it on under `effects:` (see
+[the test-bed file](testbed-file.md)). Winch quantities are at the
 motor shaft, bar quantities in world_ned at the origin of bar_ned. In the equations q is the motor
 angle, n the gear ratio, r the drum's radius, t the tension, ε the elongation.
 
 *Absent at* is the value at which an effect does nothing: it is then left out altogether. Effects of
 several entries add up; one with memory acts once per element. Effects of block `sensor` change what
 is measured and nothing else. *Searched over* lists the values at which a diagnosis looks for a
-parameter that does not enter the residual as a factor. Controllers and their design know the
-test-bed without its effects.
+parameter that does not enter the residual as a factor. *Usual* ranges and these values are those of
+a machine of the thesis's size, with torques of 0.35 N·m, 100 rad/s, 15 N and cables of 2 m. Where
+the recorded ones are of another order of magnitude, a diagnosis multiplies them by powers of ten. A
+file may go a million times beyond where a number has a dimension. Controllers and their design
+know the test-bed without its effects.
 
-This page is generated: `python -m cspm_sim.effects.document > docs/effects.md`. Which sensors tell
+What no effect of this list explains can be described by a table of values: effect `empirical`,
+whose keys are in [the test-bed file](testbed-file.md).
+A diagnosis writes such tables; they explain nothing, and
+another machine or motion may need others.
+
+This page is generated: `python -m cspm_sim.effects.document > docs/reference/effects.md`.
+Which sensors tell
 which effects apart is in [isolability.md](isolability.md), how to add one of your own in
-[add-an-effect.md](add-an-effect.md).
+[add-an-effect.md](../how-to/add-an-effect.md).
 """
 
 _PICTURES = """
@@ -37,13 +48,13 @@ signal that explains most of it, along the worst case; the largest value is 1. B
 a drive show nowhere along that planned motion, without slack and commands: they are drawn along
 `worst_case_4m` as simulated. Drawn by `python docs/scripts/draw_signatures.py`.
 
-![Signatures of effects on winches](figures/signatures_winch.png)
+![Signatures of effects on winches](../figures/signatures_winch.png)
 
-![Signatures of effects on cables](figures/signatures_cable.png)
+![Signatures of effects on cables](../figures/signatures_cable.png)
 
-![Signatures of effects on the bar](figures/signatures_bar.png)
+![Signatures of effects on the bar](../figures/signatures_bar.png)
 
-![Signatures of effects on winch frame and sensors](figures/signatures_frame_and_sensor.png)"""
+![Signatures of effects on winch frame and sensors](../figures/signatures_frame_and_sensor.png)"""
 
 _ELEMENTS = {
     Elements.CABLES: "named cables, all where none is named",
@@ -84,7 +95,7 @@ def effect_section(effect: Effect) -> str:
     return "\n".join(
         [
             f"\n## {effect.id}\n",
-            "| parameter | unit | allowed | absent at | meaning |",
+            "| parameter | unit | usual | absent at | meaning |",
             "|---|---|---|---|---|",
             *(_row(parameter) for parameter in effect.parameters),
             "",
@@ -96,9 +107,10 @@ def effect_section(effect: Effect) -> str:
 def _row(p: EffectParameter) -> str:
     absent = "" if p.absent is None else f"{p.absent:g}"
     bounds = f"{p.minimum:g} to {p.maximum:g}"
-    left_out = "" if p.default is None else f"; {p.default:g} where a file leaves it out"
-    usual = "" if p.usual is None else f"; wrong by {p.usual:g} as a rule, where it is"
-    return f"| `{p.name}` | {p.unit} | {bounds} | {absent} | {p.meaning}{left_out}{usual} |"
+    texts = [p.meaning] if p.meaning else []
+    texts += [f"{p.default:g} where a file leaves it out"] if p.default is not None else []
+    texts += [f"usually wrong by {p.usual:g}"] if p.usual is not None else []
+    return f"| `{p.name}` | {p.unit} | {bounds} | {absent} | {'; '.join(texts)} |"
 
 
 def _grids(effect: Effect) -> str:

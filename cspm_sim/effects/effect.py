@@ -9,11 +9,17 @@ from enum import Enum, IntEnum
 import numpy as np
 from numpy.typing import NDArray
 
-from cspm_msgs_py.testbed import Testbed
+from cspm_msgs_py.testbed import EffectEntry, Testbed
+from cspm_msgs_py.testbed_keys.effect_table import EffectTable
 from cspm_sim.kernels import hooks
 
 Array = NDArray[np.float64]
 Values = Mapping[str, float]
+
+
+# By how much a machine may be larger or smaller than the thesis's.
+WIDER = 1e6
+_WITHOUT_SCALE = frozenset({"1", "s", "Hz", "rad"})
 
 
 class Block(Enum):
@@ -70,8 +76,8 @@ class EffectParameter:
     Attributes:
         name: public name.
         unit: SI.
-        minimum: least value allowed.
-        maximum: largest value allowed.
+        minimum: least plausible value, on a machine of the thesis's size.
+        maximum: largest plausible value, likewise.
         absent: the value at which the effect is not there; None for a number that only shapes it.
         meaning: what the number is, where the equation does not say it.
         default: what holds where a file leaves it out; None: it has to be given.
@@ -86,6 +92,14 @@ class EffectParameter:
     meaning: str = ""
     default: float | None = None
     usual: float | None = None
+
+    @property
+    def allowed(self) -> tuple[float, float]:
+        """Ends of what a file may say: of what has a dimension, whatever the machine's size."""
+        if self.unit in _WITHOUT_SCALE:
+            return self.minimum, self.maximum
+        least = self.minimum / WIDER if self.minimum > 0.0 else self.minimum * WIDER
+        return least, self.maximum * WIDER
 
     def is_open(self, low: float, high: float) -> bool:
         """Return whether an interval is all that is allowed, so that nothing bounds the number."""
@@ -141,6 +155,7 @@ class Physics:
             that is no more than that.
         sense: what it does to a sensor's readings.
         plausible: whether parameters within their bounds go together; None: always.
+        constants: numbers that the kernels take ahead of the parameters, such as a table's knots.
         nearest: `nearest(testbed, values, errors)`: of the values that a machine can have those
             nearest to `values`, in units of their errors; None: any values will do.
     """
@@ -151,6 +166,7 @@ class Physics:
     alter: Callable[[Testbed, int, Values], Testbed] | None = None
     sense: Sense | None = None
     plausible: Callable[[Values], bool] | None = None
+    constants: tuple[float, ...] = ()
     nearest: Callable[[Testbed, Values, Values], Values] | None = None
 
 
@@ -163,6 +179,7 @@ class Signature:
         partners: how the same coefficients show in further residuals at the same time.
         nonlinear: coarse grids, by name, of the parameters on which the columns depend otherwise
             than as a factor.
+        whole: of these the whole numbers, which are not refined between the grid's points.
         spectrum: of these the time constant of which a machine has many, its other number being a
             share of theirs in all: the interval of that is reported for their sum; empty: it has
             one.
@@ -173,6 +190,9 @@ class Signature:
             the default above.
         tied: whether its columns' weights depend on one another, so that weights that were fitted
             freely need not be those of any parameters.
+        rescales: whether it multiplies the quantity that its main residual compares. Its column is
+            then that quantity as the model has it, in the unit that was measured: no gain can
+            shrink the residual by which it is judged.
         negligible: how far parameters, by name, may lie from where the effect is absent in a
             healthy machine; less is taken into account and not reported.
     """
@@ -180,11 +200,13 @@ class Signature:
     regression: Regression
     partners: tuple[Regression, ...] = ()
     nonlinear: Mapping[str, tuple[float, ...]] = field(default_factory=dict)
+    whole: tuple[str, ...] = ()
     spectrum: str = ""
     saturates: bool = False
     coefficients: Callable[[Values], Sequence[float]] | None = None
     from_coefficients: Callable[[Sequence[float], Values], dict[str, float]] | None = None
     tied: bool = False
+    rescales: bool = False
     negligible: Mapping[str, float] = field(default_factory=dict)
 
 
@@ -221,6 +243,7 @@ class Effect:
         signature: how it is recognised in a recording.
         description: what people read about it.
         elements: what it can act on; None: that which its block says.
+        table: the table whose values are its parameters; None for an effect with a name.
     """
 
     id: str
@@ -230,6 +253,25 @@ class Effect:
     signature: Signature
     description: Description
     elements: Elements | None = None
+    table: EffectTable | None = None
+
+    @property
+    def key(self) -> str:
+        """What tells it from other effects of the same id, which only tables share."""
+        return self.id if self.table is None else f"{self.id} {self.table.key}"
+
+    def entry(self, elements: Sequence[str], values: Values) -> EffectEntry:
+        """Return its entry in a test-bed file.
+
+        Args:
+            elements: that it acts on; none: all.
+            values: of all parameters, by name.
+        """
+        if self.table is None:
+            return EffectEntry(effect=self.id, elements=tuple(elements), parameters=dict(values))
+        numbers = tuple(float(values[p.name]) for p in self.parameters)
+        table = self.table.model_copy(update={"values": numbers})
+        return EffectEntry(effect=self.id, elements=tuple(elements), parameters=table)
 
     @property
     def words(self) -> str:

@@ -2,7 +2,7 @@
 
 All of them can be filled from a recording: smoothed readings, their derivatives, and what the
 nominal model says at the measured state. Slices name what has several columns. Units SI, axes as in
-docs/conventions.md.
+docs/reference/conventions.md.
 """
 
 from __future__ import annotations
@@ -56,6 +56,7 @@ class BarSignal(IntEnum):
     MASS = 24
     GRAVITY = 25
     TIME = 26
+    POSE = 27  # six: position [m], Euler angles [rad]
 
 
 class EndSignal(IntEnum):

@@ -4,8 +4,9 @@ Without effects it gives bit for bit what the shorter way in `kernels.plant` giv
 """
 
 from math import sqrt
+from typing import Any
 
-from numba import njit
+from numba import njit, types
 from numpy import float64, int64
 from numpy.typing import NDArray
 
@@ -26,6 +27,7 @@ from cspm_model.kernels.cable import (
     elastic_tension,
     law_scale,
 )
+from cspm_model.kernels.native import caller_returning
 from cspm_model.kernels.rotation import Placement
 from cspm_sim.kernels.hooks import (
     CABLE,
@@ -47,6 +49,10 @@ from cspm_sim.kernels.winch import (
 Array = NDArray[float64]
 Rows = NDArray[int64]
 
+_VECTOR, _PLACE = types.float64[::1], types.UniTuple(types.float64, 3)
+_PLACEMENT = types.Tuple((_PLACE, types.UniTuple(types.float64, 9), _PLACE, _PLACE))
+call_affected_cables = caller_returning(_PLACEMENT)
+
 # What effects on a cable read.
 SPAN_LENGTH = 0  # from exit to attachment [m]
 SPAN_RATE = 1
@@ -67,7 +73,9 @@ TURN_ADDED = 14  # speed of the drum beyond the motor's, at the motor shaft [rad
 ELONGATION_ADDED = 15  # [m]
 FORCE_ADDED = 16  # tension; fades with the elastic tension as the damper does [N]
 SAG = 17  # elongation added, times the tension squared [m·N²]
-CABLE_SIGNALS = 18
+LOADED_FORCE = 18  # tension, added when the elastic tension is known; fades likewise [N]
+CARRIED_TENSION = 19  # with damper and all that was added so far, only of a loaded cable [N]
+CABLE_SIGNALS = 20
 # What effects on the winch frame read and change.
 FRAME_SHIFT = 0  # of the exits, world axes [m]
 FRAME_SHIFT_RATE = 3
@@ -209,7 +217,27 @@ def _load_cable(
     spans[i, TENSION] = tension if tension > 0.0 and has_cable else 0.0
     signals[ELASTIC_TENSION] = elastic if has_cable else 0.0
     signals[ELONGATION_RATE] = spans[i, RATE] - rate
+    signals[CARRIED_TENSION] = spans[i, TENSION]
     return rate if has_cable else 0.0
+
+
+@njit(cache=True, error_model="numpy", _nrt=False)
+def _add_tension(i: int, cables: Array, spans: Array, signals: Array) -> None:
+    """Add to a cable's tension what effects add when its elastic tension is known."""
+    elastic, floor = signals[ELASTIC_TENSION], cables[i, FLOOR_TENSION]
+    fade = elastic / floor if elastic < floor else 1.0
+    tension = spans[i, TENSION] + fade * signals[LOADED_FORCE]
+    has_cable = cables[i, HAS_CABLE] != 0.0
+    spans[i, TENSION] = tension if tension > 0.0 and has_cable else 0.0
+
+
+def affected_signature(cables: Any) -> Any:  # noqa: ANN401 - numba's types
+    """Return the signature of `affected_cables` for rows of cables of a type."""
+    rows, matrix, integers = types.int64[:, ::1], types.float64[:, ::1], types.int64
+    return _PLACEMENT(
+        *(_VECTOR, _VECTOR, _PLACEMENT, _PLACEMENT, integers, types.boolean, types.float64),
+        *(cables, types.float64[:, :, ::1], rows, matrix, cables, _VECTOR, _VECTOR),
+    )
 
 
 @njit(cache=True, error_model="numpy", _nrt=False)
@@ -246,6 +274,8 @@ def affected_cables(
         at_loaded = run_effects(
             LOADED_CABLE, i, at_loaded, effects, effect_parameters, signals, state, out
         )
+        if signals[LOADED_FORCE] != 0.0:
+            _add_tension(i, cables, spans, signals)
         radius_added = signals[RADIUS_ADDED]
         angle, speed, tension = state[first + n + i], state[first + 2 * n + i], spans[i, TENSION]
         fill_winch_signals(angle, speed, tension, torque[i], cables, i, signals)

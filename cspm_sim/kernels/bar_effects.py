@@ -1,21 +1,31 @@
 """Effects that put forces and moments on the bar."""
 
-from numba import njit
+from typing import Any
+
+from numba import njit, types
 from numpy import float64, int64
 from numpy.typing import NDArray
 
 from cspm_model.kernels.bar import GRAVITY, bar_acceleration
 from cspm_model.kernels.cable import ARM, DIRECTION, EXIT, LENGTH, TENSION
+from cspm_model.kernels.native import caller_returning
 from cspm_model.kernels.rotation import Placement, Vector, cross, rotate
 from cspm_sim.kernels.hooks import ATTACHMENT, BAR, HOOK, PENDANT, first_effect, run_effects
 
 Array = NDArray[float64]
 Rows = NDArray[int64]
 
+_VECTOR, _PLACE = types.float64[::1], types.UniTuple(types.float64, 3)
+_PLACEMENT = types.Tuple((_PLACE, types.UniTuple(types.float64, 9), _PLACE, _PLACE))
+_FORCES = types.UniTuple(_PLACE, 2)
+call_effects_on_bar = caller_returning(_FORCES)
+
 # What effects on the bar read and change: velocity of the bar frame's origin, world axes, and the
-# wrench that the effect adds there, world axes.
+# wrench that the effect adds there, world axes; its position and Euler angles.
 VELOCITY = 0
 WRENCH = 6
+POSE = 12
+BAR_SIGNALS = 18
 # What effects at an attachment read: cable direction, velocity of the attachment against the exit,
 # world axes, length, tension, gravity, velocity of the exit; and the force on the bar at the
 # attachment that they add to.
@@ -101,6 +111,8 @@ def bar_wrench(
         signals[VELOCITY + 3 + d] = rate[d]
         signals[WRENCH + d] = 0.0
         signals[WRENCH + 3 + d] = 0.0
+        signals[POSE + d] = state[d]
+        signals[POSE + 3 + d] = state[3 + d]
     run_effects(BAR, 0, cursor, effects, effect_parameters, signals, state, out)
     w = WRENCH
     return (signals[w], signals[w + 1], signals[w + 2]), (
@@ -148,6 +160,15 @@ def pendant_wrench(
         signals[w + 3],
         signals[w + 4],
         signals[w + 5],
+    )
+
+
+def on_bar_signature(cables: Any) -> Any:  # noqa: ANN401 - numba's types
+    """Return the signature of `effects_on_bar` for rows of cables of a type."""
+    rows, matrix = types.int64[:, ::1], types.float64[:, ::1]
+    return _FORCES(
+        *(_VECTOR, _PLACEMENT, _PLACEMENT, _PLACE, _PLACE, _VECTOR, cables, rows, matrix, cables),
+        *(_VECTOR, _VECTOR),
     )
 
 

@@ -32,6 +32,9 @@ ELEMENT = 1
 ADDRESS = 2
 FIRST_STATE = 3  # index in the plant's state, -1 without memory
 STATES = 4  # how many
+# The same in all rows: addresses of `affected_cables` and `effects_on_bar`, 0 where none needs it.
+AFFECTED = 5
+ON_BAR = 6
 ROW_COLUMNS = EFFECT_COLUMNS
 
 

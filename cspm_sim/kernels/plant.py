@@ -28,9 +28,9 @@ from cspm_model.kernels.rotation import (
     Placement,
     body_rate_to_euler_rate,
 )
-from cspm_sim.kernels.affected_cables import CABLE_SIGNALS, affected_cables
-from cspm_sim.kernels.bar_effects import END_SIGNALS, PENDANT_SIGNALS, effects_on_bar
-from cspm_sim.kernels.hooks import FIRST_STATE, HOOK, STATES, WINCH, run_effects
+from cspm_sim.kernels.affected_cables import CABLE_SIGNALS, call_affected_cables
+from cspm_sim.kernels.bar_effects import END_SIGNALS, PENDANT_SIGNALS, call_effects_on_bar
+from cspm_sim.kernels.hooks import AFFECTED, FIRST_STATE, HOOK, ON_BAR, STATES, WINCH, run_effects
 from cspm_sim.kernels.winch import (
     DRY_LIMIT,
     RESISTANCE,
@@ -85,8 +85,9 @@ def bar_rate(
     """Write the time derivative of the bar's 12 states to `out`, under the tensions in `spans`."""
     _, rotation, velocity, _ = placement
     force, moment = cable_wrench(spans)
-    if effects.shape[0] > 0:
-        force, moment = effects_on_bar(
+    if effects.shape[0] > 0 and effects[0, ON_BAR] != 0:
+        force, moment = call_effects_on_bar(
+            effects[0, ON_BAR],
             state,
             frame,
             placement,
@@ -135,7 +136,8 @@ def plant_rate(
     first = BAR_STATES if has_bar else 0
     placement = bar_placement(state, has_bar)
     if effects.shape[0] > 0 and effects[0, HOOK] < WINCH:
-        frame = affected_cables(
+        frame = call_affected_cables(
+            effects[0, AFFECTED],
             state,
             torque,
             frame,
@@ -196,7 +198,8 @@ def plant_tensions(
     spans = scratch.spans
     placement = bar_placement(state, has_bar)
     if p.effects.shape[0] > 0 and p.effects[0, HOOK] < WINCH:
-        affected_cables(
+        call_affected_cables(
+            p.effects[0, AFFECTED],
             state,
             scratch.stages[1],
             frame_placement(frame),

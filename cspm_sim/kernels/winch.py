@@ -4,7 +4,7 @@ from numba import njit
 from numpy import float64
 from numpy.typing import NDArray
 
-from cspm_model.kernels.cable import INERTIA, RADIUS, TORQUE_LIMIT
+from cspm_model.kernels.cable import GEAR_RATIO, INERTIA, RADIUS, TORQUE_LIMIT
 
 Array = NDArray[float64]
 
@@ -17,7 +17,8 @@ RESISTANCE = 4  # torque against positive motion [N·m]; an effect adds to it
 DRY_LIMIT = 5  # largest dry friction torque [N·m]; an effect adds to it
 REPORTED_TORQUE = 6  # what the drive says; effects of the drive change it
 COMMANDED_TORQUE = 7  # within the torque limit
-WINCH_SIGNALS = 8
+MOTOR_GEAR = 8
+WINCH_SIGNALS = 9
 
 
 @njit(cache=True, error_model="numpy", inline="always")
@@ -68,6 +69,7 @@ def fill_winch_signals(
     signals[SPEED] = speed
     signals[WINCH_TENSION] = tension
     signals[WINDING_RADIUS] = cables[i, RADIUS]
+    signals[MOTOR_GEAR] = cables[i, GEAR_RATIO]
     signals[RESISTANCE] = 0.0
     signals[DRY_LIMIT] = 0.0
     signals[COMMANDED_TORQUE] = signals[REPORTED_TORQUE] = clip(torque, cables[i, TORQUE_LIMIT])

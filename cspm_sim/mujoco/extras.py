@@ -45,8 +45,12 @@ def find_extras(testbed: Testbed) -> Extras:
     """Return the sum of a machine's effects.
 
     Raises:
-        InputError: an effect that this plant does not have, or a wrong element or parameter.
+        InputError: an effect or a load that this plant does not have, or a wrong element or
+            parameter.
     """
+    for cable in testbed.cables:
+        if cable.load is not None:
+            raise InputError(f"load: of {cable.name}: not in the MuJoCo plant, allowed: none")
     n = len(testbed.cables)
     extras = Extras(np.zeros(6), np.zeros((n, 2)), np.zeros(n), np.zeros(n))
     of_cables = {
@@ -76,10 +80,10 @@ def _values(entry: EffectEntry) -> list[float]:
     if names is None:
         allowed = ", ".join(_PARAMETERS)
         raise InputError(f"effects: {entry.effect}: not in the MuJoCo plant, allowed: {allowed}")
-    given = {**_DEFAULTS.get(entry.effect, {}), **entry.parameters}
+    given = {**_DEFAULTS.get(entry.effect, {}), **entry.numbers}
     if set(given) != set(names):
         raise InputError(
-            f"effects: {entry.effect}: parameters {sorted(entry.parameters)}, allowed: exactly"
+            f"effects: {entry.effect}: parameters {sorted(entry.numbers)}, allowed: exactly"
             f" {list(names)}"
         )
     negative = [name for name in names if name not in _SIGNED and not given[name] >= 0.0]

@@ -68,6 +68,7 @@ class MujocoPlant:
         self.testbed = testbed
         self.period_ns = period_ns
         self.steps = 0
+        self.cut: tuple[str, ...] = ()
         self._substeps = substeps
         self._failure: DivergenceError | None = None
         self._motion = frame_motion

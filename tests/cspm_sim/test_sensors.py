@@ -37,7 +37,7 @@ def test_noise_has_the_described_deviation_per_quantity_and_is_white():
     bound = 4.5 / np.sqrt(len(errors))
     assert np.abs(errors.mean(axis=0)).max() < bound
     np.testing.assert_allclose(errors.std(axis=0), 1.0, atol=bound)
-    # Neither one sample of the next, nor one quantity of another, tells anything.
+    # Neither one sample of the next, nor one quantity of another, shows anything.
     for lag in (1, 2, 10, 1000):
         assert np.abs((errors[lag:] * errors[:-lag]).mean(axis=0)).max() < bound
     correlation = np.corrcoef(errors.T) - np.eye(6)
@@ -95,7 +95,7 @@ def test_the_same_seed_gives_the_same_bits_and_another_does_not():
     assert not np.isin(*twists).any()
 
 
-def test_an_ideal_sensor_tells_the_truth_at_once():
+def test_an_ideal_sensor_measures_the_truth_at_once():
     description = {"noise": (0.1, 0.1), "resolution": (0.5, 0.5), "delay": 0.01}
     model = sensor("/bar/twist", ideal=True, **description)
     truth = np.random.default_rng(0).normal(size=(50, 6))

@@ -61,7 +61,7 @@ def test_the_stamp_that_is_due_with_another_number_is_refused_and_changes_nothin
             f"/in: stamp 0.030000 s is its sender's message {number}, allowed: 4; a second sender"
         )
     assert sequence.complete == 29
-    # Where the middleware tells no numbers the stamp has to do.
+    # Where the middleware gives no numbers the stamp has to do.
     sequence.take(30 * MS)
     sequence.take(40 * MS, 5)
     assert sequence.complete == 49
@@ -74,7 +74,7 @@ def taken(steps):
     return sequence
 
 
-def test_a_stranger_that_cannot_be_told_from_the_sender_ends_the_run():
+def test_a_stranger_that_cannot_be_distinguished_from_the_sender_ends_the_run():
     """If the last message was the stranger's, this one is the genuine one; if not, not."""
     with pytest.raises(CspmError) as caught:
         taken(6).take(5 * MS, 6)

@@ -247,7 +247,7 @@ def test_brakes_stop_the_motors_at_once_and_release_them_from_rest(name):
 
 
 @pytest.mark.compiled
-def test_both_plants_brake_alike():
+def test_both_plants_brake_equally():
     ours, theirs = hanging("sim"), hanging("mujoco")
     for plant in (ours, theirs):
         torque = carried(plant)

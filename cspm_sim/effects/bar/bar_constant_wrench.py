@@ -39,7 +39,7 @@ EFFECT = Effect(
         noun="a constant wrench from outside",
         equation="wrench on the bar in world_ned = the six numbers",
         shows="bar wrench residual is shifted by a constant at all poses and speeds",
-        confounded_with=("bar_mass", "bar_com", "tension_bias"),
+        confounded_with=("bar_mass", "bar_com", "tension_bias", "bar_restoring"),
         separating_experiment="hold still at three poses, turned and unturned, then accelerate",
         reference="a steady wind or a cable that drags; Newton and Euler, thesis (2-12)",
     ),

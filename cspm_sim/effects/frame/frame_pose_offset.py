@@ -45,7 +45,8 @@ EFFECT = Effect(
     id="frame_pose_offset",
     block=Block.FRAME,
     parameters=tuple(
-        EffectParameter(dof, "m" if i < 3 else "rad", -1.0, 1.0) for i, dof in enumerate(DOFS)
+        EffectParameter(dof, "m" if i < 3 else "rad", -1.0, 1.0, usual=1e-3)
+        for i, dof in enumerate(DOFS)
     ),
     physics=Physics(alter=_alter),
     signature=Signature(regression=Regression(Channel.TENSION, _columns)),

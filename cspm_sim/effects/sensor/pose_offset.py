@@ -50,7 +50,8 @@ EFFECT = Effect(
     id="pose_offset",
     block=Block.SENSOR,
     parameters=tuple(
-        EffectParameter(dof, "m" if i < 3 else "rad", -1.0, 1.0) for i, dof in enumerate(DOFS)
+        EffectParameter(dof, "m" if i < 3 else "rad", -1.0, 1.0, usual=1e-3)
+        for i, dof in enumerate(DOFS)
     ),
     elements=Elements.BODIES,
     physics=Physics(sense=Sense(("/{}/pose",), _reading)),

@@ -36,7 +36,7 @@ EFFECT = Effect(
         ),
     ),
     physics=Physics(sense=Sense(("/cables/tension",), _reading)),
-    signature=Signature(regression=Regression(Channel.READING, _columns)),
+    signature=Signature(regression=Regression(Channel.READING, _columns), rescales=True),
     description=Description(
         noun="a scale error",
         equation="measured tension = gain·tension",

@@ -71,7 +71,7 @@ EFFECT = Effect(
         noun="backlash",
         equation=(
             "drum angle·gear ratio = q + lead, 0 ≤ lead ≤ width; lead → 0 while the cable is taut,"
-            " otherwise the drum stands until a flank moves it"
+            " otherwise the drum rests until a flank moves it"
         ),
         shows=(
             "after slack the motor turns by up to width before the cable follows; nothing while"

@@ -43,6 +43,7 @@ EFFECT = Effect(
             "winch_stribeck_friction",
             "winch_viscous_friction",
             "pulley_friction",
+            "winch_curved_friction",
         ),
         separating_experiment="slow reversals at two or more tension levels",
         reference=(

@@ -74,7 +74,7 @@ EFFECT = Effect(
             "a line at one per turn of the drum in torque, in proportion to tension, and a quarter"
             " turn behind it in the cable's length"
         ),
-        confounded_with=("winch_torque_ripple",),
+        confounded_with=("winch_torque_ripple", "winch_unbalance"),
         separating_experiment="several turns of the drum at constant speed, at two tension levels",
         reference="geometry; thesis (2-16) and (2-21) with a radius that changes",
     ),

@@ -48,7 +48,7 @@ EFFECT = Effect(
     parameters=(
         EffectParameter("breakaway_torque", "N·m", 0.0, 1.0),
         EffectParameter("coulomb_torque", "N·m", 0.0, 1.0),
-        EffectParameter("stribeck_speed", "rad/s", 1e-3, 100.0, absent=None),
+        EffectParameter("stribeck_speed", "rad/s", 1e-2, 1e3, absent=None),
     ),
     physics=Physics(
         kernels={Hook.WINCH: _kernel},
@@ -56,7 +56,7 @@ EFFECT = Effect(
     ),
     signature=Signature(
         regression=Regression(Channel.SHAFT, _columns),
-        nonlinear={"stribeck_speed": (0.03, 0.1, 0.3, 1.0, 3.0, 10.0)},
+        nonlinear={"stribeck_speed": (0.3, 1.0, 3.0, 10.0, 30.0, 100.0)},
     ),
     description=Description(
         noun="dry friction with a larger breakaway torque",

@@ -35,7 +35,7 @@ EFFECT = Effect(
         ),
     ),
     physics=Physics(kernels={Hook.WINCH: _kernel}),
-    signature=Signature(regression=Regression(Channel.SHAFT, _columns)),
+    signature=Signature(regression=Regression(Channel.SHAFT, _columns), rescales=True),
     description=Description(
         noun="a scale error of its torque",
         equation="torque at the shaft = gain·reported torque",

@@ -35,7 +35,13 @@ EFFECT = Effect(
         noun="a constant torque",
         equation="torque at the shaft = reported torque + torque: a resisting torque of −torque",
         shows="winch torque residual is shifted by a constant, at rest and in motion either way",
-        confounded_with=("winch_torque_gain", "tension_bias", "winch_drum_radius"),
+        confounded_with=(
+            "winch_torque_gain",
+            "tension_bias",
+            "winch_drum_radius",
+            "winch_directional_friction",
+            "winch_unbalance",
+        ),
         separating_experiment="hold still at three tension levels: the offset is the same at all",
         reference=(
             "Janot, Gautier, Brunot, EMPS data set, nonlinearbenchmark.org, 2019 (drive offset)"

@@ -46,15 +46,14 @@ EFFECT = Effect(
     block=Block.WINCH,
     parameters=(
         EffectParameter("amplitude", "N·m", 0.0, 1.0),
-        EffectParameter("order", "1", 0.0, 1000.0, absent=None),
+        EffectParameter("order", "1", 0.0, 1000.0, absent=None, meaning="per turn of the motor"),
         EffectParameter("phase", "rad", -pi, pi, absent=None),
     ),
     physics=Physics(kernels={Hook.WINCH: _kernel}),
     signature=Signature(
         regression=Regression(Channel.SHAFT, _columns),
-        nonlinear={
-            "order": (1, 2, 3, 4, 5, 6, 7, 8, 9, 10, 12, 14, 16, 18, 20, 24, 30, 36, 42, 48)
-        },
+        nonlinear={"order": (*range(1, 25), 26, 28, 30, 32, 36, 40, 42, 44, 48)},
+        whole=("order",),
         coefficients=_weights,
         from_coefficients=_values,
     ),
@@ -64,7 +63,7 @@ EFFECT = Effect(
         shows=(
             "winch torque residual has a line at a fixed order of the motor angle, none in tension"
         ),
-        confounded_with=("winch_drum_eccentricity",),
+        confounded_with=("winch_drum_eccentricity", "winch_unbalance"),
         separating_experiment="several turns at constant speed, at two tension levels",
         reference="Holtz, Springob, IEEE Trans. Industrial Electronics 43(2), 1996",
     ),

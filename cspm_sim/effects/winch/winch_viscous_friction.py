@@ -41,6 +41,8 @@ EFFECT = Effect(
             "winch_stribeck_friction",
             "cable_axial_damping",
             "tension_delay",
+            "winch_directional_friction",
+            "winch_curved_friction",
         ),
         separating_experiment="constant speeds over at least one decade at constant tension",
         reference=(

@@ -89,5 +89,5 @@ def test_the_bar_is_pulled_by_what_the_exit_carries_less_the_weight_between(dire
     ("weights", "density"),
     [((4e-4, 0.01), 0.01), ((4e-4, -0.01), 0.0), ((4e-4, 0.0), 0.02), ((-1e-4, 0.0), 0.0)],
 )
-def test_density_is_told_by_weight_and_by_sag_where_none_shows(weights, density):
+def test_density_is_identified_by_weight_and_by_sag_where_none_shows(weights, density):
     assert catalogue()["cable_sag"].values(weights) == {"linear_density": pytest.approx(density)}

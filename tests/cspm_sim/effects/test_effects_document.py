@@ -7,13 +7,13 @@ import pytest
 from cspm_sim.effects import catalogue
 from cspm_sim.effects.document import effects_page
 
-PAGE = Path(__file__).resolve().parents[3] / "docs" / "effects.md"
+PAGE = Path(__file__).resolve().parents[3] / "docs" / "reference" / "effects.md"
 
 
 def test_committed_page_is_up_to_date() -> None:
     committed = PAGE.read_text(encoding="utf-8")
     assert committed == effects_page(catalogue()), (
-        "run: python -m cspm_sim.effects.document > docs/effects.md"
+        "run: python -m cspm_sim.effects.document > docs/reference/effects.md"
     )
 
 
@@ -45,6 +45,6 @@ def test_an_effect_that_is_confounded_with_none_is_described_so() -> None:
 
 
 def test_module_writes_the_page(capsys: pytest.CaptureFixture[str]) -> None:
-    path = PAGE.parents[1] / "cspm_sim" / "effects" / "document.py"
+    path = PAGE.parents[2] / "cspm_sim" / "effects" / "document.py"
     runpy.run_path(str(path), run_name="__main__")
     assert capsys.readouterr().out == effects_page(catalogue())

@@ -1,4 +1,4 @@
-"""An effect in a file of one's own: simulated, recognised and documented; bad files are told."""
+"""An effect in a file of one's own: simulated, recognised, documented; bad files are refused."""
 
 import json
 import re
@@ -14,7 +14,7 @@ from cspm_sim.effects import catalogue
 from cspm_sim.effects.document import effects_page
 from cspm_sim.effects.own_files import VARIABLE
 
-PAGE = Path(__file__).resolve().parents[3] / "docs" / "add-an-effect.md"
+PAGE = Path(__file__).resolve().parents[3] / "docs" / "how-to" / "add-an-effect.md"
 RIG = SCENARIOS / "testbeds" / "one_winch.yaml"
 COEFFICIENT = 0.01
 
@@ -100,8 +100,8 @@ def test_it_is_simulated_and_recognised(own, cspm, tmp_path):
     assert finding["elements"] == ["surge"]
     assert finding["parameters"][0]["value"] == pytest.approx(COEFFICIENT, rel=0.02)
     assert cspm("diagnose", "free", "--json", "free.json")[0] == 0
-    sound = json.loads((tmp_path / "free.json").read_text(encoding="utf-8"))
-    assert (sound["verdict"], sound["findings"]) == ("consistent", [])
+    healthy = json.loads((tmp_path / "free.json").read_text(encoding="utf-8"))
+    assert (healthy["verdict"], healthy["findings"]) == ("consistent", [])
 
 
 @pytest.mark.compiled

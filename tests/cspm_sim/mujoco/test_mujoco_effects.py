@@ -83,7 +83,7 @@ def test_damping_across_a_cable_resists_motion_across_it_alone(general, share):
 
 
 @pytest.mark.compiled
-def test_a_dry_winch_slides_alike_and_stays_where_it_is(general):
+def test_a_dry_winch_slides_equally_and_stays_where_it_is(general):
     machine = with_effect(general, "winch_coulomb_friction", torque=0.01)
     ours, theirs = pair(machine)
     balance = radii(machine) * ours.tensions

@@ -99,21 +99,21 @@ def test_bristles_slide_as_dry_friction_of_mujoco_does(general):
 
 
 class Halving:
-    """A drive that gives half of what it was told a period ago."""
+    """A drive that gives half of what it was commanded a period ago."""
 
     def __init__(self):
-        self.told = None
+        self.reported = None
 
     def deliver(self, command):
-        return 0.5 * (command if self.told is None else self.told)
+        return 0.5 * (command if self.reported is None else self.reported)
 
     def advance(self, command, period):
         assert period == pytest.approx(1e-3)
-        self.told = command.copy()
+        self.reported = command.copy()
 
 
 @pytest.mark.compiled
-def test_a_drive_lies_between_command_and_torque_and_is_told_no_more_than_the_limit(general):
+def test_a_drive_lies_between_command_and_torque_and_is_commanded_no_more_than_the_limit(general):
     direct = plant(general)
     driven = MujocoPlant(general, still().at, MS, bar_pose=POSE, drive=Halving())
     limits = np.array([cable.torque_limit for cable in general.cables])

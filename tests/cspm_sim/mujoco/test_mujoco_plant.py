@@ -99,7 +99,7 @@ def test_both_fall_freely_when_all_cables_are_slack(general):
 
 @pytest.mark.compiled
 @pytest.mark.parametrize("name", ["thesis", "general", "point"])
-def test_both_answer_steps_of_torque_alike(request, name):
+def test_both_answer_steps_of_torque_equally(request, name):
     ours, theirs = pair(request.getfixturevalue(name))
     worst = drive(ours, theirs, swinging_torques(ours, 10))
     assert np.abs(ours.bar_state[:3] - POSE[:3]).max() > 1e-3
@@ -111,7 +111,7 @@ def test_both_answer_steps_of_torque_alike(request, name):
 
 
 @pytest.mark.compiled
-def test_both_answer_alike_through_slack_and_taut(thesis):
+def test_both_answer_equally_through_slack_and_taut(thesis):
     ours, theirs = pair(thesis, waving(2.0))
     torques = swinging_torques(ours, 12, share=0.8)
     slack = 0
@@ -123,7 +123,7 @@ def test_both_answer_alike_through_slack_and_taut(thesis):
 
 
 @pytest.mark.compiled
-def test_both_follow_a_moving_frame_alike_with_locked_winches(general):
+def test_both_follow_a_moving_frame_equally_with_locked_winches(general):
     ours, theirs = pair(general, waving(2.0), locked=True)
     worst = drive(ours, theirs, np.zeros((10, 8)))
     assert worst["frame"] < 1e-14
@@ -194,7 +194,7 @@ def winch_without_cable():
 
 
 @pytest.mark.compiled
-def test_a_winch_without_cable_turns_alike():
+def test_a_winch_without_cable_turns_equally():
     ours, theirs = pair(winch_without_cable())
     worst = drive(ours, theirs, [[0.01, 0.3]] * np.ones((2, 1)))
     assert theirs.speeds[1] == pytest.approx(0.1 / 1e-4 * 0.2)  # the drive's limit

@@ -22,7 +22,7 @@ from cspm_run.resim import resimulate
 
 pytest.importorskip("mujoco", minversion="4.0", reason="the MuJoCo plant needs MuJoCo 4")
 
-PAGE = Path(__file__).resolve().parents[3] / "docs" / "measured" / "agreement.md"
+PAGE = Path(__file__).resolve().parents[3] / "results" / "agreement.md"
 NUMBER = re.compile(r"\d\.\de[-+]\d\d")
 
 
@@ -95,7 +95,9 @@ def test_an_old_mujoco_is_one_line(monkeypatch):
 @pytest.mark.slow
 @pytest.mark.compiled
 def test_both_plants_agree_in_closed_loop():
-    case = AgreementCase("worst_case", "", ("duration=6", "sensors=ideal", "target.motion.ramp=2"))
+    case = AgreementCase(
+        "worst_case_steep", "", ("duration=6", "sensors=ideal", "target.motion.ramp=2")
+    )
     found = compare(case)
     assert (found.motion[:3] > 5e-3).all()
     assert (found.pose < 1e-7).all()
@@ -105,7 +107,7 @@ def test_both_plants_agree_in_closed_loop():
 @pytest.mark.slow
 @pytest.mark.compiled
 def test_rounding_sensors_set_them_apart_within_the_sensors_resolution():
-    found = compare(AgreementCase("worst_case", "", ("duration=3",)))
+    found = compare(AgreementCase("worst_case_steep", "", ("duration=3",)))
     assert (found.pose < 1e-4).all()
     assert 1e-6 < found.tension < 0.01
 
@@ -122,7 +124,7 @@ def test_noise_without_rounding_does_not_set_them_apart(monkeypatch):
         return file_of(found.testbed.model_copy(update={"sensors": sensors}))
 
     monkeypatch.setattr("cspm_run.agreement.load_testbed", unrounded)
-    found = compare(AgreementCase("worst_case", "", ("duration=3",)))
+    found = compare(AgreementCase("worst_case_steep", "", ("duration=3",)))
     assert (found.pose < 1e-9).all()
     assert found.tension < 1e-7
 

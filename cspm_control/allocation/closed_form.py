@@ -1,8 +1,8 @@
 """Tension distributions by linear algebra alone.
 
 All share one signature: structure A (m, n) with A·t = w, wrench w (m,), limits (n, 2) [N], weights
-(unused: where no tensions are found, each is limited by itself), tensions out (n,) [N]. They return
-how many tensions had to be limited, or −1, nothing written, where A has no full row rank.
+and memory (unused), tensions out (n,) [N]. The tensions may be beyond the limits; whoever asks
+limits each by itself. They return 0, or −1, nothing written, where A has no full row rank.
 """
 
 from __future__ import annotations
@@ -23,26 +23,28 @@ SLACK = 1e-9
 
 @njit(cache=True, error_model="numpy")
 def pseudo_inverse(
-    structure: Array, wrench: Array, limits: Array, weights: Array, out: Array
+    structure: Array, wrench: Array, limits: Array, weights: Array, memory: Array, out: Array
 ) -> int:
-    """Write t = A⁺w, each tension then limited to its range; thesis (5-1) and 7."""
-    if not _nearest(structure, wrench, np.zeros(len(out)), np.ones(len(out)), out):
+    """Write t = A⁺w, thesis (5-1)."""
+    if not nearest_tensions(structure, wrench, np.zeros(len(out)), np.ones(len(out)), out):
         return -1
-    return _limit(limits, out)
+    return 0
 
 
 @njit(cache=True, error_model="numpy")
-def closed_form(structure: Array, wrench: Array, limits: Array, weights: Array, out: Array) -> int:
+def closed_form(
+    structure: Array, wrench: Array, limits: Array, weights: Array, memory: Array, out: Array
+) -> int:
     """Write t = tₘ + A⁺(w − A·tₘ), tₘ amid the limits; Pott, Bruckmann, Mikelsons 2009."""
     middle = 0.5 * (limits[:, 0] + limits[:, 1])
-    if not _nearest(structure, wrench, middle, np.ones(len(out)), out):
+    if not nearest_tensions(structure, wrench, middle, np.ones(len(out)), out):
         return -1
-    return _limit(limits, out)
+    return 0
 
 
 @njit(cache=True, error_model="numpy")
 def improved_closed_form(
-    structure: Array, wrench: Array, limits: Array, weights: Array, out: Array
+    structure: Array, wrench: Array, limits: Array, weights: Array, memory: Array, out: Array
 ) -> int:
     """Write the closed form, the cable furthest beyond its limits held there, again and again.
 
@@ -51,7 +53,7 @@ def improved_closed_form(
     """
     n, free = len(out), np.ones(len(out))
     held = 0.5 * (limits[:, 0] + limits[:, 1])
-    if not _nearest(structure, wrench, held, free, out):
+    if not nearest_tensions(structure, wrench, held, free, out):
         return -1
     tensions = out.copy()
     for _ in range(n - len(wrench)):
@@ -64,23 +66,25 @@ def improved_closed_form(
             break
         held[worst] = limits[worst, 0] if tensions[worst] < limits[worst, 0] else limits[worst, 1]
         free[worst] = 0.0
-        if not _nearest(structure, wrench, held, free, tensions):
+        if not nearest_tensions(structure, wrench, held, free, tensions):
             break
         out[:] = tensions
-    return _limit(limits, out)
+    return 0
 
 
 @njit(cache=True, error_model="numpy")
-def removal(structure: Array, wrench: Array, limits: Array, weights: Array, out: Array) -> int:
+def removal(
+    structure: Array, wrench: Array, limits: Array, weights: Array, memory: Array, out: Array
+) -> int:
     """Write the pseudo-inverse of all cables but up to three, which stay at their lower limit.
 
     The fewest are removed that leave all tensions within the limits, and of as many those that
     leave the least sum of squares. Where none do, it is the limited pseudo-inverse of all.
     """
-    if not _nearest(structure, wrench, np.zeros(len(out)), np.ones(len(out)), out):
+    if not nearest_tensions(structure, wrench, np.zeros(len(out)), np.ones(len(out)), out):
         return -1
     if _within(limits, out):
-        return _limit(limits, out)
+        return 0
     n, best, tensions = len(out), out.copy(), np.empty(len(out))
     free = np.empty(n)
     for count in range(1, min(MOST_REMOVED, n - len(wrench)) + 1):
@@ -93,7 +97,7 @@ def removal(structure: Array, wrench: Array, limits: Array, weights: Array, out:
             if removed != count:
                 continue
             held = np.where(free > 0.0, 0.0, limits[:, 0])
-            if not _nearest(structure, wrench, held, free, tensions):
+            if not nearest_tensions(structure, wrench, held, free, tensions):
                 continue
             if _within(limits, tensions) and (tensions**2).sum() < least:
                 least = (tensions**2).sum()
@@ -101,23 +105,32 @@ def removal(structure: Array, wrench: Array, limits: Array, weights: Array, out:
         if least < np.inf:
             break
     out[:] = best
-    return _limit(limits, out)
+    return 0
 
 
 @njit(cache=True, error_model="numpy")
-def _nearest(structure: Array, wrench: Array, start: Array, free: Array, out: Array) -> bool:
+def nearest_tensions(
+    structure: Array, wrench: Array, start: Array, free: Array, out: Array
+) -> bool:
     """Write the tensions nearest to `start` with A·t = w, of which only the free ones differ.
 
     Returns False, with `out` as it was, where the free columns have no full row rank.
     """
-    columns = structure * free
-    multipliers = np.empty(len(wrench))
-    for row in range(len(wrench)):
-        multipliers[row] = wrench[row] - (structure[row] * start).sum()
+    m, n = structure.shape
+    columns, multipliers = np.empty((m, n)), np.empty(m)
+    for row in range(m):
+        given = 0.0
+        for i in range(n):
+            columns[row, i] = structure[row, i] * free[i]
+            given += structure[row, i] * start[i]
+        multipliers[row] = wrench[row] - given
     if not solve_gram(columns, multipliers):
         return False
-    for i in range(len(out)):
-        out[i] = start[i] + (columns[:, i] * multipliers).sum()
+    for i in range(n):
+        change = 0.0
+        for row in range(m):
+            change += columns[row, i] * multipliers[row]
+        out[i] = start[i] + change
     return True
 
 
@@ -131,7 +144,7 @@ def _within(limits: Array, tensions: Array) -> bool:
 
 
 @njit(cache=True, error_model="numpy")
-def _limit(limits: Array, tensions: Array) -> int:
+def limit_tensions(limits: Array, tensions: Array) -> int:
     """Limit each tension to its range; return how many were beyond it."""
     limited = 0
     for i in range(len(tensions)):

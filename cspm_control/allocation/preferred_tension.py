@@ -24,7 +24,13 @@ class PreferredTension:
         self._preferred = preferred
 
     def __call__(
-        self, structure: Array, wrench: Array, limits: Array, weights: Array, out: Array
+        self,
+        structure: Array,
+        wrench: Array,
+        limits: Array,
+        weights: Array,
+        memory: Array,
+        out: Array,
     ) -> int:
         """Write the tensions (n,) [N]; return how many stand at a limit.
 

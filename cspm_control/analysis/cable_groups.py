@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
-import re
 from collections.abc import Sequence
+
+from cspm_msgs_py.control_spec.per_cable import cable_kind
 
 
 def cable_groups(names: Sequence[str]) -> dict[str, list[int]]:
@@ -13,5 +14,5 @@ def cable_groups(names: Sequence[str]) -> dict[str, list[int]]:
     """
     groups: dict[str, list[int]] = {}
     for i, name in enumerate(names):
-        groups.setdefault(re.sub(r"[_-]?\d+$", "", name) or name, []).append(i)
+        groups.setdefault(cable_kind(name), []).append(i)
     return groups

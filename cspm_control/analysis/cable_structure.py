@@ -10,10 +10,8 @@ from numpy.typing import ArrayLike, NDArray
 from cspm_control.analysis.pose_grid import Grid
 from cspm_model.kernels import bar as bar_kernel
 from cspm_model.kernels.cable import ATTACHMENT, EXIT
-from cspm_model.kinematics import RANK_TOLERANCE, geometry
-from cspm_model.linearisation import ALL_AXES
 from cspm_model.parameters import nominal_parameters
-from cspm_msgs_py.dofs import CONTROLLED_AXES
+from cspm_model.spanned_axes import spanned_axes, structures_at
 from cspm_msgs_py.errors import InputError
 from cspm_msgs_py.testbed import Testbed
 
@@ -24,8 +22,7 @@ class CableStructure(NamedTuple):
     """A machine as far as statics go, its winch frame at the origin.
 
     Attributes:
-        axes: rows of the wrench that the cables are to meet: all, or all but roll where they span
-            no more.
+        axes: rows of the wrench that the cables are to meet: those that they give independently.
         exits: (n, 3), [m].
         attachments: (n, 3) in bar_ned [m].
         limits: tensions (n, 2) [N].
@@ -45,20 +42,18 @@ def cable_structure(testbed: Testbed, pose: ArrayLike) -> CableStructure:
     """Return what a machine exerts; `pose` is where its rank is counted.
 
     Raises:
-        InputError: no bar, or the cables span too few directions of a wrench.
+        InputError: no bar, or cables that give no force.
     """
     if testbed.bar is None:
-        raise InputError("workspace: this test-bed has no bar, allowed: a test-bed with a bar")
+        raise InputError("analysis: this test-bed has no bar, allowed: a test-bed with a bar")
     parameters = nominal_parameters(testbed)
     cables, bar = parameters.cables, parameters.bar
-    jacobian = geometry(cables, pose, np.zeros(6)).bar
-    for axes in (ALL_AXES, CONTROLLED_AXES):
-        if np.linalg.matrix_rank(jacobian[:, list(axes)], rtol=RANK_TOLERANCE) == len(axes):
-            break
-    else:
+    place = np.array([pose], dtype=float)
+    axes = spanned_axes(structures_at(parameters, place, np.zeros((1, 6))))
+    if not axes:
         raise InputError(
-            f"workspace: {len(cables)} cables do not span every force and moment but roll,"
-            " allowed: a machine whose cables do"
+            f"analysis: {len(cables)} cables give no force at this pose, allowed: a machine and a"
+            " pose whose cables do"
         )
     return CableStructure(
         axes,

@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from cspm_control.analysis.sampled_system import SampledSystem, closed, series
-from cspm_control.design.gains import Margins, Response, margins
+from cspm_control.design.margins import Margins, Response, margins
 
 Array = NDArray[np.float64]
 ComplexArray = NDArray[np.complex128]

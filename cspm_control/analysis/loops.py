@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from functools import partial
 
@@ -20,15 +21,16 @@ from cspm_control.analysis.sampled_loops import (
 )
 from cspm_control.analysis.sampled_system import SampledSystem, closed
 from cspm_control.design.gains import (
-    CONTROLLED_DOFS,
     LARGEST_FORCE_BANDWIDTH,
     MOTION_BANDWIDTH,
     force_loop,
-    loop_frequencies,
     motion_loop,
     motion_plant,
     tension_plant,
+    wrench_column,
 )
+from cspm_control.design.margins import loop_frequencies
+from cspm_control.stages.make import controlled_axes
 from cspm_model.linearisation import StateSpace, linear_model, motion_subsystem, operating_point
 from cspm_model.parameters import nominal_parameters
 from cspm_msgs_py.dofs import DOFS
@@ -79,8 +81,9 @@ def analyse_loops(testbed: Testbed, control: ClosedLoop, timing: LoopTiming) -> 
     prompt = replace(timing, torque_delay=0)
     cascades = {CASCADE: prompt, LATE: timing}
     law = pid_law(control)
-    motion = _designed_motion(testbed, law)
-    motion[SAMPLED] = _sampled_motion(testbed, law, prompt)
+    axes = controlled_axes(control)
+    motion = _designed_motion(testbed, law, axes)
+    motion[SAMPLED] = _sampled_motion(testbed, law, prompt, axes)
     growth = {}
     for way, clock in cascades.items():
         motion[way], growth[way] = _cascaded_motion(testbed, control, clock)
@@ -101,12 +104,14 @@ def pid_law(control: ClosedLoop) -> MotionControl:
     return control.motion
 
 
-def _designed_motion(testbed: Testbed, motion: MotionControl) -> dict[str, dict[str, LoopView]]:
-    plant = motion_plant(testbed, nominal_parameters(testbed), motion.design_pose)
+def _designed_motion(
+    testbed: Testbed, motion: MotionControl, axes: Sequence[int]
+) -> dict[str, dict[str, LoopView]]:
+    plant = motion_plant(testbed, nominal_parameters(testbed), motion.design_pose, axes)
     grid = loop_frequencies(plant, MOTION_BANDWIDTH)
     found = {}
     for dof, gains in (motion.gains or {}).items():
-        place = DOFS.index(dof), CONTROLLED_DOFS.index(dof)
+        place = DOFS.index(dof), wrench_column(plant, dof)
         found[str(dof)] = continuous_view(
             partial(_entry, plant, place),
             motion_loop(plant, dof, gains),
@@ -130,13 +135,13 @@ def _designed_force(testbed: Testbed, control: ClosedLoop) -> dict[str, dict[str
 
 
 def _sampled_motion(
-    testbed: Testbed, motion: MotionControl, timing: LoopTiming
+    testbed: Testbed, motion: MotionControl, timing: LoopTiming, axes: Sequence[int]
 ) -> dict[str, LoopView]:
-    continuous = motion_plant(testbed, nominal_parameters(testbed), motion.design_pose)
+    continuous = motion_plant(testbed, nominal_parameters(testbed), motion.design_pose, axes)
     plant = motion_plant_sampled(continuous, timing)
     found = {}
     for dof, gains in (motion.gains or {}).items():
-        output, column = DOFS.index(dof), CONTROLLED_DOFS.index(dof)
+        output, column = DOFS.index(dof), wrench_column(continuous, dof)
         alone = plant.part(slice(output, output + 1), slice(column, column + 1))
         pid = pid_system(gains, motion.derivative_filter, plant.period)
         found[str(dof)] = sampled_view(alone, pid, MOTION_STEP)
@@ -165,13 +170,14 @@ def _cascaded_motion(
     model = linear_model(testbed, parameters, point, exact=True)
     rows = motion_subsystem(model, parameters, point).C
     gains = {name: (control.force.gains or {})[name] for name in testbed.cable_names}
-    plant = cascade_plant(model, parameters, point, rows, timing, gains)
-    everything = closed(plant, motion_controllers(motion, plant.period))
+    axes = controlled_axes(control)
+    plant = cascade_plant(model, parameters, point, rows, timing, gains, axes)
+    everything = closed(plant, motion_controllers(motion, plant.period, axes))
     found = {}
     for dof, pid in (motion.gains or {}).items():
         output = slice(DOFS.index(dof), DOFS.index(dof) + 1)
         found[str(dof)] = sampled_view(
-            _with_others_closed(plant, motion, dof),
+            _with_others_closed(plant, motion, dof, axes),
             pid_system(pid, motion.derivative_filter, plant.period),
             MOTION_STEP,
             everything.part(output, output),
@@ -179,10 +185,12 @@ def _cascaded_motion(
     return found, _growth(everything)
 
 
-def _with_others_closed(plant: SampledSystem, motion: MotionControl, dof: str) -> SampledSystem:
+def _with_others_closed(
+    plant: SampledSystem, motion: MotionControl, dof: str, axes: Sequence[int]
+) -> SampledSystem:
     """Return one DOF's wrench to its pose while the controllers of the others act."""
-    others = closed(plant, motion_controllers(motion, plant.period, without=dof))
-    output, column = DOFS.index(dof), CONTROLLED_DOFS.index(dof)
+    others = closed(plant, motion_controllers(motion, plant.period, axes, without=dof))
+    output, column = DOFS.index(dof), list(axes).index(DOFS.index(dof))
     memories = len(others.A) - len(plant.A)
     wrench = np.vstack([np.zeros((memories, 1)), plant.B[:, [column]]])
     rows = slice(output, output + 1)

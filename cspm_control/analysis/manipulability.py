@@ -6,6 +6,7 @@ Source: Yoshikawa, "Manipulability of Robotic Mechanisms", Int. J. Robotics Rese
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from typing import NamedTuple
 
 import numpy as np
@@ -14,9 +15,9 @@ from numpy.typing import NDArray
 from cspm_control.analysis.cable_structure import CableStructure, structures, wanted_at_rest
 from cspm_control.analysis.pose_grid import Grid
 from cspm_control.analysis.wrench_set import wrench_set
-from cspm_model.kernels import bar as bar_kernel
 from cspm_model.kernels.machine import PlantParameters
 from cspm_model.linearisation import mass_matrix
+from cspm_model.spanned_axes import gyration_radius
 from cspm_msgs_py.dofs import DOFS
 
 Array = NDArray[np.float64]
@@ -57,13 +58,6 @@ class Manipulability(NamedTuple):
     force: tuple[Ellipsoid, Ellipsoid]
     acceleration: tuple[Ellipsoid, Ellipsoid]
     available: dict[str, tuple[float, float]]
-
-
-def gyration_radius(parameters: PlantParameters) -> float:
-    """Return √(tr(I)/2m) of the bar [m], which makes moments comparable to forces."""
-    bar = parameters.bar
-    inertia = bar[bar_kernel.INERTIA : bar_kernel.INERTIA + 9].reshape(3, 3)
-    return float(np.sqrt(np.trace(inertia) / (2.0 * bar[bar_kernel.MASS])))
 
 
 def measures(machine: CableStructure, structure: Array, radius: float) -> Array:
@@ -117,9 +111,10 @@ def _scaled(machine: CableStructure, structure: Array, radius: float) -> Array:
     return np.asarray(scale[:, None] * structure)
 
 
-def _ellipsoids(gains: Array, dofs: list[str]) -> tuple[Ellipsoid, Ellipsoid]:
-    def of(rows: Array, names: list[str]) -> Ellipsoid:
+def _ellipsoids(gains: Array, dofs: Sequence[str]) -> tuple[Ellipsoid, Ellipsoid]:
+    def of(rows: Array, names: Sequence[str]) -> Ellipsoid:
         left, lengths, _ = np.linalg.svd(rows, full_matrices=False)
         return Ellipsoid(tuple(names), left, lengths)
 
-    return of(gains[:3], dofs[:3]), of(gains[3:], dofs[3:])
+    linear = sum(DOFS.index(dof) < 3 for dof in dofs)
+    return of(gains[:linear], dofs[:linear]), of(gains[linear:], dofs[linear:])

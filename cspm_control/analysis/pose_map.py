@@ -8,11 +8,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from cspm_control.analysis.cable_structure import CableStructure, structures, wanted_at_rest
-from cspm_control.analysis.manipulability import conditions, gyration_radius, mass_columns, measures
+from cspm_control.analysis.manipulability import conditions, mass_columns, measures
 from cspm_control.analysis.pose_grid import Grid
 from cspm_control.analysis.workspace import ALGORITHMS, static_workspace
 from cspm_control.analysis.wrench_set import WrenchSet, wrench_set
 from cspm_model.kernels.machine import PlantParameters
+from cspm_model.spanned_axes import gyration_radius
 
 Array = NDArray[np.float64]
 Mask = NDArray[np.bool_]

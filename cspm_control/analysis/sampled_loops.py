@@ -2,26 +2,25 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
 
 from cspm_control.analysis.sampled_system import SampledSystem, closed, diagonal, sample, series
-from cspm_control.design.gains import CONTROLLED_DOFS
 from cspm_model.equilibrium import gravity_wrench
 from cspm_model.kernels.machine import PlantParameters
 from cspm_model.kinematics import RANK_TOLERANCE, geometry
 from cspm_model.linearisation import OperatingPoint, StateSpace
+from cspm_msgs_py.control_spec.force import PiGains
 from cspm_msgs_py.dofs import CONTROLLED_AXES, DOFS
 from cspm_msgs_py.errors import InputError
-from cspm_msgs_py.scenario import MotionControl, PidGains, PiGains, Rates
+from cspm_msgs_py.scenario import MotionControl, PidGains, Rates
 
 Array = NDArray[np.float64]
 
 POSE = slice(0, 6)
-AXES = list(CONTROLLED_AXES)
 # Step of the pose in differencing the tension distribution [m, rad].
 POSE_STEP = 1e-6
 # How far from a whole number of periods a time may be, for round-off.
@@ -137,6 +136,7 @@ def cascade_plant(
     pose_rows: Array,
     timing: LoopTiming,
     force: Mapping[str, PiGains],
+    axes: Sequence[int] = CONTROLLED_AXES,
 ) -> SampledSystem:
     """Return wanted wrench to measured pose with force loops and tension distribution at work.
 
@@ -149,6 +149,7 @@ def cascade_plant(
         pose_rows: from states to the pose x y z φ θ ψ, (6, states).
         timing: of the loops.
         force: gains per cable, in the machine's order.
+        axes: world axes of the wrench that the tensions meet.
     """
     cables = len(point.tensions)
     outputs = np.vstack([pose_rows, model.C[-cables:]])
@@ -160,28 +161,31 @@ def cascade_plant(
     inner = (
         closed(seen, controllers).part(POSE, slice(6, None)).every(timing.motion // timing.force)
     )
-    per_wrench, per_pose = distribution_slopes(parameters, point)
+    per_wrench, per_pose = distribution_slopes(parameters, point, axes)
     return SampledSystem(
         inner.A + inner.B @ per_pose @ inner.C,
         inner.B @ per_wrench,
         inner.C,
-        np.zeros((6, len(AXES))),
+        np.zeros((6, len(axes))),
         inner.period,
     )
 
 
-def distribution_slopes(parameters: PlantParameters, point: OperatingPoint) -> tuple[Array, Array]:
-    """Return ∂t/∂wrench (n, 5) and ∂t/∂pose (n, 6) of the pseudo-inverse holding the weight.
+def distribution_slopes(
+    parameters: PlantParameters, point: OperatingPoint, axes: Sequence[int] = CONTROLLED_AXES
+) -> tuple[Array, Array]:
+    """Return ∂t/∂wrench (n, m) and ∂t/∂pose (n, 6) of the pseudo-inverse holding the weight.
 
-    The latter, with Euler angles, by central differences.
+    The latter, with Euler angles, by central differences. `axes` (m,) are those of the wrench.
     """
+    rows = list(axes)
 
     def inverse(pose: Array) -> Array:
         jacobian = geometry(parameters.cables, pose, point.frame_pose).bar
-        return -np.linalg.pinv(jacobian[:, AXES].T, rcond=RANK_TOLERANCE)
+        return -np.linalg.pinv(jacobian[:, rows].T, rcond=RANK_TOLERANCE)
 
     def tensions(pose: Array) -> Array:
-        return inverse(pose) @ -gravity_wrench(parameters, pose)[AXES]
+        return inverse(pose) @ -gravity_wrench(parameters, pose)[rows]
 
     pairs = [
         (tensions(point.bar_pose + step), tensions(point.bar_pose - step))
@@ -191,15 +195,19 @@ def distribution_slopes(parameters: PlantParameters, point: OperatingPoint) -> t
     return inverse(point.bar_pose), slopes
 
 
-def motion_controllers(motion: MotionControl, period: float, without: str = "") -> SampledSystem:
-    """Return the PIDs from the six pose errors to the five wrenches, one of them left out."""
+def motion_controllers(
+    motion: MotionControl,
+    period: float,
+    axes: Sequence[int] = CONTROLLED_AXES,
+    without: str = "",
+) -> SampledSystem:
+    """Return the PIDs from the six pose errors to the wrench along `axes`, one of them left out."""
     still = PidGains(kp=0.0, ki=0.0, kd=0.0)
     kept = {str(dof): each for dof, each in (motion.gains or {}).items() if dof != without}
     each = [
-        pid_system(kept.get(dof, still), motion.derivative_filter, period)
-        for dof in CONTROLLED_DOFS
+        pid_system(kept.get(DOFS[axis], still), motion.derivative_filter, period) for axis in axes
     ]
-    chosen = np.eye(6)[[DOFS.index(dof) for dof in CONTROLLED_DOFS]]
+    chosen = np.eye(6)[list(axes)]
     chooser = SampledSystem(
         np.zeros((0, 0)), np.zeros((0, 6)), np.zeros((len(chosen), 0)), chosen, period
     )

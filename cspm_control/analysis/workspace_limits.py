@@ -7,18 +7,20 @@ from collections.abc import Callable, Sequence
 import numpy as np
 from numpy.typing import NDArray
 
-from cspm_control.analysis.pose_grid import Grid
+from cspm_control.analysis.pose_grid import GRID_AXES, Grid
 
-# Which value of a pose each DOF of a grid is.
-GRID_AXES = {"surge": 0, "sway": 1, "heave": 2, "pitch": 4, "yaw": 5}
 LIMITED = ("surge", "sway", "pitch", "yaw")
 
 
 def sweep(grid: Grid, dof: str, pose: Sequence[float]) -> Grid:
-    """Return the grid's values of one DOF from zero on, all others as in `pose`."""
+    """Return the grid's values of one DOF from zero on, all others as in `pose`.
+
+    From the pose's own value on where that is not among those about zero.
+    """
     fixed = {name: np.array([float(pose[axis])]) for name, axis in GRID_AXES.items()}
     values = grid[list(GRID_AXES).index(dof)]
-    fixed[dof] = values[values >= 0.0]
+    start = 0.0 if values[0] <= 0.0 <= values[-1] else float(pose[GRID_AXES[dof]])
+    fixed[dof] = values[values >= start]
     return Grid(*fixed.values())
 
 
@@ -27,7 +29,7 @@ def limits(
 ) -> dict[str, float | None]:
     """Return the last value of the grid up to which each DOF of `LIMITED` is held [m, rad].
 
-    None where not even the first is.
+    None where not even the first is, and for a DOF of which the grid has no values to try.
 
     Args:
         holds: says at which poses of a grid the bar is held.
@@ -37,6 +39,9 @@ def limits(
     found: dict[str, float | None] = {}
     for dof in LIMITED:
         line = sweep(grid, dof, pose)
+        if len(grid[list(GRID_AXES).index(dof)]) == 1:
+            found[dof] = None
+            continue
         held = holds(line).ravel()
         count = len(held) if held.all() else int(np.argmin(held))
         values = line[list(GRID_AXES).index(dof)]

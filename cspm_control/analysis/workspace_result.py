@@ -12,10 +12,10 @@ from numpy.typing import NDArray
 
 from cspm_control.analysis.cable_structure import CableStructure, cable_structure, structures
 from cspm_control.analysis.manipulability import conditions
-from cspm_control.analysis.pose_grid import GRIDS, Grid, steps
+from cspm_control.analysis.pose_grid import GRID_AXES, Grid, both_ways, workspace_grids
 from cspm_control.analysis.pose_map import PoseMap, feasible_wrenches, pose_map, required_edges
 from cspm_control.analysis.workspace import ALGORITHMS, static_workspace
-from cspm_control.analysis.workspace_limits import GRID_AXES, limits
+from cspm_control.analysis.workspace_limits import limits
 from cspm_model.kernels.machine import PlantParameters
 from cspm_model.parameters import nominal_parameters
 from cspm_msgs_py.testbed import Testbed
@@ -25,7 +25,6 @@ Mask = NDArray[np.bool_]
 
 FEASIBLE, ACCELERATED = "wrench_feasible", "accelerated"
 TRANSLATION, ROTATION = "translation", "rotation"
-AROUND = steps(-0.35, 0.025, 0.35)
 
 
 class WholeGrid(NamedTuple):
@@ -35,11 +34,13 @@ class WholeGrid(NamedTuple):
         poses: how many were tried.
         held: how many of them are held.
         largest: the farthest value of each DOF at which any pose is held [m, rad]; none: empty.
+        ends: the farthest value of each DOF of which several were tried [m, rad].
     """
 
     poses: int
     held: int
     largest: dict[str, float]
+    ends: dict[str, float]
 
 
 @dataclass(frozen=True, eq=False)
@@ -91,42 +92,46 @@ def analyse_workspace(
         InputError: no bar, or the cables span too few directions.
     """
     machine, parameters = cable_structure(testbed, pose), nominal_parameters(testbed)
+    grids = workspace_grids(testbed.name, machine.exits, machine.axes, pose)
     whole = {}
     for name in ALGORITHMS:
-        grid = GRIDS[name].every(coarse)
+        grid = grids[name].every(coarse)
         held = static_workspace(machine, grid, name, partial(advance, name), stopped)
         whole[name] = _whole(grid, held)
     if stopped():
         return None
-    around = _around(pose, x=AROUND, y=AROUND, z=GRIDS["general"].z)
+    fine = grids["general"]
+    around = _around(pose, x=both_ways(fine.x), y=both_ways(fine.y), z=fine.z)
     return WorkspaceResult(
         pose=tuple(pose),
         acceleration=acceleration,
         factor=float(_factors(machine, parameters, _around(pose), acceleration)[0]),
-        limits=_limits(machine, parameters, pose, acceleration),
+        limits=_limits(machine, parameters, pose, acceleration, grids),
         whole=whole,
-        largest_condition=_largest_conditions(machine, pose),
+        largest_condition=_largest_conditions(machine, pose, fine),
         translation=(
             around,
             {name: static_workspace(machine, around, name) for name in ALGORITHMS},
         ),
         maps={
             name: pose_map(machine, parameters, plane, acceleration)
-            for name, plane in planes(pose).items()
+            for name, plane in planes(pose, fine).items()
         },
     )
 
 
-def planes(pose: Sequence[float]) -> dict[str, Grid]:
-    """Return the planes through a pose that are mapped, by the names of their DOFs."""
-    fine = GRIDS["general"]
-    pitch = np.concatenate([-fine.pitch[:0:-1], fine.pitch])
-    yaw = np.concatenate([-fine.yaw[:0:-1], fine.yaw])
-    return {
-        "surge, sway": _around(pose, x=AROUND, y=AROUND),
-        "surge, heave": _around(pose, x=AROUND, z=fine.z),
-        "pitch, yaw": _around(pose, pitch=pitch, yaw=yaw),
+def planes(pose: Sequence[float], fine: Grid) -> dict[str, Grid]:
+    """Return the planes through a pose that are mapped, by the names of their DOFs.
+
+    Only those in which both DOFs of the grid `fine` have several values.
+    """
+    x, y = both_ways(fine.x), both_ways(fine.y)
+    found = {
+        "surge, sway": _around(pose, x=x, y=y),
+        "surge, heave": _around(pose, x=x, z=fine.z),
+        "pitch, yaw": _around(pose, pitch=both_ways(fine.pitch), yaw=both_ways(fine.yaw)),
     }
+    return {name: plane for name, plane in found.items() if sum(n > 1 for n in plane.shape) == 2}
 
 
 def _around(pose: Sequence[float], **values: Array) -> Grid:
@@ -141,7 +146,9 @@ def _whole(grid: Grid, held: Mask) -> WholeGrid:
         values = np.abs(grid[axis][held.any(axis=others)])
         if len(values):
             largest[dof] = float(values.max())
-    return WholeGrid(grid.size, int(held.sum()), largest)
+    tried = {dof: grid[axis] for axis, dof in enumerate(GRID_AXES) if len(grid[axis]) > 1}
+    ends = {dof: float(np.abs(values).max()) for dof, values in tried.items()}
+    return WholeGrid(grid.size, int(held.sum()), largest, ends)
 
 
 def _limits(
@@ -149,6 +156,7 @@ def _limits(
     parameters: PlantParameters,
     pose: Sequence[float],
     acceleration: Array,
+    grids: dict[str, Grid],
 ) -> dict[str, dict[str, float | None]]:
     def accelerated(grid: Grid) -> Mask:
         return np.asarray(_factors(machine, parameters, grid, acceleration) >= 1.0)
@@ -158,8 +166,8 @@ def _limits(
     }
     ways[FEASIBLE] = lambda grid: feasible_wrenches(machine, grid).holds
     ways[ACCELERATED] = accelerated
-    fine = GRIDS["general"]
-    return {name: limits(holds, GRIDS.get(name, fine), pose) for name, holds in ways.items()}
+    fine = grids["general"]
+    return {name: limits(holds, grids.get(name, fine), pose) for name, holds in ways.items()}
 
 
 def _factors(
@@ -169,8 +177,9 @@ def _factors(
     return feasible_wrenches(machine, grid).factor(edges)
 
 
-def _largest_conditions(machine: CableStructure, pose: Sequence[float]) -> dict[str, float]:
-    fine = GRIDS["general"]
+def _largest_conditions(
+    machine: CableStructure, pose: Sequence[float], fine: Grid
+) -> dict[str, float]:
     slices = {
         TRANSLATION: _around(pose, x=fine.x, y=fine.y, z=fine.z),
         ROTATION: _around(pose, pitch=fine.pitch, yaw=fine.yaw),

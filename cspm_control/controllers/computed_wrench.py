@@ -6,7 +6,7 @@ from collections.abc import Mapping, Sequence
 from math import exp, floor, pi
 
 import numpy as np
-from numba import njit
+from numba import njit, types
 from numpy.typing import NDArray
 
 from cspm_control.allocation.tension_distribution import TensionDistribution, fill_structure
@@ -18,16 +18,30 @@ from cspm_control.controllers.bar_dynamics import (
     wanted_motion,
     wrench_for,
 )
-from cspm_control.controllers.mass_observer import MassObserver
+from cspm_control.controllers.mass_observer import MassObserver, believed_mass, learn_mass
 from cspm_model.kernels.rotation import euler_from_quaternion
 from cspm_msgs_py.dofs import DOFS, Dof
 from cspm_msgs_py.testbed import Testbed
 
 Array = NDArray[np.float64]
+Counts = NDArray[np.int64]
 
 HEAVE = DOFS.index("heave")
 # Rows of the observer's memory.
 UNEXPLAINED, EXPECTED = 2, 3
+# What is counted: steps from one pose to the next, steps since the last new one, and whether any
+# wrench was computed.
+STEPS_PER_POSE, AGE, STARTED = 0, 1, 2
+
+_VECTOR, _MATRIX = types.float64[::1], types.float64[:, ::1]
+# Of `wanted_wrench` and `expect`.
+WANTED_WRENCH = types.void(
+    *(_VECTOR, types.boolean, _MATRIX, _VECTOR, _MATRIX, _VECTOR, types.float64, types.float64),
+    *(types.boolean, _MATRIX, _VECTOR),
+)
+EXPECT = types.void(
+    *(_VECTOR, _VECTOR, _MATRIX, _VECTOR, types.float64[::1, :], _VECTOR, _VECTOR, _MATRIX)
+)
 
 
 class ComputedWrench:
@@ -41,6 +55,20 @@ class ComputedWrench:
     it computes. δ takes the place of a PID's integral term. The observer is given the acceleration
     that the tension distribution can give, not the one wanted, so that a wrench that cannot be met
     leaves nothing behind in it.
+
+    Attributes:
+        gains: ωc² and 2ωc of each DOF, (6, 2).
+        bar: the kernels' parameters of the bar, whose mass may be adapted.
+        distribution: how the wrench becomes tensions.
+        observer: what error, rate and acceleration take of a surprise, (3,).
+        period: time between steps [s].
+        pose_age: how old a pose is when it is new here [s].
+        known_wrench: constant wrench (6,) on the bar from outside [N, N·m].
+        mass: the observer of the bar's mass, if there is one.
+        memory: of the observer, see `wanted_wrench`, (5, 6).
+        wanted: coordinates and their derivatives, (3, 6).
+        last_pose: the last new pose row, (7,).
+        counts: see `STEPS_PER_POSE`.
     """
 
     def __init__(
@@ -70,29 +98,39 @@ class ComputedWrench:
             mass: the observer of the bar's mass; None: it is the nominal one.
         """
         assert testbed.bar is not None
-        self._gains = np.zeros((6, 2))
+        self.gains = np.zeros((6, 2))
         for name, frequency in bandwidth.items():
-            self._gains[DOFS.index(name)] = frequency**2, 2.0 * frequency
-        self._bar = bar_parameters(testbed.bar, testbed.gravity)
-        self._distribution = distribution
-        self._known_wrench, self._mass = np.array(known_wrench, dtype=float), mass
-        self._observer = _observer_gains(observer_bandwidth, period * steps_per_pose, pose_age)
-        self._period, self._pose_age = period, pose_age
-        self._last_pose = np.full(7, np.nan)
-        self._steps_per_pose, self._age = steps_per_pose, 0
-        self._memory, self._wanted = np.zeros((5, 6)), np.empty((3, 6))
-        self._started = False
+            self.gains[DOFS.index(name)] = frequency**2, 2.0 * frequency
+        self.bar = bar_parameters(testbed.bar, testbed.gravity)
+        self.distribution = distribution
+        self.known_wrench, self.mass = np.array(known_wrench, dtype=float), mass
+        self.observer = _observer_gains(observer_bandwidth, period * steps_per_pose, pose_age)
+        self.period, self.pose_age = period, pose_age
+        self.last_pose = np.full(7, np.nan)
+        self.counts = np.array([steps_per_pose, 0, 0], dtype=np.int64)
+        self.memory, self.wanted = np.zeros((5, 6)), np.empty((3, 6))
 
     @property
     def adapted_mass(self) -> float | None:
         """The estimated mass of the bar [kg], None where it is not estimated."""
-        return None if self._mass is None else float(self._bar[MASS])
+        return None if self.mass is None else float(self.bar[MASS])
+
+    @property
+    def terms(self) -> Array:
+        """Observed error [m, rad] and the terms ωc²·e, δ and 2ωc·ė [m/s², rad/s²], shape (4, 6).
+
+        As known after the last wrench; δ only where the error is fed back.
+        """
+        error, rate, unexplained = self.memory[:3]
+        fed_back = self.gains[:, 0] > 0.0
+        proportional, derivative = self.gains[:, 0] * error, self.gains[:, 1] * rate
+        return np.array([error, proportional, unexplained * fed_back, derivative])
 
     def restart(self) -> None:
         """Let the next wrench be the one that follows the reference, whatever the error."""
-        self._started = False
-        if self._mass is not None:
-            self._mass.restart()
+        self.counts[STARTED] = 0
+        if self.mass is not None:
+            self.mass.restart()
 
     def step(
         self,
@@ -106,57 +144,40 @@ class ComputedWrench:
         `deviation` (18,) is by how much the bar is to be elsewhere: x y z φ θ ψ, first and second
         derivatives.
         """
-        wanted_motion(reference, self._wanted)
+        wanted_motion(reference, self.wanted)
         if deviation is not None:
-            self._wanted += deviation.reshape(3, 6)
-        # A pose that stays the same for longer than its period is a new one all the same.
-        self._age += 1
-        fresh = self._age >= self._steps_per_pose or not np.array_equal(bar_pose, self._last_pose)
-        if fresh:
-            self._last_pose[:] = bar_pose
-            self._age = 0
+            self.wanted += deviation.reshape(3, 6)
+        fresh = is_new(bar_pose, self.last_pose, self.counts)
         wrench = np.empty(6)
-        _wanted_wrench(
+        wanted_wrench(
             bar_pose,
             fresh,
-            self._wanted,
-            self._bar,
-            self._gains,
-            self._observer,
-            self._period,
-            self._pose_age,
-            self._started,
-            self._memory,
+            self.wanted,
+            self.bar,
+            self.gains,
+            self.observer,
+            self.period,
+            self.pose_age,
+            bool(self.counts[STARTED]),
+            self.memory,
             wrench,
         )
-        self._started = True
-        wrench -= self._known_wrench
-        tensions = self._distribution.step(wrench, bar_pose, frame_pose).tensions
-        _expect(
+        self.counts[STARTED] = 1
+        wrench -= self.known_wrench
+        tensions = self.distribution.step(wrench, bar_pose, frame_pose).tensions
+        expect(
             bar_pose,
             frame_pose,
-            self._wanted,
+            self.wanted,
             tensions,
-            self._distribution.cables,
-            self._bar,
-            self._known_wrench,
-            self._memory,
+            self.distribution.cables,
+            self.bar,
+            self.known_wrench,
+            self.memory,
         )
-        if self._mass is not None:
-            self._adapt(self._mass)
+        if self.mass is not None:
+            adapt_mass(self.wanted, self.bar, self.memory, *self.mass.arrays)
         return wrench
-
-    def _adapt(self, mass: MassObserver) -> None:
-        """Take the mass estimated in the last step, for the next one."""
-        bar, memory = self._bar, self._memory
-        given = self._wanted[2, HEAVE] - memory[EXPECTED, HEAVE]
-        lift = bar[GRAVITY] - given
-        mass.step(bar[MASS] * lift, lift + memory[UNEXPLAINED, HEAVE])
-        # What the mass explains from now on is no longer unexplained.
-        explained = lift * (bar[MASS] / mass.mass - 1.0)
-        memory[EXPECTED, HEAVE] += explained
-        memory[UNEXPLAINED, HEAVE] -= explained
-        bar[MASS] = mass.mass
 
 
 def _observer_gains(bandwidth: float, period: float, age: float) -> Array:
@@ -174,8 +195,47 @@ def _observer_gains(bandwidth: float, period: float, age: float) -> Array:
     return np.array(onward) @ then
 
 
+@njit(cache=True, error_model="numpy", _nrt=False)
+def is_new(pose: Array, last: Array, counts: Counts) -> bool:
+    """Return whether a pose row (7,) is new, which then is the `last`."""
+    counts[AGE] += 1
+    # A pose that stays the same for longer than its period is a new one all the same.
+    fresh = counts[AGE] >= counts[STEPS_PER_POSE]
+    for i in range(7):
+        if pose[i] != last[i]:
+            fresh = True
+    if fresh:
+        counts[AGE] = 0
+        for i in range(7):
+            last[i] = pose[i]
+    return fresh
+
+
+@njit(cache=True, error_model="numpy", _nrt=False)
+def adapt_mass(
+    wanted: Array,
+    bar: Array,
+    memory: Array,
+    numbers: Array,
+    wait: Counts,
+    mean: Array,
+    spread: Array,
+) -> None:
+    """Take the mass estimated in the last step, for the next one; see `MassObserver`."""
+    given = wanted[2, HEAVE] - memory[EXPECTED, HEAVE]
+    lift = bar[GRAVITY] - given
+    unexplained = lift + memory[UNEXPLAINED, HEAVE]
+    learn_mass(bar[MASS] * lift, unexplained, numbers, wait, mean, spread)
+    mass = believed_mass(mean, numbers)
+    # What the mass explains from now on is no longer unexplained.
+    explained = lift * (bar[MASS] / mass - 1.0)
+    memory[EXPECTED, HEAVE] += explained
+    memory[UNEXPLAINED, HEAVE] -= explained
+    bar[MASS] = mass
+
+
 @njit(cache=True, error_model="numpy")
-def _wanted_wrench(
+def wanted_wrench(
     pose_row: Array,
     fresh: bool,
     wanted: Array,
@@ -213,18 +273,19 @@ def _wanted_wrench(
         else:
             error[d], rate[d], unexplained[d] = found, 0.0, 0.0
             memory[4, d] = gains[d, 0] * found
-    acceleration = wanted[2].copy()
+    acceleration, turned = np.empty(6), np.empty(6)
     for d in range(6):
+        acceleration[d], turned[d] = wanted[2, d], wanted[1, d] - rate[d]
         if gains[d, 0] > 0.0:
             acceleration[d] += gains[d, 0] * error[d] + gains[d, 1] * rate[d] + unexplained[d]
             # The initial error is reduced gently.
             acceleration[d] -= memory[4, d]
             memory[4, d] *= 1.0 - 0.5 * gains[d, 1] * period
-    wrench_for(pose, wanted[1] - rate, acceleration, bar, out)
+    wrench_for(pose, turned, acceleration, bar, out)
 
 
 @njit(cache=True, error_model="numpy")
-def _expect(
+def expect(
     bar_row: Array,
     frame_row: Array,
     wanted: Array,
@@ -239,10 +300,16 @@ def _expect(
     _pose(bar_row, pose)
     structure, wrench = np.empty((6, len(tensions))), np.empty(6)
     fill_structure(bar_row, frame_row, cables, np.arange(6), structure)
-    for row in range(6):
-        wrench[row] = (structure[row] * tensions).sum() + known_wrench[row]
-    acceleration_from(pose, wanted[1] - memory[1], wrench, bar, given)
-    memory[3] = wanted[2] - given
+    rate = np.empty(6)
+    for d in range(6):
+        total = 0.0
+        for i in range(len(tensions)):
+            total += structure[d, i] * tensions[i]
+        wrench[d] = total + known_wrench[d]
+        rate[d] = wanted[1, d] - memory[1, d]
+    acceleration_from(pose, rate, wrench, bar, given)
+    for d in range(6):
+        memory[3, d] = wanted[2, d] - given[d]
 
 
 @njit(cache=True, error_model="numpy", forceinline=True)
@@ -254,5 +321,5 @@ def _earlier(place: float, rate: float, acceleration: float, age: float) -> floa
 @njit(cache=True, error_model="numpy")
 def _pose(row: Array, out: Array) -> None:
     """Write x y z φ θ ψ of a pose row (7,)."""
-    out[:3] = row[:3]
+    out[0], out[1], out[2] = row[0], row[1], row[2]
     out[3], out[4], out[5] = euler_from_quaternion(row[3:7])

@@ -8,7 +8,7 @@ import numpy as np
 from numba import njit
 from numpy.typing import NDArray
 
-from cspm_msgs_py.scenario import PiGains
+from cspm_msgs_py.control_spec.force import PiGains
 
 Array = NDArray[np.float64]
 
@@ -18,6 +18,14 @@ class ForceController:
 
     The first output is the torque that balances the measured tension: no jump at the start. At the
     torque limit the integrator moves only back into range.
+
+    Attributes:
+        torque_limits: largest torque of each motor, (n,) [N·m].
+        saturated: how many torques of the last step stand at their limit.
+        gains: proportional gain and integral frequency of each, (n, 2).
+        period: time between steps [s].
+        integral: the integral terms, (n,) [N·m].
+        terms: proportional and integral terms of the last torques, shape (2, n) [N·m].
     """
 
     def __init__(
@@ -31,38 +39,51 @@ class ForceController:
             torque_limits: shape (n,) [N·m].
             period: time between steps [s].
         """
-        self._gains = np.array([(g.kp, g.integral_frequency) for g in gains])
+        self.gains = np.array([(g.kp, g.integral_frequency) for g in gains])
         self._radii = radii
-        self._limits = torque_limits
-        self._period = period
-        self._integral, self._nothing = np.zeros(len(radii)), np.zeros(len(radii))
+        self.torque_limits = torque_limits
+        self.period = period
+        self.integral, self._nothing = np.zeros(len(radii)), np.zeros(len(radii))
         self._started = False
         self.saturated = 0
+        self.terms = np.zeros((2, len(radii)))
 
     def restart(self) -> None:
         """Let the next output balance the measured tension again."""
         self._started = False
 
+    def release(self, cables: NDArray[np.bool_]) -> None:
+        """Give the cables where `cables` (n,) is true no torque from now on."""
+        self.gains[cables] = 0.0
+        self.integral[cables] = 0.0
+
     def step(self, wanted: Array, measured: Array, ahead: Array | None = None) -> Array:
         """Return motor torques (n,) [N·m] for wanted and measured tensions (n,) [N].
 
-        `ahead` (n,) [N·m] is fed forward. `saturated` then says how many torques stand at their
-        limit.
+        `ahead` (n,) [N·m] is fed forward.
         """
         ahead = self._nothing if ahead is None else ahead
         if not self._started:
-            proportional = self._gains[:, 0] * (wanted - measured)
-            self._integral[:] = self._radii * measured - proportional - ahead
+            proportional = self.gains[:, 0] * (wanted - measured)
+            self.integral[:] = self._radii * measured - proportional - ahead
             self._started = True
         torque = np.empty(len(wanted))
-        self.saturated = _pi(
-            wanted, measured, ahead, self._gains, self._limits, self._period, self._integral, torque
+        self.saturated = pi_torques(
+            wanted,
+            measured,
+            ahead,
+            self.gains,
+            self.torque_limits,
+            self.period,
+            self.integral,
+            self.terms,
+            torque,
         )
         return torque
 
 
 @njit(cache=True, error_model="numpy")
-def _pi(
+def pi_torques(
     wanted: Array,
     measured: Array,
     ahead: Array,
@@ -70,11 +91,14 @@ def _pi(
     limits: Array,
     period: float,
     integral: Array,
+    terms: Array,
     out: Array,
 ) -> int:
+    """Write torques and their terms, and advance the integrals; return how many are limited."""
     saturated = 0
     for i in range(wanted.shape[0]):
         error = wanted[i] - measured[i]
+        terms[0, i], terms[1, i] = gains[i, 0] * error, integral[i]
         torque = gains[i, 0] * error + integral[i] + ahead[i]
         out[i] = min(limits[i], max(-limits[i], torque))
         if out[i] != torque:

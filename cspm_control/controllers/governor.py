@@ -115,9 +115,11 @@ def _blocked(machine: Governed, wanted: Array, frames: Array) -> NDArray[np.bool
     """Return at which knots no tensions within the limits give the reference's acceleration."""
     demand = _demand(machine, wanted, frames)
     weights, tensions = np.ones(len(machine.axes)), np.empty(len(machine.cables))
+    # Each knot for itself, whatever the one before.
+    none = np.zeros(0)
     blocked = np.empty(len(wanted), dtype=bool)
     for k, (structure, wrench) in enumerate(zip(demand.structure, demand.wrench, strict=True)):
-        analytic_centre(structure, wrench, machine.limits, weights, tensions)
+        analytic_centre(structure, wrench, machine.limits, weights, none, tensions)
         missing = np.linalg.norm(structure @ tensions - wrench)
         blocked[k] = missing > RESIDUAL_TOLERANCE * np.linalg.norm(wrench)
     return blocked
@@ -166,7 +168,7 @@ def _least_deviation(
 ) -> Array:
     """Return the deviation rows (k, 18) nearest to zero that tensions within the limits can give.
 
-    `demand` is linear about the rows planned so far; `ends` tells where the window begins or ends
+    `demand` is linear about the rows planned so far; `ends` says where the window begins or ends
     with the plan, so that the bar need not be on its reference there; `excess` (k,) weighs what is
     beyond the tolerances at each knot.
     """

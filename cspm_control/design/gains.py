@@ -5,13 +5,21 @@ Both designs see the linear model with frozen cable directions of chapter 6, one
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
-from typing import NamedTuple, TypeVar
+from collections.abc import Mapping, Sequence
+from typing import TypeVar
 
 import numpy as np
-import scipy
 from numpy.typing import ArrayLike, NDArray
 
+from cspm_control.design.margins import (
+    ComplexArray,
+    GridResponse,
+    Margins,
+    Response,
+    loop_frequencies,
+    margins,
+)
+from cspm_control.design.widest_loop import Axis, LoopRequirement, widest_loop
 from cspm_model.kernels.machine import PlantParameters
 from cspm_model.kinematics import RANK_TOLERANCE
 from cspm_model.linearisation import (
@@ -22,19 +30,17 @@ from cspm_model.linearisation import (
     operating_point,
     tension_subsystem,
 )
+from cspm_msgs_py.control_spec.force import FORCE_BANDWIDTH, PiGains
+from cspm_msgs_py.control_spec.per_cable import values_per_cable
 from cspm_msgs_py.dofs import CONTROLLED_AXES, DOFS
 from cspm_msgs_py.errors import InputError
-from cspm_msgs_py.scenario import PidGains, PiGains
+from cspm_msgs_py.scenario import PidGains
 from cspm_msgs_py.testbed import Testbed
 
 Array = NDArray[np.float64]
-ComplexArray = NDArray[np.complex128]
-Response = Callable[[Array], ComplexArray]
 Dof = TypeVar("Dof", bound=str)
 
-CONTROLLED_DOFS = tuple(DOFS[axis] for axis in CONTROLLED_AXES)
-
-# Zeros of the PID, as shares of the crossover frequency: integral action below the first,
+# Zeros of a PID whose crossover is wanted, as shares of it: integral action below the first,
 # derivative action above the second.
 INTEGRAL_ZERO = 1.0 / 40.0
 DERIVATIVE_ZERO = 1.0 / 3.0
@@ -47,75 +53,16 @@ MOTION_BANDWIDTH = 7.3  # rad/s
 # Requirements on the force loops, section 7-2.
 LARGEST_FORCE_BANDWIDTH = 1000.0  # rad/s
 BANDWIDTH_RATIO = 10.0
+BANDWIDTH_KEY = "control.force.bandwidth"
 
 # The force loop's integral frequency is the largest that keeps the open loop's phase 60° away from
-# −180° at every frequency, and at most this share of the bandwidth, where it costs 3° of phase.
-LOWEST_PHASE = -np.pi + PHASE_MARGIN
+# −180° at every frequency, and at most this share of the bandwidth, where it costs 3° of phase. A
+# steel cable, whose resonance is little damped, keeps 30°, the least that is usual: Åström,
+# Hägglund, Advanced PID Control (2006), section 4.6.
+LEAST_PHASE_MARGIN = np.radians(30.0)
 LARGEST_INTEGRAL_SHARE = 1.0 / 20.0
-
-POINTS_PER_DECADE = 60
-HALF_POWER = np.sqrt(0.5)
-
-
-class Margins(NamedTuple):
-    """How far a loop is from instability, and how fast it is.
-
-    Attributes:
-        crossover: highest frequency with |L| = 1 [rad/s]; 0 where |L| never reaches 1.
-        phase_margin: least phase above −180° at any crossover [rad].
-        gain_margin: how much the gain may rise [dB]; infinite without a −180° crossing.
-        low_frequency_gain: how much the gain may fall [dB]: |L| at the −180° crossing below the
-            crossover, infinite without one.
-        bandwidth: where |L/(1+L)| first falls below −3 dB [rad/s].
-    """
-
-    crossover: float
-    phase_margin: float
-    gain_margin: float
-    low_frequency_gain: float
-    bandwidth: float
-
-
-class GridResponse:
-    """A plant whose frequency response on one grid is computed once, for all of its loops."""
-
-    def __init__(self, plant: StateSpace, grid: Array) -> None:
-        """Compute it at angular frequencies of shape (m,) [rad/s]."""
-        self._plant, self._grid = plant, grid
-        self._values = plant.response(grid)
-
-    def response(self, frequencies: ArrayLike) -> ComplexArray:
-        """Return G(jω) as `StateSpace.response` does."""
-        return self._values if frequencies is self._grid else self._plant.response(frequencies)
-
-
-def margins(loop: Response, frequencies: Array) -> Margins:
-    """Return the margins of the open loop L(jω).
-
-    Args:
-        loop: L at angular frequencies (m,) [rad/s].
-        frequencies: rising grid that brackets each crossing once; the crossings are then refined.
-    """
-    values = loop(frequencies)
-
-    def crossings(measure: Callable[[ComplexArray], Array]) -> Array:
-        above = measure(values) > 0.0
-        places = np.flatnonzero(above[1:] != above[:-1])
-        pairs = [(frequencies[i], frequencies[i + 1]) for i in places]
-        return np.array([_refine(loop, measure, *pair) for pair in pairs])
-
-    unit = crossings(lambda value: np.abs(value) - 1.0)
-    real = crossings(np.imag)
-    at_real = np.real(loop(real)) if len(real) else np.zeros(0)
-    gains = 20.0 * np.log10(-at_real[at_real < 0.0])
-    half = crossings(lambda value: np.abs(value / (1.0 + value)) - HALF_POWER)
-    return Margins(
-        crossover=float(unit.max(initial=0.0)),
-        phase_margin=float(np.angle(-loop(unit)).min()) if len(unit) else np.inf,
-        gain_margin=float((-gains[gains <= 0.0]).min(initial=np.inf)),
-        low_frequency_gain=float(gains[gains > 0.0].min(initial=np.inf)),
-        bandwidth=float(half.min(initial=np.inf)),
-    )
+# Margins are interpolated on this grid while the widest loop is looked for: within 0.02 dB.
+DESIGN_POINTS_PER_DECADE = 240
 
 
 def design_motion_gains(
@@ -123,6 +70,7 @@ def design_motion_gains(
     parameters: PlantParameters,
     design_pose: ArrayLike,
     crossover: Mapping[Dof, float],
+    axes: Sequence[int] = CONTROLLED_AXES,
 ) -> dict[Dof, PidGains]:
     """Return the PID per DOF with |L| = 1 at its crossover and zeros in fixed ratio to it.
 
@@ -131,14 +79,17 @@ def design_motion_gains(
         parameters: its kernel parameters.
         design_pose: the bar's pose x y z φ θ ψ with the winch frame at the origin.
         crossover: wanted crossover frequency per DOF [rad/s].
+        axes: world axes of the wrench that the tensions meet.
 
     Raises:
         InputError: the machine has no bar or cannot exert all controlled forces, a DOF is not
             controlled, or its loop misses a requirement of the thesis.
         ConvergenceError: the bar cannot hang at the design pose.
     """
-    _check_dofs(crossover)
-    plant = motion_plant(testbed, parameters, design_pose)
+    _check_dofs(crossover, axes)
+    if not crossover:
+        return {}
+    plant = motion_plant(testbed, parameters, design_pose, axes)
     gains = {}
     for dof, frequency in crossover.items():
         low, high = INTEGRAL_ZERO * frequency, DERIVATIVE_ZERO * frequency
@@ -151,55 +102,106 @@ def design_motion_gains(
     return gains
 
 
+def design_widest_gains(
+    testbed: Testbed,
+    parameters: PlantParameters,
+    design_pose: ArrayLike,
+    dofs: Sequence[Dof],
+    *,
+    dead_time: float,
+    force_bandwidth: float,
+    axes: Sequence[int] = CONTROLLED_AXES,
+) -> dict[Dof, PidGains]:
+    """Return the PID of largest crossover per DOF, by the procedure of section 7-1.
+
+    Args:
+        testbed: the machine.
+        parameters: its kernel parameters.
+        design_pose: the bar's pose x y z φ θ ψ with the winch frame at the origin.
+        dofs: whose loops to design.
+        dead_time: what sampling and sensors delay the loop by [s].
+        force_bandwidth: of the slowest force loop [rad/s], ten times what a motion loop may have.
+        axes: world axes of the wrench that the tensions meet.
+
+    Raises:
+        InputError: the machine has no bar or cannot exert all controlled forces, a DOF is not
+            controlled, or no PID of it meets the requirements.
+        ConvergenceError: the bar cannot hang at the design pose.
+    """
+    _check_dofs(dict.fromkeys(dofs), axes)
+    if not dofs:
+        return {}
+    plant = motion_plant(testbed, parameters, design_pose, axes)
+    frequencies = loop_frequencies(plant, MOTION_BANDWIDTH, DESIGN_POINTS_PER_DECADE)
+    responses = plant.response(frequencies) * np.exp(-1j * frequencies * dead_time)[:, None, None]
+    requirement = LoopRequirement(
+        PHASE_MARGIN, GAIN_MARGIN, LOW_FREQUENCY_GAIN, force_bandwidth / BANDWIDTH_RATIO
+    )
+    places = {dof: (DOFS.index(dof), wrench_column(plant, dof)) for dof in dofs}
+    return {
+        dof: widest_loop(dof, Axis(frequencies, responses[:, output, column]), requirement)
+        for dof, (output, column) in places.items()
+    }
+
+
 def motion_margins(
     testbed: Testbed,
     parameters: PlantParameters,
     design_pose: ArrayLike,
     gains: Mapping[Dof, PidGains],
+    axes: Sequence[int] = CONTROLLED_AXES,
 ) -> dict[Dof, Margins]:
     """Return each motion loop's margins on the motion plant (6-2), without derivative filter.
+
+    `axes` are the world axes of the wrench that the tensions meet.
 
     Raises:
         InputError: the machine has no bar or cannot exert all controlled forces, or a DOF is not
             controlled.
         ConvergenceError: the bar cannot hang at the design pose.
     """
-    _check_dofs(gains)
-    model = motion_plant(testbed, parameters, design_pose)
+    _check_dofs(gains, axes)
+    model = motion_plant(testbed, parameters, design_pose, axes)
     frequencies = loop_frequencies(model, MOTION_BANDWIDTH)
     plant = GridResponse(model, frequencies)
     return {dof: margins(motion_loop(plant, dof, g), frequencies) for dof, g in gains.items()}
 
 
 def design_force_gains(
-    testbed: Testbed, parameters: PlantParameters, design_pose: ArrayLike, bandwidth: float
+    testbed: Testbed,
+    parameters: PlantParameters,
+    design_pose: ArrayLike,
+    bandwidth: float | dict[str, float],
 ) -> dict[str, PiGains]:
-    """Return the PI per cable whose closed loop has −3 dB at `bandwidth` [rad/s].
+    """Return the PI per cable whose closed loop has −3 dB at its bandwidth, section 7-2.
+
+    Args:
+        testbed: the machine.
+        parameters: its kernel parameters.
+        design_pose: the bar's pose x y z φ θ ψ with the winch frame at the origin.
+        bandwidth: one for all cables, or by name or kind of cable [rad/s]; a cable that is not
+            named has the default.
 
     Raises:
-        InputError: the machine has no bar, the bandwidth is above the thesis's limit, or a cable's
-            loop would come near −180°.
+        InputError: the machine has no bar or no such cable, a bandwidth is above the thesis's
+            limit, or a cable's loop would come near −180°.
         ConvergenceError: the bar cannot hang at the design pose.
     """
-    if not 0.0 < bandwidth <= LARGEST_FORCE_BANDWIDTH:
-        raise InputError(
-            f"control.force.bandwidth: {bandwidth:g} rad/s, allowed: above 0 and at most"
-            f" {LARGEST_FORCE_BANDWIDTH:g} rad/s"
-        )
+    names = testbed.cable_names
+    bandwidths = values_per_cable(bandwidth, names, FORCE_BANDWIDTH, BANDWIDTH_KEY)
+    for name, wanted in zip(names, bandwidths, strict=True):
+        if not 0.0 < wanted <= LARGEST_FORCE_BANDWIDTH:
+            whose = f" of {name}" if isinstance(bandwidth, dict) else ""
+            raise InputError(
+                f"{BANDWIDTH_KEY}: {wanted:g} rad/s{whose}, allowed: above 0 and at most"
+                f" {LARGEST_FORCE_BANDWIDTH:g} rad/s"
+            )
     model = tension_plant(testbed, parameters, design_pose)
-    frequencies = loop_frequencies(model, bandwidth)
-    plant = GridResponse(model, frequencies)
-    responses = plant.response(frequencies)
-    at_bandwidth = plant.response(bandwidth)[0]
-    gains = {}
-    for i, name in enumerate(testbed.cable_names):
-        integral = _integral_frequency(name, frequencies, responses[:, i, i], bandwidth)
-        shape = (1.0 + integral / (1j * bandwidth)) * at_bandwidth[i, i]
-        # The root Kp > 0 of 2·|Kp·g|² = |1 + Kp·g|².
-        kp = (shape.real + np.hypot(shape.real, np.abs(shape))) / np.abs(shape) ** 2
-        gains[name] = PiGains(kp=float(kp), integral_frequency=integral)
-        _check_force(name, bandwidth, margins(force_loop(plant, i, gains[name]), frequencies))
-    return gains
+    plants = {wanted: _grid_response(model, wanted) for wanted in set(bandwidths)}
+    return {
+        name: _design_force_loop(name, i, *plants[bandwidths[i]], bandwidths[i])
+        for i, name in enumerate(names)
+    }
 
 
 def force_margins(
@@ -243,31 +245,24 @@ def check_separation(motion: Mapping[Dof, Margins], force: Mapping[str, Margins]
         )
 
 
-def _refine(
-    loop: Response, measure: Callable[[ComplexArray], Array], low: float, high: float
-) -> float:
-    def at(frequency: float) -> float:
-        return float(measure(loop(np.array([frequency])))[0])
-
-    ends = at(low), at(high)
-    if ends[0] * ends[1] > 0.0:  # a root on the grid itself, rounded to either side of it
-        return low if abs(ends[0]) < abs(ends[1]) else high
-    return float(scipy.optimize.brentq(at, low, high, xtol=1e-10 * low))
-
-
 def motion_plant(
-    testbed: Testbed, parameters: PlantParameters, design_pose: ArrayLike
+    testbed: Testbed,
+    parameters: PlantParameters,
+    design_pose: ArrayLike,
+    axes: Sequence[int] = CONTROLLED_AXES,
 ) -> StateSpace:
     """Return the motion sub-system (6-2) that the motion controller is designed on.
+
+    `axes` are the world axes of the wrench that the tensions meet, its inputs.
 
     Raises:
         InputError: the machine has no bar or cannot exert all controlled forces.
         ConvergenceError: the bar cannot hang at the design pose.
     """
     point = operating_point(testbed, parameters, design_pose)
-    _check_rank(point)
+    _check_rank(point, axes)
     model = linear_model(testbed, parameters, point)
-    return motion_subsystem(model, parameters, point, CONTROLLED_AXES)
+    return motion_subsystem(model, parameters, point, axes)
 
 
 def tension_plant(
@@ -285,7 +280,7 @@ def tension_plant(
 
 def motion_loop(plant: StateSpace | GridResponse, dof: str, gains: PidGains) -> Response:
     """Return one DOF's open loop, PID without derivative filter on the motion sub-system."""
-    output, column = DOFS.index(dof), CONTROLLED_DOFS.index(dof)
+    output, column = DOFS.index(dof), wrench_column(plant, dof)
 
     def loop(frequencies: Array) -> ComplexArray:
         s = 1j * frequencies
@@ -293,6 +288,11 @@ def motion_loop(plant: StateSpace | GridResponse, dof: str, gains: PidGains) -> 
         return np.asarray(controller * plant.response(frequencies)[:, output, column])
 
     return loop
+
+
+def wrench_column(plant: StateSpace | GridResponse, dof: str) -> int:
+    """Return which input of a motion sub-system is the wrench along a DOF."""
+    return plant.inputs.index(f"wrench {dof}")
 
 
 def force_loop(plant: StateSpace | GridResponse, i: int, gains: PiGains) -> Response:
@@ -305,42 +305,62 @@ def force_loop(plant: StateSpace | GridResponse, i: int, gains: PiGains) -> Resp
     return loop
 
 
-def loop_frequencies(plant: StateSpace, frequency: float) -> Array:
-    """Return three decades around `frequency`, and every resonance, which may be sharp."""
-    even = np.geomspace(1e-3 * frequency, 1e3 * frequency, 6 * POINTS_PER_DECADE)
-    resonances = np.abs(np.linalg.eigvals(plant.A))
-    return np.union1d(even, resonances[(resonances > even[0]) & (resonances < even[-1])])
+def _grid_response(model: StateSpace, bandwidth: float) -> tuple[GridResponse, Array]:
+    """Return a plant's response about a bandwidth [rad/s], and the frequencies of its grid."""
+    frequencies = loop_frequencies(model, bandwidth)
+    return GridResponse(model, frequencies), frequencies
+
+
+def _design_force_loop(
+    name: str, i: int, plant: GridResponse, frequencies: Array, bandwidth: float
+) -> PiGains:
+    """Return the PI of cable `i` for a bandwidth [rad/s]; see `design_force_gains`."""
+    response = plant.response(frequencies)[:, i, i]
+    integral = _integral_frequency(name, frequencies, response, bandwidth)
+    at_bandwidth = plant.response(bandwidth)[0, i, i]
+    shape = (1.0 + integral / (1j * bandwidth)) * at_bandwidth
+    # The root Kp > 0 of 2·|Kp·g|² = |1 + Kp·g|².
+    kp = (shape.real + np.hypot(shape.real, np.abs(shape))) / np.abs(shape) ** 2
+    gains = PiGains(kp=float(kp), integral_frequency=integral)
+    _check_force(name, bandwidth, margins(force_loop(plant, i, gains), frequencies))
+    return gains
 
 
 def _integral_frequency(
     name: str, frequencies: Array, response: ComplexArray, bandwidth: float
 ) -> float:
-    room = np.unwrap(np.angle(response)) - LOWEST_PHASE
-    if room.min() <= 0.0:
-        raise InputError(
-            f"control.force: {name}'s tension falls {np.degrees(-LOWEST_PHASE - room.min()):.0f}°"
-            f" behind its torque at {frequencies[room.argmin()]:.4g} rad/s, allowed: less than"
-            f" {np.degrees(-LOWEST_PHASE):.0f}°"
-        )
-    lag = room < 0.5 * np.pi  # elsewhere any integral frequency will do
-    largest = LARGEST_INTEGRAL_SHARE * bandwidth
-    return float(np.min(frequencies[lag] * np.tan(room[lag]), initial=largest))
+    phase, largest = np.unwrap(np.angle(response)), LARGEST_INTEGRAL_SHARE * bandwidth
+    for margin in (PHASE_MARGIN, LEAST_PHASE_MARGIN):
+        room = phase + np.pi - margin
+        if room.min() > 0.0:
+            lag = room < 0.5 * np.pi  # elsewhere any integral frequency will do
+            return float(np.min(frequencies[lag] * np.tan(room[lag]), initial=largest))
+    worst = int(phase.argmin())
+    raise InputError(
+        f"control.force: {name}'s tension falls {-np.degrees(phase[worst]):.0f}° behind its torque"
+        f" at {frequencies[worst]:.4g} rad/s at any bandwidth, allowed: less than"
+        f" {np.degrees(np.pi - LEAST_PHASE_MARGIN):.0f}°; a cable with more damping, a winch with"
+        " less inertia, or control.force.gains chosen by hand"
+    )
 
 
-def _check_dofs(given: Mapping[Dof, object]) -> None:
-    unknown = [dof for dof in given if dof not in CONTROLLED_DOFS]
+def _check_dofs(given: Mapping[Dof, object], axes: Sequence[int]) -> None:
+    possible = [DOFS[axis] for axis in axes]
+    unknown = [dof for dof in given if dof not in possible]
     if unknown:
-        allowed = ", ".join(CONTROLLED_DOFS)
-        raise InputError(f"control.motion: {unknown[0]} is not controlled, allowed: {allowed}")
-
-
-def _check_rank(point: OperatingPoint) -> None:
-    structure = point.jacobian[:, list(CONTROLLED_AXES)]
-    rank = int(np.linalg.matrix_rank(structure, rtol=RANK_TOLERANCE))
-    if rank < len(CONTROLLED_AXES):
         raise InputError(
-            f"control.motion: the cables span {rank} of the wrench's {len(CONTROLLED_AXES)}"
-            f" controlled directions {', '.join(CONTROLLED_DOFS)} at the design pose, allowed: all"
+            f"control.motion: {unknown[0]} is not controlled, allowed: {', '.join(possible)}"
+        )
+
+
+def _check_rank(point: OperatingPoint, axes: Sequence[int]) -> None:
+    structure = point.jacobian[:, list(axes)]
+    rank = int(np.linalg.matrix_rank(structure, rtol=RANK_TOLERANCE))
+    if rank < len(axes):
+        names = ", ".join(DOFS[axis] for axis in axes)
+        raise InputError(
+            f"control.motion: the cables span {rank} of the wrench's {len(axes)}"
+            f" controlled directions {names} at the design pose, allowed: all"
         )
 
 
@@ -362,7 +382,7 @@ def _check_motion(dof: str, frequency: float, found: Margins) -> None:
 def _check_force(name: str, bandwidth: float, found: Margins) -> None:
     if abs(found.bandwidth - bandwidth) > 1e-3 * bandwidth:
         raise InputError(
-            f"control.force.bandwidth: at {bandwidth:g} rad/s the loop of {name} already falls"
+            f"{BANDWIDTH_KEY}: at {bandwidth:g} rad/s the loop of {name} already falls"
             f" below −3 dB at {found.bandwidth:.4g} rad/s, allowed: a bandwidth above the"
             " resonances of the cables"
         )

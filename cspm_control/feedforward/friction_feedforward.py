@@ -48,7 +48,7 @@ def winch_friction(testbed: Testbed) -> Array:
                         f"effects: {entry.effect}: no element '{element}', allowed:"
                         f" {', '.join(names)}"
                     )
-                friction[names.index(element), column] += entry.parameters[parameter]
+                friction[names.index(element), column] += entry.numbers[parameter]
     if not friction.any():
         raise InputError(
             f"control.force.friction_feedforward: the effects of test-bed {testbed.name} tell of no"

@@ -56,7 +56,7 @@ class AngleStage(GuardedStage):
         self._steps = self._limited = 0
 
     def start(self, start_ns: int) -> None:
-        """Let the paths begin at an instant [ns]; untold they begin at 0."""
+        """Let the paths begin at an instant [ns]; without a call they begin at 0."""
         self._start_ns = start_ns
 
     def step(self, now_ns: int, inputs: Mapping[str, Array], send: Send) -> None:

@@ -9,6 +9,7 @@ import numpy as np
 from numba import njit
 from numpy.typing import NDArray
 
+from cspm_control.controllers.dither import Dither
 from cspm_control.controllers.force_controller import ForceController
 from cspm_control.controllers.load_cell_bias import LoadCellBias
 from cspm_control.feedforward.friction_feedforward import FrictionFeedforward
@@ -18,6 +19,7 @@ from cspm_msgs_py.diagnostics import Level, Status
 from cspm_msgs_py.safety_spec import Safety
 from cspm_msgs_py.schedule import (
     BAR_REFERENCE,
+    FORCE_INTERNALS,
     FRAME_REFERENCE,
     TENSION,
     TENSION_COMMAND,
@@ -28,6 +30,9 @@ from cspm_msgs_py.stepping.stage import Send
 
 Array = NDArray[np.float64]
 
+# What is counted since the last status: steps, and those with a torque at its limit, with a wanted
+# tension beyond its limits, and with a torque that changes no faster than it may.
+STEPS, LIMITED_STEPS, CLIPPED_STEPS, SLEWED_STEPS, COUNTS = range(5)
 _NO_ROW = np.zeros(0)
 # The reference of a frame that does not move: pose, twist, acceleration.
 _STILL = np.array([0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 1.0] + 12 * [0.0])
@@ -49,7 +54,19 @@ class ForceLimits:
 
 
 class ForceStage(GuardedStage):
-    """Sends the motor torques, and those of the safe state when an input cannot be right."""
+    """Sends the motor torques, and those of the safe state when an input cannot be right.
+
+    Attributes:
+        controller, bias, friction, winch, dither: what computes them, as `__init__` takes it.
+        limits: what tensions and torques may do.
+        tension_limits: of wanted tensions, (n, 2) [N]; a released cable's begin at 0.
+        release_damping: what brings released winches to rest, (n,) [N·m·s/rad], if any are.
+        released: which winches are, (n,).
+        internals: whether the controllers' terms are sent too.
+        wanted, measured: tensions that were controlled last, (n,) [N].
+        torque: last torques, (n,) [N·m].
+        counts: see `STEPS`.
+    """
 
     def __init__(
         self,
@@ -62,24 +79,32 @@ class ForceStage(GuardedStage):
         bias: LoadCellBias | None = None,
         friction: FrictionFeedforward | None = None,
         winch: WinchFeedforward | None = None,
+        dither: Dither | None = None,
+        release_damping: Array | None = None,
+        *,
+        internals: bool = False,
     ) -> None:
         """Take the controllers, their limits, the cables' names, and the guard's arguments.
 
         With `bias` the tensions are corrected before they are controlled; what trips is measured.
         With `friction` its torque at the references' speed is fed forward, with `winch` that of
-        the winches' motion and tension.
+        the winches' motion and tension. `dither` comes on top of all. With `release_damping` (n,)
+        [N·m·s/rad] a winch from which 0 N is wanted is released for good: this damping alone brings
+        it to rest. With `internals` the controllers' terms are sent too, in the safe state zeros.
         """
         super().__init__(safe_state, safety, period_ns, len(names))
-        self._controller, self._bias = controller, bias
-        self._friction, self._winch = friction, winch
-        self._limits = limits
+        self.controller, self.bias = controller, bias
+        self.friction, self.winch, self.dither = friction, winch, dither
+        self.limits, self.tension_limits = limits, limits.tensions.copy()
+        self.release_damping, self.released = release_damping, np.zeros(len(names), dtype=bool)
+        self.internals = internals
         self._names = names
         self._shape = (len(names),)
         self._sizes = (0, self._width)
-        self._wanted, self._measured = np.zeros(len(names)), np.zeros(len(names))
+        self.wanted, self.measured = np.zeros(len(names)), np.zeros(len(names))
         self._has_measured = False
-        self._torque: Array | None = None
-        self._steps = self._limited = self._clipped = self._slewed = 0
+        self.torque, self._has_torque = np.zeros(len(names)), False
+        self.counts = np.zeros(COUNTS, dtype=np.int64)
 
     def step(self, now_ns: int, inputs: Mapping[str, Array], send: Send) -> None:
         """Send the torques for the latest wanted and measured tensions."""
@@ -91,63 +116,76 @@ class ForceStage(GuardedStage):
         if fault or self._latch.open:
             self._latch.stand(now_ns, "input", fault)
             self._send_safe(now_ns, send)
+            self._send_internals(np.zeros_like(self.controller.terms), send)
             return
         corrected = self._corrected(measured, winches)
         ahead = self._ahead(inputs)
-        torque = self._slew(self._controller.step(self._wanted, corrected, ahead))
-        self._steps += 1
-        self._limited += self._controller.saturated > 0
-        self._clipped += clipped
+        torque = self.controller.step(self.wanted, corrected, ahead)
+        if self.dither is not None:
+            torque = self.dither.added_to(torque, now_ns)
+        torque = self._slew(self._with_released(torque, winches))
+        self.counts += (1, self.controller.saturated > 0, clipped, 0)
         self._send(now_ns, torque, send)
+        self._send_internals(self.controller.terms, send)
+
+    @property
+    def steady(self) -> bool:
+        """Whether it commands torques and has done so before."""
+        return self._has_torque and not self._latch.open
 
     def status(self) -> Status:
         """Return shares of steps with a limit met since the last call, or the safe state.
 
         And the largest bias of a load cell, where biases are estimated.
         """
-        steps = max(1, self._steps)
+        steps, limited, clipped, slewed = self.counts.tolist()
+        steps = max(1, steps)
         values = {
-            "limited_share": f"{self._limited / steps:.3f}",
-            "slew_share": f"{self._slewed / steps:.3f}",
-            "tension_limited_share": f"{self._clipped / steps:.3f}",
+            "limited_share": f"{limited / steps:.3f}",
+            "slew_share": f"{slewed / steps:.3f}",
+            "tension_limited_share": f"{clipped / steps:.3f}",
         }
-        if self._bias is not None:
-            most = int(np.argmax(np.abs(self._bias.values)))
-            values["load_cell_bias"] = f"{self._names[most]} {self._bias.values[most]:+.2f} N"
+        if self.bias is not None:
+            most = int(np.argmax(np.abs(self.bias.values)))
+            values["load_cell_bias"] = f"{self._names[most]} {self.bias.values[most]:+.2f} N"
         trouble = "ok"
-        if self._limited:
+        if limited:
             trouble = "torque at its limit"
-        elif self._slewed:
+        elif slewed:
             trouble = "torque slew at its limit"
-        elif self._clipped:
+        elif clipped:
             trouble = "tension command beyond the tension limits"
         level = Level.OK if trouble == "ok" else Level.WARN
-        self._steps = self._limited = self._clipped = self._slewed = 0
+        self.counts[:] = 0
         found = Status(level, self.node, trouble, values)
         return self._latch.status(self._safe_state.name, found)
 
     def _restart(self) -> None:
-        self._controller.restart()
-        self._torque = None
-        if self._bias is not None:
-            self._bias.restart()
-        if self._winch is not None:
-            self._winch.restart()
+        self.controller.restart()
+        self._has_torque = False
+        if self.bias is not None:
+            self.bias.restart()
+        if self.winch is not None:
+            self.winch.restart()
+
+    def _send_internals(self, terms: Array, send: Send) -> None:
+        if self.internals:
+            send(FORCE_INTERNALS, terms.ravel())
 
     def _present_tensions(self) -> Array | None:
-        return self._measured.copy() if self._has_measured else None
+        return self.measured.copy() if self._has_measured else None
 
     def _corrected(self, measured: Array, winches: Array | None) -> Array:
         """Return tensions without the biases of their load cells, as far as these are known."""
-        if self._bias is None:
+        if self.bias is None:
             return measured
         n = len(self._names)
-        if self._torque is not None and winches is not None and winches.size:
-            self._bias.step(measured, winches[n : 2 * n], self._torque)
-        return measured - self._bias.values
+        if self._has_torque and winches is not None and winches.size:
+            self.bias.step(measured, winches[n : 2 * n], self.torque)
+        return measured - self.bias.values
 
     def _reference_fault(self, inputs: Mapping[str, Array]) -> str | None:
-        if self._friction is None and self._winch is None:
+        if self.friction is None and self.winch is None:
             return None
         for topic in (BAR_REFERENCE, FRAME_REFERENCE):
             row = inputs.get(topic, _STILL)
@@ -160,21 +198,21 @@ class ForceStage(GuardedStage):
     def _ahead(self, inputs: Mapping[str, Array]) -> Array | None:
         """Return what is fed forward (n,) [N·m], None for nothing or before a reference came."""
         bar = inputs.get(BAR_REFERENCE)
-        ahead = [each for each in (self._friction, self._winch) if each is not None]
+        ahead = [each for each in (self.friction, self.winch) if each is not None]
         if bar is None or not ahead:
             return None
         frame = inputs.get(FRAME_REFERENCE, _STILL)
-        first, *more = [each.torque(bar, frame, self._wanted) for each in ahead]
+        first, *more = [each.torque(bar, frame, self.wanted) for each in ahead]
         for torque in more:
             first = first + torque
         return first
 
     def _slew(self, torque: Array) -> Array:
-        step = self._limits.torque_step
-        if step is not None and self._torque is not None:
-            wanted, torque = torque, np.clip(torque, self._torque - step, self._torque + step)
-            self._slewed += bool((wanted != torque).any())
-        self._torque = torque
+        step = self.limits.torque_step
+        if step is not None and self._has_torque:
+            wanted, torque = torque, np.clip(torque, self.torque - step, self.torque + step)
+            self.counts[SLEWED_STEPS] += bool((wanted != torque).any())
+        self.torque[:], self._has_torque = torque, True
         return torque
 
     def _examine(self, wanted: Array, measured: Array, winches: Array) -> tuple[str | None, bool]:
@@ -184,14 +222,31 @@ class ForceStage(GuardedStage):
         """
         if not wanted.shape == measured.shape == self._shape or winches.size not in self._sizes:
             return self._shape_fault(wanted, measured, winches), False
-        limits = self._limits
-        bad, clipped = _keep(
-            wanted, measured, winches, limits.tensions, limits.trip, self._wanted, self._measured
-        )
+        self._release(wanted)
+        limits, kept = (self.tension_limits, self.limits.trip), (self.wanted, self.measured)
+        bad, clipped = keep_tensions(wanted, measured, winches, *limits, *kept)
         if bad >= 0:
             return self._number_fault(bad, wanted, measured, winches), False
         self._has_measured = True
         return None, clipped
+
+    def _release(self, wanted: Array) -> None:
+        """Release the winches from which nothing is wanted."""
+        if self.release_damping is None:
+            return
+        found = (wanted == 0.0) & ~self.released
+        if found.any():
+            self.released |= found
+            self.tension_limits[found, 0] = 0.0
+            self.controller.release(found)
+
+    def _with_released(self, torque: Array, winches: Array | None) -> Array:
+        damping, n = self.release_damping, len(self._names)
+        if damping is not None and self.released.any():
+            speeds = np.zeros(n) if winches is None else winches[n : 2 * n]
+            most = self.controller.torque_limits
+            torque[self.released] = np.clip(-damping * speeds, -most, most)[self.released]
+        return torque
 
     def _shape_fault(self, wanted: Array, measured: Array, winches: Array) -> str:
         topic, row, shape = WINCH_STATE, winches, (self._width,)
@@ -209,13 +264,13 @@ class ForceStage(GuardedStage):
         if bad >= n:
             return f"{TENSION_COMMAND}: {wanted[bad - n]} N of {name}, allowed: finite numbers"
         if np.isfinite(measured[bad]):
-            trip = self._limits.trip[bad]
+            trip = self.limits.trip[bad]
             return f"{TENSION}: {measured[bad]:.1f} N in {name}, allowed: at most {trip:g} N"
         return f"{TENSION}: {measured[bad]} N in {name}, allowed: finite numbers"
 
 
 @njit(cache=True, error_model="numpy")
-def _keep(
+def keep_tensions(
     wanted: Array,
     measured: Array,
     winches: Array,

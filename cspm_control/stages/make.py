@@ -7,10 +7,12 @@ from collections.abc import Callable, Mapping
 import numpy as np
 from numpy.typing import NDArray
 
+from cspm_control.allocation.lost_cables import LostCables
 from cspm_control.allocation.tension_distribution import TensionDistribution
 from cspm_control.controllers.angle_servo import AngleGenerator, AngleServo
 from cspm_control.controllers.bar_dynamics import bar_parameters
 from cspm_control.controllers.computed_wrench import ComputedWrench
+from cspm_control.controllers.dither import make_dither
 from cspm_control.controllers.force_controller import ForceController
 from cspm_control.controllers.governor import Governed, plan_deviation
 from cspm_control.controllers.load_cell_bias import LoadCellBias
@@ -24,14 +26,14 @@ from cspm_control.stages.angle_stage import AngleStage
 from cspm_control.stages.distribution_stage import DistributionStage
 from cspm_control.stages.force_stage import ForceLimits, ForceStage
 from cspm_control.stages.motion_stage import MotionStage
+from cspm_control.stages.target_stage import target_stage
 from cspm_control.stages.torque_stage import TorqueStage
 from cspm_model.kernels.cable import INERTIA, RADIUS
 from cspm_model.motion import Motion
 from cspm_model.parameters import nominal_parameters
-from cspm_msgs_py.dofs import CONTROLLED_AXES
+from cspm_msgs_py.dofs import CONTROLLED_AXES, DOFS
 from cspm_msgs_py.errors import InputError
 from cspm_msgs_py.scenario import (
-    ORIGIN,
     AngleProfile,
     ClosedLoop,
     ComputedWrenchControl,
@@ -39,12 +41,14 @@ from cspm_msgs_py.scenario import (
     Scenario,
     TorqueProfile,
 )
+from cspm_msgs_py.scenario_keys.bodies import ORIGIN
 from cspm_msgs_py.schedule import (
     BAR_POSE,
     BAR_REFERENCE,
     FORCE_CONTROLLER,
     FRAME_REFERENCE,
     MOTION_CONTROLLER,
+    TARGET_TRACKER,
     TENSION_DISTRIBUTION,
     schedule_of,
 )
@@ -55,6 +59,9 @@ from cspm_msgs_py.testbed import Bar, Testbed
 TRIP_FACTOR = 2.0
 # After so many time constants what the pose's observer leaves unexplained is believed.
 SETTLING = 5.0
+# At this rate the speed of a winch without its cable dies out [1/s]: its torque stays within the
+# motor's limit from any speed that it reaches until it is released.
+RELEASE_RATE = 10.0
 
 
 def make_controller(
@@ -73,6 +80,8 @@ def make_controller(
         return torque_stage(control, scenario, testbed)
     if isinstance(control, AngleProfile) and node == FORCE_CONTROLLER:
         return angle_stage(control, scenario, testbed)
+    if node == TARGET_TRACKER and scenario.target.is_measured:
+        return target_stage(scenario)
     if isinstance(control, ClosedLoop) and node == MOTION_CONTROLLER:
         return motion_stage(control, scenario, testbed, motions)
     makers: dict[str, Callable[[ClosedLoop, Scenario, Testbed], Stage]] = {
@@ -111,7 +120,8 @@ def motion_stage(
             known_wrench=motion.known_wrench,
             mass=mass_observer(motion, testbed.bar, period),
         )
-        return MotionStage(computed, _planned(motion.governor, scenario, testbed, motions))
+        planned = _planned(motion.governor, scenario, testbed, motions)
+        return MotionStage(computed, planned, internals=control.record_internals)
     return MotionStage(
         MotionController(
             motion.gains or {},
@@ -120,7 +130,8 @@ def motion_stage(
             period=period,
             derivative_filter=motion.derivative_filter,
             integral_limits=motion.integral_limits,
-        )
+        ),
+        internals=control.record_internals,
     )
 
 
@@ -199,7 +210,29 @@ def distribution_stage(
     control: ClosedLoop, scenario: Scenario, testbed: Testbed
 ) -> DistributionStage:
     """Return the tension distribution."""
-    return DistributionStage(tension_distribution(control, testbed))
+    solver = tension_distribution(control, testbed)
+    lost = lost_cables(control, testbed, scenario.rates.tension_distribution)
+    return DistributionStage(solver, testbed.cable_names, lost, internals=control.record_internals)
+
+
+def lost_cables(control: ClosedLoop, testbed: Testbed, rate: int) -> LostCables | None:
+    """Return what knows lost cables at `rate` [Hz], where the scenario wants it.
+
+    Raises:
+        InputError: a whole cable may have as little tension as a lost one.
+    """
+    wanted = control.tension_distribution.lost_cable
+    if wanted is None:
+        return None
+    lowest = wanted_tension_limits(control, testbed)[:, 0]
+    i = int(np.argmin(lowest))
+    if lowest[i] <= wanted.below:
+        raise InputError(
+            f"control.tension_distribution.lost_cable.below: {wanted.below:g} N, allowed: less"
+            f" than the lower tension limit of {testbed.cable_names[i]}, {lowest[i]:g} N"
+        )
+    steps = max(1, round(wanted.duration * rate))
+    return LostCables(len(lowest), wanted.below, steps, len(controlled_axes(control)))
 
 
 def tension_distribution(control: ClosedLoop, testbed: Testbed) -> TensionDistribution:
@@ -209,12 +242,19 @@ def tension_distribution(control: ClosedLoop, testbed: Testbed) -> TensionDistri
         wanted_tension_limits(control, testbed),
         control.tension_distribution,
         controlled_axes(control),
+        control.motion.design_pose,
     )
 
 
 def controlled_axes(control: ClosedLoop) -> tuple[int, ...]:
-    """Return the world axes in which the wrench is to be met: roll only where it is controlled."""
-    return tuple(range(6)) if "roll" in control.motion.dofs else CONTROLLED_AXES
+    """Return the world axes in which the wrench is to be met.
+
+    A recording from before the distribution had `axes` meets roll only where it is controlled.
+    """
+    axes = control.tension_distribution.axes
+    if axes is not None:
+        return tuple(DOFS.index(dof) for dof in axes)
+    return tuple(range(6)) if "roll" in control.motion.controlled else CONTROLLED_AXES
 
 
 def known_wrench(control: ClosedLoop) -> NDArray[np.float64]:
@@ -256,22 +296,29 @@ def force_stage(control: ClosedLoop, scenario: Scenario, testbed: Testbed) -> Fo
         None if safety.torque_slew is None else safety.torque_slew / rate,
     )
     radii = nominal_parameters(testbed).cables[:, RADIUS].copy()
+    torque_limits = np.array([cable.torque_limit for cable in testbed.cables])
+    dither, names = control.force.dither, testbed.cable_names
     return ForceStage(
-        ForceController(
-            [gains[cable.name] for cable in testbed.cables],
-            radii,
-            np.array([cable.torque_limit for cable in testbed.cables]),
-            period=1.0 / rate,
-        ),
+        ForceController([gains[name] for name in names], radii, torque_limits, period=1.0 / rate),
         limits,
-        testbed.cable_names,
+        names,
         make_safe_state(scenario, testbed),
         safety,
         1_000_000_000 // rate,
         load_cell_bias(control, testbed, 1.0 / rate),
         friction_feedforward(control, testbed),
         winch_feedforward(control, testbed, 1.0 / rate),
+        None if dither is None else make_dither(dither, names, torque_limits, rate),
+        release_damping(control, testbed),
+        internals=control.record_internals,
     )
+
+
+def release_damping(control: ClosedLoop, testbed: Testbed) -> NDArray[np.float64] | None:
+    """Return what brings released winches to rest, (n,) [N·m·s/rad], where any are released."""
+    if control.tension_distribution.lost_cable is None:
+        return None
+    return RELEASE_RATE * nominal_parameters(testbed).cables[:, INERTIA]
 
 
 def load_cell_bias(control: ClosedLoop, testbed: Testbed, period: float) -> LoadCellBias | None:

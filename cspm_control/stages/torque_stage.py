@@ -37,7 +37,7 @@ class TorqueStage(GuardedStage):
         self._start_ns = 0
 
     def start(self, start_ns: int) -> None:
-        """Let the prescribed torques begin at an instant [ns]; untold they begin at 0."""
+        """Let the prescribed torques begin at an instant [ns]; without a call they begin at 0."""
         self._start_ns = start_ns
 
     def step(self, now_ns: int, inputs: Mapping[str, Array], send: Send) -> None:

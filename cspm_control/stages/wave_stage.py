@@ -16,17 +16,21 @@ Array = NDArray[np.float64]
 
 
 class WaveStage:
-    """Sends the reference of each body."""
+    """Sends the reference of each body.
+
+    Attributes:
+        trajectories: the motions, by reference topic.
+    """
 
     node = WAVE_TRAJECTORY
 
     def __init__(self, trajectories: Mapping[str, WaveTrajectory]) -> None:
         """Take the trajectories by reference topic."""
-        self._trajectories = trajectories
+        self.trajectories = trajectories
 
     def step(self, now_ns: int, inputs: Mapping[str, Array], send: Send) -> None:
         """Send the references at `now_ns`."""
-        for topic, trajectory in self._trajectories.items():
+        for topic, trajectory in self.trajectories.items():
             send(topic, trajectory.step(now_ns))
 
     def status(self) -> Status:

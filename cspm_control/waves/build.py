@@ -8,6 +8,7 @@ from pathlib import Path
 
 import numpy as np
 
+from cspm_control.waves.curves import curve_sines, listed_sines, sine_knots
 from cspm_control.waves.motion_file import motion_knots, read_motion
 from cspm_control.waves.moves import move_knots
 from cspm_control.waves.realisation import knot_count, start_from_rest, synthesise
@@ -15,6 +16,7 @@ from cspm_control.waves.sea import Array, Complex, WaveSet, draw_waves, wave_num
 from cspm_control.waves.small_body import small_body_response
 from cspm_control.waves.spectrum import jonswap
 from cspm_control.waves.vessel import read_vessel
+from cspm_control.waves.waypoints import waypoint_knots
 from cspm_model.motion import Motion
 from cspm_msgs_py.dofs import DOFS
 from cspm_msgs_py.errors import InputError
@@ -26,6 +28,14 @@ from cspm_msgs_py.motion_spec import (
     Sea,
     StillMotion,
     VesselMotion,
+)
+from cspm_msgs_py.scenario_keys.curves import (
+    CircleMotion,
+    HelixMotion,
+    LemniscateMotion,
+    LineMotion,
+    SinesMotion,
+    WaypointsMotion,
 )
 
 UNEXCITED = 1e-6  # response below this share of the waves cannot honestly be scaled up
@@ -62,13 +72,19 @@ def build_motion(
             motion = _about(mean, *motion_knots(rows, spec.rate))
         case MovesMotion():
             motion = _about(mean, *move_knots(spec.moves))
+        case WaypointsMotion():
+            motion = _about(mean, *waypoint_knots(spec))
+        case SinesMotion():
+            motion = _about(mean, *sine_knots(listed_sines(spec), spec.ramp, duration))
+        case LineMotion() | CircleMotion() | LemniscateMotion() | HelixMotion():
+            motion = _about(mean, *sine_knots(curve_sines(spec), spec.ramp, duration))
         case JonswapMotion():
             motion = _sea_motion(spec, mean, *_small_body(spec, mean[5], seed, gravity), duration)
         case VesselMotion():
             motion = _sea_motion(
                 spec, mean, *_vessel(spec, mean[5], seed, gravity, folder), duration
             )
-    _check_attitude(motion)
+    check_attitude(motion)
     return motion
 
 
@@ -150,7 +166,12 @@ def _about(mean: Array, knots: Array, spacing: float, periodic: bool = False) ->
     return Motion(knots, spacing, periodic)
 
 
-def _check_attitude(motion: Motion) -> None:
+def check_attitude(motion: Motion) -> None:
+    """Check that a motion's Euler angles stay where they are unique.
+
+    Raises:
+        InputError: roll or pitch reaches π/2 at a knot.
+    """
     for column, name in ((3, "roll"), (4, "pitch")):
         largest = float(np.abs(motion.knots[:, column]).max())
         if largest >= pi / 2:

@@ -19,6 +19,7 @@ import numpy as np
 import scipy
 
 from cspm_control.waves.sea import Array, Complex
+from cspm_control.waves.vessel_checks import check_physics
 from cspm_msgs_py.errors import InputError
 
 WIDEST_GAP = np.pi / 4  # rad: a table with headings farther apart says too little between them
@@ -83,7 +84,8 @@ def read_vessel(path: Path) -> VesselResponse:
     """Read the motion response at the first speed of an MSS vessel file.
 
     Raises:
-        InputError: the file is missing, no MATLAB file, or lacks a plausible `vessel.motionRAO`.
+        InputError: the file is missing, no MATLAB file, or lacks a plausible `vessel.motionRAO`;
+            see `check_physics`.
     """
     vessel: Any = _load(path).get("vessel")
     if not (hasattr(vessel, "headings") and hasattr(vessel, "motionRAO")):
@@ -100,6 +102,7 @@ def read_vessel(path: Path) -> VesselResponse:
             " frequency, heading and speed"
         ) from None
     _check_table(path, frequency, heading, amplitude, phase)
+    check_physics(path, frequency, heading, amplitude, phase)
     return VesselResponse(frequency, heading, amplitude * np.exp(1j * phase), str(path))
 
 
@@ -133,8 +136,9 @@ def _check_table(
     if len(frequency) < 2 or not frequency[0] >= 0 or not (np.diff(frequency) > 0).all():
         raise InputError(f"{path}: vessel.motionRAO.w: allowed: increasing rad/s")
     gaps = np.diff(np.concatenate([heading, heading[:1] + 2.0 * np.pi]))
+    hint = "; these are degrees?" if 2.0 * np.pi < heading[-1] <= 360.0 else ""
     if not (heading[0] >= 0.0 and heading[-1] < 2.0 * np.pi and (gaps > 0.0).all()):
-        raise InputError(f"{path}: vessel.headings: allowed: increasing rad in [0, 2π)")
+        raise InputError(f"{path}: vessel.headings: allowed: increasing rad in [0, 2π){hint}")
     if gaps.max() > WIDEST_GAP:
         raise InputError(
             f"{path}: vessel.headings: a gap of {gaps.max():.3g} rad, allowed: at most"

@@ -4,10 +4,11 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from cascade import SCENARIO, Cascade
+from cascade import CROSSOVER, SCENARIO, Cascade
 
 from cspm_control.design.gains import design_force_gains, design_motion_gains
-from cspm_msgs_py.scenario import ForceControl, PidGains, PiGains
+from cspm_msgs_py.control_spec.force import ForceControl, PiGains
+from cspm_msgs_py.scenario import PidGains
 from cspm_msgs_py.testbed import load_testbed
 from cspm_sim.parameters import plant_parameters
 
@@ -19,7 +20,7 @@ CENTRE = SCENARIO.design_pose
 
 @pytest.fixture(scope="module")
 def motion_gains():
-    return design_motion_gains(THESIS, PARAMETERS, CENTRE, SCENARIO.crossover)
+    return design_motion_gains(THESIS, PARAMETERS, CENTRE, CROSSOVER)
 
 
 @pytest.fixture(scope="module")

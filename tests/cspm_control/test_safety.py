@@ -236,3 +236,14 @@ def test_a_trip_before_the_first_step_holds_without_a_jerk():
     stage.trip(0, "early")
     stage.watch(0, {}, sent, winch_row())
     assert sent.torques[0][0] == 0.0
+
+
+def test_an_input_is_stale_after_the_time_that_the_file_says():
+    stage, sent = torque_stage("safety.stale_after=0.05"), Sent()
+    stage.step(0, winch_row(), sent)
+    stage.watch(50 * MS, {WINCH_STATE: 50 * MS}, sent)
+    assert not stage.safe
+    stage.watch(51 * MS, {WINCH_STATE: 51 * MS}, sent)
+    assert stage.safe
+    reason = f"{WINCH_STATE} stale: 51 ms old, allowed: 50 ms"
+    assert stage.status().message.endswith(reason)

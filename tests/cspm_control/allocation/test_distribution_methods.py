@@ -10,17 +10,19 @@ from scipy.linalg import null_space
 from scipy.optimize import linprog, lsq_linear
 from structure_samples import HOLD, HOME, row, structure
 
+from cspm_control.allocation.analytic_centre import analytic_centre
 from cspm_control.allocation.tension_distribution import TensionDistribution
 from cspm_control.stages.make import wanted_tension_limits
 from cspm_model.parameters import nominal_parameters
+from cspm_msgs_py.control_spec.distribution import DistributionMethod
+from cspm_msgs_py.control_spec.distribution import TensionDistribution as HowDistributed
 from cspm_msgs_py.dofs import CONTROLLED_AXES
 from cspm_msgs_py.errors import InputError
-from cspm_msgs_py.scenario import ClosedLoop, DistributionMethod
-from cspm_msgs_py.scenario import TensionDistribution as HowDistributed
+from cspm_msgs_py.scenario import ClosedLoop
 from cspm_msgs_py.testbed import load_testbed
 
 AXES = list(CONTROLLED_AXES)
-METHODS = get_args(DistributionMethod)
+METHODS = [method for method in get_args(DistributionMethod) if method != "prescribed"]
 COMPLETE = ("qp", "analytic_centre")
 STILL = np.zeros(6)
 WEIGHTS = np.array([1.0, 1.0, 1.0, 6.0, 6.0, 6.0])
@@ -222,3 +224,17 @@ def test_the_scenarios_lower_limit_takes_the_place_of_the_files(thesis):
     assert str(caught.value) == (
         "control.tension_distribution.lower_limit: 20 N, allowed: below the upper limit of sway_1"
     )
+
+
+def test_the_analytic_centre_from_the_last_solution_is_the_one_from_amid_the_limits(thesis):
+    """Whatever came before, to 1e-5 N: along a path, after a jump, and beyond what can be met."""
+    kept, limits = solver_of(thesis, "analytic_centre"), limits_of(thesis)
+    none, alone = np.zeros(0), np.empty(len(limits))
+    random = np.random.default_rng(3)
+    sizes = np.repeat([0.01, 0.3, 30.0, 300.0], 40)
+    changes = [random.normal(0.0, size, 6) for size in sizes]
+    for change in changes:
+        wanted = HOLD + change * [1.0, 1.0, 1.0, 0.0, 0.1, 0.1]
+        found = kept.step(wanted, row(HOME), row(STILL)).tensions
+        analytic_centre(kept.structure, kept.wanted, limits, kept.weights, none, alone)
+        np.testing.assert_allclose(found, alone, rtol=0.0, atol=1e-5)

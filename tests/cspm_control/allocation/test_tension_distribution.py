@@ -4,9 +4,9 @@ from machines import build, general_content, point_content, random_poses
 from structure_samples import HOLD, HOME, row, structure
 
 from cspm_control.allocation.tension_distribution import TensionDistribution
+from cspm_msgs_py.control_spec.distribution import TensionDistribution as HowDistributed
 from cspm_msgs_py.dofs import CONTROLLED_AXES
 from cspm_msgs_py.errors import SingularityError
-from cspm_msgs_py.scenario import TensionDistribution as HowDistributed
 from cspm_sim.parameters import plant_parameters
 
 AXES = list(CONTROLLED_AXES)
@@ -118,7 +118,7 @@ def test_a_geometry_that_cannot_give_a_moment_is_one_line():
         solver.step(HOLD, row(HOME), row(np.zeros(6)))
     assert str(caught.value) == (
         "tension distribution: with the bar measured at [0, 0, 2, 0, 0, 0, 1] (m, quaternion) the"
-        " cables cannot give every force and every moment but roll"
+        " cables cannot give every force and moment along surge, sway, heave, pitch, yaw"
     )
 
 

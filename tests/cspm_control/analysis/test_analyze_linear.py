@@ -30,7 +30,7 @@ def words(analysis):
     return {round(mode.frequency, 1): mode.words for mode in analysis.modes}
 
 
-def test_modes_are_told_in_words(found):
+def test_modes_are_put_in_words(found):
     frozen, exact = words(found.frozen), words(found.exact)
     assert frozen[33.0] == "pitch against hoist winches"
     assert frozen[42.5] == "heave against hoist winches"
@@ -154,11 +154,13 @@ def test_what_holds_of_chapter_6(found):
 
 
 def test_the_pages_table_is_what_the_code_finds(found):
-    page = (TESTBEDS.parents[1] / "docs" / "analyze.md").read_text(encoding="utf-8")
+    page = (TESTBEDS.parents[1] / "docs" / "explanation" / "what-a-machine-can-do.md").read_text(
+        encoding="utf-8"
+    )
     rows = [line.strip("| ").split(" | ") for line in page.splitlines()]
-    told = {row[0]: row[1:] for row in rows if len(row) == 4}
+    reported = {row[0]: row[1:] for row in rows if len(row) == 4}
     for claim in linear_claims(found, THESIS.cable_names):
-        published, *cells = told[claim.what]
+        published, *cells = reported[claim.what]
         assert published == claim.published
         for way, cell in zip((FROZEN, EXACT), cells, strict=True):
             number, _, cross = cell.replace("−", "-").partition(" ")
@@ -168,11 +170,11 @@ def test_the_pages_table_is_what_the_code_finds(found):
 
 def test_the_pages_python_gives_a_named_system(found, monkeypatch):
     root = TESTBEDS.parents[1]
-    page = (root / "docs" / "analyze.md").read_text(encoding="utf-8")
+    page = (root / "docs" / "explanation" / "what-a-machine-can-do.md").read_text(encoding="utf-8")
     (code,) = re.findall(r"```python\n(.*?)```", page, re.DOTALL)
     monkeypatch.chdir(root)
     said = {}
-    exec(compile(code, "docs/analyze.md", "exec"), said)
+    exec(compile(code, "docs/explanation/what-a-machine-can-do.md", "exec"), said)
     system, ours = said["system"], found.exact.motion.system
     assert isinstance(system, control.StateSpace)
     assert system.input_labels == list(ours.inputs)

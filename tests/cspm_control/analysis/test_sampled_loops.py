@@ -26,14 +26,15 @@ from cspm_control.analysis.sampled_loops import (
 from cspm_control.analysis.sampled_system import closed, diagonal, sample, series
 from cspm_control.controllers.force_controller import ForceController
 from cspm_control.controllers.motion_controller import MotionController
-from cspm_control.design.gains import margins
+from cspm_control.design.margins import margins
 from cspm_model.equilibrium import gravity_wrench
 from cspm_model.kernels.rotation import quaternion_from_euler
 from cspm_model.linearisation import linear_model, mass_matrix, motion_subsystem, operating_point
 from cspm_model.parameters import nominal_parameters
+from cspm_msgs_py.control_spec.force import PiGains
 from cspm_msgs_py.dofs import CONTROLLED_AXES, DOFS
 from cspm_msgs_py.errors import InputError
-from cspm_msgs_py.scenario import ClosedLoop, PidGains, PiGains, Rates, parse_scenario
+from cspm_msgs_py.scenario import ClosedLoop, PidGains, Rates, parse_scenario
 from cspm_run.assembly import resolve
 from cspm_run.recorded_run import run
 
@@ -41,7 +42,13 @@ PERIOD = 1e-3
 PROMPT = LoopTiming(PERIOD, 1, 1, 0, 0, 0)
 FREQUENCIES = np.array([0.5, 7.0, 60.0, 900.0])
 PARAMETERS = nominal_parameters(THESIS)
-SCENARIO = parse_scenario("{name: loops, testbed: x, duration: 1.0}", "test")
+# Slower than the margins let it be, so that what each way of looking changes shows by itself.
+CROSSOVER = "{surge: 12, sway: 10, heave: 12, pitch: 12, yaw: 10}"
+SCENARIO = parse_scenario(
+    "{name: loops, testbed: x, duration: 1.0}",
+    "test",
+    ["control.mode=closed_loop", f"control.motion.crossover={CROSSOVER}"],
+)
 CONTROL = resolve(SCENARIO, THESIS).control
 
 

@@ -166,7 +166,7 @@ def rig_scenario(tmp_path, path=None, sensors=SENSORS, **changes):
 
 
 @pytest.mark.compiled
-def test_the_motor_goes_where_it_is_told(tmp_path):
+def test_the_motor_goes_where_it_is_commanded(tmp_path):
     """It starts at rest with its tension, follows the ramp, and stays at its end."""
     result, rows = run_to(tmp_path / "bag", rig_scenario(tmp_path))
     assert result.failure is None
@@ -240,7 +240,7 @@ def test_what_cannot_be_right_trips(tmp_path, changed, reason):
     assert sent.torques[-1][0] == pytest.approx(0.025 * 3.0, rel=1e-9)
 
 
-def test_a_torque_at_its_limit_is_told(tmp_path):
+def test_a_torque_at_its_limit_is_reported(tmp_path):
     stage, sent = stage_of(tmp_path), Sent()
     stage.step(0, inputs(), sent)
     stage.step(MS, inputs(angle=-50.0), sent)

@@ -2,7 +2,7 @@ import numpy as np
 import pytest
 
 from cspm_control.controllers.force_controller import ForceController
-from cspm_msgs_py.scenario import PiGains
+from cspm_msgs_py.control_spec.force import PiGains
 
 RADII = np.array([0.0025, 0.025])
 LIMITS = np.array([0.5, 2.0])

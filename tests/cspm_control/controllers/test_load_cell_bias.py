@@ -1,4 +1,4 @@
-"""Whether a load cell's bias is told from a weak drive, dry friction, and the rotor's inertia."""
+"""A load cell's bias is distinguished from a weak drive, dry friction and the rotor's inertia."""
 
 from dataclasses import replace
 
@@ -36,8 +36,8 @@ def winches(seconds, *, bias=0.0, gain=1.0, dry=0.0, seed=1):
     return noisy, speeds + rng.normal(0.0, 0.01, speeds.shape), torques / gain
 
 
-def told(largest=2.0, seconds=8.0, **machine):
-    """Return the biases that are told at the end."""
+def reported(largest=2.0, seconds=8.0, **machine):
+    """Return the biases that are reported at the end."""
     found = LoadCellBias(RADII, INERTIAS, largest, period=PERIOD)
     measured, speeds, torques = winches(seconds, **machine)
     for k in range(len(measured)):
@@ -46,22 +46,22 @@ def told(largest=2.0, seconds=8.0, **machine):
 
 
 @pytest.mark.parametrize("bias", [-1.0, 0.0, 0.4])
-def test_a_bias_is_told_with_its_sign(bias):
-    np.testing.assert_allclose(told(bias=bias), bias, atol=0.02)
+def test_a_bias_is_reported_with_its_sign(bias):
+    np.testing.assert_allclose(reported(bias=bias), bias, atol=0.02)
 
 
 @pytest.mark.parametrize("machine", [{"gain": 0.5}, {"dry": 0.8}, {"gain": 0.7, "dry": 0.4}])
 def test_weak_drives_and_dry_friction_are_no_bias(machine):
-    np.testing.assert_allclose(told(**machine), 0.0, atol=0.05)
-    np.testing.assert_allclose(told(bias=0.6, **machine), 0.6, atol=0.05)
+    np.testing.assert_allclose(reported(**machine), 0.0, atol=0.05)
+    np.testing.assert_allclose(reported(bias=0.6, **machine), 0.6, atol=0.05)
 
 
 def test_no_more_is_believed_than_the_largest():
-    np.testing.assert_array_equal(told(largest=0.5, bias=3.0), 0.5)
-    np.testing.assert_array_equal(told(largest=0.5, bias=-3.0), -0.5)
+    np.testing.assert_array_equal(reported(largest=0.5, bias=3.0), 0.5)
+    np.testing.assert_array_equal(reported(largest=0.5, bias=-3.0), -0.5)
 
 
-def test_at_rest_a_bias_cannot_be_told_from_a_weak_drive():
+def test_at_rest_a_bias_cannot_be_distinguished_from_a_weak_drive():
     """Nothing moves: the prior shares out what is seen, and never beyond it."""
     found = LoadCellBias(RADII, INERTIAS, 2.0, period=PERIOD)
     for _ in range(3000):
@@ -87,7 +87,7 @@ class Stage:
     """A force stage, stepped with all tensions near 6 N."""
 
     def __init__(self, *overrides):
-        self.bundle = bundle_of("worst_case_past_thesis", *overrides)
+        self.bundle = bundle_of("worst_case_steep_past_thesis", *overrides)
         self.testbed = self.bundle.testbed.testbed
         self.stage = make_controller(FORCE_CONTROLLER, self.bundle.scenario, self.testbed)
         self.rng = np.random.default_rng(3)
@@ -115,7 +115,7 @@ class Stage:
         return self.stage.status().values
 
 
-def test_the_stage_controls_tensions_without_what_is_told():
+def test_the_stage_controls_tensions_without_what_is_given():
     stage = Stage(ON)
     cables = stage.testbed.cables
     radii = np.array([cable.drum_radius / cable.gear_ratio for cable in cables])
@@ -136,7 +136,7 @@ def test_the_stage_controls_tensions_without_what_is_told():
     assert stage.status()["load_cell_bias"] == expected
 
 
-def test_without_the_option_or_the_winches_state_nothing_is_told():
+def test_without_the_option_or_the_winches_state_nothing_is_reported():
     plain, blind = Stage(), Stage(ON)
     for _ in range(50):
         plain.step(1.0)
@@ -157,7 +157,7 @@ def test_what_trips_is_what_the_load_cells_say():
 
 def test_the_largest_bias_is_above_zero():
     with pytest.raises(InputError, match=r"load_cell_bias.largest: 0, .*greater than 0"):
-        bundle_of("worst_case_past_thesis", "control.force.load_cell_bias={largest: 0}")
+        bundle_of("worst_case_steep_past_thesis", "control.force.load_cell_bias={largest: 0}")
 
 
 class OffBy:
@@ -165,14 +165,14 @@ class OffBy:
 
     def __init__(self, stage, offset):
         self._stage, self._offset, self.node = stage, offset, stage.node
-        self.told = ""
+        self.reported = ""
 
     def step(self, now_ns, inputs, send):
         self._stage.step(now_ns, inputs | {TENSION: inputs[TENSION] + self._offset}, send)
 
     def status(self):
         status = self._stage.status()
-        self.told = status.values["load_cell_bias"]
+        self.reported = status.values["load_cell_bias"]
         return status
 
 
@@ -182,13 +182,13 @@ def test_a_biased_load_cell_on_the_other_plant():
     """MuJoCo's winches have dry friction besides."""
     friction = (("winch_coulomb_friction", (), {"torque": 0.002}),)
     overrides = ("duration=7.0", "control.motion.governor=null", ON)
-    bundle = Case("worst_case_past_thesis", overrides, friction, plant="mujoco").bundle()
+    bundle = Case("worst_case_steep_past_thesis", overrides, friction, plant="mujoco").bundle()
     parts = assembled(bundle)
     offset = np.array([1.0 * (name == "surge_1") for name in bundle.testbed.testbed.cable_names])
     force = OffBy(parts.stages[-1], offset)
     loop = Loop(replace(parts, stages=[*parts.stages[:-1], force]), {}, lambda *_: None)
     for _ in range(7000):
         loop.step()
-    name, value, _ = force.told.split()
+    name, value, _ = force.reported.split()
     assert name == "surge_1"
     assert float(value) == pytest.approx(1.0, abs=0.1)

@@ -1,4 +1,4 @@
-"""Whether the bar's mass is told from its heave, and from what else pulls on it."""
+"""Whether the bar's mass is estimated from its heave, and from what else pulls on it."""
 
 import numpy as np
 import pytest
@@ -12,13 +12,13 @@ from cspm_msgs_py.schedule import MOTION_CONTROLLER
 from cspm_run.loop import Loop
 
 PERIOD, NOMINAL, G = 1e-3, 4.0, 9.81
-PAST = "worst_case_past_thesis"
+PAST = "worst_case_steep_past_thesis"
 ON = "control.motion.mass_adaptation={}"
 NO_PLAN = "control.motion.governor=null"
 
 
-def told(mass, *, pull=0.0, heave=2.0, seconds=10.0, largest=0.5):
-    """Return the mass told of a bar in waves, pulled downwards by a steady force [N]."""
+def reported(mass, *, pull=0.0, heave=2.0, seconds=10.0, largest=0.5):
+    """Return the mass estimated of a bar in waves, pulled downwards by a steady force [N]."""
     found = MassObserver(NOMINAL, largest, period=PERIOD, settling=0.1)
     rng = np.random.default_rng(7)
     for time in np.arange(0.0, seconds, PERIOD):
@@ -30,19 +30,19 @@ def told(mass, *, pull=0.0, heave=2.0, seconds=10.0, largest=0.5):
 
 @pytest.mark.parametrize("mass", [3.2, 4.0, 4.8])
 @pytest.mark.parametrize("pull", [-4.0, 0.0, 4.0])
-def test_a_mass_is_told_and_a_steady_force_is_none(mass, pull):
-    assert told(mass, pull=pull) == pytest.approx(mass, rel=0.02)
+def test_a_mass_is_estimated_and_a_steady_force_is_none(mass, pull):
+    assert reported(mass, pull=pull) == pytest.approx(mass, rel=0.02)
 
 
-def test_at_rest_a_force_cannot_be_told_from_a_mass():
+def test_at_rest_a_force_cannot_be_distinguished_from_a_mass():
     """Nothing moves: whatever is carried is taken for mass, which is the likelier."""
-    assert told(4.8, heave=0.0) == pytest.approx(4.8, rel=0.02)
-    assert told(NOMINAL, pull=4.0, heave=0.0) == pytest.approx(NOMINAL + 4.0 / G, rel=0.02)
+    assert reported(4.8, heave=0.0) == pytest.approx(4.8, rel=0.02)
+    assert reported(NOMINAL, pull=4.0, heave=0.0) == pytest.approx(NOMINAL + 4.0 / G, rel=0.02)
 
 
 def test_no_more_is_believed_than_the_largest():
-    assert told(8.0, largest=0.2) == pytest.approx(1.2 * NOMINAL)
-    assert told(2.0, largest=0.2) == pytest.approx(0.8 * NOMINAL)
+    assert reported(8.0, largest=0.2) == pytest.approx(1.2 * NOMINAL)
+    assert reported(2.0, largest=0.2) == pytest.approx(0.8 * NOMINAL)
 
 
 def test_after_a_restart_what_was_learnt_stays_and_what_settles_is_not_believed():
@@ -83,7 +83,7 @@ class Run:
 
 @pytest.mark.compiled
 @pytest.mark.parametrize("share", [0.2, -0.2])
-def test_a_wrong_mass_costs_little_once_it_is_told(share):
+def test_a_wrong_mass_costs_little_once_it_is_known(share):
     wrong = (("bar_mass", (), {"mass": share * 4.06}),)
     without, with_it = Run(wrong), Run(wrong, ON)
     assert with_it.heave < 0.3 * without.heave
@@ -99,7 +99,7 @@ def test_a_right_mass_stays_right_also_where_something_pulls():
         assert Run(effects, ON, seconds=15.0).mass == pytest.approx(4.06, rel=0.03)
 
 
-def test_nobody_who_does_not_ask_is_told_of_a_mass():
+def test_no_stage_that_does_not_ask_is_given_a_mass():
     for overrides, expected in (((), {}), ((ON,), {"bar_mass": "4.060 kg"})):
         bundle = bundle_of(PAST, *overrides)
         stage = make_controller(MOTION_CONTROLLER, bundle.scenario, bundle.testbed.testbed)

@@ -196,3 +196,15 @@ def test_angles_are_euler_angles_not_the_rotation_vector():
     found.step(pose(), reference())
     wrench = found.step(pose(), reference(values)) - WEIGHT
     np.testing.assert_allclose(wrench, [0, 0, 0, 0, 30.0, 8.0], atol=1e-12)
+
+
+def test_after_a_restart_the_bar_is_led_to_its_reference():
+    """By minimum jerk, however far away it is: half of the error counts after half of the time."""
+    found = controller(only("heave", kp=1000.0))
+    found.restart()
+    far = reference(away(2, 0.4))
+    wrenches = [found.step(pose(), far)[2] - WEIGHT[2] for _ in range(round(5.0 / PERIOD) + 2)]
+    assert wrenches[0] == 0.0
+    assert wrenches[round(2.5 / PERIOD)] == pytest.approx(200.0)
+    assert wrenches[-1] == pytest.approx(400.0)
+    assert np.diff(wrenches).max() < 1.9 * 400.0 * PERIOD / 5.0

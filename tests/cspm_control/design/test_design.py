@@ -9,24 +9,23 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from cspm_control.design.gains import (
-    CONTROLLED_DOFS,
-    Margins,
     check_separation,
     design_force_gains,
     design_motion_gains,
     force_margins,
-    margins,
     motion_margins,
 )
+from cspm_control.design.margins import Margins, margins
 from cspm_model.linearisation import (
     linear_model,
     motion_subsystem,
     operating_point,
     tension_subsystem,
 )
-from cspm_msgs_py.dofs import CONTROLLED_AXES
+from cspm_msgs_py.control_spec.force import ForceControl, PiGains
+from cspm_msgs_py.dofs import CONTROLLED_AXES, DOFS
 from cspm_msgs_py.errors import InputError
-from cspm_msgs_py.scenario import ForceControl, MotionControl, PidGains, PiGains
+from cspm_msgs_py.scenario import MotionControl, PidGains
 from cspm_msgs_py.testbed import Testbed, load_testbed
 from cspm_sim.parameters import plant_parameters
 
@@ -34,8 +33,11 @@ TESTBEDS = Path(__file__).resolve().parents[3] / "scenarios" / "testbeds"
 THESIS = load_testbed(TESTBEDS / "thesis.yaml").testbed.model_copy(update={"effects": ()})
 PARAMETERS = plant_parameters(THESIS)
 SCENARIO = MotionControl()
+# That the table of the reconstruction was computed for [rad/s].
+CROSSOVER = {"surge": 12.0, "sway": 10.0, "heave": 12.0, "pitch": 12.0, "yaw": 10.0}
 CENTRE = SCENARIO.design_pose
 AXES = list(CONTROLLED_AXES)
+CONTROLLED_DOFS = [DOFS[axis] for axis in AXES]
 
 # Kp, Ki, Kd, −3 dB bandwidth [rad/s], phase margin [°], gain margin [dB].
 TABLE = {
@@ -74,7 +76,7 @@ def roll_held() -> Testbed:
 
 @pytest.fixture(scope="module")
 def motion_gains():
-    return design_motion_gains(THESIS, PARAMETERS, CENTRE, SCENARIO.crossover)
+    return design_motion_gains(THESIS, PARAMETERS, CENTRE, CROSSOVER)
 
 
 @pytest.fixture(scope="module")
@@ -99,7 +101,7 @@ def test_motion_gains_are_those_of_the_table(motion_gains):
 def test_motion_margins_are_those_of_the_table(motion_gains):
     found = motion_margins(THESIS, PARAMETERS, CENTRE, motion_gains)
     for dof, row in TABLE.items():
-        assert found[dof].crossover == pytest.approx(SCENARIO.crossover[dof], rel=1e-6)
+        assert found[dof].crossover == pytest.approx(CROSSOVER[dof], rel=1e-6)
         assert found[dof].bandwidth == pytest.approx(row[3], abs=0.06)
         assert np.degrees(found[dof].phase_margin) == pytest.approx(row[4], abs=0.1)
         assert found[dof].gain_margin == pytest.approx(row[5], abs=0.5)
@@ -288,7 +290,7 @@ def test_what_cannot_be_controlled_is_refused():
 @pytest.mark.parametrize("testbed", [ten_cables(), roll_held()], ids=["ten", "rank_6"])
 def test_another_machine(testbed):
     parameters = plant_parameters(testbed)
-    motion = design_motion_gains(testbed, parameters, CENTRE, SCENARIO.crossover)
+    motion = design_motion_gains(testbed, parameters, CENTRE, CROSSOVER)
     force = design_force_gains(testbed, parameters, CENTRE, 700.0)
     assert list(force) == list(testbed.cable_names)
     found = force_margins(testbed, parameters, CENTRE, force)

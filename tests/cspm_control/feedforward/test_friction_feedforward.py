@@ -21,8 +21,8 @@ from cspm_model.kernels.cable import RADIUS
 from cspm_model.kernels.rotation import quaternion_from_euler, rotation_from_euler
 from cspm_model.kinematics import inverse_kinematics
 from cspm_model.parameters import nominal_parameters
+from cspm_msgs_py.control_spec.force import PiGains
 from cspm_msgs_py.errors import InputError
-from cspm_msgs_py.scenario import PiGains
 from cspm_msgs_py.schedule import (
     BAR_REFERENCE,
     FORCE_CONTROLLER,
@@ -34,7 +34,7 @@ from cspm_msgs_py.schedule import (
 )
 from cspm_msgs_py.testbed import EffectEntry
 
-PAST = "worst_case_past_thesis"
+PAST = "worst_case_steep_past_thesis"
 ON = "control.force.friction_feedforward={}"
 THESIS = bundle_of("rest").testbed.testbed
 CABLES = nominal_parameters(THESIS).cables
@@ -118,7 +118,7 @@ def test_the_sign_turns_without_a_step():
     np.testing.assert_allclose(torque(0.05), -0.01, rtol=1e-3)
 
 
-def test_what_the_file_tells_of_friction():
+def test_what_the_file_says_of_friction():
     machine = with_friction(
         ("winch_coulomb_friction", ("hoist_1", "sway_2"), {"torque": 0.01}),
         ("winch_stribeck_friction", ("hoist_1",), STRIBECK),
@@ -135,7 +135,7 @@ def test_what_the_file_tells_of_friction():
     np.testing.assert_allclose(winch_friction(machine), expected, rtol=1e-12)
 
 
-def test_a_file_that_tells_of_no_friction_is_refused_in_one_line():
+def test_a_file_that_has_no_friction_is_refused_in_one_line():
     scenario = bundle_of(PAST, ON).scenario
     with pytest.raises(InputError) as caught:
         make_controller(FORCE_CONTROLLER, scenario, THESIS)

@@ -33,7 +33,7 @@ from cspm_msgs_py.schedule import (
     schedule_of,
 )
 
-PAST = "worst_case_past_thesis"
+PAST = "worst_case_steep_past_thesis"
 ON = "control.force.winch_feedforward={}"
 STRETCHED = "control.force.winch_feedforward={stretch_bandwidth: 200.0}"
 MACHINE = nominal_parameters(bundle_of("rest").testbed.testbed)

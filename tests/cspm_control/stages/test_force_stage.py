@@ -169,7 +169,7 @@ def test_a_torque_at_its_limit_is_said_as_before(bench):
     assert bench.stage.status().values["tension_limited_share"] == "0.000"
 
 
-def test_without_a_slew_limit_a_torque_turns_round_at_once(bench):
+def test_without_a_slew_limit_a_torque_reverses_at_once(bench):
     limits = np.array([cable.torque_limit for cable in bench.testbed.cables])
     bench.step()
     (high,) = bench.step(wanted=np.full(N, 15.0), measured=np.full(N, 2.0))
@@ -269,7 +269,7 @@ def test_a_fault_in_the_first_row_balances(bench):
     np.testing.assert_allclose(torque, bench.radii * bench.balance, rtol=1e-12)
 
 
-def test_a_clock_that_goes_back_trips_one_that_stands_does_not(bench):
+def test_a_clock_that_goes_back_trips_one_that_stops_does_not(bench):
     bench.now_ms = 5000
     bench.step()
     bench.now_ms = 5000

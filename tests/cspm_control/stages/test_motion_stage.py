@@ -53,11 +53,8 @@ def test_it_goes_on_from_there_without_a_jump(bundle):
         before = bench.step(0.005)
     bench.stage.suspend(False)
     after = bench.step(0.005)
-    # One step's share of the integral.
-    assert abs(after[2] - before[2]) < 0.5
-    fresh = Bench(bundle)
-    fresh.step(0.005)
-    np.testing.assert_array_equal(after, fresh.step(0.005))
+    # The error counts from nothing on: after one step of 5 s it is next to nothing.
+    assert abs(after[2] - before[2]) < 1e-3
 
 
 def test_not_suspended_it_winds_up_all_it_may(bundle):
@@ -68,8 +65,8 @@ def test_not_suspended_it_winds_up_all_it_may(bundle):
     assert wrench[2] < -WEIGHT - limit
 
 
-class Told:
-    """A controller that keeps by how much it is told to deviate."""
+class Reported:
+    """A controller that keeps by how much it is requested to deviate."""
 
     def step(self, bar_pose, frame_pose, reference, deviation):
         self.deviation = deviation
@@ -79,10 +76,10 @@ class Told:
 def test_a_plan_begins_when_the_run_does():
     knots = np.zeros((3, 18))
     knots[:, 0], knots[:, 6] = [0.0, 0.1, 0.2], 0.1
-    told, rows = Told(), {BAR_POSE: np.zeros(7), BAR_REFERENCE: np.zeros(19)}
-    stage = MotionStage(told, Motion(knots, 1.0))
+    reported, rows = Reported(), {BAR_POSE: np.zeros(7), BAR_REFERENCE: np.zeros(19)}
+    stage = MotionStage(reported, Motion(knots, 1.0))
     for start, now in ((0, 500_000_000), (7_000_000_000, 7_500_000_000)):
         stage.start(start)
         stage.step(now, rows, lambda _topic, _row: None)
-        assert told.deviation[0] == pytest.approx(0.05)
-        assert told.deviation[6] == pytest.approx(0.1)
+        assert reported.deviation[0] == pytest.approx(0.05)
+        assert reported.deviation[6] == pytest.approx(0.1)

@@ -1,0 +1,1 @@
+"""The stages as compiled phases of a step, which a loop calls without Python in between."""

@@ -1,0 +1,118 @@
+"""The force controllers as a compiled phase, while nothing is wrong."""
+
+from __future__ import annotations
+
+import numpy as np
+from numba import njit
+from numpy.typing import NDArray
+
+from cspm_control.controllers.force_controller import pi_torques
+from cspm_control.stages.force_stage import (
+    CLIPPED_STEPS,
+    LIMITED_STEPS,
+    SLEWED_STEPS,
+    STEPS,
+    ForceStage,
+    keep_tensions,
+)
+from cspm_model.kernels.native import flags_at, integers_at, matrix_at, vector_at
+from cspm_model.phase import DONE, LEAVE, Phase, Slots, make_phase
+from cspm_msgs_py.schedule import (
+    FORCE_INTERNALS,
+    TENSION,
+    TENSION_COMMAND,
+    TORQUE_COMMAND,
+    WINCH_STATE,
+)
+
+Array = NDArray[np.float64]
+Places = NDArray[np.int64]
+
+# Integers: columns in the row (-1: none), whether winches are released, and if torques are slewed.
+WANTED, MEASURED, WINCHES, OUT, INTERNALS, RELEASES, SLEWS, INTEGERS = range(8)
+
+
+@njit(cache=True, error_model="numpy", _nrt=False)
+def _kernel(step: int, row: Array, places: Places) -> int:
+    integers, counts, numbers = integers_at(places, 0), integers_at(places, 1), vector_at(places, 2)
+    gains, terms, ahead = matrix_at(places, 3), matrix_at(places, 5), vector_at(places, 6)
+    limits, integral = vector_at(places, 4), vector_at(places, 7)
+    wanted, measured = vector_at(places, 8), vector_at(places, 9)
+    clipped = take_inputs(row, integers, places)
+    if clipped < 0:
+        return LEAVE
+    n, first = wanted.shape[0], integers[OUT]
+    out = row[first : first + n]
+    period = numbers[0]
+    limited = pi_torques(wanted, measured, ahead, gains, limits, period, integral, terms, out)
+    finish(row, integers, counts, places)
+    counts[STEPS] += 1
+    counts[LIMITED_STEPS] += limited > 0
+    counts[CLIPPED_STEPS] += clipped
+    return DONE
+
+
+@njit(cache=True, error_model="numpy", inline="always")
+def take_inputs(row: Array, integers: Places, places: Places) -> int:
+    """Keep the tensions; return whether a wanted one was limited, −1 where Python has to look."""
+    wanted, measured, released = vector_at(places, 8), vector_at(places, 9), flags_at(places, 13)
+    n, first = wanted.shape[0], integers[WANTED]
+    command = row[first : first + n]
+    if integers[RELEASES] != 0:
+        for i in range(n):
+            if command[i] == 0.0 and not released[i]:
+                return -1
+    winches, first = integers[WINCHES], integers[MEASURED]
+    state = row[winches : winches + 3 * n] if winches >= 0 else row[:0]
+    found = row[first : first + n]
+    limits, trip = matrix_at(places, 10), vector_at(places, 11)
+    bad, clipped = keep_tensions(command, found, state, limits, trip, wanted, measured)
+    return -1 if bad >= 0 else int(clipped)
+
+
+@njit(cache=True, error_model="numpy", inline="always")
+def finish(row: Array, integers: Places, counts: Places, places: Places) -> None:
+    """Let released winches come to rest, slew the torques, and send the terms."""
+    terms, torque, numbers = matrix_at(places, 5), vector_at(places, 12), vector_at(places, 2)
+    released, damping = flags_at(places, 13), vector_at(places, 14)
+    limits, n, first = vector_at(places, 4), torque.shape[0], integers[OUT]
+    out = row[first : first + n]
+    slewed = 0
+    for i in range(n):
+        if integers[RELEASES] != 0 and released[i]:
+            speed = row[integers[WINCHES] + n + i] if integers[WINCHES] >= 0 else 0.0
+            out[i] = min(limits[i], max(-limits[i], -damping[i] * speed))
+        if integers[SLEWS] != 0:
+            given = min(torque[i] + numbers[1], max(torque[i] - numbers[1], out[i]))
+            if given != out[i]:
+                slewed = 1
+            out[i] = given
+        torque[i] = out[i]
+    counts[SLEWED_STEPS] += slewed
+    if integers[INTERNALS] >= 0:
+        for i in range(n):
+            row[integers[INTERNALS] + i] = terms[0, i]
+            row[integers[INTERNALS] + n + i] = terms[1, i]
+
+
+def force_phase(stage: ForceStage, slots: Slots) -> Phase | None:
+    """Return the stage as a phase, None where Python computes."""
+    extras = stage.bias, stage.friction, stage.winch, stage.dither
+    if any(extra is not None for extra in extras):
+        return None
+    n, step, found = len(stage.wanted), stage.limits.torque_step, stage.controller
+    integers = np.full(INTEGERS, -1, dtype=np.int64)
+    integers[WANTED], integers[MEASURED] = slots.first(TENSION_COMMAND), slots.first(TENSION)
+    integers[WINCHES], integers[OUT] = slots.first(WINCH_STATE), slots.first(TORQUE_COMMAND)
+    damping = stage.release_damping
+    integers[RELEASES], integers[SLEWS] = damping is not None, step is not None
+    if stage.internals:
+        integers[INTERNALS] = slots.first(FORCE_INTERNALS)
+    return make_phase(
+        _kernel,
+        *(integers, stage.counts, np.array([found.period, step or 0.0])),
+        *(found.gains, found.torque_limits, found.terms, np.zeros(n), found.integral),
+        *(stage.wanted, stage.measured, stage.tension_limits, stage.limits.trip, stage.torque),
+        *(stage.released, np.zeros(n) if damping is None else damping),
+        ready=lambda: stage.steady,
+    )

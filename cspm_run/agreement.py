@@ -1,6 +1,6 @@
 """How far the two plants differ, and the page that shows it.
 
-Run `python -m cspm_run.agreement > docs/measured/agreement.md` after a change in either plant.
+Run `python -m cspm_run.agreement > results/agreement.md` after a change in either plant.
 """
 
 from __future__ import annotations
@@ -46,11 +46,11 @@ class AgreementCase:
 MINUTE = "duration=60"
 IDEAL = "sensors=ideal"
 CASES = (
-    AgreementCase("calm", "", (MINUTE,)),
-    AgreementCase("worst_case", "", (MINUTE,)),
-    AgreementCase("calm", "ideal sensors", (MINUTE, IDEAL)),
-    AgreementCase("worst_case", "ideal sensors", (MINUTE, IDEAL)),
-    AgreementCase("worst_case", "ideal sensors, ours at 0.25 ms", (MINUTE, IDEAL), finer=4),
+    AgreementCase("calm_broadband", "", (MINUTE,)),
+    AgreementCase("worst_case_steep", "", (MINUTE,)),
+    AgreementCase("calm_broadband", "ideal sensors", (MINUTE, IDEAL)),
+    AgreementCase("worst_case_steep", "ideal sensors", (MINUTE, IDEAL)),
+    AgreementCase("worst_case_steep", "ideal sensors, ours at 0.25 ms", (MINUTE, IDEAL), finer=4),
     AgreementCase("verification_short"),
     AgreementCase("verification_mid"),
     AgreementCase("verification_long"),
@@ -96,7 +96,8 @@ def trace(scenario: str, overrides: Sequence[str], plant: str) -> Trace:
     path = find_scenario(scenario)
     loaded = load_scenario(path, overrides)
     testbed = load_testbed(path.parent / loaded.testbed)
-    bundle = make_bundle(resolve(loaded, testbed.testbed), testbed, path.parent)
+    resolved = resolve(loaded, testbed.testbed, path.parent)
+    bundle = make_bundle(resolved, testbed, path.parent)
     with bundle.unpacked() as place:
         parts = assemble(bundle.scenario, testbed.testbed, place, plant)
     loop = Loop(parts, {}, lambda _now, _status: None)
@@ -139,9 +140,9 @@ test-bed files, prescribed motions, sensors and controllers, and not one line of
 
 The table has the RMS of *MuJoCo − ours* over all steps of 1 ms, of true values, from the same seed:
 surge, sway and heave in m, angles in rad, tension over all cables in N, and the largest difference
-of any tension. Below stands the RMS of the motion itself about its mean.
+of any tension. Below is the RMS of the motion itself about its mean.
 
-This page is generated: `python -m cspm_run.agreement > docs/measured/agreement.md`.
+This page is generated: `python -m cspm_run.agreement > results/agreement.md`.
 """
 
 _CAUSES = """

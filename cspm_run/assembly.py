@@ -14,15 +14,17 @@ from cspm_control.design.gains import (
     check_separation,
     design_force_gains,
     design_motion_gains,
+    design_widest_gains,
     force_margins,
     motion_margins,
 )
-from cspm_control.stages.make import make_controller
+from cspm_control.stages.make import controlled_axes, make_controller
+from cspm_control.stages.target_stage import TargetStage
 from cspm_control.stages.wave_stage import WaveStage
-from cspm_control.waves.build import build_motion
 from cspm_control.waves.wave_trajectory import WaveTrajectory
 from cspm_model.motion import Motion
 from cspm_model.parameters import nominal_parameters
+from cspm_msgs_py.dofs import Dof
 from cspm_msgs_py.errors import InputError
 from cspm_msgs_py.scenario import (
     AngleProfile,
@@ -30,22 +32,32 @@ from cspm_msgs_py.scenario import (
     Control,
     LockedWinches,
     MotionControl,
+    PidGains,
     Scenario,
     TorqueProfile,
 )
+from cspm_msgs_py.scenario_keys.events import check_cables, cuts_by_step
 from cspm_msgs_py.schedule import (
+    BAR_POSE,
+    BAR_REFERENCE,
     MOTION_CONTROLLER,
     RATE_OF_SENSOR,
+    TARGET_POSE,
+    TARGET_REFERENCE,
     WAVE_TRAJECTORY,
     Schedule,
     schedule_of,
 )
 from cspm_msgs_py.stepping.stage import Stage
 from cspm_msgs_py.testbed import Testbed
+from cspm_run.controlled_dofs import with_controlled_dofs
+from cspm_run.motions import motions_of, reference_poses
 from cspm_run.plants import SIM, make_plant
 from cspm_sim.any_plant import AnyPlant
+from cspm_sim.plant import Plant
 from cspm_sim.sensor_fault import sensor_faults
 from cspm_sim.sensors import AnySensor, SensorModel
+from cspm_sim.step_stability import axial_modes, check_step
 
 Array = NDArray[np.float64]
 
@@ -58,8 +70,8 @@ class Assembly:
     """Everything that one run steps.
 
     `references` holds the prescribed motions by topic, `/winch_frame/reference` and
-    `/bar/reference`, of the bodies that the machine has; `stages` the controllers in the order in
-    which they compute.
+    `/bar/reference`, or `/target/reference` where the target is measured; `stages` the controllers
+    in the order in which they compute; `target` the motion of a target that is measured.
     """
 
     scenario: Scenario
@@ -69,6 +81,7 @@ class Assembly:
     sensors: dict[str, AnySensor]
     references: dict[str, WaveTrajectory]
     stages: list[Stage]
+    target: Motion | None = None
 
     @property
     def period_ns(self) -> int:
@@ -80,46 +93,107 @@ class Assembly:
         """Whether a closed loop is to follow the reference."""
         return isinstance(self.scenario.control, ClosedLoop)
 
+    @property
+    def bar_reference(self) -> Array | None:
+        """The bar's reference last computed, as `Motion.at`; None where it has none."""
+        computed = [each for each in self.stages if isinstance(each, TargetStage)]
+        prescribed = self.references.get(BAR_REFERENCE)
+        if computed:
+            return computed[0].values
+        return None if prescribed is None else prescribed.values
 
-def resolve(scenario: Scenario, testbed: Testbed) -> Scenario:
-    """Return the scenario with its controller gains computed, so that it is complete.
+
+def resolve(scenario: Scenario, testbed: Testbed, folder: Path | None = None) -> Scenario:
+    """Return the scenario with its controlled DOFs chosen and their gains computed.
+
+    So that it is complete. `folder` is where its relative paths start; without it the DOFs are
+    those at the design pose and the mean pose.
 
     Raises:
-        InputError: the machine cannot be controlled as the scenario requires.
+        InputError: the machine cannot be controlled as the scenario requires, or has no cable that
+            the scenario cuts.
     """
+    check_cables(scenario.events, testbed)
     control = scenario.control
+    locked = [cable.name for cable in testbed.cables if cable.locked]
+    if locked and not (isinstance(control, LockedWinches) and len(locked) == len(testbed.cables)):
+        raise InputError(
+            f"locked: {', '.join(locked)}, allowed in a run: all winches, under control.mode"
+            " locked_winches"
+        )
     if not isinstance(control, ClosedLoop):
         return scenario
     if testbed.bar is None:
         raise InputError(
             "control.mode: closed_loop without a bar, allowed: torque, angle, locked_winches"
         )
-    parameters = nominal_parameters(testbed)
-    motion, force = control.motion, control.force
-    pose = motion.design_pose
-    force_gains = force.gains or design_force_gains(testbed, parameters, pose, force.bandwidth)
-    if isinstance(motion, MotionControl):
-        designed = motion.gains is None and force.gains is None
-        gains = motion.gains or design_motion_gains(testbed, parameters, pose, motion.crossover)
-        if designed:
-            check_separation(
-                motion_margins(testbed, parameters, pose, gains),
-                force_margins(testbed, parameters, pose, force_gains),
-            )
-        motion = motion.model_copy(update={"gains": gains})
-    missing = set(testbed.cable_names) ^ set(force_gains)
+    if control.tension_distribution.axes is None:
+        control = with_controlled_dofs(
+            scenario, testbed, reference_poses(scenario, testbed, folder)
+        )
+    # Half the nodes of a run need no parameters, for which scipy's integrators have to be loaded.
+    if not control.force.gains or _lacks_gains(control.motion):
+        control = _with_gains(control, scenario, testbed)
+    missing = set(testbed.cable_names) ^ set(control.force.gains or {})
     if missing:
         raise InputError(
             f"control.force.gains: {', '.join(sorted(missing))}, allowed: exactly the cables"
             f" {', '.join(testbed.cable_names)}"
         )
-    control = control.model_copy(
-        update={
-            "motion": motion,
-            "force": force.model_copy(update={"gains": force_gains}),
-        }
-    )
     return scenario.model_copy(update={"control": control})
+
+
+def _lacks_gains(motion: object) -> bool:
+    return isinstance(motion, MotionControl) and set(motion.gains or {}) < set(motion.controlled)
+
+
+def _with_gains(control: ClosedLoop, scenario: Scenario, testbed: Testbed) -> ClosedLoop:
+    """Return a closed loop whose missing gains are designed."""
+    parameters = nominal_parameters(testbed)
+    motion, force = control.motion, control.force
+    pose = motion.design_pose
+    force_gains = force.gains or design_force_gains(testbed, parameters, pose, force.bandwidth)
+    control = control.model_copy(update={"force": force.model_copy(update={"gains": force_gains})})
+    if isinstance(motion, MotionControl) and _lacks_gains(motion):
+        gains = _motion_gains(control, scenario, testbed, designed=force.gains is None)
+        control = control.model_copy(update={"motion": motion.model_copy(update={"gains": gains})})
+    return control
+
+
+def _motion_gains(
+    control: ClosedLoop, scenario: Scenario, testbed: Testbed, *, designed: bool
+) -> dict[Dof, PidGains]:
+    """Return the gains of the motion controller; `designed` says that those of force are too."""
+    motion, axes = control.motion, controlled_axes(control)
+    assert isinstance(motion, MotionControl)
+    parameters, pose = nominal_parameters(testbed), motion.design_pose
+    force = force_margins(testbed, parameters, pose, control.force.gains or {})
+    crossover = {dof: motion.crossover[dof] for dof in motion.controlled if dof in motion.crossover}
+    wanted = design_motion_gains(testbed, parameters, pose, crossover, axes)
+    if designed and wanted:
+        check_separation(motion_margins(testbed, parameters, pose, wanted, axes), force)
+    wanted |= motion.gains or {}
+    widest = design_widest_gains(
+        testbed,
+        parameters,
+        pose,
+        [dof for dof in motion.controlled if dof not in wanted],
+        dead_time=_motion_dead_time(scenario, testbed),
+        force_bandwidth=min(found.bandwidth for found in force.values()),
+        axes=axes,
+    )
+    return {dof: wanted.get(dof) or widest[dof] for dof in motion.controlled}
+
+
+def _motion_dead_time(scenario: Scenario, testbed: Testbed) -> float:
+    """Return by how much the motion loop's sampling and sensor delay it [s].
+
+    A held output and the difference that approximates the derivative cost half a period each. A
+    loop that runs with every step of the plant counts as continuous, as the thesis designs it.
+    """
+    rates = scenario.rates
+    slower = 1.0 / min(rates.motion_controller, rates.motion_capture) - 1.0 / rates.plant
+    return slower + (0.0 if scenario.sensors == "ideal" else testbed.sensors[BAR_POSE].delay)
 
 
 def assemble(scenario: Scenario, testbed: Testbed, folder: Path, plant: str = SIM) -> Assembly:
@@ -132,10 +206,10 @@ def assemble(scenario: Scenario, testbed: Testbed, folder: Path, plant: str = SI
         ConvergenceError: the bar cannot hang at its first reference pose.
     """
     schedule = schedule_of(scenario, testbed)
+    check_lockstep(schedule)
     motions = motions_of(scenario, testbed, folder)
-    references = {
-        name: WaveTrajectory(motions[name]) for name in schedule.topics if name in motions
-    }
+    wave = schedule.nodes.get(WAVE_TRAJECTORY)
+    references = {name: WaveTrajectory(motions[name]) for name in (wave.outputs if wave else ())}
     return Assembly(
         scenario=scenario,
         testbed=testbed,
@@ -149,15 +223,33 @@ def assemble(scenario: Scenario, testbed: Testbed, folder: Path, plant: str = SI
             else make_controller(node, scenario, testbed, motions)
             for node in schedule.nodes
         ],
+        target=_target(schedule, motions),
     )
+
+
+def check_lockstep(schedule: Schedule) -> None:
+    """Check that a run can keep the schedule without a clock.
+
+    Raises:
+        InputError: somebody's driver is to send a topic, who goes by the wall.
+    """
+    if schedule.foreign:
+        raise InputError(
+            f"target.source: external, {', '.join(schedule.foreign)} of a driver, in lockstep,"
+            " allowed: mode realtime, or source measured"
+        )
 
 
 def assemble_simulator(
     scenario: Scenario, testbed: Testbed, folder: Path, plant: str
-) -> tuple[AnyPlant, dict[str, AnySensor]]:
-    """Build a resolved scenario's plant and its sensors; arguments and errors as `assemble`."""
+) -> tuple[AnyPlant, dict[str, AnySensor], Motion | None]:
+    """Build a resolved scenario's plant, its sensors, and the motion of a target that is measured.
+
+    Arguments and errors as `assemble`.
+    """
     motions = motions_of(scenario, testbed, folder)
-    return _plant(scenario, testbed, motions, plant), _sensors(scenario, testbed)
+    target = _target(schedule_of(scenario, testbed), motions)
+    return _plant(scenario, testbed, motions, plant), _sensors(scenario, testbed), target
 
 
 def assemble_stage(node: str, scenario: Scenario, testbed: Testbed, folder: Path) -> Stage:
@@ -169,20 +261,36 @@ def assemble_stage(node: str, scenario: Scenario, testbed: Testbed, folder: Path
     return WaveStage({name: WaveTrajectory(motions[name]) for name in names})
 
 
+def _target(schedule: Schedule, motions: Mapping[str, Motion]) -> Motion | None:
+    return motions[TARGET_REFERENCE] if TARGET_REFERENCE in schedule.topics else None
+
+
 def _plant(
     scenario: Scenario, testbed: Testbed, motions: Mapping[str, Motion], name: str
 ) -> AnyPlant:
-    control = scenario.control
+    control, period_ns = scenario.control, 1_000_000_000 // scenario.rates.plant
     bar = motions["/bar/reference"].at(0.0)[:6] if testbed.bar else None
-    return make_plant(
+    made = make_plant(
         name,
         testbed,
         motions["/winch_frame/reference"],
-        1_000_000_000 // scenario.rates.plant,
+        period_ns,
         bar_pose=bar,
         tensions=_start_tensions(testbed, control),
         locked=isinstance(control, LockedWinches),
+        cuts=cuts_by_step(scenario.events, testbed.cable_names, period_ns),
     )
+    if isinstance(made, Plant):
+        modes = axial_modes(
+            made.parameters,
+            made.bar_state[:6] if testbed.bar else None,
+            made.frame[:6],
+            (made.unstretched_lengths, made.lengths),
+            made.tensions,
+            locked=made.locked,
+        )
+        check_step(modes, scenario.rates.plant)
+    return made
 
 
 def _start_tensions(testbed: Testbed, control: Control) -> Array | None:
@@ -199,28 +307,6 @@ def _start_tensions(testbed: Testbed, control: Control) -> Array | None:
     return tensions
 
 
-def motions_of(scenario: Scenario, testbed: Testbed, folder: Path) -> dict[str, Motion]:
-    """Return the motions of winch frame, moving or not, and bar, by reference topic."""
-    target = scenario.target.model_copy(update={"mean_pose": scenario.bar_mean_pose})
-    bodies = {"/winch_frame/reference": scenario.winch_frame}
-    if testbed.bar:
-        bodies["/bar/reference"] = target
-    motions = {
-        name: build_motion(
-            body.motion,
-            body.mean_pose,
-            seed=scenario.seed,
-            duration=scenario.duration,
-            gravity=testbed.gravity,
-            folder=folder,
-        )
-        for name, body in bodies.items()
-    }
-    if testbed.winch_frame is None and motions["/winch_frame/reference"].knots.any():
-        raise InputError("winch_frame: this test-bed has none, allowed: no motion and no mean pose")
-    return motions
-
-
 def _sensors(scenario: Scenario, testbed: Testbed) -> dict[str, AnySensor]:
     return {
         name: SensorModel(
@@ -233,4 +319,5 @@ def _sensors(scenario: Scenario, testbed: Testbed) -> dict[str, AnySensor]:
             faults=sensor_faults(testbed, name),
         )
         for name, sensor in testbed.sensors.items()
+        if name != TARGET_POSE or scenario.target.is_measured
     }

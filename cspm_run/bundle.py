@@ -5,14 +5,15 @@ from __future__ import annotations
 import tempfile
 from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 
 from cspm_msgs_py.edited import file_of
 from cspm_msgs_py.errors import InputError
 from cspm_msgs_py.motion_spec import FileMotion, VesselMotion
 from cspm_msgs_py.recording.attached_testbed import TESTBED, attached_testbed
-from cspm_msgs_py.scenario import Body, Scenario, parse_scenario
+from cspm_msgs_py.scenario import Scenario, parse_scenario
+from cspm_msgs_py.scenario_keys.bodies import Body
 from cspm_msgs_py.testbed import Testbed, TestbedFile
 from cspm_msgs_py.yaml_file import dump_yaml
 from cspm_run.plants import SIM
@@ -31,6 +32,7 @@ class Bundle:
         plant: whose equations are simulated.
         attached: the file that the recording carries where the simulated machine is concealed;
             None: that of the simulated machine.
+        origins: where the user has the files, by name, for errors.
     """
 
     scenario: Scenario
@@ -38,6 +40,7 @@ class Bundle:
     files: dict[str, bytes]
     plant: str = SIM
     attached: TestbedFile | None = None
+    origins: dict[str, str] = field(default_factory=dict, compare=False)
 
     @property
     def described(self) -> TestbedFile:
@@ -67,7 +70,16 @@ class Bundle:
         with tempfile.TemporaryDirectory(prefix="cspm-") as place:
             for name, content in self.files.items():
                 (Path(place) / name).write_bytes(content)
-            yield Path(place)
+            try:
+                yield Path(place)
+            except InputError as err:
+                raise InputError(self._by_origin(str(err), Path(place))) from None
+
+    def _by_origin(self, text: str, place: Path) -> str:
+        """Return an error's text with the user's files in place of their copies."""
+        for name in self.files:
+            text = text.replace(str(place / name), self.origins.get(name, name))
+        return text
 
 
 def make_bundle(scenario: Scenario, testbed: TestbedFile, folder: Path) -> Bundle:
@@ -77,14 +89,17 @@ def make_bundle(scenario: Scenario, testbed: TestbedFile, folder: Path) -> Bundl
         InputError: a file that a motion reads cannot be read.
     """
     files: dict[str, bytes] = {}
+    origins: dict[str, str] = {}
 
     def contained(body: Body, role: str) -> Body:
         motion = body.motion
         if isinstance(motion, FileMotion):
             name = _take(folder / motion.path, role, files)
+            origins[name] = str(folder / motion.path)
             return body.model_copy(update={"motion": motion.model_copy(update={"path": name})})
         if isinstance(motion, VesselMotion):
             name = _take(folder / motion.rao, role, files)
+            origins[name] = str(folder / motion.rao)
             return body.model_copy(update={"motion": motion.model_copy(update={"rao": name})})
         return body
 
@@ -93,7 +108,7 @@ def make_bundle(scenario: Scenario, testbed: TestbedFile, folder: Path) -> Bundl
         "winch_frame": contained(scenario.winch_frame, "winch_frame"),
         "target": contained(scenario.target, "target"),
     }
-    return Bundle(scenario.model_copy(update=changes), testbed, files)
+    return Bundle(scenario.model_copy(update=changes), testbed, files, origins=origins)
 
 
 def read_bundle(attachments: Mapping[str, bytes], source: str) -> Bundle:

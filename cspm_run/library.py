@@ -4,12 +4,17 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterable
 from pathlib import Path
+from typing import overload
 
 from cspm_msgs_py.errors import InputError
+from cspm_msgs_py.testbed import TestbedFile, load_testbed
+
+# Groups of scenarios with a folder of their own.
+GROUPS = ("steep", "operation", "robots")
 
 
-def scenario_folders() -> list[Path]:
-    """Return where scenarios are looked for: the source tree, then the installation's `share`.
+def library_folders() -> list[Path]:
+    """Return where the library may be: the source tree, then the installation's `share`.
 
     An installation is whatever holds this package: an environment, `~/.local`, or the prefix of a
     colcon workspace, each as `PREFIX/lib/python3.X/site-packages`.
@@ -19,6 +24,12 @@ def scenario_folders() -> list[Path]:
     return [package.parent / "scenarios", *installed]
 
 
+def scenario_folders() -> list[Path]:
+    """Return where scenarios are looked for."""
+    groups = (".", *GROUPS)
+    return [folder / group for folder in library_folders() for group in groups]
+
+
 def scenario_names() -> list[str]:
     """Return the names of all scenarios that come with the package."""
     return sorted({path.stem for folder in scenario_folders() for path in folder.glob("*.yaml")})
@@ -26,7 +37,7 @@ def scenario_names() -> list[str]:
 
 def testbed_names() -> list[str]:
     """Return the names of all test-beds that come with the package."""
-    folders = [folder / "testbeds" for folder in scenario_folders()]
+    folders = [folder / "testbeds" for folder in library_folders()]
     return sorted({path.stem for folder in folders for path in folder.glob("*.yaml")})
 
 
@@ -45,8 +56,21 @@ def find_testbed(name: str) -> Path:
     Raises:
         InputError: there is none; the line lists the library.
     """
-    folders = [folder / "testbeds" for folder in scenario_folders()]
+    folders = [folder / "testbeds" for folder in library_folders()]
     return _find(name, "test-bed", folders, testbed_names)
+
+
+@overload
+def named_testbed(name: Path | str) -> TestbedFile: ...
+@overload
+def named_testbed(name: None) -> None: ...
+def named_testbed(name: Path | str | None) -> TestbedFile | None:
+    """Return the file that an option such as `--testbed thesis` means, None without one.
+
+    Raises:
+        InputError: there is none, which names the library; or a key with a fault.
+    """
+    return None if name is None else load_testbed(find_testbed(str(name)))
 
 
 def _find(name: str, kind: str, folders: Iterable[Path], names: Callable[[], list[str]]) -> Path:

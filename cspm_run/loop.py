@@ -36,39 +36,51 @@ class Loop:
     """One run in one process; `step` advances it by one plant period.
 
     After a step `slack` and `infeasible` describe the state that was just published.
+
+    Attributes:
+        parts: what is stepped.
+        schedule: of the run.
+        simulator: the plant and its sensors.
+        known: the latest row of each topic.
+        distribution: the stage that distributes tensions, if there is one.
+        guards: the stages that have a safe state.
+        publish_status: where statuses go.
+        last_feasible: when the wrench could be met last [s].
     """
 
     def __init__(
         self, parts: Assembly, publish: Mapping[str, Publish], publish_status: PublishStatus
     ) -> None:
         """Take the parts, and where messages go: by topic; topics that are absent are not sent."""
+        self.parts = parts
         self._publish = publish
-        self._publish_status = publish_status
-        self._schedule = schedule = parts.schedule
-        self._simulator = Simulator(
+        self.publish_status = publish_status
+        self.schedule = schedule = parts.schedule
+        self.simulator = Simulator(
             parts.plant,
             parts.sensors,
             publish,
             period_ns=parts.period_ns,
             controlled=parts.controlled,
+            target=parts.target,
         )
-        self._known = self._simulator.measured
-        self._known[TORQUE_COMMAND] = self._simulator.torque
+        self.known = self.simulator.measured
+        self.known[TORQUE_COMMAND] = self.simulator.torque
         self._due = [_Due(stage, schedule.nodes[stage.node]) for stage in parts.stages]
         found = [stage for stage in parts.stages if isinstance(stage, DistributionStage)]
-        self._distribution = found[0] if found else None
-        self._guards = [stage for stage in parts.stages if isinstance(stage, GuardedStage)]
-        self._last_feasible = 0.0
+        self.distribution = found[0] if found else None
+        self.guards = [stage for stage in parts.stages if isinstance(stage, GuardedStage)]
+        self.last_feasible = 0.0
 
     @property
     def slack(self) -> bool:
         """Whether any cable is slack."""
-        return self._simulator.slack
+        return self.simulator.slack
 
     @property
     def infeasible(self) -> bool:
         """Whether the last wrench cannot be met within the tension limits."""
-        return self._distribution is not None and self._distribution.infeasible
+        return self.distribution is not None and self.distribution.infeasible
 
     def step(self) -> None:
         """Publish everything that belongs to the current instant, then advance the plant.
@@ -77,33 +89,37 @@ class Loop:
             DivergenceError: the plant left the range of its equations, or the bar that is to be
                 controlled has turned over.
         """
-        simulator = self._simulator
+        simulator = self.simulator
         step, now = simulator.plant.steps, simulator.now_ns
         simulator.observe()
-        if step % self._schedule.plant_status_divider == 0:
-            self._publish_status(now, simulator.status())
+        if step % self.schedule.plant_status_divider == 0:
+            self.publish_status(now, simulator.status())
         for stage, plan in self._due:
             if step >= plan.first and step % plan.divider == 0:
-                stage.step(now, self._known, self._send)
+                stage.step(now, self.known, self._send)
                 if step % plan.status_divider == 0:
-                    self._publish_status(now, stage.status())
-        if any(guard.brake for guard in self._guards):
-            simulator.plant.locked = True
+                    self.publish_status(now, stage.status())
+        self.set_brakes()
         if not self.infeasible:
-            self._last_feasible = now * 1e-9
-        simulator.torque = self._known[TORQUE_COMMAND]
+            self.last_feasible = now * 1e-9
+        simulator.torque = self.known[TORQUE_COMMAND]
         simulator.advance()
+
+    def set_brakes(self) -> None:
+        """Set the brakes where a guard wants them."""
+        if any(guard.brake for guard in self.guards):
+            self.simulator.plant.locked = True
 
     def history(self) -> str:
         """Return what preceded the current instant, in words, for the report of a divergence."""
-        events = self._simulator.history()
+        events = self.simulator.history()
         if self.infeasible:
-            events.insert(0, f"wrench infeasible since {self._last_feasible:.3f} s")
+            events.insert(0, f"wrench infeasible since {self.last_feasible:.3f} s")
         return "before it: " + "; ".join(events) if events else "nothing unusual before it"
 
     def _send(self, topic: str, row: Array) -> None:
-        self._known[topic] = row
+        self.known[topic] = row
         publish = self._publish.get(topic)
         if publish is not None:
-            now = self._simulator.now_ns
+            now = self.simulator.now_ns
             publish(now, now, row)

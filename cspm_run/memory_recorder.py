@@ -35,6 +35,12 @@ class KeptChannel:
         self.stamps.append(stamp_ns)
         self.contents.append(row.tobytes())
 
+    def append_rows(self, logs_ns: list[int], stamps_ns: list[int], content: bytes) -> None:
+        """Keep messages: when they are recorded and valid [ns], and the bytes of their rows."""
+        self.logs += logs_ns
+        self.stamps += stamps_ns
+        self.contents.append(content)
+
 
 class _Part(NamedTuple):
     """The messages of one topic; `rows` of a topic with rows, else `payloads`."""
@@ -60,6 +66,10 @@ class MemoryRecorder:
         """Keep messages of these topics, by name, in the order of a recording."""
         self.topics = dict(topics)
         self._channels = {name: KeptChannel() for name in topics}
+
+    def takes(self, name: str) -> bool:
+        """Return whether messages of a topic are kept."""
+        return name in self._channels
 
     def channel(self, name: str) -> KeptChannel:
         """Return the channel of a topic.

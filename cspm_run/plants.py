@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Collection, Mapping, Sequence
 from importlib import import_module
 from importlib.metadata import version as metadata_version
 
@@ -31,6 +32,7 @@ def make_plant(
     bar_pose: Array | None,
     tensions: Array | None,
     locked: bool,
+    cuts: Mapping[int, Sequence[int]],
 ) -> AnyPlant:
     """Return the plant of this name, at rest; see `cspm_sim.plant.Plant` for the arguments.
 
@@ -42,17 +44,34 @@ def make_plant(
         from cspm_sim.plant import Plant
 
         return Plant(
-            testbed, frame_motion, period_ns, bar_pose=bar_pose, tensions=tensions, locked=locked
+            testbed,
+            frame_motion,
+            period_ns,
+            bar_pose=bar_pose,
+            tensions=tensions,
+            locked=locked,
+            cuts=cuts,
         )
     if name != MUJOCO:
         raise InputError(f"plant {name}: allowed: {', '.join(PLANTS)}")
     require_mujoco(f"plant {name}")
+    refuse_cuts(name, cuts)
     from cspm_sim.mujoco.plant import MujocoPlant
 
     motion = frame_motion.at
     return MujocoPlant(
         testbed, motion, period_ns, bar_pose=bar_pose, tensions=tensions, locked=locked
     )
+
+
+def refuse_cuts(plant: str, cuts: Collection[object]) -> None:
+    """Refuse cuts where nothing can cut a cable.
+
+    Raises:
+        InputError: there are any.
+    """
+    if cuts:
+        raise InputError(f"events: plant {plant} cannot cut a cable, allowed: none, or plant {SIM}")
 
 
 def require_mujoco(what: str) -> None:

@@ -4,9 +4,10 @@ from __future__ import annotations
 
 from pathlib import Path
 
+from cspm_model.cable_strength import strength_warnings
 from cspm_msgs_py.recording.overview import overview
-from cspm_msgs_py.scenario import ClosedLoop
 from cspm_run.bundle import Bundle
+from cspm_run.controlled_dofs import controlled_dofs
 from cspm_run.recorded_statistics import recording_statistics
 from cspm_run.recorded_timing import first_alarm, timing_of
 from cspm_run.run_result import RunResult
@@ -32,18 +33,20 @@ def recorded_result(
         InputError: the recording cannot be read.
     """
     scenario, testbed = bundle.scenario, bundle.testbed.testbed
+    statistics = recording_statistics(folder, testbed)
     return RunResult(
         scenario=scenario.name,
         seed=scenario.seed,
         mode=mode,
         simulated=simulated,
         elapsed=elapsed,
-        statistics=recording_statistics(folder, testbed),
+        statistics=statistics,
         messages={topic.name: topic.count for topic in overview(folder).topics},
         folder=folder.absolute(),
-        controlled=isinstance(scenario.control, ClosedLoop),
+        controlled=controlled_dofs(scenario),
         has_bar=testbed.bar is not None,
         interrupted=interrupted and failure is None,
         failure=failure or first_alarm(folder),
+        warnings=strength_warnings(testbed, statistics.highest_tensions),
         timing=timing_of(folder) if timed else {},
     )

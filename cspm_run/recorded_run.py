@@ -2,14 +2,12 @@
 
 from __future__ import annotations
 
-import time
 from collections.abc import Callable, Mapping
 from importlib.metadata import version
 from pathlib import Path
 from typing import Protocol
 
-import numpy as np
-
+from cspm_model.cable_strength import strength_warnings
 from cspm_msgs_py.diagnostics import Level, Status, encode_diagnostics
 from cspm_msgs_py.errors import DivergenceError
 from cspm_msgs_py.interruption import interruptible
@@ -18,13 +16,15 @@ from cspm_msgs_py.schedule import schedule_of
 from cspm_msgs_py.topics import DIAGNOSTICS, Topic
 from cspm_run.assembly import Assembly, assemble
 from cspm_run.bundle import Bundle
+from cspm_run.compiled.compiled_loop import TakeBlock
+from cspm_run.controlled_dofs import controlled_dofs
 from cspm_run.loop import Loop
 from cspm_run.run_result import RunResult
 from cspm_run.run_statistics import RunStatistics
+from cspm_run.stepping import Stepping
 from cspm_sim.simulator import Publish
 
 CONTRACT_VERSION = "1"
-PROGRESS_STEPS = 50
 INPROCESS = "inprocess"
 
 
@@ -38,6 +38,9 @@ class Recorder(Protocol):
     @property
     def counts(self) -> dict[str, int]:
         """How many messages were taken, by topic; complete once closed."""
+
+    def takes(self, name: str) -> bool:
+        """Return whether messages of a topic are taken."""
 
     def channel(self, name: str) -> TakesRows:
         """Return what takes the messages of a topic with rows."""
@@ -55,6 +58,10 @@ class TakesRows(Protocol):
     @property
     def append(self) -> Publish:
         """Takes log time and stamp [ns], and the row."""
+
+    @property
+    def append_rows(self) -> TakeBlock:
+        """Takes log times and stamps [ns], and the rows' bytes."""
 
 
 def run(
@@ -152,38 +159,35 @@ def simulate(
 
     Args:
         parts: what to step.
-        writer: takes the topics of the parts' schedule; None records nothing.
+        writer: takes topics of the parts' schedule; None records nothing.
         progress: called now and then with the time simulated so far [s].
         steps: of the plant.
     """
     scenario, plant = parts.scenario, parts.plant
     statistics = RunStatistics(steps, len(plant.tensions))
     publish: Mapping[str, Publish] = {}
+    take: Mapping[str, TakeBlock] = {}
     if writer is not None:
-        publish = {name: writer.channel(name).append for name in parts.schedule.topics}
+        names = [name for name in parts.schedule.topics if writer.takes(name)]
+        channels = {name: writer.channel(name) for name in names}
+        publish = {name: channel.append for name, channel in channels.items()}
+        take = {name: channel.append_rows for name, channel in channels.items()}
 
     alarms: list[str] = []
 
     def publish_status(now_ns: int, status: Status) -> None:
         if status.level == Level.ERROR and not alarms:
             alarms.append(f"{status.name}: {status.message}")
-        if writer is not None:
+        if writer is not None and writer.takes(DIAGNOSTICS.name):
             writer.append_payload(DIAGNOSTICS.name, now_ns, encode_diagnostics(now_ns, [status]))
 
     loop = Loop(parts, publish, publish_status)
-    failure = None
+    stepping, failure = Stepping(loop, statistics, take, steps), None
     with interruptible() as interrupted:
-        began = time.perf_counter()
         try:
-            # The first step of all compiles the kernels; it is no part of the speed.
-            _advance(loop, parts, statistics, 1)
-            began = time.perf_counter()
-            while plant.steps < steps and not interrupted():
-                _advance(loop, parts, statistics, min(PROGRESS_STEPS, steps - plant.steps))
-                progress(plant.time)
+            stepping.run(progress, interrupted)
         except DivergenceError as err:
-            failure = f"{err}; {loop.history()}"
-        elapsed = time.perf_counter() - began
+            failure = f"{err}; {stepping.history()}"
         stopped = interrupted()
     if writer is not None:
         writer.close()
@@ -192,24 +196,13 @@ def simulate(
         seed=scenario.seed,
         mode=INPROCESS,
         simulated=plant.time,
-        elapsed=elapsed,
+        elapsed=stepping.elapsed,
         statistics=statistics,
         messages=writer.counts if writer is not None else {},
         folder=writer.folder if writer is not None else None,
-        controlled=parts.controlled,
+        controlled=controlled_dofs(scenario),
         has_bar=parts.testbed.bar is not None,
         interrupted=stopped and failure is None,
         failure=failure or (alarms[0] if alarms else None),
+        warnings=strength_warnings(parts.testbed, statistics.highest_tensions),
     )
-
-
-def _advance(loop: Loop, parts: Assembly, statistics: RunStatistics, steps: int) -> None:
-    plant = parts.plant
-    reference = parts.references.get("/bar/reference")
-    zero = np.zeros(6)
-    for _ in range(steps):
-        bar_pose = plant.bar_state[:6].copy()
-        tensions = plant.tensions.copy()
-        loop.step()
-        error = reference.values[:6] - bar_pose if reference else zero
-        statistics.add(error, tensions, loop.slack, loop.infeasible)

@@ -21,10 +21,11 @@ class RunResult:
         statistics: errors and tensions.
         messages: how many messages each topic got.
         folder: the recording, if one was made.
-        controlled: whether a closed loop was to follow the reference.
+        controlled: the DOFs in which a closed loop was to follow the reference, if any.
         has_bar: whether the errors mean anything.
         interrupted: whether the user ended it early.
         failure: what went wrong, in one line, if anything did.
+        warnings: what is not as it should be though the run went on, a line each.
         timing: in real time, what each node reported of its deadlines and inputs, by node.
     """
 
@@ -36,10 +37,11 @@ class RunResult:
     statistics: RunStatistics
     messages: dict[str, int]
     folder: Path | None
-    controlled: bool
+    controlled: tuple[str, ...]
     has_bar: bool
     interrupted: bool = False
     failure: str | None = None
+    warnings: tuple[str, ...] = ()
     timing: dict[str, dict[str, float]] = field(default_factory=dict)
 
     @property

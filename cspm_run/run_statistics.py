@@ -17,6 +17,8 @@ class RunStatistics:
     Attributes:
         envelope: shape (BINS, 2, 6 + n): lowest and highest pose error and tension per time bin.
         bin_steps: plant steps per bin.
+        squares: sums of the squared pose errors, (6,).
+        counts: steps, and those with a slack cable and with a wrench not met.
     """
 
     def __init__(self, steps: int, n_cables: int) -> None:
@@ -24,16 +26,18 @@ class RunStatistics:
         self.bin_steps = max(1, -(-steps // BINS))
         self.envelope: Array = np.empty((BINS, 2, 6 + n_cables))
         self.envelope[:, 0], self.envelope[:, 1] = np.inf, -np.inf
-        self.steps = 0
-        self._squares = np.zeros(6)
-        self._counts = np.zeros(2, dtype=np.int64)
+        self.squares = np.zeros(6)
+        self.counts = np.zeros(3, dtype=np.int64)
 
     def add(self, error: Array, tensions: Array, slack: bool, infeasible: bool) -> None:
         """Count one step with pose error (6,) [m, rad] and tensions (n,) [N]."""
-        _add(self.envelope[self.steps // self.bin_steps], error, tensions, self._squares)
-        self.steps += 1
-        self._counts[0] += slack
-        self._counts[1] += infeasible
+        add_step(self.envelope[self.steps // self.bin_steps], error, tensions, self.squares)
+        self.counts += (1, slack, infeasible)
+
+    @property
+    def steps(self) -> int:
+        """How many steps were counted."""
+        return int(self.counts[0])
 
     @property
     def max_error(self) -> Array:
@@ -44,7 +48,7 @@ class RunStatistics:
     @property
     def rms_error(self) -> Array:
         """Root mean square pose error (6,) [m, rad]."""
-        return np.sqrt(self._squares / max(1, self.steps))
+        return np.sqrt(self.squares / max(1, self.steps))
 
     @property
     def tension_range(self) -> tuple[float, float]:
@@ -53,21 +57,28 @@ class RunStatistics:
         return (float(used.min()), float(used.max())) if used.size else (0.0, 0.0)
 
     @property
+    def highest_tensions(self) -> Array:
+        """Highest tension of each cable (n,) [N]; before the first step 0."""
+        used = self._used()[:, 1, 6:]
+        return np.asarray(used.max(axis=0)) if len(used) else np.zeros(self.envelope.shape[2] - 6)
+
+    @property
     def slack_share(self) -> float:
         """Share of time with any cable slack."""
-        return float(self._counts[0] / max(1, self.steps))
+        return float(self.counts[1] / max(1, self.steps))
 
     @property
     def infeasible_share(self) -> float:
         """Share of time with a wrench that no allowed tensions give."""
-        return float(self._counts[1] / max(1, self.steps))
+        return float(self.counts[2] / max(1, self.steps))
 
     def _used(self) -> Array:
         return self.envelope[: -(-self.steps // self.bin_steps)]
 
 
 @njit(cache=True)
-def _add(envelope: Array, error: Array, tensions: Array, squares: Array) -> None:
+def add_step(envelope: Array, error: Array, tensions: Array, squares: Array) -> None:
+    """Count pose error (6,) and tensions (n,) in a bin's envelope (2, 6 + n) and the squares."""
     for d in range(6):
         squares[d] += error[d] * error[d]
         envelope[0, d] = min(envelope[0, d], error[d])

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import sys
 from pathlib import Path
 from typing import Any
 
@@ -13,7 +14,11 @@ from rich.table import Table
 
 from cspm_msgs_py.dofs import DOFS
 from cspm_msgs_py.scenario import Requirement
+from cspm_run.console import say
 from cspm_run.run_result import RunResult
+
+# Names standard output instead of a file.
+STANDARD_OUTPUT = Path("-")
 
 
 def summary_data(result: RunResult) -> dict[str, Any]:
@@ -31,17 +36,26 @@ def summary_data(result: RunResult) -> dict[str, Any]:
         "tension": {"min": low, "max": high},
         "slack_share": statistics.slack_share,
         "infeasible_share": statistics.infeasible_share,
+        "controlled": list(result.controlled),
         "messages": result.messages,
+        "warnings": list(result.warnings),
     } | ({"realtime": result.timing} if result.timing else {})
 
 
 def write_json(path: Path, data: Any) -> None:  # noqa: ANN401 - any plain data
-    """Write plain data as JSON."""
-    path.write_text(json.dumps(data, indent=2) + "\n", encoding="utf-8")
+    """Write plain data as JSON; to standard output where the path is `-`."""
+    text = json.dumps(data, indent=2) + "\n"
+    if path == STANDARD_OUTPUT:
+        sys.stdout.write(text)
+    else:
+        path.write_text(text, encoding="utf-8")
 
 
 def print_summary(console: Console, result: RunResult, requirement: Requirement) -> None:
-    """Print pose errors (against the requirement where a controller ran), tensions and speed."""
+    """Print pose errors (against the requirement where a controller ran), tensions and speed.
+
+    And what the run warns of.
+    """
     data = summary_data(result)
     if result.has_bar and result.statistics.steps:
         console.print(_error_table(result, data["errors"], requirement))
@@ -53,6 +67,8 @@ def print_summary(console: Console, result: RunResult, requirement: Requirement)
         f" within the tension limits {data['infeasible_share']:.1%} of the time",
         soft_wrap=True,
     )
+    for line in result.warnings:
+        say(console, f"warning: {line}")
     console.print(f"simulated {result.simulated:g} s at {result.real_time_factor:.1f} × real time")
 
 
@@ -61,7 +77,7 @@ def _error_table(
 ) -> Table:
     what = "reference − pose" if result.controlled else "mean pose − pose, nothing controls it"
     table = Table(title=f"{escape(result.scenario)}, seed {result.seed}: {what}")
-    columns = ["", "max", "RMS"] + ["required", "within"] * result.controlled
+    columns = ["", "max", "RMS"] + ["required", "within"] * bool(result.controlled)
     for column in columns:
         table.add_column(column, justify="right" if column else "left")
     for i, dof in enumerate(DOFS):

@@ -97,6 +97,16 @@ def test_a_file_that_cannot_be_read_is_one_line(scenario_path):
     )
 
 
+def test_errors_name_the_users_file_and_not_its_copy(scenario_path):
+    bundle = bundle_of(scenario_path)
+    name = next(iter(bundle.files))
+    with pytest.raises(InputError) as caught, bundle.unpacked() as place:
+        raise InputError(f"{place / name}: line 3: nonsense")
+    origin = bundle.origins[name]
+    assert str(caught.value) == f"{origin}: line 3: nonsense"
+    assert str(scenario_path.parent) in origin
+
+
 @pytest.mark.parametrize(
     ("attachments", "text"),
     [

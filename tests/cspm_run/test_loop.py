@@ -122,11 +122,11 @@ def test_every_part_runs_at_its_own_rate():
     for topic in ("/clock", "/truth/bar/pose", "/truth/cables/unstretched_length"):
         np.testing.assert_array_equal(found.stamp(topic), stamps(1000, 0.4))
     for node in ("plant", "wave_trajectory", "motion_controller", "force_controller"):
-        told = [now for now, _ in found.statuses_of(node)]
-        assert told == [0, 100_000_000, 200_000_000, 300_000_000]
+        reported = [now for now, _ in found.statuses_of(node)]
+        assert reported == [0, 100_000_000, 200_000_000, 300_000_000]
     # At 125 Hz no computation falls on a multiple of 0.1 s; the next one does.
-    told = [now for now, _ in found.statuses_of("tension_distribution")]
-    assert told == [0, 104_000_000, 208_000_000, 312_000_000]
+    reported = [now for now, _ in found.statuses_of("tension_distribution")]
+    assert reported == [0, 104_000_000, 208_000_000, 312_000_000]
 
 
 def test_the_plants_rate_sets_the_grid():
@@ -180,7 +180,7 @@ def test_all_is_well_at_rest():
     assert found.loop.history().startswith("before it: bar at [")
 
 
-def test_slack_cables_are_told():
+def test_slack_cables_are_reported():
     unwinding = "control={mode: torque, torque: {surge_1: {offset: -0.2}}}"
     found = after(bundle_of("rest", unwinding), 400)
     tensions = found.rows("/truth/cables/tension")
@@ -191,7 +191,7 @@ def test_slack_cables_are_told():
     assert f"slack since {(first - 1) * 1e-3:.3f} s (surge_1)" in found.loop.history()
     now, plant = found.statuses_of("plant")[-1]
     assert (now, plant.level, plant.message) == (300_000_000, Level.WARN, "slack cable")
-    shares = [float(told.values["slack_share"]) for _, told in found.statuses_of("plant")]
+    shares = [float(reported.values["slack_share"]) for _, reported in found.statuses_of("plant")]
     expected = (tensions <= 0.0).any(axis=1)
     # A status counts the steps since the last one, its own among them.
     np.testing.assert_allclose(
@@ -199,7 +199,7 @@ def test_slack_cables_are_told():
     )
 
 
-def test_a_wrench_out_of_reach_is_told():
+def test_a_wrench_out_of_reach_is_reported():
     asked = "control={mode: closed_loop, motion: {gains: {surge: {kp: 9000, ki: 0, kd: 0}}}}"
     calm = after(bundle_of("rest", asked), 50)
     assert not calm.loop.infeasible

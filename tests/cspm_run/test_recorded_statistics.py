@@ -22,7 +22,7 @@ def both(tmp_path, scenario, *overrides, steps):
     return result.statistics, recording_statistics(tmp_path / "bag", bundle.testbed.testbed)
 
 
-def assert_alike(kept, found):
+def assert_equal(kept, found):
     assert found.steps == kept.steps
     np.testing.assert_allclose(found.max_error, kept.max_error, rtol=1e-9, atol=1e-14)
     np.testing.assert_allclose(found.rms_error, kept.rms_error, rtol=1e-9, atol=1e-14)
@@ -37,14 +37,14 @@ def assert_alike(kept, found):
 )
 def test_a_recording_amounts_to_what_the_run_did(tmp_path, scenario, steps):
     kept, found = both(tmp_path, scenario, steps=steps)
-    assert_alike(kept, found)
+    assert_equal(kept, found)
     assert kept.infeasible_share == pytest.approx(found.infeasible_share, abs=0.05)
 
 
 def test_slack_cables_are_counted(tmp_path):
     kept, found = both(tmp_path, "rest", UNWINDING, steps=400)
     assert 0.0 < kept.slack_share < 1.0
-    assert_alike(kept, found)
+    assert_equal(kept, found)
 
 
 def test_wrenches_out_of_reach_are_counted(tmp_path):
@@ -119,7 +119,7 @@ def test_a_turn_is_no_error(tmp_path):
 
 
 @pytest.mark.parametrize(
-    ("told", "expected"),
+    ("reported", "expected"),
     [
         ([], 0.0),
         (["0.5"], 0.5),
@@ -128,12 +128,12 @@ def test_a_turn_is_no_error(tmp_path):
         (["0", "many"], 0.0),
     ],
 )
-def test_shares_are_those_that_the_distribution_told(tmp_path, told, expected):
+def test_shares_are_those_that_the_distribution_reported(tmp_path, reported, expected):
     bundle = bundle_of("rest")
     with new_recording(bundle, tmp_path / "bag", "graph") as writer:
         for step in range(10):
             writer.channel("/truth/cables/tension").append(step * MS, step * MS, np.ones(8))
-        for i, share in enumerate(told):
+        for i, share in enumerate(reported):
             statuses = [
                 (0, "plant", "ok", {"infeasible_share": "1"}),
                 (0, "tension_distribution", "ok", {"infeasible_share": share}),

@@ -47,14 +47,14 @@ def cut(folder, target, size):
 
 
 def test_a_run_repeats_itself(folder):
-    told = []
-    found = resimulate(folder, lambda now, total: told.append((now, total)))
+    reported = []
+    found = resimulate(folder, lambda now, total: reported.append((now, total)))
     assert found.difference is None
     assert found.cut_ns is None
     assert found.same_version
     with Recording(folder) as recording:
         assert found.messages == sum(info.count for info in recording.topics.values())
-    assert told[-1] == (pytest.approx(0.4), pytest.approx(0.4))
+    assert reported[-1] == (pytest.approx(0.4), pytest.approx(0.4))
 
 
 @pytest.mark.parametrize("scenario", ["one_winch", "verification_mid", "rest"])
@@ -114,7 +114,7 @@ def test_another_seed_in_the_attachment_is_a_difference(folder, tmp_path):
     assert found.index == 0
 
 
-def test_another_version_is_told(folder, tmp_path):
+def test_another_version_is_reported(folder, tmp_path):
     found = again(rewrite(folder, tmp_path / "old", metadata={"package_version": "0.0.1"}))
     assert found.recorded_version == "0.0.1"
     assert not found.same_version
@@ -213,7 +213,7 @@ def test_without_clock_there_is_nothing_to_repeat(folder, tmp_path):
 def test_a_recording_cut_anywhere_repeats_itself(folder, tmp_path):
     [file] = folder.glob("*.mcap")
     first = chunk_spans(folder)[0][1]
-    sizes = random.Random(3).sample(range(first, file.stat().st_size), 25)
+    sizes = random.Random(3).sample(range(first, file.stat().st_size), 12)
     for size in sizes:
         broken = cut(folder, tmp_path / f"cut{size}", size)
         recover(broken)

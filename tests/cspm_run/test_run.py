@@ -192,7 +192,11 @@ def test_the_recording_says_what_was_run(folder):
         assert recording.attachments == bundle.attachments()
         assert recording.metadata["cspm"] == metadata(bundle, "inprocess")
     found = overview(folder)
-    assert (found.scenario, found.testbed, found.complete) == ("worst_case", "thesis", True)
+    assert (found.scenario, found.testbed, found.complete) == (
+        "worst_case",
+        "thesis_refitted",
+        True,
+    )
     assert metadata(bundle, "inprocess") == {
         "contract_version": "1",
         "scenario": "worst_case",
@@ -200,19 +204,19 @@ def test_the_recording_says_what_was_run(folder):
         "mode": "inprocess",
         "plant": "sim",
         "package_version": version("cspm"),
-        "testbed": "thesis",
+        "testbed": "thesis_refitted",
         "testbed_sha256": bundle.testbed.sha256,
     }
 
 
-def test_a_run_lasts_as_long_as_its_scenario_or_as_told(tmp_path):
-    told = []
-    result = run(bundle_of("one_winch", "duration=0.234"), tmp_path / "bag", told.append)
+def test_a_run_lasts_as_long_as_its_scenario_or_as_requested(tmp_path):
+    reported = []
+    result = run(bundle_of("one_winch", "duration=0.234"), tmp_path / "bag", reported.append)
     assert result.simulated == pytest.approx(0.234)
     assert not result.interrupted
     assert result.failure is None
-    assert told == sorted(told)
-    assert told[-1] == pytest.approx(0.234)
+    assert reported == sorted(reported)
+    assert reported[-1] == pytest.approx(0.234)
     assert result.messages["/clock"] == 234
     assert result.real_time_factor == result.simulated / result.elapsed > 0.0
     assert run(bundle_of("one_winch"), None, steps=1).simulated == pytest.approx(0.001)

@@ -4,47 +4,66 @@ import numpy as np
 import pytest
 from run_samples import SCENARIOS, bundle_of, run_to
 
+from cspm_msgs_py.dofs import DOFS
 from cspm_msgs_py.errors import InputError
 from cspm_msgs_py.scenario import load_scenario
-from cspm_run.library import find_scenario, scenario_names
+from cspm_run.library import GROUPS, find_scenario, scenario_names
 from cspm_run.recorded_run import run
 
-NAMES = sorted(path.stem for path in SCENARIOS.glob("*.yaml"))
-WAVES = ["calm", "worst_case", "worst_case_4m", "worst_case_literal"]
-POSITION, ANGLE = 0.002, 0.004
+NAMES = sorted(
+    path.stem for folder in (".", *GROUPS) for path in (SCENARIOS / folder).glob("*.yaml")
+)
+WAVES = [
+    *("calm", "calm_4m", "calm_broadband"),
+    *("worst_case", "worst_case_4m", "worst_case_steep", "worst_case_literal"),
+]
+CUT = ["calm_cut_cable", "worst_case_cut_cable"]
+ANGLE = 0.004
 
 
 def test_the_library_is_complete():
-    wanted = {*WAVES, "rest", *(f"verification_{length}" for length in ("short", "mid", "long"))}
+    wanted = {
+        *WAVES,
+        *CUT,
+        *("rest", "calm_measured_target", "manual_hoist"),
+        *(f"verification_{length}" for length in ("short", "mid", "long")),
+    }
     assert wanted <= set(NAMES)
-    assert set(NAMES) <= set(scenario_names())
+    files = [path for path in SCENARIOS.rglob("*.yaml") if "testbed:" in path.read_text()]
+    assert {path.stem for path in files} == set(NAMES)
 
 
 @pytest.mark.parametrize("name", NAMES)
 def test_each_says_what_it_is(name):
-    scenario = load_scenario(SCENARIOS / f"{name}.yaml")
+    scenario = load_scenario(find_scenario(name))
     assert scenario.name == name
     assert len(scenario.description) > 40
-    assert (SCENARIOS / scenario.testbed).is_file()
+    assert (find_scenario(name).parent / scenario.testbed).is_file()
 
 
 @pytest.mark.compiled
 @pytest.mark.parametrize("name", NAMES)
 def test_each_runs_for_two_seconds(name, tmp_path):
-    result, rows = run_to(tmp_path / name, name, "duration=2.0")
+    scenario = load_scenario(find_scenario(name))
+    events, required = scenario.events, scenario.requirement
+    sooner = f"events={[{'at': 1.0, 'cut': event.cut} for event in events]}"
+    tracks = "operation=[]"
+    result, rows = run_to(tmp_path / name, name, "duration=2.0", sooner, tracks)
     assert result.failure is None
     assert result.simulated == pytest.approx(2.0)
     assert len(rows["/clock"].stamp_ns) == 2000
     for topic, found in rows.items():
         assert np.isfinite(found.rows).all(), topic
     low, high = result.statistics.tension_range
-    assert 0.0 <= low <= high < 100.0
     cables = bundle_of(name).testbed.testbed.cables
+    limits = [cable.tension_limits[1] for cable in cables if cable.tension_limits]
+    assert 0.0 <= low <= high < max([100.0, *limits])
     assert (low < high) == any(cable.stiffness is not None for cable in cables)
     if result.controlled:
-        errors = result.statistics.max_error
-        assert errors[:3].max() < 5 * POSITION
-        assert errors[4:].max() < 5 * ANGLE
+        errors = dict(zip(DOFS, result.statistics.max_error, strict=True))
+        for dof in result.controlled:
+            limit = required.position if dof in DOFS[:3] else required.angle
+            assert errors[dof] < 5 * limit, dof
 
 
 def test_a_name_finds_its_file():
@@ -93,7 +112,7 @@ def test_the_thesis_seas_are_ridden_out():
         assert result.statistics.slack_share < 0.01
         low, high = result.statistics.tension_range
         # The commands stay between 2 N and the limits of 15, 35 and 60 N.
-        assert low > 1.0
+        assert low > 0.5
         assert high < 40.0
     assert (worst.statistics.rms_error > 2 * calm.statistics.rms_error).all()
     assert worst.statistics.infeasible_share > 2 * calm.statistics.infeasible_share
@@ -107,7 +126,8 @@ def test_rest_at_full_length_shows_the_noise_floor():
     assert (result.statistics.rms_error[[0, 1, 2]] < 1e-4).all()
     assert (result.statistics.rms_error[[4, 5]] < 2e-4).all()
     assert result.statistics.rms_error[3] < ANGLE
-    assert result.statistics.infeasible_share == 0.0
+    # The noise of the poses brings a wanted tension to its lower limit now and then.
+    assert result.statistics.infeasible_share < 0.01
 
 
 @pytest.mark.slow
@@ -119,7 +139,7 @@ def test_verification_leaves_the_bar_swinging(length, tmp_path):
     assert result.failure is None
     assert result.statistics.slack_share == 0.0
     stamps = rows["/truth/bar/pose"].stamp_ns
-    still = stamps > 34 * 10**9
+    still = stamps > 42 * 10**9
     surge = rows["/truth/bar/pose"].rows[still, 0]
     assert np.ptp(rows["/winch_frame/reference"].rows[still, 0]) == 0.0
     assert np.ptp(surge) > 0.005

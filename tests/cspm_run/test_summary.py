@@ -81,13 +81,17 @@ def test_summary_has_the_contracts_keys_and_survives_json(measured, tmp_path):
         "tension",
         "slack_share",
         "infeasible_share",
+        "controlled",
         "messages",
+        "warnings",
     ]
     assert (data["scenario"], data["seed"], data["mode"]) == ("worst_case_literal", 1, "inprocess")
     assert data["duration_s"] == pytest.approx(0.6)
     assert list(data["errors"]) == list(DOFS)
+    assert data["warnings"] == []
+    assert data["controlled"] == ["surge", "sway", "heave", "pitch", "yaw"]
     counts = {name: len(found.stamp_ns) for name, found in rows.items()}
-    assert data["messages"] == counts | {"/diagnostics": 5 * 6}  # five nodes tell
+    assert data["messages"] == counts | {"/diagnostics": 5 * 6}  # five nodes report
     write_json(tmp_path / "summary.json", data)
     assert json.loads((tmp_path / "summary.json").read_text()) == data
 

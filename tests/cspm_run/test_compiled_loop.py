@@ -1,0 +1,120 @@
+"""Runs in compiled code are those of the staged loop, bit for bit."""
+
+import numpy as np
+import pytest
+from loop_pairs import assert_same, with_stages
+from loops import WILD
+from run_samples import SCENARIOS, bundle_of
+
+from cspm_msgs_py.diagnostics import Level
+from cspm_msgs_py.scenario import load_scenario
+from cspm_msgs_py.testbed import EffectEntry
+from cspm_run.assembly import assemble
+from cspm_run.library import find_scenario
+
+NAMES = sorted(p.stem for p in SCENARIOS.rglob("*.yaml") if "testbed:" in p.read_text())
+STEPS = 260
+# Of the scenarios' duration, short enough for a governor's plan to take no time.
+SHORT = "duration=0.5"
+
+
+@pytest.mark.compiled
+@pytest.mark.parametrize("name", NAMES)
+def test_every_scenario_is_the_same_bit_for_bit(name):
+    events = load_scenario(find_scenario(name)).events
+    sooner = f"events={[{'at': 0.1, 'cut': event.cut} for event in events]}"
+    assert_same(bundle_of(name, SHORT, sooner, "operation=[]"), STEPS)
+
+
+COMPUTED = "control.motion={law: computed_wrench, mass_adaptation: {}}"
+VARIANTS = {
+    "internals": ("worst_case", "control.record_internals=true", "control.motion.gains=null"),
+    "computed internals": ("worst_case", COMPUTED, "control.record_internals=true"),
+    "qp": ("worst_case", "control.tension_distribution={method: qp}"),
+    "prescribed": (
+        "worst_case",
+        "control.tension_distribution={method: prescribed, null_space: [9, 0, 0]}",
+    ),
+    "removal": ("worst_case", "control.tension_distribution={method: removal}"),
+    "slew": ("worst_case", "safety.torque_slew=1.0"),
+    "trips": ("worst_case", "safety.tension_trip=8.5"),
+    "trips and brakes": ("worst_case", "safety={tension_trip: 8.5, state: brake}"),
+    "other rates": ("worst_case", "rates.motion_capture=200", "rates.winches=500"),
+}
+
+
+@pytest.mark.compiled
+@pytest.mark.parametrize("name", VARIANTS)
+def test_every_setting_is_the_same_bit_for_bit(name):
+    scenario, *settings = VARIANTS[name]
+    assert_same(bundle_of(scenario, SHORT, *settings), STEPS)
+
+
+@pytest.mark.compiled
+def test_it_trips_in_compiled_steps():
+    """The variants above do trip, and do so after the staged steps."""
+    run = assert_same(bundle_of(*VARIANTS["trips"]), STEPS)
+    alarms = [s for s in run.statuses if s.level == Level.ERROR]
+    assert alarms
+    assert "allowed: at most 8.5 N" in alarms[0].message
+
+
+@pytest.mark.compiled
+def test_a_run_that_diverges_ends_at_the_same_step_with_the_same_words():
+    run = assert_same(bundle_of("rest", *WILD), 20_000)
+    assert "infeasible since" in run.failure
+
+
+@pytest.mark.compiled
+@pytest.mark.parametrize(
+    "effect",
+    [
+        ("tension_bias", ("sway_3",), {"bias": 0.4}),
+        ("pose_delay", ("bar",), {"delay": 0.0123}),
+        ("winch_torque_lag", (), {"time_constant": 0.01}),
+        ("winch_backlash", (), {"width": 0.01}),
+    ],
+    ids=lambda each: each[0],
+)
+def test_every_kind_of_effect_is_the_same_bit_for_bit(effect):
+    name, elements, parameters = effect
+    found, entry = (
+        bundle_of("worst_case", SHORT),
+        EffectEntry(effect=name, elements=elements, parameters=parameters),
+    )
+    changed = found.testbed.testbed.model_copy(update={"effects": (entry,)})
+    assert_same(found, STEPS, lambda parts: assemble(parts.scenario, changed, SCENARIOS))
+
+
+class Python:
+    """A stage that is nobody's compiled phase."""
+
+    def __init__(self, stage):
+        self.node, self.status, self._stage = stage.node, stage.status, stage
+
+    def step(self, now_ns, inputs, send):
+        self._stage.step(now_ns, inputs, send)
+
+
+@pytest.mark.compiled
+@pytest.mark.parametrize("node", ["wave_trajectory", "motion_controller", "force_controller"])
+def test_one_stage_in_python_gives_the_same_run(node):
+    change = with_stages(lambda stage: Python(stage) if stage.node == node else stage)
+    assert_same(bundle_of("worst_case", SHORT), STEPS, change)
+
+
+@pytest.mark.compiled
+def test_what_python_reads_is_its_own():
+    """A stage may keep a row that it was given: later steps do not change it."""
+    kept = []
+
+    class Keeps(Python):
+        def step(self, now_ns, inputs, send):
+            row = inputs["/cables/tension"]
+            kept.append((row, row.copy()))
+            super().step(now_ns, inputs, send)
+
+    change = with_stages(lambda stage: Keeps(stage) if stage.node == "force_controller" else stage)
+    assert_same(bundle_of("worst_case", SHORT), 150, change)
+    for row, copy in kept:
+        np.testing.assert_array_equal(row, copy)

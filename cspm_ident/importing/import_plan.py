@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Collection
 from dataclasses import dataclass, replace
+from math import isnan, nan
 
 from cspm_ident.importing.conversion import Conversion, conversion_of
 from cspm_ident.importing.mapping import ChannelSource, Clock, MappingFile
@@ -28,16 +29,25 @@ class PlannedField:
         column: where it comes from, None for a constant.
         constant: its value in SI, None for a column.
         conversion: from raw to SI; None for a constant.
+        source: what the mapping says of it; None where it says nothing.
         clock: name of the clock, empty for a constant.
-        stamps: column of the stamps; None with a rate.
+        stamps: columns of the stamps, which are added up; none with a rate.
+        logged: column of the time of the log, where the stamps are those of headers.
     """
 
     name: str
     column: str | None
     constant: float | None = None
     conversion: Conversion | None = None
+    source: ChannelSource | None = None
     clock: str = ""
-    stamps: str | None = None
+    stamps: tuple[str, ...] = ()
+    logged: str | None = None
+
+    @property
+    def is_unmeasured(self) -> bool:
+        """Whether nothing gives its number, which is NaN."""
+        return self.constant is not None and isnan(self.constant)
 
 
 @dataclass(frozen=True)
@@ -62,10 +72,15 @@ class ImportPlan:
         return list(dict.fromkeys(found))
 
     @property
-    def times(self) -> list[str]:
-        """Columns with stamps, each once."""
-        found = [f.stamps for t in self.topics for f in t.fields if f.stamps is not None]
-        return list(dict.fromkeys(found))
+    def times(self) -> dict[str, str | None]:
+        """Columns with stamps, each with its unit; None where that was not said."""
+        found: dict[str, str | None] = {}
+        for field in (f for t in self.topics for f in t.fields if f.stamps):
+            clock = self.clocks[field.clock]
+            units = clock.units if clock.columns else ("ns",) * len(field.stamps)
+            found |= dict(zip(field.stamps, units, strict=True))
+            found |= {field.logged: "ns"} if field.logged else {}
+        return found
 
 
 def plan_import(mapping: MappingFile, testbed: Testbed, source: Source) -> ImportPlan:
@@ -91,15 +106,10 @@ def plan_import(mapping: MappingFile, testbed: Testbed, source: Source) -> Impor
             )
         key = f"{where}: channels.{name}"
         topic = _topic_with(possible[name], list(fields), key)
-        planned.append(
-            PlannedTopic(
-                topic,
-                tuple(
-                    _field(topic, field, fields[field], clocks, source, f"{key}.{field}")
-                    for field in fields
-                ),
-            )
-        )
+        read = [_field(topic, f, fields[f], clocks, source, f"{key}.{f}") for f in fields]
+        # Load cells on some cables: the others have no number.
+        rest = [PlannedField(f, None, nan) for f in topic.fields if f not in fields]
+        planned.append(PlannedTopic(topic, (*read, *rest) if topic.joint_names else tuple(read)))
         if all(field.column is None for field in planned[-1].fields):
             raise InputError(f"{key}: constants only, allowed: at least one column")
     return ImportPlan(tuple(planned), clocks)
@@ -136,7 +146,7 @@ def _topic_with(topic: Topic, given: Collection[str], where: str) -> Topic:
     else:
         _check_known(given, topic.fields, where)
     missing = [field for field in wanted if field not in given]
-    if missing:
+    if missing and topic.name != "/cables/tension":
         raise InputError(
             f"{where}: without {', '.join(missing)}, allowed: all of {', '.join(wanted)};"
             " `constant` gives what is known without a sensor"
@@ -163,10 +173,12 @@ def _field(
     chosen = given.clock or next(iter(clocks))
     clock = clocks[chosen]
     if clock.stamp is not None:
-        stamps: str | None = source.stamp_column(given.column, clock.stamp)
+        stamps: tuple[str, ...] = (source.stamp_column(given.column, clock.stamp),)
     elif clock.column is not None and source.stamped:
         raise InputError(f"{where}: clock '{chosen}' has a column, allowed: stamp or rate in a bag")
     else:
-        stamps = clock.column
+        stamps = clock.columns
+    header = clock.stamp == "header"
+    logged = source.stamp_column(given.column, "log") if header else None
     conversion = conversion_of(given, field_quantity(topic, name), where)
-    return PlannedField(name, given.column, None, conversion, chosen, stamps)
+    return PlannedField(name, given.column, None, conversion, given, chosen, stamps, logged)

@@ -10,10 +10,18 @@ from hashlib import sha256
 from pathlib import Path
 from typing import Annotated, Literal
 
-from pydantic import Field, NonNegativeInt, PositiveFloat, PositiveInt, model_validator
+from pydantic import (
+    Field,
+    NonNegativeFloat,
+    NonNegativeInt,
+    PositiveFloat,
+    PositiveInt,
+    model_validator,
+)
 from typing_extensions import Self
 
-from cspm_ident.importing.units import COUNTS, ISO_TIME, TIME_UNITS
+from cspm_ident.importing.time_text import TEXT_UNITS
+from cspm_ident.importing.units import COUNTS, TIME_UNITS
 from cspm_msgs_py.testbed import Name
 from cspm_msgs_py.yaml_file import StrictModel, parse_yaml, read_text, validate
 
@@ -28,10 +36,10 @@ class Clock(StrictModel):
     by `skew` from the first stamp on; last, `offset` is added.
 
     Attributes:
-        column: name of the column that holds the time.
+        column: name of the column that holds the time, or of several that are added up.
         rate: samples per second [Hz], where the file has no time.
         stamp: of a bag's messages: `header` or `log`.
-        unit: of `column`.
+        unit: of `column`, or of each; s, or as texts show, unless given.
         wrap: what the time in `column` counts to before it starts again at 0, in its unit.
         points: two instants [s], each as the file has it and as it really was.
         skew: relative stretch; 1e-5 where the clock loses 10 us per s.
@@ -39,15 +47,29 @@ class Clock(StrictModel):
         disorder: what to do where a stamp is not later than one before it.
     """
 
-    column: str | None = None
+    column: str | tuple[str, ...] | None = None
     rate: PositiveFloat | None = None
     stamp: Literal["header", "log"] | None = None
-    unit: str = "s"
+    unit: str | tuple[str, ...] | None = None
     wrap: PositiveFloat | None = None
     points: tuple[Pair, Pair] | None = None
     skew: float = Field(default=0.0, gt=-0.5, lt=0.5)
     offset: float = 0.0
     disorder: Literal["refuse", "drop", "keep"] = "refuse"
+
+    @property
+    def columns(self) -> tuple[str, ...]:
+        """Names of the columns that hold the time; none with a rate or stamps of messages."""
+        if self.column is None:
+            return ()
+        return (self.column,) if isinstance(self.column, str) else self.column
+
+    @property
+    def units(self) -> tuple[str | None, ...]:
+        """Unit of each column, None where it was not given."""
+        if isinstance(self.unit, tuple):
+            return self.unit
+        return (self.unit,) * max(len(self.columns), 1)
 
     @model_validator(mode="after")
     def _one_way(self) -> Self:
@@ -56,12 +78,19 @@ class Clock(StrictModel):
             raise ValueError(
                 f"{' and '.join(given) or 'no time'}, allowed: one of column, rate, stamp"
             )
-        if self.unit not in TIME_UNITS:
-            raise ValueError(f"unit: '{self.unit}', allowed: {', '.join(TIME_UNITS)}")
-        if self.column is None and (self.unit != "s" or self.wrap is not None):
+        for unit in self.units:
+            if unit is not None and unit not in TIME_UNITS:
+                raise ValueError(f"unit: '{unit}', allowed: {', '.join(TIME_UNITS)}")
+        if self.column is None and (self.unit is not None or self.wrap is not None):
             raise ValueError(f"unit or wrap with {given[0]}, allowed: with column")
-        if self.wrap is not None and self.unit == ISO_TIME:
-            raise ValueError(f"wrap with unit {ISO_TIME}, allowed: with a unit of a number")
+        if len(self.columns) > 1 and not isinstance(self.unit, tuple):
+            raise ValueError("unit: missing for several columns, allowed: a list, one each")
+        if self.column is not None and len(self.units) != len(self.columns):
+            raise ValueError(
+                f"unit: {len(self.units)} for {len(self.columns)} columns, allowed: one each"
+            )
+        if self.wrap is not None and (len(self.columns) > 1 or self.unit in TEXT_UNITS):
+            raise ValueError("wrap, allowed: with one column in a unit of a number")
         if self.points and self.skew:
             raise ValueError("points and skew, allowed: one of them")
         if self.points and not self.points[1][0] > self.points[0][0]:
@@ -88,6 +117,8 @@ class ChannelSource(StrictModel):
             such as N·m/V.
         offset: added at the end, in the channel's SI unit.
         invalid: raw values that mean that there is none.
+        spikes: what to do with single samples, or zeros, that leave and come back at once.
+        jumps: what to do with steps that no motion explains: an encoder that was reset.
         clock: name of its clock; the first of the file unless given.
     """
 
@@ -100,6 +131,8 @@ class ChannelSource(StrictModel):
     scale: float | None = None
     offset: float = 0.0
     invalid: tuple[float, ...] = ()
+    spikes: Literal["keep", "mask"] = "keep"
+    jumps: Literal["keep", "join"] = "keep"
     clock: str | None = None
 
     @model_validator(mode="after")
@@ -137,26 +170,34 @@ class Segment(StrictModel):
 
 
 class CsvFormat(StrictModel):
-    """How a text table is written.
+    """How a text table is written, or where in a spreadsheet it is.
 
     Attributes:
         delimiter: between cells; found from the line of names unless given; `blank` for any
             number of blanks.
         decimal: mark of the decimals.
+        thousands: mark between thousands, which is taken out.
         names_line: which line holds the names, from 1; 0 for none: columns are then 1, 2, ….
         first_line: first line of numbers; the one after the names unless given.
         comment: what starts a comment.
+        names: of the columns, in place of those in the file.
+        short_rows: what to do with a row that ends before the last column.
         missing: texts that mean that there is no number, besides nothing and nan.
         encoding: of the text.
+        sheet: of a spreadsheet; the first unless given.
     """
 
     delimiter: str | None = None
     decimal: Literal[".", ","] = "."
+    thousands: Literal[".", ",", "'", " ", "_"] | None = None
     names_line: NonNegativeInt = 1
     first_line: PositiveInt | None = None
     comment: str = "#"
+    names: Annotated[tuple[str, ...], Field(min_length=1)] | None = None
+    short_rows: Literal["refuse", "fill"] = "refuse"
     missing: tuple[str, ...] = ()
     encoding: str = "utf-8"
+    sheet: str | None = None
 
     @model_validator(mode="after")
     def _readable(self) -> Self:
@@ -165,6 +206,12 @@ class CsvFormat(StrictModel):
         if self.first_line is not None and self.first_line <= self.names_line:
             raise ValueError(
                 f"first_line: {self.first_line}, allowed: after names_line, {self.names_line}"
+            )
+        taken = (self.decimal, self.delimiter, " " if self.delimiter == "blank" else None)
+        if self.thousands is not None and self.thousands in taken:
+            raise ValueError(
+                f"thousands: '{self.thousands}' is the decimal mark or the delimiter as well,"
+                " allowed: another mark"
             )
         try:
             "".encode(self.encoding)
@@ -185,8 +232,9 @@ class Mapping(StrictModel):
         clocks: by name; the first serves every channel that names none.
         channels: by topic and field, such as `/winches/state` and `position/surge`.
         nan: what to do with a message of which a number is missing.
-        unpaired: what to do with samples that have no partner at their instant in a message of
-            several.
+        pairing: how far stamps of one message may differ [s]; unless given a twentieth of the
+            shortest step, 0 for none.
+        unpaired: what to do with samples that have no partner in a message of several.
         drop: stretches to leave out.
     """
 
@@ -198,6 +246,7 @@ class Mapping(StrictModel):
         dict[str, Annotated[dict[str, ChannelSource], Field(min_length=1)]], Field(min_length=1)
     ]
     nan: Literal["drop", "keep", "refuse"] = "drop"
+    pairing: NonNegativeFloat | None = None
     unpaired: Literal["refuse", "drop"] = "refuse"
     drop: tuple[Segment, ...] = ()
 

@@ -6,20 +6,22 @@ from contextlib import closing
 from dataclasses import dataclass
 from pathlib import Path
 
-import numpy as np
-
+from cspm_ident.importing.checks.clock_suspicions import refuse_two_clocks
+from cspm_ident.importing.checks.pace import pace_of
+from cspm_ident.importing.checks.suspicion import Suspicion
+from cspm_ident.importing.checks.suspicions import suspicions_of
+from cspm_ident.importing.checks.time_suspicions import is_beyond_devices
 from cspm_ident.importing.column_store import ColumnStore
 from cspm_ident.importing.fingerprint import fingerprint
+from cspm_ident.importing.gathering import Gathered, gather_topics, stamps_of_clocks
 from cspm_ident.importing.import_plan import ImportPlan, PlannedTopic, plan_import
 from cspm_ident.importing.mapping import MappingFile
-from cspm_ident.importing.report import ImportReport, suspicions_of, topic_report
+from cspm_ident.importing.report import ImportReport, topic_report
 from cspm_ident.importing.sources.opening import open_source
 from cspm_ident.importing.sources.source import Progress, Source
-from cspm_ident.importing.time_base import Times, times_of
-from cspm_ident.importing.topic_messages import ColumnSeries, TopicMessages, gather
-from cspm_ident.importing.unwrapping import Unwrapped
+from cspm_ident.importing.topic_messages import TopicMessages
 from cspm_msgs_py.errors import InputError
-from cspm_msgs_py.testbed import TestbedFile
+from cspm_msgs_py.testbed import Testbed, TestbedFile
 
 
 @dataclass(frozen=True)
@@ -55,23 +57,71 @@ def prepare(
     with closing(open_source(path, mapping)) as source:
         plan = plan_import(mapping, testbed.testbed, source)
         source.read(plan.numbers, plan.times, store, progress)
-    times = _all_times(plan, store, mapping)
+    times = stamps_of_clocks(plan, store, mapping, source.time_units)
     origin = min(int(t.stamp_ns[t.known].min()) for t in times.values())
-    messages, unwrapped = {}, {}
-    for planned in plan.topics:
-        name = planned.topic.name
-        series, unwrapped[name] = _series(planned, times, store)
-        where = f"{mapping.path}: channels.{name}"
-        messages[name] = gather(planned, series, mapping.mapping, origin, where, trial=trial)
+    gathered = gather_topics(plan, times, store, mapping, origin, trial=trial)
+    for planned in gathered.topics:
+        messages = gathered.messages[planned.topic.name]
+        _check_unit_of_time(planned, messages, plan, source, testbed.testbed, mapping)
+    if not trial:
+        refuse_two_clocks(gathered.messages, str(mapping.path))
+    report = _report(path, mapping, testbed, source, plan, gathered, store, origin)
+    return Prepared(gathered.messages, report)
+
+
+def _report(
+    path: Path,
+    mapping: MappingFile,
+    testbed: TestbedFile,
+    source: Source,
+    plan: ImportPlan,
+    gathered: Gathered,
+    store: ColumnStore,
+    origin: int,
+) -> ImportReport:
     raw = {name: store.column(name) for name in plan.numbers}
     reports = []
-    for planned in plan.topics:
+    for planned in gathered.topics:
         name = planned.topic.name
-        reports.append(topic_report(planned, messages[name], raw, unwrapped[name], origin))
-    suspicions = suspicions_of(plan.topics, messages, unwrapped, testbed.testbed, origin)
-    about, unused = _about(path, mapping, testbed), _unused(source, plan)
-    report = ImportReport(about, source.kind, origin, source.notes, unused, reports, suspicions)
-    return Prepared(messages, report)
+        columns = gathered.unwrapped[name]
+        reports.append(topic_report(planned, gathered.messages[name], raw, columns, origin))
+    suspicions = [
+        Suspicion(where, "empty", "no number at all, left out") for where in gathered.empty
+    ]
+    suspicions += suspicions_of(gathered, testbed.testbed, origin)
+    return ImportReport(
+        _about(path, mapping, testbed),
+        source.kind,
+        origin,
+        source.notes,
+        _unused(source, plan),
+        reports,
+        suspicions,
+    )
+
+
+def _check_unit_of_time(
+    planned: PlannedTopic,
+    messages: TopicMessages,
+    plan: ImportPlan,
+    source: Source,
+    testbed: Testbed,
+    mapping: MappingFile,
+) -> None:
+    """Refuse numbers taken for s, without being asked, that no device can have sampled."""
+    sensor = testbed.sensors.get(planned.topic.name)
+    rate = pace_of(messages.stamp_ns, 0).rate_hz
+    if not is_beyond_devices(rate, sensor.rate if sensor else None):
+        return
+    for field in planned.fields:
+        clock = plan.clocks[field.clock] if field.clock else None
+        if clock and clock.columns and clock.unit is None and not source.time_units:
+            days = (rate or 0.0) / 86400.0
+            raise InputError(
+                f"{mapping.path}: clocks.{field.clock}.unit: missing, and in s {planned.topic.name}"
+                f" comes at {rate:.6g} Hz, in days at {days:.6g} Hz, allowed: the unit of the"
+                " column, such as datenum, excel, d, min"
+            )
 
 
 def _about(path: Path, mapping: MappingFile, testbed: TestbedFile) -> dict[str, str]:
@@ -91,51 +141,3 @@ def _unused(source: Source, plan: ImportPlan) -> list[str]:
         topics = {name.rpartition(":")[0] for name in used}
         return [name for name in source.columns if name.rpartition(":")[0] not in topics]
     return [name for name in source.columns if name not in used]
-
-
-def _all_times(
-    plan: ImportPlan, store: ColumnStore, mapping: MappingFile
-) -> dict[tuple[str, str | None, int], Times]:
-    """Return the stamps of each clock, by its name, its column and its number of rows."""
-    found: dict[tuple[str, str | None, int], Times] = {}
-    for topic in plan.topics:
-        for field in topic.fields:
-            if field.column is None:
-                continue
-            count = len(store.column(field.column))
-            key = (field.clock, field.stamps, count)
-            if key in found:
-                continue
-            where = f"{mapping.path}: clocks.{field.clock}"
-            raw = None if field.stamps is None else store.column(field.stamps)
-            if not count:
-                raise InputError(f"{mapping.path}: column '{field.column}' has no rows")
-            if raw is not None and len(raw) != count:
-                raise InputError(
-                    f"{where}: {len(raw)} times for {count} rows of column '{field.column}',"
-                    " allowed: one each"
-                )
-            found[key] = times_of(raw, count, plan.clocks[field.clock], where)
-    return found
-
-
-def _series(
-    planned: PlannedTopic, times: dict[tuple[str, str | None, int], Times], store: ColumnStore
-) -> tuple[dict[str, ColumnSeries], dict[str, Unwrapped]]:
-    """Return the columns of a topic in SI, and what unwrapping found."""
-    series: dict[str, ColumnSeries] = {}
-    unwrapped = {}
-    for field in planned.fields:
-        if field.conversion is None or field.column is None:
-            series[field.name] = ColumnSeries(np.array(field.constant), None)
-            continue
-        raw = store.column(field.column)
-        values, found = field.conversion.apply(np.asarray(raw))
-        if found is not None:
-            unwrapped[field.name] = found
-        name = f"{planned.topic.name} {field.name}"
-        store.append(name, values)
-        series[field.name] = ColumnSeries(
-            store.column(name), times[(field.clock, field.stamps, len(raw))]
-        )
-    return series, unwrapped

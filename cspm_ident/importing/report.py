@@ -9,20 +9,14 @@ from typing import Any
 
 import numpy as np
 
-from cspm_ident.importing.import_plan import PlannedTopic
-from cspm_ident.importing.relations import relation_suspicions
-from cspm_ident.importing.suspicion import Suspicion
-from cspm_ident.importing.time_base import Pace, pace_of
-from cspm_ident.importing.time_suspicions import held_suspicions, time_suspicions
+from cspm_ident.importing.checks.pace import Pace, pace_of
+from cspm_ident.importing.checks.suspicion import Suspicion
+from cspm_ident.importing.checks.value_suspicions import (
+    resolution,
+)
+from cspm_ident.importing.import_plan import PlannedField, PlannedTopic
 from cspm_ident.importing.topic_messages import SkippedMessages, TopicMessages
 from cspm_ident.importing.unwrapping import Unwrapped
-from cspm_ident.importing.value_suspicions import (
-    quaternion_suspicions,
-    resolution,
-    value_suspicions,
-)
-from cspm_msgs_py.testbed import Testbed
-from cspm_msgs_py.topics import POSE
 
 FIRST_ROWS = 5
 _SAFE_STEP = 0.25
@@ -139,7 +133,7 @@ def topic_report(
                 field=field.name,
                 source=field.column or "constant",
                 quantity=field.conversion.quantity if field.conversion else "",
-                formula=field.conversion.formula if field.conversion else f"{field.constant:g}",
+                formula=field.conversion.formula if field.conversion else _constant(field),
                 raw=first,
                 converted=values[:FIRST_ROWS].tolist(),
                 low=float(some.min()),
@@ -156,37 +150,5 @@ def topic_report(
     return TopicReport(planned.topic.name, pace, first_s, fields, messages.left_out)
 
 
-def suspicions_of(
-    planned: tuple[PlannedTopic, ...],
-    messages: MappingOf[str, TopicMessages],
-    unwrapped: MappingOf[str, MappingOf[str, Unwrapped]],
-    testbed: Testbed,
-    origin_ns: int,
-) -> list[Suspicion]:
-    """Return all that looks wrong; its times count from the origin [ns]."""
-    found: list[Suspicion] = []
-    for one in planned:
-        name = one.topic.name
-        mine = messages[name]
-        sensor = testbed.sensors.get(name)
-        pace = pace_of(mine.stamp_ns, origin_ns)
-        found += time_suspicions(name, pace, sensor.rate if sensor else None)
-        head = mine.rows(slice(_HELD_SAMPLE))
-        found += held_suspicions(name, head)
-        if "qw" in one.topic.fields:
-            found += quaternion_suspicions(name, head[:, POSE.index("qx") : POSE.index("qw") + 1])
-        for field in one.fields:
-            if field.conversion is None:
-                continue
-            values = mine.values(field.name)
-            quantity = field.conversion.quantity
-            found += value_suspicions(one.topic, field.name, quantity, values, testbed)
-            found += _unwrap_suspicions(f"{name} {field.name}", unwrapped[name].get(field.name))
-    return found + relation_suspicions(messages, testbed)
-
-
-def _unwrap_suspicions(where: str, found: Unwrapped | None) -> list[Suspicion]:
-    if found is None or found.largest_step <= _SAFE_STEP:
-        return []
-    text = f"a step of {found.largest_step:.2f} of the counter's range: which way round is a guess"
-    return [Suspicion(where, "wrap", text, {"step": found.largest_step})]
+def _constant(field: PlannedField) -> str:
+    return "not measured" if field.is_unmeasured else f"{field.constant:g}"

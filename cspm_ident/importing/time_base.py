@@ -1,22 +1,22 @@
-"""When samples were taken: stamps from columns, rates and messages, and what they look like."""
+"""When samples were taken: stamps from columns, rates and messages."""
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
 from cspm_ident.importing.mapping import Clock
-from cspm_ident.importing.units import ISO_TIME, TIME_FACTORS
+from cspm_ident.importing.time_text import TEXT_UNITS, TIME_OF_DAY
+from cspm_ident.importing.units import TIME_FACTORS, TIME_ZEROS
 from cspm_ident.importing.unwrapping import unwrap
 from cspm_msgs_py.errors import InputError
 from cspm_msgs_py.layout import LATEST_SECOND
 from cspm_msgs_py.message import NANOSECONDS
 
 Stamps = NDArray[np.int64]
-GAP = 1.5
-IRREGULAR = 0.01
 
 
 class Times(NamedTuple):
@@ -26,58 +26,85 @@ class Times(NamedTuple):
         stamp_ns: shape (n,) [ns]; meaningless where not `known`.
         known: whether a row has a time, shape (n,).
         disorder: what the clock says of stamps that are not later than one before.
+        unset: how many stamps nobody had set, and were taken from the time of their log.
+        rounded_s: to what times stored in single precision were rounded [s]; 0 in double.
     """
 
     stamp_ns: Stamps
     known: NDArray[np.bool_]
     disorder: str = "refuse"
+    unset: int = 0
+    rounded_s: float = 0.0
 
 
-class Pace(NamedTuple):
-    """What a series of stamps looks like; times from the first stamp of all.
+def set_stamps(
+    stamp_ns: NDArray[Any], log_ns: NDArray[Any], where: str
+) -> tuple[NDArray[Any], int]:
+    """Return messages' stamps [ns] with those that nobody had set, 0, and how many those are.
 
-    Attributes:
-        messages: number of stamps.
-        first_s: first stamp [s].
-        last_s: last stamp [s].
-        rate_hz: one over the mean step without gaps, None below two stamps.
-        step_s: smallest, median and largest step [s].
-        irregular: share of steps that differ from the median by more than 1 %, gaps apart.
-        gaps: number of steps longer than 1.5 medians.
-        gap_at_s: where the longest step begins [s].
-        duplicates: number of steps of zero.
-        backwards: number of negative steps.
+    They get the time of their log less the usual lag of the others. A clock that begins at 0 has
+    set them: then they lie no farther from 0 than the recording lasts.
+
+    Args:
+        stamp_ns: longdouble, shape (n,).
+        log_ns: when each was logged, shape (n,).
+        where: names the clock in errors.
+
+    Raises:
+        InputError: none was set.
     """
-
-    messages: int
-    first_s: float
-    last_s: float
-    rate_hz: float | None
-    step_s: tuple[float, float, float] | None
-    irregular: float
-    gaps: int
-    gap_at_s: float | None
-    duplicates: int
-    backwards: int
+    stamp_ns, log_ns = np.asarray(stamp_ns), np.asarray(log_ns)
+    zero = stamp_ns == 0
+    if not zero.any() or len(zero) == 1:
+        return stamp_ns, 0
+    if zero.all():
+        raise InputError(f"{where}: every stamp is 0, allowed: stamps, or `stamp: log`")
+    guess = log_ns - np.median(log_ns[~zero] - stamp_ns[~zero])
+    unset = zero & (np.abs(guess) > np.ptp(log_ns))
+    return np.where(unset, guess, stamp_ns), int(unset.sum())
 
 
-def times_of(raw: NDArray[Any] | None, count: int, clock: Clock, where: str) -> Times:
+def single_precision(raw: NDArray[Any], unit: str) -> float:
+    """Return to what a column of times was rounded in single precision [s], 0 if it was not.
+
+    Whole numbers below the end of that precision are exact, and say nothing.
+    """
+    known = np.asarray(raw, dtype=np.float64)
+    known = known[np.isfinite(known)]
+    if not len(known) or unit in TEXT_UNITS:
+        return 0.0
+    largest = float(np.abs(known).max())
+    if largest >= float(np.finfo(np.float32).max):
+        return 0.0
+    single = known.astype(np.float32)
+    spacing = float(np.spacing(np.float32(largest)))
+    whole = spacing <= 1.0 and not (known % 1.0).any()
+    return 0.0 if whole or (single != known).any() else spacing * TIME_FACTORS[unit]
+
+
+def times_of(
+    raw: Sequence[NDArray[Any]], count: int, clock: Clock, units: Sequence[str], where: str
+) -> Times:
     """Return the stamps of a clock's rows.
 
     Args:
-        raw: the clock's column, or the messages' stamps [ns], longdouble, shape (n,); None with a
-            rate.
+        raw: the clock's columns, or the messages' stamps [ns], longdouble, each of shape (n,);
+            texts in ns; none with a rate.
         count: number of rows.
         clock: how to read them.
+        units: of each column.
         where: names the clock in errors.
 
     Raises:
         InputError: there is no time at all, or a stamp that no recording can hold.
     """
-    if raw is None:
+    if not raw:
         seconds = np.arange(count, dtype=np.longdouble) / np.longdouble(clock.rate or 1.0)
+    elif len(raw) == 1:
+        seconds = _seconds(_continuous(raw[0], clock, units[0]), units[0])
     else:
-        seconds = _seconds(raw, clock)
+        parts = [_seconds(one, unit) for one, unit in zip(raw, units, strict=True)]
+        seconds = np.sum(parts, axis=0, dtype=np.longdouble)
     known = ~np.isnan(seconds)
     if not known.any():
         raise InputError(f"{where}: no row has a time, allowed: at least one")
@@ -93,13 +120,19 @@ def times_of(raw: NDArray[Any] | None, count: int, clock: Clock, where: str) -> 
     return Times(np.rint(seconds * NANOSECONDS).astype(np.int64), known, clock.disorder)
 
 
-def _seconds(raw: NDArray[Any], clock: Clock) -> NDArray[Any]:
-    if clock.stamp is not None or clock.unit == ISO_TIME:
-        return np.asarray(raw / np.longdouble(NANOSECONDS))
+def _continuous(raw: NDArray[Any], clock: Clock, unit: str) -> NDArray[Any]:
+    """Return a column of times without the steps of a counter or of midnight."""
+    if unit == TIME_OF_DAY:
+        return np.asarray(unwrap(np.asarray(raw), 86400.0 * NANOSECONDS).values)
     if clock.wrap is not None:
-        raw = unwrap(np.asarray(raw), clock.wrap).values
+        return np.asarray(unwrap(np.asarray(raw), clock.wrap).values)
+    return raw
+
+
+def _seconds(raw: NDArray[Any], unit: str) -> NDArray[Any]:
+    factor = 1.0 / NANOSECONDS if unit in TEXT_UNITS else TIME_FACTORS[unit]
+    raw = raw - np.longdouble(TIME_ZEROS.get(unit, 0.0))
     # Dividing by a whole number is exact where multiplying by 0.001 is not.
-    factor = TIME_FACTORS[clock.unit]
     if factor >= 1.0:
         return np.asarray(raw * np.longdouble(factor))
     return np.asarray(raw / np.rint(np.longdouble(1 / factor)))
@@ -120,29 +153,3 @@ def later_than_all_before(stamp_ns: Stamps) -> NDArray[np.bool_]:
         return np.zeros(0, dtype=bool)
     before = np.maximum.accumulate(stamp_ns)[:-1]
     return np.concatenate([[True], stamp_ns[1:] > before])
-
-
-def pace_of(stamp_ns: Stamps, origin_ns: int) -> Pace:
-    """Return what a series of stamps, shape (n,), looks like, seen from an origin [ns]."""
-    if not len(stamp_ns):
-        return Pace(0, 0.0, 0.0, None, None, 0.0, 0, None, 0, 0)
-    first, last = ((int(stamp_ns[i]) - origin_ns) * 1e-9 for i in (0, -1))
-    steps = np.diff(stamp_ns)
-    if not len(steps):
-        return Pace(1, first, last, None, None, 0.0, 0, None, 0, 0)
-    median = float(np.median(steps[steps > 0])) if (steps > 0).any() else 0.0
-    gaps = steps > GAP * median
-    regular = np.abs(steps - median) <= IRREGULAR * median
-    longest = int(np.argmax(steps))
-    return Pace(
-        messages=len(stamp_ns),
-        first_s=first,
-        last_s=last,
-        rate_hz=1e9 / float(steps[(steps > 0) & ~gaps].mean()) if median else None,
-        step_s=(float(steps.min()) * 1e-9, median * 1e-9, float(steps.max()) * 1e-9),
-        irregular=float(np.mean(~regular & ~gaps)),
-        gaps=int(gaps.sum()),
-        gap_at_s=(int(stamp_ns[longest]) - origin_ns) * 1e-9 if gaps.any() else None,
-        duplicates=int((steps == 0).sum()),
-        backwards=int((steps < 0).sum()),
-    )

@@ -1,42 +1,29 @@
 """The messages of one topic: which samples stand together at one instant, and which are left out.
 
-No sample is moved in time and none is made: numbers of one message have the same stamp in the
-source, or there is no message.
+No sample is moved in time and none is made; see `pairing`.
 """
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-from dataclasses import dataclass
-from functools import reduce
+from dataclasses import dataclass, field
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 from scipy.spatial.transform import Rotation
 
+from cspm_ident.importing.column_series import ColumnSeries
 from cspm_ident.importing.import_plan import ANGLES, PlannedTopic
+from cspm_ident.importing.joint_parts import not_yet_there
 from cspm_ident.importing.mapping import Mapping, Segment
-from cspm_ident.importing.time_base import Times, later_than_all_before
+from cspm_ident.importing.pairing import Tolerance, paired
+from cspm_ident.importing.time_base import later_than_all_before
 from cspm_msgs_py.errors import InputError
 from cspm_msgs_py.topics import Topic
 
 Array = NDArray[np.float64]
 Index = NDArray[np.int64]
 _QUATERNION = ("qx", "qy", "qz", "qw")
-
-
-@dataclass(frozen=True)
-class ColumnSeries:
-    """One column in SI with its stamps; several may share the same `times`.
-
-    Attributes:
-        values: shape (n,), on disk; a single number for a constant.
-        times: of the rows; None for a constant.
-    """
-
-    values: Array
-    times: Times | None
 
 
 @dataclass(frozen=True)
@@ -65,6 +52,8 @@ class TopicMessages:
         series: the columns by field, in the order of the mapping.
         places: for each field the row of each message, shape (n,); None for a constant.
         left_out: what became no message.
+        tolerance: how far stamps of one message differ; None where they are equal.
+        late_parts: how many of the first messages lack a part, by part.
     """
 
     topic: Topic
@@ -72,6 +61,8 @@ class TopicMessages:
     series: dict[str, ColumnSeries]
     places: dict[str, Index | None]
     left_out: SkippedMessages
+    tolerance: Tolerance | None = None
+    late_parts: dict[str, int] = field(default_factory=dict)
 
     def values(self, field: str, chosen: slice = slice(None)) -> Array:
         """Return a field of the chosen messages, shape (n,) [SI]."""
@@ -113,8 +104,9 @@ def gather(
         InputError: numbers of one message never stand together, or the mapping refuses what it
             finds.
     """
-    stamps, places, no_time, unpaired = _paired(series, mapping, where)
-    left: dict[str, Any] = {"no_time": no_time, "unpaired": unpaired}
+    pairs = paired(series, mapping, where)
+    stamps, places = pairs.stamp_ns, pairs.places
+    left: dict[str, Any] = {"no_time": pairs.no_time, "unpaired": pairs.unpaired}
     keep = np.ones(len(stamps), dtype=bool)
     dropped = []
     for segment in mapping.drop:
@@ -122,63 +114,15 @@ def gather(
         dropped.append(int(hit.sum()))
         keep &= ~hit
     left["segments"] = tuple(dropped)
-    keep, left["missing"] = _complete(stamps, keep, series, places, mapping, where, origin_ns)
+    absent, late = _absent(series, places, len(stamps), planned.topic.parts)
+    keep, left["missing"] = _complete(stamps, keep, absent, mapping, where, origin_ns)
     keep, left["disorder"] = _in_order(stamps, keep, series, where, origin_ns, trial=trial)
     if not keep.any():
         raise InputError(f"{where}: no message is left, allowed: at least one")
     places = {name: None if at is None else at[keep] for name, at in places.items()}
-    return TopicMessages(planned.topic, stamps[keep], series, places, SkippedMessages(**left))
-
-
-def _paired(
-    series: dict[str, ColumnSeries], mapping: Mapping, where: str
-) -> tuple[Index, dict[str, Index | None], int, int]:
-    """Return stamps, places by field, and how many rows had no time or no partner."""
-    clocks: dict[int, tuple[Times, list[str]]] = {}
-    for name, one in series.items():
-        if one.times is not None:
-            clocks.setdefault(id(one.times), (one.times, []))[1].append(name)
-    groups = list(clocks.values())
-    rows = [np.flatnonzero(times.known) for times, _ in groups]
-    no_time = sum(int((~times.known).sum()) for times, _ in groups)
-    stamps = [times.stamp_ns[at] for (times, _), at in zip(groups, rows, strict=True)]
-    unpaired = 0
-    common = stamps[0]
-    if any(not np.array_equal(common, other) for other in stamps[1:]):
-        common = reduce(np.intersect1d, stamps)
-        unpaired = sum(len(own) - len(common) for own in stamps)
-        _check_pairs(groups, stamps, common, mapping, where)
-        rows = [_at(own, at, common) for own, at in zip(stamps, rows, strict=True)]
-    places: dict[str, Index | None] = dict.fromkeys(series)
-    for (_, names), at in zip(groups, rows, strict=True):
-        places |= dict.fromkeys(names, at)
-    return common, places, no_time, unpaired
-
-
-def _at(own: Index, rows: Index, common: Index) -> Index:
-    """Return for each common stamp the first row that has it."""
-    unique, first = np.unique(own, return_index=True)
-    return rows[first[np.searchsorted(unique, common)]]
-
-
-def _check_pairs(
-    groups: Sequence[tuple[Times, list[str]]],
-    stamps: Sequence[Index],
-    common: Index,
-    mapping: Mapping,
-    where: str,
-) -> None:
-    both = " and ".join(
-        f"{', '.join(names)} ({len(own)})" for (_, names), own in zip(groups, stamps, strict=True)
-    )
-    if len(common) and mapping.unpaired == "drop":
-        return
-    allowed = "numbers of one message from one instant; map what was measured at other instants"
-    if len(common):
-        allowed += " to another topic or leave it out, or unpaired: drop"
-    raise InputError(
-        f"{where}: {both} have {len(common)} stamps in common and nothing is interpolated, allowed:"
-        f" {allowed}{'' if len(common) else ' to another topic or leave it out'}"
+    skipped = SkippedMessages(**left)
+    return TopicMessages(
+        planned.topic, stamps[keep], series, places, skipped, pairs.tolerance, late
     )
 
 
@@ -192,14 +136,13 @@ def _inside(segment: Segment, topic: str, stamps: Index, origin_ns: int) -> NDAr
 def _complete(
     stamps: Index,
     keep: NDArray[np.bool_],
-    series: dict[str, ColumnSeries],
-    places: dict[str, Index | None],
+    absent: NDArray[np.bool_],
     mapping: Mapping,
     where: str,
     origin_ns: int,
 ) -> tuple[NDArray[np.bool_], int]:
     """Return what to keep, and how many messages went because a number is missing."""
-    absent = keep & _absent(series, places, len(stamps))
+    absent = keep & absent
     count = int(absent.sum())
     if mapping.nan == "keep" or not count:
         return keep, 0
@@ -213,13 +156,20 @@ def _complete(
 
 
 def _absent(
-    series: dict[str, ColumnSeries], places: dict[str, Index | None], count: int
-) -> NDArray[np.bool_]:
+    series: dict[str, ColumnSeries],
+    places: dict[str, Index | None],
+    count: int,
+    parts: tuple[str, ...],
+) -> tuple[NDArray[np.bool_], dict[str, int]]:
+    """Return which messages miss a number, and by part how many of the first have it not yet."""
+    columns = {name: series[name].values[at] for name, at in places.items() if at is not None}
+    late = not_yet_there(columns, parts)
     absent = np.zeros(count, dtype=bool)
-    for name, at in places.items():
-        if at is not None:
-            absent |= np.isnan(series[name].values[at])
-    return absent
+    for name, values in columns.items():
+        first = late.get(name.partition("/")[0])
+        missing = np.isnan(values)
+        absent |= missing if first is None else missing & ~first
+    return absent, {part: int(first.sum()) for part, first in late.items()}
 
 
 def _in_order(

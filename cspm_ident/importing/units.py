@@ -6,11 +6,11 @@ from typing import NamedTuple
 
 import numpy as np
 
+from cspm_ident.importing.time_text import TEXT_UNITS
 from cspm_msgs_py.errors import InputError
 from cspm_msgs_py.topics import Topic
 
 COUNTS = "counts"
-ISO_TIME = "iso8601"
 _TURN = 2.0 * np.pi
 _DEGREE = np.pi / 180.0
 _POUND = 0.45359237
@@ -42,8 +42,14 @@ _FACTORS: dict[str, dict[str, float]] = {
     "A": {"A": 1.0, "mA": 1e-3},
     COUNTS: {COUNTS: 1.0},
 }
-TIME_FACTORS = {"s": 1.0, "ms": 1e-3, "us": 1e-6, "ns": 1e-9, "min": 60.0, "h": 3600.0}
-TIME_UNITS = (*TIME_FACTORS, ISO_TIME)
+_DAY = 86400.0
+TIME_FACTORS = {
+    **{"s": 1.0, "ms": 1e-3, "us": 1e-6, "ns": 1e-9, "min": 60.0, "h": 3600.0},
+    **dict.fromkeys(("d", "datenum", "excel"), _DAY),
+}
+TIME_ZEROS = {"datenum": 719529.0, "excel": 25569.0}
+"""What MATLAB and spreadsheets count for the beginning of 1970 [d]."""
+TIME_UNITS = (*TIME_FACTORS, *TEXT_UNITS)
 
 _JOINT_QUANTITIES = {"position": "rad", "velocity": "rad/s", "effort": "N·m"}
 _FIELD_QUANTITIES = {

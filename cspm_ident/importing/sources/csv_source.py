@@ -3,23 +3,28 @@
 from __future__ import annotations
 
 import csv
+import gzip
 import re
-from collections.abc import Collection, Iterator
+import zlib
+from collections.abc import Collection, Iterator, Mapping
 from pathlib import Path
-from typing import Any, TextIO
+from typing import Any, TextIO, cast
 
 import numpy as np
 from numpy.typing import NDArray
 
 from cspm_ident.importing.column_store import ColumnStore
 from cspm_ident.importing.mapping import CsvFormat
+from cspm_ident.importing.sources.row_shape import RowShape
 from cspm_ident.importing.sources.source import Progress, check_columns
 from cspm_ident.importing.sources.table_source import TableSource
+from cspm_ident.importing.sources.time_cells import TimeCells
 from cspm_msgs_py.errors import InputError
 
 PIECE = 1 << 23  # characters read at once
 _DELIMITERS = (",", ";", "\t", "|")
 _TIME_CELL = 40  # characters
+_PACKED = 4  # times shorter, for the progress shown
 Lines = list[str]
 Table = NDArray[Any]
 
@@ -30,14 +35,23 @@ class CsvSource(TableSource):
     kind = "text table"
     stamped = False
 
-    def __init__(self, path: Path, form: CsvFormat, mapping_path: str) -> None:
+    def __init__(
+        self, path: Path, form: CsvFormat, mapping_path: str, *, packed: bool = False
+    ) -> None:
         """Read the names of the columns.
+
+        Args:
+            path: the table.
+            form: how it is written.
+            mapping_path: of the mapping, for errors.
+            packed: the table is compressed by gzip.
 
         Raises:
             InputError: the file has no such line, or is no text in this encoding.
         """
-        self.path, self._form = path, form
+        self.path, self._form, self._packed = path, form, packed
         self.notes: list[str] = []
+        self.time_units: dict[str, str] = {}
         self._first = form.first_line or form.names_line + 1
         with self._open() as file:
             lines = _first_lines(file, self._first, path)
@@ -47,36 +61,55 @@ class CsvSource(TableSource):
         if form.decimal == "," and self._delimiter == ",":
             raise InputError(f"{mapping_path}: csv.delimiter: ',' is the decimal mark as well")
         cells = [cell.strip() for cell in self._cells(head)]
-        self._width = len(cells)
-        self.columns = tuple(cells if form.names_line else (str(i + 1) for i in range(len(cells))))
+        if not form.names_line:
+            cells = [str(i + 1) for i in range(len(cells))]
+        self.columns = form.names or tuple(cells)
+        self._width = len(self.columns)
+        self._rows = RowShape(path, self.columns, self._delimiter, form)
 
     def read(
         self,
         numbers: Collection[str],
-        times: Collection[str],
+        times: Mapping[str, str | None],
         store: ColumnStore,
         progress: Progress,
     ) -> None:
         """Store columns; see `Source`."""
         wanted = check_columns(numbers, times, self.columns, self.path)
         places = {self.columns.index(name): name for name in wanted}
-        exact = {place for place, name in places.items() if name in times}
+        clocks = {
+            place: TimeCells(self.path, name, times[name])
+            for place, name in places.items()
+            if name in times
+        }
         total, done = self.path.stat().st_size, 0
+        total *= _PACKED if self._packed else 1
         with self._open() as file:
             for line, lines in self._pieces(file):
-                table = self._parse(lines, line, sorted(places), exact)
+                table = self._parse(lines, line, sorted(places), clocks)
                 for place, name in places.items():
                     piece = table[str(place)]
-                    if place in exact:
-                        piece = self._times(piece, line, name)
+                    if place in clocks:
+                        piece = clocks[place].read(piece, line)
                     store.append(name, piece)
                 done += sum(map(len, lines))
                 progress(min(done / total, 1.0))
+        progress(1.0)
+        self._conclude(clocks)
+
+    def _conclude(self, clocks: Mapping[int, TimeCells]) -> None:
+        for place, clock in clocks.items():
+            if clock.unit is not None:
+                self.time_units[self.columns[place]] = clock.unit
+        if self._rows.trailing:
+            self.notes.append(f"{self._rows.trailing} rows end with empty cells, left out")
 
     def _open(self) -> TextIO:
         encoding = self._form.encoding
         # Spreadsheets put a mark before their text, which is no part of the first name.
         encoding = "utf-8-sig" if encoding.lower() in ("utf-8", "utf8") else encoding
+        if self._packed:
+            return cast("TextIO", gzip.open(self.path, "rt", encoding=encoding, errors="strict"))
         return self.path.open(encoding=encoding, errors="strict", newline=None)
 
     def _find_delimiter(self, head: str) -> str | None:
@@ -112,12 +145,16 @@ class CsvSource(TableSource):
                 line = following
         except UnicodeDecodeError as err:
             raise InputError(_undecodable(self.path, err)) from None
+        except (EOFError, zlib.error, gzip.BadGzipFile) as err:
+            raise InputError(f"{self.path}: damaged gzip data ({err})") from None
 
-    def _parse(self, lines: Lines, line: int, places: list[int], exact: set[int]) -> Table:
+    def _parse(
+        self, lines: Lines, line: int, places: list[int], clocks: Mapping[int, TimeCells]
+    ) -> Table:
+        exact = set(clocks)
         kind = np.dtype([(str(p), f"U{_TIME_CELL}" if p in exact else "f8") for p in places])
-        text = lines
-        if self._form.decimal == ",":
-            text = [row.replace(",", ".") for row in text]
+        numeric = [p for p in places if p not in clocks or not clocks[p].textual]
+        text = self._rows.plain_numbers(self._rows.check_widths(lines, line), line, numeric)
         try:
             table = self._load(text, kind, places)
         except ValueError:
@@ -125,7 +162,7 @@ class CsvSource(TableSource):
             table = self._load_or_blame(text, kind, places, line, exact)
         # An open quote swallows lines in silence.
         if any('"' in row for row in lines):
-            rows = sum(not self._is_void(row) for row in lines)
+            rows = sum(not self._rows.is_void(row) for row in lines)
             if rows != len(table):
                 raise InputError(self._quoted(line, lines))
         return table
@@ -144,7 +181,7 @@ class CsvSource(TableSource):
         return f"{self.path}: line {line + first}: a quote is left open, allowed: one line per row"
 
     def _load(self, lines: Lines, kind: np.dtype[Any], places: list[int]) -> Table:
-        if all(self._is_void(row) for row in lines):
+        if all(self._rows.is_void(row) for row in lines):
             return np.zeros(0, dtype=kind)
         return np.loadtxt(
             lines,
@@ -155,12 +192,6 @@ class CsvSource(TableSource):
             quotechar='"',
             ndmin=1,
         )
-
-    def _content(self, row: str) -> str:
-        return row.split(self._form.comment)[0] if self._form.comment else row
-
-    def _is_void(self, row: str) -> bool:
-        return not self._content(row).strip()
 
     def _filled(self, row: str) -> str:
         """Return a line with `nan` where there is no number."""
@@ -174,9 +205,9 @@ class CsvSource(TableSource):
     def _blame(self, lines: Lines, line: int, places: list[int], exact: set[int]) -> None:
         """Refuse the first cell of these lines that is no number."""
         for number, row in enumerate(lines, start=line):
-            if self._is_void(row):
+            if self._rows.is_void(row):
                 continue
-            cells = self._cells(self._content(row))
+            cells = self._cells(self._rows.content(row))
             for place in places:
                 where = f"{self.path}: line {number}, column '{self.columns[place]}'"
                 if place >= len(cells):
@@ -186,22 +217,6 @@ class CsvSource(TableSource):
                         f"{where}: '{cells[place].strip()}', allowed: a number, nothing, or a text"
                         " named in csv.missing"
                     )
-
-    def _times(self, cells: NDArray[np.str_], line: int, name: str) -> NDArray[Any]:
-        """Return a column of times as longdouble; dates in ns since 1970."""
-        try:
-            return cells.astype(np.longdouble)
-        except ValueError:
-            pass
-        try:
-            dates = np.char.rstrip(np.char.strip(cells), "Z").astype("datetime64[ns]")
-        except ValueError:
-            bad = next(cell for cell in cells if not _is_number(cell))
-            raise InputError(
-                f"{self.path}: column '{name}' from line {line}: '{bad}', allowed: a number, or a"
-                " date and time as 2026-01-31T12:00:00.125"
-            ) from None
-        return np.where(np.isnat(dates), np.longdouble("nan"), dates.astype(np.int64))
 
 
 def _first_lines(file: TextIO, count: int, path: Path) -> Lines:

@@ -2,19 +2,29 @@
 
 from __future__ import annotations
 
+import gzip
+import zlib
 from pathlib import Path
 
 from cspm_ident.importing.mapping import MappingFile
 from cspm_ident.importing.sources.bag_source import BagSource
 from cspm_ident.importing.sources.csv_source import CsvSource
+from cspm_ident.importing.sources.hdf5_source import Hdf5Source
 from cspm_ident.importing.sources.mat_source import MatSource
+from cspm_ident.importing.sources.parquet_source import ParquetSource
 from cspm_ident.importing.sources.source import Source
+from cspm_ident.importing.sources.spreadsheet_source import SpreadsheetSource
 from cspm_msgs_py.errors import InputError
 
 _HDF5 = b"\x89HDF\r\n\x1a\n"
 _BAGS = (b"\x89MCAP0\r\n", b"SQLite format 3\x00", b"#ROSBAG V2.0")
 _MATLAB_5 = b"MATLAB 5.0 MAT-file"
 _MATLAB_HDF5 = b"MATLAB 7.3 MAT-file"
+_GZIP = b"\x1f\x8b"
+_ZIP = b"PK\x03\x04"
+_PARQUET = b"PAR1"
+_OLD_OFFICE = b"\xd0\xcf\x11\xe0"
+ALLOWED = "allowed: a text table, .csv.gz, .xlsx, .parquet, .mat or HDF5 file, or a bag"
 
 
 def open_source(path: Path, mapping: MappingFile) -> Source:
@@ -27,22 +37,45 @@ def open_source(path: Path, mapping: MappingFile) -> Source:
         return BagSource(path)
     try:
         with path.open("rb") as file:
-            start = file.read(512)
+            start = file.read(1024)
     except FileNotFoundError:
-        raise InputError(f"{path}: no such file, allowed: a text table, .mat file or bag") from None
+        raise InputError(f"{path}: no such file, {ALLOWED}") from None
     except OSError as err:
         raise InputError(f"{path}: unreadable ({err.strerror})") from None
     if not start:
-        raise InputError(f"{path}: an empty file, allowed: a text table, .mat file or bag")
+        raise InputError(f"{path}: an empty file, {ALLOWED}")
     if start.startswith(_BAGS):
         return BagSource(path)
-    if start.startswith((_HDF5, _MATLAB_HDF5)):
-        raise InputError(
-            f"{path}: HDF5, as MATLAB writes with -v7.3, allowed: save(…, '-v7') or a text table"
-        )
+    if (table := _binary_table(path, start, mapping)) is not None:
+        return table
+    form = mapping.mapping.csv
+    packed = start.startswith(_GZIP)
+    if packed:
+        start = _unpacked_start(path)
+    wide = form.encoding.lower().replace("_", "-").startswith("utf-16")
+    if b"\x00" in start and not wide:
+        inside = " inside" if packed else ""
+        raise InputError(f"{path}: no text{inside}, {ALLOWED}")
+    return CsvSource(path, form, str(mapping.path), packed=packed)
+
+
+def _binary_table(path: Path, start: bytes, mapping: MappingFile) -> Source | None:
+    if start.startswith(_HDF5) or start.startswith(_MATLAB_HDF5):
+        return Hdf5Source(path, matlab=not start.startswith(_HDF5) or path.suffix == ".mat")
+    if start.startswith(_PARQUET):
+        return ParquetSource(path)
+    if start.startswith(_ZIP):
+        return SpreadsheetSource(path, mapping.mapping.csv)
+    if start.startswith(_OLD_OFFICE):
+        raise InputError(f"{path}: an old spreadsheet (.xls), allowed: saved as .xlsx or .csv")
     if start.startswith(_MATLAB_5) or path.suffix == ".mat":
         return MatSource(path)
-    wide = mapping.mapping.csv.encoding.lower().replace("_", "-").startswith("utf-16")
-    if b"\x00" in start and not wide:
-        raise InputError(f"{path}: no text, allowed: a text table, .mat file or bag")
-    return CsvSource(path, mapping.mapping.csv, str(mapping.path))
+    return None
+
+
+def _unpacked_start(path: Path) -> bytes:
+    try:
+        with gzip.open(path) as file:
+            return file.read(1024)
+    except (OSError, EOFError, zlib.error) as err:
+        raise InputError(f"{path}: damaged gzip data ({' '.join(str(err).split())})") from None

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Collection
+from collections.abc import Callable, Collection, Mapping
 from pathlib import Path
 from typing import Protocol
 
@@ -22,6 +22,7 @@ class Source(Protocol):
         columns: names of its columns, as far as they are known without reading the file.
         notes: what a person should know about how it was read.
         stamped: whether its rows are messages that bring their own stamps.
+        time_units: units of columns of times that showed themselves while they were read.
     """
 
     path: Path
@@ -29,6 +30,7 @@ class Source(Protocol):
     columns: tuple[str, ...]
     notes: list[str]
     stamped: bool
+    time_units: dict[str, str]
 
     def stamp_column(self, column: str, stamp: str) -> str:
         """Return the name of the column with the stamps, `header` or `log`, of another's rows."""
@@ -36,7 +38,7 @@ class Source(Protocol):
     def read(
         self,
         numbers: Collection[str],
-        times: Collection[str],
+        times: Mapping[str, str | None],
         store: ColumnStore,
         progress: Progress,
     ) -> None:
@@ -44,7 +46,8 @@ class Source(Protocol):
 
         Args:
             numbers: columns to be stored as float64.
-            times: columns to be stored with every digit, as longdouble.
+            times: columns to be stored with every digit, as longdouble, and their units where
+                the mapping says them; texts are stored in ns.
             store: gets them.
             progress: called with the share that was read.
 
@@ -76,7 +79,7 @@ def check_columns(
                 f"{path}: no column '{name}', allowed: {', '.join(names[:shown])}{more}"
             )
         if names.count(name) > 1:
-            raise InputError(f"{path}: column '{name}' stands twice, allowed: each name once")
+            raise InputError(f"{path}: column '{name}' occurs twice, allowed: each name once")
         if name in numbers and name in times:
             raise InputError(f"{path}: column '{name}' is clock and channel, allowed: one of both")
     return wanted

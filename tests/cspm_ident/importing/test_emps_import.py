@@ -36,7 +36,7 @@ def emps(tmp_path, name, mapping=None):
 
 
 def force_fit(found):
-    """Least squares of the force balance, all columns filtered alike; see Gautier 1997.
+    """Least squares of the force balance, all columns filtered equally; see Gautier 1997.
 
     Returns the four parameters, and the relative force error [%] with them and as published.
     """

@@ -5,11 +5,15 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from cspm_ident.importing.suspicion import Suspicion
-from cspm_ident.importing.time_base import Pace
+from cspm_ident.importing.checks.pace import GAP, JITTERED_GAP, Pace
+from cspm_ident.importing.checks.suspicion import Suspicion
 
 RATE_TOLERANCE = 0.01
 IRREGULAR_SHARE = 0.01
+UNIT_STEP = 1000.0
+"""Between neighbouring units of time: s, ms, us, ns."""
+FASTEST = 1e6
+"""Hz that no drive, load cell or camera of such a machine reaches."""
 _REGULAR = 0.8  # share of equal distances between events
 _EVENTS = 20
 
@@ -33,15 +37,24 @@ def time_suspicions(topic: str, pace: Pace, sensor_rate: float | None) -> list[S
         add("duplicate", f"{pace.duplicates} stamps stand twice", count=pace.duplicates)
     if pace.gaps and pace.step_s and pace.gap_at_s is not None:
         _, median, longest = pace.step_s
+        least = JITTERED_GAP if pace.jitter_s else GAP
         add(
             "gap",
-            f"{pace.gaps} gaps longer than 1.5 steps, the longest {longest:.6g} s at"
+            f"{pace.gaps} gaps longer than {least} steps, the longest {longest:.6g} s at"
             f" {pace.gap_at_s:.6g} s",
             count=pace.gaps,
             longest=longest,
             at=pace.gap_at_s,
         )
-    if pace.irregular > IRREGULAR_SHARE and pace.step_s:
+    if pace.jitter_s and pace.rate_hz:
+        add(
+            "jitter",
+            f"stamps scatter by {1e3 * pace.jitter_s:.3g} ms (one sigma) about an even clock of"
+            f" {pace.rate_hz:.6g} Hz",
+            sigma=pace.jitter_s,
+            rate=pace.rate_hz,
+        )
+    elif pace.irregular > IRREGULAR_SHARE and pace.step_s:
         low, median, _ = pace.step_s
         add(
             "irregular",
@@ -50,15 +63,30 @@ def time_suspicions(topic: str, pace: Pace, sensor_rate: float | None) -> list[S
             median=median,
             shortest=low,
         )
-    if sensor_rate and pace.rate_hz and pace.rate_hz > sensor_rate * (1 + RATE_TOLERANCE):
-        add(
-            "rate",
-            f"comes at {pace.rate_hz:.6g} Hz, the test-bed's sensor delivers {sensor_rate:g} Hz at"
-            " most",
-            found=pace.rate_hz,
-            sensor=sensor_rate,
-        )
+    if sensor_rate and pace.rate_hz and (text := _rate(pace.rate_hz, sensor_rate)):
+        add("rate", text, found=pace.rate_hz, sensor=sensor_rate)
     return found
+
+
+def _rate(found: float, sensor: float) -> str:
+    """Return what is wrong with a rate beside that of the test-bed's sensor [Hz]."""
+    if found > sensor * (1 + RATE_TOLERANCE):
+        days = found / 86400.0
+        hint = f"; were it days, {days:.4g} Hz" if sensor / UNIT_STEP < days <= sensor else ""
+        return (
+            f"comes at {found:.6g} Hz, the test-bed's sensor delivers {sensor:g} Hz at most{hint}"
+        )
+    if found * UNIT_STEP <= sensor * (1 + RATE_TOLERANCE):
+        return (
+            f"comes at {found:.6g} Hz only, the test-bed's sensor delivers {sensor:g} Hz; were it"
+            f" the next smaller unit of time, {found * UNIT_STEP:.6g} Hz"
+        )
+    return ""
+
+
+def is_beyond_devices(rate: float | None, sensor_rate: float | None) -> bool:
+    """Return whether a rate [Hz] is more than a wrong step between units of time explains."""
+    return rate is not None and rate > UNIT_STEP * (sensor_rate or FASTEST / UNIT_STEP)
 
 
 def held_suspicions(topic: str, rows: NDArray[np.float64]) -> list[Suspicion]:
@@ -98,7 +126,7 @@ def held_suspicions(topic: str, rows: NDArray[np.float64]) -> list[Suspicion]:
 
 
 def _single_steps(steps: NDArray[np.float64]) -> bool:
-    """Return whether all steps, shape (n, width), are alike: a coarse sensor at constant speed."""
+    """Return whether all steps, shape (n, width), are equal: a coarse sensor at constant speed."""
     sizes = np.abs(steps).max(axis=0)
     shares = np.abs(steps[:, sizes > 0]) / sizes[sizes > 0]
     return bool(((shares < 0.01) | (shares > 0.99)).mean() > _REGULAR)

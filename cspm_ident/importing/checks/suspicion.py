@@ -4,6 +4,8 @@ from __future__ import annotations
 
 from dataclasses import dataclass, field
 
+from cspm_ident.importing.checks.catalogue import CHECKS
+
 
 @dataclass(frozen=True)
 class Suspicion:
@@ -11,12 +13,21 @@ class Suspicion:
 
     Attributes:
         where: topic, with the field where it is one.
-        kind: one word for programs.
+        kind: one word for programs, of the catalogue.
         text: for people.
         numbers: behind the text, SI.
+        at_s: the first instants where it shows, from the first stamp of all [s].
+        remedy: what repairs it, as a rule that of its kind.
     """
 
     where: str
     kind: str
     text: str
     numbers: dict[str, float] = field(default_factory=dict)
+    at_s: tuple[float, ...] = ()
+    remedy: str = ""
+
+    def __post_init__(self) -> None:
+        """Take the remedy of the kind."""
+        if not self.remedy:
+            object.__setattr__(self, "remedy", CHECKS[self.kind].remedy)

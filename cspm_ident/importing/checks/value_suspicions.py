@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from cspm_ident.importing.suspicion import Suspicion
+from cspm_ident.importing.checks.suspicion import Suspicion
 from cspm_msgs_py.sensor_spec import MEASURED, quantities
 from cspm_msgs_py.testbed import Testbed
 from cspm_msgs_py.topics import Topic
@@ -15,6 +15,8 @@ from cspm_msgs_py.topics import Topic
 Array = NDArray[np.float64]
 COARSE = 64  # levels
 LARGEST = {"N·m": np.inf, "N": np.inf, "m": 50.0, "m/s": 20.0, "rad/s": 1000.0}
+OVER = 2.0
+"""Of a limit: a controller passes it by some percent, a wrong unit by 2.2 at least (lb for kg)."""
 MOST_CABLE = 20.0  # m that one winch winds in a recording
 _SMALL = 1e-3
 _PILE = 5.0
@@ -52,15 +54,23 @@ def value_suspicions(
         return [Suspicion(where, "constant", text, {"value": float(values[0])})]
     found = []
     if "effort" in field or "velocity" in field:
-        found += _saturated(where, quantity, values)
+        found += _saturated(where, quantity, values, _known_limit(topic, field, testbed))
     found += _coarse(where, topic, field, quantity, values, testbed)
     return found + _implausible(where, topic, field, quantity, values, testbed)
 
 
-def _saturated(where: str, quantity: str, values: Array) -> list[Suspicion]:
-    """Return ends of the range at which values pile up.
+def _known_limit(topic: Topic, field: str, testbed: Testbed) -> float:
+    """Return the torque at which the test-bed's drives hold theirs, infinite for other channels."""
+    part, _, joint = field.partition("/")
+    if part != "effort" or not topic.name.startswith("/winches/"):
+        return np.inf
+    return float(testbed.cables[testbed.cable_names.index(joint)].torque_limit)
 
-    A smooth quantised signal stands 2.4 times as long on its highest level as on the next one.
+
+def _saturated(where: str, quantity: str, values: Array, limit: float) -> list[Suspicion]:
+    """Return ends of the range at which values pile up, other than a limit of the drive.
+
+    A smooth quantised signal stays 2.4 times as long on its highest level as on the next one.
     """
     levels, counts = np.unique(values, return_counts=True)
     found = []
@@ -68,6 +78,8 @@ def _saturated(where: str, quantity: str, values: Array) -> list[Suspicion]:
         (levels[-1], counts[-1], counts[-2]),
         (levels[0], counts[0], counts[1]),
     ):
+        if abs(abs(level) - limit) <= 0.01 * limit:
+            continue
         if count >= 10 and count > _PILE * beside and count > 1e-3 * len(values):
             text = f"{count} values are exactly {level:.6g} {quantity}, the end of its range:"
             text += " saturated?"
@@ -82,10 +94,12 @@ def _coarse(
     step = resolution(values)
     span = float(np.ptp(values))
     found = []
-    if step and span / step < COARSE:
+    stated = _stated_resolution(topic, field, testbed)
+    # A machine that hardly moves shows few steps of a sensor that is as fine as it should be.
+    as_stated = bool(step and stated and 0.5 <= step / stated <= 2.0)
+    if step and span / step < COARSE and not as_stated:
         text = f"only {round(span / step) + 1} levels, {step:.6g} {quantity} apart"
         found.append(Suspicion(where, "coarse", text, {"resolution": step, "range": span}))
-    stated = _stated_resolution(topic, field, testbed)
     if not stated:
         return found
     if step and not 0.5 <= step / stated <= 2.0:
@@ -144,7 +158,7 @@ def _implausible(
 
 
 def _against_limit(add: Any, largest: float, limit: float, quantity: str, name: str) -> None:  # noqa: ANN401 - a function
-    if largest > 1.05 * limit:
+    if largest > OVER * limit:
         add(
             f"up to {largest:.6g} {quantity}, the {name} is {limit:g}: unit?",
             largest=largest,

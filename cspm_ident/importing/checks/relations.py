@@ -7,17 +7,20 @@ nothing of it is recorded.
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping
-from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
-from cspm_ident.importing.robust_line import RobustLine, robust_line
-from cspm_ident.importing.suspicion import Suspicion
-from cspm_ident.importing.time_base import GAP
+from cspm_ident.importing.checks.drive_balance import Balance, drive_balance
+from cspm_ident.importing.checks.lateness import Lateness, lateness
+from cspm_ident.importing.checks.pace import GAP
+from cspm_ident.importing.checks.robust_line import RobustLine, robust_line
+from cspm_ident.importing.checks.series import SensorSeries, series_of
+from cspm_ident.importing.checks.stuck import stuck_suspicions
+from cspm_ident.importing.checks.suspicion import Suspicion
+from cspm_ident.importing.checks.value_suspicions import resolution
 from cspm_ident.importing.topic_messages import TopicMessages
-from cspm_ident.importing.value_suspicions import resolution
-from cspm_msgs_py.testbed import Testbed
+from cspm_msgs_py.testbed import Cable, Testbed
 
 Array = NDArray[np.float64]
 FACTOR_TOLERANCE = 0.02
@@ -43,33 +46,96 @@ _LIKELY = {
 }
 
 
-class SensorSeries(NamedTuple):
-    """A channel without NaN: instants [s] and values [SI], both shape (n,)."""
-
-    time: Array
-    values: Array
-
-
 def relation_suspicions(messages: Mapping[str, TopicMessages], testbed: Testbed) -> list[Suspicion]:
     """Return which channels contradict each other."""
     found: list[Suspicion] = []
     origin = min(int(one.stamp_ns.min()) for one in messages.values())
     for where, position, velocity in _position_pairs(messages, origin):
         found += velocity_suspicions(where, position, velocity)
+        found += stuck_suspicions(where.replace("velocity", "position"), position, velocity)
+        found += late_suspicions(where, "the position", lateness(velocity, position, [], (1,)))
     state = messages.get(_STATE)
-    if state is None or "effort" not in state.topic.parts:
-        return found
-    for cable in testbed.cables:
-        torque = _signal(state, f"effort/{cable.name}", origin)
-        if "position" in state.topic.parts:
-            angle = _signal(state, f"position/{cable.name}", origin)
-            found += power_suspicions(f"{_STATE} effort/{cable.name}", angle, torque)
-        if _TENSION in messages:
-            tension = _signal(messages[_TENSION], f"effort/{cable.name}", origin)
-            radius = cable.drum_radius / cable.gear_ratio
-            where = f"{_STATE} effort/{cable.name}"
-            found += torque_suspicions(where, torque, tension, radius)
+    if state is not None and "effort" in state.topic.parts:
+        for cable in testbed.cables:
+            rides = testbed.winch_frame is not None
+            found += _torque_relations(state, messages.get(_TENSION), cable, origin, rides=rides)
     return found
+
+
+def _torque_relations(
+    state: TopicMessages,
+    cells: TopicMessages | None,
+    cable: Cable,
+    origin_ns: int,
+    *,
+    rides: bool,
+) -> list[Suspicion]:
+    """Return what contradicts the torque of one winch, which may ride on a moving frame."""
+    where = f"{_STATE} effort/{cable.name}"
+    torque = series_of(state, f"effort/{cable.name}", origin_ns)
+    tension = None
+    if cells is not None:
+        measured = series_of(cells, f"effort/{cable.name}", origin_ns)
+        tension = measured if len(measured.values) else None
+    radius = cable.drum_radius / cable.gear_ratio
+    if "position" not in state.topic.parts:
+        return [] if tension is None else torque_suspicions(where, torque, tension, radius)
+    angle = series_of(state, f"position/{cable.name}", origin_ns)
+    # Without load cell a cable's tension goes with the angle.
+    orders = (1, 2) if tension is not None or not cable.has_cable else (0, 1, 2)
+    late = lateness(torque, angle, [] if tension is None else [tension], orders)
+    found = late_suspicions(where, "the motion", late)
+    # Waves that move the winches do work on cables that nobody measures.
+    if tension is not None or not cable.has_cable or not rides:
+        pull = None if tension is None else tension._replace(values=tension.values * radius)
+        balance = drive_balance(torque, angle, pull, elastic=cable.has_cable)
+        found += balance_suspicions(where, balance)
+    return found
+
+
+def balance_suspicions(where: str, balance: Balance | None) -> list[Suspicion]:
+    """Return whether a torque has not the signs of friction, inertia and the cable's pull."""
+    if balance is None:
+        return []
+    found, (friction, inertia, drum) = [], balance
+    # A wrong sign reverses both; a loop that feeds back noise bends friction alone.
+    may_be = not (inertia.is_sure and inertia.mean > 0.0)
+    if friction.is_sure and friction.mean < -DISSIPATED and may_be:
+        text = f"torque times speed gives {-friction.mean:.0%} of what flows, where friction takes"
+        text += " energy: sign of torque or angle?"
+        found.append(Suspicion(where, "power", text, friction._asdict()))
+    elif inertia.is_sure and inertia.mean < 0.0 and inertia.share > DISSIPATED:
+        text = f"torque turns the winch the other way: inertia {inertia.mean:.3g} kg·m²"
+        text += ": sign of torque or angle?"
+        found.append(Suspicion(where, "power", text, inertia._asdict()))
+    if drum is None or drum.share < EXPLAINED or 0.5 <= drum.mean <= 2.0:
+        return found
+    if abs(drum.mean - 1.0) > 4.0 * drum.error:
+        found.append(_drum(where, drum.mean, drum._asdict()))
+    return found
+
+
+def _drum(where: str, factor: float, numbers: dict[str, float]) -> Suspicion:
+    text = f"torque is not tension times drum radius over gear ratio: factor {abs(factor):.4g},"
+    text += f" sign {'−' if factor < 0 else '+'}"
+    return Suspicion(where, "torque", text, numbers)
+
+
+def late_suspicions(where: str, leader: str, late: Lateness | None) -> list[Suspicion]:
+    """Return whether a channel is late against a leader."""
+    if late is None or not late.matters:
+        return []
+    milli, error = 1e3 * late.seconds, 1e3 * late.error
+    text = f"{abs(milli):.3g} ± {error:.2g} ms {'late' if milli > 0 else 'early'} against {leader}"
+    if late.drift:
+        text += f", and drifts by {late.drift:.3g} ± {late.drift_error:.2g} s per s"
+    numbers = {
+        "seconds": late.seconds,
+        "error": late.error,
+        "drift": late.drift,
+        "drift_error": late.drift_error,
+    }
+    return [Suspicion(where, "late", text, numbers)]
 
 
 def _position_pairs(
@@ -81,8 +147,8 @@ def _position_pairs(
             for joint in topic.topic.joint_names:
                 yield (
                     f"{topic.topic.name} velocity/{joint}",
-                    _signal(topic, f"position/{joint}", origin_ns),
-                    _signal(topic, f"velocity/{joint}", origin_ns),
+                    series_of(topic, f"position/{joint}", origin_ns),
+                    series_of(topic, f"velocity/{joint}", origin_ns),
                 )
     for body in ("/winch_frame", "/bar"):
         pose, twist = messages.get(f"{body}/pose"), messages.get(f"{body}/twist")
@@ -90,17 +156,9 @@ def _position_pairs(
             for axis in "xyz":
                 yield (
                     f"{body}/twist v{axis}",
-                    _signal(pose, axis, origin_ns),
-                    _signal(twist, f"v{axis}", origin_ns),
+                    series_of(pose, axis, origin_ns),
+                    series_of(twist, f"v{axis}", origin_ns),
                 )
-
-
-def _signal(topic: TopicMessages, field: str, origin_ns: int) -> SensorSeries:
-    values = topic.values(field)
-    order = np.argsort(topic.stamp_ns, kind="stable")
-    order = order[~np.isnan(values[order])]
-    time = np.asarray((topic.stamp_ns[order] - origin_ns) * 1e-9, dtype=np.float64)
-    return SensorSeries(time, values[order])
 
 
 def velocity_suspicions(
@@ -125,11 +183,11 @@ def velocity_suspicions(
         return [Suspicion(where, "unrelated", text, numbers)]
     if abs(line.slope - 1.0) <= max(FACTOR_TOLERANCE, 4 * line.error):
         return []
-    text = f"velocity does not integrate to position: factor {_told(line)}"
+    text = f"velocity does not integrate to position: factor {_described(line)}"
     return [Suspicion(where, "velocity", text, numbers)]
 
 
-def _told(line: RobustLine) -> str:
+def _described(line: RobustLine) -> str:
     factor = abs(line.slope)
     likely = [text for value, text in _LIKELY.items() if abs(factor / value - 1) < _HINT_TOLERANCE]
     hint = f" ({likely[0]})" if likely else ""
@@ -158,29 +216,11 @@ def _windows(position: SensorSeries, velocity: SensorSeries) -> tuple[Array, Arr
     return change[inside], moved[inside], duration[inside]
 
 
-def power_suspicions(where: str, angle: SensorSeries, torque: SensorSeries) -> list[Suspicion]:
-    """Return whether a winch gives energy where friction must take it.
-
-    Without its mean, which hoists and lowers, torque times change of angle sums up to what is
-    dissipated; what is stored comes back.
-    """
-    if len(angle.values) != len(torque.values) or len(angle.values) < 2:
-        return []
-    middle = (torque.values[1:] + torque.values[:-1]) / 2 - torque.values.mean()
-    work = middle * np.diff(angle.values)
-    flow, total = float(np.abs(work).sum()), float(work.sum())
-    if total >= -DISSIPATED * flow:
-        return []
-    text = f"torque times speed gives {-total:.4g} J, {-total / flow:.0%} of what flows, where"
-    text += " friction takes energy: sign of torque or angle?"
-    return [Suspicion(where, "power", text, {"work": total, "flow": flow})]
-
-
 def torque_suspicions(
     where: str, torque: SensorSeries, tension: SensorSeries, radius: float
 ) -> list[Suspicion]:
     """Return whether torque and tension times drum radius over gear ratio [m] are far apart."""
-    if len(torque.values) < _WINDOW or len(tension.values) < _WINDOW:
+    if len(torque.values) < _WINDOW or len(tension.values) < _WINDOW or not np.ptp(torque.values):
         return []
     every = max(len(torque.values) // _MOST_POINTS, 1)
     time, found = torque.time[::every], torque.values[::every]
@@ -189,6 +229,4 @@ def torque_suspicions(
     line = robust_line(wanted, found[inside], np.ones(len(wanted)))
     if line is None or line.explained < EXPLAINED or 0.5 <= line.slope <= 2.0:
         return []
-    text = f"torque is not tension times drum radius over gear ratio: factor {abs(line.slope):.4g},"
-    text += f" sign {'−' if line.slope < 0 else '+'}"
-    return [Suspicion(where, "torque", text, line._asdict())]
+    return [_drum(where, line.slope, line._asdict())]

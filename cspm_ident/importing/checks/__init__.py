@@ -1,0 +1,1 @@
+"""What looks wrong in an import: nothing is changed by it."""

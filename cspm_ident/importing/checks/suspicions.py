@@ -1,0 +1,111 @@
+"""All that looks wrong in an import."""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+from cspm_ident.importing.checks.clock_suspicions import message_suspicions, overlap_suspicions
+from cspm_ident.importing.checks.outlier_suspicions import (
+    mended_suspicions,
+    outlier_suspicions,
+)
+from cspm_ident.importing.checks.pace import pace_of
+from cspm_ident.importing.checks.relations import relation_suspicions
+from cspm_ident.importing.checks.stuck import frozen_suspicions
+from cspm_ident.importing.checks.suspicion import Suspicion
+from cspm_ident.importing.checks.time_suspicions import held_suspicions, time_suspicions
+from cspm_ident.importing.checks.value_suspicions import quaternion_suspicions, value_suspicions
+from cspm_ident.importing.gathering import Gathered
+from cspm_ident.importing.import_plan import PlannedTopic
+from cspm_ident.importing.topic_messages import TopicMessages
+from cspm_ident.importing.unwrapping import Unwrapped
+from cspm_msgs_py.testbed import Testbed
+from cspm_msgs_py.topics import POSE
+
+Array = NDArray[np.float64]
+_SAFE_STEP = 0.25
+_TENSION, _POSES = "/cables/tension", ("/bar/pose", "/winch_frame/pose", "/target/pose")
+_HELD_SAMPLE = 100_000
+
+
+def suspicions_of(gathered: Gathered, testbed: Testbed, origin_ns: int) -> list[Suspicion]:
+    """Return all that looks wrong; its times count from the origin [ns]."""
+    found: list[Suspicion] = []
+    for planned in gathered.topics:
+        name = planned.topic.name
+        found += _of_topic(planned, gathered.messages[name], testbed, origin_ns)
+        found += _of_fields(planned, gathered, testbed, origin_ns)
+    found += overlap_suspicions(gathered.messages)
+    return found + relation_suspicions(gathered.messages, testbed)
+
+
+def _of_topic(
+    planned: PlannedTopic, messages: TopicMessages, testbed: Testbed, origin_ns: int
+) -> list[Suspicion]:
+    name = planned.topic.name
+    sensor = testbed.sensors.get(name)
+    unmeasured = [field.name for field in planned.fields if field.is_unmeasured]
+    found = message_suspicions(messages, unmeasured)
+    pace = pace_of(messages.stamp_ns, origin_ns)
+    found += time_suspicions(name, pace, sensor.rate if sensor else None)
+    head = messages.rows(slice(_HELD_SAMPLE))
+    found += _held(planned, head)
+    if name in (_TENSION, *_POSES):
+        found += _frozen(planned, messages, origin_ns)
+    if "qw" in planned.topic.fields:
+        quaternions = head[:, POSE.index("qx") : POSE.index("qw") + 1]
+        found += quaternion_suspicions(name, quaternions)
+    return found
+
+
+def _held(planned: PlannedTopic, head: Array) -> list[Suspicion]:
+    """Return whether the topic, or else a part of a JointState, was filled up to its rate."""
+    name, parts = planned.topic.name, planned.topic.parts
+    found = held_suspicions(name, head)
+    if found or len(parts) < 2:
+        return found
+    joints = len(planned.topic.joint_names)
+    for i, part in enumerate(parts):
+        found += held_suspicions(f"{name} {part}", head[:, i * joints : (i + 1) * joints])
+    return found
+
+
+def _frozen(planned: PlannedTopic, messages: TopicMessages, origin_ns: int) -> list[Suspicion]:
+    """Return where load cells, each for itself, or a pose stand still."""
+    name = planned.topic.name
+    seconds = np.asarray((messages.stamp_ns - origin_ns) * 1e-9, dtype=np.float64)
+    if name == _TENSION:
+        fields = [field.name for field in planned.fields if not field.is_unmeasured]
+        columns = [(f"{name} {field}", messages.values(field)[:, None]) for field in fields]
+    else:
+        columns = [(name, messages.rows(slice(None)))]
+    return [one for where, rows in columns for one in frozen_suspicions(where, rows, seconds)]
+
+
+def _of_fields(
+    planned: PlannedTopic, gathered: Gathered, testbed: Testbed, origin_ns: int
+) -> list[Suspicion]:
+    name, found = planned.topic.name, []
+    messages = gathered.messages[name]
+    for field in planned.fields:
+        if field.conversion is None:
+            continue
+        values, where = messages.values(field.name), f"{name} {field.name}"
+        quantity = field.conversion.quantity
+        found += value_suspicions(planned.topic, field.name, quantity, values, testbed)
+        unwrapped = gathered.unwrapped[name].get(field.name)
+        found += _unwrap_suspicions(where, unwrapped)
+        found += outlier_suspicions(where, field, values, messages.stamp_ns, origin_ns)
+        mended, times = gathered.mended[name].get(field.name), messages.series[field.name].times
+        if mended is not None and times is not None:
+            seconds = np.asarray((times.stamp_ns - origin_ns) * 1e-9, dtype=np.float64)
+            found += mended_suspicions(where, mended, seconds)
+    return found
+
+
+def _unwrap_suspicions(where: str, found: Unwrapped | None) -> list[Suspicion]:
+    if found is None or found.largest_step <= _SAFE_STEP:
+        return []
+    text = f"a step of {found.largest_step:.2f} of the counter's range: which way round is a guess"
+    return [Suspicion(where, "wrap", text, {"step": found.largest_step})]

@@ -1,0 +1,25 @@
+"""A column in SI with its stamps."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from cspm_ident.importing.time_base import Times
+
+Array = NDArray[np.float64]
+
+
+@dataclass(frozen=True)
+class ColumnSeries:
+    """One column in SI with its stamps; several may share the same `times`.
+
+    Attributes:
+        values: shape (n,), on disk; a single number for a constant.
+        times: of the rows; None for a constant.
+    """
+
+    values: Array
+    times: Times | None

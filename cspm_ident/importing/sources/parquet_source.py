@@ -1,0 +1,48 @@
+"""A Parquet file."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+
+from cspm_ident.importing.sources.extras import needed
+from cspm_ident.importing.sources.loaded_table import LoadedTable, Vector
+from cspm_msgs_py.errors import InputError
+
+
+class ParquetSource(LoadedTable):
+    """A Parquet file, of which only the columns that are used are read; see `Source`."""
+
+    kind = "Parquet file"
+
+    def __init__(self, path: Path) -> None:
+        """Read the names of the columns.
+
+        Raises:
+            InputError: pyarrow is missing, or the file is damaged.
+        """
+        super().__init__(path)
+        parquet = needed("pyarrow.parquet", path)
+        try:
+            self._file = parquet.ParquetFile(path)
+        except Exception as err:  # of many kinds, whatever the damage makes the reader do
+            raise InputError(
+                f"{path}: no Parquet file that can be read ({' '.join(str(err).split())})"
+            ) from None
+        self.columns = tuple(self._file.schema_arrow.names)
+
+    def _vector(self, name: str) -> Vector:
+        try:
+            found = self._file.read(columns=[name]).column(name)
+            if str(found.type).startswith("decimal"):
+                found = found.cast("double")
+            return np.asarray(found.to_numpy(zero_copy_only=False))
+        except Exception as err:  # see above
+            raise InputError(
+                f"{self.path}: column '{name}' cannot be read ({' '.join(str(err).split())})"
+            ) from None
+
+    def close(self) -> None:
+        """Close the file."""
+        self._file.close()

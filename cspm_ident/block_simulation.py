@@ -191,7 +191,7 @@ class BlockSimulation:
         return self._offsets[window]
 
     def _offsets_by_pose(self, window: Window, poses: Array) -> Array:
-        start, end = self._told(window)
+        start, end = self._zeroing_part(window)
         measured = poses[start : end + 1]
         frame = np.nanmean(self.timeline.frame_poses[start : end + 1], axis=0)
         lengthening = geometry(self.parameters.cables, np.nanmean(measured, axis=0), frame).bar
@@ -205,7 +205,7 @@ class BlockSimulation:
         return out
 
     def _find_offsets(self, window: Window, tensions: Array) -> Array:
-        start, end = self._told(window)
+        start, end = self._zeroing_part(window)
         out = np.zeros(len(self.testbed.cables))
         measured = tensions[start : end + 1]
         for _ in range(_OFFSET_ROUNDS):
@@ -217,7 +217,7 @@ class BlockSimulation:
             out += np.clip(change, -_OFFSET_MOST_M, _OFFSET_MOST_M)
         return out
 
-    def _told(self, window: Window) -> Window:
+    def _zeroing_part(self, window: Window) -> Window:
         """Return the part of a window that determines the zero of the lengths."""
         start, end = window
         return start, min(end, start + round(_OFFSET_LONGEST_S / self.timeline.period))

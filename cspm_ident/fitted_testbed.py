@@ -16,7 +16,7 @@ from cspm_msgs_py.testbed import TestbedFile, parse_testbed
 from cspm_msgs_py.yaml_file import round_trip
 
 DIGITS = 8
-BLOCKS = ("stiffness", "damping", "rotor_inertia")
+BLOCKS = ("stiffness", "damping", "rotor_inertia", "drum_radius")
 
 
 @dataclass(frozen=True)
@@ -73,7 +73,8 @@ def with_fitted(text: str, source: str, changes: Changes) -> TestbedFile:
     Args:
         text: the file's.
         source: names it in errors.
-        changes: by cable, by block (`stiffness`, `damping`), by key; `rotor_inertia` has no keys.
+        changes: by cable, by block (`stiffness`, `damping`), by key; `rotor_inertia` and
+            `drum_radius` have no keys.
 
     Raises:
         InputError: no such cable, or a result that is no test-bed file.

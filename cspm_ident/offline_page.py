@@ -2,13 +2,17 @@
 
 from __future__ import annotations
 
+import gzip
+from base64 import b64encode
 from collections.abc import Iterable, Sequence
+from functools import cache
 from html import escape
 from pathlib import Path
 
 import numpy as np
 import plotly.graph_objects as go
 from numpy.typing import NDArray
+from plotly.offline import get_plotlyjs
 
 Array = NDArray[np.float64]
 
@@ -20,17 +24,60 @@ LEGEND = {"orientation": "h", "yref": "container"}
 BELOW = {**LAYOUT, "legend": {**LEGEND, "y": 0.0, "yanchor": "bottom"}}
 
 _STYLE = """<style>
-body {font-family: sans-serif; margin: 2em auto; max-width: 1400px; padding: 0 1em; color: #222}
+:root {color-scheme: light dark; --back: #fff; --text: #222; --line: #ddd; --accent: #0b5cad;
+  --mark: #b3003c}
+@media (prefers-color-scheme: dark) {:root {--back: #14181d; --text: #e6eaef; --line: #3a444f;
+  --accent: #78b4f5; --mark: #ff7a9c}}
+body {font-family: sans-serif; margin: 2em auto; max-width: 1400px; padding: 0 1em;
+  color: var(--text); background: var(--back)}
 h1 {font-size: 1.5em; overflow-wrap: anywhere}
 h2 {font-size: 1.2em; margin-top: 2em}
+a {color: var(--accent)}
 ul {padding-left: 1.2em; line-height: 1.5}
 code {overflow-wrap: anywhere}
-:focus-visible {outline: 3px solid #1f77b4; outline-offset: 2px}
+.verdict {font-size: 1.15em; line-height: 1.5; border-left: 6px solid var(--accent);
+  padding: 0.2em 1em}
+summary {cursor: pointer; padding: 0.4em 0; font-weight: bold}
+:focus-visible {outline: 3px solid var(--accent); outline-offset: 2px}
 .wide {overflow-x: auto}
 table {border-collapse: collapse; margin: 1em 0; white-space: nowrap}
-td, th {padding: 0.2em 0.8em; text-align: right; border-bottom: 1px solid #ddd}
+td, th {padding: 0.2em 0.8em; text-align: right; border-bottom: 1px solid var(--line)}
 td:first-child, th:first-child, .text {text-align: left}
 </style>"""
+# The text is on the screen before the script that draws is unpacked. Folded plots wait.
+_DRAWING = """<script>
+const unpacked = async () => {
+  const packed = atob(document.getElementById("plotly").textContent);
+  const bytes = Uint8Array.from(packed, letter => letter.charCodeAt(0));
+  const stream = new Blob([bytes]).stream().pipeThrough(new DecompressionStream("gzip"));
+  return new Response(stream).text();
+};
+const coloured = layout => {
+  const css = name => getComputedStyle(document.documentElement).getPropertyValue(name).trim();
+  Object.assign(layout, {paper_bgcolor: css("--back"), plot_bgcolor: css("--back")});
+  layout.font = {...layout.font, color: css("--text")};
+  for (const name of Object.keys(layout).filter(key => /^[xy]axis/.test(key))) {
+    layout[name] = {...layout[name], gridcolor: css("--line"), zerolinecolor: css("--line")};
+  }
+  return layout;
+};
+const drawn = async place => {
+  const {data, layout} = JSON.parse(place.nextElementSibling.textContent);
+  await Plotly.newPlot(place, data, coloured(layout), {responsive: true});
+  place.dispatchEvent(new CustomEvent("drawn", {bubbles: true}));
+};
+setTimeout(async () => {
+  const script = document.createElement("script");
+  script.textContent = await unpacked();
+  document.head.append(script);
+  for (const place of document.querySelectorAll(".plotly-graph-div")) {
+    const fold = place.closest("details:not([open])");
+    if (fold) fold.addEventListener("toggle", () => drawn(place), {once: true});
+    else await drawn(place);
+  }
+}, 0);
+</script>"""
+_PLOT = "plotly-graph-div"
 
 
 def write_offline_page(path: Path, title: str, parts: Iterable[str]) -> None:
@@ -39,21 +86,41 @@ def write_offline_page(path: Path, title: str, parts: Iterable[str]) -> None:
     Raises:
         OSError: the file cannot be written.
     """
+    body = "\n".join(parts)
+    drawing = (_plotly(), _DRAWING) if _PLOT in body else ()
     whole = [
         "<!doctype html><html lang=en><head><meta charset=utf-8>",
         "<meta name=viewport content='width=device-width, initial-scale=1'>",
         f"<title>{escape(title)}</title>",
         _STYLE,
-        f"</head><body><h1>{escape(title)}</h1>",
-        *parts,
+        f"</head><body><main><h1>{escape(title)}</h1>",
+        body,
+        "</main>",
+        *drawing,
         "</body></html>",
     ]
     path.write_text("\n".join(whole), encoding="utf-8")
 
 
-def table_html(heads: Sequence[str], rows: Iterable[Sequence[str]], label: str) -> str:
-    """Return a table that scrolls sideways, by keyboard too; the first column names each row."""
+def table_html(
+    heads: Sequence[str],
+    rows: Iterable[Sequence[str]],
+    label: str,
+    links: Sequence[str] = (),
+) -> str:
+    """Return a table that scrolls sideways, by keyboard too; the first column names each row.
+
+    Args:
+        heads: of the columns.
+        rows: their cells.
+        label: what the table is, for readers that do not see it.
+        links: where the first cell of each row leads; none: nowhere.
+    """
     body = [[_cell("td", cell, text=not _begins_as_number(cell)) for cell in row] for row in rows]
+    for cells, link in zip(body, links, strict=False):
+        open_tag, _, rest = cells[0].partition(">")
+        content = rest.removesuffix("</td>")
+        cells[0] = f'{open_tag}><a href="{escape(link, quote=True)}">{content}</a></td>'
     of_text = [all(" class=text" in row[i] for row in body) for i in range(len(heads))]
     top = [_cell("th scope=col", *each) for each in zip(heads, of_text, strict=True)]
     lines = ["<tr>" + "".join(cells) + "</tr>" for cells in (top, *body)]
@@ -73,11 +140,21 @@ def _begins_as_number(content: str) -> bool:
     return content.lstrip("−-")[:1].isdigit() or not content
 
 
-def figure_html(figure: go.Figure, *, script: bool) -> str:
-    """Return a figure as HTML; the first on a page brings the script that draws all of them."""
-    return str(
-        figure.to_html(full_html=False, include_plotlyjs=script, config={"responsive": True})
+def figure_html(figure: go.Figure) -> str:
+    """Return a figure as HTML; `write_offline_page` adds once what draws all of them."""
+    height = figure.layout.height or 450
+    data = str(figure.to_json()).replace("<", "\\u003c")
+    return (
+        f'<div class={_PLOT} style="height:{height}px;width:100%"></div>'
+        f"<script type=application/json>{data}</script>"
     )
+
+
+@cache
+def _plotly() -> str:
+    """Return the script that draws, packed to 2 of its 5 MB."""
+    packed = b64encode(gzip.compress(get_plotlyjs().encode(), mtime=0)).decode()
+    return f"<script type=text/plain id=plotly>{packed}</script>"
 
 
 def thinned(times: Array, values: Array, points: int = POINTS) -> tuple[Array, Array]:

@@ -1,4 +1,4 @@
-"""The report page of a comparison: measured over simulated over residual, zoomed together."""
+"""The report page of a comparison: verdict and table first, then the worst channels."""
 
 from __future__ import annotations
 
@@ -10,12 +10,11 @@ import plotly.graph_objects as go
 from numpy.typing import NDArray
 from plotly.subplots import make_subplots
 
+from cspm_ident.channel_words import channel_words
 from cspm_ident.comparison.channel_fit import ChannelFit
 from cspm_ident.comparison.compare import Comparison
 from cspm_ident.offline_page import (
     BELOW,
-    LAYOUT,
-    LEGEND,
     figure_html,
     table_html,
     thinned,
@@ -24,9 +23,15 @@ from cspm_ident.offline_page import (
 
 Array = NDArray[np.float64]
 
-_ROW_PIXELS = 130
+_CHANNEL_PIXELS = 420
 _ENTRY_PIXELS = 20
-_MODEBAR_PIXELS = 35
+# Points per line of channels that are drawn at once, and of those that are folded.
+_LINE_POINTS, _FOLDED_POINTS = 2000, 800
+# Channels that are drawn at once; the others are folded.
+_OPEN = 6
+# An error beyond this multiple of its noise floor is named in the verdict. Of a floor that is
+# known to a tenth, 1.5 lies five standard errors above it.
+_BEYOND = 1.5
 _BLOCKS = {
     "whole": "The whole, from measured {drive}",
     "winch": "Winches alone, from measured torques and tensions",
@@ -43,7 +48,7 @@ _QUANTITIES = {
 # All lines over time show the same stretch, whichever of them the reader zooms.
 _OVER_TIME = "over-time"
 _LINKED = f"""<script>
-const plots = [...document.querySelectorAll(".{_OVER_TIME} .plotly-graph-div")];
+const plots = () => [...document.querySelectorAll(".{_OVER_TIME} .plotly-graph-div")];
 let following = false;
 const all = (plot, part, value) => Object.fromEntries(
   Object.keys(plot.layout).filter(name => /^xaxis/.test(name)).map(name => [name + part, value]));
@@ -52,13 +57,16 @@ const follow = (zoomed, name) => {{
   const change = plot =>
     autorange ? all(plot, ".autorange", true) : all(plot, ".range", [...range]);
   following = true;
-  Promise.all(plots.filter(plot => plot !== zoomed).map(p => Plotly.relayout(p, change(p))))
+  const others = plots().filter(plot => plot !== zoomed && plot.layout);
+  Promise.all(others.map(plot => Plotly.relayout(plot, change(plot))))
     .finally(() => {{ following = false; }});
 }};
-plots.forEach(plot => plot.on("plotly_relayout", change => {{
-  const moved = Object.keys(change).find(key => /^xaxis/.test(key));
-  if (!following && moved) follow(plot, moved.split(".")[0]);
-}}));
+document.addEventListener("drawn", ({{target}}) => {{
+  if (plots().includes(target)) target.on("plotly_relayout", change => {{
+    const moved = Object.keys(change).find(key => /^xaxis/.test(key));
+    if (!following && moved) follow(target, moved.split(".")[0]);
+  }});
+}});
 </script>"""
 
 
@@ -69,22 +77,74 @@ def write_page(path: Path, comparison: Comparison) -> None:
         OSError: the file cannot be written.
     """
     title = f"{comparison.measurement.path.name}: measured and simulated"
-    parts = [_about(comparison)]
-    first = True
-    for block in _BLOCKS:
-        channels = [channel for channel in comparison.channels if channel.block == block]
-        if not channels:
-            continue
-        heading = _BLOCKS[block].format(drive=comparison.drive.value)
-        parts.append(f"<h2>{escape(heading)}</h2>{_table(channels)}")
-        lines = figure_html(_lines(channels), script=first)
-        parts.append(f"<div class={_OVER_TIME}>{lines}</div>")
-        parts.append("<h3>Coherence of measured and simulated</h3>")
-        parts.append(figure_html(_spectra(channels), script=False))
-        parts.append("<h3>Error against what may drive it</h3>")
-        parts.append(figure_html(_bins(channels), script=False))
-        first = False
+    ranked = sorted(comparison.channels, key=_excess, reverse=True)
+    parts = [_verdict(ranked), _table(ranked, comparison)]
+    parts += [_channel(each, comparison, _LINE_POINTS) for each in ranked[:_OPEN]]
+    if ranked[_OPEN:]:
+        folded = "".join(_channel(each, comparison, _FOLDED_POINTS) for each in ranked[_OPEN:])
+        title_of_rest = f"The other {len(ranked) - _OPEN} channels, which differ less"
+        parts.append(f"<details><summary>{title_of_rest}</summary>{folded}</details>")
+    parts += [_block(block, comparison) for block in _BLOCKS]
+    parts.append(f"<h2>How it was compared</h2>{_about(comparison)}")
     write_offline_page(path, title, [*parts, _LINKED])
+
+
+def _excess(channel: ChannelFit) -> float:
+    """Return the RMS error in multiples of its noise floor."""
+    return channel.rms / channel.floor if channel.floor > 0.0 else float(channel.rms > 0.0)
+
+
+def _times(channel: ChannelFit) -> str:
+    """Return the excess as text, in two digits, or whole where it has more."""
+    excess = _excess(channel)
+    return f"{excess:.0f}" if excess >= 10.0 else f"{excess:.2g}"
+
+
+def _verdict(ranked: list[ChannelFit]) -> str:
+    """Return in a sentence or two how many channels agree, and which is the worst."""
+    if not ranked:
+        return "<p class=verdict>Nothing could be compared.</p>"
+    beyond = [each for each in ranked if _excess(each) > _BEYOND]
+    text = f"{len(ranked) - len(beyond)} of {len(ranked)} channels agree within their noise."
+    if beyond:
+        worst = beyond[0]
+        text += (
+            f" The worst is {_words(worst)}: its error is {_times(worst)} times the noise floor."
+        )
+    return f"<p class=verdict>{escape(text)}</p>"
+
+
+def _words(channel: ChannelFit) -> str:
+    return f"{channel_words(channel.name)} ({channel.block})"
+
+
+def _id(channel: ChannelFit) -> str:
+    return f"{channel.block}-{channel.name}".replace("/", "-")
+
+
+def _channel(channel: ChannelFit, comparison: Comparison, points: int) -> str:
+    """Return one channel with its lines over time."""
+    from_what = _BLOCKS[channel.block].format(drive=comparison.drive.value)
+    figure = figure_html(_lines(channel, points))
+    return (
+        f"<section id={_id(channel)}><h2>{escape(channel_words(channel.name))}</h2>"
+        f"<p>{escape(from_what)}. Error {channel.rms:.3g} {escape(channel.unit)} RMS,"
+        f" noise floor {channel.floor:.3g} {escape(channel.unit)}.</p>"
+        f"<div class={_OVER_TIME}>{figure}</div></section>"
+    )
+
+
+def _block(block: str, comparison: Comparison) -> str:
+    """Return spectra and drivers of the errors of a block, folded; empty without channels."""
+    channels = [channel for channel in comparison.channels if channel.block == block]
+    if not channels:
+        return ""
+    heading = _BLOCKS[block].format(drive=comparison.drive.value)
+    return (
+        f"<details><summary>{escape(heading)}: coherence, and what may drive the error</summary>"
+        f"<h3>Coherence of measured and simulated</h3>{figure_html(_spectra(channels))}"
+        f"<h3>Error against what may drive it</h3>{figure_html(_bins(channels))}</details>"
+    )
 
 
 def _about(comparison: Comparison) -> str:
@@ -102,54 +162,56 @@ def _about(comparison: Comparison) -> str:
     return "<ul>" + "".join(f"<li>{escape(line)}</li>" for line in lines) + "</ul>"
 
 
-def _table(channels: list[ChannelFit]) -> str:
-    heads = ("channel", "VAF %", "NRMSE", "RMS error", "noise floor", "bias", "lag ms", "unit")
+def _table(channels: list[ChannelFit], comparison: Comparison) -> str:
+    """Return a row per channel, linked to its lines, in the given order."""
+    heads = (
+        *("channel", "from", "error / floor", "RMS error", "noise floor", "unit", "VAF %"),
+        *("NRMSE", "bias", "lag ms"),
+    )
     rows = []
     for c in channels:
         cells = (
-            c.name,
-            "at rest" if c.vaf is None else f"{c.vaf:.3f}",
-            "" if c.nrmse is None else f"{c.nrmse:.4f}",
+            channel_words(c.name),
+            c.block,
+            _times(c),
             f"{c.rms:.3g}",
             f"{c.floor:.3g}",
+            c.unit,
+            "at rest" if c.vaf is None else f"{c.vaf:.3f}",
+            "" if c.nrmse is None else f"{c.nrmse:.4f}",
             f"{c.bias:.2g}",
             "" if c.lag is None else f"{round(1e3 * c.lag, 2) + 0.0:.2f}",
-            c.unit,
         )
         rows.append(cells)
-    return table_html(heads, rows, "accuracy by channel")
-
-
-def _lines(channels: list[ChannelFit]) -> go.Figure:
-    """Return two rows per channel, both signals and their difference, on one time axis."""
-    figure = make_subplots(
-        rows=2 * len(channels), cols=1, shared_xaxes=True, vertical_spacing=0.08 / len(channels)
+    links = [f"#{_id(each)}" for each in channels]
+    note = "".join(
+        f"<li>{escape(name)}: {escape(text.format(drive=comparison.drive.value))}</li>"
+        for name, text in _BLOCKS.items()
+        if any(c.block == name for c in channels)
     )
-    for i, channel in enumerate(channels):
-        for values, name, colour, row in (
-            (channel.measured, "measured", "#1f77b4", 2 * i + 1),
-            (channel.simulated, "simulated", "#ff7f0e", 2 * i + 1),
-            (channel.error, "measured − simulated", "#555555", 2 * i + 2),
-        ):
-            times, shown = thinned(channel.times, values)
-            figure.add_scatter(
-                x=times,
-                y=shown,
-                name=name,
-                legendgroup=name,
-                showlegend=i == 0,
-                line={"color": colour, "width": 1},
-                row=row,
-                col=1,
-            )
-        label = f"{channel.name.split('/', 1)[-1]}<br>[{channel.unit}]"
-        figure.update_yaxes(title_text=label, title_font_size=10, row=2 * i + 1, col=1)
-        label = f"error<br>[{channel.unit}]"
-        figure.update_yaxes(title_text=label, title_font_size=10, row=2 * i + 2, col=1)
-    figure.update_xaxes(title_text="time [s]", row=2 * len(channels), col=1)
-    height = 2 * len(channels) * _ROW_PIXELS + 150
-    legend = {**LEGEND, "y": 1.0 - _MODEBAR_PIXELS / height, "yanchor": "top"}
-    figure.update_layout(height=height, hovermode="x", legend=legend, **LAYOUT)
+    return f"{table_html(heads, rows, 'accuracy by channel', links)}<ul>{note}</ul>"
+
+
+def _lines(channel: ChannelFit, points: int) -> go.Figure:
+    """Return measured and simulated signal, and below them their difference and its floor."""
+    figure = make_subplots(rows=2, cols=1, shared_xaxes=True, vertical_spacing=0.06)
+    # The measured line is wide and below, so that it is seen where both agree.
+    for values, name, colour, width, row in (
+        (channel.measured, "measured", "#9ecae9", 4, 1),
+        (channel.simulated, "simulated", "#c04a00", 1.2, 1),
+        (channel.error, "measured − simulated", "#0b5cad", 1, 2),
+    ):
+        times, shown = thinned(channel.times, values, points)
+        line = {"color": colour, "width": width}
+        x, y = times.astype(np.float32), shown.astype(np.float32)
+        figure.add_scatter(x=x, y=y, name=name, mode="lines", line=line, row=row, col=1)
+    for side in (-channel.floor, channel.floor):
+        figure.add_hline(y=side, line={"color": "#888", "dash": "dash", "width": 1}, row=2, col=1)
+    figure.update_yaxes(title_text=f"[{channel.unit}]", row=1, col=1)
+    figure.update_yaxes(title_text=f"error [{channel.unit}]", row=2, col=1)
+    figure.update_xaxes(title_text="time [s]", row=2, col=1)
+    figure.update_layout(height=_CHANNEL_PIXELS, hovermode="x", **BELOW)
+    figure.update_layout(margin_t=30)
     return figure
 
 

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping, Sequence, Set
 from dataclasses import replace
 from functools import partial
 
@@ -10,6 +10,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from cspm_ident.diagnosis.diagnosis import Diagnosis
+from cspm_ident.diagnosis.empirical.empirical_model import Searched, empirical_tables
+from cspm_ident.diagnosis.empirical.table_holdout import (
+    confirmed_tables,
+    simulated_tables,
+    with_tables,
+)
 from cspm_ident.diagnosis.finding import (
     Finding,
     HoldOut,
@@ -18,33 +24,38 @@ from cspm_ident.diagnosis.finding import (
     Unexplained,
     reported_status,
 )
-from cspm_ident.diagnosis.regression.block_gram import BlockGram, gather
+from cspm_ident.diagnosis.judged_search import JudgedSearch, searched_and_judged
+from cspm_ident.diagnosis.one_number import with_one_number
 from cspm_ident.diagnosis.residuals.aliased_tension import chatters_of
-from cspm_ident.diagnosis.residuals.data_split import first_part, span_of, whole_part
-from cspm_ident.diagnosis.residuals.free_shapes import Driver, Knots
+from cspm_ident.diagnosis.residuals.data_split import first_part, whole_part
+from cspm_ident.diagnosis.residuals.free_shapes import Knots
 from cspm_ident.diagnosis.residuals.load_cell_clock import on_drives_clock
-from cspm_ident.diagnosis.residuals.regressors import Candidate
-from cspm_ident.diagnosis.residuals.residual_equation import in_noise, steady
+from cspm_ident.diagnosis.residuals.regressors import Candidate, Place
+from cspm_ident.diagnosis.residuals.residual_equation import Equation, steady
 from cspm_ident.diagnosis.residuals.spectral_lines import Line
 from cspm_ident.diagnosis.selection.refinement import Cut
 from cspm_ident.diagnosis.selection.region import region_of
 from cspm_ident.diagnosis.selection.search import Search
 from cspm_ident.diagnosis.selection.search_pass import (
-    Parts,
     Progress,
     Recordings,
     hums_of,
-    searched_for,
 )
-from cspm_ident.diagnosis.selection.search_result import SearchResult
 from cspm_ident.diagnosis.thresholds import DEFAULT_THRESHOLDS, Thresholds
-from cspm_ident.diagnosis.validation.acceptance import Acceptance, accepted
+from cspm_ident.diagnosis.validation.acceptance import Acceptance, with_rivals
 from cspm_ident.diagnosis.validation.detection_limits import detection_limits
 from cspm_ident.diagnosis.validation.found_model import Data, Model, modelled
-from cspm_ident.diagnosis.validation.holdout_residuals import free_functions, judged
-from cspm_ident.diagnosis.validation.holdout_simulation import baselines_of
+from cspm_ident.diagnosis.validation.holdout_residuals import HeldOut, free_functions, judged
+from cspm_ident.diagnosis.validation.holdout_simulation import (
+    SimulatedFit,
+    baselines_of,
+    with_tables_simulated,
+)
+from cspm_ident.diagnosis.validation.remainder import (
+    is_immaterial,
+)
 from cspm_ident.diagnosis.validation.residual_curves import held_out_curves
-from cspm_ident.diagnosis.validation.reversals import with_wider
+from cspm_ident.diagnosis.validation.rest import concerned, rest_share
 from cspm_ident.signals.measurement import Measurement
 from cspm_sim.effects import Effect, catalogue
 
@@ -70,66 +81,152 @@ def diagnose(
     Raises:
         InputError: the recordings have no residual to search, or are too short.
     """
-    searched, held_out = (
-        [on_drives_clock(each, thresholds) for each in own] for own in (searched, held_out)
+    recordings = Recordings(
+        *([on_drives_clock(each, thresholds) for each in own] for own in (searched, held_out))
     )
     effects = list(catalogue().values()) if effects is None else effects
-    # The search pass has no name here, so that its columns are freed once they are unused.
-    (search_parts, judge_parts, hums, noise, block, search, knots, assumed), found = searched_for(
-        Recordings(searched, held_out), effects, progress, thresholds
-    )
-    gram = search.gram
-    found = with_wider(found, in_noise(search_parts, noise), block, thresholds)
-    progress("held-out data")
-    judge = _judge(in_noise(judge_parts, noise), found, block)
-    search_parts, judge_parts = _found_only(search_parts, found), _found_only(judge_parts, found)
-    rows = in_noise(search_parts, noise)
-    acceptance = accepted(search, found, judge, searched, rows, block)
-    starts = [span_of(part)[0] for part in judge_parts]
-    retuned = search.retuned()
+    own = searched_and_judged(recordings, effects, progress, thresholds)
     progress("parameters, and simulation of held-out data")
-    baselines = baselines_of(held_out or searched, starts, retuned)
-    cut: Cut = whole_part if held_out else partial(first_part, thresholds=thresholds)
-    data = Data(searched, cut, baselines, rows, noise, block, assumed)
-    acceptance, model = _useful(search, acceptance, data)
-    unexplained = acceptance.unexplained(search, found)
-    lines = tuple(line for each in (*searched, *held_out) for line in chatters_of(each, thresholds))
-    aliased = {line.place.element for line in lines}
-    values = {c: w for c, (w, _) in model.weights.items()}
-    first = search.fits.values([each.hypothesis for each in acceptance.kept])
-    free = free_functions(gram, judge)
-    reported = _reported(search, acceptance, model)
-    negligible = (each for each in model.findings if each.status is Status.NEGLIGIBLE)
-    gone = (*acceptance.rejected, *acceptance.fed_back)
+    data = _data(own)
+    acceptance, model = _useful(own, data)
+    own = own._replace(acceptance=acceptance)
+    acceptance, model = with_one_number(own, model, data) or (acceptance, model)
+    return _diagnosis(own._replace(acceptance=acceptance), model, data, effects)
 
-    def described(finding: Finding) -> Finding:
-        status = reported_status(finding, unexplained, aliased, thresholds)
-        region = region_of(rows, finding.hypothesis.candidates, first, thresholds)
-        return replace(finding, status=status, region=region)
 
+def _data(own: JudgedSearch) -> Data:
+    """Return what models are fitted to, with simulations of the held-out data."""
+    (searched, held_out), last = own.recordings, own.last
+    cut: Cut = whole_part if held_out else partial(first_part, thresholds=own.thresholds)
+    baselines = baselines_of(own.judges, own.starts, own.retuned)
+    return Data(searched, cut, baselines, own.rows, last.noise, last.block, last.assumed)
+
+
+def _diagnosis(own: JudgedSearch, model: Model, data: Data, effects: Sequence[Effect]) -> Diagnosis:
+    """Return what is reported of a judged search and the model of its kept findings."""
+    recordings, search, acceptance = own.recordings, own.search, own.acceptance
+    left = own.searched_left(data, model)
+    unexplained = own.beyond_noise(acceptance.unexplained(search, own.found), left)
+    lines = _aliased_lines(recordings, own.thresholds)
+    first, fit, limits = own.first, _fit(own, model, left), own.thresholds
+    open_places = {e.driver.place for e in unexplained} | _not_at_noise(fit, limits)
+    tables = _tables(own, model, data, open_places)
     return Diagnosis(
-        searched=searched,
-        held_out=held_out,
-        findings=(*map(described, reported), *negligible, *gone),
-        unexplained=_with_shapes(search, acceptance.tested, knots, unexplained),
-        tested=found.tested,
-        fit=judged(held_out or searched, starts, retuned, values, noise, free, thresholds),
-        simulated=model.simulated,
-        lines=(*lines, *_lasting(hums, searched, search_parts, values, thresholds)),
+        searched=recordings.searched,
+        held_out=recordings.held_out,
+        findings=_findings(own, model, unexplained, lines, fit),
+        unexplained=_with_shapes(search, acceptance.tested, own.last.knots, unexplained),
+        tested=own.found.tested,
+        tables=tables,
+        fit=_with_tables(own, model, tables, fit),
+        simulated=_simulated(model, data, tables),
+        lines=(
+            *lines,
+            *(line for line in _lasting(own, model) if _matters(line, fit, own.thresholds)),
+        ),
         limits=detection_limits(search, acceptance.kept),
         not_excited=_not_excited(search, effects),
-        places=tuple(place.place for place in gram.places),
-        curves=held_out_curves(steady(judge_parts), first),
-        noise=noise,
-        thresholds=thresholds,
+        places=tuple(place.place for place in search.gram.places),
+        curves=held_out_curves(steady(own.last.judge_parts), first),
+        noise=own.last.noise,
+        thresholds=own.thresholds,
     )
 
 
-def _useful(search: Search, acceptance: Acceptance, data: Data) -> tuple[Acceptance, Model]:
-    """Return the acceptance and the model after rejecting findings until none is useless."""
+def _aliased_lines(recordings: Recordings, thresholds: Thresholds) -> tuple[Line, ...]:
+    """Return the spectral lines of aliased tensions in all recordings."""
+    every = (*recordings.searched, *recordings.held_out)
+    return tuple(line for each in every for line in chatters_of(each, thresholds))
+
+
+def _findings(
+    own: JudgedSearch,
+    model: Model,
+    unexplained: Sequence[Unexplained],
+    lines: Sequence[Line],
+    fit: Sequence[HeldOut],
+) -> tuple[Finding, ...]:
+    """Return all findings: reported with status and region, negligible, and rejected.
+
+    Args:
+        own: the judged search.
+        model: of the findings that are kept.
+        unexplained: residuals that these leave unexplained.
+        lines: of aliased tensions.
+        fit: held-out residuals with and without the model.
+    """
+    aliased = {line.place.element for line in lines}
+
+    def described(finding: Finding) -> Finding:
+        left = rest_share(concerned(fit, finding), own.thresholds)
+        status = reported_status(finding, unexplained, aliased, own.thresholds, left)
+        region = region_of(own.rows, finding.hypothesis.candidates, own.first, own.thresholds)
+        return replace(finding, status=status, region=region)
+
+    reported = map(described, _reported(own.search, own.acceptance, model))
+    negligible = (each for each in model.findings if each.status is Status.NEGLIGIBLE)
+    return (*reported, *negligible, *own.acceptance.rejected, *own.acceptance.fed_back)
+
+
+def _tables(
+    own: JudgedSearch, model: Model, data: Data, places: Set[Place]
+) -> dict[Candidate, Array]:
+    """Return tables of values for some residuals, as far as they lower held-out ones."""
+    values, noise = model.values, own.last.noise
+    if not (values or places):
+        return {}
+    searched = Searched(
+        data.searched, data.searched_part, values, noise, own.last.block, own.thresholds
+    )
+    tables = empirical_tables(searched, places)
+    parts = list(zip(own.judges, own.starts, strict=True))
+    tables = confirmed_tables(parts, values, tables, noise, own.thresholds)
+    return simulated_tables(model.simulated, data.baselines, values, tables)
+
+
+def _fit(
+    own: JudgedSearch, model: Model, left: Mapping[Place, Sequence[Equation]]
+) -> tuple[HeldOut, ...]:
+    """Return how large the held-out residuals are with and without the model."""
+    free = free_functions(own.search.gram, own.judge)
+    given = own.retuned, model.values, own.last.noise, free, left
+    return judged(own.judges, own.starts, *given, own.thresholds)
+
+
+def _with_tables(
+    own: JudgedSearch,
+    model: Model,
+    tables: Mapping[Candidate, Array],
+    fit: tuple[HeldOut, ...],
+) -> tuple[HeldOut, ...]:
+    """Return the held-out fits, with the tables where there are any."""
+    found = {**model.values, **tables}
+    given = own.judges, own.starts, found, own.last.noise
+    return with_tables(fit, *given) if tables else fit
+
+
+def _not_at_noise(fit: Sequence[HeldOut], thresholds: Thresholds) -> set[Place]:
+    return {each.place for each in fit if each.is_at_noise(thresholds) is False}
+
+
+def _simulated(
+    model: Model, data: Data, tables: Mapping[Candidate, Array]
+) -> tuple[SimulatedFit, ...]:
+    """Return the simulations of held-out data, with the tables where there are any."""
+    if not tables:
+        return model.simulated
+    return with_tables_simulated(model.simulated, data.baselines, {**model.values, **tables})
+
+
+def _useful(own: JudgedSearch, data: Data) -> tuple[Acceptance, Model]:
+    """Return the acceptance and the model after rejecting findings until none is useless.
+
+    A rival takes the place of a rejected finding where one passes the hold-out test.
+    """
+    search, acceptance = own.search, own.acceptance
     model = modelled(search, acceptance.kept, data)
     while gone := model.useless:
-        acceptance = acceptance.rejecting(gone)
+        acceptance = with_rivals(search, own.judge, acceptance.rejecting(gone), gone)
         model = modelled(search, acceptance.kept, data)
     return acceptance, model
 
@@ -147,39 +244,25 @@ def _reported(search: Search, acceptance: Acceptance, model: Model) -> list[Find
     return sorted(found, key=lambda each: (each.holdout is HoldOut.SILENT, -each.gain.total))
 
 
-def _lasting(
-    lines: Sequence[Sequence[Line]],
-    searched: Sequence[Measurement],
-    parts: Parts,
-    weights: Mapping[Candidate, Array],
-    thresholds: Thresholds,
-) -> tuple[Line, ...]:
+def _matters(line: Line, fit: Sequence[HeldOut], thresholds: Thresholds) -> bool:
+    """Return whether a spectral line is larger than the sensor's accuracy or a material share."""
+    own = (each.remainders[line.channel :] for each in fit if each.place == line.place)
+    left = [parts[0] for parts in own if parts]
+    rms = line.amplitude / np.sqrt(2.0)
+    return not any(
+        np.isfinite(each.accuracy) and is_immaterial(rms, each.measured, each.accuracy, thresholds)
+        for each in left
+    )
+
+
+def _lasting(own: JudgedSearch, model: Model) -> tuple[Line, ...]:
     """Return the spectral lines that remain beyond the final model."""
-    found = []
-    for own, measurement, part in zip(lines, searched, parts, strict=True):
-        now = hums_of(measurement, part, weights, thresholds) if own else ()
-        found += [line for line in now if any(line.is_same(before, thresholds) for before in own)]
+    found, weights = [], model.values
+    searched = zip(own.last.hums, own.recordings.searched, own.last.search_parts, strict=True)
+    for before, measurement, part in searched:
+        now = hums_of(measurement, part, weights, own.thresholds) if before else ()
+        found += [one for one in now if any(one.is_same(b, own.thresholds) for b in before)]
     return tuple(found)
-
-
-def _judge(parts: Parts, found: SearchResult, block: float) -> BlockGram:
-    """Return Gram matrices of held-out residuals, findings, alternatives and free functions."""
-    terms = _candidates(found) | {
-        t for part in parts for e in part for t in e.columns if isinstance(t, Driver)
-    }
-    return gather([[e.only(terms) for e in part] for part in parts], block)
-
-
-def _candidates(found: SearchResult) -> set[Candidate | Driver]:
-    own = [each.hypothesis.candidates for each in found.findings]
-    rivals = [rival.candidates for each in found.findings for rival in each.alternatives]
-    return {candidate for each in (*own, *rivals) for candidate in each}
-
-
-def _found_only(parts: Parts, found: SearchResult) -> Parts:
-    """Return equations with the columns of findings and alternatives only, to free memory."""
-    terms = _candidates(found)
-    return [[equation.only(terms) for equation in part] for part in parts]
 
 
 def _with_shapes(

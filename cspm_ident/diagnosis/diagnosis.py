@@ -3,18 +3,19 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
 import numpy as np
 from numpy.typing import NDArray
 
 from cspm_ident.diagnosis.finding import Finding, Status, Unexplained
-from cspm_ident.diagnosis.residuals.regressors import Place
+from cspm_ident.diagnosis.residuals.regressors import Candidate, Place
 from cspm_ident.diagnosis.residuals.spectral_lines import Line
 from cspm_ident.diagnosis.thresholds import DEFAULT_THRESHOLDS, Thresholds
 from cspm_ident.diagnosis.validation.detection_limits import Limit
 from cspm_ident.diagnosis.validation.holdout_residuals import HeldOut
 from cspm_ident.diagnosis.validation.holdout_simulation import SimulatedFit
+from cspm_ident.diagnosis.validation.remainder import Remainder
 from cspm_ident.diagnosis.validation.residual_curves import Curve
 from cspm_ident.signals.measurement import Measurement
 
@@ -30,6 +31,7 @@ class Diagnosis:
         held_out: recordings of the hold-out test; empty where it used the end of each searched one.
         findings: all that were selected: first the reported ones, the most important first.
         unexplained: residuals that no effect explains, the largest first.
+        tables: values of tables that describe what is unexplained, by effect and element.
         tested: number of hypotheses that were tested.
         fit: hold-out errors of each residual.
         simulated: hold-out errors of each simulated quantity.
@@ -47,6 +49,7 @@ class Diagnosis:
     findings: tuple[Finding, ...]
     unexplained: tuple[Unexplained, ...]
     tested: int
+    tables: dict[Candidate, Array] = field(default_factory=dict)
     fit: tuple[HeldOut, ...]
     simulated: tuple[SimulatedFit, ...]
     lines: tuple[Line, ...]
@@ -56,6 +59,28 @@ class Diagnosis:
     curves: tuple[Curve, ...]
     noise: dict[Place, Array]
     thresholds: Thresholds = DEFAULT_THRESHOLDS
+
+    @property
+    def remainders(self) -> tuple[Remainder, ...]:
+        """What is left of every component of every residual on held-out data, with the findings."""
+        return tuple(left for fit in self.fit for left in fit.remainders)
+
+    @property
+    def beyond_noise(self) -> tuple[Remainder, ...]:
+        """What is left beyond the noise, the largest multiple of its noise first."""
+        left = (e for e in self.remainders if e.is_judged and not e.is_at_noise(self.thresholds))
+        return tuple(sorted(left, key=lambda each: -each.ratio))
+
+    @property
+    def undescribed(self) -> tuple[Remainder, ...]:
+        """What is left beyond the noise where no function and no spectral line describes it."""
+        described = {e.driver.place for e in self.unexplained} | {e.place for e in self.lines}
+        return tuple(each for each in self.beyond_noise if each.place not in described)
+
+    @property
+    def is_excited(self) -> bool:
+        """Whether any residual is known well enough, and moves enough, to judge the model by it."""
+        return any(each.is_excited(self.thresholds) for each in self.remainders)
 
     @property
     def reported(self) -> tuple[Finding, ...]:

@@ -12,7 +12,12 @@ from numpy.typing import NDArray
 
 from cspm_ident.diagnosis.parameter import Coefficients, Parameter, parameters_of
 from cspm_ident.diagnosis.regression.block_regression import Gain
-from cspm_ident.diagnosis.regression.hypothesis import Hypothesis, Rival, is_constant
+from cspm_ident.diagnosis.regression.hypothesis import (
+    Hypothesis,
+    Rival,
+    is_constant,
+    may_be_none,
+)
 from cspm_ident.diagnosis.residuals.free_shapes import Driver
 from cspm_ident.diagnosis.thresholds import DEFAULT_THRESHOLDS, Thresholds
 
@@ -198,9 +203,18 @@ def reported_status(
     unexplained: Sequence[Unexplained],
     aliased: Collection[str] = (),
     thresholds: Thresholds = DEFAULT_THRESHOLDS,
+    left: float = 0.0,
 ) -> Status:
-    """Return the status of a finding that is reported; see `is_doubtful`."""
-    if is_doubtful(finding, unexplained, aliased, thresholds):
+    """Return the status of a finding that is reported; see `is_doubtful`.
+
+    It is doubtful as well where the intervals of all its coefficients contain zero. They include
+    the model-form error, which is then as large as the effect.
+    """
+    intervals = {c.candidate: (c.values, c.half_widths) for c in finding.coefficients}
+    drifts = finding.hypothesis.effect.physics.sense is not None
+    if may_be_none(intervals) and not (drifts or finding.hypothesis.effect.signature.saturates):
+        return Status.DOUBTFUL
+    if is_doubtful(finding, unexplained, aliased, thresholds, left):
         return Status.DOUBTFUL
     return Status.TIED if finding.alternatives else Status.REPORTED
 
@@ -210,6 +224,7 @@ def is_doubtful(
     unexplained: Sequence[Unexplained],
     aliased: Collection[str] = (),
     thresholds: Thresholds = DEFAULT_THRESHOLDS,
+    left: float = 0.0,
 ) -> bool:
     """Return whether unexplained residuals are large relative to the gain of a finding.
 
@@ -222,12 +237,16 @@ def is_doubtful(
         aliased: cables with aliased tension, which alternates from one reading to the next. Any
             finding that depends on these is doubtful.
         thresholds: `doubtful_share`.
+        left: what all findings leave of its held-out residuals beyond the noise, as a share of
+            what they take; see `rest_share`.
     """
     misread = {*aliased, *_FED_BY_ALL} if aliased else set()
     if misread & set(finding.elements):
         return True
     gained, constant = finding.gain.total, is_constant(finding.hypothesis.effect)
     share = thresholds.doubtful_share
+    if left > (1.0 if constant else share):
+        return True
     return any(
         each.gain.total > gained * (1.0 if constant and not each.driver.of_time else share)
         for each in unexplained

@@ -37,7 +37,7 @@ class Thresholds(
     RegressionThresholds,
     ResidualThresholds,
 ):
-    """All thresholds of a diagnosis; `docs/thresholds.md` lists them.
+    """All thresholds of a diagnosis; `docs/reference/thresholds.md` lists them.
 
     Each field has metadata `unit`, `low`, `high`, `meaning` and `basis`.
 
@@ -86,6 +86,6 @@ def thresholds_of(values: Mapping[str, float]) -> Thresholds:
     known = [each.name for each in fields(Thresholds)]
     for name in values:
         if name not in known:
-            near = get_close_matches(name, known) or ["those of docs/thresholds.md"]
+            near = get_close_matches(name, known) or ["those of docs/reference/thresholds.md"]
             raise InputError(f"thresholds: no {name}, allowed: {', '.join(near)}")
     return replace(DEFAULT_THRESHOLDS, **dict[str, Any](values))

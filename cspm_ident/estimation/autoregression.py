@@ -91,7 +91,7 @@ def whiten(model: Autoregression, values: Array) -> Array:
 
     Args:
         model: of the process.
-        values: one piece, or columns alike, shape (n, …).
+        values: one piece, or columns of one process, shape (n, …).
     """
     predictors = _predictors(model.reflections)
     result = lfilter(np.concatenate([[1.0], predictors[-1]]), [1.0], values, axis=0)

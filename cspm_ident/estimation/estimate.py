@@ -68,8 +68,23 @@ class Estimate:
         lower, upper = self.ci95[self.names.index(name)]
         return float(lower), float(upper)
 
+    def without(self, name: str) -> Estimate:
+        """Return the other parameters, with the intervals that they have beside that one."""
+        kept = [i for i, each in enumerate(self.names) if each != name]
+        return replace(
+            self,
+            names=tuple(self.names[i] for i in kept),
+            units=tuple(self.units[i] for i in kept),
+            values=self.values[kept],
+            sd=self.sd[kept],
+            ci95=self.ci95[kept],
+            correlation=self.correlation[np.ix_(kept, kept)],
+            frozen=tuple(each for each in self.frozen if each != name),
+            at_bound=tuple(each for each in self.at_bound if each != name),
+        )
+
     def data(self) -> dict[str, Any]:
-        """Return everything as plain data for JSON; null stands for infinite and for none."""
+        """Return everything as plain data for JSON; null means infinite or none."""
         return {
             "method": self.method,
             "effective_samples": self.effective_samples,

@@ -13,7 +13,8 @@ from cspm_ident.experiment.envelope import Reach, pose_reach, reach_of
 from cspm_ident.signals.measurement import Measurement
 from cspm_msgs_py.dofs import DOFS
 from cspm_msgs_py.motion_spec import JonswapMotion, Move, MovesMotion, Six
-from cspm_msgs_py.scenario import AnglePath, AngleProfile, Body, Scenario
+from cspm_msgs_py.scenario import AnglePath, AngleProfile, Scenario
+from cspm_msgs_py.scenario_keys.bodies import Body, Target
 
 Array = NDArray[np.float64]
 
@@ -49,7 +50,7 @@ def _bar_excitations(
     reach, speed = share * bar.excursion, share * bar.speed
     reach[_ROLL] = 0.0
     pace = float(np.median(bar.speed / (2.0 * pi * bar.excursion)))
-    home = Body(mean_pose=_six(bar.mean, _ROLL))
+    home = Target(mean_pose=_six(bar.mean, _ROLL))
     for name, size, frequency in (
         ("slow", 1.0, 0.2 * pace),
         ("even", 1.0, pace),
@@ -72,7 +73,7 @@ def _bar_excitations(
         yield _scenario("frame_alone", testbed, home, moving)
 
 
-def _scenario(name: str, testbed: str, target: Body, frame: Body | None = None) -> Scenario:
+def _scenario(name: str, testbed: str, target: Target, frame: Body | None = None) -> Scenario:
     return Scenario(
         name=name,
         testbed=testbed,

@@ -25,7 +25,7 @@ def write_experiments(
 ) -> None:
     """Write an experiment for each tie and one for what was not testable, and name them in `data`.
 
-    Each stays within the excursions and speeds of the recordings. Where no such motion would tell
+    Each stays within the excursions and speeds of the recordings. Where no such motion would show
     more than the recordings did, nothing is written, and `data` says null.
 
     Args:
@@ -48,7 +48,7 @@ def write_experiments(
         answer = best_answer(found.searched, found.noise, question, plans)
         if answer is not None:
             gain = (answer.separation / max(answer.recorded, 1e-12)) ** 2
-            text = f"{title}: {gain:.3g} times what as long a recording told so far, as planned."
+            text = f"{title}: {gain:.3g} times what as long a recording showed so far, as planned."
             entry[_KEY] = files.add(answer.scenario, text)
     best = most_showing(silent, plans)
     if best is not None:
@@ -85,9 +85,9 @@ def _scenario_text(scenario: Scenario) -> str:
 
 
 def _ties(found: Diagnosis, data: dict[str, Any]) -> Iterator[tuple[dict[str, Any], Question, str]]:
-    """Yield every alternative's entry, what would tell it apart, and that in words."""
+    """Yield every alternative's entry, what would distinguish it, and that in words."""
     for finding, reported in zip(found.reported, named_in(data), strict=True):
         truth = {own.candidate: own.values for own in finding.coefficients}
         for rival, entry in zip(finding.alternatives, reported["alternatives"], strict=True):
-            title = f"Tells {finding.hypothesis.words} from {rival.words}"
+            title = f"Distinguishes {finding.hypothesis.words} from {rival.words}"
             yield entry, Question(truth, rival.candidates), title

@@ -1,4 +1,4 @@
-"""Which effects a set of sensors can tell apart, from what they add to its residuals."""
+"""Which effects a set of sensors can distinguish, from what they add to its residuals."""
 
 from __future__ import annotations
 

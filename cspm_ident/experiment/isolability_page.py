@@ -1,6 +1,7 @@
-"""The page `docs/isolability.md`: which effects which sensors can tell apart, computed.
+"""The page `docs/reference/isolability.md`: which effects which sensors can distinguish, computed.
 
-Run `python -m cspm_ident.experiment.isolability_page > docs/isolability.md` after adding or
+Run `python -m cspm_ident.experiment.isolability_page > docs/reference/isolability.md` after
+adding or
 changing an effect.
 """
 
@@ -18,6 +19,7 @@ from cspm_ident.experiment.plan import planned
 from cspm_ident.signals.measurement import Measurement
 from cspm_msgs_py.scenario import load_scenario
 from cspm_msgs_py.testbed import load_testbed
+from cspm_run.library import find_scenario
 from cspm_sim.effects import Channel, Effect, catalogue
 
 Array = NDArray[np.float64]
@@ -37,10 +39,11 @@ NOISE = {
 NARROW_DEG = 15.0
 _SCENARIOS = Path(__file__).resolve().parents[2] / "scenarios"
 _HEAD = """\
-# Which sensors tell which effects apart
+# Which sensors distinguish which effects
 
 For every pair of [effects](effects.md) the smallest angle, in degrees, between what they can add to
-the residuals of [`cspm diagnose`](diagnose.md) along a rich motion: {motion} of the worst case,
+the residuals of
+[`cspm diagnose`](../how-to/diagnose.md) along a rich motion: {motion} of the worst case,
 planned without simulation. At 0 some amount of the one looks exactly as some amount of the other,
 however long the recording; at 90 they have nothing in common. A small angle asks for low noise or
 for another motion. A dash: one of the two shows nowhere with these sensors. Effects on cables act
@@ -52,7 +55,8 @@ and pulley (*drum*). Without load cells the winches' torques stand for them, so 
 faults show in its cable and in the bar's equation (*capture*); without motion capture as well
 `cspm diagnose` has no residual of a winch with a cable.
 
-This page is generated: `python -m cspm_ident.experiment.isolability_page > docs/isolability.md`.
+This page is generated:
+`python -m cspm_ident.experiment.isolability_page > docs/reference/isolability.md`.
 
 ## Pairs
 
@@ -79,7 +83,7 @@ _SETS = (
 
 def rich_measurement() -> Measurement:
     """Return what the thesis's machine would read along the worst case, exactly."""
-    path = _SCENARIOS / "worst_case.yaml"
+    path = find_scenario("worst_case_steep")
     scenario = load_scenario(path, [f"duration={DURATION_S}"])
     return planned(scenario, load_testbed(path.parent / scenario.testbed)).measurement
 

@@ -31,7 +31,8 @@ from cspm_model.kernels.cable import ATTACHMENT, EXIT, OFFSET_LENGTH, RADIUS
 from cspm_model.kernels.machine import PlantParameters
 from cspm_model.kernels.rotation import quaternion_from_euler
 from cspm_model.parameters import nominal_parameters
-from cspm_msgs_py.scenario import AngleProfile, Body, ClosedLoop, Scenario
+from cspm_msgs_py.scenario import DESIGN_POSE, AngleProfile, ClosedLoop, Scenario
+from cspm_msgs_py.scenario_keys.bodies import Body
 from cspm_msgs_py.testbed import Testbed, TestbedFile
 
 Array = NDArray[np.float64]
@@ -73,9 +74,11 @@ def planned(scenario: Scenario, testbed: TestbedFile) -> Plan:
     still = MachineSignals(times, frame, bar, zero, zero, zero)
     needed = Suspension(still, machine, parameters, np.ones(zero.shape[1])).wrench_residuals
     control = scenario.control
-    how = control.tension_distribution if isinstance(control, ClosedLoop) else None
+    how, pose = None, DESIGN_POSE
+    if isinstance(control, ClosedLoop):
+        how, pose = control.tension_distribution, control.motion.design_pose
     limits = np.array([cable.tension_limits for cable in machine.cables])
-    distribution = TensionDistribution(parameters.cables, limits, how)
+    distribution = TensionDistribution(parameters.cables, limits, how, design_pose=pose)
     tensions, missed = _distributed(distribution, needed, bar.poses, frame.poses)
     lengths = cable_spans(still, body_state(bar), body_state(frame), parameters.cables).lengths
     angles = _wound_angles(parameters, lengths, tensions)

@@ -65,10 +65,10 @@ def chance_of_misfit(
             common += float(left @ left) / size**2
             scattered += float(np.sum(each**2)) / (len(each) * (len(each) - 1.0)) / size**2
             count += len(left)
-    alike = count * _independent_share([each for mine in cycles for each in mine])
-    above = max(alike - parameters, 1.0)
-    below = alike * float(np.mean([len(mine[0]) - 1.0 for mine in cycles]))
-    return float(fisher.sf(common / above * alike / scattered, above, below))
+    independent = count * _independent_share([each for mine in cycles for each in mine])
+    above = max(independent - parameters, 1.0)
+    below = independent * float(np.mean([len(mine[0]) - 1.0 for mine in cycles]))
+    return float(fisher.sf(common / above * independent / scattered, above, below))
 
 
 def _independent_share(each: Sequence[Array]) -> float:

@@ -12,10 +12,11 @@ from scipy.signal import butter, sosfiltfilt
 from scipy.stats import t as student
 
 from cspm_ident.estimation import Estimate, Interval, Parameter, Problem, fit
+from cspm_ident.estimation.objection import Objection, error_objections, sign_objections
 from cspm_ident.rig.law import TensionCurve, law_of, tension_curve
 from cspm_ident.rig.specimen import Specimen
-from cspm_ident.rig.stiffness import split
-from cspm_ident.vaf import vaf
+from cspm_ident.rig.stiffness import SIGN_REMEDY, split
+from cspm_ident.vaf import error_percent, vaf
 from cspm_msgs_py.errors import InputError
 
 Array = NDArray[np.float64]
@@ -81,6 +82,15 @@ class SpecimenDamping:
     signals: Signals
     modelled: Array
 
+    @property
+    def objections(self) -> list[Objection]:
+        """Why its damping is no result; none where it is."""
+        own = self.estimate.without(STRETCH)
+        return [
+            *sign_objections(own, set(), {DAMPING}, SIGN_REMEDY),
+            *error_objections(own, [("the recording", error_percent(self.vaf))], "tension"),
+        ]
+
 
 class LinearDamping(NamedTuple):
     """constant − slope·length [N·s/m], thesis (3-13).
@@ -121,6 +131,16 @@ class DampingResult:
     law: LinearDamping | None
     verified: dict[str, float]
     cutoff: float
+
+    @property
+    def objections(self) -> tuple[Objection, ...]:
+        """Why dampings are no result; none where they are."""
+        return tuple(
+            each._replace(reason=f"{one.specimen.label}: {each.reason}")
+            for one in self.specimens
+            if one.fitted
+            for each in one.objections
+        )
 
     def data(self) -> dict[str, Any]:
         """Return everything as plain data for JSON."""

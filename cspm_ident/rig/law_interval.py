@@ -35,7 +35,7 @@ def with_intervals(found: Fitted, groups: Sequence[Sequence[Branch]], response: 
 
     The scatter of the cycles is that of the noise, whatever its colour: a stiffness is a quotient
     of differences, whose noise cancels in sums, and a window over the residuals of their mean is
-    never long enough for that. To it comes where encoders rest, which is alike in all cycles. Both
+    never long enough for that. To it comes where encoders rest, which is equal in all cycles. Both
     move the law farther than the residuals alone do, since what the filter did follows from the
     law. Where the residuals are more than the scatter leaves in their mean, the law does not fit:
     then their own interval (a sandwich) is given where it is the wider one.

@@ -24,7 +24,7 @@ SMALLEST = 1e-9
 # Less wound [m] or pulled [N] than this is rounding.
 ROUNDING = 1e-9
 # An encoder that rests within so many of its steps in all cycles rests in one place.
-ALIKE = 2.0
+RESTING_STEPS = 2.0
 
 
 class Response(NamedTuple):
@@ -127,8 +127,8 @@ def _rested_elsewhere(ramps: Ramps, cutoff: float) -> list[Ramps]:
     if not steps.size:
         return []
     step = float(steps.min())
-    low = specimen.wound <= specimen.wound.min() + ALIKE * step
-    high = specimen.wound >= specimen.wound.max() - ALIKE * step
+    low = specimen.wound <= specimen.wound.min() + RESTING_STEPS * step
+    high = specimen.wound >= specimen.wound.max() - RESTING_STEPS * step
     moved = [specimen.wound + where * step / np.sqrt(12.0) for where in (low, high)]
     return [find_ramps(replace(specimen, wound=wound), cutoff) for wound in moved]
 

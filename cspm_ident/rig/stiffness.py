@@ -10,6 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.stats import t as student
 
+from cspm_ident.estimation.objection import Objection, error_objections, sign_objections
 from cspm_ident.rig.branches import BRANCHES, Branch, mean_branches
 from cspm_ident.rig.candidates import Rank, rank_candidates
 from cspm_ident.rig.distortion import centred, modelled, undistorted
@@ -20,15 +21,16 @@ from cspm_ident.rig.law_interval import with_intervals
 from cspm_ident.rig.response import Response, find_response
 from cspm_ident.rig.specimen import Specimen
 from cspm_ident.rig.stiffness_fit import ASYMPTOTE_SHARE, Fitted, above_cap, fit_law
-from cspm_ident.vaf import vaf
+from cspm_ident.vaf import error_percent, vaf
 from cspm_msgs_py.errors import InputError
 
 Array = NDArray[np.float64]
 
+SIGN_REMEDY = "check the signs of angle and tension"
 CUTOFF = 2.0
 MEAN, POINTS = "mean", 100
 # Where the winch rests the encoder is off by a part of its step all the time; through the filter
-# that reaches so many samples into the ramp, alike in every cycle.
+# that reaches so many samples into the ramp, equal in every cycle.
 REACH = 3
 # The law determines how far the cables are stretched at their lowest tension and what the filter
 # did to them, and that changes the law by a tenth of its interval at most from the third round on.
@@ -84,6 +86,16 @@ class StiffnessResult:
     def area(self) -> float:
         """Cross-section that the test-bed file gives the cables [m²]."""
         return section_of(self.specimens[0].specimen.cable)
+
+    @property
+    def objections(self) -> tuple[Objection, ...]:
+        """Why the law is no result; none where it is one."""
+        found, fitted = self.both.estimate, [one for one in self.specimens if one.fitted]
+        errors = [(one.specimen.label, error_percent(one.vaf[MEAN])) for one in fitted]
+        return (
+            *sign_objections(found, {"a", "rigidity"}, set(), SIGN_REMEDY),
+            *error_objections(found, errors, "stiffness"),
+        )
 
     def data(self) -> dict[str, Any]:
         """Return everything as plain data for JSON."""

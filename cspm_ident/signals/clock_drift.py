@@ -137,7 +137,7 @@ def _search(
         found = [delay_records(piece, parameters, names, drifting=True) for piece in moved]
         records = [record for each, _ in found for record in each]
         unknowns = found[0][1]
-        if not all(each and unknowns == told for each, told in found):
+        if not all(each and unknowns == own for each, own in found):
             return []
         steps = least_squares(records)[: 2 * count] / unit
         steps = np.clip(steps, -LONGEST_STEP_S, LONGEST_STEP_S)

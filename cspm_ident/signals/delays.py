@@ -1,7 +1,7 @@
 """How late motion capture is: what it says of the cables' lengths must fit winches and load cells.
 
 Drives and load cells are the reference; a load cell that is late cannot be distinguished from a
-cable whose damping is wrong, so that is not tried. A late pose shows in all cables alike, in
+cable whose damping is wrong, so that is not tried. A late pose shows in all cables equally, in
 proportion to how fast it changes the length. Wrong compliance and damping show otherwise and are
 fitted beside it.
 """

@@ -92,6 +92,11 @@ class Measurement:
         return {name: samples for name, samples in found.items() if samples is not None}
 
     @property
+    def knows_frame(self) -> bool:
+        """Whether the winch frame's pose is known: measured, or fixed as no sensor is listed."""
+        return self.frame_pose is not None or FRAME not in self.machine.sensors
+
+    @property
     def duration(self) -> float:
         """Time of the last sample of all sensors [s]."""
         return max((float(s.times[-1]) for s in self.sensors.values()), default=0.0)
@@ -106,6 +111,13 @@ class Measurement:
         names = ("frame_pose", "bar_pose", "angle", "speed", "torque", "tension", "command")
         parts = {name: getattr(self, name) for name in names}
         return replace(self, **{n: s.within(start, end) for n, s in parts.items() if s is not None})
+
+    def without(self, start: float, end: float) -> Measurement:
+        """Return what was measured outside `start` to `end` [s], where each sensor has a hole."""
+        names = ("frame_pose", "bar_pose", "angle", "speed", "torque", "tension", "command")
+        parts = {name: getattr(self, name) for name in (*names, "wanted")}
+        left = {n: s.without(start, end) for n, s in parts.items() if s is not None}
+        return replace(self, **left)
 
     def with_testbed(self, testbed: TestbedFile) -> Measurement:
         """Return the same, said to be of another description of the machine."""
@@ -144,6 +156,7 @@ def read_measurement(path: Path, testbed: Path | TestbedFile | None = None) -> M
     parts: dict[str, Samples] = {}
     for name in names:
         parts.update(_samples(name, found[name], rows[name], start, machine.testbed))
+    parts.update(_locked(parts, machine.testbed))
     torque = parts.get("torque")
     age = 0.5 * torque.interval if simulated and torque is not None else 0.0
     # mypy takes `parts` for every argument that is not given.
@@ -194,6 +207,24 @@ def _samples(
             columns = [topic.fields.index(f"{part}/{cable}") for cable in machine.cable_names]
             out[kind] = ordered(times, rows.rows[:, columns])
     return {kind: samples for kind, samples in out.items() if len(samples.times)}
+
+
+def _locked(parts: Mapping[str, Samples], machine: Testbed) -> dict[str, Samples]:
+    """Return the angles and speeds of a machine with locked winches: constant, and 0.
+
+    Where all are locked, no angle need be recorded.
+    """
+    locked = np.array([cable.locked for cable in machine.cables])
+    beside = next((parts[n] for n in ("tension", "bar_pose", "frame_pose") if n in parts), None)
+    if "angle" not in parts and locked.all() and beside is not None:
+        return {"angle": Samples(beside.times, np.zeros((len(beside.times), len(locked))))}
+    found = {}
+    for name in ("angle", "speed"):
+        if name in parts and locked.any():
+            values = parts[name].values.copy()
+            values[:, locked] = values[:1, locked] if name == "angle" else 0.0
+            found[name] = Samples(parts[name].times, values)
+    return found
 
 
 def _wanted(rows: Mapping[str, Rows], start_ns: int) -> Samples:

@@ -35,7 +35,7 @@ def noise_of(
     sources: dict[str, NoiseSource] = {}
     again = {} if repeat is None else _parts(repeat)
     for topic, samples in _parts(measurement).items():
-        declared = _declared(measurement.machine, topic, samples.values.shape[1])
+        declared = declared_noise(measurement.machine, topic, samples.values.shape[1])
         if topic in again:
             found[topic], sources[topic] = (
                 noise_between(samples, again[topic]),
@@ -61,8 +61,14 @@ def _enough(samples: Samples, rest: tuple[float, float]) -> bool:
     return len(samples.within(*rest).times) >= 50
 
 
-def _declared(machine: Testbed, topic: str, width: int) -> Array | None:
-    """Return what the test-bed file says: its noise, and the rounding to its resolution."""
+def declared_noise(machine: Testbed, topic: str, width: int) -> Array | None:
+    """Return a sensor's noise and rounding by the test-bed file, (width,); None if not stated.
+
+    Args:
+        machine: as described.
+        topic: of the sensor; parts of the winches' state by their own names.
+        width: number of columns.
+    """
     sensor = machine.sensors.get(topic.split(" ")[0])
     if sensor is None:
         return None

@@ -139,6 +139,11 @@ class Samples:
         last = np.searchsorted(self.times, end, side="right")
         return Samples(self.times[first:last], self.values[first:last])
 
+    def without(self, start: float, end: float) -> Samples:
+        """Return the samples before `start` and after `end` [s], which leaves a hole."""
+        outside = (self.times < start) | (self.times > end)
+        return Samples(self.times[outside], self.values[outside])
+
 
 def _clocked(times: Array) -> tuple[Array, NDArray[np.intp]]:
     order = np.arange(len(times))

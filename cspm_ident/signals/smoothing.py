@@ -1,7 +1,7 @@
 """From noisy samples to smooth functions of time, without phase.
 
-Whatever enters one equation is smoothed alike, or the difference of the smoothings would look like
-physics: so the band is chosen once per sensor and is reported.
+Whatever enters one equation is smoothed equally, or the difference of the smoothings would look
+like physics: so the band is chosen once per sensor and is reported.
 """
 
 from __future__ import annotations
@@ -108,7 +108,7 @@ def band_of(samples: Samples) -> float:
     """Return the frequency [Hz] up to which the sensor shows more than its noise, with a margin.
 
     Its noise is what its spectrum has in the highest fifth of the frequencies. Infinite where the
-    spectrum stands out up to there, or is too short to tell.
+    spectrum exceeds the noise up to there, or is too short to show it.
     """
     longest = max(samples.spans, key=lambda span: span.stop - span.start)
     values = samples.values[longest]

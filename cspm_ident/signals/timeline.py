@@ -159,7 +159,7 @@ class Timeline:
 
     @cached_property
     def pose_band(self) -> float:
-        """The band of both poses [Hz]: cables see their difference, so both are smoothed alike."""
+        """The band of both poses [Hz]: cables see their difference, so one band serves both."""
         if self._smoothed is not None:
             return self._smoothed.pose_band
         if self._given_band is not None:

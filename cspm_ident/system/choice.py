@@ -114,7 +114,7 @@ def choose(
         bounds: lowest and highest value by name, in the parameter's unit, within the usual ones.
 
     Raises:
-        InputError: a name that there is not or that stands twice, a prior or bounds of none that is
+        InputError: a name that there is not or that occurs twice, a prior or bounds of none that is
             fitted, a value out of bounds, or a machine without bar.
     """
     frozen, priors, bounds = frozen or {}, priors or {}, bounds or {}
@@ -128,7 +128,7 @@ def choose(
     wanted = [*fitted, *held]
     for i, name in enumerate(fitted):
         if name in fitted[:i]:
-            raise InputError(f"--fit {name}: stands twice, allowed: each name once")
+            raise InputError(f"--fit {name}: occurs twice, allowed: each name once")
     for option, known in (("--prior", priors), ("--bound", bounds)):
         for name in known:
             if name not in wanted:
@@ -232,7 +232,7 @@ def _present(testbed: Testbed, place: EffectPlace) -> float:
     read_actions(testbed)
     for entry in testbed.effects:
         if same_place(testbed, place, entry.effect, entry.elements):
-            return entry.parameters[place.parameter]
+            return entry.numbers[place.parameter]
     return absent_values(place.effect)[place.parameter]
 
 

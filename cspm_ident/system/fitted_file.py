@@ -80,7 +80,7 @@ def _now(testbed: Testbed, each: Chosen) -> float:
     if isinstance(each.place, EffectPlace):
         for entry in testbed.effects:
             if same_place(testbed, each.place, entry.effect, entry.elements):
-                return entry.parameters[each.place.parameter]
+                return entry.numbers[each.place.parameter]
         return absent_values(each.place.effect)[each.place.parameter]
     if isinstance(each.place, PointPlace):
         return coordinate(testbed, each.place)

@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 from cspm_ident.estimation import Profile, Solution, find_profile, fit
 from cspm_ident.estimation.estimate import Interval
 from cspm_ident.estimation.noise import unit_noise
+from cspm_ident.estimation.objection import Objection, error_objections, sign_objections
 from cspm_ident.estimation.problem import Problem
 from cspm_ident.recording_roles import check_roles
 from cspm_ident.signals.clock_drift import ClockDrift, on_one_clock
@@ -29,7 +30,7 @@ from cspm_ident.system.noise_scatter import (
     widened,
     without_bias,
 )
-from cspm_ident.system.prediction_test import Judgement, judge
+from cspm_ident.system.prediction_test import FITTED, Judgement, judge
 from cspm_ident.system.search import search
 from cspm_ident.system.shooting import Shooting, make_shooting
 from cspm_msgs_py.errors import InputError
@@ -73,6 +74,25 @@ class SystemResult:
     profiles: tuple[Profile, ...]
     settled: bool
     drifts: dict[str, list[ClockDrift]]
+
+    @property
+    def objections(self) -> tuple[Objection, ...]:
+        """Why values are no result; none where all are."""
+        estimate, given = self.solution.estimate, [each.parameter for each in self.chosen]
+        errors = [
+            (each.measurement.path.name, error)
+            for each in self.judgements
+            if not each.held_out and (error := each.error(FITTED)) is not None
+        ]
+        return (
+            *sign_objections(
+                estimate,
+                {each.name for each in given if each.lower > 0.0},
+                {each.name for each in given if each.lower == 0.0},
+                "check the signs of poses, angles and tensions",
+            ),
+            *error_objections(estimate, errors, "bar's motion"),
+        )
 
     def data(self) -> dict[str, Any]:
         """Return everything as plain data for JSON."""
@@ -160,7 +180,7 @@ def identify_system(
         horizon,
         tuple(len(shooting.windows) for shooting in shootings),
         tuple(searched),
-        _judged(shootings, held_out, {"nominal": machine, "fitted": found}, delays, progress),
+        _judged(shootings, held_out, {"nominal": machine, FITTED: found}, delays, progress),
         tuple(profiles),
         solved.settled,
         drifts,

@@ -45,7 +45,7 @@ def machine_with(
 
 
 def bar_values(place: BarPlace, value: float, bar: Bar) -> Mapping[str, float]:
-    """Return the numbers of `bar`, by key, that a value stands for."""
+    """Return the numbers of `bar`, by key, that a value sets."""
     if place.key == "inertia":
         keys = (*MOMENTS, *_PRODUCTS)
         found = {f"inertia.{key}": value * float(getattr(bar.inertia, key)) for key in keys}
@@ -78,7 +78,7 @@ def _put_effect(
 ) -> None:
     for i, entry in enumerate(effects):
         if same_place(testbed, place, entry.effect, entry.elements):
-            parameters = {**entry.parameters, place.parameter: value}
+            parameters = {**entry.numbers, place.parameter: value}
             effects[i] = entry.model_copy(update={"parameters": parameters})
             return
     parameters = {**absent_values(place.effect), place.parameter: value}

@@ -121,7 +121,7 @@ def noise_bias(
 ) -> Bias:
     """Return to which side noise throws each parameter.
 
-    Noise on a signal that drives the model stands in the residuals and in their derivatives alike,
+    Noise on a signal that drives the model is both in the residuals and in their derivatives,
     which draws the estimate to one side, in proportion to the noise's variance. As much noise once
     more throws it as far once more (SIMEX along a straight line, Cook and Stefanski 1994); a
     Gauss-Newton step from the optimum shows where to.

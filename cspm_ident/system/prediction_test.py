@@ -14,7 +14,7 @@ from cspm_ident.signals.measurement import BAR, Measurement
 from cspm_ident.signals.noise_source import noise_of
 from cspm_ident.signals.timeline import Timeline
 from cspm_ident.system.lateness import delays_to_remove
-from cspm_ident.vaf import vaf
+from cspm_ident.vaf import error_percent, vaf
 from cspm_msgs_py.dofs import DOFS
 from cspm_msgs_py.testbed import Testbed
 
@@ -22,6 +22,10 @@ Array = NDArray[np.float64]
 
 # Below this many times its noise a coordinate is at rest, and shares of it mean nothing.
 _MOVES = 10.0
+
+
+# Names the identified machine in judgements.
+FITTED = "fitted"
 
 
 @dataclass(frozen=True, eq=False)
@@ -45,6 +49,11 @@ class Judgement:
     simulated: dict[str, Array]
     vaf: dict[str, dict[str, float | None]]
     delays: dict[str, float]
+
+    def error(self, machine: str) -> float | None:
+        """Return the least error of all degrees of freedom [%]; None where the bar is still."""
+        shares = [share for share in self.vaf[machine].values() if share is not None]
+        return error_percent(max(shares)) if shares else None
 
     def data(self) -> dict[str, Any]:
         """Return the figures as plain data for JSON."""

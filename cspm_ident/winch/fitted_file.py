@@ -4,14 +4,13 @@ from __future__ import annotations
 
 import io
 from collections.abc import Mapping
-from math import isfinite
 from typing import Any
 
 from ruamel.yaml.comments import CommentedMap, CommentedSeq
 
 from cspm_ident.fitted_testbed import FittedNumber, with_fitted
 from cspm_ident.winch.identification import INERTIA
-from cspm_ident.winch.identify_winches import IdentifiedWinch, WinchesResult
+from cspm_ident.winch.identified_winch import IdentifiedWinch, WinchesResult, absent_value
 from cspm_msgs_py.errors import InputError
 from cspm_msgs_py.testbed import TestbedFile, parse_testbed
 from cspm_msgs_py.yaml_file import round_trip
@@ -24,12 +23,13 @@ Fitted = dict[str, FittedNumber]
 _INERTIA_EFFECT = "winch_inertia"
 
 
-def fitted_testbed(result: WinchesResult, file: TestbedFile, source: str) -> TestbedFile:
+def fitted_testbed(result: WinchesResult, file: TestbedFile, source: str) -> TestbedFile | None:
     """Return the test-bed file with the fitted numbers, each with recording and interval.
 
-    The inertia stands in the cable, all others in `effects`, one entry per winch and effect: what
-    was fitted is the whole of an effect, so it replaces what the winch had of it. What was not
-    excited is left as it was.
+    The inertia is an entry of the cable, all others in `effects`, one entry per winch and effect:
+    what was fitted is the whole of an effect, so it replaces what the winch had of it. What is no
+    result is left as it was. So is what the recordings do not show, unless they exclude the
+    described number. None where there is no result at all.
 
     Args:
         result: what was identified.
@@ -40,6 +40,8 @@ def fitted_testbed(result: WinchesResult, file: TestbedFile, source: str) -> Tes
         InputError: the numbers are no machine's, such as a negative friction.
     """
     numbers = {winch.name: _numbers(result, winch) for winch in result.winches}
+    if not any(winch.valid for winch in result.winches):
+        return None
     inertias = {
         name: {"rotor_inertia": found[INERTIA]}
         for name, found in numbers.items()
@@ -65,15 +67,20 @@ def fitted_testbed(result: WinchesResult, file: TestbedFile, source: str) -> Tes
 
 
 def _numbers(result: WinchesResult, winch: IdentifiedWinch) -> Fitted:
-    """Return what was excited, by the estimate's names."""
+    """Return what was determined, by the estimate's names."""
     hashes = tuple(measurement.sha256 for measurement in result.searched)
     windows = tuple((0.0, measurement.duration) for measurement in result.searched)
     estimate = winch.fit.estimate
-    return {
-        name: FittedNumber(estimate.value(name), estimate.interval(name), hashes, windows)
-        for name in estimate.names
-        if all(isfinite(end) for end in estimate.interval(name))
-    }
+    found = {}
+    for name in winch.valid:
+        value, (low, high) = estimate.value(name), estimate.interval(name)
+        if name in winch.unseen:
+            if low <= winch.described.get(name, low) <= high:
+                continue
+            value = absent_value(name)
+            low = max(low, value) if name in winch.one_signed else low
+        found[name] = FittedNumber(value, (low, high), hashes, windows)
+    return found
 
 
 def _by_effect(found: Fitted) -> dict[str, Fitted]:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import replace
+from math import isfinite
 from typing import NamedTuple
 
 import numpy as np
@@ -14,12 +15,13 @@ from cspm_ident.estimation import (
     Exogeneity,
     Interval,
     Parameter,
+    Prior,
     Record,
     fit_instruments,
     fit_linear,
 )
 from cspm_ident.winch.recording import WinchSignals, signal_rows
-from cspm_ident.winch.weak_form import HALF_WIDTH_S, make_window, weigh
+from cspm_ident.winch.weak_form import HALF_WIDTH_S, first_of, make_window, weigh
 from cspm_msgs_py.errors import InputError
 from cspm_sim.effects import Effect, catalogue
 from cspm_sim.effects.effect import Channel
@@ -28,7 +30,12 @@ from cspm_sim.effects.signals import WinchSignal
 Array = NDArray[np.float64]
 
 INERTIA = "inertia"
+LATENESS = "torque lateness"
 _INERTIA_SCALE = 1.0  # kg·m², as far as an inertia may lie off
+_LATENESS_SCALE = 1.0  # s
+# Of the shaft's RMS speed: a shaft that is slower throughout a window may stick, and its direction
+# may be noise. Dry friction then holds whatever the drive gives, which says nothing of its size.
+_STANDING = 0.05
 
 
 class WinchFit(NamedTuple):
@@ -55,6 +62,7 @@ def identify_winch(
     reversals: bool = True,
     whiten: bool = False,
     interval: Interval = Interval.BOOTSTRAP,
+    lateness: float | None = None,
     seed: int = 0,
 ) -> WinchFit:
     """Estimate J and the effects' parameters in J·q̈ + (r/n)·t + Σ effects = τ, thesis (2-21).
@@ -69,20 +77,34 @@ def identify_winch(
         instruments: the same winch simulated from the reference alone, entry by entry, where the
             measured signals carry noise that the controller feeds back.
         half_width: of the windows [s].
-        band: kept of the angle for the speed [Hz]; by default what stands out of its noise.
+        band: kept of the angle for the speed [Hz]; by default what exceeds its noise.
         reversals: whether windows count in which the shaft reverses. Dry friction holds it there
             for a while, and is then whatever holds, which no regressor of the speed's sign says.
         whiten: see `fit_linear`; not used with instruments.
         interval: see `fit_linear`.
+        lateness: if given, `LATENESS` [s] is fitted as well, last: how much longer than
+            `torque_age` before its stamp the torque acted, to first order. The standard deviation
+            of what is known of it beforehand [s]; infinite: nothing is.
         seed: of the bootstrap.
 
     Raises:
         InputError: an effect that is not in the catalogue, not linear or the inertia itself, no
             signals or too short ones, or instruments that do not fit.
     """
-    chosen = [_linear_effect(name) for name in effects]
+    chosen = linear_effects(effects)
     parameters = _parameters(chosen)
-    records = winch_records(signals, chosen, half_width, band, instruments, reversals=reversals)
+    if lateness is not None:
+        prior = Prior(0.0, lateness) if isfinite(lateness) else None
+        parameters.append(Parameter(LATENESS, "s", scale=_LATENESS_SCALE, prior=prior))
+    records = winch_records(
+        signals,
+        chosen,
+        half_width,
+        band,
+        instruments,
+        reversals=reversals,
+        lateness=lateness is not None,
+    )
     exogeneity = None
     if instruments is None:
         solution = fit_linear(records, parameters, whiten=whiten, interval=interval, seed=seed)
@@ -101,6 +123,7 @@ def winch_records(
     instruments: Sequence[WinchSignals] | None = None,
     *,
     reversals: bool = True,
+    lateness: bool = False,
 ) -> list[Record]:
     """Return the weak form of the winch equation: inertia first, then the effects' parameters.
 
@@ -115,16 +138,17 @@ def winch_records(
             f"{len(instruments)} instruments for {len(signals)} recordings; allowed: one for each"
         )
     records: list[Record] = []
-    for i, each in enumerate(signals):
-        pieces = _pieces(each, effects, half_width, band)
+    found = [_pieces(each, effects, half_width, band) for each in signals]
+    slow = _slow(found)
+    for i, pieces in enumerate(found):
         others: list[Array | None] = [None] * len(pieces)
         if instruments is not None:
             others = [*_instrument_columns(pieces, instruments[i], effects, half_width, band)]
-        for (target, columns, turns), other in zip(pieces, others, strict=True):
-            for part in _kept(turns) if not reversals else [slice(0, len(target))]:
-                if len(target[part]):
-                    chosen = None if other is None else other[part]
-                    records.append(Record(target[part], columns[part], instruments=chosen))
+        for piece, other in zip(pieces, others, strict=True):
+            for part in piece.kept(slow, reversals=reversals):
+                chosen = None if other is None else other[part]
+                columns = piece.columns if lateness else piece.columns[:, :-1]
+                records.append(Record(piece.target[part], columns[part], instruments=chosen))
     if not records:
         without = "" if reversals else " without a reversal"
         raise InputError(
@@ -142,11 +166,40 @@ def relative_error(records: Sequence[Record], values: Array) -> float:
 
 
 class _Weak(NamedTuple):
-    """One stretch in weak form: target, columns, and whether the shaft reverses, by window."""
+    """One stretch in weak form.
+
+    Attributes:
+        target: torque less the cable's pull, by window, (n,) [N·m].
+        columns: regressors, (n, parameters + 1); the last is minus the torque's rate.
+        turns: whether the shaft reverses within a window, (n,).
+        fastest: largest speed within a window, (n,) [rad/s].
+        speed: mean square over the stretch [rad²/s²], and its samples.
+    """
 
     target: Array
     columns: Array
     turns: NDArray[np.bool_]
+    fastest: Array
+    speed: tuple[float, int]
+
+    def kept(self, slow: float, *, reversals: bool) -> list[slice]:
+        """Return the stretches of windows in which the shaft moves, faster than `slow` [rad/s]."""
+        keep = self.fastest > slow
+        if not reversals:
+            keep &= ~self.turns
+        edges = np.flatnonzero(np.diff(np.concatenate([[False], keep, [False]]).astype(int)))
+        return [slice(a, b) for a, b in zip(edges[::2], edges[1::2], strict=True)]
+
+
+def _slow(pieces: Sequence[Sequence[_Weak]]) -> float:
+    """Return the speed up to which the shaft counts as standing [rad/s].
+
+    A shaft that never moves counts as moving, so that what it does not excite can be named.
+    """
+    speeds = [each.speed for own in pieces for each in own]
+    count = sum(n for _, n in speeds)
+    total = sum(mean * n for mean, n in speeds)
+    return _STANDING * float(np.sqrt(total / count)) if total else -1.0
 
 
 def _pieces(
@@ -160,26 +213,31 @@ def _weak(
 ) -> _Weak:
     step = signals.angle.interval
     half = max(2, round(half_width / step))
-    columns = 1 + sum(effect.regressors(rows[:1]).shape[2] for effect in effects)
+    width = 2 + sum(effect.regressors(rows[:1]).shape[2] for effect in effects)
     if len(rows) < 2 * half + 1:
-        return _Weak(np.zeros(0), np.zeros((0, columns)), np.zeros(0, dtype=np.bool_))
+        none = np.zeros(0)
+        return _Weak(none, np.zeros((0, width)), none.astype(np.bool_), none, (0.0, 0))
     window, stride = make_window(half, step), max(1, half // 2)
     load = rows[:, WinchSignal.TORQUE] - signals.radius * rows[:, WinchSignal.TENSION]
-    inertia = weigh(window.second, rows[:, WinchSignal.ANGLE], stride)
+    load = load - signals.load_torque(rows)
+    speed = rows[:, WinchSignal.SPEED]
+    if signals.speed is None:
+        inertia = weigh(window.second, rows[:, WinchSignal.ANGLE], stride)
+    else:
+        inertia = weigh(first_of(half, step), speed, stride)
     added = np.concatenate([effect.regressors(rows)[:, 0] for effect in effects], axis=1)
-    target = weigh(window.weights, load, stride)
+    target = weigh(window.weights, load, stride) - signals.load_inertia * inertia
     # The mean of the signs is ±1 where the shaft turns one way throughout.
-    signs = np.sign(rows[:, WinchSignal.SPEED])
+    signs = np.sign(speed)
     one_way = weigh(np.full(len(window.weights), 1.0 / len(window.weights)), signs, stride)
     turns = np.abs(one_way) < 1.0 - 0.5 / len(window.weights)
     added = weigh(window.weights, added, stride)
-    return _Weak(target, np.column_stack([inertia, added]), turns)
-
-
-def _kept(turns: NDArray[np.bool_]) -> list[slice]:
-    """Return the stretches of windows without reversal."""
-    edges = np.flatnonzero(np.diff(np.concatenate([[True], turns, [True]]).astype(int)))
-    return [slice(a, b) for a, b in zip(edges[::2], edges[1::2], strict=True)]
+    rate = weigh(first_of(half, step), rows[:, WinchSignal.TORQUE], stride)
+    view = np.lib.stride_tricks.sliding_window_view(np.abs(speed), len(window.weights))
+    fastest = view[::stride].max(axis=1)
+    moving = (float(np.mean(speed**2)), len(speed))
+    columns = np.column_stack([inertia, added, -rate])
+    return _Weak(target, columns, turns, fastest, moving)
 
 
 def _instrument_columns(
@@ -195,18 +253,24 @@ def _instrument_columns(
             "instruments have other stretches than the recording; "
             "allowed: signals at the recording's times"
         )
-    return [each.columns for each in found]
+    return [each.columns[:, :-1] for each in found]
 
 
-def _linear_effect(name: str) -> Effect:
+def linear_effects(names: Sequence[str]) -> list[Effect]:
+    """Return effects of the catalogue that are linear in their parameters and act at the shaft.
+
+    Raises:
+        InputError: one that is not among them.
+    """
     known = {
         key: effect
         for key, effect in catalogue().items()
         if _is_linear(effect) and not _is_inertia(effect)
     }
-    if name not in known:
-        raise InputError(f"effect {name} of a winch; allowed: {', '.join(known)}")
-    return known[name]
+    for name in names:
+        if name not in known:
+            raise InputError(f"effect {name} of a winch; allowed: {', '.join(known)}")
+    return [known[name] for name in names]
 
 
 def _is_linear(effect: Effect) -> bool:
@@ -215,7 +279,7 @@ def _is_linear(effect: Effect) -> bool:
 
 
 def _is_inertia(effect: Effect) -> bool:
-    """Return whether the effect is what `inertia` already stands for."""
+    """Return whether the effect is what `inertia` already describes."""
     probe = np.random.default_rng(0).standard_normal((4, len(WinchSignal)))
     columns = effect.regressors(probe)[:, 0]
     return np.array_equal(columns, probe[:, [WinchSignal.ACCELERATION]])
@@ -235,6 +299,8 @@ def _parameters(effects: Sequence[Effect]) -> list[Parameter]:
 
 def _from_weights(estimate: Estimate, effects: Sequence[Effect]) -> Estimate:
     """Return the estimate with values of parameters instead of columns' weights."""
-    shift = np.array([0.0, *(p.absent or 0.0 for effect in effects for p in effect.parameters)])
+    shift = np.zeros(len(estimate.values))
+    absent = [p.absent or 0.0 for effect in effects for p in effect.parameters]
+    shift[1 : 1 + len(absent)] = absent
     ends = estimate.ci95 + shift[:, None]
     return replace(estimate, values=estimate.values + shift, ci95=ends)

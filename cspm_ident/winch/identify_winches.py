@@ -3,12 +3,33 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
-from typing import Any
+from dataclasses import dataclass, replace
+from functools import partial
 
+import numpy as np
+
+from cspm_ident.estimation.objection import Objection, error_objections, sign_objections
 from cspm_ident.recording_roles import check_roles
+from cspm_ident.signals.jumps import jumps, without_jumps
 from cspm_ident.signals.measurement import Measurement
+from cspm_ident.signals.prediction_noise import prediction_noise
+from cspm_ident.signals.samples import Samples
 from cspm_ident.winch.identification import INERTIA, WinchFit, identify_winch
+from cspm_ident.winch.identified_winch import (
+    DESCRIBED,
+    FITTED,
+    IdentifiedWinch,
+    WinchesResult,
+    WinchJudgement,
+    is_one_signed,
+)
+from cspm_ident.winch.lateness import at_age, fit_beside_lateness, lateness_of
+from cspm_ident.winch.motion_source import (
+    MotionSource,
+    motion_source,
+    speed_agrees,
+)
+from cspm_ident.winch.parsimony import without_unseen
 from cspm_ident.winch.reconstruction import TorqueError, torque_error
 from cspm_ident.winch.recording import WinchSignals, winch_signals
 from cspm_msgs_py.errors import InputError
@@ -17,106 +38,24 @@ from cspm_sim.effects import catalogue
 
 EFFECTS = ("winch_viscous_friction", "winch_coulomb_friction", "winch_torque_offset")
 BAND_HZ = 40.0
-DESCRIBED, FITTED = "described", "fitted"
 Equation = tuple[float, dict[str, dict[str, float]]]
 Progress = Callable[[str], None]
+# Standard deviations of an encoder's noise within which a shaft counts as resting.
+_STANDING_NOISES = 3.0
+_SIGN_REMEDY = (
+    "check the signs of torque and angle, which of them comes late, and what the winch carries"
+)
 
 
-@dataclass(frozen=True, eq=False)
-class WinchJudgement:
-    """A recording's torque beside what equations say of it.
+@dataclass(frozen=True)
+class _Way:
+    """How each winch is identified; see `identify_winches`."""
 
-    Attributes:
-        measurement: the recording.
-        held_out: whether nothing was fitted to it.
-        errors: by equation, `described` and `fitted`; in one band.
-    """
-
-    measurement: Measurement
-    held_out: bool
-    errors: dict[str, TorqueError]
-
-    def data(self) -> dict[str, Any]:
-        """Return the figures as plain data for JSON."""
-        errors = {label: found.percent for label, found in self.errors.items()}
-        path = str(self.measurement.path)
-        return {"recording": path, "held_out": self.held_out, "torque_error_percent": errors}
-
-
-@dataclass(frozen=True, eq=False)
-class IdentifiedWinch:
-    """One winch.
-
-    Attributes:
-        name: of its cable.
-        radius: drum radius / gear ratio [m].
-        described: the parameters as the test-bed file has them, by the estimate's names.
-        fit: values with intervals.
-        otherwise: the same with the windows across reversals left out, or, where `fit` did without
-            them, with them; None where that leaves no window.
-        judgements: searched recordings first, then those held out.
-    """
-
-    name: str
-    radius: float
-    described: dict[str, float]
-    fit: WinchFit
-    otherwise: WinchFit | None
-    judgements: tuple[WinchJudgement, ...]
-
-    @property
-    def torn(self) -> tuple[str, ...]:
-        """Parameters for which the windows across reversals differ significantly."""
-        if self.otherwise is None:
-            return ()
-        pair = self.fit.estimate, self.otherwise.estimate
-        return tuple(
-            name
-            for name in pair[0].names
-            if max(each.interval(name)[0] for each in pair)
-            > min(each.interval(name)[1] for each in pair)
-        )
-
-    def data(self) -> dict[str, Any]:
-        """Return everything as plain data for JSON."""
-        return {
-            "name": self.name,
-            "radius_m": self.radius,
-            "described": self.described,
-            "estimate": self.fit.estimate.data(),
-            "otherwise": None if self.otherwise is None else self.otherwise.estimate.data(),
-            "weak_form_error_percent": self.fit.error,
-            "judgements": [each.data() for each in self.judgements],
-        }
-
-
-@dataclass(frozen=True, eq=False)
-class WinchesResult:
-    """Winches of one machine.
-
-    Attributes:
-        winches: in the order requested.
-        searched: recordings that were fitted.
-        band: in which the torque errors are counted [Hz].
-        torque_age: see `WinchSignals` [s].
-        reversals: whether windows counted in which the shaft reverses.
-    """
-
-    winches: tuple[IdentifiedWinch, ...]
-    searched: tuple[Measurement, ...]
-    band: float
+    effects: Sequence[str]
     torque_age: float
-    reversals: bool
-
-    def data(self) -> dict[str, Any]:
-        """Return everything as plain data for JSON."""
-        return {
-            "recordings": [{"path": str(m.path), "sha256": m.sha256} for m in self.searched],
-            "band_hz": self.band,
-            "torque_age_s": self.torque_age,
-            "reversals": self.reversals,
-            "winches": [winch.data() for winch in self.winches],
-        }
+    lateness: bool
+    reversals: bool | None
+    band: float
 
 
 def identify_winches(
@@ -126,59 +65,189 @@ def identify_winches(
     *,
     held_out: Sequence[Measurement] = (),
     torque_age: float = 0.0,
-    reversals: bool = True,
+    lateness: bool = False,
+    reversals: bool | None = None,
     band: float = BAND_HZ,
     progress: Progress = lambda _: None,
 ) -> WinchesResult:
     """Fit inertia and effects of winches, each by itself, and predict the torque of recordings.
 
+    Jumps of an encoder are left out; see `jumps`. Accelerations are taken from the drive's speed
+    where the angle is too noisy for them; see `motion_source`.
+
     Args:
         searched: to fit, at least one, all of one machine.
-        names: of the winches' cables; none for all.
+        names: of the winches' cables; none for all that move.
         effects: ids from the catalogue, see `identify_winch`.
         held_out: to judge only.
         torque_age: see `WinchSignals` [s].
-        reversals: see `identify_winch`.
+        lateness: whether to look for another torque age, and to take it into account.
+        reversals: see `identify_winch`; None leaves them out wherever that loses no parameter.
         band: in which torque errors are counted [Hz].
         progress: called with what is being done.
 
     Raises:
-        InputError: recordings that do not go together, a band that is none, or see `winch_signals`
-            and `identify_winch`.
+        InputError: recordings that do not go together, a band that is none, no winch that moves, or
+            see `winch_signals` and `identify_winch`.
     """
     check_roles(searched, held_out)
     if not band > 0.0:
         raise InputError(f"--band {band:g}: allowed: a frequency above 0 Hz")
+    way = _Way(tuple(effects), torque_age, lateness, reversals, band)
+    every = searched[0].machine.cable_names
+    resting = () if names else tuple(name for name in every if _is_at_rest(searched, name))
+    if resting == every:
+        raise InputError(
+            f"{searched[0].path}: no winch moves by more than its encoder's noise, allowed:"
+            " recordings in which one does"
+        )
     found = []
-    for name in names or searched[0].machine.cable_names:
+    for name in names or [name for name in every if name not in resting]:
         progress(name)
-        signals = [winch_signals(each, name, torque_age) for each in (*searched, *held_out)]
-        fit = identify_winch(signals[: len(searched)], effects, reversals=reversals)
-        otherwise = _otherwise(signals[: len(searched)], effects, not reversals)
-        described = described_equation(searched[0].machine, name, effects)
-        equations = {DESCRIBED: described, FITTED: fitted_equation(fit, effects)}
-        judgements = tuple(
-            WinchJudgement(measurement, i >= len(searched), _errors(each, equations, band))
-            for i, (measurement, each) in enumerate(
-                zip((*searched, *held_out), signals, strict=True)
-            )
-        )
-        found.append(
-            IdentifiedWinch(
-                name, signals[0].radius, _by_name(described), fit, otherwise, judgements
-            )
-        )
-    return WinchesResult(tuple(found), tuple(searched), band, torque_age, reversals)
+        found.append(_identified(name, searched, held_out, way))
+    return WinchesResult(tuple(found), tuple(searched), band, torque_age, resting)
+
+
+def _is_at_rest(searched: Sequence[Measurement], name: str) -> bool:
+    """Return whether a winch's angle is recorded and moves no more than its noise."""
+    index = searched[0].machine.cable_names.index(name)
+    angles = [m.angle.column(index) for m in searched if m.angle is not None]
+    return bool(angles) and all(
+        float(np.std(each.values)) <= _STANDING_NOISES * np.sqrt(prediction_noise(each))
+        for each in angles
+    )
+
+
+def _identified(
+    name: str, searched: Sequence[Measurement], held_out: Sequence[Measurement], way: _Way
+) -> IdentifiedWinch:
+    recordings = (*searched, *held_out)
+    raw = [winch_signals(each, name, way.torque_age) for each in recordings]
+    signals = [replace(each, angle=without_jumps(each.angle)) for each in raw]
+    own = signals[: len(searched)]
+    reversals = _reversals(own, way)
+    source = motion_source(own, _speeds(searched, own, name), way.effects, reversals=reversals)
+    late = lateness_of(source.signals, way.effects, reversals=reversals) if way.lateness else None
+    if late is not None:
+        source = source._replace(signals=at_age(source.signals, late.age))
+    # What a simulated drive reports is known to half a period.
+    beside = late is not None or (way.lateness and way.torque_age == 0.0)
+    described = described_equation(searched[0].machine, name, way.effects)
+    fit = without_unseen(
+        _fit(source, way.effects, beside=beside, reversals=reversals),
+        way.effects,
+        _by_name(described),
+        partial(_fit, source, beside=beside, reversals=reversals),
+    )
+    equations = {DESCRIBED: described, FITTED: fitted_equation(fit, way.effects)}
+    age = way.torque_age if late is None else late.age
+    others = signals[len(searched) :]
+    if source.signals[0].speed is not None:
+        speeds = _speeds(held_out, others, name)
+        others = [replace(each, speed=own) for each, own in zip(others, speeds, strict=True)]
+    judged = at_age([*source.signals, *others], age)
+    judgements = tuple(
+        WinchJudgement(each, i >= len(searched), _errors(own, equations, way.band))
+        for i, (each, own) in enumerate(zip(recordings, judged, strict=True))
+    )
+    return IdentifiedWinch(
+        name,
+        raw[0].radius,
+        _by_name(described),
+        fit,
+        _otherwise(source, way.effects, beside=beside, reversals=not reversals),
+        judgements,
+        reversals,
+        _objections(fit, source, judgements),
+        late,
+        tuple(
+            (each.path, tuple(s.angle.times[jumps(s.angle)].tolist()))
+            for each, s in zip(recordings, raw, strict=True)
+            if len(jumps(s.angle))
+        ),
+        source.signals[0].speed is not None,
+    )
+
+
+def _speeds(
+    searched: Sequence[Measurement], signals: Sequence[WinchSignals], name: str
+) -> list[Samples | None]:
+    """Return the speeds that drives report, where they are the angles' derivatives."""
+    index = searched[0].machine.cable_names.index(name)
+    found: list[Samples | None] = []
+    for each, own in zip(searched, signals, strict=True):
+        speed = None if each.speed is None else each.speed.column(index)
+        found.append(speed if speed is not None and speed_agrees(own.angle, speed) else None)
+    return found
+
+
+def _reversals(signals: Sequence[WinchSignals], way: _Way) -> bool:
+    """Return whether windows with a reversal count: by default only if a parameter needs them.
+
+    Dry friction sticks there, and then holds what no law of the speed says.
+    """
+    if way.reversals is not None:
+        return way.reversals
+    try:
+        without = identify_winch(signals, way.effects, reversals=False)
+    except InputError:
+        # A shaft that never keeps one direction for a window.
+        return True
+    all_windows = identify_winch(signals, way.effects)
+    return len(without.estimate.unexcited) > len(all_windows.estimate.unexcited)
+
+
+def _fit(
+    source: MotionSource, effects: Sequence[str], *, beside: bool, reversals: bool
+) -> WinchFit:
+    """Return the fit; the inertia's interval reaches as far as noise may have made it too small.
+
+    With `beside`, all intervals hold that the torque's age is known to a period only.
+    """
+    fitted = fit_beside_lateness if beside else identify_winch
+    fit = fitted(source.signals, effects, reversals=reversals)
+    ends = fit.estimate.ci95.copy()
+    if source.shows_acceleration:
+        ends[0, 1] += source.noise_share / (1.0 - source.noise_share) * abs(fit.estimate.values[0])
+    return fit._replace(estimate=replace(fit.estimate, ci95=ends))
 
 
 def _otherwise(
-    signals: Sequence[WinchSignals], effects: Sequence[str], reversals: bool
+    source: MotionSource, effects: Sequence[str], *, beside: bool, reversals: bool
 ) -> WinchFit | None:
     try:
-        return identify_winch(signals, effects, reversals=reversals)
+        return _fit(source, effects, beside=beside, reversals=reversals)
     except InputError:
-        # A shaft that never keeps one direction for a window.
         return None
+
+
+def _objections(
+    fit: WinchFit,
+    source: MotionSource,
+    judgements: Sequence[WinchJudgement],
+) -> tuple[Objection, ...]:
+    """Return why parameters of a winch are no result."""
+    frictions = set(filter(is_one_signed, fit.estimate.names))
+    always = {INERTIA} if source.shows_acceleration else set()
+    found = sign_objections(fit.estimate, always, frictions - {INERTIA}, _SIGN_REMEDY)
+    if not source.shows_acceleration:
+        found = [_noise_objection(source), *found]
+    errors = [
+        (each.measurement.path.name, each.errors[FITTED].percent)
+        for each in judgements
+        if not each.held_out
+    ]
+    return (*found, *error_objections(fit.estimate, errors, "torque"))
+
+
+def _noise_objection(source: MotionSource) -> Objection:
+    share, stamps, step = source.noise_share, 1e3 * source.stamp_error, 1e3 * source.interval
+    return Objection(
+        (INERTIA,),
+        f"{100.0 * share:.0f} % of what would be its accelerations is noise of the angle, as stamps"
+        f" that scatter by {stamps:.2g} ms at {step:.3g} ms make it",
+        "record stamps of the instant of measurement, or the drive's speed",
+    )
 
 
 def described_equation(machine: Testbed, name: str, effects: Sequence[str]) -> Equation:
@@ -194,7 +263,7 @@ def described_equation(machine: Testbed, name: str, effects: Sequence[str]) -> E
         for entry in machine.effects:
             if entry.effect == effect and (not entry.elements or name in entry.elements):
                 for p in parameters:
-                    total[p.name] += entry.parameters[p.name] - (p.absent or 0.0)
+                    total[p.name] += entry.numbers[p.name] - (p.absent or 0.0)
         values[effect] = total
     return inertia, values
 

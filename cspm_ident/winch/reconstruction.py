@@ -45,7 +45,7 @@ def torque_error(
     """Return how well an equation explains the torque of a recording, sample by sample.
 
     Measured torque and prediction pass the same filter; derivatives of the angle are taken before
-    it, in all of the band that stands out of the angle's noise.
+    it, in all of the band that exceeds the angle's noise.
 
     Args:
         signals: the recording.
@@ -75,7 +75,8 @@ def _predict(
     inertia: float,
     effects: Mapping[str, Mapping[str, float]],
 ) -> Array:
-    torque = inertia * rows[:, WinchSignal.ACCELERATION]
+    torque = (inertia + signals.load_inertia) * rows[:, WinchSignal.ACCELERATION]
+    torque += signals.load_torque(rows)
     torque += signals.radius * rows[:, WinchSignal.TENSION]
     for name, values in effects.items():
         effect = catalogue()[name]

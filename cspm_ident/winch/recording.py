@@ -12,7 +12,9 @@ from cspm_ident.signals.samples import Samples
 from cspm_ident.signals.smoothing import smooth
 from cspm_ident.signals.timeline import joined
 from cspm_msgs_py.errors import InputError
+from cspm_sim.effects import Effect
 from cspm_sim.effects.signals import WinchSignal
+from cspm_sim.effects.winch_load import load_effects
 
 Array = NDArray[np.float64]
 
@@ -29,6 +31,9 @@ class WinchSignals:
         gear: gear ratio.
         torque_age: how long before its stamp the reported torque acted, on average [s]: half a
             period where a drive reports what it applied up to the stamp.
+        speed: as the drive reports it [rad/s], one column, where acceleration and direction are
+            taken from it instead of the angle; None takes them from the angle.
+        load: what is known to hang at the winch, as effects; see `load_effects`.
     """
 
     angle: Samples
@@ -37,6 +42,22 @@ class WinchSignals:
     radius: float
     gear: float = 1.0
     torque_age: float = 0.0
+    speed: Samples | None = None
+    load: tuple[tuple[Effect, dict[str, float]], ...] = ()
+
+    def load_torque(self, rows: Array) -> Array:
+        """Return the torque of the known load at rest against winding, of signals, (n,) [N·m]."""
+        total = np.zeros(len(rows))
+        for effect, values in self.load:
+            if effect.physics.alter is None:
+                shape = {name: values[name] for name in effect.signature.nonlinear}
+                total += effect.regressors(rows, **shape)[:, 0] @ np.asarray(effect.weights(values))
+        return total
+
+    @property
+    def load_inertia(self) -> float:
+        """Inertia of the known load at the motor shaft [kg·m²]."""
+        return sum(values.get("inertia", 0.0) for _, values in self.load)
 
 
 def winch_signals(measurement: Measurement, cable: str, torque_age: float = 0.0) -> WinchSignals:
@@ -75,23 +96,25 @@ def winch_signals(measurement: Measurement, cable: str, torque_age: float = 0.0)
         description.drum_radius / description.gear_ratio,
         description.gear_ratio,
         torque_age,
+        load=tuple(load_effects(description, machine.gravity)),
     )
 
 
 def signal_rows(signals: WinchSignals, band: float | None = None) -> list[tuple[Array, Array]]:
     """Return the winch's signals at equal steps, one table for each stretch without a hole.
 
-    Angle, speed and acceleration come from one smooth function. Torque and tension are joined by
-    straight lines.
+    Angle, speed and acceleration come from one smooth function, unless `signals` name the drive's
+    speed. That, torque and tension are joined by straight lines.
 
     Args:
         signals: the readings.
-        band: kept of the angle [Hz]; by default what stands out of its noise.
+        band: kept of the angle [Hz]; by default what exceeds its noise.
 
     Returns:
         Pairs of times [s], shape (n,), and signals, shape (n, len(WinchSignal)).
     """
     smoothed = smooth(signals.angle, band)
+    reported = signals.speed
     step = signals.angle.interval
     tables = []
     for start, end in smoothed.spans:
@@ -101,6 +124,9 @@ def signal_rows(signals: WinchSignals, band: float | None = None) -> list[tuple[
         columns = (WinchSignal.ANGLE, WinchSignal.SPEED, WinchSignal.ACCELERATION)
         for derivative, column in enumerate(columns):
             rows[:, column] = smoothed.at(times, derivative)[:, 0]
+        if reported is not None:
+            rows[:, WinchSignal.SPEED] = joined(reported, times)[:, 0]
+            rows[:, WinchSignal.ACCELERATION] = np.gradient(rows[:, WinchSignal.SPEED], step)
         rows[:, WinchSignal.TORQUE] = joined(signals.torque, times + signals.torque_age)[:, 0]
         rows[:, WinchSignal.TORQUE_RATE] = np.gradient(rows[:, WinchSignal.TORQUE], step)
         if signals.tension is not None:

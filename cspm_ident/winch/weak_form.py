@@ -53,6 +53,21 @@ def make_window(half_width: int, step: float) -> Window:
     )
 
 
+def first_of(half_width: int, step: float) -> Array:
+    """Return −φ′ of `make_window` [1/s], shape (w,), which makes of a signal its weighted rate.
+
+    Central differences of the window, so that summation by parts is exact.
+
+    Args:
+        half_width: see `make_window`.
+        step: time between samples [s].
+    """
+    s = np.arange(-half_width - 1, half_width + 2) / half_width
+    window = np.where(np.abs(s) < 1.0, (1.0 - s**2), 0.0) ** _POWER
+    window /= window.sum()
+    return np.asarray((window[:-2] - window[2:]) / (2.0 * step))
+
+
 def weigh(weights: Array, values: Array, stride: int) -> Array:
     """Return Σ weights·values at every stride-th place where the window fits.
 

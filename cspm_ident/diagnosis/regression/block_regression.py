@@ -7,12 +7,13 @@ from typing import NamedTuple, TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.stats import norm, wilcoxon
 from scipy.stats import t as t_distribution
 
+from cspm_ident.diagnosis.regression.block_comparison import paired
 from cspm_ident.diagnosis.regression.block_gram import BlockGram, silenced, squares_by_block
 from cspm_ident.diagnosis.regression.jackknife import RANK, Jackknife, left_out, pseudo_inverse
 from cspm_ident.diagnosis.regression.symmetric_table import SymmetricTable
+from cspm_ident.diagnosis.regression.usual_precision import usual_precision
 from cspm_ident.diagnosis.thresholds import DEFAULT_THRESHOLDS, Thresholds
 
 Array = NDArray[np.float64]
@@ -61,6 +62,7 @@ class BlockRegression:
             for place, scale in zip(gram.places, scales, strict=True)
         ]
         self._lengths = lengths[:-1]
+        self._prior = np.append(usual_precision(gram) / self._lengths**2, 0.0)
         self._starts: Index = np.zeros(width + 1, dtype=np.intp)
         self._undelayed: BlockRegression | None = None
         self._folds = np.array_split(np.arange(gram.blocks), min(FOLDS, gram.blocks))
@@ -100,6 +102,7 @@ class BlockRegression:
         other = self._like()
         other._grams, other._at = [blocks], [np.arange(blocks.shape[1])]
         other._lengths, other._undelayed = lengths, None
+        other._prior = np.zeros(blocks.shape[1])
         other._starts = np.zeros(blocks.shape[1], dtype=np.intp)
         return other
 
@@ -109,6 +112,7 @@ class BlockRegression:
             return self
         other = self._like()
         other._grams, other._at, other._lengths = self._grams, self._at, self._lengths
+        other._prior = self._prior
         other._starts = self._starts.copy()
         other._starts[columns] = np.maximum(self._starts[columns], block)
         other._undelayed = self if self._undelayed is None else self._undelayed
@@ -148,15 +152,24 @@ class BlockRegression:
         lengths = np.append(np.sqrt(np.maximum(np.einsum("bii->i", grams), 0.0))[:-1], 1.0)
         lengths[lengths == 0.0] = 1.0
         grams = grams / (lengths[:, None] * lengths)
-        return self._alone(grams, lengths[:-1] * np.append(self._lengths[columns], np.ones(count)))
+        found = self._alone(grams, lengths[:-1] * np.append(self._lengths[columns], np.ones(count)))
+        found._prior = turn[:-1].T ** 2 @ self._prior[columns] / lengths**2
+        return found
 
     @cached_property
     def _whole(self) -> SymmetricTable:
         """Sums of all blocks, (width + 1, width + 1)."""
         if self._undelayed is None:
-            return SymmetricTable(self._summed(np.arange(len(self._starts)), slice(None)))
+            every = np.arange(len(self._starts))
+            return SymmetricTable(self._expected(every, self._summed(every, slice(None))))
         late = np.flatnonzero(self._starts)
-        return self._undelayed._whole.replacing(late, self._summed(late, slice(None)))
+        found = self._expected(late, self._summed(late, slice(None)))
+        return self._undelayed._whole.replacing(late, found)
+
+    def _expected(self, rows: Index, products: Array) -> Array:
+        """Return rows of products, (rows, width + 1), with what is known of weights beforehand."""
+        products[np.arange(len(rows)), rows] += self._prior[rows]
+        return products
 
     @cached_property
     def _others(self) -> list[SymmetricTable]:
@@ -195,7 +208,16 @@ class BlockRegression:
     @cached_property
     def excited(self) -> NDArray[np.bool_]:
         """Whether each column is non-zero anywhere, (width,)."""
-        return np.asarray(self._whole.diagonal()[:-1] > 0.0)
+        return np.asarray((self._whole.diagonal() - self._prior)[:-1] > 0.0)
+
+    def freedom(self, columns: Index) -> float:
+        """Return how many weights the data determine, rather than what is known of them before.
+
+        The effective number of parameters of a ridge regression (Hastie, Tibshirani, Friedman, The
+        Elements of Statistical Learning, 2nd ed., 2009, eq. 3.50).
+        """
+        inverse = pseudo_inverse(self._whole.at(columns, columns))
+        return float(len(columns) - np.diag(inverse) @ self._prior[columns])
 
     def weights(self, columns: Index) -> Array:
         """Return the least-squares weights of columns."""
@@ -245,9 +267,7 @@ class BlockRegression:
         For columns that differ in every block, such as functions of time. Hold-out blocks have no
         information on them.
         """
-        both = np.concatenate([base, columns])
-        before, after = self._fitted(base), self._fitted(both)
-        return gain_of(before - after)
+        return gain_of(self._fitted(base) - self._fitted(np.concatenate([base, columns])))
 
     def _fitted(self, columns: Index) -> Array:
         """Return Σ residual² of each block, fitted to all of them."""
@@ -378,22 +398,3 @@ def gain_of(better: Array) -> Gain:
     """Return total and standard error of gains by block."""
     spread = float(better.std(ddof=1)) if len(better) > 1 else float("inf")
     return Gain(float(better.sum()), spread * float(np.sqrt(len(better))))
-
-
-def behind(worse: Array) -> float:
-    """Return the standard deviations of a normal by which blocks are worse.
-
-    By Wilcoxon's signed-rank test, which no single outlying block decides.
-    """
-    if not np.any(worse):
-        return 0.0
-    return float(norm.isf(wilcoxon(worse, alternative="greater").pvalue))
-
-
-def paired(values: Array) -> Array:
-    """Return sums over blocks two by two, (⌈blocks / 2⌉, …).
-
-    Model-form errors are correlated over more than a block. Single blocks would make a difference
-    between two imperfect models appear significant.
-    """
-    return np.add.reduceat(values, np.arange(0, len(values), 2), axis=0)

@@ -7,8 +7,9 @@ from collections.abc import Sequence
 import numpy as np
 from numpy.typing import NDArray
 
+from cspm_ident.diagnosis.regression.block_comparison import behind, paired
 from cspm_ident.diagnosis.regression.block_gram import BlockGram
-from cspm_ident.diagnosis.regression.block_regression import BlockRegression, behind, paired
+from cspm_ident.diagnosis.regression.block_regression import BlockRegression
 from cspm_ident.diagnosis.residuals.free_shapes import Driver
 from cspm_ident.diagnosis.residuals.regressors import Candidate, Place
 from cspm_ident.diagnosis.thresholds import DEFAULT_THRESHOLDS, Thresholds
@@ -40,7 +41,7 @@ def contains(sums: BlockRegression, base: Index, wide: Index, narrow: Index) -> 
 
 
 def distance(
-    worse: Array, undecided: float, wider: int, thresholds: Thresholds = DEFAULT_THRESHOLDS
+    worse: Array, undecided: float, wider: float, thresholds: Thresholds = DEFAULT_THRESHOLDS
 ) -> float:
     """Return by how many standard deviations of a normal something explains less.
 
@@ -107,7 +108,7 @@ def freely_gained_at(
     return found
 
 
-def where_alike(members: Sequence[Candidate], elements: set[str]) -> list[tuple[Candidate, ...]]:
+def places_for(members: Sequence[Candidate], elements: set[str]) -> list[tuple[Candidate, ...]]:
     """Return the members on which an effect may replace one on the given elements.
 
     These are the members on those elements. Where there are none: each member alone, then all.

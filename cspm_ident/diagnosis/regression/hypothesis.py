@@ -15,6 +15,8 @@ from cspm_sim.effects import Effect
 
 Array = NDArray[np.float64]
 
+# Exponents of factors are compared up to here, far beyond any that is allowed.
+_LARGEST = 50.0
 # Number of random signals, larger than any effect reads.
 _SIGNALS = 128
 
@@ -162,7 +164,10 @@ def is_seen_to_end(
 
 
 def bounded(candidate: Candidate, weights: Array, half: Array) -> Array:
-    """Return weights, with those outside their range moved to its bound where noise explains it.
+    """Return weights, with insignificant ones outside their range moved to its bound.
+
+    A friction is never negative, yet noise makes an estimate so. A significant weight on its bound
+    would be no estimate: it stays where it was fitted, and the catalogue does not allow it.
 
     Args:
         candidate: that the weights belong to.
@@ -175,13 +180,28 @@ def bounded(candidate: Candidate, weights: Array, half: Array) -> Array:
     absent = np.array([p.absent or 0.0 for p in effect.linear])
     low = np.array([p.minimum for p in effect.linear]) - absent
     nearest = np.clip(weights, low, np.array([p.maximum for p in effect.linear]) - absent)
-    return np.where(np.abs(nearest - weights) <= half, nearest, weights)
+    return np.where(np.abs(weights) <= half, nearest, weights)
 
 
 def is_allowed(candidate: Candidate, weights: Array) -> bool:
-    """Return whether the catalogue allows such weights, and they have an effect."""
-    values = candidate.effect.values(weights.tolist(), **candidate.nonlinear)
-    return candidate.effect.is_plausible(values) and not candidate.effect.is_absent(values)
+    """Return whether the catalogue allows such weights, and they have an effect.
+
+    To first order a factor is 1 + w, or exp(w) just as well: a cable of half the stiffness may have
+    a weight of −1. One of both has to be allowed.
+    """
+    effect = candidate.effect
+    steps = np.where(factors_of(effect), np.expm1(np.minimum(weights, _LARGEST)), weights)
+    for each in (weights, steps):
+        values = effect.values(each.tolist(), **candidate.nonlinear)
+        if effect.is_plausible(values) and not effect.is_absent(values):
+            return True
+    return False
+
+
+def factors_of(effect: Effect) -> NDArray[np.bool_]:
+    """Return which weights of a correction are factors, less 1: of the file or of a reading."""
+    usual = effect.is_correction and not effect.signature.coefficients
+    return np.array([usual and parameter.absent == 1.0 for parameter in effect.linear])
 
 
 def is_tied(candidate: Candidate, weights: Array, half: Array) -> bool:
@@ -194,8 +214,8 @@ def joined(chosen: Sequence[Hypothesis], found: Hypothesis) -> list[Hypothesis]:
     """Return hypotheses with a further one; merge those of the same effect, shape and onset."""
     shape, out = found.candidates[0].shape, []
     for other in chosen:
-        alike = other.effect.id == found.effect.id and other.candidates[0].shape == shape
-        if alike and other.onset == found.onset:
+        same_effect = other.effect.id == found.effect.id and other.candidates[0].shape == shape
+        if same_effect and other.onset == found.onset:
             found = replace(other, candidates=(*other.candidates, *found.candidates))
         else:
             out.append(other)
@@ -266,9 +286,10 @@ def boldness(
 def unusual(weights: Mapping[Candidate, Array], hypothesis: Hypothesis) -> float:
     """Return the largest error of a parameter of the file, in units of its usual error.
 
-    0 where no usual error is given.
+    At least 1: of errors that are usual, the smaller is no likelier. 1 where no usual error is
+    given.
     """
-    found = [0.0]
+    found = [1.0]
     for candidate in hypothesis.candidates:
         values = candidate.effect.values(weights[candidate].tolist(), **candidate.nonlinear)
         found += [

@@ -23,8 +23,8 @@ class Jackknife(NamedTuple):
         blocks: effective number of blocks with information on all weights together.
         blocks_of: effective number of blocks with information on each weight, shape (m,).
         shares: each block's share of the information, shape (blocks,).
-        alike: correlation of the changes that two successive blocks make to each weight, (m,).
-            Negative correlations count as 0.
+        correlation: of the changes that two successive blocks make to each weight, (m,). Negative
+            correlations count as 0.
     """
 
     weights: Array
@@ -32,7 +32,7 @@ class Jackknife(NamedTuple):
     blocks: float
     blocks_of: Array
     shares: Array
-    alike: Array
+    correlation: Array
 
     def spread(self) -> tuple[Array, Array]:
         """Return standard errors (m,) and their degrees of freedom (m,) for correlated blocks.
@@ -42,7 +42,7 @@ class Jackknife(NamedTuple):
         has few states. The estimate of ρ is rough. So one degree of freedom is kept where there are
         blocks for it: with fewer, Student's factor would make every weight insignificant.
         """
-        more = (1.0 + self.alike) / (1.0 - self.alike)
+        more = (1.0 + self.correlation) / (1.0 - self.correlation)
         errors = np.sqrt(np.maximum(np.diag(self.covariance), 1e-300) * more)
         return errors, np.maximum(self.blocks_of / more, np.minimum(self.blocks_of, 2.0)) - 1.0
 
@@ -69,12 +69,12 @@ class Jackknife(NamedTuple):
         return float(f_distribution.sf(wald / count, count, self.blocks - count))
 
 
-def left_out(parts: Array, most_alike: float) -> Jackknife:
+def left_out(parts: Array, most_correlation: float) -> Jackknife:
     """Return the block jackknife of the weights (Bell and McCaffrey, Surv. Methodol. 28(2), 2002).
 
     Args:
         parts: Gram matrix of each block, of regressors and target, shape (blocks, m + 1, m + 1).
-        most_alike: upper limit of the correlation of successive blocks.
+        most_correlation: upper limit of the correlation of successive blocks.
     """
     whole, count = parts.sum(axis=0), parts.shape[1] - 1
     inverse = pseudo_inverse(whole[:-1, :-1])
@@ -91,9 +91,9 @@ def left_out(parts: Array, most_alike: float) -> Jackknife:
     apart, blocks = without - weights, max(1, int(np.count_nonzero(heard)))
     covariance = (blocks - 1) / blocks * apart.T @ apart
     together = 1.0 / max(float(np.sum(shares**2)), RANK)
-    alike = _alike(apart, most_alike)
+    correlation = _successive_correlation(apart, most_correlation)
     return Jackknife(
-        weights, covariance, together, _informative_blocks(reported, inverse), shares, alike
+        weights, covariance, together, _informative_blocks(reported, inverse), shares, correlation
     )
 
 
@@ -113,11 +113,11 @@ def _informative_blocks(reported: Array, inverse: Array) -> Array:
     return np.asarray(1.0 / np.maximum(np.sum(shares**2, axis=0), RANK))
 
 
-def _alike(apart: Array, most: float) -> Array:
+def _successive_correlation(apart: Array, most: float) -> Array:
     """Return the correlation of rows (blocks, m) with the next row, clipped to 0 … `most`."""
     squares = np.maximum(np.sum(apart**2, axis=0), 1e-300)
-    alike = np.sum(apart[1:] * apart[:-1], axis=0) / squares
-    return np.asarray(np.clip(alike, 0.0, most))
+    correlation = np.sum(apart[1:] * apart[:-1], axis=0) / squares
+    return np.asarray(np.clip(correlation, 0.0, most))
 
 
 def pseudo_inverse(gram: Array) -> Array:

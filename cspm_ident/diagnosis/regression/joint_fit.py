@@ -15,6 +15,7 @@ from cspm_ident.diagnosis.regression.collinearity import freely_gained_at
 from cspm_ident.diagnosis.regression.hypothesis import (
     Hypothesis,
     bounded,
+    freedom,
     is_allowed,
     is_early,
     is_exact,
@@ -49,6 +50,12 @@ class Fits:
     def own_columns(self, hypothesis: Hypothesis) -> Index:
         """Return indices of one hypothesis's regressors."""
         return self.gram.columns_of(hypothesis.candidates)
+
+    def freedom(self, hypothesis: Hypothesis) -> float:
+        """Return the number of free parameters of a hypothesis that the data determine."""
+        own = self.own_columns(hypothesis)
+        known = len(own) - self.sums.freedom(own)
+        return freedom(hypothesis) - known
 
     def beside(self, base: Index, *further: Hypothesis) -> Index:
         """Return the indices of a base and of hypotheses' regressors."""

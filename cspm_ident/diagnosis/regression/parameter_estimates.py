@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Container, Mapping, Sequence
 
 import numpy as np
 
@@ -70,6 +70,27 @@ def of_drives(weights: Weights, period: float) -> Weights:
                 time_constant(each, period) for each in (values - half, values, values + half)
             )
             found[candidate] = middle, np.maximum(high - middle, middle - low)
+    return found
+
+
+def of_scales(weights: Weights, places: Container[Place]) -> Weights:
+    """Return the weights with gains of torque exact, not only for small ones.
+
+    A gain g multiplies the torque M that the model needs by 1/g, so that the column of −M fits
+    1 − 1/g where the effect's weight is g − 1.
+
+    Args:
+        weights: as found.
+        places: residuals that were searched. Without that of the shaft, torques enter a virtual
+            load cell, whose column is linear in the gain.
+    """
+    found = dict(weights)
+    for candidate, (values, half) in weights.items():
+        signature = candidate.effect.signature
+        channel = signature.regression.channel
+        at_shaft = channel is Channel.SHAFT and Place(channel, candidate.element) in places
+        if signature.rescales and at_shaft and np.all(values + half < 1.0):
+            found[candidate] = values / (1.0 - values), half / (1.0 - values) ** 2
     return found
 
 

@@ -15,8 +15,9 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from cspm_ident.diagnosis.regression.block_comparison import behind, paired
 from cspm_ident.diagnosis.regression.block_gram import BlockGram
-from cspm_ident.diagnosis.regression.block_regression import BlockRegression, behind, paired
+from cspm_ident.diagnosis.regression.block_regression import BlockRegression
 from cspm_ident.diagnosis.residuals.regressors import Candidate
 from cspm_ident.diagnosis.thresholds import DEFAULT_THRESHOLDS, Thresholds
 from cspm_sim.effects import Effect
@@ -39,7 +40,7 @@ class _Form(NamedTuple):
     half: float
 
 
-def told_within(effect: Effect, longest: float) -> Effect:
+def covered_within(effect: Effect, longest: float) -> Effect:
     """Return the effect with only those time constants that the recording covers.
 
     Slower relaxations grow as the integral of the tension, as does slip. A rope that slips on its
@@ -103,8 +104,8 @@ def most_in_all(
     left = sums.held_out(np.concatenate([base, gram.columns_of([candidate])]))
     best = min([left, *(form.left for form in forms)], key=np.sum)
     most = thresholds.tie_sigma
-    alike = [form for form in forms if behind(paired(form.left - best)) <= most]
-    return np.array([max(form.total + form.half for form in alike)]) if alike else None
+    tied = [form for form in forms if behind(paired(form.left - best)) <= most]
+    return np.array([max(form.total + form.half for form in tied)]) if tied else None
 
 
 def _form(sums: BlockRegression, base: Index, parts: Index) -> _Form | None:

@@ -13,16 +13,22 @@ from numpy.typing import NDArray
 from cspm_ident.diagnosis.diagnosis import Diagnosis
 from cspm_ident.diagnosis.finding import Finding
 from cspm_ident.diagnosis.regression.hypothesis import Hypothesis
+from cspm_ident.diagnosis.reporting.empirical_statement import stage_errors, stage_names
 from cspm_ident.diagnosis.reporting.evidence_figure import caption_of, driver_figure, overlay_figure
 from cspm_ident.diagnosis.reporting.machine_drawing import drawing
 from cspm_ident.diagnosis.reporting.machine_part import Part, part_behind, parts_of
-from cspm_ident.diagnosis.reporting.page_checks import controllers_table, energy_table
+from cspm_ident.diagnosis.reporting.page_checks import (
+    controllers_table,
+    data_table,
+    energy_table,
+)
 from cspm_ident.diagnosis.reporting.statement import (
     channel_of,
     drive_of,
     tension_statement,
     unit_of,
 )
+from cspm_ident.diagnosis.reporting.summary_sheet import STYLE, summary_sheet
 from cspm_ident.diagnosis.reporting.verdict import (
     IMPROVED,
     SENTENCES,
@@ -42,12 +48,12 @@ _MOST_CURVES = 3
 # Least explained share of the squared residual for a curve to illustrate a finding.
 _GAINED = 0.2
 _STYLE = """<style>
-.verdict {font-size: 1.15em; line-height: 1.5; border-left: 6px solid #c62828; padding: 0.2em 1em}
+.verdict {border-color: #b3003c}
 .consistent {border-color: #1b7f3b}
 nav a {display: inline-block; margin: 0.2em 1em 0.2em 0; padding: 0.3em 0}
 </style>"""
 _SECTIONS = {
-    "where": "Where",
+    "data": "The data first",
     "evidence": "Evidence on held-out data",
     "parameters": "Parameters",
     "hypotheses": "Hypotheses",
@@ -76,7 +82,7 @@ def write_diagnosis_page(path: Path, found: Diagnosis, data: dict[str, Any]) -> 
     verdict = verdict_of(found)
     title = f"Diagnosis of {', '.join(m.path.name for m in found.searched)}: {verdict.value}"
     bodies = {
-        "where": _where(found),
+        "data": data_table(data),
         "evidence": _evidence(found),
         "parameters": _parameters(data),
         "hypotheses": _hypotheses(found, data),
@@ -95,21 +101,27 @@ def write_diagnosis_page(path: Path, found: Diagnosis, data: dict[str, Any]) -> 
         f"<section id={name}><h2>{escape(_SECTIONS[name])}</h2>{body}</section>"
         for name, body in shown.items()
     )
-    top = [_STYLE, _verdict(verdict, data), f"<nav aria-label=sections>{links}</nav>"]
-    write_offline_page(path, title, [*top, *sections])
+    where = f"<section id=where>{_where(found)}</section>"
+    _, curves, _ = next(iter(_subjects(found)), ("", (), ""))
+    sheet = summary_sheet(
+        found, data, _verdict(verdict, data), where, curves, lambda: _steps(found, data)[0]
+    )
+    details = f"<div class=details><nav aria-label=sections>{links}</nav>{''.join(sections)}</div>"
+    write_offline_page(path, title, [STYLE, _STYLE, sheet, details])
 
 
 def _verdict(verdict: Verdict, data: dict[str, Any]) -> str:
     sentences = [SENTENCES[verdict]]
     for finding in data["findings"]:
         sentences.append(finding["statement"])
-        sentences += [f"As well explained by {_twin(each)}." for each in finding["alternatives"]]
+        sentences += [f"As well explained by {_rival(each)}." for each in finding["alternatives"]]
+    sentences += [entry["statement"] for entry in data["empirical"]]
     kind = " consistent" if verdict is Verdict.CONSISTENT else ""
     text = "<br>".join(escape(sentence) for sentence in sentences)
     return f'<p class="verdict{kind}">{text}</p>'
 
 
-def _twin(alternative: dict[str, Any]) -> str:
+def _rival(alternative: dict[str, Any]) -> str:
     """Return an alternative in plain words, with its probability."""
     beside = alternative["beside"]
     with_it = f", beside another {catalogue()[beside].words} than the file's" if beside else ""
@@ -140,6 +152,9 @@ def _parts(found: Diagnosis) -> Iterable[Part]:
         yield part_behind(each.driver.place)
     for line in found.lines:
         yield part_behind(line.place)
+    if not found.reported:
+        for left in found.undescribed:
+            yield part_behind(left.place)
 
 
 def _mean_pose(samples: Samples | None) -> Array | None:
@@ -149,17 +164,14 @@ def _mean_pose(samples: Samples | None) -> Array | None:
 def _evidence(found: Diagnosis) -> str:
     """Return the figures of each finding, or of the largest residual if there is no finding."""
     texts = []
-    script = True
     for heading, curves, driver in _subjects(found):
         texts.append(f"<h3>{escape(heading)}</h3>")
         for curve in curves:
             signal = driver or curve.main_signal
             texts.append(f"<p>{escape(caption_of(curve, signal))}</p>")
             if signal:
-                texts.append(figure_html(driver_figure(curve, signal), script=script))
-                script = False
-            texts.append(figure_html(overlay_figure(curve), script=script))
-            script = False
+                texts.append(figure_html(driver_figure(curve, signal)))
+            texts.append(figure_html(overlay_figure(curve)))
     return "".join(texts)
 
 
@@ -177,7 +189,12 @@ def _subjects(found: Diagnosis) -> Iterable[tuple[str, Sequence[Curve], str]]:
             own[:1],
             driver.signal,
         )
-    if not found.reported and not found.unexplained and found.curves:
+    if found.reported or found.unexplained:
+        return
+    for left in found.undescribed[:_MOST_CURVES]:
+        own = [c for c in found.curves if (c.place, c.component) == (left.place, left.component)]
+        yield f"unknown, in {channel_of(left)}", own[:1], left.driver
+    if not found.undescribed and found.curves:
         largest = max(found.curves, key=_size)
         yield "nothing found; the residual that is largest against what was measured", [largest], ""
 
@@ -222,7 +239,7 @@ def _hypotheses(found: Diagnosis, data: dict[str, Any]) -> str:
         name = f"periodic, {line.frequency:.2f} Hz, {line.place.element}"
         rows.append((name, "unknown", "", f"by chance {line.chance:.1g}", ""))
     if not rows:
-        return f"<p>None of {found.tested} stood.</p>"
+        return f"<p>None of {found.tested} was accepted.</p>"
     heads = ("hypothesis", "verdict", "probability", "gain in standard errors", "residual taken")
     trusted = found.thresholds.trusted_probability
     count = (
@@ -257,16 +274,21 @@ def _in_errors(total: float, error: float) -> str:
 
 def _fit(found: Diagnosis) -> str:
     judged = "recordings held out" if found.held_out else "the last part, which was not searched"
-    heads = ("residual", "before", "re-tuned", "after", "black box", "noise", "unit")
+    heads = ("residual", *stage_names(found), "black box", "noise", "unit")
     rows = []
     for fit in found.fit:
-        numbers = (fit.before, fit.retuned, fit.after, fit.ceiling, fit.noise)
+        numbers = (*stage_errors(found, fit), fit.ceiling, fit.noise)
         rows.append((channel_of(fit), *(f"{n:.3g}" for n in numbers), unit_of(fit)))
     text = (
         f"<p>Root mean square on {judged}. <i>Re-tuned</i> is the file with its own numbers fitted"
         " and nothing added; <i>black box</i> is free functions of every signal instead of"
-        " physics; <i>noise</i> is what differs from row to row.</p>"
+        " physics; <i>noise</i> is the white part of what is left.</p>"
     )
+    if found.tables:
+        text += (
+            "<p><i>Named</i> is the model with the effects that were found; <i>after</i> has tables"
+            " of values as well, which describe the rest and explain nothing.</p>"
+        )
     return text + table_html(heads, rows, "root mean square of every residual")
 
 
@@ -274,10 +296,10 @@ def _simulated(found: Diagnosis, data: dict[str, Any]) -> str:
     """Return errors of hold-out simulations, and of the closed loop where it was simulated."""
     if not found.simulated:
         return ""
-    heads = ("quantity", "input", "before", "re-tuned", "after", "noise", "unit")
+    heads = ("quantity", "input", *stage_names(found), "noise", "unit")
     rows = []
     for fit in found.simulated:
-        numbers = (fit.before, fit.retuned, fit.after, fit.floor)
+        numbers = (*stage_errors(found, fit), fit.floor)
         reported = (f"{n:.3g}" for n in numbers)
         rows.append((fit.output.name, drive_of(fit), *reported, fit.output.unit))
     text = (
@@ -309,7 +331,7 @@ def _limits(found: Diagnosis) -> str:
         for (effect, parameter, unit), least in sizes.items()
     ]
     heads = ("effect", "parameter", "on the clearest element", "on the least clear", "unit")
-    text = "<p>More of an effect than this would have been told, beside what was found.</p>"
+    text = "<p>More of an effect than this would have been reported, beside what was found.</p>"
     return text + table_html(heads, rows, "limits of detection") if rows else ""
 
 
@@ -326,17 +348,22 @@ def _silent(data: dict[str, Any]) -> str:
 
 
 def _next(found: Diagnosis, data: dict[str, Any]) -> str:
+    return f"<ul>{''.join(f'<li>{step}</li>' for step in _steps(found, data))}</ul>"
+
+
+def _steps(found: Diagnosis, data: dict[str, Any]) -> list[str]:
+    """Return what to do next, the first thing first, as HTML."""
     steps = []
+    for finding in data["findings"]:
+        for rival in finding["alternatives"]:
+            pair = f"To distinguish {finding['effect']} from {rival['effect']}"
+            advice = catalogue()[finding["effect"]].description.separating_experiment
+            steps.append(_experiment(pair, rival["separating_experiment"], advice))
     if data["model"]:
         steps.append(
             f"<code>cspm run SCENARIO --testbed {IMPROVED}</code> simulates the machine with what"
             " was found."
         )
-    for finding in data["findings"]:
-        for rival in finding["alternatives"]:
-            pair = f"To tell {finding['effect']} from {rival['effect']}"
-            advice = catalogue()[finding["effect"]].description.separating_experiment
-            steps.append(_experiment(pair, rival["separating_experiment"], advice))
     shown: dict[str, list[str]] = {}
     for each in data["not_excited"]:
         if each.get("separating_experiment"):
@@ -347,13 +374,13 @@ def _next(found: Diagnosis, data: dict[str, Any]) -> str:
         steps.append("Describe what was found as unknown as an effect of your own.")
     if not steps:
         steps.append("Nothing has to be done. What was not testable needs other recordings.")
-    return f"<ul>{''.join(f'<li>{step}</li>' for step in steps)}</ul>"
+    return steps
 
 
 def _experiment(purpose: str, file: str | None, advice: str) -> str:
     """Return one line of HTML: which scenario to run, or what to do where there is none."""
     if file is None:
-        reason = "no motion that the recordings show to be safe tells more than they do"
+        reason = "no motion that the recordings show to be safe shows more than they do"
         return escape(f"{purpose}: {advice} ({reason}).")
     said = escape(f"{purpose}, record ")
     return f"{said}<a href='{escape(file)}'><code>cspm run {escape(file)}</code></a>."

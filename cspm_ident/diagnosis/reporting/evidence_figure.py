@@ -16,7 +16,8 @@ Array = NDArray[np.float64]
 
 # Most points of a drawn curve.
 _POINTS = 1500
-_BEFORE, _AFTER, _MEASURED = "#c62828", "#1b7f3b", "#9ecae9"
+# Orange and blue, which colour-blind readers tell apart, as in grey by lightness.
+_BEFORE, _AFTER, _MEASURED = "#d9660a", "#0b5cad", "#9ecae9"
 # Ratio to the usual step from which a step counts as a gap.
 _HOLE = 3.0
 _DOTS = {"mode": "markers", "opacity": 0.35}
@@ -34,9 +35,7 @@ def caption_of(curve: Curve, signal: str) -> str:
     of = f", {curve.component}" if curve.component else ""
     before, after = (float(np.sqrt(np.mean(v**2))) for v in (curve.before, curve.after))
     then = f" before and {after:.3g} {curve.unit} after" if curve.touched else ""
-    away = (
-        ", apart from where the shaft turns round" if curve.place.channel is Channel.SHAFT else ""
-    )
+    away = ", apart from where the shaft reverses" if curve.place.channel is Channel.SHAFT else ""
     text = (
         f"{part_behind(curve.place).words}{of}: the residual is measured less modelled; its root"
         f" mean square is {before:.3g} {curve.unit}{then}{away}."

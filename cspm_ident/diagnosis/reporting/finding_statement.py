@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
+from cspm_ident.channel_words import channel_words
 from cspm_ident.diagnosis.diagnosis import Diagnosis
 from cspm_ident.diagnosis.finding import Finding, Improvement, Onset, Region
 from cspm_ident.diagnosis.parameter import Coefficients, Parameter
@@ -11,12 +12,15 @@ from cspm_ident.diagnosis.reporting.machine_part import Kind, kind_of
 from cspm_ident.diagnosis.reporting.quantity import amount_words
 from cspm_ident.diagnosis.reporting.statement import channel_of
 from cspm_ident.diagnosis.validation.holdout_residuals import HeldOut
+from cspm_ident.diagnosis.validation.rest import concerned
 from cspm_sim.effects import Block, Effect, Elements
 
 _DOUBT = (
-    " Doubtful: beside it is much that nothing in the catalogue explains, of which this may be a"
-    " part, so that its numbers have no interval."
+    " Doubtful: beside it is much that nothing in the catalogue explains. This may be a part of"
+    " that, so its numbers have no interval."
 )
+# Of a wave: how often it comes back per turn. It is reported though it was searched on a grid.
+_ORDER = "order"
 _FAINT = " What was not searched moves so little that it shows little of it."
 
 
@@ -40,11 +44,11 @@ def _subject(effect: Effect, elements: Sequence[str]) -> str:
     if effect.acts_on is Elements.CELLS:
         return "All load cells have"
     kind = kind_of(effect)
-    listed = " and ".join(", ".join(elements).rsplit(", ", 1))
+    listed = " and ".join(", ".join(elements).rsplit(", ", 1)).replace("_", " ")
     if kind is Kind.BODY:
-        return f"The {listed.replace('_', ' ')} {verb}"
+        return f"The {listed} {verb}"
     if kind is Kind.MARKERS:
-        return f"The motion capture of {listed.replace('_', ' ')} has"
+        return f"The motion capture of {listed} has"
     words = {Kind.WINCH: "winches"}.get(kind, f"{kind.value}s") if many else kind.value
     return f"{words.capitalize()} {listed} {verb}"
 
@@ -60,7 +64,7 @@ def _sizes(finding: Finding) -> str:
     reported = {own.candidate.element: _size(finding, own) for own in finding.coefficients}
     if len(set(reported.values())) == 1:
         return next(iter(reported.values()))
-    return "; ".join(f"{element} {size}" for element, size in reported.items())
+    return "; ".join(f"{element.replace('_', ' ')} {size}" for element, size in reported.items())
 
 
 def _size(finding: Finding, own: Coefficients) -> str:
@@ -73,12 +77,13 @@ def _size(finding: Finding, own: Coefficients) -> str:
     if all(n.is_open for n in known):
         reported = ", ".join(f"{_name(effect, n)} {amount_words(n.value, n.unit)}" for n in known)
         return f"{reported}, too few data for an interval"
-    sure = [n for n in known if not _may_be_absent(effect, n)] or known
+    orders = [n for n in numbers if n.name == _ORDER and n not in known]
+    sure = [*orders, *([n for n in known if not _may_be_absent(effect, n)] or known)]
     reported = ", ".join(
         f"{_name(effect, n)} {amount_words(n.value, n.unit, (n.low, n.high))}" for n in sure
     )
     rest = ", ".join(n.name for n in known if n not in sure)
-    return f"{reported}, {rest} not surely" if rest else reported
+    return f"{reported}, {rest} not significantly" if rest else reported
 
 
 def _may_be_absent(effect: Effect, number: Parameter) -> bool:
@@ -142,21 +147,23 @@ def _suspected(diagnosis: Diagnosis, effect: Effect) -> set[str]:
 
 def _improvement(diagnosis: Diagnosis, finding: Finding) -> str:
     """Return the change of the held-out error, in the finding's own residual and simulated."""
-    best = max(_concerned(diagnosis, finding), key=lambda fit: fit.before / max(fit.after, 1e-300))
-    noise, limits = "at the noise floor", diagnosis.thresholds
-    if best.after > limits.noise_floor_ratio * best.noise:
-        noise = f"where noise is {_share(best, best.noise)}"
-    away = ""
+    best = max(
+        concerned(diagnosis.fit, finding), key=lambda fit: fit.before / max(fit.after, 1e-300)
+    )
+    limits = diagnosis.thresholds
+    at_noise = best.tabled is None and best.is_at_noise(limits)
+    noise = "That is the noise floor." if at_noise else f"Noise is {_share(best, best.noise)}."
     if best.steady is not None and best.steady < limits.steady_error_share * best.after:
-        away = f" ({_share(best, best.steady)} apart from where the shaft turns round)"
+        away = f"Apart from where the shaft reverses it is {_share(best, best.steady)}."
+        noise = f"{away} {noise}"
     before, after = _share(best, best.before), _share(best, best.after)
     moves = "falls" if best.after < best.before else "rises"
     course = f"stays at {after}" if before == after else f"{moves} from {before} to {after}"
-    together = sum(best in _concerned(diagnosis, each) for each in diagnosis.reported) > 1
+    together = sum(best in concerned(diagnosis.fit, each) for each in diagnosis.reported) > 1
     return (
-        f"With {'all that was found' if together else 'it'} the held-out error of"
-        f" {channel_of(best)} {course} of what was measured{away}, {noise};"
-        f" {_simulated(finding.improvement)}."
+        f"With {'all that was found' if together else 'it'} the held-out error of the"
+        f" {channel_words(channel_of(best))} {course} of what was measured. {noise}"
+        f" {_simulated(finding.improvement)}"
     )
 
 
@@ -167,12 +174,13 @@ def _share(fit: HeldOut, value: float) -> str:
 
 def _simulated(improvement: Improvement | None) -> str:
     if improvement is None:
-        return "what was recorded does not allow to simulate it"
+        return "What was recorded does not allow to simulate it."
     if improvement.with_it >= improvement.without:
-        return "simulations of the held-out data do not improve with it"
+        return "Simulations of the held-out data do not improve with it."
     both = improvement.without, improvement.with_it
     before, after = (amount_words(each, improvement.unit) for each in both)
-    return f"simulated, the error of {improvement.channel} falls from {before} to {after}"
+    words = channel_words(improvement.channel)
+    return f"Simulated, the error of the {words} falls from {before} to {after}."
 
 
 def region_words(region: Region) -> str:
@@ -183,14 +191,3 @@ def region_words(region: Region) -> str:
         f" what it takes from the squared residual lies in these {100 * region.share:.0f} % of the"
         " data"
     )
-
-
-def _concerned(diagnosis: Diagnosis, finding: Finding) -> Sequence[HeldOut]:
-    """Return the residuals of a finding's own elements that improve, else all it may affect."""
-    effect, elements = finding.hypothesis.effect, finding.elements
-    signature = effect.signature
-    places = {r.channel for r in (signature.regression, *signature.partners)}
-    fits = [f for f in diagnosis.fit if f.place.element in (*elements, "bar")]
-    fits = [f for f in fits if f.place.channel in places] or fits or list(diagnosis.fit)
-    own = [f for f in fits if f.place.element in elements and f.after < f.before]
-    return own or fits

@@ -8,8 +8,9 @@ import numpy as np
 from ruamel.yaml.comments import CommentedMap, CommentedSeq
 
 from cspm_ident.diagnosis.diagnosis import Diagnosis
+from cspm_ident.diagnosis.reporting.empirical_statement import table_entries
 from cspm_ident.fitted_testbed import FittedNumber
-from cspm_msgs_py.testbed import TestbedFile, parse_testbed
+from cspm_msgs_py.testbed import EffectEntry, TestbedFile, parse_testbed
 from cspm_msgs_py.yaml_file import round_trip
 
 _UNBOUNDED = (-np.inf, np.inf)
@@ -42,6 +43,24 @@ def improved_testbed(diagnosis: Diagnosis, source: str) -> TestbedFile:
                 }
             )
             entries.append(entry)
+    entries.extend(_tabled(entry, hashes) for entry in table_entries(diagnosis))
     stream = io.StringIO()
     yaml.dump(content, stream)
     return parse_testbed(stream.getvalue(), source)
+
+
+def _tabled(entry: EffectEntry, hashes: tuple[str, ...]) -> CommentedMap:
+    """Return a table's entry; its note says that it describes and does not explain."""
+    assert entry.table is not None
+    content = CommentedMap(entry.table.model_dump(exclude_defaults=True))
+    for name in ("knots", "second_knots", "values"):
+        if name in content:
+            content[name] = CommentedSeq(content[name])
+            content[name].fa.set_flow_style()
+    source: dict[str, object] = {"provenance": "fitted", "recording": hashes[0]}
+    if hashes[1:]:
+        source["further_recordings"] = list(hashes[1:])
+    content["values"] = CommentedMap({"value": content["values"], **source})
+    return CommentedMap(
+        {"effect": entry.effect, "elements": [*entry.elements], "parameters": content}
+    )

@@ -1,13 +1,31 @@
-"""Tables of the report page that check the recordings: energy balance and controller parity."""
+"""Tables of the report page that check the recordings: data, energy and controllers."""
 
 from __future__ import annotations
 
+from pathlib import Path
 from typing import Any
 
 from cspm_ident.diagnosis.diagnosis import Diagnosis
 from cspm_ident.diagnosis.reporting.statement import channel_of
 from cspm_ident.diagnosis.validation.residual_power import Power, lost_powers
 from cspm_ident.offline_page import table_html
+
+
+def data_table(data: dict[str, Any]) -> str:
+    """Return what the recordings themselves show as HTML; empty where nothing was looked at.
+
+    Args:
+        data: contents of `diagnosis.json`, with `data_checks`.
+    """
+    checks = data.get("data_checks", ())
+    rows = [
+        (Path(each["recording"]).name, each["check"], each["what"], each["remedy"])
+        for each in sorted(checks, key=lambda each: bool(each["ok"]))
+    ]
+    wrong = sum(not each["ok"] for each in checks)
+    text = f"<p>{wrong} of {len(rows)} checks found something, before any model was fitted.</p>"
+    heads = ("recording", "check", "what was found", "remedy")
+    return text + table_html(heads, rows, "the recordings themselves") if rows else ""
 
 
 def energy_table(found: Diagnosis) -> str:
@@ -29,7 +47,7 @@ def energy_table(found: Diagnosis) -> str:
 def _takes_or_gives(power: Power) -> str:
     if power.gives:
         return "gives energy"
-    return "takes energy" if power.after > power.half else "neither, surely"
+    return "takes energy" if power.after > power.half else "neither significantly"
 
 
 def controllers_table(data: dict[str, Any]) -> str:

@@ -9,11 +9,14 @@ from cspm_ident.block_simulation import Input
 from cspm_ident.diagnosis.diagnosis import Diagnosis
 from cspm_ident.diagnosis.finding import Shape, Unexplained
 from cspm_ident.diagnosis.reporting.formula_hint import is_even, sketch
+from cspm_ident.diagnosis.reporting.quantity import amount_words
 from cspm_ident.diagnosis.residuals.free_shapes import Driver
 from cspm_ident.diagnosis.residuals.spectral_lines import Line
 from cspm_ident.diagnosis.thresholds import DEFAULT_THRESHOLDS, Thresholds
 from cspm_ident.diagnosis.validation.holdout_residuals import HeldOut
 from cspm_ident.diagnosis.validation.holdout_simulation import SimulatedFit
+from cspm_ident.diagnosis.validation.remainder import Remainder
+from cspm_ident.diagnosis.validation.residual_curves import Curve
 from cspm_ident.diagnosis.validation.residual_power import Power
 from cspm_msgs_py.dofs import DOFS
 from cspm_sim.effects import Channel
@@ -87,6 +90,27 @@ def line_statement(line: Line) -> str:
     )
 
 
+def remainder_statement(left: Remainder) -> str:
+    """Return what is left of a residual beyond its noise: size, function of what, and when."""
+    turns = left.place.channel in (Channel.DRIVE, Channel.SHAFT) or left.component in DOFS[3:]
+    unit = "N·m" if turns else "N"
+    where = _CHANNELS[left.place.channel].format(left.place.element)
+    where += f" in {left.component}" if left.component else ""
+    percent = 100.0 * left.rms / max(left.measured, 1e-300)
+    words = (
+        f"On held-out data {where} differs from the model by {amount_words(left.rms, unit)},"
+        f" {left.ratio:.2g} times its noise and {percent:.2g} % of what was measured"
+    )
+    if left.share >= _SHOWN:
+        words += f"; {100 * left.share:.0f} % of the squares are a function of {left.driver}"
+    if left.stretch.share >= _SHOWN:
+        words += (
+            f"; {100 * left.stretch.share:.0f} % of the squares lie between"
+            f" {left.stretch.start:.3g} and {left.stretch.end:.3g} s"
+        )
+    return f"{words}. Nothing in the catalogue explains it."
+
+
 def formula_of(
     driver: Driver, shape: Shape, thresholds: Thresholds = DEFAULT_THRESHOLDS
 ) -> str | None:
@@ -95,7 +119,7 @@ def formula_of(
     return sketch(shape.knots, shape.values, name, thresholds)
 
 
-def channel_of(fit: HeldOut | Power) -> str:
+def channel_of(fit: HeldOut | Power | Remainder | Curve) -> str:
     """Return the public name of a residual's measured quantity."""
     return _CHANNELS[fit.place.channel].format(fit.place.element)
 
@@ -110,6 +134,8 @@ def unit_of(fit: HeldOut) -> str:
     return _UNITS.get(fit.place.channel, "times its noise")
 
 
+# Share of squares from which on a signal or a stretch is named.
+_SHOWN = 0.3
 _CHANNELS = {
     Channel.DRIVE: "winches/torque_command/{}",
     Channel.SHAFT: "winches/torque/{}",

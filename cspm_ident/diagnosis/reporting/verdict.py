@@ -11,18 +11,22 @@ from typing import Any
 from cspm_ident.diagnosis.diagnosis import Diagnosis
 from cspm_ident.diagnosis.finding import Finding, Region, Unexplained
 from cspm_ident.diagnosis.regression.hypothesis import Rival
+from cspm_ident.diagnosis.reporting.empirical_statement import empirical_entries
 from cspm_ident.diagnosis.reporting.finding_statement import statement_of
+from cspm_ident.diagnosis.reporting.shown_place import shown_place
 from cspm_ident.diagnosis.reporting.statement import (
     channel_of,
     drive_of,
     formula_of,
     line_statement,
+    remainder_statement,
     unknown_statement,
 )
 from cspm_ident.diagnosis.residuals.spectral_lines import Line
 from cspm_ident.diagnosis.thresholds import DEFAULT_THRESHOLDS, Thresholds
 from cspm_ident.diagnosis.validation.holdout_residuals import HeldOut
 from cspm_ident.diagnosis.validation.holdout_simulation import SimulatedFit
+from cspm_ident.diagnosis.validation.remainder import Remainder
 from cspm_ident.diagnosis.validation.residual_power import Power, lost_powers
 from cspm_ident.signals.measurement import Measurement
 from cspm_sim.effects import Block, Channel
@@ -44,23 +48,28 @@ class Verdict(Enum):
 
 
 SENTENCES = {
-    Verdict.CONSISTENT: "The recordings agree with the model. Nothing in the catalogue, and no free"
-    " function of the measured signals, is surely missing and worth a word.",
+    Verdict.CONSISTENT: "The recordings agree with the model: what is left on held-out data is"
+    " noise or immaterial, and a difference of relevant size would have shown.",
     Verdict.EFFECT: "Physics is missing in the model.",
     Verdict.PARAMETER: "A number of the test-bed file is wrong; no physics is missing.",
-    Verdict.TIE: "Something is missing, and these recordings cannot tell which of several.",
+    Verdict.TIE: "Something is missing, and several causes explain these recordings equally well.",
     Verdict.UNKNOWN: "Something is missing that the catalogue does not have.",
-    Verdict.NOT_EXCITED: "These recordings cannot tell.",
+    Verdict.NOT_EXCITED: "These recordings cannot tell: nothing that was measured moves enough"
+    " beyond its noise to decide.",
 }
 
 
 def verdict_of(diagnosis: Diagnosis) -> Verdict:
-    """Return the verdict; doubtful findings are ignored."""
+    """Return the verdict; doubtful findings are ignored.
+
+    The model is consistent only where all that is left on held-out data is noise or immaterial, and
+    some measured quantity exceeds its noise enough to show a difference.
+    """
     certain = [each for each in diagnosis.reported if not each.is_doubtful]
     if not certain:
-        if diagnosis.unexplained or diagnosis.lines:
+        if diagnosis.unexplained or diagnosis.lines or diagnosis.beyond_noise:
             return Verdict.UNKNOWN
-        return Verdict.CONSISTENT if diagnosis.places else Verdict.NOT_EXCITED
+        return Verdict.CONSISTENT if diagnosis.is_excited else Verdict.NOT_EXCITED
     if any(each.alternatives for each in certain):
         return Verdict.TIE
     if all(each.hypothesis.effect.physics.alter is not None for each in certain):
@@ -121,10 +130,11 @@ def diagnosis_data(diagnosis: Diagnosis, testbed: Path | None = None) -> dict[st
             {"effect": name, "elements": list(elements)} for name, elements in diagnosis.not_excited
         ],
         "detection_limits": [limit._asdict() for limit in diagnosis.limits],
+        "empirical": empirical_entries(diagnosis),
         "fit": [_simulated_fit(each) for each in diagnosis.simulated],
-        "residuals": [_equation_fit(each) for each in diagnosis.fit],
+        "residuals": [_equation_fit(each, diagnosis.thresholds) for each in diagnosis.fit],
         "energy": [_power(each) for each in lost_powers(diagnosis.curves)],
-        "model": IMPROVED if diagnosis.reported else None,
+        "model": IMPROVED if diagnosis.reported or diagnosis.tables else None,
     }
 
 
@@ -147,7 +157,10 @@ def _findings(diagnosis: Diagnosis) -> list[dict[str, Any]]:
         most = max((each.gain.total for each in diagnosis.unexplained), default=0.0)
         ahead = sum(each.gain.total >= most for each in found)
     unknown = [_unknown(diagnosis, each) for each in diagnosis.unexplained]
-    return [*named[:ahead], *unknown, *map(_line, diagnosis.lines), *named[ahead:]]
+    lines = map(_line, diagnosis.lines)
+    # Beside a finding, what is left is reported with the residuals: no model is exact.
+    left = [] if ahead else map(_remainder, diagnosis.undescribed)
+    return [*named[:ahead], *unknown, *lines, *left, *named[ahead:]]
 
 
 def _recording(role: str, measurement: Measurement) -> dict[str, Any]:
@@ -170,6 +183,7 @@ def _finding(diagnosis: Diagnosis, finding: Finding) -> dict[str, Any]:
         "onset_s": onset.time if onset is not None else None,
         "onset_ci95_s": [onset.low, onset.high] if onset is not None else None,
         "region": _region(finding.region),
+        "shows_at": shown_place(diagnosis, finding),
         "parameters": [
             {
                 "element": n.element,
@@ -216,6 +230,20 @@ def _line(line: Line) -> dict[str, Any]:
     }
 
 
+def _remainder(left: Remainder) -> dict[str, Any]:
+    return {
+        "subsystem": _BLOCKS[left.place.channel].value,
+        "elements": [left.place.element],
+        "effect": UNKNOWN,
+        "probability": None,
+        "statement": remainder_statement(left),
+        "onset_s": None,
+        "region": {"driver": left.driver or "time [s]", "at": [], "adds": [], "hint": None},
+        "parameters": [],
+        "alternatives": [],
+    }
+
+
 def _unknown(diagnosis: Diagnosis, unexplained: Unexplained) -> dict[str, Any]:
     driver, _, _, shape = unexplained
     assert shape is not None
@@ -237,12 +265,33 @@ def _unknown(diagnosis: Diagnosis, unexplained: Unexplained) -> dict[str, Any]:
     }
 
 
-def _equation_fit(fit: HeldOut) -> dict[str, Any]:
-    numbers = fit.before, fit.after, fit.retuned, fit.noise
+def _equation_fit(fit: HeldOut, thresholds: Thresholds) -> dict[str, Any]:
+    numbers = fit.before, fit.final, fit.retuned, fit.noise
     drive = _DRIVES[fit.place.channel]
     found = _fit(channel_of(fit), drive, fit.measured, *numbers)
+    if fit.tabled is not None:
+        found["held_out"]["nrmse_named"] = fit.after / max(fit.measured, fit.noise, 1e-300)
     found["held_out"]["nrmse_black_box"] = fit.ceiling / max(fit.measured, 1e-300)
+    found["at_noise"] = fit.is_at_noise(thresholds)
+    found["left"] = [_left(each, thresholds) for each in fit.remainders]
     return found
+
+
+def _left(left: Remainder, thresholds: Thresholds) -> dict[str, Any]:
+    """Return what is left of a component of a residual; numbers in the unit that was measured."""
+    return {
+        "component": left.component or None,
+        "rms": left.rms,
+        "noise": left.noise if left.is_judged else None,
+        "measured": left.measured,
+        "at_noise": left.is_at_noise(thresholds) if left.is_judged else None,
+        "excited": left.is_excited(thresholds),
+        "function_of": left.driver or None,
+        "function_share": left.share,
+        "most_from_s": left.stretch.start,
+        "most_to_s": left.stretch.end,
+        "most_share": left.stretch.share,
+    }
 
 
 def _power(power: Power) -> dict[str, Any]:
@@ -256,8 +305,11 @@ def _power(power: Power) -> dict[str, Any]:
 
 
 def _simulated_fit(fit: SimulatedFit) -> dict[str, Any]:
-    numbers = fit.before, fit.after, fit.retuned, fit.floor
-    return _fit(fit.output.name, drive_of(fit), fit.measured, *numbers)
+    numbers = fit.before, fit.final, fit.retuned, fit.floor
+    found = _fit(fit.output.name, drive_of(fit), fit.measured, *numbers)
+    if fit.tabled is not None:
+        found["held_out"]["nrmse_named"] = fit.after / max(fit.measured, fit.floor, 1e-300)
+    return found
 
 
 def _fit(

@@ -174,11 +174,11 @@ class Suspension:
         """
         if self._known.steady_damper is not None:
             return self._known.steady_damper
-        sigma, damper = _STEADY_S / self.signals.step, self._damping * self._told_rates
+        sigma, damper = _STEADY_S / self.signals.step, self._damping * self._rates_by_tension
         return np.asarray(gaussian_filter1d(damper, sigma, axis=0, mode="nearest"))
 
     @cached_property
-    def _told(self) -> Array:
+    def _elongations_by_tension(self) -> Array:
         """Elongations from law and measured tension alone, (k, n) [m].
 
         For the regressors of effects: with a stiff cable, tensions give elongations far more
@@ -195,9 +195,9 @@ class Suspension:
         return np.asarray(reported)
 
     @cached_property
-    def _told_rates(self) -> Array:
+    def _rates_by_tension(self) -> Array:
         """Elongation rates from law and measured tension alone, (k, n) [m/s]."""
-        rates = np.gradient(self._told, self.signals.step, axis=0)
+        rates = np.gradient(self._elongations_by_tension, self.signals.step, axis=0)
         # The dashpot's state before the first sample is unknown.
         start, sigma = round(_START_S / self.signals.step), _STEADY_S / self.signals.step
         rates[:start] = gaussian_filter1d(self._rates, sigma, axis=0, mode="nearest")[:start]
@@ -207,7 +207,9 @@ class Suspension:
     def _calm_elongations(self) -> Array:
         """Elongations without reversals caused by noise, (k, n) [m]."""
         sigma = _CALM_S / self.signals.step
-        return np.asarray(gaussian_filter1d(self._told, sigma, axis=0, mode="nearest"))
+        return np.asarray(
+            gaussian_filter1d(self._elongations_by_tension, sigma, axis=0, mode="nearest")
+        )
 
     @cached_property
     def _carrying(self) -> Array:
@@ -277,7 +279,7 @@ class Suspension:
         return np.asarray(sum(self.pulled(i, tensions[:, i]) for i in range(tensions.shape[1])))
 
     @cached_property
-    def _told_acceleration(self) -> tuple[Array, Array]:
+    def _acceleration_by_tension(self) -> tuple[Array, Array]:
         """Acceleration of the bar's origin and α by (2-13) from the measured tensions, (k, 3) each.
 
         For the regressors of effects: the poses' noise, differentiated twice, is in the residual
@@ -314,11 +316,11 @@ class Suspension:
             CableSignal.TIME: self.signals.times,
             CableSignal.LENGTH: lengths,
             CableSignal.ELONGATION: self._calm_elongations[:, i],
-            CableSignal.RATE: self._told_rates[:, i],
+            CableSignal.RATE: self._rates_by_tension[:, i],
             CableSignal.TENSION: self.signals.tensions[:, i],
             CableSignal.STIFFNESS: self._law[:, i, 1],
             CableSignal.LENGTH_SLOPE: self._length_slopes[:, i],
-            CableSignal.DAMPER: self._damping[:, i] * self._told_rates[:, i],
+            CableSignal.DAMPER: self._damping[:, i] * self._rates_by_tension[:, i],
             CableSignal.DAMPING: self._damping[:, i],
             CableSignal.WOUND: wound / lengths,
             CableSignal.ANGLE: self.signals.angles[:, i],
@@ -348,7 +350,7 @@ class Suspension:
     @cached_property
     def bar_rows(self) -> Array:
         """`BarSignal` columns, with accelerations from the tensions."""
-        return self._bar_rows(*self._told_acceleration)
+        return self._bar_rows(*self._acceleration_by_tension)
 
     @cached_property
     def posed_bar_rows(self) -> Array:
@@ -359,7 +361,7 @@ class Suspension:
         bar, state = self._testbed.bar, self.bar
         assert bar is not None
         count = len(self.signals.times)
-        rows = np.zeros((count, int(BarSignal.TIME) + 1))
+        rows = np.zeros((count, int(BarSignal.POSE) + 6))
         rows[:, :3], rows[:, 3:6] = state.velocity, state.omega
         rows[:, 6:9], rows[:, 9:12] = acceleration, alpha
         rows[:, BarSignal.ROTATION : BarSignal.ROTATION + 9] = state.rotation.reshape(count, 9)
@@ -367,6 +369,7 @@ class Suspension:
         rows[:, BarSignal.MASS] = bar.mass
         rows[:, BarSignal.GRAVITY] = self._testbed.gravity
         rows[:, BarSignal.TIME] = self.signals.times
+        rows[:, BarSignal.POSE :] = self.signals.bar.poses
         return rows
 
     def frame_rows(self, i: int) -> Array:

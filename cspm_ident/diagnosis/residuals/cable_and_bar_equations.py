@@ -150,7 +150,7 @@ class _Stretch:
             self._cable_equation(
                 i, tensions[:, i], columns.get(Place(Channel.TENSION, name), {}), knots
             )
-            for i, name in enumerate(self._machine.cable_names)
+            for i, name in enumerate(self._machine.cable_names if self._signals.wound else ())
         ]
         out.append(self._bar_equation(wrench, columns.get(Place(Channel.WRENCH, BAR), {}), knots))
         return out if self._drawn is None else [self._known(each, self._drawn) for each in out]
@@ -171,15 +171,16 @@ class _Stretch:
         place = Place(Channel.TENSION, self._machine.cable_names[i])
         rows = self._here.cable_rows(i)
         drivers = {key: weighed(rows[:, column]) for key, column in _DRIVERS.items()}
-        # The residual contains the tension's noise, so it would appear as a function of the
-        # tension.
+        # The residual contains the tension's noise, and would appear as a function of the tension.
         drivers[_TENSION] = around(drivers[_TENSION], self._apart(Channel.TENSION))
         if knots is not None:
             columns = columns | knots.columns(place, drivers)
         target, start = weighed(missing), weighed(self._here.start_column(i))
         drawn, at = self._drawn, self._signals.times
-        untold = (
-            [] if drawn is None else [weighed(e) for e in drawn.untold(i, at, self._thresholds)]
+        unknown = (
+            []
+            if drawn is None
+            else [weighed(e) for e in drawn.unknown_parts(i, at, self._thresholds)]
         )
         # Without the start's part, the target is as small as its noise even in a hold-out fold with
         # the whole stretch.
@@ -190,9 +191,9 @@ class _Stretch:
             target[:, None],
             columns,
             weighed(self._signals.tensions[:, i])[:, None],
-            np.stack([*untold, start], axis=1)[:, None],
+            np.stack([*unknown, start], axis=1)[:, None],
             signals=drivers,
-            shared=len(untold),
+            shared=len(unknown),
         )
 
     def _bar_equation(
@@ -360,7 +361,8 @@ class _Stretch:
         """Return a reading fault's change of its cable's weighted residual, and of the reading."""
         signals = self._signals
         readings = signals.tensions if topic == TENSION else signals.angles
-        change = effect.regressors(reading_rows(signals.times, readings[:, i]))[:, 0, 0]
+        rescaled = effect.signature.rescales * self._here.tension_residuals[:, i]
+        change = effect.regressors(reading_rows(signals.times, readings[:, i] - rescaled))[:, 0, 0]
         step = small_step(change)
         changed = readings.copy()
         changed[:, i] += step * change

@@ -12,8 +12,8 @@ from cspm_ident.diagnosis.residuals.sensor_readings import pose_rows, reading_ro
 from cspm_ident.signals.measurement import BAR, FRAME, TENSION, WINCHES, Measurement
 from cspm_ident.signals.samples import Samples
 from cspm_msgs_py.errors import InputError
-from cspm_msgs_py.testbed import EffectEntry
 from cspm_sim.effect_entries import Action, altered_testbed, read_actions
+from cspm_sim.effects.winch_load import without_loads
 
 Array = NDArray[np.float64]
 
@@ -29,10 +29,8 @@ def with_found(measurement: Measurement, weights: Mapping[Candidate, Array]) -> 
         weights: of the effects' regressors, by candidate.
     """
     entries = [
-        EffectEntry(
-            effect=candidate.effect_id,
-            elements=(candidate.element,),
-            parameters=dict(candidate.effect.values(own.tolist(), **candidate.nonlinear)),
+        candidate.effect.entry(
+            (candidate.element,), candidate.effect.values(own.tolist(), **candidate.nonlinear)
         )
         for candidate, own in weights.items()
     ]
@@ -58,11 +56,11 @@ def settled(measurement: Measurement) -> Measurement:
             measurement = _true_readings(measurement, action)
     numbers = altered_testbed(machine, actions)
     kept = tuple(
-        EffectEntry(effect=a.effect.id, elements=(a.name,), parameters=dict(a.values))
+        a.effect.entry((a.name,), a.values)
         for a in actions
         if a.effect.physics.alter is None and a.effect.physics.sense is None
     )
-    left = numbers.model_copy(update={"effects": kept})
+    left = without_loads(numbers).model_copy(update={"effects": kept})
     return measurement.with_machine(left)
 
 

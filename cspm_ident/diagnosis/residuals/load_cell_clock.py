@@ -36,7 +36,7 @@ def on_drives_clock(
     if measurement.machine.bar is not None or measurement.tension is None:
         return measurement
     drift = cell_drift(measurement, thresholds)
-    if drift is None or not _is_sound(drift, thresholds):
+    if drift is None or not _is_plausible(drift, thresholds):
         return measurement
     return without_drifts(measurement, [drift])
 
@@ -80,7 +80,7 @@ def _record(equation: Equation) -> Record:
     return Record(left[:, :1], left[:, 1:])
 
 
-def _is_sound(drift: ClockDrift, thresholds: Thresholds) -> bool:
+def _is_plausible(drift: ClockDrift, thresholds: Thresholds) -> bool:
     low, high = drift.interval
     least = thresholds.least_clock_shift_s
     reported = not low <= 0.0 <= high and abs(drift.rate) * drift.apart > least

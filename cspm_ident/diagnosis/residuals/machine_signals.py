@@ -54,6 +54,8 @@ class MachineSignals:
         bar: the bar's motion.
         angles, speeds: of the motors, shape (k, n) [rad, rad/s].
         tensions: shape (k, n) [N].
+        wound: whether angles were measured. If not they are 0 here: cables have no equation, the
+            bar's does without them.
     """
 
     times: Array
@@ -62,6 +64,7 @@ class MachineSignals:
     angles: Array
     speeds: Array
     tensions: Array
+    wound: bool = True
 
     @property
     def step(self) -> float:
@@ -70,10 +73,8 @@ class MachineSignals:
 
     def of_cable(self, i: int) -> MachineSignals:
         """Return the signals with angles, speeds and tensions of cable i alone, n = 1."""
-        joints = (self.angles, self.speeds, self.tensions)
-        return MachineSignals(
-            self.times, self.frame, self.bar, *(each[:, i : i + 1] for each in joints)
-        )
+        names = ("angles", "speeds", "tensions")
+        return replace(self, **{name: getattr(self, name)[:, i : i + 1] for name in names})
 
     def with_pose_change(self, body: str, change: Array, step: float) -> MachineSignals:
         """Return the signals with `step`·change (k, 6) added to the pose of `bar` or `frame`."""
@@ -84,21 +85,27 @@ class MachineSignals:
 def machine_signals(timeline: Timeline) -> list[MachineSignals]:
     """Return the measured signals at steps of 5 ms, one entry per stretch without gaps."""
     measured = timeline.measurement
-    if measured.bar_pose is None or measured.angle is None or measured.tension is None:
+    if measured.bar_pose is None or measured.tension is None:
         return []
     slow = timeline.slowly(PERIOD_NS, timeline.pose_band)
     frame, bar = slow.body_motion("frame"), slow.body_motion("bar")
-    columns = [frame[0], bar[0], slow.angles, slow.speeds, slow.smooth_tensions]
+    tensions = np.asarray(slow.smooth_tensions)
+    angles, speeds = slow.angles, slow.speeds
+    if angles is None or speeds is None:
+        angles = speeds = np.zeros_like(tensions)
+    columns = [frame[0], bar[0], angles, speeds, tensions]
     whole = [np.asarray(c) for c in columns]
     shortest = round(_SHORTEST_S / slow.period)
+    wound = measured.angle is not None
     return [
         MachineSignals(
-            slow.times[a : b + 1],
-            BodyMotion(*(part[a : b + 1] for part in frame)),
-            BodyMotion(*(part[a : b + 1] for part in bar)),
-            *(each[a : b + 1] for each in whole[2:]),
+            slow.times[part],
+            BodyMotion(*(each[part] for each in frame)),
+            BodyMotion(*(each[part] for each in bar)),
+            *(angles[part], speeds[part], tensions[part]),
+            wound,
         )
-        for a, b in whole_stretches(whole, shortest)
+        for part in (slice(a, b + 1) for a, b in whole_stretches(whole, shortest))
     ]
 
 

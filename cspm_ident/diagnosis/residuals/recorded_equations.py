@@ -54,7 +54,7 @@ def equations_of(
     winches, suspended = _reached(measurement, touched)
     # Cables and bar first, because they need most memory.
     late: list[Equation] = []
-    if measurement.machine.bar is not None and suspended:
+    if measurement.machine.bar is not None and suspended and measurement.knows_frame:
         progress("cables and bar")
         drawn = None if measurement.tension else drawn_tension(measurement, known)
         drawn = drawn and drawn.less(assumed)

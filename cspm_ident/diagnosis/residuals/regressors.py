@@ -36,7 +36,7 @@ class Candidate:
         effect: of the catalogue.
         element: name of the cable or body.
         shape: the nonlinear parameters, by name, sorted.
-        effect_id: the effect's.
+        effect_id: the effect's key: its id, and of a table what tells it from others.
     """
 
     effect: Effect = field(compare=False)
@@ -46,7 +46,7 @@ class Candidate:
 
     def __post_init__(self) -> None:
         """Set the id that represents the effect where candidates are compared."""
-        object.__setattr__(self, "effect_id", self.effect.id)
+        object.__setattr__(self, "effect_id", self.effect.key)
 
     @property
     def nonlinear(self) -> dict[str, float]:

@@ -78,6 +78,24 @@ class Equation:
         """White noise of the target from differences between rows, one sd per channel."""
         return difference_noise(self.target)
 
+    @property
+    def left(self) -> Array:
+        """The target without its fitted nuisance terms, shape (k, channels)."""
+        if not self.nuisance.size:
+            return self.target
+        columns = self.nuisance.reshape(self.target.size, -1)
+        target = self.target.reshape(-1)
+        left = target - columns @ np.linalg.lstsq(columns, target, rcond=None)[0]
+        return np.asarray(left.reshape(self.target.shape))
+
+    def less(self, weights: Mapping[Candidate, Array]) -> Equation:
+        """Return the equation with its terms of the given weights subtracted from the target."""
+        target = self.target
+        for term, own in weights.items():
+            if term in self.columns:
+                target = target - self.columns[term] @ own
+        return replace(self, target=target)
+
     def scaled(self, noise: Array) -> Equation:
         """Return the equation in units of a noise, (channels,)."""
         unit = np.where(noise > 0.0, noise, 1.0)

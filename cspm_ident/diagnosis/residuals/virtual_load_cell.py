@@ -8,9 +8,9 @@ from functools import cached_property
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.ndimage import minimum_filter1d
 
 from cspm_ident.diagnosis.residuals.regressors import Candidate, shapes_of
+from cspm_ident.diagnosis.residuals.winch_torque import may_reverse
 from cspm_ident.diagnosis.thresholds import DEFAULT_THRESHOLDS, Thresholds
 from cspm_ident.signals.measurement import Measurement
 from cspm_ident.signals.samples import Samples
@@ -118,12 +118,11 @@ class DrawnTension:
         rows = self._rows[i]
         speeds = rows[:, WinchSignal.SPEED]
         width = 2 * round(HALF_WIDTH_S / float(np.median(np.diff(self.times)))) + 1
-        slow = thresholds.reversal_speed_share * np.sqrt(np.mean(speeds**2))
-        near = minimum_filter1d(np.abs(speeds), width) < slow
+        near = may_reverse(speeds, thresholds.reversal_speed_share, width)
         held = near * np.sign(speeds) / rows[:, WinchSignal.RADIUS]
         return self._smooth(held[:, None], times)[:, 0]
 
-    def untold(
+    def unknown_parts(
         self, i: int, times: Array, thresholds: Thresholds = DEFAULT_THRESHOLDS
     ) -> list[Array]:
         """Return the unknown parts of winch i's tension, each of shape (len(times),).

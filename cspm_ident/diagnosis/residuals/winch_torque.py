@@ -2,10 +2,11 @@
 
 from __future__ import annotations
 
-from collections.abc import Collection, Iterator, Sequence
+from collections.abc import Collection, Iterator, Mapping, Sequence
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.ndimage import maximum_filter1d, minimum_filter1d
 
 from cspm_ident.diagnosis.residuals.free_shapes import Driver, Knots
 from cspm_ident.diagnosis.residuals.regressors import Candidate, Place, elements_of, shapes_of
@@ -83,6 +84,23 @@ def shaft_equations(
     return found
 
 
+def may_reverse(speeds: Array, share: float, width: int) -> NDArray[np.bool_]:
+    """Return where a shaft may reverse or stick within a window about each instant, shape (n,).
+
+    Its speed is there below a share of its root mean square, or below half of the change from one
+    reading to the next: where steps of an encoder or noise make that large, the sign of the speed
+    is not known.
+
+    Args:
+        speeds: at equal steps, shape (n,) [rad/s].
+        share: of the root mean square.
+        width: number of instants of a window.
+    """
+    change = maximum_filter1d(np.abs(np.diff(speeds, append=speeds[-1:])), width)
+    slow = np.maximum(share * np.sqrt(np.mean(speeds**2)), 0.5 * change)
+    return np.asarray(minimum_filter1d(np.abs(speeds), width) < slow)
+
+
 def _turns(angles: Array, samples: Samples, ratio: float) -> bool:
     """Return whether a shaft moves by more than its encoder's noise.
 
@@ -127,9 +145,10 @@ class _Shaft:
         view, width = np.lib.stride_tricks.sliding_window_view, len(self._window.weights)
         windows = view(speed, width)[:: self._stride]
         slow = still_share * np.sqrt(np.mean(speed**2))
+        reverses = may_reverse(rows[:, WinchSignal.SPEED], still_share, width)
         whole = ~view(lost, width)[:: self._stride].any(axis=1)
         self._moving = (windows.max(axis=1) >= slow) & whole
-        self._turning = windows.min(axis=1)[self._moving] < slow
+        self._turning = view(reverses, width)[:: self._stride, width // 2][self._moving]
         self._times = self._weighed(times)
 
     def equation(
@@ -139,6 +158,7 @@ class _Shaft:
         pulled = rows[:, WinchSignal.RADIUS] * rows[:, WinchSignal.TENSION]
         target = self._weighed(rows[:, WinchSignal.TORQUE]) - self._averaged(pulled)
         target = target - self._inertia * self._accelerated(rows[:, WinchSignal.ANGLE])
+        gain = 1.0
         for action in known:
             effect = action.effect
             if (
@@ -147,6 +167,7 @@ class _Shaft:
             ):
                 shape = {name: action.values[name] for name in effect.signature.nonlinear}
                 target = target - self._regressed(effect, shape) @ effect.weights(action.values)
+                gain *= 1.0 + effect.weights(action.values)[0] if effect.signature.rescales else 1.0
         columns: dict[Candidate | Driver, Array] = {
             candidate: found[:, None, :]
             for effect in effects
@@ -160,8 +181,8 @@ class _Shaft:
         return Equation(
             place,
             self._times,
-            target[:, None],
-            columns,
+            target[:, None] / gain,
+            _as_reported(columns, target[:, None] / gain, torque, gain),
             torque,
             turning=self._turning,
             signals=drivers,
@@ -197,3 +218,31 @@ class _Shaft:
 
     def _accelerated(self, values: Array) -> Array:
         return np.asarray(weigh(self._window.second, values, self._stride)[self._moving])
+
+
+def _as_reported(
+    columns: Mapping[Candidate | Driver, Array], target: Array, torque: Array, gain: float
+) -> dict[Candidate | Driver, Array]:
+    """Return columns of the torque as the drive reports it, where the shaft gets `gain` times that.
+
+    A further gain multiplies the torque that the model needs, which is what the drive reports less
+    the residual. By the reported torque itself, a gain of zero would leave no residual.
+
+    Args:
+        columns: of the torque at the shaft, each of shape (k, 1, weights).
+        target: residual of the reported torque, shape (k, 1).
+        torque: as reported, shape (k, 1).
+        gain: known.
+    """
+    needed = (target - torque)[:, :, None]
+    return {
+        term: (needed if _is_scale(term) else column) / gain for term, column in columns.items()
+    }
+
+
+def _is_scale(term: Candidate | Driver) -> bool:
+    """Return whether a term multiplies the reported torque."""
+    if not isinstance(term, Candidate):
+        return False
+    signature = term.effect.signature
+    return signature.rescales and signature.regression.channel is Channel.SHAFT

@@ -11,7 +11,7 @@ from cspm_ident.diagnosis.regression.collinearity import (
     distance,
     freely_gained,
 )
-from cspm_ident.diagnosis.regression.hypothesis import Hypothesis, Rival, freedom
+from cspm_ident.diagnosis.regression.hypothesis import Hypothesis, Rival
 from cspm_ident.diagnosis.regression.joint_fit import Fits
 from cspm_ident.diagnosis.residuals.regressors import Candidate
 from cspm_ident.diagnosis.selection.masked_by_parameter import absorbed_pairs
@@ -43,10 +43,10 @@ def alternatives_of(
     free_gain = freely_gained(fits.gram, sums, base, own)
     limits = fits.thresholds
     undecided = max(limits.model_form_error_share * gained, free_gain)
-    for rival, *beside in _alike(fits, free, hypothesis, others):
+    for rival, *beside in _rivals(fits, free, hypothesis, others):
         assumed = [rival, *beside]
         columns = fits.gram.columns_of(c for h in assumed for c in h.candidates)
-        wider = max(0, sum(map(freedom, assumed)) - freedom(hypothesis))
+        wider = max(0.0, sum(map(fits.freedom, assumed)) - fits.freedom(hypothesis))
         nested = wider and not beside and contains(sums, base, columns, own)
         if nested or not fits.is_plausible([*others, *assumed], loosely=True):
             continue
@@ -59,7 +59,7 @@ def alternatives_of(
             yield Rival(rival, apart, *beside)
 
 
-def _alike(
+def _rivals(
     fits: Fits,
     free: Sequence[Candidate],
     hypothesis: Hypothesis,
@@ -74,9 +74,9 @@ def _alike(
     rivals = rivals_of(*given, base, hypothesis, free)
     yield from ((rival,) for rival in rivals)
     alone = {hypothesis.effect.id, *(rival.effect.id for rival in rivals)}
-    alike = [hypothesis, *(r for r in rivals if r.elements == hypothesis.elements)]
+    collinear = [hypothesis, *(r for r in rivals if r.elements == hypothesis.elements)]
     pairs: dict[tuple[str, str], tuple[Hypothesis, Hypothesis]] = {}
-    for like in alike:
+    for like in collinear:
         for effect, number in absorbed_pairs(*given, base, like, free):
             pairs.setdefault((effect.effect.id, number.effect.id), (effect, number))
     yield from (pair for (effect_id, _), pair in pairs.items() if effect_id not in alone)

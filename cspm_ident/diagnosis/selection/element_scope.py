@@ -38,16 +38,16 @@ class Scopes:
             free: candidates that may be added.
             base: columns already selected.
         """
-        alike = [
+        same_effect = [
             c for c in free if c.effect_id == candidate.effect_id and c.shape == candidate.shape
         ]
-        whole = Hypothesis(candidate.effect, tuple(alike))
-        own = self._extended(candidate, alike, base)
-        if len(alike) == 1:
+        whole = Hypothesis(candidate.effect, tuple(same_effect))
+        own = self._extended(candidate, same_effect, base)
+        if len(same_effect) == 1:
             return [own]
         one_system = has_one_system(own.effect)
         common = [replace(whole, common=True)] if one_system or self.agree(whole, base) else []
-        wider = [whole] if len(own.candidates) < len(alike) else []
+        wider = [whole] if len(own.candidates) < len(same_effect) else []
         # Order matters: a later hypothesis replaces an earlier one only if it explains more.
         return [*common, own, *wider] if one_system else [own, *common, *wider]
 
@@ -97,21 +97,21 @@ class Scopes:
         return weights.reshape(shape), half.reshape(shape)
 
     def _extended(
-        self, candidate: Candidate, alike: Sequence[Candidate], base: Index
+        self, candidate: Candidate, same_effect: Sequence[Candidate], base: Index
     ) -> Hypothesis:
         """Return the effect on the elements where it is significant beside those already added."""
         sums, gram, found = self._fits.sums, self._fits.gram, [candidate]
-        others = [c for c in alike if c.element != candidate.element]
+        others = [c for c in same_effect if c.element != candidate.element]
         columns = [gram.columns_of([c]) for c in others]
         for k in np.argsort(-sums.gains_beyond(base, columns)):
             beside = np.concatenate([base, gram.columns_of(found)])
             further = Hypothesis(candidate.effect, (others[k],))
             if self._significance.counts(beside, further, sums.gain(beside, columns[k])):
                 found.append(others[k])
-        return Hypothesis(candidate.effect, tuple(c for c in alike if c in found))
+        return Hypothesis(candidate.effect, tuple(c for c in same_effect if c in found))
 
     def _everywhere(self, hypothesis: Hypothesis) -> Hypothesis:
         """Return the hypothesis on all elements that its effect can act on."""
         own = hypothesis.effect.id, hypothesis.candidates[0].shape
-        alike = tuple(c for c in self._candidates if (c.effect_id, c.shape) == own)
-        return replace(hypothesis, candidates=alike)
+        same_effect = tuple(c for c in self._candidates if (c.effect_id, c.shape) == own)
+        return replace(hypothesis, candidates=same_effect)

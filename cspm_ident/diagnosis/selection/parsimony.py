@@ -8,7 +8,8 @@ from dataclasses import replace
 import numpy as np
 from numpy.typing import NDArray
 
-from cspm_ident.diagnosis.regression.block_regression import behind, gain_of, paired
+from cspm_ident.diagnosis.regression.block_comparison import behind, paired
+from cspm_ident.diagnosis.regression.block_regression import gain_of
 from cspm_ident.diagnosis.regression.hypothesis import (
     Hypothesis,
     freedom,

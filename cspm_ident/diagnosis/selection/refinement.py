@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 from cspm_ident.diagnosis.regression.block_gram import BlockGram, gather
 from cspm_ident.diagnosis.regression.block_regression import BlockRegression
 from cspm_ident.diagnosis.regression.coefficients import Weights, values_of, weights_of
-from cspm_ident.diagnosis.regression.hypothesis import Hypothesis, parts_of
+from cspm_ident.diagnosis.regression.hypothesis import Hypothesis, factors_of, parts_of
 from cspm_ident.diagnosis.regression.parameter_estimates import of_reach
 from cspm_ident.diagnosis.regression.time_constants import most_in_all, with_spectrum
 from cspm_ident.diagnosis.residuals.corrected_measurement import settled, with_found
@@ -80,8 +80,7 @@ def refine(
         for candidate, (weights, half) in found.items():
             if candidate.effect.is_correction:
                 before = values.get(candidate, np.zeros_like(weights))
-                turned = _unit_after(candidate.effect, before)
-                applied[candidate] = before + turned * weights, turned * half
+                applied[candidate] = _corrected(candidate.effect, before, weights, half)
         factor = float(np.sqrt(factor))
         if _is_settled(found):
             break
@@ -166,15 +165,16 @@ def needs_refining(effect: Effect) -> bool:
     return effect.is_correction or bool(effect.signature.nonlinear)
 
 
-def _unit_after(effect: Effect, applied: Array) -> Array:
-    """Return the correction per unit of each further weight, beside the one already applied.
+def _corrected(effect: Effect, applied: Array, weights: Array, half: Array) -> tuple[Array, Array]:
+    """Return a correction after a further step, with half the widths of its intervals.
 
-    A factor of the test-bed file or of a reading multiplies the value corrected so far.
+    A factor of the test-bed file or of a reading multiplies the value corrected so far, by the
+    exponential of the step: no step of first order makes a stiffness negative.
     """
-    if effect.signature.coefficients:
-        return np.ones_like(applied)
-    factors = np.array([parameter.absent == 1.0 for parameter in effect.linear])
-    return np.where(factors, 1.0 + applied, 1.0)
+    factors = factors_of(effect)
+    steps = np.exp(np.where(factors, weights, 0.0))
+    value = np.where(factors, (1.0 + applied) * steps - 1.0, applied + weights)
+    return value, np.where(factors, (1.0 + applied) * steps, 1.0) * half
 
 
 def _near(effect: Effect, shape: Mapping[str, float], factor: float) -> Effect:
@@ -183,8 +183,10 @@ def _near(effect: Effect, shape: Mapping[str, float], factor: float) -> Effect:
     grid = {
         name: tuple(sorted({float(np.clip(value * f, *bounds[name])) for f in _steps(factor)}))
         for name, value in shape.items()
+        if name not in effect.signature.whole
     }
-    return effect.with_grid(grid)
+    whole = {name: (value,) for name, value in shape.items() if name not in grid}
+    return effect.with_grid({**grid, **whole})
 
 
 def _steps(factor: float) -> tuple[float, ...]:
@@ -239,14 +241,14 @@ def _turns(gram: BlockGram, weights: Mapping[Candidate, Array]) -> Array:
 def _ends(gram: BlockGram, candidate: Candidate, name: str) -> list[Candidate]:
     """Return the candidates that differ in one nonlinear parameter only, in ascending order."""
     kept = {n: value for n, value in candidate.shape if n != name}
-    alike = [
+    same = [
         term
         for term in gram.terms
         if isinstance(term, Candidate)
         and (term.effect_id, term.element) == (candidate.effect_id, candidate.element)
         and {n: value for n, value in term.shape if n != name} == kept
     ]
-    return sorted(alike, key=lambda term: term.nonlinear[name])
+    return sorted(same, key=lambda term: term.nonlinear[name])
 
 
 def _shapes(gram: BlockGram, name: str) -> list[tuple[tuple[str, float], ...]]:

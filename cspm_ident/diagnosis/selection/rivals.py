@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 
 from cspm_ident.diagnosis.regression.block_gram import BlockGram
 from cspm_ident.diagnosis.regression.block_regression import BlockRegression
-from cspm_ident.diagnosis.regression.collinearity import overlap, where_alike
+from cspm_ident.diagnosis.regression.collinearity import overlap, places_for
 from cspm_ident.diagnosis.regression.hypothesis import Hypothesis, has_one_system
 from cspm_ident.diagnosis.residuals.regressors import Candidate
 
@@ -44,7 +44,7 @@ def rivals_of(
     for (name, _), members in groups.items():
         if name == hypothesis.effect.id:
             continue
-        for own in where_alike(members, elements):
+        for own in places_for(members, elements):
             effect = members[0].effect
             rival = Hypothesis(effect, own, common=len(own) > 1 and has_one_system(effect))
             gain = float(sums.gains_beyond(base, [gram.columns_of(own)])[0])
@@ -54,7 +54,7 @@ def rivals_of(
     rivals = [rival for _, rival in best.values()]
     if len(elements) == 1:
         group = hypothesis.effect.id, hypothesis.candidates[0].shape
-        alike = (c for c in groups.get(group, ()) if c.element not in elements)
-        rivals += [Hypothesis(hypothesis.effect, (c,)) for c in alike]
+        elsewhere = (c for c in groups.get(group, ()) if c.element not in elements)
+        rivals += [Hypothesis(hypothesis.effect, (c,)) for c in elsewhere]
     columns = gram.columns_of(hypothesis.candidates)
     return [r for r in rivals if overlap(sums, base, columns, gram.columns_of(r.candidates))]

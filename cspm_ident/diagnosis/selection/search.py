@@ -88,7 +88,7 @@ class Search:
     def run(self) -> SearchResult:
         """Select effects one by one, each on all elements where it is significant."""
         chosen = self._chosen()
-        found = [self._judged(hypothesis, chosen) for hypothesis in chosen]
+        found = [self.finding_of(hypothesis, chosen) for hypothesis in chosen]
         found.sort(key=lambda each: -each.gain.total)
         self._progress("what is left")
         return SearchResult(tuple(found), self.unexplained(chosen), len(self._effects))
@@ -346,13 +346,14 @@ class Search:
 
         Rejected hypotheses no longer exclude alternatives, and may be alternatives themselves.
         """
-        again = self._judged(finding.hypothesis, chosen)
+        again = self.finding_of(finding.hypothesis, chosen)
         known = {rival.words for rival in finding.alternatives}
         further = (rival for rival in again.alternatives if rival.words not in known)
         alternatives = (*finding.alternatives, *further)
         return replace(finding, gain=again.gain, share=again.share, alternatives=alternatives)
 
-    def _judged(self, hypothesis: Hypothesis, chosen: Sequence[Hypothesis]) -> Finding:
+    def finding_of(self, hypothesis: Hypothesis, chosen: Sequence[Hypothesis]) -> Finding:
+        """Return the finding of a hypothesis beside others: gain, share and alternatives."""
         others = [h for h in chosen if h is not hypothesis]
         base, own = self.fits.columns(others), self.fits.own_columns(hypothesis)
         gain = self.sums.gain(base, own)

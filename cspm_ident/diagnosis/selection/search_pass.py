@@ -11,9 +11,10 @@ from numpy.typing import NDArray
 from cspm_ident.diagnosis.regression.block_gram import gather
 from cspm_ident.diagnosis.regression.block_regression import FOLDS
 from cspm_ident.diagnosis.regression.hypothesis import Hypothesis
-from cspm_ident.diagnosis.regression.time_constants import told_within
+from cspm_ident.diagnosis.regression.time_constants import covered_within
 from cspm_ident.diagnosis.residuals.data_split import first_part, last_part, span_of
 from cspm_ident.diagnosis.residuals.free_shapes import Knots
+from cspm_ident.diagnosis.residuals.machine_scales import scaled, scales_of
 from cspm_ident.diagnosis.residuals.recorded_equations import equations_of
 from cspm_ident.diagnosis.residuals.regressors import Candidate, Place
 from cspm_ident.diagnosis.residuals.residual_equation import Equation, in_noise, steady
@@ -129,7 +130,8 @@ def _search_pass(
 ) -> SearchPass:
     searched, held_out = recordings
     longest = max(m.duration for m in searched)
-    visible, knots = [told_within(e, longest) for e in effects], Knots()
+    scales, knots = scales_of(searched), Knots()
+    visible = [covered_within(scaled(e, scales), longest) for e in effects]
 
     def equations(measurements: Sequence[Measurement]) -> Parts:
         return [
@@ -146,6 +148,8 @@ def _search_pass(
     noise = noise_of(steady(parts))
     seconds = sum(b - a for a, b in map(span_of, parts))
     block = max(thresholds.shortest_block_s, seconds / thresholds.block_count)
+    if not noise:
+        raise _reversing(searched[0])
     gram = gather(in_noise(steady(parts), noise), block)
     if gram.blocks < FOLDS:
         raise _too_short(searched[0], seconds, thresholds)
@@ -161,12 +165,21 @@ def _too_short(measurement: Measurement, seconds: float, thresholds: Thresholds)
     )
 
 
+def _reversing(measurement: Measurement) -> InputError:
+    return InputError(
+        f"{measurement.path}: the shafts reverse all the time, allowed: {_FEWEST_ROWS + 1} or more"
+        " windows of 40 ms with a known direction; move slowly over longer ways, or record the"
+        " drive's own speed"
+    )
+
+
 def _check(searched: Sequence[Measurement], found: Parts) -> None:
     for measurement, equations in zip(searched, found, strict=True):
         if not equations:
             raise InputError(
                 f"{measurement.path}: no residual, allowed: recordings with /winches/state angle"
-                " and torque, and with /cables/tension where there are cables"
+                " and torque, and with /cables/tension where there are cables, or with /bar/pose"
+                " and /cables/tension; poses and motor angles alone: cspm identify lengths"
             )
 
 

@@ -23,8 +23,19 @@ class ReportingThresholds:
     )
     noise_floor_ratio: float = ratio(
         1.5,
-        "Multiple of the noise from row to row up to which an error is at the noise floor.",
-        "Windows overlap: a healthy machine leaves 1.4 times that noise.",
+        "Multiple of its noise up to which what is left of a residual is at the noise.",
+        "White noise of 200 rows exceeds it with probability 0.001.",
+    )
+    excited_noise_ratio: float = ratio(
+        3.0,
+        "Multiple of its noise that a measured quantity has to exceed to judge a model by it.",
+        "Three standard deviations of normal noise; below, a model of nothing is as good.",
+    )
+    immaterial_share: float = share(
+        0.05,
+        "Share of the measured quantity up to which a difference below the sensor's accuracy is"
+        " immaterial.",
+        "A usual tolerance of models for control; both limits have to hold.",
     )
     steady_error_share: float = share(
         0.8,

@@ -56,7 +56,7 @@ class ResidualThresholds:
         0.7,
         "Share of a regressor's square that accelerations by tensions and by poses must have in"
         " common.",
-        "Set by hand; what two sensors see alike is no noise of either.",
+        "Set by hand; what two sensors have in common is no noise of either.",
     )
     healthy_clock_drift: float = quantity(
         2.5e-5,

@@ -16,6 +16,7 @@ from cspm_ident.diagnosis.finding import (
 )
 from cspm_ident.diagnosis.regression.block_gram import BlockGram
 from cspm_ident.diagnosis.regression.hypothesis import Hypothesis
+from cspm_ident.diagnosis.residuals.regressors import Candidate
 from cspm_ident.diagnosis.residuals.residual_equation import Equation
 from cspm_ident.diagnosis.selection.search import Search
 from cspm_ident.diagnosis.selection.search_result import SearchResult
@@ -23,7 +24,7 @@ from cspm_ident.diagnosis.validation.holdout_test import holdout_tested
 from cspm_ident.diagnosis.validation.instrumental_variables import (
     instruments_of,
     is_proportional,
-    shows_in_what_was_asked,
+    shows_in_reference_motion,
 )
 from cspm_ident.signals.measurement import Measurement
 
@@ -120,6 +121,52 @@ def accepted(
     return Acceptance((*kept, *left_open, *rejected, *fed_back))
 
 
+def with_rivals(
+    search: Search, judge: BlockGram, acceptance: Acceptance, gone: Sequence[Finding]
+) -> Acceptance:
+    """Return the acceptance with a rival in place of a finding that a model cannot have.
+
+    A law whose parameters are insignificant or impossible may stand for a simpler one that explains
+    the same. A law that no element shows alone may be shown by all with one set of parameters. The
+    closest rival that passes the hold-out test beside the kept findings is taken; one that was
+    rejected before is not tried again.
+
+    Args:
+        search: the search.
+        judge: Gram matrices of the held-out data.
+        acceptance: in which the findings are rejected.
+        gone: the rejected findings.
+    """
+    tried = {_form(each) for each in acceptance.findings}
+    for each in gone:
+        rivals = _rivals(search, each, [*acceptance.kept, each])
+        for rival in (*_shared(search, each, acceptance.kept), *rivals):
+            if _form(rival) in tried:
+                continue
+            tested = holdout_tested(search.fits, judge, [*acceptance.kept, rival])[-1]
+            if tested.status is not Status.REJECTED and not _is_silent(tested):
+                return _with(acceptance, tested)
+    return acceptance
+
+
+def _with(acceptance: Acceptance, finding: Finding) -> Acceptance:
+    """Return an acceptance with a further finding, without rejected ones of the same candidates."""
+    own, kept = finding.hypothesis.candidates, acceptance.kept
+    rest = acceptance.findings[len(kept) :]
+    return Acceptance((*kept, finding, *(e for e in rest if e.hypothesis.candidates != own)))
+
+
+def _form(finding: Finding) -> tuple[tuple[Candidate, ...], bool]:
+    return finding.hypothesis.candidates, finding.hypothesis.common
+
+
+def _shared(search: Search, finding: Finding, kept: Sequence[Finding]) -> Iterator[Finding]:
+    """Yield a finding with one set of parameters, where it has one on each of several elements."""
+    own = finding.hypothesis
+    if finding.rejection is Rejection.INSIGNIFICANT and len(own.candidates) > 1 and not own.common:
+        yield search.finding_of(replace(own, common=True), _hypotheses(kept))
+
+
 def _is_silent(finding: Finding) -> bool:
     return finding.holdout is HoldOut.SILENT
 
@@ -175,7 +222,7 @@ def _shown_by_reference(
             not is_proportional(own.effect)
             or own.onset > 0
             or search.fits.is_negligible(own, hypotheses)
-            or shows_in_what_was_asked(rows, wanted, own.candidates, values, block, limits)
+            or shows_in_reference_motion(rows, wanted, own.candidates, values, block, limits)
         )
 
     shown = [is_shown(each) for each in kept]

@@ -27,6 +27,7 @@ from cspm_ident.diagnosis.regression.parameter_estimates import (
     of_clocks,
     of_drives,
     of_forms,
+    of_scales,
     of_shafts,
 )
 from cspm_ident.diagnosis.residuals.corrected_measurement import is_possible, nearest_possible
@@ -43,6 +44,7 @@ from cspm_ident.diagnosis.validation.holdout_simulation import (
     improvement_by,
     simulate_held_out,
 )
+from cspm_ident.diagnosis.validation.materiality import acts_immaterially
 from cspm_ident.signals.measurement import Measurement
 
 Array = NDArray[np.float64]
@@ -120,6 +122,11 @@ class Model(NamedTuple):
         return tuple(each.finding for each in self.assessments)
 
     @property
+    def values(self) -> dict[Candidate, Array]:
+        """The weights without intervals."""
+        return {candidate: weight for candidate, (weight, _) in self.weights.items()}
+
+    @property
     def untenable(self) -> list[Finding]:
         """Rejected without held-out data: impossible findings, else the last insignificant one.
 
@@ -155,13 +162,18 @@ def modelled(search: Search, kept: Sequence[Finding], data: Data) -> Model:
     onsets = _onsets(kept, steady(data.rows), search.gram.times, limits)
     since = max((onset.time for onset in onsets if onset is not None), default=-np.inf)
     weights, upper_ends = _fitted(search, kept, data, since)
-    negligible = [_may_be_negligible(each, weights) for each in kept]
+    immaterial = _immaterial(search, kept, data)
+    negligible = [
+        small or _may_be_negligible(each, weights)
+        for each, small in zip(kept, immaterial, strict=True)
+    ]
+    weights = of_scales(weights, {place.place for place in search.gram.places})
     weights = of_clocks(of_drives(weights, 2.0 * data.searched[0].torque_age))
     weights = {
         c: (_allowed(data.searched[0], c, own, half), half) for c, (own, half) in weights.items()
     }
     zero = [_is_insignificant(each.hypothesis, weights) for each in kept]
-    weights = of_forms(weights, _untrue(search, kept, weights), limits)
+    weights = of_forms(weights, _model_form_errors(search, kept, weights), limits)
     assessments = []
     for each, onset, small, none in zip(kept, onsets, negligible, zero, strict=True):
         own = {c: weights[c] for c in members_of(weights, each.hypothesis)}
@@ -192,6 +204,19 @@ def _fitted(
 def _may_be_negligible(finding: Finding, weights: Weights) -> bool:
     own = members_of(weights, finding.hypothesis)
     return may_be_negligible({c: weights[c] for c in own})
+
+
+def _immaterial(search: Search, kept: Sequence[Finding], data: Data) -> list[bool]:
+    """Return for each finding whether it changes every residual by less than matters."""
+    rows, limits = steady(data.rows), search.thresholds
+    weights = search.fits.values([each.hypothesis for each in kept])
+    machine = data.searched[0].machine
+    return [
+        acts_immaterially(
+            {c: weights[c] for c in each.hypothesis.candidates}, rows, data.noise, machine, limits
+        )
+        for each in kept
+    ]
 
 
 def _is_possible(
@@ -285,7 +310,7 @@ def _in_all(
     return spectra(data.searched, hypotheses, weights, *given)
 
 
-def _untrue(
+def _model_form_errors(
     search: Search, kept: Sequence[Finding], found: Iterable[Candidate]
 ) -> dict[Candidate, float]:
     """Return each candidate's model-form error, relative to its amplitude, for final shapes."""

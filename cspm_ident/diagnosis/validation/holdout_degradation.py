@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 from cspm_ident.diagnosis.regression.block_regression import gain_of
 from cspm_ident.diagnosis.residuals.regressors import Candidate, Place
 from cspm_ident.diagnosis.thresholds import DEFAULT_THRESHOLDS, Thresholds
-from cspm_ident.diagnosis.validation.holdout_residuals import residuals_of, without_nuisance
+from cspm_ident.diagnosis.validation.holdout_residuals import residuals_of
 from cspm_ident.diagnosis.validation.holdout_simulation import LONGEST_S, Baselines
 
 Array = NDArray[np.float64]
@@ -46,7 +46,7 @@ def squares_left(
         for place, equations in residuals.items():
             own = np.zeros(blocks)
             for equation in equations:
-                rows = np.sum(without_nuisance(equation) ** 2, axis=1)
+                rows = np.sum(equation.left**2, axis=1)
                 at = np.clip((equation.times - since) // block_s, 0, blocks - 1)
                 own += np.bincount(at.astype(np.intp), rows, blocks)
             left[place] = np.concatenate([left.get(place, np.zeros(0)), own])

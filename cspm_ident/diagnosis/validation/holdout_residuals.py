@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
+from types import MappingProxyType
 
 import numpy as np
 from numpy.typing import NDArray
@@ -16,8 +17,9 @@ from cspm_ident.diagnosis.residuals.regressors import Candidate, Place
 from cspm_ident.diagnosis.residuals.residual_equation import Equation, in_noise
 from cspm_ident.diagnosis.thresholds import DEFAULT_THRESHOLDS, Thresholds
 from cspm_ident.diagnosis.validation.holdout_simulation import LEAD_S
+from cspm_ident.diagnosis.validation.materiality import accuracy_of
+from cspm_ident.diagnosis.validation.remainder import Remainder, independent_noise, remainders_of
 from cspm_ident.signals.measurement import Measurement
-from cspm_model.robust_statistics import difference_noise
 
 Array = NDArray[np.float64]
 
@@ -37,9 +39,11 @@ class HeldOut:
         after: with the findings.
         ceiling: with free functions of every driver fitted to the searched data, as a black-box
             model.
-        noise: from differences of successive rows with the findings, so that explained signals do
-            not count as noise.
+        noise: white part of what is left with the findings, from rows that share no window.
+        remainders: what is left with the findings of each channel, without reversals; empty without
+            such rows.
         steady: with the findings, without the rows of a reversal; None where there is no reversal.
+        tabled: with the findings and tables of what is unexplained; None without tables.
     """
 
     place: Place
@@ -49,7 +53,19 @@ class HeldOut:
     after: float
     ceiling: float
     noise: float
+    remainders: tuple[Remainder, ...] = ()
     steady: float | None = None
+    tabled: float | None = None
+
+    @property
+    def final(self) -> float:
+        """The residual with all that the improved test-bed file has."""
+        return self.after if self.tabled is None else self.tabled
+
+    def is_at_noise(self, thresholds: Thresholds = DEFAULT_THRESHOLDS) -> bool | None:
+        """Return whether what is left is noise or immaterial; None where that is not known."""
+        known = [each for each in self.remainders if each.is_judged]
+        return all(each.is_at_noise(thresholds) for each in known) if known else None
 
 
 def judged(
@@ -59,6 +75,7 @@ def judged(
     found: Mapping[Candidate, Array],
     noise: Mapping[Place, Array],
     free: Mapping[Place, float],
+    searched: Mapping[Place, Sequence[Equation]] = MappingProxyType({}),
     thresholds: Thresholds = DEFAULT_THRESHOLDS,
 ) -> tuple[HeldOut, ...]:
     """Return every hold-out residual with the file's model, re-tuned, and with the findings.
@@ -70,24 +87,54 @@ def judged(
         found: weights of the findings.
         noise: noise of each residual, its unit.
         free: residual after fitting free functions, root mean square in units of the noise.
+        searched: what the findings leave of the searched data, without reversals. Its noise counts
+            as well.
         thresholds: those of residuals.
     """
     parts = list(zip(measurements, starts, strict=True))
     described = residuals_of(parts, {}, noise, thresholds)
     tuned = residuals_of(parts, retuned, noise, thresholds) if retuned else described
     after = residuals_of(parts, found, noise, thresholds) if found else described
-    out = []
-    for place, equations in described.items():
-        unit = float(noise[place][0]) if len(noise[place]) == 1 else 1.0
-        measured = np.concatenate([e.measured for e in equations])
-        spread = float(np.sqrt(np.mean((measured - measured.mean(axis=0)) ** 2)))
-        stages = (rms(each.get(place, ())) for each in (described, tuned, after))
-        before, then, now = (unit * stage for stage in stages)
-        ceiling, floor = unit * free.get(place, float("nan")), unit * _floor(after.get(place, ()))
-        steady = _steady(after.get(place, ()))
-        away = None if steady is None else unit * steady
-        out.append(HeldOut(place, unit * spread, before, then, now, ceiling, floor, away))
-    return tuple(out)
+    return tuple(
+        _held_out(
+            [each.get(place, ()) for each in (described, tuned, after)],
+            searched.get(place, ()),
+            noise[place],
+            free.get(place, float("nan")),
+            accuracy_of(measurements[0].machine, place),
+        )
+        for place in described
+    )
+
+
+def _held_out(
+    stages: Sequence[Sequence[Equation]],
+    searched: Sequence[Equation],
+    noise: Array,
+    free: float,
+    accuracy: float,
+) -> HeldOut:
+    """Return one hold-out residual: with the file's model, re-tuned, and with the findings."""
+    described, _, after = stages
+    unit = float(noise[0]) if len(noise) == 1 else 1.0
+    measured = np.concatenate([e.measured for e in described])
+    spread = float(np.sqrt(np.mean((measured - measured.mean(axis=0)) ** 2)))
+    before, tuned, found = (unit * rms(stage) for stage in stages)
+    steady = _steady(after)
+    calm = [each.steady for each in after]
+    # Noise may grow with the motion; few held-out rows leave it to chance.
+    floor = np.fmax(independent_noise(calm), independent_noise([*calm, *searched]))
+    return HeldOut(
+        place=described[0].place,
+        measured=unit * spread,
+        before=before,
+        retuned=tuned,
+        after=found,
+        ceiling=unit * free,
+        noise=unit * float(np.sqrt(np.mean(floor**2))),
+        remainders=remainders_of(calm, floor, noise, accuracy),
+        steady=None if steady is None else unit * steady,
+    )
 
 
 def free_functions(searched: BlockGram, judge: BlockGram) -> dict[Place, float]:
@@ -115,7 +162,7 @@ def rms(equations: Sequence[Equation]) -> float:
     """Return the root mean square of residuals, with the nuisance terms fitted to each."""
     squares, count = 0.0, 0
     for equation in equations:
-        left = without_nuisance(equation)
+        left = equation.left
         squares, count = squares + float(np.sum(left**2)), count + left.size
     return float(np.sqrt(squares / max(count, 1)))
 
@@ -125,22 +172,6 @@ def _steady(equations: Sequence[Equation]) -> float | None:
     if not any(equation.turning.any() for equation in equations):
         return None
     return rms([equation.steady for equation in equations])
-
-
-def _floor(equations: Sequence[Equation]) -> float:
-    """Return the noise from differences of successive rows, root mean square over channels."""
-    noises = [difference_noise(without_nuisance(e)) for e in equations if len(e.times) > 3]
-    return float(np.sqrt(np.mean(np.square(noises)))) if noises else float("nan")
-
-
-def without_nuisance(equation: Equation) -> Array:
-    """Return the residual without its fitted nuisance terms, shape (k, channels)."""
-    if not equation.nuisance.size:
-        return equation.target
-    columns = equation.nuisance.reshape(equation.target.size, -1)
-    target = equation.target.reshape(-1)
-    left = target - columns @ np.linalg.lstsq(columns, target, rcond=None)[0]
-    return np.asarray(left.reshape(equation.target.shape))
 
 
 def residuals_of(

@@ -62,6 +62,7 @@ class SimulatedFit(NamedTuple):
         retuned: with the file's parameters fitted to the searched data, nothing added.
         after: with the findings.
         floor: RMS error due to noise of sensors and inputs.
+        tabled: with the findings and tables of what is unexplained; None without tables.
     """
 
     output: Output
@@ -70,6 +71,12 @@ class SimulatedFit(NamedTuple):
     retuned: float
     after: float
     floor: float
+    tabled: float | None = None
+
+    @property
+    def final(self) -> float:
+        """The error with all that the improved test-bed file has."""
+        return self.after if self.tabled is None else self.tabled
 
 
 class Baselines(NamedTuple):
@@ -127,6 +134,22 @@ def simulate_held_out(baselines: Baselines, found: Weights) -> tuple[SimulatedFi
     )
 
 
+def with_tables_simulated(
+    fits: Sequence[SimulatedFit], baselines: Baselines, found: Weights
+) -> tuple[SimulatedFit, ...]:
+    """Return the fits with those of a model that has tables of what is unexplained as well.
+
+    Args:
+        fits: without tables.
+        baselines: those of the recordings.
+        found: weights of the findings and values of the tables.
+    """
+    errors = _errors(baselines.parts, baselines.since, found)
+    return tuple(
+        fit._replace(tabled=errors[fit.output][1]) if fit.output in errors else fit for fit in fits
+    )
+
+
 def improvement_by(
     baselines: Baselines,
     fits: Sequence[SimulatedFit],
@@ -156,13 +179,13 @@ def improvement_by(
     shown = [
         Improvement(fit.output.name, fit.output.unit, before[fit.output][1], fit.after)
         for fit in fits
-        if fit.output in before and (sensed or _is_told(fit.output, kinds))
+        if fit.output in before and (sensed or _is_affected(fit.output, kinds))
     ]
     shown = [each for each in shown if each.without > 0.0 and np.isfinite(each.with_it)]
     return min(shown, key=lambda each: each.with_it / each.without, default=None)
 
 
-def _is_told(output: Output, kinds: Collection[Channel]) -> bool:
+def _is_affected(output: Output, kinds: Collection[Channel]) -> bool:
     """Return whether a simulated quantity depends on effects in residuals of the given channels.
 
     Motor angles drive cables and bar together, so that an effect in either changes both.

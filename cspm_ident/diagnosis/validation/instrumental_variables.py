@@ -62,13 +62,13 @@ def _is_driven(bar: Samples | None, wanted: Samples, thresholds: Thresholds) -> 
     noise, thin = difference_noise(bar.values[:, :3]), _thinning(len(bar.times))
     position = bar.values[thin, :3] - bar.values[thin, :3].mean(axis=0)
     basis = _basis(_at(wanted, bar.times[thin]))
-    unasked = np.std(position - basis @ (basis.T @ position), axis=0)
-    share = np.sum(unasked**2) / np.sum(np.var(position, axis=0))
-    far = np.any(unasked > thresholds.driven_noise_ratio * noise)
+    beyond = np.std(position - basis @ (basis.T @ position), axis=0)
+    share = np.sum(beyond**2) / np.sum(np.var(position, axis=0))
+    far = np.any(beyond > thresholds.driven_noise_ratio * noise)
     return bool(far and share > thresholds.undemanded_motion_share)
 
 
-def shows_in_what_was_asked(
+def shows_in_reference_motion(
     parts: Sequence[Sequence[Equation]],
     wanted: Sequence[Samples | None],
     own: Collection[Candidate],

@@ -16,7 +16,7 @@ from cspm_sim.effects import Channel
 Array = NDArray[np.float64]
 
 # Number of bins of a signal's values, each with equally many samples.
-_BINS = 12
+BINS = 12
 
 
 @dataclass(frozen=True, eq=False)
@@ -32,6 +32,7 @@ class Curve:
         after: residual with the findings, shape (k,).
         signals: measured signals that it may depend on, by name and unit, shape (k,) each.
         touched: candidates that act on it.
+        recording: which of the judged recordings, counted from 0.
     """
 
     place: Place
@@ -42,6 +43,7 @@ class Curve:
     after: Array
     signals: Mapping[str, Array]
     touched: tuple[Candidate, ...]
+    recording: int = 0
 
     @property
     def unit(self) -> str:
@@ -74,20 +76,16 @@ def held_out_curves(
     """
     return tuple(
         curve
-        for part in parts
+        for recording, part in enumerate(parts)
         for equation in part
         if len(equation.times)
-        for curve in _curves(equation, weights)
+        for curve in _curves(recording, equation, weights)
     )
 
 
-def _curves(equation: Equation, weights: Mapping[Candidate, Array]) -> list[Curve]:
+def _curves(recording: int, equation: Equation, weights: Mapping[Candidate, Array]) -> list[Curve]:
     own = {c: w for c, w in weights.items() if c in equation.columns}
-    model = np.zeros_like(equation.target)
-    for candidate, values in own.items():
-        model += equation.columns[candidate] @ values
-    before = _without(equation.nuisance, equation.target)
-    after = _without(equation.nuisance, equation.target - model)
+    before, after = equation.left, equation.less(own).left
     components = DOFS if equation.target.shape[1] > 1 else ("",)
     found = []
     for i, name in enumerate(components):
@@ -95,30 +93,25 @@ def _curves(equation: Equation, weights: Mapping[Candidate, Array]) -> list[Curv
         signals = {k: v for k, v in equation.signals.items() if name in k}
         measured = equation.measured[:, i]
         sides = before[:, i], after[:, i]
-        found.append(
-            Curve(equation.place, name, equation.times, measured, *sides, signals, touched)
-        )
+        what = equation.place, name, equation.times
+        found.append(Curve(*what, measured, *sides, signals, touched, recording))
     return found
 
 
-def _without(nuisance: Array, values: Array) -> Array:
-    """Return values (k, channels) without their regression on the nuisance (k, channels, m)."""
-    if not nuisance.size:
-        return values
-    table = nuisance.reshape(-1, nuisance.shape[2])
-    known = np.linalg.lstsq(table, values.reshape(-1), rcond=None)[0]
-    return np.asarray(values - nuisance @ known)
+def bins_of(signal: Array, count: int = BINS) -> tuple[Array, NDArray[np.intp]]:
+    """Return the edges of bins that hold equally many samples, and the bin of each sample.
 
-
-def bins_of(signal: Array) -> tuple[Array, NDArray[np.intp]]:
-    """Return the edges of bins that hold equally many samples, and the bin of each sample."""
-    edges = np.unique(np.quantile(signal, np.linspace(0.0, 1.0, _BINS + 1)))
+    A signal that does not change has one bin, between two equal edges.
+    """
+    edges = np.unique(np.quantile(signal, np.linspace(0.0, 1.0, count + 1)))
+    if len(edges) == 1:
+        edges = np.repeat(edges, 2)
     return edges, np.clip(np.searchsorted(edges, signal, side="right") - 1, 0, len(edges) - 2)
 
 
-def explained_by(signal: Array, values: Array) -> float:
+def explained_by(signal: Array, values: Array, bins: int = BINS) -> float:
     """Return the correlation ratio η²: the share of squares that means over bins explain."""
-    edges, home = bins_of(signal)
+    edges, home = bins_of(signal, bins)
     whole = float(np.sum((values - values.mean()) ** 2))
     if len(edges) < 3 or whole <= 0.0:
         return 0.0

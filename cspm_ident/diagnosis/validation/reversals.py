@@ -34,7 +34,7 @@ Parts = Sequence[Sequence[Equation]]
 Array = NDArray[np.float64]
 
 # Largest relative difference of two regressors that count as equal.
-_ALIKE = 1e-4
+_EQUAL_WITHIN = 1e-4
 
 
 def with_wider(
@@ -108,8 +108,8 @@ def _wider(
             weights = fits.weights([*beside, form])
             reported = near_rest([weights[c] for c in form.candidates], thresholds)
             forms.setdefault(form.effect.id, []).append((form, reported))
-    for alike in forms.values():
-        if left_open := _left_open(alike, thresholds):
+    for same_effect in forms.values():
+        if left_open := _left_open(same_effect, thresholds):
             yield min(left_open, key=lambda form: float(fits.held_out(form, base).sum()))
 
 
@@ -126,7 +126,7 @@ def _is_case(narrow: Hypothesis, wide: Hypothesis, rows: Parts) -> bool:
         if e.place.element == c.element
     )
     # Regressors are stored in single precision.
-    return all(np.linalg.norm(b - a) <= _ALIKE * np.linalg.norm(a) for a, b in pairs)
+    return all(np.linalg.norm(b - a) <= _EQUAL_WITHIN * np.linalg.norm(a) for a, b in pairs)
 
 
 class NearRest(NamedTuple):

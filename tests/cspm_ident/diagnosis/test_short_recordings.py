@@ -1,9 +1,13 @@
-"""What tells motion from noise in a recording of a few seconds, and where nothing does."""
+"""What distinguishes motion from noise in a recording of a few seconds, and where nothing does."""
+
+from dataclasses import replace
 
 import numpy as np
 import pytest
 from machines import THESIS
+from measured_samples import measured_with
 
+from cspm_ident.diagnosis.diagnose import diagnose
 from cspm_ident.signals.measurement import Measurement
 from cspm_ident.signals.samples import Samples
 from cspm_ident.signals.smoothing import band_of
@@ -68,3 +72,13 @@ def test_a_recording_shorter_than_half_a_window_says_so():
         f"{THESIS}: of 1.5 s no stretch of 2 s is without a hole, allowed: a longer recording or a"
         " shorter --horizon"
     )
+
+
+def test_a_shaft_that_reverses_in_every_window_is_refused_in_one_line(tmp_path):
+    measured = measured_with("", tmp_path / "rig", "one_winch", "duration=6")
+    shaken = np.sin(2.0 * np.pi * 30.0 * measured.angle.times)[:, None]
+    angle = measured.angle.of_others(shaken)
+    with pytest.raises(
+        InputError, match=r"reverse all the time, allowed: .* with a known direction"
+    ):
+        diagnose([replace(measured, angle=angle, speed=None, command=None)])

@@ -61,7 +61,7 @@ def test_some_values_by_name_leave_the_others_at_their_defaults():
     ("values", "refused"),
     [
         ({"tie_sigmas": 3.0}, "thresholds: no tie_sigmas, allowed: tie_sigma"),
-        ({"xyz": 3.0}, "thresholds: no xyz, allowed: those of docs/thresholds.md"),
+        ({"xyz": 3.0}, "thresholds: no xyz, allowed: those of docs/reference/thresholds.md"),
         ({"tie_sigma": -1.0}, "thresholds: tie_sigma is -1.0, allowed: 0 or more"),
     ],
 )
@@ -82,7 +82,7 @@ def test_the_ends_of_a_range_are_allowed_and_what_is_beyond_is_not(each):
         replace(DEFAULT_THRESHOLDS, **{each.name: ends[0] - 1})
 
 
-def test_a_diagnosis_tells_the_thresholds_that_it_was_given():
+def test_a_diagnosis_reports_the_thresholds_that_it_was_given():
     moved = replace(DEFAULT_THRESHOLDS, unknown_share=0.3)
     assert diagnosis_data(diagnosis())["thresholds"] == DEFAULT_THRESHOLDS.values
     assert diagnosis_data(replace(diagnosis(), thresholds=moved))["thresholds"] == moved.values

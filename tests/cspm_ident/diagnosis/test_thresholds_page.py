@@ -4,12 +4,12 @@ from pathlib import Path
 from cspm_ident.diagnosis.thresholds import GROUPS, Thresholds
 from cspm_ident.diagnosis.thresholds_page import allowed, main, thresholds_page
 
-PAGE = Path(__file__).resolve().parents[3] / "docs" / "thresholds.md"
+PAGE = Path(__file__).resolve().parents[3] / "docs" / "reference" / "thresholds.md"
 
 
 def test_the_committed_page_is_up_to_date():
     assert PAGE.read_text(encoding="utf-8") == thresholds_page(), (
-        "run: python -m cspm_ident.diagnosis.thresholds_page > docs/thresholds.md"
+        "run: python -m cspm_ident.diagnosis.thresholds_page > docs/reference/thresholds.md"
     )
 
 

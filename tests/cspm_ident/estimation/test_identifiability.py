@@ -44,7 +44,7 @@ def test_only_a_combination_is_seen(interval):
     assert np.isfinite(found.correlation[2:, 2:]).all()
 
 
-def test_sign_of_the_combination_is_told():
+def test_sign_of_the_combination_is_reported():
     record = experiment(np.random.default_rng(2), lambda first, _: 2.0 * first)
     found = fit_linear([record], parameters()).estimate
     assert found.unexcited[0].name == "bar mass − 0.5 hoist stiffness"

@@ -85,7 +85,7 @@ def test_an_unknown_or_frozen_name_is_refused():
             find_profile(problem, solution, name)
 
 
-def test_a_better_fit_elsewhere_is_told():
+def test_a_better_fit_elsewhere_is_reported():
     """A valley, a low ridge, and a deeper valley behind it."""
     noise = np.random.default_rng(5).standard_normal(200)
     noise = (noise - noise.mean()) / noise.std()

@@ -29,6 +29,7 @@ from cspm_msgs_py.testbed import load_testbed
 from cspm_msgs_py.yaml_file import dump_yaml
 from cspm_run.assembly import resolve
 from cspm_run.bundle import make_bundle
+from cspm_run.library import find_scenario
 from cspm_run.recorded_run import run
 from cspm_sim.effects import Channel, catalogue
 
@@ -44,7 +45,7 @@ RUBBING = candidate("winch_coulomb_friction", "surge_2")
 LOADED = candidate("winch_load_friction", "surge_2")
 BIAS = candidate("tension_bias", "hoist_1")
 WRENCH = candidate("bar_constant_wrench", "bar")
-TWINS = {
+CONFOUNDED = {
     "friction": Question({RUBBING: np.array([0.03])}, (LOADED,)),
     "bias": Question({BIAS: np.array([0.3])}, (WRENCH,)),
 }
@@ -53,7 +54,7 @@ TWINS = {
 @pytest.fixture(scope="module")
 def sea():
     """What 12 s of the worst sea would read, as planned."""
-    scenario = load_scenario(SCENARIOS / "worst_case.yaml", ["duration=12"])
+    scenario = load_scenario(find_scenario("worst_case_steep"), ["duration=12"])
     return planned(scenario, THESIS).measurement
 
 
@@ -67,7 +68,7 @@ def plans(sea):
 def test_a_plan_leaves_no_residual_but_the_dampers():
     """The planned signals obey all equations, but for the dampers, which the plan leaves out."""
     damping = catalogue()["cable_axial_damping"]
-    calm = planned(load_scenario(SCENARIOS / "calm.yaml", ["duration=12"]), THESIS)
+    calm = planned(load_scenario(find_scenario("calm_broadband"), ["duration=12"]), THESIS)
     assert np.mean(calm.missed > 0.05) < 0.02
     for equation in equations_of(calm.measurement, [damping]):
         columns = equation.columns.get(Candidate(damping, equation.place.element))
@@ -83,7 +84,7 @@ def test_a_plan_leaves_no_residual_but_the_dampers():
             weight = THESIS.testbed.bar.mass * THESIS.testbed.gravity
             # Roll is not controlled, and what the least tensions miss is left.
             scale = weight * np.array([1.0, 1.0, 1.0, np.inf, 0.5, 0.5])
-        # Rates are told by tensions as if the cables were damped.
+        # Rates are given by tensions as if the cables were damped.
         assert np.all(np.std(left, axis=0) < 0.04 * scale), equation.place
 
 
@@ -127,8 +128,8 @@ def test_a_separation_is_what_the_rival_cannot_imitate(sea):
     assert apart == pytest.approx(np.linalg.norm(left), rel=1e-6)
 
 
-@pytest.mark.parametrize(("unlike", "tells"), [(0.06, False), (0.08, True)])
-def test_what_no_model_is_true_enough_for_is_not_promised(unlike, tells):
+@pytest.mark.parametrize(("unlike", "promised"), [(0.06, False), (0.08, True)])
+def test_what_no_model_is_true_enough_for_is_not_promised(unlike, promised):
     """Half a percent of the squares is 7 % of the amplitude; both are far above the noise."""
     turns = np.linspace(0.0, 20.0 * np.pi, 5000, endpoint=False)
     one, other = np.sin(turns), np.sin(turns) + unlike * np.cos(turns)
@@ -140,9 +141,9 @@ def test_what_no_model_is_true_enough_for_is_not_promised(unlike, tells):
     left = separation(equations, noise, truth, (LOADED,))
     alone = separation(equations, noise, truth, ())
     assert left == pytest.approx(unlike * alone, rel=0.01)
-    told = decided(equations, noise, truth, (LOADED,))
-    assert told == pytest.approx(alone * np.sqrt(max(0.0, unlike**2 - 0.005)), rel=0.03)
-    assert (told > 3.0) is tells
+    reported = decided(equations, noise, truth, (LOADED,))
+    assert reported == pytest.approx(alone * np.sqrt(max(0.0, unlike**2 - 0.005)), rel=0.03)
+    assert (reported > 3.0) is promised
     assert left > 3.0
 
 
@@ -153,7 +154,7 @@ def test_two_that_do_the_same_get_no_experiment(sea, plans):
     same = Question({LOADED: np.array([0.03])}, (pulley,))
     gentle = sea.within(0.0, 2.0)
     assert best_answer([gentle], noise, same, plans) is None
-    assert best_answer([gentle], noise, TWINS["friction"], plans) is not None
+    assert best_answer([gentle], noise, CONFOUNDED["friction"], plans) is not None
 
 
 def test_what_cannot_show_safely_is_not_promised(plans):
@@ -196,7 +197,7 @@ def test_ties_and_what_was_not_testable_become_scenarios_that_run(
     monkeypatch.setattr(experiment_files, "safe_plans", lambda *_: plans)
     found = tied(sea)
     data = diagnosis_data(found)
-    # The same motion shows it and separates the twins, or there are two files.
+    # The same motion shows it and separates the confounded effects, or there are two files.
     data["not_excited"] = [
         {"effect": name, "elements": []} for name in ("winch_viscous_friction", "winch_backlash")
     ]
@@ -218,7 +219,7 @@ def test_ties_and_what_was_not_testable_become_scenarios_that_run(
 def tied(measurement):
     """A diagnosis that found dry friction on one winch, and friction by load as likely."""
     noise = {e.place: np.full(e.target.shape[1], 1e-3) for e in equations_of(measurement, [])}
-    # So little was recorded that any motion tells more.
+    # So little was recorded that any motion shows more.
     short = measurement.within(0.0, 2.5)
     rival = Rival(Hypothesis(LOADED.effect, (LOADED,)), 0.1)
     finding = Finding(
@@ -251,20 +252,20 @@ def tied(measurement):
 def gentle(tmp_path_factory):
     """Five seconds of a calm sea on the second plant, with its sensors' noise, and what is safe."""
     pytest.importorskip("mujoco", minversion="4.0", reason="the MuJoCo plant needs MuJoCo 4")
-    calm = load_scenario(SCENARIOS / "calm.yaml", ["duration=5"])
-    recorded = recorded_on("mujoco", tmp_path_factory.mktemp("gentle") / "calm", calm)
+    calm = load_scenario(find_scenario("calm_broadband"), ["duration=5"])
+    recorded = recorded_on("mujoco", tmp_path_factory.mktemp("gentle") / "calm_broadband", calm)
     return recorded, safe_plans(recorded, "testbeds/thesis.yaml")
 
 
 @pytest.mark.slow
 @pytest.mark.compiled
-@pytest.mark.parametrize(("twins", "plant"), [("friction", "mujoco"), ("bias", "sim")])
-def test_the_experiment_separates_twins_better_than_the_recording(tmp_path, gentle, twins, plant):
+@pytest.mark.parametrize(("pair", "plant"), [("friction", "mujoco"), ("bias", "sim")])
+def test_the_experiment_separates_better_than_the_recording(tmp_path, gentle, pair, plant):
     """The experiment is run; the choice knew the recording and the plans alone."""
     recorded, plans = gentle
     assert {scenario.name for scenario, _ in plans} >= {"slow_sea", "postures", "heights"}
     assert all(is_safe(plan, THESIS.testbed) for _, plan in plans)
-    question = TWINS[twins]
+    question = CONFOUNDED[pair]
     noise = {e.place: e.noise for e in equations_of(recorded, [])}
     answer = best_answer([recorded], noise, question, plans)
     shorter = answer.scenario.model_copy(update={"duration": 8.0})

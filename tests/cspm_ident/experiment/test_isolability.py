@@ -12,7 +12,7 @@ from cspm_ident.experiment.isolability import Sensors, Signature, angles
 from cspm_ident.experiment.isolability_page import angle_table, isolability_page, rich_measurement
 from cspm_sim.effects import Channel, catalogue
 
-PAGE = Path(__file__).resolve().parents[3] / "docs" / "isolability.md"
+PAGE = Path(__file__).resolve().parents[3] / "docs" / "reference" / "isolability.md"
 # Each with a dry friction, a constant, or a force in proportion to the tension.
 NAMES = (
     "pulley_friction",
@@ -39,7 +39,7 @@ def test_the_committed_page_holds_what_the_columns_say(table):
     committed = rows(PAGE.read_text(encoding="utf-8"))
     fresh = rows(isolability_page({name: catalogue()[name] for name in NAMES}, table))
     assert len(fresh) >= 4
-    hint = "run: python -m cspm_ident.experiment.isolability_page > docs/isolability.md"
+    hint = "run: python -m cspm_ident.experiment.isolability_page > docs/reference/isolability.md"
     for pair, written in fresh.items():
         for old, new in zip(committed[pair], written, strict=True):
             assert (old == "—") == (new == "—"), hint
@@ -66,7 +66,7 @@ def test_where_the_load_cell_sits_decides_on_friction_of_the_pulley(table):
 
 
 @pytest.mark.slow
-def test_motion_capture_tells_a_bias_of_the_cell_from_one_of_the_torque(table):
+def test_motion_capture_distinguishes_a_bias_of_the_cell_from_one_of_the_torque(table):
     pair = "tension_bias", "winch_torque_offset"
     assert table[Sensors.BAR][pair] < 0.01
     assert table[Sensors.BAR_AND_CAPTURE][pair] > 1.0

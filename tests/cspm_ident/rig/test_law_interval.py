@@ -36,9 +36,9 @@ def test_scores_of_the_mean_vary_as_those_of_the_cycles_say():
     rng = np.random.default_rng(2)
     rows = rng.normal(0.0, 1.0, (POINTS, 2))
     drawn = rng.normal(0.0, 3.0, (2000, CYCLES, POINTS))
-    told = [score_covariance([each - each.mean(axis=0)], [rows]) for each in drawn]
+    reported = [score_covariance([each - each.mean(axis=0)], [rows]) for each in drawn]
     means = np.array([each.mean(axis=0) @ rows for each in drawn])
-    np.testing.assert_allclose(np.mean(told, axis=0), 9.0 / CYCLES * rows.T @ rows, atol=12.0)
+    np.testing.assert_allclose(np.mean(reported, axis=0), 9.0 / CYCLES * rows.T @ rows, atol=12.0)
     np.testing.assert_allclose(np.cov(means.T), 9.0 / CYCLES * rows.T @ rows, atol=20.0)
 
 
@@ -55,7 +55,7 @@ def test_a_cycle_at_another_tension_deviates_by_what_the_law_changes_there():
         deviations(one._replace(scatter=None), LAW)
 
 
-def test_a_law_that_fits_is_told_from_one_that_does_not():
+def test_a_law_that_fits_is_distinguished_from_one_that_does_not():
     """Chance says 'no misfit' nearly always, evenly, and of a law one per cent off never."""
     rng, sizes = np.random.default_rng(3), [20.0] * 3
     chances = [chance_of_misfit(branches(rng), LAW, sizes, 0) for _ in range(300)]

@@ -60,7 +60,7 @@ def test_the_hash_is_that_of_the_mcap_file(bag):
     assert {one.sha256 for one in read_specimens([bag])} == {digest}
 
 
-def test_cables_of_one_name_are_told_apart_by_their_recordings(tmp_path, bag):
+def test_cables_of_one_name_are_distinguished_by_their_recordings(tmp_path, bag):
     other = record(tmp_path / "again", SAMPLES[:1])
     found = read_specimens([bag, other])
     assert [one.label for one in found] == ["bag:short", "long", "again:short"]
@@ -84,7 +84,7 @@ def test_sensors_of_two_rates_meet_on_the_slower(tmp_path):
     np.testing.assert_allclose(found[0].wound, SAMPLES[0].wound[: 4 * 125 : 4], atol=1e-12)
 
 
-def test_holes_are_told(tmp_path):
+def test_holes_are_reported(tmp_path):
     holed = record(tmp_path / "holed", SAMPLES, keep=lambda n, k: not 200 <= k < 220)
     assert line_of([holed]) == (
         f"{holed}: /winches/state: a gap of 0.021 s at 0.199 s, allowed: at most 0.005 s"

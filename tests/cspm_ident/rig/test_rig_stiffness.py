@@ -88,7 +88,7 @@ def test_without_hysteresis_none_is_seen(clean):
 
 
 @pytest.mark.slow
-def test_hysteresis_is_told_with_its_size(loose):
+def test_hysteresis_is_reported_with_its_size(loose):
     for one in loose.specimens:
         found = one.hysteresis
         assert found.seen

@@ -55,7 +55,7 @@ def test_a_frame_beside_its_sensor_is_found_from_motion_in_surge(tmp_path):
 
 @pytest.mark.slow
 def test_geometry_that_nothing_excites_is_named_and_has_no_interval(tmp_path):
-    """A bar at rest: the balance of forces tells surge, but only to load cells, and never heave."""
+    """A bar at rest: the balance of forces shows surge, but only to load cells, and never heave."""
     beside = (0.008, 0.0, 0.01, 0.0, 0.0, 0.0)
     options = ("duration=12.5", "control.mode=locked_winches")
     still = recorded(tmp_path / "rest", beside, "rest", *options)

@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 from machines import THESIS
 from rich.console import Console
+from run_samples import PLUCKED_IN_SURGE
 from system_samples import TRUE, record_other
 
 from cspm.commands.identify_system_command import print_system
@@ -31,7 +32,9 @@ def recordings(tmp_path_factory):
     folder = tmp_path_factory.mktemp("system")
     searched = record_other(folder / "searched", "factor_six_mid", "duration=13", "seed=3")
     held_out = record_other(
-        folder / "held_out", "verification_mid", "duration=12", "seed=4", plant="sim"
+        folder / "held_out",
+        *("verification_mid", "duration=12", "seed=4", PLUCKED_IN_SURGE),
+        plant="sim",
     )
     return searched, held_out
 
@@ -187,7 +190,7 @@ def test_knowledge_goes_to_its_parameter():
         (["bar.weight"], {}, r"^--fit bar.weight: allowed: bar.mass, bar.com.x, .*frame_offset"),
         (["stiffness.rope"], {}, r"^--fit stiffness.rope: allowed: .*stiffness\[.hoist\|.surge"),
         (["bar_damping"], {}, r"^--fit bar_damping: allowed: .*bar_damping.surge"),
-        (["bar.mass", "bar.mass"], {}, r"^--fit bar.mass: stands twice, allowed: each name once$"),
+        (["bar.mass", "bar.mass"], {}, r"^--fit bar.mass: occurs twice, allowed: each name once$"),
         (["bar.mass"], {"bar.weight": 4.0}, r"^--freeze bar.weight: allowed: bar.mass, bar.com.x"),
         (["bar.mass"], {"bar.mass": 900.0}, r"^bar.mass: 900 kg, allowed: 0.406 to 40.6$"),
     ],

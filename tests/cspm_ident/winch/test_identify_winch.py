@@ -14,12 +14,8 @@ from winch_samples import EFFECTS, Winch, closed_loop
 from cspm_ident.signals.measurement import Measurement, read_measurement
 from cspm_ident.winch import identify_winch
 from cspm_ident.winch.fitted_file import fitted_testbed
-from cspm_ident.winch.identify_winches import (
-    IdentifiedWinch,
-    WinchesResult,
-    described_equation,
-    identify_winches,
-)
+from cspm_ident.winch.identified_winch import IdentifiedWinch, WinchesResult
+from cspm_ident.winch.identify_winches import described_equation, identify_winches
 from cspm_msgs_py.errors import InputError
 from cspm_msgs_py.testbed import load_testbed, parse_testbed
 from cspm_run.recorded_run import run
@@ -66,17 +62,20 @@ def test_another_plants_winch_lies_within_the_intervals(measured):
     found = identify_winches([measured], torque_age=age, reversals=False).winches[0]
     estimate = found.fit.estimate
     assert inside(estimate).all(), estimate
-    assert np.all(estimate.sd[:3] < 0.01 * TRUTH[:3])
+    assert np.all(estimate.sd[:3] < 0.012 * TRUTH[:3])
     assert found.described == dict(zip(estimate.names, [2.4e-4, 0.0, 0.0, 0.0], strict=True))
     errors = found.judgements[0].errors
     assert errors["fitted"].percent < 0.5 * errors["described"].percent
 
 
 @pytest.mark.slow
-def test_where_friction_sticks_the_windows_disagree_and_it_is_told(measured):
-    with_them = identify_winches([measured], torque_age=measured.torque_age).winches[0]
+def test_where_friction_sticks_the_windows_disagree_and_it_is_reported(measured):
+    age = measured.torque_age
+    with_them = identify_winches([measured], torque_age=age, reversals=True).winches[0]
     assert not inside(with_them.fit.estimate)[0]
     assert "inertia" in with_them.torn
+    without = identify_winches([measured], torque_age=age).winches[0]
+    assert (without.reversals, inside(without.fit.estimate).all()) == (False, True)
     smooth = identify_winches([measured], ["surge"], ["winch_viscous_friction"], torque_age=5e-4)
     assert smooth.winches[0].otherwise is not None
 
@@ -123,11 +122,12 @@ def test_the_command_on_emps(cspm, tmp_path):
     code, out, err = cspm("identify", "winch", "DATA_EMPS", *words)
     assert (code, err) == (0, "")
     assert "torque taken to act 0 ms before its stamp" in out
-    assert "in which the shaft turns round" not in out
+    assert "in which the shaft reverses" not in out
+    assert "no result" not in out
     winch = json.loads((tmp_path / "emps.json").read_text())["winches"][0]
     values = np.array([each["value"] for each in winch["estimate"]["parameters"]])
     # From the shaft to the carriage; the effect's torque helps, hence the sign.
-    np.testing.assert_allclose(values * [1e4, 1e4, 1e2, -1e2], PUBLISHED, rtol=0.01)
+    np.testing.assert_allclose(values * [1e4, 1e4, 1e2, -1e2], PUBLISHED, rtol=0.015)
     searched, held_out = (each["torque_error_percent"] for each in winch["judgements"])
     assert searched["fitted"] < 4.0834
     assert held_out["fitted"] < PUBLISHED_FORCE_ERROR
@@ -146,7 +146,7 @@ def result_for(names, winch=MADE):
     file = load_testbed(THESIS)
     measurement = Measurement(THESIS, "ab" * 32, file)
     winches = (IdentifiedWinch(name, 0.01, {}, fit, None, ()) for name in names)
-    return WinchesResult(tuple(winches), (measurement,), 40.0, 0.0, True)
+    return WinchesResult(tuple(winches), (measurement,), 40.0, 0.0)
 
 
 def test_the_file_keeps_what_other_winches_have():

@@ -128,7 +128,7 @@ def test_standstill_excites_nothing():
 
 
 def test_a_load_that_never_changes_is_an_offset():
-    """Drum radius and torque offset act alike at constant tension; the rest stays known."""
+    """Drum radius and torque offset act equally at constant tension; the rest stays known."""
     load = np.full(5000, 40.0)
     made = closed_loop(WINCH, 5000, torque_noise=0.005, seed=6, load=load)
     estimate = identify_winch([made], [*EFFECTS, "winch_drum_radius"]).estimate

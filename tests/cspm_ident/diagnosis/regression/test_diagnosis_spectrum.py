@@ -10,7 +10,11 @@ from cspm_ident.diagnosis.regression.block_gram import gather
 from cspm_ident.diagnosis.regression.block_regression import BlockRegression
 from cspm_ident.diagnosis.regression.coefficients import weights_of
 from cspm_ident.diagnosis.regression.hypothesis import Hypothesis, is_seen_to_end
-from cspm_ident.diagnosis.regression.time_constants import most_in_all, told_within, with_spectrum
+from cspm_ident.diagnosis.regression.time_constants import (
+    covered_within,
+    most_in_all,
+    with_spectrum,
+)
 from cspm_ident.diagnosis.residuals.recorded_equations import equations_of
 from cspm_ident.diagnosis.residuals.regressors import Candidate, Place, shapes_of
 from cspm_ident.diagnosis.residuals.residual_equation import Equation, steady
@@ -88,26 +92,26 @@ def test_parts_are_those_of_the_grid_that_a_recording_can_show():
     assert grid == (2e-3,)
 
 
-def test_no_time_constant_is_told_that_outlasts_the_recording():
-    short = told_within(CREEP, 42.0)
+def test_no_time_constant_is_reported_that_outlasts_the_recording():
+    short = covered_within(CREEP, 42.0)
     assert short.signature.nonlinear["time_constant"] == (0.1, 0.3, 1.0, 3.0, 10.0, 30.0)
     bounds = {p.name: (p.minimum, p.maximum) for p in short.parameters}
     assert bounds == {"compliance": (0.0, 0.1), "time_constant": (0.01, 42.0)}
-    assert told_within(CREEP, 0.05).signature.nonlinear["time_constant"] == (0.1,)
+    assert covered_within(CREEP, 0.05).signature.nonlinear["time_constant"] == (0.1,)
     other = catalogue()["cable_hysteresis"]
-    assert told_within(other, 42.0) is other
+    assert covered_within(other, 42.0) is other
 
 
 @pytest.mark.parametrize(("time_constant", "ends"), [(30.0, True), (41.9, False), (42.0, False)])
-def test_a_memory_that_is_as_long_as_can_be_told_is_not_seen_to_end(time_constant, ends):
+def test_a_memory_that_is_as_long_as_can_be_resolved_is_not_seen_to_end(time_constant, ends):
     shape = (("time_constant", time_constant),)
-    creep = Candidate(told_within(CREEP, 42.0), "surge_1", shape)
+    creep = Candidate(covered_within(CREEP, 42.0), "surge_1", shape)
     other = Candidate(catalogue()["cable_hysteresis"], "surge_1", (("displacement", 0.003),))
     assert is_seen_to_end([creep, other]) is ends
     assert is_seen_to_end([other])
 
 
-def test_a_spectrum_widens_upwards_only_what_is_told():
+def test_a_spectrum_widens_upwards_only_what_is_reported():
     reported = Coefficients(FOUND, np.array([1e-3]), np.array([1e-4]))
     plain = parameters_of(reported)
     assert [plain[0].low, plain[0].high] == pytest.approx([9e-4, 1.1e-3])
@@ -127,7 +131,7 @@ CREEPING = f"""  - effect: cable_creep
 @pytest.mark.slow
 def test_parts_are_fitted_about_what_was_found_of_effects_with_a_spectrum_alone(tmp_path):
     overrides = "duration=16", "sensors=ideal"
-    measured = measured_with(CREEPING, tmp_path / "bag", "worst_case", *overrides)
+    measured = measured_with(CREEPING, tmp_path / "bag", "worst_case_steep", *overrides)
     given = noise_of(steady([equations_of(measured, [])])), 0.5, lambda parts: parts
     damped = Hypothesis(DAMPING, (Candidate(DAMPING, "hoist_1"),))
     hypotheses = [Hypothesis(CREEP, (FOUND,)), damped]

@@ -5,8 +5,9 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from cspm_ident.diagnosis.regression.block_comparison import paired
 from cspm_ident.diagnosis.regression.block_gram import gather
-from cspm_ident.diagnosis.regression.block_regression import BlockRegression, paired
+from cspm_ident.diagnosis.regression.block_regression import BlockRegression
 from cspm_ident.diagnosis.regression.jackknife import Jackknife
 from cspm_ident.diagnosis.residuals.regressors import Candidate, Place
 from cspm_ident.diagnosis.residuals.residual_equation import Equation
@@ -100,7 +101,7 @@ def test_a_few_blocks_that_agree_are_enough_and_a_single_one_is_not():
 
 
 def with_a_start(seed=0, at_start=0.0, afterwards=0.0, tail=1.0):
-    """A column whose first block tells more than all others, and its weights there and later.
+    """A column whose first block shows more than all others, and its weights there and later.
 
     The second block is `tail` times as loud as those after it.
     """
@@ -122,7 +123,7 @@ def test_a_violent_start_hides_nothing_of_what_goes_on_afterwards():
 
 
 @pytest.mark.parametrize("tail", [1.0, 40.0])
-def test_chance_is_told_as_promised_beside_a_violent_start(tail):
+def test_chance_is_reported_as_promised_beside_a_violent_start(tail):
     """Of 200 absent effects at most 20 may look present at 5 %, by the binomial at 1e-3."""
     base, own = np.array([0]), np.array([2])
     false = [with_a_start(seed, tail=tail).p_value(base, own) < 0.05 for seed in range(200)]
@@ -130,7 +131,7 @@ def test_chance_is_told_as_promised_beside_a_violent_start(tail):
 
 
 @pytest.mark.parametrize("blocks", [[3, 9], [3, 9, 15, 21]])
-def test_chance_is_told_as_promised_for_what_acts_in_few_blocks(blocks):
+def test_chance_is_reported_as_promised_for_what_acts_in_few_blocks(blocks):
     """Of 200 absent effects at most 20 may look present at 5 %, by the binomial at 1e-3."""
     base, own = np.array([0]), np.array([2])
     false = [in_few_blocks(blocks, seed).p_value(base, own) < 0.05 for seed in range(200)]
@@ -138,7 +139,7 @@ def test_chance_is_told_as_promised_for_what_acts_in_few_blocks(blocks):
 
 
 @pytest.mark.parametrize("colour", [0.0, 0.95])
-def test_chance_is_told_as_often_as_promised(colour):
+def test_chance_is_reported_as_often_as_promised(colour):
     """Of 200 absent effects 5 % may look present at 5 %: at most 20, by the binomial at 1e-3."""
     base, own = np.array([0, 1]), np.array([2])
     false = [
@@ -245,8 +246,8 @@ def test_weights_beyond_a_base_leave_the_base_as_it_is():
 
 def test_columns_that_others_span_are_known():
     equation = made()[0]
-    twin = dict(equation.columns) | {THIRD: 2.0 * equation.columns[FIRST]}
-    same = Equation(PLACE, equation.times, equation.target, twin, equation.measured)
+    doubled = dict(equation.columns) | {THIRD: 2.0 * equation.columns[FIRST]}
+    same = Equation(PLACE, equation.times, equation.target, doubled, equation.measured)
     sums = sums_of(same)[1]
     assert sums.spanned(np.array([1]), np.array([2]), np.array([0]))[0] > 0.999
     other = sums_of(equation)[1]
@@ -290,26 +291,26 @@ def test_a_weight_beside_a_column_like_its_own_is_less_sure():
     assert sums.half_width(close, own)[0] > 2.0 * sums.half_width(far, own)[0]
 
 
-def test_what_a_single_block_tells_has_no_interval():
+def test_what_a_single_block_shows_has_no_interval():
     base, own = np.array([0]), np.array([2])
     assert np.isinf(in_few_blocks([9]).half_width(base, own)[0])
     assert np.isfinite(in_few_blocks([3, 9]).half_width(base, own)[0])
 
 
 @pytest.mark.parametrize(
-    ("alike", "blocks", "free"),
+    ("correlation", "blocks", "free"),
     [(0.0, 20.0, 19.0), (0.5, 20.0, 20.0 / 3.0 - 1.0), (0.8, 10.0, 1.0), (0.8, 1.5, 0.5)],
 )
-def test_blocks_that_are_alike_leave_one_degree_of_freedom_if_there_is_one(alike, blocks, free):
+def test_correlated_blocks_leave_one_degree_of_freedom_if_there_is_one(correlation, blocks, free):
     reported = Jackknife(
-        np.ones(1), np.eye(1), blocks, np.array([blocks]), np.ones(1), np.array([alike])
+        np.ones(1), np.eye(1), blocks, np.array([blocks]), np.ones(1), np.array([correlation])
     )
     errors, freedom = reported.spread()
     assert freedom == pytest.approx([free])
-    assert errors**2 == pytest.approx([(1.0 + alike) / (1.0 - alike)])
+    assert errors**2 == pytest.approx([(1.0 + correlation) / (1.0 - correlation)])
 
 
-def test_a_weight_that_drifts_is_told_from_one_that_does_not():
+def test_a_weight_that_drifts_is_distinguished_from_one_that_does_not():
     equation, columns, _ = made(weights=(3.0, 0.0, 0.0))
     steady = sums_of(equation)[1]
     ramp = np.linspace(0.0, 2.0, ROWS)
@@ -326,7 +327,7 @@ def test_a_weight_that_drifts_is_told_from_one_that_does_not():
     assert gain.total < 0.01 * steady.gain(base, own).total
 
 
-def test_what_drifts_is_not_told_by_other_columns():
+def test_what_drifts_is_not_determined_by_other_columns():
     """The base has its own weight; only the columns asked about change."""
     equation, columns, _ = made(weights=(3.0, -2.0, 0.0))
     target = equation.target[:, 0] + np.linspace(-0.02, 0.02, ROWS) * columns[:, 1]
@@ -344,7 +345,7 @@ def test_blocks_are_joined_two_by_two(count):
     assert joined[0] == values[:2].sum()
 
 
-def test_a_combination_that_is_nothing_tells_nothing():
+def test_a_combination_that_is_nothing_shows_nothing():
     """Three times a column less the same, whose squares are rounded to less than none."""
     equation = made(seed=7)[0]
     threefold = equation.columns | {THIRD: 3.0 * equation.columns[FIRST]}

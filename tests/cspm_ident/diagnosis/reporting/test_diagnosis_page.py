@@ -15,6 +15,7 @@ from diagnosis_samples import (
     TORQUE,
     diagnosis,
     equation,
+    held_out,
     judged,
 )
 
@@ -26,7 +27,7 @@ from cspm_ident.diagnosis.finding import (
 from cspm_ident.diagnosis.regression.block_regression import Gain
 from cspm_ident.diagnosis.regression.hypothesis import Hypothesis, Rival, is_constant
 from cspm_ident.diagnosis.reporting.diagnosis_page import write_diagnosis_page
-from cspm_ident.diagnosis.reporting.evidence_figure import caption_of
+from cspm_ident.diagnosis.reporting.evidence_figure import caption_of, driver_figure
 from cspm_ident.diagnosis.reporting.verdict import (
     Verdict,
     diagnosis_data,
@@ -38,7 +39,12 @@ from cspm_ident.diagnosis.residuals.regressors import Candidate, Place
 from cspm_ident.diagnosis.residuals.residual_equation import Equation
 from cspm_ident.diagnosis.residuals.spectral_lines import Line
 from cspm_ident.diagnosis.thresholds import DEFAULT_THRESHOLDS
-from cspm_ident.diagnosis.validation.residual_curves import explained_by, held_out_curves
+from cspm_ident.diagnosis.validation.residual_curves import (
+    Curve,
+    bins_of,
+    explained_by,
+    held_out_curves,
+)
 from cspm_ident.signals.samples import Samples
 from cspm_sim.effects import Channel, catalogue
 
@@ -99,7 +105,7 @@ def test_a_curve_is_what_the_found_columns_leave():
     assert wrong.gained < -2.0
 
 
-def test_what_no_recording_tells_is_fitted_on_both_sides():
+def test_what_no_recording_shows_is_fitted_on_both_sides():
     part = equation()
     start = np.linspace(1.0, 2.0, len(part.times))
     shifted = Equation(
@@ -115,7 +121,7 @@ def test_what_no_recording_tells_is_fitted_on_both_sides():
     assert np.std(curve.after) < 2.0 * NOISE
 
 
-def test_a_caption_tells_how_far_a_residual_depends_on_its_driver():
+def test_a_caption_says_how_far_a_residual_depends_on_its_driver():
     """Friction of 0.03 N·m with a noise of 0.001: all before, of what is left chance alone."""
     (curve,) = held_out_curves([[equation()]], {RUBBING: np.array([TORQUE])})
     reported = caption_of(curve, "speed [rad/s]")
@@ -137,14 +143,28 @@ def test_a_signal_explains_what_is_a_function_of_it():
     assert explained_by(np.zeros(10), np.arange(10.0)) == 0.0
 
 
+def test_a_signal_that_does_not_change_has_one_bin_that_can_be_drawn():
+    edges, home = bins_of(np.full(10, 3.0))
+    assert list(edges) == [3.0, 3.0]
+    assert set(home) == {0}
+    values = np.arange(10.0)
+    still = {"tension [N]": np.full(10, 3.0)}
+    place = Place(Channel.SHAFT, "surge")
+    curve = Curve(place, "", np.arange(10.0), values, values, values, still, ())
+    means = driver_figure(curve, "tension [N]").data[-1]
+    assert (tuple(means.x), tuple(means.y)) == ((3.0,), (4.5,))
+
+
 def test_the_page_says_all_that_was_found(tmp_path):
     rival = Rival(Hypothesis(LOADED.effect, (LOADED,)), 0.1)
     page = page_of(tmp_path, diagnosis(alternatives=[rival]))
     assert "Diagnosis of today: tie" in page
     top = page.index('class="verdict"')
     assert top < page.index("<section")
-    twin = "As well explained by friction in proportion to tension (winch_load_friction on surge_2)"
-    assert top < page.index(twin) < page.index("<section")
+    rival = (
+        "As well explained by friction in proportion to tension (winch_load_friction on surge_2)"
+    )
+    assert top < page.index(rival) < page.index("<section")
     simulated = section(page, "simulated")
     for reported in ("winches/angle/surge_2", "torque", "1.46", "0.0071", "0.0049"):
         assert f">{reported}<" in simulated
@@ -166,7 +186,7 @@ def test_the_page_says_all_that_was_found(tmp_path):
     assert '"name":"after"' in page
 
 
-def test_the_power_of_what_is_missing_is_told(tmp_path):
+def test_the_power_of_what_is_missing_is_reported(tmp_path):
     """Dry friction takes torque·⟨|speed|⟩; modelled, nothing is left."""
     found = diagnosis()
     (power,) = diagnosis_data(found)["energy"]
@@ -176,14 +196,14 @@ def test_the_power_of_what_is_missing_is_told(tmp_path):
     assert low < 0.0 < high < 1e-3
     reported = section(page_of(tmp_path, found), "energy")
     assert ">0.019<" in reported
-    assert ">neither, surely<" in reported
+    assert ">neither significantly<" in reported
     assert ">takes energy<" in section(page_of(tmp_path, diagnosis(named=False)), "energy")
 
 
 def test_a_page_without_findings_says_so(tmp_path):
-    page = page_of(tmp_path, diagnosis(named=False))
+    page = page_of(tmp_path, replace(diagnosis(named=False), fit=(held_out(NOISE),)))
     assert "The recordings agree with the model" in page
-    assert "None of 485 stood" in section(page, "hypotheses")
+    assert "None of 485 was accepted" in section(page, "hypotheses")
     assert 'id="parameters"' not in page
     assert "no part" in section(page, "where")
     # What was not found changes nothing: there is no after to be drawn.
@@ -287,7 +307,7 @@ def test_what_the_catalogue_has_as_constants():
 
 
 @pytest.mark.parametrize(("gain", "behind"), [(201.0, False), (199.0, True)])
-def test_the_doubtful_stands_behind_a_greater_unknown_though_another_is_sure(gain, behind):
+def test_the_doubtful_comes_behind_a_greater_unknown_though_another_is_sure(gain, behind):
     """The sure one gains 9000, the unknown 200: no tenth of that, and much of the other."""
     found = diagnosis(unknown=[(Driver(PLACE, "tension [N]"), Gain(200.0, 1.0), 0.2)])
     (one,) = found.findings
@@ -309,7 +329,7 @@ def test_what_alternates_comes_first_and_the_rest_is_doubtful():
     assert verdict_of(found) is Verdict.UNKNOWN
 
 
-def test_where_a_finding_shows_is_told():
+def test_where_a_finding_shows_is_reported():
     (finding,) = diagnosis_data(diagnosis(region=FAST))["findings"]
     assert finding["region"] == FAST._asdict()
     assert "It shows where speed is 0.5 to 2 rad/s: 93 %" in finding["statement"]
@@ -325,7 +345,7 @@ def test_an_unknown_shape_marks_the_part_of_its_residual(tmp_path):
     assert "winch surge" in section(page, "where")
     # Against the signal that was named, though another one explains more.
     assert '"text":"tension [N]"' in section(page, "evidence")
-    assert '"text":"speed [rad\\u002fs]"' not in section(page, "evidence")
+    assert '"text":"speed [rad/s]"' not in section(page, "evidence")
     assert "40 %" in section(page, "hypotheses")
 
 

@@ -1,4 +1,4 @@
-"""A rig's load cells whose clock runs away from the drives': found, taken out, and told apart."""
+"""A rig's load cells whose clock runs away from the drives': found, taken out, distinguished."""
 
 from dataclasses import replace
 
@@ -17,15 +17,15 @@ OFFSET = 8e-5  # of the two clocks when the recording begins [s]
 
 @pytest.fixture(scope="module")
 def rig(tmp_path_factory):
-    folder = tmp_path_factory.mktemp("rig") / "sound"
+    folder = tmp_path_factory.mktemp("rig") / "healthy"
     run_to(folder, "one_winch", "duration=20")
     return read_measurement(folder)
 
 
 @pytest.fixture(scope="module")
 def sea(tmp_path_factory):
-    folder = tmp_path_factory.mktemp("sea") / "sound"
-    run_to(folder, "worst_case", "duration=2")
+    folder = tmp_path_factory.mktemp("sea") / "healthy"
+    run_to(folder, "worst_case_steep", "duration=2")
     return read_measurement(folder)
 
 
@@ -49,7 +49,7 @@ def test_what_is_late_at_the_beginning_stays_and_what_grows_is_taken_out(rig):
     assert whole[-1] - whole[0] > 1.1e-4
 
 
-def test_what_runs_away_faster_than_sound_clocks_is_left_to_be_told(rig):
+def test_what_runs_away_faster_than_healthy_clocks_is_left_to_be_reported(rig):
     fast = drifting(rig, 1e-4)
     assert on_drives_clock(fast) is fast
     assert cell_drift(fast).rate == pytest.approx(1e-4, rel=0.05)
@@ -63,20 +63,20 @@ def test_a_clock_that_does_not_drift_and_machines_with_a_bar_are_left_alone(rig,
     assert on_drives_clock(blind) is blind
 
 
-def test_too_short_a_recording_tells_no_drift(rig):
+def test_too_short_a_recording_shows_no_drift(rig):
     short = rig.within(5.0, 5.06)
     assert cell_drift(short) is None
     assert on_drives_clock(short) is short
 
 
 @pytest.mark.slow
-def test_a_sound_rig_with_clocks_of_its_own_is_consistent(rig):
+def test_a_healthy_rig_with_clocks_of_its_own_is_consistent(rig):
     found = diagnose([drifting(rig, 6e-6)])
     assert not found.reported
     assert not found.unexplained
 
 
-def test_the_jerk_of_a_rope_pulled_taut_leaves_nothing_in_a_sound_rig(tmp_path):
+def test_the_jerk_of_a_rope_pulled_taut_leaves_nothing_in_a_healthy_rig(tmp_path):
     """Trapezoids, and a force that is read at instants, would miss a thousandth of it."""
     run_to(tmp_path / "ideal", "one_winch", "duration=3", "sensors=ideal")
     ideal = read_measurement(tmp_path / "ideal")

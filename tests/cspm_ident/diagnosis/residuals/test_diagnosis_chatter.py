@@ -48,7 +48,7 @@ def test_what_is_smooth_or_noise_or_slower_does_not_alternate(first):
 
 
 @pytest.mark.parametrize("frequency", [420.0, 500.0])
-def test_what_swings_faster_than_it_is_read_is_told(frequency):
+def test_what_swings_faster_than_it_is_read_is_reported(frequency):
     swing = 4.0 * np.cos(2.0 * np.pi * frequency * TIMES)
     (line,) = chatters_of(recorded(SEA + swing + 0.02 * NOISE[1:]))
     assert (line.place.element, line.frequency) == ("hoist_1", pytest.approx(500.0))
@@ -57,7 +57,7 @@ def test_what_swings_faster_than_it_is_read_is_told(frequency):
     assert "comes from outside" not in said
 
 
-def test_its_amplitude_is_told():
+def test_its_amplitude_is_reported():
     for amplitude in (4.0, 2.6):
         (line,) = chatters_of(recorded(SEA + amplitude * SWING))
         assert line.amplitude == pytest.approx(amplitude, rel=1e-3)
@@ -76,7 +76,7 @@ def test_without_load_cells_nothing_alternates():
         ("frame_flexibility", "winch_frame", True),
     ],
 )
-def test_what_is_told_by_readings_that_alternate_is_doubtful(effect, element, doubtful):
+def test_what_is_reported_by_readings_that_alternate_is_doubtful(effect, element, doubtful):
     own = catalogue()[effect]
     finding = Finding(Hypothesis(own, (Candidate(own, element),)), Gain(9000.0, 10.0), 0.9)
     assert is_doubtful(finding, (), {"hoist_1"}) is doubtful

@@ -6,7 +6,6 @@ import pytest
 from cspm_ident.diagnosis.residuals.regressors import Place
 from cspm_ident.diagnosis.residuals.residual_equation import Equation
 from cspm_ident.diagnosis.residuals.spectral_lines import Line, highest_line, with_lines
-from cspm_ident.diagnosis.validation.holdout_residuals import without_nuisance
 from cspm_sim.effects import Channel
 
 PLACE = Place(Channel.WRENCH, "bar")
@@ -63,7 +62,7 @@ def test_equations_with_a_line_leave_it_out():
     equation = Equation(PLACE, TIMES, target, {}, target)
     own, other = Line(PLACE, 1, 2.7, 4.0, 0.0), Line(Place(Channel.TENSION, "a"), 0, 2.7, 4.0, 0.0)
     (found,) = with_lines([equation], [own, other])
-    left = without_nuisance(found)
+    left = found.left
     np.testing.assert_array_equal(left[:, 0], target[:, 0])
     assert np.std(left[:, 1] - rest[:, 1]) < 0.1
     assert with_lines([equation], [other])[0] is equation

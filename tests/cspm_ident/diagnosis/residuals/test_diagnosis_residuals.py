@@ -11,6 +11,7 @@ from cspm_ident.diagnosis.residuals.corrected_measurement import with_found
 from cspm_ident.diagnosis.residuals.drive_torque import sampled_constant, time_constant
 from cspm_ident.diagnosis.residuals.recorded_equations import equations_of
 from cspm_ident.diagnosis.residuals.regressors import Candidate, Place
+from cspm_ident.diagnosis.residuals.winch_torque import may_reverse
 from cspm_ident.signals.measurement import read_measurement
 from cspm_ident.signals.samples import Samples
 from cspm_msgs_py.testbed import EffectEntry, load_testbed
@@ -92,7 +93,7 @@ def test_a_wrong_reading_leaves_its_columns(measurement, equations, name, elemen
             assert np.all(np.abs(change_seen) < 1e-9)
             continue
         expected = without_start(equation, weight * equation.columns[candidate][:, :, 0])
-        # The length at the start, told by the first tension, is taken out to first order only.
+        # The length at the start, given by the first tension, is taken out to first order only.
         assert rms(change_seen - expected).max() < 0.03 * rms(expected).max()
 
 
@@ -190,7 +191,7 @@ def test_a_drive_that_lags_leaves_its_column(tmp_path):
         effect="winch_torque_lag", elements=("sway_1",), parameters={"time_constant": 0.004}
     )
     slow = THESIS.testbed.model_copy(update={"effects": (*THESIS.testbed.effects, lag)})
-    bundle = bundle_of("worst_case", "duration=4", "sensors=ideal")
+    bundle = bundle_of("worst_case_steep", "duration=4", "sensors=ideal")
     run(bundle.concealing(slow), tmp_path / "bag")
     plain = read_measurement(tmp_path / "bag")
     effect = catalogue()["winch_torque_lag"]
@@ -202,8 +203,8 @@ def test_a_drive_that_lags_leaves_its_column(tmp_path):
         assert sampled_constant(time_constant(found, 1e-3), 1e-3) == pytest.approx(found, abs=1e-6)
     known = with_found(plain, {Candidate(effect, "sway_1"): np.array([0.004])})
     reported = by_place(known, [])[Place(Channel.DRIVE, "sway_1")]
-    untold = by_place(plain, [])[Place(Channel.DRIVE, "sway_1")]
-    assert rms(reported.target)[0] < 0.1 * rms(untold.target)[0]
+    without = by_place(plain, [])[Place(Channel.DRIVE, "sway_1")]
+    assert rms(reported.target)[0] < 0.1 * rms(without.target)[0]
 
 
 @pytest.mark.parametrize(
@@ -225,3 +226,59 @@ def test_effects_of_the_file_count(measurement, equations, name, element, value,
     change = without_start(equations[place], known.target - equations[place].target)
     expected = without_start(equations[place], -equations[place].columns[candidate] @ weights)
     assert rms(change - expected).max() < 0.03 * rms(expected).max()
+
+
+@pytest.mark.parametrize("gain", [0.5, 0.9, 2.0])
+def test_a_gain_of_torque_is_judged_by_the_torque_as_it_was_reported(measurement, gain):
+    """A wrong gain leaves 1 − 1/g of the torque; never less than that."""
+    place = Place(Channel.SHAFT, "surge_2")
+    entry = EffectEntry(
+        effect="winch_torque_gain", elements=("surge_2",), parameters={"gain": gain}
+    )
+    machine = measurement.machine.model_copy(update={"effects": (entry,)})
+    own = by_place(measurement.with_machine(machine))[place]
+    expected = abs(1.0 - 1.0 / gain) * rms(own.measured)
+    assert rms(own.target) == pytest.approx(expected, rel=0.02)
+
+
+def test_the_column_of_a_gain_is_the_torque_that_the_model_needs(measurement):
+    """Fitted alone it takes nothing of a torque that no gain makes, however large that is."""
+    place = Place(Channel.SHAFT, "surge_2")
+    torque = measurement.torque
+    column = measurement.machine.cable_names.index("surge_2")
+    values = torque.values.copy()
+    values[:, column] += 50.0 * np.sin(31.0 * torque.times)
+    off = measurement.with_samples("torque", Samples(torque.times, values))
+    own = by_place(off, [catalogue()["winch_torque_gain"]])[place]
+    (columns,) = own.columns.values()
+    regressor, target = columns[:, 0, 0].astype(float), own.target[:, 0]
+    weight = regressor @ target / (regressor @ regressor)
+    assert rms(target - weight * regressor) == pytest.approx(rms(target), rel=0.05)
+    np.testing.assert_allclose(regressor, target - own.measured[:, 0], atol=1e-3 * rms(target))
+
+
+def test_the_column_of_a_load_cells_scale_is_the_tension_of_the_cables_law(measurement):
+    place = Place(Channel.TENSION, "sway_2")
+    own = by_place(measurement, [catalogue()["tension_gain"]])[place]
+    scale = Candidate(catalogue()["tension_gain"], "sway_2")
+    expected = (own.measured - own.target)[:, 0]
+    np.testing.assert_allclose(own.columns[scale][:, 0, 0], expected, rtol=1e-3, atol=1e-3)
+
+
+@pytest.mark.parametrize(("counts", "known"), [(1_000, False), (100_000, True)])
+def test_the_direction_is_known_where_the_speed_exceeds_the_encoder_s_steps(counts, known):
+    """At 2 rad/s and 1 kHz a coarse encoder's difference is 0 or 6.3 rad/s."""
+    step = 2.0 * np.pi / counts
+    angles = step * np.round(2e-3 * np.arange(2000) / step)
+    reverses = may_reverse(np.diff(angles) / 1e-3, 0.05, 41)
+    assert reverses.all() if not known else not reverses.any()
+
+
+def test_a_reversal_is_found_within_half_a_window():
+    times = 1e-3 * np.arange(2001)
+    reverses = may_reverse(np.cos(np.pi * times), 0.05, 41)
+    # Speeds below 5 % of the root mean square are within 11.3 ms of the reversal.
+    found = np.flatnonzero(reverses)
+    assert (found[0], found[-1]) == (500 - 31, 1500 + 31)
+    assert not reverses[600:1400].any()
+    assert may_reverse(-np.cos(np.pi * times), 0.05, 41).tolist() == reverses.tolist()

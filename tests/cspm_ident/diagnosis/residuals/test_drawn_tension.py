@@ -1,4 +1,4 @@
-"""Without load cells the winches tell the tensions, and their faults look like those of cells."""
+"""Without load cells the winches show the tensions, and their faults look like those of cells."""
 
 from dataclasses import replace
 
@@ -45,7 +45,7 @@ def by_place(measurement, *names, **options):
 @pytest.fixture(scope="module")
 def rubbing(tmp_path_factory):
     """Six seconds of it with dry friction at a winch of which the file does not know."""
-    described = bundle_of("worst_case", "duration=6", "sensors=ideal")
+    described = bundle_of("worst_case_steep", "duration=6", "sensors=ideal")
     machine = described.testbed.testbed
     entry = EffectEntry(effect=COULOMB.id, elements=("surge_2",), parameters={"torque": RUBBED})
     machine = machine.model_copy(update={"effects": (*machine.effects, entry)})
@@ -64,7 +64,7 @@ def weight_of(values, *columns):
     return np.linalg.lstsq(table, values.reshape(-1), rcond=None)[0]
 
 
-def test_torques_tell_the_tensions(whole, blind):
+def test_torques_show_the_tensions(whole, blind):
     drawn = drawn_tension(blind, ()).measurement.tension
     inner = slice(500, -500)
     measured = whole.tension
@@ -112,7 +112,7 @@ def test_laws_are_taken_about_tensions_without_the_friction_supposed(rubbing):
     assert found[1] == pytest.approx(RUBBED, rel=0.015)
 
 
-def test_what_a_shaft_holds_while_it_turns_round_is_never_told(rubbing):
+def test_what_a_shaft_holds_while_it_reverses_is_never_reported(rubbing):
     """Apart from it friction is what was planted; with it too little, for a shaft that sticks."""
     blind = replace(rubbing, tension=None)
     candidate = Candidate(COULOMB, "surge_2")
@@ -185,7 +185,7 @@ def test_a_load_cell_that_is_not_there_has_no_faults(blind):
         assert not equation.columns
 
 
-def test_what_torques_that_are_late_do_to_the_bar_is_never_told(blind, whole):
+def test_what_torques_that_are_late_do_to_the_bar_is_never_reported(blind, whole):
     """Torques a period late; with load cells there is no such thing."""
     values = blind.torque.values
     torque = Samples(blind.torque.times, np.vstack([values[:1], values[:-1]]))
@@ -198,7 +198,7 @@ def test_what_torques_that_are_late_do_to_the_bar_is_never_told(blind, whole):
     assert not by_place(whole)[BAR].nuisance.size
 
 
-def test_what_is_not_told_is_one_number_for_all_stretches(rubbing):
+def test_what_is_not_reported_is_one_number_for_all_stretches(rubbing):
     """However often a reading was lost; lengths at the start are of each stretch."""
     blind = replace(rubbing, tension=None)
     torque = blind.torque

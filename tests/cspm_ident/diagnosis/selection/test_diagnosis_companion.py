@@ -1,4 +1,4 @@
-"""Whether a small companion may be no more than what a law beside it is untrue by."""
+"""Whether a small companion may be no more than the model-form error of a law beside it."""
 
 import numpy as np
 import pytest
@@ -68,6 +68,6 @@ def test_it_is_held_against_what_the_law_takes_where_it_shows(elsewhere, model_f
         ("winch_torque_offset", True),
     ],
 )
-def test_numbers_readings_and_constants_have_no_form_to_be_untrue(strong, exact):
+def test_numbers_readings_and_constants_have_no_model_form_error(strong, exact):
     assert is_exact(catalogue()[strong]) is exact
     assert may_be_untruth(strong, "winch_load_friction", (SHAFT, (1.0, 0.01))) is not exact

@@ -1,4 +1,4 @@
-"""Readings that are late, or would be early: which clock is told of two that explain the same."""
+"""Readings that are late, or would be early: which of two clocks is reported."""
 
 import numpy as np
 import pytest
@@ -26,7 +26,7 @@ POSE, TENSION = Candidate(TRACKER, "bar"), Candidate(CELLS, "load_cells")
 def cable(delay, apart=0.0, noise=0.05, seed=5):
     """One cable's tension under locked winches, its pose late by `delay` [s].
 
-    Its pose, in which `apart` is noise, and its load cells tell the same with opposite signs.
+    Its pose, in which `apart` is noise, and its load cells show the same with opposite signs.
     """
     rng = np.random.default_rng(seed)
     times = STEP * np.arange(ROWS)
@@ -45,13 +45,13 @@ def named(equation):
 
 @pytest.mark.parametrize("apart", [0.0, 0.1])
 @pytest.mark.parametrize("delay", [0.003, -0.003])
-def test_what_is_late_is_told_of_two_that_explain_the_same(delay, apart):
+def test_what_is_late_is_reported_of_two_that_explain_the_same(delay, apart):
     """Also where the noise of its readings makes it explain a hundredth less."""
     late = TRACKER if delay > 0.0 else CELLS
     assert [h.effect for h in named(cable(delay, apart))] == [late]
 
 
-def test_what_explains_much_more_is_told_though_it_be_early():
+def test_what_explains_much_more_is_reported_though_it_be_early():
     assert [h.effect for h in named(cable(0.003, apart=0.6))] == [CELLS]
 
 
@@ -80,7 +80,7 @@ def rig(delay, drag=0.0, like=1.0, seed=7):
         (0.0, -0.6 * CLOCK, -0.5, [DRAG]),
     ],
 )
-def test_what_sound_clocks_explain_as_well_is_theirs(delay, drag, like, reported):
+def test_what_healthy_clocks_explain_as_well_is_theirs(delay, drag, like, reported):
     """Where they would have to lie farther apart, or explain less, it is friction."""
     assert [h.effect for h in named(rig(delay, drag, like))] == reported
 
@@ -113,7 +113,7 @@ def test_a_delay_counts_from_where_its_interval_leaves_what_clocks_may_be_apart(
 
 
 @pytest.mark.parametrize(("delay", "reported"), [(0.5 * CLOCK, False), (4.0 * CLOCK, True)])
-def test_what_sound_clocks_may_have_done_is_nothing_unknown(delay, reported):
+def test_what_healthy_clocks_may_have_done_is_nothing_unknown(delay, reported):
     """A slow motion's delay is a function of time, of which clocks explain what clocks may do."""
     times = STEP * np.arange(ROWS)
     rate = 2000.0 * np.sin(0.5 * times)

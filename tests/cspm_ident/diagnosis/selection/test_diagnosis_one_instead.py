@@ -50,7 +50,7 @@ def instead(looked, chosen, *free):
     return one_instead(looked.fits, looked.significance, chosen, free)
 
 
-def test_what_explains_both_stands_for_them():
+def test_what_explains_both_replaces_them():
     looked, chosen = search(1.0), of(COULOMB, VISCOUS)
     one, *two = instead(looked, chosen, LOAD)
     assert (one.effect.id, two) == ("winch_load_friction", chosen)
@@ -65,7 +65,7 @@ def test_what_explains_less_does_not(share):
 
 
 def test_what_has_no_fewer_numbers_has_to_explain_no_less():
-    """One fault more counts for a number; as much as models are untrue is too much."""
+    """One fault more counts for a number; as much as the model-form error is too much."""
     chosen = of(COULOMB, VISCOUS)
     assert freedom(*of(COM)) == 3
     one, *two = instead(search(1.0, COM, further=0.01), chosen, COM)
@@ -74,8 +74,8 @@ def test_what_has_no_fewer_numbers_has_to_explain_no_less():
     assert instead(search(1.03), chosen, LOAD) is not None
 
 
-@pytest.mark.parametrize(("weight", "stands"), [(1.0, True), (1.1, False)])
-def test_what_explains_a_finding_on_two_elements_stands_for_it(weight, stands):
+@pytest.mark.parametrize(("weight", "replaced"), [(1.0, True), (1.1, False)])
+def test_what_explains_a_finding_on_two_elements_replaces_it(weight, replaced):
     """A bar's own, which has three numbers, shows in two cables at once."""
     times = STEP * np.arange(ROWS)
     speeds = {"a": np.sin(2.1 * times), "b": np.sin(0.83 * times)}
@@ -84,7 +84,7 @@ def test_what_explains_a_finding_on_two_elements_stands_for_it(weight, stands):
     for k, (name, speed) in enumerate(speeds.items()):
         noise = 0.3 * np.random.default_rng(7 + k).standard_normal(ROWS)
         own = speed if name == "a" else weight * speed
-        cable = np.stack([own, 1e-6 * np.cos(times), 1e-6 * np.sin(times)], axis=1)
+        cable = np.stack([2.0 * own, 1e-6 * np.cos(times), 1e-6 * np.sin(times)], axis=1)
         columns = {COM: cable[:, None, :], rubs[name]: speed[:, None, None]}
         target = (speed + noise)[:, None]
         place = Place(Channel.SHAFT, name)
@@ -93,10 +93,10 @@ def test_what_explains_a_finding_on_two_elements_stands_for_it(weight, stands):
     both = Hypothesis(VISCOUS.effect, tuple(rubs.values()))
     assert freedom(both) == freedom(*of(COM)) == 3
     found = instead(looked, [both], COM)
-    assert found == ((*of(COM), both) if stands else None)
+    assert found == ((*of(COM), both) if replaced else None)
 
 
-def test_nor_does_anything_for_what_begins_late_or_stands_alone():
+def test_nor_does_anything_for_what_begins_late_or_is_alone():
     looked = search(1.0)
     late = [replace(each, onset=20) for each in of(COULOMB, VISCOUS)]
     assert instead(looked, late, LOAD) is None

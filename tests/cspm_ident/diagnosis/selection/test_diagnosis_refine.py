@@ -25,7 +25,7 @@ BLOCK_S = 0.3
 @pytest.fixture(scope="module")
 def measured(tmp_path_factory):
     folder = tmp_path_factory.mktemp("refine") / "sea"
-    run(bundle_of("worst_case", "duration=12"), folder)
+    run(bundle_of("worst_case_steep", "duration=12"), folder)
     return read_measurement(folder)
 
 
@@ -60,7 +60,7 @@ def test_a_factor_is_the_same_however_wrong_the_file_was(measured, factor):
     np.testing.assert_allclose(other_half, half, rtol=0.05)
 
 
-def test_no_delay_is_surer_than_the_clocks_of_a_sound_machine():
+def test_no_delay_is_more_significant_than_the_clocks_of_a_healthy_machine():
     late, dry = (
         Candidate(catalogue()[name], "one") for name in ("tension_delay", "winch_coulomb_friction")
     )
@@ -72,7 +72,7 @@ def test_no_delay_is_surer_than_the_clocks_of_a_sound_machine():
     assert found[dry][1] == given[dry][1]
 
 
-def test_no_weight_is_surer_than_the_form_of_its_law():
+def test_no_weight_is_more_significant_than_the_form_of_its_law():
     """Be it seen to be off or not; a number of the file or of a reading has none."""
     unseen = np.sqrt(DEFAULT_THRESHOLDS.model_form_error_share)
     cases = (
@@ -93,7 +93,7 @@ def test_no_weight_is_surer_than_the_form_of_its_law():
 @pytest.mark.parametrize(
     ("reach", "start", "missing"), [(0.6, 0.0, 0.4), (0.6, -5.0, 0.4), (1.2, 0.9, 0.0)]
 )
-def test_what_saturates_is_no_surer_than_how_much_of_it_has_acted(reach, start, missing):
+def test_what_saturates_is_no_more_significant_than_how_much_of_it_has_acted(reach, start, missing):
     """Half of the range, since a memory may start anywhere."""
     slides = Candidate(catalogue()["cable_hysteresis"], "hoist_1", (("displacement", 1e-3),))
     rubs = Candidate(DAMPING, "hoist_1")

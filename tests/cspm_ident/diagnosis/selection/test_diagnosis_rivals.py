@@ -62,7 +62,7 @@ def test_weights_that_one_coefficient_has_are_found():
 
 
 @pytest.mark.parametrize(("beside", "found"), [(-0.002, True), (-0.02, False)])
-def test_weights_that_differ_by_less_than_models_are_untrue_are_an_alternative(beside, found):
+def test_weights_that_differ_by_less_than_the_model_form_error_are_an_alternative(beside, found):
     """A share of the load against 0.1 of it that changes sides: 2 % of the amplitude, and 20 %."""
     search = Search(gather([[winch(LOAD * (0.1 * SIDE + beside), noise=0.001)]], BLOCK_S))
     pulley = Hypothesis(PULLEY.effect, (PULLEY,))
@@ -94,7 +94,7 @@ def test_an_effect_on_another_element_is_a_tie_where_it_explains_the_same():
     assert {*named.hypothesis.elements, *rival.hypothesis.elements} == {"a", "b"}
 
 
-def test_an_effect_on_another_element_is_no_tie_where_data_tell_it():
+def test_an_effect_on_another_element_is_no_tie_where_data_distinguish_it():
     (named,) = named_in(swinging(1.0))
     assert named.hypothesis.elements == ("a",)
     assert named.alternatives == ()
@@ -163,7 +163,7 @@ def test_what_a_true_model_surely_does_better_decides():
     assert named.alternatives == ()
 
 
-def test_less_than_a_model_is_untrue_by_decides_nothing():
+def test_less_than_the_model_form_error_decides_nothing():
     """The rival leaves 2 % of the gain in every block, a free function finds 4 times as much."""
     (named,) = named_in(torque_of(0.28))
     (rival,) = named.alternatives
@@ -226,7 +226,7 @@ def test_what_explains_the_same_with_a_number_more_is_tied_however_long_is_measu
     assert apart < DEFAULT_THRESHOLDS.tie_sigma < distance(np.zeros(blocks), 1.0, 2)
 
 
-def test_an_effect_on_more_elements_than_blocks_tell_of_is_found():
+def test_an_effect_on_more_elements_than_blocks_show_is_found():
     """In six blocks of 24, on eight winches, each of which is sure."""
     names = [f"winch_{k}" for k in range(8)]
     speed = np.where(TIMES < 12.0, np.sin(1.7 * TIMES), 0.0)
@@ -287,7 +287,7 @@ def test_what_one_system_reads_is_a_rival_with_one_number_for_all(name, common):
 
 
 @pytest.mark.parametrize(("delay", "unknown"), [(1e-4, False), (1e-3, True)])
-def test_what_a_sound_machine_has_as_well_is_no_unknown_though_it_is_rejected(delay, unknown):
+def test_what_a_healthy_machine_has_as_well_is_no_unknown_though_it_is_rejected(delay, unknown):
     cells = Candidate(catalogue()["tension_delay"], "load_cells")
     place, waves = Place(Channel.TENSION, "only"), np.sin(1.7 * TIMES)
     shape = Knots().columns(place, {"speed [rad/s]": waves})

@@ -15,7 +15,7 @@ from cspm_ident.diagnosis.residuals.residual_equation import Equation
 from cspm_ident.diagnosis.selection.onset import onset_of
 from cspm_ident.diagnosis.selection.search import Search
 from cspm_ident.diagnosis.validation.detection_limits import detection_limits
-from cspm_ident.diagnosis.validation.holdout_residuals import free_functions, rms, without_nuisance
+from cspm_ident.diagnosis.validation.holdout_residuals import free_functions, rms
 from cspm_sim.effects import Channel, catalogue
 
 ROWS, STEP, BLOCK_S = 4800, 0.01, 1.0
@@ -28,7 +28,7 @@ TORQUE = 0.3
 
 
 def turning(seed=0, start=0, missing=None, sticks=False):
-    """A shaft swinging against dry friction in noise, and rows in which it turns round."""
+    """A shaft swinging against dry friction in noise, and rows in which it reverses."""
     rng = np.random.default_rng(seed)
     times = STEP * np.arange(ROWS)
     speed = np.sin(2.1 * times) + 0.6 * np.sin(0.83 * times + seed)
@@ -72,7 +72,7 @@ def test_an_effect_that_begins_late_is_named_with_when_it_began():
     assert onset.time == pytest.approx(3000 * STEP, abs=0.2)
 
 
-def test_what_shows_at_the_very_end_only_is_not_told():
+def test_what_shows_at_the_very_end_only_is_not_reported():
     assert found(turning(start=ROWS - 500)).findings == ()
 
 
@@ -119,8 +119,8 @@ def test_knots_are_those_of_the_first_recording():
     assert knots.columns(PLACE, {"still": np.zeros(50)}) == {}
 
 
-def test_an_effect_below_its_limit_is_not_told_and_one_above_it_is():
-    """The limit is that of the search itself, told from a recording without the effect."""
+def test_an_effect_below_its_limit_is_not_reported_and_one_above_it_is():
+    """The limit is that of the search itself, determined from a recording without the effect."""
     quiet = turning(missing=lambda speed: -TORQUE * np.sign(speed))
     search = Search(gather([[quiet]], BLOCK_S))
     limits = {limit.effect: limit for limit in detection_limits(search, ())}
@@ -134,7 +134,7 @@ def test_an_effect_below_its_limit_is_not_told_and_one_above_it_is():
         assert bool(found_here.findings) is reported
 
 
-def test_what_is_never_told_is_fitted_before_a_residual_counts():
+def test_what_is_never_reported_is_fitted_before_a_residual_counts():
     equation = turning()
     start = np.linspace(1.0, 2.0, ROWS)[:, None, None]
     shifted = Equation(
@@ -145,7 +145,7 @@ def test_what_is_never_told_is_fitted_before_a_residual_counts():
         equation.measured,
         nuisance=start,
     )
-    left = without_nuisance(shifted)
+    left = shifted.left
     assert abs(float(left[:, 0] @ start[:, 0, 0])) < 1e-6 * ROWS
     assert rms([shifted]) <= rms([equation]) * (1.0 + 1e-9)
 
@@ -169,7 +169,7 @@ def drifting(times):
     return 0.15 * np.sign(np.sin(5.0 * np.pi * times / 48.0))
 
 
-def test_what_only_time_tells_is_unknown_though_no_other_block_foretells_it():
+def test_what_only_time_shows_is_unknown_though_no_other_block_foretells_it():
     equation = turning(missing=lambda speed: drifting(STEP * np.arange(ROWS)))
     reported = {driver.signal for driver, *_ in found(equation).unexplained}
     assert reported == {"time [s]"}

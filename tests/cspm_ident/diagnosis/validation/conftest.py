@@ -9,4 +9,4 @@ from measured_samples import measured_with
 def crept(tmp_path_factory):
     """Sixteen seconds of the calm sea with a cable that creeps; the file knows nothing of it."""
     folder = tmp_path_factory.mktemp("judgement") / "bag"
-    return measured_with(CREEP, folder, "calm", "duration=16")
+    return measured_with(CREEP, folder, "calm_broadband", "duration=16")

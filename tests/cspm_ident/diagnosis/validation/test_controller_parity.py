@@ -20,7 +20,7 @@ STEPS = 400
 def recorded(tmp_path_factory):
     """Controllers at several rates, in a sea, with the sensors' noise and delays."""
     folder = tmp_path_factory.mktemp("parity") / "bag"
-    run(bundle_of("worst_case", "rates.motion_controller=200"), folder, steps=STEPS)
+    run(bundle_of("worst_case_steep", "rates.motion_controller=200"), folder, steps=STEPS)
     return folder
 
 

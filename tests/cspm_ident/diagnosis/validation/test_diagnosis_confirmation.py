@@ -5,6 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from measured_samples import measured_with
+from run_samples import PLUCKED_IN_SURGE
 
 from cspm_ident.diagnosis.diagnose import diagnose
 from cspm_ident.diagnosis.finding import HoldOut, Rejection, Status
@@ -78,9 +79,11 @@ def test_data_without_any_residual_say_nothing():
 
 
 @pytest.mark.slow
-def test_drag_of_a_bar_that_has_come_to_rest_is_told_with_that_nothing_confirms_it(tmp_path):
+def test_drag_of_a_bar_that_has_come_to_rest_is_reported_with_that_nothing_confirms_it(tmp_path):
     """In the last three tenths of a minute a plucked bar shows nothing, which confirms nothing."""
-    measured = measured_with(AIR, tmp_path / "plucked", "verification_mid", "duration=60")
+    measured = measured_with(
+        AIR, tmp_path / "plucked", "verification_mid", "duration=60", PLUCKED_IN_SURGE
+    )
     found = diagnosis_data(diagnose([measured]))
     (reported,) = found["findings"]
     assert (found["verdict"], reported["effect"]) == ("effect", "bar_quadratic_drag")

@@ -2,7 +2,7 @@
 
 import numpy as np
 import pytest
-from crept_cables import CREEPING, CREPT, SOUND, START_S, TRUE
+from crept_cables import CREEPING, CREPT, HEALTHY, START_S, TRUE
 
 from cspm_ident.diagnosis.residuals.recorded_equations import equations_of
 from cspm_ident.diagnosis.residuals.regressors import Place
@@ -58,8 +58,8 @@ def test_what_is_right_takes_squares_and_thrice_of_it_adds_them(crept):
     described = found(0.0)
     assert harm(described, found(1.0)) == 0.0
     assert harm(described, found(3.0)) > described[CREPT].sum()
-    (rows,) = (e for e in equations_of(crept, ()) if e.place == SOUND)
-    late = rows.within(START_S, np.inf).scaled(noise[SOUND])
-    assert described[SOUND].sum() == pytest.approx(rms([late]) ** 2 * late.target.size, rel=0.05)
+    (rows,) = (e for e in equations_of(crept, ()) if e.place == HEALTHY)
+    late = rows.within(START_S, np.inf).scaled(noise[HEALTHY])
+    assert described[HEALTHY].sum() == pytest.approx(rms([late]) ** 2 * late.target.size, rel=0.05)
     by_block = [np.sum(late.within(t, t + BLOCK_S).target ** 2) for t in (START_S, START_S + 1.0)]
-    assert np.all(described[SOUND][[0, 2]] > 0.2 * np.array(by_block))
+    assert np.all(described[HEALTHY][[0, 2]] > 0.2 * np.array(by_block))

@@ -2,7 +2,7 @@
 
 import numpy as np
 import pytest
-from crept_cables import CREEPING, CREPT, SOUND, START_S, TRUE
+from crept_cables import CREEPING, CREPT, HEALTHY, START_S, TRUE
 
 from cspm_ident.diagnosis.residuals.recorded_equations import equations_of
 from cspm_ident.diagnosis.residuals.residual_equation import steady
@@ -19,7 +19,7 @@ def fits(measurement, start=START_S):
 
 def test_what_a_cable_remembers_at_the_start_is_what_it_was(crept, monkeypatch):
     fit = fits(crept)[CREPT]
-    healthy = fits(crept)[SOUND]
+    healthy = fits(crept)[HEALTHY]
     assert fit.before > 5.0 * healthy.before
     assert fit.after < 1.5 * healthy.after
     # Were it at rest there, the right physics would leave far more.
@@ -43,10 +43,10 @@ def test_a_residual_without_rows_there_is_left_out(crept, monkeypatch):
 
     def slack(measurement, effects, **given):
         found = whole(measurement, effects, **given)
-        return [e.within(0.0, START_S) if e.place == SOUND else e for e in found]
+        return [e.within(0.0, START_S) if e.place == HEALTHY else e for e in found]
 
     monkeypatch.setattr(judgement, "equations_of", slack)
     found = fits(crept)
-    assert SOUND not in found
+    assert HEALTHY not in found
     assert CREPT in found
-    assert SOUND in fits(crept, 0.0)
+    assert HEALTHY in fits(crept, 0.0)

@@ -117,7 +117,7 @@ def test_what_no_machine_can_have_goes_before_anything_is_judged():
     [((True, False), None, [1]), ((True, True), (True, True), [1]), ((True, True), None, [])],
 )
 def test_what_is_untenable_goes_though_nothing_is_held_out(possible, unsure, gone):
-    """What is of no use or harms is told by held-out data alone."""
+    """What is of no use or harms is decided by held-out data alone."""
     found = model((1.2, 0.5), possible, unsure=unsure, harm=(3.0, 0.0))
     assert places(found.untenable) == gone
 
@@ -141,7 +141,7 @@ def test_of_what_may_be_none_the_least_goes_then_what_harms_most():
         # The mean of what drifts is none of it.
         ("tension_bias", 0.021, False),
         ("tension_gain", 0.021, True),
-        # What no data tell may be anything, and is no reason to take it for none.
+        # What no data show may be anything, and is no reason to take it for none.
         ("winch_coulomb_friction", np.inf, False),
     ],
 )

@@ -31,7 +31,7 @@ def test_a_damper_that_the_model_lacks_takes_what_it_turns_into_heat(channel):
     assert not power.gives
 
 
-def test_what_gives_energy_is_told_from_what_takes_it():
+def test_what_gives_energy_is_distinguished_from_what_takes_it():
     (taken,) = lost_powers([curve(0.3 * RATE, 0.3 * RATE)])
     (given,) = lost_powers([curve(-0.3 * RATE, -0.3 * RATE)])
     assert (taken.gives, given.gives) == (False, True)
@@ -43,7 +43,7 @@ def test_what_gives_energy_is_told_from_what_takes_it():
 
 
 def test_drag_on_the_bar_takes_energy_in_every_component():
-    """Drag stands in M·ν̇ + h − g less the cables' wrench as −c·ν."""
+    """Drag is in M·ν̇ + h − g less the cables' wrench as −c·ν."""
     speeds = {f"{dof} speed [1/s]": np.cos((k + 1.0) * TIMES) for k, dof in enumerate(DOFS)}
     target = -0.2 * np.column_stack(list(speeds.values()))
     part = Equation(Place(Channel.WRENCH, "bar"), TIMES, target, {}, target, signals=speeds)

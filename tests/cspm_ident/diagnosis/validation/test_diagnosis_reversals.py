@@ -1,4 +1,4 @@
-"""Whether dry friction is larger near rest, which only rows tell in which a shaft turns round."""
+"""Whether dry friction is larger near rest, which only reversals of a shaft show."""
 
 from dataclasses import replace
 
@@ -63,13 +63,13 @@ def test_more_torque_near_rest_makes_a_larger_breakaway_an_alternative(law, wide
 
 
 @pytest.mark.parametrize("seed", range(3))
-def test_what_reversals_do_not_tell_is_left_open(seed):
-    """Beside noise of three times the friction all rows tell it, those near rest nothing."""
+def test_what_reversals_do_not_show_is_left_open(seed):
+    """Beside noise of three times the friction all rows show it, those near rest nothing."""
     assert reported(shaft(lambda v: 3.0 + 0.0 * v, seed, noise=8.0)) == [WIDER]
 
 
 @pytest.mark.parametrize(("half", "reported"), [(0.9, True), (1.1, False)])
-def test_friction_near_rest_is_told_where_half_of_it_would_show(half, reported):
+def test_friction_near_rest_is_reported_where_half_of_it_would_show(half, reported):
     sure = np.array([2.5, 2.0]), np.array([0.3, 0.1])
     other = np.array([1.0, 2.0]), np.array([half, 0.1])
     near = near_rest([sure, other])

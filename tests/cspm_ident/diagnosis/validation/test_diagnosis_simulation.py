@@ -24,7 +24,7 @@ from cspm_sim.effects import Channel, catalogue
 def recording(tmp_path_factory):
     """Eight seconds of the worst sea."""
     folder = tmp_path_factory.mktemp("simulation") / "bag"
-    run(bundle_of("worst_case", "duration=8"), folder)
+    run(bundle_of("worst_case_steep", "duration=8"), folder)
     return read_measurement(folder)
 
 
@@ -49,7 +49,7 @@ def test_only_what_was_not_searched_is_judged(recording, start):
         ("bar_mass", "bar", Input.TENSION, True),
     ],
 )
-def test_a_pose_tells_of_cables_where_motor_angles_drive_both(effect, element, drive, reported):
+def test_a_pose_depends_on_cables_where_motor_angles_drive_both(effect, element, drive, reported):
     pose = Output(drive, "bar/pose/yaw", "rad", "bar", Channel.WRENCH)
     fit = SimulatedFit(pose, 1.0, before=0.4, retuned=0.4, after=0.3, floor=0.1)
     own = {Candidate(catalogue()[effect], element): np.array([0.1])}

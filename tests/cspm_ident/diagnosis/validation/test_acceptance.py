@@ -6,7 +6,8 @@ import numpy as np
 import pytest
 
 from cspm_ident.diagnosis.diagnose import _reported
-from cspm_ident.diagnosis.finding import Finding, HoldOut, Rejection, Status
+from cspm_ident.diagnosis.finding import Finding, HoldOut, Rejection, Status, reported_status
+from cspm_ident.diagnosis.parameter import Coefficients
 from cspm_ident.diagnosis.regression.block_gram import gather
 from cspm_ident.diagnosis.regression.block_regression import Gain
 from cspm_ident.diagnosis.regression.hypothesis import Hypothesis, Rival
@@ -63,7 +64,7 @@ def test_what_is_useless_is_rejected_behind_what_was():
     "less",
     [{"left_open": OPEN}, {"rejected": gone(WET)}, {"fed_back": gone(WET, Rejection.FED_BACK)}, {}],
 )
-def test_what_is_unexplained_is_asked_again_where_less_is_counted_on_than_was_found(
+def test_what_is_unexplained_is_tested_again_where_less_is_counted_on_than_was_found(
     monkeypatch, less
 ):
     """Beside what is certain, of all that is not."""
@@ -112,7 +113,7 @@ def found_in(search, hypothesis, *rivals):
     return Finding(hypothesis, gain, share, tuple(Rival(h, 1.0) for h in rivals))
 
 
-def test_what_explains_the_same_and_is_not_contradicted_stands_instead():
+def test_what_explains_the_same_and_is_not_contradicted_replaces_it():
     """Where it moves a fifth as much, a line is too much, and of a square there is nothing."""
     search = Search(shaft(2.0))
     still = shaft(0.2, seed=2)
@@ -129,7 +130,7 @@ def test_what_explains_the_same_and_is_not_contradicted_stands_instead():
         assert (tested.hypothesis, tested.status) == (LINE, Status.REJECTED)
 
 
-def test_what_takes_as_much_as_the_unknown_is_told_though_no_free_function_does():
+def test_what_takes_as_much_as_the_unknown_is_reported_though_no_free_function_does():
     search = Search(shaft(2.0))
     square, late = found_in(search, SQUARE), found_in(search, LATE)
     assert square.share > 0.5
@@ -169,3 +170,62 @@ def test_findings_are_judged_once_more_only_where_something_was_rejected(others)
     assert [each.effect for each in reported] == [each.effect for each in order]
     dry = next(each for each in reported if each.effect == DRY.effect)
     assert dry.gain.total == (10.0 if others else DRY.gain.total)
+
+
+def test_a_rival_replaces_what_a_model_cannot_have():
+    """The square explains what the impossible line did; the line is not tried again."""
+    search, judge = Search(shaft(2.0)), shaft(2.0, seed=2)
+    line = gone(found_in(search, LINE, SQUARE), Rejection.IMPOSSIBLE)
+    rejected = Acceptance((line,))
+    again = module.with_rivals(search, judge, rejected, [line])
+    assert [each.hypothesis for each in again.kept] == [SQUARE]
+    assert again.rejected == (line,)
+    square = gone(found_in(search, SQUARE, LINE), Rejection.INSIGNIFICANT)
+    both = Acceptance((line, square))
+    assert module.with_rivals(search, judge, both, [square]) is both
+
+
+def twisted(seed, weight=1.0):
+    """Two winches whose shafts move alike act on one torque, each half of it."""
+    rng, times = np.random.default_rng(seed), 0.01 * np.arange(2400)
+    speed = 2.0 * np.sin(2.1 * times) + np.sin(0.83 * times)
+    target = (weight * speed + rng.standard_normal(2400))[:, None]
+    alike = [speed + 1e-3 * rng.standard_normal(2400) for _ in BOTH.candidates]
+    own = {c: 5.0 * each[:, None, None] for c, each in zip(BOTH.candidates, alike, strict=True)}
+    place = Place(Channel.WRENCH, "bar")
+    return gather([[Equation(place, times, target, own, target)]], 0.5)
+
+
+VISCOUS = catalogue()["winch_viscous_friction"]
+BOTH = Hypothesis(VISCOUS, tuple(Candidate(VISCOUS, name) for name in ("surge", "sway")))
+
+
+@pytest.mark.parametrize("reason", [Rejection.INSIGNIFICANT, Rejection.IMPOSSIBLE])
+def test_what_no_element_shows_alone_all_may_show_with_one_set_of_parameters(reason):
+    search = Search(twisted(1))
+    each = gone(found_in(search, BOTH), reason)
+    again = module.with_rivals(search, twisted(2), Acceptance((each,)), [each])
+    if reason is Rejection.IMPOSSIBLE:
+        assert again.findings == (each,)
+        return
+    (kept,) = again.findings
+    assert kept.hypothesis == replace(BOTH, common=True)
+    values = search.fits.values([kept.hypothesis])
+    assert [v.item() for v in values.values()] == pytest.approx([0.1, 0.1], rel=0.05)
+    opposite = module.with_rivals(search, twisted(2, -1.0), Acceptance((each,)), [each])
+    assert opposite.findings == (each,)
+
+
+def test_no_rival_is_taken_that_held_out_data_contradict_or_are_silent_on():
+    search = Search(shaft(2.0))
+    line = gone(found_in(search, LINE, SQUARE), Rejection.IMPOSSIBLE)
+    rejected = Acceptance((line,))
+    for judge in (shaft(2.0, seed=2, weight=-1.0), shaft(0.02, seed=2)):
+        assert module.with_rivals(search, judge, rejected, [line]) is rejected
+
+
+@pytest.mark.parametrize(("half", "status"), [(0.9, Status.REPORTED), (1.1, Status.DOUBTFUL)])
+def test_an_interval_that_contains_zero_is_doubtful(half, status):
+    (candidate,) = DRY.hypothesis.candidates
+    own = Coefficients(candidate, np.array([0.03]), half * np.array([0.03]))
+    assert reported_status(replace(DRY, coefficients=(own,)), ()) is status

@@ -15,7 +15,7 @@ from cspm_ident.diagnosis.residuals.residual_equation import Equation
 from cspm_ident.diagnosis.validation.instrumental_variables import (
     instruments_of,
     is_proportional,
-    shows_in_what_was_asked,
+    shows_in_reference_motion,
 )
 from cspm_ident.signals.measurement import Measurement, read_measurement
 from cspm_ident.signals.samples import Samples
@@ -46,14 +46,14 @@ def shows(motion, *, missing, fed_back, beside=0.0, wanted=WANTED):
     part = Equation(PLACE, TIMES, target[:, None], columns, target[:, None])
     fitted = np.linalg.lstsq(np.column_stack([moved, other]), target, rcond=None)[0]
     weights = {INERTIA: fitted[:1], GAIN: fitted[1:]}
-    return shows_in_what_was_asked([[part]], [wanted], [INERTIA], weights, 0.5)
+    return shows_in_reference_motion([[part]], [wanted], [INERTIA], weights, 0.5)
 
 
 def test_what_only_answers_noise_does_not_show():
     """Motion in proportion to the residual's noise explains all of it, and nothing is missing."""
     assert not shows(0.0, missing=0.0, fed_back=0.3)
     assert not shows(1.0, missing=0.0, fed_back=0.3)
-    # Of what was told a part is there; the number is that of the noise.
+    # Of what was reported a part is there; the number is that of the noise.
     assert not shows(1.0, missing=0.05, fed_back=0.3)
     # What is there and what is fed back make up to the wrong sign.
     assert not shows(1.0, missing=-0.2, fed_back=0.3)
@@ -125,15 +125,15 @@ def alone():
 
 
 @pytest.mark.slow
-def test_a_sound_machine_whose_bar_stands_still_is_consistent(tmp_path):
+def test_a_healthy_machine_whose_bar_stands_still_is_consistent(tmp_path):
     """Of what stands still sensors see noise alone, which motion control follows."""
     pytest.importorskip("mujoco", minversion="4.0", reason="the MuJoCo plant needs MuJoCo 4")
     scenario = resolve(alone(), THESIS.testbed)
     bundle = make_bundle(scenario, THESIS, SCENARIOS / "testbeds")
     healthy = conceal(THESIS.testbed, {}, 0.0, 6)
     record_concealed(
-        bundle, healthy, tmp_path / "sound", note="", without=(), progress=lambda now: None
+        bundle, healthy, tmp_path / "healthy", note="", without=(), progress=lambda now: None
     )
-    found = diagnose([read_measurement(tmp_path / "sound")])
+    found = diagnose([read_measurement(tmp_path / "healthy")])
     assert verdict_of(found) is Verdict.CONSISTENT
     assert any(is_proportional(each.hypothesis.effect) for each in found.rejected)

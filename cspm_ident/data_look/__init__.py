@@ -1,0 +1,1 @@
+"""What recordings themselves show, before any model is fitted to them."""

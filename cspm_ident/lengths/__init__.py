@@ -1,0 +1,1 @@
+"""Encoders against measured poses: cable lengths without torque or tension."""

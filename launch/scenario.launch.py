@@ -1,6 +1,7 @@
 """Start the nodes of one scenario, each in a process; all of them end when the plant does.
 
 ros2 launch cspm scenario.launch.py scenario:=calm pace:=realtime record:=/tmp/calm
+ros2 launch cspm scenario.launch.py scenario:=calm_measured_target target:=measured
 """
 
 from datetime import datetime
@@ -12,6 +13,8 @@ from launch.substitutions import LaunchConfiguration
 from launch_ros.actions import Node
 
 EXTERNAL = "external"
+PRESCRIBED = "prescribed"
+TRACKER = "target_tracker"
 OTHERS = (
     "wave_trajectory",
     "motion_controller",
@@ -35,6 +38,12 @@ def generate_launch_description() -> LaunchDescription:
                 "plant", default_value="sim", choices=["sim", "mujoco", EXTERNAL]
             ),
             DeclareLaunchArgument(
+                "target",
+                default_value=PRESCRIBED,
+                choices=[PRESCRIBED, "measured", EXTERNAL],
+                description="as the scenario's target.source; its tracker is a node of its own",
+            ),
+            DeclareLaunchArgument(
                 "record",
                 default_value="",
                 description="a new folder; empty for recordings/SCENARIO-DATE-TIME",
@@ -51,10 +60,11 @@ def generate_launch_description() -> LaunchDescription:
 
 def nodes(context: LaunchContext) -> list[Node]:
     """Return the nodes that the arguments ask for; an external plant is not ours to start."""
-    scenario, pace, plant, record, patience = (
+    scenario, pace, plant, target, record, patience = (
         LaunchConfiguration(name).perform(context)
-        for name in ("scenario", "pace", "plant", "record", "patience")
+        for name in ("scenario", "pace", "plant", "target", "record", "patience")
     )
+    others = OTHERS if target == PRESCRIBED else (TRACKER, *OTHERS)
     dated = f"recordings/{Path(scenario).stem}-{datetime.now():%Y%m%d-%H%M%S}"
     # Launch reads texts as YAML, so that the nodes get a number.
     parameters = {
@@ -64,10 +74,10 @@ def nodes(context: LaunchContext) -> list[Node]:
         "patience": patience,
     }
     if plant == EXTERNAL:
-        return [node(name, parameters) for name in OTHERS]
+        return [node(name, parameters) for name in others]
     parameters["plant"] = plant
     plant_node = node("plant", parameters, on_exit=Shutdown(reason="the plant has ended"))
-    return [plant_node, *(node(name, parameters) for name in OTHERS)]
+    return [plant_node, *(node(name, parameters) for name in others)]
 
 
 def node(name: str, parameters: dict[str, str], **options: Shutdown) -> Node:

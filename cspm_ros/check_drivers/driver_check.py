@@ -1,7 +1,7 @@
 """Whether drivers speak the contract, judged from what was heard on their topics for some seconds.
 
 Pure: the messages come in, findings go out. A finding's `ok` is None where the messages cannot
-tell, or where something is odd that only a person at the machine can judge.
+decide, or where something is odd that only a person at the machine can judge.
 """
 
 from __future__ import annotations
@@ -19,6 +19,7 @@ from cspm_msgs_py.wire import WireReader
 from cspm_ros.check_drivers.driver_change import check_change, check_finite
 from cspm_ros.check_drivers.driver_machine import check_machine
 from cspm_ros.check_drivers.driver_observation import Finding, Heard, Observation, hear
+from cspm_ros.check_drivers.driver_rest import constant_at_rest, said_at_rest
 from cspm_ros.check_drivers.driver_timing import check_timing
 from cspm_ros.check_drivers.driver_values import check_units
 
@@ -54,13 +55,16 @@ def check_drivers(
         found, comparable = _check(topic, rate_hz, observation, testbed)
         findings += [_with_hint(topic, finding, observations, testbed) for finding in found]
         heard |= {name: comparable} if comparable else {}
-    return findings + check_machine(testbed, heard, {f.topic for f in findings if _spoils(f)})
+    resting = constant_at_rest(testbed, heard)
+    faulty = {f.topic for f in findings if _spoils(f, resting)}
+    findings = [said_at_rest(finding, resting) for finding in findings]
+    return findings + check_machine(testbed, heard, faulty)
 
 
-def _spoils(finding: Finding) -> bool:
+def _spoils(finding: Finding, resting: frozenset[str]) -> bool:
     """Return whether a topic with this finding cannot serve to judge another."""
     if finding.check == "changes":
-        return finding.ok is None
+        return finding.ok is None and finding.topic not in resting
     return finding.check in _SPOILING and finding.ok is False
 
 

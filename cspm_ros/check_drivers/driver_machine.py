@@ -47,47 +47,47 @@ TORQUE_TOLERANCE = 0.5  # friction takes or adds that much
 
 
 def check_machine(
-    testbed: Testbed, heard: Mapping[str, Heard], unsound: Collection[str]
+    testbed: Testbed, heard: Mapping[str, Heard], faulty: Collection[str]
 ) -> list[Finding]:
     """Judge topics against each other.
 
     Args:
         testbed: the machine.
         heard: what was heard, by topic, with finite numbers and increasing stamps.
-        unsound: topics whose numbers are known to be wrong.
+        faulty: topics whose numbers are known to be wrong.
     """
     findings = []
     for body in ("/winch_frame", "/bar"):
         if f"{body}/twist" in heard:
-            findings += list(_twist(heard, unsound, body))
+            findings += list(_twist(heard, faulty, body))
     if testbed.bar is not None and testbed.gravity:
-        findings += _hanging(testbed, heard, unsound)
+        findings += _hanging(testbed, heard, faulty)
     # Where no weight shows the tensions' unit, the torques may.
-    comparable = TENSION not in unsound or testbed.bar is None
+    comparable = TENSION not in faulty or testbed.bar is None
     if WINCHES in heard and TENSION in heard and comparable:
         findings += _torques(testbed, heard[WINCHES], heard[TENSION])
     return findings
 
 
-def _obstacle(names: list[str], heard: Mapping[str, Heard], unsound: Collection[str]) -> str:
+def _obstacle(names: list[str], heard: Mapping[str, Heard], faulty: Collection[str]) -> str:
     """Return why these topics cannot be compared, empty if they can."""
     for name in names:
-        if name not in heard or name in unsound:
-            return f"cannot tell without a usable {name}"
+        if name not in heard or name in faulty:
+            return f"cannot decide without a usable {name}"
     starts = [int(heard[name].value_stamp_ns[0]) for name in names]
     ends = [int(heard[name].value_stamp_ns[-1]) for name in names]
     shortest = min(end - start for start, end in zip(starts, ends, strict=True))
     if min(ends) - max(starts) < LEAST_OVERLAP * shortest:
-        return f"cannot tell: the stamps of {' and '.join(names)} are not of the same time"
+        return f"cannot decide: the stamps of {' and '.join(names)} are not of the same time"
     return ""
 
 
 def _hanging(
-    testbed: Testbed, heard: Mapping[str, Heard], unsound: Collection[str]
+    testbed: Testbed, heard: Mapping[str, Heard], faulty: Collection[str]
 ) -> list[Finding]:
     """Judge what needs the machine's geometry: where z points, the weight, the lengths."""
     poses = [BAR_POSE] + [FRAME_POSE] * (testbed.winch_frame is not None)
-    obstacle = _obstacle(poses, heard, unsound)
+    obstacle = _obstacle(poses, heard, faulty)
     if obstacle:
         return [Finding(BAR_POSE, "axes", None, obstacle)]
     try:
@@ -111,7 +111,7 @@ def _hanging(
 def _axes(shape: Geometry) -> Finding:
     depth = float(np.median(shape.depth))
     if abs(depth) < LEAST_DEPTH:
-        return Finding(BAR_POSE, "axes", None, "cannot tell: the bar is as high as the exits")
+        return Finding(BAR_POSE, "axes", None, "cannot decide: the bar is as high as the exits")
     if depth > 0:
         text = f"z points down: the bar is {depth:.3g} m below the exits"
         return Finding(BAR_POSE, "axes", True, text)
@@ -126,19 +126,19 @@ def _balance(testbed: Testbed, shape: Geometry, tension: Heard) -> list[Finding]
         return []
     negative = tensions.mean(axis=0) < LOWEST_TENSION
     if negative.any() and not negative.all():
-        return [Finding(TENSION, "balance", None, "cannot tell with some tensions negative")]
+        return [Finding(TENSION, "balance", None, "cannot decide with some tensions negative")]
     times = seconds(tension.value_stamp_ns - shape.start_ns)
     window = shape.times[-1]
     (early, first), (late, last) = _velocities(shape.times, shape.com_z, END_SHARE * window)
     inside = (times >= early) & (times <= late)
     if late <= early or not inside.any():
-        return [Finding(TENSION, "balance", None, "cannot tell from so few messages")]
+        return [Finding(TENSION, "balance", None, "cannot decide from so few messages")]
     lift = np.array([np.interp(times[inside], shape.times, c) for c in shape.lift.T]).T
     carried = float(np.mean((lift * tensions[inside]).sum(axis=1)))
     needed = testbed.bar.mass * (testbed.gravity - (last - first) / (late - early))
     text = f"the cables lift {carried:.4g} where the bar needs {needed:.4g} N"
     if needed < LEAST_LOAD * testbed.bar.mass * testbed.gravity:
-        return [Finding(TENSION, "balance", None, f"{text}: it falls too fast to tell")]
+        return [Finding(TENSION, "balance", None, f"{text}: it falls too fast to decide")]
     if abs(carried) < HANGING * needed:
         return [Finding(TENSION, "balance", None, f"{text}: does it hang?")]
     fault = factor_fault(carried / needed, TENSION_UNITS, WEIGHT_TOLERANCE)
@@ -195,7 +195,7 @@ def _torques(testbed: Testbed, winches: Heard, tension: Heard) -> list[Finding]:
         held, pull = float(torques[:, i].mean()) / _radius(cable), float(tensions[:, i].mean())
         units = _with_drum(cable, TORQUE_UNITS, 1) | (HELD_UNITS if testbed.bar is None else {})
         if cable.rotor_inertia * abs(spin[i]) > INERTIA_SHARE * _radius(cable) * abs(pull):
-            verdicts[cable.name] = None, "cannot tell the torque's unit: the winch gains speed"
+            verdicts[cable.name] = None, "cannot decide the torque's unit: the winch gains speed"
         else:
             verdicts[cable.name] = _torque_verdict(held, pull, units)
     return grouped(WINCHES, "holding", verdicts)
@@ -216,17 +216,17 @@ def _torque_verdict(held: float, tension: float, units: Mapping[float, str]) -> 
     """Judge the force at the drum that a torque holds by the cable's tension [N]."""
     what = "the torque that holds the tension"
     if tension < LEAST_TENSION:
-        return None, "cannot tell the torque's unit: the cable carries hardly anything"
+        return None, "cannot decide the torque's unit: the cable carries hardly anything"
     name = factor_name(held / tension, units, TORQUE_TOLERANCE)
     if name is None:
         return None, f"{held / tension:.1f} × {what}: do friction or a brake hold it?"
     return not name, f"{what}, but {name}" if name else f"about {what}"
 
 
-def _twist(heard: Mapping[str, Heard], unsound: Collection[str], body: str) -> Iterator[Finding]:
+def _twist(heard: Mapping[str, Heard], faulty: Collection[str], body: str) -> Iterator[Finding]:
     """Judge a measured twist by the measured pose's derivative."""
     name, pose = f"{body}/twist", f"{body}/pose"
-    obstacle = _obstacle([pose, name], heard, unsound)
+    obstacle = _obstacle([pose, name], heard, faulty)
     if obstacle:
         yield Finding(name, "speed", None, obstacle)
         return

@@ -54,7 +54,7 @@ class Finding:
     Attributes:
         topic: the topic judged.
         check: which check, one word.
-        ok: None where the messages cannot tell, or where only a person can.
+        ok: None where the messages cannot decide, or where only a person can.
         text: what was found, and what was expected where it differs.
     """
 

@@ -41,7 +41,7 @@ HELD_UNITS = {
     0.001: "with the tension in millinewtons",
 }
 
-# Whether something is as it must be, None where the numbers cannot tell, and why.
+# Whether something is as it must be, None where the numbers cannot decide, and why.
 Verdict = tuple[bool | None, str]
 
 
@@ -149,7 +149,7 @@ def verdict_on(
         tolerance: by how much the factor may be off.
     """
     if not relation.clear and relation.swamped:
-        return None, f"cannot tell whether it is {what}: it hardly moves"
+        return None, f"cannot decide whether it is {what}: it hardly moves"
     if abs(relation.correlation) < LEAST_CORRELATION:
         return False, f"is not {what}{hint}"
     fault = factor_fault(relation.factor, units, tolerance)

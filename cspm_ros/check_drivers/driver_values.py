@@ -116,7 +116,7 @@ def _angles(heard: Heard) -> list[Finding]:
     """Judge each winch's angle by itself, and its speed by the angle."""
     name, ordered = heard.topic.name, heard.in_order()
     if ordered is None:
-        return [Finding(name, "speed", None, "cannot tell without increasing stamps")]
+        return [Finding(name, "speed", None, "cannot decide without increasing stamps")]
     angles, speeds = ordered.part("position"), ordered.part("velocity")
     if angles is None:
         return []

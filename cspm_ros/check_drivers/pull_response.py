@@ -64,11 +64,11 @@ _SIGNALS = (
     ),
     _Signal(
         "angle", "/winches/state", 0, LEAST_LENGTH, "let out {:.3g} m", "wound in {:.3g} m",
-        "cannot tell: no motor turned clearly, the drives hold",
+        "cannot decide: no motor turned clearly, the drives hold",
     ),
     _Signal(
         "torque", "/winches/state", 2, LEAST_FORCE, "rose by {:.3g} N", "fell by {:.3g} N",
-        "cannot tell: no torque changed clearly, brakes or constant torques hold",
+        "cannot decide: no torque changed clearly, brakes or constant torques hold",
     ),
 )  # fmt: skip
 
@@ -177,12 +177,12 @@ def _farthest(values: Array, rest: Array) -> Array:
 
 def _verdict(signal: _Signal, answer: _Answer | None, names: Sequence[str], cable: str) -> Verdict:
     if answer is None:
-        return None, f"cannot tell: too few messages of {signal.topic}"
+        return None, f"cannot decide: too few messages of {signal.topic}"
     if not answer.answered:
         return None, signal.unmoved
     if len(answer.answered) > 1:
         several = " and ".join(names[i] for i in answer.answered)
-        return None, f"cannot tell: the {signal.name} of {several} answered alike; hold the bar"
+        return None, f"cannot decide: the {signal.name} of {several} answered equally; hold the bar"
     found = answer.answered[0]
     change = float(answer.changes[found])
     said = (signal.grows if change > 0 else signal.shrinks).format(abs(change))
@@ -200,7 +200,7 @@ def _bar_verdict(testbed: Testbed, cable: str, before: Window, during: Window) -
     for name in moving:
         for window in (before, during):
             if name not in window or len(window[name]) < FEWEST_ROWS:
-                return None, f"cannot tell: too few messages of {name}"
+                return None, f"cannot decide: too few messages of {name}"
     index = testbed.cable_names.index(cable)
     try:
         rest, pulled = (_lengths(testbed, window, index) for window in (before, during))
@@ -208,10 +208,10 @@ def _bar_verdict(testbed: Testbed, cable: str, before: Window, during: Window) -
         return False, f"impossible pose: {err}"
     still, moved = (_movement(window, before) for window in (before, during))
     if moved < max(LEAST_LENGTH, ABOVE_REST * still):
-        return None, "cannot tell: the bar did not move clearly"
+        return None, "cannot decide: the bar did not move clearly"
     change = float(_farthest(pulled, rest)[0])
     if abs(change) < max(0.5 * LEAST_LENGTH, ABOVE_REST * abs(float(_farthest(rest, rest)[0]))):
-        return None, f"cannot tell: the bar moved across {cable}, not along it"
+        return None, f"cannot decide: the bar moved across {cable}, not along it"
     text = f"the bar moved by {moved:.3g} m"
     if change > 0:
         return True, f"{text}, {change:.3g} m away from the exit of {cable}"

@@ -2,16 +2,24 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 from contextlib import contextmanager
+from typing import Protocol
 
 from rich.console import Console
 from rich.markup import escape
 from rich.progress import BarColumn, Progress, TextColumn
 
 
+class ShowTime(Protocol):
+    """What shows the time that has passed [s], and what is being done where that changes."""
+
+    def __call__(self, passed: float, what: str = ..., /) -> None:
+        """Show it."""
+
+
 @contextmanager
-def time_bar(console: Console, text: str, seconds: float) -> Iterator[Callable[[float], None]]:
+def time_bar(console: Console, text: str, seconds: float) -> Iterator[ShowTime]:
     """Give what shows the time that has passed [s]; nothing is shown where nobody looks."""
     with Progress(
         TextColumn("{task.description}"),
@@ -22,4 +30,8 @@ def time_bar(console: Console, text: str, seconds: float) -> Iterator[Callable[[
         disable=not console.is_terminal,
     ) as bar:
         task = bar.add_task(escape(text), total=seconds)
-        yield lambda passed: bar.update(task, completed=passed)
+
+        def show(passed: float, what: str = text, /) -> None:
+            bar.update(task, completed=passed, description=escape(what))
+
+        yield show

@@ -83,7 +83,7 @@ class LockstepPlayerNode:
         others = [name for name in run.members if name != PLAYER]
         self._others = PlantSide(node, self._schedule.period_ns, others, self._note_progress)
         self._recorded = -1 if RECORDER in others else None
-        self.started, self._told_end = False, False
+        self.started, self._reported_end = False, False
         self.last_step = -1
         self.refused = (0, "")
         selection = Selection(duration_s=duration_s)
@@ -98,7 +98,7 @@ class LockstepPlayerNode:
     @property
     def finished(self) -> bool:
         """Whether the run is over and everybody has all of it."""
-        return self._told_end and self._slowest() >= self.last_step
+        return self._reported_end and self._slowest() >= self.last_step
 
     @property
     def progress(self) -> int:
@@ -139,8 +139,8 @@ class LockstepPlayerNode:
     def _pump(self) -> None:
         """Go on as far as time and the other nodes allow."""
         self.controls.advance()
-        if self.controls.player.finished and not self._told_end:
-            self._told_end = True
+        if self.controls.player.finished and not self._reported_end:
+            self._reported_end = True
             self._others.tell_end(self.last_step)
 
     def _slowest(self) -> int:

@@ -65,7 +65,7 @@ def replay(
     *,
     paused: bool = False,
     domain_id: int | None = None,
-    tell: Callable[[str], None] = lambda _: None,
+    notify: Callable[[str], None] = lambda _: None,
 ) -> Replayed:
     """Play a bag to whoever listens.
 
@@ -76,14 +76,14 @@ def replay(
         look: called some 20 times a second with the player.
         paused: whether to begin paused.
         domain_id: instead of `ROS_DOMAIN_ID`.
-        tell: gets a line about each topic that cannot be played.
+        notify: gets a line about each topic that cannot be played.
 
     Raises:
         InputError: the bag does not have what is to be played, or is damaged.
     """
     with Session(domain_id=domain_id) as session:
         node = PlayerNode(session.node(PLAYER), bag, selection, _in_time(rate), paused=paused)
-        return _play_in_time(session, node, look, tell)
+        return _play_in_time(session, node, look, notify)
 
 
 def replay_through(
@@ -214,10 +214,10 @@ def _run_in_step(
 
 
 def _play_in_time(
-    session: Session, node: PlayerNode, look: Look, tell: Callable[[str], None]
+    session: Session, node: PlayerNode, look: Look, notify: Callable[[str], None]
 ) -> Replayed:
     for name, why in node.unplayable.items():
-        tell(f"{name} is not played: {why}")
+        notify(f"{name} is not played: {why}")
     player = node.controls.player
     session.every(_LOOK_OFTEN_S, lambda: look(player))
     session.spin_until(lambda: session.stopped or player.finished)

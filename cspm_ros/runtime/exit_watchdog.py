@@ -11,14 +11,14 @@ IN_ORDER = frozenset({0, -signal.SIGALRM})
 
 
 @contextmanager
-def exit_watchdog(seconds: float) -> Iterator[Callable[[], None]]:
+def exit_watchdog() -> Iterator[Callable[[float], None]]:
     """Yield what gives the rest of the block so long [s]: then the system ends the process.
 
     A participant of Fast DDS 2.14 that leaves while another does may wait for itself without end,
     with Python's lock held, so that nothing written in Python could end it. The signal is SIGALRM.
     """
 
-    def begin() -> None:
+    def begin(seconds: float) -> None:
         signal.signal(signal.SIGALRM, signal.SIG_DFL)
         signal.setitimer(signal.ITIMER_REAL, seconds)
 

@@ -11,7 +11,7 @@ from cspm_msgs_py.stepping.lockstep import WINDOW
 from cspm_msgs_py.topics import DIAGNOSTICS
 from cspm_ros.runtime.nodes_of_run import NodesOfRun
 from cspm_ros.runtime.recorder_node import RecorderNode
-from cspm_run.assembly import assemble_stage
+from cspm_run.assembly import assemble_stage, check_lockstep
 from cspm_sim.plant_node import PlantNode
 
 
@@ -19,7 +19,12 @@ class LockstepRun(NodesOfRun):
     """A run in lockstep whose nodes are to be made; attributes as `NodesOfRun`."""
 
     def plant(self, node: ContractNode, steps: int) -> PlantNode:
-        """Return the plant's node; `steps` is how many plant steps to make."""
+        """Return the plant's node; `steps` is how many plant steps to make.
+
+        Raises:
+            InputError: somebody's driver is to send a topic, who cannot keep the schedule.
+        """
+        check_lockstep(self.schedule)
         with self.bundle.unpacked() as place:
             run = self.plant_run(steps, place)
         return PlantNode(node, run)

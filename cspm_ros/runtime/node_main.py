@@ -12,6 +12,7 @@ from cspm_msgs_py.schedule import (
     FORCE_CONTROLLER,
     MOTION_CONTROLLER,
     PLANT,
+    TARGET_TRACKER,
     TENSION_DISTRIBUTION,
     WAVE_TRAJECTORY,
 )
@@ -74,6 +75,11 @@ def plant() -> None:
 def wave_trajectory() -> None:
     """Run the wave trajectory."""
     sys.exit(main(WAVE_TRAJECTORY, sys.argv[1:]))
+
+
+def target_tracker() -> None:
+    """Run the target tracker."""
+    sys.exit(main(TARGET_TRACKER, sys.argv[1:]))
 
 
 def motion_controller() -> None:

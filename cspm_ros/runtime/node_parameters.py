@@ -27,7 +27,7 @@ from cspm_run.recorded_bundle import recorded_bundle
 LOCKSTEP, REALTIME = "lockstep", "realtime"
 
 
-def _told(default: object, text: str, *choices: str, least: float | None = None) -> Any:  # noqa: ANN401 - a dataclass field
+def _value(default: object, text: str, *choices: str, least: float | None = None) -> Any:  # noqa: ANN401 - a dataclass field
     return field(default=default, metadata={"text": text, "choices": choices, "least": least})
 
 
@@ -35,28 +35,28 @@ def _told(default: object, text: str, *choices: str, least: float | None = None)
 class NodeParameters:
     """One node's parameters; empty text and zero stand for the scenario's own."""
 
-    scenario: str = _told("worst_case", "a scenario's name, or a scenario file")
-    overrides: tuple[str, ...] = _told((), "values put over the scenario's, key.path=value")
-    pace: str = _told(LOCKSTEP, "what paces the run: the schedule or the wall", LOCKSTEP, REALTIME)
-    plant: str = _told(SIM, "whose equations the plant node simulates", *PLANTS)
-    nodes: tuple[str, ...] = _told((), "the nodes of this run; empty: all, and the recorder")
-    steps: int = _told(0, "end after so many plant steps; 0: the scenario's duration", least=0)
-    folder: str = _told("", "recorder: a new folder for the recording")
-    mode: str = _told("processes", "recorder: the mode named in the recording")
-    report: str = _told("", "plant or leader: a file that it keeps up to date with how far it is")
-    patience: float = _told(
+    scenario: str = _value("worst_case", "a scenario's name, or a scenario file")
+    overrides: tuple[str, ...] = _value((), "values put over the scenario's, key.path=value")
+    pace: str = _value(LOCKSTEP, "what paces the run: the schedule or the wall", LOCKSTEP, REALTIME)
+    plant: str = _value(SIM, "whose equations the plant node simulates", *PLANTS)
+    nodes: tuple[str, ...] = _value((), "the nodes of this run; empty: all, and the recorder")
+    steps: int = _value(0, "end after so many plant steps; 0: the scenario's duration", least=0)
+    folder: str = _value("", "recorder: a new folder for the recording")
+    mode: str = _value("processes", "recorder: the mode named in the recording")
+    report: str = _value("", "plant or leader: a file that it keeps up to date with how far it is")
+    patience: float = _value(
         PATIENCE_S,
         "give up when nothing moves for so long, once the run is under way [s]",
         least=LEAST_PATIENCE_S,
     )
-    until_stdin_closes: bool = _told(False, "stop when standard input is closed")
-    bag: str = _told("", "player: what to play; others: a recording that names the scenario")
-    rate: float = _told(1.0, "player: bag time per wall time; 0, in lockstep: as nodes can")
-    topics: tuple[str, ...] = _told((), "player: only these topics, and the clock")
-    left_out: tuple[str, ...] = _told((), "player: all topics but these")
-    start: float = _told(0.0, "player: where in the bag to begin [s]")
-    paused: bool = _told(False, "player: whether to begin paused")
-    lockstep: bool = _told(False, "player: take the plant's place in a run in lockstep")
+    until_stdin_closes: bool = _value(False, "stop when standard input is closed")
+    bag: str = _value("", "player: what to play; others: a recording that names the scenario")
+    rate: float = _value(1.0, "player: bag time per wall time; 0, in lockstep: as nodes can")
+    topics: tuple[str, ...] = _value((), "player: only these topics, and the clock")
+    left_out: tuple[str, ...] = _value((), "player: all topics but these")
+    start: float = _value(0.0, "player: where in the bag to begin [s]")
+    paused: bool = _value(False, "player: whether to begin paused")
+    lockstep: bool = _value(False, "player: take the plant's place in a run in lockstep")
 
     def bundle(self) -> Bundle:
         """Return the run's description, resolved.
@@ -69,7 +69,8 @@ class NodeParameters:
         path = find_scenario(self.scenario)
         scenario = load_scenario(path, self.overrides)
         testbed = load_testbed(path.parent / scenario.testbed)
-        bundle = make_bundle(resolve(scenario, testbed.testbed), testbed, path.parent)
+        resolved = resolve(scenario, testbed.testbed, path.parent)
+        bundle = make_bundle(resolved, testbed, path.parent)
         return replace(bundle, plant=self.plant)
 
     def members(self, schedule: Schedule) -> tuple[str, ...]:
@@ -96,11 +97,16 @@ def read_parameters(node: Node) -> NodeParameters:
     for each in fields(NodeParameters):
         found[each.name] = value = _declare(node, each)
         choices, least = each.metadata["choices"], each.metadata["least"]
-        if choices and value not in choices:
-            raise InputError(f"parameter {each.name}: {value}, allowed: {', '.join(choices)}")
-        if least is not None and not least <= value < math.inf:
-            raise InputError(f"parameter {each.name}: {value}, allowed: {least} or more")
+        outside = choices and value not in choices
+        if outside or (least is not None and not least <= value < math.inf):
+            raise InputError(f"parameter {each.name}: {value}, allowed: {_allowed(each)}")
     return NodeParameters(**found)
+
+
+def _allowed(each: Field[Any]) -> str:
+    """Return a parameter's choices or range in words, empty if it has neither."""
+    choices, least = each.metadata["choices"], each.metadata["least"]
+    return ", ".join(choices) if choices or least is None else f"{least} or more"
 
 
 def _declare(node: Node, each: Field[Any]) -> Any:  # noqa: ANN401 - of the field's type
@@ -108,7 +114,11 @@ def _declare(node: Node, each: Field[Any]) -> Any:  # noqa: ANN401 - of the fiel
     default, text = each.default, each.metadata["text"]
     # ROS 2 knows no type of an empty list, and takes no whole number for another.
     several, real = isinstance(default, tuple), isinstance(default, float)
-    descriptor = ParameterDescriptor(description=text, read_only=True, dynamic_typing=real)
+    # In words: of a range broken at the start, ROS 2 would say neither where nor what is allowed.
+    constraints = f"allowed: {allowed}" if (allowed := _allowed(each)) else ""
+    descriptor = ParameterDescriptor(
+        description=text, additional_constraints=constraints, read_only=True, dynamic_typing=real
+    )
     try:
         declared = node.declare_parameter(each.name, [""] if several else default, descriptor)
     except InvalidParameterTypeException:

@@ -16,8 +16,9 @@ from cspm_ros.runtime.background import put_behind
 from cspm_ros.runtime.stall_watchdog import STANDSTILL
 
 LEAVING_S = 5.0
-# How long a node may be gone, or silent, before that is reported.
+# How long a node may be gone before that is reported.
 SILENCE_S = 2.0
+_LOOK_EVERY_S = 0.05
 _TAIL = 4000
 _WARNING = re.compile(r"\[(?:WARN|ERROR|FATAL)\] \[[\d.]+\] \[(.+?)\]: (.+)\n")
 
@@ -34,14 +35,13 @@ class NodeProcesses:
             names: of the nodes.
             parameters: ROS 2 parameter file for all of them.
             log: folder for what they print.
-            behind: who of them has time and gives way to the others.
+            behind: who of them has time, and gives way to the others once the run has begun.
         """
         self._log = log
-        self._asked: set[str] = set()
+        self._ending: set[str] = set()
         self._read = dict.fromkeys(names, 0)
         self.by_name = {name: self._start(name, parameters) for name in names}
-        for name in behind:
-            put_behind(self.by_name[name].pid)
+        self._behind = list(behind)
 
     def _start(self, name: str, parameters: Path) -> subprocess.Popen[bytes]:
         command = [sys.executable, "-m", "cspm_ros.runtime.node_main", name]
@@ -55,27 +55,46 @@ class NodeProcesses:
                 start_new_session=True,
             )
 
+    def begin(self) -> None:
+        """Note that the run has begun: who has time gives way. The start waits for them as well."""
+        while self._behind:
+            put_behind(self.by_name[self._behind.pop()].pid)
+
     def ended(self) -> dict[str, int]:
         """Return the exit codes of those that ended; a signal is negative."""
         codes = {name: process.poll() for name, process in self.by_name.items()}
         return {name: code for name, code in codes.items() if code is not None}
 
     def stop(self, name: str) -> None:
-        """Ask a node to end, once: a second signal would not let it end in order."""
-        if self.by_name[name].poll() is None and name not in self._asked:
-            self._asked.add(name)
+        """Signal a node to end, once: a second signal would not let it end in order."""
+        if self.by_name[name].poll() is None and name not in self._ending:
+            self._ending.add(name)
             self.by_name[name].send_signal(signal.SIGINT)
 
-    def obituary(self, name: str) -> str:
-        """Return in one line how a node ended, and its last words."""
+    def obituary(self, name: str, leaving_s: float = LEAVING_S) -> str:
+        """Return in one line how a node ended, and its last words.
+
+        Args:
+            name: of the node.
+            leaving_s: how long the others may take to give up as well [s].
+        """
         code, words = self.by_name[name].poll() or 0, self._last_words(name)
         how = f"by signal {signal.Signals(-code).name}" if code < 0 else f"with exit code {code}"
-        told = f"{name} ended {how} before the run did" + f": {words}" * bool(words)
-        if STANDSTILL not in words or self.wait(SILENCE_S):
-            return told
+        text = f"{name} ended {how} before the run did" + f": {words}" * bool(words)
+        if STANDSTILL not in words or self._wait_for_others(leaving_s):
+            return text
         # All nodes give up a run that stands still, but for those that hang themselves.
         silent = [name for name in self.by_name if name not in self.ended()]
-        return f"no answer from {', '.join(silent)}; {told}"
+        return f"no answer from {', '.join(silent)}; {text}"
+
+    def _wait_for_others(self, seconds: float) -> bool:
+        """Wait for all to end; return whether they did. Nobody waits for those that are stopped."""
+        deadline = time.monotonic() + seconds
+        while left := [each for each in self.by_name.values() if each.poll() is None]:
+            if time.monotonic() > deadline or all(_is_stopped(each.pid) for each in left):
+                return False
+            time.sleep(_LOOK_EVERY_S)
+        return True
 
     def warnings(self) -> list[str]:
         """Return what the nodes warned of since the last call, a line each."""
@@ -125,3 +144,13 @@ class NodeProcesses:
 
     def __exit__(self, *_: object) -> None:
         self.close()
+
+
+def _is_stopped(process: int) -> bool:
+    """Return whether a signal has stopped a process; False where the system does not show it."""
+    try:
+        state = Path(f"/proc/{process}/stat").read_text(errors="replace")
+    except OSError:
+        return False
+    # After the name in parentheses, which may hold anything.
+    return state.rpartition(")")[2].split()[0] == "T"

@@ -28,7 +28,8 @@ from cspm_run.recorded_run import new_recording
 # Where nobody is in a hurry: longer than lost packets take; or as long as starting took.
 _DELIVERY_S = 3.0
 _STDIN_BYTES = 4096
-# To destroy what the node has takes a tenth of a second; the processor may be full.
+# To destroy what the node has takes a tenth of a second; or as long as starting took, where the
+# processor is full.
 _LEAVING_S = 3.0
 
 
@@ -47,9 +48,9 @@ def run_node(name: str, args: Sequence[str], began: float) -> None:
     if name not in NODES:
         raise InputError(f"node {name}: allowed: {', '.join(NODES)}")
     with ExitStack() as stack:
-        start_exit_watchdog = stack.enter_context(exit_watchdog(_LEAVING_S))
+        start_exit_watchdog = stack.enter_context(exit_watchdog())
         session = stack.enter_context(Session(args))
-        stack.callback(start_exit_watchdog)
+        stack.callback(start_exit_watchdog, max(_LEAVING_S, time.perf_counter() - began))
         node = session.node(name)
         parameters = read_parameters(node.node)
         if parameters.until_stdin_closes:
@@ -57,6 +58,7 @@ def run_node(name: str, args: Sequence[str], began: float) -> None:
         if name == PLAYER:
             run_player(session, node, parameters, began)
         elif parameters.pace == REALTIME:
+            session.poll()
             _run_realtime(session, node, parameters, stack)
         else:
             _run_lockstep(session, node, parameters, stack, began)

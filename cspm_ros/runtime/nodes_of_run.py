@@ -50,7 +50,7 @@ class NodesOfRun:
             place: where the bundle is unpacked.
         """
         scenario, testbed = self.bundle.scenario, self.bundle.testbed.testbed
-        plant, sensors = assemble_simulator(scenario, testbed, place, self.bundle.plant)
+        plant, sensors, target = assemble_simulator(scenario, testbed, place, self.bundle.plant)
         return PlantRun(
             plant=plant,
             sensors=sensors,
@@ -59,4 +59,5 @@ class NodesOfRun:
             edges=self.edges,
             nodes=self.members,
             controlled=isinstance(scenario.control, ClosedLoop),
+            target=target,
         )

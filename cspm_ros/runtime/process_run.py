@@ -15,6 +15,7 @@ from cspm_msgs_py.errors import CspmError, InputError
 from cspm_msgs_py.graph import RECORDER
 from cspm_msgs_py.interruption import interruptible
 from cspm_msgs_py.schedule import PLANT, schedule_of
+from cspm_ros.runtime.background import SHARE_BEHIND
 from cspm_ros.runtime.exit_watchdog import IN_ORDER
 from cspm_ros.runtime.node_parameters import LOCKSTEP, REALTIME, NodeParameters, write_parameters
 from cspm_ros.runtime.node_processes import LEAVING_S, SILENCE_S, NodeProcesses
@@ -39,7 +40,7 @@ def run_processes(
     *,
     mode: str = PROCESSES,
     external: bool = False,
-    tell: Callable[[str], None] = lambda _: None,
+    notify: Callable[[str], None] = lambda _: None,
     steps: int | None = None,
     domain_id: int | None = None,
     patience_s: float = PATIENCE_S,
@@ -52,7 +53,7 @@ def run_processes(
         progress: called now and then with the time simulated so far [s].
         mode: `processes`, in lockstep, or `realtime`.
         external: leave the plant out: hardware is in its place.
-        tell: called with what the start waits for, in one line, when that changes, and with what
+        notify: called with what the start waits for, in one line, when that changes, and with what
             the nodes warn of.
         steps: end after so many plant steps; None runs the scenario's duration.
         domain_id: instead of `ROS_DOMAIN_ID`.
@@ -104,7 +105,7 @@ def run_processes(
                 mode == REALTIME,
                 Patience(math.inf if external else patience_s),
             )
-            report = follower.follow(progress, tell, stop_wanted)
+            report = follower.follow(progress, notify, stop_wanted)
             interrupted = stop_wanted()
     return recorded_result(
         bundle,
@@ -144,7 +145,7 @@ class _Follower:
     def follow(
         self,
         progress: Callable[[float], None],
-        tell: Callable[[str], None],
+        notify: Callable[[str], None],
         stop_wanted: Callable[[], bool],
     ) -> Report:
         """Return the leader's last report, once the leader has ended.
@@ -153,12 +154,14 @@ class _Follower:
             CspmError: not all nodes joined; or a node ended too early, after which in real time
                 the others first show what they do.
         """
-        processes, start = self._processes, StartWatch(tell, self._patience)
+        processes, start = self._processes, StartWatch(notify, self._patience)
         while self._leader not in (ended := processes.ended()):
             report = read_report(self._path)
+            if report.simulated:
+                processes.begin()
             progress(report.simulated)
             for warning in processes.warnings():
-                tell(warning)
+                notify(warning)
             self._look_for_dead(self._dead(ended, report))
             if not report.simulated:
                 self._look_at_start(start, report.waiting)
@@ -170,8 +173,19 @@ class _Follower:
                 processes.stop(self._leader)
             time.sleep(_LOOK_EVERY_S)
         report = read_report(self._path)
-        if report.finished or report.failure is not None or stop_wanted():
-            if not processes.wait(self._leaving_s):
+        self._see_off(report, stop_wanted())
+        return report
+
+    @property
+    def _longest_leaving_s(self) -> float:
+        """How long all nodes may take to end; in lockstep the recorder gives way to others."""
+        return self._leaving_s if self._realtime else self._leaving_s / SHARE_BEHIND
+
+    def _see_off(self, report: Report, interrupted: bool) -> None:
+        """Wait for the others to end as well, once the leader has."""
+        processes = self._processes
+        if report.finished or report.failure is not None or interrupted:
+            if not processes.wait(self._longest_leaving_s):
                 ended = processes.ended()
                 stubborn = ", ".join(name for name in processes.by_name if name not in ended)
                 self.failure = self.failure or f"{stubborn} did not end with the run"
@@ -180,7 +194,6 @@ class _Follower:
         else:
             processes.wait(_AFTERMATH_S)
             self._note_dead(self._leader, report)
-        return report
 
     def _look_at_start(self, start: StartWatch, waiting: str) -> None:
         """Tell who has not joined; give the start up if that takes too long."""
@@ -200,13 +213,13 @@ class _Follower:
         now = time.monotonic()
         if report != self._last:
             self._last, self._moved = report, now
-        told = self._stop_at is not None and now - self._stop_at > self._leaving_s
+        overdue = self._stop_at is not None and now - self._stop_at > self._leaving_s
         silent = self._realtime and report.simulated > 0.0 and now - self._moved > _STUCK_S
-        if (told or silent) and self.failure is None:
+        if (overdue or silent) and self.failure is None:
             length = now - self._moved
             text = f"{self._leader} gave no sign of life for {length:.0f} s"
             self.failure = f"{text}, at {report.simulated:.1f} s"
-        return told or silent
+        return overdue or silent
 
     def _dead(self, ended: dict[str, int], report: Report) -> list[str]:
         """Return who ended too early: in order one may be ahead of the leader for a moment.
@@ -224,7 +237,7 @@ class _Follower:
     def _look_for_dead(self, dead: list[str]) -> None:
         if not dead or self.failure is not None:
             return
-        obituary = self._processes.obituary(dead[0])
+        obituary = self._processes.obituary(dead[0], self._longest_leaving_s)
         report = read_report(self._path)
         under_way = self._realtime and report.simulated
         if not under_way and not report.finished and report.failure is None:

@@ -108,7 +108,7 @@ class RealtimeRun(NodesOfRun):
     ) -> tuple[RealtimeRecorderNode, Leader | None]:
         """Return the recorder's node, and the leader if it leads."""
         period_ns = self.schedule.period_ns
-        made = RealtimeRecorderNode(node, period_ns, self.topics(), writer)
+        made = RealtimeRecorderNode(node, period_ns, self.topics(), self.edges, writer)
         if self.leader != RECORDER:
             made.follow()
             return made, None

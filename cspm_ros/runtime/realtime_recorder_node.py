@@ -3,19 +3,25 @@
 from __future__ import annotations
 
 from collections.abc import Collection, Mapping
+from functools import partial
 from itertools import cycle
 
 from cspm_msgs_py.diagnostics import Level, Status, decode_diagnostics
 from cspm_msgs_py.errors import InputError
-from cspm_msgs_py.graph import RECORDER
+from cspm_msgs_py.graph import RECORDER, Edges
 from cspm_msgs_py.message import carries_row
 from cspm_msgs_py.recording.writer import RecordingWriter
+from cspm_msgs_py.ros.bound_flag import read_flag
 from cspm_msgs_py.ros.contract_node import ContractNode, ros_class
+from cspm_msgs_py.ros.fault_line import FaultLine
+from cspm_msgs_py.ros.graph_publishers import bind, census_of
 from cspm_msgs_py.ros.intake import Intake
 from cspm_msgs_py.ros.leader import Leader
 from cspm_msgs_py.ros.rendezvous import FollowerSide
+from cspm_msgs_py.ros.tagged_taker import Tagged
 from cspm_msgs_py.schedule import DIAGNOSTICS_RATE
-from cspm_msgs_py.topics import DIAGNOSTICS, Topic
+from cspm_msgs_py.stepping.admission import Admission
+from cspm_msgs_py.topics import DIAGNOSTICS, SAFE, Topic
 from cspm_ros.runtime.topic_buffer import TopicBuffer
 
 _TAKE_EVERY_S = 0.002
@@ -24,6 +30,8 @@ _WRITE_EVERY_S = 0.02
 
 class RealtimeRecorderNode:
     """Writes what comes, with the time at which it came.
+
+    What does not count in the run is written as it came, apart from what does, and reported.
 
     Attributes:
         refused: how many messages were unusable, and why the last was.
@@ -34,18 +42,22 @@ class RealtimeRecorderNode:
         node: ContractNode,
         period_ns: int,
         topics: Mapping[str, Topic],
+        edges: Mapping[str, Edges],
         writer: RecordingWriter,
     ) -> None:
         """Connect the recording to its topics; `period_ns` is the plant's."""
-        self._writer = writer
+        self._writer, self._edges, self._topics = writer, edges, topics
+        self._node, self._period_ns = node, period_ns
+        node.keep_time()
         self._intake = Intake(node.node)
         self._buffers: dict[str, TopicBuffer] = {}
         self._came: set[str] = set()
+        self._safe = self._begun = False
         self.refused = (0, "")
+        self._line = FaultLine(node)
         for name, topic in topics.items():
             self._subscribe(name, topic)
         self._leader: FollowerSide | Leader | None = None
-        self._node, self._period_ns = node, period_ns
         node.every(_TAKE_EVERY_S, self._intake.take)
         # One topic after the other: all at once would keep other nodes of the process waiting.
         self._next = cycle(self._buffers.values())
@@ -55,16 +67,19 @@ class RealtimeRecorderNode:
 
     def follow(self) -> None:
         """Start and end with the plant."""
-        self._leader = FollowerSide(self._node, self._period_ns)
+        self._leader = FollowerSide(self._node, self._period_ns, on_start=self._begin)
 
     def lead(self, others: Collection[str], needed: Collection[str], duration_ns: int) -> Leader:
         """Start the run once `others` and a message of each of the topics `needed` are there."""
+        bound = [topic for topic in self._topics.values() if carries_row(topic.ros_type)]
+        excess = census_of(self._node, bound, self._edges)
         self._leader = Leader(
             self._node,
             self._period_ns,
             others,
             duration_ns,
-            missing=lambda: [name for name in needed if name not in self._came],
+            missing=lambda: [*(name for name in needed if name not in self._came), *excess()],
+            on_start=self._begin,
         )
         return self._leader
 
@@ -80,28 +95,57 @@ class RealtimeRecorderNode:
             buffer.write(len(buffer.payloads))
         self._intake.close()
 
+    def _begin(self, _: int) -> None:
+        self._begun = True
+
     def _subscribe(self, name: str, topic: Topic) -> None:
         message_class = ros_class(topic.ros_type)
         if not carries_row(topic.ros_type):
-
-            def keep(payload: bytes, log_ns: int, _: int | None) -> None:
-                if name == DIAGNOSTICS.name and not self._looks_right(payload):
-                    return
-                self._writer.append_payload(name, log_ns, payload)
-
-            self._intake.subscribe(topic, message_class, keep, numbered=False)
+            take = partial(self._take_other, name)
+            self._intake.subscribe_tagged(topic, message_class, take)
             return
-        buffer = TopicBuffer(topic, self._writer.channel(name), self._refuse)
-        self._buffers[name] = buffer
+        buffer = self._buffers[name] = self._buffer(topic)
 
-        def take(payload: bytes, log_ns: int, _: int | None) -> None:
+        def take_row(message: Tagged) -> None:
             self._came.add(name)
-            buffer.payloads.append(payload)
-            buffer.logs.append(log_ns)
+            buffer.add(message)
 
-        self._intake.subscribe(topic, message_class, take)
+        self._intake.subscribe_tagged(topic, message_class, take_row, numbered=True)
+
+    def _buffer(self, topic: Topic) -> TopicBuffer:
+        """Return what collects a topic's rows, and knows which count."""
+        name, node = topic.name, self._node
+        binding = bind(node, topic, self._edges)
+        admission = Admission(name)
+
+        def stranger(gid: bytes | None) -> str | None:
+            found = binding.fault(gid, node.now_ns(), safe=self._lenient)
+            # Before the run nobody is bound, and who is missing is reported by its leader.
+            return found if self._begun or binding.bound is not None else None
+
+        def fault(stamp_ns: int) -> str | None:
+            return admission.fault(stamp_ns, node.now_ns(), safe=self._lenient)
+
+        channel, refuse = self._writer.channel(name), partial(self._refuse_row, name)
+        return TopicBuffer(topic, channel, refuse, stranger, fault)
+
+    @property
+    def _lenient(self) -> bool:
+        """Whether clocks and publishers may change: before the run, and in the safe state."""
+        return self._safe or not self._begun
+
+    def _take_other(self, name: str, message: Tagged) -> None:
+        log_ns, payload = message.received_ns, message.payload
+        if name == SAFE.name:
+            self._safe = read_flag(name, payload)
+        if name == DIAGNOSTICS.name and not self._looks_right(payload):
+            return
+        self._writer.append_payload(name, log_ns, payload)
 
     def _tell(self) -> None:
+        fault = self._node.clock_fault()
+        if fault is not None:
+            self._line.report(fault)
         lost = sum(self._intake.lost.values())
         values = {"lost": str(lost), "refused": str(self.refused[0])}
         trouble = "messages lost" if lost else f"refused: {self.refused[1]}"
@@ -120,6 +164,12 @@ class RealtimeRecorderNode:
             self._refuse(f"{DIAGNOSTICS.name}: {err}")
             return False
         return True
+
+    def _refuse_row(self, name: str, log_ns: int, payload: bytes, reason: str) -> None:
+        self._writer.append_refused(name, log_ns, payload)
+        self._refuse(reason)
+        if self._begun:
+            self._line.report(reason)
 
     def _refuse(self, reason: str) -> None:
         self.refused = (self.refused[0] + 1, reason)

@@ -32,7 +32,7 @@ def run_realtime(
     progress: Callable[[float], None] = lambda _: None,
     *,
     external: bool = False,
-    tell: Callable[[str], None] = lambda _: None,
+    notify: Callable[[str], None] = lambda _: None,
     steps: int | None = None,
     domain_id: int | None = None,
     patience_s: float = PATIENCE_S,
@@ -44,7 +44,7 @@ def run_realtime(
         folder: where to record.
         progress: called now and then with the time run so far [s].
         external: leave the plant out: hardware is in its place.
-        tell: called with what the start waits for, in one line, when that changes.
+        notify: called with what the start waits for, in one line, when that changes.
         steps: end after so many plant steps; None runs the scenario's duration.
         domain_id: instead of `ROS_DOMAIN_ID`.
         patience_s: bounds the start [s], as in lockstep, but not where somebody's drivers are
@@ -72,7 +72,7 @@ def run_realtime(
         leader = leading if plant is None else plant.leader
         assert leader is not None
         patience = Patience(math.inf if external else patience_s, time.perf_counter() - began)
-        start = StartWatch(tell, patience)
+        start = StartWatch(notify, patience)
 
         def look() -> None:
             if not leader.elapsed:

@@ -36,14 +36,14 @@ class RosInstall:
 
 
 def find_ros(
-    asked_by: str = "ROS 2",
+    needed_by: str = "ROS 2",
     environment: Mapping[str, str] = os.environ,
     path: Sequence[str] | None = None,
 ) -> RosInstall:
     """Find the ROS 2 Jazzy that `import rclpy` would use, and refuse what could not work.
 
     Args:
-        asked_by: what needs ROS, such as `--mode graph`; begins the line of an error.
+        needed_by: what needs ROS, such as `--mode graph`; begins the line of an error.
         environment: the process's.
         path: where modules are looked for; `sys.path` unless given.
 
@@ -54,24 +54,24 @@ def find_ros(
     distro = environment.get("ROS_DISTRO", DISTRO)
     if distro != DISTRO:
         raise InputError(
-            f"{asked_by}: ROS_DISTRO is {distro}, allowed: {DISTRO}, or, in a shell without ROS"
+            f"{needed_by}: ROS_DISTRO is {distro}, allowed: {DISTRO}, or, in a shell without ROS"
             f" sourced, {_how_to_install()}"
         )
     folders = list(sys.path if path is None else path)
     spec = PathFinder.find_spec("rclpy", folders)
     if spec is None or spec.origin is None:
         raise InputError(
-            f"{asked_by}: ROS 2 Jazzy is not installed, allowed: {_how_to_install()},"
+            f"{needed_by}: ROS 2 Jazzy is not installed, allowed: {_how_to_install()},"
             " or a shell with a native Jazzy sourced"
         )
     package = Path(spec.origin).parent
     wheel = _version(package.parent, "ros-rclpy")
     version = wheel or _version(package.parent, "rclpy") or "unknown"
-    _check_rclpy(asked_by, package, version)
+    _check_rclpy(needed_by, package, version)
     if wheel:
-        _check_library_path(asked_by, environment)
+        _check_library_path(needed_by, environment)
         return RosInstall("wheels", wheel, Path(sys.prefix))
-    _check_native(asked_by, package, environment, folders)
+    _check_native(needed_by, package, environment, folders)
     return RosInstall("native", version, _prefix(package, environment))
 
 
@@ -99,48 +99,48 @@ def _version(folder: Path, name: str) -> str | None:
     return found.version if found else None
 
 
-def _check_rclpy(asked_by: str, package: Path, version: str) -> None:
+def _check_rclpy(needed_by: str, package: Path, version: str) -> None:
     digits = version.split(".")
     numbers = tuple(int(part) for part in digits if part.isdecimal())
     if len(numbers) != len(digits) or numbers < OLDEST_RCLPY or numbers[0] != OLDEST_RCLPY[0]:
         raise InputError(
-            f"{asked_by}: rclpy in {package} has version {version},"
+            f"{needed_by}: rclpy in {package} has version {version},"
             f" allowed: {'.'.join(map(str, OLDEST_RCLPY))} or newer of ROS 2 Jazzy"
         )
     core = "_rclpy_pybind11"
     if not any((package / f"{core}{suffix}").is_file() for suffix in EXTENSION_SUFFIXES):
         built = ", ".join(sorted(file.name for file in package.glob(f"{core}*"))) or "nothing"
         raise InputError(
-            f"{asked_by}: {package} holds {built}, allowed: {core}{EXTENSION_SUFFIXES[0]}; use the"
+            f"{needed_by}: {package} holds {built}, allowed: {core}{EXTENSION_SUFFIXES[0]}; use the"
             " Python for which this ROS was built, or a shell without ROS sourced"
         )
 
 
-def _check_library_path(asked_by: str, environment: Mapping[str, str]) -> None:
+def _check_library_path(needed_by: str, environment: Mapping[str, str]) -> None:
     """Refuse a process whose libraries are those of another environment than its Python."""
     needed = str(Path(sys.prefix) / "lib")
     if needed not in environment.get("LD_LIBRARY_PATH", "").split(os.pathsep):
         raise InputError(
-            f"{asked_by}: LD_LIBRARY_PATH lacks {needed}, allowed: with it, as `pip install"
+            f"{needed_by}: LD_LIBRARY_PATH lacks {needed}, allowed: with it, as `pip install"
             " ros-wheels-bootstrapper` makes Python set it at its start, unless"
             " _ROS_WHEELS_BOOTSTRAP_COMPLETE was inherited from elsewhere"
         )
 
 
 def _check_native(
-    asked_by: str, package: Path, environment: Mapping[str, str], folders: Sequence[str]
+    needed_by: str, package: Path, environment: Mapping[str, str], folders: Sequence[str]
 ) -> None:
     if "ROS_DISTRO" not in environment:
         raise InputError(
-            f"{asked_by}: ROS_DISTRO is not set, allowed: {DISTRO}; source the setup.bash that"
+            f"{needed_by}: ROS_DISTRO is not set, allowed: {DISTRO}; source the setup.bash that"
             f" belongs to {package}"
         )
     # The wheels put their libraries before and after the native ones in an order left to chance.
     if PathFinder.find_spec("ros_wheels_bootstrapper", folders) is not None:
         raise InputError(
-            f"{asked_by}: both the native rclpy in {package} and the wheels of ROS 2 are installed,"
-            " allowed: one of them; `pip uninstall ros-wheels-bootstrapper`, or a shell without ROS"
-            " sourced"
+            f"{needed_by}: both the native rclpy in {package} and the wheels of ROS 2 are"
+            " installed, allowed: one of them; `pip uninstall ros-wheels-bootstrapper`, or a shell"
+            " without ROS sourced"
         )
 
 

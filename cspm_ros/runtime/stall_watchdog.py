@@ -1,4 +1,4 @@
-"""Looks at a run now and then: tells what it waits for, in lockstep loses patience.
+"""Looks at a run now and then: says what it waits for, in lockstep loses patience.
 
 A run starts until every node has gone on beyond `FIRST_STEPS`: it loads libraries, compiles, waits
 for all nodes to join, and compiles again in the first steps. Patience counts from then on. What a
@@ -24,7 +24,7 @@ LEAST_PATIENCE_S = 0.1
 COMPLAIN_S = 5.0
 LOOK_EVERY_S = 0.1
 STANDSTILL = "nothing moved"
-# How long a start may take before it is told what it waits for.
+# How long a start may take before what it waits for is reported.
 GRACE_S = 3.0
 # A start may take so many times the longer of patience and its own cost.
 START_FACTOR = 10.0
@@ -166,9 +166,9 @@ class StartWatch:
         stuck: why the start is given up, if it is.
     """
 
-    def __init__(self, tell: Callable[[str], None], patience: Patience) -> None:
-        """Take whom to tell, and how long it may take; infinite patience never gives up."""
-        self._tell, self._told = tell, ""
+    def __init__(self, notify: Callable[[str], None], patience: Patience) -> None:
+        """Take what gets each line, and how long it may take; infinite patience never gives up."""
+        self._notify, self._reported = notify, ""
         self._patience = patience
         self._began = time.monotonic()
         self.stuck: str | None = None
@@ -187,8 +187,8 @@ class StartWatch:
         """Take what it waits for now, in one line; empty if for nothing."""
         passed = self.elapsed
         waits = waiting if passed > GRACE_S else ""
-        if waits != self._told:
-            self._told = waits
-            self._tell(waits)
+        if waits != self._reported:
+            self._reported = waits
+            self._notify(waits)
         if waiting and passed > self._patience.start:
             self.stuck = self._patience.late(False, waiting)

@@ -7,14 +7,12 @@ from __future__ import annotations
 
 from pathlib import Path
 
-import numpy as np
-
 from cspm_control.safety import GuardedStage
 from cspm_msgs_py.schedule import PLANT, schedule_of
-from cspm_msgs_py.topics import POSE, WRENCH
 from cspm_run.assembly import assemble_simulator, assemble_stage
 from cspm_run.bundle import Bundle
 from cspm_run.plant_guard import make_watchdog
+from cspm_run.stage_warm_up import rest_rows
 from cspm_sim.simulator import Simulator
 
 
@@ -29,24 +27,15 @@ def warm_up(node: str, bundle: Bundle, folder: Path) -> None:
     scenario, testbed = bundle.scenario, bundle.testbed.testbed
     schedule = schedule_of(scenario, testbed)
     if node == PLANT:
-        plant, sensors = assemble_simulator(scenario, testbed, folder, bundle.plant)
-        simulator = Simulator(plant, sensors, {}, period_ns=schedule.period_ns, controlled=False)
+        plant, sensors, target = assemble_simulator(scenario, testbed, folder, bundle.plant)
+        simulator = Simulator(
+            plant, sensors, {}, period_ns=schedule.period_ns, controlled=False, target=target
+        )
         simulator.observe()
         simulator.advance()
         make_watchdog(scenario, plant)
         return
-    stage, plan = assemble_stage(node, scenario, testbed, folder), schedule.nodes[node]
-    position = np.array(scenario.bar_mean_pose[:3])
-    rows = {}
-    for name in (*plan.inputs, *plan.held):
-        row = np.zeros(testbed.topics[name].width)
-        if testbed.topics[name].fields[: len(POSE)] == POSE:
-            row[:3], row[6] = position, 1.0
-        elif testbed.topics[name].fields == WRENCH and testbed.bar:
-            row[2] = -testbed.bar.mass * testbed.gravity
-        rows[name] = row
-    if "/winch_frame/pose" in rows:
-        rows["/winch_frame/pose"][:3] = scenario.winch_frame.mean_pose[:3]
+    stage, rows = assemble_stage(node, scenario, testbed, folder), rest_rows(node, bundle)
     stage.step(0, rows, lambda _topic, _row: None)
     if isinstance(stage, GuardedStage):
         stage.trip(0, "warming up")

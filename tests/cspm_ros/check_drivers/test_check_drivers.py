@@ -7,7 +7,7 @@ import pytest
 from run_samples import SCENARIOS
 
 from cspm.cli import main as cli
-from cspm.commands.check_drivers_command import machine_of
+from cspm.drivers import machine_of
 from cspm_msgs_py.errors import InputError
 
 THESIS = SCENARIOS / "testbeds" / "thesis.yaml"
@@ -30,15 +30,15 @@ def refused(monkeypatch, capsys):
 
 class TestMachine:
     def test_a_scenario_brings_its_machine_rates_and_safe_state(self):
-        machine = machine_of(None, "calm", ["safety.state=brake"])
-        assert machine.testbed.name == "thesis"
+        machine = machine_of("calm", None, ["safety.state=brake"])
+        assert machine.testbed.name == "thesis_refitted"
         assert machine.scenario.rates.motion_capture == 1000
         assert (machine.commanded, machine.braked) == (True, True)
-        locked = machine_of(None, "calm", ["control={mode: locked_winches}"])
+        locked = machine_of("calm", None, ["control={mode: locked_winches}"])
         assert (locked.commanded, locked.braked) == (False, False)
 
     def test_a_testbed_alone_has_the_usual_rates(self):
-        machine = machine_of(THESIS, None)
+        machine = machine_of(None, THESIS)
         rates = machine.scenario.rates
         assert (rates.winches, rates.load_cells, rates.motion_capture) == (1000, 1000, 100)
         assert (machine.commanded, machine.braked) == (True, False)
@@ -47,24 +47,27 @@ class TestMachine:
         path = tmp_path / "slow.yaml"
         text = (SCENARIOS / "testbeds" / "one_winch.yaml").read_text(encoding="utf-8")
         path.write_text(re.sub(r"rate: .*1000.*", "rate: 500", text), encoding="utf-8")
-        rates = machine_of(path, None).scenario.rates
+        rates = machine_of(None, path).scenario.rates
         assert (rates.winches, rates.motion_capture, rates.plant) == (500, 100, 1000)
-        assert machine_of(path, None, ["rates.winches=250"]).scenario.rates.winches == 250
+        assert machine_of(None, path, ["rates.winches=250"]).scenario.rates.winches == 250
 
     def test_one_of_both_is_to_be_given(self):
-        both = r"^check-drivers: allowed: --testbed FILE or --scenario NAME, one of both$"
-        for given in ((None, None), (THESIS, "calm")):
+        both = "^check-drivers: allowed: a scenario or a test-bed, one of both$"
+        for given in ((None, None), ("calm", THESIS)):
             with pytest.raises(InputError, match=both):
                 machine_of(*given)
 
 
 class TestRefusals:
     def test_unusable_arguments_end_in_one_line(self, refused):
-        assert refused().startswith("check-drivers: allowed: --testbed FILE or ")
+        assert refused().startswith("check-drivers: allowed: a scenario or a test-bed")
         assert refused("--scenario", "none").startswith("none: no such scenario, allowed: ")
-        assert refused("--testbed", "none.yaml") == "none.yaml: no such file, allowed: a YAML file"
-        assert refused("--scenario", "rest", "--for", "0.5") == "--for 0.5: allowed: 1 to 300 s"
-        assert refused("--scenario", "rest", "--for", "nan") == "--for nan: allowed: 1 to 300 s"
+        assert (
+            refused("--testbed", "none.yaml") == "none.yaml: no such file, allowed: a test-bed file"
+        )
+        for time in ("0.5", "nan"):
+            line = f"listening for {time} s: allowed: 1 to 300 s"
+            assert refused("--scenario", "rest", "--for", time) == line
         assert refused("--scenario", "rest", "--set", "rates.winches=30").startswith(
             f"{SCENARIOS / 'rest.yaml'}: rates.winches: 30 Hz "
         )
@@ -81,10 +84,10 @@ class TestRefusals:
         assert refused("--testbed", path).startswith(f"{path}: ")
 
     def test_a_pull_needs_a_terminal(self, refused):
-        told = "--pull: standard input is no terminal, allowed: one, for its Enter key"
-        assert refused("--scenario", "rest", "--pull", "all") == told
+        reported = "--pull: standard input is no terminal, allowed: one, for its Enter key"
+        assert refused("--scenario", "rest", "--pull", "all") == reported
 
     def test_another_ros_is_refused(self, refused, monkeypatch):
         monkeypatch.setenv("ROS_DISTRO", "humble")
-        told = refused("--scenario", "rest")
-        assert told.startswith("check-drivers: ROS_DISTRO is humble, allowed: jazzy")
+        reported = refused("--scenario", "rest")
+        assert reported.startswith("check-drivers: ROS_DISTRO is humble, allowed: jazzy")

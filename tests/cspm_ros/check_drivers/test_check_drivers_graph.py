@@ -81,12 +81,12 @@ def but_load(errors):
 
 
 class TestDrivers:
-    def test_sound_drivers_of_a_moving_bar_have_no_error(self, checked, sea):
+    def test_healthy_drivers_of_a_moving_bar_have_no_error(self, checked, sea):
         _, out, errors, data = checked(sea, "worst_case")
         assert but_load(errors) == set()
         assert list(data["topics"]) == [FRAME, BAR, WINCHES, TENSION, TORQUE, BRAKE]
         assert all(data["topics"][name]["messages"] > 20 for name in sea.feeds)
-        assert (data["testbed"], data["scenario"]) == ("thesis", "worst_case")
+        assert (data["testbed"], data["scenario"]) == ("thesis_refitted", "worst_case")
         assert (data["seconds"], data["complete"]) == (3.0, True)
         rows = dict(line.split()[:2] for line in out.splitlines() if line.startswith("  /"))
         assert rows == {name: topic["verdict"] for name, topic in data["topics"].items()}
@@ -125,8 +125,8 @@ class TestDrivers:
         lab = sea.but(WINCHES, lambda feed: feed.scaled(DEGREES, slice(0, 16)))
         code, _, errors, _ = checked(lab, "worst_case", seconds=4.0)
         assert code == 1
-        told = "is the angle that the poses give, but in degrees"
-        assert errors[WINCHES, "length"].endswith(told)
+        reported = "is the angle that the poses give, but in degrees"
+        assert errors[WINCHES, "length"].endswith(reported)
 
     @pytest.mark.slow
     def test_a_misnamed_topic_is_found(self, checked, rest):

@@ -1,4 +1,4 @@
-"""Sound signals of the simulator raise no finding; each corruption raises its own."""
+"""Healthy signals of the simulator raise no finding; each corruption raises its own."""
 
 from dataclasses import replace
 
@@ -12,8 +12,8 @@ from driver_samples import (
     TENSION,
     WINCHES,
     lab_of,
+    refitted_with_twists,
     said,
-    thesis_with_twists,
     undecided,
     wrong,
 )
@@ -45,7 +45,7 @@ def rig(tmp_path_factory):
 @pytest.fixture(scope="module")
 def twists(tmp_path_factory):
     folder = tmp_path_factory.mktemp("twists")
-    lab = lab_of(folder / "r", thesis_with_twists(folder), *SHORT_RAMP)
+    lab = lab_of(folder / "r", refitted_with_twists(folder), *SHORT_RAMP)
     return lab.window(1.0, 4.0)
 
 
@@ -85,14 +85,14 @@ class TestSoundSignals:
             ("verification_long", 12.0, []),
         ],
     )
-    def test_no_window_of_a_sound_run_has_anything_wrong(
+    def test_no_window_of_a_healthy_run_has_anything_wrong(
         self, tmp_path, scenario, seconds, overrides
     ):
         lab = lab_of(tmp_path / "r", scenario, f"duration={seconds}", *overrides)
         for start in np.arange(0.0, seconds, 2.0):
             assert wrong(lab.window(start, start + 2.0).findings()) == set(), start
 
-    def test_what_is_sound_is_said_with_numbers(self, rest):
+    def test_what_is_healthy_is_said_with_numbers(self, rest):
         findings = rest.findings()
         assert said(findings, TENSION, "rate") == [(True, "1000.0 Hz (interval 1.000 ms)")]
         assert said(findings, BAR, "rate") == [(True, "100.0 Hz (interval 10.000 ms)")]
@@ -273,11 +273,11 @@ def test_wrong_numbers_raise_their_finding_and_no_other(lab, corruption, check, 
         (-1.0, None),
     ],
 )
-def test_where_no_weight_tells_the_unit_of_a_tension_the_torque_does(rig, factor, words):
+def test_where_no_weight_shows_the_unit_of_a_tension_the_torque_does(rig, factor, words):
     findings = rig.but(TENSION, lambda feed: feed.scaled(factor)).findings()
     [(ok, text)] = said(findings, WINCHES, "holding")
     if words is None:
-        expected = "surge: cannot tell the torque's unit: the cable carries hardly anything"
+        expected = "surge: cannot decide the torque's unit: the cable carries hardly anything"
         assert (ok, text) == (None, expected)
     else:
         assert (ok, text) == (False, f"surge: the torque that holds the tension, {words}")
@@ -303,7 +303,7 @@ def test_a_fast_drum_over_a_lost_message_is_no_jump_of_a_turn(sea):
 
 
 TWISTS = {
-    "sound": (BAR_TWIST, 1.0, slice(0, 6), True, "all: is the derivative of the pose"),
+    "healthy": (BAR_TWIST, 1.0, slice(0, 6), True, "all: is the derivative of the pose"),
     "degrees": (BAR_TWIST, DEGREES, slice(3, 6), False, "but in degrees per second"),
     "millimetres": (FRAME_TWIST, 1e3, slice(0, 3), False, "but in millimetres"),
     "one inverted": (BAR_TWIST, -1.0, 2, False, "vz: is the derivative of the pose, but its sign"),

@@ -24,7 +24,7 @@ def test_a_clock_of_even_speed_is_followed_to_the_nanosecond(speed):
         assert time_ns == pytest.approx((wall - TODAY_NS) * speed, abs=1.0)
 
 
-def test_a_clock_that_stands_stamps_all_alike():
+def test_a_clock_that_stops_stamps_all_equally():
     found = on_ros_clock(received([TODAY_NS + 1, TODAY_NS + 5]), [(TODAY_NS, 7), (TODAY_NS + 9, 7)])
     assert [time_ns for time_ns, _ in found] == [7, 7]
 

@@ -42,7 +42,7 @@ def listened(lab, *, sim_time=False, seconds=SECONDS, **options):
         return found, listener.findings(commanded=True, braked=True), there
 
 
-def told(findings, topic):
+def reported(findings, topic):
     return [
         (finding.check, finding.ok, finding.text) for finding in findings if finding.topic == topic
     ]
@@ -67,35 +67,35 @@ def test_every_message_is_heard_with_its_time_of_reception(lab):
         assert (np.diff(heard.stamp_ns) == 1_000_000_000 // RATE).all()
         assert set(map(tuple, heard.rows)) <= set(map(tuple, feed.rows))
         assert np.abs(ages(each, feed.topic)).max() < 10.0
-        assert told(findings, name) == [
+        assert reported(findings, name) == [
             ("qos", True, "reliable, from lab"),
             ("losses", True, "none lost on the way"),
         ]
-    assert told(findings, TORQUE_COMMAND) == [
+    assert reported(findings, TORQUE_COMMAND) == [
         ("hearers", True, "heard by drive"),
         ("publishers", True, "nobody gives it now"),
     ]
-    assert told(findings, "/winches/brake") == [("hearers", True, "heard by drive")]
+    assert reported(findings, "/winches/brake") == [("hearers", True, "heard by drive")]
 
 
 @pytest.mark.slow
-def test_misfits_are_heard_and_told_of(lab):
+def test_misfits_are_heard_and_reported(lab):
     lab = lab.without(FRAME).but(TENSION, lambda feed: feed.described(name="/lab/tension"))
     found, findings, there = listened(lab, best_effort=[BAR], doubled=[WINCHES], drive=False)
     assert there
     assert (TENSION in found, FRAME in found) == (False, False)
     assert (found["/lab/tension"].publishers, found["/lab/tension"].samples) == (1, [])
     text = "best effort (from lab), expected reliable: no controller hears it"
-    assert told(findings, BAR)[0] == ("qos", False, text)
+    assert reported(findings, BAR)[0] == ("qos", False, text)
     assert len(found[BAR].samples) >= 0.5 * RATE * SECONDS
     assert found[WINCHES].publishers == 2
-    assert told(findings, TORQUE_COMMAND)[0][:2] == ("hearers", False)
-    assert told(findings, "/winches/brake")[0][:2] == ("hearers", False)
+    assert reported(findings, TORQUE_COMMAND)[0][:2] == ("hearers", False)
+    assert reported(findings, "/winches/brake")[0][:2] == ("hearers", False)
 
 
 def test_with_a_clock_of_its_own_a_simulation_is_heard_on_that_clock(lab):
     found, findings, _ = listened(lab, sim_time=True, sim_start_ns=SIM_START_NS)
-    [(check, ok, text)] = told(findings, "/clock")
+    [(check, ok, text)] = reported(findings, "/clock")
     assert (check, ok) == ("ticks", True)
     assert text.endswith(" messages, from lab")
     for name, feed in lab.feeds.items():
@@ -106,16 +106,16 @@ def test_with_a_clock_of_its_own_a_simulation_is_heard_on_that_clock(lab):
 @pytest.mark.slow
 def test_a_clock_that_is_not_asked_for_leaves_the_wall_clock(lab):
     found, findings, _ = listened(lab, sim_start_ns=SIM_START_NS)
-    [(check, ok, text)] = told(findings, "/clock")
+    [(check, ok, text)] = reported(findings, "/clock")
     assert (check, ok) == ("ticks", None)
     assert text.startswith("given by lab: ")
     assert ages(found[BAR], lab.feeds[BAR].topic).min() > YEAR_S
 
 
 @pytest.mark.slow
-def test_a_clock_that_is_missing_is_told_of(lab):
+def test_a_clock_that_is_missing_is_reported(lab):
     _, findings, _ = listened(lab, sim_time=True)
-    assert [told(findings, "/clock")[0][:2]] == [("ticks", False)]
+    assert [reported(findings, "/clock")[0][:2]] == [("ticks", False)]
 
 
 @pytest.mark.slow

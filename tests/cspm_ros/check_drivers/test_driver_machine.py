@@ -69,7 +69,7 @@ def test_a_machine_at_rest_carries_its_weight(hanging):
 
 @MACHINES
 @pytest.mark.parametrize("factor", [1.3, 0.7, 2.0])
-def test_a_wrong_gain_is_told_with_its_size(hanging, factor):
+def test_a_wrong_gain_is_reported_with_its_size(hanging, factor):
     findings = hanging.but(TENSION, lambda feed: feed.scaled(factor)).findings()
     [(ok, text)] = said(findings, TENSION, "balance")
     assert ok is False
@@ -77,7 +77,7 @@ def test_a_wrong_gain_is_told_with_its_size(hanging, factor):
 
 
 @pytest.mark.parametrize("hanging", ["general", "thesis"], indirect=True)
-def test_axes_that_point_up_are_told(hanging):
+def test_axes_that_point_up_are_reported(hanging):
     flipped = hanging.but(BAR, lambda feed: feed.scaled(-1.0, [1, 2, 4, 5]))
     flipped = flipped.but(FRAME, lambda feed: feed.scaled(-1.0, [1, 2, 4, 5]))
     findings = flipped.findings()
@@ -89,7 +89,7 @@ class TestWhatIsMissing:
     @pytest.mark.parametrize("name", [BAR, FRAME])
     def test_without_a_pose_nothing_is_said_of_the_geometry(self, hanging, name):
         findings = hanging.without(name).findings()
-        assert said(findings, BAR, "axes") == [(None, f"cannot tell without a usable {name}")]
+        assert said(findings, BAR, "axes") == [(None, f"cannot decide without a usable {name}")]
         assert said(findings, TENSION, "balance") == []
 
     def test_topics_of_different_times_are_not_compared(self, hanging):
@@ -97,23 +97,23 @@ class TestWhatIsMissing:
         assert said(findings, BAR, "axes") == [
             (
                 None,
-                f"cannot tell: the stamps of {BAR} and {FRAME} are not of the same time",
+                f"cannot decide: the stamps of {BAR} and {FRAME} are not of the same time",
             )
         ]
 
-    def test_without_poses_grams_are_still_told(self, hanging):
+    def test_without_poses_grams_are_still_reported(self, hanging):
         lab = hanging.without(BAR).but(TENSION, lambda feed: feed.scaled(101.97))
         [(ok, text)] = said(lab.findings(), TENSION, "units")
         assert ok is False
         assert text.startswith("looks in grams: ")
 
-    def test_a_bar_in_the_exits_plane_cannot_tell_the_axes(self, hanging):
+    def test_a_bar_in_the_exits_plane_cannot_decide_the_axes(self, hanging):
         exits = np.mean([cable.exit for cable in hanging.testbed.cables], axis=0)
         at_exits = pose_row(beneath(FRAME_POSE, exits))
         lab = hanging.but(BAR, lambda feed: replace(feed, rows=feed.rows * 0.0 + at_exits))
         lab = lab.but(BAR, lambda feed: replace(feed, rows=feed.rows + jitter(feed.rows)))
         assert said(lab.findings(), BAR, "axes") == [
-            (None, "cannot tell: the bar is as high as the exits")
+            (None, "cannot decide: the bar is as high as the exits")
         ]
 
     def test_cables_that_carry_nothing_leave_it_open(self, hanging):
@@ -142,16 +142,16 @@ class TestWhatIsMissing:
     def test_tensions_of_another_time_are_not_compared(self, hanging):
         findings = hanging.but(TENSION, lambda feed: feed.shifted(10**10)).findings()
         assert said(findings, TENSION, "geometry") == [
-            (None, f"cannot tell: the stamps of {BAR} and {TENSION} are not of the same time")
+            (None, f"cannot decide: the stamps of {BAR} and {TENSION} are not of the same time")
         ]
 
-    def test_a_few_poses_do_not_tell_the_balance(self, hanging):
+    def test_a_few_poses_do_not_decide_the_balance(self, hanging):
         few = hanging.but(BAR, lambda feed: feed.only(slice(0, 200, 60)))
         assert said(few.findings(), TENSION, "balance") == [
-            (None, "cannot tell from so few messages")
+            (None, "cannot decide from so few messages")
         ]
 
-    def test_a_falling_bar_does_not_tell_the_balance(self, hanging):
+    def test_a_falling_bar_does_not_decide_the_balance(self, hanging):
         def falling(feed):
             rows = feed.rows.copy()
             times = (feed.stamps - feed.stamps[0]) * 1e-9
@@ -162,13 +162,13 @@ class TestWhatIsMissing:
         lab = lab.but(FRAME, lambda feed: feed.only(slice(0, 60)))
         [(ok, text)] = said(lab.findings(), TENSION, "balance")
         assert ok is None
-        assert text.endswith(": it falls too fast to tell")
+        assert text.endswith(": it falls too fast to decide")
 
     def test_a_twist_without_pose_is_left_open(self, hanging):
         twist = steady_feed(hanging.testbed.topics["/bar/twist"], 100, 2.0)
         lab = replace(hanging.without(BAR), feeds={**hanging.feeds, "/bar/twist": twist})
         found = said(lab.without(BAR).findings(), "/bar/twist", "speed")
-        assert found == [(None, f"cannot tell without a usable {BAR}")]
+        assert found == [(None, f"cannot decide without a usable {BAR}")]
 
 
 NEEDING = {

@@ -108,7 +108,7 @@ class TestPresence:
 
 
 class TestMessages:
-    def test_sound_ones_are_said_to_be(self, thesis, feed):
+    def test_healthy_ones_are_said_to_be(self, thesis, feed):
         findings = checked(thesis, feed.observation())
         assert said(findings, TENSION, "message") == [
             (True, f"300 of {JOINT_STATE}, names as in the test-bed")
@@ -136,7 +136,7 @@ class TestMessages:
         assert ok is False
         assert text.startswith("all messages: names winch_9 hoist_2 surge_1")
 
-    def test_an_empty_part_is_told_and_the_others_are_read(self, thesis):
+    def test_an_empty_part_is_reported_and_the_others_are_read(self, thesis):
         topic = thesis.topics[WINCHES]
         payload = joint_state(THESIS_CABLES, position=range(8), velocity=range(8))
         samples = [(EPOCH_NS + i, payload) for i in range(5)]
@@ -169,7 +169,7 @@ class TestMessages:
     @pytest.mark.parametrize(
         ("frame", "hint"), [("world", "; z must point down"), ("map_ned", ""), ("", "; z must")]
     )
-    def test_another_frame_is_told_and_read(self, thesis, pose_feed, frame, hint):
+    def test_another_frame_is_reported_and_read(self, thesis, pose_feed, frame, hint):
         observation = pose_feed.described(frame_id=frame).observation()
         heard, findings = hear(thesis.topics[BAR], observation)
         np.testing.assert_array_equal(heard.values, pose_feed.rows)
@@ -186,7 +186,7 @@ class TestMessages:
         observation = payloads(feed.observation(), lambda _, p: p + b"\0" * 8)
         assert wrong(checked(thesis, observation)) == set()
 
-    def test_what_the_nodes_alone_refuse_is_told(self, thesis, feed):
+    def test_what_the_nodes_alone_refuse_is_reported(self, thesis, feed):
         seconds = (EPOCH_NS // 10**9).to_bytes(4, "little")
         place = feed.observation().samples[0][1].index(seconds) + 4
 
@@ -223,9 +223,9 @@ class TestHostileBytes:
 
     @given(data=st.data())
     def test_no_bytes_break_the_check(self, thesis, feed, data):
-        sound = [payload for _, payload in feed.only(slice(0, 6)).observation().samples]
+        healthy = [payload for _, payload in feed.only(slice(0, 6)).observation().samples]
         broken = []
-        for payload in sound:
+        for payload in healthy:
             content = bytearray(payload)
             for _ in range(data.draw(st.integers(0, 4))):
                 content[data.draw(st.integers(0, len(content) - 1))] = data.draw(
@@ -244,8 +244,8 @@ class TestHostileBytes:
             except InputError:
                 refused += 1
         explaining = {"message", "names", "parts", "finite"}
-        told = {check for topic, check in wrong(findings) if topic == TENSION} & explaining
-        assert bool(told) >= bool(refused)
+        reported = {check for topic, check in wrong(findings) if topic == TENSION} & explaining
+        assert bool(reported) >= bool(refused)
 
 
 def test_numbers_beyond_all_reason_end_the_judging_of_numbers(thesis, feed):

@@ -50,13 +50,13 @@ class TestRate:
         relation = rate_relation(slow, Series(times[100:], speed[100:]))
         assert relation.factor == pytest.approx(1.0, rel=0.03)
 
-    def test_noise_alone_cannot_tell(self):
+    def test_noise_alone_cannot_decide(self):
         rng = np.random.default_rng(6)
         times = np.arange(2000) * 1e-3
         noise = [Series(times, rng.normal(0.0, 1.0, 2000)) for _ in range(2)]
         assert verdict_on(rate_relation(*noise), {}, "it") == (
             None,
-            "cannot tell whether it is it: it hardly moves",
+            "cannot decide whether it is it: it hardly moves",
         )
 
     def test_a_rate_of_zero_beside_a_moving_value_is_wrong(self):
@@ -70,7 +70,7 @@ class TestRate:
         verdict = verdict_on(rate_relation(Series(times, value), Series(times, other)), {}, "it")
         assert verdict == (False, "is not it")
 
-    def test_too_short_a_time_cannot_tell(self):
+    def test_too_short_a_time_cannot_decide(self):
         times, value, speed = swinging(10, count=100)
         relation = rate_relation(Series(times, value), Series(times, speed))
         assert verdict_on(relation, {}, "it")[0] is None

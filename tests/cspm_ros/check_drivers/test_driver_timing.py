@@ -1,11 +1,11 @@
-"""Rates, losses and clocks: each fault of timing is told by its own check, with its size."""
+"""Rates, losses and clocks: each fault of timing is reported by its own check, with its size."""
 
 from dataclasses import replace
 
 import numpy as np
 import pytest
 from driver_samples import EPOCH_NS, TENSION, said, steady_feed, undecided, wrong
-from hypothesis import given
+from hypothesis import example, given
 from hypothesis import strategies as st
 
 from cspm_msgs_py.topics import contract_topics
@@ -106,7 +106,7 @@ FAULTS = {
 @pytest.mark.parametrize(
     ("change", "check", "ok", "words", "follows"), FAULTS.values(), ids=FAULTS.keys()
 )
-def test_a_fault_is_told_by_its_check_and_no_other(steady, change, check, ok, words, follows):
+def test_a_fault_is_reported_by_its_check_and_no_other(steady, change, check, ok, words, follows):
     findings = judged(change(steady))
     found = said(findings, TENSION, check)
     assert any(verdict is ok and words in text for verdict, text in found), found
@@ -153,6 +153,7 @@ def test_a_short_window_does_not_judge_the_drift(steady):
 
 
 @given(seed=st.integers(0, 2**31))
+@example(seed=9908122)  # Both halves fall as a drift would, but the whole does not.
 def test_a_jammed_network_is_not_taken_for_a_drift(seed):
     # Delays of up to 0.1 s in a line where nothing overtakes hold each other up.
     feed = steady_feed(TOPIC, 100, 2.0)
@@ -160,7 +161,7 @@ def test_a_jammed_network_is_not_taken_for_a_drift(seed):
     jammed = replace(feed, receives=np.maximum.accumulate(feed.receives + delays))
     [(ok, text)] = said(judged(jammed, rate=100), TENSION, "drift")
     assert ok is None
-    assert text.endswith("against this computer's clock; listen longer to tell")
+    assert text.endswith("against this computer's clock; listen longer to decide")
 
 
 @pytest.mark.parametrize("count", [0, 1, 2])

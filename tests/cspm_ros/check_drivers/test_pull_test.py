@@ -122,11 +122,11 @@ class TestSoundMachine:
         found = findings(verdict)
         assert found["pull_angle"] == (
             None,
-            "cannot tell: no motor turned clearly, the drives hold",
+            "cannot decide: no motor turned clearly, the drives hold",
         )
-        assert found["pull_pose"] == (None, "cannot tell: the bar did not move clearly")
+        assert found["pull_pose"] == (None, "cannot decide: the bar did not move clearly")
 
-    def test_an_inverted_load_cell_is_told(self, simulated, cable):
+    def test_an_inverted_load_cell_is_reported(self, simulated, cable):
         lab, i = simulated[cable], THESIS_CABLES.index(cable)
         both = changed(windows(lab, cable), TENSION, inverted(i))
         verdict = analyse_pull(lab.testbed, cable, *both)
@@ -136,7 +136,7 @@ class TestSoundMachine:
             f"pulled {cable}: its tension fell by 12 N: is its sign inverted?",
         )
 
-    def test_an_inverted_angle_is_told(self, simulated, cable):
+    def test_an_inverted_angle_is_reported(self, simulated, cable):
         lab, i = simulated[cable], THESIS_CABLES.index(cable)
         both = changed(windows(lab, cable), WINCHES, inverted(i))
         ok, text = findings(analyse_pull(lab.testbed, cable, *both))["pull_angle"]
@@ -144,7 +144,7 @@ class TestSoundMachine:
         assert text.startswith(f"pulled {cable}: its angle wound in 0.0")
         assert text.endswith(" m: is its sign inverted?")
 
-    def test_an_inverted_torque_is_told(self, simulated, cable):
+    def test_an_inverted_torque_is_reported(self, simulated, cable):
         lab, i = simulated[cable], 16 + THESIS_CABLES.index(cable)
         both = changed(windows(lab, cable, gives_way=False), WINCHES, inverted(i))
         assert findings(analyse_pull(lab.testbed, cable, *both))["pull_torque"] == (
@@ -154,7 +154,7 @@ class TestSoundMachine:
 
 
 class TestSwappedCables:
-    def test_a_swapped_load_cell_is_told_with_its_cable(self, simulated):
+    def test_a_swapped_load_cell_is_reported_with_its_cable(self, simulated):
         lab = simulated["surge_2"]
         both = changed(windows(lab, "surge_2"), TENSION, exchanged("surge_1", "surge_2"))
         verdict = analyse_pull(lab.testbed, "surge_2", *both)
@@ -165,7 +165,7 @@ class TestSwappedCables:
         )
         assert findings(verdict)["pull_angle"][0] is True
 
-    def test_a_swapped_and_inverted_one_is_told_as_both(self, simulated):
+    def test_a_swapped_and_inverted_one_is_reported_as_both(self, simulated):
         lab = simulated["surge_2"]
         both = changed(windows(lab, "surge_2"), TENSION, exchanged("surge_1", "surge_2"))
         both = changed(both, TENSION, inverted(2))
@@ -173,7 +173,7 @@ class TestSwappedCables:
         assert ok is False
         assert text.endswith("fell by 12 N: are two cables swapped and one inverted?")
 
-    def test_a_swapped_motor_is_told(self, simulated):
+    def test_a_swapped_motor_is_reported(self, simulated):
         lab = simulated["sway_1"]
         both = changed(windows(lab, "sway_1"), WINCHES, exchanged("sway_1", "sway_3"))
         ok, text = findings(analyse_pull(lab.testbed, "sway_1", *both))["pull_angle"]
@@ -194,7 +194,7 @@ class TestSwappedCables:
 
 class TestPose:
     @pytest.mark.parametrize(("rise", "ok"), [(0.02, False), (-0.02, True)])
-    def test_a_bar_that_comes_nearer_to_the_exit_is_told(self, simulated, rise, ok):
+    def test_a_bar_that_comes_nearer_to_the_exit_is_reported(self, simulated, rise, ok):
         lab = simulated["sway_1"]
         before, during = windows(lab, "sway_1", gives_way=False)
         during[BAR] = during[BAR] - np.array([0.0, 0.0, rise, 0, 0, 0, 0])
@@ -203,7 +203,7 @@ class TestPose:
         mirrored = "m towards the exit of sway_1, expected: away from it; is the pose mirrored, or"
         assert (mirrored in found[1]) is not ok
 
-    def test_a_mirrored_pose_is_told_at_a_cable_to_the_side(self, simulated):
+    def test_a_mirrored_pose_is_reported_at_a_cable_to_the_side(self, simulated):
         lab = simulated["sway_1"]
         before, during = windows(lab, "sway_1", gives_way=False)
         aside = -0.05 if lab.testbed.cables[4].exit[1] > 0 else 0.05
@@ -221,7 +221,7 @@ class TestPose:
         found = findings(analyse_pull(lab.testbed, "hoist_1", before, during))
         assert found["pull_pose"] == (
             None,
-            "cannot tell: the bar moved across hoist_1, not along it",
+            "cannot decide: the bar moved across hoist_1, not along it",
         )
 
     def test_a_moving_frame_is_taken_into_account(self, simulated):
@@ -246,7 +246,7 @@ class TestUndecided:
             "no tension changed clearly: pull harder, or no load cell is on",
         )
 
-    def test_two_cables_that_answer_alike_leave_it_open(self, simulated):
+    def test_two_cables_that_answer_equally_leave_it_open(self, simulated):
         lab = simulated["surge_2"]
         before, during = windows(lab, "surge_2")
         during[TENSION][:, 0] += 0.9 * (during[TENSION][:, 3] - 5.0)
@@ -254,7 +254,7 @@ class TestUndecided:
         assert verdict.ok is None
         assert findings(verdict)["pull_tension"] == (
             None,
-            "cannot tell: the tension of hoist_1 and surge_2 answered alike; hold the bar",
+            "cannot decide: the tension of hoist_1 and surge_2 answered equally; hold the bar",
         )
 
     def test_a_weaker_answer_elsewhere_does_not_matter(self, simulated):
@@ -270,7 +270,7 @@ class TestUndecided:
         del during[name]
         verdict = analyse_pull(lab.testbed, "surge_2", before, during)
         texts = [finding.text for finding in verdict.findings if finding.ok is None]
-        assert f"cannot tell: too few messages of {name}" in texts
+        assert f"cannot decide: too few messages of {name}" in texts
         assert verdict.ok is (None if name == TENSION else True)
 
 

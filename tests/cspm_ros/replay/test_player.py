@@ -272,7 +272,7 @@ def bag(tmp_path_factory):
         yield opened
 
 
-def test_everything_is_chosen_unless_told_otherwise(bag):
+def test_everything_is_chosen_by_default(bag):
     assert Selection().names(bag) == {name: name for name in TYPES}
     assert Selection().unplayable(bag) == {}
     assert Selection().span_ns(bag) == (bag.start_ns, bag.end_ns)
@@ -308,20 +308,20 @@ def test_what_the_bag_does_not_have_is_refused(bag):
         assert refused(selection.names, bag) == f"{bag.path}: no topic /nope, {has}"
     both = Selection(["/bar/pose"], ["/clock"])
     assert refused(both.names, bag).startswith("topics: chosen as well as left out, allowed: one")
-    told = refused(Selection(remap={"/bar/pose": "a b"}).names, bag)
-    assert told == "/bar/pose: renamed to 'a b', allowed: a name like /bar/pose"
-    told = refused(Selection(remap={"/bar/pose": "/clock"}).names, bag)
-    assert told == "/clock, /bar/pose: all named /clock, allowed: one topic of a name"
+    reported = refused(Selection(remap={"/bar/pose": "a b"}).names, bag)
+    assert reported == "/bar/pose: renamed to 'a b', allowed: a name like /bar/pose"
+    reported = refused(Selection(remap={"/bar/pose": "/clock"}).names, bag)
+    assert reported == "/clock, /bar/pose: all named /clock, allowed: one topic of a name"
     length = (bag.end_ns - bag.start_ns) * 1e-9
     for start in (-1.0, length + 1.0, float("nan")):
-        told = refused(Selection(start_s=start).span_ns, bag)
-        assert told == f"start {start:g} s: allowed: 0 to {length:g} s, {bag.path}"
+        reported = refused(Selection(start_s=start).span_ns, bag)
+        assert reported == f"start {start:g} s: allowed: 0 to {length:g} s, {bag.path}"
     for duration in (0.0, -1.0, float("nan")):
-        told = refused(Selection(duration_s=duration).span_ns, bag)
-        assert told == f"duration {duration:g} s: allowed: more than 0 s"
+        reported = refused(Selection(duration_s=duration).span_ns, bag)
+        assert reported == f"duration {duration:g} s: allowed: more than 0 s"
 
 
-def test_a_topic_that_cannot_be_played_is_told_or_refused(tmp_path):
+def test_a_topic_that_cannot_be_played_is_reported_or_refused(tmp_path):
     def schema(kind):
         return ("ros2msg", "int32 other") if kind == TYPES[FLAG] else ("ros2msg", "")
 
@@ -330,8 +330,8 @@ def test_a_topic_that_cannot_be_played_is_told_or_refused(tmp_path):
         assert FLAG in bag.unplayable
         assert Selection().unplayable(bag) == bag.unplayable
         assert FLAG not in Selection(left_out=[FLAG]).unplayable(bag)
-        told = refused(Selection([FLAG]).names, bag)
-        assert told == f"{path}: {FLAG}: {bag.unplayable[FLAG]}"
+        reported = refused(Selection([FLAG]).names, bag)
+        assert reported == f"{path}: {FLAG}: {bag.unplayable[FLAG]}"
 
 
 def test_log_times_must_fit_a_clock():
@@ -411,7 +411,7 @@ def test_equal_messages_are_identical():
     assert str(compared) == "/cables/tension: 3 messages, identical bit for bit"
 
 
-def test_the_first_and_the_largest_difference_are_told():
+def test_the_first_and_the_largest_difference_are_reported():
     compared = Reproduction(TENSION)
     for i, row in enumerate([(1.0, 0.0), (1.0, -0.0), (1.5, 0.0), (1.25, 0.0)]):
         compared.expect(i * 1_000_000, np.array([1.0, 0.0]))
@@ -432,8 +432,8 @@ def test_stamps_are_compared_and_what_was_not_recorded_is_refused():
     compared.take(2, np.zeros(2))
     assert compared.first.field == "stamp"
     assert str(compared).startswith("/cables/tension: 1 of 1 messages differ; first: ")
-    told = refused(compared.take, 3_000_000, np.zeros(2))
-    assert told == "/cables/tension: a message of 0.003000 s, allowed: those recorded"
+    reported = refused(compared.take, 3_000_000, np.zeros(2))
+    assert reported == "/cables/tension: a message of 0.003000 s, allowed: those recorded"
 
 
 @pytest.fixture(scope="module")
@@ -480,8 +480,8 @@ def test_a_last_instant_that_was_cut_is_left_out(lockstep):
 
 def test_messages_that_are_missing_inside_are_refused(lockstep):
     for topic in ("/clock", "/wrench_command", "/bar/pose"):
-        told = refused(steps_of, lockstep, without(lockstep[2], 20, topic))
-        assert told == (
+        reported = refused(steps_of, lockstep, without(lockstep[2], 20, topic))
+        assert reported == (
             f"bag: no {topic} at 0.020000 s, allowed: all that the scenario's rates require"
         )
 

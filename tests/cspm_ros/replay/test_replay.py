@@ -170,7 +170,7 @@ def test_a_bag_without_clock_gets_one_of_its_log_times(tmp_path):
 
 
 class FakeNode:
-    """A node that keeps the order of what is published, and whose timers tick when told."""
+    """A node that keeps the order of what is published, and whose timers tick on request."""
 
     def __init__(self):
         self.node = self
@@ -243,7 +243,7 @@ def test_the_clock_goes_ahead_of_the_messages_of_its_instant(tmp_path, monkeypat
     assert without == [(name, payload) for _, name, payload in messages]
 
 
-def test_types_that_are_not_installed_are_told(recording, monkeypatch):
+def test_types_that_are_not_installed_are_reported(recording, monkeypatch):
     monkeypatch.setitem(sys.modules, "trajectory_msgs.msg", None)
     fake = FakeNode()
     with open_bag(recording) as bag:
@@ -256,8 +256,8 @@ def test_types_that_are_not_installed_are_told(recording, monkeypatch):
         selection = Selection(left_out=[name for name in bag.topics if name != "/bar/reference"])
         with pytest.raises(InputError) as caught:
             PlayerNode(fake, bag, selection, 1.0)
-    told = f"{recording}: no topic of it can be played, /bar/reference: {missing}"
-    assert str(caught.value) == told
+    reported = f"{recording}: no topic of it can be played, /bar/reference: {missing}"
+    assert str(caught.value) == reported
 
 
 def test_others_pause_and_step(recording):
@@ -293,7 +293,7 @@ def test_others_pause_and_step(recording):
 
 
 @pytest.mark.slow
-def test_readers_of_another_quality_of_service_are_told(recording, capfd, monkeypatch):
+def test_readers_of_another_quality_of_service_are_reported(recording, capfd, monkeypatch):
     monkeypatch.setattr(Discovery, "LONGEST_S", 1.0)
     from rclpy.qos import DurabilityPolicy, QoSProfile
 
@@ -345,12 +345,12 @@ def test_a_controller_reproduces_while_others_are_played(recording, tmp_path, th
 
 
 def test_late_sensors_are_reproduced(tmp_path):
-    testbed = (SCENARIOS / "testbeds" / "thesis.yaml").read_text(encoding="utf-8")
+    testbed = (SCENARIOS / "testbeds" / "thesis_refitted.yaml").read_text(encoding="utf-8")
     late = testbed.replace("delay: {value: 0.0,", "delay: {value: 0.003,")
     assert late != testbed
     (tmp_path / "late.yaml").write_text(late, encoding="utf-8")
     scenario = (SCENARIOS / "calm.yaml").read_text(encoding="utf-8")
-    scenario = scenario.replace("testbeds/thesis.yaml", "late.yaml")
+    scenario = scenario.replace("testbeds/thesis_refitted.yaml", "late.yaml")
     (tmp_path / "scenario.yaml").write_text(scenario, encoding="utf-8")
     run(bundle_of(tmp_path / "scenario.yaml"), tmp_path / "bag", steps=50)
     found = replay_through(
@@ -390,11 +390,11 @@ def test_a_pause_is_no_lack_of_patience(recording):
     assert looks == [True] * 20
 
 
-def test_the_command_compares_and_tells_the_first_difference(cspm, domain, recording, tmp_path):
+def test_the_command_compares_and_reports_the_first_difference(cspm, domain, recording, tmp_path):
     gain = "control.force.gains.hoist_1.kp=0.5"
     code, out, err = cspm(
         *("replay", recording, "--through", "motion_controller,force_controller"),
-        *("--set", gain, "--json", "told.json", "--duration", "0.1"),
+        *("--set", gain, "--json", "reported.json", "--duration", "0.1"),
     )
     assert (code, err) == (1, "")
     wrench, torque, last = out.splitlines()
@@ -402,10 +402,10 @@ def test_the_command_compares_and_tells_the_first_difference(cspm, domain, recor
     start = "/winches/torque_command: 9. of 100 messages differ, by at most .* (effort/hoist_1)"
     assert re.match(start.replace("(", r"\(").replace(")", r"\)"), torque)
     assert last.startswith("played 0.099 s, ")
-    told = json.loads((tmp_path / "told.json").read_text())
-    assert (told["identical"], told["interrupted"]) == (False, False)
-    assert told["reproduced"]["/wrench_command"]["first_difference"] is None
-    first = told["reproduced"]["/winches/torque_command"]["first_difference"]
+    reported = json.loads((tmp_path / "reported.json").read_text())
+    assert (reported["identical"], reported["interrupted"]) == (False, False)
+    assert reported["reproduced"]["/wrench_command"]["first_difference"] is None
+    first = reported["reproduced"]["/winches/torque_command"]["first_difference"]
     assert first["field"] == "effort/hoist_1"
     assert first["first"] != first["second"]
 
@@ -419,10 +419,10 @@ def test_the_command_plays_all_nodes(cspm, domain, recording, tmp_path):
 
 def test_the_command_plays_to_nobody(cspm, domain, recording, tmp_path):
     arguments = ("--topics", "/bar/pose", "--start", "0.1", "--duration", "0.05")
-    code, out, err = cspm("replay", recording, *arguments, "--json", "told.json")
+    code, out, err = cspm("replay", recording, *arguments, "--json", "reported.json")
     assert (code, out, err) == (0, "played 0.049 s, 100 messages\n", "")
-    told = json.loads((tmp_path / "told.json").read_text())
-    assert told == {
+    reported = json.loads((tmp_path / "reported.json").read_text())
+    assert reported == {
         "bag": str(recording),
         "messages": 100,
         "played_s": 0.049,
@@ -437,9 +437,12 @@ def test_the_command_plays_to_nobody(cspm, domain, recording, tmp_path):
         (["--rate", "0"], "rate 0: allowed with nodes in step, which report how far they are"),
         (["--rate", "-1"], "rate -1: allowed: 0.001 to 1000, or 0 with nodes in step"),
         (["--remap", "/bar/pose"], "--remap /bar/pose: allowed: OLD=NEW, such as "),
-        (["--out", "x"], "--out without --through: allowed: with it"),
-        (["--set", "seed=2"], "--set without --through: allowed: with it"),
-        (["--through", "all", "--start", "1"], "--through with --topics, --except, --start or "),
+        (["--out", "x"], "out without through: allowed: with it"),
+        (["--set", "seed=2"], "changed values without through: allowed: with it"),
+        (
+            ["--through", "all", "--start", "1"],
+            "through with chosen or renamed topics or a ",
+        ),
         (["--through", "plant"], "through plant: allowed: wave_trajectory, motion_controller, "),
         (["--through", ""], "through no node: allowed: wave_trajectory, motion_controller, "),
         (["--through", "all", "--set", "nonsense"], "--set nonsense: allowed: key.path=value"),
@@ -609,10 +612,10 @@ def test_keys_in_a_terminal_steer(domain, recording):
 )
 def test_a_signal_ends_a_replay(domain, recording, tmp_path, number, through):
     # Paused, so that nothing but the signal can end it.
-    given = ["replay", recording, "--paused", *through, "--json", tmp_path / "told.json"]
+    given = ["replay", recording, "--paused", *through, "--json", tmp_path / "reported.json"]
     terminal = Terminal(*given)
     terminal.wait_for("s, paused")
     os.kill(terminal.process, number)
     assert terminal.end() == 1
     assert "interrupted after 0.000 s" in terminal.text
-    assert json.loads((tmp_path / "told.json").read_text())["interrupted"] is True
+    assert json.loads((tmp_path / "reported.json").read_text())["interrupted"] is True

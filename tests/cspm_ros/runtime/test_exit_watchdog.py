@@ -8,7 +8,7 @@ import sys
 _PROGRAM = """
 import ctypes, time
 from cspm_ros.runtime.exit_watchdog import exit_watchdog
-with exit_watchdog(0.2) as begin:
+with exit_watchdog() as begin:
     {inside}
 {after}
 """
@@ -22,7 +22,7 @@ def code_of(inside, after=""):
 
 
 def test_the_system_ends_who_is_stuck_with_pythons_lock():
-    assert code_of(f"begin(); {STUCK}") == -signal.SIGALRM
+    assert code_of(f"begin(0.2); {STUCK}") == -signal.SIGALRM
 
 
 def test_before_it_begins_there_is_time():
@@ -30,4 +30,4 @@ def test_before_it_begins_there_is_time():
 
 
 def test_who_has_left_is_not_ended():
-    assert code_of("begin()", after=LONGER) == 0
+    assert code_of("begin(0.2)", after=LONGER) == 0

@@ -1,4 +1,4 @@
-"""Runs with somebody else's hardware, for which a simulated plant stands that leads nobody."""
+"""Runs with somebody else's hardware, simulated by a plant that leads nobody."""
 
 from dataclasses import replace
 from pathlib import Path
@@ -85,8 +85,8 @@ def test_a_run_waits_for_the_hardware_and_holds_its_bar(warm, tmp_path, plant):
         missing = f"waits for {', '.join(MEASURED)}"
         witness.until(lambda: waits_for(graph) == missing, missing)
         # Nothing is commanded before the run has begun.
-        told = witness.until_said(FORCE_CONTROLLER, lambda s: s.level == 3, "what it waits for")
-        assert told.message.startswith("waits for ")
+        reported = witness.until_said(FORCE_CONTROLLER, lambda s: s.level == 3, "what it waits for")
+        assert reported.message.startswith("waits for ")
         hardware.switch_on()
         witness.until(lambda: read_report(Path(graph.parameters.report)).simulated > 0.0, "start")
         witness.until_running(FORCE_CONTROLLER, WATCHDOG)
@@ -166,10 +166,10 @@ def test_hardware_that_dies_is_missed_and_may_come_back(warm, tmp_path):
         witness.until_running(FORCE_CONTROLLER, WATCHDOG)
         witness.until_more(TENSION, 100)
         first.processes[PLANT].kill()
-        told = witness.until_state(FORCE_CONTROLLER, "hold")
+        reported = witness.until_state(FORCE_CONTROLLER, "hold")
         # Without poses there are no wanted tensions either.
         silent = (TENSION, WINCH_STATE, TENSION_COMMAND)
-        assert told.values["reason"].startswith(tuple(f"{topic} stale: " for topic in silent))
+        assert reported.values["reason"].startswith(tuple(f"{topic} stale: " for topic in silent))
         assert not witness.reset(FORCE_CONTROLLER)[0]
         witness.until_more(TORQUE_COMMAND, 50)
         second.switch_on()

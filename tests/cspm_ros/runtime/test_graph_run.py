@@ -49,6 +49,16 @@ RUNS = {
     "torques, no bar": (bundle_of("one_winch"), 250),
     "angles, no bar": (bundle_of("rig_stiffness_sway"), 250),
     "late sensors": (late(bundle_of("rest"), **LATE), 200),
+    "internals and dither": (
+        bundle_of(
+            "worst_case",
+            "control.record_internals=true",
+            "control.force.dither={amplitude: 0.01, frequency: 130}",
+        ),
+        300,
+    ),
+    "a measured target": (bundle_of("calm_measured_target", "rates.motion_capture=100"), 250),
+    "a cut cable": (bundle_of("calm_cut_cable", "events=[{at: 0.1, cut: hoist_1}]"), 250),
     "odd rates": (bundle_of("rest", *[f"rates.{rate}" for rate in ODD]), 200),
 }
 MORE_RUNS = {
@@ -61,7 +71,7 @@ MORE_RUNS = {
         250,
     ),
     # The force controller reads references as well.
-    "friction and winches fed forward, mass told": (
+    "friction and winches fed forward, mass given": (
         Case(
             "worst_case_past_thesis",
             (
@@ -75,7 +85,10 @@ MORE_RUNS = {
         400,
     ),
     # Tensions that trip the force controllers.
-    "safe state": (bundle_of("worst_case", "safety.tension_trip=8.2"), 700),
+    "safe state": (
+        bundle_of("worst_case", "safety.tension_trip=8.2", "control.record_internals=true"),
+        700,
+    ),
 }
 
 
@@ -155,12 +168,12 @@ def test_a_divergence_ends_the_run_and_keeps_its_recording(tmp_path):
 
 
 def test_a_run_lasts_as_long_as_its_scenario_and_says_how_far_it_is(tmp_path):
-    told = []
-    result = graph(bundle_of("one_winch", "duration=0.6"), tmp_path / "bag", told.append)
+    reported = []
+    result = graph(bundle_of("one_winch", "duration=0.6"), tmp_path / "bag", reported.append)
     assert result.simulated == pytest.approx(0.6)
     assert result.messages["/clock"] == 600
-    assert told == sorted(told)
-    assert 0.0 <= told[-1] <= 0.6
+    assert reported == sorted(reported)
+    assert 0.0 <= reported[-1] <= 0.6
 
 
 @pytest.mark.parametrize(
@@ -191,7 +204,7 @@ def test_a_signal_ends_the_run_between_two_steps(tmp_path, number, at):
 
 @pytest.mark.parametrize("stopped", [False, True])
 def test_a_plant_that_is_stopped_before_its_start_never_starts(stopped):
-    """It has told the end, and who then heard of a first step would wait for the next for ever."""
+    """It has reported the end; who then heard of a first step would wait for the next for ever."""
     with Session(domain_id=new_domain(), polled=True) as session:
         plant = LockstepRun(bundle_of("one_winch"), (PLANT,)).plant(session.node(PLANT), 10)
         if stopped:
@@ -329,21 +342,21 @@ def test_the_command_line_runs_a_graph(tmp_path):
         "--out",
         folder,
         "--json",
-        tmp_path / "told.json",
+        tmp_path / "reported.json",
     )
     assert (code, err) == (0, "")
     assert "simulated 0.3 s at " in out
     assert (folder / "run.png").is_file()
-    told = json.loads((tmp_path / "told.json").read_text())
-    assert told["mode"] == "graph"
-    assert told == json.loads((folder / "summary.json").read_text())
+    reported = json.loads((tmp_path / "reported.json").read_text())
+    assert reported["mode"] == "graph"
+    assert reported == json.loads((folder / "summary.json").read_text())
     run(bundle_of("rest", "duration=0.3"), tmp_path / "inprocess")
     assert difference(folder, tmp_path / "inprocess") is None
     assert recorded(folder)["/clock"].stamp_ns[-1] == 299_000_000
 
 
 @pytest.mark.slow
-def test_the_command_line_tells_a_divergence(tmp_path):
+def test_the_command_line_reports_a_divergence(tmp_path):
     settings = [word for override in WILD for word in ("--set", override)]
     code, _, err = done("run", "rest", "--mode", "graph", "--out", tmp_path / "bag", *settings)
     assert code == 1

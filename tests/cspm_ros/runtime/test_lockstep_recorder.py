@@ -61,15 +61,15 @@ def test_any_delivery_makes_the_same_file(case, tmp_path_factory, seed):
         assert intake.recorder.done
     assert content(folder) == content(case.expected)
     assert intake.recorder.refused == (0, "")
-    assert intake.told[-1] == STEPS - 1
-    assert intake.told == sorted(intake.told)
+    assert intake.reported[-1] == STEPS - 1
+    assert intake.reported == sorted(intake.reported)
 
 
 @pytest.mark.slow
 @settings(max_examples=5)
 @given(seed=SEEDS)
 def test_recorded_while_it_runs(case, tmp_path_factory, seed):
-    """The recorder holds the plant back, so that no queue overflows, and is told the end."""
+    """The recorder holds the plant back, so that no queue overflows, and is notified of the end."""
     folder = tmp_path_factory.mktemp("run") / "bag"
     intakes = []
 
@@ -87,7 +87,7 @@ def test_recorded_while_it_runs(case, tmp_path_factory, seed):
     assert content(folder) == content(case.expected)
 
 
-def test_hashes_tell_recordings_apart(case, tmp_path):
+def test_hashes_distinguish_recordings(case, tmp_path):
     run(bundle_of("rest", "seed=2"), tmp_path / "other", steps=STEPS)
     found, other = hashes(case.expected), hashes(tmp_path / "other")
     assert found["/cables/tension"] != other["/cables/tension"]
@@ -135,14 +135,14 @@ def test_nothing_is_acknowledged_before_all_of_it_is_there(case, tmp_path):
     intake = Intake(case.bundle, tmp_path / "bag")
     with intake.writer:
         deliver_through(intake, case, 40, until=-1)
-        assert intake.told == []
+        assert intake.reported == []
         assert intake.recorder.missing() == ["/clock"]
         clock = count()
         for payload in case.sent["/clock"][:41]:
             intake.take("/clock", payload)
             step = next(clock)
-            assert not intake.told or intake.told[-1] <= step
-            assert step - max(intake.told, default=-1) <= RECORDED_EVERY
+            assert not intake.reported or intake.reported[-1] <= step
+            assert step - max(intake.reported, default=-1) <= RECORDED_EVERY
         assert intake.recorder.completed >= 40 - RECORDED_EVERY
 
 

@@ -54,7 +54,7 @@ def test_blocks_make_the_same_file(case, tmp_path, seed, share):
     assert content(tmp_path / "bag") == content(case.expected)
     assert intake.recorder.refused[0] == added == len(intake.rate_limited_warnings)
     assert (added > 20) == (share > 0.0)
-    assert intake.told[-1] == STEPS - 1
+    assert intake.reported[-1] == STEPS - 1
 
 
 def test_rows_that_are_due_make_the_same_file(case, tmp_path):
@@ -77,7 +77,7 @@ def test_rows_that_are_due_make_the_same_file(case, tmp_path):
         intake.recorder.end(STEPS - 1)
         assert intake.recorder.done
     assert content(tmp_path / "bag") == content(case.expected)
-    assert intake.told[-1] == STEPS - 1
+    assert intake.reported[-1] == STEPS - 1
 
 
 def test_a_second_sender_in_a_block_is_an_error(case, tmp_path):

@@ -56,14 +56,14 @@ class Machine(Graph):
 def test_every_message_that_is_sent_is_recorded(tmp_path, plant):
     check_plant(plant)
     bundle = replace(slow_bundle(), plant=plant)
-    told = []
+    reported = []
     with going_first():
         result = run_realtime(
-            bundle, tmp_path / "bag", told.append, steps=600, domain_id=new_domain()
+            bundle, tmp_path / "bag", reported.append, steps=600, domain_id=new_domain()
         )
     assert (result.failure, result.interrupted, result.mode) == (None, False, "realtime")
     assert result.simulated == pytest.approx(3.005, abs=0.1)
-    assert told == sorted(told)
+    assert reported == sorted(reported)
     assert result.timing[RECORDER] == {"lost": 0, "refused": 0}
     assert result.timing[PLANT]["refused"] == result.timing[FORCE_CONTROLLER]["refused"] == 0
     found = overview(tmp_path / "bag")
@@ -112,8 +112,8 @@ def test_an_emergency_stop_from_outside_is_obeyed_at_once(tmp_path):
     ):
         under_way(witness)
         witness.emergency_stop(True)
-        told = witness.until_state(FORCE_CONTROLLER, "hold")
-        assert told.values["reason"] == "emergency stop set"
+        reported = witness.until_state(FORCE_CONTROLLER, "hold")
+        assert reported.values["reason"] == "emergency stop set"
         assert not witness.reset(FORCE_CONTROLLER)[0]
         witness.emergency_stop(False)
         witness.until_reset(FORCE_CONTROLLER)
@@ -127,7 +127,7 @@ def test_an_emergency_stop_from_outside_is_obeyed_at_once(tmp_path):
     with Recording(command.folder) as recording:
         pressed = int(recording.payloads(EMERGENCY_STOP.name).log_ns[0])
     gap = evidence.longest_gap(TORQUE_COMMAND, pressed, since + 10 * PERIOD)
-    # What it tells is rounded to 1 ms.
+    # What it reports is rounded to 1 ms.
     assert since - pressed <= 2 * PERIOD + gap + MS
 
 
@@ -141,8 +141,8 @@ def test_hardware_stops_by_itself_when_the_process_is_killed(warm, tmp_path):
         under_way(witness)
         command.process.kill()
         assert command.done()[0] == -signal.SIGKILL
-        told = witness.until_state(WATCHDOG, "hold")
-        assert told.values["reason"].startswith(f"no {TORQUE_COMMAND} for ")
+        reported = witness.until_state(WATCHDOG, "hold")
+        assert reported.values["reason"].startswith(f"no {TORQUE_COMMAND} for ")
         assert machine.end() == {PLANT: 0}
     recover(command.folder)
     assert len(Evidence(command.folder).stamps(TENSION)) >= 60

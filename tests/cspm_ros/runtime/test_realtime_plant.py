@@ -49,7 +49,7 @@ class Bench:
         self.period = self.schedule.period_ns
         self.sent = {name: [] for name in self.schedule.topics if name != CLOCK}
         self.listeners, self.under_way = [], deque()
-        self.told = []
+        self.reported = []
         publish = {
             name: self._publisher(name)
             for name in self.sent
@@ -68,7 +68,7 @@ class Bench:
             self.schedule,
             steps,
             self.dog,
-            lambda stamp, status: self.told.append((stamp, status)),
+            lambda stamp, status: self.reported.append((stamp, status)),
         )
         self.now = START
         self.hanging = self.simulator.torque.copy()
@@ -213,13 +213,13 @@ def test_a_late_command_is_held_counted_and_followed_when_it_comes(tmp_path):
     assert bench.plant.missed == 2
 
 
-def test_missed_commands_are_told(tmp_path):
+def test_missed_commands_are_reported(tmp_path):
     bench = quiet(tmp_path)
     for k in range(41):
         bench.at(k)
         if k < 19:
             bench.command(k)
-    mine = [status for _, status in bench.told if status.name == "plant"]
+    mine = [status for _, status in bench.reported if status.name == "plant"]
     assert [status.values["deadlines_missed"] for status in mine] == ["0", "1", "21"]
     assert (mine[0].level, mine[0].message) == (Level.OK, "ok")
     assert (mine[1].level, mine[1].message) == (Level.WARN, "torque commands came too late")
@@ -283,7 +283,7 @@ def test_its_watchdog_takes_over_when_commands_end(tmp_path, state):
         assert bench.dog.safe == (k > 109)
     assert bench.parts.plant.locked == (state == "brake")
     assert abs(bench.parts.plant.bar_state[2] - start) < 1e-3
-    said = [status for _, status in bench.told if status.name == "plant/watchdog"]
+    said = [status for _, status in bench.reported if status.name == "plant/watchdog"]
     assert said[5].message == "ok"
     assert said[-1].level == Level.ERROR
     assert said[-1].values["reason"] == f"no {TORQUE_COMMAND} for 55 ms, allowed: 50 ms"
@@ -317,14 +317,14 @@ def test_the_brake_topic_sets_and_releases_the_brakes(tmp_path):
     np.testing.assert_array_equal(bench.parts.plant.angles, angles)
 
 
-def test_refused_commands_are_counted_and_told(tmp_path):
+def test_refused_commands_are_counted_and_reported(tmp_path):
     bench = quiet(tmp_path)
     bench.at(0)
-    bench.plant.refuse("a reason")
+    bench.plant.refuse(bench.now, "a reason")
     for k in range(1, 21):
         bench.command(k - 1)
         bench.at(k)
-    said = [status for _, status in bench.told if status.name == "plant"]
+    said = [status for _, status in bench.reported if status.name == "plant"]
     assert [status.values["refused"] for status in said] == ["0", "1"]
     assert (said[1].level, said[1].message) == (Level.WARN, "refused: a reason")
 
@@ -348,12 +348,12 @@ def test_a_plant_that_leaves_its_equations_says_so_and_ends(tmp_path):
 def test_the_watchdogs_torques_are_what_the_plant_does(tmp_path):
     """Two plants, one commanded with the safe state's torques, one left to its watchdog."""
     bench = quiet(tmp_path, 200)
-    twin = parts_of(tmp_path, "rest", QUIET).plant
+    other = parts_of(tmp_path, "rest", QUIET).plant
     for k in range(100):
         bench.at(k)
         if k == 0:
             bench.command(0)
         if k:
-            twin.step(bench.simulator.torque)
+            other.step(bench.simulator.torque)
     assert bench.dog.safe
-    np.testing.assert_array_equal(twin.bar_state, bench.parts.plant.bar_state)
+    np.testing.assert_array_equal(other.bar_state, bench.parts.plant.bar_state)

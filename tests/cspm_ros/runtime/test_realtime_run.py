@@ -48,12 +48,12 @@ def test_a_run_keeps_the_bar_where_it_is_and_says_how_late_it_was(tmp_path, proc
     summary = json.loads((command.folder / "summary.json").read_text())
     assert summary["mode"] == "realtime"
     assert summary["duration_s"] == pytest.approx(3.0, abs=0.5)
-    told = summary["realtime"]
-    assert told["recorder"] == {"lost": 0, "refused": 0}
-    assert set(told) == {*bundle_nodes(bundle), PLANT, "recorder"}
+    reported = summary["realtime"]
+    assert reported["recorder"] == {"lost": 0, "refused": 0}
+    assert set(reported) == {*bundle_nodes(bundle), PLANT, "recorder"}
     for name in (PLANT, FORCE_CONTROLLER):
-        assert told[name]["deadlines_missed"] >= 0
-        assert told[name]["refused"] == 0
+        assert reported[name]["deadlines_missed"] >= 0
+        assert reported[name]["refused"] == 0
     # Near its reference, however late commands were.
     assert max(error["max"] for error in list(summary["errors"].values())[:3]) < 0.01
     found = overview(command.folder)
@@ -86,7 +86,11 @@ def test_interrupting_ends_the_run_early_with_a_complete_recording(tmp_path, pro
         Witness(command.domain, topics_of(bundle, TENSION)) as witness,
     ):
         under_way(witness)
-        assert bool(command.nodes()) == (processes == APART)
+        nodes = command.nodes()
+        assert bool(nodes) == (processes == APART)
+        # By the wall clock a recorder that gives way would lose messages.
+        policies = {os.sched_getscheduler(node.pid) for node in nodes.values()}
+        assert os.SCHED_BATCH not in policies
         command.process.send_signal(signal.SIGINT)
         code, out, err = command.done()
     assert (code, err) == (1, "")
@@ -120,7 +124,7 @@ def warm():
     return warm_processes()
 
 
-def test_deadlines_missed_are_counted_told_and_recorded(warm, tmp_path):
+def test_deadlines_missed_are_counted_reported_and_recorded(warm, tmp_path):
     """A node that stood still for a while missed what was due then."""
     bundle = slow_bundle("safety.stale_after=5.0", "safety.watchdog=5.0")
     with (
@@ -131,8 +135,8 @@ def test_deadlines_missed_are_counted_told_and_recorded(warm, tmp_path):
         under_way(witness)
 
         def missed(name):
-            told = witness.until_said(name, lambda _: True, "a status")
-            return int(told.values["deadlines_missed"])
+            reported = witness.until_said(name, lambda _: True, "a status")
+            return int(reported.values["deadlines_missed"])
 
         before = {name: missed(name) for name in (PLANT, FORCE_CONTROLLER)}
         graph.send(FORCE_CONTROLLER, signal.SIGSTOP)
@@ -144,13 +148,13 @@ def test_deadlines_missed_are_counted_told_and_recorded(warm, tmp_path):
         assert set(graph.end().values()) == {0}
     for name, count in before.items():
         assert after[name] - count >= 45, name
-    told = timing_of(graph.folder)
+    reported = timing_of(graph.folder)
     for name, count in after.items():
-        assert told[name]["deadlines_missed"] >= count
-    assert told[FORCE_CONTROLLER]["worst_latency_ms"] > 5.0
+        assert reported[name]["deadlines_missed"] >= count
+    assert reported[FORCE_CONTROLLER]["worst_latency_ms"] > 5.0
 
 
-def test_on_a_busy_processor_deadlines_are_missed_and_told(warm, tmp_path):
+def test_on_a_busy_processor_deadlines_are_missed_and_reported(warm, tmp_path):
     """At 1 kHz, with more to do than the processor can."""
     bundle = bundle_of("rest", "safety.stale_after=10.0", "safety.watchdog=10.0")
     burners = [
@@ -177,10 +181,10 @@ def test_on_a_busy_processor_deadlines_are_missed_and_told(warm, tmp_path):
         for burner in burners:
             burner.kill()
             burner.wait()
-    told = timing_of(graph.folder)
-    assert told[PLANT]["deadlines_missed"] > 0
-    assert told[FORCE_CONTROLLER]["deadlines_missed"] > 0
-    assert told[FORCE_CONTROLLER]["worst_latency_ms"] > 1.0
+    reported = timing_of(graph.folder)
+    assert reported[PLANT]["deadlines_missed"] > 0
+    assert reported[FORCE_CONTROLLER]["deadlines_missed"] > 0
+    assert reported[FORCE_CONTROLLER]["worst_latency_ms"] > 1.0
 
 
 def test_prescribed_torques_follow_the_time_since_the_start(warm, tmp_path):

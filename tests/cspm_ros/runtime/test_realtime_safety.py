@@ -18,13 +18,16 @@ from realtime_graph import (
     warm_processes,
 )
 from ros_graph import load_ros
+from rosbags.highlevel import AnyReader
 
 from cspm_control.safe_state import balancing_tensions
 from cspm_msgs_py.message import message_of
 from cspm_msgs_py.recording import Recording
 from cspm_msgs_py.recording.recover import recover
-from cspm_msgs_py.ros_types import serialize
+from cspm_msgs_py.ros.contract_node import ros_class
+from cspm_msgs_py.ros_types import serialize, typestore
 from cspm_msgs_py.schedule import (
+    BAR_POSE,
     FORCE_CONTROLLER,
     MOTION_CONTROLLER,
     PLANT,
@@ -37,13 +40,16 @@ from cspm_msgs_py.schedule import (
 )
 
 load_ros()
+
+from rclpy.parameter import Parameter  # noqa: E402
+
 pytestmark = pytest.mark.slow
 
 MS = 1_000_000
 PERIOD = 5 * MS
 WATCHDOG = "plant/watchdog"
 GUARDS = (FORCE_CONTROLLER, WATCHDOG)
-REFERENCE = "/bar/reference"
+REFERENCE, TRUTH = "/bar/reference", "/truth/bar/pose"
 # How far the bar may move [m] until somebody holds it; a falling one sinks 0.44 m in STALE_AFTER.
 SAG = 0.02
 # Who falls silent, and what is missing in the end.
@@ -60,7 +66,7 @@ def warm():
 
 
 @pytest.fixture
-def tell(request):
+def note(request):
     """Return what shows a measured time among the test's progress."""
     plugins = request.config.pluginmanager
 
@@ -95,7 +101,7 @@ def reaction(evidence, guard, topic, reacts, wait=STALE_AFTER, event=0):
     since, reason = evidence.alarms(guard)[event]
     assert reason.startswith((f"{topic} stale: ", f"no {topic} for ")), reason
     good = evidence.last_before(topic, since)
-    # What it tells is rounded to 1 ms.
+    # What it reports is rounded to 1 ms.
     allowed = round(wait * 1e9) + 2 * PERIOD + MS
     allowed += evidence.longest_gap(reacts, good, since + 10 * PERIOD)
     took = since - good
@@ -134,7 +140,7 @@ def heave(evidence):
     ],
 )
 def test_a_killed_node_brings_the_force_controllers_to_their_safe_state(
-    warm, tmp_path, name, state, tell
+    warm, tmp_path, name, state, note
 ):
     bundle = slow_bundle(f"safety.state={state}")
     with (
@@ -144,8 +150,8 @@ def test_a_killed_node_brings_the_force_controllers_to_their_safe_state(
         graph.start()
         under_way(witness)
         graph.send(name, signal.SIGKILL)
-        told = witness.until_state(FORCE_CONTROLLER, state)
-        assert told.level == 2
+        reported = witness.until_state(FORCE_CONTROLLER, state)
+        assert reported.level == 2
         witness.until_more(TORQUE_COMMAND, 100)
         if name == PLANT:
             for left in set(graph.names) - {PLANT}:
@@ -169,11 +175,11 @@ def test_a_killed_node_brings_the_force_controllers_to_their_safe_state(
     if name != PLANT:
         assert np.ptp(heave(evidence)) < SAG
         assert not evidence.alarms(WATCHDOG)
-    tell(said)
+    note(said)
 
 
 @pytest.mark.parametrize("state", ["hold", "brake"])
-def test_when_the_force_controllers_are_killed_the_plant_stops_itself(warm, tmp_path, state, tell):
+def test_when_the_force_controllers_are_killed_the_plant_stops_itself(warm, tmp_path, state, note):
     bundle = slow_bundle(f"safety.state={state}")
     with (
         Graph(warm, bundle, tmp_path) as graph,
@@ -198,7 +204,7 @@ def test_when_the_force_controllers_are_killed_the_plant_stops_itself(warm, tmp_
         np.testing.assert_allclose(torques[-1], balance_torque(bundle), rtol=0.2)
     assert np.ptp(heave(evidence)) < SAG
     assert not evidence.alarms(FORCE_CONTROLLER)
-    tell(f"force_controller killed, {state}: last command to safe torque {took * 1e3:.0f} ms")
+    note(f"force_controller killed, {state}: last command to safe torque {took * 1e3:.0f} ms")
 
 
 def test_a_patient_watchdog_lets_the_last_torques_stand(warm, tmp_path):
@@ -242,7 +248,7 @@ def test_without_the_recorder_the_winches_go_on_and_the_recording_can_be_restore
     assert (np.diff(evidence.stamps(TENSION)) == PERIOD).all()
 
 
-def test_stopped_nodes_are_missed_one_after_the_other_and_come_back(warm, tmp_path, tell):
+def test_stopped_nodes_are_missed_one_after_the_other_and_come_back(warm, tmp_path, note):
     """SIGSTOP hits each node in turn; SIGCONT and a reset bring it back, in one run."""
     bundle = slow_bundle()
     guard_of = dict.fromkeys(MISSED, FORCE_CONTROLLER)
@@ -274,7 +280,7 @@ def test_stopped_nodes_are_missed_one_after_the_other_and_come_back(warm, tmp_pa
     reasons = [reason for _, reason in evidence.alarms(FORCE_CONTROLLER)]
     for event, name in enumerate(MISSED):
         took = reaction(evidence, FORCE_CONTROLLER, TENSION_COMMAND, TORQUE_COMMAND, event=event)
-        tell(f"{name} stopped: {TENSION_COMMAND} to safe torque {took * 1e3:.0f} ms")
+        note(f"{name} stopped: {TENSION_COMMAND} to safe torque {took * 1e3:.0f} ms")
     silent = (TENSION, WINCH_STATE, TENSION_COMMAND)
     assert reasons[3].startswith(tuple(f"{topic} stale: " for topic in silent))
     assert reasons[4].startswith("stood still for ")
@@ -287,7 +293,7 @@ def test_stopped_nodes_are_missed_one_after_the_other_and_come_back(warm, tmp_pa
 
 
 @pytest.mark.parametrize("state", ["hold", "brake"])
-def test_the_emergency_stop_acts_within_two_periods_until_it_is_reset(warm, tmp_path, state, tell):
+def test_the_emergency_stop_acts_within_two_periods_until_it_is_reset(warm, tmp_path, state, note):
     bundle = slow_bundle(f"safety.state={state}")
     with (
         Graph(warm, bundle, tmp_path) as graph,
@@ -302,8 +308,8 @@ def test_the_emergency_stop_acts_within_two_periods_until_it_is_reset(warm, tmp_
         pressed_ns = witness.node.now_ns()
         witness.emergency_stop(True)
         pressing = witness.node.now_ns() - pressed_ns
-        told = witness.until_state(FORCE_CONTROLLER, state)
-        assert told.values["reason"] == "emergency stop set"
+        reported = witness.until_state(FORCE_CONTROLLER, state)
+        assert reported.values["reason"] == "emergency stop set"
         assert witness.reset(FORCE_CONTROLLER) == (False, "reset refused: emergency stop set")
         witness.emergency_stop(False)
         witness.until_more(TENSION, 100)
@@ -328,7 +334,7 @@ def test_the_emergency_stop_acts_within_two_periods_until_it_is_reset(warm, tmp_
         assert len(safe) > 90
         took = int(evidence.torques()[0][safe[0]]) - pressed_ns
         assert took <= 2 * PERIOD + gap + pressing
-    tell(f"emergency stop, {state}: to safe torque {took * 1e-6:.1f} ms")
+    note(f"emergency stop, {state}: to safe torque {took * 1e-6:.1f} ms")
 
 
 # Foreign messages
@@ -342,34 +348,46 @@ def message(topic, stamp_ns, row, **changes):
     return serialize(made)
 
 
-def test_foreign_messages_are_answered_with_the_safe_state_and_its_reason(warm, tmp_path, tell):
+def test_foreign_messages_are_answered_with_the_safe_state_and_its_reason(warm, tmp_path, note):
     bundle = slow_bundle()
     topics = bundle.testbed.testbed.topics
     tension, command, twist = topics[TENSION], topics[TENSION_COMMAND], topics["/bar/twist"]
+    pose, torque, truth = topics[BAR_POSE], topics[TORQUE_COMMAND], topics[TRUTH]
     five, names = np.full(8, 5.0), list(bundle.testbed.testbed.cable_names)
     nan = np.where(np.arange(8) == 2, np.nan, 5.0)
     swapped = [names[1], names[0], *names[2:]]
     thousands = [f"c{i}" for i in range(10_000)]
+    upright = np.array([0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 1.0])
+    abroad = message_of(pose, 0, upright).header
+    abroad.frame_id = "map"
     second = 1_000 * MS
+    stranger = "a second publisher, of witness, allowed: that of"
     cases = [
         (tension, 0, nan, {}, f"{TENSION}: effort of surge_1 is nan, allowed: finite numbers"),
         (command, 0, nan, {}, f"{TENSION_COMMAND}: effort of surge_1 is nan, allowed: finite"),
         (command, 0, five, {"effort": five[:7]}, f"{TENSION_COMMAND}: effort has 7 values for 8"),
         (tension, 0, five, {"name": swapped}, f"{TENSION}: names in a wrong order, name 1 is 'h"),
         (tension, 0, five, {"name": thousands}, f"{TENSION}: a message of "),
-        (tension, -second, five, {}, f"{TENSION}: stamp went back from "),
-        (command, -second, five, {}, f"{TENSION_COMMAND}: stamp went back from "),
-        (tension, 10 * second, five, {}, f"{TENSION}: stamp "),
+        (tension, -second, five, {}, f"{TENSION}: {stranger} plant alone"),
+        (command, 0, five, {}, f"{TENSION_COMMAND}: {stranger} tension_distribution alone"),
+        (tension, 10 * second, five, {}, f"{TENSION}: {stranger}"),
+        (pose, 0, upright, {}, f"{BAR_POSE}: {stranger} plant alone"),
+        (pose, 0, upright, {"header": abroad}, f"{BAR_POSE}: frame 'map', allowed: 'world_ned'"),
+        (truth, 0, upright, {}, f"recorder: {TRUTH}: {stranger} plant alone"),
+        (torque, 3600 * second, five, {}, f"{TORQUE_COMMAND}: {stranger} force_controller alone"),
     ]
     took = []
     with (
         Graph(warm, bundle, tmp_path) as graph,
         Witness(graph.domain, topics_of(bundle, TENSION)) as witness,
     ):
-        send = {topic.name: witness.publisher(topic) for topic in (tension, command, twist)}
+        send = {
+            topic.name: witness.publisher(topic)
+            for topic in (tension, command, twist, pose, torque, truth)
+        }
         graph.start()
         under_way(witness)
-        # What nobody asked for changes nothing.
+        # What is no topic of this run changes nothing.
         for _ in range(20):
             send[twist.name](message(twist, witness.node.now_ns(), np.full(6, np.nan)))
         witness.until_more(TENSION, 50)
@@ -378,10 +396,14 @@ def test_foreign_messages_are_answered_with_the_safe_state_and_its_reason(warm, 
             sent_ns = witness.node.now_ns()
             send[topic.name](message(topic, sent_ns + shift, row, **changes))
             sending = witness.node.now_ns() - sent_ns
-            told = witness.until_state(FORCE_CONTROLLER, "hold")
-            assert told.values["reason"].startswith(reason)
-            since = float(told.message.partition(" since ")[2].partition(" s:")[0])
+            reported = witness.until_state(FORCE_CONTROLLER, "hold")
+            assert reason in reported.values["reason"]
+            since = float(reported.message.partition(" since ")[2].partition(" s:")[0])
             took.append((round(since * 1e3) * MS - sent_ns, sent_ns, sending))
+            if topic is torque:
+                held = witness.until_state(WATCHDOG, "hold")
+                assert held.values["reason"].startswith(reason)
+                witness.until_reset(PLANT)
             witness.until_reset(FORCE_CONTROLLER)
             witness.until_running(*GUARDS)
         assert set(graph.end().values()) == {0}
@@ -392,7 +414,53 @@ def test_foreign_messages_are_answered_with_the_safe_state_and_its_reason(warm, 
         gap = evidence.longest_gap(TORQUE_COMMAND, sent_ns - PERIOD, until)
         assert reacted <= 2 * PERIOD + MS + gap + sending
     assert np.ptp(heave(evidence)) < SAG
+    # What nobody obeyed is recorded as it came, and apart from what counted.
+    with Recording(graph.folder) as recording:
+        assert recording.refused == {
+            TENSION: 5,
+            TENSION_COMMAND: 3,
+            BAR_POSE: 2,
+            TRUTH: 1,
+            TORQUE_COMMAND: 1,
+        }
+        assert np.abs(recording.rows(BAR_POSE).rows[:, 2] - 2.0).max() < SAG
+    frames = {m.header.frame_id for m in rosbags_messages(graph.folder, BAR_POSE)}
+    assert frames == {"world_ned", "map"}
     # Strangers' numbers are no losses.
     lost = [s.values["lost"] for s in evidence.statuses if s.name == "recorder"]
     assert set(lost) == {"0"}
-    tell(f"foreign messages: {max(r for r, _, _ in took) * 1e-6:.0f} ms at most")
+    note(f"foreign messages: {max(r for r, _, _ in took) * 1e-6:.0f} ms at most")
+
+
+def rosbags_messages(folder, topic):
+    """Yield the messages of a topic as another reader of bags finds them."""
+    with AnyReader([folder], default_typestore=typestore()) as reader:
+        wanted = [each for each in reader.connections if each.topic == topic]
+        for connection, _, payload in reader.messages(wanted):
+            yield reader.deserialize(payload, connection.msgtype)
+
+
+def test_the_time_of_a_run_is_nobody_elses(warm, tmp_path):
+    bundle = slow_bundle()
+    with (
+        Graph(warm, bundle, tmp_path) as graph,
+        Witness(graph.domain, topics_of(bundle, TENSION)) as witness,
+    ):
+        graph.start()
+        under_way(witness)
+        service = f"/{FORCE_CONTROLLER}/set_parameters"
+        kind = ros_class("rcl_interfaces/srv/SetParameters")
+        client = witness.node.node.create_client(kind, service)
+        witness.until(client.service_is_ready, service)
+        request = kind.Request(
+            parameters=[Parameter("use_sim_time", value=True).to_parameter_msg()]
+        )
+        answer = client.call_async(request)
+        witness.until(answer.done, service)
+        (result,) = answer.result().results
+        assert not result.successful
+        assert result.reason == "use_sim_time: true, allowed in real time: false"
+        witness.until_more(TENSION, 50)
+        witness.until_running(*GUARDS)
+        assert set(graph.end().values()) == {0}
+    assert not Evidence(graph.folder).alarms(FORCE_CONTROLLER)

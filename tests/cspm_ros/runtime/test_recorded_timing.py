@@ -1,4 +1,4 @@
-"""What nodes told of their deadlines, read from a recording."""
+"""What nodes reported of their deadlines, read from a recording."""
 
 import pytest
 
@@ -39,18 +39,18 @@ def test_of_totals_the_last_counts_and_of_latencies_the_largest(tmp_path):
     }
 
 
-def test_who_tells_nothing_of_time_is_left_out(tmp_path):
+def test_who_reports_nothing_of_time_is_left_out(tmp_path):
     folder = record(tmp_path / "r", said("plant/watchdog", state="running"))
     assert timing_of(folder) == {}
 
 
-def test_a_recording_without_diagnostics_tells_nothing(tmp_path):
+def test_a_recording_without_diagnostics_shows_nothing(tmp_path):
     folder = record(tmp_path / "r")
     assert timing_of(folder) == {}
     assert first_alarm(folder) is None
 
 
-def test_the_first_error_is_told_with_its_name_whatever_comes_after(tmp_path):
+def test_the_first_error_is_reported_with_its_name_whatever_comes_after(tmp_path):
     folder = record(
         tmp_path / "r",
         said("plant", Level.WARN, "slack cable"),

@@ -2,6 +2,7 @@
 
 import math
 import signal
+import subprocess
 
 import pytest
 from ros_graph import load_ros
@@ -61,8 +62,11 @@ class Processes:
             self._plot = []
             self.codes = dict.fromkeys(NAMES, 0) | self.codes
 
-    def obituary(self, name):
+    def obituary(self, name, leaving_s=0.0):
         return f"{name} ended with {self.codes[name]}"
+
+    def begin(self):
+        pass
 
     def warnings(self):
         return []
@@ -74,11 +78,11 @@ class Processes:
 def follow(
     path, processes, *, realtime=True, stop=lambda: False, leader=PLANT, patience=PATIENCE_S
 ):
-    """Follow to the end; return the follower, its report, and what it told and showed."""
-    told, shown = [], []
+    """Follow to the end; return the follower, its report, and what it reported and showed."""
+    reported, shown = [], []
     follower = _Follower(processes, leader, path, realtime, Patience(patience))
-    report = follower.follow(shown.append, told.append, stop)
-    return follower, report, told, shown
+    report = follower.follow(shown.append, reported.append, stop)
+    return follower, report, reported, shown
 
 
 def running(seconds):
@@ -92,18 +96,18 @@ def test_a_run_that_ends_in_order(tmp_path):
     path = tmp_path / "report.json"
     plot = [running(0.5), running(1.0), Report(1.5, 1.5, finished=True), ALL]
     processes = Processes(path, *plot)
-    follower, report, told, shown = follow(path, processes)
-    assert (follower.failure, report.simulated, told) == (None, 1.5, [])
+    follower, report, reported, shown = follow(path, processes)
+    assert (follower.failure, report.simulated, reported) == (None, 1.5, [])
     assert shown == [0.5, 1.0, 1.5]
     assert processes.asked == []
 
 
-def test_what_the_start_waits_for_is_told_when_it_changes(tmp_path):
+def test_what_the_start_waits_for_is_reported_when_it_changes(tmp_path):
     path = tmp_path / "report.json"
     waits = [Report(waiting=text) for text in ("waits for a, b", "waits for a, b", "waits for b")]
     processes = Processes(path, *waits, Report(), Report(1.0, 1.0, finished=True), ALL)
-    _, _, told, _ = follow(path, processes)
-    assert told == ["waits for a, b", "waits for b", ""]
+    _, _, reported, _ = follow(path, processes)
+    assert reported == ["waits for a, b", "waits for b", ""]
 
 
 @pytest.mark.parametrize("realtime", [True, False])
@@ -118,8 +122,8 @@ def test_who_dies_before_the_start_ends_it_at_once(tmp_path, realtime):
 def test_a_leader_that_has_not_joined_is_waited_for_and_named(tmp_path):
     path = tmp_path / "report.json"
     processes = Processes(path, {}, {}, Report(1.0, 1.0, finished=True), ALL)
-    _, _, told, _ = follow(path, processes)
-    assert told == ["waits for plant"]
+    _, _, reported, _ = follow(path, processes)
+    assert reported == ["waits for plant"]
 
 
 @pytest.mark.parametrize("realtime", [True, False])
@@ -259,18 +263,24 @@ def test_who_does_not_end_with_the_run_is_named(tmp_path):
 
 
 @pytest.mark.parametrize(
-    ("took", "patience", "wanted"), [(0.1, 20.0, 0.2), (60.0, 20.0, 60.0), (60.0, math.inf, 0.2)]
+    ("took", "patience", "realtime", "wanted"),
+    [
+        (0.1, 20.0, True, 0.2),
+        (60.0, 20.0, True, 60.0),
+        (60.0, math.inf, True, 0.2),
+        (60.0, 20.0, False, 600.0),
+    ],
 )
 def test_nodes_may_take_as_long_to_leave_as_they_took_to_start(
-    tmp_path, monkeypatch, took, patience, wanted
+    tmp_path, monkeypatch, took, patience, realtime, wanted
 ):
-    """But not as long as somebody's drivers took to come."""
+    """But not as long as somebody's drivers took to come; ten times that where one gives way."""
     monkeypatch.setattr(watch.StartWatch, "elapsed", took)
     path, allowed = tmp_path / "report.json", []
     starting = Report(waiting="waits for recorder")
     processes = Processes(path, starting, Report(1.0, 1.0, finished=True), ALL)
     processes.wait = lambda seconds: allowed.append(seconds) or True
-    follow(path, processes, patience=patience)
+    follow(path, processes, realtime=realtime, patience=patience)
     assert allowed == [wanted]
 
 
@@ -292,3 +302,23 @@ def test_a_node_is_asked_to_end_once(tmp_path):
     for _ in range(3):
         processes.stop(PLANT)
     assert sent == [signal.SIGINT]
+
+
+def test_no_answer_comes_from_who_is_stopped_and_not_from_who_is_slow(tmp_path):
+    from cspm_ros.runtime.node_processes import NodeProcesses
+
+    processes = NodeProcesses((), tmp_path / "parameters.yaml", tmp_path)
+    (tmp_path / f"{FORCE_CONTROLLER}.log").write_text("cspm: nothing moved for 4 s: it waits\n")
+    commands = {PLANT: ["sleep", "600"], FORCE_CONTROLLER: ["false"], RECORDER: ["sleep", "0.5"]}
+    processes.by_name = {name: subprocess.Popen(words) for name, words in commands.items()}
+    processes.by_name[PLANT].send_signal(signal.SIGSTOP)
+    try:
+        processes.by_name[FORCE_CONTROLLER].wait()
+        reported = processes.obituary(FORCE_CONTROLLER, 600.0)
+    finally:
+        processes.by_name[PLANT].kill()
+        processes.wait(60.0)
+    assert reported == (
+        "no answer from plant; force_controller ended with exit code 1 before the run did: cspm:"
+        " nothing moved for 4 s: it waits"
+    )

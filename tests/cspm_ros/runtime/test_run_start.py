@@ -35,16 +35,16 @@ def test_a_node_that_dies_while_the_run_starts_is_named(tmp_path, monkeypatch):
 def test_a_node_that_never_joins_ends_the_start_with_its_name(tmp_path, monkeypatch):
     use_site(tmp_path, monkeypatch, _AT_START.format(act="time.sleep(3600)"))
     monkeypatch.setattr(watch, "GRACE_S", 0.0)
-    told = []
+    reported = []
 
-    def tell(text):
-        told.append(text)
+    def notify(text):
+        reported.append(text)
         if text == "plant waits for motion_controller":
             monkeypatch.setattr(watch, "START_FACTOR", 0.0)
 
     with pytest.raises(CspmError) as caught:
-        processes(bundle_of("rest"), tmp_path / "bag", tell=tell, steps=10)
-    assert told[0] == "waits for plant"
+        processes(bundle_of("rest"), tmp_path / "bag", notify=notify, steps=10)
+    assert reported[0] == "waits for plant"
     assert re.match(
         r"not all nodes joined within 0 s: plant waits for motion_controller; allowed: 0 times the"
         r" longer of patience \(20 s\) and what this start cost \(\S+ s\); for more use --patience",

@@ -160,7 +160,7 @@ def test_time_in_which_nobody_had_to_move_does_not_count(clock):
     assert run.still(8.1) is not None
 
 
-def test_a_standstill_is_told_before_it_is_given_up(clock):
+def test_a_standstill_is_reported_before_it_is_given_up(clock):
     run = Watched(clock, Node())
     assert run.still(COMPLAIN_S - 0.1) is None
     assert run.complaints == []
@@ -192,22 +192,22 @@ def test_time_before_the_first_step_is_not_time_that_the_run_took(clock):
 
 
 @pytest.fixture
-def told(monkeypatch):
+def reported(monkeypatch):
     monkeypatch.setattr(watch, "GRACE_S", 3.0)
     return []
 
 
-def test_a_start_that_takes_long_is_told_when_it_changes(clock, told):
-    start = StartWatch(told.append, PATIENCE)
+def test_a_start_that_takes_long_is_reported_when_it_changes(clock, reported):
+    start = StartWatch(reported.append, PATIENCE)
     for waiting in ("waits for a, b", "waits for a, b", "waits for b", ""):
         start.look(waiting)
         clock.now += 2.0
-    assert told == ["waits for b", ""]
+    assert reported == ["waits for b", ""]
     assert start.stuck is None
 
 
-def test_a_start_is_given_up_in_the_end(clock, told):
-    start = StartWatch(told.append, Patience(8.0))
+def test_a_start_is_given_up_in_the_end(clock, reported):
+    start = StartWatch(reported.append, Patience(8.0))
     clock.now += 80.0
     start.look("waits for b")
     assert start.stuck is None
@@ -218,8 +218,8 @@ def test_a_start_is_given_up_in_the_end(clock, told):
     assert start.stuck.startswith("not all nodes joined within 80 s: waits for b; allowed: ")
 
 
-def test_a_start_may_take_longer_where_its_leader_took_long(clock, told):
-    start = StartWatch(told.append, Patience(8.0))
+def test_a_start_may_take_longer_where_its_leader_took_long(clock, reported):
+    start = StartWatch(reported.append, Patience(8.0))
     clock.now += 20.0
     start.note_cost()
     clock.now += 180.0
@@ -233,8 +233,8 @@ def test_a_start_may_take_longer_where_its_leader_took_long(clock, told):
     assert "what this start cost (20.0 s)" in start.stuck
 
 
-def test_somebodys_drivers_are_waited_for_without_end(clock, told):
-    start = StartWatch(told.append, Patience(math.inf, 5.0))
+def test_somebodys_drivers_are_waited_for_without_end(clock, reported):
+    start = StartWatch(reported.append, Patience(math.inf, 5.0))
     clock.now += 1e9
     start.look("waits for /bar/pose")
-    assert (told, start.stuck) == (["waits for /bar/pose"], None)
+    assert (reported, start.stuck) == (["waits for /bar/pose"], None)

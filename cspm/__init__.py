@@ -8,8 +8,10 @@
     print(run.tension["sway_3"].max())
 
 All quantities are in SI units and radians, z points down. Whatever is wrong with what is given,
-`InputError` carries one line: what, where, what is allowed. Names that are not in `__all__` are
-internal and change without notice.
+`InputError` carries one line: what, where, what is allowed.
+
+What meets a ROS 2 graph is in the submodule `cspm.graph`: `replay`, `run_node`, `check_drivers`.
+Other names that are not in `__all__` are internal and change without notice.
 """
 
 from __future__ import annotations
@@ -30,12 +32,13 @@ if TYPE_CHECKING:
     from cspm.diagnosis import Diagnosis as Diagnosis
     from cspm.diagnosis import Finding as Finding
     from cspm.diagnosis import diagnose as diagnose
-    from cspm.identification import Identification as Identification
-    from cspm.identification import identify_damping as identify_damping
-    from cspm.identification import identify_stiffness as identify_stiffness
-    from cspm.identification import identify_system as identify_system
-    from cspm.identification import identify_winch as identify_winch
+    from cspm.identification.cables import identify_damping as identify_damping
+    from cspm.identification.cables import identify_stiffness as identify_stiffness
+    from cspm.identification.identified import Identification as Identification
+    from cspm.identification.system import identify_system as identify_system
+    from cspm.identification.winches import identify_winch as identify_winch
     from cspm.importing import import_recording as import_recording
+    from cspm.many import simulate_many as simulate_many
     from cspm.recorded import Recording as Recording
     from cspm.recorded import open as open
     from cspm.recorded import recover as recover
@@ -55,7 +58,7 @@ _PLACES = {
     "CspmError": "cspm_msgs_py.errors",
     "Diagnosis": "cspm.diagnosis",
     "Finding": "cspm.diagnosis",
-    "Identification": "cspm.identification",
+    "Identification": "cspm.identification.identified",
     "InputError": "cspm_msgs_py.errors",
     "Recording": "cspm.recorded",
     "Run": "cspm.simulation",
@@ -70,16 +73,17 @@ _PLACES = {
     "compare": "cspm.comparison",
     "diagnose": "cspm.diagnosis",
     "effects": "cspm.catalogue",
-    "identify_damping": "cspm.identification",
-    "identify_stiffness": "cspm.identification",
-    "identify_system": "cspm.identification",
-    "identify_winch": "cspm.identification",
+    "identify_damping": "cspm.identification.cables",
+    "identify_stiffness": "cspm.identification.cables",
+    "identify_system": "cspm.identification.system",
+    "identify_winch": "cspm.identification.winches",
     "import_recording": "cspm.importing",
     "load_scenario": "cspm.scenario",
     "load_testbed": "cspm.testbed",
     "open": "cspm.recorded",
     "recover": "cspm.recorded",
     "simulate": "cspm.simulation",
+    "simulate_many": "cspm.many",
     "use_effects": "cspm.catalogue",
 }
 __all__ = [*_PLACES]

@@ -16,7 +16,7 @@ def effects() -> Mapping[str, Effect]:
     Of each: `parameters` with name, unit, minimum and maximum; `block`, the part of the machine;
     `equation`; `shows`; `separating_experiment`; `reference`.
 
-    Example:
+    Examples:
         >>> import cspm
         >>> [p.unit for p in cspm.effects()["winch_coulomb_friction"].parameters]
         ['N·m']
@@ -28,7 +28,7 @@ def use_effects(path: str | Path) -> None:
     """Add the effects that a Python file, or each file of a folder, declares as `EFFECT`.
 
     They hold for this process and for those that it starts, as the environment variable
-    CSPM_EFFECTS does; see `docs/add-an-effect.md`.
+    CSPM_EFFECTS does; see `docs/how-to/add-an-effect.md`.
 
     Raises:
         InputError: no such file, one that declares no effect, or an id that is taken.

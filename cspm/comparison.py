@@ -102,7 +102,7 @@ def compare(
     Raises:
         InputError: naming what is wrong in recording, test-bed or arguments.
 
-    Example:
+    Examples:
         >>> import cspm
         >>> found = cspm.compare("today", testbed="thesis")  # doctest: +SKIP
         >>> found.channel("cables/tension/sway_3").vaf  # doctest: +SKIP

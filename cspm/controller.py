@@ -12,7 +12,7 @@ from cspm.scenario import AnyScenario, as_scenario
 from cspm.testbed import AnyTestbed, as_file
 from cspm_msgs_py.diagnostics import Level, Status
 from cspm_msgs_py.errors import InputError
-from cspm_msgs_py.schedule import WAVE_TRAJECTORY, Schedule, schedule_of
+from cspm_msgs_py.schedule import INTERNALS, WAVE_TRAJECTORY, Schedule, schedule_of
 from cspm_msgs_py.stepping.stage import Send, Stage
 from cspm_msgs_py.testbed import Testbed
 from cspm_run.assembly import assemble_stage, resolve
@@ -44,7 +44,7 @@ class Controller(Protocol):
     An object that has `start(period, testbed)` is given its period [s] and the machine before the
     first step.
 
-    Example:
+    Examples:
         >>> import cspm
         >>> class Proportional:
         ...     def step(self, time, inputs):
@@ -94,7 +94,7 @@ def builtin_controller(
     Raises:
         InputError: no such scenario, test-bed or stage, or scenario and test-bed do not fit.
 
-    Example:
+    Examples:
         >>> import cspm
         >>> distribution = cspm.builtin_controller("tension_distribution", "calm")
         >>> pose = [0, 0, 1.8, 0, 0, 0, 1]
@@ -104,7 +104,7 @@ def builtin_controller(
     """
     chosen = as_scenario(scenario)
     machine = (chosen.testbed_file if testbed is None else as_file(testbed)).testbed
-    described = resolve(chosen.description, machine)
+    described = resolve(chosen.description, machine, chosen.path.parent)
     nodes = schedule_of(described, machine).nodes
     if stage not in nodes:
         raise InputError(f"stage {stage}: allowed: {', '.join(nodes) or 'none'}")
@@ -191,7 +191,7 @@ def with_own(
             stage.node,
             controllers[stage.node],
             stage,
-            {name: sizes[name] for name in parts.nodes[stage.node].outputs},
+            {n: sizes[n] for n in parts.nodes[stage.node].outputs if n not in INTERNALS},
         )
         if stage.node in controllers
         else stage

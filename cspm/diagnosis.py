@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
 from functools import cached_property
 from pathlib import Path
@@ -13,6 +13,7 @@ from cspm.parameters import Parameter, Parameters
 from cspm.progress import Progress, by_steps, silent
 from cspm.recorded import AnyRecording, path_of
 from cspm.testbed import AnyTestbed, Testbed, as_file
+from cspm_ident.data_look.look import look_at, without_regimes
 from cspm_ident.diagnosis.diagnose import diagnose as diagnose_measurements
 from cspm_ident.diagnosis.diagnosis import Diagnosis as Result
 from cspm_ident.diagnosis.finding import Finding as FoundEffect
@@ -41,8 +42,8 @@ class Alternative:
     Attributes:
         effect: its id.
         elements: the cables or bodies that it is on.
-        probability: of it, as far as the data tell.
-        experiment: scenario file that tells it from the finding; None before `write`.
+        probability: of it, as far as the data show.
+        experiment: scenario file that distinguishes it from the finding; None before `write`.
     """
 
     effect: str
@@ -91,7 +92,7 @@ class Diagnosis:
 
     Attributes:
         result: the diagnosis itself, internal.
-        data: what `diagnosis.json` holds; see `docs/contract.md`.
+        data: what `diagnosis.json` holds; see `docs/reference/contract.md`.
         closed_loop: differences of the closed loop simulated again, before and after.
         parity: commands against what the described controllers make of the measurements.
     """
@@ -124,6 +125,23 @@ class Diagnosis:
     def negligible(self) -> tuple[Finding, ...]:
         """What is there, too small to matter."""
         return tuple(_without_numbers(each) for each in self.result.negligible)
+
+    def _repr_html_(self) -> str:
+        """Show the verdict and what was found as a table in a notebook."""
+        from cspm.notebook import table
+
+        heads = ("effect", "on", "status", "probability", "statement")
+        rows = (
+            (
+                each.effect,
+                ", ".join(each.elements),
+                each.status,
+                "" if each.probability is None else f"{100 * each.probability:.0f} %",
+                each.statement,
+            )
+            for each in self.findings
+        )
+        return table(f"Diagnosis: {self.verdict}", heads, rows)
 
     @cached_property
     def improved_testbed(self) -> Testbed | None:
@@ -165,6 +183,7 @@ def diagnose(
     testbed: AnyTestbed | None = None,
     held_out: AnyRecording | Iterable[AnyRecording] = (),
     closed_loop: bool = True,
+    leave_out_regimes: bool = False,
     thresholds: Mapping[str, float] | None = None,
     progress: Progress = silent,
 ) -> Diagnosis:
@@ -179,14 +198,16 @@ def diagnose(
             that the recordings carry.
         held_out: on which to judge what was found; none: the last three tenths of each recording.
         closed_loop: whether to simulate the recorded closed loop again with what was found.
+        leave_out_regimes: whether to leave out the stretches that obey another equation than the
+            rest of their recording; `data["data_checks"]` names them.
         thresholds: those that are not the defaults, by name, such as `{"material_share": 0.1}`;
-            `docs/thresholds.md` lists all with units and ranges.
+            `docs/reference/thresholds.md` lists all with units and ranges.
         progress: called now and then with an estimate of the share that is done and what is done.
 
     Raises:
         InputError: naming what is wrong in recordings, test-bed or thresholds.
 
-    Example:
+    Examples:
         >>> import cspm
         >>> verdict = cspm.diagnose("friction_30", testbed="thesis")  # doctest: +SKIP
         >>> verdict.findings[0].parameters["torque"].ci95  # doctest: +SKIP
@@ -201,19 +222,30 @@ def diagnose(
     step("reading")
     looked, judged = measured(searched, testbed), measured(judges, testbed)
     _refuse_twice(looked, judged)
+    step("looking at the data")
+    checks = look_at(looked, judged)
+    if leave_out_regimes:
+        looked, judged = without_regimes(looked, checks), without_regimes(judged, checks)
     found = diagnose_measurements(looked, judged, step, thresholds=limits)
-    loop: tuple[ClosedLoopFit, ...] = ()
-    if closed_loop and found.reported:
-        improved = improved_testbed(found, IMPROVED)
-        loop = simulate_closed_loop((judged or looked)[0], improved, step)
+    loop = _closed_loop(found, (judged or looked)[0], step) if closed_loop else ()
     step("controllers")
     parity = tuple(controller_parity(path_of(searched[0])))
     data = diagnosis_data(found, _path(testbed)) | {
+        "data_checks": [each.data() for each in checks],
         "closed_loop": [each._asdict() for each in loop],
         "controllers": [each._asdict() for each in parity],
     }
     progress(1.0, "done")
     return Diagnosis(found, data, loop, parity)
+
+
+def _closed_loop(
+    found: Result, measurement: Measurement, step: Callable[[str], None]
+) -> tuple[ClosedLoopFit, ...]:
+    """Return how well the machine with what was found repeats a recording; () without findings."""
+    if not found.reported:
+        return ()
+    return simulate_closed_loop(measurement, improved_testbed(found, IMPROVED), step)
 
 
 def _path(testbed: AnyTestbed | None) -> Path | None:

@@ -36,17 +36,18 @@ def import_recording(
     What was converted, and what looks wrong, is in its attachment `import.yaml`.
 
     Args:
-        source: a text table, a .mat file up to version 7, or a bag: a rosbag2 folder, an .mcap or
-            .db3 file, or a ROS 1 .bag.
+        source: a text table, a spreadsheet, a Parquet, HDF5 or .mat file, or a bag: a rosbag2
+            folder, an .mcap or .db3 file, or a ROS 1 .bag.
         folder: a new one for the recording.
-        mapping: file that says which column is which number, in which unit; see `docs/import.md`.
+        mapping: file that says which column is which number, in which unit; see
+            `docs/reference/import-mapping.md`.
         testbed: the machine that was recorded: a name, a file or a `Testbed`.
         progress: called now and then with the share that is done and what is being done.
 
     Raises:
         InputError: naming what is wrong in the file, the mapping or the test-bed.
 
-    Example:
+    Examples:
         >>> import cspm
         >>> recording = cspm.import_recording(
         ...     "DATA_EMPS.mat", "emps", mapping="emps.yaml", testbed="emps"

@@ -16,7 +16,7 @@ class Parameter:
         element: the cable or body that it is of; empty for the whole machine.
         value: in `unit`.
         unit: SI.
-        ci95: 95 % interval; None where nothing bounds it.
+        ci95: 95 % interval; None where nothing bounds it, and where the value is no result.
     """
 
     name: str
@@ -29,7 +29,7 @@ class Parameter:
 class Parameters(Mapping[Any, Parameter]):
     """Estimated numbers by name, or by name and element where several elements have them.
 
-    Example:
+    Examples:
         >>> found = Parameters([Parameter("torque", "sway_3", 0.03, "N·m", (0.029, 0.031))])
         >>> found["torque"].ci95
         (0.029, 0.031)

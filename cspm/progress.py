@@ -1,4 +1,4 @@
-"""How long work tells how far it is."""
+"""How long work reports how far it is."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ Progress: TypeAlias = Callable[[float, str], None]
 
 
 def silent(share: float, what: str) -> None:
-    """Tell nobody."""
+    """Report to nobody."""
 
 
 def by_steps(progress: Progress) -> Callable[[str], None]:

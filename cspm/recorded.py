@@ -29,7 +29,7 @@ from cspm_run.resim import Resimulation, resimulate
 class Recording(Signals):
     """A recording on disk; its signals are read when they are asked for.
 
-    Example:
+    Examples:
         >>> import cspm
         >>> recording = cspm.open("calm_30")  # doctest: +SKIP
         >>> recording.tension["sway_3"].mean()  # doctest: +SKIP

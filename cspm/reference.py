@@ -13,7 +13,7 @@ from cspm.scenario import Scenario, redescribed
 from cspm_control.waves.motion_file import COLUMNS
 from cspm_msgs_py.errors import InputError
 from cspm_msgs_py.motion_spec import FileMotion
-from cspm_msgs_py.scenario import ORIGIN, Body
+from cspm_msgs_py.scenario_keys.bodies import ORIGIN, Target
 
 Array = NDArray[np.float64]
 Reference: TypeAlias = Callable[[float], ArrayLike] | tuple[ArrayLike, ArrayLike]
@@ -39,7 +39,7 @@ def with_reference(scenario: Scenario, reference: Reference, folder: Path) -> Sc
     table = np.column_stack([time, pose]).tolist()
     lines = [",".join(COLUMNS), *(",".join(map(repr, row)) for row in table)]
     path.write_text("\n".join(lines) + "\n", encoding="utf-8")
-    body = Body(mean_pose=ORIGIN, motion=FileMotion(path=str(path.absolute())))
+    body = Target(mean_pose=ORIGIN, motion=FileMotion(path=str(path.absolute())))
     return redescribed(scenario, target=body, bar_offset=ORIGIN)
 
 

@@ -1,4 +1,4 @@
-"""What both identifications of single cables share: what is asked for, read and written."""
+"""What both identifications of single cables share: what is requested, read and written."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ AnyFile: TypeAlias = Path | TestbedFile
 
 @dataclass(frozen=True)
 class RigRequest:
-    """What was asked for on the command line.
+    """What is requested.
 
     Attributes:
         recordings: to identify from.

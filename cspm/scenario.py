@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any, TypeAlias
@@ -60,13 +61,13 @@ class Scenario:
 
         Args:
             key: its path in the file: `duration`, `seed`, `rates.motion_controller`,
-                `control.motion.crossover.surge`; see `docs/files.md`.
+                `control.motion.crossover.surge`; see `docs/reference/testbed-file.md`.
             value: the new one in SI: a number, a text, or lists and mappings of these.
 
         Raises:
             InputError: no such parameter, or a value that it cannot have.
 
-        Example:
+        Examples:
             >>> import cspm
             >>> calm = cspm.load_scenario("calm").with_parameter("duration", 30)
             >>> calm.description.duration
@@ -85,12 +86,12 @@ def load_scenario(name: str | Path) -> Scenario:
     """Return a scenario by its name in the library or by its file's path.
 
     Args:
-        name: such as `calm`, or the path of a YAML file; see `docs/files.md`.
+        name: such as `calm`, or the path of a YAML file; see `docs/reference/testbed-file.md`.
 
     Raises:
         InputError: no such scenario, or a file with a fault: which key, what is allowed.
 
-    Example:
+    Examples:
         >>> import cspm
         >>> cspm.load_scenario("calm").description.duration
         700.0
@@ -112,6 +113,17 @@ def with_changes(scenario: Scenario, **changes: Any) -> Scenario:  # noqa: ANN40
     for key, value in changes.items():
         scenario = scenario if value is None else scenario.with_parameter(key, value)
     return scenario
+
+
+def overridden(scenario: Scenario, overrides: Sequence[str]) -> Scenario:
+    """Return the scenario with values replaced as `cspm run --set` takes them, `key.path=value`.
+
+    Raises:
+        InputError: no such parameter, or a value that it cannot have.
+    """
+    if not overrides:
+        return scenario
+    return _loaded(scenario.path, (*scenario.overrides, *overrides))
 
 
 def redescribed(scenario: Scenario, **changes: Any) -> Scenario:  # noqa: ANN401 - checked models

@@ -33,7 +33,7 @@ class Signal(NDArrayOperatorsMixin):
 
     `signal["sway_3"]` is one column, (n,); any other index is that of the array.
 
-    Example:
+    Examples:
         >>> import numpy as np
         >>> from cspm import Signal
         >>> tension = Signal("tension", np.arange(3.0), np.eye(3, 2), ("a", "b"), ("N", "N"))
@@ -96,6 +96,7 @@ class _Place(NamedTuple):
 _PLACES = {
     "bar_pose": _Place("/bar/pose", "pose"),
     "frame_pose": _Place("/winch_frame/pose", "pose"),
+    "target_pose": _Place("/target/pose", "pose"),
     "winch_angle": _Place("/winches/state", "position", "rad"),
     "winch_speed": _Place("/winches/state", "velocity", "rad/s"),
     "winch_torque": _Place("/winches/state", "effort", "N·m"),
@@ -215,6 +216,12 @@ class Signals(ABC):
             InputError: it is not recorded, as on hardware.
         """
         return Truth(self)
+
+    def _repr_html_(self) -> str:
+        """Show the signals as a table in a notebook."""
+        from cspm.notebook import signals_table
+
+        return signals_table(repr(self), self)
 
     @property
     def _label(self) -> str:

@@ -5,7 +5,8 @@ from __future__ import annotations
 import shutil
 import tempfile
 import warnings
-from collections.abc import Callable, Mapping
+import weakref
+from collections.abc import Callable, Collection, Mapping
 from dataclasses import replace
 from functools import partial
 from pathlib import Path
@@ -17,7 +18,7 @@ from cspm.recorded import Recording
 from cspm.reference import Reference, with_reference
 from cspm.scenario import AnyScenario, Scenario, as_scenario, with_changes
 from cspm.signals import Signals
-from cspm.testbed import AnyTestbed, Testbed, as_file
+from cspm.testbed import AnyTestbed, Testbed, as_file, check_plant
 from cspm_msgs_py.errors import InputError
 from cspm_msgs_py.new_folder import refuse_existing
 from cspm_msgs_py.recording.rows import Rows
@@ -28,7 +29,7 @@ from cspm_msgs_py.topics import Topic
 from cspm_run.assembly import resolve
 from cspm_run.bundle import Bundle, make_bundle
 from cspm_run.memory_recorder import MemoryRecorder
-from cspm_run.plants import PLANTS, SIM
+from cspm_run.plants import PLANTS, SIM, refuse_cuts
 from cspm_run.recorded_run import (
     INPROCESS,
     metadata,
@@ -39,7 +40,6 @@ from cspm_run.recorded_run import (
 from cspm_run.recorded_run import simulate as step_through
 from cspm_run.run_result import RunResult
 from cspm_run.summary import summary_data, write_json
-from cspm_sim.parameters import plant_parameters
 
 GRAPH, PROCESSES, REALTIME = "graph", "processes", "realtime"
 MODES = (INPROCESS, GRAPH, PROCESSES, REALTIME)
@@ -49,7 +49,7 @@ Runner: TypeAlias = Callable[[Bundle, Path, Callable[[float], None]], RunResult]
 class Run(Signals):
     """What was simulated, as arrays; `save` makes a recording of it.
 
-    Example:
+    Examples:
         >>> import cspm
         >>> run = cspm.simulate("rest", duration=0.1)
         >>> run.tension["sway_3"].shape, run.bar_pose["heave"].shape, run.bar_pose.time.shape
@@ -67,17 +67,23 @@ class Run(Signals):
         result: RunResult,
         source: MemoryRecorder | Recording,
         about: Mapping[str, str],
-        place: tempfile.TemporaryDirectory[str] | None = None,
+        place: Path | None = None,
+        *,
+        partial: bool = False,
     ) -> None:
         """Take what was run, what it amounted to, its messages, and its metadata record.
 
-        `place` is where the messages are on disk, as long as the run is of use.
+        `place` is a folder with the messages, which is removed when the run is not used any more.
+        `partial` says that some of the messages were not kept.
         """
+        self._partial = partial
         self.testbed = Testbed(bundle.testbed)
         self.failure = result.failure
         self.interrupted = result.interrupted
         self._bundle, self._result, self._source = bundle, result, source
-        self._about, self._place = about, place
+        self._about = about
+        if place is not None:
+            weakref.finalize(self, shutil.rmtree, place, ignore_errors=True)
 
     @property
     def duration(self) -> float:
@@ -86,7 +92,7 @@ class Run(Signals):
 
     @property
     def summary(self) -> dict[str, Any]:
-        """Return what `summary.json` holds; see `docs/contract.md`."""
+        """Return what `summary.json` holds; see `docs/reference/contract.md`."""
         return summary_data(self._result)
 
     @property
@@ -102,8 +108,12 @@ class Run(Signals):
             folder: a new one; its name becomes the recording's.
 
         Raises:
-            InputError: the folder exists or cannot be written.
+            InputError: the folder exists or cannot be written, or not every signal was kept.
         """
+        if self._partial:
+            raise InputError(
+                f"{folder}: the run keeps but some signals, allowed: one that keeps all"
+            )
         place = Path(folder)
         refuse_existing(place)
         if isinstance(self._source, Recording):
@@ -187,8 +197,9 @@ def simulate(
     Warns:
         RuntimeWarning: the run failed on its way, as `Run.failure` has it; what there is up to then
             is returned.
+        UserWarning: a cable carried, or may carry, more than its breaking force allows.
 
-    Example:
+    Examples:
         >>> import cspm
         >>> run = cspm.simulate("calm", duration=0.5, seed=2)
         >>> float(run.time[-1])
@@ -202,15 +213,14 @@ def simulate(
         bundle = bundle_of(chosen, None if testbed is None else as_file(testbed), plant)
     total = bundle.scenario.duration
 
-    def tell(now: float) -> None:
+    def show(now: float) -> None:
         progress(min(1.0, now / total), "simulating")
 
     if mode == INPROCESS:
-        run = _in_memory(bundle, controllers or {}, tell)
+        run = simulate_in_memory(bundle, controllers or {}, show)
     else:
-        run = _by_nodes(bundle, mode, plant == EXTERNAL, tell, progress)
-    if run.failure is not None:
-        warnings.warn(f"{bundle.scenario.name}: {run.failure}", RuntimeWarning, stacklevel=2)
+        run = _by_nodes(bundle, mode, plant == EXTERNAL, show, progress)
+    warn_of(run, stacklevel=3)
     return run
 
 
@@ -218,7 +228,7 @@ def bundle_of(scenario: Scenario, testbed: TestbedFile | None, plant: str) -> Bu
     """Return the self-contained description of a run.
 
     Args:
-        scenario: as asked for.
+        scenario: as requested.
         testbed: a machine instead of the scenario's.
         plant: one of `PLANTS`, or `external`.
 
@@ -226,41 +236,39 @@ def bundle_of(scenario: Scenario, testbed: TestbedFile | None, plant: str) -> Bu
         InputError: scenario and test-bed do not fit, or an effect is not possible.
     """
     machine = scenario.testbed_file if testbed is None else testbed
-    try:
-        plant_parameters(machine.testbed)
-    except InputError as err:
-        # Only the model sees such a fault, which is one of the test-bed's file.
-        raise InputError(f"{machine.source}: {err}") from None
-    resolved = resolve(scenario.description, machine.testbed)
+    check_plant(machine)
+    resolved = resolve(scenario.description, machine.testbed, scenario.path.parent)
+    if plant == EXTERNAL:
+        refuse_cuts(EXTERNAL, resolved.events)
     bundle = make_bundle(resolved, machine, scenario.path.parent)
     return replace(bundle, plant=SIM if plant == EXTERNAL else plant)
 
 
 def ros_runner(
     mode: str,
-    tell: Callable[[str], None],
+    notify: Callable[[str], None],
     *,
     external: bool,
     apart: bool,
     patience_s: float,
-    asked: str,
+    needed_by: str,
 ) -> Runner:
     """Return what runs a scenario in a mode that needs ROS; only now is ROS loaded.
 
     Args:
         mode: one of `MODES` but the first.
-        tell: called with what is being waited for, and with nothing once all is there.
+        notify: called with what is being waited for, and with nothing once all is there.
         external: whether somebody's drivers take the plant's place.
         apart: in real time, whether each node has a process of its own.
         patience_s: how long nothing may move [s].
-        asked: what needs ROS, for the error.
+        needed_by: what needs ROS, for the error.
 
     Raises:
         InputError: ROS is not installed.
     """
     from cspm_ros.runtime.ros_install import find_ros
 
-    find_ros(asked)
+    find_ros(needed_by)
     if mode == GRAPH:
         from cspm_ros.runtime.graph_run import run_graph
 
@@ -268,10 +276,21 @@ def ros_runner(
     if mode == REALTIME and not apart:
         from cspm_ros.runtime.realtime_run import run_realtime
 
-        return partial(run_realtime, external=external, tell=tell, patience_s=patience_s)
+        return partial(run_realtime, external=external, notify=notify, patience_s=patience_s)
     from cspm_ros.runtime.process_run import run_processes
 
-    return partial(run_processes, mode=mode, external=external, tell=tell, patience_s=patience_s)
+    return partial(
+        run_processes, mode=mode, external=external, notify=notify, patience_s=patience_s
+    )
+
+
+def warn_of(run: Run, *, stacklevel: int) -> None:
+    """Warn of what went wrong with a run; `stacklevel` counts from this function's caller."""
+    name = run.summary["scenario"]
+    if run.failure is not None:
+        warnings.warn(f"{name}: {run.failure}", RuntimeWarning, stacklevel=stacklevel)
+    for line in run.summary["warnings"]:
+        warnings.warn(f"{name}: {line}", UserWarning, stacklevel=stacklevel)
 
 
 def _check_choices(plant: str, mode: str, own: bool) -> None:
@@ -285,22 +304,46 @@ def _check_choices(plant: str, mode: str, own: bool) -> None:
         raise InputError(f"controllers in mode {mode}: allowed: mode {INPROCESS}")
 
 
-def _in_memory(
-    bundle: Bundle, controllers: Mapping[str, Controller], tell: Callable[[float], None]
+def simulate_in_memory(
+    bundle: Bundle,
+    controllers: Mapping[str, Controller],
+    show: Callable[[float], None],
+    kept: Collection[str] | None = None,
 ) -> Run:
+    """Return the run of a bundle in this process.
+
+    Args:
+        bundle: what to run.
+        controllers: of one's own, by stage.
+        show: called now and then with the time simulated so far [s].
+        kept: topics that the run keeps; None: all.
+
+    Raises:
+        InputError: scenario and test-bed do not fit, or no such stage or topic.
+        ConvergenceError: the bar cannot hang where the scenario starts.
+    """
     parts = parts_of(bundle)
     stages = with_own(parts.stages, controllers, parts.testbed, parts.schedule)
-    recorder = MemoryRecorder(recorded_topics(bundle))
-    result = step_through(replace(parts, stages=stages), recorder, tell, steps_of(bundle))
+    recorder = MemoryRecorder(_chosen(recorded_topics(bundle), kept))
+    result = step_through(replace(parts, stages=stages), recorder, show, steps_of(bundle))
     about = metadata(bundle, INPROCESS)
     if controllers:
         names = [f"{node}: {type(each).__name__}" for node, each in controllers.items()]
         about[OWN_CONTROLLERS] = ", ".join(names)
-    return Run(bundle, result, recorder, about)
+    return Run(bundle, result, recorder, about, partial=kept is not None)
+
+
+def _chosen(topics: dict[str, Topic], kept: Collection[str] | None) -> dict[str, Topic]:
+    if kept is None:
+        return topics
+    for name in kept:
+        if name not in topics:
+            raise InputError(f"signals: {name}, allowed: {', '.join(topics)}")
+    return {name: topic for name, topic in topics.items() if name in kept}
 
 
 def _by_nodes(
-    bundle: Bundle, mode: str, external: bool, tell: Callable[[float], None], progress: Progress
+    bundle: Bundle, mode: str, external: bool, show: Callable[[float], None], progress: Progress
 ) -> Run:
     """Run nodes, which record; the recording lives as long as the run that is returned."""
 
@@ -310,10 +353,14 @@ def _by_nodes(
     from cspm_ros.runtime.stall_watchdog import PATIENCE_S
 
     runner = ros_runner(
-        mode, wait, external=external, apart=False, patience_s=PATIENCE_S, asked=f"mode {mode}"
+        mode, wait, external=external, apart=False, patience_s=PATIENCE_S, needed_by=f"mode {mode}"
     )
-    place = tempfile.TemporaryDirectory(prefix="cspm-run-")
-    folder = Path(place.name) / bundle.scenario.name
-    result = runner(bundle, folder, tell)
-    source = Recording(folder)
+    place = Path(tempfile.mkdtemp(prefix="cspm-run-"))
+    try:
+        folder = place / bundle.scenario.name
+        result = runner(bundle, folder, show)
+        source = Recording(folder)
+    except BaseException:
+        shutil.rmtree(place, ignore_errors=True)
+        raise
     return Run(bundle, replace(result, folder=None), source, {}, place)

@@ -13,16 +13,18 @@ from cspm_msgs_py.testbed import Testbed as Description
 from cspm_msgs_py.testbed import load_testbed as load_file
 from cspm_run.library import find_testbed
 from cspm_sim.effect_entries import altered_testbed, read_actions
+from cspm_sim.parameters import plant_parameters
 
 
 @dataclass(frozen=True)
 class Testbed:
     """A machine: its geometry, parameters, sensors and known effects.
 
-    Changes give a new one; this one stays. Its text is the YAML file of `docs/files.md`, and its
+    Changes give a new one; this one stays. Its text is the YAML file of
+    `docs/reference/testbed-file.md`, and its
     hash that of the text, so that a recording always carries the machine that was simulated.
 
-    Example:
+    Examples:
         >>> import cspm
         >>> testbed = cspm.load_testbed("thesis").with_parameter("bar.mass", 5.2)
         >>> testbed.description.bar.mass
@@ -83,7 +85,7 @@ class Testbed:
         Raises:
             InputError: no such parameter, or a value that it cannot have.
 
-        Example:
+        Examples:
             >>> import cspm
             >>> light = cspm.load_testbed("thesis").with_parameter("bar.mass", 3.0)
         """
@@ -100,7 +102,7 @@ class Testbed:
         Raises:
             InputError: no such effect, element or parameter, or a value out of its bounds.
 
-        Example:
+        Examples:
             >>> import cspm
             >>> thesis = cspm.load_testbed("thesis")
             >>> worn = thesis.with_effect("winch_coulomb_friction", "sway_3", torque=0.03)
@@ -141,12 +143,12 @@ def load_testbed(name: str | Path) -> Testbed:
     """Return a test-bed by its name in the library or by its file's path.
 
     Args:
-        name: such as `thesis`, or the path of a YAML file; see `docs/files.md`.
+        name: such as `thesis`, or the path of a YAML file; see `docs/reference/testbed-file.md`.
 
     Raises:
         InputError: no such test-bed, or a file with a fault: which key, what is allowed.
 
-    Example:
+    Examples:
         >>> import cspm
         >>> cspm.load_testbed("thesis").description.bar.mass
         4.06
@@ -163,6 +165,18 @@ def as_file(testbed: AnyTestbed) -> TestbedFile:
     if isinstance(testbed, TestbedFile):
         return testbed
     return testbed.file if isinstance(testbed, Testbed) else load_testbed(testbed).file
+
+
+def check_plant(file: TestbedFile) -> None:
+    """Refuse a test-bed that no plant can be built of: only the model sees some faults.
+
+    Raises:
+        InputError: naming the file and the fault.
+    """
+    try:
+        plant_parameters(file.testbed)
+    except InputError as err:
+        raise InputError(f"{file.source}: {err}") from None
 
 
 def _numbers(parameters: dict[str, float]) -> dict[str, float]:

@@ -1,4 +1,4 @@
-"""Drives, load cells and motion capture: a driver to fill in, explained in docs/drivers.md."""
+"""Drives, load cells and motion capture: a driver to fill in; see docs/how-to/bring-hardware.md."""
 
 import signal
 import sys
@@ -18,7 +18,7 @@ POSES = {"/winch_frame/pose": Pose(), "/bar/pose": Pose(position=Point(z=2.0))} 
 
 
 class Hardware:
-    """Stands for a machine whose bar is clamped: tensions follow the motors' torques."""
+    """Simulates a machine whose bar is clamped: tensions follow the motors' torques."""
 
     tensions, torques = [5.0] * 8, [5.0 * radius for radius in RADII]
 
@@ -55,8 +55,8 @@ class Driver(Node):
         if self.tripped:  # until it is restarted; without winch state the controllers stop as well
             self.hardware.write([0.0] * 8, brakes=True)
         else:
-            told = {"position": angles, "velocity": speeds, "effort": torques}
-            self.winches.publish(JointState(header=header, name=CABLES, **told))
+            measured = {"position": angles, "velocity": speeds, "effort": torques}
+            self.winches.publish(JointState(header=header, name=CABLES, **measured))
         self.cells.publish(JointState(header=header, name=CABLES, effort=tensions))
         for name, pose in POSES.items():
             self.poses[name].publish(PoseStamped(header=header, pose=pose))

@@ -4,7 +4,7 @@ import cspm
 
 thesis = cspm.load_testbed("thesis")
 worn = thesis.with_effect("winch_coulomb_friction", "sway_3", torque=0.03)  # N·m at the motor
-recording = cspm.simulate("worst_case", testbed=worn, duration=20).save("worn")
+recording = cspm.simulate("worst_case_steep", testbed=worn, duration=20).save("worn")
 
 # The recording carries the worn machine: say which machine is believed in.
 found = cspm.diagnose(recording, testbed=thesis, closed_loop=False)

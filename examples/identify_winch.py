@@ -2,7 +2,7 @@
 
 import cspm
 
-# Stands for your recording: a winch with viscous and Coulomb friction.
+# In place of your recording: a winch with viscous and Coulomb friction.
 machine = cspm.load_testbed("one_winch")
 machine = machine.with_effect("winch_viscous_friction", "surge", coefficient=2e-3)
 machine = machine.with_effect("winch_coulomb_friction", "surge", torque=0.02)

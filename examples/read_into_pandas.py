@@ -2,7 +2,7 @@
 
 import cspm
 
-cspm.simulate("calm", duration=5).save("calm_5")  # stands for a recording of yours
+cspm.simulate("calm", duration=5).save("calm_5")  # in place of your recording
 
 recording = cspm.open("calm_5")
 print(recording, "signals:", ", ".join(recording.names))

@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
+from math import isclose
 from pathlib import Path
 from typing import Any
 
@@ -16,12 +17,15 @@ from cspm_control.analysis.cable_groups import cable_groups
 from cspm_control.analysis.loop_view import LoopView
 from cspm_control.analysis.loops import LoopAnalysis, analyse_loops, pid_law
 from cspm_control.analysis.sampled_loops import LoopTiming, loop_timing
+from cspm_msgs_py.control_spec.force import PiGains
 from cspm_msgs_py.errors import InputError
 from cspm_msgs_py.new_folder import refuse_existing
 from cspm_msgs_py.scenario import ClosedLoop
 from cspm_run.assembly import resolve
 
 PICTURES = ("motion_loops.png", "force_loops.png")
+# Gains of cables of one kind that differ by less, as a share, are shown once.
+SAME_GAINS = 1e-3
 
 
 @dataclass(frozen=True, eq=False)
@@ -43,9 +47,8 @@ class Design:
 
     @property
     def groups(self) -> dict[str, str]:
-        """Kinds of cables, each with its first cable."""
-        names = self.machine.testbed.cable_names
-        return {name: names[members[0]] for name, members in cable_groups(names).items()}
+        """Kinds of cables, each with its first cable, and every cable with gains of its own."""
+        return gain_groups(self.machine.testbed.cable_names, self.control.force.gains or {})
 
     def data(self) -> dict[str, Any]:
         """Return everything as plain data: what `cspm analyze design --json` writes."""
@@ -68,6 +71,28 @@ class Design:
         draw_motion_loops(place / PICTURES[0], self.result)
         draw_force_loops(place / PICTURES[1], self.result, list(self.groups.values()))
         return tuple(place / name for name in PICTURES)
+
+
+def gain_groups(names: Sequence[str], gains: Mapping[str, PiGains]) -> dict[str, str]:
+    """Return each kind of cable with its first, and by its own name each that is tuned otherwise.
+
+    Args:
+        names: of the cables.
+        gains: of the force controllers, by cable.
+    """
+    found: dict[str, str] = {}
+    for kind, (first, *others) in cable_groups(names).items():
+        found[kind] = names[first]
+        common = gains[names[first]]
+        found |= {
+            names[i]: names[i]
+            for i in others
+            if not isclose(gains[names[i]].kp, common.kp, rel_tol=SAME_GAINS)
+            or not isclose(
+                gains[names[i]].integral_frequency, common.integral_frequency, rel_tol=SAME_GAINS
+            )
+        }
+    return found
 
 
 def analyze_design(
@@ -106,10 +131,10 @@ def _closed_loop(
         raise InputError(
             f"scenario {scenario.name}: control.mode {scenario.control.mode}, allowed: closed_loop"
         )
-    designed = resolve(scenario, machine.testbed).control
+    designed = resolve(scenario, machine.testbed, machine.folder).control
     assert isinstance(designed, ClosedLoop)
     pid_law(designed)
-    # The gains are those of the design pose; how they do is asked here.
+    # The gains are those of the design pose; how they do is checked here.
     motion = designed.motion.model_copy(update={"design_pose": machine.pose})
     control = designed.model_copy(update={"motion": motion})
     ideal = scenario.sensors == "ideal"

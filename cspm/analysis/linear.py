@@ -111,7 +111,7 @@ def analyze_linear(
         InputError: no such scenario or test-bed, or a machine without bar.
         CspmError: the bar cannot hang there.
 
-    Example:
+    Examples:
         >>> import cspm
         >>> linear = cspm.analyze_linear("worst_case")
         >>> linear.to_control("tension").ninputs

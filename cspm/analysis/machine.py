@@ -12,12 +12,13 @@ from cspm.scenario import AnyScenario, as_scenario
 from cspm.testbed import AnyTestbed, as_file
 from cspm_msgs_py.dofs import DOFS
 from cspm_msgs_py.errors import InputError
-from cspm_msgs_py.scenario import ORIGIN, ClosedLoop, Pose, Scenario
+from cspm_msgs_py.scenario import ClosedLoop, Scenario
+from cspm_msgs_py.scenario_keys.bodies import ORIGIN, Pose
 from cspm_msgs_py.testbed import Testbed
 
-# The pose at which the thesis analyses its machine, and the name of its test-bed file.
+# The pose at which the thesis analyses its machine, and the test-beds that reconstruct it.
 THESIS_POSE: Pose = (0.0, 0.0, 2.0, 0.0, 0.0, 0.0)
-THESIS_MACHINE = "thesis"
+THESIS_MACHINES = ("thesis", "thesis_refitted")
 DEFAULT_SCENARIO = "worst_case"
 
 
@@ -40,7 +41,7 @@ class AnalyzedMachine:
     @property
     def is_published(self) -> bool:
         """Whether the thesis's figures are of this machine at this pose."""
-        return self.testbed.name == THESIS_MACHINE and bool(np.allclose(self.pose, THESIS_POSE))
+        return self.testbed.name in THESIS_MACHINES and bool(np.allclose(self.pose, THESIS_POSE))
 
 
 def analyzed_machine(

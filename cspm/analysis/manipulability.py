@@ -14,6 +14,7 @@ from cspm.scenario import AnyScenario
 from cspm.testbed import AnyTestbed
 from cspm_control.analysis.cable_structure import cable_structure
 from cspm_control.analysis.manipulability import Ellipsoid, Manipulability, manipulability
+from cspm_control.analysis.pose_grid import workspace_grids
 from cspm_model.parameters import nominal_parameters
 from cspm_msgs_py.new_folder import refuse_existing
 
@@ -52,8 +53,13 @@ class ManipulabilityAnalysis:
         place.mkdir(parents=True)
         machine = self.machine
         cables = cable_structure(machine.testbed, machine.pose)
+        grids = workspace_grids(machine.testbed.name, cables.exits, cables.axes, machine.pose)
         draw_manipulability(
-            place / PICTURE, cables, nominal_parameters(machine.testbed), machine.pose
+            place / PICTURE,
+            cables,
+            nominal_parameters(machine.testbed),
+            machine.pose,
+            grids["general"],
         )
         return place / PICTURE
 
@@ -75,7 +81,7 @@ def analyze_manipulability(
         InputError: no such scenario or test-bed, or a machine without bar.
         CspmError: the cables span too few directions.
 
-    Example:
+    Examples:
         >>> import cspm
         >>> cspm.analyze_manipulability().result.rank
         5

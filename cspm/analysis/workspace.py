@@ -14,8 +14,9 @@ from cspm.analysis.machine import DEFAULT_SCENARIO, AnalyzedMachine, analyzed_ma
 from cspm.progress import Progress, silent
 from cspm.scenario import AnyScenario
 from cspm.testbed import AnyTestbed
+from cspm_control.analysis.cable_structure import cable_structure
 from cspm_control.analysis.claim import Claim
-from cspm_control.analysis.pose_grid import GRIDS
+from cspm_control.analysis.pose_grid import Grid, workspace_grids
 from cspm_control.analysis.published_workspace import workspace_claims
 from cspm_control.analysis.workspace import ALGORITHMS
 from cspm_control.analysis.workspace_result import (
@@ -108,7 +109,7 @@ def analyze_workspace(
         raise InputError(f"acceleration {required}: allowed: six numbers that are not negative")
     if coarse < 1:
         raise InputError(f"coarse {coarse}: allowed: 1 or more")
-    sizes = {name: GRIDS[name].every(coarse).size for name in ALGORITHMS}
+    sizes = {name: grid.every(coarse).size for name, grid in grids_of(machine).items()}
     done = 0
 
     def advance(name: str, count: int) -> None:
@@ -119,6 +120,12 @@ def analyze_workspace(
     found = workspace_of(machine, required, coarse, advance, lambda: False)
     assert found is not None
     return found
+
+
+def grids_of(machine: AnalyzedMachine) -> dict[str, Grid]:
+    """Return the whole grid of each algorithm for a machine."""
+    structure = cable_structure(machine.testbed, machine.pose)
+    return workspace_grids(machine.testbed.name, structure.exits, structure.axes, machine.pose)
 
 
 def workspace_of(

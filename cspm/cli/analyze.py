@@ -133,7 +133,7 @@ def manipulability(
     out: Folder = None,
     json: Json = None,
 ) -> None:
-    """Tell how well the cables move the bar at a pose: Yoshikawa's measure and ellipsoids.
+    """Report how well the cables move the bar at a pose: Yoshikawa's measure and ellipsoids.
 
     And what acceleration gravity and the cables' limits leave in each DOF.
     """

@@ -11,6 +11,8 @@ import typer
 import typer.core
 
 from cspm_msgs_py.errors import InputError
+from cspm_run.console import VOICE, Voice
+from cspm_run.summary import STANDARD_OUTPUT
 
 RUN_FAILED = 1
 
@@ -19,8 +21,8 @@ class _Listed(typer.core.TyperGroup):
     """Lists the commands in the order in which a newcomer needs them."""
 
     order = (
-        *("run", "info", "recover", "resim", "import", "compare", "identify"),
-        *("diagnose", "analyze"),
+        *("demo", "new", "run", "view", "info", "recover", "resim", "import", "compare"),
+        *("identify", "diagnose", "analyze"),
         *("replay", "check-drivers", "node"),
     )
 
@@ -30,11 +32,22 @@ class _Listed(typer.core.TyperGroup):
         return sorted(names, key=lambda n: self.order.index(n) if n in self.order else len(names))
 
 
-app = typer.Typer(cls=_Listed, add_completion=False, pretty_exceptions_enable=False)
+app = typer.Typer(
+    cls=_Listed,
+    pretty_exceptions_enable=False,
+    context_settings={"help_option_names": ["-h", "--help"]},
+)
 
 
 def _usable_json(path: Path | None) -> Path | None:
-    """Refuse a file that cannot be written before the work that fills it."""
+    """Refuse a file that cannot be written before the work that fills it.
+
+    Where the data go to standard output, the text goes to standard error.
+    """
+    if path == STANDARD_OUTPUT:
+        if VOICE.get() is Voice.OUTPUT:
+            VOICE.set(Voice.ERRORS)
+        return path
     if path is not None and (path.is_dir() or not path.absolute().parent.is_dir()):
         raise InputError(f"--json {path}: allowed: a file in a folder that exists")
     return path
@@ -45,8 +58,18 @@ Json = Annotated[
     typer.Option(
         "--json",
         metavar="FILE",
-        help="Also write as JSON what is printed.",
+        help="Also write as JSON what is printed; - for standard output.",
         callback=_usable_json,
+    ),
+]
+
+
+LeaveOutRegimes = Annotated[
+    bool,
+    typer.Option(
+        "--leave-out-regimes",
+        help="Leave out the stretches in which a winch obeys another equation than in the rest of"
+        " the recording, such as without its load; they are named in any case.",
     ),
 ]
 

@@ -15,7 +15,7 @@ SENSORS = ("/bar/pose", "/winch_frame/pose", "/cables/tension")
 
 
 def _delays(texts: list[str] | None) -> dict[str, float] | None:
-    """Return delays [s] by topic of TOPIC=SECONDS; None where none are told."""
+    """Return delays [s] by topic of TOPIC=SECONDS; None where none are given."""
     if texts is None:
         return None
     found = {}
@@ -89,7 +89,7 @@ def compare(
     ] = None,
     json: Json = None,
 ) -> None:
-    """Simulate a recording from its own measured inputs, and tell where both differ.
+    """Simulate a recording from its own measured inputs, and report where both differ.
 
     The whole, then cables and bar alone, each from what was measured.
     """

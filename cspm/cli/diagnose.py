@@ -7,7 +7,7 @@ from typing import Annotated
 
 import typer
 
-from cspm.cli.app import Json, app
+from cspm.cli.app import Json, LeaveOutRegimes, app
 from cspm_msgs_py.errors import InputError
 
 
@@ -57,6 +57,7 @@ def diagnose(
         bool,
         typer.Option(help="Simulate the recorded closed loop again with what was found."),
     ] = True,
+    leave_out_regimes: LeaveOutRegimes = False,
     json: Json = None,
 ) -> None:
     """Locate the mismatch of recording and model, name what is missing, and show the fit improve.
@@ -71,4 +72,7 @@ def diagnose(
         return
     if not recordings:
         raise InputError("diagnose: no recording, allowed: one or more, or --explain EFFECT")
-    diagnose_command(DiagnoseRequest(recordings, held_out or [], testbed, out, closed_loop), json)
+    diagnose_command(
+        DiagnoseRequest(recordings, held_out or [], testbed, out, closed_loop, leave_out_regimes),
+        json,
+    )

@@ -9,14 +9,14 @@ from typing import TYPE_CHECKING, Annotated, Any, TypeAlias
 
 import typer
 
-from cspm.cli.app import Json, app
+from cspm.cli.app import RUN_FAILED, Json, LeaveOutRegimes, app
 from cspm_msgs_py.errors import InputError
 
 if TYPE_CHECKING:
     from cspm.rig import RigRequest
     from cspm_ident.estimation import Prior
 
-RigCommand: TypeAlias = "Callable[[RigRequest, Path | None], None]"
+RigCommand: TypeAlias = "Callable[[RigRequest, Path | None], bool]"
 
 identify = typer.Typer(
     no_args_is_help=True,
@@ -27,7 +27,7 @@ app.add_typer(identify, name="identify")
 Recordings = Annotated[
     list[Path],
     typer.Argument(
-        metavar="BAG…",
+        metavar="REC...",
         help="Recordings of machines without bar, each winch pulling a cable that is fixed to a"
         " load cell: all lengths in one recording, or a recording for each.",
     ),
@@ -80,7 +80,7 @@ IntoCables = Annotated[
 ]
 HeldOut = Annotated[
     list[Path] | None,
-    typer.Option("--held-out", metavar="BAG", help="Judges without being fitted; repeatable."),
+    typer.Option("--held-out", metavar="REC", help="Judges without being fitted; repeatable."),
 ]
 Cutoff = Annotated[
     float | None,
@@ -127,6 +127,12 @@ def _names(option: str, text: str | None) -> tuple[str, ...]:
     return names
 
 
+def _end(valid: bool) -> None:
+    """End the command: with an error where parameters are no result."""
+    if not valid:
+        raise typer.Exit(RUN_FAILED)
+
+
 def _rig_command(epilog: str, *without: str) -> Callable[[RigCommand], RigCommand]:
     """Register a command with the options of `_rig_request`, those named left out, and --json."""
     taken = signature(_rig_request, locals={"RigRequest": object}, eval_str=True).parameters
@@ -135,7 +141,7 @@ def _rig_command(epilog: str, *without: str) -> Callable[[RigCommand], RigComman
 
     def register(does: RigCommand) -> RigCommand:
         def command(json: Path | None, **given: Any) -> None:  # noqa: ANN401 - as `_rig_request`
-            does(_rig_request(**given), json)
+            _end(does(_rig_request(**given), json))
 
         command.__signature__ = Signature([*options, json])  # type: ignore[attr-defined]
         command.__doc__ = does.__doc__
@@ -153,14 +159,14 @@ cspm run rig_stiffness_hoist --out ramps
 cspm identify stiffness ramps --verify hoist_180 --out hoist_stiffness""",
     "stiffness",
 )
-def stiffness(asked: RigRequest, json: Path | None) -> None:
+def stiffness(request: RigRequest, json: Path | None) -> bool:
     """Identify the stiffness law of one kind of cable from slow ramps at several lengths.
 
-    Stretching and releasing are kept apart, and the hysteresis between them is told.
+    Stretching and releasing are kept apart, and the hysteresis between them is reported.
     """
     from cspm.commands.identify_stiffness_command import identify_stiffness_command
 
-    identify_stiffness_command(asked, json)
+    return identify_stiffness_command(request, json)
 
 
 @_rig_command(
@@ -171,14 +177,14 @@ cspm run rig_damping_hoist --out sines
 cspm identify damping sines --stiffness hoist_stiffness/fitted_testbed.yaml --verify hoist_180
 --out hoist_damping"""
 )
-def damping(asked: RigRequest, json: Path | None) -> None:
+def damping(request: RigRequest, json: Path | None) -> bool:
     """Identify the damping of one kind of cable from multi-sines at several lengths.
 
     Identify the stiffness first, and give its fitted test-bed file by --stiffness.
     """
     from cspm.commands.identify_damping_command import identify_damping_command
 
-    identify_damping_command(asked, json)
+    return identify_damping_command(request, json)
 
 
 @identify.command(
@@ -197,7 +203,7 @@ def winch(
     recordings: Annotated[
         list[Path],
         typer.Argument(
-            metavar="BAG…",
+            metavar="REC...",
             help="Recordings of motor angle and torque, and of the tension where the winch pulls a"
             " cable; with a bar or without.",
         ),
@@ -221,21 +227,24 @@ def winch(
         typer.Option(
             metavar="S",
             help="How long before its stamp a reported torque acted; otherwise half a period for"
-            " recordings of `cspm run`, whose drives hold it, and 0 for others.",
+            " recordings of `cspm run`, whose drives hold it, and 0 for others, unless the motion"
+            " clearly says another.",
         ),
     ] = None,
-    without_reversals: Annotated[
-        bool,
+    reversals: Annotated[
+        bool | None,
         typer.Option(
-            "--without-reversals",
-            help="Leave out the windows in which the shaft turns round, where dry friction sticks:"
-            " for fast reversals under friction.",
+            "--with-reversals/--without-reversals",
+            help="Whether windows count in which the shaft reverses, where dry friction sticks."
+            " Otherwise only where a parameter cannot be identified without them.",
+            show_default=False,
         ),
-    ] = False,
+    ] = None,
     band: Annotated[
         float | None,
         typer.Option(metavar="HZ", help="Torque errors are counted below, otherwise 40 Hz."),
     ] = None,
+    leave_out_regimes: LeaveOutRegimes = False,
     out: Out = None,
     json: Json = None,
 ) -> None:
@@ -245,18 +254,46 @@ def winch(
     """
     from cspm.commands.identify_winch_command import WinchRequest, identify_winch_command
 
-    asked = WinchRequest(
+    request = WinchRequest(
         recordings=tuple(recordings),
         held_out=tuple(held_out or ()),
         testbed=testbed,
         winches=_names("--winches", winches),
         effects=_names("--effects", effects),
         torque_age=torque_age,
-        reversals=not without_reversals,
+        reversals=reversals,
         band=band,
         out=out,
+        leave_out_regimes=leave_out_regimes,
     )
-    identify_winch_command(asked, json)
+    _end(identify_winch_command(request, json))
+
+
+@identify.command(
+    epilog="""Example:
+
+cspm run calm --out calm_60s
+
+cspm identify lengths calm_60s --out lengths"""
+)
+def lengths(
+    recordings: Annotated[
+        list[Path],
+        typer.Argument(
+            metavar="REC...",
+            help="Recordings of motor angles and the poses of what moves; neither torque nor"
+            " tension is needed.",
+        ),
+    ],
+    testbed: MachineFile = None,
+    held_out: HeldOut = None,
+    out: Out = None,
+    json: Json = None,
+) -> None:
+    """Hold encoders against the cable lengths that measured poses give: scale, zero and sag."""
+    from cspm.commands.identify_lengths_command import identify_lengths_command
+
+    _end(identify_lengths_command(tuple(recordings), tuple(held_out or ()), testbed, out, json))
 
 
 @identify.command(
@@ -274,9 +311,9 @@ def system(
     recordings: Annotated[
         list[Path],
         typer.Argument(
-            metavar="BAG…",
+            metavar="REC...",
             help="Recordings of one machine with bar: poses of bar and winch frame, motor angles"
-            " and, better, tensions; several lengths tell more.",
+            " and, better, tensions; several lengths show more.",
         ),
     ],
     testbed: MachineFile = None,
@@ -318,6 +355,7 @@ def system(
             metavar="NAME", help="Also its profile likelihood, which is slow; repeatable."
         ),
     ] = None,
+    leave_out_regimes: LeaveOutRegimes = False,
     out: Annotated[
         Path | None,
         typer.Option(metavar="FOLDER", help="A new folder for picture and fitted test-bed file."),
@@ -331,7 +369,7 @@ def system(
     """
     from cspm.commands.identify_system_command import SystemRequest, identify_system_command
 
-    asked = SystemRequest(
+    request = SystemRequest(
         recordings=tuple(recordings),
         held_out=tuple(held_out or ()),
         testbed=testbed,
@@ -342,8 +380,9 @@ def system(
         profiled=tuple(profile or ()),
         horizon=horizon,
         out=out,
+        leave_out_regimes=leave_out_regimes,
     )
-    identify_system_command(asked, json)
+    _end(identify_system_command(request, json))
 
 
 def _frozen(text: str) -> tuple[str, float | None]:

@@ -3,14 +3,17 @@
 from __future__ import annotations
 
 import sys
+from contextvars import copy_context
 from importlib import import_module
+from importlib.metadata import version as metadata_version
 from pathlib import Path
 from typing import Annotated, NoReturn
 
 import typer
 
 from cspm.cli.app import RUN_FAILED, Json, app, new_folder
-from cspm_msgs_py.errors import CspmError, InputError
+from cspm.cli.shared_options import add_shared_options
+from cspm_msgs_py.errors import CspmError, DamageError, InputError
 from cspm_run.library import find_scenario, scenario_names
 
 MODES = ("inprocess", "graph", "processes", "realtime")
@@ -28,14 +31,22 @@ def main() -> None:
     import_module("cspm.cli.analyze")
     import_module("cspm.cli.diagnose")
     import_module("cspm.cli.identify")
+    import_module("cspm.cli.view")
+    import_module("cspm.cli.demo")
     import_module("cspm.cli.ros")
+    import_module("cspm.cli.new")
     run_app(app, "cspm")
 
 
 def run_app(commands: typer.Typer, name: str) -> NoReturn:
     """Run commands as the program `name`; every error is one line on stderr and an exit code."""
     try:
-        code = typer.main.get_command(commands).main(prog_name=name, standalone_mode=False)
+        root = typer.main.get_command(commands)
+        add_shared_options(root)
+        # What a command sets about its output ends with it.
+        code = copy_context().run(root.main, prog_name=name, standalone_mode=False)
+    except DamageError as err:
+        _fail(f"{err}; {err.remedy}", err.exit_code)
     except CspmError as err:
         _fail(str(err), err.exit_code)
     except _UsageError as err:
@@ -53,11 +64,26 @@ def _fail(text: str, code: int) -> NoReturn:
     sys.exit(code)
 
 
+def _show_version(wanted: bool) -> None:
+    if wanted:
+        typer.echo(f"cspm {metadata_version('cspm')}")
+        raise typer.Exit
+
+
 @app.callback(invoke_without_command=True)
-def overview(context: typer.Context) -> None:
+def overview(
+    context: typer.Context,
+    _: Annotated[
+        bool,
+        typer.Option(
+            "--version", help="Show the version and exit.", is_eager=True, callback=_show_version
+        ),
+    ] = False,
+) -> None:
     """A cable-suspended test-bed in software: 8 elastic cables carry a bar below moving winches.
 
-    Begin with `cspm run worst_case`. `cspm COMMAND --help` explains a command.
+    Begin with `cspm run worst_case worst_case_past_thesis`.
+    `cspm COMMAND --help` explains a command.
     """
     if context.invoked_subcommand is None:
         typer.echo(context.get_help())
@@ -69,6 +95,10 @@ def overview(context: typer.Context) -> None:
 Examples:
 
 cspm run calm --duration 60 --out calm_60s
+
+cspm run worst_case worst_case_past_thesis
+
+cspm run calm --effect winch_coulomb_friction@sway_3:torque=0.02 --out worn
 
 cspm run my_scenario.yaml --seed 2 --no-record --json result.json
 
@@ -83,8 +113,13 @@ cspm run calm --mode realtime --plant external
 Exit code: 0 done, 1 diverged or interrupted, 2 unusable input.""",
 )
 def run(
-    scenario: Annotated[
-        str, typer.Argument(metavar="SCENARIO", help="A scenario's name, or a scenario file.")
+    scenarios: Annotated[
+        list[str],
+        typer.Argument(
+            metavar="SCENARIO...",
+            help="A scenario's name, or a scenario file. Several run at once, a process each, and"
+            " are shown side by side.",
+        ),
     ],
     mode: Annotated[
         str,
@@ -144,8 +179,8 @@ def run(
         Path | None,
         typer.Option(
             metavar="FOLDER",
-            help="A new folder for the recording, its summary.json and its run.png;"
-            " otherwise recordings/SCENARIO-DATE-TIME.",
+            help="A new folder for recording, summary.json and run.png; otherwise"
+            " one in recordings/, named after scenario and time.",
         ),
     ] = None,
     record: Annotated[bool, typer.Option(help="Whether to record.")] = True,
@@ -155,17 +190,29 @@ def run(
             "--set",
             metavar="KEY=VALUE",
             help="Replace a value of the scenario, in its units (SI, rad), such as"
-            " target.motion.peak_period=2; may be repeated.",
+            " target.motion.peak_period=2, or of its test-bed, such as"
+            " testbed.cables.sway_3.drum_radius=0.026; may be repeated.",
+        ),
+    ] = None,
+    effects: Annotated[
+        list[str] | None,
+        typer.Option(
+            "--effect",
+            metavar="EFFECT",
+            help="Plant physics in the machine: EFFECT@ELEMENTS:PARAMETER=VALUE, such as"
+            " winch_coulomb_friction@sway_3:torque=0.02; several elements or parameters by"
+            " commas; may be repeated. `cspm diagnose --explain EFFECT` describes one.",
         ),
     ] = None,
     json: Json = None,
 ) -> None:
-    """Simulate a scenario: record it, draw it, and tell how well the bar followed.
+    """Simulate a scenario: record it, draw it, and report how well the bar followed.
 
     Ctrl-C ends the run early with a complete recording.
     """
     if mode not in MODES:
         raise InputError(f"--mode {mode}: allowed: {', '.join(MODES)}")
+    from cspm.commands.run_beside_command import Settings, run_beside_command
     from cspm.commands.run_command import run_command
     from cspm_msgs_py.recording.run_record import EXTERNAL
     from cspm_run.plants import PLANTS
@@ -174,9 +221,33 @@ def run(
         raise InputError(f"--plant {plant}: allowed: {', '.join((*PLANTS, EXTERNAL))}")
     settings = [f"duration={duration}"] * (duration is not None)
     settings += [f"seed={seed}"] * (seed is not None)
-    folder = out if out is not None else new_folder(Path(scenario).stem)
-    path = find_scenario(scenario)
-    place = folder if record else None
     settings = [*(overrides or []), *settings]
-    finished = run_command(path, settings, place, json, plant, mode, testbed, one_process, patience)
+    folder = out if out is not None else new_folder("+".join(Path(s).stem for s in scenarios))
+    place = folder if record else None
+    paths = [find_scenario(scenario) for scenario in scenarios]
+    if len(paths) == 1:
+        finished = run_command(
+            paths[0],
+            settings,
+            place,
+            json,
+            plant,
+            mode,
+            testbed,
+            one_process,
+            patience,
+            effects or (),
+        )
+    else:
+        _check_beside(mode, plant)
+        finished = run_beside_command(
+            paths, Settings(settings, place, json, plant, testbed, effects or ())
+        )
     raise typer.Exit(0 if finished else RUN_FAILED)
+
+
+def _check_beside(mode: str, plant: str) -> None:
+    if mode != MODES[0]:
+        raise InputError(f"--mode {mode}: allowed with several scenarios: {MODES[0]}")
+    if plant == "external":
+        raise InputError("--plant external: allowed with one scenario")

@@ -14,7 +14,7 @@ from cspm_msgs_py.errors import InputError
 @app.command(epilog="Example: cspm info recordings/calm-20260131-120000")
 def info(
     bag: Annotated[
-        Path, typer.Argument(metavar="BAG", help="A recording: its folder or its MCAP file.")
+        Path, typer.Argument(metavar="REC", help="A recording: its folder or its MCAP file.")
     ],
     json: Json = None,
 ) -> None:
@@ -29,7 +29,7 @@ def recover(
     bag: Annotated[
         Path,
         typer.Argument(
-            metavar="BAG", help="A recording that was cut short: its folder or its MCAP file."
+            metavar="REC", help="A recording that was cut short: its folder or its MCAP file."
         ),
     ],
     out: Annotated[
@@ -58,13 +58,13 @@ Exit code: 0 identical, 1 different, 2 no recording made by cspm."""
 )
 def resim(
     bag: Annotated[
-        Path, typer.Argument(metavar="BAG", help="A recording made by cspm: its folder or file.")
+        Path, typer.Argument(metavar="REC", help="A recording made by cspm: its folder or file.")
     ],
     json: Json = None,
 ) -> None:
     """Repeat a run from its recording alone, and say whether every message is identical.
 
-    Bit for bit, in every field. Otherwise the first difference is told: topic, message, field.
+    Bit for bit, in every field. Otherwise the first difference is printed: topic, message, field.
     """
     from cspm.commands.run_command import resim_command
 
@@ -87,8 +87,8 @@ def import_(
         Path,
         typer.Argument(
             metavar="FILE",
-            help="A text table, a .mat file up to version 7, or a bag: a rosbag2 folder, an .mcap"
-            " or .db3 file, or a ROS 1 .bag.",
+            help="A text table (.csv.gz too), a spreadsheet (.xlsx), a Parquet, HDF5 or .mat file,"
+            " or a bag: a rosbag2 folder, an .mcap or .db3 file, or a ROS 1 .bag.",
         ),
     ],
     mapping: Annotated[
@@ -110,7 +110,7 @@ def import_(
 ) -> None:
     """Turn a recording of others into one of the contract; every conversion is shown.
 
-    What looks wrong is told: units, signs, gaps, clocks. Nothing is interpolated.
+    What looks wrong is reported: units, signs, gaps, clocks. Nothing is interpolated.
     """
     from cspm.commands.import_command import Import, import_command
 

@@ -29,9 +29,9 @@ def node(context: typer.Context) -> None:
     if {"--help", "-h"} & {name, *rest}:
         typer.echo(context.get_help())
         raise typer.Exit(0)
-    from cspm_ros.runtime.node_main import start_node
+    from cspm.graph import run_node
 
-    start_node(name, rest)
+    run_node(name, rest)
 
 
 @app.command(
@@ -52,7 +52,7 @@ def replay(
     bag: Annotated[
         Path,
         typer.Argument(
-            metavar="BAG",
+            metavar="REC",
             help="A rosbag2 folder, an .mcap or .db3 file, or a ROS 1 .bag.",
         ),
     ],
@@ -115,14 +115,15 @@ def replay(
 
     The services /player/pause (std_srvs/SetBool) and /player/step (std_srvs/Trigger) steer it too.
     """
-    from cspm.commands.replay_command import Replay, replay_command
+    from cspm.commands.replay_command import replay_command
+    from cspm.replaying import ReplayRequest
     from cspm_ros.replay.bag_selection import Selection
 
     names = dict(_pair(text) for text in remap or ())
     selection = Selection(topics or (), left_out or (), start, duration, names)
     nodes = through.split(",") if through is not None else ()
-    asked = Replay(bag, selection, rate, paused, nodes, overrides or (), out)
-    raise typer.Exit(0 if replay_command(asked, json) else RUN_FAILED)
+    request = ReplayRequest(bag, selection, rate, paused, nodes, overrides or (), out)
+    raise typer.Exit(0 if replay_command(request, json) else RUN_FAILED)
 
 
 def _pair(text: str) -> tuple[str, str]:
@@ -185,7 +186,9 @@ def check_drivers(
     Per topic: type, quality of service, names, rate, jitter, stamps, units, signs; and whether the
     topics agree with each other and with the machine's geometry. A bar that moves shows more.
     """
-    from cspm.commands.check_drivers_command import Asked, check_drivers_command, machine_of
+    from cspm.commands.check_drivers_command import check_drivers_command
+    from cspm.drivers import machine_of
 
-    asked = Asked(machine_of(testbed, scenario, overrides or ()), seconds, sim_time, pull)
-    raise typer.Exit(0 if check_drivers_command(asked, json) else RUN_FAILED)
+    machine = machine_of(scenario, testbed, overrides or ())
+    fine = check_drivers_command(machine, seconds, sim_time=sim_time, pull=pull, json=json)
+    raise typer.Exit(0 if fine else RUN_FAILED)

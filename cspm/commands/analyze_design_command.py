@@ -113,7 +113,8 @@ def _gain_table(control: ClosedLoop, groups: dict[str, str]) -> Table:
         table.add_row(dof, f"{pid.kp:.4g}", f"{pid.ki:.4g}", f"{pid.kd:.4g}", "")
     for name, first in groups.items():
         pi = (control.force.gains or {})[first]
-        table.add_row(f"{name} cables", f"{pi.kp:.4g}", "", "", f"{pi.integral_frequency:.4g}")
+        label = name if name == first else f"{name} cables"
+        table.add_row(label, f"{pi.kp:.4g}", "", "", f"{pi.integral_frequency:.4g}")
     return table
 
 
@@ -128,7 +129,7 @@ def _motion_table(found: LoopAnalysis) -> Table:
 
 
 def _force_table(found: LoopAnalysis, cables: list[str]) -> Table:
-    table = _margin_table("force loops, one cable of a kind, other torques held")
+    table = _margin_table("force loops, one cable of those with the same gains, other torques held")
     for name in cables:
         for way, loops in found.force.items():
             # The force loops alone form no cascade, so the label does not name one.

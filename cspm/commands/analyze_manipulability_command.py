@@ -12,12 +12,9 @@ from rich.table import Table
 
 from cspm.analysis.machine import AnalyzedMachine
 from cspm.analysis.manipulability import manipulability_of
-from cspm_control.analysis.manipulability import (
-    Ellipsoid,
-    Manipulability,
-    gyration_radius,
-)
+from cspm_control.analysis.manipulability import Ellipsoid, Manipulability
 from cspm_model.parameters import nominal_parameters
+from cspm_model.spanned_axes import gyration_radius
 from cspm_msgs_py.new_folder import refuse_existing
 from cspm_run.console import make_console, say
 from cspm_run.summary import write_json

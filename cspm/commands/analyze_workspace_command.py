@@ -13,10 +13,9 @@ from rich.progress import BarColumn, Progress, TaskProgressColumn, TextColumn, T
 from rich.table import Table
 
 from cspm.analysis.machine import AnalyzedMachine
-from cspm.analysis.workspace import workspace_of
+from cspm.analysis.workspace import grids_of, workspace_of
 from cspm.commands.claim_table import claim_table
 from cspm_control.analysis.claim import Claim
-from cspm_control.analysis.pose_grid import GRIDS
 from cspm_control.analysis.published_workspace import OURS
 from cspm_control.analysis.workspace import ALGORITHMS
 from cspm_control.analysis.workspace_limits import LIMITED
@@ -62,7 +61,7 @@ def analyze_workspace_command(
     """
     refuse_existing(folder)
     console = make_console()
-    with interruptible() as stopped, _bars(console, coarse) as advance:
+    with interruptible() as stopped, _bars(console, machine, coarse) as advance:
         found = workspace_of(machine, acceleration, coarse, advance, stopped)
     if found is None:
         raise typer.Abort
@@ -74,7 +73,9 @@ def analyze_workspace_command(
 
 
 @contextmanager
-def _bars(console: Console, coarse: int) -> Iterator[Callable[[str, int], None]]:
+def _bars(
+    console: Console, machine: AnalyzedMachine, coarse: int
+) -> Iterator[Callable[[str, int], None]]:
     """Yield a callback with one progress bar per algorithm; silent without a terminal."""
     with Progress(
         *(TextColumn("{task.description}"), BarColumn(), TaskProgressColumn()),
@@ -83,9 +84,9 @@ def _bars(console: Console, coarse: int) -> Iterator[Callable[[str, int], None]]
         transient=True,
         disable=not console.is_terminal,
     ) as bar:
-        tasks = {}
+        tasks, grids = {}, grids_of(machine)
         for name in ALGORITHMS:
-            size = GRIDS[name].every(coarse).size
+            size = grids[name].every(coarse).size
             tasks[name] = bar.add_task(f"{WAYS[name]}, {size:,} poses", total=size)
         yield lambda name, count: bar.advance(tasks[name], count)
 
@@ -101,7 +102,11 @@ def _show(console: Console, found: WorkspaceResult, claims: Sequence[Claim]) -> 
     )
     for name, whole in found.whole.items():
         share = whole.held / whole.poses
-        reach = ", ".join(f"{dof} {value:g}" for dof, value in whole.largest.items())
+        reach = ", ".join(
+            f"{dof} {value:g}" + (" (the grid's end)" if value >= whole.ends[dof] else "")
+            for dof, value in whole.largest.items()
+            if dof in whole.ends
+        )
         say(
             console,
             f"{WAYS[name]}: {whole.held:,} of {whole.poses:,} poses of the whole grid,"
@@ -120,6 +125,16 @@ def _limit_table(title: str, found: WorkspaceResult) -> Table:
         table.add_column(heading, justify="right")
     for dof in LIMITED:
         values = [found.limits[way][dof] for way in WAYS]
-        cells = ["nowhere" if value is None else f"{value:g} {UNITS[dof]}" for value in values]
+        end = found.whole["general"].ends.get(dof)
+        cells = [_limit(value, UNITS[dof], end) for value in values]
         table.add_row(dof, *cells)
     return table
+
+
+def _limit(value: float | None, unit: str, end: float | None) -> str:
+    """Return a limit in words: at the end of the grid it is the grid's, not the machine's."""
+    if end is None:
+        return "–"
+    if value is None:
+        return "nowhere"
+    return f"{'≥ ' if value >= end else ''}{value:g} {unit}"

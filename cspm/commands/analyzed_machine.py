@@ -11,8 +11,8 @@ from cspm.analysis.machine import AnalyzedMachine, analyzed_machine
 from cspm.scenario import load_scenario
 from cspm_msgs_py.dofs import DOFS
 from cspm_msgs_py.errors import InputError
-from cspm_msgs_py.scenario import ORIGIN, Pose
-from cspm_msgs_py.testbed import load_testbed
+from cspm_msgs_py.scenario_keys.bodies import ORIGIN, Pose
+from cspm_run.library import named_testbed
 
 
 def read_machine(scenario: str, testbed: Path | None, pose: str | None) -> AnalyzedMachine:
@@ -28,7 +28,7 @@ def read_machine(scenario: str, testbed: Path | None, pose: str | None) -> Analy
         InputError: an input cannot be used; names file, key or option, and what is allowed.
     """
     described = load_scenario(scenario)
-    file = load_testbed(testbed) if testbed else described.testbed_file
+    file = named_testbed(testbed) if testbed else described.testbed_file
     if file.testbed.bar is None:
         raise InputError(
             f"{testbed or scenario}: machine {file.testbed.name} has no bar, allowed: one with a"

@@ -15,8 +15,8 @@ from cspm_ident.block_simulation import Input
 from cspm_ident.comparison.channel_fit import ChannelFit
 from cspm_ident.comparison.compare import Comparison
 from cspm_msgs_py.new_folder import refuse_existing
-from cspm_msgs_py.testbed import load_testbed
 from cspm_run.console import make_console, say
+from cspm_run.library import named_testbed
 from cspm_run.summary import write_json
 
 
@@ -43,25 +43,25 @@ class CompareRequest:
     out: Path | None
 
 
-def compare_command(asked: CompareRequest, json: Path | None) -> None:
+def compare_command(request: CompareRequest, json: Path | None) -> None:
     """Compare a recording with its simulation, print, and write the requested report.
 
     Raises:
         InputError: recording, test-bed or options cannot be used.
     """
     console = make_console()
-    refuse_existing(asked.out)
+    refuse_existing(request.out)
     with console.status("reading") as status:
         compared = compare(
-            asked.recording,
-            testbed=None if asked.testbed is None else load_testbed(asked.testbed),
-            drive=asked.drive.value,
-            horizon=asked.horizon,
-            delays=asked.delays,
-            repeat=asked.repeat,
+            request.recording,
+            testbed=None if request.testbed is None else named_testbed(request.testbed),
+            drive=request.drive.value,
+            horizon=request.horizon,
+            delays=request.delays,
+            repeat=request.repeat,
             progress=lambda _, what: status.update(what),
         )
-        written = None if asked.out is None else compared.write(asked.out)
+        written = None if request.out is None else compared.write(request.out)
     print_comparison(console, compared.result)
     if written is not None:
         say(console, f"report {written}")

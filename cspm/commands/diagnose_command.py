@@ -2,22 +2,26 @@
 
 from __future__ import annotations
 
+import shlex
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
+from typing import Any, NamedTuple
 
 from rich import box
 from rich.console import Console
 from rich.table import Table
 
+from cspm.commands.data_look_lines import print_data_look
 from cspm.diagnosis import diagnose
 from cspm_ident.diagnosis.diagnosis import Diagnosis
+from cspm_ident.diagnosis.reporting.empirical_statement import stage_errors, stage_names
 from cspm_ident.diagnosis.reporting.finding_statement import statement_of
 from cspm_ident.diagnosis.reporting.statement import (
     channel_of,
     drive_of,
     line_statement,
+    remainder_statement,
     tension_statement,
     unit_of,
     unknown_statement,
@@ -31,8 +35,9 @@ from cspm_ident.diagnosis.validation.closed_loop import ClosedLoopFit
 from cspm_ident.diagnosis.validation.controller_parity import Parity
 from cspm_msgs_py.errors import InputError
 from cspm_msgs_py.new_folder import refuse_existing
-from cspm_msgs_py.testbed import load_testbed
+from cspm_msgs_py.testbed import Testbed
 from cspm_run.console import make_console, say
+from cspm_run.library import named_testbed
 from cspm_run.summary import write_json
 from cspm_sim.effects import catalogue
 
@@ -47,6 +52,7 @@ class DiagnoseRequest:
         testbed: file of the assumed machine, instead of the recorded one.
         out: a new folder for the results; None writes nothing.
         closed_loop: whether to simulate the closed loop again with the findings.
+        leave_out_regimes: whether to leave out stretches that do not belong to the rest.
     """
 
     recordings: Sequence[Path]
@@ -54,38 +60,61 @@ class DiagnoseRequest:
     testbed: Path | None
     out: Path | None
     closed_loop: bool = True
+    leave_out_regimes: bool = False
 
 
-def diagnose_command(asked: DiagnoseRequest, json: Path | None) -> None:
+def diagnose_command(request: DiagnoseRequest, json: Path | None) -> None:
     """Diagnose, print the results, and write the requested files.
 
     Raises:
         InputError: recordings, test-bed or options cannot be used.
     """
     console = make_console()
-    refuse_existing(asked.out)
+    refuse_existing(request.out)
     with console.status("reading") as status:
 
         def show(_: float, what: str) -> None:
             status.update(what)
 
         found = diagnose(
-            asked.recordings,
-            testbed=None if asked.testbed is None else load_testbed(asked.testbed),
-            held_out=asked.held_out,
-            closed_loop=asked.closed_loop,
+            request.recordings,
+            testbed=None if request.testbed is None else named_testbed(request.testbed),
+            held_out=request.held_out,
+            closed_loop=request.closed_loop,
+            leave_out_regimes=request.leave_out_regimes,
             progress=show,
         )
-        if asked.out is not None:
-            found.write(asked.out, show)
-    print_diagnosis(console, found.result, found.data, asked.out)
+        if request.out is not None:
+            found.write(request.out, show)
+    print_data_look(console, found.data["data_checks"])
+    say(console, believed_line(found.result.searched[0].machine, request.testbed))
+    print_diagnosis(console, found.result, found.data, request.out)
     _print_parity(console, found.parity)
     if found.closed_loop:
         console.print(_loop_table(found.closed_loop))
-    if asked.out is not None:
-        say(console, f"written {asked.out}")
+    if request.out is not None:
+        say(console, f"written {request.out}")
+        words = ("view", str(request.recordings[0]), "--diagnosis", str(request.out))
+        say(console, f"next: cspm {shlex.join(words)}")
     if json is not None:
         write_json(json, found.data)
+
+
+def believed_line(machine: Testbed, file: Path | None) -> str:
+    """Return which description the verdict is about.
+
+    A simulated recording carries the machine that was simulated, whose effects are then believed.
+    """
+    if file is not None:
+        return f"compared with {machine.name} of {file}"
+    own = f"compared with {machine.name}, the test-bed that the recording carries"
+    if not machine.effects:
+        return own
+    names = ", ".join(dict.fromkeys(entry.effect for entry in machine.effects))
+    return (
+        f"{own}, with its {names}: these are believed, not looked for; --testbed FILE compares with"
+        " another, such as the one without them"
+    )
 
 
 def _print_cut_short(console: Console, found: Diagnosis) -> None:
@@ -120,7 +149,7 @@ def explain_command(name: str) -> None:
     effects = catalogue()
     if name not in effects:
         raise InputError(f"--explain {name}: allowed: {', '.join(effects)}")
-    Console().print(Markdown(effect_section(effects[name])))
+    make_console().print(Markdown(effect_section(effects[name])))
 
 
 def _print_named(
@@ -131,7 +160,7 @@ def _print_named(
             continue
         say(console, f"• {statement_of(found, finding)}")
         for rival, experiment in zip(finding.alternatives, own, strict=True):
-            say(console, f"  as well explained by {rival.words}; to tell: {experiment}")
+            say(console, f"  as well explained by {rival.words}; to distinguish: {experiment}")
 
 
 def _experiments(found: Diagnosis, data: Mapping[str, Any], folder: Path | None) -> list[list[str]]:
@@ -167,8 +196,12 @@ def print_diagnosis(
     _print_named(console, found, experiments, doubtful=False)
     for each in found.unexplained:
         say(console, f"• {unknown_statement(found, each)}")
+    for entry in data["empirical"]:
+        say(console, f"  {entry['statement']}")
     for line in found.lines:
         say(console, f"• {line_statement(line)}")
+    for left in found.undescribed[:_MOST_REMAINDERS]:
+        say(console, f"• {remainder_statement(left)}")
     _print_named(console, found, experiments, doubtful=True)
     for finding in found.rejected:
         say(
@@ -201,37 +234,62 @@ def print_diagnosis(
         )
 
 
+class _Row(NamedTuple):
+    """One line of a table of fits: RMS errors of the stages, of others, and the noise."""
+
+    name: str
+    numbers: tuple[float, ...]
+    unit: str
+    at_noise: bool
+
+    def changes(self, stages: int) -> bool:
+        """Return whether the root mean square differs among so many stages."""
+        numbers = self.numbers[:stages]
+        return max(numbers) > _CHANGED * min(numbers)
+
+
 def _print_fits(console: Console, found: Diagnosis) -> None:
     """Print fits that changed or are well above their noise, and the count of the others."""
     judged = "held-out recordings" if found.held_out else "the last part, not searched"
-    rows: list[tuple[str, tuple[float, ...], str]] = [
-        (channel_of(f), (f.before, f.retuned, f.after, f.ceiling, f.noise), unit_of(f))
+    stages, limits = stage_names(found), found.thresholds
+    rows = [
+        _Row(
+            channel_of(f),
+            (*stage_errors(found, f), f.ceiling, f.noise),
+            unit_of(f),
+            f.is_at_noise(limits) is not False,
+        )
         for f in found.fit
     ]
-    _print_table(console, f"residuals of the equations, {judged}", ("black box", "noise"), rows)
+    headings = (*stages, "black box", "noise")
+    _print_table(console, f"residuals of the equations, {judged}", headings, len(stages), rows)
     rows = [
-        (
+        _Row(
             f"{f.output.name}, from measured {drive_of(f)}",
-            (f.before, f.retuned, f.after, f.floor),
+            (*stage_errors(found, f), f.floor),
             f.output.unit,
+            f.after <= limits.noise_floor_ratio * f.floor,
         )
         for f in found.simulated
     ]
     if rows:
-        _print_table(console, f"errors of simulations, {judged}", ("noise",), rows)
+        _print_table(
+            console, f"errors of simulations, {judged}", (*stages, "noise"), len(stages), rows
+        )
 
 
 def _print_table(
     console: Console,
     title: str,
-    last: Sequence[str],
-    rows: Sequence[tuple[str, tuple[float, ...], str]],
+    headings: Sequence[str],
+    stages: int,
+    rows: Sequence[_Row],
 ) -> None:
-    shown = [row for row in rows if _is_worth_showing(row[1])]
+    shown = [row for row in rows if not row.at_noise or row.changes(stages)]
     table = Table(title=f"{title}: root mean square", box=box.SIMPLE_HEAD)
-    for heading in ("", "before", "re-tuned", "after", *last, "unit"):
+    for heading in ("", *headings, "unit"):
         table.add_column(heading, justify="left" if heading in ("", "unit") else "right")
-    for name, numbers, unit in shown:
+    for name, numbers, unit, _ in shown:
         table.add_row(name, *(f"{number:.3g}" for number in numbers), unit)
     if shown:
         console.print(table)
@@ -239,15 +297,10 @@ def _print_table(
     say(console, f"{title}: {others} of {len(rows)} at their noise, before and after")
 
 
-def _is_worth_showing(numbers: tuple[float, ...]) -> bool:
-    before, retuned, after, noise = *numbers[:3], numbers[-1]
-    changed = max(before, retuned, after) > _CHANGED * min(before, retuned, after)
-    return changed or after > _ABOVE * noise
-
-
-# Smaller changes of a root mean square, and smaller excesses over the noise, are not printed.
+# Smaller changes of a root mean square are not printed where it is at the noise.
 _CHANGED = 1.05
-_ABOVE = 3.0
+# Remainders that are printed; `diagnosis.json` has all.
+_MOST_REMAINDERS = 3
 
 
 def _loop_table(loop: Sequence[ClosedLoopFit]) -> Table:

@@ -10,19 +10,21 @@ from rich.markup import escape
 from rich.table import Table
 
 from cspm.commands.identify_outcome import hand_out, interval_text
-from cspm.identification import identified_damping
+from cspm.identification.cables import identified_damping
 from cspm.rig import RigRequest
 from cspm_ident.rig.damping import DAMPING, DampingResult
 from cspm_run.console import say
 
 
-def identify_damping_command(asked: RigRequest, json: Path | None) -> None:
+def identify_damping_command(request: RigRequest, json: Path | None) -> bool:
     """Identify the cable damping, print the results, and write the requested files.
+
+    Returns whether all parameters are a result.
 
     Raises:
         InputError: recordings, test-bed or options cannot be used.
     """
-    hand_out(identified_damping(asked), print_damping, asked.out, json)
+    return hand_out(identified_damping(request), print_damping, request.out, json)
 
 
 def print_damping(console: Console, result: DampingResult) -> None:
@@ -30,7 +32,7 @@ def print_damping(console: Console, result: DampingResult) -> None:
     console.print(_specimen_table(result))
     law = result.law
     if law is None:
-        say(console, "cables of one length: the slope cannot be told, no law")
+        say(console, "cables of one length: the slope cannot be identified, no law")
         return
     constant = interval_text(law.constant, law.constant_interval, 5)
     slope = interval_text(law.slope, law.slope_interval, 5)

@@ -8,7 +8,8 @@ from typing import TypeVar
 
 from rich.console import Console
 
-from cspm.identification import Identification, Outcome
+from cspm.commands.data_look_lines import print_data_look
+from cspm.identification.identified import Identification, Outcome
 from cspm_run.console import make_console, say
 from cspm_run.summary import write_json
 
@@ -20,8 +21,10 @@ def hand_out(
     show: Callable[[Console, Found], None],
     folder: Path | None,
     json: Path | None,
-) -> None:
+) -> bool:
     """Print the identified parameters, and write the requested files.
+
+    Returns whether all of them are a result.
 
     Args:
         found: the identified parameters.
@@ -30,13 +33,20 @@ def hand_out(
         json: file for the printed results; None writes none.
     """
     console = make_console()
+    checks = [each.data() for each in found.data_checks]
+    if checks:
+        print_data_look(console, checks)
     show(console, found.result)
+    for objection in found.objections:
+        say(console, objection)
     written: dict[str, str] = {}
     if folder is not None:
         written = found.write(folder)
         say(console, f"written: {', '.join(written.values())}")
     if json is not None:
-        write_json(json, found.data() | {"written": written})
+        data = {"objections": list(found.objections), "data_checks": checks, "written": written}
+        write_json(json, found.data() | data)
+    return not found.objections
 
 
 def interval_text(value: float, interval: tuple[float, float], digits: int = 6) -> str:

@@ -10,7 +10,7 @@ from rich.markup import escape
 from rich.table import Table
 
 from cspm.commands.identify_outcome import hand_out, interval_text
-from cspm.identification import identified_stiffness
+from cspm.identification.cables import identified_stiffness
 from cspm.rig import RigRequest
 from cspm_ident.rig.flanks import DOWN, UP
 from cspm_ident.rig.stiffness import MEAN, StiffnessResult
@@ -20,13 +20,15 @@ from cspm_run.console import say
 LAW = "k = min(a/l^b (e^(c t) - e^(d t)), E A/l)"
 
 
-def identify_stiffness_command(asked: RigRequest, json: Path | None) -> None:
+def identify_stiffness_command(request: RigRequest, json: Path | None) -> bool:
     """Identify the cable stiffness, print the results, and write the requested files.
+
+    Returns whether all parameters are a result.
 
     Raises:
         InputError: recordings, test-bed or options cannot be used.
     """
-    hand_out(identified_stiffness(asked), print_stiffness, asked.out, json)
+    return hand_out(identified_stiffness(request), print_stiffness, request.out, json)
 
 
 def print_stiffness(console: Console, result: StiffnessResult) -> None:

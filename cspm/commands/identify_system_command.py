@@ -13,14 +13,14 @@ from rich.markup import escape
 from rich.table import Table
 
 from cspm.commands.identify_outcome import hand_out, interval_text
-from cspm.identification import identify_system
+from cspm.identification.system import identify_system
 from cspm_ident.estimation import Prior
 from cspm_ident.system.identification import SystemResult
 from cspm_ident.system.prediction_test import Judgement
 from cspm_msgs_py.dofs import DOFS
 from cspm_msgs_py.new_folder import refuse_existing
-from cspm_msgs_py.testbed import load_testbed
 from cspm_run.console import make_console, say
+from cspm_run.library import named_testbed
 
 
 @dataclass(frozen=True)
@@ -37,6 +37,7 @@ class SystemRequest:
         bounds: lowest and highest value, by name.
         profiled: parameters whose profile likelihood is computed.
         horizon: length of the windows [s]; None for the default one.
+        leave_out_regimes: whether to leave out stretches that do not belong to the rest.
         out: a new folder for picture and fitted test-bed; None writes nothing.
     """
 
@@ -50,30 +51,34 @@ class SystemRequest:
     profiled: tuple[str, ...]
     horizon: float | None
     out: Path | None
+    leave_out_regimes: bool = False
 
 
-def identify_system_command(asked: SystemRequest, json: Path | None) -> None:
+def identify_system_command(request: SystemRequest, json: Path | None) -> bool:
     """Identify the system, print the results, and write the requested files.
+
+    Returns whether all parameters are a result.
 
     Raises:
         InputError: recordings, test-bed or options cannot be used.
     """
     console = make_console()
-    refuse_existing(asked.out)
+    refuse_existing(request.out)
     with console.status("") as status:
         found = identify_system(
-            asked.recordings,
-            held_out=asked.held_out,
-            testbed=None if asked.testbed is None else load_testbed(asked.testbed),
-            names=asked.names,
-            frozen=asked.frozen,
-            priors=asked.priors,
-            bounds=asked.bounds,
-            profiled=asked.profiled,
-            horizon=asked.horizon,
+            request.recordings,
+            held_out=request.held_out,
+            testbed=None if request.testbed is None else named_testbed(request.testbed),
+            names=request.names,
+            frozen=request.frozen,
+            priors=request.priors,
+            bounds=request.bounds,
+            profiled=request.profiled,
+            horizon=request.horizon,
+            leave_out_regimes=request.leave_out_regimes,
             progress=lambda _, what: status.update(escape(what)),
         )
-    hand_out(found, print_system, asked.out, json)
+    return hand_out(found, print_system, request.out, json)
 
 
 def print_system(console: Console, result: SystemResult) -> None:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from dataclasses import dataclass
 from math import isfinite
 from pathlib import Path
@@ -12,14 +13,11 @@ from rich.markup import escape
 from rich.table import Table
 
 from cspm.commands.identify_outcome import hand_out, interval_text
-from cspm.identification import identify_winch
-from cspm_ident.winch.identify_winches import (
-    IdentifiedWinch,
-    WinchesResult,
-)
+from cspm.identification.winches import identify_winch
+from cspm_ident.winch.identified_winch import IdentifiedWinch, WinchesResult
 from cspm_msgs_py.new_folder import refuse_existing
-from cspm_msgs_py.testbed import load_testbed
 from cspm_run.console import make_console, say
+from cspm_run.library import named_testbed
 
 # Unit at the shaft to unit at the drum's rim, and the power of the radius that converts them.
 _AT_RIM = {"kg·m²": ("kg", 2), "N·m·s/rad": ("N·s/m", 2), "N·m": ("N", 1)}
@@ -36,8 +34,9 @@ class WinchRequest:
         winches: names of their cables; none for all.
         effects: to fit beside the inertia; none for the default ones.
         torque_age: see `WinchSignals` [s]; None for the first recording's.
-        reversals: whether windows with a reversal of the shaft count.
+        reversals: whether windows with a reversal of the shaft count; None: where needed.
         band: frequency band of the torque errors [Hz]; None for the default one.
+        leave_out_regimes: whether to leave out stretches that do not belong to the rest.
         out: a new folder for pictures and fitted test-bed; None writes nothing.
     """
 
@@ -47,31 +46,35 @@ class WinchRequest:
     winches: tuple[str, ...]
     effects: tuple[str, ...]
     torque_age: float | None
-    reversals: bool
+    reversals: bool | None
     band: float | None
     out: Path | None
+    leave_out_regimes: bool = False
 
 
-def identify_winch_command(asked: WinchRequest, json: Path | None) -> None:
+def identify_winch_command(request: WinchRequest, json: Path | None) -> bool:
     """Identify winches, print the results, and write the requested files.
+
+    Returns whether all parameters are a result.
 
     Raises:
         InputError: recordings, test-bed or options cannot be used.
     """
-    refuse_existing(asked.out)
+    refuse_existing(request.out)
     with make_console().status("") as status:
         found = identify_winch(
-            asked.recordings,
-            held_out=asked.held_out,
-            testbed=None if asked.testbed is None else load_testbed(asked.testbed),
-            winches=asked.winches,
-            effects=asked.effects,
-            torque_age=asked.torque_age,
-            reversals=asked.reversals,
-            band=asked.band,
+            request.recordings,
+            held_out=request.held_out,
+            testbed=None if request.testbed is None else named_testbed(request.testbed),
+            winches=request.winches,
+            effects=request.effects,
+            torque_age=request.torque_age,
+            reversals=request.reversals,
+            band=request.band,
+            leave_out_regimes=request.leave_out_regimes,
             progress=lambda _, what: status.update(escape(what)),
         )
-    hand_out(found, print_winches, asked.out, json)
+    return hand_out(found, print_winches, request.out, json)
 
 
 def print_winches(console: Console, result: WinchesResult) -> None:
@@ -80,20 +83,46 @@ def print_winches(console: Console, result: WinchesResult) -> None:
         console.print(_table(winch))
         for direction in winch.fit.estimate.unexcited:
             say(console, f"not excited: {direction.name}; its values are no result")
-        if winch.torn:
-            say(console, _torn_text(winch, result.reversals))
-    say(console, f"torque taken to act {1e3 * result.torque_age:g} ms before its stamp")
+        for line in _remarks(winch, result.torque_age):
+            say(console, line)
+    if result.standing:
+        say(console, f"no motion, so nothing identified: {', '.join(result.standing)}")
     console.print(_error_table(result))
 
 
-def _torn_text(winch: IdentifiedWinch, reversals: bool) -> str:
+def _remarks(winch: IdentifiedWinch, torque_age: float) -> Iterator[str]:
+    """Yield what was left out or taken into account."""
+    for path, times in winch.jumps:
+        shown = ", ".join(f"{time:.3f}" for time in times[:5]) + (", …" * (len(times) > 5))
+        yield (
+            f"{path.name}: the angle of {winch.name} jumps {len(times)} times, at {shown} s; left"
+            " out. A counter that rolls over: `wrap` in the mapping"
+        )
+    if winch.from_speed:
+        yield f"{winch.name}: accelerations from the drive's speed; the angle is too noisy for them"
+    late = winch.lateness
+    if late is None:
+        yield f"torque taken to act {1e3 * torque_age:g} ms before its stamp"
+    else:
+        low, high = (1e3 * end for end in late.ci95)
+        word = "late" if late.age > late.stated else "early"
+        yield (
+            f"{winch.name}: the torque acts {1e3 * late.age:.4g} ({low:.4g} … {high:.4g}) ms before"
+            f" its stamp, not {1e3 * late.stated:g}: it is {word} against the angle. Taken into"
+            f" account, which takes the residual from {late.error[0]:.3g} to {late.error[1]:.3g} %"
+        )
+    if winch.torn:
+        yield _torn_text(winch)
+
+
+def _torn_text(winch: IdentifiedWinch) -> str:
     other = winch.otherwise
     values = [f"{name} {other.estimate.value(name):.5g}" for name in winch.torn] if other else []
-    role = "left out" if reversals else "counted"
+    role = "left out" if winch.reversals else "counted"
     return (
-        f"with windows {role} in which the shaft turns round: {', '.join(values)}. Dry friction"
-        " sticks there, and these windows say something else than the rest"
-        + (": consider --without-reversals" if reversals else "")
+        f"with windows {role} in which the shaft reverses: {', '.join(values)}. Dry friction sticks"
+        " there, and these windows say something else than the rest"
+        + (": consider --without-reversals" if winch.reversals else "")
     )
 
 
@@ -104,17 +133,26 @@ def _table(winch: IdentifiedWinch) -> Table:
     for column in ("parameter", "unit", "described", "found", "found at the drum's rim"):
         table.add_column(column, justify="right" if column == "described" else "left")
     for name, unit in zip(estimate.names, estimate.units, strict=True):
-        value, ends = estimate.value(name), estimate.interval(name)
-        seen = all(isfinite(end) for end in ends)
-        text = interval_text(value, ends, 5) if seen else f"{value:.5g}, not excited"
-        rim = ""
-        if seen and unit in _AT_RIM:
-            rim_unit, power = _AT_RIM[unit]
-            factor = winch.radius**-power
-            low, high = (factor * end for end in ends)
-            rim = f"{interval_text(factor * value, (low, high), 5)} {rim_unit}"
-        table.add_row(name, unit, f"{winch.described[name]:.5g}", text, rim)
+        found, rim = _cells(winch, name, unit)
+        table.add_row(name, unit, f"{winch.described[name]:.5g}", found, rim)
     return table
+
+
+def _cells(winch: IdentifiedWinch, name: str, unit: str) -> tuple[str, str]:
+    """Return what was found of a parameter, at the shaft and at the drum's rim."""
+    estimate = winch.fit.estimate
+    value, ends = estimate.value(name), estimate.interval(name)
+    if not all(isfinite(end) for end in ends):
+        return f"{value:.5g}, not excited", ""
+    if name not in winch.valid:
+        return "no result", ""
+    text = interval_text(value, ends, 5) + (", none seen" if name in winch.unseen else "")
+    if unit not in _AT_RIM:
+        return text, ""
+    rim_unit, power = _AT_RIM[unit]
+    factor = winch.radius**-power
+    low, high = (factor * end for end in ends)
+    return text, f"{interval_text(factor * value, (low, high), 5)} {rim_unit}"
 
 
 def _error_table(result: WinchesResult) -> Table:

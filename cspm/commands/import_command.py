@@ -16,8 +16,8 @@ from cspm_ident.importing.column_store import ColumnStore
 from cspm_ident.importing.mapping import load_mapping
 from cspm_ident.importing.preparation import prepare
 from cspm_msgs_py.new_folder import refuse_existing
-from cspm_msgs_py.testbed import load_testbed
 from cspm_run.console import make_console, say
+from cspm_run.library import named_testbed
 from cspm_run.summary import write_json
 
 
@@ -31,30 +31,33 @@ class Import:
     out: Path | None
 
 
-def import_command(asked: Import, json: Path | None) -> None:
+def import_command(request: Import, json: Path | None) -> None:
     """Print the report of an import, and write the recording unless it is a trial.
 
     Raises:
         InputError: the file, the mapping or the test-bed cannot be used.
     """
     console = make_console()
-    refuse_existing(asked.out)
-    mapping, testbed = load_mapping(asked.mapping), load_testbed(asked.testbed)
+    refuse_existing(request.out)
+    mapping, testbed = (
+        load_mapping(request.mapping),
+        named_testbed(request.testbed),
+    )
     with ColumnStore() as store:
-        with _progress(console, f"reading {asked.source.name}") as progress:
+        with _progress(console, f"reading {request.source.name}") as progress:
             prepared = prepare(
-                asked.source, mapping, testbed, store, progress, trial=asked.out is None
+                request.source, mapping, testbed, store, progress, trial=request.out is None
             )
         print_report(console, prepared.report)
         counts: dict[str, int] = {}
-        if asked.out is not None:
-            with _progress(console, f"writing {asked.out.name}") as progress:
-                counts = write_import(asked.out, prepared, mapping, testbed, progress)
-            say(console, f"recording {asked.out}: {sum(counts.values())} messages")
+        if request.out is not None:
+            with _progress(console, f"writing {request.out.name}") as progress:
+                counts = write_import(request.out, prepared, mapping, testbed, progress)
+            say(console, f"recording {request.out}: {sum(counts.values())} messages")
         else:
             say(console, "trial: nothing was written")
     if json is not None:
-        written = {"recording": str(asked.out) if asked.out else None, "messages": counts}
+        written = {"recording": str(request.out) if request.out else None, "messages": counts}
         write_json(json, prepared.report.data() | written)
 
 

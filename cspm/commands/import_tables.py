@@ -7,9 +7,9 @@ from rich.console import Console
 from rich.markup import escape
 from rich.table import Table
 
+from cspm_ident.importing.checks.pace import Pace
+from cspm_ident.importing.checks.suspicion import Suspicion
 from cspm_ident.importing.report import FieldReport, ImportReport, TopicReport
-from cspm_ident.importing.suspicion import Suspicion
-from cspm_ident.importing.time_base import Pace
 from cspm_run.console import say
 
 
@@ -27,15 +27,15 @@ def print_report(console: Console, report: ImportReport) -> None:
         _print_topic(console, topic)
     if not report.suspicions:
         say(console, "suspicions: none")
-    for text, places in _by_text(report.suspicions).items():
-        say(console, f"suspicion: {', '.join(places)}: {text}")
+    for (text, remedy), places in _by_text(report.suspicions).items():
+        say(console, f"suspicion: {', '.join(places)}: {text}; remedy: {remedy}")
 
 
-def _by_text(suspicions: list[Suspicion]) -> dict[str, list[str]]:
+def _by_text(suspicions: list[Suspicion]) -> dict[tuple[str, str], list[str]]:
     """Return the places of each suspicion, as one cable's fault often concerns all cables."""
-    found: dict[str, list[str]] = {}
+    found: dict[tuple[str, str], list[str]] = {}
     for one in suspicions:
-        found.setdefault(one.text, []).append(one.where)
+        found.setdefault((one.text, one.remedy), []).append(one.where)
     return found
 
 

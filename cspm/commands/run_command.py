@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import dataclasses
+import shlex
 import tempfile
 from collections.abc import Sequence
 from pathlib import Path
@@ -13,22 +14,26 @@ from rich.markup import escape
 from rich.progress import BarColumn, Progress, TaskID, TextColumn, TimeRemainingColumn
 from rich.table import Table
 
+from cspm.changed_machine import changed_machine, of_testbed
 from cspm.scenario import Scenario
 from cspm.simulation import REALTIME, Runner, bundle_of, ros_runner
+from cspm_model.cable_strength import limit_warnings
 from cspm_msgs_py.errors import CspmError, InputError
 from cspm_msgs_py.new_folder import refuse_existing
 from cspm_msgs_py.recording.overview import overview
 from cspm_msgs_py.recording.recover import recover
 from cspm_msgs_py.recording.run_record import EXTERNAL, RECORD_NAME
 from cspm_msgs_py.scenario import load_scenario
-from cspm_msgs_py.testbed import load_testbed
 from cspm_ros.runtime.stall_watchdog import PATIENCE_S, check_patience
 from cspm_run.bundle import Bundle
+from cspm_run.bundle_dofs import free_of
 from cspm_run.console import make_console, say
+from cspm_run.library import named_testbed
 from cspm_run.plants import SIM
 from cspm_run.recorded_run import INPROCESS, run
 from cspm_run.resim import resimulate
 from cspm_run.run_result import RunResult
+from cspm_run.stage_warm_up import compile_beside
 from cspm_run.summary import print_summary, summary_data, write_json
 
 
@@ -42,6 +47,7 @@ def run_command(
     machine: Path | None = None,
     one_process: bool | None = None,
     patience: float | None = None,
+    effects: Sequence[str] = (),
 ) -> bool:
     """Run a scenario file, show the result, and return whether it ran to its end.
 
@@ -55,19 +61,20 @@ def run_command(
         machine: a test-bed file instead of the scenario's.
         one_process: in real time, whether all nodes share a process; None for yes.
         patience: with ROS, longest stall [s]; None for the default.
+        effects: physics planted in the machine, `EFFECT@ELEMENT,…:PARAMETER=VALUE,…`.
 
     Raises:
         CspmError: the run diverged, or a node failed; recording and figure are kept.
     """
-    console = Console()
+    console = make_console()
     if patience is not None:
         check_patience(patience)
         if mode == INPROCESS:
             raise InputError(
                 f"--patience --mode {mode}: allowed: --mode graph, processes or {REALTIME}"
             )
-    scenario = Scenario(path, load_scenario(path, overrides))
-    bundle = bundle_of(scenario, load_testbed(machine) if machine else None, plant)
+    bundle = bundle_from(path, overrides, machine, plant, effects)
+    compile_beside(bundle)
     external = plant == EXTERNAL
     if external and mode != REALTIME:
         raise InputError(f"--plant {EXTERNAL} --mode {mode}: allowed: --mode {REALTIME}")
@@ -78,28 +85,26 @@ def run_command(
     runner = None
     if mode != INPROCESS:
 
-        def tell(waiting: str) -> None:
+        def notify(waiting: str) -> None:
             say(console, waiting or "all is there")
 
         patience_s = PATIENCE_S if patience is None else patience
-        apart, asked = one_process is False, f"--mode {mode}"
+        apart, needed_by = one_process is False, f"--mode {mode}"
         runner = ros_runner(
-            mode, tell, external=external, apart=apart, patience_s=patience_s, asked=asked
+            mode, notify, external=external, apart=apart, patience_s=patience_s, needed_by=needed_by
         )
+    for line in limit_warnings(bundle.testbed.testbed):
+        say(Console(stderr=True), f"warning: {line}")
+    for line in free_of(bundle):
+        say(console, line)
     result = _run_with_progress(bundle, folder, console, runner)
-    requirement = bundle.scenario.requirement
-    print_summary(console, result, requirement)
+    print_summary(console, result, bundle.scenario.requirement)
     if json is not None:
         write_json(json, summary_data(result))
     if result.folder is not None:
-        # Loading matplotlib takes a quarter of a second, which the first step need not wait for.
-        from cspm.plots.run_figure import draw_run
-
-        write_json(result.folder / "summary.json", summary_data(result))
-        period = 1.0 / bundle.scenario.rates.plant
-        names = bundle.testbed.testbed.cable_names
-        draw_run(result.folder / "run.png", result, requirement, names, period)
+        summarise(result.folder, bundle, result)
         say(console, f"recording {result.folder}, picture {result.folder.name}/run.png")
+        say(console, f"next: cspm view {shlex.quote(str(folder))}")
     if result.failure:
         diverged = result.failure.startswith("t = ")
         raise CspmError(f"diverged at {result.failure}" if diverged else result.failure)
@@ -107,6 +112,31 @@ def run_command(
         kept = "; the recording is complete so far" if result.folder else ""
         say(console, f"interrupted after {result.simulated:g} s{kept}")
     return not result.interrupted
+
+
+def bundle_from(
+    path: Path,
+    overrides: Sequence[str],
+    machine: Path | None,
+    plant: str,
+    effects: Sequence[str] = (),
+) -> Bundle:
+    """Return what is run for a scenario file, on another or a changed machine where asked for."""
+    of_scenario, own = of_testbed(overrides)
+    scenario = Scenario(path, load_scenario(path, of_scenario))
+    file = named_testbed(machine) if machine else scenario.testbed_file
+    return bundle_of(scenario, changed_machine(file, own, effects), plant)
+
+
+def summarise(folder: Path, bundle: Bundle, result: RunResult) -> None:
+    """Put `summary.json` and `run.png` beside a recording."""
+    # Loading matplotlib takes a quarter of a second, which the first step need not wait for.
+    from cspm.plots.run_figure import draw_run
+
+    write_json(folder / "summary.json", summary_data(result))
+    period = 1.0 / bundle.scenario.rates.plant
+    names = bundle.testbed.testbed.cable_names
+    draw_run(folder / "run.png", result, bundle.scenario.requirement, names, period)
 
 
 def info_command(bag: Path, json: Path | None) -> None:
@@ -149,6 +179,10 @@ def info_command(bag: Path, json: Path | None) -> None:
             f" {found.testbed}, mode {record.get('mode', 'unknown')}, plant"
             f" {record.get('plant', SIM)}",
         )
+    for fault in found.faults:
+        say(console, f"fault: {fault}")
+    if found.faults and found.complete:
+        say(console, f"`cspm recover {bag}` restores what can be read")
     if not found.complete:
         say(console, f"cut short: `cspm recover {bag}` restores its index")
     if json is not None:
@@ -157,10 +191,14 @@ def info_command(bag: Path, json: Path | None) -> None:
 
 def recover_command(bag: Path, out: Path | None, json: Path | None) -> None:
     """Restore a recording, and print what was restored."""
-    console = Console()
+    console = make_console()
     report = recover(bag, out)
+    if report.bare:
+        names = ", ".join(path.name for path in report.bare)
+        say(console, f"{names}: holds nothing, left out")
     if not report.restored:
-        say(console, f"{report.path}: complete, nothing to restore")
+        done = "metadata.yaml was written" if report.described else "nothing to restore"
+        say(console, f"{report.path}: complete, {done}")
     else:
         say(
             console,
@@ -169,13 +207,14 @@ def recover_command(bag: Path, out: Path | None, json: Path | None) -> None:
             f" out; the original is kept as {', '.join(path.name for path in report.kept)}",
         )
     if json is not None:
-        paths = {name: [str(p) for p in getattr(report, name)] for name in ("restored", "kept")}
+        listed = ("restored", "kept", "bare")
+        paths = {name: [str(p) for p in getattr(report, name)] for name in listed}
         write_json(json, dataclasses.asdict(report) | paths | {"path": str(report.path)})
 
 
 def resim_command(bag: Path, json: Path | None) -> bool:
     """Repeat a recorded run, and return whether every message is identical."""
-    console = Console()
+    console = make_console()
     with _progress(console) as bar:
         task = bar.add_task(f"repeating {escape(bag.name)}", total=None, speed=0.0)
         found = resimulate(bag, lambda now, total: _show(bar, task, now, total))

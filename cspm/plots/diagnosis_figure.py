@@ -31,12 +31,13 @@ def draw_diagnosis(path: Path, found: Diagnosis) -> None:
     FigureCanvasAgg(figure)
     axes = figure.subplots()
     height = np.arange(len(found.fit))
-    noise = np.array([fit.noise for fit in found.fit])
+    # Ideal sensors have no noise that a residual could be a multiple of: those are not drawn.
+    noise = np.array([fit.noise or np.nan for fit in found.fit])
     for name, marker, colour in _STAGES:
         values = np.array([getattr(fit, name) for fit in found.fit]) / noise
         axes.plot(values, height, marker, color=colour, label=_LABELS[name], alpha=0.8)
-    for row, fit in zip(height, found.fit, strict=True):
-        ends = fit.before / fit.noise, fit.after / fit.noise
+    for row, fit, unit in zip(height, found.fit, noise, strict=True):
+        ends = fit.before / unit, fit.after / unit
         axes.plot(ends, (row, row), color="0.6", linewidth=1.0, zorder=0)
     axes.axvline(1.0, color="black", linewidth=0.8)
     axes.set_xscale("log")

@@ -1,4 +1,4 @@
-"""The figure of a run: pose errors and tensions over time."""
+"""The figure of a run: pose errors in the requirement's band, and tensions per group of cables."""
 
 from __future__ import annotations
 
@@ -11,11 +11,15 @@ from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.figure import Figure
 from numpy.typing import NDArray
 
-from cspm_msgs_py.dofs import DOFS
+from cspm.plots.picture_style import DPI, TENSION, large_letters
+from cspm.plots.run_panels import draw_envelope, draw_errors
+from cspm_control.analysis.cable_groups import cable_groups
 from cspm_msgs_py.scenario import Requirement
 from cspm_run.run_result import RunResult
 
 Array = NDArray[np.float64]
+
+_ERRORS = ("position error\n[mm]", "angle error\n[mrad]")
 
 
 def draw_run(
@@ -30,43 +34,48 @@ def draw_run(
     Args:
         path: where to.
         result: the run.
-        requirement: limits drawn into the errors.
+        requirement: drawn as a band into the errors.
         cables: names, in the order of the tensions.
         period: the plant's period [s].
     """
-    has_bar = result.has_bar
-    used = -(-result.statistics.steps // result.statistics.bin_steps)
-    envelope = result.statistics.envelope[:used]
-    thousandths: Array = 1e3 * envelope
-    time = np.arange(used, dtype=np.float64) * (result.statistics.bin_steps * period)
-    figure = Figure(figsize=(11, 9 if has_bar else 4), layout="constrained")
-    FigureCanvasAgg(figure)
-    rows = figure.subplots(3 if has_bar else 1, 1, sharex=True, squeeze=False)[:, 0]
-    if has_bar:
-        _errors(rows[0], time, thousandths[:, :, :3], DOFS[:3], 1e3 * requirement.position, "mm")
-        _errors(rows[1], time, thousandths[:, :, 3:6], DOFS[3:], 1e3 * requirement.angle, "mrad")
-    for i, name in enumerate(cables):
-        _band(rows[-1], time, envelope[:, :, 6 + i], name)
-    rows[-1].set_ylabel("tension [N]")
-    rows[-1].set_xlabel("time [s]")
-    rows[-1].legend(loc="upper right", ncols=4, fontsize="small")
-    rows[0].set_title(f"{result.scenario}, seed {result.seed}")
-    figure.savefig(path, dpi=110)
+    groups = cable_groups(cables)
+    labels = list(_ERRORS) * result.has_bar + [f"{kind.replace('_', ' ')}\n[N]" for kind in groups]
+    heights = [2.0, 2.0] * result.has_bar + [1.0] * len(groups)
+    with large_letters():
+        figure = Figure(figsize=(12, 1.6 * sum(heights) + 1.2), layout="constrained")
+        FigureCanvasAgg(figure)
+        rows = figure.subplots(len(labels), 1, sharex=True, squeeze=False, height_ratios=heights)[
+            :, 0
+        ]
+        _fill(list(rows), result, requirement, list(groups.values()), period)
+        for axes, label in zip(rows, labels, strict=True):
+            axes.set_ylabel(label)
+        rows[-1].set_xlabel("time [s]")
+        figure.suptitle(f"{result.scenario}, seed {result.seed}")
+        figure.savefig(path, dpi=DPI)
 
 
-def _errors(
-    axes: Axes, time: Array, bands: Array, names: Sequence[str], limit: float, unit: str
+def _fill(
+    rows: Sequence[Axes],
+    result: RunResult,
+    requirement: Requirement,
+    groups: Sequence[Sequence[int]],
+    period: float,
 ) -> None:
-    for i, name in enumerate(names):
-        _band(axes, time, bands[:, :, i], name)
-    for side in (-limit, limit):
-        label = "required" if side > 0 else None
-        axes.axhline(side, color="black", linestyle="--", linewidth=0.8, label=label)
-    axes.set_ylabel(f"reference − pose [{unit}]")
-    axes.legend(loc="upper right", ncols=4, fontsize="small")
-
-
-def _band(axes: Axes, time: Array, band: Array, name: str) -> None:
-    axes.fill_between(time, band[:, 0], band[:, 1], label=name, alpha=0.8, linewidth=1.0)
-    axes.grid(alpha=0.3)
-    axes.margins(x=0)
+    statistics = result.statistics
+    used = -(-statistics.steps // statistics.bin_steps)
+    envelope = statistics.envelope[:used]
+    time = np.arange(used, dtype=np.float64) * (statistics.bin_steps * period)
+    if result.has_bar:
+        thousandths: Array = 1e3 * envelope
+        draw_errors(rows[0], time, thousandths, (0, 1, 2), 1e3 * requirement.position)
+        draw_errors(rows[1], time, thousandths, (3, 4, 5), 1e3 * requirement.angle)
+        for axes in rows[:2]:
+            axes.legend(loc="upper left", bbox_to_anchor=(1.0, 1.0), frameon=False)
+    for axes, members in zip(rows[len(rows) - len(groups) :], groups, strict=True):
+        columns = envelope[:, :, [6 + member for member in members]]
+        low, high = columns[:, 0].min(axis=1), columns[:, 1].max(axis=1)
+        draw_envelope(axes, time, low, high, TENSION, "")
+        if used:
+            extent = f"{low.min():.3g} to {high.max():.3g} N"
+            axes.text(1.01, 0.5, extent, transform=axes.transAxes, va="center")

@@ -8,7 +8,7 @@ from matplotlib.axes import Axes
 from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.figure import Figure
 
-from cspm_ident.winch.identify_winches import DESCRIBED, FITTED, IdentifiedWinch, WinchJudgement
+from cspm_ident.winch.identified_winch import DESCRIBED, FITTED, IdentifiedWinch, WinchJudgement
 
 DPI = 100
 # Most samples that a figure shows.

@@ -12,9 +12,8 @@ from matplotlib.figure import Figure
 from matplotlib.patches import Patch
 from numpy.typing import NDArray
 
-from cspm_control.analysis.pose_grid import Grid
+from cspm_control.analysis.pose_grid import GRID_AXES, Grid
 from cspm_control.analysis.pose_map import PoseMap
-from cspm_control.analysis.workspace_limits import GRID_AXES
 from cspm_control.analysis.workspace_result import WorkspaceResult
 
 Array = NDArray[np.float64]
@@ -32,7 +31,7 @@ def draw_workspace(path: Path, found: WorkspaceResult) -> None:
     figure = Figure(figsize=(13, 8), layout="constrained")
     FigureCanvasAgg(figure)
     places = figure.subplot_mosaic(
-        [["space", "surge, sway"], ["space", "surge, heave"], ["space", "pitch, yaw"]],
+        [["space", name] for name in found.maps],
         width_ratios=[1.6, 1.0],
         per_subplot_kw={"space": {"projection": "3d"}},
     )
@@ -68,6 +67,9 @@ def _space(
     held: dict[str, NDArray[np.bool_]],
 ) -> None:
     shape = tuple(len(values) for values in (grid.x, grid.y, grid.z))
+    if min(shape) == 1:
+        axes.set_axis_off()  # a machine in a plane, which its maps show
+        return
     # The deepest first, since what is drawn later lies on top.
     for depth, z in reversed(list(enumerate(grid.z))):
         for name, alpha in (("general", 0.15), ("pseudo_inverse", 0.9)):

@@ -57,7 +57,7 @@ def test_a_saved_test_bed_is_loaded_again(thesis, tmp_path):
             "torque = 'much', allowed: a number",
         ),
         (lambda t: t.with_parameter("bar.mass", -1), "bar.mass: -1, allowed: greater than 0"),
-        (lambda t: cspm.load_testbed("thesys"), "thesys: no such test-bed, allowed: emps, "),
+        (lambda t: cspm.load_testbed("thesys"), "thesys: no such test-bed, allowed: cogiro, "),
         (lambda t: cspm.load_testbed("thesys.yaml"), "no such file, allowed: a test-bed file"),
     ],
 )
@@ -73,7 +73,7 @@ def test_a_scenario_changes_as_by_the_command_line():
     path = find_scenario("calm")
     assert changed.path == path
     assert changed.description == load_scenario(path, ["seed=3", "rates.motion_controller=100"])
-    assert changed.testbed.name == "thesis"
+    assert changed.testbed.name == "thesis_refitted"
     assert cspm.load_scenario(path).description == load_scenario(path)
 
 

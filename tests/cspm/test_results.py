@@ -24,20 +24,20 @@ def recording(friction, tmp_path_factory):
 
 
 def test_a_winch_is_identified_with_intervals_that_hold_the_truth(recording, tmp_path):
-    told = []
+    reported = []
     found = cspm.identify_winch(
         recording,
         testbed="one_winch",
         # Dry friction sticks at reversals.
         reversals=False,
-        progress=lambda *each: told.append(each),
+        progress=lambda *each: reported.append(each),
     )
     truth = {"inertia": 2.4e-4, "winch_viscous_friction coefficient": 2e-3}
     for name, value in truth.items():
         low, high = found.parameters[name].ci95
         assert low < value < high
         assert found.parameters[name, "surge"].unit
-    assert told == [(0.0, "surge")]
+    assert reported == [(0.0, "surge")]
     effects = {entry.effect for entry in found.testbed.effects}
     assert {"winch_viscous_friction", "winch_coulomb_friction"} <= effects
     written = found.write(tmp_path / "fitted")
@@ -95,11 +95,11 @@ def test_parameters_go_by_name_and_by_element():
 
 
 def test_progress_of_unknown_length_grows_and_stays_below_one():
-    told = []
-    step = by_steps(lambda share, what: told.append((share, what)))
+    reported = []
+    step = by_steps(lambda share, what: reported.append((share, what)))
     for number in range(50):
         step(str(number))
-    shares = [share for share, _ in told]
+    shares = [share for share, _ in reported]
     assert shares[0] == 0.0
     assert (np.diff(shares) > 0.0).all()
     assert shares[-1] < 1.0

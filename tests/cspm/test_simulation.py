@@ -96,7 +96,7 @@ class Copy:
 def test_a_controller_of_ones_own_takes_a_stages_place(calm, tmp_path):
     own = Copy()
     run = cspm.simulate("calm", duration=DURATION, controllers={"force_controller": own})
-    assert own.started == (0.001, "thesis")
+    assert own.started == (0.001, "thesis_refitted")
     assert own.times == pytest.approx((np.arange(COUNT) * 1e-3).tolist())
     assert np.array_equal(run.torque_command, own.radii * run.tension_command)
     assert run.testbed.sha256 == calm.testbed.sha256
@@ -152,7 +152,7 @@ class Wrong:
             "controllers in mode graph: allowed: mode inprocess",
         ),
         ({"duration": -1.0}, "duration: -1.0, allowed: greater than 0"),
-        ({"testbed": "thesys"}, "thesys: no such test-bed, allowed: emps"),
+        ({"testbed": "thesys"}, "thesys: no such test-bed, allowed: cogiro"),
         (
             {"controllers": {"autopilot": Copy()}},
             "controllers: autopilot, allowed: wave_trajectory, motion_controller",
@@ -227,7 +227,7 @@ def test_a_machine_without_bar_has_no_bar_pose():
         run.bar_pose  # noqa: B018
 
 
-def test_without_pandas_the_remedy_is_told(calm, monkeypatch):
+def test_without_pandas_the_remedy_is_reported(calm, monkeypatch):
     for name in ("pandas", "xarray"):
         monkeypatch.setitem(sys.modules, name, None)
         with pytest.raises(cspm.InputError, match=f"allowed: after `pip install {name}`"):

@@ -1,6 +1,7 @@
 """The command line, called in this process."""
 
 import json
+from importlib.metadata import version
 from pathlib import Path
 
 import pytest
@@ -64,7 +65,7 @@ def test_json_says_what_is_printed_and_nothing_is_recorded(cspm, tmp_path):
     assert found["tension"]["max"] < 30.0  # 0.5 N·m at 0.025 m, and sines
 
 
-def test_without_out_the_folder_tells_scenario_and_time(cspm, tmp_path):
+def test_without_out_the_folder_names_scenario_and_time(cspm, tmp_path):
     code, *_ = cspm("run", "one_winch", "--duration", "0.01")
     assert code == 0
     [folder] = (tmp_path / "recordings").iterdir()
@@ -82,15 +83,15 @@ def test_a_scenario_file_of_ones_own(cspm, tmp_path):
 @pytest.mark.parametrize(
     ("arguments", "text"),
     [
-        (["run"], "Missing argument 'SCENARIO'; see `cspm run --help`"),
+        (["run"], "Missing argument 'SCENARIO...'; see `cspm run --help`"),
         (["run", "rest", "--bogus"], "--bogus"),
         (["run", "rest", "--duration", "long"], "--duration"),
         (["run", "rest", "--seed", "1.5"], "--seed"),
         (["run", "rest", "--out"], "--out"),
-        (["run", "rest", "twice"], "twice"),
+        (["info", "bag", "twice"], "twice"),
         (["fly"], "fly"),
         (["--bogus"], "--bogus"),
-        (["info"], "BAG"),
+        (["info"], "REC"),
     ],
 )
 def test_wrong_usage_is_one_line(refused, arguments, text):
@@ -213,7 +214,7 @@ def test_info_shows_topics_rates_gaps_duration_and_scenario(cspm, tmp_path):
     assert found["message_count"] == sum(topic["count"] for topic in found["topics"])
 
 
-def test_a_cut_recording_is_told_recovered_and_repeated(cspm, tmp_path):
+def test_a_cut_recording_is_reported_recovered_and_repeated(cspm, tmp_path):
     run(bundle_of("rest"), tmp_path / "bag", steps=400)
     [file] = (tmp_path / "bag").glob("*.mcap")
     file.write_bytes(file.read_bytes()[:150_000])
@@ -240,7 +241,21 @@ def test_a_cut_recording_is_told_recovered_and_repeated(cspm, tmp_path):
     assert out.strip() == f"identical: all {found['messages']} messages, bit for bit{reported}"
 
 
-def test_resim_tells_the_first_difference(cspm, tmp_path, monkeypatch):
+def test_a_hole_is_named_with_its_remedy_by_every_command(cspm, refused, tmp_path):
+    run(bundle_of("rest"), tmp_path / "bag", steps=400)
+    [file] = (tmp_path / "bag").glob("*.mcap")
+    content = bytearray(file.read_bytes())
+    content[100_000:100_500] = bytes(500)
+    file.write_bytes(content)
+    for command in (["resim"], ["compare"], ["diagnose"], ["view", "--html", "x.html"]):
+        line = refused(command[0], "bag", *command[1:])
+        assert line.startswith("bag/bag_0.mcap: chunk at byte "), command
+        assert line.endswith("; `cspm recover` leaves the damaged part out"), command
+    assert cspm("recover", "bag")[0] == 0
+    assert cspm("info", "bag")[0] == 0
+
+
+def test_resim_reports_the_first_difference(cspm, tmp_path, monkeypatch):
     bundle = bundle_of("one_winch")
     run(bundle, tmp_path / "bag", steps=50)
     # The other bundle has one more sine digit: the recording was made by something else.
@@ -270,7 +285,7 @@ def test_cspm_alone_explains_itself(cspm):
     code, out, err = cspm()
     assert (code, err) == (0, "")
     text = squeezed(out)
-    assert "Begin with `cspm run worst_case`." in text
+    assert "Begin with `cspm run worst_case worst_case_past_thesis`." in text
     for command in ("run", "info", "recover", "resim"):
         assert f" {command} " in text
 
@@ -284,7 +299,7 @@ def test_cspm_alone_explains_itself(cspm):
                 "SECONDS",
                 "--set",
                 "(SI, rad)",
-                "recordings/SCENARIO-DATE-TIME",
+                "one in recordings/, named after scenario and time",
                 "cspm run calm --duration 60 --out calm_60s",
                 "Scenarios: calm, ",
                 "--no-record",
@@ -311,3 +326,47 @@ def test_interrupting_the_start_is_no_traceback(cspm, monkeypatch):
 
     monkeypatch.setattr(cli, "find_scenario", interrupted)
     assert cspm("run", "rest") == (130, "", "")
+
+
+def test_version_says_which(cspm):
+    assert cspm("--version") == (0, f"cspm {version('cspm')}\n", "")
+
+
+def test_several_scenarios_run_side_by_side(cspm, tmp_path):
+    words = ("run", "rest", "worst_case", "--duration", "0.2", "--out", "both", "--json", "j.json")
+    code, out, err = cspm(*words)
+    assert (code, err) == (0, "")
+    found = json.loads((tmp_path / "j.json").read_text())
+    assert list(found) == ["rest", "worst_case"]
+    for name, summary in found.items():
+        assert summary["duration_s"] == pytest.approx(0.2)
+        with Recording(tmp_path / "both" / name) as recording:
+            assert recording.complete
+            assert recording.metadata["cspm"]["scenario"] == name
+        assert (tmp_path / "both" / name / "run.png").is_file()
+        largest = 1e3 * summary["errors"]["heave"]["max"]
+        assert f"{largest:.3g}, " in out
+    assert json.loads((tmp_path / "both" / "summary.json").read_text()) == found
+    picture = imread(tmp_path / "both" / "runs.png")
+    assert picture.shape[1] > 1000
+    assert picture.std() > 0.05
+    assert "next: `cspm run rest worst_case --seed 2`" in squeezed(out)
+
+
+@pytest.mark.parametrize(
+    ("words", "line"),
+    [
+        (("rest", "rest"), "scenario rest: named twice, allowed: once each"),
+        (
+            ("rest", "one_winch"),
+            "scenarios rest and one_winch: machines with other cables, allowed: machines with the"
+            " same, or one scenario at a time",
+        ),
+        (("rest", "calm", "--mode", "graph"), "--mode graph: allowed with several scenarios:"),
+        (("rest", "calm", "--plant", "external"), "--plant external: allowed with one scenario"),
+    ],
+)
+def test_what_cannot_run_side_by_side_is_one_line(cspm, words, line):
+    code, out, err = cspm("run", *words, "--no-record", "--duration", "0.1")
+    assert (code, out) == (2, "")
+    assert err.startswith(f"cspm: {line}")

@@ -61,7 +61,7 @@ def test_a_full_disk_is_one_line(tmp_path):
 
 @pytest.mark.slow
 @pytest.mark.compiled
-@pytest.mark.parametrize("size", [53_000, 410_000, 1_234_567, 4_000_001])
+@pytest.mark.parametrize("size", [53_000, 1_234_567])
 def test_a_killed_run_is_recovered_and_repeats_itself(tmp_path, size):
     folder = tmp_path / "bag"
     process = child("run", "worst_case", "--out", folder)

@@ -75,7 +75,7 @@ def test_a_trial_shows_everything_and_writes_nothing(lab, tmp_path):
 
 
 def test_the_recording_carries_where_it_comes_from(lab, tmp_path):
-    code, out, err = lab("--out", "bag", "--json", "told.json")
+    code, out, err = lab("--out", "bag", "--json", "reported.json")
     assert (code, err) == (0, "")
     assert "factor 1, sign −" in out
     assert "recording bag: 4000 messages" in out
@@ -95,7 +95,7 @@ def test_the_recording_carries_where_it_comes_from(lab, tmp_path):
     assert about["testbed_sha256"] == hashlib.sha256(ONE_WINCH.read_bytes()).hexdigest()
     assert files["mapping.yaml"] == MAPPING.encode()
     assert files["testbed.yaml"] == ONE_WINCH.read_bytes()
-    reported = json.loads((tmp_path / "told.json").read_text())
+    reported = json.loads((tmp_path / "reported.json").read_text())
     assert reported["recording"] == "bag"
     assert reported["messages"] == {TENSION: 2000, STATE: 2000}
     assert reported["about"]["source_sha256"] == sha
@@ -104,7 +104,7 @@ def test_the_recording_carries_where_it_comes_from(lab, tmp_path):
     assert b"source_sha256: " + sha.encode() in files["import.yaml"]
 
 
-def test_info_tells_what_was_imported(lab, monkeypatch, capsys):
+def test_info_says_what_was_imported(lab, monkeypatch, capsys):
     lab("--out", "bag")
     monkeypatch.setattr(sys, "argv", ["cspm", "info", "bag"])
     with pytest.raises(SystemExit):

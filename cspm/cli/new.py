@@ -1,0 +1,42 @@
+"""The command that begins: new."""
+
+from __future__ import annotations
+
+from typing import Annotated
+
+import typer
+
+from cspm.cli.app import app
+from cspm_msgs_py.errors import InputError
+
+
+@app.command(
+    epilog="""Kinds: suspended, a plate on four cables; point, four cables that meet in a point;
+crossed, eight cables from above; held, eight cables from above and below; planar, four cables in
+a plane.
+
+Examples:
+
+cspm new my_robot
+
+cspm new gantry --kind crossed --size 4,3,2.5 --mass 12
+
+Exit code: 0 done, 2 unusable input."""
+)
+def new(
+    name: Annotated[str, typer.Argument(metavar="NAME", help="The robot's name.")],
+    kind: Annotated[str, typer.Option(metavar="KIND", help="How its cables run.")] = "suspended",
+    size: Annotated[
+        str, typer.Option(metavar="X,Y,Z", help="The frame that carries the winches, in m.")
+    ] = "2,2,2",
+    mass: Annotated[float, typer.Option(metavar="KG", help="Mass of the platform.")] = 5.0,
+    run: Annotated[bool, typer.Option(help="Whether to run the scenario.")] = True,
+) -> None:
+    """Write the first test-bed and scenario of your own robot, check, draw and run them."""
+    from cspm.commands.new_command import new_command
+
+    try:
+        x, y, z = (float(value) for value in size.split(","))
+    except ValueError:
+        raise InputError(f"--size {size}: allowed: three numbers in m, such as 2,2,2") from None
+    new_command(name, kind, (x, y, z), mass, run=run)

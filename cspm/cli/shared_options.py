@@ -1,0 +1,57 @@
+"""What every command has: `--quiet`, and its exit codes in its help."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from typing import Annotated, Any
+
+import typer
+from typer.core import TyperCommand, TyperGroup
+
+from cspm_run.console import VOICE, Voice
+
+_CODES = "Exit code: 0 done, 1 failed, 2 unusable input."
+
+
+def add_shared_options(command: Any) -> None:  # noqa: ANN401 - a command or a group of commands
+    """Give each command below `--quiet`, and exit codes where its help has none."""
+    for each in _leaves(command):
+        each.params.append(_quiet())
+        if "Exit code" not in (each.epilog or ""):
+            each.epilog = f"{each.epilog}\n\n{_CODES}" if each.epilog else _CODES
+
+
+def _leaves(command: Any) -> Iterator[TyperCommand]:  # noqa: ANN401 - as above
+    if isinstance(command, TyperGroup):
+        for each in command.commands.values():
+            yield from _leaves(each)
+    else:
+        yield command
+
+
+def _hush(wanted: bool) -> None:
+    if wanted:
+        VOICE.set(Voice.NOWHERE)
+
+
+def _quiet_alone(
+    quiet: Annotated[
+        bool,
+        typer.Option(
+            "--quiet",
+            "-q",
+            is_eager=True,
+            callback=_hush,
+            help="Print nothing but errors.",
+        ),
+    ] = False,
+) -> None:
+    """Take the option that other commands share."""
+
+
+def _quiet() -> Any:  # noqa: ANN401 - an option, as Typer makes it
+    alone = typer.Typer(add_completion=False)
+    alone.command()(_quiet_alone)
+    (option,) = typer.main.get_command(alone).params
+    option.expose_value = False
+    return option

@@ -1,0 +1,1 @@
+"""A demonstration: an effect is concealed in a machine, guessed, diagnosed and revealed."""

@@ -1,0 +1,1 @@
+"""Identifying parameters from recordings, with 95 % intervals."""

@@ -1,0 +1,30 @@
+"""What all pictures of runs look like: colours, sizes, fonts."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from contextlib import contextmanager
+
+import matplotlib as mpl
+
+# Blue, orange and nearly black: colour-blind readers tell them apart, and a grey print too.
+COLOURS = ("#0072b2", "#e69f00", "#222222")
+TENSION = "#555555"
+BAND = "#d9ead3"
+DPI = 110
+
+
+@contextmanager
+def large_letters() -> Iterator[None]:
+    """Draw with letters that are read from two metres: 5 mm high on a sheet, 8 minutes of arc."""
+    with mpl.rc_context(
+        {
+            "font.size": 15.0,
+            "axes.titlesize": 17.0,
+            "axes.labelsize": 15.0,
+            "legend.fontsize": 14.0,
+            "axes.spines.top": False,
+            "axes.spines.right": False,
+        }
+    ):
+        yield

@@ -1,0 +1,66 @@
+"""What every command has: quiet, help by -h, data on standard output, exit codes in its help."""
+
+import json
+
+import pytest
+import typer
+from typer.core import TyperGroup
+
+from cspm.cli import main as cli
+from cspm.cli.app import app
+
+
+@pytest.fixture(scope="module")
+def commands():
+    """All commands by their words."""
+
+    def below(command, words):
+        if not isinstance(command, TyperGroup):
+            return {words: command}
+        return {k: v for n, c in command.commands.items() for k, v in below(c, (*words, n)).items()}
+
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr("sys.argv", ["cspm", "--version"])
+        with pytest.raises(SystemExit):
+            cli.main()
+    return below(typer.main.get_command(app), ())
+
+
+def test_every_command_has_the_same_options_and_names_its_exit_codes(cspm, commands):
+    assert {("view",), ("demo",), ("analyze", "linear"), ("identify", "winch")} <= set(commands)
+    for words in commands:
+        code, out, err = cspm(*words, "-h")
+        assert (code, err) == (0, ""), words
+        for part in ("--quiet", "-h", "Exit code"):
+            assert part in out, words
+        assert "--json" in out or words in (("node",), ("new",)), words
+        assert "BAG" not in out, words
+
+
+@pytest.mark.parametrize("flag", ["-q", "--quiet"])
+def test_quiet_prints_nothing_and_the_next_command_prints_again(cspm, tmp_path, flag):
+    words = ("run", "rest", "--duration", "0.05", "--no-record")
+    assert cspm(*words, flag) == (0, "", "")
+    code, out, _ = cspm(*words)
+    assert code == 0
+    assert "tensions" in out
+
+
+def test_errors_are_printed_though_quiet(refused):
+    assert refused("info", "nowhere", "--quiet") == "nowhere: no such file or folder"
+
+
+@pytest.mark.parametrize("more", [(), ("--quiet",)])
+def test_data_on_standard_output_are_alone_there(cspm, tmp_path, more):
+    words = ("run", "rest", "--duration", "0.05", "--no-record", "--json", "-")
+    code, out, err = cspm(*words, *more)
+    assert code == 0
+    assert json.loads(out)["scenario"] == "rest"
+    assert ("tensions" in err) is (not more)
+    assert not (tmp_path / "-").exists()
+
+
+def test_a_run_names_the_next_command(cspm, tmp_path):
+    code, out, _ = cspm("run", "rest", "--duration", "0.05", "--out", "my run")
+    assert code == 0
+    assert "next: cspm view 'my run'" in out

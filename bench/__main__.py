@@ -13,6 +13,7 @@ from bench.performance.closed_loop import measure_closed_loop
 from bench.performance.figure_table import print_report
 from bench.performance.graph_speed import measure_graph
 from bench.performance.host import describe_machine, is_busy
+from bench.performance.loop_share import measure_loop_share
 from bench.performance.measured_figure import Advance, Figure
 from bench.performance.memory import measure_memory
 from bench.performance.plant_speed import measure_against_mujoco, measure_plant
@@ -73,6 +74,7 @@ def _figures(volume: Volume, advance: Advance) -> list[Figure]:
         *measure_plant(volume.plant, advance),
         *measure_against_mujoco(volume.plant, advance),
         *measure_closed_loop(volume.loops, volume.loop_duration, advance),
+        *measure_loop_share(volume.loops, volume.share_duration, advance),
         *_graph(volume, advance),
         *measure_start_up(volume.first_runs, volume.later_runs, advance),
         *measure_memory(volume.silent_duration, False, advance),

@@ -31,7 +31,7 @@ class Mutation(NamedTuple):
         name: what is wrong then.
         file: path in the checkout.
         old: text that occurs once in the file.
-        new: what stands there instead.
+        new: what replaces it.
         tests: path of the tests that have to fail.
     """
 

@@ -1,7 +1,7 @@
 """How near `cspm compare` comes to the noise where nothing is missing, and which delays it finds.
 
 `python -m bench.accuracy.compare_tables` records, compares, and writes the two tables of
-docs/compare.md.
+docs/how-to/compare.md.
 """
 
 from __future__ import annotations
@@ -22,11 +22,12 @@ from cspm_msgs_py.scenario import load_scenario
 from cspm_msgs_py.testbed import load_testbed
 from cspm_run.assembly import resolve
 from cspm_run.bundle import make_bundle
+from cspm_run.library import find_scenario
 from cspm_run.recorded_run import run
 
 ROOT = Path(__file__).resolve().parents[2]
 SCENARIOS = ROOT / "scenarios"
-PAGE = ROOT / "docs" / "compare.md"
+PAGE = ROOT / "docs" / "how-to" / "compare.md"
 # By how much stamps of bar and frame are shifted [s].
 SHIFTS = (
     (0.0, 0.0),
@@ -73,9 +74,9 @@ class TableCase:
 
 CASES = (
     TableCase("verification_mid", 40.0, "winches locked, 100 Hz"),
-    TableCase("calm", 50.0, "1 kHz"),
-    TableCase("worst_case", 60.0, "1 kHz"),
-    TableCase("worst_case", 20.0, "1 kHz", "mujoco"),
+    TableCase("calm_broadband", 50.0, "1 kHz"),
+    TableCase("worst_case_steep", 60.0, "1 kHz"),
+    TableCase("worst_case_steep", 20.0, "1 kHz", "mujoco"),
 )
 
 
@@ -109,7 +110,7 @@ def ratios(found: Comparison) -> dict[str, str]:
 
 
 def _record(folder: Path, case: TableCase) -> Measurement:
-    path = SCENARIOS / f"{case.scenario}.yaml"
+    path = find_scenario(case.scenario)
     scenario = load_scenario(path, [f"duration={case.seconds}"])
     testbed = load_testbed(path.parent / scenario.testbed)
     bundle = make_bundle(resolve(scenario, testbed.testbed), testbed, path.parent)

@@ -2,7 +2,7 @@
 
 `python -m bench.accuracy.geometry` records scenario factor_six_mid on the MuJoCo plant twice, once
 with all exits moved together and once with the ends of two cables moved, identifies them, and
-writes the tables of docs/identify.md.
+writes the tables of results/identification.md.
 """
 
 from __future__ import annotations

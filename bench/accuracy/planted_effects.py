@@ -21,6 +21,7 @@ from cspm_msgs_py.scenario import load_scenario
 from cspm_msgs_py.testbed import EffectEntry, load_testbed
 from cspm_run.assembly import resolve
 from cspm_run.bundle import make_bundle
+from cspm_run.library import find_scenario
 from cspm_run.recorded_run import run
 
 DURATION_S = 60
@@ -93,7 +94,7 @@ def main() -> None:
 
 def record(case: PlantedCase, seed: int, folder: Path, duration: float = DURATION_S) -> None:
     """Run the worst sea for `duration` [s] with an effect planted."""
-    path = SCENARIOS / "worst_case.yaml"
+    path = find_scenario("worst_case_steep")
     capture = f"rates.motion_capture={case.capture}"
     scenario = load_scenario(path, [f"duration={duration:g}", f"seed={seed}", capture])
     file = load_testbed(path.parent / scenario.testbed)

@@ -1,7 +1,7 @@
 """What `cspm identify system` finds of a machine that another plant simulated.
 
 `python -m bench.accuracy.recovery` records scenario factor_six_mid on the MuJoCo plant with wrong
-numbers throughout, identifies them, and writes the table of docs/identify.md.
+numbers throughout, identifies them, and writes the table of results/identification.md.
 """
 
 from __future__ import annotations
@@ -29,7 +29,7 @@ from cspm_run.recorded_run import run
 
 ROOT = Path(__file__).resolve().parents[2]
 SCENARIOS = ROOT / "scenarios"
-PAGE = ROOT / "docs" / "identify.md"
+PAGE = ROOT / "results" / "identification.md"
 TESTBED = SCENARIOS / "testbeds" / "thesis.yaml"
 SCENARIO = "factor_six_mid"
 # What the recorded machine has; factors count from the described one.

@@ -16,10 +16,11 @@ from cspm_msgs_py.scenario import LockedWinches, load_scenario
 from cspm_msgs_py.schedule import RATE_OF_SENSOR
 from cspm_msgs_py.testbed import Testbed, load_testbed
 from cspm_msgs_py.topics import DIAGNOSTICS
-from cspm_run.assembly import Assembly, assemble, motions_of, resolve
+from cspm_run.assembly import Assembly, assemble, resolve
 from cspm_run.bundle import Bundle, make_bundle
 from cspm_run.library import find_scenario
 from cspm_run.loop import Loop
+from cspm_run.motions import motions_of
 from cspm_run.recorded_run import INPROCESS, metadata, simulate
 from cspm_sim.mujoco.influence import Scene
 from cspm_sim.mujoco.plant import MujocoPlant

@@ -20,7 +20,7 @@ _SYSTEM = ("/usr", "/lib", "/lib64", "/etc", "/proc", "/sys", "/dev")
 
 
 def readable(room: Path) -> tuple[str, ...]:
-    """Return the folders that may be read: the room, the code and what it stands on."""
+    """Return the folders that may be read: the room, the code and what it imports."""
     code = Path(__file__).resolve().parents[2]
     found = (*code.glob("cspm*"), code / "bench")
     packages = [f for f in found if f.suffix == ".egg-info" or _is_package(f)]

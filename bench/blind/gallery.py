@@ -1,4 +1,4 @@
-"""Three concealed machines in pictures, by `python -m bench.blind.gallery`: docs/blind/gallery.md.
+"""Three concealed machines in pictures, by `python -m bench.blind.gallery`: results/gallery.md.
 
 They are the first ones that a seed draws in three strata of the blind benchmark, whatever the
 diagnosis says of them.
@@ -32,7 +32,7 @@ from cspm_msgs_py.recording.reader import Recording
 from cspm_sim.effects import catalogue
 
 ROOT = Path(__file__).resolve().parents[2]
-PAGE, FIGURES = ROOT / "docs" / "blind" / "gallery.md", ROOT / "docs" / "figures"
+PAGE, FIGURES = ROOT / "results" / "gallery.md", ROOT / "docs" / "figures"
 STRATA = ("feedback", "company", "outside")
 SEED, DURATION_S = 3, 30.0
 _DPI = 90
@@ -70,7 +70,8 @@ def main() -> None:
 
 _HEAD = """# Three concealed machines
 
-The first machines that seed {seed} draws in three strata of the [blind benchmark](../blind.md),
+The first machines that seed {seed} draws in three strata of the
+[blind benchmark](../docs/explanation/blind-benchmark.md),
 shown whatever the diagnosis says of them; 30 s each, sensors with coloured noise, jitter, dropouts
 and clocks of their own. Made by `python -m bench.blind.gallery`.
 

@@ -150,11 +150,13 @@ def truth_of(
         "without": list(item.case.without),
         "absorbed_by": item.case.absorbed_by,
         "note": item.note,
-        "concealed": [_told(each, amounts[each.phenomenon], machine) for each in item.concealed],
+        "concealed": [
+            _revealed(each, amounts[each.phenomenon], machine) for each in item.concealed
+        ],
     }
 
 
-def _told(each: Concealed, amounts: Sequence[float], machine: Testbed) -> dict[str, Any]:
+def _revealed(each: Concealed, amounts: Sequence[float], machine: Testbed) -> dict[str, Any]:
     phenomenon = PHENOMENA[each.phenomenon]
     elements = {
         CABLES: [machine.cable_names[i] for i in each.cables],

@@ -38,7 +38,7 @@ from cspm_ident.diagnosis.selection.search_pass import Recordings, searched_for
 from cspm_ident.signals.measurement import read_measurement
 from cspm_sim.effects import catalogue
 
-PAGE = Path(__file__).resolve().parents[2] / "docs" / "blind" / "misses.md"
+PAGE = Path(__file__).resolve().parents[2] / "results" / "misses.md"
 # Standard errors of the scatter between blocks.
 SIGNIFICANT_ERRORS = 2.0
 NO_COLUMN, GIVEN_UP, MORE, SIMPLER, NO_MORE = REASONS = (
@@ -81,7 +81,7 @@ def main() -> None:
     parser = argparse.ArgumentParser(prog="python -m bench.blind.misses", description=__doc__)
     parser.add_argument("folder", type=Path, help="a blind benchmark with its results")
     parser.add_argument("truth", type=Path, help="its truth file")
-    parser.add_argument("--page", action="store_true", help="renew docs/blind/misses.md")
+    parser.add_argument("--page", action="store_true", help="renew results/misses.md")
     options, console = parser.parse_args(), Console()
     items = {item["name"]: item for item in read_truth(options.truth)["items"]}
     results = read_results(options.folder, list(items))
@@ -120,17 +120,17 @@ def compared(outcome: Outcome, item: Data, search: Search, found: Sequence[Hypot
         found: what it has found.
     """
     fits = search.fits
-    sound = [h for h in found if fits.is_negligible(h, found)]
+    negligible = [h for h in found if fits.is_negligible(h, found)]
     reported = fits.sums.held_out(fits.columns(found))
-    squares = float(np.sum(fits.sums.held_out(fits.columns(sound)) - reported))
-    true = nearest_truth(search, item, sound)
+    squares = float(np.sum(fits.sums.held_out(fits.columns(negligible)) - reported))
+    true = nearest_truth(search, item, negligible)
     if true is None:
         return Miss(outcome, None, squares, NO_COLUMN)
-    gain = gain_of(reported - _left(search, true, sound))
+    gain = gain_of(reported - _left(search, true, negligible))
     names = {(h.effect.id, e) for h in found for e in h.elements}
     if {(h.effect.id, e) for h in true for e in h.elements} <= names:
         return Miss(outcome, gain, squares, GIVEN_UP)
-    reported_numbers = _numbers([h for h in found if h not in sound])
+    reported_numbers = _numbers([h for h in found if h not in negligible])
     return Miss(outcome, gain, squares, reason_of(gain, _numbers(true), reported_numbers))
 
 

@@ -1,34 +1,34 @@
-"""All sealed recordings in one table: `python -m bench.blind.sealed` renews docs/blind/sealed.md.
+"""All sealed parts in one page: `python -m bench.blind.sealed` renews results/sealed/README.md.
 
-It counts what the pages of the parts say, each written when its part was scored, once: those of
-docs/blind/sealed, and docs/blind/results.md, of the last set of which all recordings were scored.
+It counts what the CSV files of results/sealed say. They are filled from the page that was written
+when a part was scored, once: `python -m bench.blind.sealed --add PAGE`.
 """
 
 from __future__ import annotations
 
+import argparse
 import re
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import NamedTuple
 
 from bench.blind.scoring.share import Share, share_of, share_words, upper_bound
 from bench.blind.scoring.target import Range, allowed
+from bench.blind.sealed_store import STORE, add_page, read_table
 from bench.markdown import markdown_table
 from bench.page import into_page
 
-DOCS = Path(__file__).resolve().parents[2] / "docs" / "blind"
-PAGE, EARLIER, LAST = DOCS / "sealed.md", "sealed", "results.md"
+PAGE = STORE / "README.md"
 ALARMS, BOUND = "alarm where there is nothing", "one-sided upper bound of alarms"
 TIED, TIES = "truth among the ties", "mean size of the ties"
 _COUNTS = re.compile(r"\((\d+) of (\d+);")
-_TRUTH = re.compile(r"truth file SHA-256 `(\w+)`\. Scored (\S+) ")
 
 
 class Part(NamedTuple):
-    """What the page of one part says.
+    """What one part of a sealed set was scored at.
 
     Attributes:
-        page: its file, from `docs/blind`.
+        number: its place in the order of scoring, from 1.
         truth: SHA-256 of its set's truth file.
         date: when it was scored.
         recordings: their names.
@@ -37,7 +37,7 @@ class Part(NamedTuple):
         amounts: cells by detection limits and column.
     """
 
-    page: str
+    number: str
     truth: str
     date: str
     recordings: tuple[str, ...]
@@ -47,67 +47,46 @@ class Part(NamedTuple):
 
 
 def main() -> None:
-    """Read the parts' pages and renew the page of all."""
-    for name, text in tables(read_parts(DOCS)).items():
+    """Add a page of one part if asked to, and renew the page of all."""
+    parser = argparse.ArgumentParser(description="Count all sealed parts together.")
+    parser.add_argument("--add", type=Path, metavar="PAGE", help="scorecard page of a new part")
+    page = parser.parse_args().add
+    if page is not None:
+        add_page(page, str(len(read_table(STORE, "parts")) + 1))
+    for name, text in tables(read_parts()).items():
         into_page(PAGE, name, text)
 
 
-def read_parts(folder: Path) -> list[Part]:
-    """Return the parts, those of docs/blind/sealed in the order in which they were scored.
+def read_parts(folder: Path = STORE) -> list[Part]:
+    """Return the parts in the order in which they were scored.
 
     Args:
-        folder: that of the page of all parts.
-
-    Raises:
-        ValueError: a recording is in two parts.
+        folder: that of the CSV files.
     """
-    pages = [*sorted((folder / EARLIER).glob("part-*.md")), folder / LAST]
-    parts = [read_part(page, folder) for page in pages]
-    seen: set[tuple[str, str]] = set()
-    for part in parts:
-        own = {(part.truth, name) for name in part.recordings}
-        if seen & own:
-            raise ValueError(f"{part.page}: {len(seen & own)} recordings are in an earlier part")
-        seen |= own
-    return parts
+    names = ("recordings", "targets", "amounts")
+    stored = {name: read_table(folder, name) for name in names}
+    return [_part(each, stored) for each in read_table(folder, "parts")]
 
 
-def read_part(page: Path, folder: Path = DOCS) -> Part:
-    """Read a page that `python -m bench.blind score --page` has written.
-
-    Args:
-        page: somewhere in the folder.
-        folder: from which it is linked.
-
-    Raises:
-        ValueError: it does not say of which truth it is.
-    """
-    text = page.read_text(encoding="utf-8")
-    reported = _TRUTH.search(text)
-    if reported is None:
-        raise ValueError(
-            f"{page}: no truth file named, allowed: a page of `python -m bench.blind score`"
-        )
-    sections = dict(each.split("\n", 1) for each in text.split("\n## ")[1:])
-    heads, *amounts = _table(sections["By amount"])
-    _, *targets = _table(sections["Against the targets"])
-    _, *recordings = _table(sections["Every recording"])
+def _part(part: Mapping[str, str], stored: Mapping[str, list[dict[str, str]]]) -> Part:
+    """Return one part from the rows of all."""
+    own = {
+        name: [each for each in rows if each["part"] == part["part"]]
+        for name, rows in stored.items()
+    }
+    known = ("part", "detection limits", "cases")
     return Part(
-        str(page.relative_to(folder)),
-        reported.group(1),
-        reported.group(2),
-        recordings=tuple(row[0] for row in recordings),
-        found={label: found for label, found, _ in targets},
-        targets={label: target for label, _, target in targets},
-        amounts={row[0]: dict(zip(heads[2:], row[2:], strict=True)) for row in amounts},
+        part["part"],
+        part["truth"],
+        part["scored"],
+        recordings=tuple(row["recording"] for row in own["recordings"]),
+        found={row["measure"]: row["found"] for row in own["targets"]},
+        targets={row["measure"]: row["target"] for row in own["targets"]},
+        amounts={
+            row["detection limits"]: {head: cell for head, cell in row.items() if head not in known}
+            for row in own["amounts"]
+        },
     )
-
-
-def _table(text: str) -> Iterator[list[str]]:
-    """Yield the cells of each row but the rule of a section's table."""
-    for line in text.splitlines():
-        if line.startswith("|") and not line.startswith("| ---"):
-            yield [cell.strip() for cell in line.strip("|").split("|")]
 
 
 def pooled(cells: Sequence[str]) -> Share:
@@ -129,7 +108,6 @@ def tables(parts: Sequence[Part]) -> dict[str, str]:
     """Return the page's tables by the names of their marks."""
     labels = list(dict.fromkeys(label for part in parts for label in part.found))
     targets = {label: target for part in parts for label, target in part.targets.items()}
-    names = [str(k) for k in range(1, len(parts) + 1)]
     rows = [(label, *_judged(parts, label, targets[label])) for label in labels]
     return {
         "all": "\n\n".join(
@@ -139,13 +117,9 @@ def tables(parts: Sequence[Part]) -> dict[str, str]:
         "sets": markdown_table(
             ("part", "set", "scored", "recordings"),
             [
-                (f"[{k}]({p.page})", f"`{p.truth[:8]}`", p.date, str(len(p.recordings)))
-                for k, p in zip(names, parts, strict=True)
+                (part.number, f"`{part.truth[:8]}`", part.date, str(len(part.recordings)))
+                for part in parts
             ],
-        ),
-        "parts": markdown_table(
-            ("", *names),
-            [(label, *(part.found.get(label, "—") for part in parts)) for label in labels],
         ),
     }
 

@@ -33,7 +33,7 @@ from cspm_msgs_py.scenario import load_scenario
 from cspm_run.assembly import resolve
 from cspm_run.bundle import make_bundle
 
-PAGE = Path(__file__).resolve().parents[2] / "docs" / "blind" / "experiments.md"
+PAGE = Path(__file__).resolve().parents[2] / "results" / "experiments.md"
 # What is drawn anew in an experiment's run is not what was drawn in the recording's.
 _ANOTHER_SEED = 1
 _EXPERIMENT = "separating_experiment"
@@ -64,7 +64,7 @@ def main() -> None:
     parser.add_argument("truth", type=Path, help="its truth file")
     parser.add_argument("--work", type=Path, required=True, help="folder for runs and diagnoses")
     parser.add_argument("--names", nargs="*", help="of recordings; otherwise all")
-    parser.add_argument("--page", action="store_true", help="renew docs/blind/experiments.md")
+    parser.add_argument("--page", action="store_true", help="renew results/experiments.md")
     options = parser.parse_args()
     console, cases = Console(), []
     items = read_truth(options.truth)["items"]

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-MOVING = ("calm", "worst_case")
+MOVING = ("calm_broadband", "worst_case_steep")
 # Winches locked: what needs turning motors does not show in it.
 LOCKED = ("verification_mid", "factor_six_mid")
 ANY = (*MOVING, *LOCKED)

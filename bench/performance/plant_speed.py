@@ -53,7 +53,7 @@ def measure_plant(repetitions: int, advance: Advance) -> list[Figure]:
 
 
 def measure_against_mujoco(repetitions: int, advance: Advance) -> list[Figure]:
-    """Measure both in turns, so that each ratio is of two runs that stood side by side."""
+    """Measure both in turns, so that each ratio is of two runs made side by side."""
     machine = ThesisMachine(())
     others = [MujocoMachine(machine.plant, integrator) for integrator in ("RK4", "Euler")]
     if min(other.least_stretch(STEPS) for other in others) <= 0.0:

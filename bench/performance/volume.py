@@ -11,6 +11,7 @@ class Volume(NamedTuple):
     plant: int
     loops: int
     loop_duration: float
+    share_duration: float
     graphs: int
     graph_duration: float
     realtime_duration: float
@@ -22,12 +23,12 @@ class Volume(NamedTuple):
     @property
     def parts(self) -> int:
         """How many parts report that they are done."""
-        loops = 2 * self.loops + 2 * self.graphs + 2
+        loops = 3 * self.loops + 2 * self.graphs + 2
         return 2 * self.plant + loops + self.first_runs + self.later_runs + 2
 
 
-USUAL = Volume(200, 5, 20.0, 3, 10.0, 30.0, 2, 5, 3600.0, 600.0)
-QUICK = Volume(50, 2, 5.0, 1, 3.0, 5.0, 1, 2, 120.0, 60.0)
+USUAL = Volume(200, 5, 20.0, 20.0, 3, 10.0, 30.0, 2, 5, 3600.0, 600.0)
+QUICK = Volume(50, 2, 5.0, 2.0, 1, 3.0, 5.0, 1, 2, 120.0, 60.0)
 
 
 def full(volume: Volume) -> Volume:

@@ -1,1 +1,1 @@
-"""The numbers and pictures of docs/results.md: `python -m bench.results`."""
+"""The numbers and pictures of results/steep-sea.md: `python -m bench.results`."""

@@ -1,4 +1,4 @@
-"""The numbers and pictures of docs/results.md: `python -m bench.results`, or `make results`.
+"""What results/steep-sea.md shows: `python -m bench.results`, or `make results`.
 
 What was measured stays in a folder. A call measures what is missing there, or was measured by other
 code, scenarios or test-beds, and writes the page from all of it. Ctrl-C ends it; what was under way
@@ -23,7 +23,7 @@ from bench.results.result_measures import LIMIT_PERIOD
 from bench.results.result_store import ROOT, Kept, Measurement, Store
 from bench.results.result_work import work_off
 
-PAGE = ROOT / "docs" / "results.md"
+PAGE = ROOT / "results" / "steep-sea.md"
 FIGURES = ROOT / "docs" / "figures"
 KEEP = ROOT / ".results"
 MACHINE, PICTURES = "machine", "pictures"

@@ -1,4 +1,4 @@
-"""The runs behind docs/results.md."""
+"""The runs behind results/steep-sea.md."""
 
 from __future__ import annotations
 
@@ -7,7 +7,11 @@ from dataclasses import replace
 from bench.results.tracking import Case
 from cspm_msgs_py.dofs import Dof
 
-PAST, SIX, DEEP = "worst_case_past_thesis", "worst_case_six_dof", "worst_case_4m_past_thesis"
+PAST, SIX, DEEP = (
+    "worst_case_steep_past_thesis",
+    "worst_case_steep_six_dof",
+    "worst_case_steep_4m_past_thesis",
+)
 CAMERA_100_HZ = (
     "rates.motion_capture=100",
     "rates.motion_controller=100",
@@ -29,9 +33,9 @@ KNOWN_WIND = "control.motion.known_wrench=[1.0, 2.0, 0.0, 0.0, 0.0, 0.0]"
 BLOWN = "worst case, 20 s, wind of 2 N in sway and 1 N in surge"
 
 THESIS = {
-    "calm": Case("calm", ("duration=200",)),
-    "worst case": Case("worst_case"),
-    "worst case, 4 m": Case("worst_case_4m"),
+    "calm": Case("calm_broadband", ("duration=200",)),
+    "worst case": Case("worst_case_steep"),
+    "worst case, 4 m": Case("worst_case_steep_4m"),
 }
 HALF = "duration=100"
 MINUTE = "duration=60"
@@ -69,38 +73,44 @@ BEAM = (
 LONG_WAVES = ("target.motion.band=[0.21, 0.25]", "winch_frame.motion.band=[0.21, 0.25]")
 # The thesis's worst case with one thing changed.
 SWITCHED = {
-    "as in the thesis": Case("worst_case", (HALF,)),
-    "ideal sensors": Case("worst_case", (HALF, IDEAL)),
-    "analytic centre": Case("worst_case", (HALF, *CENTRE)),
-    "analytic centre, wanted tensions down to 0.3 N": Case("worst_case", (HALF, *CENTRE, LOWER)),
-    "half the waves": Case("worst_case", (HALF, *HALF_WAVES)),
+    "as in the thesis": Case("worst_case_steep", (HALF,)),
+    "ideal sensors": Case("worst_case_steep", (HALF, IDEAL)),
+    "analytic centre": Case("worst_case_steep", (HALF, *CENTRE)),
+    "analytic centre, wanted tensions down to 0.3 N": Case(
+        "worst_case_steep", (HALF, *CENTRE, LOWER)
+    ),
+    "half the waves": Case("worst_case_steep", (HALF, *HALF_WAVES)),
 }
 # The same with the gains changed, without sensor noise, which gains of this size amplify.
 SWITCHED_GAINS = {
-    "fastest loops": Case("worst_case", (HALF, IDEAL, *FASTEST)),
+    "fastest loops": Case("worst_case_steep", (HALF, IDEAL, *FASTEST)),
     "the same, analytic centre, down to 0.3 N": Case(
-        "worst_case", (HALF, IDEAL, *FASTEST, *CENTRE, LOWER)
+        "worst_case_steep", (HALF, IDEAL, *FASTEST, *CENTRE, LOWER)
     ),
     "the same, sway beyond its margin": Case(
-        "worst_case", (HALF, IDEAL, *FASTER_SWAY, *CENTRE, LOWER)
+        "worst_case_steep", (HALF, IDEAL, *FASTER_SWAY, *CENTRE, LOWER)
     ),
     "the same, sway with 1.75 times that gain": Case(
-        "worst_case", (HALF, IDEAL, *FASTEST_SWAY, *CENTRE, LOWER)
+        "worst_case_steep", (HALF, IDEAL, *FASTEST_SWAY, *CENTRE, LOWER)
     ),
 }
 SWITCHED_CALM = {
-    "as in the thesis": Case("calm", (MINUTE,)),
-    "motions of a sea from abeam": Case("calm", (MINUTE, *BEAM)),
-    "the same, fastest loops, ideal sensors": Case("calm", (MINUTE, IDEAL, *FASTEST, *BEAM)),
-    "the same, sway beyond its margin": Case("calm", (MINUTE, IDEAL, *FASTER_SWAY, *BEAM)),
+    "as in the thesis": Case("calm_broadband", (MINUTE,)),
+    "motions of a sea from abeam": Case("calm_broadband", (MINUTE, *BEAM)),
+    "the same, fastest loops, ideal sensors": Case(
+        "calm_broadband", (MINUTE, IDEAL, *FASTEST, *BEAM)
+    ),
+    "the same, sway beyond its margin": Case(
+        "calm_broadband", (MINUTE, IDEAL, *FASTER_SWAY, *BEAM)
+    ),
     "fastest loops, and no wave shorter than 4 s": Case(
-        "calm", (MINUTE, IDEAL, *FASTEST, *BEAM, *LONG_WAVES)
+        "calm_broadband", (MINUTE, IDEAL, *FASTEST, *BEAM, *LONG_WAVES)
     ),
     "no wave shorter than 4 s, sway beyond its margin": Case(
-        "calm", (MINUTE, IDEAL, *FASTER_SWAY, *BEAM, *LONG_WAVES)
+        "calm_broadband", (MINUTE, IDEAL, *FASTER_SWAY, *BEAM, *LONG_WAVES)
     ),
     "no wave shorter than 4 s, sway with 1.75 times that gain": Case(
-        "calm", (MINUTE, IDEAL, *FASTEST_SWAY, *BEAM, *LONG_WAVES)
+        "calm_broadband", (MINUTE, IDEAL, *FASTEST_SWAY, *BEAM, *LONG_WAVES)
     ),
 }
 # At 4 m the thesis's margins leave sway and yaw no more than 9 rad/s.
@@ -110,12 +120,12 @@ DESIGNED_AT_FOUR = (
     " tension_distribution: {method: pseudo_inverse}}"
 )
 SWITCHED_4M = {
-    "as in the thesis": Case("worst_case_4m", (SHORT,)),
-    "gains designed at 4 m": Case("worst_case_4m", (SHORT, DESIGNED_AT_FOUR)),
-    "ideal sensors": Case("worst_case_4m", (SHORT, IDEAL)),
-    "half the waves": Case("worst_case_4m", (SHORT, *HALF_WAVES)),
-    "analytic centre": Case("worst_case_4m", (SHORT, *CENTRE)),
-    "wanted tensions down to 0.3 N": Case("worst_case_4m", (SHORT, *CENTRE, LOWER)),
+    "as in the thesis": Case("worst_case_steep_4m", (SHORT,)),
+    "gains designed at 4 m": Case("worst_case_steep_4m", (SHORT, DESIGNED_AT_FOUR)),
+    "ideal sensors": Case("worst_case_steep_4m", (SHORT, IDEAL)),
+    "half the waves": Case("worst_case_steep_4m", (SHORT, *HALF_WAVES)),
+    "analytic centre": Case("worst_case_steep_4m", (SHORT, *CENTRE)),
+    "wanted tensions down to 0.3 N": Case("worst_case_steep_4m", (SHORT, *CENTRE, LOWER)),
 }
 # A seed that meets the limit within 40 s, without the governor, with one thing changed.
 UNGOVERNED = "control.motion.governor=null"
@@ -143,7 +153,7 @@ BEYOND = {
     "dry friction 10 mN·m at every motor": Case(
         PAST, (SHORT,), (("winch_coulomb_friction", (), {"torque": 0.01}),)
     ),
-    "calm": Case("calm", (SHORT, PAST_ON_CALM)),
+    "calm": Case("calm_broadband", (SHORT, PAST_ON_CALM)),
     "all six coordinates": Case(SIX, (SHORT,)),
     "all six coordinates, the whole 200 s": Case(SIX),
     "all six coordinates, 200 s, seed 2": Case(SIX, ("seed=2",)),
@@ -174,7 +184,7 @@ PLACES = {
     "x = y = 0.06 m, pitch 0.5, yaw 0.3 rad": [0.06, 0.06, 2.0, 0.0, 0.5, 0.3],
 }
 CORNERS = {
-    name: Case("calm", ("duration=20", PAST_ON_CALM, f"target.mean_pose={place}"))
+    name: Case("calm_broadband", ("duration=20", PAST_ON_CALM, f"target.mean_pose={place}"))
     for name, place in PLACES.items()
 }
 # The same places in the worst case's sea, scaled to as many tenths as leave the reference possible
@@ -207,11 +217,11 @@ DESIGNED_THERE = {
     if place != [-0.09, -0.09, 4.0, 0.0, 0.0, 0.0]
 }
 LIMITED = {
-    "worst case": Case("worst_case"),
+    "worst case": Case("worst_case_steep"),
     "worst case, all six coordinates": Case(SIX),
-    "worst case, 4 m": Case("worst_case_4m"),
+    "worst case, 4 m": Case("worst_case_steep_4m"),
     "worst case, read literally": Case("worst_case_literal"),
-    "calm": Case("calm", ("duration=200",)),
+    "calm": Case("calm_broadband", ("duration=200",)),
     BLOWN: Case(PAST, (ROBUST, KNOWN_WIND)),
 }
 ROUGHEST = "worst case, all six coordinates, seed 9"
@@ -245,5 +255,5 @@ def calm(seeds: int) -> dict[str, Case]:
     return {
         f"{profile}, {name}": case
         for profile, rates in PROFILES.items()
-        for name, case in seeded(seeds, (*TENTH, *rates), "calm").items()
+        for name, case in seeded(seeds, (*TENTH, *rates), "calm_broadband").items()
     }

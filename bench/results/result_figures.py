@@ -1,4 +1,4 @@
-"""The pictures of docs/results.md."""
+"""The pictures of results/steep-sea.md."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""What docs/results.md says of the machines themselves: worked out whenever it is written."""
+"""What results/steep-sea.md says of the machines: worked out whenever it is written."""
 
 from __future__ import annotations
 

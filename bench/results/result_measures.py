@@ -1,4 +1,4 @@
-"""What is measured for docs/results.md, each as plain data."""
+"""What is measured for results/steep-sea.md, each as plain data."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""The runs behind docs/results.md on machines that are not what their controllers think."""
+"""The runs of results/steep-sea.md on machines that controllers are wrong about."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Sentences of docs/results.md with what was measured in them."""
+"""Sentences of results/steep-sea.md with what was measured in them."""
 
 from __future__ import annotations
 
@@ -75,7 +75,7 @@ def beam_said(found: Found) -> str:
         f" {1e3 * thesis[ROLL]:.0f} mrad is no following of such waves, which make"
         f" {stiffest[ROLL]:.1f}. It may have rung from the start: a roll that begins with"
         f" {1e3 * (largest[ROLL] or 0.0):.0f} mrad and is not damped leaves sway as it is"
-        " ([decisions.md](decisions.md))."
+        " ([decisions.md](../docs/decisions/README.md))."
     )
 
 

@@ -1,4 +1,4 @@
-"""What was measured for docs/results.md, kept by name until something that decides it changes."""
+"""What was measured for results/steep-sea.md, kept until what decides it changes."""
 
 from __future__ import annotations
 
@@ -16,6 +16,7 @@ from pathlib import Path
 from typing import Any, NamedTuple
 
 from bench.results.tracking import SCENARIOS, Case
+from cspm_run.library import find_scenario
 
 ROOT = Path(__file__).resolve().parents[2]
 # What all measurements are made with, beside the module that measures: rooms, and files of those
@@ -59,7 +60,7 @@ class Measurement:
         parts = [code_hash(), spoken(measuring), self.by.__qualname__, repr(self.arguments)]
         for case in self.arguments:
             if isinstance(case, Case):
-                parts.append((SCENARIOS / f"{case.scenario}.yaml").read_text(encoding="utf-8"))
+                parts.append(find_scenario(case.scenario).read_text(encoding="utf-8"))
         parts += [path.read_text(encoding="utf-8") for path in _testbeds()]
         parts += [each.fingerprint() for each in self.needs]
         return hashlib.sha256("\0".join(parts).encode()).hexdigest()

@@ -1,4 +1,4 @@
-"""The tables of docs/results.md, each from what was found, by name."""
+"""The tables of results/steep-sea.md, each from what was found, by name."""
 
 from __future__ import annotations
 
@@ -9,8 +9,8 @@ import numpy as np
 
 from bench.accuracy.tension_distribution import HEADINGS, MET, P99, RESIDUAL
 from bench.markdown import markdown_table
+from cspm_msgs_py.control_spec.distribution import TensionDistribution
 from cspm_msgs_py.dofs import DOFS
-from cspm_msgs_py.scenario import TensionDistribution
 
 # Tables 8-1 and 8-2: largest and RMS error in mm and rad; None where the text is lost.
 THESIS_TABLES: dict[str, tuple[tuple[float | None, ...], tuple[float | None, ...]]] = {

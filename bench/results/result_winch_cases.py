@@ -1,4 +1,4 @@
-"""The runs behind docs/results.md that are about friction and winches."""
+"""The runs behind results/steep-sea.md that are about friction and winches."""
 
 from __future__ import annotations
 
@@ -23,7 +23,7 @@ FRICTION = {
     "dry friction 20 % of the load": Case(PAST, (SHORT,), OF_LOAD),
     "dry friction 10 mN·m, viscous 0.1 mN·m·s": Case(PAST, (SHORT,), DRY_10 + VISCOUS),
     "dry friction 10 mN·m, force controllers at 200 rad/s": Case(PAST, (SHORT, SLOW_FORCE), DRY_10),
-    "dry friction 10 mN·m, the thesis's controllers": Case("worst_case", (SHORT,), DRY_10),
+    "dry friction 10 mN·m, the thesis's controllers": Case("worst_case_steep", (SHORT,), DRY_10),
 }
 AHEAD = "control.force.friction_feedforward={}"
 # What is left of stiffness and damping of cables that are 4 times softer. With a quarter of the
@@ -39,7 +39,7 @@ WINCHES = {
     "200 rad/s, cables 4 times softer": Case(PAST, SLOW, cables=SOFT),
     "200 rad/s, dry friction 10 mN·m as described": Case(PAST, (*SLOW, AHEAD), DRY_10),
     "all six coordinates": Case(SIX, (SHORT,)),
-    "the thesis's controllers": Case("worst_case", (SHORT,)),
+    "the thesis's controllers": Case("worst_case_steep", (SHORT,)),
 }
 WINCH_AHEAD = {
     "fed forward": "control.force.winch_feedforward={}",

@@ -16,9 +16,11 @@ from cspm_msgs_py.errors import DivergenceError
 from cspm_msgs_py.scenario import load_scenario
 from cspm_msgs_py.schedule import WAVE_TRAJECTORY
 from cspm_msgs_py.testbed import Cable, EffectEntry, ExponentialStiffness, Testbed, load_testbed
-from cspm_run.assembly import Assembly, assemble, assemble_stage, motions_of, resolve
+from cspm_run.assembly import Assembly, assemble, assemble_stage, resolve
 from cspm_run.bundle import Bundle, make_bundle
+from cspm_run.library import find_scenario
 from cspm_run.loop import Loop
+from cspm_run.motions import motions_of
 from cspm_sim.plant import Plant
 
 Array = NDArray[np.float64]
@@ -55,7 +57,7 @@ class Case:
 
     def bundle(self) -> Bundle:
         """Return what is run."""
-        path = SCENARIOS / f"{self.scenario}.yaml"
+        path = find_scenario(self.scenario)
         scenario = load_scenario(path, self.overrides)
         file = load_testbed(path.parent / scenario.testbed)
         entries = (*file.testbed.effects, *_entries(self.effects))
@@ -205,7 +207,7 @@ def within_requirement(bundle: Bundle, errors: Array) -> NDArray[np.bool_]:
     """Return when all controlled coordinates are within the scenario's requirement, (n,)."""
     wanted = bundle.scenario.requirement
     limits = np.array([wanted.position] * 3 + [wanted.angle] * 3)
-    dofs = getattr(bundle.scenario.control, "motion").dofs  # noqa: B009 - closed loops only
+    dofs = getattr(bundle.scenario.control, "motion").controlled  # noqa: B009 - closed loops only
     if "roll" not in dofs:
         limits[3] = np.inf
     return np.asarray((np.abs(errors) <= limits).all(axis=1))

@@ -12,7 +12,7 @@ from bench.thresholds.sensitivity import ROOT, diagnose_all, outcomes
 from bench.thresholds.sensitivity_page import sensitivity_page
 
 FOLDER = ROOT / ".results" / "thresholds"
-PAGE = ROOT / "docs" / "thresholds-sensitivity.md"
+PAGE = ROOT / "results" / "thresholds-sensitivity.md"
 
 
 def main() -> None:

@@ -6,9 +6,12 @@ from collections.abc import Iterator
 from dataclasses import fields, replace
 from typing import Any, NamedTuple
 
+from typing_extensions import Self
+
 from cspm_ident.diagnosis.thresholds import DEFAULT_THRESHOLDS, Thresholds
 
 SHARE = 0.5
+_NAMES = frozenset(each.name for each in fields(Thresholds))
 
 
 class Move(NamedTuple):
@@ -54,19 +57,23 @@ class WatchedThresholds(Thresholds):
 
     read: set[str]
 
+    def __new__(cls, *_: float, **__: float) -> Self:
+        """Return new thresholds, none of which was read."""
+        made = super().__new__(cls)
+        # Before the values are checked, which reads them; frozen classes take it no other way.
+        object.__setattr__(made, "read", set())
+        return made
+
     def __getattribute__(self, name: str) -> float:
-        """Return an attribute, and remember that it was read."""
-        own: dict[str, object] = object.__getattribute__(self, "__dict__")
-        if name in own and "read" in own:
-            read = own["read"]
-            assert isinstance(read, set)
-            read.add(name)
-        found: float = object.__getattribute__(self, name)
+        """Return an attribute, and remember that it was read if it is a threshold."""
+        if name in _NAMES:
+            self.read.add(name)
+        found: float = super().__getattribute__(name)
         return found
 
 
 def watched() -> tuple[WatchedThresholds, set[str]]:
     """Return the default thresholds, and the set to which names of those read are added."""
-    thresholds, read = WatchedThresholds(), set[str]()
-    object.__setattr__(thresholds, "read", read)
-    return thresholds, read
+    thresholds = WatchedThresholds()
+    thresholds.read.clear()
+    return thresholds, thresholds.read

@@ -1,4 +1,4 @@
-"""The page `docs/thresholds-sensitivity.md`, from what moving thresholds changes."""
+"""The page `results/thresholds-sensitivity.md`, from what moving thresholds changes."""
 
 from __future__ import annotations
 
@@ -11,7 +11,8 @@ from cspm_ident.diagnosis.thresholds import DEFAULT_THRESHOLDS
 _HEAD = """\
 # What moving a threshold changes
 
-Each threshold of the diagnosis ([thresholds.md](thresholds.md)) was moved down and up by half of
+Each threshold of the diagnosis ([thresholds.md](../docs/reference/thresholds.md))
+was moved down and up by half of
 its value, clipped to its range, alone. The recordings are a fixed set with planted effects:
 
 {cases}

@@ -1,4 +1,4 @@
-"""Measure all that `make validate` measures, and write docs/validation-runs.md."""
+"""Measure all that `make validate` measures, and write results/validation-runs.md."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ from bench.performance.host import describe_machine
 from bench.validation import blind_slice, coverage_check, generated_pages
 from bench.validation.check import Check, Finding
 
-PAGE = Path(__file__).resolve().parents[2] / "docs" / "validation-runs.md"
+PAGE = Path(__file__).resolve().parents[2] / "results" / "validation-runs.md"
 CHECKS = (*coverage_check.CHECKS, *blind_slice.CHECKS, *generated_pages.CHECKS)
 _HEAD = """\
 # Validation runs

@@ -1,7 +1,7 @@
 """A stratified slice of the blind benchmark, its detection limits fixed, its bounds as well.
 
 Every way of concealing has one recording at least, at amounts that a diagnosis has to see, so that
-a change that harms it shows. What it is worth in full, sealed sets measure (docs/blind.md).
+a change that harms it shows. What it is worth in full, sealed sets measure.
 """
 
 from __future__ import annotations
@@ -24,7 +24,7 @@ from bench.blind.stratum import Case, Stratum
 from bench.validation.check import Check, Finding, at_least, at_most
 
 SEED, DURATION_S = 5, 30.0
-WORST, CALM, RIG = ("worst_case",), ("calm",), ("one_winch",)
+WORST, CALM, RIG = ("worst_case_steep",), ("calm_broadband",), ("one_winch",)
 BAR_POSE = ("/bar/pose",)
 
 CASES: Mapping[str, tuple[Case, ...]] = {
@@ -64,9 +64,15 @@ def limits() -> dict[str, list[float]]:
 def blank() -> BlankRuns:
     """Return what blank runs would measure, phenomena being in the catalogue's form."""
     crane = limits()
-    scenarios = {"worst_case": crane, "calm": crane, "one_winch": {"bristles": [5.9e-4]}}
+    scenarios = {
+        "worst_case_steep": crane,
+        "calm_broadband": crane,
+        "one_winch": {"bristles": [5.9e-4]},
+    }
     alike = {(scenario, each): [1.0] * 8 for scenario in scenarios for each in PHENOMENA}
-    return BlankRuns(scenarios, {("worst_case", "drive scale", "radius"): [-RADIUS] * 8}, alike)
+    return BlankRuns(
+        scenarios, {("worst_case_steep", "drive scale", "radius"): [-RADIUS] * 8}, alike
+    )
 
 
 @contextmanager

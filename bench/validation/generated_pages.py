@@ -38,7 +38,7 @@ def same_angles(committed: str, fresh: str) -> Finding:
     pairs = old.keys() | new.keys()
     wrong = [pair for pair in pairs if _differ(old.get(pair, ()), new.get(pair, ()))]
     found = f"{len(wrong)} of {len(pairs)}"
-    return Finding("docs/isolability.md: pairs that differ", found, "0", not wrong)
+    return Finding("docs/reference/isolability.md: pairs that differ", found, "0", not wrong)
 
 
 def _differ(one: Sequence[str], other: Sequence[str]) -> bool:
@@ -57,15 +57,16 @@ def measure() -> list[Finding]:
     import winding_energy
 
     fresh = numbers_in(model_numbers.report() + winding_energy.report() + "\n<!-- end -->\n")
-    page = numbers_in((DOCS / "model.md").read_text(encoding="utf-8"))
+    page = numbers_in((DOCS / "explanation" / "model.md").read_text(encoding="utf-8"))
     wrong = [name for name in fresh.keys() | page.keys() if fresh.get(name) != page.get(name)]
     effects = catalogue()
     table = angle_table(rich_measurement(), list(effects.values()))
     found = f"{len(wrong)} of {len(page)}"
     return [
-        Finding("docs/model.md: blocks that differ", found, "0", not wrong),
+        Finding("docs/explanation/model.md: blocks that differ", found, "0", not wrong),
         same_angles(
-            (DOCS / "isolability.md").read_text(encoding="utf-8"), isolability_page(effects, table)
+            (DOCS / "reference" / "isolability.md").read_text(encoding="utf-8"),
+            isolability_page(effects, table),
         ),
     ]
 

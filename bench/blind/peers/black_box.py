@@ -14,7 +14,6 @@ from bench.blind.peers.report import fits, report, unknown_finding
 from cspm_ident.diagnosis.reporting.verdict import Verdict
 from cspm_ident.diagnosis.residuals.regressors import Place
 from cspm_ident.diagnosis.residuals.residual_equation import Equation
-from cspm_ident.diagnosis.validation.holdout_residuals import without_nuisance
 from cspm_sim.effects import Block, Channel
 
 Array = NDArray[np.float64]
@@ -53,7 +52,7 @@ def _by_place(equations: Sequence[Equation]) -> dict[Place, tuple[Array, Array]]
     for equation in equations:
         signals = [v for name, v in equation.signals.items() if not name.startswith("time")]
         if len(equation.times) and signals:
-            rows = np.stack(signals, axis=1), without_nuisance(equation)
+            rows = np.stack(signals, axis=1), equation.left
             found.setdefault(equation.place, []).append(rows)
     return {
         place: (np.vstack([x for x, _ in parts]), np.vstack([y for _, y in parts]))

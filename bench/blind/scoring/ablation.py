@@ -34,7 +34,7 @@ class Ablation(NamedTuple):
 
     Attributes:
         prepare: what it makes of a measurement.
-        replaced: names of what else stands in the diagnosis, by what is put there.
+        replaced: names of what is replaced in the diagnosis, by what is put there.
         effects: those that are looked for.
     """
 

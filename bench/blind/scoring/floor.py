@@ -11,7 +11,7 @@ Data = Mapping[str, Any]
 Floors = Mapping[tuple[str, str], float]
 
 
-def sound_floors(truth: Data, results: Mapping[str, Data]) -> Floors:
+def healthy_floors(truth: Data, results: Mapping[str, Data]) -> Floors:
     """Return the median error of each residual of machines as described, by scenario.
 
     Noise that is alike from row to row, as a sensor's coloured part, is in it.

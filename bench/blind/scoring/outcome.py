@@ -124,7 +124,7 @@ def judge(item: Data, result: Data, floors: Floors) -> Outcome:
     Args:
         item: of the truth file.
         result: `diagnosis`, as `diagnosis.json` has it or None, and `times`.
-        floors: of the residuals, see `sound_floors`.
+        floors: of the residuals, see `healthy_floors`.
     """
     diagnosis: Data = result["diagnosis"] or {"verdict": FAILED, "findings": [], "residuals": []}
     findings: Sequence[Data] = diagnosis["findings"]

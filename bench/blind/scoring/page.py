@@ -99,7 +99,8 @@ def _about(card: Data, sha256: str, machine: str) -> str:
         f" `{sha256}`."
         f" Scored {machine}."
         f" {_STANDING[request['split']]} How it is made and what the words mean:"
-        " [blind.md](../blind.md). Written by `python -m bench.blind score DIR --page FILE`."
+        " [blind benchmark](../docs/explanation/blind-benchmark.md)."
+        " Written by `python -m bench.blind score DIR --page FILE`."
     )
 
 
@@ -176,10 +177,14 @@ _WORTH = {
     "below_retuned": "below re-tuned",
 }
 _PEERS = (
-    "Others' ways on the same residuals, see [blind.md](../blind.md#peers); `retuned` is what a"
+    "Others' ways on the same residuals, see"
+    " [blind benchmark](../docs/explanation/blind-benchmark.md#peers); `retuned` is what a"
     " laboratory does today."
 )
-_ABLATIONS = "What each safeguard adds, see [blind.md](../blind.md#without-one-safeguard)."
+_ABLATIONS = (
+    "What each safeguard adds, see"
+    " [blind benchmark](../docs/explanation/blind-benchmark.md#without-one-safeguard)."
+)
 _COLUMNS = (
     "Hits and cases are those of the targets; the bound is the one-sided one of alarms; wrong"
     " findings are per recording; the parameter error is the median of relative ones; held-out is"
@@ -192,7 +197,7 @@ def _onsets(found: Data, driver: Sequence[float]) -> str:
     error = found["median_error_s"]
     return (
         "Of what was named and began late, an onset was given for"
-        f" {share_words(found['told'])}, with a median error of"
+        f" {share_words(found['reported'])}, with a median error of"
         f" {'—' if error is None else f'{error:.1f} s'}, and its interval held the truth for"
         f" {share_words(found['held'])}; of what was there from the start, one was given for"
         f" {share_words(found['false'])}. Of the unknown that was recognised, the signal that it"
@@ -218,7 +223,7 @@ def _strata(rows: Sequence[Data]) -> str:
 
 
 def _region(shares: Data) -> str:
-    reported, named, *_ = shares["region_told"]
+    reported, named, *_ = shares["region_reported"]
     return f"{share_words(shares['region'])}; none given for {named - reported}"
 
 

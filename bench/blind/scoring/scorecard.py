@@ -9,7 +9,7 @@ from itertools import pairwise
 from statistics import median
 from typing import Any
 
-from bench.blind.scoring.floor import sound_floors
+from bench.blind.scoring.floor import healthy_floors
 from bench.blind.scoring.outcome import (
     EFFECT,
     FAILED,
@@ -37,7 +37,7 @@ def scorecard(truth: Mapping[str, Any], results: Mapping[str, Mapping[str, Any]]
         truth: as the truth file has it.
         results: by recording, see `judge`.
     """
-    floors, items = sound_floors(truth, results), truth["items"]
+    floors, items = healthy_floors(truth, results), truth["items"]
     outcomes = [judge(i, results[i["name"]], floors) for i in items if i["name"] in results]
     clear = [o for o in outcomes if is_clear(o.kind, o.multiple)]
     return {
@@ -94,7 +94,7 @@ def _shares(outcomes: Sequence[Outcome], clear: Sequence[Outcome]) -> dict[str, 
         "driver": share(o.driver for o in outside if o.driver is not None),
         "false_unknown": share(o.unknown for o in inside),
         "failed": share(o.verdict == FAILED for o in outcomes),
-        "region_told": share(reported is not None for reported in regions),
+        "region_reported": share(reported is not None for reported in regions),
         "region": share(reported for reported in regions if reported is not None),
         "mean_tie_size": _mean([float(s) for o in clear for s in o.tie_sizes]),
     }
@@ -188,7 +188,7 @@ def _onsets(outcomes: Sequence[Outcome]) -> dict[str, Any]:
     late = [b for b in reported if b.true > 0.0]
     errors = [abs(b.reported - b.true) for b in late if b.reported is not None]
     return {
-        "told": share(b.reported is not None for b in late),
+        "reported": share(b.reported is not None for b in late),
         "held": share(b.held for b in late if b.held is not None),
         "median_error_s": median(errors) if errors else None,
         "false": share(b.reported is not None for b in reported if b.true == 0.0),

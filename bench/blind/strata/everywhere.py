@@ -1,4 +1,4 @@
-"""By being the same on all eight cables, where nothing stands out."""
+"""By being the same on all eight cables, where no cable differs from the others."""
 
 from bench.blind.stratum import MOVING, Case, Stratum
 

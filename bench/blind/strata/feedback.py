@@ -6,7 +6,7 @@ FEEDBACK = Stratum(
     "feedback",
     1.0,
     tuple(
-        Case((name,), (2.0, 4.0, 8.0), ("calm",))
+        Case((name,), (2.0, 4.0, 8.0), ("calm_broadband",))
         for name in ("drive zero", "drive scale", "bristles", "wind", "loaded bristles")
     ),
 )

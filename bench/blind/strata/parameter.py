@@ -8,7 +8,7 @@ PARAMETER = Stratum(
     (
         Case(("mass",), (2.0, 4.0), ANY),
         Case(("centre of mass",), (2.0, 4.0), ANY),
-        Case(("inertia of the bar",), (2.0, 4.0), ("worst_case",)),
+        Case(("inertia of the bar",), (2.0, 4.0), ("worst_case_steep",)),
         Case(("stiffness",), (2.0, 4.0), ANY),
         Case(("damper",), (2.0, 4.0), MOVING),
         Case(("inertia",), (2.0, 4.0), MOVING),

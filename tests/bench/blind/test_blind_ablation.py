@@ -32,7 +32,7 @@ from cspm_sim.effects import Channel, catalogue
 def measurement(tmp_path_factory):
     """Three seconds of the worst sea, read by the test-bed's sensors."""
     folder = tmp_path_factory.mktemp("ablation") / "bag"
-    run_to(folder, "worst_case", "duration=3")
+    run_to(folder, "worst_case_steep", "duration=3")
     return read_measurement(folder)
 
 
@@ -140,8 +140,8 @@ RUBBING = """  - effect: winch_coulomb_friction
 
 
 @pytest.mark.slow
-def test_without_held_out_data_what_is_found_is_told_unjudged(tmp_path):
-    measured = measured_with(RUBBING, tmp_path / "bag", "worst_case", "duration=16")
+def test_without_held_out_data_what_is_found_is_reported_unjudged(tmp_path):
+    measured = measured_with(RUBBING, tmp_path / "bag", "worst_case_steep", "duration=16")
     found = diagnose_without(measured, "held-out")
     (finding,) = found.reported
     assert (finding.effect, finding.elements) == (

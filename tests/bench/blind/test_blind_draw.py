@@ -21,6 +21,7 @@ from bench.blind.make import Request, make
 from bench.blind.reality.phenomena import PHENOMENA
 from bench.blind.strata import STRATA
 from bench.blind.truth import SPLITS
+from cspm_run.library import find_scenario
 from cspm_sim.effects import catalogue
 
 SCENARIOS = Path(__file__).resolve().parents[3] / "scenarios"
@@ -42,7 +43,7 @@ def test_strata_have_their_shares_and_enough_has_nothing_to_find():
     assert all(abs(counted[n] - 400 * s.share / whole) <= 1 for n, s in STRATA.items())
     assert counted["nothing"] >= 60
     assert counted["parameter"] >= 60
-    page = (SCENARIOS.parent / "docs/blind.md").read_text(encoding="utf-8")
+    page = (SCENARIOS.parent / "docs/explanation/blind-benchmark.md").read_text(encoding="utf-8")
     rows = re.findall(r"^\| (\w+) \| .* \| (\d+) \|$", page, re.MULTILINE)
     assert {name: int(count) for name, count in rows} == counted
 
@@ -67,7 +68,7 @@ def test_all_that_strata_name_is_there():
     for stratum in STRATA.values():
         for case in stratum.cases:
             assert set(case.phenomena) <= set(PHENOMENA)
-            assert all((SCENARIOS / f"{name}.yaml").exists() for name in case.scenarios)
+            assert all(find_scenario(name).exists() for name in case.scenarios)
             assert case.absorbed_by is None or case.absorbed_by in PHENOMENA
     used = {n for s in STRATA.values() for c in s.cases for n in c.phenomena}
     assert used == set(PHENOMENA)
@@ -83,17 +84,17 @@ def test_every_case_is_drawn_as_often_as_any_other_of_its_stratum():
     assert {abs(m) for m in multiples} == {0.5, 1.0, 2.0, 4.0}
 
 
-def test_all_that_the_catalogue_calls_twins_keep_company():
+def test_all_that_the_catalogue_calls_confounded_is_combined():
     known = {p.effect for p in PHENOMENA.values() if p.effect}
-    twins = {
-        frozenset((effect.id, twin))
+    confounded = {
+        frozenset((effect.id, other))
         for effect in catalogue().values()
-        for twin in effect.description.confounded_with
-        if effect.id in known and twin in known
+        for other in effect.description.confounded_with
+        if effect.id in known and other in known
     }
-    assert len(twins) >= 32
+    assert len(confounded) >= 32
     company = [i.case.phenomena for i in draw() if i.stratum == "company"]
-    assert twins <= {frozenset(PHENOMENA[name].effect for name in pair) for pair in company}
+    assert confounded <= {frozenset(PHENOMENA[name].effect for name in pair) for pair in company}
 
 
 def test_splits_of_one_seed_have_nothing_in_common(tmp_path):

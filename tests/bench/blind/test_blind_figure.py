@@ -77,7 +77,7 @@ def test_bars_have_their_length_and_say_of_how_many():
     assert [tick.get_text() for tick in axes.get_yticklabels()] == ["a", "b"]
 
 
-def test_probabilities_that_were_never_told_are_not_drawn():
+def test_probabilities_that_were_never_reported_are_not_drawn():
     axes = Figure().subplots()
     _draw_calibration(axes, card()["calibration"])
     (dot,) = [line for line in axes.get_lines() if line.get_marker() == "o"]

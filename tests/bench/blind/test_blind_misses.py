@@ -67,7 +67,7 @@ def reason(search, reported, *found):
     return compared(outcome_of(reported), reported, search, [hypothesis(c) for c in found]).reason
 
 
-def test_what_the_residuals_show_and_was_not_found_could_have_been_told():
+def test_what_the_residuals_show_and_was_not_found_could_have_been_reported():
     search = search_of(SIDE, {DRY: SIDE, GREASE: SPEED})
     assert reason(search, item("winch_coulomb_friction"), GREASE) == MORE
 
@@ -84,7 +84,7 @@ def test_a_companion_that_adds_nothing_is_hidden_and_one_that_does_is_not():
     assert reason(search_of(SIDE + SPEED, columns), both, DRY) == MORE
 
 
-def test_a_twin_that_takes_two_faults_is_not_as_simple():
+def test_a_confounded_effect_that_takes_two_faults_is_not_as_simple():
     search = search_of(SIDE, {DRY: SIDE, GREASE: SIDE, GAIN: SPEED})
     assert reason(search, item("winch_coulomb_friction"), GREASE, GAIN) == SIMPLER
 
@@ -104,13 +104,13 @@ def test_what_a_wrong_number_hides_is_held_against_with_that_number():
     assert both > alone + 100.0
 
 
-def test_what_sound_clocks_do_is_no_number_of_what_was_found():
+def test_what_healthy_clocks_do_is_no_number_of_what_was_found():
     late = Candidate(catalogue()["tension_delay"], "only", ())
     search = search_of(SIDE, {DRY: SIDE, GREASE: SIDE, late: 1e6 * SPEED})
     assert reason(search, item("winch_coulomb_friction"), GREASE, late) == NO_MORE
 
 
-def test_what_was_found_and_not_told_first_is_said_so():
+def test_what_was_found_and_not_reported_first_is_said_so():
     search = search_of(SIDE, {DRY: SIDE, GREASE: SPEED})
     assert reason(search, item("winch_coulomb_friction"), DRY) == GIVEN_UP
 

@@ -87,7 +87,7 @@ def test_white_noise_alone_is_mostly_nothing_to_them(name):
 
 def test_coloured_noise_misleads_errors_of_white_rows_and_not_those_of_blocks():
     """Of thirty recordings without any effect; 5 % is what the intervals promise."""
-    misled, sound = 0, 0
+    misled, healthy = 0, 0
     for seed in range(30):
         gram = gather([[equation(seed, (0.0, 0.0, 0.0), colour=0.95)]], BLOCK_S)
         columns = gram.with_nuisance([VISCOUS])
@@ -95,9 +95,9 @@ def test_coloured_noise_misleads_errors_of_white_rows_and_not_those_of_blocks():
             abs(sums.weights(columns)[-1]) > sums.half_width(columns[:-1], columns[-1:])[0]
             for sums in (WhiteSums(gram), BlockRegression(gram))
         )
-        misled, sound = misled + white, sound + blocks
+        misled, healthy = misled + white, healthy + blocks
     assert misled >= 10
-    assert sound <= 6
+    assert healthy <= 6
 
 
 def test_errors_of_white_rows_are_the_textbook_s():
@@ -116,7 +116,7 @@ def test_errors_of_white_rows_are_the_textbook_s():
     assert sums.p_value(base, own) == pytest.approx(chance, rel=1e-3, abs=1e-300)
 
 
-def test_normal_equations_are_those_of_rows_without_what_is_never_told():
+def test_normal_equations_are_those_of_rows_without_what_is_never_reported():
     lib = library((2.0, 1.0, 0.0))
     (made,) = lib.searched
     candidates = [COULOMB, VISCOUS, INERTIA]
@@ -135,7 +135,7 @@ def test_normal_equations_are_those_of_rows_without_what_is_never_told():
     np.testing.assert_allclose(few.T @ target, normal.cross, atol=1e-6)
 
 
-def test_a_retuned_number_is_told_and_friction_makes_one_wrong():
+def test_a_retuned_number_is_reported_and_friction_makes_one_wrong():
     (reported,) = retuned.diagnosis_of(library((0.0, 0.0, 1.0)))["findings"]
     assert reported["effect"] == "winch_inertia"
     (number,) = reported["parameters"]
@@ -180,7 +180,7 @@ def test_methods_are_named_and_others_refused(monkeypatch):
         require_method("sindy")
 
 
-def test_what_a_sound_machine_has_as_well_is_not_told():
+def test_what_a_healthy_machine_has_as_well_is_not_reported():
     reported = report_of(skewed(5e-6), np.array([0]), intervals=False)
     assert (reported["verdict"], reported["findings"]) == ("consistent", [])
     (finding,) = report_of(skewed(5e-4), np.array([0]), intervals=False)["findings"]

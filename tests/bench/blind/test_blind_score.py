@@ -5,7 +5,7 @@ import pytest
 from scipy.stats import binom
 
 from bench.blind.scoring.comparison import comparison
-from bench.blind.scoring.floor import sound_floors
+from bench.blind.scoring.floor import healthy_floors
 from bench.blind.scoring.outcome import Beginning, judge, kind_of
 from bench.blind.scoring.page import scorecard_page
 from bench.blind.scoring.scorecard import scorecard
@@ -144,23 +144,23 @@ def test_errors_are_those_of_the_residual_that_shows_the_effect(effect, channel)
     assert judge(hidden, reported, floors).fit == pytest.approx((100 * sides[channel], 8.0, 1.2))
 
 
-def test_errors_are_told_in_units_of_what_sound_machines_of_the_scenario_leave():
-    sound, broken = item("sound"), item("broken", concealed())
+def test_errors_are_in_units_of_what_healthy_machines_of_the_scenario_leave():
+    healthy, broken = item("healthy"), item("broken", concealed())
     other, failed = item("other") | {"scenario": "worst_case"}, item("failed")
-    results = {name: result("consistent") for name in ("sound", "broken", "other")}
+    results = {name: result("consistent") for name in ("healthy", "broken", "other")}
     results["failed"] = {"diagnosis": None, "times": {"cpu_s": 1.0}}
-    found = sound_floors({"items": [sound, broken, other, failed]}, results)
+    found = healthy_floors({"items": [healthy, broken, other, failed]}, results)
     assert found["calm", TORQUE] == pytest.approx(10.0)
     assert found["worst_case", TORQUE] == pytest.approx(10.0)
     assert found["calm", "winches/torque/surge_2"] == pytest.approx(50.0)
     louder = result("consistent")
     louder["diagnosis"]["residuals"][0]["held_out"] = FIT | {"noise_floor": 0.005}
-    two = {"items": [sound, item("louder")]}
-    assert sound_floors(two, {"sound": results["sound"], "louder": louder})[
+    two = {"items": [healthy, item("louder")]}
+    assert healthy_floors(two, {"healthy": results["healthy"], "louder": louder})[
         "calm", TORQUE
     ] == pytest.approx(15.0)
     assert judge(broken, result("consistent"), {}).fit is None
-    assert sound_floors({"items": [broken]}, results) == {}
+    assert healthy_floors({"items": [broken]}, results) == {}
 
 
 def test_the_right_effect_on_another_element_is_not_named():
@@ -189,7 +189,7 @@ def test_a_finding_that_holds_no_truth_is_wrong():
     assert outcome.wrong == 1
 
 
-def test_company_is_named_when_all_of_it_is():
+def test_combined_faults_are_named_when_all_of_them_are():
     pair = item("a", concealed(), concealed("winch_viscous_friction", "sway_1"))
     half = judged(pair, result("effect", finding(FRICTION)))
     assert not half.named
@@ -307,7 +307,7 @@ def test_a_scorecard_counts():
         "driver": (0, 0),
         "false_unknown": (0, 6),
         "failed": (1, 7),
-        "region_told": (0, 1),
+        "region_reported": (0, 1),
         "region": (0, 0),
     }
     assert [(r["multiple"], r["detected"][:2]) for r in found["by_multiple"]] == [
@@ -320,7 +320,7 @@ def test_a_scorecard_counts():
     (row,) = found["parameters"]["by_effect"]
     assert (row["effect"], row["estimates"], row["covered"][:2]) == (FRICTION, 1, (1, 1))
     assert row["median_signed_error"] == pytest.approx(0.05)
-    # Of the findings told with 0.9, one is right.
+    # Of the findings reported with 0.9, one is right.
     assert [row["right"][:2] for row in found["calibration"]] == [(0, 0), (0, 0), (1, 3), (0, 0)]
 
 
@@ -373,7 +373,7 @@ def test_onsets_are_counted_late_and_false():
         for name, (at, interval) in said.items()
     }
     onsets = scorecard(truth, results)["onsets"]
-    assert onsets["told"][:2] == (1, 2)
+    assert onsets["reported"][:2] == (1, 2)
     assert onsets["held"][:2] == (1, 1)
     assert onsets["median_error_s"] == pytest.approx(0.5)
     assert onsets["false"][:2] == (1, 2)
@@ -393,7 +393,7 @@ def test_regions_of_what_was_named_are_counted_and_what_tells_nothing_apart():
     }
     found = scorecard(truth, results)
     assert [o["regions"] for o in found["outcomes"]] == [(True,), (False,), (None,)]
-    assert found["shares"]["region_told"][:2] == (2, 3)
+    assert found["shares"]["region_reported"][:2] == (2, 3)
     assert found["shares"]["region"][:2] == (1, 2)
     (row,) = found["by_stratum"]
     assert row["region"][:2] == (1, 2)
@@ -439,7 +439,7 @@ def test_methods_are_compared_on_the_recordings_that_all_have():
     assert [row["first"][:2] for row in rows] == [(1, 1), (0, 1)]
     assert [row["false_alarm"][:2] for row in rows] == [(1, 1), (1, 1)]
     assert [row["wrong_per_recording"] for row in rows] == [0.5, 2.0]
-    # The sound machine's residuals are as large before.
+    # The healthy machine's residuals are as large before.
     assert (rows[0]["before"], rows[0]["after"]) == pytest.approx((1.0, 0.12))
     text = scorecard_page(card() | {"peers": rows}, "ab" * 32, "today")
     assert "2 recordings, the same for all" in text

@@ -26,8 +26,8 @@ from bench.blind.truth import truth_sha256
 from cspm_msgs_py.errors import DivergenceError, InputError
 from cspm_msgs_py.recording.reader import Recording
 
-NOTHING = Stratum("nothing", 1.0, (Case(scenarios=("worst_case",)),))
-LOUD = Stratum("noise", 1.0, (Case(("bristles",), (16.0,), ("worst_case",)),))
+NOTHING = Stratum("nothing", 1.0, (Case(scenarios=("worst_case_steep",)),))
+LOUD = Stratum("noise", 1.0, (Case(("bristles",), (16.0,), ("worst_case_steep",)),))
 
 
 @pytest.fixture(scope="module")
@@ -37,7 +37,7 @@ def bench(tmp_path_factory):
     patch = pytest.MonkeyPatch()
     patch.setattr(making, "STRATA", {"nothing": NOTHING, "noise": LOUD})
     limits = {name: [5e-4] * 8 for name in PHENOMENA}
-    patch.setattr(making, "run_blank", lambda *_: blank({"worst_case": limits}))
+    patch.setattr(making, "run_blank", lambda *_: blank({"worst_case_steep": limits}))
     options = Request(
         place / "bench", place / "truth.json", 3, 2, "dev", ("nothing", "noise"), 15.0
     )
@@ -62,7 +62,7 @@ def stratum_of(options):
 
 
 @pytest.mark.slow
-def test_the_hash_is_told_before_anything_is_recorded(bench):
+def test_the_hash_is_published_before_anything_is_recorded(bench):
     options, digest, said = bench
     assert digest == truth_sha256(options.truth)
     assert digest in said[0][0]
@@ -96,7 +96,7 @@ def test_what_surrounds_the_signals_is_the_same_in_all(bench):
 
 @pytest.mark.slow
 def test_sizes_do_not_part_the_strata(bench):
-    """Were they told by size, either stratum's recordings would be all the larger ones."""
+    """Were they ranked by size, either stratum's recordings would be all the larger ones."""
     options, _, _ = bench
     strata = stratum_of(options)
     sizes = [
@@ -118,7 +118,7 @@ def test_an_interrupted_make_goes_on_where_it_was(tmp_path, monkeypatch):
         made.append(folder.name)
 
     monkeypatch.setattr(making, "record_concealed", record)
-    monkeypatch.setattr(making, "run_blank", lambda *_: blank({"worst_case": {}}))
+    monkeypatch.setattr(making, "run_blank", lambda *_: blank({"worst_case_steep": {}}))
     monkeypatch.setattr(making, "STRATA", {"nothing": NOTHING})
     options = Request(tmp_path / "bench", tmp_path / "t.json", 3, 3, "dev", ("nothing",), 15.0)
     with pytest.raises(KeyboardInterrupt):
@@ -132,7 +132,7 @@ def test_an_interrupted_make_goes_on_where_it_was(tmp_path, monkeypatch):
 
 @pytest.mark.compiled
 def test_a_recording_that_is_cut_short_is_not_taken_for_whole(tmp_path):
-    bundle = believed("worst_case", 15.0, 1)
+    bundle = believed("worst_case_steep", 15.0, 1)
     reality = conceal(bundle.testbed.testbed, {}, 0.0, 1)
     with pytest.raises(KeyboardInterrupt):
         record_concealed(
@@ -157,7 +157,7 @@ def test_the_command_line_tells_the_hash_and_keeps_the_truth_beside(tmp_path, mo
         (folder / "x.mcap").write_text(str(bundle.scenario.seed))
 
     monkeypatch.setattr(making, "record_concealed", record)
-    monkeypatch.setattr(making, "run_blank", lambda *_: blank({"worst_case": {}}))
+    monkeypatch.setattr(making, "run_blank", lambda *_: blank({"worst_case_steep": {}}))
     monkeypatch.setattr(making, "STRATA", {"nothing": NOTHING})
     out = tmp_path / "bench"
     words = f"bench.blind make --seed 3 --count 1 --duration 15 --strata nothing --out {out}"
@@ -180,7 +180,7 @@ def test_what_diverges_is_an_empty_folder_and_is_not_tried_again(tmp_path, monke
         raise DivergenceError("t = 1 s: gone")
 
     monkeypatch.setattr(making, "record_concealed", record)
-    monkeypatch.setattr(making, "run_blank", lambda *_: blank({"worst_case": {}}))
+    monkeypatch.setattr(making, "run_blank", lambda *_: blank({"worst_case_steep": {}}))
     monkeypatch.setattr(making, "STRATA", {"nothing": NOTHING})
     options = Request(tmp_path / "bench", tmp_path / "t.json", 3, 1, "dev", ("nothing",), 15.0)
     make(options)

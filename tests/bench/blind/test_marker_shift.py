@@ -130,7 +130,7 @@ def test_a_still_bars_limit_is_that_of_the_force_across_its_cables(thesis):
     assert limit == pytest.approx(noise.force / pull)
 
 
-@pytest.mark.parametrize("scenario", ["worst_case", "factor_six_mid"])
+@pytest.mark.parametrize("scenario", ["worst_case_steep", "factor_six_mid"])
 def test_where_the_bar_moves_markers_must_be_farther_out_than_a_reading_is_noisy(scenario):
     machine = machine_of(scenario)
     scenes = watch(believed(scenario, 10.0, 1), conceal(machine, {}, 0.0, 1), 7.0)[::10]

@@ -63,7 +63,7 @@ def test_a_beginning_is_a_region_of_time():
     assert region_right("cell zero", 12.0, reported("time [s]", 9.0, 20.0)) is False
 
 
-def test_all_that_is_told_has_to_be_right():
+def test_all_that_is_reported_has_to_be_right():
     assert region_right("bristles", 12.0, reported("speed [rad/s]", -1.0, 2.0, **LATE)) is True
     assert region_right("bristles", 12.0, reported("angle [rad]", -1.0, 2.0, **LATE)) is False
     assert region_right("bristles", 0.0, reported("speed [rad/s]", -1.0, 2.0, **LATE)) is False

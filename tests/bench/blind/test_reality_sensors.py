@@ -56,7 +56,7 @@ def test_readings_come_in_steps_and_at_the_sensors_rate():
     assert np.unique(np.mod(rows, 0.25)).tolist() == [0.0]
 
 
-def test_a_pose_is_told_as_a_quaternion():
+def test_a_pose_is_given_as_a_quaternion():
     spec = Sensor(noise=(0.0, 0.0), resolution=(0.0, 0.0), rate=1000)
     _, row = read("/bar/pose", spec, np.array([1.0, 2, 3, 0, 0, np.pi / 2]), steps=1)[0]
     assert row == pytest.approx([1, 2, 3, 0, 0, np.sqrt(0.5), np.sqrt(0.5)])

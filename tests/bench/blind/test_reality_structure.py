@@ -178,13 +178,13 @@ def test_a_drive_is_late_by_its_lag_where_others_are_not():
         command = np.full(2, 3.0 * time)
         held.append(drive.deliver(command))
         drive.advance(command, MS)
-    late, sound = np.array(held)[-1]
-    assert sound == 3.0 * times[-1]
+    late, healthy = np.array(held)[-1]
+    assert healthy == 3.0 * times[-1]
     # A command that is held for 1 ms is late by half of it in the mean.
     assert late == pytest.approx(3.0 * (times[-1] - lag - 0.5 * MS), rel=1e-3)
 
 
-def test_a_drive_begins_with_what_it_was_told_first_and_follows_without_overshoot():
+def test_a_drive_begins_with_what_was_commanded_first_and_follows_without_overshoot():
     drive = SlowDrive(np.array([0.003]))
     assert drive.deliver(np.array([2.0])) == 2.0
     drive.advance(np.array([2.0]), MS)
@@ -197,7 +197,7 @@ def test_a_drive_begins_with_what_it_was_told_first_and_follows_without_overshoo
     assert torques[-1] == pytest.approx(5.0, abs=1e-4)
 
 
-def test_a_mode_keeps_its_energy_and_its_period_and_loses_what_it_is_told_to():
+def test_a_mode_keeps_its_energy_and_its_period_and_loses_what_it_is_to():
     """q̈ = −ω²·q has q̇² + ω²·q² for ever; with loss q̇ decays by exp(−loss·t/2)."""
     omega = 2.0 * np.pi
     place, speed = np.ones(1), np.zeros(1)
@@ -217,7 +217,7 @@ def test_moments_are_those_of_vector_products():
     assert turned(rate, arms) == pytest.approx(np.cross(rate, arms))
 
 
-def test_limits_of_drives_and_clocks_are_no_less_than_what_sound_ones_do(eight):
+def test_limits_of_drives_and_clocks_are_no_less_than_what_healthy_ones_do(eight):
     """A period of the commands, and the 25 ppm of quartz, however noiseless readings are."""
     moving = [
         scene(LEVEL.repeat(8, axis=0), body=(900.0 * np.sin(9.0 * k), 0, 0))._replace(

@@ -36,7 +36,7 @@ def test_what_is_unknown_or_consistent_misleads_nobody():
     assert counts(tie, {"verdict": "consistent", "findings": []})[1] == [False] * 4
 
 
-def test_a_tie_without_an_experiment_is_told_and_not_counted():
+def test_a_tie_without_an_experiment_is_reported_and_not_counted():
     case = SeparationCase(ITEM, reported("pulley_friction", "winch_coulomb_friction"), (), None)
     table = separating_table([case], "ab" * 32, 7)
     assert "1 are tied in what is found first; for 0 an experiment" in table

@@ -23,7 +23,7 @@ def run(surge=0.0, sway=0.0, heave=0.0, roll=0.0, **more):
     return found | {"tensions": [0.2, 9.0], "within": 1.0, "failure": ""} | more
 
 
-def test_causes_are_told_by_the_largest_gain_and_the_range_that_is_left():
+def test_causes_are_stated_by_the_largest_gain_and_the_range_that_is_left():
     found = {
         "without the governor": run(9.0, 6.0, 2.0),
         "ideal sensors": run(8.9, 6.1, 2.0),
@@ -34,7 +34,7 @@ def test_causes_are_told_by_the_largest_gain_and_the_range_that_is_left():
     assert "errors are 0.01 to 0.04 mm with" in causes_said(found)
 
 
-def test_the_calm_sea_is_told_beside_the_figures_of_the_thesis():
+def test_the_calm_sea_is_stated_beside_the_figures_of_the_thesis():
     found = {
         STEPS_OF_SWAY[0]: run(0.0, 0.208, 0.107),
         STEPS_OF_SWAY[1]: run(0.0, 0.0416, 0.0535, 2.0),
@@ -47,7 +47,7 @@ def test_the_calm_sea_is_told_beside_the_figures_of_the_thesis():
     assert "begins with 68 mrad" in said
 
 
-def test_what_is_planned_and_what_is_kept_are_told_as_shares_of_the_least():
+def test_what_is_planned_and_what_is_kept_are_stated_as_shares_of_the_least():
     found = {run_: run(4.0, 3.3) for run_ in DEEP_PLANS}
     found |= {plan: [4e-3, 3e-3, *4 * [0.0]] for plan in DEEP_PLANS.values()}
     assert "has 1.00 to 1.10 times the least error" in deep_said(found)
@@ -62,7 +62,7 @@ def test_what_is_planned_and_what_is_kept_are_told_as_shares_of_the_least():
     assert said.endswith("one is in 2 seeds, for 2 ms at most.")
 
 
-def test_robustness_is_told_by_time_share_and_difference():
+def test_robustness_is_stated_by_time_share_and_difference():
     assert "first time after 1 s." in touched_said({"worst case": [0.9] * 5 + [0.29, 0.8]})
     assert "requirement for 12% of" in late_said({"poses 5 ms late": run(within=0.88)})
     found = {
@@ -74,7 +74,7 @@ def test_robustness_is_told_by_time_share_and_difference():
     assert corrected_said(found).startswith(said)
 
 
-def test_feed_forward_is_told_for_each_of_its_steps():
+def test_feed_forward_is_stated_for_each_of_its_steps():
     found = {name: run(heave=0.5) for name in wound()}
     for name, heave in (("", 0.4), (", fed forward", 0.03), (", and stretch", 0.012)):
         found[f"force controllers at 200 rad/s{name}"] = run(heave=heave, slack=heave / 100)
@@ -85,7 +85,7 @@ def test_feed_forward_is_told_for_each_of_its_steps():
     assert "from 0.20 to 0.00 N at 200 rad/s" in said
 
 
-def test_payloads_are_told_with_and_without():
+def test_payloads_are_stated_with_and_without():
     fixed, swinging = "0.8 kg taken up at 50 s", "0.4 kg swinging 0.3 m below"
     found = {fixed: run(heave=0.3), swinging: run(2.0, heave=0.7, not_met=0.04)}
     found[f"{fixed}, estimated from its heave"] = run(heave=0.1)

@@ -45,8 +45,8 @@ from bench.results.result_work import work_off
 from bench.results.tracking import Case, follow, track
 from cspm_control.design.gains import design_motion_gains
 from cspm_model.parameters import nominal_parameters
+from cspm_msgs_py.control_spec.distribution import TensionDistribution
 from cspm_msgs_py.errors import InputError
-from cspm_msgs_py.scenario import TensionDistribution
 from cspm_run.recorded_run import run
 
 pytestmark = pytest.mark.compiled
@@ -238,7 +238,7 @@ def test_an_error_that_nobody_can_avoid_is_where_no_tensions_are_left():
     assert 1e-3 < errors[0] < errors[1]
 
 
-def test_what_the_default_distribution_reaches_is_told_beside_the_table():
+def test_what_the_default_distribution_reaches_is_stated_beside_the_table():
     rows = [[f"`{name}`", *"123456", "78"] for name in ("qp", "analytic_centre")]
     rows[1][1:4] = "100 %", "90 %", "5e-7"
     assert distribution_block(rows).endswith(

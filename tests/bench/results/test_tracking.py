@@ -26,7 +26,7 @@ def test_a_load_is_taken_up_and_set_down_in_mid_run():
     assert both[-1, 2] > taken[-1, 2]
 
 
-def test_controllers_may_be_told_of_another_friction_than_the_plant_has():
+def test_controllers_may_be_given_another_friction_than_the_plant_has():
     plain = Case("worst_case", ("duration=0.3", AHEAD), rubbing(1.2))
     found = [
         replace(plain, reported=reported).run() for reported in (None, rubbing(1.2), rubbing(1.0))

@@ -70,7 +70,7 @@ def found(case, **moved):
 
 
 def test_a_threshold_that_is_not_read_needs_no_diagnosis():
-    own = dict(outcomes(found("rig", to_3={"refused": "why"}), "rig"))
+    own = dict(outcomes(found("friction", to_3={"refused": "why"}), "friction"))
     assert own[Move("tie_sigma", 1.0)] == "nothing"
     assert own[Move("tie_sigma", 3.0)] == "refused"
     assert own[Move("holdout_sigma", 1.5)] == "not read"
@@ -85,25 +85,27 @@ def test_what_is_kept_is_not_diagnosed_again(tmp_path, monkeypatch):
         return {"data": DATA}
 
     monkeypatch.setattr(sensitivity, "diagnosed", diagnosed)
-    task = Task("rig", Move("tie_sigma", 3.0))
+    task = Task("friction", Move("tie_sigma", 3.0))
     first = kept(task, str(tmp_path), "code")
     assert kept(task, str(tmp_path), "code") == first == {"data": DATA}
     assert len(calls) == 1
     kept(task, str(tmp_path), "other code")
     assert len(calls) == 2
-    (place,) = (tmp_path / "code").glob("rig-*/*")
+    (place,) = (tmp_path / "code").glob("friction-*/*")
     assert json.loads(place.read_text()) == first
 
 
 def test_the_page_lists_what_changes_nothing_and_what_is_not_read():
-    rig = next(case for case in SET if case.name == "rig")
+    one = next(case for case in SET if case.name == "friction")
     worse = {"data": {**DATA, "verdict": "unknown"}}
-    same = {"rig": dict(outcomes(found("rig"), "rig"))}
-    page = sensitivity_page([rig], same)
+    same = {"friction": dict(outcomes(found("friction"), "friction"))}
+    page = sensitivity_page([one], same)
     silent, _, unread = page.partition("Not read on this set: ")
     assert "`tie_sigma`" in silent
     assert "`holdout_sigma`" in unread.splitlines()[0]
-    other = sensitivity_page([rig], {"rig": dict(outcomes(found("rig", to_3=worse), "rig"))})
+    other = sensitivity_page(
+        [one], {"friction": dict(outcomes(found("friction", to_3=worse), "friction"))}
+    )
     assert "| `tie_sigma` | 2 | 3 | verdict: unknown |" in other
     assert "| `tie_sigma` | 2 | 1 |" not in other
     assert "| `tie_sigma`" not in page
@@ -112,6 +114,6 @@ def test_the_page_lists_what_changes_nothing_and_what_is_not_read():
 
 def test_the_set_has_fixed_seeds_and_names_of_its_own():
     assert len({case.name for case in SET}) == len({case.seed for case in SET}) == len(SET)
-    assert all(case.duration <= 24.0 for case in SET)
+    assert all(case.duration <= 15.0 for case in SET)
     assert replace(SET[0], seed=1).key != SET[0].key
     assert SET[0].key.startswith(f"{SET[0].name}-")

@@ -9,8 +9,9 @@ import ast
 from pathlib import Path
 
 ROOT = Path(__file__).resolve().parents[2]
-EXAMPLES, PAGE = ROOT / "examples", ROOT / "docs" / "examples.md"
-# In the order in which a newcomer needs them; `driver.py` has its own page, docs/drivers.md.
+EXAMPLES, PAGE = ROOT / "examples", ROOT / "docs" / "reference" / "examples.md"
+# In the order in which a newcomer needs them; `driver.py` has its own page,
+# docs/how-to/bring-hardware.md.
 ORDER = (
     *("first_run", "find_friction", "own_controller", "own_reference", "own_effect"),
     *("compare_recordings", "identify_winch", "sweep_gain", "read_into_pandas"),
@@ -19,7 +20,8 @@ ORDER = (
 _HEAD = """\
 # Examples
 
-Twelve scripts to copy. Each is a file of [`examples/`](../examples), runs as it stands, and writes
+Twelve scripts to copy. Each is a file of [`examples/`](../../examples), runs as it stands, and
+writes
 into the folder in which it is started. `import cspm` is all that they need; what a function takes
 and returns is in its docstring, `help(cspm.simulate)`. All numbers are in SI units and radians, z
 points down.
@@ -44,7 +46,7 @@ def _section(name: str) -> str:
 
 def _file(title: str, name: str, language: str) -> str:
     text = (EXAMPLES / name).read_text(encoding="utf-8")
-    return f"## {title}\n\n[`examples/{name}`](../examples/{name})\n\n```{language}\n{text}```\n"
+    return f"## {title}\n\n[`examples/{name}`](../../examples/{name})\n\n```{language}\n{text}```\n"
 
 
 if __name__ == "__main__":

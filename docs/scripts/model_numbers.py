@@ -1,4 +1,4 @@
-"""The numbers quoted in `docs/model.md`, computed from the thesis's test-bed by the project's code.
+"""The numbers quoted in `docs/explanation/model.md`, from the thesis's test-bed by this code.
 
 Run `python docs/scripts/model_numbers.py`; the page holds what it writes, as a test checks.
 """

@@ -1,7 +1,7 @@
 """The energy balance of the machine with free winches, and the share that winding cable takes.
 
 Run `python docs/scripts/winding_energy.py`. It simulates the thesis's machine under torques that
-swing about those that hold it, and adds up all works and energies; see `docs/model.md`.
+swing about those that hold it, and adds up all works and energies; see `docs/explanation/model.md`.
 """
 
 from __future__ import annotations

@@ -24,6 +24,7 @@ NODES = {
     "motion_controller",
     "tension_distribution",
     "force_controller",
+    "target_tracker",
     "recorder",
     "player",
 }
@@ -130,10 +131,10 @@ def test_a_node_of_the_installation_reads_its_parameters(installed, tmp_path, na
     """Started as `ros2 run` and `ros2 launch` do: by its path, with ROS arguments."""
     pytest.importorskip("rclpy", reason="ROS 2 is not installed")
     prefix, environment = installed
-    told = tmp_path / "told.yaml"
-    told.write_text("/**: {ros__parameters: {scenario: nowhere, pace: lockstep, plant: sim}}\n")
+    reported = tmp_path / "reported.yaml"
+    reported.write_text("/**: {ros__parameters: {scenario: nowhere, pace: lockstep, plant: sim}}\n")
     done = subprocess.run(
-        [prefix / "lib" / "cspm" / name, "--ros-args", "--params-file", told],
+        [prefix / "lib" / "cspm" / name, "--ros-args", "--params-file", reported],
         env=environment | {"ROS_AUTOMATIC_DISCOVERY_RANGE": "LOCALHOST", "ROS_DOMAIN_ID": "84"},
         cwd=tmp_path,
         capture_output=True,
@@ -224,14 +225,14 @@ def test_the_launch_files_parameters_are_those_that_nodes_declare():
 
 
 @pytest.mark.parametrize(
-    ("plant", "nodes"),
+    ("plant", "target", "left_out"),
     [
-        ("sim", NODES - {"player"}),
-        ("mujoco", NODES - {"player"}),
-        ("external", NODES - {"plant", "player"}),
+        ("sim", "prescribed", {"target_tracker"}),
+        ("mujoco", "measured", set()),
+        ("external", "external", {"plant"}),
     ],
 )
-def test_the_launch_file_starts_the_nodes_that_its_arguments_ask_for(plant, nodes):
+def test_the_launch_file_starts_the_nodes_that_its_arguments_ask_for(plant, target, left_out):
     """Runs on a native ROS 2 only: neither `launch` nor `ros2 run` is on the package index."""
     launch = pytest.importorskip("launch.actions", reason="`launch` comes with a native ROS 2 only")
     launch_ros = pytest.importorskip("launch_ros.actions")
@@ -248,6 +249,7 @@ def test_the_launch_file_starts_the_nodes_that_its_arguments_ask_for(plant, node
         "scenario": "calm",
         "pace": "lockstep",
         "plant": plant,
+        "target": target,
         "record": "/tmp/bag",
         "patience": "60",
     }
@@ -255,4 +257,4 @@ def test_the_launch_file_starts_the_nodes_that_its_arguments_ask_for(plant, node
     context.launch_configurations.update(wanted)
     started = module.nodes(context)
     assert all(isinstance(node, launch_ros.Node) for node in started)
-    assert {node.node_executable for node in started} == nodes
+    assert {node.node_executable for node in started} == NODES - left_out - {"player"}

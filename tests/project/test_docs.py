@@ -12,6 +12,10 @@ from cspm_msgs_py.testbed import parse_testbed
 from cspm_sim.plant import Plant
 
 DOCS = Path(__file__).resolve().parents[2] / "docs"
+FILES = "\n".join(
+    (DOCS / "reference" / f"{name}-file.md").read_text(encoding="utf-8")
+    for name in ("testbed", "scenario")
+)
 EXAMPLE = re.compile(r"<!-- (testbed|scenario): (\S+) -->\n```yaml\n(.*?)```", re.DOTALL)
 NUMBERS = re.compile(r"<!-- numbers: (\w+) -->\n.*?<!-- end -->", re.DOTALL)
 
@@ -22,8 +26,7 @@ def figure_scripts(monkeypatch: pytest.MonkeyPatch) -> None:
 
 
 def examples(kind: str) -> list[tuple[str, str]]:
-    page = (DOCS / "files.md").read_text(encoding="utf-8")
-    return [(name, text) for found, name, text in EXAMPLE.findall(page) if found == kind]
+    return [(name, text) for found, name, text in EXAMPLE.findall(FILES) if found == kind]
 
 
 def numbers_in(text: str) -> dict[str, str]:
@@ -37,7 +40,7 @@ def test_there_are_examples_of_both_files() -> None:
 
 @pytest.mark.parametrize(("name", "text"), examples("testbed"))
 def test_example_testbed_is_accepted_and_its_plant_runs(name: str, text: str) -> None:
-    testbed = parse_testbed(text, "docs/files.md").testbed
+    testbed = parse_testbed(text, "docs/reference/testbed-file.md").testbed
     assert testbed.name == name
     pose = [0.0, 0.0, 1.0, 0.0, 0.0, 0.0] if testbed.bar else None
     plant = Plant(testbed, Motion.still(np.zeros(6)), 1_000_000, bar_pose=pose)
@@ -48,21 +51,23 @@ def test_example_testbed_is_accepted_and_its_plant_runs(name: str, text: str) ->
 
 @pytest.mark.parametrize(("name", "text"), examples("scenario"))
 def test_example_scenario_is_accepted(name: str, text: str) -> None:
-    assert parse_scenario(text, "docs/files.md").name == name
+    assert parse_scenario(text, "docs/reference/testbed-file.md").name == name
 
 
 def test_provenance_of_the_example_is_found() -> None:
     text = dict(examples("testbed"))["two_cable_bar"]
-    assert parse_testbed(text, "docs/files.md").provenance["bar.mass"].provenance == "measured"
+    assert (
+        parse_testbed(text, "docs/reference/testbed-file.md").provenance["bar.mass"].provenance
+        == "measured"
+    )
 
 
 def test_every_key_of_both_files_is_documented() -> None:
     from cspm_msgs_py.scenario import Scenario
     from cspm_msgs_py.testbed import Testbed
 
-    page = (DOCS / "files.md").read_text(encoding="utf-8")
     keys = _keys(Testbed) | _keys(Scenario)
-    missing = sorted(key for key in keys if f"`{key}`" not in page)
+    missing = sorted(key for key in keys if f"`{key}`" not in FILES)
     assert not missing
 
 
@@ -87,7 +92,7 @@ def test_numbers_of_the_model_page_are_those_that_the_code_gives() -> None:
     import model_numbers
     import winding_energy
 
-    page = numbers_in((DOCS / "model.md").read_text(encoding="utf-8"))
+    page = numbers_in((DOCS / "explanation" / "model.md").read_text(encoding="utf-8"))
     found = numbers_in(model_numbers.report() + winding_energy.report() + "\n<!-- end -->\n")
     assert sorted(found) == ["energy", "law", "step", "winding"]
     assert page == found, "copy what docs/scripts/model_numbers.py, winding_energy.py write"

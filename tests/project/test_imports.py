@@ -40,7 +40,13 @@ ROS = {
 }
 
 # Front-end modules that are made for ROS.
-FOR_ROS = {"cspm.commands.check_drivers_command", "cspm.commands.replay_command"}
+FOR_ROS = {
+    "cspm.commands.check_drivers_command",
+    "cspm.commands.replay_command",
+    "cspm.drivers",
+    "cspm.graph",
+    "cspm.replaying",
+}
 
 
 def imported(text):

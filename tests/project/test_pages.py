@@ -16,7 +16,12 @@ import cspm.cli.app
 ROOT = Path(__file__).resolve().parents[2]
 PAGES = sorted(
     path.relative_to(ROOT).as_posix()
-    for path in [*ROOT.glob("*.md"), *(ROOT / "docs").rglob("*.md"), *ROOT.glob("examples/*.md")]
+    for path in [
+        *ROOT.glob("*.md"),
+        *(ROOT / "docs").rglob("*.md"),
+        *(ROOT / "results").rglob("*.md"),
+        *ROOT.glob("examples/*.md"),
+    ]
 )
 # Names what earlier versions had.
 OF_THE_PAST = {"CHANGELOG.md"}
@@ -26,6 +31,8 @@ FENCED = re.compile(r"^```.*?^```", re.MULTILINE | re.DOTALL)
 INLINE = re.compile(r"`([^`\n]+)`")
 MODULE = re.compile(r"\bpython3? -m ((?:cspm|bench)[\w.]*)")
 SCRIPT = re.compile(r"\bpython3? ([\w./]+\.py)\b")
+# A file that the page has its reader write.
+SAVED = re.compile(r"<!-- file: (\S+) -->")
 TARGET = re.compile(r"^(?:`|\s*)make ([a-z][a-z-]*)", re.MULTILINE)
 TARGETS = re.compile(r"^([a-z][a-z-]*):", re.MULTILINE)
 COMMAND = re.compile(r"^[`\s]*(?:\$ )?cspm ([a-z][^#\n|&>;]*)", re.MULTILINE)
@@ -111,7 +118,8 @@ def mistakes(text: str) -> list[str]:
     targets = set(TARGETS.findall((ROOT / "Makefile").read_text(encoding="utf-8")))
     for code in code_of(text):
         found += [name for name in MODULE.findall(code) if not exists(name)]
-        found += [name for name in SCRIPT.findall(code) if not (ROOT / name).is_file()]
+        scripts = [name for name in SCRIPT.findall(code) if name not in SAVED.findall(text)]
+        found += [name for name in scripts if not (ROOT / name).is_file()]
         found += [f"make {name}" for name in TARGET.findall(code) if name not in targets]
         found += [each for line in COMMAND.findall(code) for each in command_mistakes(line)]
         if DOTTED.match(code) and not exists(code):
@@ -132,8 +140,8 @@ def test_what_a_page_names_exists(page: str) -> None:
 
 
 def test_the_check_sees_a_dead_link() -> None:
-    text = "[a](docs/model.md#no-such) [b](docs/nothing.md) [c](#here)\n# Here\n"
-    assert dead_links("README.md", text) == ["docs/model.md#no-such", "docs/nothing.md"]
+    text = "[a](docs/explanation/model.md#no-such) [b](docs/nothing.md) [c](#here)\n# Here\n"
+    assert dead_links("README.md", text) == ["docs/explanation/model.md#no-such", "docs/nothing.md"]
 
 
 def test_the_check_sees_what_does_not_exist() -> None:

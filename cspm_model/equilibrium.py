@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from typing import NamedTuple
 
 import numpy as np
@@ -12,6 +13,7 @@ from cspm_model.kernels import bar as bar_kernel
 from cspm_model.kernels.cable import OFFSET_LENGTH, elastic_tension, law_scale
 from cspm_model.kernels.machine import PlantParameters
 from cspm_model.kinematics import geometry, rotation
+from cspm_model.spanned_axes import gyration_radius, spanned_axes, structures_at
 from cspm_msgs_py.errors import ConvergenceError
 
 Array = NDArray[np.float64]
@@ -19,6 +21,8 @@ Array = NDArray[np.float64]
 WRENCH_TOLERANCE = 1e-9  # of the weight
 RESIDUAL_TOLERANCE = 1e-6
 RANK_TOLERANCE = 1e-9
+SEARCH_TOLERANCE = 1e-12
+ROLL = 3
 
 
 class Equilibrium(NamedTuple):
@@ -56,34 +60,96 @@ def find_equilibrium(
     """Return the state of rest at `bar_pose`, tensions least in norm within `limits` (n, 2) [N].
 
     Where the cables cannot balance every moment (the thesis's machine, in roll), the roll is found
-    at which gravity needs none. `load` is a wrench on the bar beside gravity's, (6,), world axes.
+    at which gravity needs none; of a machine whose cables give still less, all that they do not
+    give. `load` is a wrench on the bar beside gravity's, (6,), world axes.
 
     Raises:
         ConvergenceError: no tensions within the limits hold the bar at rest near this pose.
     """
     pose = np.array(bar_pose, dtype=float)
-
-    def imbalance(roll: float) -> float:
-        pose[3] = roll
-        structure = -geometry(parameters.cables, pose, frame_pose).bar.T
-        direction = np.linalg.svd(structure)[0][:, -1]
-        return float(direction @ (gravity_wrench(parameters, pose) + load) * np.sign(direction[3]))
-
-    start = float(pose[3])
     if not _balanced(parameters, pose, frame_pose, load):
-        found = scipy.optimize.root_scalar(imbalance, x0=start, x1=start + 1e-3, xtol=1e-14)
-        pose[3] = found.root if found.converged else start
+        structures = structures_at(parameters, pose[None], np.array([frame_pose], dtype=float))
+        free = [axis for axis in range(6) if axis not in spanned_axes(structures)]
+        if free in ([], [ROLL]):
+            pose[ROLL] = _balanced_roll(parameters, pose, frame_pose, load)
+        else:
+            pose = _balanced_pose(parameters, pose, frame_pose, limits, load, free)
     tensions = _hold(parameters, pose, frame_pose, limits, load)
     lengths = geometry(parameters.cables, pose, frame_pose).lengths
     return Equilibrium(pose, tensions, unstretched_lengths(parameters, lengths, tensions))
 
 
+def _balanced_roll(
+    parameters: PlantParameters, bar_pose: Array, frame_pose: ArrayLike, load: Array
+) -> float:
+    """Return the roll at which gravity and load need no moment that the cables do not give."""
+    pose, start = bar_pose.copy(), float(bar_pose[ROLL])
+
+    def imbalance(roll: float) -> float:
+        pose[ROLL] = roll
+        structure = -geometry(parameters.cables, pose, frame_pose).bar.T
+        direction = np.linalg.svd(structure)[0][:, -1]
+        return float(direction @ (gravity_wrench(parameters, pose) + load) * np.sign(direction[3]))
+
+    found = scipy.optimize.root_scalar(imbalance, x0=start, x1=start + 1e-3, xtol=1e-14)
+    return float(found.root) if found.converged else start
+
+
+def _balanced_pose(
+    parameters: PlantParameters,
+    bar_pose: Array,
+    frame_pose: ArrayLike,
+    limits: Array,
+    load: Array,
+    free: Sequence[int],
+) -> Array:
+    """Return the pose near `bar_pose`, changed in its `free` coordinates, that tensions balance.
+
+    Tensions and coordinates are found together, by least squares of what is missing of the wrench.
+    """
+    count = len(free)
+    size = np.linalg.norm(gravity_wrench(parameters, bar_pose) + load) or 1.0
+    lever = gyration_radius(parameters)
+    scale = np.array([1.0] * 3 + [1.0 / lever] * 3) / size
+
+    def pose_of(unknown: Array) -> Array:
+        pose = bar_pose.copy()
+        pose[list(free)] = unknown[:count]
+        return pose
+
+    def missing(unknown: Array) -> Array:
+        pose = pose_of(unknown)
+        structure = -geometry(parameters.cables, pose, frame_pose).bar.T
+        wrench = gravity_wrench(parameters, pose) + load
+        return np.asarray(scale * (structure @ (size * unknown[count:]) + wrench))
+
+    low = np.concatenate([np.full(count, -np.inf), limits[:, 0] / size])
+    high = np.concatenate([np.full(count, np.inf), limits[:, 1] / size])
+    structure = -geometry(parameters.cables, bar_pose, frame_pose).bar.T
+    tensions = least_tensions(structure, -gravity_wrench(parameters, bar_pose) - load, limits)
+    start = np.concatenate([bar_pose[list(free)], tensions / size])
+    inner = np.clip(start, low + SEARCH_TOLERANCE, high - SEARCH_TOLERANCE)
+    found = scipy.optimize.least_squares(
+        missing, inner, bounds=(low, high), ftol=None, xtol=SEARCH_TOLERANCE, gtol=SEARCH_TOLERANCE
+    )
+    return pose_of(found.x)
+
+
 def unstretched_lengths(parameters: PlantParameters, lengths: Array, tensions: Array) -> Array:
-    """Return l0 (n,) [m] at which cables stretched to `lengths` carry `tensions` at rest."""
+    """Return l0 (n,) [m] at which cables stretched to `lengths` carry `tensions` at rest.
+
+    Raises:
+        ConvergenceError: a cable would be stretched to more than twice its length.
+    """
     out = np.empty(len(lengths))
     for i, (length, tension) in enumerate(zip(lengths, tensions, strict=True)):
         bounds = (0.5 * length, length)
         args = (length, tension, parameters, i)
+        if tension > 0 and _excess_tension(bounds[0], *args) < 0.0:
+            raise ConvergenceError(
+                f"cable {i}: {tension:.4g} N stretch it to more than twice its length, allowed: a"
+                " stiffer cable (youngs_modulus is in Pa, diameter in m)"
+            )
         out[i] = (
             scipy.optimize.brentq(_excess_tension, *bounds, args, xtol=1e-15)
             if tension > 0

@@ -14,14 +14,18 @@ from pathlib import Path
 from numba import config
 
 _KERNELS = Path(__file__).parent / "kernels"
-_FOLDERS = (_KERNELS, Path(__file__).parents[1] / "cspm_sim" / "kernels")
+_PACKAGES = ("cspm_model", "cspm_sim", "cspm_control", "cspm_run")
+_MARK = b"numba"
 
 
 def kernel_digest(*folders: Path) -> str:
-    """Return a digest of the content of all Python files in `folders`."""
+    """Return a digest of the content of all Python files below `folders` that use numba."""
     digest = hashlib.sha256()
-    for path in (path for folder in folders for path in sorted(folder.glob("*.py"))):
-        digest.update(path.name.encode() + b"\0" + path.read_bytes() + b"\0")
+    for folder in folders:
+        for path in sorted(folder.rglob("*.py")):
+            content = path.read_bytes()
+            if _MARK in content:
+                digest.update(path.name.encode() + b"\0" + content + b"\0")
     return digest.hexdigest()[:16]
 
 
@@ -32,4 +36,5 @@ def use_kernel_cache() -> None:
     written numba chooses a place of its own.
     """
     base = Path(os.environ.get("NUMBA_CACHE_DIR") or _KERNELS / "__pycache__")
-    config.CACHE_DIR = str(base / f"kernels-{kernel_digest(*_FOLDERS)}")
+    folders = [Path(__file__).parents[1] / package for package in _PACKAGES]
+    config.CACHE_DIR = str(base / f"kernels-{kernel_digest(*folders)}")

@@ -26,7 +26,7 @@ from cspm_model.kernels.machine import BAR_STATES, PlantParameters
 from cspm_model.kinematics import RANK_TOLERANCE, euler_rates, geometry, rotation
 from cspm_msgs_py.dofs import DOFS
 from cspm_msgs_py.errors import InputError
-from cspm_msgs_py.scenario import ORIGIN
+from cspm_msgs_py.scenario_keys.bodies import ORIGIN
 from cspm_msgs_py.testbed import Testbed
 
 Array = NDArray[np.float64]

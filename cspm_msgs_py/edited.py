@@ -65,7 +65,10 @@ def with_effect(file: TestbedFile, entry: EffectEntry) -> TestbedFile:
     """
     content: dict[str, Any] = {"effect": entry.effect}
     content |= {"elements": [*entry.elements]} if entry.elements else {}
-    content["parameters"] = plain(entry.parameters)
+    table = entry.table
+    content["parameters"] = plain(
+        entry.numbers if table is None else table.model_dump(exclude_defaults=True)
+    )
 
     def add(root: Any) -> None:  # noqa: ANN401 - any YAML
         entries = _own(root, "effects", set())

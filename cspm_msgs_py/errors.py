@@ -13,6 +13,16 @@ class InputError(CspmError):
     exit_code = 2
 
 
+class DamageError(InputError):
+    """A recording is damaged: the line says which file and where.
+
+    Attributes:
+        remedy: what restores the rest.
+    """
+
+    remedy = "`cspm recover` leaves the damaged part out"
+
+
 class DivergenceError(CspmError):
     """The simulation left the range in which its equations hold."""
 

@@ -9,6 +9,7 @@ from cspm_msgs_py.schedule import (
     FORCE_CONTROLLER,
     MOTION_CONTROLLER,
     PLANT,
+    TARGET_TRACKER,
     TENSION_DISTRIBUTION,
     TORQUE_COMMAND,
     WAVE_TRAJECTORY,
@@ -19,8 +20,9 @@ from cspm_msgs_py.topics import DIAGNOSTICS
 
 RECORDER = "recorder"
 PLAYER = "player"
+# Of every closed loop; where the target is measured its tracker stands beside them.
 STAGES = (WAVE_TRAJECTORY, MOTION_CONTROLLER, TENSION_DISTRIBUTION, FORCE_CONTROLLER)
-NODES = (PLANT, *STAGES, RECORDER, PLAYER)
+NODES = (PLANT, *STAGES, TARGET_TRACKER, RECORDER, PLAYER)
 
 
 @dataclass(frozen=True)
@@ -39,7 +41,9 @@ def graph_of(schedule: Schedule, nodes: Sequence[str]) -> dict[str, Edges]:
     """
     present = set(nodes)
     source = PLAYER if PLAYER in present else PLANT
-    senders = {name: source for name in schedule.topics}
+    # A player plays what drivers sent as well; the plant does not speak for them.
+    foreign = schedule.foreign if source == PLANT else ()
+    senders = {name: source for name in schedule.topics if name not in foreign}
     readers: dict[str, list[str]] = {name: [] for name in schedule.topics}
     for node, plan in schedule.nodes.items():
         if source == PLANT or node in present:
@@ -52,7 +56,7 @@ def graph_of(schedule: Schedule, nodes: Sequence[str]) -> dict[str, Edges]:
         readers[TORQUE_COMMAND].append(PLANT)
     found = {
         topic: Edges(
-            tuple({senders[topic]} & present),
+            tuple({senders[topic]} & present) if topic in senders else (),
             tuple(node for node in (*readers[topic], RECORDER) if node in present),
         )
         for topic in schedule.topics
@@ -76,7 +80,8 @@ def followers(schedule: Schedule, nodes: Sequence[str], window: int) -> tuple[st
     topic.
     """
     unread, proven = 0, set()
-    chain = (FORCE_CONTROLLER, TENSION_DISTRIBUTION, MOTION_CONTROLLER, WAVE_TRAJECTORY)
+    reference = TARGET_TRACKER if TARGET_TRACKER in schedule.nodes else WAVE_TRAJECTORY
+    chain = (FORCE_CONTROLLER, TENSION_DISTRIBUTION, MOTION_CONTROLLER, reference)
     for node in chain if MOTION_CONTROLLER in schedule.nodes else chain[:1]:
         plan = schedule.nodes.get(node)
         if plan is not None:

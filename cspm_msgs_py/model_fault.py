@@ -9,6 +9,8 @@ from pydantic import BaseModel, ValidationError
 from pydantic_core import ErrorDetails
 
 Place = tuple[int | str, ...]
+# Tags of values that may be written as a number or as a mapping.
+NUMBER, MAPPING = "(number)", "(mapping)"
 
 # What the file's author may write instead, by pydantic's fault type, in place of its own words.
 ALLOWED = {
@@ -101,7 +103,7 @@ def _spot(model: type[BaseModel], loc: Place) -> _Spot:
     """Follow a fault's place through the model's types; the tags of unions leave no trace."""
     spot = _Spot("", (model,))
     for part in loc:
-        if part == "[key]":
+        if part in ("[key]", NUMBER, MAPPING):
             continue
         chosen = tuple(m for m in _models(spot) if part in _tags(m)) if _is_union(spot) else ()
         spot = _Spot(spot.path, chosen) if chosen else _step(spot, part)

@@ -22,6 +22,14 @@ from pydantic import (
 from typing_extensions import Self
 
 from cspm_msgs_py.dofs import DOFS
+from cspm_msgs_py.scenario_keys.curves import (
+    CircleMotion,
+    HelixMotion,
+    LemniscateMotion,
+    LineMotion,
+    SinesMotion,
+    WaypointsMotion,
+)
 from cspm_msgs_py.yaml_file import StrictModel
 
 Six = tuple[float, float, float, float, float, float]
@@ -182,6 +190,16 @@ class MovesMotion(StrictModel):
 
 
 MotionSpec = Annotated[
-    StillMotion | JonswapMotion | VesselMotion | FileMotion | MovesMotion,
+    StillMotion
+    | JonswapMotion
+    | VesselMotion
+    | FileMotion
+    | MovesMotion
+    | LineMotion
+    | CircleMotion
+    | LemniscateMotion
+    | HelixMotion
+    | SinesMotion
+    | WaypointsMotion,
     Field(discriminator="type"),
 ]

@@ -21,13 +21,14 @@ class Provenance(StrictModel):
 
     `thesis`: published in the thesis; `reconstructed`: chosen so that the published results hold,
     or assumed where nothing fixes it; `fitted`: identified from the recording with SHA-256
-    `recording` and those in `further_recordings`; `measured`, `datasheet`: as the words say.
+    `recording` and those in `further_recordings`; `measured`, `datasheet`, `published`: as the
+    words say, the source in the `note` or at the head of the file.
     `window` is the time [s] of the recording that was used, `further_windows` those of the further
     recordings; `interval` holds the value with 95 % probability, an end that nothing bounds is
     None.
     """
 
-    provenance: Literal["thesis", "reconstructed", "fitted", "measured", "datasheet"]
+    provenance: Literal["thesis", "reconstructed", "fitted", "measured", "datasheet", "published"]
     recording: Sha256 | None = None
     note: str = ""
     further_recordings: tuple[Sha256, ...] = ()

@@ -18,6 +18,7 @@ if TYPE_CHECKING:
 
 SCHEMA_ENCODING = "ros2msg"
 IDL_ENCODING = "ros2idl"
+ROS1_SCHEMA_ENCODING = "ros1msg"
 MESSAGE_ENCODING = "cdr"
 NO_FIELDS = "structure_needs_at_least_one_member"
 """Name of the byte that CDR has in place of a message without fields."""
@@ -73,17 +74,24 @@ def serialize(message: Any) -> bytes:  # noqa: ANN401 - classes are generated at
     return bytes(typestore().serialize_cdr(message, message.__msgtype__))
 
 
-def deserialize(payload: bytes, ros_type: str) -> Any:  # noqa: ANN401 - see message_class
+def deserialize(payload: bytes, ros_type: str, store: Typestore | None = None) -> Any:  # noqa: ANN401 - see message_class
     """Return the message that CDR bytes hold.
+
+    Args:
+        payload: the bytes.
+        ros_type: `package/msg/Type`.
+        store: classes to read it by, those of ROS 2 Jazzy unless given.
 
     Raises:
         InputError: the type is unknown or the bytes do not hold it.
     """
-    message_class(ros_type)
+    if store is None:
+        message_class(ros_type)
+        store = typestore()
     reason = ""
     for extra in _EXTRA_BYTES:
         try:
-            return typestore().deserialize_cdr(payload[: len(payload) - extra], ros_type)
+            return store.deserialize_cdr(payload[: len(payload) - extra], ros_type)
         except Exception as err:
             reason = reason or type(err).__name__
     raise InputError(f"{len(payload)} bytes that are no {ros_type} ({reason})")
@@ -95,30 +103,38 @@ def check_definition(ros_type: str, encoding: str, text: str) -> None:
     Raises:
         InputError: another schema encoding, an unknown type, or other fields.
     """
-    from rosbags.typesys import get_types_from_idl, get_types_from_msg
-
     message_class(ros_type)
-    try:
-        if encoding == SCHEMA_ENCODING:
-            found = get_types_from_msg(text, ros_type)
-        elif encoding == IDL_ENCODING:
-            found = {}
-            for section in _IDL_SECTION.split(text):
-                found.update(get_types_from_idl(section) if section.strip() else {})
-        else:
-            raise InputError(
-                f"schema of {ros_type} has the encoding {encoding!r}, allowed: {SCHEMA_ENCODING}"
-            )
-    except InputError:
-        raise
-    except Exception:
-        raise InputError(f"schema of {ros_type} is not a message definition") from None
-    if ros_type not in found:
-        raise InputError(f"schema of {ros_type} defines another type")
+    found = definitions_in(ros_type, encoding, text)
     known = typestore().fielddefs
     for name, (_, fields) in found.items():
         if name not in known or _real(known[name][1]) != _real(fields):
             raise InputError(f"schema of {ros_type}: {name} has other fields than in ROS 2 Jazzy")
+
+
+def definitions_in(ros_type: str, encoding: str, text: str) -> dict[str, Any]:
+    """Return the definitions by type that a recorded schema holds.
+
+    Raises:
+        InputError: another schema encoding, no definition, or that of another type.
+    """
+    from rosbags.typesys import get_types_from_idl, get_types_from_msg
+
+    if encoding not in (SCHEMA_ENCODING, ROS1_SCHEMA_ENCODING, IDL_ENCODING):
+        raise InputError(
+            f"schema of {ros_type} has the encoding {encoding!r}, allowed: {SCHEMA_ENCODING}"
+        )
+    try:
+        if encoding == IDL_ENCODING:
+            found: dict[str, Any] = {}
+            for section in _IDL_SECTION.split(text):
+                found.update(get_types_from_idl(section) if section.strip() else {})
+        else:
+            found = dict(get_types_from_msg(text, ros_type))
+    except Exception:
+        raise InputError(f"schema of {ros_type} is not a message definition") from None
+    if ros_type not in found:
+        raise InputError(f"schema of {ros_type} defines another type")
+    return found
 
 
 def _real(fields: Sequence[tuple[str, Any]]) -> list[tuple[str, Any]]:

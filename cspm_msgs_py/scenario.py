@@ -19,18 +19,20 @@ from pydantic import (
 )
 from typing_extensions import Self
 
-from cspm_msgs_py.dofs import ControlledDof, Dof
+from cspm_msgs_py.control_spec.distribution import TensionDistribution
+from cspm_msgs_py.control_spec.force import ForceControl
+from cspm_msgs_py.dofs import CONTROLLED_AXES, DOFS, Dof
 from cspm_msgs_py.errors import InputError
-from cspm_msgs_py.motion_spec import MotionSpec, StillMotion
 from cspm_msgs_py.safety_spec import Safety
+from cspm_msgs_py.scenario_keys.bodies import ORIGIN, Body, Pose, Target
+from cspm_msgs_py.scenario_keys.curves import Sine
+from cspm_msgs_py.scenario_keys.events import CableCut, check_times
+from cspm_msgs_py.scenario_keys.operation import Operation, check_operation
 from cspm_msgs_py.yaml_file import StrictModel, parse_yaml, read_yaml, validate
 
-Pose = tuple[float, float, float, float, float, float]
 Wrench = tuple[float, float, float, float, float, float]
-WrenchWeights = tuple[
-    PositiveFloat, PositiveFloat, PositiveFloat, PositiveFloat, PositiveFloat, PositiveFloat
-]
-ORIGIN: Pose = (0.0, 0.0, 0.0, 0.0, 0.0, 0.0)
+# The operating point of the thesis.
+DESIGN_POSE: Pose = (0.0, 0.0, 2.0, 0.0, 0.0, 0.0)
 
 
 class Rates(StrictModel):
@@ -60,13 +62,6 @@ class Rates(StrictModel):
         return self
 
 
-class Body(StrictModel):
-    """A body with a prescribed motion about a mean pose in world_ned (x y z φ θ ψ; m, rad)."""
-
-    mean_pose: Pose = ORIGIN
-    motion: MotionSpec = StillMotion()
-
-
 class PidGains(StrictModel):
     """Gains of Kp·e + Ki·∫e + Kd·ė, thesis (7-2); per metre or radian."""
 
@@ -75,38 +70,28 @@ class PidGains(StrictModel):
     kd: float
 
 
-class PiGains(StrictModel):
-    """Gains of Kp·(e + ω_i·∫e), thesis (7-4); Kp in N·m/N at the motor shaft, ω_i in rad/s."""
-
-    kp: float
-    integral_frequency: float
-
-
 class MotionControl(StrictModel):
-    """The thesis's controller: crossover [rad/s] per controlled DOF, or the gains themselves.
+    """The thesis's controller, designed by its procedure, for crossovers, or with gains given.
 
-    Gains that are absent are designed at `design_pose` for the crossover frequencies. The
-    derivative term has a pole at `derivative_filter` [rad/s]; integral terms stop at
+    `dofs` are the coordinates to control; absent, all that the cables give along the reference.
+    Gains that are absent are designed at `design_pose`: with the largest bandwidth that the margins
+    of section 7-1 let each loop have, or for the `crossover` frequencies [rad/s] of those DOFs that
+    it names. The derivative term has a pole at `derivative_filter` [rad/s]; integral terms stop at
     `integral_limits` [N, N·m].
     """
 
     law: Literal["pid"] = "pid"
-    crossover: dict[ControlledDof, PositiveFloat] = {
-        "surge": 12.0,
-        "sway": 10.0,
-        "heave": 12.0,
-        "pitch": 12.0,
-        "yaw": 10.0,
-    }
-    design_pose: Pose = (0.0, 0.0, 2.0, 0.0, 0.0, 0.0)
+    dofs: tuple[Dof, ...] | None = None
+    crossover: dict[Dof, PositiveFloat] = {}
+    design_pose: Pose = DESIGN_POSE
     derivative_filter: PositiveFloat = 200.0
     integral_limits: tuple[PositiveFloat, PositiveFloat] = (20.0, 5.0)
-    gains: dict[ControlledDof, PidGains] | None = None
+    gains: dict[Dof, PidGains] | None = None
 
     @property
-    def dofs(self) -> tuple[ControlledDof, ...]:
-        """The controlled DOFs."""
-        return tuple(self.crossover if self.gains is None else self.gains)
+    def controlled(self) -> tuple[Dof, ...]:
+        """The controlled DOFs: those named, with gains, or of the thesis."""
+        return self.dofs or tuple(self.gains or (DOFS[axis] for axis in CONTROLLED_AXES))
 
 
 class Governor(StrictModel):
@@ -131,89 +116,28 @@ class MassAdaptation(StrictModel):
 class ComputedWrenchControl(StrictModel):
     """Inverse dynamics of the bar with an observer of its pose error.
 
-    `bandwidth` [rad/s] is that of the error's dynamics per controlled DOF, `observer_bandwidth`
-    [rad/s] that of the observer. With a `governor` the bar leaves its reference, ahead of time and
-    as little as can be, where no tensions can give it. `known_wrench` [N, N·m] is a constant one on
-    the bar's origin in world_ned, such as wind that was measured. With `mass_adaptation` the bar's
-    mass is estimated from its heave. The force controllers are designed at `design_pose`.
+    `dofs` are the coordinates to control; absent, all that the cables give along the reference.
+    `bandwidth` [rad/s] is that of the error's dynamics per controlled DOF, 20 rad/s where it names
+    none, `observer_bandwidth` [rad/s] that of the observer. With a `governor` the bar leaves its
+    reference, ahead of time and as little as can be, where no tensions can give it. `known_wrench`
+    [N, N·m] is a constant one on the bar's origin in world_ned, such as wind that was measured.
+    With `mass_adaptation` the bar's mass is estimated from its heave. The force controllers are
+    designed at `design_pose`.
     """
 
     law: Literal["computed_wrench"]
-    bandwidth: dict[Dof, PositiveFloat] = {
-        "surge": 20.0,
-        "sway": 20.0,
-        "heave": 20.0,
-        "pitch": 20.0,
-        "yaw": 20.0,
-    }
+    dofs: tuple[Dof, ...] | None = None
+    bandwidth: dict[Dof, PositiveFloat] = {}
     observer_bandwidth: PositiveFloat = 40.0
     governor: Governor | None = None
     known_wrench: Wrench = ORIGIN
     mass_adaptation: MassAdaptation | None = None
-    design_pose: Pose = (0.0, 0.0, 2.0, 0.0, 0.0, 0.0)
+    design_pose: Pose = DESIGN_POSE
 
     @property
-    def dofs(self) -> tuple[Dof, ...]:
-        """The controlled DOFs."""
-        return tuple(self.bandwidth)
-
-
-class LoadCellBias(StrictModel):
-    """Largest bias of a load cell that is corrected [N]."""
-
-    largest: PositiveFloat = 2.0
-
-
-class FrictionFeedforward(StrictModel):
-    """Cable speed [m/s] about which the sign of dry friction turns: tanh(speed/smooth_below)."""
-
-    smooth_below: PositiveFloat = 0.003
-
-
-class WinchFeedforward(StrictModel):
-    """Bandwidth [rad/s] up to which cables are wound by what wanted tensions stretch them."""
-
-    stretch_bandwidth: PositiveFloat | None = None
-
-
-class ForceControl(StrictModel):
-    """Force controllers: closed-loop bandwidth [rad/s] to design for, or the gains per cable.
-
-    With `load_cell_bias` the biases of the load cells are estimated from torques and speeds of the
-    winches, and taken off. With `friction_feedforward` the torque goes ahead of the friction that
-    the test-bed's file describes, with `winch_feedforward` of what the wanted tensions and the
-    references require of the winches.
-    """
-
-    bandwidth: PositiveFloat = 800.0
-    gains: dict[str, PiGains] | None = None
-    load_cell_bias: LoadCellBias | None = None
-    friction_feedforward: FrictionFeedforward | None = None
-    winch_feedforward: WinchFeedforward | None = None
-
-    @property
-    def looks_ahead(self) -> bool:
-        """Whether torques depend on the references."""
-        return bool(self.friction_feedforward or self.winch_feedforward)
-
-
-DistributionMethod = Literal[
-    "pseudo_inverse", "removal", "closed_form", "improved_closed_form", "qp", "analytic_centre"
-]
-
-
-class TensionDistribution(StrictModel):
-    """How a wanted wrench becomes tensions.
-
-    `lower_limit` [N] takes the place of the test-bed's lower tension limits. `preferred_tension`
-    [N] is what the method `qp` stays near. `wrench_weights` say what a missed N or N·m counts, per
-    DOF, where the methods `qp` and `analytic_centre` look for the nearest wrench.
-    """
-
-    method: DistributionMethod = "analytic_centre"
-    lower_limit: NonNegativeFloat | None = None
-    preferred_tension: PositiveFloat = 5.0
-    wrench_weights: WrenchWeights = (1.0, 1.0, 1.0, 6.0, 6.0, 6.0)
+    def controlled(self) -> tuple[Dof, ...]:
+        """The controlled DOFs: those named, or with a bandwidth."""
+        return self.dofs or tuple(self.bandwidth)
 
 
 def law(motion: object) -> object:
@@ -230,26 +154,31 @@ MotionLaw = Annotated[
 
 
 class ClosedLoop(StrictModel):
-    """Motion controller, tension distribution and force controllers (chapter 7)."""
+    """Motion controller, tension distribution and force controllers (chapter 7).
+
+    With `record_internals` each also sends what it computes on the way, for the recording.
+    """
 
     mode: Literal["closed_loop"] = "closed_loop"
     motion: MotionLaw = MotionControl()
     tension_distribution: TensionDistribution = TensionDistribution()
     force: ForceControl = ForceControl()
+    record_internals: bool = False
+
+    @model_validator(mode="after")
+    def _knows_its_cables(self) -> Self:
+        if self.tension_distribution.lost_cable and self.motion.law != "pid":
+            raise ValueError(
+                f"tension_distribution.lost_cable: with law {self.motion.law}, whose observer"
+                " counts on every cable, allowed: with law pid"
+            )
+        return self
 
 
 class LockedWinches(StrictModel):
     """All winches braked at their initial angle; the bar moves by the winch frame alone."""
 
     mode: Literal["locked_winches"] = "locked_winches"
-
-
-class Sine(StrictModel):
-    """amplitude·sin(2π·frequency·t + phase) [as the signal, Hz, rad]."""
-
-    amplitude: float
-    frequency: PositiveFloat
-    phase: float = 0.0
 
 
 class Signal(StrictModel):
@@ -326,10 +255,12 @@ class Scenario(StrictModel):
     rates: Rates = Rates()
     sensors: Literal["testbed", "ideal"] = "testbed"
     winch_frame: Body = Body()
-    target: Body = Body()
+    target: Target = Target()
     bar_offset: Pose = ORIGIN
     control: Control = ClosedLoop()
     safety: Safety = Safety()
+    events: tuple[CableCut, ...] = ()
+    operation: tuple[Operation, ...] = ()
     requirement: Requirement = Requirement()
 
     @model_validator(mode="after")
@@ -339,6 +270,18 @@ class Scenario(StrictModel):
             raise ValueError(
                 f"duration: {self.duration:g} s, allowed: a whole number of the plant's periods"
                 f" of 1/{self.rates.plant} s"
+            )
+        check_times(self.events, self.duration, self.rates.plant)
+        check_operation(self.operation, self.duration, self.target.source)
+        return self
+
+    @model_validator(mode="after")
+    def _plans_with_what_is_known(self) -> Self:
+        motion = self.control.motion if isinstance(self.control, ClosedLoop) else None
+        if self.target.is_measured and getattr(motion, "governor", None) is not None:
+            raise ValueError(
+                f"target.source: {self.target.source} with a governor, which plans with the"
+                " target's motion to come, allowed: prescribed, or no governor"
             )
         return self
 

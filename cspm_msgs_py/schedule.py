@@ -20,10 +20,12 @@ from cspm_msgs_py.scenario import (
     Scenario,
     TorqueProfile,
 )
+from cspm_msgs_py.scenario_keys.bodies import EXTERNAL, PRESCRIBED
 from cspm_msgs_py.testbed import Testbed
 
 DIAGNOSTICS_RATE = 10
 PLANT, WAVE_TRAJECTORY, MOTION_CONTROLLER = "plant", "wave_trajectory", "motion_controller"
+TARGET_TRACKER = "target_tracker"
 TENSION_DISTRIBUTION, FORCE_CONTROLLER = "tension_distribution", "force_controller"
 
 RATE_OF_SENSOR = {
@@ -31,14 +33,21 @@ RATE_OF_SENSOR = {
     "/winch_frame/twist": "motion_capture",
     "/bar/pose": "motion_capture",
     "/bar/twist": "motion_capture",
+    "/target/pose": "motion_capture",
     "/winches/state": "winches",
     "/cables/tension": "load_cells",
 }
 CLOCK = "/clock"
 BAR_REFERENCE, FRAME_REFERENCE = "/bar/reference", "/winch_frame/reference"
+TARGET_REFERENCE, TARGET_POSE = "/target/reference", "/target/pose"
 BAR_POSE, FRAME_POSE = "/bar/pose", "/winch_frame/pose"
 TENSION, WRENCH, WINCH_STATE = "/cables/tension", "/wrench_command", "/winches/state"
 TENSION_COMMAND, TORQUE_COMMAND = "/tension_command", "/winches/torque_command"
+# What controllers compute on the way, sent where `control.record_internals` asks for it.
+MOTION_INTERNALS = f"/{MOTION_CONTROLLER}/internals"
+DISTRIBUTION_INTERNALS = f"/{TENSION_DISTRIBUTION}/internals"
+FORCE_INTERNALS = f"/{FORCE_CONTROLLER}/internals"
+INTERNALS = (MOTION_INTERNALS, DISTRIBUTION_INTERNALS, FORCE_INTERNALS)
 
 # What a node reads once it is there, beside what it cannot compute without. The force controller
 # needs the winches' state in its safe state. What computes more often than anything comes to it
@@ -100,12 +109,14 @@ class Schedule:
         topics: timing of every topic of rows that this scenario publishes, in contract order.
         nodes: plans of all nodes but the plant, in the order in which they compute.
         plant_status_divider: steps from one of the plant's diagnostics messages to the next.
+        foreign: topics that somebody else's driver sends, in this simulation too.
     """
 
     period_ns: int
     topics: Mapping[str, Timing]
     nodes: Mapping[str, NodePlan]
     plant_status_divider: int
+    foreign: tuple[str, ...] = ()
 
     def idle_through(self, node: str) -> int:
         """Return the last step through which nothing comes to a node, nor has it to compute."""
@@ -131,19 +142,23 @@ def schedule_of(scenario: Scenario, testbed: Testbed) -> Schedule:
 
     Raises:
         InputError: a closed loop is wanted of a machine without bar or without the sensors for it,
-            or angles of one that does not measure them.
+            angles of one that does not measure them, or a measured target where none is.
     """
     if isinstance(scenario.control, ClosedLoop):
         _check_closed_loop(testbed)
-    rates, names = scenario.rates, testbed.topics
+    rates, source = scenario.rates, scenario.target.source
+    names = _topics_of(source, testbed)
     period_ns = 1_000_000_000 // rates.plant
     timings = {name: Timing(0, 1) for name in names if name.startswith("/truth/") or name == CLOCK}
     for name, sensor in testbed.sensors.items():
+        if name not in names:
+            continue
         delay = 0 if scenario.sensors == "ideal" else round(sensor.delay * 1e9 / period_ns)
         divider = rates.plant // int(getattr(rates, RATE_OF_SENSOR[name]))
         timings[name] = Timing(delay, divider, delay)
     nodes: dict[str, NodePlan] = {}
     references = tuple(name for name in names if name.endswith("/reference"))
+    prescribed = tuple(n for n in references if source == PRESCRIBED or n != BAR_REFERENCE)
 
     def add(
         node: str,
@@ -163,25 +178,51 @@ def schedule_of(scenario: Scenario, testbed: Testbed) -> Schedule:
         nodes[node] = NodePlan(first, divider, every, inputs, held, outputs)
         timings.update(dict.fromkeys(outputs, Timing(first, divider)))
 
-    if references:
-        add(WAVE_TRAJECTORY, rates.wave_trajectory, (CLOCK,), references)
+    def outputs(command: str, internals: str) -> tuple[str, ...]:
+        wanted = isinstance(scenario.control, ClosedLoop) and scenario.control.record_internals
+        return (command, internals) if wanted else (command,)
+
+    if prescribed:
+        add(WAVE_TRAJECTORY, rates.wave_trajectory, (CLOCK,), prescribed)
+    if source != PRESCRIBED:
+        add(TARGET_TRACKER, rates.wave_trajectory, (TARGET_POSE,), (BAR_REFERENCE,))
     if isinstance(scenario.control, ClosedLoop):
         # The computed wrench looks at what the tensions can give, as the distribution does.
         computed = isinstance(scenario.control.motion, ComputedWrenchControl)
         frame = (FRAME_POSE,) if computed else ()
-        motion = (BAR_POSE, BAR_REFERENCE), (WRENCH,)
+        motion = (BAR_POSE, BAR_REFERENCE), outputs(WRENCH, MOTION_INTERNALS)
         add(MOTION_CONTROLLER, rates.motion_controller, *motion, frame)
-        distribution = (WRENCH, BAR_POSE), (TENSION_COMMAND,)
-        add(TENSION_DISTRIBUTION, rates.tension_distribution, *distribution)
-        force = (TENSION_COMMAND, TENSION), (TORQUE_COMMAND,)
-        ahead = references if scenario.control.force.looks_ahead else ()
+        distribution = (WRENCH, BAR_POSE), outputs(TENSION_COMMAND, DISTRIBUTION_INTERNALS)
+        looks = (TENSION,) if scenario.control.tension_distribution.lost_cable else ()
+        add(TENSION_DISTRIBUTION, rates.tension_distribution, *distribution, looks)
+        force = (TENSION_COMMAND, TENSION), outputs(TORQUE_COMMAND, FORCE_INTERNALS)
+        followed = tuple(name for name in references if name != TARGET_REFERENCE)
+        ahead = followed if scenario.control.force.looks_ahead else ()
         add(FORCE_CONTROLLER, rates.force_controller, *force, ahead)
     elif isinstance(scenario.control, TorqueProfile):
         add(FORCE_CONTROLLER, rates.plant, (CLOCK,), (TORQUE_COMMAND,))
     elif isinstance(scenario.control, AngleProfile):
         add(FORCE_CONTROLLER, rates.force_controller, _servo_inputs(testbed), (TORQUE_COMMAND,))
     ordered = {name: timings[name] for name in names if name in timings}
-    return Schedule(period_ns, ordered, nodes, status_divider(rates.plant, 1))
+    foreign = (TARGET_POSE,) if source == EXTERNAL else ()
+    return Schedule(period_ns, ordered, nodes, status_divider(rates.plant, 1), foreign)
+
+
+def _topics_of(source: str, testbed: Testbed) -> list[str]:
+    """Return the topics that a machine may have whose target has this source, in contract order.
+
+    Raises:
+        InputError: the target is to be measured and the test-bed has no sensor for it.
+    """
+    if source != PRESCRIBED and TARGET_POSE not in testbed.sensors:
+        raise InputError(
+            f"target.source: {source} without sensor {TARGET_POSE}, allowed: prescribed, or a"
+            f" test-bed with a bar and {TARGET_POSE} among its sensors"
+        )
+    absent = {PRESCRIBED: ("/target/", "/truth/target/"), EXTERNAL: ("/truth/target/",)}
+    left_out = absent.get(source, ())
+    unknown = TARGET_REFERENCE if source == EXTERNAL else ""
+    return [n for n in testbed.topics if not n.startswith(left_out) and n != unknown]
 
 
 def _check_closed_loop(testbed: Testbed) -> None:

@@ -23,6 +23,7 @@ MEASURED = (
     "/winch_frame/twist",
     "/bar/pose",
     "/bar/twist",
+    "/target/pose",
     "/winches/state",
     "/cables/tension",
 )

@@ -14,15 +14,39 @@ from pathlib import Path
 from typing import Annotated, Literal
 
 import numpy as np
-from pydantic import Field, NonNegativeFloat, PositiveFloat, field_validator, model_validator
+from pydantic import (
+    Discriminator,
+    Field,
+    NonNegativeFloat,
+    PositiveFloat,
+    Tag,
+    field_validator,
+    model_validator,
+)
 from typing_extensions import Self
 
+from cspm_msgs_py.model_fault import MAPPING, NUMBER
 from cspm_msgs_py.provenance import Provenance, unwrap_provenance
 from cspm_msgs_py.sensor_spec import Sensor, check_sensor_topics
+from cspm_msgs_py.testbed_keys.effect_table import EMPIRICAL, EffectTable
+from cspm_msgs_py.testbed_keys.plausible import (
+    Coordinate,
+    Diameter,
+    DrumRadius,
+    Extent,
+    Mass,
+    Modulus,
+    RotorInertia,
+    Tension,
+    Torque,
+)
+from cspm_msgs_py.testbed_keys.winch_load import WinchLoad
 from cspm_msgs_py.topics import Topic, contract_topics
 from cspm_msgs_py.yaml_file import StrictModel, parse_yaml, read_text, validate
 
-Vector3 = tuple[float, float, float]
+Point = tuple[Coordinate, Coordinate, Coordinate]
+Extents = tuple[Extent, Extent, Extent]
+SafetyFactor = Annotated[float, Field(ge=1.0)]
 Name = Annotated[str, Field(pattern=r"^[A-Za-z][A-Za-z0-9_]*$")]
 
 
@@ -61,16 +85,16 @@ class Inertia(StrictModel):
 class Bar(StrictModel):
     """The suspended rigid body; `com` is its centre of mass in bar_ned [m]."""
 
-    mass: PositiveFloat
+    mass: Mass
     inertia: Inertia
-    com: Vector3 = (0.0, 0.0, 0.0)
-    dimensions: tuple[PositiveFloat, PositiveFloat, PositiveFloat]
+    com: Point = (0.0, 0.0, 0.0)
+    dimensions: Extents
 
 
 class WinchFrame(StrictModel):
     """The moving frame that carries the winches; its presence says that it can move."""
 
-    dimensions: tuple[PositiveFloat, PositiveFloat, PositiveFloat] | None = None
+    dimensions: Extents | None = None
 
 
 class ExponentialStiffness(StrictModel):
@@ -85,8 +109,8 @@ class ExponentialStiffness(StrictModel):
     b: NonNegativeFloat
     c: float
     d: float
-    youngs_modulus: PositiveFloat
-    diameter: PositiveFloat
+    youngs_modulus: Modulus
+    diameter: Diameter
     floor_tension: PositiveFloat
 
     @model_validator(mode="after")
@@ -108,8 +132,8 @@ class LinearStiffness(StrictModel):
     """
 
     law: Literal["linear"] = "linear"
-    youngs_modulus: PositiveFloat
-    diameter: PositiveFloat
+    youngs_modulus: Modulus
+    diameter: Diameter
     floor_tension: PositiveFloat
 
     @property
@@ -128,21 +152,29 @@ class AxialDamping(StrictModel):
 
 
 class Cable(StrictModel):
-    """One winch with its drum, gear and cable. A winch without cable has no `exit`."""
+    """One winch with its drum, gear and cable. A winch without cable has no `exit`, or a `load`.
+
+    A `locked` winch is held by its brake: its motor angle is constant, measured or not.
+    `breaking_force` [N] is its maker's; `safety_factor` takes the place of the machine's.
+    """
 
     name: Name
-    exit: Vector3 | None = None
-    attachment: Vector3 | None = None
+    exit: Point | None = None
+    attachment: Point | None = None
     offset_length: NonNegativeFloat = 0.0
     stiffness: (
         Annotated[ExponentialStiffness | LinearStiffness, Field(discriminator="law")] | None
     ) = None
     damping: AxialDamping | None = None
-    drum_radius: PositiveFloat
+    drum_radius: DrumRadius
     gear_ratio: PositiveFloat = 1.0
-    rotor_inertia: PositiveFloat
-    torque_limit: PositiveFloat
-    tension_limits: tuple[NonNegativeFloat, PositiveFloat] | None = None
+    rotor_inertia: RotorInertia
+    torque_limit: Torque
+    tension_limits: tuple[NonNegativeFloat, Tension] | None = None
+    breaking_force: PositiveFloat | None = None
+    safety_factor: SafetyFactor | None = None
+    load: WinchLoad | None = None
+    locked: bool = False
 
     @field_validator("tension_limits")
     @classmethod
@@ -160,6 +192,16 @@ class Cable(StrictModel):
                 f"cable {self.name}: without {', '.join(missing)}, allowed: all of"
                 f" {', '.join(parts)}, or none for a winch without cable"
             )
+        if self.load is not None and not missing:
+            raise ValueError(
+                f"load: of {self.name}, whose cable carries what its attachment does, allowed: of a"
+                " winch without cable"
+            )
+        if missing and self.breaking_force is not None:
+            raise ValueError(
+                f"breaking_force: {self.breaking_force:g} N of {self.name}, a winch without cable,"
+                " allowed: none"
+            )
         return self
 
     @property
@@ -168,16 +210,46 @@ class Cable(StrictModel):
         return self.exit is not None
 
 
+def _kind_of_parameters(parameters: object) -> str:
+    tabled = isinstance(parameters, EffectTable) or (
+        isinstance(parameters, dict) and "knots" in parameters
+    )
+    return MAPPING if tabled else NUMBER
+
+
 class EffectEntry(StrictModel):
     """One entry of `effects`: physics beyond the thesis's model, on the named elements."""
 
     effect: Name
     elements: tuple[str, ...] = ()
-    parameters: dict[str, float]
+    parameters: Annotated[
+        Annotated[dict[str, float], Tag(NUMBER)] | Annotated[EffectTable, Tag(MAPPING)],
+        Discriminator(_kind_of_parameters),
+    ]
+
+    @model_validator(mode="after")
+    def _tabled(self) -> Self:
+        if (self.effect == EMPIRICAL) != (self.table is not None):
+            allowed = "a table of knots and values with effect empirical, numbers with any other"
+            raise ValueError(f"parameters: {self.effect} has another kind, allowed: {allowed}")
+        return self
+
+    @property
+    def numbers(self) -> dict[str, float]:
+        """The parameters that are numbers; none where they are a table."""
+        return self.parameters if isinstance(self.parameters, dict) else {}
+
+    @property
+    def table(self) -> EffectTable | None:
+        """The table of an empirical effect, else None."""
+        return self.parameters if isinstance(self.parameters, EffectTable) else None
 
 
 class Testbed(StrictModel):
-    """A whole machine. Build it with `load_testbed` or `parse_testbed`."""
+    """A whole machine. Build it with `load_testbed` or `parse_testbed`.
+
+    `safety_factor` is how many times the highest tension the breaking force of a cable must be.
+    """
 
     name: Name
     gravity: NonNegativeFloat = 9.81
@@ -186,6 +258,7 @@ class Testbed(StrictModel):
     cables: Annotated[tuple[Cable, ...], Field(min_length=1)]
     sensors: dict[str, Sensor] = Field(default_factory=dict)
     effects: tuple[EffectEntry, ...] = ()
+    safety_factor: SafetyFactor = 3.0
 
     @model_validator(mode="after")
     def _consistent(self) -> Self:
@@ -212,7 +285,7 @@ class Testbed(StrictModel):
         for i, name in enumerate(names):
             if name in names[:i]:
                 raise ValueError(
-                    f"cables[{i}].name: '{name}' stands twice, allowed: each name once"
+                    f"cables[{i}].name: '{name}' occurs twice, allowed: each name once"
                 )
 
     @property

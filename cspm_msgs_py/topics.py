@@ -11,9 +11,12 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass
 
+from cspm_msgs_py.dofs import DOFS
+
 WORLD_FRAME = "world_ned"
 WINCH_FRAME = "winch_frame_ned"
 BAR_FRAME = "bar_ned"
+TARGET_FRAME = "target_ned"
 
 POSE = ("x", "y", "z", "qx", "qy", "qz", "qw")
 TWIST = ("vx", "vy", "vz", "wx", "wy", "wz")
@@ -90,14 +93,17 @@ def contract_topics(
 
     Args:
         cables: cable names in the order of the test-bed file.
-        has_bar: whether a bar hangs on the cables.
+        has_bar: whether a bar hangs on the cables, which may follow a target.
         has_winch_frame: whether the winches ride on a moving frame.
     """
     topics = [CLOCK]
     bodies = [("winch_frame", WINCH_FRAME)] * has_winch_frame + [("bar", BAR_FRAME)] * has_bar
+    bodies += [("target", TARGET_FRAME)] * has_bar
     topics += [_reference(f"/{body}/reference", frame) for body, frame in bodies]
     for body, _ in bodies:
-        topics += [_pose(f"/{body}/pose"), _twist(f"/{body}/twist")]
+        topics.append(_pose(f"/{body}/pose"))
+        if body != "target":
+            topics.append(_twist(f"/{body}/twist"))
     topics += _winch_topics("", cables)
     if has_bar:
         topics.append(
@@ -106,6 +112,7 @@ def contract_topics(
     topics += [
         _joint_state("/tension_command", cables, ["effort"]),
         _joint_state("/winches/torque_command", cables, ["effort"]),
+        *(_internals(cables) if has_bar else ()),
         DIAGNOSTICS,
     ]
     for body, _ in bodies:
@@ -113,6 +120,21 @@ def contract_topics(
     topics += _winch_topics("/truth", cables)
     topics.append(_joint_state("/truth/cables/unstretched_length", cables, ["position"]))
     return {topic.name: topic for topic in topics}
+
+
+def _internals(cables: Sequence[str]) -> list[Topic]:
+    """Return what controllers compute on the way; a JointState's `effort` as named numbers."""
+    described = {
+        "/motion_controller": (("error", "proportional", "integral", "derivative"), DOFS),
+        "/tension_distribution": (("unlimited", "limit"), cables),
+        "/force_controller": (("proportional", "integral"), cables),
+    }
+    return [
+        _joint_state(
+            f"{node}/internals", [f"{what}_{of}" for what in kinds for of in names], ["effort"]
+        )
+        for node, (kinds, names) in described.items()
+    ]
 
 
 def _winch_topics(prefix: str, cables: Sequence[str]) -> list[Topic]:

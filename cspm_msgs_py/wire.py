@@ -102,16 +102,16 @@ class WireReader:
     def decode(self, payload: bytes) -> tuple[int, Array]:
         """Return stamp [ns] and row, shape (width,), of one message; the row is the caller's.
 
-        Accepted is what carries the contract's numbers: any frame, in a JointState more parts than
-        asked for (they are not looked at), either byte order, uninitialised padding, and up to 8
-        bytes that some serialisers append. The bytes do not name their type: that twist and wrench
-        are distinguished is up to the middleware.
+        Accepted is what carries the contract's numbers: in a JointState any frame and more parts
+        than asked for (they are not looked at), either byte order, uninitialised padding, and up to
+        8 bytes that some serialisers append. The bytes do not name their type: that twist and
+        wrench are distinguished is up to the middleware.
 
         Raises:
-            InputError: no message of the topic's type, other names or another order of them, a
-                part missing or of another length, a trajectory of more than one instant, a stamp
-                before zero or with too many nanoseconds, a number that is not finite, or a
-                quaternion whose length is not 1.
+            InputError: no message of the topic's type, another frame, other names or another order
+                of them, a part missing or of another length, a trajectory of more than one
+                instant, a stamp before zero or with too many nanoseconds, a number that is not
+                finite, or a quaternion whose length is not 1.
         """
         form = self._last
         if not form.fits(payload):
@@ -271,6 +271,7 @@ def _sender_of(topic: Topic, message: Any) -> Topic:  # noqa: ANN401 - generated
                 f"{topic.name}: {part} is empty, allowed: one value for each of"
                 f" {len(topic.joint_names)} names"
             )
+    _check_frame(topic, sender.frame_id)
     if len(sender.frame_id) > _MOST_FRAME_CHARACTERS:
         raise InputError(
             f"{topic.name}: a frame_id of {len(sender.frame_id)} characters, allowed: at most"
@@ -279,6 +280,14 @@ def _sender_of(topic: Topic, message: Any) -> Topic:  # noqa: ANN401 - generated
     if hasattr(message, "points"):
         _check_start(topic, message.points[0].time_from_start)
     return sender
+
+
+def _check_frame(topic: Topic, frame: str) -> None:
+    # What carries no vector has no use for a frame.
+    if topic.frame_id and frame != topic.frame_id:
+        raise InputError(
+            f"{topic.name}: frame {_quoted(frame)}, allowed: {topic.frame_id!r} (z down)"
+        )
 
 
 def _check_start(topic: Topic, start: Any) -> None:  # noqa: ANN401 - generated classes

@@ -17,7 +17,7 @@ Array = NDArray[float64]
 
 BAR_STATES = 12
 # Columns of an effect's row in `PlantParameters.effects`.
-EFFECT_COLUMNS = 5
+EFFECT_COLUMNS = 7
 
 
 class PlantParameters(NamedTuple):
@@ -29,7 +29,8 @@ class PlantParameters(NamedTuple):
             order in memory, so that a processor takes several cables at a time.
         tables: shape (n, points, 2): tension and its slope along the stiffness law.
         effects: shape (m, ROW_COLUMNS): hook, element (cable index, 0 for bar and winch frame),
-            kernel address, first state, number of states; see `cspm_sim.kernels.hooks`. Rows
+            kernel address, first state, number of states, and the addresses of what computes
+            effects on cables and on the bar; see `cspm_sim.kernels.hooks`. Rows
             ascend by hook and within a hook by element: kernels walk them once, without search.
         effect_parameters: shape (m, widest).
     """

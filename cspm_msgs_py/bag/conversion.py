@@ -6,12 +6,12 @@ from collections.abc import Callable, Sequence
 from typing import Any
 
 from cspm_msgs_py.bag.ros1_runs import ENCODING as ROS1_ENCODING
-from cspm_msgs_py.bag.ros1_runs import SCHEMA_ENCODING as ROS1_SCHEMA_ENCODING
 from cspm_msgs_py.bag.run import StoredChannel
 from cspm_msgs_py.errors import InputError
 from cspm_msgs_py.ros_types import (
     MESSAGE_ENCODING,
     NO_FIELDS,
+    ROS1_SCHEMA_ENCODING,
     SCHEMA_ENCODING,
     check_definition,
     definition,

@@ -18,6 +18,7 @@ from cspm_msgs_py.bag.run import StoredFile, StoredMessage, StoredRun
 from cspm_msgs_py.bag.sqlite_runs import SqliteRuns
 from cspm_msgs_py.errors import InputError
 from cspm_msgs_py.recording.chunk import LARGEST_CHUNK
+from cspm_msgs_py.recording.mcap_file import BareFileError
 from cspm_msgs_py.recording.records import MAGIC as MCAP_MAGIC
 from cspm_msgs_py.recording.rosbag2_metadata import read_bag
 
@@ -31,14 +32,18 @@ _READERS: dict[bytes, Callable[[Path], StoredFile]] = {
 }
 
 
-def open_files(path: Path, stack: ExitStack) -> list[StoredFile]:
-    """Return the open files of a bag, in order.
+def open_files(
+    path: Path, stack: ExitStack, *, tolerant: bool
+) -> tuple[list[StoredFile], list[str]]:
+    """Return the open files of a bag, in order, and what is missing in its folder.
 
-    Files that are compressed as a whole are unpacked into a temporary folder.
+    Files that are compressed as a whole are unpacked into a temporary folder. One of several that
+    its writer left without a message is left out.
 
     Args:
         path: a rosbag2 folder or a file of a bag.
         stack: gets what closes the files and removes the folder.
+        tolerant: leave out what is damaged in MCAP files, and list it in their `faults`.
 
     Raises:
         InputError: it is missing, not a bag, or damaged.
@@ -46,7 +51,7 @@ def open_files(path: Path, stack: ExitStack) -> list[StoredFile]:
     if not path.exists():
         raise InputError(f"{path}: no such file or folder")
     if not path.is_dir():
-        return [_open(path, stack)]
+        return [_unpacked(_open(path, stack, tolerant=tolerant), None)], []
     bag = read_bag(path, compressions=_COMPRESSIONS)
     if bag.storage not in _STORAGES:
         raise InputError(f"{path}: stored as {bag.storage}, allowed: {', '.join(_STORAGES)}")
@@ -54,21 +59,41 @@ def open_files(path: Path, stack: ExitStack) -> list[StoredFile]:
     if bag.compression == "file":
         folder = Path(stack.enter_context(TemporaryDirectory(prefix="cspm-bag-")))
         paths = [_unpack_file(file, folder / file.stem) for file in paths]
-    files = [_open(file, stack) for file in paths]
-    return [Unpacked(file) for file in files] if bag.compression == "message" else files
+    files, faults = [], list(bag.faults)
+    for file in paths:
+        try:
+            files.append(_unpacked(_open(file, stack, tolerant=tolerant), bag.compression))
+        except BareFileError as err:
+            if len(faults) - len(bag.faults) + 1 == len(paths):
+                raise
+            faults.append(f"{err}: left out")
+    return files, faults
 
 
-def _open(path: Path, stack: ExitStack) -> StoredFile:
+def _unpacked(file: StoredFile, compression: str | None) -> StoredFile:
+    """Return a file whose messages are decompressed, where they are compressed one by one.
+
+    Where nothing says so, the first message shows it: none of CDR begins as zstd does.
+    """
+    if compression is None:
+        everything = [channel.id for channel in file.channels]
+        first = next(iter(run.read(everything, 0) for run in file.runs), iter(()))
+        payload = next(first, (0, 0, b""))[2]
+        return Unpacked(file) if payload.startswith(zstandard.FRAME_HEADER) else file
+    return Unpacked(file) if compression == "message" else file
+
+
+def _open(path: Path, stack: ExitStack, *, tolerant: bool) -> StoredFile:
     try:
         with path.open("rb") as file:
             start = file.read(max(map(len, _READERS)))
     except OSError as err:
         raise InputError(f"{path}: unreadable ({err.strerror})") from None
     if not start:
-        raise InputError(f"{path}: an empty file, allowed: {ALLOWED}")
+        raise BareFileError(f"{path}: an empty file, allowed: {ALLOWED}")
     for magic, reader in _READERS.items():
         if start.startswith(magic):
-            opened = reader(path)
+            opened = McapRuns(path, tolerant=tolerant) if reader is McapRuns else reader(path)
             stack.callback(opened.close)
             return opened
     raise InputError(f"{path}: not a bag (by its first bytes), allowed: {ALLOWED}")
@@ -95,6 +120,7 @@ class Unpacked:
             InputError: a sample of a channel is damaged.
         """
         self.path = file.path
+        self.faults = file.faults
         self.channels = [
             replace(channel, sample=self._unpack(channel.sample)) if channel.sample else channel
             for channel in file.channels

@@ -20,25 +20,56 @@ _SpanNs = tuple[int, int]
 class McapRuns:
     """An MCAP file, closed by its writer or not, chunked or not; see `StoredFile`."""
 
-    def __init__(self, path: Path) -> None:
+    def __init__(self, path: Path, *, tolerant: bool = False) -> None:
         """Open the file.
 
+        Args:
+            path: the file.
+            tolerant: leave chunks that cannot be read out, and list why in `faults`.
+
         Raises:
-            InputError: it is not an MCAP file, or damaged.
+            InputError: it is not an MCAP file, or damaged; BareFileError if it holds nothing.
         """
         self.path = path
+        self.faults: list[str] = []
+        self._tolerant = tolerant
         self._file = McapFile(path)
         try:
             self._file.check_not_bare()
+            if not self._file.complete:
+                self.faults.append(
+                    f"{path}: not closed by its writer, read as far as it goes; `cspm recover`"
+                    " restores its index"
+                )
+            spans = self._spans()
             self.channels = _channels(self._file)
             self.runs = [
-                StoredRun(*span, partial(self._read, place, span))
-                for place in self._file.chunks
-                if (span := self._span(place)) is not None
+                StoredRun(*span, partial(self._read, place, span)) for place, span in spans
             ]
         except BaseException:
             self._file.close()
             raise
+
+    def _spans(self) -> list[tuple[ChunkPlace, _SpanNs]]:
+        """Return the chunks that hold messages with their first and last log times [ns]."""
+        found, readable = [], []
+        for place in self._file.chunks:
+            try:
+                span = self._span(place)
+                self._file.times(place)
+            except InputError as err:
+                self._fault(err)
+                continue
+            readable.append(place)
+            if span is not None:
+                found.append((place, span))
+        self._file.chunks = readable
+        return found
+
+    def _fault(self, err: InputError) -> None:
+        if not self._tolerant:
+            raise err
+        self.faults.append(f"{err}: left out; `cspm recover` leaves it out as well")
 
     def _span(self, place: ChunkPlace) -> _SpanNs | None:
         """Return first and last log time of a chunk [ns], None if it has no message."""
@@ -66,10 +97,14 @@ class McapRuns:
         index = self._file.index(place)
         if index is not None and index.keys().isdisjoint(channels):
             return
-        messages = self._file.messages(place, index)
-        logs = messages.prefixes["log"]
-        if len(logs) and not span[0] <= logs.min() <= logs.max() <= span[1]:
-            raise InputError(f"{self._where(place)}: holds other times than its head says")
+        try:
+            messages = self._file.messages(place, index)
+            logs = messages.prefixes["log"]
+            if len(logs) and not span[0] <= logs.min() <= logs.max() <= span[1]:
+                raise InputError(f"{self._where(place)}: holds other times than its head says")
+        except InputError as err:
+            self._fault(err)
+            return
         chosen = _ordered(messages.select(channels), start_ns)
         yield from zip(
             chosen.logs.tolist(), chosen.channels.tolist(), chosen.payloads(), strict=True
@@ -86,7 +121,7 @@ class McapRuns:
 def _channels(file: McapFile) -> list[StoredChannel]:
     counts = message_counts(file)
     channels = []
-    for channel in file.channels.values():
+    for channel in file.admitted:
         schema = file.schemas.get(channel.schema_id)
         channels.append(
             StoredChannel(

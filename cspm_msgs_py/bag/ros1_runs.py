@@ -26,9 +26,10 @@ from cspm_msgs_py.errors import InputError
 from cspm_msgs_py.message import NANOSECONDS
 from cspm_msgs_py.recording.chunk import LARGEST_CHUNK
 from cspm_msgs_py.recording.records import read_at
+from cspm_msgs_py.ros_types import ROS1_SCHEMA_ENCODING
 
 MAGIC = b"#ROSBAG V"
-ENCODING, SCHEMA_ENCODING = "ros1", "ros1msg"
+ENCODING = "ros1"
 _VERSION = b"2.0\n"
 _MESSAGE, _BAG, _CHUNK, _CHUNK_INFO, _CONNECTION = (bytes([op]) for op in (2, 3, 5, 6, 7))
 _LARGEST_HEADER = 1 << 20
@@ -70,6 +71,7 @@ class Ros1Runs:
             InputError: it is not such a bag, was not closed, or is damaged.
         """
         self.path = path
+        self.faults: list[str] = []
         self._file = path.open("rb")
         try:
             with self._damage("index"):
@@ -148,7 +150,7 @@ class Ros1Runs:
             ros_type=about[b"type"].decode(),
             count=counts[id_],
             encoding=ENCODING,
-            schema_encoding=SCHEMA_ENCODING,
+            schema_encoding=ROS1_SCHEMA_ENCODING,
             definition=about[b"message_definition"].decode(errors="replace"),
         )
 

@@ -77,11 +77,13 @@ class StoredFile(Protocol):
         path: the file.
         channels: in the file's order.
         runs: in the order in which they stand in the file.
+        faults: why it is not whole, one line each: not closed, parts that cannot be read.
     """
 
     path: Path
     channels: list[StoredChannel]
     runs: list[StoredRun]
+    faults: list[str]
 
     def close(self) -> None:
         """Close the file."""

@@ -29,6 +29,7 @@ class SqliteRuns:
             InputError: it is not a bag, or damaged.
         """
         self.path = path
+        self.faults: list[str] = []
         with self._errors():
             self._database = sqlite3.connect(_uri(path), uri=True, check_same_thread=False)
         try:

@@ -7,13 +7,23 @@ from contextlib import ExitStack
 from dataclasses import dataclass
 from functools import partial
 from pathlib import Path
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 from cspm_msgs_py.bag.conversion import Convert, converter, ros2_type
 from cspm_msgs_py.bag.files import open_files
-from cspm_msgs_py.bag.run import BagMessage, Run, StoredFile, StoredMessage, StoredRun, in_order
+from cspm_msgs_py.bag.own_types import Decode, decoder
+from cspm_msgs_py.bag.run import (
+    BagMessage,
+    Run,
+    StoredChannel,
+    StoredFile,
+    StoredMessage,
+    StoredRun,
+    in_order,
+)
 from cspm_msgs_py.closing import Closing
 from cspm_msgs_py.errors import InputError
+from cspm_msgs_py.ros_types import deserialize
 
 _EARLIEST_NS = -(2**63)
 
@@ -40,7 +50,7 @@ class BagStream(Closing):
         end_ns: latest log time of the bag [ns].
     """
 
-    def __init__(self, path: Path) -> None:
+    def __init__(self, path: Path, *, own_types: bool = False, tolerant: bool = False) -> None:
         """Open a bag; see `open_bag`.
 
         Raises:
@@ -49,13 +59,14 @@ class BagStream(Closing):
         self.path = path
         self._stack = ExitStack()
         try:
-            self._files = open_files(path, self._stack)
+            self._files, self._faults = open_files(path, self._stack, tolerant=tolerant)
             runs = [run for file in self._files for run in file.runs]
             if not runs:
                 raise InputError(f"{path}: holds no message")
             self.start_ns = min(run.first_ns for run in runs)
             self.end_ns = max(run.last_ns for run in runs)
-            self.topics, self.unplayable, self._routes = _plan(self._files)
+            plan = _plan(self._files, own_types=own_types)
+            self.topics, self.unplayable, self._routes, self._decoders = plan
         except BaseException:
             self.close()
             raise
@@ -88,6 +99,21 @@ class BagStream(Closing):
             ]
         return in_order(runs)
 
+    @property
+    def faults(self) -> list[str]:
+        """What is missing or damaged, one line each, as far as the bag was read."""
+        return [*self._faults, *(fault for file in self._files for fault in file.faults)]
+
+    def message(self, topic: str, payload: bytes) -> Any:  # noqa: ANN401 - made at run time
+        """Return the message that a payload of the stream holds.
+
+        Raises:
+            InputError: it does not hold its type.
+        """
+        if topic in self._decoders:
+            return self._decoders[topic](payload)
+        return deserialize(payload, self.topics[topic].ros_type)
+
     def _wanted(self, topics: Collection[str] | None) -> Collection[str]:
         if topics is None and not self.topics:
             first, reason = next(iter(self.unplayable.items()), ("", ""))
@@ -106,16 +132,22 @@ class BagStream(Closing):
         self._stack.close()
 
 
-def open_bag(path: Path) -> BagStream:
+def open_bag(path: Path, *, own_types: bool = False, tolerant: bool = False) -> BagStream:
     """Open a bag for streaming.
 
     Read are rosbag2 folders and their single `.mcap` and `.db3` files, among them this project's
     recordings, closed or cut short, and ROS 1 bags.
 
+    Args:
+        path: a folder or file.
+        own_types: also read types that ROS 2 Jazzy has not, or has otherwise, by the definitions in
+            the bag. Their payloads are as stored; `BagStream.message` reads them.
+        tolerant: leave out chunks of MCAP files that cannot be read; `BagStream.faults` says which.
+
     Raises:
         InputError: it is missing, not a bag, damaged, stored in an unknown way, or without message.
     """
-    return BagStream(Path(path))
+    return BagStream(Path(path), own_types=own_types, tolerant=tolerant)
 
 
 class _Route(NamedTuple):
@@ -128,10 +160,16 @@ class _Route(NamedTuple):
 _Routes = Mapping[int, _Route]
 
 
-def _plan(
-    files: Sequence[StoredFile],
-) -> tuple[dict[str, BagTopic], dict[str, str], list[_Routes]]:
-    """Return topics, reasons against playing the others, and per file the route of each channel."""
+class _Plan(NamedTuple):
+    """Topics, reasons against reading the others, routes by file, and decoders of own types."""
+
+    topics: dict[str, BagTopic]
+    unplayable: dict[str, str]
+    routes: list[_Routes]
+    decoders: dict[str, Decode]
+
+
+def _plan(files: Sequence[StoredFile], *, own_types: bool) -> _Plan:
     types: dict[str, list[str]] = {}
     counts: dict[str, int] = {}
     for file in files:
@@ -145,24 +183,57 @@ def _plan(
         for name, known in types.items()
         if len(known) > 1
     }
-    routes: list[_Routes] = [_converters(file, unplayable) for file in files]
+    own = _OwnTypes() if own_types else None
+    routes: list[_Routes] = [_converters(file, unplayable, own) for file in files]
     topics = {
         name: BagTopic(name, known[0], counts[name])
         for name, known in types.items()
         if name not in unplayable
     }
-    return topics, unplayable, routes
+    return _Plan(topics, unplayable, routes, own.decoders if own else {})
 
 
-def _converters(file: StoredFile, unplayable: dict[str, str]) -> dict[int, _Route]:
-    """Return the route of each channel that can be played; add the others to `unplayable`."""
+class _OwnTypes:
+    """Decoders by topic of what is read by the bag's own definitions."""
+
+    def __init__(self) -> None:
+        self.decoders: dict[str, Decode] = {}
+        self._known: dict[str, tuple[str, str]] = {}
+
+    def route(self, channel: StoredChannel) -> _Route:
+        """Return the route of a channel's messages as they are stored.
+
+        Raises:
+            InputError: its definition is missing, cannot be read, or is not that of another sender.
+        """
+        said = (channel.encoding, channel.definition)
+        if self._known.setdefault(channel.topic, said) != said:
+            raise InputError("recorded with two definitions of its type, allowed: one")
+        if channel.topic not in self.decoders:
+            self.decoders[channel.topic] = decoder(channel, ros2_type(channel))
+        return _Route(channel.topic, bytes)
+
+
+def _converters(
+    file: StoredFile, unplayable: dict[str, str], own: _OwnTypes | None
+) -> dict[int, _Route]:
+    """Return the route of each channel that can be read; add the others to `unplayable`."""
     routes = {}
     for channel in file.channels:
         try:
-            routes[channel.id] = _Route(channel.topic, converter(channel))
+            routes[channel.id] = _route(channel, own)
         except InputError as err:
             unplayable.setdefault(channel.topic, str(err))
     return routes
+
+
+def _route(channel: StoredChannel, own: _OwnTypes | None) -> _Route:
+    try:
+        return _Route(channel.topic, converter(channel))
+    except InputError:
+        if own is None or not channel.definition:
+            raise
+        return own.route(channel)
 
 
 def _routed(path: Path, run: StoredRun, routes: _Routes, start_ns: int) -> Iterator[BagMessage]:

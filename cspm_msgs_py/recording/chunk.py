@@ -12,7 +12,7 @@ import numpy as np
 import zstandard
 from numpy.typing import NDArray
 
-from cspm_msgs_py.errors import InputError
+from cspm_msgs_py.errors import DamageError
 from cspm_msgs_py.recording.records import HEAD, MESSAGE_PREFIX, Opcode, Span, spans_in
 
 Bytes = NDArray[np.uint8]
@@ -72,7 +72,7 @@ def chunk_head(content: bytes, length: int, where: str) -> ChunkHead:
         where: names the chunk in errors.
 
     Raises:
-        InputError: it does not fit the record.
+        DamageError: it does not fit the record.
     """
     try:
         first, last, size, crc, name_length = _CHUNK_HEAD.unpack_from(content)
@@ -80,12 +80,12 @@ def chunk_head(content: bytes, length: int, where: str) -> ChunkHead:
         name = content[_CHUNK_HEAD.size : name_end].decode()
         (data_size,) = struct.unpack_from("<Q", content, name_end)
     except (struct.error, UnicodeDecodeError):
-        raise InputError(f"{where}: damaged Chunk record") from None
+        raise DamageError(f"{where}: damaged Chunk record") from None
     head = ChunkHead(first, last, size, crc, name, name_end + 8, data_size)
     if head.data + data_size > length:
-        raise InputError(f"{where}: damaged Chunk record")
+        raise DamageError(f"{where}: damaged Chunk record")
     if size > LARGEST_CHUNK:
-        raise InputError(f"{where}: a chunk of {size} bytes, allowed: up to {LARGEST_CHUNK}")
+        raise DamageError(f"{where}: a chunk of {size} bytes, allowed: up to {LARGEST_CHUNK}")
     return head
 
 
@@ -93,20 +93,22 @@ def decompress(data: bytes, head: ChunkHead, where: str) -> bytes:
     """Return a chunk's content, its length and CRC checked.
 
     Raises:
-        InputError: the data is damaged or compressed in a way that is not known.
+        DamageError: the data is damaged or compressed in a way that is not known.
     """
     try:
         content = _DECOMPRESS[head.compression](data, head.size)
     except KeyError:
-        raise InputError(
+        raise DamageError(
             f"{where}: compression {head.compression!r}, allowed: zstd, lz4 or none"
         ) from None
     except (zstandard.ZstdError, RuntimeError, ValueError, MemoryError) as err:
-        raise InputError(f"{where}: damaged {head.compression} data ({_first_line(err)})") from None
+        raise DamageError(
+            f"{where}: damaged {head.compression} data ({_first_line(err)})"
+        ) from None
     if len(content) != head.size:
-        raise InputError(f"{where}: {len(content)} bytes where {head.size} are announced")
+        raise DamageError(f"{where}: {len(content)} bytes where {head.size} are announced")
     if head.crc and zlib.crc32(content) != head.crc:
-        raise InputError(f"{where}: the chunk's CRC does not fit its content")
+        raise DamageError(f"{where}: the chunk's CRC does not fit its content")
     return content
 
 
@@ -209,7 +211,7 @@ def read_messages(content: bytes, index: ChunkIndex | None, where: str) -> Messa
         where: names the chunk in errors.
 
     Raises:
-        InputError: the content is not a sequence of records.
+        DamageError: the content is not a sequence of records.
     """
     return (_by_index(content, index) if index else None) or scan_messages(content, where)
 
@@ -218,17 +220,17 @@ def scan_messages(content: bytes, where: str) -> Messages:
     """Return the messages of a chunk by walking from record to record.
 
     Raises:
-        InputError: the content is not a sequence of records.
+        DamageError: the content is not a sequence of records.
     """
     found, end = [], 0
     for span in spans_in(content):
         if span.opcode == Opcode.MESSAGE:
             if span.length < _PREFIX - HEAD.size:
-                raise InputError(f"{where}: damaged Message record at {span.offset}")
+                raise DamageError(f"{where}: damaged Message record at {span.offset}")
             found.append(span.offset)
         end = span.end
     if end != len(content):
-        raise InputError(f"{where}: no record at byte {end} of the chunk")
+        raise DamageError(f"{where}: no record at byte {end} of the chunk")
     offsets = np.array(found, dtype=np.int64)
     return Messages(content, offsets, _prefixes(content, offsets))
 

@@ -45,9 +45,15 @@ from cspm_msgs_py.recording.records import (
     spans_in,
 )
 
+# In a channel's metadata: messages on its topic that nobody of the recorded run obeyed.
+REFUSED = "cspm_refused"
 _FOOTER_SIZE = HEAD.size + 20 + len(MAGIC)
 _HEAD_SIZE = 256
 _RUN = 1 << 22
+
+
+class BareFileError(InputError):
+    """A file that its writer left without a channel and a message."""
 
 
 class McapFile(Closing):
@@ -100,13 +106,13 @@ class McapFile(Closing):
 
     def _read(self, use_summary: bool) -> None:
         if self._size == 0:
-            raise InputError(f"{self.path}: an empty file, allowed: an MCAP file")
+            raise BareFileError(f"{self.path}: an empty file, allowed: an MCAP file")
         self._file.seek(0)
         if self._file.read(len(MAGIC)) != MAGIC:
             raise InputError(f"{self.path}: not an MCAP file (its first bytes are no MCAP magic)")
         first = next(spans(self._file, len(MAGIC), self._size), None)
         if first is None or first.opcode != Opcode.HEADER:
-            raise InputError(f"{self.path}: an MCAP file that ends before its header does")
+            raise BareFileError(f"{self.path}: an MCAP file that ends before its header does")
         header = parse(Header, self._content(first), str(self.path))
         self.profile, self.library = header.profile, header.library
         footer = self._footer() if use_summary else None
@@ -263,14 +269,19 @@ class McapFile(Closing):
             )
         return self.channels[channel].topic
 
+    @property
+    def admitted(self) -> list[Channel]:
+        """The channels but those of messages that nobody of the recorded run obeyed."""
+        return [each for each in self.channels.values() if REFUSED not in each.metadata]
+
     def check_not_bare(self) -> None:
         """Refuse a file that was not closed and lists no message.
 
         Raises:
-            InputError: it is such a file.
+            BareFileError: it is such a file.
         """
         if not (self.complete or self.channels):
-            raise InputError(f"{self.path}: not closed, and holds no channel and no message")
+            raise BareFileError(f"{self.path}: not closed, and holds no channel and no message")
 
     def record_bytes(self, start: int, end: int) -> bytes:
         """Return the file's bytes between two offsets.
@@ -306,6 +317,19 @@ class McapFile(Closing):
         length = min(place.record.length, _HEAD_SIZE)
         content = self.record_bytes(place.record.content, place.record.content + length)
         return chunk_head(content, place.record.length, self._where(place))
+
+    def drop_damaged(self) -> list[str]:
+        """Take chunks that cannot be read out of the list; return why, one line each."""
+        whole, faults = [], []
+        for place in self.chunks:
+            try:
+                self.messages(place, self.index(place))
+            except InputError as err:
+                faults.append(str(err))
+            else:
+                whole.append(place)
+        self.chunks = whole
+        return faults
 
     def chunk_data(self, place: ChunkPlace, head: ChunkHead) -> bytes:
         """Return a chunk's data as they are in the file."""

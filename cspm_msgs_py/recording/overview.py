@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Iterator
-from dataclasses import dataclass
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any
 
@@ -12,10 +12,12 @@ from numpy.typing import NDArray
 
 from cspm_msgs_py.errors import InputError
 from cspm_msgs_py.recording.reader import Recording
-from cspm_msgs_py.recording.rosbag2_metadata import read_bag
+from cspm_msgs_py.recording.rosbag2_metadata import FILE_NAME, read_bag
 from cspm_msgs_py.yaml_file import parse_yaml
 
 Times = NDArray[np.int64]
+# Times are outside of what is compressed.
+_COMPRESSIONS = ("none", "message")
 _SQLITE = b"SQLite format 3\x00"
 
 
@@ -54,12 +56,14 @@ class Overview:
         profile: profile of the MCAP file, such as `ros2`; empty for sqlite3.
         library: what wrote it.
         complete: whether it was closed; if not, `cspm recover` restores its index.
+        faults: what is damaged or missing, one line each.
         unread_bytes: what follows the last complete record of files that were not closed [bytes].
         size_bytes: length of all files [bytes].
         start_ns: earliest log time [ns], 0 without messages.
         end_ns: latest log time [ns], 0 without messages.
         message_count: number of messages.
         topics: in the order of the recording.
+        refused: number of messages that nobody of the run obeyed, by topic.
         attachments: length of each attached file [bytes] by name.
         metadata: metadata records by name.
         scenario: the name that the attached scenario gives itself, None without one.
@@ -71,6 +75,7 @@ class Overview:
     profile: str
     library: str
     complete: bool
+    faults: list[str]
     unread_bytes: int
     size_bytes: int
     start_ns: int
@@ -81,6 +86,7 @@ class Overview:
     metadata: dict[str, dict[str, str]]
     scenario: str | None
     testbed: str | None
+    refused: dict[str, int] = field(default_factory=dict)
 
     @property
     def duration_s(self) -> float:
@@ -95,12 +101,18 @@ def overview(path: Path) -> Overview:
         InputError: it is missing, damaged, or neither MCAP nor sqlite3.
     """
     path = Path(path)
-    if path.is_dir() and read_bag(path).storage == "sqlite3":
-        return _sqlite_overview(path)
+    faults: list[str] = []
+    if path.is_dir():
+        bag = read_bag(path, compressions=_COMPRESSIONS)
+        faults += bag.faults
+        if bag.storage == "sqlite3":
+            return replace(_sqlite_overview(path), faults=faults)
     if path.is_file() and _starts_with(path, _SQLITE):
         return _sqlite_overview(path)
-    with Recording(path) as recording:
-        return _mcap_overview(recording)
+    with Recording(path, compressions=_COMPRESSIONS) as recording:
+        faults += [f"{file}: not closed, and holds no message" for file in recording.bare]
+        damaged = [fault for file in recording.files for fault in file.drop_damaged()]
+        return _mcap_overview(recording, faults, damaged)
 
 
 def _starts_with(path: Path, magic: bytes) -> bool:
@@ -166,11 +178,11 @@ def _gaps_of(
     return gaps
 
 
-def _mcap_overview(recording: Recording) -> Overview:
+def _mcap_overview(recording: Recording, faults: list[str], damaged: list[str]) -> Overview:
     types = {name: info.ros_type for name, info in recording.topics.items()}
     gaps = _gaps_of(types, lambda: _chunk_times(recording))
     for name, info in recording.topics.items():
-        if gaps[name].count != info.count:
+        if gaps[name].count != info.count and not damaged:
             raise InputError(
                 f"{recording.path}: {gaps[name].count} messages of {name}, but its statistics say"
                 f" {info.count}"
@@ -182,6 +194,7 @@ def _mcap_overview(recording: Recording) -> Overview:
         profile=files[0].profile,
         library=files[0].library,
         complete=recording.complete,
+        faults=[*faults, *damaged],
         unread_bytes=sum(0 if file.complete else file.size - file.end for file in files),
         size_bytes=sum(file.size for file in files),
         start_ns=recording.start_ns,
@@ -192,13 +205,17 @@ def _mcap_overview(recording: Recording) -> Overview:
         metadata=recording.metadata,
         scenario=_own_name(recording, "scenario.yaml"),
         testbed=_own_name(recording, "testbed.yaml"),
+        refused=recording.refused,
     )
 
 
 def _chunk_times(recording: Recording) -> Iterator[tuple[str, Times]]:
     for file in recording.files:
         for place in file.chunks:
+            admitted = {channel.id for channel in file.admitted}
             for channel, table in file.times(place).items():
+                if channel in file.channels and channel not in admitted:
+                    continue
                 yield file.topic_of(channel), table[:, 0].astype(np.int64)
 
 
@@ -215,12 +232,16 @@ def _own_name(recording: Recording, attachment: str) -> str | None:
 def _sqlite_overview(path: Path) -> Overview:
     from rosbags.rosbag2 import Reader
 
+    types: dict[str, str] = {}
+    times: dict[str, list[int]] = {}
     try:
-        with Reader(path) as bag:
-            types = {c.topic: c.msgtype for c in bag.connections}
-            times: dict[str, list[int]] = {name: [] for name in types}
-            for connection, time, _ in bag.messages():
-                times[connection.topic].append(time)
+        for file in _sqlite_files(path):
+            with Reader(file) as bag:
+                for connection in bag.connections:
+                    types[connection.topic] = connection.msgtype
+                    times.setdefault(connection.topic, [])
+                for connection, time, _ in bag.messages():
+                    times[connection.topic].append(time)
     except Exception as err:
         raise InputError(
             f"{path}: not a readable sqlite3 bag ({' '.join(str(err).split())})"
@@ -228,6 +249,13 @@ def _sqlite_overview(path: Path) -> Overview:
     arrays = [(name, np.array(found, dtype=np.int64)) for name, found in times.items()]
     gaps = _gaps_of(types, lambda: arrays)
     return _sqlite_result(path, [gaps[name].topic(name, kind) for name, kind in types.items()])
+
+
+def _sqlite_files(path: Path) -> list[Path]:
+    """Return what is opened one after the other: a folder, or its files if it has no metadata."""
+    if path.is_dir() and not (path / FILE_NAME).exists():
+        return read_bag(path, compressions=_COMPRESSIONS).files
+    return [path]
 
 
 def _sqlite_result(path: Path, topics: list[TopicOverview]) -> Overview:
@@ -238,6 +266,7 @@ def _sqlite_result(path: Path, topics: list[TopicOverview]) -> Overview:
         profile="",
         library="",
         complete=True,
+        faults=[],
         unread_bytes=0,
         size_bytes=sum(file.stat().st_size for file in files),
         start_ns=min((t.first_ns for t in topics if t.first_ns is not None), default=0),

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections import Counter
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass
 from functools import cached_property
 from pathlib import Path
@@ -17,7 +17,7 @@ from cspm_msgs_py.closing import Closing
 from cspm_msgs_py.errors import InputError
 from cspm_msgs_py.message import carries_row
 from cspm_msgs_py.recording.chunk import ChunkPlace, Messages
-from cspm_msgs_py.recording.mcap_file import McapFile
+from cspm_msgs_py.recording.mcap_file import BareFileError, McapFile
 from cspm_msgs_py.recording.rosbag2_metadata import read_bag
 from cspm_msgs_py.recording.rows import RowCollector, Rows
 from cspm_msgs_py.ros_types import MESSAGE_ENCODING, check_definition
@@ -50,29 +50,48 @@ class Recording(Closing):
     Attributes:
         path: what was opened.
         files: its MCAP files, in order.
+        bare: files that their writer left without a message, and are not read.
     """
 
-    def __init__(self, path: Path) -> None:
+    def __init__(self, path: Path, *, compressions: Sequence[str] = ("none",)) -> None:
         """Open a recording.
+
+        Args:
+            path: a folder or file.
+            compressions: see `read_bag`.
 
         Raises:
             InputError: missing, damaged beyond use, or not stored as MCAP.
         """
         self.path = path = Path(path)
         self.files: list[McapFile] = []
+        self.bare: list[Path] = []
         self._checked: set[str] = set()
+        paths = mcap_paths(path, compressions=compressions)
         try:
-            for file in mcap_paths(path):
-                self.files.append(McapFile(file))
-                self.files[-1].check_not_bare()
+            for file in paths:
+                self._open(file, len(paths))
         except BaseException:
             self.close()
             raise
 
+    def _open(self, path: Path, count: int) -> None:
+        """Open one of some files; leave it out if it holds nothing, but not all of them."""
+        try:
+            self.files.append(McapFile(path))
+            self.files[-1].check_not_bare()
+        except BareFileError:
+            if len(self.bare) + 1 == count:
+                raise
+            self.bare.append(path)
+            for file in [file for file in self.files if file.path == path]:
+                self.files.remove(file)
+                file.close()
+
     @property
     def complete(self) -> bool:
         """Whether all files were closed by whatever wrote them."""
-        return all(file.complete for file in self.files)
+        return not self.bare and all(file.complete for file in self.files)
 
     @cached_property
     def topics(self) -> dict[str, TopicInfo]:
@@ -81,12 +100,23 @@ class Recording(Closing):
         counts: Counter[str] = Counter()
         for file in self.files:
             found = message_counts(file)
-            for channel in file.channels.values():
+            for channel in file.admitted:
                 kind = message_type(file, channel)
                 known = types.setdefault(channel.topic, [])
                 known.extend([kind] if kind not in known else [])
                 counts[channel.topic] += found[channel.id]
         return {name: TopicInfo(", ".join(types[name]), counts[name]) for name in types}
+
+    @cached_property
+    def refused(self) -> dict[str, int]:
+        """Number of messages that nobody of the recorded run obeyed, by topic that has any."""
+        counts: Counter[str] = Counter()
+        for file in self.files:
+            found, admitted = message_counts(file), {each.id for each in file.admitted}
+            for channel in file.channels.values():
+                if channel.id not in admitted:
+                    counts[channel.topic] += found[channel.id]
+        return {name: count for name, count in counts.items() if count}
 
     @cached_property
     def attachments(self) -> dict[str, bytes]:
@@ -192,7 +222,7 @@ class Recording(Closing):
         """Yield each topic's messages chunk by chunk, leaving out chunks that begin later."""
         for file in self.files:
             ids = {
-                name: [channel.id for channel in file.channels.values() if channel.topic == name]
+                name: [channel.id for channel in file.admitted if channel.topic == name]
                 for name in names
             }
             wanted = {channel for channels in ids.values() for channel in channels}
@@ -257,8 +287,12 @@ def _span_of(file: McapFile, place: ChunkPlace) -> tuple[int, int]:
     return head.first_ns, head.last_ns
 
 
-def mcap_paths(path: Path) -> list[Path]:
+def mcap_paths(path: Path, *, compressions: Sequence[str] = ("none",)) -> list[Path]:
     """Return the MCAP files of a recording: the file itself, or those of a rosbag2 folder.
+
+    Args:
+        path: the recording.
+        compressions: see `read_bag`.
 
     Raises:
         InputError: it is missing or stored otherwise.
@@ -267,7 +301,7 @@ def mcap_paths(path: Path) -> list[Path]:
         raise InputError(f"{path}: no such file or folder")
     if not path.is_dir():
         return [path]
-    bag = read_bag(path)
+    bag = read_bag(path, compressions=compressions)
     if bag.storage != "mcap":
         raise InputError(f"{path}: stored as {bag.storage}, allowed: mcap")
     return bag.files

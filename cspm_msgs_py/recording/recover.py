@@ -24,7 +24,7 @@ from cspm_msgs_py.recording.chunk import (
     other_records,
     scan_messages,
 )
-from cspm_msgs_py.recording.mcap_file import McapFile
+from cspm_msgs_py.recording.mcap_file import BareFileError, McapFile
 from cspm_msgs_py.recording.reader import message_counts, message_type
 from cspm_msgs_py.recording.records import HEAD, Opcode, parse, spans_in
 from cspm_msgs_py.recording.rosbag2_metadata import (
@@ -53,6 +53,8 @@ class RecoveryReport:
         counts: messages by topic, of the whole recording.
         end_ns: log time of the last message [ns], 0 without any.
         damaged: chunks and attachments left out because their content is damaged.
+        bare: files left out because they hold nothing.
+        described: whether `metadata.yaml` was written.
         lost_bytes: what could not be used at the ends of the files [bytes].
     """
 
@@ -63,6 +65,8 @@ class RecoveryReport:
     end_ns: int
     damaged: int
     lost_bytes: int
+    bare: list[Path]
+    described: bool
 
     @property
     def messages(self) -> int:
@@ -73,8 +77,9 @@ class RecoveryReport:
 def recover(path: Path, out: Path | None = None) -> RecoveryReport:
     """Restore a recording so that every reader can use it.
 
-    Files that were closed are left alone. Any other is written anew beside the original, which
-    is then kept under its name with `.broken` added; at every instant one of the two has its name.
+    Files that were closed and can be read throughout are left alone. Any other is written anew
+    beside the original, which is then kept under its name with `.broken` added; at every instant
+    one of the two has its name.
 
     Args:
         path: a rosbag2 folder, with or without `metadata.yaml`, or an MCAP file.
@@ -85,30 +90,47 @@ def recover(path: Path, out: Path | None = None) -> RecoveryReport:
         CspmError: the restored file cannot be written.
     """
     path = Path(path)
-    files = _files(path)
+    found, packed = _files(path)
+    bare = [file for file in found if _is_bare(file)] if len(found) > 1 else []
+    files = [file for file in found if file not in bare] or found
     try:
         if out is not None:
-            return _restore_to(files, Path(out))
-        return _restore_in_place(path, files)
+            return _restore_to(files, bare, Path(out), packed=packed)
+        return _restore_in_place(path, files, bare, packed=packed)
     except OSError as err:
         raise CspmError(f"{path}: cannot be restored ({err.strerror})") from None
 
 
-def _files(path: Path) -> list[Path]:
+def _files(path: Path) -> tuple[list[Path], bool]:
+    """Return the files of a recording, and whether their messages are compressed one by one."""
     if not path.exists():
         raise InputError(f"{path}: no such file or folder")
     if not path.is_dir():
-        return [path]
+        return [path], False
     if (path / FILE_NAME).exists():
         with suppress(InputError):
-            return read_bag(path).files
+            bag = read_bag(path, compressions=("none", "message"))
+            return bag.files, bag.compression == "message"
     files = sorted(path.glob("*.mcap"))
     if not files:
         raise InputError(f"{path}: a folder without MCAP files, allowed: a rosbag2 folder")
-    return files
+    return files, False
 
 
-def _restore_in_place(path: Path, files: list[Path]) -> RecoveryReport:
+def _is_bare(path: Path) -> bool:
+    try:
+        with McapFile(path) as file:
+            file.check_not_bare()
+    except BareFileError:
+        return True
+    except InputError:
+        return False
+    return False
+
+
+def _restore_in_place(
+    path: Path, files: list[Path], bare: list[Path], *, packed: bool
+) -> RecoveryReport:
     restored, kept, damaged, lost = [], [], 0, 0
     for file in files:
         if _is_whole(file):
@@ -122,23 +144,22 @@ def _restore_in_place(path: Path, files: list[Path]) -> RecoveryReport:
         restored.append(file)
         kept.append(broken)
     folder = path if path.is_dir() else path.parent
+    write = False
     if path.is_dir() or (folder / FILE_NAME).exists():
-        files = files if path.is_dir() else _files(folder)
-        counts, end = _describe(folder, files, write=bool(restored) or not _has_metadata(folder))
-    else:
-        counts, end = _describe(folder, files, write=False)
-    return RecoveryReport(path, restored, kept, counts, end, damaged, lost)
+        files, packed = (files, packed) if path.is_dir() else _files(folder)
+        write = bool(restored or bare) or not _has_metadata(folder)
+    counts, end = _describe(folder, files, write=write, packed=packed)
+    return RecoveryReport(path, restored, kept, counts, end, damaged, lost, bare, write)
 
 
 def _has_metadata(folder: Path) -> bool:
     try:
-        read_bag(folder)
+        return not read_bag(folder, compressions=("none", "message")).faults
     except InputError:
         return False
-    return True
 
 
-def _restore_to(files: list[Path], out: Path) -> RecoveryReport:
+def _restore_to(files: list[Path], bare: list[Path], out: Path, *, packed: bool) -> RecoveryReport:
     refuse_existing(out)
     out.mkdir(parents=True)
     targets, damaged, lost = [], 0, 0
@@ -146,8 +167,8 @@ def _restore_to(files: list[Path], out: Path) -> RecoveryReport:
         targets.append(out / f"{out.name}_{i}.mcap")
         result = _restore(file, targets[-1])
         damaged, lost = damaged + result[0], lost + result[1]
-    counts, end = _describe(out, targets, write=True)
-    return RecoveryReport(out, targets, files, counts, end, damaged, lost)
+    counts, end = _describe(out, targets, write=True, packed=packed)
+    return RecoveryReport(out, targets, files, counts, end, damaged, lost, bare, described=True)
 
 
 def _exchange(file: Path, beside: Path, broken: Path) -> None:
@@ -162,7 +183,8 @@ def _exchange(file: Path, beside: Path, broken: Path) -> None:
 def _is_whole(path: Path) -> bool:
     try:
         with McapFile(path) as file:
-            return file.complete and bool(file.statistics or file.chunks or not file.channels)
+            listed = bool(file.statistics or file.chunks or not file.channels)
+            return file.complete and listed and not file.drop_damaged()
     except InputError:
         return False
 
@@ -298,7 +320,9 @@ def _take_definitions(source: McapFile, content: bytes) -> None:
             source.channels.setdefault(channel.id, channel)
 
 
-def _describe(folder: Path, paths: list[Path], *, write: bool) -> tuple[dict[str, int], int]:
+def _describe(
+    folder: Path, paths: list[Path], *, write: bool, packed: bool
+) -> tuple[dict[str, int], int]:
     """Return messages by topic and the last log time; write `metadata.yaml` if asked to."""
     entries: list[FileEntry] = []
     channels: dict[str, tuple[McapFile, Channel]] = {}
@@ -315,7 +339,7 @@ def _describe(folder: Path, paths: list[Path], *, write: bool) -> tuple[dict[str
             _topic_entry(file, channel, counts[name]) for name, (file, channel) in channels.items()
         ]
     if write:
-        write_metadata(folder, topics, entries)
+        write_metadata(folder, topics, entries, message_zstd=packed)
     return {topic.name: topic.count for topic in topics}, max(e.last_ns for e in entries)
 
 

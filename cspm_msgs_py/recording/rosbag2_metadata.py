@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+import re
 from collections.abc import Sequence
 from copy import deepcopy
 from dataclasses import dataclass
@@ -16,6 +17,7 @@ from cspm_msgs_py.yaml_file import dump_yaml, read_yaml
 FILE_NAME = "metadata.yaml"
 ROS_DISTRO = "jazzy"
 _VERSION = 9
+_REMEDY = "`cspm recover` writes it"
 _INFINITE = {"sec": 9223372036, "nsec": 854775807}
 
 
@@ -67,8 +69,10 @@ def contract_qos() -> list[dict[str, Any]]:
     ]
 
 
-def metadata_text(topics: Sequence[TopicEntry], files: Sequence[FileEntry]) -> str:
-    """Return the text of `metadata.yaml`."""
+def metadata_text(
+    topics: Sequence[TopicEntry], files: Sequence[FileEntry], *, message_zstd: bool = False
+) -> str:
+    """Return the text of `metadata.yaml`; messages may be compressed with zstd one by one."""
     filled = [file for file in files if file.count]
     first = min((file.first_ns for file in filled), default=0)
     last = max((file.last_ns for file in filled), default=0)
@@ -81,8 +85,8 @@ def metadata_text(topics: Sequence[TopicEntry], files: Sequence[FileEntry]) -> s
                 "starting_time": {"nanoseconds_since_epoch": first},
                 "message_count": sum(file.count for file in files),
                 "topics_with_message_count": [_topic(topic) for topic in topics],
-                "compression_format": "",
-                "compression_mode": "",
+                "compression_format": "zstd" if message_zstd else "",
+                "compression_mode": "MESSAGE" if message_zstd else "",
                 "relative_file_paths": [file.name for file in files],
                 "files": [_file(file) for file in files],
                 "custom_data": None,
@@ -114,14 +118,20 @@ def _file(file: FileEntry) -> dict[str, Any]:
     }
 
 
-def write_metadata(folder: Path, topics: Sequence[TopicEntry], files: Sequence[FileEntry]) -> None:
+def write_metadata(
+    folder: Path,
+    topics: Sequence[TopicEntry],
+    files: Sequence[FileEntry],
+    *,
+    message_zstd: bool = False,
+) -> None:
     """Write `metadata.yaml` so that at every instant an old or a new one is there.
 
     Raises:
         OSError: the folder cannot be written.
     """
     beside = folder / (FILE_NAME + ".new")
-    beside.write_text(metadata_text(topics, files), encoding="utf-8")
+    beside.write_text(metadata_text(topics, files, message_zstd=message_zstd), encoding="utf-8")
     os.replace(beside, folder / FILE_NAME)
 
 
@@ -129,13 +139,18 @@ def write_metadata(folder: Path, topics: Sequence[TopicEntry], files: Sequence[F
 class Bag:
     """What a folder's `metadata.yaml` names: how the messages are stored, and in which files.
 
-    `compression` is `none`, or what is compressed with zstd: `file` or `message`. The chunks of an
-    MCAP file may be compressed in any case.
+    Attributes:
+        storage: `mcap` or `sqlite3`, or what else it names.
+        files: in order.
+        compression: `none`, or what is compressed with zstd: `file` or `message`; None where
+            nothing says it. The chunks of an MCAP file may be compressed in any case.
+        faults: what is missing in the metadata, and was found from the files.
     """
 
     storage: str
     files: list[Path]
-    compression: str = "none"
+    compression: str | None = "none"
+    faults: tuple[str, ...] = ()
 
 
 def read_bag(folder: Path, *, compressions: Sequence[str] = ("none",)) -> Bag:
@@ -146,18 +161,17 @@ def read_bag(folder: Path, *, compressions: Sequence[str] = ("none",)) -> Bag:
         compressions: which of `none`, `file` and `message` the caller can read.
 
     Raises:
-        InputError: no or unusable `metadata.yaml`, or a file that it names is missing.
+        InputError: unusable `metadata.yaml`, a file that it names is missing, or neither metadata
+            nor files of a bag.
     """
     path = folder / FILE_NAME
     if not path.exists():
-        raise InputError(
-            f"{folder}: a folder without {FILE_NAME}, allowed: a rosbag2 folder or an .mcap file"
-        )
+        return _bag_of_files(folder)
     content = read_yaml(path)
     try:
         bag = content["rosbag2_bagfile_information"]
         storage, names = (
-            str(bag["storage_identifier"]),
+            str(bag["storage_identifier"] or ""),
             [str(n) for n in bag["relative_file_paths"]],
         )
         mode = str(bag.get("compression_mode") or "none").lower()
@@ -177,4 +191,33 @@ def read_bag(folder: Path, *, compressions: Sequence[str] = ("none",)) -> Bag:
     for file in files:
         if not file.is_file():
             raise InputError(f"{file}: no such file, but {FILE_NAME} names it")
-    return Bag(storage, files, mode)
+    if storage:
+        return Bag(storage, files, mode)
+    fault = f"{path}: names no storage_identifier, taken from the files; {_REMEDY}"
+    return Bag(_storage_of(files[0]), files, mode, (fault,))
+
+
+def _bag_of_files(folder: Path) -> Bag:
+    """Return the bag that the files of a folder without metadata make, by the numbers in names."""
+    for suffix in ("*.mcap", "*.db3"):
+        if files := sorted(folder.glob(suffix), key=_numbered):
+            fault = f"{folder}: {FILE_NAME} is missing, its {len(files)} files are read by the"
+            fault += f" numbers in their names; {_REMEDY}"
+            return Bag(_storage_of(files[0]), files, None, (fault,))
+    raise InputError(
+        f"{folder}: a folder without {FILE_NAME}, allowed: a rosbag2 folder or an .mcap file"
+    )
+
+
+def _numbered(path: Path) -> list[tuple[int, str]]:
+    parts = re.split(r"(\d+)", path.name)
+    return [(int(part), "") if part.isdigit() else (-1, part) for part in parts]
+
+
+def _storage_of(path: Path) -> str:
+    try:
+        with path.open("rb") as file:
+            start = file.read(16)
+    except OSError as err:
+        raise InputError(f"{path}: unreadable ({err.strerror})") from None
+    return "sqlite3" if start.startswith(b"SQLite format 3") else "mcap"

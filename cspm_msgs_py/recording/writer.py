@@ -7,6 +7,7 @@ one being written. With blocks of 0.05 s that is at most 0.15 s of log time.
 from __future__ import annotations
 
 import threading
+from collections import Counter
 from collections.abc import Mapping
 from importlib.metadata import version
 from pathlib import Path
@@ -30,6 +31,7 @@ from cspm_msgs_py.recording.block import (
     merge,
 )
 from cspm_msgs_py.recording.channel_buffer import ChannelBuffer
+from cspm_msgs_py.recording.mcap_file import REFUSED
 from cspm_msgs_py.recording.rosbag2_metadata import (
     ROS_DISTRO,
     FileEntry,
@@ -85,6 +87,7 @@ class RecordingWriter:
         self._block_ns = block_ns
         self._channels = [ChannelBuffer(topic.name, self._turn) for topic in self._topics]
         self._by_name = {channel.name: channel for channel in self._channels}
+        self._refused: dict[str, ChannelBuffer] = {}
         self._counts = [0] * len(self._topics)
         try:
             folder.mkdir(parents=True)
@@ -101,6 +104,10 @@ class RecordingWriter:
         self._closed = False
         self._thread = threading.Thread(target=self._run, name="recording", daemon=True)
         self._thread.start()
+
+    def takes(self, name: str) -> bool:
+        """Return whether a topic was declared."""
+        return name in self._by_name
 
     def channel(self, name: str) -> ChannelBuffer:
         """Return the channel of a topic; keep it, looking it up costs time.
@@ -125,6 +132,26 @@ class RecordingWriter:
             raise InputError(f"{name}: carries a row of numbers, allowed: channel({name!r}).append")
         channel.append_payload(log_ns, payload)
 
+    def append_refused(self, name: str, log_ns: int, payload: bytes) -> None:
+        """Record a message as it came that nobody of the run obeyed, from its CDR bytes.
+
+        It is on its topic, in a channel of its own: others' readers see it there, ours do not.
+
+        Raises:
+            InputError: the topic was not declared.
+            CspmError: writing failed earlier.
+        """
+        channel = self._refused.get(name)
+        if channel is None:
+            like = self._channels.index(self._declared(name))
+            channel = self._refused[name] = ChannelBuffer(name, self._turn)
+            self._topics.append(self._topics[like])
+            self._hashes.append(self._hashes[like])
+            self._counts.append(0)
+            self._records.append(PayloadRecords(len(self._topics)))
+            self._channels.append(channel)
+        channel.append_payload(log_ns, payload)
+
     def _declared(self, name: str) -> ChannelBuffer:
         try:
             return self._by_name[name]
@@ -136,7 +163,7 @@ class RecordingWriter:
     @property
     def counts(self) -> dict[str, int]:
         """Messages written by topic; complete once the recording is closed."""
-        return dict(zip(self._by_name, self._counts, strict=True))
+        return dict(zip(self._by_name, self._counts, strict=False))
 
     def _turn(self, log_ns: int) -> None:
         """Hand the filled block to the thread and begin the one that holds `log_ns`."""
@@ -169,6 +196,8 @@ class RecordingWriter:
             self._room.release()
 
     def _write_block(self, block: _Block, compressor: zstandard.ZstdCompressor) -> None:
+        for i in range(self._announced, len(block)):
+            self._add_channel(i, {REFUSED: "true"})
         parts = [
             BlockPart(i + 1, self._topics[i].name, self._counts[i], batch, self._records[i])
             for i, batch in enumerate(block)
@@ -228,19 +257,26 @@ class RecordingWriter:
         for i, ros_type in enumerate(types):
             text = definition(ros_type).encode()
             self._sink.add_schema(Schema(i + 1, text, SCHEMA_ENCODING, ros_type))
+        for i in range(len(self._topics)):
+            self._add_channel(i, {})
+
+    def _add_channel(self, i: int, about: Mapping[str, str]) -> None:
+        """Describe channel `i`, counted from 0, before its first message."""
+        topic, types = self._topics[i], [topic.ros_type for topic in self._topics]
         qos = dump_yaml(contract_qos())
-        for i, topic in enumerate(self._topics):
-            about = {"offered_qos_profiles": qos, "topic_type_hash": self._hashes[i]}
-            schema = types.index(topic.ros_type) + 1
-            self._sink.add_channel(
-                ChannelRecord(i + 1, topic.name, MESSAGE_ENCODING, about, schema)
-            )
+        known = {"offered_qos_profiles": qos, "topic_type_hash": self._hashes[i], **about}
+        schema = list(dict.fromkeys(types)).index(topic.ros_type) + 1
+        self._sink.add_channel(ChannelRecord(i + 1, topic.name, MESSAGE_ENCODING, known, schema))
+        self._announced = i + 1
 
     def _write_metadata(self) -> None:
         qos = contract_qos()
+        counts = Counter[str]()
+        for topic, count in zip(self._topics, self._counts, strict=True):
+            counts[topic.name] += count
         entries = [
-            TopicEntry(topic.name, topic.ros_type, self._hashes[i], qos, self._counts[i])
-            for i, topic in enumerate(self._topics)
+            TopicEntry(name, self._topics[i].ros_type, self._hashes[i], qos, counts[name])
+            for i, name in enumerate(self._by_name)
         ]
         first, last = self._sink.span_ns
         write_metadata(

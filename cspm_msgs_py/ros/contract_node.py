@@ -10,10 +10,12 @@ from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
+from rcl_interfaces.msg import SetParametersResult
 from rclpy.clock import Clock, ClockType
 from rclpy.context import Context
 from rclpy.duration import Duration
 from rclpy.node import Node
+from rclpy.parameter import Parameter
 from rclpy.publisher import Publisher
 from rclpy.qos import DurabilityPolicy
 
@@ -22,11 +24,15 @@ from cspm_msgs_py.errors import CspmError, InputError
 from cspm_msgs_py.rate_limited_warnings import RateLimitedWarnings
 from cspm_msgs_py.ros.intake import Intake
 from cspm_msgs_py.ros.qos import contract_qos
+from cspm_msgs_py.ros.tagged_taker import Tagged
+from cspm_msgs_py.ros.wake_up import WakeUp
 from cspm_msgs_py.ros.wall_timers import WallTimers
+from cspm_msgs_py.stepping.steady_time import SteadyTime
 from cspm_msgs_py.topics import DIAGNOSTICS, QOS_DEPTH, SENDER_DEPTH, Topic
 from cspm_msgs_py.wire import WireReader, WireWriter
 
 Array = NDArray[np.float64]
+_SIM_TIME = "use_sim_time"
 
 
 class ContractNode:
@@ -41,16 +47,32 @@ class ContractNode:
         failure: why the session is to end, in one line, if `fail` was called.
     """
 
-    def __init__(self, name: str, context: Context, timers: WallTimers | None = None) -> None:
-        """Make a node; with `timers` somebody runs these and empties its intake, no executor."""
+    def __init__(
+        self,
+        name: str,
+        context: Context,
+        timers: WallTimers | None = None,
+        wake_up: WakeUp | None = None,
+    ) -> None:
+        """Make a node; with `timers` somebody runs these and empties its intake, no executor.
+
+        What comes into that intake ends the sleep of `wake_up`.
+        """
         self.node = Node(name, context=context)
-        self.intake = Intake(self.node) if timers is not None else None
-        self._timers = timers
+        self.intake: Intake | None = None
+        self._timers: WallTimers | None = None
+        self._time: SteadyTime | None = None
+        if timers is not None:
+            self.poll(timers, wake_up)
         self._clock = self.node.get_clock().handle
         self._publishers: dict[str, tuple[Publisher, frozenset[str]]] = {}
         self._steady = Clock(clock_type=ClockType.STEADY_TIME)
         self._complaints = RateLimitedWarnings(self.warn)
         self.failure: str | None = None
+
+    def poll(self, timers: WallTimers, wake_up: WakeUp | None) -> None:
+        """Have somebody run timers and empty the intake; before anything is subscribed to."""
+        self._timers, self.intake = timers, Intake(self.node, wake_up)
 
     @property
     def name(self) -> str:
@@ -173,6 +195,30 @@ class ContractNode:
         else:
             self.intake.subscribe_rows(topic, message_class, take_row, take)
 
+    def subscribe_tagged(
+        self, topic: Topic, take: Callable[[Tagged], None], depth: int = QOS_DEPTH
+    ) -> None:
+        """Have `take` called with each message and its publisher; for nodes in a polled session."""
+        assert self.intake is not None
+        self.intake.subscribe_tagged(topic, ros_class(topic.ros_type), take, depth=depth)
+
+    def subscribe_tagged_rows(
+        self,
+        topic: Topic,
+        receive: Callable[[int, Array, bytes | None], None],
+        refuse: Callable[[str], None],
+    ) -> None:
+        """As `subscribe_rows`, with the identity of each message's publisher, None if unknown."""
+        decode = WireReader(topic).decode
+
+        def take(message: Tagged) -> None:
+            try:
+                receive(*decode(message.payload), message.gid)
+            except InputError as err:
+                refuse(str(err))
+
+        self.subscribe_tagged(topic, take)
+
     def unmatched(self) -> list[str]:
         """Return `topic (reader)` for each reader that is not connected to our publisher yet."""
         missing = []
@@ -225,9 +271,39 @@ class ContractNode:
             self.node.destroy_timer(timer)
 
     def now_ns(self) -> int:
-        """Return the time on the ROS clock [ns], simulated where `use_sim_time` is set."""
+        """Return the time on the ROS clock [ns], simulated where `use_sim_time` is set.
+
+        After `keep_time` it does not follow when that clock is set.
+        """
+        if self._time is not None:
+            return self._time.now_ns(time.monotonic_ns())
+        return self._ros_ns()
+
+    def _ros_ns(self) -> int:
         with self._clock:
             return int(self._clock.get_now().nanoseconds)
+
+    def keep_time(self) -> None:
+        """Follow the ROS clock by a steady one from now on, and keep `use_sim_time` off.
+
+        Raises:
+            InputError: `use_sim_time` is set: then the run would have no time of its own.
+        """
+        if self.node.get_parameter(_SIM_TIME).value:
+            raise InputError(f"parameter {_SIM_TIME}: true, allowed in real time: false")
+        self.node.add_on_set_parameters_callback(_refuse_sim_time)
+        self._time = SteadyTime(self._ros_ns(), time.monotonic_ns())
+
+    def clock_fault(self) -> str | None:
+        """Return in one line that the ROS clock was set since the last call, None if not."""
+        if self._time is None:
+            return None
+        return self._time.look(self._ros_ns(), time.monotonic_ns())
+
+    def accept_clock(self) -> None:
+        """Take the ROS clock as it is now."""
+        if self._time is not None:
+            self._time.accept(self._ros_ns(), time.monotonic_ns())
 
     def complain(self, subject: str, text: str) -> None:
         """Log what is wrong with a topic's messages; a flood of them does not fill the log."""
@@ -258,6 +334,13 @@ class _Numbered:
         # The events executor of rclpy 7.1 passes both as one argument.
         payload, found = message if info is None else (message, info)
         self._take(payload, found["received_timestamp"], found["publication_sequence_number"])
+
+
+def _refuse_sim_time(parameters: list[Parameter]) -> SetParametersResult:
+    """Refuse to take the time from others in a run that goes by the wall."""
+    wanted = any(each.name == _SIM_TIME and each.value for each in parameters)
+    reason = f"{_SIM_TIME}: true, allowed in real time: false" if wanted else ""
+    return SetParametersResult(successful=not wanted, reason=reason)
 
 
 def _ros_type(message_class: type) -> str:

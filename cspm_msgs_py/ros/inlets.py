@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 from rclpy.impl.implementation_singleton import rclpy_implementation
 
 from cspm_msgs_py.ros.row_taker import RowTaker, TakenRow
+from cspm_msgs_py.ros.tagged_taker import Tagged, TaggedTaker, UntaggedTaker
 from cspm_msgs_py.stepping.sequence_numbers import SequenceNumbers
 
 Array = NDArray[np.float64]
@@ -70,6 +71,41 @@ class Inlet:
         if self._numbers is not None and number is not None:
             self._numbers.add(number)
         self._receive(payload, info["received_timestamp"], number)
+        return True
+
+    def take(self) -> None:
+        """Hand on what has come, of a flood its beginning."""
+        _take_each(self.take_one)
+
+
+class TaggedInlet:
+    """One subscription whose messages are handed on with their publisher's identity."""
+
+    def __init__(
+        self,
+        topic: str,
+        handle: rclpy_implementation.Subscription,
+        taker: TaggedTaker | UntaggedTaker,
+        receive: Callable[[Tagged], None],
+        numbered: bool,
+    ) -> None:
+        self.topic, self.handle = topic, handle
+        self._taker, self._receive = taker, receive
+        self._numbers = SequenceNumbers() if numbered else None
+
+    @property
+    def lost(self) -> int:
+        """Messages missing by their numbers."""
+        return self._numbers.lost if self._numbers is not None else 0
+
+    def take_one(self) -> bool:
+        """Hand on a message, if there is one; return whether there was."""
+        taken = self._taker.take()
+        if taken is None:
+            return False
+        if self._numbers is not None and taken.number is not None:
+            self._numbers.add(taken.number)
+        self._receive(taken)
         return True
 
     def take(self) -> None:

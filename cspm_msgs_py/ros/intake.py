@@ -15,13 +15,24 @@ from rclpy.impl.implementation_singleton import rclpy_implementation
 from rclpy.node import Node
 from rclpy.type_support import check_for_type_support
 
-from cspm_msgs_py.ros.inlets import BlockInlet, DueInlet, DueReceiver, Inlet, ObjectInlet, RowInlet
+from cspm_msgs_py.ros.inlets import (
+    BlockInlet,
+    DueInlet,
+    DueReceiver,
+    Inlet,
+    ObjectInlet,
+    RowInlet,
+    TaggedInlet,
+)
 from cspm_msgs_py.ros.qos import contract_qos
 from cspm_msgs_py.ros.rcl_message import take_address
 from cspm_msgs_py.ros.row_taker import RowTaker
+from cspm_msgs_py.ros.tagged_taker import Tagged, TaggedTaker, UntaggedTaker, make_taker
+from cspm_msgs_py.ros.wake_up import WakeUp
 from cspm_msgs_py.topics import QOS_RELIABILITY, Topic
 
 Array = NDArray[np.float64]
+_Inlet = Inlet | BlockInlet | ObjectInlet | RowInlet | DueInlet | TaggedInlet
 # Long enough for a reader that is held up for a second.
 DEPTH = 2000
 
@@ -33,10 +44,11 @@ class Intake:
         lost: messages missing by the numbers that their senders gave them, by topic.
     """
 
-    def __init__(self, node: Node) -> None:
-        self._node = node
-        self._inlets: list[Inlet | BlockInlet | ObjectInlet | RowInlet | DueInlet] = []
-        self._takers: list[RowTaker] = []
+    def __init__(self, node: Node, wake_up: WakeUp | None = None) -> None:
+        """Subscribe as `node`; what comes ends the sleep of `wake_up`."""
+        self._node, self._wake_up = node, wake_up
+        self._inlets: list[_Inlet] = []
+        self._takers: list[RowTaker | TaggedTaker | UntaggedTaker] = []
 
     @property
     def lost(self) -> dict[str, int]:
@@ -109,6 +121,21 @@ class Intake:
             else DueInlet(topic.name, handle, message_class, taker, receiver)
         )
 
+    def subscribe_tagged(
+        self,
+        topic: Topic,
+        message_class: type,
+        receive: Callable[[Tagged], None],
+        *,
+        numbered: bool = False,
+        depth: int | None = DEPTH,
+    ) -> None:
+        """Have `receive` called with each message and its publisher's identity; see `subscribe`."""
+        handle = self._handle(topic.name, message_class, QOS_RELIABILITY, depth)
+        taker = make_taker(handle, message_class)
+        self._takers.append(taker)
+        self._inlets.append(TaggedInlet(topic.name, handle, taker, receive, numbered))
+
     def subscribe_objects(
         self, topic: str, message_class: type, receive: Callable[[Any], None], depth: int | None
     ) -> None:
@@ -122,20 +149,24 @@ class Intake:
         node = self._node
         check_for_type_support(message_class)
         with node.handle:
-            return rclpy_implementation.Subscription(
+            handle = rclpy_implementation.Subscription(
                 node.handle,
                 message_class,
                 node.resolve_topic_name(topic),
                 contract_qos(depth, reliability=reliability).get_c_qos_profile(),
             )
+        if self._wake_up is not None:
+            self._wake_up.watch(handle.pointer)
+        return handle
 
     def _taker(self, topic: Topic, handle: rclpy_implementation.Subscription) -> RowTaker | None:
         """Return what takes a topic's rows without rclpy, None where rcl cannot be called."""
         address = take_address()
         if address is None:
             return None
-        self._takers.append(RowTaker(topic, handle.pointer, address))
-        return self._takers[-1]
+        taker = RowTaker(topic, handle.pointer, address)
+        self._takers.append(taker)
+        return taker
 
     def take(self) -> None:
         """Hand on what has come, of a flood its beginning."""
@@ -152,6 +183,8 @@ class Intake:
     def close(self) -> None:
         """Leave the topics."""
         for inlet in self._inlets:
+            if self._wake_up is not None:
+                self._wake_up.forget(inlet.handle.pointer)
             inlet.handle.destroy_when_not_in_use()
         for taker in self._takers:
             taker.close()

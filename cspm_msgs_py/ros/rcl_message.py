@@ -47,7 +47,7 @@ class RclMessage:
         Raises:
             MemoryError: there is none.
         """
-        rcutils = _library("librcutils.so")
+        rcutils = rcl_library("librcutils.so")
         rcutils.rcutils_get_default_allocator.restype = _Allocator
         allocator = rcutils.rcutils_get_default_allocator()
         self._message = _Message()
@@ -88,8 +88,8 @@ def take_address() -> int | None:
     if numba.config.DISABLE_JIT or sys.byteorder != "little" or sys.maxsize != 2**63 - 1:
         return None
     try:
-        take = _library("librcl.so").rcl_take_serialized_message
-        rcutils = _library("librcutils.so")
+        take = rcl_library("librcl.so").rcl_take_serialized_message
+        rcutils = rcl_library("librcutils.so")
         found = rcutils.rcutils_uint8_array_init, rcutils.rcutils_uint8_array_fini
         _ = (*found, rcutils.rcutils_get_default_allocator)
     except (OSError, AttributeError):
@@ -97,7 +97,7 @@ def take_address() -> int | None:
     return ctypes.cast(take, ctypes.c_void_p).value
 
 
-def _library(name: str) -> ctypes.CDLL:
+def rcl_library(name: str) -> ctypes.CDLL:
     """Return a library that rclpy has loaded: another copy would not know its subscriptions.
 
     Raises:

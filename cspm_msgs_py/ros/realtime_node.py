@@ -9,13 +9,16 @@ import numpy as np
 from numpy.typing import NDArray
 
 from cspm_msgs_py.graph import Edges
-from cspm_msgs_py.ros.contract_node import ContractNode, ros_class
+from cspm_msgs_py.ros.bound_flag import BoundFlag
+from cspm_msgs_py.ros.contract_node import ContractNode
+from cspm_msgs_py.ros.fault_line import FaultLine
+from cspm_msgs_py.ros.graph_publishers import bind
 from cspm_msgs_py.ros.guard_ports import GuardPorts
 from cspm_msgs_py.ros.rendezvous import FollowerSide
-from cspm_msgs_py.schedule import CLOCK, TORQUE_COMMAND, Schedule
+from cspm_msgs_py.schedule import CLOCK, FORCE_CONTROLLER, TORQUE_COMMAND, Schedule
 from cspm_msgs_py.stepping.sample_and_hold import SampleAndHold, WallTrajectory
 from cspm_msgs_py.stepping.stage import Guard, Stage
-from cspm_msgs_py.topics import DIAGNOSTICS, QOS_DEPTH, SAFE, Topic
+from cspm_msgs_py.topics import DIAGNOSTICS, SAFE, Topic
 
 Array = NDArray[np.float64]
 # While processes find each other they stand still for some tenths of a second.
@@ -52,27 +55,33 @@ class RealtimeNode:
             on_safe: called with whether the winches are in their safe state.
         """
         plan = schedule.nodes[stage.node]
-        self._node = node
+        self._node, self._guard = node, guard
+        node.keep_time()
         publish = {name: node.publisher(topics[name], edges[name].readers) for name in plan.outputs}
         status = node.status_publisher(edges[DIAGNOSTICS.name].readers)
-        self._loop = SampleAndHold(stage, schedule, stale_after, publish, status, guard)
-        for name in (*plan.inputs, *plan.held):
-            if name != CLOCK:
-                refuse = partial(self._refuse, name)
-                node.subscribe_rows(topics[name], partial(self._receive, name), refuse)
+        self._line = FaultLine(node, None if guard is None else self._hear_of_fault)
+        read = [name for name in (*plan.inputs, *plan.held) if name != CLOCK]
+        self._bindings = {name: bind(node, topics[name], edges) for name in read}
+        self._loop = SampleAndHold(
+            stage,
+            schedule,
+            stale_after,
+            publish,
+            status,
+            guard,
+            bindings=self._bindings,
+            on_fault=self._line.report,
+        )
+        for name in read:
+            refuse = partial(self._refuse, name)
+            node.subscribe_tagged_rows(topics[name], partial(self._receive, name), refuse)
+        self._on_safe = on_safe
+        self._foreign = [name for name in read if not edges[name].senders]
         if guard is not None:
-            GuardPorts(node, guard, node.now_ns)
-        if on_safe is not None:
-            node.subscribe_objects(
-                SAFE.name,
-                ros_class(SAFE.ros_type),
-                lambda message: on_safe(bool(message.data)),
-                QOS_DEPTH,
-            )
+            GuardPorts(node, guard, node.now_ns, self._reset)
+        elif FORCE_CONTROLLER in schedule.nodes:
+            BoundFlag(node, SAFE, FORCE_CONTROLLER, self._note_safe, self._refuse)
         self._on_start = on_start
-        self._foreign = [
-            name for name in (*plan.inputs, *plan.held) if name != CLOCK and not edges[name].senders
-        ]
         # Drivers in the plant's place read the commands as well.
         self._driven = [name for name in plan.outputs if name == TORQUE_COMMAND and self._foreign]
         self._unsteady_ns = node.now_ns()
@@ -86,12 +95,30 @@ class RealtimeNode:
         """Whether the run is over."""
         return self._leader.end_ns is not None
 
-    def _receive(self, topic: str, stamp_ns: int, row: Array) -> None:
-        self._loop.receive(topic, stamp_ns, row, self._node.now_ns())
+    def _receive(self, topic: str, stamp_ns: int, row: Array, gid: bytes | None) -> None:
+        self._loop.receive(topic, stamp_ns, row, self._node.now_ns(), gid)
 
     def _refuse(self, topic: str, reason: str) -> None:
+        binding = self._bindings.get(topic)
+        if not self._loop.begun and binding is not None and binding.bound is None:
+            # Before the run nobody is bound, and who is missing is reported by its leader.
+            return
         self._loop.refuse(self._node.now_ns(), reason)
         self._node.complain(topic, reason)
+
+    def _hear_of_fault(self, reason: str) -> None:
+        self._loop.alarm(self._node.now_ns(), reason)
+
+    def _note_safe(self, safe: bool) -> None:
+        if self._foreign and safe and not self._loop.safe:
+            # Drivers stamp by the clock as it is; a simulated plant goes on by the old one.
+            self._node.accept_clock()
+        self._loop.note_safe(safe)
+        if self._on_safe is not None:
+            self._on_safe(safe)
+
+    def _reset(self, now_ns: int) -> str | None:
+        return self._loop.reset(now_ns)
 
     def _start(self, start_ns: int) -> None:
         if self._on_start is not None:
@@ -99,7 +126,14 @@ class RealtimeNode:
         self._loop.start(start_ns)
 
     def _connected(self) -> bool:
-        """Return whether drivers have been heard without a pause, and read the commands to them."""
+        """Return whether all inputs are bound and drivers have been heard without a pause.
+
+        And whether they read the commands to them.
+        """
+        if self._loop.begun:
+            return True
+        if any([binding.missing() for binding in self._bindings.values()]):
+            return False
         now = self._node.now_ns()
         read = all(self._node.has_other_readers(name) for name in self._driven)
         if not read or not self._loop.hears(self._foreign, now):
@@ -107,6 +141,11 @@ class RealtimeNode:
         return not self._foreign or now - self._unsteady_ns >= _STEADY_NS
 
     def _tick(self) -> None:
+        fault = self._node.clock_fault()
+        if fault is not None:
+            self._loop.alarm(self._node.now_ns(), fault)
+            if self._foreign and self._loop.safe:
+                self._node.accept_clock()
         self._loop.tick(self._node.now_ns())
 
 
@@ -124,6 +163,8 @@ class RealtimeWaveNode:
         """Connect the wave trajectory; arguments as `RealtimeNode`."""
         plan = schedule.nodes[stage.node]
         self._node = node
+        node.keep_time()
+        self._line = FaultLine(node)
         publish = {name: node.publisher(topics[name], edges[name].readers) for name in plan.outputs}
         status = node.status_publisher(edges[DIAGNOSTICS.name].readers)
         self._loop = WallTrajectory(stage, schedule, publish, status)
@@ -137,4 +178,7 @@ class RealtimeWaveNode:
         return self._leader.end_ns is not None
 
     def _tick(self) -> None:
+        fault = self._node.clock_fault()
+        if fault is not None:
+            self._line.report(fault)
         self._loop.tick(self._node.now_ns())

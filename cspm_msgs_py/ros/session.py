@@ -22,6 +22,7 @@ from typing_extensions import Self
 from cspm_msgs_py.errors import CspmError, InputError
 from cspm_msgs_py.interruption import interruptible
 from cspm_msgs_py.ros.contract_node import ContractNode
+from cspm_msgs_py.ros.wake_up import WakeUp, make_wake_up
 from cspm_msgs_py.ros.wall_timers import WallTimers
 
 DISCOVERY_RANGE = "ROS_AUTOMATIC_DISCOVERY_RANGE"
@@ -30,7 +31,8 @@ _LOOK_EVERY_S = 0.02
 _LONG_S = 1e6
 # A node that was ordered to stop leaves in less than a second, whoever does not answer it.
 FAREWELL_S = 0.5
-# In a polled session: how often the executor has its turn, and how long it waits when all is quiet.
+# In a polled session: how often the executor has its turn, and how long it sleeps when all is quiet
+# where no message can wake it.
 _TURN_S, _IDLE_S = 0.01, 0.0002
 # New objects between two collections of garbage, of which nodes make next to none.
 _OBJECTS = 10_000
@@ -67,15 +69,27 @@ class Session:
         self.context = Context()
         _init(self.context, list(args), domain_id)
         self._executor = EventsExecutor(context=self.context)
-        self._timers = WallTimers() if polled else None
+        self._timers: WallTimers | None = None
+        self._wake_up: WakeUp | None = None
         self._nodes: list[ContractNode] = []
         self._stack = ExitStack()
         self._interrupted: Callable[[], bool] = lambda: False
         self._left = False
+        if polled:
+            self.poll()
+
+    def poll(self) -> None:
+        """Take messages by looking for them in turn, also for nodes that have no subscription yet.
+
+        A message ends the sleep between two looks.
+        """
+        self._timers, self._wake_up = WallTimers(), make_wake_up()
+        for node in self._nodes:
+            node.poll(self._timers, self._wake_up)
 
     def node(self, name: str) -> ContractNode:
         """Return a new node that this session spins."""
-        made = ContractNode(name, self.context, self._timers)
+        made = ContractNode(name, self.context, self._timers, self._wake_up)
         self._nodes.append(made)
         self._executor.add_node(made.node)
         return made
@@ -143,7 +157,14 @@ class Session:
                 self._executor.spin_once(timeout_sec=0.0)
                 turn = now + _TURN_S
             elif not moved and rest > 0.0:
-                time.sleep(min(rest, _IDLE_S))
+                self._sleep(min(rest, turn - now))
+
+    def _sleep(self, seconds: float) -> None:
+        """Sleep for so long [s] at most, less if a message comes."""
+        if self._wake_up is not None:
+            self._wake_up.wait(seconds)
+        else:
+            time.sleep(min(seconds, _IDLE_S))
 
     def deliver(self, seconds: float) -> bool:
         """Wait until all that was sent has come to those who read it; return whether it has.
@@ -161,6 +182,9 @@ class Session:
             self._executor.remove_node(node.node)
             node.node.destroy_node()
         self._nodes = []
+        if self._wake_up is not None:
+            self._wake_up.close()
+            self._wake_up = None
         self._executor.shutdown()
         self.context.try_shutdown()
         self._stack.close()

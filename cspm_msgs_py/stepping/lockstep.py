@@ -129,15 +129,15 @@ class Acknowledgement:
     """
 
     def __init__(self) -> None:
-        self._told = -1
+        self._reported = -1
         self.last: int | None = None
 
     def due(self, reached: int) -> bool:
         """Return whether to report that all is there through step `reached`."""
-        at_last = self.last is not None and self._told < self.last <= reached
-        if not at_last and reached < self._told + ACKNOWLEDGE_EVERY:
+        at_last = self.last is not None and self._reported < self.last <= reached
+        if not at_last and reached < self._reported + ACKNOWLEDGE_EVERY:
             return False
-        self._told = reached
+        self._reported = reached
         return True
 
 

@@ -17,13 +17,12 @@ from numpy.typing import NDArray
 from cspm_msgs_py.diagnostics import Level, Status
 from cspm_msgs_py.errors import InputError
 from cspm_msgs_py.schedule import CLOCK, DIAGNOSTICS_RATE, FORCE_CONTROLLER, TENSION, Schedule
+from cspm_msgs_py.stepping.admission import Admission
+from cspm_msgs_py.stepping.publisher_binding import PublisherBinding
 from cspm_msgs_py.stepping.stage import Guard, Stage
 
 Array = NDArray[np.float64]
 Publish = Callable[[int, int, Array], None]
-
-# How far a clock may be ahead of ours before its stamps are called wrong.
-AHEAD_NS = 50_000_000
 
 _NO_ROW = np.zeros(0)
 
@@ -46,6 +45,9 @@ class SampleAndHold:
         publish: Mapping[str, Publish],
         publish_status: Callable[[int, Status], None],
         guard: Guard | None = None,
+        *,
+        bindings: Mapping[str, PublisherBinding] | None = None,
+        on_fault: Callable[[str], None] = lambda _: None,
     ) -> None:
         """Make the node's part.
 
@@ -56,9 +58,11 @@ class SampleAndHold:
             publish: where outputs go, by topic.
             publish_status: where diagnostics go.
             guard: the stage itself, where it has a safe state.
+            bindings: to whom inputs are bound, by topic; absent: to nobody.
+            on_fault: where there is no guard, called with what has to lead to the safe state.
         """
         plan = schedule.nodes[stage.node]
-        self._stage, self._guard = stage, guard
+        self._stage, self._guard, self._on_fault = stage, guard, on_fault
         self._stale_ns = round(stale_after * 1e9)
         self._publish, self._publish_status = publish, publish_status
         self._inputs = plan.inputs
@@ -81,7 +85,9 @@ class SampleAndHold:
             # The guard allows what the scenario says and not a period more.
             self._limits = dict.fromkeys(self._delays, self._stale_ns)
         self._rows: dict[str, Array] = {}
-        self._stamps: dict[str, int] = {}
+        bound = bindings or {}
+        self._admissions = {name: Admission(name, bound.get(name)) for name in self._delays}
+        self._safe = False
         self._stamp = self._due = 0
         self._sent: dict[str, int] = {}
         self._start_ns: int | None = None
@@ -96,40 +102,76 @@ class SampleAndHold:
         """Let what follows the time alone begin at an instant [ns] on the ROS clock."""
         self._start_ns = start_ns
 
-    def receive(self, topic: str, stamp_ns: int, row: Array, now_ns: int) -> None:
+    @property
+    def safe(self) -> bool:
+        """Whether the winches are in their safe state, as far as this node knows."""
+        return self._safe if self._guard is None else self._guard.safe
+
+    def note_safe(self, safe: bool) -> None:
+        """Take from the node that has a guard whether the winches are in their safe state."""
+        self._safe = safe
+
+    def receive(
+        self, topic: str, stamp_ns: int, row: Array, now_ns: int, gid: bytes | None = None
+    ) -> None:
         """Take a message, and compute if it is the one that the stage waits for.
 
+        Args:
+            topic: its topic.
+            stamp_ns: its stamp [ns].
+            row: its numbers.
+            now_ns: the present instant [ns].
+            gid: identity of its publisher, None if unknown.
+
         Raises:
-            InputError: its stamp is one that cannot be.
+            InputError: it is another publisher's, or its stamp is one that cannot be.
         """
-        before = self._stamps.get(topic)
-        if before is not None and stamp_ns < before:
-            raise InputError(
-                f"{topic}: stamp went back from {before * 1e-9:.3f} s to {stamp_ns * 1e-9:.3f} s: a"
-                " restarted clock or a second sender"
-            )
-        if stamp_ns > now_ns + AHEAD_NS:
-            raise InputError(
-                f"{topic}: stamp {(stamp_ns - now_ns) * 1e-9:.3f} s in the future, allowed:"
-                f" {AHEAD_NS * 1e-9:g} s"
-            )
+        admission = self._admissions[topic]
+        before = admission.stamp_ns
+        fault = admission.fault(stamp_ns, now_ns, gid, safe=self.safe)
+        if fault is not None:
+            raise InputError(fault)
         if stamp_ns == before:
             return
-        self._stamps[topic], self._rows[topic] = stamp_ns, row
-        if topic == self._trigger and self._triggered and stamp_ns >= self._due:
-            self._due = stamp_ns + self._wait_ns
-            self._compute(stamp_ns, now_ns)
+        self._rows[topic] = row
+        if topic == self._trigger and self._triggered:
+            if before is not None and stamp_ns < before:
+                # A clock that was restarted: what is due is counted from its new stamps.
+                self._due = stamp_ns
+            if stamp_ns >= self._due:
+                self._due = stamp_ns + self._wait_ns
+                self._compute(stamp_ns, now_ns)
 
     def hears(self, topics: Collection[str], now_ns: int) -> bool:
         """Return whether messages of these topics came that are not too old to compute on."""
-        came = all(name in self._stamps for name in topics)
-        return came and not self._too_old(topics, now_ns)
+        return set(topics) <= set(self._came) and not self._too_old(topics, now_ns)
 
     def refuse(self, now_ns: int, reason: str) -> None:
-        """Take note of an unusable message; with a guard it leads to the safe state."""
+        """Take note of an unusable message; in a run it leads to the safe state."""
         self.refused = (self.refused[0] + 1, reason)
+        self.alarm(now_ns, reason)
+
+    def alarm(self, now_ns: int, reason: str) -> None:
+        """Go to the safe state, or have it gone to, once the run has begun."""
+        if not self.begun:
+            return
         if self._guard is not None:
             self._guard.trip(now_ns, reason)
+        else:
+            self._on_fault(reason)
+
+    @property
+    def begun(self) -> bool:
+        """Whether the run has begun."""
+        return self._start_ns is not None or self._computed_ns is not None
+
+    def reset(self, now_ns: int) -> str | None:
+        """Leave the safe state; return why not in one line while an input is not fresh."""
+        read = [name for name in self._delays if name != CLOCK]
+        blind = [name for name in read if not self.hears([name], now_ns)]
+        if blind:
+            return f"reset refused: no fresh {', '.join(blind)}"
+        return None if self._guard is None else self._guard.reset(now_ns)
 
     def tick(self, now_ns: int) -> None:
         """Do what is due without a message: to be called once in every period."""
@@ -140,7 +182,7 @@ class SampleAndHold:
         if self._guard is not None:
             self._look_at_clock(self._guard, now_ns)
             # Before anything was commanded nobody misses an input that comes and goes.
-            known = self._stamps if self._computed_ns is not None else ()
+            known = self._came if self._computed_ns is not None else ()
             ages = {name: self._age(name, now_ns) for name in known}
             self._stamp = now_ns
             self._guard.watch(now_ns, ages, self._send, self._rows)
@@ -177,9 +219,15 @@ class SampleAndHold:
         stamp = self._sent[topic] = max(self._stamp, self._sent.get(topic, -1) + 1)
         self._publish[topic](stamp, stamp, row)
 
+    @property
+    def _came(self) -> list[str]:
+        """The topics of which a message came."""
+        return [name for name, each in self._admissions.items() if each.stamp_ns is not None]
+
     def _age(self, topic: str, now_ns: int) -> int:
+        stamp = self._admissions[topic].stamp_ns
         # The time itself, which has no stamp here, is never old.
-        return max(0, now_ns - self._stamps.get(topic, now_ns) - self._delays[topic])
+        return 0 if stamp is None else max(0, now_ns - stamp - self._delays[topic])
 
     def _too_old(self, inputs: Collection[str], now_ns: int) -> str:
         """Return which of the inputs are too old to compute on."""

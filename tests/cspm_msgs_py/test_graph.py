@@ -69,6 +69,37 @@ def test_nodes_that_are_absent_neither_send_nor_read():
     assert edges["/diagnostics"].readers == ()
 
 
+def target(source):
+    return schedule("calm_measured_target", f"target.source={source}")
+
+
+def test_a_measured_target_has_topics_and_a_tracker_of_its_own():
+    found = target("measured")
+    edges = graph_of(found, everybody(found))
+    assert edges["/target/reference"].senders == ("wave_trajectory",)
+    assert edges["/target/pose"].senders == (PLANT,)
+    assert edges["/target/pose"].readers == ("target_tracker", RECORDER)
+    assert edges["/bar/reference"].senders == ("target_tracker",)
+    assert edges["/truth/target/pose"].readers == (RECORDER,)
+    # Through the bar's reference a torque proves that the tracker read, not the wave trajectory.
+    assert followers(found, everybody(found), WINDOW) == ("wave_trajectory", RECORDER)
+
+
+def test_nobody_of_a_run_sends_what_is_somebody_elses():
+    found = target("external")
+    edges = graph_of(found, everybody(found))
+    assert edges["/target/pose"].senders == ()
+    assert edges["/target/pose"].readers == ("target_tracker", RECORDER)
+    assert not {"/target/reference", "/truth/target/pose"} & set(edges)
+    assert graph_of(found, (PLAYER, "target_tracker"))["/target/pose"].senders == (PLAYER,)
+
+
+def test_a_prescribed_target_has_no_topics():
+    found = target("prescribed")
+    assert not [name for name in found.topics if "target" in name]
+    assert "target_tracker" not in found.nodes
+
+
 def test_a_rig_with_one_winch():
     found = schedule("one_winch")
     edges = graph_of(found, everybody(found))
@@ -77,7 +108,7 @@ def test_a_rig_with_one_winch():
     assert not [name for name in edges if "pose" in name or "wrench" in name]
 
 
-def test_a_player_stands_for_the_plant_and_for_who_is_absent():
+def test_a_player_replaces_the_plant_and_who_is_absent():
     found = schedule()
     edges = graph_of(found, (PLAYER, "motion_controller", RECORDER))
     assert edges["/bar/pose"].senders == (PLAYER,)
@@ -93,6 +124,7 @@ def test_the_names_of_all_nodes_are_the_contracts():
         "motion_controller",
         "tension_distribution",
         "force_controller",
+        "target_tracker",
         "recorder",
         "player",
     )

@@ -230,7 +230,7 @@ def test_only_definitions_with_the_same_fields_are_accepted():
         check_definition(kind, "ros2msg", "}{")
 
 
-def test_a_pose_topic_serialises_alike_through_both_roads():
+def test_a_pose_topic_serialises_equally_through_both_roads():
     topic = Topic("/p", "geometry_msgs/msg/PoseStamped", "x_ned", POSE)
     row = np.arange(7.0)
     assert layout_of(topic).encode([3], [row])[0].tobytes() == serialize(message_of(topic, 3, row))

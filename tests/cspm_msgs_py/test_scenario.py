@@ -2,12 +2,12 @@ from pathlib import Path
 
 import pytest
 
+from cspm_msgs_py.control_spec.distribution import TensionDistribution
 from cspm_msgs_py.errors import InputError
 from cspm_msgs_py.scenario import (
     ClosedLoop,
     LockedWinches,
     Scenario,
-    TensionDistribution,
     TorqueProfile,
     load_scenario,
     parse_scenario,
@@ -34,6 +34,77 @@ FAULTS = [
     (
         {"duration": 1e-9},
         "duration: 1e-09 s, allowed: a whole number of the plant's periods of 1/1000 s",
+    ),
+    (
+        {"events": [{"at": 10.0, "cut": "sway_3"}]},
+        "events[0].at: 10 s, allowed: before the run's end at 10 s",
+    ),
+    (
+        {"events": [{"at": 1.0, "cut": "a"}, {"at": 1.0005, "cut": "b"}]},
+        "events[1].at: 1.0005 s, allowed: a whole number of the plant's periods of 1/1000 s",
+    ),
+    (
+        {"events": [{"at": 1.0, "cut": "a"}, {"at": 2.0, "cut": "a"}]},
+        "events[1].cut: a is cut twice, allowed: once",
+    ),
+    ({"events": [{"at": -1.0, "cut": "a"}]}, "events[0].at: -1.0, allowed: greater than or equal"),
+    (
+        {
+            "control": {
+                "mode": "closed_loop",
+                "motion": {"law": "computed_wrench"},
+                "tension_distribution": {"lost_cable": {}},
+            }
+        },
+        "control: tension_distribution.lost_cable: with law computed_wrench, whose observer counts",
+    ),
+    (
+        {
+            "control": {
+                "mode": "closed_loop",
+                "tension_distribution": {
+                    "method": "prescribed",
+                    "null_space": [0.0, 0.0, 0.0],
+                    "lost_cable": {},
+                },
+            }
+        },
+        "control.tension_distribution.lost_cable: with method prescribed, whose null_space is",
+    ),
+    (
+        {"operation": [{"at": 1.0, "mode": "auto"}]},
+        "operation[0].mode: 'auto', allowed: 'manual' or 'track'",
+    ),
+    (
+        {"operation": [{"at": 1.005, "mode": "track"}]},
+        "operation[0].at: 1.005 s, allowed: a multiple of 0.01 s",
+    ),
+    (
+        {"operation": [{"at": 10.0, "mode": "track"}]},
+        "operation[0].at: 10 s, allowed: before the run's end at 10 s",
+    ),
+    (
+        {"operation": [{"at": 2.0, "mode": "manual"}, {"at": 2.0, "mode": "track"}]},
+        "operation[1].at: 2 s, allowed: later than operation[0] at 2 s",
+    ),
+    (
+        {"operation": [{"at": 2.0, "mode": "track"}], "target": {"source": "measured"}},
+        "operation: with target.source measured, allowed: prescribed, or no operation",
+    ),
+    (
+        {"target": {"source": "seen"}},
+        "target.source: 'seen', allowed: 'prescribed', 'measured' or 'external'",
+    ),
+    ({"target": {"bandwidth": 0.0}}, "target.bandwidth: 0.0, allowed: greater than 0"),
+    (
+        {
+            "target": {"source": "measured"},
+            "control": {
+                "mode": "closed_loop",
+                "motion": {"law": "computed_wrench", "governor": {}},
+            },
+        },
+        "target.source: measured with a governor, which plans with the target's motion to come",
     ),
     ({"seed": -1}, "seed: -1, allowed: greater than or equal to 0"),
     ({"seed": 1.5}, "seed: 1.5, allowed: a whole number without decimal point"),
@@ -84,8 +155,8 @@ FAULTS = [
         "control.torque.c.ofset: unknown key, allowed: offset, sines",
     ),
     (
-        {"control": {"mode": "closed_loop", "motion": {"crossover": {"roll": 1}}}},
-        "control.motion.crossover.roll: 'roll', allowed: 'surge', 'sway', 'heave', 'pitch' or 'yaw",
+        {"control": {"mode": "closed_loop", "motion": {"crossover": {"rol": 1}}}},
+        "control.motion.crossover.rol: 'rol', allowed: 'surge', 'sway', 'heave', 'roll', 'pitch'",
     ),
     (
         {"control": {"mode": "closed_loop", "force": {"bandwidth": -1}}},

@@ -32,8 +32,8 @@ THESIS = bundle_of("rest").testbed.testbed
 
 
 def scenario(text="", **rates):
-    told = "".join(f"  {name}: {rate}\n" for name, rate in rates.items())
-    return parse_scenario(f"{PLAIN}rates:\n{told}{text}" if rates else PLAIN + text, "my.yaml")
+    reported = "".join(f"  {name}: {rate}\n" for name, rate in rates.items())
+    return parse_scenario(f"{PLAIN}rates:\n{reported}{text}" if rates else PLAIN + text, "my.yaml")
 
 
 class Account:

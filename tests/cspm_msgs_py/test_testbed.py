@@ -73,7 +73,7 @@ VALUES = [
     ("bar", [], "bar: [], allowed: a mapping of keys to values"),
     ("cables", [], "cables: [], allowed: a list of at least 1"),
     ("cables", {}, "cables: {}, allowed: a list"),
-    (f"{C0}.name", "c1", "cables[1].name: 'c1' stands twice, allowed: each name once"),
+    (f"{C0}.name", "c1", "cables[1].name: 'c1' occurs twice, allowed: each name once"),
     (f"{C0}.name", "", "cables[0].name: '', allowed: text that matches"),
     (
         f"{C0}.exit",
@@ -133,7 +133,7 @@ VALUES = [
         "sensors",
         {"/bar/pse": {"noise": [0, 0], "resolution": [0, 0], "rate": 100}},
         "sensors./bar/pse: no such sensor, allowed: /winch_frame/pose, /winch_frame/twist, /bar/"
-        "pose, /bar/twist, /winches/state, /cables/tension",
+        "pose, /bar/twist, /target/pose, /winches/state, /cables/tension",
     ),
     (
         "sensors",
@@ -253,7 +253,7 @@ def test_a_winch_may_have_no_cable_where_there_is_no_bar():
     assert build(RIG).cables[0].has_cable
 
 
-def test_one_number_stands_for_a_list_of_one():
+def test_one_number_means_a_list_of_one():
     sensor = {"noise": 0.1, "resolution": [0.2], "rate": 100}
     testbed = build({**RIG, "sensors": {"/cables/tension": sensor}})
     assert testbed.sensors["/cables/tension"].noise == (0.1,)

@@ -173,10 +173,13 @@ def test_more_than_eight_appended_bytes_are_refused(topic):
 
 
 def from_another_sender(topic, seed=0, frame="map"):
-    """A message with every part of a JointState filled and another frame; its stamp and row."""
+    """A message with every part of a JointState filled; its stamp and row.
+
+    And with another frame, where that has no meaning.
+    """
     message = message_for(topic, row_for(topic, seed), STAMP + seed)
     if topic is not CLOCK:
-        message.header.frame_id = frame
+        message.header.frame_id = topic.frame_id or frame
     for part in ("position", "velocity", "effort"):
         if hasattr(message, part) and not len(getattr(message, part)):
             setattr(message, part, np.full(len(topic.joint_names), np.nan))
@@ -213,9 +216,9 @@ def test_senders_without_end_are_read_and_few_are_remembered(monkeypatch):
     learned = []
     find = wire.find_layout
     monkeypatch.setattr(wire, "find_layout", lambda topic: learned.append(topic) or find(topic))
-    reader, kept = WireReader(POSE), layout_of.cache_info().currsize
+    reader, kept = WireReader(TENSION), layout_of.cache_info().currsize
     for seed in range(40):
-        message, _, row = from_another_sender(POSE, seed, frame=f"frame_{seed % 20}")
+        message, _, row = from_another_sender(TENSION, seed, frame=f"frame_{seed % 20}")
         np.testing.assert_array_equal(reader.decode(serialize(message))[1], row)
     assert [topic.frame_id for topic in learned] == [f"frame_{i}" for i in range(8)]
     assert layout_of.cache_info().currsize == kept
@@ -289,11 +292,23 @@ def test_a_long_list_of_allowed_names_is_cut():
 
 
 def test_frame_of_any_sensible_length_is_read():
-    longest, _, row = from_another_sender(POSE, frame="é" * 255)
-    np.testing.assert_array_equal(WireReader(POSE).decode(serialize(longest))[1], row)
-    longer, _, _ = from_another_sender(POSE, frame="e" * 256)
-    assert refusal(POSE, serialize(longer)) == (
+    longest, _, row = from_another_sender(TENSION, frame="é" * 255)
+    np.testing.assert_array_equal(WireReader(TENSION).decode(serialize(longest))[1], row)
+    longer, _, _ = from_another_sender(TENSION, frame="e" * 256)
+    assert refusal(TENSION, serialize(longer)) == (
         "a frame_id of 256 characters, allowed: at most 255"
+    )
+
+
+@each_topic
+@pytest.mark.parametrize("frame", ["map", "", "world", "World_ned"])
+def test_vectors_in_another_frame_are_refused(topic, frame):
+    if not topic.frame_id:
+        return
+    message = message_for(topic, row_for(topic))
+    message.header.frame_id = frame
+    assert refusal(topic, serialize(message)) == (
+        f"frame {frame!r}, allowed: {topic.frame_id!r} (z down)"
     )
 
 
@@ -380,13 +395,13 @@ def test_stamps_that_are_none_are_refused(topic, seconds, nanoseconds):
 
 @each_topic
 def test_messages_of_other_types_are_refused(topic):
-    """But for those whose bytes are alike: names of types are not in the bytes."""
+    """But for those whose bytes are equal: names of types are not in the bytes."""
     kinds = {other.ros_type: other for other in ROW_TOPICS.values()}
     twist, wrench = "geometry_msgs/msg/TwistStamped", "geometry_msgs/msg/WrenchStamped"
     # A pose has 8 bytes more than a twist, as if a serialiser had appended them.
-    alike = {twist, wrench, POSE.ros_type} if topic.ros_type in (twist, wrench) else set()
+    equal = {twist, wrench, POSE.ros_type} if topic.ros_type in (twist, wrench) else set()
     for kind, other in kinds.items():
-        if kind not in alike | {topic.ros_type}:
+        if kind not in equal | {topic.ros_type}:
             refusal(topic, payload_for(other))
 
 

@@ -68,7 +68,7 @@ def places(content, count, seed):
 
 
 @pytest.mark.slow
-def test_a_cut_anywhere_leaves_what_stands_before_it(tmp_path, sample):
+def test_a_cut_anywhere_leaves_what_is_before_it(tmp_path, sample):
     content, rows = sample
     path, whole = tmp_path / "cut.mcap", tmp_path / "whole.mcap"
     whole.write_bytes(content)

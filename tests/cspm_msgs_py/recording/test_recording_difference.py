@@ -69,7 +69,7 @@ def test_one_flipped_bit_is_found_and_named(tmp_path_factory, original, name, st
         assert struct.pack("<d", getattr(found, side)) == struct.pack("<d", values[side])
 
 
-def test_the_earliest_difference_is_told(tmp_path, original):
+def test_the_earliest_difference_is_reported(tmp_path, original):
     def change(topic, k, row):
         late = {"/clock": 999, "/bar/pose": 71, "/bar/twist": 33}.get(topic, 999)
         return row + 1.0 if k >= late else row

@@ -23,7 +23,7 @@ MOMENTS = random.Random(20).sample(range(1, 20_000), 6)
 
 
 def record_until_killed(folder, progress_path, steps):
-    """Kill the recording child once it has begun `steps` steps; return the last that it told."""
+    """Kill the recording child once it has begun `steps` steps; return the last one reported."""
     progress_path.write_bytes(bytes(8))
     with progress_path.open("r+b") as file, mmap.mmap(file.fileno(), 8) as shared:
         child = subprocess.Popen([sys.executable, CHILD, folder, progress_path])

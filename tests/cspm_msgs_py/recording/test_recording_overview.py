@@ -121,7 +121,7 @@ def test_what_cannot_be_read_gives_one_line(tmp_path):
     with pytest.raises(InputError, match=r"nowhere: no such file or folder$"):
         overview(tmp_path / "nowhere")
     with pytest.raises(InputError, match=r"a folder without metadata.yaml"):
-        overview(tmp_path)
+        overview(tmp_path.parent)
 
 
 @pytest.mark.parametrize("name", ["chunk_not_closed.mcap", "zstd_chunk_with_padding.mcap"])

@@ -121,7 +121,7 @@ def test_the_file_alone_mends_the_metadata_of_its_folder(tmp_path, sample):
         assert bag.message_count == overview(folder).message_count
 
 
-def test_a_file_that_stands_alone_stays_alone(tmp_path, sample):
+def test_a_file_that_is_alone_stays_alone(tmp_path, sample):
     source, ends = sample
     path = tmp_path / "alone.mcap"
     path.write_bytes((source / "calm_0.mcap").read_bytes()[: ends[0]])

@@ -22,7 +22,7 @@ def domain():
 
 
 class Follower:
-    """A node of a run that notes what it is told."""
+    """A node of a run that notes what it is given."""
 
     def __init__(self, session, name):
         self.node, self.started, self.ended = session.node(name), [], []
@@ -53,7 +53,7 @@ class Run:
         assert self.session.spin_until(condition, PATIENCE_S), self.leader.waiting()
 
 
-def test_it_waits_for_every_node_by_name_and_tells_start_and_end(domain):
+def test_it_waits_for_every_node_by_name_and_reports_start_and_end(domain):
     with Session(domain_id=domain) as session:
         run = Run(session, ["recorder", "force_controller"])
         assert run.leader.waiting() == ["force_controller", "recorder"]

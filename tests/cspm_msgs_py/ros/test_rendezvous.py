@@ -27,11 +27,11 @@ def test_a_node_announces_itself_whoever_says_that_the_run_began_or_ended(topic)
         header = ros_class("std_msgs/msg/Header")
         said = stranger.node.create_publisher(header, topic, contract_qos())
 
-        def told():
+        def reported():
             said.publish(header())
             return bool(heard) if topic == START else follower.end_ns == 0
 
-        assert session.spin_until(told, PATIENCE_S)
+        assert session.spin_until(reported, PATIENCE_S)
         plant = PlantSide(session.node("plant"), PERIOD_NS, ["recorder"], lambda *_: None)
         assert session.spin_until(lambda: not plant.absent, PATIENCE_S), plant.absent
 

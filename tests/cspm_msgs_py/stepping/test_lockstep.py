@@ -62,8 +62,11 @@ def assert_as_in_process(network, listener):
             np.testing.assert_array_equal(row.view(np.uint64), other.view(np.uint64))
     assert not {name for name, found in listener.messages.items() if found} - set(network.heard)
     order = ["plant", *network.nodes]
-    told = [told for told in network.statuses if told[0] <= last_ns]
-    assert sorted(told, key=lambda told: (told[0], order.index(told[1].name))) == listener.statuses
+    reported = [reported for reported in network.statuses if reported[0] <= last_ns]
+    assert (
+        sorted(reported, key=lambda reported: (reported[0], order.index(reported[1].name)))
+        == listener.statuses
+    )
 
 
 def listened(bundle, scenario, testbed, steps):
@@ -102,7 +105,7 @@ def test_without_a_closed_loop_as_well(name, seed):
 
 
 def test_the_order_of_delivery_does_differ():
-    """The property would hold for nothing if all seeds delivered alike."""
+    """The property would hold for nothing if all seeds delivered equally."""
     orders = []
     for seed in range(3):
         network, order = Network(*with_rates(REST), 30), []
@@ -292,21 +295,21 @@ def test_how_far_a_node_is_counts_what_it_has_not_read():
 
 
 @given(steps=st.lists(st.integers(0, 6), max_size=40), ahead=st.integers(0, 10), when=SEEDS)
-def test_the_plant_is_told_every_few_steps_and_the_last(steps, ahead, when):
-    acknowledgement, reached, told = Acknowledgement(), -1, [-1]
+def test_the_plant_is_notified_every_few_steps_and_the_last(steps, ahead, when):
+    acknowledgement, reached, reported = Acknowledgement(), -1, [-1]
     last = sum(steps) - 1 - ahead
     for i, step in enumerate(steps):
         reached += step
         if i == when % len(steps):
             acknowledgement.last = last
         if acknowledgement.due(reached):
-            assert reached > told[-1]
-            told.append(reached)
-        assert reached - told[-1] < ACKNOWLEDGE_EVERY
+            assert reached > reported[-1]
+            reported.append(reached)
+        assert reached - reported[-1] < ACKNOWLEDGE_EVERY
     acknowledgement.last = last
     if acknowledgement.due(reached):
-        told.append(reached)
-    assert told[-1] >= last
+        reported.append(reached)
+    assert reported[-1] >= last
     assert not acknowledgement.due(reached)
 
 

@@ -24,7 +24,8 @@ from cspm_msgs_py.schedule import (
     WRENCH,
     schedule_of,
 )
-from cspm_msgs_py.stepping.sample_and_hold import AHEAD_NS, SampleAndHold, WallTrajectory
+from cspm_msgs_py.stepping.admission import AHEAD_NS
+from cspm_msgs_py.stepping.sample_and_hold import SampleAndHold, WallTrajectory
 
 MS = 1_000_000
 # A wall clock's present, far from the zero at which lockstep begins.
@@ -38,9 +39,9 @@ def at(ms):
 
 
 class Recorder:
-    """A stage that notes what it is given, and a guard that notes what it is told."""
+    """A stage that notes what it is given, and a guard that notes what it is given."""
 
-    brake = False
+    brake = safe = False
 
     def __init__(self, node, output):
         self.node, self.output = node, output
@@ -68,13 +69,13 @@ class Part:
         self.schedule = schedule_of(bundle.scenario, bundle.testbed.testbed)
         plan = self.schedule.nodes[node]
         self.stage = stage or Recorder(node, plan.outputs[0])
-        self.sent, self.told = [], []
+        self.sent, self.reported = [], []
         self.part = SampleAndHold(
             self.stage,
             self.schedule,
             stale_after,
             {plan.outputs[0]: lambda log, stamp, row: self.sent.append((stamp, row))},
-            lambda stamp, status: self.told.append((stamp, status)),
+            lambda stamp, status: self.reported.append((stamp, status)),
             self.stage if guarded else None,
         )
 
@@ -94,7 +95,7 @@ class Part:
         """Return what it says when it is asked to at a time."""
         self.part._status_due = 0
         self.tick(at_ms)
-        return self.told[-1][1]
+        return self.reported[-1][1]
 
 
 def motion(*overrides, **arguments):
@@ -217,7 +218,7 @@ def test_what_begins_more_than_a_period_late_is_counted(late_ms, late):
     found = part.status(50.0)
     assert found.values["deadlines_missed"] == str(late)
     assert found.values["worst_latency_ms"] == f"{late_ms:.3f}"
-    # The worst since the last time that it was told.
+    # The worst since the last time that it was reported.
     assert part.status(51.0).values["worst_latency_ms"] == "0.000"
 
 
@@ -240,7 +241,7 @@ def test_the_sensors_own_delay_is_not_late():
     schedule = schedule_of(bundle.scenario, delayed)
     stage, sent = Recorder(MOTION_CONTROLLER, WRENCH), []
     part = SampleAndHold(
-        stage, schedule, 0.05, {WRENCH: lambda *told: sent.append(told)}, lambda *_: None
+        stage, schedule, 0.05, {WRENCH: lambda *reported: sent.append(reported)}, lambda *_: None
     )
     reference = NOW + 100 * MS
     part.receive(BAR_REFERENCE, reference, np.zeros(1), reference)
@@ -350,7 +351,7 @@ def test_stamps_of_the_future_are_refused():
     assert part.stamps_ms == [10.0]
 
 
-def test_what_was_refused_is_told():
+def test_what_was_refused_is_reported():
     part = motion()
     part.receive(BAR_REFERENCE, 0.0)
     part.receive(BAR_POSE, 0.0)
@@ -398,7 +399,7 @@ def test_before_anything_was_commanded_no_input_is_missed():
     assert (found.level, found.message) == (Level.STALE, f"waits for {TENSION_COMMAND}")
 
 
-def test_a_guarded_stage_computes_on_stale_inputs_and_is_told_their_age():
+def test_a_guarded_stage_computes_on_stale_inputs_and_is_given_their_age():
     part = force()
     part.receive(TENSION, 500.0)
     assert len(part.stage.steps) == 2
@@ -488,9 +489,11 @@ def test_it_reports_ten_times_a_second():
     part = motion()
     for time in range(1000):
         part.tick(time)
-    assert len(part.told) == DIAGNOSTICS_RATE
-    assert {status.message for _, status in part.told} == {f"waits for {BAR_POSE}, {BAR_REFERENCE}"}
-    assert part.told[0][1].values["own"] == "1"
+    assert len(part.reported) == DIAGNOSTICS_RATE
+    assert {status.message for _, status in part.reported} == {
+        f"waits for {BAR_POSE}, {BAR_REFERENCE}"
+    }
+    assert part.reported[0][1].values["own"] == "1"
 
 
 # Prescribed torques
@@ -567,16 +570,16 @@ class Waves:
 def wall(*overrides):
     bundle = bundle_of("rest", *overrides)
     schedule = schedule_of(bundle.scenario, bundle.testbed.testbed)
-    sent, told = [], []
+    sent, reported = [], []
     publish = {BAR_REFERENCE: lambda log, stamp, row: sent.append((stamp, row[0]))}
-    part = WallTrajectory(Waves(), schedule, publish, lambda _, status: told.append(status))
-    return part, sent, told
+    part = WallTrajectory(Waves(), schedule, publish, lambda _, status: reported.append(status))
+    return part, sent, reported
 
 
 def test_references_begin_at_the_start_and_carry_the_instants_due():
-    part, sent, told = wall("rates={wave_trajectory: 100}")
+    part, sent, reported = wall("rates={wave_trajectory: 100}")
     part.tick(NOW)
-    assert told[-1].message == "waits for the start"
+    assert reported[-1].message == "waits for the start"
     part.start(NOW + 100 * MS)
     part.tick(NOW + 99 * MS)
     assert sent == []
@@ -585,19 +588,19 @@ def test_references_begin_at_the_start_and_carry_the_instants_due():
     assert [stamp for stamp, _ in sent] == [NOW + (100 + 10 * k) * MS for k in range(100)]
     assert [at for _, at in sent] == [10 * MS * k for k in range(100)]
     assert part.late == 0
-    assert told[-1].message == "ok"
-    assert told[-1].values["worst_latency_ms"] == "2.000"
+    assert reported[-1].message == "ok"
+    assert reported[-1].values["worst_latency_ms"] == "2.000"
 
 
 def test_references_that_are_late_are_left_out_and_counted():
-    part, sent, told = wall("rates={wave_trajectory: 100}")
+    part, sent, reported = wall("rates={wave_trajectory: 100}")
     part.start(NOW)
     for time in (0, 10, 57, 60):
         part.tick(at(time))
     assert [(stamp - NOW) // MS for stamp, _ in sent] == [0, 10, 50, 60]
     assert part.late == 3
     part.tick(NOW + 100 * MS)
-    assert told[-1].values["deadlines_missed"] == "6"
+    assert reported[-1].values["deadlines_missed"] == "6"
 
 
 def test_motions_that_run_are_not_started_again():

@@ -1,0 +1,1 @@
+"""Parts of the scenario's `control`: force controllers, tension distribution, values per cable."""

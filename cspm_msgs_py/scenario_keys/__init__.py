@@ -1,0 +1,1 @@
+"""Parts of the scenario file beside `control`: bodies, and what happens during a run."""

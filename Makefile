@@ -3,10 +3,13 @@ PYTHON ?= python3
 VENV := .venv
 BIN := $(VENV)/bin
 PIP := $(BIN)/python -m pip install --quiet --disable-pip-version-check
-SCENARIO ?= worst_case
+SCENARIO ?= worst_case worst_case_past_thesis
 # One worker per processor. Each begins with its share of the files in order, and takes over from
 # the other what that has not begun: both end together, and few files are set up twice.
 SPREAD := -n logical --dist worksteal
+
+# A process per node imports some 200 modules of this project: compiled anew each time, unless kept.
+unexport PYTHONDONTWRITEBYTECODE
 
 # ROS 2 Jazzy comes as wheels, unless a native one is sourced. Both at once would mix their libraries.
 ROS := wheels
@@ -19,12 +22,12 @@ export PYTEST_ADDOPTS := -p pytest_cov -p xdist
 endif
 endif
 
-.PHONY: help run test test-fast test-slow kernels lint bench validate results coverage clean
+.PHONY: docs help run test test-fast test-slow kernels lint bench fuzz validate results coverage clean
 
 help: ## show this list
 	@grep -hE '^[a-z-]+:.*## ' Makefile | sed -E 's/:.*## /\t/' | expand -t 12
 
-run: $(VENV)/$(ROS).stamp ## build what a run needs and simulate the worst-case sea (SCENARIO=calm for another)
+run: $(VENV)/$(ROS).stamp ## build what a run needs and simulate the worst-case sea under two controllers (SCENARIO=calm for another)
 	@$(BIN)/cspm run $(SCENARIO)
 
 test: lint kernels ## build what the tests need; then style, types and all tests
@@ -44,13 +47,20 @@ lint: $(VENV)/test.stamp ## style and types
 coverage: $(VENV)/test.stamp ## line coverage with the kernels uncompiled
 	NUMBA_DISABLE_JIT=1 $(BIN)/python -m pytest -m "not slow and not compiled" --cov --cov-report=term --cov-report=html
 
+docs: $(VENV)/docs.stamp ## build the site into build/site, without a network
+	$(BIN)/mkdocs build --strict --quiet
+
 bench: $(VENV)/test.stamp ## measure speed, start-up and memory; prints a table
 	$(BIN)/python -m bench
 
-validate: $(VENV)/test.stamp ## measure over many runs what tests hold over few, and write docs/validation-runs.md; half an hour
+fuzz: $(VENV)/test.stamp ## 10 000 tables, damaged bags and mappings through the import, half an hour
+	CSPM_FUZZ_EXAMPLES=10000 $(BIN)/python -m pytest $(SPREAD) tests/cspm_ident/importing/test_import_fuzz.py
+
+validate: $(VENV)/test.stamp ## measure over many runs what tests hold over few, and write results/validation-runs.md; half an hour
 	OMP_NUM_THREADS=1 $(BIN)/python -m bench.validation
 
-results: $(VENV)/test.stamp ## every number and picture of docs/results.md: what .results does not keep is measured, at most two hours
+results: $(VENV)/test.stamp ## docs/results.md, half an hour, and results/steep-sea.md, two hours where .results keeps nothing
+	OMP_NUM_THREADS=1 $(BIN)/python -m bench.results.reproduction
 	OMP_NUM_THREADS=1 $(BIN)/python -m bench.results
 
 clean: ## remove the environment and caches
@@ -63,6 +73,10 @@ $(VENV)/pip.stamp:
 	  { echo "cspm: $(PYTHON) is older than 3.10, allowed: make PYTHON=python3.10 or newer" >&2; exit 1; }
 	@$(PYTHON) -m venv $(VENV) || \
 	  { rm -rf $(VENV); echo "cspm: $(PYTHON) lacks its venv module (Debian, Ubuntu: apt install python3-venv)" >&2; exit 1; }
+	@touch $@
+
+$(VENV)/docs.stamp: $(VENV)/$(ROS).stamp
+	@$(PIP) -e '.[docs]'
 	@touch $@
 
 $(VENV)/wheels.stamp: $(VENV)/pip.stamp pyproject.toml setup.cfg

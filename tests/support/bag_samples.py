@@ -164,7 +164,7 @@ def write_mcap(
 
 
 def clock_messages(logs: list[int]) -> list[Written]:
-    """Return a clock message for each log time [ns]; each tells its own number."""
+    """Return a clock message for each log time [ns]; each carries its own number."""
     kind = message_class(TYPES["/clock"])
     return [Written(log, "/clock", kind(time_of(i))) for i, log in enumerate(logs)]
 

@@ -15,8 +15,8 @@ frame.onload = () => {
   const page = frame.contentDocument.documentElement;
   frame.contentWindow.addEventListener('error', e => errors.push(e.message));
   setTimeout(async () => {
-    const told = await frame.contentWindow.eval(`(async () => {%s})()`);
-    const found = {errors, told, wide: page.scrollWidth, seen: page.clientWidth,
+    const reported = await frame.contentWindow.eval(`(async () => {%s})()`);
+    const found = {errors, reported, wide: page.scrollWidth, seen: page.clientWidth,
       plots: page.querySelectorAll('.scatterlayer').length};
     const out = document.createElement('pre');
     out.id = 'found'; out.textContent = JSON.stringify(found);
@@ -26,15 +26,21 @@ frame.onload = () => {
 </script></body>"""
 
 
-def look(page, width, script="return null"):
-    """Return how wide the page is, how wide it is seen, its plots, its errors, and what it told.
-
-    The script is run in the page and may wait; what it returns is told. Skips the test where there
-    is no Chromium.
-    """
+def find_browser():
+    """Return where Chromium is; skip the test where there is none, best before it does anything."""
     browser = shutil.which("chromium") or shutil.which("google-chrome")
     if browser is None:
         pytest.skip("no Chromium on this system")
+    return browser
+
+
+def look(page, width, script="return null"):
+    """Return how wide the page is and is seen, its plots, its errors, and what it returned.
+
+    The script is run in the page and may wait; what it returns is handed on. Skips the test where
+    there is no Chromium.
+    """
+    browser = find_browser()
     probe = page.with_name("probe.html")
     probe.write_text(_PROBE % (width, page.name, script), encoding="utf-8")
     options = ["--headless", "--no-sandbox", "--disable-gpu", "--allow-file-access-from-files"]

@@ -3,16 +3,18 @@
 import numpy as np
 from scipy.linalg import expm
 
-from cspm_control.design.gains import CONTROLLED_DOFS
 from cspm_model.equilibrium import gravity_wrench
 from cspm_model.kinematics import geometry
 from cspm_model.linearisation import linear_model, operating_point
-from cspm_msgs_py.dofs import CONTROLLED_AXES
+from cspm_msgs_py.dofs import CONTROLLED_AXES, DOFS
 from cspm_msgs_py.scenario import MotionControl
 from cspm_sim.parameters import plant_parameters
 
 SCENARIO = MotionControl()
+# Slower than the margins let it be [rad/s]: the table of the reconstruction.
+CROSSOVER = {"surge": 12.0, "sway": 10.0, "heave": 12.0, "pitch": 12.0, "yaw": 10.0}
 AXES = list(CONTROLLED_AXES)
+CONTROLLED_DOFS = [DOFS[axis] for axis in AXES]
 PERIOD = 1e-3
 
 

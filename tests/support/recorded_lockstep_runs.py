@@ -45,17 +45,17 @@ class Case:
 
 
 class Intake:
-    """A recorder that records to a folder, with what it told."""
+    """A recorder that records to a folder, with what it reported."""
 
     def __init__(self, bundle, folder, acknowledge=None, reporting=()):
-        self.told, self.rate_limited_warnings = [], []
+        self.reported, self.rate_limited_warnings = [], []
         schedule = schedule_of(bundle.scenario, bundle.testbed.testbed)
         self.writer = new_recording(bundle, folder, "graph")
         self.recorder = LockstepRecorder(
             schedule,
             bundle.testbed.testbed.topics,
             self.writer,
-            acknowledge or self.told.append,
+            acknowledge or self.reported.append,
             lambda topic, reason: self.rate_limited_warnings.append((topic, reason)),
             reporting,
         )

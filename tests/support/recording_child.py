@@ -1,4 +1,4 @@
-"""Records as fast as it can until it is killed; tells beforehand how far it is."""
+"""Records as fast as it can until it is killed; reports beforehand how far it is."""
 
 import mmap
 import struct

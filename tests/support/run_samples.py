@@ -10,9 +10,20 @@ from cspm_msgs_py.scenario import load_scenario
 from cspm_msgs_py.testbed import load_testbed
 from cspm_run.assembly import resolve
 from cspm_run.bundle import make_bundle
+from cspm_run.library import find_scenario
 from cspm_run.recorded_run import run
 
 SCENARIOS = Path(__file__).resolve().parents[2] / "scenarios"
+# The frame moves in surge alone: a bar that swings in one plane.
+PLUCKED_IN_SURGE = (
+    "winch_frame.motion.moves=["
+    "{at: 2.0, duration: 2.0, by: [0.06, 0, 0, 0, 0, 0]},"
+    " {at: 8.0, duration: 2.0, by: [-0.12, 0, 0, 0, 0, 0]},"
+    " {at: 14.0, duration: 1.0, by: [0.06, 0, 0, 0, 0, 0]},"
+    " {at: 20.0, duration: 1.0, by: [0.04, 0, 0, 0, 0, 0]},"
+    " {at: 26.0, duration: 0.5, by: [-0.02, 0, 0, 0, 0, 0]},"
+    " {at: 32.0, duration: 0.5, by: [-0.02, 0, 0, 0, 0, 0]}]"
+)
 THESIS_CABLES = ("hoist_1", "hoist_2", "surge_1", "surge_2", "sway_1", "sway_2", "sway_3", "sway_4")
 
 
@@ -23,7 +34,7 @@ def bundle_of(path, *overrides):
 
 @cache
 def _of_the_library(name, overrides):
-    return _bundle(SCENARIOS / f"{name}.yaml", overrides)
+    return _bundle(find_scenario(name), overrides)
 
 
 def _bundle(path, overrides):

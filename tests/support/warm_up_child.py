@@ -29,7 +29,7 @@ def loaded():
 def step_plant(bundle, place):
     """Make the plant's first steps, and those of its watchdog in the safe state."""
     scenario, testbed = bundle.scenario, bundle.testbed.testbed
-    plant, sensors = assemble_simulator(scenario, testbed, place, "sim")
+    plant, sensors, _ = assemble_simulator(scenario, testbed, place, "sim")
     dog = make_watchdog(scenario, plant)
     simulator = Simulator(plant, sensors, {}, period_ns=MS, controlled=False)
     for k in range(5):

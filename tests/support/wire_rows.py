@@ -13,7 +13,7 @@ TOPICS = {
 
 
 def rows_of(topic, seed=0):
-    """Return rows that are sound for a topic, shape (COUNT, width)."""
+    """Return rows that are valid for a topic, shape (COUNT, width)."""
     rows = np.random.default_rng(seed).normal(size=(COUNT, topic.width))
     if topic.fields[: len(POSE)] == POSE:
         rows[:, 3:7] /= np.linalg.norm(rows[:, 3:7], axis=1)[:, None]

@@ -17,7 +17,7 @@ from cspm_msgs_py.wire import WireWriter
 
 RATE = 20
 PERIOD_NS = 1_000_000_000 // RATE
-# `cspm check-drivers` is told that the drivers are that slow.
+# `cspm check-drivers` is set to drivers that are that slow.
 SLOW = [f"--set=rates.{name}={RATE}" for name in ("winches", "load_cells", "motion_capture")]
 
 

@@ -107,12 +107,12 @@ def lab_of(folder, scenario, *overrides):
     return Lab(testbed, bundle.scenario.rates, feeds)
 
 
-def thesis_with_twists(folder):
+def refitted_with_twists(folder):
     """Write the sea's scenario for a machine that also measures twists; return its path."""
-    text = (SCENARIOS / "testbeds" / "thesis.yaml").read_text(encoding="utf-8")
+    text = (SCENARIOS / "testbeds" / "thesis_refitted.yaml").read_text(encoding="utf-8")
     sensors = "".join(f"  {name}: {TWIST_SENSOR}\n" for name in (BAR_TWIST, FRAME_TWIST))
     (folder / "testbeds").mkdir(parents=True)
-    (folder / "testbeds" / "thesis.yaml").write_text(
+    (folder / "testbeds" / "thesis_refitted.yaml").write_text(
         text.replace("\nsensors:\n", f"\nsensors:\n{sensors}"), encoding="utf-8"
     )
     path: Path = folder / "twists.yaml"
@@ -136,7 +136,7 @@ def wrong(findings):
 
 
 def undecided(findings):
-    """Topic and check of everything that cannot be told."""
+    """Topic and check of everything that cannot be decided."""
     return {(finding.topic, finding.check) for finding in findings if finding.ok is None}
 
 

@@ -76,7 +76,7 @@ class Stranger:
             self._decode[name] = WireReader(self.topics[name]).decode
 
     def _hear(self, name, payload):
-        """Keep what is sound: its own noise comes back to it as well."""
+        """Keep what is valid: its own noise comes back to it as well."""
         with suppress(InputError):
             self._decode[name](payload)
             self.heard[name] = payload

@@ -173,8 +173,8 @@ class Witness:
     def until(self, condition, what, seconds=PATIENCE_S):
         """Listen until a condition holds."""
         if not self.session.spin_until(condition, seconds):
-            told = {name: (s.message, dict(s.values)) for name, s in self.latest.items()}
-            raise AssertionError(f"waited {seconds:g} s for {what}; diagnostics: {told}")
+            reported = {name: (s.message, dict(s.values)) for name, s in self.latest.items()}
+            raise AssertionError(f"waited {seconds:g} s for {what}; diagnostics: {reported}")
 
     def until_said(self, name, condition, what, seconds=PATIENCE_S):
         """Listen until what a part says of itself from now on meets a condition; return it."""
@@ -245,10 +245,10 @@ class Evidence:
             types = {name: topic.ros_type for name, topic in recording.topics.items()}
             names = [name for name, ros_type in types.items() if carries_row(ros_type)]
             self.rows = recording.rows_of(names)
-            told = recording.payloads(DIAGNOSTICS.name)
+            reported = recording.payloads(DIAGNOSTICS.name)
             self.statuses = [
                 status
-                for payload in told.payloads
+                for payload in reported.payloads
                 for status in decode_diagnostics(payload).statuses
             ]
             brakes = recording.payloads(BRAKE.name).payloads

@@ -6,7 +6,7 @@ from cspm_ident.diagnosis.residuals.regressors import Candidate, Place
 from cspm_sim.effects import Channel, catalogue
 
 TRUE = np.array([2e-3])
-CREPT, SOUND = Place(Channel.TENSION, "sway_2"), Place(Channel.TENSION, "sway_3")
+CREPT, HEALTHY = Place(Channel.TENSION, "sway_2"), Place(Channel.TENSION, "sway_3")
 CREEP = """  - effect: cable_creep
     elements: [sway_2]
     parameters: {compliance: 2.0e-3, time_constant: 3.0}

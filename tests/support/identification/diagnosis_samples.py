@@ -23,6 +23,7 @@ from cspm_ident.diagnosis.residuals.residual_equation import Equation
 from cspm_ident.diagnosis.validation.detection_limits import Limit
 from cspm_ident.diagnosis.validation.holdout_residuals import HeldOut
 from cspm_ident.diagnosis.validation.holdout_simulation import Output, SimulatedFit
+from cspm_ident.diagnosis.validation.remainder import Remainder, Stretch
 from cspm_ident.diagnosis.validation.residual_curves import held_out_curves
 from cspm_ident.signals.measurement import Measurement
 from cspm_ident.signals.samples import Samples
@@ -76,7 +77,7 @@ def diagnosis(named=True, alternatives=(), unknown=(), rejected=(), lines=(), re
         findings=(*((finding,) if named else ()), *rejected),
         unexplained=unexplained,
         tested=485,
-        fit=(HeldOut(PLACE, 0.15, TORQUE, TORQUE, NOISE, NOISE, NOISE),),
+        fit=(held_out(NOISE),),
         simulated=(SimulatedFit(OUTPUT, 3.5, 1.46, 1.45, 0.0071, 0.0049),),
         lines=tuple(lines),
         limits=(
@@ -88,6 +89,19 @@ def diagnosis(named=True, alternatives=(), unknown=(), rejected=(), lines=(), re
         noise={PLACE: np.array([NOISE])},
     )
     return judged(found, found.findings)
+
+
+def held_out(after, measured=0.15, steady=None):
+    """A winch's residual on held-out data, with so much left after the findings."""
+    left = remainder(after if steady is None else steady, measured)
+    return HeldOut(PLACE, measured, TORQUE, TORQUE, after, NOISE, NOISE, (left,), steady)
+
+
+def remainder(rms, measured=0.15, place=PLACE, component=""):
+    """What is left of a residual of 1000 rows, half of it a function of the angle."""
+    stretch = Stretch(3.0, 4.0, 0.6)
+    sizes = rms, NOISE, 1000, measured, float("nan")
+    return Remainder(place, component, *sizes, "angle [rad]", 0.5, 0.6, stretch)
 
 
 def judged(found, findings, aliased=()):

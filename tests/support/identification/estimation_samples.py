@@ -25,7 +25,7 @@ def first_order(rng, count, decay, deviation):
 
 
 def columns(time):
-    """Three regressors that are far from alike."""
+    """Three regressors that are far from equal."""
     return np.stack([np.sin(0.05 * time), np.cos(0.11 * time), np.ones_like(time)], axis=1)
 
 

@@ -8,7 +8,7 @@ from cspm_ident.signals.measurement import read_measurement
 
 def worst_sea(folder):
     """Return the measurement of six seconds of the worst sea, read by ideal sensors."""
-    run_to(folder, "worst_case", "duration=6", "sensors=ideal")
+    run_to(folder, "worst_case_steep", "duration=6", "sensors=ideal")
     return read_measurement(folder)
 
 

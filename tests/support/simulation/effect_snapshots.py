@@ -145,7 +145,8 @@ class Snapshots:
 
     def bar(self):
         """Signals of the bar."""
-        out = np.zeros((len(self.states), BarSignal.TIME + 1))
+        out = np.zeros((len(self.states), BarSignal.POSE + 6))
+        out[:, BarSignal.POSE :] = self.states[:, :6]
         bar = self.nominal.bar
         for k, (state, rate) in enumerate(zip(self.states, self.rates, strict=True)):
             turn = rotation(state[:6])

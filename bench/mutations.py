@@ -88,8 +88,8 @@ MUTATIONS = (
     Mutation(
         "sign: a sensor's sample arrives before it is taken",
         "cspm_sim/sensors.py",
-        "(step + self._delay_steps, now_ns, sample)",
-        "(step - self._delay_steps, now_ns, sample)",
+        "(step + self.delay_steps, now_ns, sample)",
+        "(step - self.delay_steps, now_ns, sample)",
         "tests/cspm_sim/test_sensors.py",
     ),
     Mutation(

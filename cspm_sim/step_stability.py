@@ -68,7 +68,7 @@ def axial_modes(
         give += jacobian @ np.linalg.solve(mass_matrix(parameters, bar_pose), jacobian.T)
     if not locked:
         give += np.diag(
-            cables[:, RADIUS] ** 2 / cables[:, INERTIA] * (unstretched / stretched)[chosen]
+            cables[:, RADIUS] ** 2 / cables[:, INERTIA] * unstretched[chosen] / stretched[chosen]
         )
     stiffness = np.array(
         [_stiffness(parameters, int(i), unstretched[i], stretched[i]) for i in chosen]

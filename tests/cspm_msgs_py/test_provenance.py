@@ -37,7 +37,7 @@ def test_values_are_separated_from_where_they_come_from():
     [
         (
             {"provenance": "guess"},
-            "provenance: 'guess', allowed: 'thesis', 'reconstructed', 'fitted', 'measured' or 'dat",
+            "provenance: 'guess', allowed: 'thesis', 'reconstructed', 'fitted', 'measured', 'data",
         ),
         ({"provenance": None}, "provenance: None, allowed: 'thesis',"),
         (

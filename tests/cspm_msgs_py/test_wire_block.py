@@ -74,14 +74,27 @@ def test_other_names_are_seen():
 
 
 def test_another_senders_form_is_left_to_the_reader_of_one():
-    """A frame of its own is no fault, but not the contract's bytes."""
-    topic = TOPICS["/bar/pose"]
+    """A frame where no vector needs one is no fault, but not the contract's bytes."""
+    topic = TOPICS["/cables/tension"]
     reader, payloads = WireReader(topic), block_of(topic)
-    message = deserialize(payloads[1], topic.ros_type)
-    message.header.frame_id = "lab"
-    payloads[1] = serialize(message)
+    payloads[1] = in_frame(topic, payloads[1], "lab")
     assert reader.decode_block(payloads) is None
     np.testing.assert_array_equal(reader.decode(payloads[1])[1], rows_of(topic)[1])
+
+
+def test_another_frame_of_a_vector_is_refused():
+    topic = TOPICS["/bar/pose"]
+    reader, payloads = WireReader(topic), block_of(topic)
+    payloads[1] = in_frame(topic, payloads[1], "lab")
+    assert reader.decode_block(payloads) is None
+    with pytest.raises(InputError, match="frame 'lab', allowed: 'world_ned'"):
+        reader.decode(payloads[1])
+
+
+def in_frame(topic, payload, frame):
+    message = deserialize(payload, topic.ros_type)
+    message.header.frame_id = frame
+    return serialize(message)
 
 
 # Stamps of a block

@@ -219,7 +219,8 @@ def test_wrong_calls_are_refused(general, rig):
 
 
 def test_a_body_that_mujoco_refuses_is_named():
-    content = changed(point_content(), "bar.mass", 1e-17)
+    inertia = {"ixx": 1e-17, "iyy": 1e-17, "izz": 1e-17}
+    content = changed(point_content(), "bar.inertia", inertia)
     with pytest.raises(InputError, match=r"test-bed point: MuJoCo refuses it \(.*\), allowed"):
         MujocoPlant(build(content), still().at, MS, bar_pose=POSE)
 

@@ -78,12 +78,14 @@ def measured(resisting, force=1.0, length=1.0, gear=1.0):
     )
 
 
+# Lengths within what a file may have: one a thousand times as long is refused as a wrong unit.
 UNITS = [
     {"force": 1e3},
     {"force": 1e-3},
-    {"length": 1e3},
-    {"length": 1e-3},
-    {"force": 1e3, "length": 1e-3},
+    {"length": 20.0},
+    {"length": 0.05},
+    {"force": 1e3, "length": 20.0},
+    {"force": 1e-3, "length": 0.05},
     {"gear": 100.0},
     {"gear": 1e-2},
 ]

@@ -20,7 +20,7 @@ from cspm.simulation import REALTIME, Runner, bundle_of, ros_runner
 from cspm_model.cable_strength import limit_warnings
 from cspm_msgs_py.errors import CspmError, InputError
 from cspm_msgs_py.new_folder import refuse_existing
-from cspm_msgs_py.recording.overview import overview
+from cspm_msgs_py.recording.overview import Overview, overview
 from cspm_msgs_py.recording.recover import recover
 from cspm_msgs_py.recording.run_record import EXTERNAL, RECORD_NAME
 from cspm_msgs_py.scenario import load_scenario
@@ -179,14 +179,20 @@ def info_command(bag: Path, json: Path | None) -> None:
             f" {found.testbed}, mode {record.get('mode', 'unknown')}, plant"
             f" {record.get('plant', SIM)}",
         )
+    _say_troubles(console, bag, found)
+    if json is not None:
+        write_json(json, dataclasses.asdict(found) | {"path": str(found.path)})
+
+
+def _say_troubles(console: Console, bag: Path, found: Overview) -> None:
+    for topic, count in found.refused.items():
+        say(console, f"refused: {count} messages on {topic}, which no node of the run obeyed")
     for fault in found.faults:
         say(console, f"fault: {fault}")
     if found.faults and found.complete:
         say(console, f"`cspm recover {bag}` restores what can be read")
     if not found.complete:
         say(console, f"cut short: `cspm recover {bag}` restores its index")
-    if json is not None:
-        write_json(json, dataclasses.asdict(found) | {"path": str(found.path)})
 
 
 def recover_command(bag: Path, out: Path | None, json: Path | None) -> None:

@@ -1,6 +1,7 @@
 """Messages that nobody obeyed: recorded as they came, and apart from those that counted."""
 
 import numpy as np
+import pytest
 from recording_samples import ROW_TOPICS
 
 from cspm_msgs_py.message import message_of
@@ -41,6 +42,13 @@ def test_they_are_there_and_do_not_count(tmp_path):
     found = overview(folder)
     assert found.refused == {POSE.name: 3}
     assert [topic.count for topic in found.topics] == [200]
+
+
+@pytest.mark.parametrize("numbers", [{70, 71, 199}, ()])
+def test_info_counts_them(tmp_path, cspm, numbers):
+    code, out, _ = cspm("info", record(tmp_path / "bag", numbers))
+    said = "refused: 3 messages on /bar/pose, which no node of the run obeyed"
+    assert (code, said in " ".join(out.split())) == (0, bool(numbers))
 
 
 def test_a_recording_without_any_is_as_before(tmp_path):

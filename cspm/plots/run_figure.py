@@ -11,8 +11,8 @@ from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.figure import Figure
 from numpy.typing import NDArray
 
-from cspm.plots.picture_style import DPI, TENSION, large_letters
-from cspm.plots.run_panels import draw_envelope, draw_errors
+from cspm.plots.picture_style import DPI, large_letters
+from cspm.plots.run_panels import binned, draw_errors, draw_tensions
 from cspm_control.analysis.cable_groups import cable_groups
 from cspm_msgs_py.scenario import Requirement
 from cspm_run.run_result import RunResult
@@ -62,10 +62,7 @@ def _fill(
     groups: Sequence[Sequence[int]],
     period: float,
 ) -> None:
-    statistics = result.statistics
-    used = -(-statistics.steps // statistics.bin_steps)
-    envelope = statistics.envelope[:used]
-    time = np.arange(used, dtype=np.float64) * (statistics.bin_steps * period)
+    time, envelope = binned(result.statistics, period)
     if result.has_bar:
         thousandths: Array = 1e3 * envelope
         draw_errors(rows[0], time, thousandths, (0, 1, 2), 1e3 * requirement.position)
@@ -73,9 +70,7 @@ def _fill(
         for axes in rows[:2]:
             axes.legend(loc="upper left", bbox_to_anchor=(1.0, 1.0), frameon=False)
     for axes, members in zip(rows[len(rows) - len(groups) :], groups, strict=True):
-        columns = envelope[:, :, [6 + member for member in members]]
-        low, high = columns[:, 0].min(axis=1), columns[:, 1].max(axis=1)
-        draw_envelope(axes, time, low, high, TENSION, "")
-        if used:
+        low, high = draw_tensions(axes, time, envelope, members)
+        if len(time):
             extent = f"{low.min():.3g} to {high.max():.3g} N"
             axes.text(1.01, 0.5, extent, transform=axes.transAxes, va="center")

@@ -8,8 +8,9 @@ import numpy as np
 from matplotlib.axes import Axes
 from numpy.typing import NDArray
 
-from cspm.plots.picture_style import BAND, COLOURS
+from cspm.plots.picture_style import BAND, COLOURS, TENSION
 from cspm_msgs_py.dofs import DOFS
+from cspm_run.run_statistics import RunStatistics
 
 Array = NDArray[np.float64]
 
@@ -53,6 +54,35 @@ def _mark_peak(axes: Axes, time: Array, band: Array, name: str) -> None:
         va="bottom" if above else "top",
         fontsize="large",
     )
+
+
+def binned(statistics: RunStatistics, period: float) -> tuple[Array, Array]:
+    """Return when the bins of a run begin, shape (n,) [s], and its envelope, shape (n, 2, 6 + m).
+
+    Args:
+        statistics: of the run, with errors [m, rad] and m tensions [N].
+        period: the plant's period [s].
+    """
+    used = -(-statistics.steps // statistics.bin_steps)
+    time = np.arange(used, dtype=np.float64) * (statistics.bin_steps * period)
+    return time, statistics.envelope[:used]
+
+
+def draw_tensions(
+    axes: Axes, time: Array, envelope: Array, members: Sequence[int]
+) -> tuple[Array, Array]:
+    """Draw the envelope of some cables' tensions; return it, lowest and highest, (n,) each [N].
+
+    Args:
+        axes: where to.
+        time: of the bins, shape (n,) [s].
+        envelope: of a run, as `binned` returns it.
+        members: indices of the cables.
+    """
+    columns = envelope[:, :, [6 + member for member in members]]
+    low, high = columns[:, 0].min(axis=1), columns[:, 1].max(axis=1)
+    draw_envelope(axes, time, low, high, TENSION, "")
+    return low, high
 
 
 def draw_envelope(axes: Axes, time: Array, low: Array, high: Array, colour: str, name: str) -> None:

@@ -10,8 +10,8 @@ from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.figure import Figure
 from numpy.typing import NDArray
 
-from cspm.plots.picture_style import DPI, TENSION
-from cspm.plots.run_panels import draw_envelope, draw_errors
+from cspm.plots.picture_style import DPI
+from cspm.plots.run_panels import binned, draw_errors, draw_tensions
 from cspm_control.analysis.cable_groups import cable_groups
 from cspm_msgs_py.scenario import Requirement
 from cspm_run.run_result import RunResult
@@ -64,16 +64,11 @@ def _draw_run(
     groups: Mapping[str, Sequence[int]],
     period: float,
 ) -> None:
-    statistics = result.statistics
-    used = -(-statistics.steps // statistics.bin_steps)
-    envelope = statistics.envelope[:used]
-    time = np.arange(used, dtype=np.float64) * (statistics.bin_steps * period)
+    time, envelope = binned(result.statistics, period)
     thousandths: Array = 1e3 * envelope
     draw_errors(rows[0], time, thousandths, (0, 1, 2), 1e3 * requirement.position)
     draw_errors(rows[1], time, thousandths, (4, 5), 1e3 * requirement.angle)
     for axes, members in zip(rows[len(ERRORS) :], groups.values(), strict=True):
-        columns = envelope[:, :, [6 + member for member in members]]
-        low, high = columns[:, 0].min(axis=1), columns[:, 1].max(axis=1)
-        draw_envelope(axes, time, low, high, TENSION, "")
+        draw_tensions(axes, time, envelope, members)
     rows[0].set_title(f"{result.scenario}, seed {result.seed}")
     rows[-1].set_xlabel("time [s]")

@@ -7,6 +7,9 @@ from pathlib import Path
 
 from cspm.recorded import AnyRecording, Recording, path_of
 from cspm.testbed import AnyTestbed, as_file
+from cspm_ident.data_look.data_check import DataCheck
+from cspm_ident.data_look.look import look_at, without_regimes
+from cspm_ident.recording_roles import check_roles
 from cspm_ident.signals.measurement import Measurement, read_measurement
 from cspm_msgs_py.errors import InputError
 
@@ -19,6 +22,33 @@ def measured(recordings: Iterable[AnyRecording], testbed: AnyTestbed | None) -> 
     """
     file = None if testbed is None else as_file(testbed)
     return [read_measurement(path_of(each), file) for each in recordings]
+
+
+def looked_at(
+    recordings: AnyRecording | Iterable[AnyRecording],
+    held_out: AnyRecording | Iterable[AnyRecording],
+    testbed: AnyTestbed | None,
+    *,
+    leave_out_regimes: bool = False,
+) -> tuple[list[Measurement], list[Measurement], tuple[DataCheck, ...]]:
+    """Return what is searched, what is held out, and what a first look says of both.
+
+    Args:
+        recordings: to search.
+        held_out: to judge by.
+        testbed: the machine, instead of the one that the recordings carry.
+        leave_out_regimes: whether stretches of another regime are left out.
+
+    Raises:
+        InputError: no recording, no test-bed, other cables than the test-bed's, or recordings that
+            share rows.
+    """
+    searched, judged = measured(listed(recordings), testbed), measured(listed(held_out), testbed)
+    check_roles(searched, judged)
+    checks = look_at(searched, judged)
+    if leave_out_regimes:
+        searched, judged = without_regimes(searched, checks), without_regimes(judged, checks)
+    return searched, judged, checks
 
 
 def listed(recordings: AnyRecording | Iterable[AnyRecording]) -> Sequence[AnyRecording]:

@@ -6,15 +6,13 @@ from collections.abc import Iterable
 from pathlib import Path
 
 from cspm.identification.identified import Identification, estimates, source_of
-from cspm.measured import listed, measured
+from cspm.measured import looked_at
 from cspm.parameters import Parameters
 from cspm.recorded import AnyRecording
 from cspm.testbed import AnyTestbed
-from cspm_ident.data_look.look import look_at
 from cspm_ident.fitted_testbed import FittedNumber, with_fitted
 from cspm_ident.lengths.identify_lengths import SCALE, LengthsResult
 from cspm_ident.lengths.identify_lengths import identify_lengths as fit_lengths
-from cspm_ident.recording_roles import check_roles
 from cspm_msgs_py.testbed import TestbedFile
 
 
@@ -34,9 +32,7 @@ def identify_lengths(
     Raises:
         InputError: naming what is wrong in recordings or test-bed.
     """
-    searched, judged = measured(listed(recordings), testbed), measured(listed(held_out), testbed)
-    check_roles(searched, judged)
-    checks = look_at(searched, judged)
+    searched, judged, checks = looked_at(recordings, held_out, testbed)
     result = fit_lengths(searched, judged)
     file, source = searched[0].testbed, source_of(testbed, searched[0].path)
     return Identification(

@@ -7,15 +7,13 @@ from functools import partial
 from pathlib import Path
 
 from cspm.identification.identified import Identification, estimates, source_of
-from cspm.measured import listed, measured
+from cspm.measured import looked_at
 from cspm.parameters import Parameters
 from cspm.progress import Progress, by_steps, silent
 from cspm.recorded import AnyRecording
 from cspm.testbed import AnyTestbed
 from cspm_ident.data_look.data_check import DataCheck
-from cspm_ident.data_look.look import look_at, without_regimes
 from cspm_ident.estimation import Prior
-from cspm_ident.recording_roles import check_roles
 from cspm_ident.system.choice import Chosen, choose
 from cspm_ident.system.fitted_file import fitted_testbed
 from cspm_ident.system.identification import HORIZON, SystemResult
@@ -60,11 +58,9 @@ def identify_system(
     Raises:
         InputError: naming what is wrong in recordings, test-bed or arguments.
     """
-    searched, judged = measured(listed(recordings), testbed), measured(listed(held_out), testbed)
-    check_roles(searched, judged)
-    checks = look_at(searched, judged)
-    if leave_out_regimes:
-        searched, judged = without_regimes(searched, checks), without_regimes(judged, checks)
+    searched, judged, checks = looked_at(
+        recordings, held_out, testbed, leave_out_regimes=leave_out_regimes
+    )
     chosen = choose(searched[0].machine, names, frozen or {}, _priors(priors), bounds or {})
     _check_profiled(profiled, chosen)
     result = fit_system(

@@ -7,14 +7,12 @@ from functools import partial
 from pathlib import Path
 
 from cspm.identification.identified import Identification, estimates, source_of
-from cspm.measured import listed, measured
+from cspm.measured import looked_at
 from cspm.parameters import Parameters
 from cspm.progress import Progress, by_steps, silent
 from cspm.recorded import AnyRecording
 from cspm.testbed import AnyTestbed
 from cspm_ident.data_look.data_check import DataCheck
-from cspm_ident.data_look.look import look_at, without_regimes
-from cspm_ident.recording_roles import check_roles
 from cspm_ident.winch.fitted_file import fitted_testbed
 from cspm_ident.winch.identified_winch import WinchesResult
 from cspm_ident.winch.identify_winches import BAND_HZ, EFFECTS, identify_winches
@@ -63,11 +61,9 @@ def identify_winch(
         >>> found.parameters["inertia"].ci95  # doctest: +SKIP
         (3.9e-05, 4.1e-05)
     """
-    searched, judged = measured(listed(recordings), testbed), measured(listed(held_out), testbed)
-    check_roles(searched, judged)
-    checks = look_at(searched, judged)
-    if leave_out_regimes:
-        searched, judged = without_regimes(searched, checks), without_regimes(judged, checks)
+    searched, judged, checks = looked_at(
+        recordings, held_out, testbed, leave_out_regimes=leave_out_regimes
+    )
     age = searched[0].torque_age if torque_age is None else torque_age
     result = identify_winches(
         searched,

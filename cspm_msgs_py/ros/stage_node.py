@@ -67,10 +67,18 @@ class StageNode:
         self.refused = (0, "")
 
     @property
+    def end_known(self) -> bool:
+        """Whether the plant has announced with which step the run ends."""
+        return self._plant.end_step is not None
+
+    @property
     def ended(self) -> bool:
-        """Whether the plant has ended the run, and this node has computed all of it."""
+        """Whether the plant has ended the run, and this node has read and computed all of it.
+
+        Who computes seldom has nothing left to compute before it has read, and so reported, all.
+        """
         last = self._plant.end_step
-        return last is not None and self._follower.completed >= last
+        return last is not None and self._follower.reached >= last
 
     @property
     def progress(self) -> int:

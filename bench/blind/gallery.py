@@ -33,7 +33,7 @@ from cspm_sim.effects import catalogue
 
 ROOT = Path(__file__).resolve().parents[2]
 PAGE, FIGURES = ROOT / "results" / "gallery.md", ROOT / "docs" / "figures"
-STRATA = ("feedback", "company", "outside")
+STRATA = ("feedback", "combined", "outside")
 SEED, DURATION_S = 3, 30.0
 _DPI = 90
 _DOTS: dict[str, Any] = {"linestyle": "", "marker": ".", "markersize": 3, "alpha": 0.4}

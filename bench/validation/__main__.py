@@ -23,8 +23,8 @@ _HEAD = """\
 
 Measurements over many runs, with bounds that were fixed beforehand. `make validate` makes them anew
 and writes this page; it fails where a bound does not hold. The tests hold a smaller case of each.
-Other measurements have pages of their own: [speed](performance.md), [results](results.md),
-[the blind benchmark](blind.md), [intervals](intervals.md).
+Other measurements have pages of their own: [speed](performance.md), [results](../docs/results.md),
+[the blind benchmark](sealed/README.md), [intervals](intervals.md).
 """
 
 

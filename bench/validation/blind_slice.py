@@ -38,7 +38,7 @@ CASES: Mapping[str, tuple[Case, ...]] = {
     ),
     "feedback": (Case(("drive zero",), (8.0,), CALM),),
     "mistuned": (Case(("drive scale",), (4.0,), WORST, absorbed_by="radius"),),
-    "company": (Case(("cell scale", "stiffness"), (4.0,), WORST),),
+    "combined": (Case(("cell scale", "stiffness"), (4.0,), WORST),),
     "absence": (Case(("bristles",), (4.0,), WORST, without=BAR_POSE),),
     "onset": (Case(("cell zero",), (8.0,), WORST, onset_share=0.4),),
     "everywhere": (Case(("bristles",), (4.0,), WORST, everywhere=True),),

@@ -23,7 +23,7 @@ def testbed_text(name: str, layout: Layout, mass: float) -> str:
     """Return the test-bed file of a robot of `mass` [kg], with comments."""
     first, *others = layout.lines
     more = "".join(f"  - <<: *winch\n{_cable(line)}\n" for line in others)
-    head = "SI units, radians, z down. Replace every number; docs/files.md has all keys."
+    head = "SI units, radians, z down. Replace every number; keys: docs/reference/testbed-file.md"
     return (
         f"# {head}\nname: {name}\n{_platform(layout.half, mass)}"
         f"cables: # a winch each\n  - &winch\n{_cable(first)}\n{_winch(mass)}{more}"
@@ -80,7 +80,7 @@ def scenario_text(name: str, testbed: str, layout: Layout, radius: float) -> str
     pose = f"[0.0, 0.0, {layout.heave:g}, 0.0, 0.0, 0.0]"
     turn = "[1.5708, 0.0, 0.0]" if layout.upright else "[0.0, 0.0, 0.0]"
     return f"""\
-# docs/files.md has all keys; `cspm run {name}.yaml --set KEY=VALUE` changes one for one run.
+# Keys: docs/reference/scenario-file.md. `cspm run {name}.yaml --set KEY=VALUE` changes one.
 name: {name}
 description: a circle of {radius:g} m in 6 s
 testbed: {testbed}

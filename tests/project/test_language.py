@@ -10,8 +10,6 @@ DOCS = Path(__file__).resolve().parents[2] / "docs"
 GENERATED = {"effects", "isolability", "thresholds", "examples", "command-line"}
 # Pages that are still to be rewritten; none may be added.
 EARLIER = {
-    "explanation/blind-benchmark.md",
-    "explanation/model.md",
     "reference/import-mapping.md",
     "reference/scenario-file.md",
 }

@@ -3,7 +3,7 @@
 from collections.abc import Mapping
 
 from bench.blind.strata.absence import ABSENCE
-from bench.blind.strata.company import COMPANY
+from bench.blind.strata.combined import COMBINED
 from bench.blind.strata.everywhere import EVERYWHERE
 from bench.blind.strata.feedback import FEEDBACK
 from bench.blind.strata.mistuned import MISTUNED
@@ -17,6 +17,6 @@ from bench.blind.stratum import Stratum
 
 _ALL = (
     *(NOTHING, PARAMETER, NOISE, FEEDBACK, MISTUNED),
-    *(COMPANY, ABSENCE, ONSET, EVERYWHERE, OUTSIDE, RIG),
+    *(COMBINED, ABSENCE, ONSET, EVERYWHERE, OUTSIDE, RIG),
 )
 STRATA: Mapping[str, Stratum] = {each.name: each for each in _ALL}

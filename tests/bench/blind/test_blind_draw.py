@@ -93,8 +93,8 @@ def test_all_that_the_catalogue_calls_confounded_is_combined():
         if effect.id in known and other in known
     }
     assert len(confounded) >= 32
-    company = [i.case.phenomena for i in draw() if i.stratum == "company"]
-    assert confounded <= {frozenset(PHENOMENA[name].effect for name in pair) for pair in company}
+    pairs = [i.case.phenomena for i in draw() if i.stratum == "combined"]
+    assert confounded <= {frozenset(PHENOMENA[name].effect for name in pair) for pair in pairs}
 
 
 def test_splits_of_one_seed_have_nothing_in_common(tmp_path):

@@ -44,8 +44,8 @@ PAIRS = (
 # Of a larger lag the winches shake, which conceals nothing.
 SLOW = (("slow drive", "inertia"), ("slow drive", "late tracker"))
 
-COMPANY = Stratum(
-    "company",
+COMBINED = Stratum(
+    "combined",
     2.5,
     (
         *(Case(pair, (2.0, 4.0), MOVING) for pair in PAIRS),

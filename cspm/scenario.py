@@ -61,7 +61,7 @@ class Scenario:
 
         Args:
             key: its path in the file: `duration`, `seed`, `rates.motion_controller`,
-                `control.motion.crossover.surge`; see `docs/reference/testbed-file.md`.
+                `control.motion.crossover.surge`; see `docs/reference/scenario-file.md`.
             value: the new one in SI: a number, a text, or lists and mappings of these.
 
         Raises:
@@ -86,7 +86,7 @@ def load_scenario(name: str | Path) -> Scenario:
     """Return a scenario by its name in the library or by its file's path.
 
     Args:
-        name: such as `calm`, or the path of a YAML file; see `docs/reference/testbed-file.md`.
+        name: such as `calm`, or the path of a YAML file; see `docs/reference/scenario-file.md`.
 
     Raises:
         InputError: no such scenario, or a file with a fault: which key, what is allowed.

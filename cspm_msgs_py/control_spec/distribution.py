@@ -30,7 +30,7 @@ class LostCable(StrictModel):
     One in which less than `below` [N] was measured for `duration` [s] without a break is lost:
     never less than the lower tension limit, 2 N on the thesis's machine, is wanted of it. No whole
     cable of a sea whose bar can be held is below 0.5 N for longer than 1 ms, nor below 1 N for
-    longer than 2 ms (`docs/reference/testbed-file.md`); the load cells' noise is 0.02 N.
+    longer than 2 ms (`docs/reference/scenario-file.md`); the load cells' noise is 0.02 N.
     """
 
     below: PositiveFloat = 0.5

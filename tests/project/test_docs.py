@@ -13,8 +13,8 @@ from cspm_sim.plant import Plant
 
 DOCS = Path(__file__).resolve().parents[2] / "docs"
 FILES = "\n".join(
-    (DOCS / "reference" / f"{name}-file.md").read_text(encoding="utf-8")
-    for name in ("testbed", "scenario")
+    (DOCS / "reference" / f"{name}.md").read_text(encoding="utf-8")
+    for name in ("testbed-file", "scenario-file", "control-section")
 )
 EXAMPLE = re.compile(r"<!-- (testbed|scenario): (\S+) -->\n```yaml\n(.*?)```", re.DOTALL)
 NUMBERS = re.compile(r"<!-- numbers: (\w+) -->\n.*?<!-- end -->", re.DOTALL)
@@ -51,7 +51,7 @@ def test_example_testbed_is_accepted_and_its_plant_runs(name: str, text: str) ->
 
 @pytest.mark.parametrize(("name", "text"), examples("scenario"))
 def test_example_scenario_is_accepted(name: str, text: str) -> None:
-    assert parse_scenario(text, "docs/reference/testbed-file.md").name == name
+    assert parse_scenario(text, "docs/reference/scenario-file.md").name == name
 
 
 def test_provenance_of_the_example_is_found() -> None:

@@ -55,8 +55,9 @@ def test_every_key_is_documented():
 
 
 def test_every_unit_on_the_page_is_one_and_none_is_missing():
-    reported = re.search(r"^Units: (.*?)\n\n", PAGE, re.DOTALL | re.MULTILINE)[1].partition(".")[0]
-    words = [word.strip('"') for word in reported.split() if word != "·"]
+    table = re.search(r"<!-- units -->\n(?:.*\n){2}((?:\|.*\n)+)", PAGE)[1]
+    rows = re.findall(r"^\| [a-z ]+ \| (.*) \|$", table, re.MULTILINE)
+    words = [word.strip('"') for row in rows for word in row.split()]
     assert all(unit_of(word, "") for word in words)
     from cspm_ident.importing import units
 

@@ -144,7 +144,7 @@ def _draw_fit(axes: Axes, found: Diagnosis) -> None:
 
 def _text(k: int, stratum: str, item: Mapping[str, Any], found: Diagnosis) -> str:
     concealed = "; ".join(
-        f"{c['phenomenon']} ({c['effect'] or 'not in the catalogue'}) on {_amounts(c)},"
+        f"{c['effect'] or c['phenomenon'] + ' (not in the catalogue)'} on {_amounts(c)},"
         f" {c['multiple']:g} × its detection limit"
         for c in item["concealed"]
     )
@@ -159,7 +159,7 @@ def _text(k: int, stratum: str, item: Mapping[str, Any], found: Diagnosis) -> st
         f"## {k}. {stratum}, `{item['scenario']}`\n\n"
         f"Concealed: {concealed or 'nothing'}.\n\n"
         f"Verdict: **{verdict_of(found).value}**.\n\n{lines}\n\n"
-        f"![{stratum}](../figures/gallery_{k}.png)\n"
+        f"![{stratum}](../docs/figures/gallery_{k}.png)\n"
     )
 
 

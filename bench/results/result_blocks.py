@@ -40,7 +40,7 @@ from bench.results.result_measures import (
 )
 from bench.results.result_robust_cases import (
     ADAPTED,
-    ESTIMATED_OF,
+    INFORMED,
     MASSES,
     PAYLOADS,
     changed,
@@ -118,7 +118,7 @@ def blocks_of(seeds: int) -> dict[str, Block]:
         "changes": Block({"worst case": _limit("worst case", LIMITED["worst case"])}, touched_said),
         "robust": _tracked("robust", changed(PAST), _and(late_said)),
         "moved_on": _moved_on(),
-        "told": _tracked("told", ESTIMATED_OF),
+        "informed": _tracked("informed", INFORMED),
         "corrected": _tracked("corrected", corrected(), _and(corrected_said)),
         "adapted": _tracked(
             "adapted", with_and_without(MASSES, ADAPTED, "estimated from its heave")

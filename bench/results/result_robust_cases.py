@@ -35,7 +35,7 @@ CORRECTED: dict[str, Effects] = {
     "hoist_1's drive at half torque": (("winch_torque_gain", HOIST, {"gain": 0.5}),),
 }
 # What the machine has and its controllers know, by the test-bed's file or by the scenario.
-ESTIMATED_OF = {
+INFORMED = {
     "poses 5 ms late": Case(PAST, (ROBUST,), pose_delay=0.005),
     "wind of 2 N in sway and 1 N in surge": Case(
         PAST, (ROBUST, KNOWN_WIND), (("bar_constant_wrench", (), WIND),)

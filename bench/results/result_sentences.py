@@ -64,18 +64,18 @@ def beam_said(found: Found) -> str:
     sway, heave = thesis[SWAY], thesis[HEAVE]
     return (
         f"That explains the thesis's pitch and yaw errors, of {1e6 * thesis[PITCH]:.0f} and"
-        f" {1e6 * thesis[YAW]:.0f} µrad: their references hardly move. It leaves open what moves"
-        f" its surge, by {thesis[SURGE]:.2f} mm RMS. With its longest waves alone heave is"
-        f" {fastest[HEAVE] / heave:.1f} times and sway {fastest[SWAY] / sway:.0f} times as large as"
-        " the thesis's with the gains that its margins allow. The stiff sway loop of the worst"
-        f" case's last line makes them {stiffest[HEAVE] / heave:.1f} and"
+        f" {1e6 * thesis[YAW]:.0f} µrad: their references hardly move. It does not explain its"
+        f" surge error of {thesis[SURGE]:.2f} mm RMS. With the longest waves alone, and the gains"
+        f" that its margins allow, heave is {fastest[HEAVE] / heave:.1f} times and sway"
+        f" {fastest[SWAY] / sway:.0f} times as large as the thesis's. The stiff sway loop of the"
+        f" worst case's last line makes them {stiffest[HEAVE] / heave:.1f} and"
         f" {stiffest[SWAY] / sway:.1f} times as large, sway below heave as in the thesis"
         f" ({sway:.3g} and {heave:.3g} mm). Why its margins allowed that is lost with its tables;"
-        " here the roll pendulum limits sway. Its roll of"
-        f" {1e3 * thesis[ROLL]:.0f} mrad is no following of such waves, which make"
-        f" {stiffest[ROLL]:.1f}. It may have rung from the start: a roll that begins with"
-        f" {1e3 * (largest[ROLL] or 0.0):.0f} mrad and is not damped leaves sway as it is"
-        " ([decisions.md](../docs/decisions/README.md))."
+        " here the roll pendulum limits sway.\n\n"
+        f"Its roll of {1e3 * thesis[ROLL]:.0f} mrad does not follow such waves, which make"
+        f" {stiffest[ROLL]:.1f}. It may be a free oscillation from the start: a roll that begins"
+        f" with {1e3 * (largest[ROLL] or 0.0):.0f} mrad and is not damped leaves sway as it is"
+        " ([decisions](../docs/decisions/README.md))."
     )
 
 
@@ -127,14 +127,14 @@ def late_said(found: Found) -> str:
     """Return what poses that come late without being known to be late cost."""
     beyond = 1.0 - found["poses 5 ms late"]["within"]
     return (
-        "Poses 5 ms late that nobody knows of take the bar beyond the requirement for"
-        f" {beyond:.0%} of the time. What is measured then follows its reference, and the bar is"
-        " where the reference will be 5 ms later, by as much as this line says:"
+        "Poses 5 ms late without a delay in the test-bed's file take the bar beyond the requirement"
+        f" for {beyond:.0%} of the time. What is measured then follows its reference, and the bar"
+        " is where the reference will be 5 ms later, by as much as this line says:"
     )
 
 
 def corrected_said(found: Found) -> str:
-    """Return what telling the load cells' biases costs."""
+    """Return what estimating the load cells' biases costs."""
     plain = _rms(found["nothing"])[HEAVE]
     all_off = _rms(found["all load cells +1 N, dry friction 2 mN·m at every motor"])[HEAVE]
     ended = sum(bool(each["failure"]) for each in found.values())
@@ -170,7 +170,7 @@ def winch_said(found: Found) -> str:
 
 
 def payload_said(found: Found) -> str:
-    """Return where telling a load's mass pays."""
+    """Return where estimating a load's mass pays."""
     fixed, swinging = "0.8 kg taken up at 50 s", "0.4 kg swinging 0.3 m below"
 
     def steps_of(name: str, dof: int) -> str:

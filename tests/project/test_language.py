@@ -5,7 +5,8 @@ from pathlib import Path
 
 import pytest
 
-DOCS = Path(__file__).resolve().parents[2] / "docs"
+ROOT = Path(__file__).resolve().parents[2]
+DOCS = ROOT / "docs"
 # Written by programs, or made of tables of keys.
 GENERATED = {"effects", "isolability", "thresholds", "examples", "command-line"}
 PAGES = [
@@ -13,6 +14,7 @@ PAGES = [
     for path in sorted(DOCS.rglob("*.md"))
     if path.stem not in GENERATED
 ]
+RESULTS = [path.relative_to(ROOT).as_posix() for path in sorted((ROOT / "results").rglob("*.md"))]
 LONGEST_SENTENCE, MEAN_SENTENCE, LONGEST_PARAGRAPH, LONGEST_PAGE = 40, 25, 120, 3000
 # What the field says instead is in the glossary.
 AVOIDED = re.compile(
@@ -64,6 +66,14 @@ def faults(text: str) -> list[str]:
 @pytest.mark.parametrize("page", PAGES)
 def test_sentences_paragraphs_and_words(page: str) -> None:
     assert faults(text_of(page)) == []
+
+
+@pytest.mark.parametrize("page", RESULTS)
+def test_paragraphs_and_words_of_results(page: str) -> None:
+    """Results are notes with tables: long sentences are left, long paragraphs are not."""
+    paragraphs = paragraphs_of((ROOT / page).read_text(encoding="utf-8"))
+    assert [each[:60] for each in paragraphs if words(each) > LONGEST_PARAGRAPH] == []
+    assert AVOIDED.findall(" ".join(paragraphs)) == []
 
 
 @pytest.mark.parametrize("page", PAGES)

@@ -43,7 +43,7 @@ def test_the_calm_sea_is_stated_beside_the_figures_of_the_thesis():
     assert "of 4 and 15 µrad" in said
     assert "heave is 2.0 times and sway 10 times as large" in said
     assert "makes them 1.0 and 2.0 times as large" in said
-    assert "roll of 23 mrad is no following of such waves, which make 2.0. " in said
+    assert "roll of 23 mrad does not follow such waves, which make 2.0. " in said
     assert "begins with 68 mrad" in said
 
 

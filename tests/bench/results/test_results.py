@@ -33,7 +33,7 @@ from bench.results.result_cases import (
 )
 from bench.results.result_machines import fastest_crossover
 from bench.results.result_measures import tracking
-from bench.results.result_robust_cases import ESTIMATED_OF, changed, corrected
+from bench.results.result_robust_cases import INFORMED, changed, corrected
 from bench.results.result_store import Measurement, Store, spoken
 from bench.results.result_tables import (
     calm_block,
@@ -66,7 +66,7 @@ def test_every_case_is_a_run_that_can_be_made():
         CORNERS,
         LIMITED,
     )
-    groups += (ROUGH_CORNERS, ESTIMATED_OF, changed(PAST), corrected(), seeded(2, CAMERA_100_HZ))
+    groups += (ROUGH_CORNERS, INFORMED, changed(PAST), corrected(), seeded(2, CAMERA_100_HZ))
     for case in {case.scenario: case for group in groups for case in group.values()}.values():
         assert case.bundle().testbed.testbed.bar is not None
     for case in SWITCHED_4M.values():

@@ -48,7 +48,7 @@ coverage: $(VENV)/test.stamp ## line coverage with the kernels uncompiled
 	NUMBA_DISABLE_JIT=1 $(BIN)/python -m pytest -m "not slow and not compiled" --cov --cov-report=term --cov-report=html
 
 docs: $(VENV)/docs.stamp ## build the site into build/site, without a network
-	$(BIN)/mkdocs build --strict --quiet
+	NO_MKDOCS_2_WARNING=1 $(BIN)/mkdocs build --strict --quiet
 
 bench: $(VENV)/test.stamp ## measure speed, start-up and memory; prints a table
 	$(BIN)/python -m bench

@@ -14,6 +14,7 @@ from typing import NamedTuple
 
 from bench.blind.scoring.share import Share, share_of, share_words, upper_bound
 from bench.blind.scoring.target import Range, allowed
+from bench.blind.sealed_card import stored_card
 from bench.blind.sealed_store import STORE, add_page, read_table
 from bench.markdown import markdown_table
 from bench.page import into_page
@@ -50,9 +51,14 @@ def main() -> None:
     """Add a page of one part if asked to, and renew the page of all."""
     parser = argparse.ArgumentParser(description="Count all sealed parts together.")
     parser.add_argument("--add", type=Path, metavar="PAGE", help="scorecard page of a new part")
-    page = parser.parse_args().add
-    if page is not None:
-        add_page(page, str(len(read_table(STORE, "parts")) + 1))
+    parser.add_argument("--draw", metavar="PART", help="draw the scorecard of a part again")
+    options = parser.parse_args()
+    if options.add is not None:
+        add_page(options.add, str(len(read_table(STORE, "parts")) + 1))
+    if options.draw is not None:
+        from bench.blind.scoring.figure import draw_scorecard
+
+        draw_scorecard(STORE / f"part-{options.draw}.png", stored_card(options.draw))
     for name, text in tables(read_parts()).items():
         into_page(PAGE, name, text)
 

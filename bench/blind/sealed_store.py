@@ -17,7 +17,7 @@ SECTIONS = {
     "By amount": ("amounts",),
     "By stratum": ("strata",),
     "Verdicts": ("verdicts",),
-    "What was said first": ("first",),
+    "What was named first": ("first",),
     "Parameters, fit, probabilities, time": ("parameters", "probabilities"),
     "Every recording": ("recordings",),
 }

@@ -26,7 +26,7 @@ such as lengths of filters and numbers of iterations, stay beside the code that 
 A *share* is a number from 0 to 1. A *gain* is the sum of squared residuals that an effect takes in
 blocks of time that were not fitted. *Set by hand* means that neither statistics nor data gave the
 value. What moving each value by half changes is in
-[thresholds-sensitivity.md](../../results/thresholds-sensitivity.md).
+[thresholds sensitivity](../../results/thresholds-sensitivity.md).
 
 This page is generated:
 `python -m cspm_ident.diagnosis.thresholds_page > docs/reference/thresholds.md`.

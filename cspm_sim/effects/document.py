@@ -35,9 +35,9 @@ A diagnosis writes such tables; they explain nothing, and
 another machine or motion may need others.
 
 This page is generated: `python -m cspm_sim.effects.document > docs/reference/effects.md`.
-Which sensors tell
-which effects apart is in [isolability.md](isolability.md), how to add one of your own in
-[add-an-effect.md](../how-to/add-an-effect.md).
+Which sensors separate
+which effects is in [isolability](isolability.md), how to add one of your own in
+[add an effect](../how-to/add-an-effect.md).
 """
 
 _PICTURES = """

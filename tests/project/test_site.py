@@ -1,13 +1,72 @@
-"""The site is built from the pages without a warning, and its commands are documented."""
+"""The site is built from the pages without a warning, and nothing on it leads nowhere."""
 
 import importlib
+import re
 import subprocess
 import sys
+from html.parser import HTMLParser
 from pathlib import Path
+from urllib.parse import unquote, urlsplit
 
 import pytest
 
 ROOT = Path(__file__).resolve().parents[2]
+LEADS = {"a": "href", "img": "src", "link": "href", "script": "src"}
+# Paragraphs in an item of a list need four blanks on the site, a list an empty line before it.
+CONTINUED = re.compile(r"\n\s*\n {1,3}(?![ `-])\S.*")
+ITEM = re.compile(r"[-*] |\d+\. ")
+
+
+class Leads(HTMLParser):
+    """What a page leads to, shows and loads, and what on it can be led to."""
+
+    def __init__(self) -> None:
+        super().__init__()
+        self.targets: list[str] = []
+        self.places: set[str] = set()
+
+    def handle_starttag(self, tag: str, attrs: list[tuple[str, str | None]]) -> None:
+        known = {name: value or "" for name, value in attrs}
+        self.places |= {known[name] for name in ("id", "name") if name in known}
+        target = known.get(LEADS.get(tag, ""))
+        if target:
+            self.targets.append(target)
+
+
+def leads_of(page: Path) -> Leads:
+    found = Leads()
+    found.feed(page.read_text(encoding="utf-8"))
+    return found
+
+
+def dead_ends(site: Path) -> list[str]:
+    """Every link, picture, style and script of a site that is not in it, offline."""
+    pages = {page.resolve(): leads_of(page) for page in sorted(site.rglob("*.html"))}
+    found = []
+    for page, leads in pages.items():
+        # That of a server alone is led to from its root.
+        for target in [] if page.name == "404.html" else leads.targets:
+            parts = urlsplit(target)
+            if parts.scheme in ("http", "https", "mailto"):
+                continue
+            place = (page.parent / unquote(parts.path)).resolve() if parts.path else page
+            there = place.is_file()
+            if there and parts.fragment and place in pages:
+                there = unquote(parts.fragment) in pages[place].places
+            if not there:
+                found.append(f"{page.relative_to(site.resolve())}: {target}")
+    return found
+
+
+def unseparated(text: str) -> list[str]:
+    """First lines of lists and of paragraphs in lists that the site shows as plain text."""
+    plain = re.sub(r"^ *```.*?^ *```", "", text, flags=re.MULTILINE | re.DOTALL)
+    found = [each.strip() for each in CONTINUED.findall(plain)]
+    for paragraph in re.split(r"\n\s*\n", plain):
+        first, *others = paragraph.strip("\n").split("\n")
+        if not ITEM.match(first.lstrip()):
+            found += [line for line in others if ITEM.match(line)][:1]
+    return found
 
 
 def test_the_page_of_the_command_line_is_up_to_date(monkeypatch: pytest.MonkeyPatch) -> None:
@@ -17,15 +76,39 @@ def test_the_page_of_the_command_line_is_up_to_date(monkeypatch: pytest.MonkeyPa
     assert committed == command_line.page(), "run: python docs/scripts/command_line_page.py"
 
 
+@pytest.mark.parametrize("page", sorted((ROOT / "docs").rglob("*.md")), ids=lambda page: page.stem)
+def test_lists_of_a_page_are_lists_on_the_site(page: Path) -> None:
+    assert unseparated(page.read_text(encoding="utf-8")) == []
+
+
+def test_the_check_sees_what_becomes_plain_text() -> None:
+    assert unseparated("Text:\n- item\n- item\n") == ["- item"]
+    assert unseparated("- item\n\n  more of it\n") == ["more of it"]
+    assert unseparated("Text:\n\n- item\n  goes on\n- item\n\n```\na\n- b\n```\n") == []
+
+
+def test_the_check_sees_dead_ends(tmp_path: Path) -> None:
+    (tmp_path / "a.html").write_text(
+        '<h2 id="here"><a href="#here"></a><a href="b.html#there"></a><img src="c.png">'
+        '<a href="https://example.org"></a><a href="b.html#nowhere"></a>',
+        encoding="utf-8",
+    )
+    (tmp_path / "b.html").write_text('<h2 id="there">', encoding="utf-8")
+    assert dead_ends(tmp_path) == ["a.html: c.png", "a.html: b.html#nowhere"]
+
+
 @pytest.mark.slow
-def test_the_site_is_built_without_a_warning(tmp_path: Path) -> None:
+def test_the_site_is_built_without_a_warning_and_leads_nowhere_wrong(tmp_path: Path) -> None:
     pytest.importorskip("mkdocs", reason="pip install -e '.[docs]'")
     words = ["mkdocs", "build", "--strict", "--site-dir", str(tmp_path)]
     found = subprocess.run(
         [sys.executable, "-m", *words], cwd=ROOT, capture_output=True, text=True, check=False
     )
     assert found.returncode == 0, found.stderr
-    assert (tmp_path / "search" / "search_index.json").exists()
+    # Of files, without a server: the index of the search as a script, and what runs it.
+    assert (tmp_path / "search" / "search_index.js").exists()
+    assert (tmp_path / "assets" / "iframe-worker.js").exists()
     python = (tmp_path / "reference" / "python.html").read_text(encoding="utf-8")
     cspm = importlib.import_module("cspm")
     assert [name for name in cspm.__all__ if f'id="cspm.{name}"' not in python] == []
+    assert dead_ends(tmp_path) == []

@@ -22,7 +22,7 @@ _AMOUNTS = {"detected": "anything found", "tied": "truth among the ties", "named
 _METHODS = {
     "first": ("named first", "C0"),
     "nothing_wrong_beside": ("named, nothing wrong beside", "C1"),
-    "false_alarm": ("alarm where nothing is", _MISSED),
+    "false_alarm": ("false alarm", _MISSED),
 }
 _STRATA = {"detected": ("anything found", "C0"), "named": ("all named", "C1")}
 
@@ -88,11 +88,11 @@ def _draw_bars(
             at = height + (k - 0.5 * (len(kinds) - 1)) * width
             share = hits / cases if cases else 0.0
             axes.barh(at, share, width, color=colour, label=None if height else label)
-            axes.annotate(f" {hits:g} of {cases:g}", (share, at), va="center", fontsize=6)
+            axes.annotate(f" {hits:g} of {cases:g}", (share, at), va="center", fontsize=8)
     axes.set_yticks(range(len(rows)), [row[name] for row in rows])
     axes.invert_yaxis()
     axes.set(xlim=(0.0, 1.18), xlabel="share of cases")
-    axes.legend(loc="upper center", bbox_to_anchor=(0.5, -0.12), ncols=len(kinds), fontsize=8)
+    axes.legend(loc="upper center", bbox_to_anchor=(0.5, -0.12), ncols=len(kinds), fontsize=9)
 
 
 def _by_stratum(card: Data) -> list[dict[str, Any]]:
@@ -110,7 +110,7 @@ def _draw_calibration(axes: Axes, rows: Sequence[Data]) -> None:
             _draw_share(axes, row["said"], row["right"], "C0", upright=True)
             _, cases, _, high = row["right"]
             place = row["said"] - 0.01, high
-            axes.annotate(f"{cases:g} findings", place, ha="right", fontsize=7)
+            axes.annotate(f"{cases:g} findings", place, ha="right", fontsize=8)
     axes.set(xlim=(0.0, 1.02), ylim=(-0.02, 1.02))
     axes.set(xlabel="reported probability, mean", ylabel="share that was right")
     axes.set_title("Probabilities")

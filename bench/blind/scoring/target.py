@@ -23,7 +23,7 @@ class Judged(NamedTuple):
     target: str
 
 
-_FINDINGS = (
+FINDINGS = (
     ("block", "block found", "≥ 97 %"),
     ("block_tied", "block found, or tied with what was", ""),
     ("element", "element found", "≥ 93 %"),
@@ -41,19 +41,22 @@ _FINDINGS = (
 )
 
 
+NUMBERS = (
+    ("covered", "intervals that hold the truth", "90 to 97 %"),
+    ("near_floor", "held-out error within 1.5 × floor", "all"),
+    ("below_retuned", "held-out error below re-tuned", "≥ 95 %"),
+)
+
+
 def findings_judged(card: Mapping[str, Any]) -> list[Judged]:
     """Return the shares of what was found."""
-    return [Judged(label, card["shares"][key], target) for key, label, target in _FINDINGS]
+    return [Judged(label, card["shares"][key], target) for key, label, target in FINDINGS]
 
 
 def numbers_judged(card: Mapping[str, Any]) -> list[Judged]:
     """Return the shares of parameters and fits."""
-    fit = card["fit"]
-    return [
-        Judged("intervals that hold the truth", card["parameters"]["covered"], "90 to 97 %"),
-        Judged("held-out error within 1.5 × floor", fit["near_floor"], "all"),
-        Judged("held-out error below re-tuned", fit["below_retuned"], "≥ 95 %"),
-    ]
+    found = {**card["fit"], "covered": card["parameters"]["covered"]}
+    return [Judged(label, found[key], target) for key, label, target in NUMBERS]
 
 
 def allowed(target: str) -> Range:

@@ -1,9 +1,12 @@
 """The table over all sealed parts: counted again from their recordings, and up to date."""
 
+import inspect
 import shutil
 
 import pytest
 
+from bench.blind.scoring.figure import draw_scorecard
+from bench.blind.scoring.page import scorecard_page
 from bench.blind.scoring.target import allowed
 from bench.blind.sealed import (
     ALARMS,
@@ -14,7 +17,8 @@ from bench.blind.sealed import (
     tables,
     verdict,
 )
-from bench.blind.sealed_store import STORE, add_page, read_table
+from bench.blind.sealed_card import stored_card
+from bench.blind.sealed_store import SECTIONS, STORE, add_page, read_table
 from bench.page import into_page
 from cspm_sim.effects import catalogue
 
@@ -167,3 +171,27 @@ def test_no_recording_counts_twice(tmp_path):
 def test_a_page_of_something_else_is_refused(tmp_path):
     with pytest.raises(ValueError, match="no truth file named"):
         add_page(scorecard(tmp_path, "# Gallery\n"), "1", tmp_path / "store")
+
+
+def test_a_stored_part_is_the_scorecard_of_its_picture(tmp_path):
+    card = stored_card("18")
+    assert card["shares"]["first"][:2] == (203, 242)
+    assert (
+        card["parameters"]["covered"][:2]
+        == pooled(
+            [each.found["intervals that hold the truth"] for each in PARTS if each.number == "18"]
+        )[:2]
+    )
+    assert [row["multiple"] for row in card["by_multiple"]] == [0.5, 1.0, 2.0, 4.0, 8.0]
+    assert [row["said"] for row in card["calibration"]] == [0.3, 0.62, 0.9]
+    assert {row["scored"] for row in card["peers"]} == {36}
+    assert card["peers"][1]["false_alarm"][:2] == (2, 2)
+    draw_scorecard(tmp_path / "card.png", card)
+    assert (tmp_path / "card.png").stat().st_size > 10_000
+    with pytest.raises(ValueError, match="--draw 99: allowed: a part of"):
+        stored_card("99")
+
+
+def test_sections_of_the_store_are_those_of_a_scorecards_page():
+    page = inspect.getsource(scorecard_page) + "## Peers ## Without one safeguard"
+    assert [title for title in SECTIONS if f"## {title}" not in page] == []

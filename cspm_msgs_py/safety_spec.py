@@ -25,6 +25,12 @@ class Safety(StrictModel):
             other within one period of the force controller, which never acts.
         watchdog: the plant goes to the safe state by itself without a torque command for so long
             [s].
+        workspace: largest distance of a body from its mean position [m]; None: the machine's size.
+        pose_speed: largest speed of a body's points [m/s]; None: what the cables can give the bar.
+        following_error: largest distance of the bar's points from where they are wanted [m]; None:
+            half the machine's size.
+        torque_mismatch: torque at the motor shaft by which tension and motion may be missed [N·m];
+            None: a twentieth of each motor's limit.
     """
 
     state: Literal["hold", "brake"] = "hold"
@@ -33,3 +39,7 @@ class Safety(StrictModel):
     tension_trip: PositiveFloat | None = None
     torque_slew: PositiveFloat | None = None
     watchdog: Wait = 0.05
+    workspace: PositiveFloat | None = None
+    pose_speed: PositiveFloat | None = None
+    following_error: PositiveFloat | None = None
+    torque_mismatch: PositiveFloat | None = None

@@ -16,6 +16,7 @@ from cspm_msgs_py.ros.graph_publishers import bind
 from cspm_msgs_py.ros.guard_ports import GuardPorts
 from cspm_msgs_py.ros.rendezvous import FollowerSide
 from cspm_msgs_py.schedule import CLOCK, FORCE_CONTROLLER, TORQUE_COMMAND, Schedule
+from cspm_msgs_py.stepping.plausibility import Plausibility
 from cspm_msgs_py.stepping.sample_and_hold import SampleAndHold, WallTrajectory
 from cspm_msgs_py.stepping.stage import Guard, Stage
 from cspm_msgs_py.topics import DIAGNOSTICS, SAFE, Topic
@@ -38,6 +39,7 @@ class RealtimeNode:
         edges: Mapping[str, Edges],
         stale_after: float,
         *,
+        plausibility: Plausibility | None = None,
         on_start: Callable[[int], None] | None = None,
         on_safe: Callable[[bool], None] | None = None,
     ) -> None:
@@ -51,6 +53,7 @@ class RealtimeNode:
             topics: of the test-bed, by name.
             edges: who reads what in this run.
             stale_after: age beyond its due at which an input is too old [s].
+            plausibility: says which inputs cannot be true.
             on_start: called with the first instant [ns] of the run.
             on_safe: called with whether the winches are in their safe state.
         """
@@ -70,6 +73,7 @@ class RealtimeNode:
             status,
             guard,
             bindings=self._bindings,
+            plausibility=plausibility,
             on_fault=self._line.report,
         )
         for name in read:

@@ -18,6 +18,7 @@ from cspm_msgs_py.diagnostics import Level, Status
 from cspm_msgs_py.errors import InputError
 from cspm_msgs_py.schedule import CLOCK, DIAGNOSTICS_RATE, FORCE_CONTROLLER, TENSION, Schedule
 from cspm_msgs_py.stepping.admission import Admission
+from cspm_msgs_py.stepping.plausibility import Anything, Plausibility
 from cspm_msgs_py.stepping.publisher_binding import PublisherBinding
 from cspm_msgs_py.stepping.stage import Guard, Stage
 
@@ -47,6 +48,7 @@ class SampleAndHold:
         guard: Guard | None = None,
         *,
         bindings: Mapping[str, PublisherBinding] | None = None,
+        plausibility: Plausibility | None = None,
         on_fault: Callable[[str], None] = lambda _: None,
     ) -> None:
         """Make the node's part.
@@ -59,6 +61,7 @@ class SampleAndHold:
             publish_status: where diagnostics go.
             guard: the stage itself, where it has a safe state.
             bindings: to whom inputs are bound, by topic; absent: to nobody.
+            plausibility: says which inputs cannot be true; absent: any can.
             on_fault: where there is no guard, called with what has to lead to the safe state.
         """
         plan = schedule.nodes[stage.node]
@@ -87,6 +90,8 @@ class SampleAndHold:
         self._rows: dict[str, Array] = {}
         bound = bindings or {}
         self._admissions = {name: Admission(name, bound.get(name)) for name in self._delays}
+        self._plausibility = plausibility or Anything()
+        self._implausible: set[str] = set()
         self._safe = False
         self._stamp = self._due = 0
         self._sent: dict[str, int] = {}
@@ -124,7 +129,7 @@ class SampleAndHold:
             gid: identity of its publisher, None if unknown.
 
         Raises:
-            InputError: it is another publisher's, or its stamp is one that cannot be.
+            InputError: it is another publisher's, or its stamp or its numbers cannot be true.
         """
         admission = self._admissions[topic]
         before = admission.stamp_ns
@@ -133,6 +138,7 @@ class SampleAndHold:
             raise InputError(fault)
         if stamp_ns == before:
             return
+        self._check_plausible(topic, stamp_ns, row)
         self._rows[topic] = row
         if topic == self._trigger and self._triggered:
             if before is not None and stamp_ns < before:
@@ -142,9 +148,18 @@ class SampleAndHold:
                 self._due = stamp_ns + self._wait_ns
                 self._compute(stamp_ns, now_ns)
 
+    def _check_plausible(self, topic: str, stamp_ns: int, row: Array) -> None:
+        running = self.begun and not self.safe
+        fault = self._plausibility.fault(topic, stamp_ns, row, self._rows, running=running)
+        self._implausible.discard(topic)
+        if fault is not None:
+            self._implausible.add(topic)
+            raise InputError(fault)
+
     def hears(self, topics: Collection[str], now_ns: int) -> bool:
-        """Return whether messages of these topics came that are not too old to compute on."""
-        return set(topics) <= set(self._came) and not self._too_old(topics, now_ns)
+        """Return whether plausible messages of these topics came, not too old to compute on."""
+        came = set(self._came) - self._implausible
+        return set(topics) <= came and not self._too_old(topics, now_ns)
 
     def refuse(self, now_ns: int, reason: str) -> None:
         """Take note of an unusable message; in a run it leads to the safe state."""

@@ -6,6 +6,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
+from cspm_control.plausibility.make import machine_size
 from cspm_msgs_py.testbed import Testbed
 from cspm_ros.check_drivers.driver_observation import Array, Finding, Heard
 from cspm_ros.check_drivers.driver_relation import (
@@ -152,16 +153,8 @@ def _torques(heard: Heard, testbed: Testbed) -> list[Finding]:
     return [Finding(name, "torque", not beyond, beyond or "within the torque limits")]
 
 
-def machine_size(testbed: Testbed) -> float:
-    """Return the largest extent of exits, attachments or bar, at least 1 m [m]."""
-    points = [[c.exit, c.attachment] for c in testbed.cables if c.exit and c.attachment]
-    extents = np.ptp(np.array(points), axis=0).max() if points else 0.0
-    bar = max(testbed.bar.dimensions) if testbed.bar else 0.0
-    return max(SMALLEST_MACHINE, float(extents), bar)
-
-
 def _position(heard: Heard, testbed: Testbed) -> Finding:
-    name, size = heard.topic.name, machine_size(testbed)
+    name, size = heard.topic.name, max(SMALLEST_MACHINE, machine_size(testbed))
     position = heard.values[:, :3]
     distance = float(np.median(np.linalg.norm(position, axis=1)))
     movement = float(np.ptp(position, axis=0).max())

@@ -5,6 +5,7 @@ from __future__ import annotations
 from dataclasses import replace
 from pathlib import Path
 
+from cspm_control.plausibility.make import make_plausibility
 from cspm_control.safety import GuardedStage, check_real_time
 from cspm_control.stages.angle_stage import AngleStage
 from cspm_control.stages.motion_stage import MotionStage
@@ -89,6 +90,7 @@ class RealtimeRun(NodesOfRun):
             topics,
             edges,
             safety.stale_after,
+            plausibility=make_plausibility(node.name, bundle.scenario, bundle.testbed.testbed),
             on_start=stage.start if isinstance(stage, timed) else None,
             on_safe=stage.suspend if isinstance(stage, MotionStage) else None,
         )

@@ -64,7 +64,16 @@ class Recorder:
 class Part:
     """A node's part with a noting stage; times in ms after `NOW`."""
 
-    def __init__(self, node, *overrides, output=None, guarded=False, stale_after=0.05, stage=None):
+    def __init__(
+        self,
+        node,
+        *overrides,
+        output=None,
+        guarded=False,
+        stale_after=0.05,
+        stage=None,
+        plausibility=None,
+    ):
         bundle = bundle_of("rest", *overrides)
         self.schedule = schedule_of(bundle.scenario, bundle.testbed.testbed)
         plan = self.schedule.nodes[node]
@@ -77,6 +86,7 @@ class Part:
             {plan.outputs[0]: lambda log, stamp, row: self.sent.append((stamp, row))},
             lambda stamp, status: self.reported.append((stamp, status)),
             self.stage if guarded else None,
+            plausibility=plausibility,
         )
 
     def receive(self, topic, at_ms, late_ms=0.0, row=None):
@@ -112,6 +122,41 @@ def test_it_hears_what_came_lately_enough_to_compute_on():
     assert not part.part.hears([BAR_POSE, FRAME_POSE], at(0.0))
     part.receive(BAR_POSE, 60.0)
     assert part.part.hears([BAR_POSE], at(60.1))
+
+
+class Doubt:
+    """Believes no row that begins with a negative number, and notes whether the run was on."""
+
+    def __init__(self):
+        self.running = []
+
+    def fault(self, topic, stamp_ns, row, rows, *, running):
+        self.running.append(running)
+        return f"{topic}: {row[0]:g}" if row[0] < 0 else None
+
+
+def test_what_cannot_be_true_is_refused_and_not_heard():
+    part = motion(plausibility=Doubt())
+    part.receive(BAR_POSE, 0.0)
+    with pytest.raises(InputError, match=r"^/bar/pose: -1$"):
+        part.receive(BAR_POSE, 10.0, row=np.full(7, -1.0))
+    assert not part.part.hears([BAR_POSE], at(10.0))
+    part.receive(BAR_REFERENCE, 11.0)
+    assert part.sent == []
+    part.receive(BAR_POSE, 20.0)
+    assert part.part.hears([BAR_POSE], at(20.0))
+    assert part.stamps_ms == [20.0]
+
+
+def test_numbers_are_judged_by_whether_the_run_is_on():
+    doubt = Doubt()
+    part = motion(plausibility=doubt)
+    part.receive(BAR_POSE, 0.0)
+    part.part.start(at(1.0))
+    part.receive(BAR_POSE, 10.0)
+    part.part.note_safe(True)
+    part.receive(BAR_POSE, 20.0)
+    assert doubt.running == [False, True, False]
 
 
 # When it computes

@@ -1,0 +1,1 @@
+"""Whether measured numbers can be true of this machine: what trips a run in real time."""

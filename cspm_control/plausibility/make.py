@@ -1,0 +1,154 @@
+"""From scenario and test-bed to what is plausible on the machine.
+
+The defaults follow from the machine:
+
+- A body stays within the machine's size of its mean position: the largest extent of exits and
+  attachments. References of the shipped scenarios reach 0.33 of it.
+- No point is faster than √(2·a·size), with a what all cables at their upper limits and gravity
+  give the bar: falling, or pulled, from one end of the workspace to the other. On the thesis's
+  machine that is 11.9 m/s, where the shipped scenarios reach 2.1 m/s.
+- The bar is within half the size of its reference. In the first minute of the shipped scenarios it
+  is within 0.44 (`worst_case_steep`), but for those in which the loop loses it: `worst_case_4m`,
+  `worst_case_steep_4m` and `worst_case_literal`, more than 1 m off.
+- Torque may be off by a twentieth of the motor's limit, or half of what the tension needs. Healthy
+  runs of the shipped scenarios are off by 0.014 of the limit; dry friction comes on top.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+
+import numpy as np
+from numpy.typing import NDArray
+
+from cspm_control.plausibility.pose_limits import FollowingError, PoseLimits
+from cspm_control.plausibility.torque_balance import TorqueBalance
+from cspm_msgs_py.scenario import Scenario
+from cspm_msgs_py.schedule import (
+    BAR_POSE,
+    BAR_REFERENCE,
+    FRAME_POSE,
+    TARGET_POSE,
+    TENSION,
+    WINCH_STATE,
+    schedule_of,
+)
+from cspm_msgs_py.testbed import Testbed
+
+Array = NDArray[np.float64]
+
+FOLLOWING_SHARE = 0.5
+TORQUE_SHARE = 0.05
+
+
+@dataclass(frozen=True)
+class MachinePlausibility:
+    """What one node can judge of what it reads.
+
+    Attributes:
+        poses: limits of bodies, by the topic of their poses.
+        following: of the bar, where the node reads its reference.
+        balance: of the winches, where the node reads tensions and states.
+    """
+
+    poses: Mapping[str, PoseLimits] = field(default_factory=dict)
+    following: FollowingError | None = None
+    balance: TorqueBalance | None = None
+
+    def fault(
+        self, topic: str, stamp_ns: int, row: Array, rows: Mapping[str, Array], *, running: bool
+    ) -> str | None:
+        """Take a message; see `cspm_msgs_py.stepping.plausibility`."""
+        if topic in self.poses:
+            fault = self.poses[topic].fault(stamp_ns, row)
+            if fault is not None:
+                return fault
+        if topic == BAR_POSE and self.following is not None and BAR_REFERENCE in rows:
+            return self.following.fault(row, rows[BAR_REFERENCE], running=running)
+        if topic == WINCH_STATE and self.balance is not None and TENSION in rows:
+            return self.balance.fault(stamp_ns, row, rows[TENSION], running=running)
+        return None
+
+
+def make_plausibility(node: str, scenario: Scenario, testbed: Testbed) -> MachinePlausibility:
+    """Return what a controller's node can judge of what it reads.
+
+    Args:
+        node: its name; one of the scenario's schedule.
+        scenario: resolved.
+        testbed: the machine.
+
+    Raises:
+        InputError: scenario and test-bed do not fit.
+    """
+    schedule = schedule_of(scenario, testbed)
+    plan, safety = schedule.nodes[node], scenario.safety
+    read = {*plan.inputs, *plan.held}
+    poses = {}
+    if testbed.bar is not None:
+        size, points = machine_size(testbed), body_points(testbed)
+        speed = safety.pose_speed or fastest(testbed)
+        for topic, (middle, of_body) in _bodies(scenario, points).items():
+            if topic in read:
+                period_ns = schedule.topics[topic].divider * schedule.period_ns
+                reach = safety.workspace or size
+                poses[topic] = PoseLimits(topic, middle, of_body, reach, speed, period_ns)
+    following = balance = None
+    if {BAR_POSE, BAR_REFERENCE} <= read:
+        most = safety.following_error or FOLLOWING_SHARE * machine_size(testbed)
+        following = FollowingError(body_points(testbed)[1], most)
+    if {WINCH_STATE, TENSION} <= read:
+        balance = torque_balance(scenario, testbed)
+    return MachinePlausibility(poses, following, balance)
+
+
+def body_points(testbed: Testbed) -> tuple[Array, Array]:
+    """Return exits and attachments of a machine's cables, (k, 3) each [m]."""
+    cables = [cable for cable in testbed.cables if cable.has_cable]
+    exits = np.array([cable.exit for cable in cables], dtype=float).reshape(-1, 3)
+    return exits, np.array([cable.attachment for cable in cables], dtype=float).reshape(-1, 3)
+
+
+def machine_size(testbed: Testbed) -> float:
+    """Return the largest extent of exits, attachments or bar [m]; 0 where there is none."""
+    points = np.vstack(body_points(testbed))
+    extent = float(np.ptp(points, axis=0).max()) if len(points) else 0.0
+    return max(extent, *(testbed.bar.dimensions if testbed.bar else (0.0,)))
+
+
+def fastest(testbed: Testbed) -> float:
+    """Return the speed [m/s] beyond which no point of a machine with a bar moves."""
+    assert testbed.bar is not None
+    pull = sum(
+        cable.tension_limits[1]
+        if cable.tension_limits
+        else cable.torque_limit * cable.gear_ratio / cable.drum_radius
+        for cable in testbed.cables
+    )
+    acceleration = pull / testbed.bar.mass + testbed.gravity
+    return float(np.sqrt(2.0 * acceleration * machine_size(testbed)))
+
+
+def torque_balance(scenario: Scenario, testbed: Testbed) -> TorqueBalance:
+    """Return the balance of the winches, of those that carry a cable."""
+    cables, wanted = testbed.cables, scenario.safety.torque_mismatch
+    allowed = [wanted or TORQUE_SHARE * cable.torque_limit for cable in cables]
+    return TorqueBalance(
+        testbed.cable_names,
+        np.array([cable.drum_radius / cable.gear_ratio for cable in cables]),
+        np.array([cable.rotor_inertia for cable in cables]),
+        np.array(allowed),
+        np.array([cable.has_cable for cable in cables]),
+    )
+
+
+def _bodies(scenario: Scenario, points: tuple[Array, Array]) -> dict[str, tuple[Array, Array]]:
+    """Return mean position (3,) and points (k, 3) of each body, by the topic of its poses."""
+    exits, attachments = points
+    found = {
+        BAR_POSE: (scenario.bar_mean_pose, attachments),
+        FRAME_POSE: (scenario.winch_frame.mean_pose, exits),
+        TARGET_POSE: (scenario.target.mean_pose, attachments),
+    }
+    return {name: (np.array(pose[:3]), each) for name, (pose, each) in found.items()}

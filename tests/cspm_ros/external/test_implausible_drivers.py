@@ -1,0 +1,127 @@
+"""Drivers that send what cannot be true, over real topics: the safe state says why."""
+
+from pathlib import Path
+
+import pytest
+from realtime_graph import Evidence, Graph, Witness, warm_processes
+from ros_graph import load_ros
+from scripted_lab import ScriptedLab, clamped_bundle
+
+from cspm_msgs_py.graph import RECORDER
+from cspm_msgs_py.schedule import FORCE_CONTROLLER, MOTION_CONTROLLER, TENSION, schedule_of
+from cspm_ros.runtime.progress_file import read_report
+
+load_ros()
+pytestmark = pytest.mark.slow
+SWAY_2 = 5
+
+
+@pytest.fixture(scope="module")
+def warm():
+    return warm_processes()
+
+
+class Run:
+    """A run without plant on a scripted lab."""
+
+    def __init__(self, warm, place):
+        self.bundle = clamped_bundle()
+        self.testbed = self.bundle.testbed.testbed
+        nodes = schedule_of(self.bundle.scenario, self.testbed).nodes
+        self.graph = Graph(warm, self.bundle, place, members=(*nodes, RECORDER))
+
+    def __enter__(self):
+        self.graph.__enter__()
+        self.witness = Witness(self.graph.domain, [self.testbed.topics[TENSION]]).__enter__()
+        self.lab = ScriptedLab(self.witness.session, self.testbed)
+        return self
+
+    def __exit__(self, *error):
+        self.witness.__exit__(*error)
+        self.graph.__exit__(*error)
+
+    def tripped(self):
+        """Wait for the safe state; return its reason without the node that reported it."""
+        status = self.witness.until_state(FORCE_CONTROLLER, "hold")
+        return status.values["reason"]
+
+    def go_on(self):
+        """Reset once the lab is itself again."""
+        self.witness.until(lambda: self.lab.arrived, "the bar in its place")
+        self.witness.until_reset(FORCE_CONTROLLER)
+        self.witness.until_running(FORCE_CONTROLLER)
+        # Longer than a window of torques after their brakes may have opened.
+        self.witness.until_more(TENSION, 200)
+        self.witness.until_running(FORCE_CONTROLLER)
+
+
+def waiting(graph):
+    report = read_report(Path(graph.parameters.report))
+    return report.waiting if report else None
+
+
+def test_each_kind_of_nonsense_leads_to_the_safe_state_with_its_reason(warm, tmp_path):
+    reasons = []
+    with Run(warm, tmp_path) as run:
+        lab, witness = run.lab, run.witness
+        run.graph.start()
+        witness.until_running(FORCE_CONTROLLER)
+        witness.until_more(TENSION, 200)
+        witness.until_running(FORCE_CONTROLLER)
+
+        lab.jump(0.2, 0.0, 2.0)
+        reasons.append(run.tripped())
+        assert "/bar/pose: jumped by 0.2 m in " in reasons[-1]
+        lab.jump(0.0, 0.0, 2.0)
+        run.go_on()
+
+        lab.bar[0] = 0.6
+        reasons.append(run.tripped())
+        assert "motion_controller: /bar/pose: 0.5" in reasons[-1]
+        assert "m from /bar/reference, allowed: at most 0.5 m" in reasons[-1]
+        lab.bar[0] = 0.0
+        run.go_on()
+
+        lab.jump(0.0, 0.0, 2000.0)
+        reasons.append(run.tripped())
+        assert "/bar/pose: 2e+03 m from its mean position, allowed: at most 1 m" in reasons[-1]
+        # Longer than inputs may be old: without a pose nobody wants a tension.
+        witness.until_more(TENSION, 200)
+        assert witness.reset(FORCE_CONTROLLER) == (
+            False,
+            "reset refused: no fresh /tension_command",
+        )
+        lab.jump(0.0, 0.0, 2.0)
+        run.go_on()
+
+        lab.reported[SWAY_2] = -lab.torques[SWAY_2]
+        reasons.append(run.tripped())
+        assert reasons[-1].startswith("/winches/state: tension without torque of sway_2: ")
+        lab.reported[SWAY_2] = 0.0
+        run.go_on()
+
+        lab.reported[SWAY_2] = 0.6
+        reasons.append(run.tripped())
+        assert reasons[-1].startswith("/winches/state: torque without motion of sway_2: ")
+        lab.reported[SWAY_2] = 0.0
+        run.go_on()
+        run.graph.send(RECORDER, 2)
+        assert set(run.graph.join().values()) == {0}
+    recorded = [reason for _, reason in Evidence(tmp_path / "recording").alarms(FORCE_CONTROLLER)]
+    assert recorded == reasons
+
+
+def test_a_run_does_not_begin_on_poses_in_millimetres(warm, tmp_path):
+    named = f"waits for drivers to reach {MOTION_CONTROLLER}, tension_distribution"
+    with Run(warm, tmp_path) as run:
+        run.lab.jump(0.0, 0.0, 2000.0)
+        run.graph.start()
+        run.witness.until(lambda: waiting(run.graph) == named, named)
+        run.witness.until_more(TENSION, 200)
+        assert waiting(run.graph) == named
+        log = run.graph.log(MOTION_CONTROLLER)
+        run.witness.until(lambda: "(safety.workspace)" in log.read_text(), "the reason in the log")
+        run.lab.jump(0.0, 0.0, 2.0)
+        run.witness.until_running(FORCE_CONTROLLER)
+        run.graph.send(RECORDER, 2)
+        assert set(run.graph.join().values()) == {0}

@@ -1,0 +1,70 @@
+"""A clamped machine whose drivers send what a test says, in the session of its witness."""
+
+from pathlib import Path
+
+import numpy as np
+from run_samples import bundle_of
+
+from cspm_msgs_py.schedule import BAR_POSE, FRAME_POSE, TENSION, TORQUE_COMMAND, WINCH_STATE
+
+CLAMPED = Path(__file__).resolve().parents[3] / "examples" / "clamped_bar.yaml"
+RATE = 200
+# The way that a body moves from one message to the next: 2 m/s.
+STEP = 0.01
+
+
+def clamped_bundle(*overrides):
+    """Return the scenario of the clamped bar, patient with a busy computer."""
+    return bundle_of(
+        CLAMPED, "duration=100", "safety.stale_after=0.5", "safety.watchdog=0.5", *overrides
+    )
+
+
+class ScriptedLab:
+    """Sends poses, winches and tensions while its session is spun; tensions follow the torques.
+
+    Attributes:
+        bar: position of the bar, (3,) [m]; it goes there at 2 m/s, or at once by `jump`.
+        reported: what is added to the torques that the drives report, (n,) [N·m].
+    """
+
+    def __init__(self, session, testbed):
+        self._node = session.node("lab")
+        self._cables = testbed.cables
+        self.radii = np.array([cable.drum_radius / cable.gear_ratio for cable in self._cables])
+        self.bar, self._at = np.array([0.0, 0.0, 2.0]), np.array([0.0, 0.0, 2.0])
+        self.torques = 5.0 * self.radii
+        self.reported = np.zeros(len(self.radii))
+        topics = testbed.topics
+        self._send = {
+            name: self._node.publisher(topics[name])
+            for name in (FRAME_POSE, BAR_POSE, WINCH_STATE, TENSION)
+        }
+        self._node.subscribe_rows(topics[TORQUE_COMMAND], self._command, lambda _: None)
+        session.every(1.0 / RATE, self._measure)
+
+    def jump(self, x, y, z):
+        """Put the bar somewhere."""
+        self.bar = np.array([x, y, z])
+        self._at = self.bar.copy()
+
+    @property
+    def arrived(self):
+        return bool((self.bar == self._at).all())
+
+    def _command(self, _, row):
+        self.torques = np.maximum(row, 0.0)
+
+    def _measure(self):
+        way = self.bar - self._at
+        self._at = self._at + np.clip(way, -STEP, STEP)
+        still = np.zeros(2 * len(self.radii))
+        rows = {
+            FRAME_POSE: np.array([0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 1.0]),
+            BAR_POSE: np.array([*self._at, 0.0, 0.0, 0.0, 1.0]),
+            WINCH_STATE: np.concatenate([still, self.torques + self.reported]),
+            TENSION: self.torques / self.radii,
+        }
+        stamp = self._node.now_ns()
+        for name, row in rows.items():
+            self._send[name](stamp, stamp, row)

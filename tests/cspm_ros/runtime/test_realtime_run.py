@@ -28,6 +28,7 @@ from run_samples import bundle_of
 from cspm_control.controllers.torque_profile import TorqueGenerator
 from cspm_msgs_py.recording import Recording, overview
 from cspm_msgs_py.schedule import FORCE_CONTROLLER, PLANT, TENSION, TORQUE_COMMAND
+from cspm_ros.runtime.exit_watchdog import IN_ORDER
 from cspm_run.recorded_timing import timing_of
 
 load_ros()
@@ -145,7 +146,7 @@ def test_deadlines_missed_are_counted_reported_and_recorded(warm, tmp_path):
         witness.until_more(TENSION, 50)
         after = {name: missed(name) for name in before}
         witness.until_running(*GUARDS)
-        assert set(graph.end().values()) == {0}
+        assert set(graph.end().values()) <= IN_ORDER
     for name, count in before.items():
         assert after[name] - count >= 45, name
     reported = timing_of(graph.folder)
@@ -194,7 +195,7 @@ def test_prescribed_torques_follow_the_time_since_the_start(warm, tmp_path):
     bundle = bundle_of("one_winch", rates, "safety.stale_after=0.5", "safety.watchdog=0.5")
     with Graph(warm, bundle, tmp_path, steps=400) as graph:
         graph.start()
-        assert set(graph.join().values()) == {0}
+        assert set(graph.join().values()) <= IN_ORDER
     evidence = Evidence(graph.folder)
     start = evidence.stamps("/truth/winches/state")[0]
     generator = TorqueGenerator(bundle.scenario.control.torque, bundle.testbed.testbed.cable_names)

@@ -80,7 +80,8 @@ class Leader:
         now = self._node.now_ns()
         if self.start_ns is None:
             if not self.waiting():
-                self.start_ns = now + _NOTICE_NS
+                # What is waited for may have taken its time to say that it is there.
+                self.start_ns = self._node.now_ns() + _NOTICE_NS
                 self._side.tell_start_at(self.start_ns)
                 self._on_start(self.start_ns)
         elif now >= self.start_ns + self._duration_ns:

@@ -190,7 +190,7 @@ class _Follower:
                 stubborn = ", ".join(name for name in processes.by_name if name not in ended)
                 self.failure = self.failure or f"{stubborn} did not end with the run"
         elif not self._realtime or not report.simulated:
-            raise CspmError(processes.obituary(self._leader))
+            raise self._error(self._leader, processes.obituary(self._leader))
         else:
             processes.wait(_AFTERMATH_S)
             self._note_dead(self._leader, report)
@@ -241,10 +241,15 @@ class _Follower:
         report = read_report(self._path)
         under_way = self._realtime and report.simulated
         if not under_way and not report.finished and report.failure is None:
-            raise CspmError(obituary)
+            raise self._error(dead[0], obituary)
         if self._realtime:
             self._note_dead(dead[0], report)
             self._stop_at = time.monotonic() + _AFTERMATH_S
+
+    def _error(self, name: str, obituary: str) -> CspmError:
+        """Return the error of a node that ended before the run began; its exit code counts."""
+        refused = self._processes.ended().get(name) == InputError.exit_code
+        return InputError(obituary) if refused else CspmError(obituary)
 
     def _note_dead(self, name: str, report: Report) -> None:
         if self.failure is None:

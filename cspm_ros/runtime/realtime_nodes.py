@@ -115,4 +115,9 @@ class RealtimeRun(NodesOfRun):
             made.follow()
             return made, None
         others = [name for name in self.members if name != RECORDER]
-        return made, made.lead(others, self.measured(), steps * period_ns)
+        # Loads parts of SciPy, which no other run needs.
+        from cspm_ros.check_drivers.driver_statics import DriverStatics
+
+        needed = self.measured()
+        statics = DriverStatics(self.bundle.testbed.testbed, self.bundle.scenario.rates, needed)
+        return made, made.lead(others, needed, steps * period_ns, statics)

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Collection, Mapping
 from functools import partial
 from itertools import cycle
+from typing import TYPE_CHECKING
 
 from cspm_msgs_py.diagnostics import Level, Status, decode_diagnostics
 from cspm_msgs_py.errors import InputError
@@ -24,6 +25,10 @@ from cspm_msgs_py.stepping.admission import Admission
 from cspm_msgs_py.topics import DIAGNOSTICS, SAFE, Topic
 from cspm_ros.runtime.topic_buffer import TopicBuffer
 
+if TYPE_CHECKING:
+    from cspm_ros.check_drivers.driver_statics import DriverStatics
+
+_LISTENING = "a second of each driver's messages"
 _TAKE_EVERY_S = 0.002
 _WRITE_EVERY_S = 0.02
 
@@ -58,6 +63,7 @@ class RealtimeRecorderNode:
         for name, topic in topics.items():
             self._subscribe(name, topic)
         self._leader: FollowerSide | Leader | None = None
+        self._statics: DriverStatics | None = None
         node.every(_TAKE_EVERY_S, self._intake.take)
         # One topic after the other: all at once would keep other nodes of the process waiting.
         self._next = cycle(self._buffers.values())
@@ -69,16 +75,33 @@ class RealtimeRecorderNode:
         """Start and end with the plant."""
         self._leader = FollowerSide(self._node, self._period_ns, on_start=self._begin)
 
-    def lead(self, others: Collection[str], needed: Collection[str], duration_ns: int) -> Leader:
-        """Start the run once `others` and a message of each of the topics `needed` are there."""
+    def lead(
+        self,
+        others: Collection[str],
+        needed: Collection[str],
+        duration_ns: int,
+        statics: DriverStatics,
+    ) -> Leader:
+        """Start the run once `others` and a message of each of the topics `needed` are there.
+
+        And once `statics`, which hears them, has found no error; its `InputError` ends the session.
+        """
         bound = [topic for topic in self._topics.values() if carries_row(topic.ros_type)]
         excess = census_of(self._node, bound, self._edges)
+        self._statics = statics
+
+        def missing() -> list[str]:
+            absent = [*(name for name in needed if name not in self._came), *excess()]
+            if absent:
+                statics.restart()
+            return absent or [_LISTENING] * statics.waits()
+
         self._leader = Leader(
             self._node,
             self._period_ns,
             others,
             duration_ns,
-            missing=lambda: [*(name for name in needed if name not in self._came), *excess()],
+            missing=missing,
             on_start=self._begin,
         )
         return self._leader
@@ -108,6 +131,8 @@ class RealtimeRecorderNode:
 
         def take_row(message: Tagged) -> None:
             self._came.add(name)
+            if self._statics is not None:
+                self._statics.hear(name, message.received_ns, message.payload)
             buffer.add(message)
 
         self._intake.subscribe_tagged(topic, message_class, take_row, numbered=True)

@@ -36,7 +36,7 @@ class Edges:
 def graph_of(schedule: Schedule, nodes: Sequence[str]) -> dict[str, Edges]:
     """Return sender and readers of every topic among `nodes`, by topic in contract order.
 
-    A player among them stands for the plant and for the nodes that are absent, and reads what
+    A player among them replaces the plant and for the nodes that are absent, and reads what
     those that are present send.
     """
     present = set(nodes)

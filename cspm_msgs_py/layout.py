@@ -124,7 +124,7 @@ class Layout:
     def constant(self) -> NDArray[np.intp]:
         """Offsets that hold neither stamp nor number nor padding, ascending.
 
-        Padding is what a reader does not look at: the message read is the same whatever stands
+        Padding is what a reader does not look at: the message read is the same whatever is
         there. Some serialisers leave it uninitialised; the template's is zero.
         """
         free = np.zeros(self.size, dtype=bool)

@@ -38,7 +38,7 @@ TIME_GRID = 0.001  # s: moves start and end on it
 
 
 class StillMotion(StrictModel):
-    """The body stands at its mean pose."""
+    """The body rests at its mean pose."""
 
     type: Literal["still"] = "still"
 

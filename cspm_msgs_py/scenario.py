@@ -196,7 +196,7 @@ class TorqueProfile(StrictModel):
 
 
 class AnglePath(StrictModel):
-    """Motor angle over time, counted from where the motor stands at the start, positive winds in.
+    """Motor angle over time, counted from where the motor is at the start, positive winds in.
 
     `points` are pairs of time [s] and angle [rad], joined by straight lines and gone through
     `cycles` times; then the last angle stays. `tension` is what the cable carries at the start [N],

@@ -1,6 +1,6 @@
 """What wrenches, and so what accelerations, cables within their limits can give.
 
-The wrenches S·t with tensions in [low, high] fill a zonotope; each of its facets stands on m − 1
+The wrenches S·t with tensions in [low, high] fill a zonotope; each of its facets spans m − 1
 columns of S that it is parallel to. A wrench is within where it is on the inner side of all.
 
 Source: Bouchard, Gosselin, Moore, "On the Ability of a Cable-Driven Robot to Generate a Prescribed

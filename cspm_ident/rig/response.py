@@ -36,7 +36,7 @@ class Response(NamedTuple):
         lowest: by specimen and branch, how each cycle's lowest tension less the mean of all changes
             the stiffness, (cycles, n) [N/m].
         rests: by specimen, place of rest and branch, how a standard deviation of where the encoder
-            stands within its step there changes the stiffness, (n,) [N/m].
+            is within its step there changes the stiffness, (n,) [N/m].
     """
 
     law: list[list[Array]]

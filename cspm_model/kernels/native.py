@@ -31,7 +31,7 @@ _interpreted: dict[int, Callable[..., Any]] = {}
 def address_of(function: Any, signature: Signature) -> int:  # noqa: ANN401 - numba's dispatcher
     """Return the address of an `njit` function compiled for a signature; see `caller_of`.
 
-    With compilation switched off (NUMBA_DISABLE_JIT=1) the address stands for the Python function.
+    With compilation switched off (NUMBA_DISABLE_JIT=1) the address is that of the Python function.
     """
     if config.DISABLE_JIT:
         _interpreted[id(function)] = function

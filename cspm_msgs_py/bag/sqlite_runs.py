@@ -1,7 +1,7 @@
 """A sqlite3 file of rosbag2 as one run of messages.
 
 Tables: https://github.com/ros2/rosbag2, package `rosbag2_storage_sqlite3`. The readers of `rosbags`
-leave the order of messages with equal log time to the query planner, which is why the query stands
+leave the order of messages with equal log time to the query planner, which is why the query is
 here.
 """
 

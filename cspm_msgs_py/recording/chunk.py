@@ -30,7 +30,7 @@ _INDEX_ENTRY = 16
 
 
 class ChunkHead(NamedTuple):
-    """What stands before the data of a Chunk record.
+    """What precedes the data of a Chunk record.
 
     Attributes:
         first_ns: earliest log time in it [ns].
@@ -52,7 +52,7 @@ class ChunkHead(NamedTuple):
 
 
 class ChunkPlace(NamedTuple):
-    """Where a chunk stands: its record, and the Message Index records that follow it.
+    """Where a chunk is: its record, and the Message Index records that follow it.
 
     A run of Message records outside any chunk is treated as a chunk without compression; for it
     `loose` is set and `record` covers the run.
@@ -146,7 +146,7 @@ class Messages:
     Attributes:
         content: the chunk's content.
         offsets: offset of each Message record, shape (n,).
-        prefixes: what stands before each payload, dtype `MESSAGE_PREFIX`, shape (n,).
+        prefixes: what precedes each payload, dtype `MESSAGE_PREFIX`, shape (n,).
     """
 
     def __init__(self, content: bytes, offsets: Integers, prefixes: Prefixes) -> None:

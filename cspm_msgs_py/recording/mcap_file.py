@@ -306,7 +306,7 @@ class McapFile(Closing):
         return read_index(self.record_bytes(place.record.end, place.index_end))
 
     def head(self, place: ChunkPlace) -> ChunkHead:
-        """Return what stands before a chunk's data.
+        """Return what precedes a chunk's data.
 
         Raises:
             InputError: the record is damaged.

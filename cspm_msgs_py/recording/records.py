@@ -32,7 +32,7 @@ MESSAGE_PREFIX = np.dtype(
         "itemsize": 31,
     }
 )
-"""What stands before the payload of a Message record."""
+"""What precedes the payload of a Message record."""
 
 Record = TypeVar("Record", bound=McapRecord)
 

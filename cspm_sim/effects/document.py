@@ -43,7 +43,7 @@ which effects is in [isolability](isolability.md), how to add one of your own in
 _PICTURES = """
 ## Signatures
 
-What a little of each effect adds to the residual in which it stands out most, against the measured
+What a little of each effect adds to the residual in which it shows most, against the measured
 signal that explains most of it, along the worst case; the largest value is 1. Backlash and a lag of
 a drive show nowhere along that planned motion, without slack and commands: they are drawn along
 `worst_case_4m` as simulated. Drawn by `python docs/scripts/draw_signatures.py`.

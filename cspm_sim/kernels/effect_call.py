@@ -34,7 +34,7 @@ def kernel_address(kernel: Kernel, has_states: bool) -> int:
     """Compile a kernel and return its address.
 
     It is `kernel(parameters, signals)`, or `kernel(parameters, signals, states, rates)` where it
-    has states. With compilation switched off (NUMBA_DISABLE_JIT=1) the address stands for the
+    has states. With compilation switched off (NUMBA_DISABLE_JIT=1) the address is that of the
     Python function.
     """
     if config.DISABLE_JIT:

@@ -1,6 +1,8 @@
 """The language of the pages: short sentences and paragraphs, and the terms of the field."""
 
+import ast
 import re
+from collections.abc import Iterator
 from pathlib import Path
 
 import pytest
@@ -21,6 +23,26 @@ AVOIDED = re.compile(
     r"\b(sound machines?|told|untrue|worth a word|twins?|bristles|turns? round|sureness)\b",
     re.IGNORECASE,
 )
+# Of docstrings, messages and help as well, as whole words.
+OF_THE_DIALECT = re.compile(
+    r"\b(sound|told|untrue|worth a word|company|twins?|poor man|sureness|stands|bristles)\b",
+    re.IGNORECASE,
+)
+# A body at rest.
+STILL = re.compile(r"\bstands still\b", re.IGNORECASE)
+PACKAGES = [*sorted(p.parent.name for p in ROOT.glob("cspm*/__init__.py")), "bench"]
+_NAMES_OF_LUGRE = (
+    *(f"strata/{name}" for name in ("absence", "combined", "everywhere", "feedback", "noise")),
+    *("strata/onset", "strata/rig", "reality/friction", "reality/phenomena"),
+    "scoring/operating_region",
+)
+RIGHT_HERE: dict[str, set[str]] = {
+    # The key that files of effects had for `confounded_with`.
+    "cspm_sim/effects/own_files.py": {"twins"},
+    # The LuGre model's own word for its state, and the name of the phenomenon in truth files.
+    **{f"bench/blind/{name}.py": {"bristles"} for name in _NAMES_OF_LUGRE},
+    "bench/validation/blind_slice.py": {"bristles"},
+}
 LINK = re.compile(r"\[([^\]]*)\]\([^)]*\)")
 ITEM = re.compile(r"^(?:[-*]|\d+\.) ", re.MULTILINE)
 END = re.compile(r"(?<=[.!?:])\s+(?=[A-Z`*\[(])")
@@ -87,6 +109,42 @@ def test_the_check_sees_what_is_too_long_and_what_to_avoid() -> None:
     assert faults("A sound machine is told.") == ["avoid: sound machine", "avoid: told"]
     assert faults("```\na sound machine\n```\n\n| told |\n\nA healthy machine.") == []
     assert faults("One. " * 121)[0].startswith("paragraph")
+
+
+def texts_of(path: Path) -> Iterator[tuple[int, str]]:
+    """Docstrings, messages, help and keys of a module, each with its line."""
+    for node in ast.walk(ast.parse(path.read_text(encoding="utf-8"))):
+        if isinstance(node, ast.Constant) and isinstance(node.value, str):
+            yield node.lineno, " ".join(node.value.split())
+
+
+def avoided_in(place: str, text: str) -> list[str]:
+    """Words that a text of the packages should not use, but for those that are right there."""
+    plain = STILL.sub("", text)
+    words = [found.lower() for found in OF_THE_DIALECT.findall(plain)]
+    return [word for word in words if word not in RIGHT_HERE.get(place, set())]
+
+
+@pytest.mark.parametrize("package", PACKAGES)
+def test_docstrings_and_messages_use_the_terms_of_the_field(package: str) -> None:
+    found = []
+    for path in sorted((ROOT / package).rglob("*.py")):
+        place = path.relative_to(ROOT).as_posix()
+        for line, text in texts_of(path):
+            found += [f"{place}:{line}: {word}" for word in avoided_in(place, text)]
+    assert found == []
+
+
+def test_each_exception_is_still_needed() -> None:
+    for place, words in RIGHT_HERE.items():
+        text = " ".join(each for _, each in texts_of(ROOT / place)).lower()
+        assert [word for word in words if not re.search(rf"\b{word}\b", text)] == []
+
+
+def test_the_check_sees_words_of_the_dialect_and_a_body_at_rest() -> None:
+    assert avoided_in("a.py", "A sound machine, as told. Sounds stand.") == ["sound", "told"]
+    assert avoided_in("a.py", "A winch stands still; a cable that stands.") == ["stands"]
+    assert avoided_in("cspm_sim/effects/own_files.py", "twins") == []
 
 
 def test_messages_of_the_troubleshooting_page_are_those_of_the_code() -> None:

@@ -1,7 +1,7 @@
 """A winch frame that gives way to the cables, and rings.
 
 All exits move together, in world axes, against the frame as it is measured. The frame's own inertia
-against the motion of what it stands on is left out.
+against the motion of its base is left out.
 """
 
 from collections.abc import Sequence

@@ -79,8 +79,9 @@ $(VENV)/docs.stamp: $(VENV)/$(ROS).stamp
 	@$(PIP) -e '.[docs]'
 	@touch $@
 
+# Bytecode of some thousand modules would be made that a run never imports.
 $(VENV)/wheels.stamp: $(VENV)/pip.stamp pyproject.toml setup.cfg
-	@$(PIP) -e '.[ros]'
+	@$(PIP) --no-compile -e '.[ros]'
 	@rm -f $(VENV)/native.stamp
 	@touch $@
 

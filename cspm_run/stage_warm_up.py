@@ -1,8 +1,10 @@
-"""What a stage needs of compiled code, made or loaded before it counts."""
+"""What a run needs of compiled code, made or loaded before it counts."""
 
 from __future__ import annotations
 
 import multiprocessing
+from collections.abc import Sequence
+from concurrent.futures import Future, ProcessPoolExecutor
 from pathlib import Path
 
 import numpy as np
@@ -17,6 +19,8 @@ from cspm_msgs_py.schedule import WAVE_TRAJECTORY, schedule_of
 from cspm_msgs_py.stepping.stage import Stage
 from cspm_msgs_py.topics import POSE, WRENCH
 from cspm_run.bundle import Bundle
+from cspm_run.compiled.compiled_loop import first_compiled_step
+from cspm_run.recorded_run import run
 
 Array = NDArray[np.float64]
 
@@ -39,31 +43,51 @@ def rest_rows(node: str, bundle: Bundle) -> dict[str, Array]:
     return rows
 
 
+def is_compiled() -> bool:
+    """Return whether a run of this version has compiled anything yet."""
+    return Path(config.CACHE_DIR).exists()
+
+
 def compile_beside(bundle: Bundle) -> None:
     """Let another process compile a run's controllers where nothing is compiled yet.
 
     Meanwhile this one compiles the plant, and finds the controllers in the cache when it comes to
     them, or compiles what is not there yet.
     """
-    if not Path(config.CACHE_DIR).exists():
+    if not is_compiled():
         beside = multiprocessing.get_context("spawn").Process(
-            target=compile_stages, args=(bundle,), name="compiling", daemon=True
+            target=compile_stages, args=([bundle],), name="compiling", daemon=True
         )
         beside.start()
 
 
-def compile_stages(bundle: Bundle) -> None:
-    """Compile what the controllers of a run need; those that most depends on come first."""
-    scenario, testbed = bundle.scenario, bundle.testbed.testbed
-    schedule = schedule_of(scenario, testbed)
-    slots = Slots()
-    slots.add({name: testbed.topics[name].width for name in schedule.topics})
-    nodes = [node for node in schedule.nodes if node != WAVE_TRAJECTORY]
-    for node in sorted(nodes, reverse=True):
-        # Without motions a governor plans nothing, which would take longer than compiling.
-        stage = make_controller(node, scenario, testbed)
-        stage.step(0, rest_rows(node, bundle), lambda _topic, _row: None)
-        _compile_phase(stage, slots, schedule.period_ns)
+def compile_apart(bundles: Sequence[Bundle], pool: ProcessPoolExecutor) -> list[Future[None]]:
+    """Have two processes of a pool compile what runs need: the plant, and all controllers.
+
+    Runs that begin together on an empty cache would each compile all of what they share.
+    """
+    return [pool.submit(_compile_run, bundles[0]), pool.submit(compile_stages, bundles)]
+
+
+def _compile_run(bundle: Bundle) -> None:
+    """Make a run's steps up to the first compiled ones; nothing of it remains."""
+    schedule = schedule_of(bundle.scenario, bundle.testbed.testbed)
+    run(bundle, None, steps=first_compiled_step(schedule) + 1)
+
+
+def compile_stages(bundles: Sequence[Bundle]) -> None:
+    """Compile what the controllers of runs need; those that most depends on come first."""
+    for bundle in bundles:
+        scenario, testbed = bundle.scenario, bundle.testbed.testbed
+        schedule = schedule_of(scenario, testbed)
+        slots = Slots()
+        slots.add({name: testbed.topics[name].width for name in schedule.topics})
+        nodes = [node for node in schedule.nodes if node != WAVE_TRAJECTORY]
+        for node in sorted(nodes, reverse=True):
+            # Without motions a governor plans nothing, which would take longer than compiling.
+            stage = make_controller(node, scenario, testbed)
+            stage.step(0, rest_rows(node, bundle), lambda _topic, _row: None)
+            _compile_phase(stage, slots, schedule.period_ns)
 
 
 def _compile_phase(stage: Stage, slots: Slots, period_ns: int) -> None:

@@ -5,7 +5,7 @@ from __future__ import annotations
 import contextlib
 import multiprocessing
 from collections.abc import MutableMapping, Sequence
-from concurrent.futures import Future, ProcessPoolExecutor
+from concurrent.futures import Future, ProcessPoolExecutor, wait
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -24,6 +24,7 @@ from cspm_run.console import make_console, say
 from cspm_run.plants import SIM
 from cspm_run.recorded_run import run
 from cspm_run.run_result import RunResult
+from cspm_run.stage_warm_up import compile_apart, is_compiled
 from cspm_run.summary import summary_data, write_json
 
 PICTURE = "runs.png"
@@ -148,6 +149,8 @@ def _run_all(bundles: Sequence[Bundle], folder: Path | None, console: Console) -
         ProcessPoolExecutor(len(bundles), mp_context=context) as pool,
         Progress(*columns, console=console, transient=True) as bar,
     ):
+        if not is_compiled():
+            _compile(bundles, pool, bar)
         reached: MutableMapping[str, float] = manager.dict()
         tasks = {b.scenario.name: bar.add_task(escape(b.scenario.name)) for b in bundles}
         futures = [pool.submit(_run_one, each, folder, reached) for each in bundles]
@@ -157,6 +160,13 @@ def _run_all(bundles: Sequence[Bundle], folder: Path | None, console: Console) -
                 name, total = bundle.scenario.name, bundle.scenario.duration
                 bar.update(tasks[name], completed=reached.get(name, 0.0), total=total)
     return [future.result() for future in futures]
+
+
+def _compile(bundles: Sequence[Bundle], pool: ProcessPoolExecutor, bar: Progress) -> None:
+    task = bar.add_task("compiling, once", total=None)
+    # What fails here the run itself reports.
+    wait(compile_apart(bundles, pool))
+    bar.remove_task(task)
 
 
 def _wait(futures: Sequence[Future[RunResult]]) -> None:

@@ -225,7 +225,8 @@ def _weak(
         inertia = weigh(window.second, rows[:, WinchSignal.ANGLE], stride)
     else:
         inertia = weigh(first_of(half, step), speed, stride)
-    added = np.concatenate([effect.regressors(rows)[:, 0] for effect in effects], axis=1)
+    none = np.zeros((len(rows), 0))  # where inertia alone is left
+    added = np.concatenate([none, *(effect.regressors(rows)[:, 0] for effect in effects)], axis=1)
     target = weigh(window.weights, load, stride) - signals.load_inertia * inertia
     # The mean of the signs is ±1 where the shaft turns one way throughout.
     signs = np.sign(speed)

@@ -217,3 +217,11 @@ def test_default_interval_is_the_bootstrap():
     assert second.method == "least squares, sandwich"
     # Two roads to one covariance, with a handful of reversals.
     np.testing.assert_allclose(first.sd, second.sd, rtol=0.4)
+
+
+def test_inertia_alone_is_identified_where_no_effect_is_seen():
+    signals = closed_loop(WINCH, 3000, torque_noise=0.005, seed=8)
+    alone, whole = (identify_winch([signals], effects) for effects in ((), EFFECTS))
+    assert alone.estimate.names == ("inertia",)
+    assert alone.error > whole.error
+    assert np.isfinite(alone.estimate.interval("inertia")).all()

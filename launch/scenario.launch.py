@@ -1,11 +1,14 @@
 """Start the nodes of one scenario, each in a process; all of them end when the plant does.
 
 ros2 launch cspm scenario.launch.py scenario:=calm pace:=realtime record:=/tmp/calm
+ros2 launch cspm scenario.launch.py scenario:=calm duration:=10 overrides:="seed=2 sensors=ideal"
 ros2 launch cspm scenario.launch.py scenario:=calm_measured_target target:=measured
 """
 
+import shlex
 from datetime import datetime
 from pathlib import Path
+from typing import Any
 
 from launch import LaunchContext, LaunchDescription
 from launch.actions import DeclareLaunchArgument, OpaqueFunction, Shutdown
@@ -53,6 +56,14 @@ def generate_launch_description() -> LaunchDescription:
                 default_value="30.0",
                 description="lockstep: give up when nothing moves for so long, s",
             ),
+            DeclareLaunchArgument(
+                "duration", default_value="", description="of the run, s; empty: the scenario's"
+            ),
+            DeclareLaunchArgument(
+                "overrides",
+                default_value="",
+                description="values put over the scenario's, key.path=value, with spaces between",
+            ),
             OpaqueFunction(function=nodes),
         ]
     )
@@ -67,12 +78,18 @@ def nodes(context: LaunchContext) -> list[Node]:
     others = OTHERS if target == PRESCRIBED else (TRACKER, *OTHERS)
     dated = f"recordings/{Path(scenario).stem}-{datetime.now():%Y%m%d-%H%M%S}"
     # Launch reads texts as YAML, so that the nodes get a number.
-    parameters = {
+    parameters: dict[str, Any] = {
         "scenario": scenario,
         "pace": pace,
         "folder": record or dated,
         "patience": patience,
     }
+    duration, overrides = (
+        LaunchConfiguration(name).perform(context) for name in ("duration", "overrides")
+    )
+    # Of an empty list ROS 2 knows no type.
+    if changed := overrides_of(duration, overrides):
+        parameters["overrides"] = changed
     if plant == EXTERNAL:
         return [node(name, parameters) for name in others]
     parameters["plant"] = plant
@@ -80,7 +97,12 @@ def nodes(context: LaunchContext) -> list[Node]:
     return [plant_node, *(node(name, parameters) for name in others)]
 
 
-def node(name: str, parameters: dict[str, str], **options: Shutdown) -> Node:
+def overrides_of(duration: str, overrides: str) -> list[str]:
+    """Return the nodes' overrides: those given, quoted as in a shell, and the duration [s]."""
+    return shlex.split(overrides) + [f"duration={duration}"] * bool(duration)
+
+
+def node(name: str, parameters: dict[str, Any], **options: Shutdown) -> Node:
     """Return a node of this package in a process of its own."""
     return Node(
         package="cspm", executable=name, parameters=[parameters], output="screen", **options

@@ -5,6 +5,7 @@ from __future__ import annotations
 import inspect
 import time
 from collections.abc import Callable, Collection
+from contextlib import ExitStack
 from importlib import import_module
 from typing import Any
 
@@ -22,6 +23,7 @@ from rclpy.qos import DurabilityPolicy
 from cspm_msgs_py.diagnostics import Status, encode_diagnostics
 from cspm_msgs_py.errors import CspmError, InputError
 from cspm_msgs_py.rate_limited_warnings import RateLimitedWarnings
+from cspm_msgs_py.ros.domain_claim import DomainClaim
 from cspm_msgs_py.ros.intake import Intake
 from cspm_msgs_py.ros.qos import contract_qos
 from cspm_msgs_py.ros.tagged_taker import Tagged
@@ -44,6 +46,7 @@ class ContractNode:
     Attributes:
         node: rclpy's node.
         intake: where its messages are taken from, if no executor brings them.
+        closing: what is closed with the node.
         failure: why the session is to end, in one line, if `fail` was called.
     """
 
@@ -68,6 +71,7 @@ class ContractNode:
         self._publishers: dict[str, tuple[Publisher, frozenset[str]]] = {}
         self._steady = Clock(clock_type=ClockType.STEADY_TIME)
         self._complaints = RateLimitedWarnings(self.warn)
+        self.closing, self._claimed = ExitStack(), False
         self.failure: str | None = None
 
     def poll(self, timers: WallTimers, wake_up: WakeUp | None) -> None:
@@ -257,6 +261,21 @@ class ContractNode:
             publisher.wait_for_all_acked(Duration(seconds=max(0.0, end - time.monotonic())))
             for publisher in self.node.publishers
         )
+
+    def claim(self, run: str, topic: str) -> None:
+        """Claim the node's domain for a run of this name, until the node is closed.
+
+        Runs whose start is announced on another `topic` are kept apart. A second call does nothing.
+
+        Raises:
+            InputError: another run has it.
+        """
+        if self._claimed:
+            return
+        domain = int(self.node.context.get_domain_id())
+        claim = DomainClaim(domain, self.node.resolve_topic_name(topic), run)
+        self.closing.callback(claim.close)
+        self._claimed = True
 
     def every(self, seconds: float, call: Callable[[], None]) -> Any:  # noqa: ANN401 - rclpy's timer
         """Have `call` called at an interval of wall time; return the timer."""

@@ -26,13 +26,15 @@ class GuardPorts:
         guard: Guard,
         now_ns: Callable[[], int],
         reset: Callable[[int], str | None] | None = None,
+        begun: Callable[[], bool] = lambda: True,
     ) -> None:
         """Connect `guard`; `now_ns` gives the time on the clock that it is stepped with.
 
-        `reset` is asked in the guard's place whether it leaves its safe state.
+        `reset` is asked in the guard's place whether it leaves its safe state. Before
+        `begun` nothing is sent but a safe state: another run may be on its way there.
         """
         self._guard, self._now_ns = guard, now_ns
-        self._release = reset or guard.reset
+        self._release, self._begun = reset or guard.reset, begun
         self._bool = ros_class(BRAKE.ros_type)
         self._brake = node.node.create_publisher(self._bool, BRAKE.name, contract_qos())
         self._safe = node.node.create_publisher(self._bool, SAFE.name, contract_qos())
@@ -54,6 +56,8 @@ class GuardPorts:
 
     def _report(self) -> None:
         brake, safe = state = self._guard.brake, self._guard.safe
+        if not (safe or self._begun()):
+            return
         self._since_report += 1
         if state != self._reported or self._since_report >= _REPEAT:
             self._reported, self._since_report = state, 0

@@ -82,7 +82,7 @@ class RealtimeNode:
         self._on_safe = on_safe
         self._foreign = [name for name in read if not edges[name].senders]
         if guard is not None:
-            GuardPorts(node, guard, node.now_ns, self._reset)
+            GuardPorts(node, guard, node.now_ns, self._reset, lambda: self._loop.begun)
         elif FORCE_CONTROLLER in schedule.nodes:
             BoundFlag(node, SAFE, FORCE_CONTROLLER, self._note_safe, self._refuse)
         self._on_start = on_start

@@ -179,6 +179,7 @@ class Session:
         for node in self._nodes:
             if node.intake is not None:
                 node.intake.close()
+            node.closing.close()
             self._executor.remove_node(node.node)
             node.node.destroy_node()
         self._nodes = []

@@ -80,6 +80,7 @@ class LockstepPlayerNode:
             node.subscribe_numbered_rows(
                 topics[name], partial(self._take, name), partial(self._refuse, name)
             )
+        run.claim(node)
         others = [name for name in run.members if name != PLAYER]
         self._others = PlantSide(node, self._schedule.period_ns, others, self._note_progress)
         self._recorded = -1 if RECORDER in others else None

@@ -24,6 +24,7 @@ class LockstepRun(NodesOfRun):
         Raises:
             InputError: somebody's driver is to send a topic, who cannot keep the schedule.
         """
+        self.claim(node)
         check_lockstep(self.schedule)
         with self.bundle.unpacked() as place:
             run = self.plant_run(steps, place)

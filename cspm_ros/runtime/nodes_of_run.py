@@ -7,6 +7,8 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from cspm_msgs_py.graph import Edges, graph_of
+from cspm_msgs_py.ros.contract_node import ContractNode
+from cspm_msgs_py.ros.rendezvous import START
 from cspm_msgs_py.scenario import ClosedLoop
 from cspm_msgs_py.schedule import Schedule, schedule_of
 from cspm_msgs_py.topics import Topic
@@ -41,6 +43,14 @@ class NodesOfRun:
     def testbed_topics(self) -> dict[str, Topic]:
         """All topics of the machine, by name."""
         return self.bundle.testbed.testbed.topics
+
+    def claim(self, node: ContractNode) -> None:
+        """Claim the ROS domain for this run, in the name of the node that leads it.
+
+        Raises:
+            InputError: another run has it.
+        """
+        node.claim(self.bundle.scenario.name, START)
 
     def plant_run(self, steps: int, place: Path) -> PlantRun:
         """Return what the plant's node is made of.

@@ -14,6 +14,7 @@ from cspm_control.safety import check_real_time
 from cspm_msgs_py.errors import CspmError, InputError
 from cspm_msgs_py.graph import RECORDER
 from cspm_msgs_py.interruption import interruptible
+from cspm_msgs_py.ros.domain_claim import refuse_claimed
 from cspm_msgs_py.schedule import PLANT, schedule_of
 from cspm_ros.runtime.background import SHARE_BEHIND
 from cspm_ros.runtime.exit_watchdog import IN_ORDER
@@ -26,6 +27,8 @@ from cspm_run.recorded_result import recorded_result
 from cspm_run.run_result import RunResult
 
 PROCESSES = "processes"
+# Where the leader announces the start; the module that owns the name loads ROS.
+START = "/run/start"
 _LOOK_EVERY_S = 0.1
 # How long a run in real time goes on after a node died, to record what the others do.
 _AFTERMATH_S = 2.0
@@ -61,8 +64,8 @@ def run_processes(
             alone, and not where somebody's drivers are waited for.
 
     Raises:
-        InputError: scenario and test-bed do not fit, or inputs that come in time would count as
-            late.
+        InputError: scenario and test-bed do not fit, inputs that come in time would count as late,
+            or another run has the domain.
         CspmError: a node ended before the run did, in real time before it began; or not all nodes
             joined.
     """
@@ -75,6 +78,7 @@ def run_processes(
         check_real_time(scenario.safety, schedule)
     # In lockstep the recorder has 48 steps of time; by the wall clock it would lose messages.
     behind = () if mode == REALTIME else (RECORDER,)
+    refuse_claimed(domain_id or int(os.environ.get("ROS_DOMAIN_ID") or 0), START)
     with tempfile.TemporaryDirectory(prefix="cspm-run-") as made:
         place = Path(made)
         parameters = NodeParameters(

@@ -62,6 +62,7 @@ class RealtimeRun(NodesOfRun):
 
     def plant(self, node: ContractNode, steps: int) -> RealtimePlantNode:
         """Return the plant's node; `steps` is how many plant steps to make."""
+        self.claim(node)
         bundle = self.bundle
         check_real_time(bundle.scenario.safety, self.schedule)
         with bundle.unpacked() as place:
@@ -114,6 +115,7 @@ class RealtimeRun(NodesOfRun):
         if self.leader != RECORDER:
             made.follow()
             return made, None
+        self.claim(node)
         others = [name for name in self.members if name != RECORDER]
         # Loads parts of SciPy, which no other run needs.
         from cspm_ros.check_drivers.driver_statics import DriverStatics

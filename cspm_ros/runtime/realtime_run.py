@@ -63,11 +63,16 @@ def run_realtime(
     steps = steps or round(scenario.duration * scenario.rates.plant)
     with ExitStack() as stack:
         session = stack.enter_context(Session(domain_id=domain_id, polled=True))
-        plant = None if external else run.plant(session.node(PLANT), steps)
+        leads = session.node(run.leader)
+        # Before any other node is there, which another run's could hear.
+        run.claim(leads)
+        plant = None if external else run.plant(leads, steps)
         for name in stages:
             run.stage(session.node(name))
         writer = stack.enter_context(run.new_recording(folder, REALTIME))
-        recorder, leading = run.recorder(session.node(RECORDER), writer, steps)
+        recorder, leading = run.recorder(
+            leads if external else session.node(RECORDER), writer, steps
+        )
         stack.callback(recorder.close)
         leader = leading if plant is None else plant.leader
         assert leader is not None

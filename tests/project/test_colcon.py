@@ -5,6 +5,7 @@ import dataclasses
 import importlib.util
 import os
 import re
+import shlex
 import subprocess
 import sys
 from configparser import ConfigParser
@@ -220,8 +221,25 @@ def test_the_launch_files_parameters_are_those_that_nodes_declare():
         for node in ast.walk(start)
         if isinstance(node, ast.Subscript) and isinstance(node.slice, ast.Constant)
     }
-    assert keys == {"scenario", "pace", "folder", "plant", "patience"}
+    assert keys == {"scenario", "pace", "folder", "plant", "patience", "overrides"}
     assert keys <= declared
+
+
+@pytest.mark.parametrize(
+    ("duration", "overrides", "expected"),
+    [
+        ("", "", []),
+        ("10", "", ["duration=10"]),
+        ("", "seed=2 'a.b=[1, 2]'", ["seed=2", "a.b=[1, 2]"]),
+        ("0.5", "seed=2", ["seed=2", "duration=0.5"]),
+    ],
+)
+def test_the_launch_files_overrides_are_those_of_the_nodes(duration, overrides, expected):
+    tree = ast.parse(LAUNCH.read_text(encoding="utf-8"))
+    (found,) = (n for n in tree.body if getattr(n, "name", "") == "overrides_of")
+    names = {"shlex": shlex}
+    exec(compile(ast.Module([found], []), LAUNCH, "exec"), names)
+    assert names["overrides_of"](duration, overrides) == expected
 
 
 @pytest.mark.parametrize(
@@ -252,6 +270,8 @@ def test_the_launch_file_starts_the_nodes_that_its_arguments_ask_for(plant, targ
         "target": target,
         "record": "/tmp/bag",
         "patience": "60",
+        "duration": "10",
+        "overrides": "seed=2",
     }
     assert [argument.name for argument in arguments] == list(wanted)
     context.launch_configurations.update(wanted)

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterable, Mapping
 from functools import partial
 
 import numpy as np
@@ -59,40 +59,47 @@ class RealtimeNode:
         """
         plan = schedule.nodes[stage.node]
         self._node, self._guard = node, guard
+        self._on_start, self._on_safe = on_start, on_safe
         node.keep_time()
-        publish = {name: node.publisher(topics[name], edges[name].readers) for name in plan.outputs}
-        status = node.status_publisher(edges[DIAGNOSTICS.name].readers)
-        self._line = FaultLine(node, None if guard is None else self._hear_of_fault)
         read = [name for name in (*plan.inputs, *plan.held) if name != CLOCK]
+        self._foreign = [name for name in read if not edges[name].senders]
+        # Drivers in the plant's place read the commands as well.
+        self._driven = [name for name in plan.outputs if name == TORQUE_COMMAND and self._foreign]
+        self._line = FaultLine(node, None if guard is None else self._hear_of_fault)
         self._bindings = {name: bind(node, topics[name], edges) for name in read}
+        publish = {name: node.publisher(topics[name], edges[name].readers) for name in plan.outputs}
         self._loop = SampleAndHold(
             stage,
             schedule,
             stale_after,
             publish,
-            status,
+            node.status_publisher(edges[DIAGNOSTICS.name].readers),
             guard,
             bindings=self._bindings,
             plausibility=plausibility,
             on_fault=self._line.report,
         )
-        for name in read:
-            refuse = partial(self._refuse, name)
-            node.subscribe_tagged_rows(topics[name], partial(self._receive, name), refuse)
-        self._on_safe = on_safe
-        self._foreign = [name for name in read if not edges[name].senders]
-        if guard is not None:
-            GuardPorts(node, guard, node.now_ns, self._reset, lambda: self._loop.begun)
-        elif FORCE_CONTROLLER in schedule.nodes:
-            BoundFlag(node, SAFE, FORCE_CONTROLLER, self._note_safe, self._refuse)
-        self._on_start = on_start
-        # Drivers in the plant's place read the commands as well.
-        self._driven = [name for name in plan.outputs if name == TORQUE_COMMAND and self._foreign]
+        self._subscribe([topics[name] for name in read])
+        self._connect_guard(FORCE_CONTROLLER in schedule.nodes)
         self._unsteady_ns = node.now_ns()
         self._leader = FollowerSide(
             node, schedule.period_ns, on_start=self._start, ready=self._connected
         )
         node.every(plan.divider * schedule.period_ns * 1e-9, self._tick)
+
+    def _subscribe(self, topics: Iterable[Topic]) -> None:
+        """Hear the stage's inputs."""
+        for topic in topics:
+            receive = partial(self._receive, topic.name)
+            self._node.subscribe_tagged_rows(topic, receive, partial(self._refuse, topic.name))
+
+    def _connect_guard(self, guarded: bool) -> None:
+        """Offer the guard's ports, or hear of the safe state where another node is `guarded`."""
+        node, guard = self._node, self._guard
+        if guard is not None:
+            GuardPorts(node, guard, node.now_ns, self._reset, lambda: self._loop.begun)
+        elif guarded:
+            BoundFlag(node, SAFE, FORCE_CONTROLLER, self._note_safe, self._refuse)
 
     @property
     def ended(self) -> bool:

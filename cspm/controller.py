@@ -10,15 +10,15 @@ from numpy.typing import ArrayLike, NDArray
 
 from cspm.scenario import AnyScenario, as_scenario
 from cspm.testbed import AnyTestbed, as_file
-from cspm_msgs_py.diagnostics import Level, Status
+from cspm_control.stages.own_code import row_sizes, starter
+from cspm_control.stages.own_stage import Output, OwnStage
 from cspm_msgs_py.errors import InputError
-from cspm_msgs_py.schedule import INTERNALS, WAVE_TRAJECTORY, Schedule, schedule_of
-from cspm_msgs_py.stepping.stage import Send, Stage
+from cspm_msgs_py.schedule import WAVE_TRAJECTORY, Schedule, schedule_of
+from cspm_msgs_py.stepping.stage import Stage
 from cspm_msgs_py.testbed import Testbed
 from cspm_run.assembly import assemble_stage, resolve
 
 Array = NDArray[np.float64]
-Output = Array | Mapping[str, Array]
 
 
 class Controller(Protocol):
@@ -111,61 +111,6 @@ def builtin_controller(
     return BuiltIn(assemble_stage(stage, described, machine, chosen.path.parent))
 
 
-class OwnStage:
-    """A stage of the cascade that a controller of one's own computes."""
-
-    def __init__(
-        self, node: str, controller: Controller, replaced: Stage, sizes: Mapping[str, int]
-    ) -> None:
-        """Take the place of a stage.
-
-        Args:
-            node: the stage's name.
-            controller: what computes.
-            replaced: the stage whose place it takes.
-            sizes: of the rows that it has to return, by topic.
-        """
-        self.node = node
-        self._controller, self._replaced, self._sizes = controller, replaced, sizes
-
-    def step(self, now_ns: int, inputs: Mapping[str, Array], send: Send) -> None:
-        """Send what the controller returns.
-
-        Raises:
-            InputError: it is no row of the topic's length, or has numbers that are not finite.
-        """
-        found = self._controller.step(now_ns / 1e9, inputs)
-        rows = found if isinstance(found, Mapping) else dict.fromkeys(self._sizes, found)
-        rows = {topic: self._checked(topic, row) for topic, row in rows.items()}
-        if self.node == WAVE_TRAJECTORY:
-            # What it leaves out stays as the scenario has it.
-            scenarios: dict[str, Array] = {}
-            self._replaced.step(now_ns, inputs, scenarios.__setitem__)
-            rows = scenarios | rows
-        for topic, row in rows.items():
-            send(topic, row)
-
-    def status(self) -> Status:
-        """Return that it computed."""
-        return Status(Level.OK, self.node, "ok", {"controller": type(self._controller).__name__})
-
-    def _checked(self, topic: str, row: object) -> Array:
-        name = f"{self.node}: {type(self._controller).__name__}"
-        if topic not in self._sizes:
-            raise InputError(f"{name} returned {topic}, allowed: {', '.join(self._sizes)}")
-        try:
-            found = np.array(row, dtype=np.float64)
-        except (TypeError, ValueError):
-            found = np.empty(0)
-        if found.shape != (self._sizes[topic],):
-            raise InputError(
-                f"{name} returned {topic} of shape {found.shape}, allowed: ({self._sizes[topic]},)"
-            )
-        if not np.isfinite(found).all():
-            raise InputError(f"{name} returned {topic} {found.tolist()}, allowed: finite numbers")
-        return found
-
-
 def with_own(
     stages: list[Stage], controllers: Mapping[str, Controller], testbed: Testbed, parts: Schedule
 ) -> list[Stage]:
@@ -182,17 +127,9 @@ def with_own(
                 f"controllers: {node}: {type(controller).__name__} has no step, allowed: an object"
                 " with step(time, inputs)"
             )
-        start = getattr(controller, "start", None)
-        if start is not None:
-            start(parts.nodes[node].divider * parts.period_ns * 1e-9, testbed)
-    sizes = {name: topic.width for name, topic in testbed.topics.items()}
+        starter(controller, node, parts, testbed)()
     return [
-        OwnStage(
-            stage.node,
-            controllers[stage.node],
-            stage,
-            {n: sizes[n] for n in parts.nodes[stage.node].outputs if n not in INTERNALS},
-        )
+        OwnStage(stage.node, controllers[stage.node], stage, row_sizes(stage.node, parts, testbed))
         if stage.node in controllers
         else stage
         for stage in stages

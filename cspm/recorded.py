@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from functools import cached_property
 from pathlib import Path
 from typing import TypeAlias
@@ -74,13 +74,22 @@ class Recording(Signals):
         """Return topics with rates [Hz] and longest gaps, duration, origin: `cspm info`."""
         return overview(self.path)
 
-    def resimulate(self, progress: Progress = silent) -> Resimulation:
+    def resimulate(
+        self, progress: Progress = silent, *, controllers: Sequence[str | Path] = ()
+    ) -> Resimulation:
         """Repeat the run from the recording alone; `difference` is None where it is identical.
 
+        Args:
+            progress: called now and then with the share that is done.
+            controllers: your own copies of the controllers' files that its scenario named; what a
+                recording carries of code is never run.
+
         Raises:
-            InputError: it is no simulation by cspm with the controllers of its scenario.
+            InputError: it is no simulation by cspm with the controllers of its scenario, or took
+                a controller of which there is no copy.
         """
-        return resimulate(self.path, lambda now, total: progress(now / total, "repeating"))
+        own = [Path(each) for each in controllers]
+        return resimulate(self.path, lambda now, total: progress(now / total, "repeating"), own)
 
     def difference(self, other: Recording) -> Difference | None:
         """Return the first place where the messages of two recordings differ, or None.

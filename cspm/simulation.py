@@ -19,6 +19,7 @@ from cspm.reference import Reference, with_reference
 from cspm.scenario import AnyScenario, Scenario, as_scenario, with_changes
 from cspm.signals import Signals
 from cspm.testbed import AnyTestbed, Testbed, as_file, check_plant
+from cspm_control.stages.own_code import load_controller
 from cspm_msgs_py.errors import InputError
 from cspm_msgs_py.new_folder import refuse_existing
 from cspm_msgs_py.recording.rows import Rows
@@ -241,6 +242,10 @@ def bundle_of(scenario: Scenario, testbed: TestbedFile | None, plant: str) -> Bu
     if plant == EXTERNAL:
         refuse_cuts(EXTERNAL, resolved.events)
     bundle = make_bundle(resolved, machine, scenario.path.parent)
+    with bundle.unpacked() as place:
+        # Before anything is recorded, and in every mode.
+        for stage, named in bundle.scenario.controllers.items():
+            load_controller(stage, named, place)
     return replace(bundle, plant=SIM if plant == EXTERNAL else plant)
 
 

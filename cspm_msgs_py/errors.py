@@ -27,6 +27,10 @@ class DivergenceError(CspmError):
     """The simulation left the range in which its equations hold."""
 
 
+class ControllerError(CspmError):
+    """A controller of the user's own failed in a run: the line says where in its file."""
+
+
 class ConvergenceError(CspmError):
     """An iterative solution did not converge or is not unique near the guess."""
 

@@ -28,6 +28,7 @@ from cspm_msgs_py.scenario_keys.bodies import ORIGIN, Body, Pose, Target
 from cspm_msgs_py.scenario_keys.curves import Sine
 from cspm_msgs_py.scenario_keys.events import CableCut, check_times
 from cspm_msgs_py.scenario_keys.operation import Operation, check_operation
+from cspm_msgs_py.scenario_keys.own_controller import OwnControllers
 from cspm_msgs_py.yaml_file import StrictModel, parse_yaml, read_yaml, validate
 
 Wrench = tuple[float, float, float, float, float, float]
@@ -258,6 +259,7 @@ class Scenario(StrictModel):
     target: Target = Target()
     bar_offset: Pose = ORIGIN
     control: Control = ClosedLoop()
+    controllers: OwnControllers = {}
     safety: Safety = Safety()
     events: tuple[CableCut, ...] = ()
     operation: tuple[Operation, ...] = ()

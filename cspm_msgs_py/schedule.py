@@ -180,6 +180,8 @@ def schedule_of(scenario: Scenario, testbed: Testbed) -> Schedule:
 
     def outputs(command: str, internals: str) -> tuple[str, ...]:
         wanted = isinstance(scenario.control, ClosedLoop) and scenario.control.record_internals
+        # A controller of the user's own has no internals of ours.
+        wanted = wanted and internals.split("/")[1] not in scenario.controllers
         return (command, internals) if wanted else (command,)
 
     if prescribed:

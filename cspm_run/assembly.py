@@ -19,6 +19,7 @@ from cspm_control.design.gains import (
     motion_margins,
 )
 from cspm_control.stages.make import controlled_axes, make_controller
+from cspm_control.stages.own_code import own_stage
 from cspm_control.stages.target_stage import TargetStage
 from cspm_control.stages.wave_stage import WaveStage
 from cspm_control.waves.wave_trajectory import WaveTrajectory
@@ -114,6 +115,7 @@ def resolve(scenario: Scenario, testbed: Testbed, folder: Path | None = None) ->
             the scenario cuts.
     """
     check_cables(scenario.events, testbed)
+    _check_controllers(scenario, testbed)
     control = scenario.control
     locked = [cable.name for cable in testbed.cables if cable.locked]
     if locked and not (isinstance(control, LockedWinches) and len(locked) == len(testbed.cables)):
@@ -141,6 +143,15 @@ def resolve(scenario: Scenario, testbed: Testbed, folder: Path | None = None) ->
             f" {', '.join(testbed.cable_names)}"
         )
     return scenario.model_copy(update={"control": control})
+
+
+def _check_controllers(scenario: Scenario, testbed: Testbed) -> None:
+    """Check that the scenario has the stages in whose place it names controllers."""
+    if scenario.controllers:
+        nodes = schedule_of(scenario, testbed).nodes
+        unknown = [name for name in scenario.controllers if name not in nodes]
+        if unknown:
+            raise InputError(f"controllers: {unknown[0]}, allowed: {', '.join(nodes) or 'none'}")
 
 
 def _lacks_gains(motion: object) -> bool:
@@ -218,10 +229,7 @@ def assemble(scenario: Scenario, testbed: Testbed, folder: Path, plant: str = SI
         sensors=_sensors(scenario, testbed),
         references=references,
         stages=[
-            WaveStage(references)
-            if node == WAVE_TRAJECTORY
-            else make_controller(node, scenario, testbed, motions)
-            for node in schedule.nodes
+            _stage(node, scenario, testbed, folder, motions, references) for node in schedule.nodes
         ],
         target=_target(schedule, motions),
     )
@@ -255,10 +263,26 @@ def assemble_simulator(
 def assemble_stage(node: str, scenario: Scenario, testbed: Testbed, folder: Path) -> Stage:
     """Build one stage of a resolved scenario; arguments and errors as `assemble`."""
     motions = motions_of(scenario, testbed, folder) if node in PLANNERS else None
-    if motions is None or node != WAVE_TRAJECTORY:
-        return make_controller(node, scenario, testbed, motions)
-    names = schedule_of(scenario, testbed).nodes[node].outputs
-    return WaveStage({name: WaveTrajectory(motions[name]) for name in names})
+    references = {}
+    if motions is not None and node == WAVE_TRAJECTORY:
+        names = schedule_of(scenario, testbed).nodes[node].outputs
+        references = {name: WaveTrajectory(motions[name]) for name in names}
+    return _stage(node, scenario, testbed, folder, motions, references)
+
+
+def _stage(
+    node: str,
+    scenario: Scenario,
+    testbed: Testbed,
+    folder: Path,
+    motions: Mapping[str, Motion] | None,
+    references: Mapping[str, WaveTrajectory],
+) -> Stage:
+    """Return a stage: the user's own where the scenario names one."""
+    built_in = WaveStage(references) if node == WAVE_TRAJECTORY else None
+    if node in scenario.controllers:
+        return own_stage(node, scenario, testbed, folder, built_in)
+    return built_in or make_controller(node, scenario, testbed, motions)
 
 
 def _target(schedule: Schedule, motions: Mapping[str, Motion]) -> Motion | None:

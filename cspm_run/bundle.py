@@ -3,17 +3,19 @@
 from __future__ import annotations
 
 import tempfile
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 
+from cspm_control.stages.own_code import read_code, sha256_of
 from cspm_msgs_py.edited import file_of
 from cspm_msgs_py.errors import InputError
 from cspm_msgs_py.motion_spec import FileMotion, VesselMotion
 from cspm_msgs_py.recording.attached_testbed import TESTBED, attached_testbed
 from cspm_msgs_py.scenario import Scenario, parse_scenario
 from cspm_msgs_py.scenario_keys.bodies import Body
+from cspm_msgs_py.scenario_keys.own_controller import OwnController, path_of
 from cspm_msgs_py.testbed import Testbed, TestbedFile
 from cspm_msgs_py.yaml_file import dump_yaml
 from cspm_run.plants import SIM
@@ -33,6 +35,8 @@ class Bundle:
         attached: the file that the recording carries where the simulated machine is concealed;
             None: that of the simulated machine.
         origins: where the user has the files, by name, for errors.
+        unasked: the recording that names code which the user did not ask to run; None: no code,
+            or the user's own.
     """
 
     scenario: Scenario
@@ -41,6 +45,7 @@ class Bundle:
     plant: str = SIM
     attached: TestbedFile | None = None
     origins: dict[str, str] = field(default_factory=dict, compare=False)
+    unasked: str | None = field(default=None, compare=False)
 
     @property
     def described(self) -> TestbedFile:
@@ -66,7 +71,13 @@ class Bundle:
 
     @contextmanager
     def unpacked(self) -> Iterator[Path]:
-        """Give a folder in which the scenario's relative paths find the motions' files."""
+        """Give a folder in which the scenario's relative paths find its files.
+
+        Raises:
+            InputError: a recording names code that the user did not ask to run.
+        """
+        if self.unasked is not None:
+            raise InputError(refusal(self.scenario, self.unasked))
         with tempfile.TemporaryDirectory(prefix="cspm-") as place:
             for name, content in self.files.items():
                 (Path(place) / name).write_bytes(content)
@@ -86,7 +97,7 @@ def make_bundle(scenario: Scenario, testbed: TestbedFile, folder: Path) -> Bundl
     """Return the self-contained description of a run whose scenario file lies in `folder`.
 
     Raises:
-        InputError: a file that a motion reads cannot be read.
+        InputError: a file that a motion or a controller reads cannot be read.
     """
     files: dict[str, bytes] = {}
     origins: dict[str, str] = {}
@@ -103,7 +114,19 @@ def make_bundle(scenario: Scenario, testbed: TestbedFile, folder: Path) -> Bundl
             return body.model_copy(update={"motion": motion.model_copy(update={"rao": name})})
         return body
 
+    def controllers() -> dict[str, OwnController]:
+        found: dict[str, OwnController] = {}
+        for stage, named in scenario.controllers.items():
+            path = path_of(named, folder)
+            text, name = read_code(path), path.name
+            if files.get(name, text) != text:
+                name = f"{stage}_{name}"
+            files[name], origins[name] = text, str(path)
+            found[stage] = named.moved(name, named.sha256 or sha256_of(files[name]))
+        return found
+
     changes: dict[str, object] = {
+        "controllers": controllers(),
         "testbed": TESTBED,
         "winch_frame": contained(scenario.winch_frame, "winch_frame"),
         "target": contained(scenario.target, "target"),
@@ -125,10 +148,49 @@ def read_bundle(attachments: Mapping[str, bytes], source: str) -> Bundle:
         raise InputError(
             f"{source}: carries no {' and no '.join(missing)}, allowed: a recording made by cspm"
         )
+    text = attachments[SCENARIO].decode(errors="replace")
+    scenario = parse_scenario(text, f"{source}: {SCENARIO}")
     return Bundle(
-        parse_scenario(attachments[SCENARIO].decode(errors="replace"), f"{source}: {SCENARIO}"),
+        scenario,
         attached_testbed(attachments, source),
         {name: content for name, content in attachments.items() if name not in (SCENARIO, TESTBED)},
+        unasked=source if scenario.controllers else None,
+    )
+
+
+def with_own_code(bundle: Bundle, paths: Sequence[Path]) -> Bundle:
+    """Return a recorded run in which the user's own copies of its controllers take part.
+
+    What the recording carries of code is never run: only a file of the same SHA-256 is.
+
+    Raises:
+        InputError: a controller's file is not among the paths, or a path is no controller's.
+    """
+    own = {sha256_of(text): text for text in map(read_code, paths)}
+    wanted = bundle.scenario.controllers
+    known = {named.sha256 for named in wanted.values()}
+    for path, sha256 in zip(paths, own, strict=True):
+        if sha256 not in known:
+            allowed = ", ".join(str(each) for each in known) or "none: no controller of one's own"
+            raise InputError(f"--controller {path}: SHA-256 {sha256}, allowed: {allowed}")
+    if any(named.sha256 not in own for named in wanted.values()):
+        return bundle
+    # A name that points elsewhere is a name in the run's own folder.
+    moved = {s: n.moved(Path(n.file).name, str(n.sha256)) for s, n in wanted.items()}
+    files = {n.file: own[str(n.sha256)] for n in moved.values()}
+    scenario = bundle.scenario.model_copy(update={"controllers": moved})
+    return replace(bundle, scenario=scenario, files=bundle.files | files, unasked=None)
+
+
+def refusal(scenario: Scenario, recording: str) -> str:
+    """Return in one line why a recording's code is not run, and what runs it."""
+    named = ", ".join(
+        f"{stage}: {each.class_name}, SHA-256 {each.sha256 or 'unknown'}"
+        for stage, each in scenario.controllers.items()
+    )
+    return (
+        f"{recording}: ran code of its user's ({named}), which is not run unasked, allowed:"
+        f" `cspm resim {recording} --controller FILE.py` with your own copy of the file"
     )
 
 

@@ -32,4 +32,7 @@ def recorded_bundle(path: Path, overrides: Sequence[str] = ()) -> Bundle:
         return bundle
     text = attachments[SCENARIO].decode(errors="replace")
     scenario = parse_scenario(text, f"{path}: {SCENARIO}", overrides)
-    return replace(bundle, scenario=resolve(scenario, bundle.testbed.testbed))
+    # Overrides can take a recording's controllers away; they make none of them the user's own.
+    unasked = bundle.unasked if scenario.controllers else None
+    resolved = resolve(scenario, bundle.testbed.testbed)
+    return replace(bundle, scenario=resolved, unasked=unasked)

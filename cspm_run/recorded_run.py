@@ -9,8 +9,9 @@ from typing import Protocol
 
 from cspm_model.cable_strength import strength_warnings
 from cspm_msgs_py.diagnostics import Level, Status, encode_diagnostics
-from cspm_msgs_py.errors import DivergenceError
+from cspm_msgs_py.errors import ControllerError, DivergenceError
 from cspm_msgs_py.interruption import interruptible
+from cspm_msgs_py.recording.run_record import OWN_CONTROLLERS
 from cspm_msgs_py.recording.writer import RecordingWriter
 from cspm_msgs_py.schedule import schedule_of
 from cspm_msgs_py.topics import DIAGNOSTICS, Topic
@@ -137,7 +138,9 @@ def recorded_topics(bundle: Bundle) -> dict[str, Topic]:
 
 def metadata(bundle: Bundle, mode: str) -> dict[str, str]:
     """Return the metadata record of the recording of a run in a mode."""
-    return {
+    own = bundle.scenario.controllers
+    named = ", ".join(f"{stage}: {each.class_name}" for stage, each in own.items())
+    return ({OWN_CONTROLLERS: named} if own else {}) | {
         "contract_version": CONTRACT_VERSION,
         "scenario": bundle.scenario.name,
         "seed": str(bundle.scenario.seed),
@@ -188,6 +191,8 @@ def simulate(
             stepping.run(progress, interrupted)
         except DivergenceError as err:
             failure = f"{err}; {stepping.history()}"
+        except ControllerError as err:
+            failure = str(err)
         stopped = interrupted()
     if writer is not None:
         writer.close()

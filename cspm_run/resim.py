@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import tempfile
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from importlib.metadata import version
 from pathlib import Path
@@ -12,7 +12,7 @@ from cspm_msgs_py.errors import InputError
 from cspm_msgs_py.recording.difference import Difference, first_difference
 from cspm_msgs_py.recording.reader import Recording
 from cspm_msgs_py.recording.run_record import RECORD_NAME, own_controllers, simulated_plant
-from cspm_run.bundle import read_bundle
+from cspm_run.bundle import read_bundle, with_own_code
 from cspm_run.plants import SIM
 from cspm_run.recorded_run import run
 
@@ -39,32 +39,42 @@ class Resimulation:
         return self.recorded_version == version("cspm")
 
 
-def resimulate(path: Path, progress: Callable[[float, float], None]) -> Resimulation:
+def resimulate(
+    path: Path,
+    progress: Callable[[float, float], None],
+    controllers: Sequence[Path] = (),
+) -> Resimulation:
     """Repeat the run that a recording describes, for as long as it lasts, and compare.
 
     Args:
         path: the recording.
         progress: called with simulated and total time [s].
+        controllers: the user's own copies of the controllers' files that took part.
 
     Raises:
-        InputError: no recording, or none that cspm made by simulation.
+        InputError: no recording, or none that cspm made by simulation; or controllers took part of
+            which `controllers` has no copy.
     """
     with Recording(path) as recording:
-        return _repeat(recording, path, progress)
+        return _repeat(recording, path, progress, controllers)
 
 
 def _repeat(
-    recording: Recording, path: Path, progress: Callable[[float, float], None]
+    recording: Recording,
+    path: Path,
+    progress: Callable[[float, float], None],
+    controllers: Sequence[Path],
 ) -> Resimulation:
     record = recording.metadata.get(RECORD_NAME, {})
+    plant = simulated_plant(recording) or SIM
+    bundle = replace(read_bundle(recording.attachments, str(path)), plant=plant)
     own = own_controllers(recording)
-    if own is not None:
+    if own is not None and not bundle.scenario.controllers:
         raise InputError(
             f"{path}: was made with controllers that it does not carry ({own}), allowed: one made"
             " with those of its scenario"
         )
-    plant = simulated_plant(recording) or SIM
-    bundle = replace(read_bundle(recording.attachments, str(path)), plant=plant)
+    bundle = with_own_code(bundle, controllers)
     clock = recording.topics.get("/clock")
     if clock is None or not clock.count:
         raise InputError(f"{path}: has no /clock messages, allowed: a simulated recording")

@@ -82,7 +82,8 @@ def compile_stages(bundles: Sequence[Bundle]) -> None:
         schedule = schedule_of(scenario, testbed)
         slots = Slots()
         slots.add({name: testbed.topics[name].width for name in schedule.topics})
-        nodes = [node for node in schedule.nodes if node != WAVE_TRAJECTORY]
+        left_out = {WAVE_TRAJECTORY, *scenario.controllers}
+        nodes = [node for node in schedule.nodes if node not in left_out]
         for node in sorted(nodes, reverse=True):
             # Without motions a governor plans nothing, which would take longer than compiling.
             stage = make_controller(node, scenario, testbed)

@@ -60,6 +60,15 @@ def resim(
     bag: Annotated[
         Path, typer.Argument(metavar="REC", help="A recording made by cspm: its folder or file.")
     ],
+    controllers: Annotated[
+        list[Path] | None,
+        typer.Option(
+            "--controller",
+            metavar="FILE",
+            help="Your own copy of a Python file that the scenario named as a controller; may be"
+            " repeated. Code that a recording carries is never run.",
+        ),
+    ] = None,
     json: Json = None,
 ) -> None:
     """Repeat a run from its recording alone, and say whether every message is identical.
@@ -68,7 +77,7 @@ def resim(
     """
     from cspm.commands.run_command import resim_command
 
-    raise typer.Exit(0 if resim_command(bag, json) else RUN_FAILED)
+    raise typer.Exit(0 if resim_command(bag, json, controllers or ()) else RUN_FAILED)
 
 
 @app.command(

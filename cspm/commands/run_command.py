@@ -218,12 +218,15 @@ def recover_command(bag: Path, out: Path | None, json: Path | None) -> None:
         write_json(json, dataclasses.asdict(report) | paths | {"path": str(report.path)})
 
 
-def resim_command(bag: Path, json: Path | None) -> bool:
-    """Repeat a recorded run, and return whether every message is identical."""
+def resim_command(bag: Path, json: Path | None, controllers: Sequence[Path] = ()) -> bool:
+    """Repeat a recorded run, and return whether every message is identical.
+
+    `controllers` are the user's own copies of the controllers' files that took part.
+    """
     console = make_console()
     with _progress(console) as bar:
         task = bar.add_task(f"repeating {escape(bag.name)}", total=None, speed=0.0)
-        found = resimulate(bag, lambda now, total: _show(bar, task, now, total))
+        found = resimulate(bag, lambda now, total: _show(bar, task, now, total), controllers)
     if found.difference is None:
         end = "" if found.cut_ns is None else f", up to {found.cut_ns * 1e-9:g} s, where it was cut"
         say(console, f"identical: all {found.messages} messages, bit for bit{end}")

@@ -8,6 +8,7 @@ from functools import partial
 import numpy as np
 from numpy.typing import NDArray
 
+from cspm_msgs_py.errors import ControllerError
 from cspm_msgs_py.graph import Edges
 from cspm_msgs_py.ros.bound_flag import BoundFlag
 from cspm_msgs_py.ros.contract_node import ContractNode
@@ -107,7 +108,10 @@ class RealtimeNode:
         return self._leader.end_ns is not None
 
     def _receive(self, topic: str, stamp_ns: int, row: Array, gid: bytes | None) -> None:
-        self._loop.receive(topic, stamp_ns, row, self._node.now_ns(), gid)
+        try:
+            self._loop.receive(topic, stamp_ns, row, self._node.now_ns(), gid)
+        except ControllerError as err:
+            self._loop.alarm(self._node.now_ns(), str(err))
 
     def _refuse(self, topic: str, reason: str) -> None:
         binding = self._bindings.get(topic)
@@ -157,7 +161,10 @@ class RealtimeNode:
             self._loop.alarm(self._node.now_ns(), fault)
             if self._foreign and self._loop.safe:
                 self._node.accept_clock()
-        self._loop.tick(self._node.now_ns())
+        try:
+            self._loop.tick(self._node.now_ns())
+        except ControllerError as err:
+            self._loop.alarm(self._node.now_ns(), str(err))
 
 
 class RealtimeWaveNode:
@@ -192,4 +199,7 @@ class RealtimeWaveNode:
         fault = self._node.clock_fault()
         if fault is not None:
             self._line.report(fault)
-        self._loop.tick(self._node.now_ns())
+        try:
+            self._loop.tick(self._node.now_ns())
+        except ControllerError as err:
+            self._line.report(str(err))

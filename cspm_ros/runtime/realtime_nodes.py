@@ -9,6 +9,7 @@ from cspm_control.plausibility.make import make_plausibility
 from cspm_control.safety import GuardedStage, check_real_time
 from cspm_control.stages.angle_stage import AngleStage
 from cspm_control.stages.motion_stage import MotionStage
+from cspm_control.stages.own_stage import GuardedOwnStage, OwnStage
 from cspm_control.stages.torque_stage import TorqueStage
 from cspm_msgs_py.errors import InputError
 from cspm_msgs_py.graph import RECORDER
@@ -82,7 +83,7 @@ class RealtimeRun(NodesOfRun):
         if node.name == WAVE_TRAJECTORY:
             return RealtimeWaveNode(node, stage, schedule, topics, edges)
         guard = stage if isinstance(stage, GuardedStage) else None
-        timed = TorqueStage | AngleStage | MotionStage
+        timed = TorqueStage | AngleStage | MotionStage | OwnStage | GuardedOwnStage
         return RealtimeNode(
             node,
             stage,
@@ -93,7 +94,7 @@ class RealtimeRun(NodesOfRun):
             safety.stale_after,
             plausibility=make_plausibility(node.name, bundle.scenario, bundle.testbed.testbed),
             on_start=stage.start if isinstance(stage, timed) else None,
-            on_safe=stage.suspend if isinstance(stage, MotionStage) else None,
+            on_safe=stage.suspend if isinstance(stage, MotionStage | OwnStage) else None,
         )
 
     def new_recording(self, folder: Path, mode: str) -> RecordingWriter:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass, field
 from functools import cached_property
 from pathlib import Path
@@ -24,15 +24,14 @@ from cspm_ident.diagnosis.thresholds import thresholds_of
 from cspm_ident.diagnosis.validation.closed_loop import ClosedLoopFit, simulate_closed_loop
 from cspm_ident.diagnosis.validation.controller_parity import Parity, controller_parity
 from cspm_ident.experiment.experiment_files import write_experiments
+from cspm_ident.recording_roles import check_roles
 from cspm_ident.signals.measurement import Measurement
-from cspm_msgs_py.errors import InputError
 from cspm_msgs_py.new_folder import refuse_existing
 from cspm_run.summary import write_json
 
 REPORT = "diagnosis.json"
 PICTURE = "diagnosis.png"
 PAGE = "diagnosis.html"
-_SEARCHED = "--held-out {}: is searched as well, allowed: recordings that are not"
 
 
 @dataclass(frozen=True)
@@ -215,13 +214,10 @@ def diagnose(
     """
     limits = thresholds_of(thresholds or {})
     searched, judges = listed(recordings), listed(held_out)
-    twice = {path_of(each) for each in searched} & {path_of(each) for each in judges}
-    if twice:
-        raise InputError(_SEARCHED.format(twice.pop()))
     step = by_steps(progress)
     step("reading")
     looked, judged = measured(searched, testbed), measured(judges, testbed)
-    _refuse_twice(looked, judged)
+    check_roles(looked, judged)
     step("looking at the data")
     checks = look_at(looked, judged)
     if leave_out_regimes:
@@ -253,18 +249,6 @@ def _path(testbed: AnyTestbed | None) -> Path | None:
     if isinstance(testbed, Path) or testbed is None:
         return testbed
     return Path(as_file(testbed).source)
-
-
-def _refuse_twice(searched: Sequence[Measurement], held_out: Sequence[Measurement]) -> None:
-    """Refuse what would count twice, or be judged on what it was found in, under whatever name."""
-    seen: dict[str, Path] = {}
-    for each in searched:
-        if (other := seen.get(each.sha256)) is not None:
-            raise InputError(f"{each.path}: the same recording as {other}, allowed: each once")
-        seen[each.sha256] = each.path
-    for each in held_out:
-        if each.sha256 in seen:
-            raise InputError(_SEARCHED.format(each.path))
 
 
 def _finding(entry: Mapping[str, Any], status: Status) -> Finding:

@@ -97,7 +97,7 @@ def test_the_file_is_a_machine_with_provenance(result):
 @pytest.mark.slow
 def test_recordings_are_not_both_searched_and_held_out(recordings):
     searched, _ = recordings
-    with pytest.raises(InputError, match=r"is fitted to as well, allowed: a recording that is not"):
+    with pytest.raises(InputError, match=r"is searched as well, allowed: recordings that are not"):
         identify_system([searched], choose(MACHINE), held_out=[searched])
     with pytest.raises(InputError, match=r"^--horizon 0: allowed: 0.1 to 60 s$"):
         identify_system([searched], choose(MACHINE), horizon=0.0)

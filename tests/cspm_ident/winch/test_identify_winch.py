@@ -217,7 +217,7 @@ def test_bad_input_is_one_line(cspm, short):
     assert refused("--winches", "a,,b") == "--winches a,,b: allowed: names with commas between them"
     assert refused("--band", "0") == "--band 0: allowed: a frequency above 0 Hz"
     assert refused("--held-out", short) == (
-        f"--held-out {short}: is fitted to as well, allowed: a recording that is not"
+        f"--held-out {short}: is searched as well, allowed: recordings that are not"
     )
     assert refused("--out", ".") == ".: exists, allowed: a new folder"
 

@@ -41,7 +41,6 @@ if TYPE_CHECKING:
     from cspm.many import simulate_many as simulate_many
     from cspm.recorded import Recording as Recording
     from cspm.recorded import open as open
-    from cspm.recorded import recover as recover
     from cspm.scenario import Scenario as Scenario
     from cspm.scenario import load_scenario as load_scenario
     from cspm.signals import Signal as Signal
@@ -81,7 +80,6 @@ _PLACES = {
     "load_scenario": "cspm.scenario",
     "load_testbed": "cspm.testbed",
     "open": "cspm.recorded",
-    "recover": "cspm.recorded",
     "simulate": "cspm.simulation",
     "simulate_many": "cspm.many",
     "use_effects": "cspm.catalogue",

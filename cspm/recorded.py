@@ -74,6 +74,19 @@ class Recording(Signals):
         """Return topics with rates [Hz] and longest gaps, duration, origin: `cspm info`."""
         return overview(self.path)
 
+    @staticmethod
+    def recover(path: str | Path, out: str | Path | None = None) -> RecoveryReport:
+        """Restore a recording whose writer was killed, with its index and metadata.
+
+        Args:
+            path: of the recording.
+            out: a new folder to write to; None: in place, and the original is kept as `….broken`.
+
+        Raises:
+            InputError: it cannot be read, or the new folder exists.
+        """
+        return recover_recording(Path(path), None if out is None else Path(out))
+
     def resimulate(
         self, progress: Progress = silent, *, controllers: Sequence[str | Path] = ()
     ) -> Resimulation:
@@ -135,19 +148,6 @@ def open(path: str | Path) -> Recording:
         InputError: missing, damaged beyond use, or not stored as MCAP.
     """
     return Recording(path)
-
-
-def recover(path: str | Path, out: str | Path | None = None) -> RecoveryReport:
-    """Restore a recording whose writer was killed, with its index and metadata.
-
-    Args:
-        path: of the recording.
-        out: a new folder to write to; None: in place, and the original is kept as `….broken`.
-
-    Raises:
-        InputError: it cannot be read, or the new folder exists.
-    """
-    return recover_recording(Path(path), None if out is None else Path(out))
 
 
 def path_of(recording: AnyRecording) -> Path:

@@ -6,7 +6,7 @@ import shutil
 import tempfile
 import warnings
 import weakref
-from collections.abc import Callable, Collection, Mapping
+from collections.abc import Callable, Collection, Mapping, Sequence
 from dataclasses import replace
 from functools import partial
 from pathlib import Path
@@ -257,6 +257,7 @@ def ros_runner(
     apart: bool,
     patience_s: float,
     needed_by: str,
+    own_nodes: Sequence[str] = (),
 ) -> Runner:
     """Return what runs a scenario in a mode that needs ROS; only now is ROS loaded.
 
@@ -267,6 +268,7 @@ def ros_runner(
         apart: in real time, whether each node has a process of its own.
         patience_s: how long nothing may move [s].
         needed_by: what needs ROS, for the error.
+        own_nodes: in processes, controllers that are programs of the user's, by node name.
 
     Raises:
         InputError: ROS is not installed.
@@ -285,7 +287,12 @@ def ros_runner(
     from cspm_ros.runtime.process_run import run_processes
 
     return partial(
-        run_processes, mode=mode, external=external, notify=notify, patience_s=patience_s
+        run_processes,
+        mode=mode,
+        external=external,
+        notify=notify,
+        patience_s=patience_s,
+        own_nodes=own_nodes,
     )
 
 

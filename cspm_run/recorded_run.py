@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from importlib.metadata import version
 from pathlib import Path
 from typing import Protocol
@@ -108,24 +108,32 @@ def steps_of(bundle: Bundle) -> int:
     return round(bundle.scenario.duration * bundle.scenario.rates.plant)
 
 
-def new_recording(bundle: Bundle, folder: Path, mode: str) -> RecordingWriter:
+def new_recording(
+    bundle: Bundle, folder: Path, mode: str, own_nodes: Sequence[str] = ()
+) -> RecordingWriter:
     """Return the recording that a run by the schedule fills.
 
     Raises:
         InputError: the folder exists or cannot be created.
     """
-    return recording_of(bundle, folder, mode, recorded_topics(bundle))
+    return recording_of(bundle, folder, mode, recorded_topics(bundle), own_nodes)
 
 
 def recording_of(
-    bundle: Bundle, folder: Path, mode: str, topics: Mapping[str, Topic]
+    bundle: Bundle,
+    folder: Path,
+    mode: str,
+    topics: Mapping[str, Topic],
+    own_nodes: Sequence[str] = (),
 ) -> RecordingWriter:
     """Return a new recording of these topics that carries the run's description.
+
+    `own_nodes` are controllers that are ROS programs of the user's.
 
     Raises:
         InputError: the folder exists or cannot be created.
     """
-    attachments, about = bundle.attachments(), metadata(bundle, mode)
+    attachments, about = bundle.attachments(), metadata(bundle, mode, own_nodes)
     return RecordingWriter(folder, topics, attachments=attachments, metadata=about)
 
 
@@ -136,10 +144,13 @@ def recorded_topics(bundle: Bundle) -> dict[str, Topic]:
     return {name: topic for name, topic in testbed.topics.items() if name in published}
 
 
-def metadata(bundle: Bundle, mode: str) -> dict[str, str]:
+def metadata(bundle: Bundle, mode: str, own_nodes: Sequence[str] = ()) -> dict[str, str]:
     """Return the metadata record of the recording of a run in a mode."""
-    own = bundle.scenario.controllers
-    named = ", ".join(f"{stage}: {each.class_name}" for stage, each in own.items())
+    own: dict[str, str] = {
+        stage: each.class_name for stage, each in bundle.scenario.controllers.items()
+    }
+    own |= dict.fromkeys(own_nodes, "a ROS node")
+    named = ", ".join(f"{stage}: {what}" for stage, what in own.items())
     return ({OWN_CONTROLLERS: named} if own else {}) | {
         "contract_version": CONTRACT_VERSION,
         "scenario": bundle.scenario.name,

@@ -69,7 +69,8 @@ def _repeat(
     plant = simulated_plant(recording) or SIM
     bundle = replace(read_bundle(recording.attachments, str(path)), plant=plant)
     own = own_controllers(recording)
-    if own is not None and not bundle.scenario.controllers:
+    stages = {each.split(":")[0] for each in own.split(", ")} if own is not None else set()
+    if stages - {*bundle.scenario.controllers}:
         raise InputError(
             f"{path}: was made with controllers that it does not carry ({own}), allowed: one made"
             " with those of its scenario"

@@ -95,8 +95,13 @@ class PlantNode:
     def waiting(self) -> str:
         """Return what the run waits for."""
         if not self.started:
-            return f"plant waits for {', '.join(self._others.unmatched()) or 'its start'}"
+            return f"plant waits for {', '.join(self._missing()) or 'its start'}"
         return self._plant.waiting()
+
+    def _missing(self) -> list[str]:
+        """Return what is not there yet: nodes, readers, or what nodes read from the user's own."""
+        unmatched = self._others.unmatched()
+        return unmatched or [f"own nodes to reach {name}" for name in sorted(self._others.apart)]
 
     def _look_around(self) -> None:
         """Start when all is there; end, when too late another run is found in this domain."""
@@ -109,7 +114,7 @@ class PlantNode:
 
     def _start(self) -> None:
         # A plant that was stopped before has announced the end already.
-        if not self._plant.ended and not self._others.unmatched():
+        if not self._plant.ended and not self._missing():
             self._alone = time.monotonic() + _LOOK_AROUND_S
             self.started = True
             self._others.tell_start_at(0)

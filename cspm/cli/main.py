@@ -147,6 +147,14 @@ def run(
             show_default="one process",
         ),
     ] = None,
+    own_node: Annotated[
+        list[str] | None,
+        typer.Option(
+            metavar="NODE",
+            help="In --mode processes: a ROS program of yours takes this controller's place, under"
+            " its name. Repeat the option for several.",
+        ),
+    ] = None,
     patience: Annotated[
         float | None,
         typer.Option(
@@ -237,6 +245,7 @@ def run(
             one_process,
             patience,
             effects or (),
+            own_node or (),
         )
     else:
         _check_beside(mode, plant)

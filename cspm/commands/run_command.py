@@ -16,7 +16,7 @@ from rich.table import Table
 
 from cspm.changed_machine import changed_machine, of_testbed
 from cspm.scenario import Scenario
-from cspm.simulation import REALTIME, Runner, bundle_of, ros_runner
+from cspm.simulation import PROCESSES, REALTIME, Runner, bundle_of, ros_runner
 from cspm_model.cable_strength import limit_warnings
 from cspm_msgs_py.errors import CspmError, InputError
 from cspm_msgs_py.new_folder import refuse_existing
@@ -24,6 +24,7 @@ from cspm_msgs_py.recording.overview import Overview, overview
 from cspm_msgs_py.recording.recover import recover
 from cspm_msgs_py.recording.run_record import EXTERNAL, RECORD_NAME
 from cspm_msgs_py.scenario import load_scenario
+from cspm_msgs_py.schedule import schedule_of
 from cspm_ros.runtime.stall_watchdog import PATIENCE_S, check_patience
 from cspm_run.bundle import Bundle
 from cspm_run.bundle_dofs import free_of
@@ -48,6 +49,7 @@ def run_command(
     one_process: bool | None = None,
     patience: float | None = None,
     effects: Sequence[str] = (),
+    own_nodes: Sequence[str] = (),
 ) -> bool:
     """Run a scenario file, show the result, and return whether it ran to its end.
 
@@ -62,6 +64,7 @@ def run_command(
         one_process: in real time, whether all nodes share a process; None for yes.
         patience: with ROS, longest stall [s]; None for the default.
         effects: physics planted in the machine, `EFFECT@ELEMENT,…:PARAMETER=VALUE,…`.
+        own_nodes: controllers that are ROS programs of the user's, by node name.
 
     Raises:
         CspmError: the run diverged, or a node failed; recording and figure are kept.
@@ -81,6 +84,7 @@ def run_command(
     if one_process is not None and mode != REALTIME:
         option = "--one-process" if one_process else "--process-per-node"
         raise InputError(f"{option} --mode {mode}: allowed: --mode {REALTIME}")
+    _check_own_nodes(own_nodes, mode, bundle)
     refuse_existing(folder)
     runner = None
     if mode != INPROCESS:
@@ -91,7 +95,13 @@ def run_command(
         patience_s = PATIENCE_S if patience is None else patience
         apart, needed_by = one_process is False, f"--mode {mode}"
         runner = ros_runner(
-            mode, notify, external=external, apart=apart, patience_s=patience_s, needed_by=needed_by
+            mode,
+            notify,
+            external=external,
+            apart=apart,
+            patience_s=patience_s,
+            needed_by=needed_by,
+            own_nodes=own_nodes,
         )
     for line in limit_warnings(bundle.testbed.testbed):
         say(Console(stderr=True), f"warning: {line}")
@@ -112,6 +122,20 @@ def run_command(
         kept = "; the recording is complete so far" if result.folder else ""
         say(console, f"interrupted after {result.simulated:g} s{kept}")
     return not result.interrupted
+
+
+def _check_own_nodes(names: Sequence[str], mode: str, bundle: Bundle) -> None:
+    """Refuse own nodes in another mode than processes, or under names that the run does not have.
+
+    Raises:
+        InputError: one line.
+    """
+    if names and mode != PROCESSES:
+        raise InputError(f"--own-node --mode {mode}: allowed: --mode {PROCESSES}")
+    possible = schedule_of(bundle.scenario, bundle.testbed.testbed).nodes
+    for name in names:
+        if name not in possible:
+            raise InputError(f"--own-node {name}: allowed: {', '.join(possible)}")
 
 
 def bundle_from(

@@ -131,11 +131,13 @@ class PlantSide:
     def unmatched(self) -> list[str]:
         """Return what is still missing before the run can start.
 
-        Of the nodes first those that are not there at all: others may be waiting for them.
+        Of the nodes first those that are not there at all, then readers of ours that announce
+        nothing: others may be waiting for them.
         """
         if self.absent:
             there = self._senders(self._node.node.resolve_topic_name(PROGRESS))
-            return sorted(self.absent - set(there)) or sorted(self.absent)
+            away = sorted(self.absent - set(there))
+            return away or self._node.unmatched() or sorted(self.absent)
         for publisher in (self._starter, self._publisher):
             deaf = self._node.unconnected(publisher, self._others)
             if deaf:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Collection, Mapping
 from functools import partial
 
 import numpy as np
@@ -38,6 +38,7 @@ class StageNode:
         *,
         tells_progress: bool,
         guard: Guard | None = None,
+        own: Collection[str] = (),
     ) -> None:
         """Connect the stage.
 
@@ -49,6 +50,8 @@ class StageNode:
             edges: who reads what in this run.
             tells_progress: whether the plant waits for this node's progress.
             guard: the stage itself where it has a safe state.
+            own: nodes that are programs of the user's, whose topics have to be there before it is
+                ready.
         """
         plan = schedule.nodes[stage.node]
         self._node = node
@@ -57,7 +60,14 @@ class StageNode:
         publish = {n: outbox.publisher(topics[n], edges[n].readers) for n in plan.outputs}
         status = node.status_publisher(edges[DIAGNOSTICS.name].readers)
         self._follower = Follower(stage, schedule, publish, status)
-        self._plant = FollowerSide(node, schedule.period_ns, self._end)
+        sent = {topic for name in own for topic in schedule.nodes[name].outputs}
+        awaited = sorted(sent & {*plan.inputs, *plan.held})
+        self._plant = FollowerSide(
+            node,
+            schedule.period_ns,
+            self._end,
+            ready=lambda: all(node.node.count_publishers(topic) for topic in awaited),
+        )
         receive = self._receive_and_tell if tells_progress else self._receive
         for name in (*plan.inputs, *plan.held):
             refuse = partial(self._refuse, name)

@@ -43,6 +43,7 @@ class LockstepRun(NodesOfRun):
             self.edges,
             tells_progress=node.name in followers(schedule, self.members, WINDOW),
             guard=stage if isinstance(stage, GuardedStage) else None,
+            own=self.own,
         )
 
     def recorder(self, node: ContractNode, writer: RecordingWriter) -> RecorderNode:
@@ -50,4 +51,5 @@ class LockstepRun(NodesOfRun):
         schedule, topics = self.schedule, self.testbed_topics
         # A player speaks for all who are absent, in one row of messages.
         reporting = self.edges[DIAGNOSTICS.name].senders
-        return RecorderNode(node, schedule, topics, writer, set(reporting) - {PLAYER})
+        statuses = set(reporting) - {PLAYER, *self.own}
+        return RecorderNode(node, schedule, topics, writer, statuses, silent=self.own)

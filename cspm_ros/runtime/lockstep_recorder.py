@@ -141,11 +141,13 @@ class LockstepRecorder:
         acknowledge: Callable[[int], None],
         complain: Callable[[str, str], None] = lambda _topic, _reason: None,
         reporting: Collection[str] = (),
+        silent: Collection[str] = (),
     ) -> None:
         """Take what is to come, where it goes, and whom to report progress to.
 
         `complain` gets topic and reason of each message that is refused. The nodes in `reporting`
-        send their statuses themselves, and nothing else on `/diagnostics`.
+        send their statuses themselves, and nothing else on `/diagnostics`; of `silent` ones no
+        status is waited for.
         """
         self._schedule = schedule
         self._writer = writer
@@ -157,6 +159,7 @@ class LockstepRecorder:
         self._next_status = {PLANT: 0} | {
             node: -(-plan.first // plan.status_divider) * plan.status_divider
             for node, plan in schedule.nodes.items()
+            if node not in silent
         }
         self._reports = dict.fromkeys(reporting, 0)
         self._numbered = self._reports.keys() >= self._next_status.keys()

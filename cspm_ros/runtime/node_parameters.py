@@ -40,6 +40,7 @@ class NodeParameters:
     pace: str = _value(LOCKSTEP, "what paces the run: the schedule or the wall", LOCKSTEP, REALTIME)
     plant: str = _value(SIM, "whose equations the plant node simulates", *PLANTS)
     nodes: tuple[str, ...] = _value((), "the nodes of this run; empty: all, and the recorder")
+    own_nodes: tuple[str, ...] = _value((), "lockstep: those of the nodes that are your programs")
     steps: int = _value(0, "end after so many plant steps; 0: the scenario's duration", least=0)
     folder: str = _value("", "recorder: a new folder for the recording")
     mode: str = _value("processes", "recorder: the mode named in the recording")
@@ -85,6 +86,18 @@ class NodeParameters:
         if unknown:
             raise InputError(f"nodes: {', '.join(unknown)}, allowed: {', '.join(possible)}")
         return tuple(name for name in possible if name in self.nodes) if self.nodes else possible
+
+    def own_of(self, schedule: Schedule) -> tuple[str, ...]:
+        """Return the nodes of this run that are programs of the user's.
+
+        Raises:
+            InputError: one is no controller of this run.
+        """
+        possible = [name for name in schedule.nodes if name in self.members(schedule)]
+        unknown = [name for name in self.own_nodes if name not in possible]
+        if unknown:
+            raise InputError(f"own_nodes: {', '.join(unknown)}, allowed: {', '.join(possible)}")
+        return self.own_nodes
 
 
 def read_parameters(node: Node) -> NodeParameters:

@@ -79,13 +79,13 @@ def _run_lockstep(
 ) -> None:
     bundle = parameters.bundle()
     schedule = schedule_of(bundle.scenario, bundle.testbed.testbed)
-    run = LockstepRun(bundle, parameters.members(schedule))
+    run = LockstepRun(bundle, parameters.members(schedule), parameters.own_of(schedule))
     if node.name == PLANT:
         _run_plant(session, node, parameters, run, began)
         return
     if node.name == RECORDER:
         folder = Path(parameters.folder or f"recordings/{bundle.scenario.name}")
-        writer = stack.enter_context(new_recording(bundle, folder, parameters.mode))
+        writer = stack.enter_context(new_recording(bundle, folder, parameters.mode, run.own))
         recorder = run.recorder(node, writer)
         stack.callback(recorder.close)
         _spin(session, _watch(recorder, node, parameters, began), lambda: recorder.ended)

@@ -24,10 +24,13 @@ class NodesOfRun:
     Attributes:
         bundle: what to run, resolved.
         members: names of the nodes that take part.
+        own: those of them that are programs of the user's: they send what the schedule names, and
+            neither announce themselves nor report.
     """
 
     bundle: Bundle
     members: tuple[str, ...]
+    own: tuple[str, ...] = ()
 
     @property
     def schedule(self) -> Schedule:
@@ -67,7 +70,7 @@ class NodesOfRun:
             schedule=self.schedule,
             steps=steps,
             edges=self.edges,
-            nodes=self.members,
+            nodes=tuple(name for name in self.members if name not in self.own),
             controlled=isinstance(scenario.control, ClosedLoop),
             target=target,
         )

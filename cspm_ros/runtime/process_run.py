@@ -6,7 +6,7 @@ import math
 import os
 import tempfile
 import time
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
 from pathlib import Path
 
@@ -47,6 +47,7 @@ def run_processes(
     steps: int | None = None,
     domain_id: int | None = None,
     patience_s: float = PATIENCE_S,
+    own_nodes: Sequence[str] = (),
 ) -> RunResult:
     """Run a scenario with a process per node.
 
@@ -62,6 +63,7 @@ def run_processes(
         domain_id: instead of `ROS_DOMAIN_ID`.
         patience_s: give up when nothing moves for so long [s]; in real time it bounds the start
             alone, and not where somebody's drivers are waited for.
+        own_nodes: controllers that are programs of the user's, by node name, in lockstep.
 
     Raises:
         InputError: scenario and test-bed do not fit, inputs that come in time would count as late,
@@ -74,6 +76,7 @@ def run_processes(
     scenario, testbed = bundle.scenario, bundle.testbed.testbed
     schedule = schedule_of(scenario, testbed)
     names = (PLANT, *schedule.nodes, RECORDER)[external:]
+    started = tuple(name for name in names if name not in own_nodes)
     if mode == REALTIME:
         check_real_time(scenario.safety, schedule)
     # In lockstep the recorder has 48 steps of time; by the wall clock it would lose messages.
@@ -86,6 +89,7 @@ def run_processes(
             pace=REALTIME if mode == REALTIME else LOCKSTEP,
             scenario=str(place / SCENARIO),
             nodes=names,
+            own_nodes=tuple(own_nodes),
             steps=steps or round(scenario.duration * scenario.rates.plant),
             folder=str(folder.absolute()),
             mode=mode,
@@ -99,7 +103,7 @@ def run_processes(
         with (
             _environment(domain_id),
             interruptible() as stop_wanted,
-            NodeProcesses(names, place / "parameters.yaml", place, behind) as processes,
+            NodeProcesses(started, place / "parameters.yaml", place, behind) as processes,
         ):
             leader = RECORDER if external else PLANT
             follower = _Follower(

@@ -27,12 +27,16 @@ class RecorderNode:
         topics: Mapping[str, Topic],
         writer: RecordingWriter,
         reporting: Collection[str],
+        silent: Collection[str] = (),
     ) -> None:
-        """Connect the recording to the run's topics; `reporting` nodes send their own statuses."""
+        """Connect the recording to the run's topics.
+
+        `reporting` nodes send their statuses themselves; of `silent` ones there are none.
+        """
         self._node = node
         self._plant = FollowerSide(node, schedule.period_ns, self._end)
         self._recorder = LockstepRecorder(
-            schedule, dict(topics), writer, self._plant.report, node.complain, reporting
+            schedule, dict(topics), writer, self._plant.report, node.complain, reporting, silent
         )
         self._intake = Intake(node.node)
         for name in schedule.topics:

@@ -48,8 +48,8 @@ def examples_page(monkeypatch):
     return examples_page
 
 
-def test_there_are_twelve_examples_and_the_driver(examples_page):
-    names = {path.stem for path in EXAMPLES.glob("*.py")} - {"driver"}
+def test_there_are_twelve_examples_beside_those_of_ros_pages(examples_page):
+    names = {path.stem for path in EXAMPLES.glob("*.py")} - {"driver", "own_stage"}
     assert names == {*SHOWN, NODE} == set(examples_page.ORDER)
     assert len(names) == 12
 

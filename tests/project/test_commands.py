@@ -51,6 +51,8 @@ NOT_RUN: dict[str, str] = {
     "cspm check-drivers": f"{ROS}; {ROS_TESTS}/check_drivers",
     "cspm run examples/clamped_bar.yaml": f"{ROS}; {ROS_TESTS}/runtime/test_external_plant.py",
     "python examples/driver.py": f"{ROS}; {ROS_TESTS}/runtime/test_external_plant.py",
+    "python examples/own_stage.py": f"{ROS}; {ROS_TESTS}/external/test_own_nodes.py",
+    "cspm run rest --mode processes": f"{ROS}; {ROS_TESTS}/external/test_own_nodes.py",
     "ros2 ": f"{ROS}; {ROS_TESTS}/runtime/test_ros_install.py",
     "colcon build": "tests/project/test_colcon.py",
     # A network, or files of the reader.

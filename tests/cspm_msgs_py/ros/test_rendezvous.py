@@ -52,3 +52,17 @@ def test_who_is_not_there_is_named_before_those_who_wait_for_it():
         assert session.spin_until(lambda: plant.unmatched() == names[:1], PATIENCE_S)
         join("motion_controller", "nobody")
         assert session.spin_until(lambda: plant.unmatched() == names, PATIENCE_S)
+
+
+def test_a_reader_that_announces_nothing_is_named_before_those_who_wait_for_it():
+    """A program of the user's in a controller's place is such a reader."""
+    with Session(domain_id=new_domain()) as session:
+        node = session.node("plant")
+        node.raw_publisher(DIAGNOSTICS, ["own_program"])
+        plant = PlantSide(node, PERIOD_NS, ["recorder"], lambda *_: None)
+        assert plant.unmatched() == ["recorder"]
+        waiting = session.node("recorder")
+        waiting.raw_publisher(DIAGNOSTICS, ["own_program"])
+        FollowerSide(waiting, PERIOD_NS)
+        named = [f"{DIAGNOSTICS.name} (own_program)"]
+        assert session.spin_until(lambda: plant.unmatched() == named, PATIENCE_S), plant.unmatched()

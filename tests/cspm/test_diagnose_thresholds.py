@@ -12,8 +12,15 @@ def test_a_wrong_threshold_is_refused_before_anything_is_read():
         cspm.diagnose("nowhere", thresholds={"material": 0.1})
 
 
+@pytest.fixture(scope="module")
+def recording(tmp_path_factory):
+    folder = tmp_path_factory.mktemp("thresholds") / "bag"
+    return cspm.simulate("one_winch", duration=0.1).save(folder)
+
+
+@pytest.mark.compiled
 @pytest.mark.parametrize("given", [None, {"material_share": 0.1}])
-def test_thresholds_by_name_reach_the_search(given, monkeypatch):
+def test_thresholds_by_name_reach_the_search(given, recording, monkeypatch):
     seen = []
 
     class Stop(Exception):
@@ -23,8 +30,7 @@ def test_thresholds_by_name_reach_the_search(given, monkeypatch):
         seen.append(thresholds)
         raise Stop
 
-    monkeypatch.setattr(door, "measured", lambda recordings, testbed: [])
     monkeypatch.setattr(door, "diagnose_measurements", search)
     with pytest.raises(Stop):
-        cspm.diagnose("nowhere", thresholds=given)
+        cspm.diagnose(recording, thresholds=given)
     assert seen == [thresholds_of(given) if given else DEFAULT_THRESHOLDS]

@@ -141,6 +141,53 @@ class ComputedWrenchControl(StrictModel):
         return self.dofs or tuple(self.bandwidth)
 
 
+class FeedbackControl(StrictModel):
+    """What PD+ and LQR share: state feedback about the bar's inverse dynamics.
+
+    `dofs` are the coordinates to control; absent, all that the cables give along the reference.
+    `bandwidth` [rad/s] is that of the error's dynamics per controlled DOF, 7.3 rad/s where it names
+    none. The derivative term has a pole at `derivative_filter` [rad/s]. Gains that are absent
+    follow from the bandwidths and from the bar's inertia at `design_pose`.
+    """
+
+    dofs: tuple[Dof, ...] | None = None
+    bandwidth: dict[Dof, PositiveFloat] = {}
+    derivative_filter: PositiveFloat = 200.0
+    design_pose: Pose = DESIGN_POSE
+    gains: dict[Dof, PidGains] | None = None
+
+    @property
+    def controlled(self) -> tuple[Dof, ...]:
+        """The controlled DOFs: those named, or with a bandwidth."""
+        return self.dofs or tuple(self.bandwidth)
+
+
+class PdPlusControl(FeedbackControl):
+    """Two poles of the error at the bandwidth, and no integral action."""
+
+    law: Literal["pd_plus"]
+
+    @property
+    def integral_limits(self) -> tuple[float, float]:
+        """None [N, N·m]."""
+        return 0.0, 0.0
+
+
+class LqrControl(FeedbackControl):
+    """Feedback of pose error, its integral and its rate, of least quadratic cost.
+
+    The error's integral costs as much as the error when it is `integral_time` [s] times it. The
+    integral terms stop at `integral_limits` [N, N·m].
+    """
+
+    law: Literal["lqr"]
+    integral_time: PositiveFloat = 1.0
+    integral_limits: tuple[PositiveFloat, PositiveFloat] = (20.0, 5.0)
+
+
+MOTION_LAWS = ("pid", "computed_wrench", "pd_plus", "lqr")
+
+
 def law(motion: object) -> object:
     """Return a motion controller's law: the thesis's by default."""
     if isinstance(motion, dict):
@@ -149,7 +196,10 @@ def law(motion: object) -> object:
 
 
 MotionLaw = Annotated[
-    Annotated[MotionControl, Tag("pid")] | Annotated[ComputedWrenchControl, Tag("computed_wrench")],
+    Annotated[MotionControl, Tag("pid")]
+    | Annotated[ComputedWrenchControl, Tag("computed_wrench")]
+    | Annotated[PdPlusControl, Tag("pd_plus")]
+    | Annotated[LqrControl, Tag("lqr")],
     Discriminator(law),
 ]
 
@@ -168,10 +218,11 @@ class ClosedLoop(StrictModel):
 
     @model_validator(mode="after")
     def _knows_its_cables(self) -> Self:
-        if self.tension_distribution.lost_cable and self.motion.law != "pid":
+        computed = self.motion.law == "computed_wrench"
+        if self.tension_distribution.lost_cable and computed:
             raise ValueError(
                 f"tension_distribution.lost_cable: with law {self.motion.law}, whose observer"
-                " counts on every cable, allowed: with law pid"
+                " counts on every cable, allowed: with law pid, pd_plus or lqr"
             )
         return self
 

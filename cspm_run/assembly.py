@@ -18,6 +18,7 @@ from cspm_control.design.gains import (
     force_margins,
     motion_margins,
 )
+from cspm_control.design.state_feedback import design_feedback_gains
 from cspm_control.stages.make import controlled_axes, make_controller
 from cspm_control.stages.own_code import own_stage
 from cspm_control.stages.target_stage import TargetStage
@@ -31,6 +32,7 @@ from cspm_msgs_py.scenario import (
     AngleProfile,
     ClosedLoop,
     Control,
+    FeedbackControl,
     LockedWinches,
     MotionControl,
     PidGains,
@@ -155,7 +157,9 @@ def _check_controllers(scenario: Scenario, testbed: Testbed) -> None:
 
 
 def _lacks_gains(motion: object) -> bool:
-    return isinstance(motion, MotionControl) and set(motion.gains or {}) < set(motion.controlled)
+    if not isinstance(motion, MotionControl | FeedbackControl):
+        return False
+    return set(motion.gains or {}) < set(motion.controlled)
 
 
 def _with_gains(control: ClosedLoop, scenario: Scenario, testbed: Testbed) -> ClosedLoop:
@@ -167,6 +171,10 @@ def _with_gains(control: ClosedLoop, scenario: Scenario, testbed: Testbed) -> Cl
     control = control.model_copy(update={"force": force.model_copy(update={"gains": force_gains})})
     if isinstance(motion, MotionControl) and _lacks_gains(motion):
         gains = _motion_gains(control, scenario, testbed, designed=force.gains is None)
+        control = control.model_copy(update={"motion": motion.model_copy(update={"gains": gains})})
+    elif isinstance(motion, FeedbackControl):
+        designed = design_feedback_gains(motion, testbed, 1.0 / scenario.rates.motion_controller)
+        gains = designed | (motion.gains or {})
         control = control.model_copy(update={"motion": motion.model_copy(update={"gains": gains})})
     return control
 

@@ -7,11 +7,12 @@ from collections.abc import Sequence
 import numpy as np
 from numpy.typing import NDArray
 
+from cspm_control.design.gains import MOTION_BANDWIDTH
 from cspm_model.parameters import nominal_parameters
 from cspm_model.spanned_axes import LEAST_SHARE, share_of, spanned_axes, structures_at
 from cspm_msgs_py.dofs import DOFS, Dof
 from cspm_msgs_py.errors import InputError
-from cspm_msgs_py.scenario import ClosedLoop, ComputedWrenchControl, Scenario
+from cspm_msgs_py.scenario import ClosedLoop, ComputedWrenchControl, FeedbackControl, Scenario
 from cspm_msgs_py.testbed import Testbed
 
 Array = NDArray[np.float64]
@@ -49,6 +50,8 @@ def with_controlled_dofs(scenario: Scenario, testbed: Testbed, poses: Poses) -> 
     changes: dict[str, object] = {"dofs": dofs}
     if isinstance(motion, ComputedWrenchControl):
         changes["bandwidth"] = {dof: motion.bandwidth.get(dof, USUAL_BANDWIDTH) for dof in dofs}
+    elif isinstance(motion, FeedbackControl):
+        changes["bandwidth"] = {dof: motion.bandwidth.get(dof, MOTION_BANDWIDTH) for dof in dofs}
     how = control.tension_distribution
     return control.model_copy(
         update={

@@ -110,9 +110,13 @@ class MotionController:
             self.memory,
             wrench,
         )
-        add_weight(bar_pose, self.weight, self.com, wrench)
+        self._carry(bar_pose, reference, wrench)
         self._started = True
         return wrench
+
+    def _carry(self, bar_pose: Array, reference: Array, wrench: Array) -> None:
+        """Add what the bar is given without any error."""
+        add_weight(bar_pose, self.weight, self.com, wrench)
 
     def _left(self) -> float:
         """Return what share of the error at the restart is left out; 0 without a restart."""

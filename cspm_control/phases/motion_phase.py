@@ -1,4 +1,4 @@
-"""The motion controllers as compiled phases: PID, and the computed wrench."""
+"""The motion controllers as compiled phases: PID, state feedback and computed wrench."""
 
 from __future__ import annotations
 
@@ -19,6 +19,7 @@ from cspm_control.controllers.computed_wrench import (
     wanted_wrench,
 )
 from cspm_control.controllers.motion_controller import MotionController, add_weight, pid
+from cspm_control.controllers.state_feedback import StateFeedback, add_inverse_dynamics
 from cspm_control.phases.distribution_phase import (
     UNMOVED,
     call_distribute,
@@ -53,22 +54,36 @@ DISTRIBUTE_AT, METHOD_AT, WANTED_AT, EXPECT_AT, INTEGERS = range(10, 15)
 
 @njit(cache=True, error_model="numpy", _nrt=False)
 def _pid_kernel(step: int, row: Array, places: Places) -> int:
+    pose, _, out = _feedback(row, places)
+    add_weight(pose, vector_at(places, 4)[2], vector_at(places, 5), out)
+    return DONE
+
+
+@njit(cache=True, error_model="numpy", _nrt=False)
+def _feedback_kernel(step: int, row: Array, places: Places) -> int:
+    pose, reference, out = _feedback(row, places)
+    add_inverse_dynamics(pose, reference, vector_at(places, 5), matrix_at(places, 6), out)
+    return DONE
+
+
+@njit(cache=True, error_model="numpy", inline="always")
+def _feedback(row: Array, places: Places) -> tuple[Array, Array, Array]:
+    """Write the PID terms, and return where pose, reference and wrench are."""
     integers, gains, memory = integers_at(places, 0), matrix_at(places, 1), matrix_at(places, 2)
     # Numbers: period, the derivative's pole, and the bar's weight.
-    numbers, com, internals = vector_at(places, 4), vector_at(places, 5), integers[INTERNALS]
+    numbers, internals = vector_at(places, 4), integers[INTERNALS]
     pose = row[integers[POSE] : integers[POSE] + 7]
     reference = row[integers[REFERENCE] : integers[REFERENCE] + 19]
     out = row[integers[OUT] : integers[OUT] + 6]
     limits = vector_at(places, 3)
     pid(pose, reference, gains, limits, numbers[0], numbers[1], True, 0.0, memory, out)
-    add_weight(pose, numbers[2], com, out)
     if internals >= 0:
         for d in range(6):
             row[internals + d] = memory[2, d]
             row[internals + 6 + d] = gains[d, 0] * memory[2, d]
             row[internals + 12 + d] = memory[0, d]
             row[internals + 18 + d] = gains[d, 2] * memory[1, d]
-    return DONE
+    return pose, reference, out
 
 
 @njit(cache=True, error_model="numpy", _nrt=False)
@@ -170,13 +185,13 @@ def motion_phase(stage: MotionStage, slots: Slots, period_ns: int) -> Phase | No
 def _pid_phase(stage: MotionStage, found: MotionController, integers: Places) -> Phase:
     numbers = np.array([found.period, found.filter, found.weight])
     return make_phase(
-        _pid_kernel,
+        _feedback_kernel if isinstance(found, StateFeedback) else _pid_kernel,
         integers,
         found.gains,
         found.memory,
         found.limits,
         numbers,
-        found.com,
+        *((found.bar, found.scratch) if isinstance(found, StateFeedback) else (found.com,)),
         ready=lambda: found.steady and not stage.suspended,
     )
 

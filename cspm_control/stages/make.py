@@ -18,6 +18,7 @@ from cspm_control.controllers.governor import Governed, plan_deviation
 from cspm_control.controllers.load_cell_bias import LoadCellBias
 from cspm_control.controllers.mass_observer import MassObserver
 from cspm_control.controllers.motion_controller import MotionController
+from cspm_control.controllers.state_feedback import StateFeedback
 from cspm_control.controllers.torque_profile import TorqueGenerator
 from cspm_control.feedforward.friction_feedforward import FrictionFeedforward, winch_friction
 from cspm_control.feedforward.winch_feedforward import WinchFeedforward
@@ -38,6 +39,7 @@ from cspm_msgs_py.scenario import (
     ClosedLoop,
     ComputedWrenchControl,
     Governor,
+    MotionControl,
     Scenario,
     TorqueProfile,
 )
@@ -122,8 +124,9 @@ def motion_stage(
         )
         planned = _planned(motion.governor, scenario, testbed, motions)
         return MotionStage(computed, planned, internals=control.record_internals)
+    feedback = MotionController if isinstance(motion, MotionControl) else StateFeedback
     return MotionStage(
-        MotionController(
+        feedback(
             motion.gains or {},
             testbed.bar,
             testbed.gravity,

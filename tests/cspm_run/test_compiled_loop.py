@@ -30,6 +30,14 @@ COMPUTED = "control.motion={law: computed_wrench, mass_adaptation: {}}"
 VARIANTS = {
     "internals": ("worst_case", "control.record_internals=true", "control.motion.gains=null"),
     "computed internals": ("worst_case", COMPUTED, "control.record_internals=true"),
+    "pd_plus": ("worst_case", "control.motion={law: pd_plus}", "control.record_internals=true"),
+    "lqr": ("worst_case", "control.motion={law: lqr}"),
+    "lqr and a lost cable": (
+        "worst_case",
+        "control.motion={law: lqr}",
+        "control.tension_distribution.lost_cable={}",
+        "events=[{at: 0.1, cut: sway_3}]",
+    ),
     "qp": ("worst_case", "control.tension_distribution={method: qp}"),
     "prescribed": (
         "worst_case",

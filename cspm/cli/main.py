@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import sys
+from collections.abc import Sequence
 from contextvars import copy_context
 from importlib import import_module
 from importlib.metadata import version as metadata_version
@@ -14,6 +15,7 @@ import typer
 from cspm.cli.app import RUN_FAILED, Json, app, new_folder
 from cspm.cli.shared_options import add_shared_options
 from cspm_msgs_py.errors import CspmError, DamageError, InputError
+from cspm_msgs_py.scenario import MOTION_LAWS
 from cspm_run.library import find_scenario, scenario_names
 
 MODES = ("inprocess", "graph", "processes", "realtime")
@@ -97,6 +99,8 @@ Examples:
 cspm run calm --duration 60 --out calm_60s
 
 cspm run worst_case worst_case_past_thesis
+
+cspm run calm --controllers pid,lqr --duration 60
 
 cspm run calm --effect winch_coulomb_friction@sway_3:torque=0.02 --out worn
 
@@ -212,6 +216,15 @@ def run(
             " commas; may be repeated. `cspm diagnose --explain EFFECT` describes one.",
         ),
     ] = None,
+    laws: Annotated[
+        str | None,
+        typer.Option(
+            "--controllers",
+            metavar="LAW,…",
+            help="Run the scenario under several motion controllers at once, on the same seed, and"
+            f" show them side by side: {', '.join(MOTION_LAWS)}.",
+        ),
+    ] = None,
     json: Json = None,
 ) -> None:
     """Simulate a scenario: record it, draw it, and report how well the bar followed.
@@ -233,7 +246,7 @@ def run(
     folder = out if out is not None else new_folder("+".join(Path(s).stem for s in scenarios))
     place = folder if record else None
     paths = [find_scenario(scenario) for scenario in scenarios]
-    if len(paths) == 1:
+    if len(paths) == 1 and laws is None:
         finished = run_command(
             paths[0],
             settings,
@@ -248,15 +261,20 @@ def run(
             own_node or (),
         )
     else:
-        _check_beside(mode, plant)
+        several = "several scenarios" if laws is None else "--controllers"
+        _check_beside(mode, plant, own_node or (), several)
+        names = [] if laws is None else [name.strip() for name in laws.split(",")]
         finished = run_beside_command(
-            paths, Settings(settings, place, json, plant, testbed, effects or ())
+            paths, Settings(settings, place, json, plant, testbed, effects or (), names)
         )
     raise typer.Exit(0 if finished else RUN_FAILED)
 
 
-def _check_beside(mode: str, plant: str) -> None:
+def _check_beside(mode: str, plant: str, own_nodes: Sequence[str], several: str) -> None:
     if mode != MODES[0]:
-        raise InputError(f"--mode {mode}: allowed with several scenarios: {MODES[0]}")
+        raise InputError(f"--mode {mode}: allowed with {several}: {MODES[0]}")
+    one = "one scenario" if several != "--controllers" else f"one scenario, without {several}"
     if plant == "external":
-        raise InputError("--plant external: allowed with one scenario")
+        raise InputError(f"--plant external: allowed with {one}")
+    if own_nodes:
+        raise InputError(f"--own-node {own_nodes[0]}: allowed with {one}")

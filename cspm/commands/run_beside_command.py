@@ -1,12 +1,13 @@
-"""Run several scenarios side by side: one table, one picture."""
+"""Run several scenarios, or one under several controllers, side by side."""
 
 from __future__ import annotations
 
 import contextlib
 import multiprocessing
-from collections.abc import MutableMapping, Sequence
+from collections.abc import Mapping, MutableMapping, Sequence
 from concurrent.futures import Future, ProcessPoolExecutor, wait
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
+from json import dumps
 from pathlib import Path
 
 from rich.console import Console
@@ -14,11 +15,20 @@ from rich.markup import escape
 from rich.progress import BarColumn, Progress, TextColumn, TimeRemainingColumn
 from rich.table import Table
 
+from cspm.changed_machine import of_testbed
 from cspm.commands.run_command import bundle_from, summarise
 from cspm_msgs_py.dofs import DOFS
 from cspm_msgs_py.errors import CspmError, InputError
 from cspm_msgs_py.new_folder import refuse_existing
-from cspm_msgs_py.scenario import Requirement
+from cspm_msgs_py.scenario import (
+    MOTION_LAWS,
+    ClosedLoop,
+    MotionLaw,
+    Requirement,
+    Scenario,
+    load_scenario,
+)
+from cspm_msgs_py.schedule import MOTION_CONTROLLER
 from cspm_run.bundle import Bundle
 from cspm_run.console import make_console, say
 from cspm_run.plants import SIM
@@ -29,6 +39,8 @@ from cspm_run.summary import summary_data, write_json
 
 PICTURE = "runs.png"
 REFRESH_S = 0.2
+# What every motion controller has.
+SHARED_KEYS = ("control.motion.dofs", "control.motion.design_pose")
 
 
 @dataclass(frozen=True)
@@ -42,6 +54,7 @@ class Settings:
         plant: the plant's equations.
         machine: a test-bed file instead of each scenario's.
         effects: physics planted in each machine.
+        laws: motion controllers to run one scenario under; none: the scenario's own.
     """
 
     overrides: Sequence[str] = ()
@@ -50,6 +63,7 @@ class Settings:
     plant: str = SIM
     machine: Path | None = None
     effects: Sequence[str] = ()
+    laws: Sequence[str] = ()
 
 
 def run_beside_command(paths: Sequence[Path], settings: Settings) -> bool:
@@ -59,50 +73,112 @@ def run_beside_command(paths: Sequence[Path], settings: Settings) -> bool:
         Whether all ran to their ends.
 
     Raises:
-        InputError: two have the same name, or their machines have other cables.
+        InputError: two have the same name, their machines have other cables, or the scenario
+            cannot run under the controllers.
         CspmError: a run diverged; recordings and picture are kept.
     """
     console = make_console()
-    bundles = [
-        bundle_from(path, settings.overrides, settings.machine, settings.plant, settings.effects)
-        for path in paths
-    ]
-    _check_comparable(bundles)
+    bundles = _bundles(paths, settings)
     refuse_existing(settings.folder)
     if settings.folder is not None:
         settings.folder.mkdir(parents=True)
     results = _run_all(bundles, settings.folder, console)
-    requirement = bundles[0].scenario.requirement
-    _show(console, results, requirement)
-    data = {result.scenario: summary_data(result) for result in results}
+    _show(console, results, next(iter(bundles.values())).scenario.requirement)
+    data = {name: summary_data(result) for name, result in results.items()}
     if settings.json is not None:
         write_json(settings.json, data)
     if settings.folder is not None:
         _draw(bundles, results, settings.folder)
         write_json(settings.folder / "summary.json", data)
         say(console, f"recordings and picture {PICTURE} in {settings.folder}")
-    say(console, _next_step(results, settings.folder))
-    failed = [f"{each.scenario}: {each.failure}" for each in results if each.failure]
+    say(console, _next_step(results, settings))
+    failed = [f"{name}: {each.failure}" for name, each in results.items() if each.failure]
     if failed:
         raise CspmError("; ".join(failed))
-    return not any(result.interrupted for result in results)
+    return not any(result.interrupted for result in results.values())
 
 
-def _show(console: Console, results: Sequence[RunResult], requirement: Requirement) -> None:
+def _bundles(paths: Sequence[Path], settings: Settings) -> dict[str, Bundle]:
+    """Return what is run, by the name of scenario or controller."""
+    rest = settings.machine, settings.plant, settings.effects
+    if settings.laws:
+        changes = under_laws(paths, settings.overrides, settings.laws)
+        return {law: bundle_from(paths[0], more, *rest) for law, more in changes.items()}
+    bundles = [bundle_from(path, settings.overrides, *rest) for path in paths]
+    _check_comparable(bundles)
+    return {bundle.scenario.name: bundle for bundle in bundles}
+
+
+def under_laws(
+    paths: Sequence[Path], overrides: Sequence[str], laws: Sequence[str]
+) -> dict[str, list[str]]:
+    """Return the overrides by which one scenario runs under each motion controller.
+
+    The scenario's own controller keeps its settings. The others have the defaults, with the same
+    `dofs` and `design_pose`.
+
+    Raises:
+        InputError: no such controller, one named twice, several scenarios, one without a motion
+            controller of that choice, or overrides that choose the controller too.
+    """
+    _check_laws(paths, overrides, laws)
+    motion = _replaceable(load_scenario(paths[0], of_testbed(overrides)[0]))
+    kept = motion.model_dump(mode="json", include={"dofs", "design_pose"})
+    found = {}
+    for law in laws:
+        change = f"control.motion={dumps({'law': law} | kept)}"
+        found[law] = [*overrides, *([] if law == motion.law else [change])]
+    return found
+
+
+def _replaceable(scenario: Scenario) -> MotionLaw:
+    """Return the motion controller that others may take the place of."""
+    control = scenario.control
+    own = MOTION_CONTROLLER in scenario.controllers
+    if isinstance(control, ClosedLoop) and not own:
+        return control.motion
+    has = "one of its own" if own else f"none in mode {control.mode}"
+    raise InputError(
+        f"--controllers: scenario {scenario.name} has {has}, allowed: a scenario in mode"
+        f" closed_loop without controllers.{MOTION_CONTROLLER}"
+    )
+
+
+def _check_laws(paths: Sequence[Path], overrides: Sequence[str], laws: Sequence[str]) -> None:
+    for law in laws:
+        if law not in MOTION_LAWS:
+            raise InputError(f"--controllers {law}: allowed: {', '.join(MOTION_LAWS)}")
+        if laws.count(law) > 1:
+            raise InputError(f"--controllers {law}: named twice, allowed: once each")
+    if len(paths) > 1:
+        raise InputError(f"--controllers: with {len(paths)} scenarios, allowed: with one scenario")
+    for override in overrides:
+        key = override.partition("=")[0]
+        within = key == "control" or f"{key}.".startswith("control.motion.")
+        if within and key not in SHARED_KEYS:
+            raise InputError(
+                f"--set {override}: with --controllers, which sets it too, allowed: only one of"
+                f" them, or {' and '.join(SHARED_KEYS)}"
+            )
+
+
+def _show(console: Console, results: Mapping[str, RunResult], requirement: Requirement) -> None:
     console.print(beside_table(results, requirement))
-    for result in results:
+    for name, result in results.items():
         for line in result.warnings:
-            say(console, f"warning: {result.scenario}: {line}")
+            say(console, f"warning: {name}: {line}")
 
 
-def beside_table(results: Sequence[RunResult], requirement: Requirement) -> Table:
+def beside_table(results: Mapping[str, RunResult], requirement: Requirement) -> Table:
     """Return errors per coordinate, tensions and shares of all runs, a pair of columns each."""
-    table = Table(title=f"seed {results[0].seed}: reference − pose, largest and RMS")
+    first = next(iter(results.values()))
+    of = "" if first.scenario in results else f"{escape(first.scenario)}, "
+    table = Table(title=f"{of}seed {first.seed}: reference − pose, largest and RMS")
     table.add_column("")
     table.add_column("required", justify="right")
-    for result in results:
-        table.add_column(escape(result.scenario), justify="right", overflow="fold")
-    rows = [summary_data(result) for result in results]
+    for name in results:
+        table.add_column(escape(name), justify="right", overflow="fold")
+    rows = [summary_data(result) for result in results.values()]
     for i, dof in enumerate(DOFS):
         limit, unit = (requirement.position, "mm") if i < 3 else (requirement.angle, "mrad")
         cells = [_error(row["errors"][dof], limit, unit) for row in rows]
@@ -119,10 +195,13 @@ def _error(error: dict[str, float], limit: float, unit: str) -> str:
     return f"[{colour}]{1e3 * error['max']:.3g}, {1e3 * error['rms']:.3g} {unit}[/]"
 
 
-def _next_step(results: Sequence[RunResult], folder: Path | None) -> str:
+def _next_step(results: Mapping[str, RunResult], settings: Settings) -> str:
     """Return what to try after this."""
-    names = [result.scenario for result in results]
-    again = f"next: `cspm run {' '.join(names)} --seed 2`, another sea of the same kind"
+    names, folder = list(results), settings.folder
+    words = " ".join(names)
+    if settings.laws:
+        words = f"{results[names[0]].scenario} --controllers {','.join(names)}"
+    again = f"next: `cspm run {words} --seed 2`, another sea of the same kind"
     if folder is None:
         return again
     return f"{again}; `cspm info {folder / names[-1]}` lists what was recorded"
@@ -141,7 +220,9 @@ def _check_comparable(bundles: Sequence[Bundle]) -> None:
             )
 
 
-def _run_all(bundles: Sequence[Bundle], folder: Path | None, console: Console) -> list[RunResult]:
+def _run_all(
+    bundles: Mapping[str, Bundle], folder: Path | None, console: Console
+) -> dict[str, RunResult]:
     context = multiprocessing.get_context("spawn")
     columns = TextColumn("{task.description}"), BarColumn(), TimeRemainingColumn()
     with (
@@ -150,16 +231,19 @@ def _run_all(bundles: Sequence[Bundle], folder: Path | None, console: Console) -
         Progress(*columns, console=console, transient=True) as bar,
     ):
         if not is_compiled():
-            _compile(bundles, pool, bar)
+            _compile(list(bundles.values()), pool, bar)
         reached: MutableMapping[str, float] = manager.dict()
-        tasks = {b.scenario.name: bar.add_task(escape(b.scenario.name)) for b in bundles}
-        futures = [pool.submit(_run_one, each, folder, reached) for each in bundles]
-        while not all(future.done() for future in futures):
-            _wait(futures)
-            for bundle in bundles:
-                name, total = bundle.scenario.name, bundle.scenario.duration
+        tasks = {name: bar.add_task(escape(name)) for name in bundles}
+        futures = {
+            name: pool.submit(_run_one, name, bundle, folder, reached)
+            for name, bundle in bundles.items()
+        }
+        while not all(future.done() for future in futures.values()):
+            _wait(list(futures.values()))
+            for name, bundle in bundles.items():
+                total = bundle.scenario.duration
                 bar.update(tasks[name], completed=reached.get(name, 0.0), total=total)
-    return [future.result() for future in futures]
+    return {name: future.result() for name, future in futures.items()}
 
 
 def _compile(bundles: Sequence[Bundle], pool: ProcessPoolExecutor, bar: Progress) -> None:
@@ -176,26 +260,27 @@ def _wait(futures: Sequence[Future[RunResult]]) -> None:
         left.exception(REFRESH_S)
 
 
-def _run_one(bundle: Bundle, folder: Path | None, reached: MutableMapping[str, float]) -> RunResult:
-    name = bundle.scenario.name
-
+def _run_one(
+    name: str, bundle: Bundle, folder: Path | None, reached: MutableMapping[str, float]
+) -> RunResult:
     def show(now: float) -> None:
         reached[name] = now
 
     return run(bundle, folder and folder / name, show)
 
 
-def _draw(bundles: Sequence[Bundle], results: Sequence[RunResult], folder: Path) -> None:
+def _draw(bundles: Mapping[str, Bundle], results: Mapping[str, RunResult], folder: Path) -> None:
     # As loading matplotlib in `summarise`.
     from cspm.plots.runs_figure import draw_runs
 
-    for bundle, result in zip(bundles, results, strict=True):
+    for name, result in results.items():
         assert result.folder is not None
-        summarise(result.folder, bundle, result)
+        summarise(result.folder, bundles[name], result)
+    first = next(iter(bundles.values()))
     draw_runs(
         folder / PICTURE,
-        results,
-        bundles[0].scenario.requirement,
-        bundles[0].testbed.testbed.cable_names,
-        [1.0 / bundle.scenario.rates.plant for bundle in bundles],
+        [replace(result, scenario=name) for name, result in results.items()],
+        first.scenario.requirement,
+        first.testbed.testbed.cable_names,
+        [1.0 / bundle.scenario.rates.plant for bundle in bundles.values()],
     )

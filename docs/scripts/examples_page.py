@@ -15,12 +15,12 @@ EXAMPLES, PAGE = ROOT / "examples", ROOT / "docs" / "reference" / "examples.md"
 ORDER = (
     *("first_run", "find_friction", "own_controller", "own_reference", "own_effect"),
     *("compare_recordings", "identify_winch", "sweep_gain", "read_into_pandas"),
-    *("linear_analysis", "workspace_of_another_robot", "own_node"),
+    *("linear_analysis", "workspace_of_another_robot", "state_space_controller", "own_node"),
 )
 _HEAD = """\
 # Examples
 
-Twelve scripts to copy. Each is a file of [`examples/`](../../examples), runs as it stands, and
+Thirteen scripts to copy. Each is a file of [`examples/`](../../examples), runs as it stands, and
 writes
 into the folder in which it is started. `import cspm` is all that they need; what a function takes
 and returns is in its docstring, `help(cspm.simulate)`. All numbers are in SI units and radians, z

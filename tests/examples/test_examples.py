@@ -17,6 +17,7 @@ SHOWN = {
     "first_run": r"identical when repeated: True",
     "find_friction": r"reported winch_coulomb_friction \('sway_3',\)\n  torque = 0\.0[23]\d* N·m",
     "own_controller": r"own: heave error \d\.\d+e-0[345] m RMS",
+    "state_space_controller": r"heave error \d\.\d+e-0[34] m RMS",
     "own_reference": r"radius in the end: 0\.(049|050)\d* m",
     "own_effect": r"resisting torque = coefficient.*\nfastest: .* rad/s\nfastest: ",
     "compare_recordings": r"hoist_1: \+\d\.\d+ N more with the heavy bar",
@@ -48,10 +49,10 @@ def examples_page(monkeypatch):
     return examples_page
 
 
-def test_there_are_twelve_examples_beside_those_of_ros_pages(examples_page):
+def test_there_are_thirteen_examples_beside_those_of_ros_pages(examples_page):
     names = {path.stem for path in EXAMPLES.glob("*.py")} - {"driver", "own_stage"}
     assert names == {*SHOWN, NODE} == set(examples_page.ORDER)
-    assert len(names) == 12
+    assert len(names) == 13
 
 
 def test_the_page_is_that_of_the_files(examples_page):

@@ -11,7 +11,7 @@ from cspm_model.cable_strength import strength_warnings
 from cspm_msgs_py.diagnostics import Level, Status, encode_diagnostics
 from cspm_msgs_py.errors import ControllerError, DivergenceError
 from cspm_msgs_py.interruption import interruptible
-from cspm_msgs_py.recording.run_record import OWN_CONTROLLERS
+from cspm_msgs_py.recording.run_record import OWN_CONTROLLERS, OWN_NODE
 from cspm_msgs_py.recording.writer import RecordingWriter
 from cspm_msgs_py.schedule import schedule_of
 from cspm_msgs_py.topics import DIAGNOSTICS, Topic
@@ -149,7 +149,7 @@ def metadata(bundle: Bundle, mode: str, own_nodes: Sequence[str] = ()) -> dict[s
     own: dict[str, str] = {
         stage: each.class_name for stage, each in bundle.scenario.controllers.items()
     }
-    own |= dict.fromkeys(own_nodes, "a ROS node")
+    own |= dict.fromkeys(own_nodes, OWN_NODE)
     named = ", ".join(f"{stage}: {what}" for stage, what in own.items())
     return ({OWN_CONTROLLERS: named} if own else {}) | {
         "contract_version": CONTRACT_VERSION,

@@ -11,7 +11,12 @@ from pathlib import Path
 from cspm_msgs_py.errors import InputError
 from cspm_msgs_py.recording.difference import Difference, first_difference
 from cspm_msgs_py.recording.reader import Recording
-from cspm_msgs_py.recording.run_record import RECORD_NAME, own_controllers, simulated_plant
+from cspm_msgs_py.recording.run_record import (
+    OWN_NODE,
+    RECORD_NAME,
+    own_controllers,
+    simulated_plant,
+)
 from cspm_run.bundle import read_bundle, with_own_code
 from cspm_run.plants import SIM
 from cspm_run.recorded_run import run
@@ -69,8 +74,7 @@ def _repeat(
     plant = simulated_plant(recording) or SIM
     bundle = replace(read_bundle(recording.attachments, str(path)), plant=plant)
     own = own_controllers(recording)
-    stages = {each.split(":")[0] for each in own.split(", ")} if own is not None else set()
-    if stages - {*bundle.scenario.controllers}:
+    if own is not None and (OWN_NODE in own or not bundle.scenario.controllers):
         raise InputError(
             f"{path}: was made with controllers that it does not carry ({own}), allowed: one made"
             " with those of its scenario"

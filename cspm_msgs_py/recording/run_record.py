@@ -10,6 +10,8 @@ EXTERNAL = "external"
 # The key under which controllers of somebody's own are named: objects, which no recording carries,
 # or files, which one carries and nobody runs unasked.
 OWN_CONTROLLERS = "own_controllers"
+# What is said there of a controller that was a ROS program of the user's.
+OWN_NODE = "a ROS node"
 
 
 def own_controllers(recording: Recording) -> str | None:

@@ -43,7 +43,7 @@ class GuardedStage:
         self._latch = Latch()
         self._winches: Array | None = None
         self._stepped_ns = self._sent_ns = -1
-        self._entered = False
+        self._entered = self._braked = False
 
     @property
     def safe(self) -> bool:
@@ -52,8 +52,8 @@ class GuardedStage:
 
     @property
     def brake(self) -> bool:
-        """Whether the winches' brakes are to be set."""
-        return self._latch.open and self._safe_state.brake
+        """Whether the winches' brakes are to be set: until there is a torque to hold the bar."""
+        return self._safe_state.brake and (self._latch.open or self._braked)
 
     def trip(self, now_ns: int, reason: str) -> None:
         """Go to the safe state for a reason that came and went.
@@ -131,6 +131,7 @@ class GuardedStage:
     def _send(self, now_ns: int, torque: Array, send: Send) -> None:
         self._sent_ns = now_ns
         send(TORQUE_COMMAND, torque)
+        self._braked = self._latch.open
 
     def _send_safe(self, now_ns: int, send: Send) -> None:
         """Send the safe state's torques, once for each instant."""

@@ -335,6 +335,10 @@ def test_brake_is_no_torque_with_the_brakes_set():
     np.testing.assert_array_equal(torque, np.zeros(N))
     assert bench.stage.status().message == "safe state brake since 0.001 s: test"
     assert bench.stage.reset(2 * MS) is None
+    # Nothing holds the bar before a torque is commanded.
+    assert bench.stage.brake
+    (torque,) = bench.step()
+    assert torque.all()
     assert not bench.stage.brake
 
 

@@ -18,7 +18,7 @@ TOPICS = contract_topics(["a", "b"], has_bar=False, has_winch_frame=False)
 TENSION, COMMAND = TOPICS["/cables/tension"], TOPICS["/tension_command"]
 
 
-@pytest.fixture(scope="module")
+@pytest.fixture
 def post():
     """Return an outbox, how to send two rows a topic, and what its reader has by now."""
     with Session(domain_id=new_domain()) as session:

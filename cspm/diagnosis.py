@@ -8,12 +8,11 @@ from functools import cached_property
 from pathlib import Path
 from typing import Any
 
-from cspm.measured import listed, measured
+from cspm.measured import looked_at
 from cspm.parameters import Parameter, Parameters
 from cspm.progress import Progress, by_steps, silent
-from cspm.recorded import AnyRecording, path_of
+from cspm.recorded import AnyRecording
 from cspm.testbed import AnyTestbed, Testbed, as_file
-from cspm_ident.data_look.look import look_at, without_regimes
 from cspm_ident.diagnosis.diagnose import diagnose as diagnose_measurements
 from cspm_ident.diagnosis.diagnosis import Diagnosis as Result
 from cspm_ident.diagnosis.finding import Finding as FoundEffect
@@ -24,7 +23,6 @@ from cspm_ident.diagnosis.thresholds import thresholds_of
 from cspm_ident.diagnosis.validation.closed_loop import ClosedLoopFit, simulate_closed_loop
 from cspm_ident.diagnosis.validation.controller_parity import Parity, controller_parity
 from cspm_ident.experiment.experiment_files import write_experiments
-from cspm_ident.recording_roles import check_roles
 from cspm_ident.signals.measurement import Measurement
 from cspm_msgs_py.new_folder import refuse_existing
 from cspm_run.summary import write_json
@@ -213,19 +211,14 @@ def diagnose(
         (0.0297, 0.0304)
     """
     limits = thresholds_of(thresholds or {})
-    searched, judges = listed(recordings), listed(held_out)
     step = by_steps(progress)
-    step("reading")
-    looked, judged = measured(searched, testbed), measured(judges, testbed)
-    check_roles(looked, judged)
-    step("looking at the data")
-    checks = look_at(looked, judged)
-    if leave_out_regimes:
-        looked, judged = without_regimes(looked, checks), without_regimes(judged, checks)
-    found = diagnose_measurements(looked, judged, step, thresholds=limits)
-    loop = _closed_loop(found, (judged or looked)[0], step) if closed_loop else ()
+    searched, judged, checks = looked_at(
+        recordings, held_out, testbed, leave_out_regimes=leave_out_regimes, step=step
+    )
+    found = diagnose_measurements(searched, judged, step, thresholds=limits)
+    loop = _closed_loop(found, (judged or searched)[0], step) if closed_loop else ()
     step("controllers")
-    parity = tuple(controller_parity(path_of(searched[0])))
+    parity = tuple(controller_parity(searched[0].path))
     data = diagnosis_data(found, _path(testbed)) | {
         "data_checks": [each.data() for each in checks],
         "closed_loop": [each._asdict() for each in loop],

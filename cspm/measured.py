@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Callable, Iterable, Sequence
 from pathlib import Path
 
 from cspm.recorded import AnyRecording, Recording, path_of
@@ -30,6 +30,7 @@ def looked_at(
     testbed: AnyTestbed | None,
     *,
     leave_out_regimes: bool = False,
+    step: Callable[[str], None] = lambda _: None,
 ) -> tuple[list[Measurement], list[Measurement], tuple[DataCheck, ...]]:
     """Return what is searched, what is held out, and what a first look says of both.
 
@@ -38,13 +39,16 @@ def looked_at(
         held_out: to judge by.
         testbed: the machine, instead of the one that the recordings carry.
         leave_out_regimes: whether stretches of another regime are left out.
+        step: called with what is done next.
 
     Raises:
         InputError: no recording, no test-bed, other cables than the test-bed's, or recordings that
             share rows.
     """
+    step("reading")
     searched, judged = measured(listed(recordings), testbed), measured(listed(held_out), testbed)
     check_roles(searched, judged)
+    step("looking at the data")
     checks = look_at(searched, judged)
     if leave_out_regimes:
         searched, judged = without_regimes(searched, checks), without_regimes(judged, checks)

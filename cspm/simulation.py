@@ -242,10 +242,11 @@ def bundle_of(scenario: Scenario, testbed: TestbedFile | None, plant: str) -> Bu
     if plant == EXTERNAL:
         refuse_cuts(EXTERNAL, resolved.events)
     bundle = make_bundle(resolved, machine, scenario.path.parent)
-    with bundle.unpacked() as place:
+    if bundle.scenario.controllers:
         # Before anything is recorded, and in every mode.
-        for stage, named in bundle.scenario.controllers.items():
-            load_controller(stage, named, place)
+        with bundle.unpacked() as place:
+            for stage, named in bundle.scenario.controllers.items():
+                load_controller(stage, named, place)
     return replace(bundle, plant=SIM if plant == EXTERNAL else plant)
 
 

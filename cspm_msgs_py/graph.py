@@ -36,8 +36,8 @@ class Edges:
 def graph_of(schedule: Schedule, nodes: Sequence[str]) -> dict[str, Edges]:
     """Return sender and readers of every topic among `nodes`, by topic in contract order.
 
-    A player among them replaces the plant and for the nodes that are absent, and reads what
-    those that are present send.
+    A player among them takes the place of the plant and of the nodes that are absent, and reads
+    what those that are present send.
     """
     present = set(nodes)
     source = PLAYER if PLAYER in present else PLANT

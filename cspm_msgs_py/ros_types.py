@@ -138,5 +138,5 @@ def definitions_in(ros_type: str, encoding: str, text: str) -> dict[str, Any]:
 
 
 def _real(fields: Sequence[tuple[str, Any]]) -> list[tuple[str, Any]]:
-    """Return the fields without the one that replaces none."""
+    """Return the fields without the placeholder of a type that has none."""
     return [field for field in fields if field[0] != NO_FIELDS]

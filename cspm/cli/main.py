@@ -261,8 +261,7 @@ def run(
             own_node or (),
         )
     else:
-        several = "several scenarios" if laws is None else "--controllers"
-        _check_beside(mode, plant, own_node or (), several)
+        _check_beside(mode, plant, own_node or (), under_laws=laws is not None)
         names = [] if laws is None else [name.strip() for name in laws.split(",")]
         finished = run_beside_command(
             paths, Settings(settings, place, json, plant, testbed, effects or (), names)
@@ -270,10 +269,11 @@ def run(
     raise typer.Exit(0 if finished else RUN_FAILED)
 
 
-def _check_beside(mode: str, plant: str, own_nodes: Sequence[str], several: str) -> None:
+def _check_beside(mode: str, plant: str, own_nodes: Sequence[str], *, under_laws: bool) -> None:
+    several = "--controllers" if under_laws else "several scenarios"
+    one = "one scenario, without --controllers" if under_laws else "one scenario"
     if mode != MODES[0]:
         raise InputError(f"--mode {mode}: allowed with {several}: {MODES[0]}")
-    one = "one scenario" if several != "--controllers" else f"one scenario, without {several}"
     if plant == "external":
         raise InputError(f"--plant external: allowed with {one}")
     if own_nodes:

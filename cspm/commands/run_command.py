@@ -130,7 +130,9 @@ def _check_own_nodes(names: Sequence[str], mode: str, bundle: Bundle) -> None:
     Raises:
         InputError: one line.
     """
-    if names and mode != PROCESSES:
+    if not names:
+        return
+    if mode != PROCESSES:
         raise InputError(f"--own-node --mode {mode}: allowed: --mode {PROCESSES}")
     possible = schedule_of(bundle.scenario, bundle.testbed.testbed).nodes
     for name in names:

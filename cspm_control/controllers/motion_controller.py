@@ -64,8 +64,7 @@ class MotionController:
         self.gains = np.zeros((6, 3))
         for name, gain in gains.items():
             self.gains[DOFS.index(name)] = gain.kp, gain.ki, gain.kd
-        self.weight = bar.mass * gravity
-        self.com = np.array(bar.com, dtype=float)
+        self._know(bar, gravity)
         self.limits = np.repeat(np.array(integral_limits, dtype=float), 3)
         self.period = period
         self.filter = derivative_filter
@@ -73,6 +72,11 @@ class MotionController:
         self._started = False
         # Steps since a restart; None without one, and once the bar has been led to its reference.
         self._since: int | None = None
+
+    def _know(self, bar: Bar, gravity: float) -> None:
+        """Keep what is needed of the bar to carry it."""
+        self.weight = bar.mass * gravity
+        self.com = np.array(bar.com, dtype=float)
 
     @property
     def terms(self) -> Array:

@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
-
 import numpy as np
 from numba import njit
 from numpy.typing import NDArray
@@ -11,8 +9,6 @@ from numpy.typing import NDArray
 from cspm_control.controllers.bar_dynamics import bar_parameters, wanted_motion, wrench_for
 from cspm_control.controllers.motion_controller import MotionController
 from cspm_model.kernels.rotation import euler_from_quaternion
-from cspm_msgs_py.dofs import Dof
-from cspm_msgs_py.scenario import PidGains
 from cspm_msgs_py.testbed import Bar
 
 Array = NDArray[np.float64]
@@ -25,31 +21,15 @@ class StateFeedback(MotionController):
     nominal bar the reference's rate and acceleration at the measured attitude: M·q̈ + C·q̇ + g
     (Paden, Panja, Globally asymptotically stable 'PD+' controller for robot manipulators,
     International Journal of Control 47, 1988). The error then obeys m·ë = −w, w the feedback.
+    Integral limits of 0 leave PD+.
 
     Attributes:
         bar: the kernels' parameters of the bar.
         scratch: of `add_inverse_dynamics`, (5, 6).
     """
 
-    def __init__(
-        self,
-        gains: Mapping[Dof, PidGains],
-        bar: Bar,
-        gravity: float,
-        *,
-        period: float,
-        derivative_filter: float,
-        integral_limits: tuple[float, float],
-    ) -> None:
-        """Make the controller; see `MotionController`. Integral limits of 0 leave PD+."""
-        super().__init__(
-            gains,
-            bar,
-            gravity,
-            period=period,
-            derivative_filter=derivative_filter,
-            integral_limits=integral_limits,
-        )
+    def _know(self, bar: Bar, gravity: float) -> None:
+        super()._know(bar, gravity)
         self.bar, self.scratch = bar_parameters(bar, gravity), np.zeros((5, 6))
 
     def _carry(self, bar_pose: Array, reference: Array, wrench: Array) -> None:

@@ -184,14 +184,18 @@ def motion_phase(stage: MotionStage, slots: Slots, period_ns: int) -> Phase | No
 
 def _pid_phase(stage: MotionStage, found: MotionController, integers: Places) -> Phase:
     numbers = np.array([found.period, found.filter, found.weight])
+    kernel = _pid_kernel
+    carried: tuple[Array, ...] = (found.com,)
+    if isinstance(found, StateFeedback):
+        kernel, carried = _feedback_kernel, (found.bar, found.scratch)
     return make_phase(
-        _feedback_kernel if isinstance(found, StateFeedback) else _pid_kernel,
+        kernel,
         integers,
         found.gains,
         found.memory,
         found.limits,
         numbers,
-        *((found.bar, found.scratch) if isinstance(found, StateFeedback) else (found.com,)),
+        *carried,
         ready=lambda: found.steady and not stage.suspended,
     )
 

@@ -108,10 +108,7 @@ class RealtimeNode:
         return self._leader.end_ns is not None
 
     def _receive(self, topic: str, stamp_ns: int, row: Array, gid: bytes | None) -> None:
-        try:
-            self._loop.receive(topic, stamp_ns, row, self._node.now_ns(), gid)
-        except ControllerError as err:
-            self._loop.alarm(self._node.now_ns(), str(err))
+        self._loop.receive(topic, stamp_ns, row, self._node.now_ns(), gid)
 
     def _refuse(self, topic: str, reason: str) -> None:
         binding = self._bindings.get(topic)
@@ -161,10 +158,7 @@ class RealtimeNode:
             self._loop.alarm(self._node.now_ns(), fault)
             if self._foreign and self._loop.safe:
                 self._node.accept_clock()
-        try:
-            self._loop.tick(self._node.now_ns())
-        except ControllerError as err:
-            self._loop.alarm(self._node.now_ns(), str(err))
+        self._loop.tick(self._node.now_ns())
 
 
 class RealtimeWaveNode:

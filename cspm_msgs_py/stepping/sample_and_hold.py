@@ -15,7 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from cspm_msgs_py.diagnostics import Level, Status
-from cspm_msgs_py.errors import InputError
+from cspm_msgs_py.errors import ControllerError, InputError
 from cspm_msgs_py.schedule import CLOCK, DIAGNOSTICS_RATE, FORCE_CONTROLLER, TENSION, Schedule
 from cspm_msgs_py.stepping.admission import Admission
 from cspm_msgs_py.stepping.plausibility import Anything, Plausibility
@@ -214,7 +214,11 @@ class SampleAndHold:
             self.stale += 1
             return
         self._stamp = stamp_ns
-        self._stage.step(now_ns, self._rows, self._send)
+        try:
+            self._stage.step(now_ns, self._rows, self._send)
+        except ControllerError as err:
+            self.alarm(now_ns, str(err))
+            return
         behind = now_ns - stamp_ns - self._delays[self._trigger]
         self._worst_ns = max(self._worst_ns, behind)
         since = self._period_ns if self._computed_ns is None else stamp_ns - self._computed_ns

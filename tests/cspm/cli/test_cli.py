@@ -120,6 +120,14 @@ REST = f"{SCENARIOS}/rest.yaml"
             "--process-per-node --mode graph: allowed: --mode realtime",
         ),
         (
+            ["--own-node", "motion_controller"],
+            "--own-node --mode inprocess: allowed: --mode processes",
+        ),
+        (
+            ["--mode", "processes", "--own-node", "rudder"],
+            "--own-node rudder: allowed: wave_trajectory, motion_controller, ",
+        ),
+        (
             ["--patience", "5"],
             "--patience --mode inprocess: allowed: --mode graph, processes or re",
         ),

@@ -228,7 +228,10 @@ def test_prescribed_torques_that_brake():
     assert stage.reset(2 * MS) == "reset refused: emergency stop set"
     stage.emergency_stop(3 * MS, False)
     assert stage.reset(3 * MS) is None
+    assert stage.brake
+    stage.step(3 * MS, winch_row(), sent)
     assert not stage.brake
+    assert sent.torques[-1][0] > 0.5
 
 
 def test_a_trip_before_the_first_step_holds_without_a_jerk():

@@ -126,8 +126,9 @@ class _Strike:
     def __call__(self, simulated: float) -> None:
         if self.at_s is not None or simulated < STRIKE_AT_S:
             return
-        for process in psutil.Process().children():
-            words = process.cmdline()
+        for process in psutil.Process().children(recursive=True):
+            # The title of a process that was forked is one text.
+            words = " ".join(process.cmdline()).split()
             if "cspm_ros.runtime.node_main" in words and self._node in words:
                 self.at_s = time.time()
                 process.send_signal(self._number)

@@ -26,18 +26,19 @@ The node {name} of cspm. Parameters: scenario (a name or a file), pace (lockstep
 nodes (which take part) and more: `ros2 param describe /{name} NAME` explains each."""
 
 
-def start_node(name: str, args: Sequence[str]) -> None:
+def start_node(name: str, args: Sequence[str], began: float | None = None) -> None:
     """Run a node until its run ends or a signal comes.
 
     Args:
         name: one of `NODES`.
         args: what follows the name on the command line, such as `--ros-args -p scenario:=calm`.
+        began: when starting began, on `time.perf_counter` [s]; None: now.
 
     Raises:
         InputError: no such node, no ROS, or arguments that cannot be used.
         CspmError: the run failed.
     """
-    began = time.perf_counter()
+    began = time.perf_counter() if began is None else began
     if name not in NODES:
         raise InputError(f"node {name}: allowed: {', '.join(NODES)}")
     if args and args[0] != ROS_ARGS:
@@ -51,13 +52,19 @@ def start_node(name: str, args: Sequence[str]) -> None:
     run_node(name, [name, *args], began)
 
 
-def main(name: str, args: Sequence[str]) -> int:
-    """Run a node as a program; return its exit code, errors as one line on stderr."""
+def main(name: str, args: Sequence[str], began: float | None = None) -> int:
+    """Run a node as a program; return its exit code, errors as one line on stderr.
+
+    Args:
+        name: one of `NODES`.
+        args: as for `start_node`.
+        began: as for `start_node`.
+    """
     if {"--help", "-h"} & set(args):
         print(_HELP.format(name=name))  # noqa: T201 - the program's voice
         return 0
     try:
-        start_node(name, args)
+        start_node(name, args, began)
     except CspmError as err:
         print(f"cspm: {' '.join(str(err).split())}", file=sys.stderr)  # noqa: T201
         return err.exit_code

@@ -4,15 +4,14 @@ from __future__ import annotations
 
 import re
 import signal
-import subprocess
-import sys
 import time
-from collections.abc import Collection, Sequence
+from collections.abc import Collection
 from pathlib import Path
 
 from typing_extensions import Self
 
 from cspm_ros.runtime.background import put_behind
+from cspm_ros.runtime.hosted_process import HOST_LOG, NodeHost
 from cspm_ros.runtime.stall_watchdog import STANDSTILL
 
 LEAVING_S = 5.0
@@ -26,39 +25,26 @@ _WARNING = re.compile(r"\[(?:WARN|ERROR|FATAL)\] \[[\d.]+\] \[(.+?)\]: (.+)\n")
 class NodeProcesses:
     """The processes of a run, one a node; they stop with this one, however it ends."""
 
-    def __init__(
-        self, names: Sequence[str], parameters: Path, log: Path, behind: Collection[str] = ()
-    ) -> None:
-        """Start them.
+    def __init__(self, host: NodeHost, log: Path, behind: Collection[str] = ()) -> None:
+        """Take them over from their host.
 
         Args:
-            names: of the nodes.
-            parameters: ROS 2 parameter file for all of them.
+            host: starts them.
             log: folder for what they print.
             behind: who of them has time, and gives way to the others once the run has begun.
         """
-        self._log = log
+        self._host, self._log = host, log
         self._ending: set[str] = set()
-        self._read = dict.fromkeys(names, 0)
-        self.by_name = {name: self._start(name, parameters) for name in names}
+        self.by_name = host.nodes
+        self._read = dict.fromkeys(host.nodes, 0)
         self._behind = list(behind)
-
-    def _start(self, name: str, parameters: Path) -> subprocess.Popen[bytes]:
-        command = [sys.executable, "-m", "cspm_ros.runtime.node_main", name]
-        with (self._log / f"{name}.log").open("wb") as log:
-            return subprocess.Popen(
-                [*command, "--ros-args", "--params-file", str(parameters)],
-                stdin=subprocess.PIPE,
-                stdout=log,
-                stderr=subprocess.STDOUT,
-                # Ctrl-C in a terminal goes to a whole group; the nodes end in their own order.
-                start_new_session=True,
-            )
 
     def begin(self) -> None:
         """Note that the run has begun: who has time gives way. The start waits for them as well."""
         while self._behind:
-            put_behind(self.by_name[self._behind.pop()].pid)
+            process = self.by_name[self._behind.pop()].pid
+            if process is not None:
+                put_behind(process)
 
     def ended(self) -> dict[str, int]:
         """Return the exit codes of those that ended; a signal is negative."""
@@ -109,35 +95,30 @@ class NodeProcesses:
         return found
 
     def _last_words(self, name: str) -> str:
-        text = (self._log / f"{name}.log").read_text(errors="replace")[-_TAIL:]
+        # A host that fails before it has forked any node speaks for all.
+        files = [self._log / f"{name}.log", self._log / HOST_LOG]
+        text = next(filter(None, (file.read_text(errors="replace") for file in files)), "")[-_TAIL:]
         lines = [line for line in text.splitlines() if line.strip()]
         return lines[-1] if lines else ""
 
     def wait(self, seconds: float) -> bool:
         """Wait for all to end; return whether they did."""
         deadline = time.monotonic() + seconds
-        for process in self.by_name.values():
-            try:
-                process.wait(max(0.0, deadline - time.monotonic()))
-            except subprocess.TimeoutExpired:
-                return False
-        return True
+        return all(
+            process.wait(max(0.0, deadline - time.monotonic())) for process in self.by_name.values()
+        )
 
     def close(self) -> None:
         """End all that still run, the stubborn by force."""
         for process in self.by_name.values():
-            if process.poll() is None:
-                process.send_signal(signal.SIGTERM)
-                # Who was stopped can end in order as well.
-                process.send_signal(signal.SIGCONT)
+            process.send_signal(signal.SIGTERM)
+            # Who was stopped can end in order as well.
+            process.send_signal(signal.SIGCONT)
         if not self.wait(LEAVING_S):
             for process in self.by_name.values():
-                if process.poll() is None:
-                    process.kill()
+                process.send_signal(signal.SIGKILL)
             self.wait(LEAVING_S)
-        for process in self.by_name.values():
-            if process.stdin is not None:
-                process.stdin.close()
+        self._host.close()
 
     def __enter__(self) -> Self:
         return self
@@ -146,7 +127,7 @@ class NodeProcesses:
         self.close()
 
 
-def _is_stopped(process: int) -> bool:
+def _is_stopped(process: int | None) -> bool:
     """Return whether a signal has stopped a process; False where the system does not show it."""
     try:
         state = Path(f"/proc/{process}/stat").read_text(errors="replace")

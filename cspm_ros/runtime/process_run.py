@@ -18,6 +18,7 @@ from cspm_msgs_py.ros.domain_claim import refuse_claimed
 from cspm_msgs_py.schedule import PLANT, schedule_of
 from cspm_ros.runtime.background import SHARE_BEHIND
 from cspm_ros.runtime.exit_watchdog import IN_ORDER
+from cspm_ros.runtime.hosted_process import NodeHost
 from cspm_ros.runtime.node_parameters import LOCKSTEP, REALTIME, NodeParameters, write_parameters
 from cspm_ros.runtime.node_processes import LEAVING_S, SILENCE_S, NodeProcesses
 from cspm_ros.runtime.progress_file import Report, read_report
@@ -103,7 +104,9 @@ def run_processes(
         with (
             _environment(domain_id),
             interruptible() as stop_wanted,
-            NodeProcesses(started, place / "parameters.yaml", place, behind) as processes,
+            NodeProcesses(
+                NodeHost(started, place / "parameters.yaml", place), place, behind
+            ) as processes,
         ):
             leader = RECORDER if external else PLANT
             follower = _Follower(

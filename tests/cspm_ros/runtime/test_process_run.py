@@ -25,6 +25,7 @@ from ros_graph import (
     load_ros,
     new_domain,
     node_processes,
+    words_of,
 )
 from run_samples import bundle_of
 
@@ -224,7 +225,7 @@ def test_the_nodes_end_with_a_launcher_that_is_killed(tmp_path, when):
             wait_for(lambda: len(node_processes(process.pid)) == len(NODES), process)
         nodes = node_processes(process.pid)
         assert set(nodes) == set(NODES)
-        words = nodes["plant"].cmdline()
+        words = words_of(nodes["plant"])
         place = Path(words[words.index("--params-file") + 1]).parent
     finally:
         process.kill()

@@ -14,6 +14,7 @@ from cspm_msgs_py.graph import RECORDER  # noqa: E402
 from cspm_msgs_py.schedule import FORCE_CONTROLLER, PLANT  # noqa: E402
 from cspm_ros.runtime import process_run  # noqa: E402 - after ROS is known to be there
 from cspm_ros.runtime import stall_watchdog as watch  # noqa: E402
+from cspm_ros.runtime.node_processes import NodeProcesses  # noqa: E402
 from cspm_ros.runtime.process_run import _Follower  # noqa: E402
 from cspm_ros.runtime.progress_file import Report  # noqa: E402
 from cspm_ros.runtime.stall_watchdog import PATIENCE_S, Patience  # noqa: E402
@@ -284,12 +285,31 @@ def test_nodes_may_take_as_long_to_leave_as_they_took_to_start(
     assert allowed == [wanted]
 
 
+class Host:
+    """Nodes that are no processes of a run."""
+
+    def __init__(self, **nodes):
+        self.nodes = nodes
+
+    def close(self):
+        pass
+
+
+class Program:
+    """A program in a node's place."""
+
+    def __init__(self, *words):
+        self._process = subprocess.Popen(words)
+        self.pid = self._process.pid
+        self.poll, self.send_signal = self._process.poll, self._process.send_signal
+
+    def wait(self, seconds):
+        return self._process.wait(seconds) is not None
+
+
 def test_a_node_is_asked_to_end_once(tmp_path):
     """A second signal would end it without order."""
-    from cspm_ros.runtime.node_processes import NodeProcesses
-
     sent = []
-    processes = NodeProcesses((), tmp_path / "parameters.yaml", tmp_path)
 
     class Child:
         def poll(self):
@@ -298,25 +318,26 @@ def test_a_node_is_asked_to_end_once(tmp_path):
         def send_signal(self, number):
             sent.append(number)
 
-    processes.by_name[PLANT] = Child()
+    processes = NodeProcesses(Host(plant=Child()), tmp_path)
     for _ in range(3):
         processes.stop(PLANT)
     assert sent == [signal.SIGINT]
 
 
 def test_no_answer_comes_from_who_is_stopped_and_not_from_who_is_slow(tmp_path):
-    from cspm_ros.runtime.node_processes import NodeProcesses
-
-    processes = NodeProcesses((), tmp_path / "parameters.yaml", tmp_path)
     (tmp_path / f"{FORCE_CONTROLLER}.log").write_text("cspm: nothing moved for 4 s: it waits\n")
-    commands = {PLANT: ["sleep", "600"], FORCE_CONTROLLER: ["false"], RECORDER: ["sleep", "0.5"]}
-    processes.by_name = {name: subprocess.Popen(words) for name, words in commands.items()}
-    processes.by_name[PLANT].send_signal(signal.SIGSTOP)
+    host = Host(
+        plant=Program("sleep", "600"),
+        force_controller=Program("false"),
+        recorder=Program("sleep", "0.5"),
+    )
+    processes = NodeProcesses(host, tmp_path)
+    host.nodes[PLANT].send_signal(signal.SIGSTOP)
     try:
-        processes.by_name[FORCE_CONTROLLER].wait()
+        host.nodes[FORCE_CONTROLLER].wait(60.0)
         reported = processes.obituary(FORCE_CONTROLLER, 600.0)
     finally:
-        processes.by_name[PLANT].kill()
+        host.nodes[PLANT].send_signal(signal.SIGKILL)
         processes.wait(60.0)
     assert reported == (
         "no answer from plant; force_controller ended with exit code 1 before the run did: cspm:"

@@ -102,12 +102,17 @@ def assert_same(folder, other):
     assert hashes(folder) == hashes(other)
 
 
+def words_of(process):
+    """Return a process's command line as words; a process that was forked has it as one text."""
+    return " ".join(process.cmdline()).split()
+
+
 def node_processes(parent=None):
     """Return the processes of a run's nodes, by node, that descend from a process."""
     found = {}
     for process in psutil.Process(parent).children(recursive=True):
         try:
-            words = process.cmdline()
+            words = words_of(process)
         except psutil.Error:
             continue
         if "cspm_ros.runtime.node_main" in words:

@@ -124,7 +124,7 @@ class NodeHost:
             self._process.terminate()
 
     def close(self) -> None:
-        """Close the standard input of host and nodes, which ends those that are left."""
+        """Close the standard input of host and nodes; end by force who does not end then."""
         with self._process as process:
             if process.stdin is not None:
                 process.stdin.close()
@@ -132,3 +132,4 @@ class NodeHost:
                 process.wait(_CLOSING_S)
             except subprocess.TimeoutExpired:
                 process.kill()
+                self._lost(-signal.SIGKILL)

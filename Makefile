@@ -7,7 +7,7 @@ SCENARIO ?= worst_case worst_case_past_thesis
 # More workers than processors: tests of real time and of ROS 2 wait more than they compute. Each
 # begins with its share of the files in order, and takes over from another what that has not begun:
 # all end together, and few files are set up twice.
-WORKERS ?= $(shell echo $$(( $$(nproc) * 3 / 2 )))
+WORKERS ?= $(shell $(PYTHON) -c 'import os; print(os.cpu_count() * 3 // 2)')
 SPREAD := -n $(WORKERS) --dist worksteal
 
 # A process per node imports some 200 modules of this project: compiled anew each time, unless kept.

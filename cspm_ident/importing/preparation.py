@@ -88,15 +88,15 @@ def _report(
     suspicions = [
         Suspicion(where, "empty", "no number at all, left out") for where in gathered.empty
     ]
-    suspicions += suspicions_of(gathered, testbed.testbed, origin)
+    found, unjudged = suspicions_of(gathered, testbed.testbed, origin)
     return ImportReport(
         _about(path, mapping, testbed),
         source.kind,
         origin,
-        source.notes,
+        [*source.notes, *unjudged],
         _unused(source, plan),
         reports,
-        suspicions,
+        suspicions + found,
     )
 
 

@@ -39,8 +39,9 @@ CHECKS: dict[str, Check] = {
         "`unit`, `scale` or `sign`, or the drum in the test-bed",
     ),
     "late": Check(
-        "torque against motion and tension, or velocity against position, by more than a sample and"
-        " four times the scatter of eight segments (within 0.25 s); with the drift between clocks",
+        "torque against motion and tension, velocity against position, or poses against the winches"
+        " (by inverse kinematics), by more than a sample and four times the scatter of eight"
+        " segments or of the winches (within 0.25 s); with the drift between clocks",
         "a `clock` of its own with that `offset`, less where it is late, and `skew` for a drift",
     ),
     "stuck": Check(
@@ -50,8 +51,9 @@ CHECKS: dict[str, Check] = {
     ),
     "implausible": Check(
         "above twice the torque or tension limit, below a thousandth of it, a pushing cable, more"
-        " than 20 m wound, 50 m away, more than a turn of roll",
-        "`unit`, `sign` or `offset`",
+        " than 20 m wound, 50 m away, more than a turn of roll; a winch or the bar accelerates by"
+        " twice what torque, tension and weight allow, again and again",
+        "`unit`, `sign` or `offset`, or `unit` of the clock",
     ),
     "constant": Check("nothing changes", "leave it out, or state it as `constant`"),
     "empty": Check("no number at all", "leave it out"),

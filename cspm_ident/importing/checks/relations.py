@@ -46,14 +46,24 @@ _LIKELY = {
 }
 
 
-def relation_suspicions(messages: Mapping[str, TopicMessages], testbed: Testbed) -> list[Suspicion]:
-    """Return which channels contradict each other."""
+def relation_suspicions(
+    messages: Mapping[str, TopicMessages], testbed: Testbed, poses: Lateness | None
+) -> list[Suspicion]:
+    """Return which channels contradict each other.
+
+    Args:
+        messages: what was imported, by topic.
+        testbed: the machine.
+        poses: how late they are, if that can be said.
+    """
     found: list[Suspicion] = []
     origin = min(int(one.stamp_ns.min()) for one in messages.values())
     for where, position, velocity in _position_pairs(messages, origin):
         found += velocity_suspicions(where, position, velocity)
         found += stuck_suspicions(where.replace("velocity", "position"), position, velocity)
         found += late_suspicions(where, "the position", lateness(velocity, position, [], (1,)))
+    if poses is not None:
+        found += late_suspicions("/bar/pose", "the winches, by inverse kinematics", poses)
     state = messages.get(_STATE)
     if state is not None and "effort" in state.topic.parts:
         for cable in testbed.cables:

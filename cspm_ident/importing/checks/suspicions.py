@@ -5,13 +5,16 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
+from cspm_ident.importing.checks.acceleration import acceleration_suspicions
 from cspm_ident.importing.checks.clock_suspicions import message_suspicions, overlap_suspicions
 from cspm_ident.importing.checks.outlier_suspicions import (
     mended_suspicions,
     outlier_suspicions,
 )
 from cspm_ident.importing.checks.pace import pace_of
+from cspm_ident.importing.checks.pose_lateness import comparable, pose_lateness
 from cspm_ident.importing.checks.relations import relation_suspicions
+from cspm_ident.importing.checks.series import series_of
 from cspm_ident.importing.checks.stuck import frozen_suspicions
 from cspm_ident.importing.checks.suspicion import Suspicion
 from cspm_ident.importing.checks.time_suspicions import held_suspicions, time_suspicions
@@ -29,15 +32,32 @@ _TENSION, _POSES = "/cables/tension", ("/bar/pose", "/winch_frame/pose", "/targe
 _HELD_SAMPLE = 100_000
 
 
-def suspicions_of(gathered: Gathered, testbed: Testbed, origin_ns: int) -> list[Suspicion]:
-    """Return all that looks wrong; its times count from the origin [ns]."""
+_UNJUDGED = (
+    "whether poses are late against the winches cannot be said: too short, too little motion,"
+    " or lengths that the test-bed's geometry does not explain"
+)
+
+
+def suspicions_of(
+    gathered: Gathered, testbed: Testbed, origin_ns: int
+) -> tuple[list[Suspicion], list[str]]:
+    """Return all that looks wrong, and what could not be judged.
+
+    Args:
+        gathered: what was imported.
+        testbed: the machine.
+        origin_ns: the instant from which times count [ns].
+    """
     found: list[Suspicion] = []
     for planned in gathered.topics:
         name = planned.topic.name
         found += _of_topic(planned, gathered.messages[name], testbed, origin_ns)
         found += _of_fields(planned, gathered, testbed, origin_ns)
     found += overlap_suspicions(gathered.messages)
-    return found + relation_suspicions(gathered.messages, testbed)
+    compared = comparable(gathered.messages, testbed)
+    poses = pose_lateness(gathered.messages, testbed, origin_ns) if compared else None
+    unjudged = [_UNJUDGED] if compared and poses is None else []
+    return found + relation_suspicions(gathered.messages, testbed, poses), unjudged
 
 
 def _of_topic(
@@ -94,6 +114,8 @@ def _of_fields(
         values, where = messages.values(field.name), f"{name} {field.name}"
         quantity = field.conversion.quantity
         found += value_suspicions(planned.topic, field.name, quantity, values, testbed)
+        series = series_of(messages, field.name, origin_ns)
+        found += acceleration_suspicions(planned.topic, field.name, quantity, series, testbed)
         unwrapped = gathered.unwrapped[name].get(field.name)
         found += _unwrap_suspicions(where, unwrapped)
         found += outlier_suspicions(where, field, values, messages.stamp_ns, origin_ns)

@@ -41,9 +41,10 @@ test-fast: $(VENV)/test.stamp ## the tests without the slow ones
 kernels: $(VENV)/test.stamp ## compile what all runs share, so that no two tests do it at once
 	@$(BIN)/cspm run calm --duration 0.01 --no-record > /dev/null
 
-lint: $(VENV)/test.stamp ## style and types
+lint: $(VENV)/test.stamp ## style, spelling and types
 	$(BIN)/ruff check .
 	$(BIN)/ruff format --check .
+	$(BIN)/codespell
 	$(BIN)/mypy
 
 coverage: $(VENV)/test.stamp ## line coverage with the kernels uncompiled
@@ -96,5 +97,5 @@ $(VENV)/native.stamp: $(VENV)/pip.stamp pyproject.toml setup.cfg
 
 $(VENV)/test.stamp: $(VENV)/$(ROS).stamp
 	@echo "cspm: adding what the tests need"
-	@$(PIP) -e '.[test]'
+	@$(PIP) -e '.[test,docs]'
 	@touch $@

@@ -16,11 +16,11 @@ from cspm_msgs_py.graph import RECORDER
 from cspm_msgs_py.interruption import interruptible
 from cspm_msgs_py.ros.domain_claim import refuse_claimed
 from cspm_msgs_py.schedule import PLANT, schedule_of
-from cspm_ros.runtime.background import SHARE_BEHIND
+from cspm_ros.processes.background import SHARE_BEHIND
 from cspm_ros.runtime.exit_watchdog import IN_ORDER
-from cspm_ros.runtime.hosted_process import NodeHost
+from cspm_ros.processes.hosted_process import NodeHost
 from cspm_ros.runtime.node_parameters import LOCKSTEP, REALTIME, NodeParameters, write_parameters
-from cspm_ros.runtime.node_processes import LEAVING_S, SILENCE_S, NodeProcesses
+from cspm_ros.processes.node_processes import LEAVING_S, SILENCE_S, NodeProcesses
 from cspm_ros.runtime.progress_file import Report, read_report
 from cspm_ros.runtime.stall_watchdog import PATIENCE_S, Patience, StartWatch
 from cspm_run.bundle import SCENARIO, Bundle
@@ -171,8 +171,7 @@ class _Follower:
             if report.simulated:
                 processes.begin()
             progress(report.simulated)
-            for warning in processes.warnings():
-                notify(warning)
+            self._pass_on(notify)
             self._look_for_dead(self._dead(ended, report))
             if not report.simulated:
                 self._look_at_start(start, report.waiting)
@@ -185,7 +184,13 @@ class _Follower:
             time.sleep(_LOOK_EVERY_S)
         report = read_report(self._path)
         self._see_off(report, stop_wanted())
+        self._pass_on(notify)
         return report
+
+    def _pass_on(self, notify: Callable[[str], None]) -> None:
+        """Hand on what the nodes have warned of since the last call."""
+        for warning in self._processes.warnings():
+            notify(warning)
 
     @property
     def _longest_leaving_s(self) -> float:

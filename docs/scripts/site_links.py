@@ -16,6 +16,8 @@ from mkdocs.structure.files import File, Files
 ROOT = Path(__file__).resolve().parents[2]
 LINK = re.compile(r"(!?)\[([^\]]*)\]\((\.\.[^)\s#]*)(?:#[^)\s]*)?\)")
 CELL = re.compile(r"<td.*?</td>", re.DOTALL)
+# The theme's, without names.
+SEARCH = ('data-md-component="search" role="dialog"', 'id="__search"')
 CODE = re.compile(r"(?<=<code>)[^<]+(?=</code>)")
 
 
@@ -53,8 +55,15 @@ def on_page_markdown(markdown: str, page: _Page, **_: object) -> str:
 
 
 def on_post_page(output: str, **_: object) -> str:
-    """Let names in cells be broken; search has read the page before."""
+    """Let names in cells be broken, and name the search for readers of screens."""
+    for part in SEARCH:
+        output = output.replace(part, f'{part} aria-label="Search"')
     return CELL.sub(lambda cell: CODE.sub(_breakable, cell[0]), output)
+
+
+def on_post_template(output_content: str, **_: object) -> str:
+    """Treat pages that come from no Markdown alike."""
+    return on_post_page(output_content)
 
 
 def _breakable(name: re.Match[str]) -> str:

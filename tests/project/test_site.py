@@ -9,6 +9,8 @@ from pathlib import Path
 from urllib.parse import unquote, urlsplit
 
 import pytest
+from accessibility import serious_findings
+from driven_browser import driven_browser
 
 ROOT = Path(__file__).resolve().parents[2]
 LEADS = {"a": "href", "img": "src", "link": "href", "script": "src"}
@@ -97,18 +99,38 @@ def test_the_check_sees_dead_ends(tmp_path: Path) -> None:
     assert dead_ends(tmp_path) == ["a.html: c.png", "a.html: b.html#nowhere"]
 
 
-@pytest.mark.slow
-def test_the_site_is_built_without_a_warning_and_leads_nowhere_wrong(tmp_path: Path) -> None:
+@pytest.fixture(scope="module")
+def site(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """The site, built without a warning."""
     pytest.importorskip("mkdocs", reason="pip install -e '.[docs]'")
-    words = ["mkdocs", "build", "--strict", "--site-dir", str(tmp_path)]
+    folder: Path = tmp_path_factory.mktemp("site")
+    words = ["mkdocs", "build", "--strict", "--site-dir", str(folder)]
     found = subprocess.run(
         [sys.executable, "-m", *words], cwd=ROOT, capture_output=True, text=True, check=False
     )
     assert found.returncode == 0, found.stderr
+    return folder
+
+
+@pytest.mark.slow
+def test_nothing_on_the_site_leads_nowhere(site: Path) -> None:
     # Of files, without a server: the index of the search as a script, and what runs it.
-    assert (tmp_path / "search" / "search_index.js").exists()
-    assert (tmp_path / "assets" / "iframe-worker.js").exists()
-    python = (tmp_path / "reference" / "python.html").read_text(encoding="utf-8")
+    assert (site / "search" / "search_index.js").exists()
+    assert (site / "assets" / "iframe-worker.js").exists()
+    python = (site / "reference" / "python.html").read_text(encoding="utf-8")
     cspm = importlib.import_module("cspm")
     assert [name for name in cspm.__all__ if f'id="cspm.{name}"' not in python] == []
-    assert dead_ends(tmp_path) == []
+    assert dead_ends(site) == []
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("scheme", ["default", "slate"])
+def test_pages_of_each_kind_can_be_read_by_all(site: Path, scheme: str, tmp_path: Path) -> None:
+    dark = f"document.body.setAttribute('data-md-color-scheme', '{scheme}')"
+    with driven_browser(tmp_path) as browser:
+        for page in ("index", "tutorials/your-controller", "how-to/view", "explanation/model"):
+            browser.open((site / f"{page}.html").as_uri())
+            browser.run(dark)
+            # Colours change in an eighth of a second.
+            browser.run("await Promise.all(document.getAnimations().map(each => each.finished))")
+            assert (page, serious_findings(browser)) == (page, [])

@@ -6,6 +6,7 @@ from base64 import b64decode
 
 import numpy as np
 import pytest
+from accessibility import serious_findings
 from driven_browser import driven_browser
 
 import cspm
@@ -122,6 +123,7 @@ def test_two_runs_fit_a_telephone(rest, browser, tmp_path):
     browser.drawn()
     wide, seen = browser.run(WIDTHS)
     assert wide <= seen <= 400
+    assert serious_findings(browser) == []
     assert browser.errors() == []
 
 

@@ -12,9 +12,9 @@ load_ros()
 from cspm_msgs_py.errors import CspmError  # noqa: E402
 from cspm_msgs_py.graph import RECORDER  # noqa: E402
 from cspm_msgs_py.schedule import FORCE_CONTROLLER, PLANT  # noqa: E402
+from cspm_ros.processes.node_processes import NodeProcesses  # noqa: E402
 from cspm_ros.runtime import process_run  # noqa: E402 - after ROS is known to be there
 from cspm_ros.runtime import stall_watchdog as watch  # noqa: E402
-from cspm_ros.runtime.node_processes import NodeProcesses  # noqa: E402
 from cspm_ros.runtime.process_run import _Follower  # noqa: E402
 from cspm_ros.runtime.progress_file import Report  # noqa: E402
 from cspm_ros.runtime.stall_watchdog import PATIENCE_S, Patience  # noqa: E402

@@ -17,11 +17,14 @@ from cspm_ros.runtime.node_run import _spin  # noqa: E402
 
 pytestmark = pytest.mark.compiled
 
-# What a process does of which the others never hear, once Python runs it as this node.
+# What a process does of which the others never hear, once it has become this node.
 _AT_START = """
-import os, sys, time
-if "motion_controller" in sys.orig_argv:
-    {act}
+import os, time
+import cspm_ros.runtime.node_main as program
+main = program.main
+def act(name, *others):
+    return {act} if name == "motion_controller" else main(name, *others)
+program.main = act
 """
 
 

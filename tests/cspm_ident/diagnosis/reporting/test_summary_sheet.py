@@ -3,6 +3,7 @@
 import re
 
 import pytest
+from accessibility import serious_findings
 from diagnosis_samples import diagnosis
 from driven_browser import driven_browser
 
@@ -56,4 +57,14 @@ def test_it_prints_to_one_sheet_and_shows_before_plots_are_drawn(page, tmp_path)
         assert first > 0.0
         while not browser.run("return document.querySelectorAll('.main-svg').length"):
             browser.drawn()
+        assert serious_findings(browser) == []
         assert browser.errors() == []
+
+
+@pytest.mark.slow
+def test_a_picture_without_words_is_a_serious_finding(tmp_path):
+    page = tmp_path / "page.html"
+    page.write_text("<html lang=en><title>A</title><h1>A</h1><img src=a.png>", encoding="utf-8")
+    with driven_browser(tmp_path / "profile") as browser:
+        browser.open(page.as_uri())
+        assert [rule for rule, _ in serious_findings(browser)] == ["image-alt"]

@@ -11,7 +11,7 @@ from ros_graph import load_ros, words_of
 load_ros()
 
 from cspm_msgs_py.schedule import PLANT  # noqa: E402 - after ROS is known to be there
-from cspm_ros.runtime.hosted_process import HOST_LOG, NodeHost  # noqa: E402
+from cspm_ros.processes.hosted_process import HOST_LOG, NodeHost  # noqa: E402
 
 LONG_S = 120.0
 

@@ -8,7 +8,7 @@ from pathlib import Path
 
 import pytest
 
-from cspm_ros.runtime.background import put_behind
+from cspm_ros.processes.background import put_behind
 
 _TELL = """
 import json, os, threading

@@ -10,8 +10,8 @@ from pathlib import Path
 
 from typing_extensions import Self
 
-from cspm_ros.runtime.background import put_behind
-from cspm_ros.runtime.hosted_process import HOST_LOG, NodeHost
+from cspm_ros.processes.background import put_behind
+from cspm_ros.processes.hosted_process import HOST_LOG, NodeHost
 from cspm_ros.runtime.stall_watchdog import STANDSTILL
 
 LEAVING_S = 5.0

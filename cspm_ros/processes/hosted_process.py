@@ -12,7 +12,7 @@ from collections.abc import Sequence
 from contextlib import suppress
 from pathlib import Path
 
-from cspm_ros.runtime.node_host import ENDED, STARTED
+from cspm_ros.processes.node_host import ENDED, STARTED
 
 HOST_LOG = "host.log"
 _BYTES = 65536
@@ -79,7 +79,7 @@ class NodeHost:
         for name in names:
             (log / f"{name}.log").touch()
         self._rest = b""
-        command = [sys.executable, "-m", "cspm_ros.runtime.node_host", str(parameters), str(log)]
+        command = [sys.executable, "-m", "cspm_ros.processes.node_host", str(parameters), str(log)]
         with (log / HOST_LOG).open("wb") as errors:
             self._process = subprocess.Popen(
                 [*command, *names],

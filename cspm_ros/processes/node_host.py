@@ -11,7 +11,7 @@ from pathlib import Path
 from setproctitle import setproctitle
 
 from cspm_ros.runtime.node_main import ROS_ARGS, main
-from cspm_ros.runtime.preload import preload
+from cspm_ros.processes.preload import preload
 
 # What the host says of a node, a line each: what, the node's name and a number.
 STARTED, ENDED = "started", "ended"

@@ -10,8 +10,8 @@ from pathlib import Path
 
 from setproctitle import setproctitle
 
-from cspm_ros.runtime.node_main import ROS_ARGS, main
 from cspm_ros.processes.preload import preload
+from cspm_ros.runtime.node_main import ROS_ARGS, main
 
 # What the host says of a node, a line each: what, the node's name and a number.
 STARTED, ENDED = "started", "ended"

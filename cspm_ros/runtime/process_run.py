@@ -17,10 +17,10 @@ from cspm_msgs_py.interruption import interruptible
 from cspm_msgs_py.ros.domain_claim import refuse_claimed
 from cspm_msgs_py.schedule import PLANT, schedule_of
 from cspm_ros.processes.background import SHARE_BEHIND
-from cspm_ros.runtime.exit_watchdog import IN_ORDER
 from cspm_ros.processes.hosted_process import NodeHost
-from cspm_ros.runtime.node_parameters import LOCKSTEP, REALTIME, NodeParameters, write_parameters
 from cspm_ros.processes.node_processes import LEAVING_S, SILENCE_S, NodeProcesses
+from cspm_ros.runtime.exit_watchdog import IN_ORDER
+from cspm_ros.runtime.node_parameters import LOCKSTEP, REALTIME, NodeParameters, write_parameters
 from cspm_ros.runtime.progress_file import Report, read_report
 from cspm_ros.runtime.stall_watchdog import PATIENCE_S, Patience, StartWatch
 from cspm_run.bundle import SCENARIO, Bundle

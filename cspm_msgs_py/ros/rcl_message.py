@@ -97,6 +97,15 @@ def take_address() -> int | None:
     return ctypes.cast(take, ctypes.c_void_p).value
 
 
+def clear_error() -> None:
+    """Forget the last error of rcl in this thread, which the next one would complain about.
+
+    Raises:
+        OSError: rclpy is not loaded.
+    """
+    rcl_library("librcutils.so").rcutils_reset_error()
+
+
 def rcl_library(name: str) -> ctypes.CDLL:
     """Return a library that rclpy has loaded: another copy would not know its subscriptions.
 

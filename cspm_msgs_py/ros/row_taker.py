@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 from cspm_msgs_py.errors import CspmError
 from cspm_msgs_py.layout import layout_of
 from cspm_msgs_py.ros import take_kernel as kernel
-from cspm_msgs_py.ros.rcl_message import RclMessage
+from cspm_msgs_py.ros.rcl_message import RclMessage, clear_error
 from cspm_msgs_py.topics import POSE, Topic
 from cspm_msgs_py.wire import mask_of
 
@@ -121,6 +121,7 @@ class RowTaker:
     def _other(self, end: int) -> TakenBytes:
         """Return the message that lies in the buffer."""
         if end != kernel.STRANGE:
+            clear_error()
             raise CspmError(f"{self._topic.name}: rcl takes no messages (its code {end})")
         message = self._message
         number = int(message.state[kernel.FOUND_NUMBER])

@@ -1,4 +1,4 @@
-"""Drives, load cells and motion capture: a driver to fill in; see docs/how-to/bring-hardware.md."""
+"""Drives, load cells and motion capture: a driver to fill in; see docs/reference/driver-topics.md."""
 
 import signal
 import sys

@@ -1,7 +1,7 @@
 """How near `cspm compare` comes to the noise where nothing is missing, and which delays it finds.
 
 `python -m bench.accuracy.compare_tables` records, compares, and writes the two tables of
-docs/how-to/compare.md.
+docs/explanation/comparison.md.
 """
 
 from __future__ import annotations
@@ -27,7 +27,7 @@ from cspm_run.recorded_run import run
 
 ROOT = Path(__file__).resolve().parents[2]
 SCENARIOS = ROOT / "scenarios"
-PAGE = ROOT / "docs" / "how-to" / "compare.md"
+PAGE = ROOT / "docs" / "explanation" / "comparison.md"
 # By how much stamps of bar and frame are shifted [s].
 SHIFTS = (
     (0.0, 0.0),

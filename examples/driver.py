@@ -1,4 +1,4 @@
-"""Drives, load cells and motion capture: a driver to fill in; see docs/reference/driver-topics.md."""
+"""Drives, load cells and motion capture: to fill in; see docs/reference/driver-topics.md."""
 
 import signal
 import sys

@@ -8,6 +8,8 @@ from math import isnan, nan
 
 from cspm_ident.importing.conversion import Conversion, conversion_of
 from cspm_ident.importing.mapping import ChannelSource, Clock, MappingFile
+from cspm_ident.importing.sources.joined_source import file_of
+from cspm_ident.importing.sources.row_choice import row_choice
 from cspm_ident.importing.sources.source import Source
 from cspm_ident.importing.units import field_quantity
 from cspm_msgs_py.errors import InputError
@@ -106,7 +108,8 @@ def plan_import(mapping: MappingFile, testbed: Testbed, source: Source) -> Impor
             )
         key = f"{where}: channels.{name}"
         topic = _topic_with(possible[name], list(fields), key)
-        read = [_field(topic, f, fields[f], clocks, source, f"{key}.{f}") for f in fields]
+        files = mapping.mapping.files
+        read = [_field(topic, f, fields[f], clocks, source, files, f"{key}.{f}") for f in fields]
         # Load cells on some cables: the others have no number.
         rest = [PlannedField(f, None, nan) for f in topic.fields if f not in fields]
         planned.append(PlannedTopic(topic, (*read, *rest) if topic.joint_names else tuple(read)))
@@ -166,19 +169,49 @@ def _field(
     given: ChannelSource,
     clocks: dict[str, Clock],
     source: Source,
+    files: Collection[str],
     where: str,
 ) -> PlannedField:
     if given.column is None:
         return PlannedField(name, None, given.constant)
-    chosen = given.clock or next(iter(clocks))
+    chosen = given.clock or _own_clock(given.column, clocks, files, where)
     clock = clocks[chosen]
     if clock.stamp is not None:
         stamps: tuple[str, ...] = (source.stamp_column(given.column, clock.stamp),)
     elif clock.column is not None and source.stamped:
         raise InputError(f"{where}: clock '{chosen}' has a column, allowed: stamp or rate in a bag")
     else:
-        stamps = clock.columns
+        _check_file(given.column, chosen, clock, files, where)
+        stamps = tuple(_same_rows(each, given.column, source) for each in clock.columns)
     header = clock.stamp == "header"
     logged = source.stamp_column(given.column, "log") if header else None
     conversion = conversion_of(given, field_quantity(topic, name), where)
     return PlannedField(name, given.column, None, conversion, given, chosen, stamps, logged)
+
+
+def _own_clock(column: str, clocks: dict[str, Clock], files: Collection[str], where: str) -> str:
+    """Return the first clock that can be of a column's file."""
+    own = file_of(column, files)
+    for name, clock in clocks.items():
+        if all(file_of(each, files) == own for each in clock.columns):
+            return name
+    raise InputError(
+        f"{where}: no clock of file '{own or 'that is imported'}', allowed: one whose column is in"
+        " the channel's own file"
+    )
+
+
+def _check_file(column: str, name: str, clock: Clock, files: Collection[str], where: str) -> None:
+    if any(file_of(each, files) != file_of(column, files) for each in clock.columns):
+        raise InputError(
+            f"{where}: clock '{name}' is of another file than column '{column}', allowed: a clock"
+            " of its own file"
+        )
+
+
+def _same_rows(stamp: str, column: str, source: Source) -> str:
+    """Return the column of stamps in those rows that a column takes."""
+    choice = None if column in source.columns else row_choice(column)
+    if choice is None or row_choice(stamp) is not None:
+        return stamp
+    return choice._replace(column=stamp).name

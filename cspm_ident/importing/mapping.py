@@ -222,6 +222,18 @@ class CsvFormat(StrictModel):
         return self
 
 
+class BesideFile(StrictModel):
+    """Another file of the experiment.
+
+    Attributes:
+        path: seen from the folder of the mapping.
+        csv: how it is written, where it is a text table or a spreadsheet.
+    """
+
+    path: Annotated[str, Field(min_length=1)]
+    csv: CsvFormat = CsvFormat()
+
+
 class Mapping(StrictModel):
     """A whole mapping file. Build it with `load_mapping`.
 
@@ -229,6 +241,7 @@ class Mapping(StrictModel):
         name: what the recording shall be called.
         description: what it is of.
         csv: how a text table is written.
+        files: others beside the one that is imported, by the name before their columns.
         clocks: by name; the first serves every channel that names none.
         channels: by topic and field, such as `/winches/state` and `position/surge`.
         nan: what to do with a message of which a number is missing.
@@ -241,6 +254,7 @@ class Mapping(StrictModel):
     name: Name
     description: str = ""
     csv: CsvFormat = CsvFormat()
+    files: dict[Name, BesideFile] = Field(default_factory=dict)
     clocks: dict[str, Clock] = Field(default_factory=dict)
     channels: Annotated[
         dict[str, Annotated[dict[str, ChannelSource], Field(min_length=1)]], Field(min_length=1)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Collection
 from contextlib import closing
 from dataclasses import dataclass
 from pathlib import Path
@@ -17,7 +18,9 @@ from cspm_ident.importing.gathering import Gathered, gather_topics, stamps_of_cl
 from cspm_ident.importing.import_plan import ImportPlan, PlannedTopic, plan_import
 from cspm_ident.importing.mapping import MappingFile
 from cspm_ident.importing.report import ImportReport, topic_report
+from cspm_ident.importing.sources.joined_source import file_of
 from cspm_ident.importing.sources.opening import open_source
+from cspm_ident.importing.sources.row_choice import row_choice
 from cspm_ident.importing.sources.source import Progress, Source
 from cspm_ident.importing.topic_messages import TopicMessages
 from cspm_msgs_py.errors import InputError
@@ -94,7 +97,7 @@ def _report(
         source.kind,
         origin,
         [*source.notes, *unjudged],
-        _unused(source, plan),
+        _unused(source, plan, mapping.mapping.files),
         reports,
         suspicions + found,
     )
@@ -132,11 +135,22 @@ def _about(path: Path, mapping: MappingFile, testbed: TestbedFile) -> dict[str, 
         "mapping_sha256": mapping.sha256,
         "testbed": testbed.testbed.name,
         "testbed_sha256": testbed.sha256,
+        **_beside(mapping),
     }
 
 
-def _unused(source: Source, plan: ImportPlan) -> list[str]:
+def _beside(mapping: MappingFile) -> dict[str, str]:
+    """Return the files beside the imported one, if any, with their SHA-256."""
+    places = {name: mapping.path.parent / f.path for name, f in mapping.mapping.files.items()}
+    found = [f"{name}: {place.name} {fingerprint(place)}" for name, place in places.items()]
+    return {"files_sha256": ", ".join(found)} if found else {}
+
+
+def _unused(source: Source, plan: ImportPlan, files: Collection[str]) -> list[str]:
     used = {*plan.numbers, *plan.times}
+    for choice in filter(None, map(row_choice, (*plan.numbers, *plan.times))):
+        own = file_of(choice.column, files)
+        used |= {choice.column, f"{own}:{choice.key}" if own else choice.key}
     if source.stamped:
         topics = {name.rpartition(":")[0] for name in used}
         return [name for name in source.columns if name.rpartition(":")[0] not in topics]

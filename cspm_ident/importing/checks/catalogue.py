@@ -35,7 +35,7 @@ CHECKS: dict[str, Check] = {
     ),
     "torque": Check(
         "torque and tension are not tied by drum radius over gear ratio in the same regression:"
-        " factor below 0.5, above 2, or negative",
+        " factor below 0.5, above 2, or negative; their means likewise, where tension has one",
         "`unit`, `scale` or `sign`, or the drum in the test-bed",
     ),
     "late": Check(

@@ -40,11 +40,13 @@ class Balance(NamedTuple):
         friction: energy that friction takes, of what flows.
         inertia: [kg·m²].
         drum: torque by the tension, of tension times drum radius over gear ratio; None without.
+        level: mean torque over mean pull; None where the pull varies by more than its mean.
     """
 
     friction: Estimate
     inertia: Estimate
     drum: Estimate | None
+    level: float | None
 
 
 def drive_balance(
@@ -80,7 +82,15 @@ def drive_balance(
     if len(found) < FEWEST:
         return None
     friction, inertia, drum = (_estimate(np.array(one)) for one in zip(*found, strict=True))
-    return Balance(friction, inertia, drum if pull is not None else None)
+    if pull is None:
+        return Balance(friction, inertia, None, None)
+    return Balance(friction, inertia, drum, _level(goal, table[:, 3]))
+
+
+def _level(torque: Array, pull: Array) -> float | None:
+    """Return mean torque over mean pull, which feedback of a load cell's noise does not change."""
+    held = float(np.mean(pull))
+    return float(np.mean(torque)) / held if abs(held) > float(np.std(pull)) else None
 
 
 _Pair = tuple[float, float]

@@ -107,7 +107,7 @@ def balance_suspicions(where: str, balance: Balance | None) -> list[Suspicion]:
     """Return whether a torque has not the signs of friction, inertia and the cable's pull."""
     if balance is None:
         return []
-    found, (friction, inertia, drum) = [], balance
+    found, (friction, inertia, drum, level) = [], balance
     # A wrong sign reverses both; a loop that feeds back noise bends friction alone.
     may_be = not (inertia.is_sure and inertia.mean > 0.0)
     if friction.is_sure and friction.mean < -DISSIPATED and may_be:
@@ -119,6 +119,9 @@ def balance_suspicions(where: str, balance: Balance | None) -> list[Suspicion]:
         text += ": sign of torque or angle?"
         found.append(Suspicion(where, "power", text, inertia._asdict()))
     if drum is None or drum.share < EXPLAINED or 0.5 <= drum.mean <= 2.0:
+        return found
+    # A force loop answers its load cell's noise with more torque than the pull, not on average.
+    if level is not None and 0.5 <= level <= 2.0:
         return found
     if abs(drum.mean - 1.0) > 4.0 * drum.error:
         found.append(_drum(where, drum.mean, drum._asdict()))

@@ -15,6 +15,7 @@ from numpy.typing import NDArray
 
 from cspm_ident.importing.column_store import ColumnStore
 from cspm_ident.importing.mapping import CsvFormat
+from cspm_ident.importing.sources.row_choice import Labels
 from cspm_ident.importing.sources.row_shape import RowShape
 from cspm_ident.importing.sources.source import Progress, check_columns
 from cspm_ident.importing.sources.table_source import TableSource
@@ -33,7 +34,6 @@ class CsvSource(TableSource):
     """A text table with a column per quantity; see `Source`."""
 
     kind = "text table"
-    stamped = False
 
     def __init__(
         self, path: Path, form: CsvFormat, mapping_path: str, *, packed: bool = False
@@ -49,9 +49,8 @@ class CsvSource(TableSource):
         Raises:
             InputError: the file has no such line, or is no text in this encoding.
         """
-        self.path, self._form, self._packed = path, form, packed
-        self.notes: list[str] = []
-        self.time_units: dict[str, str] = {}
+        super().__init__(path)
+        self._form, self._packed = form, packed
         self._first = form.first_line or form.names_line + 1
         with self._open() as file:
             lines = _first_lines(file, self._first, path)
@@ -75,12 +74,12 @@ class CsvSource(TableSource):
         progress: Progress,
     ) -> None:
         """Store columns; see `Source`."""
-        wanted = check_columns(numbers, times, self.columns, self.path)
+        wanted = check_columns(numbers, times, self.columns, self.path, self.keys)
         places = {self.columns.index(name): name for name in wanted}
-        clocks = {
-            place: TimeCells(self.path, name, times[name])
+        clocks: dict[int, TimeCells | Labels] = {
+            place: self.keys.get(name) or TimeCells(self.path, name, times[name])
             for place, name in places.items()
-            if name in times
+            if name in self.keys or name in times
         }
         total, done = self.path.stat().st_size, 0
         total *= _PACKED if self._packed else 1
@@ -97,7 +96,7 @@ class CsvSource(TableSource):
         progress(1.0)
         self._conclude(clocks)
 
-    def _conclude(self, clocks: Mapping[int, TimeCells]) -> None:
+    def _conclude(self, clocks: Mapping[int, TimeCells | Labels]) -> None:
         for place, clock in clocks.items():
             if clock.unit is not None:
                 self.time_units[self.columns[place]] = clock.unit
@@ -149,7 +148,7 @@ class CsvSource(TableSource):
             raise InputError(f"{self.path}: damaged gzip data ({err})") from None
 
     def _parse(
-        self, lines: Lines, line: int, places: list[int], clocks: Mapping[int, TimeCells]
+        self, lines: Lines, line: int, places: list[int], clocks: Mapping[int, TimeCells | Labels]
     ) -> Table:
         exact = set(clocks)
         kind = np.dtype([(str(p), f"U{_TIME_CELL}" if p in exact else "f8") for p in places])

@@ -27,15 +27,11 @@ class LoadedTable(TableSource):
     Columns are numbers, dates of numpy (`datetime64`), or texts.
     """
 
-    kind: str
     columns: tuple[str, ...] = ()
-    stamped = False
 
     def __init__(self, path: Path) -> None:
         """Begin without columns; `_vectors` gets them."""
-        self.path = path
-        self.notes: list[str] = []
-        self.time_units: dict[str, str] = {}
+        super().__init__(path)
         self._vectors: dict[str, Vector] = {}
 
     def _vector(self, name: str) -> Vector:
@@ -50,14 +46,16 @@ class LoadedTable(TableSource):
         progress: Progress,
     ) -> None:
         """Store columns; see `Source`."""
-        wanted = check_columns(numbers, times, self.columns, self.path)
+        wanted = check_columns(numbers, times, self.columns, self.path, self.keys)
         for count, name in enumerate(wanted, start=1):
             vector = self._vector(name)
-            exact = name in times
-            store.append(
-                name,
-                self._times(name, vector, times[name]) if exact else self._numbers(name, vector),
-            )
+            if name in self.keys:
+                found: Vector = self.keys[name].read(vector.astype(str))
+            elif name in times:
+                found = self._times(name, vector, times[name])
+            else:
+                found = self._numbers(name, vector)
+            store.append(name, found)
             progress(count / len(wanted))
 
     def _numbers(self, name: str, vector: Vector) -> NDArray[np.float64]:

@@ -4,16 +4,20 @@ from __future__ import annotations
 
 import gzip
 import zlib
+from contextlib import ExitStack
 from pathlib import Path
 
-from cspm_ident.importing.mapping import MappingFile
+from cspm_ident.importing.mapping import CsvFormat, MappingFile
 from cspm_ident.importing.sources.bag_source import BagSource
+from cspm_ident.importing.sources.chosen_rows import ChosenRows
 from cspm_ident.importing.sources.csv_source import CsvSource
 from cspm_ident.importing.sources.hdf5_source import Hdf5Source
+from cspm_ident.importing.sources.joined_source import JoinedSource
 from cspm_ident.importing.sources.mat_source import MatSource
 from cspm_ident.importing.sources.parquet_source import ParquetSource
 from cspm_ident.importing.sources.source import Source
 from cspm_ident.importing.sources.spreadsheet_source import SpreadsheetSource
+from cspm_ident.importing.sources.table_source import TableSource
 from cspm_msgs_py.errors import InputError
 
 _HDF5 = b"\x89HDF\r\n\x1a\n"
@@ -28,11 +32,31 @@ ALLOWED = "allowed: a text table, .csv.gz, .xlsx, .parquet, .mat or HDF5 file, o
 
 
 def open_source(path: Path, mapping: MappingFile) -> Source:
-    """Return a file's columns, ready to be read.
+    """Return the columns of a file, and of those beside it, ready to be read.
 
     Raises:
-        InputError: it is missing, unreadable, or of no kind that can be read.
+        InputError: one is missing, unreadable, or of no kind that can be read.
     """
+    where, others = str(mapping.path), mapping.mapping.files
+    first = _opened(path, mapping.mapping.csv, where)
+    if not others:
+        return first
+    found: dict[str, Source] = {}
+    with ExitStack() as refused:
+        refused.callback(first.close)
+        if first.stamped:
+            raise InputError(f"{where}: files: beside a bag, allowed: beside a table")
+        for name, other in others.items():
+            place = mapping.path.parent / other.path
+            found[name] = _opened(place, other.csv, f"{where}: files.{name}")
+            refused.callback(found[name].close)
+            if found[name].stamped:
+                raise InputError(f"{where}: files.{name}.path: a bag, allowed: a table")
+        refused.pop_all()
+    return JoinedSource(first, found)
+
+
+def _opened(path: Path, form: CsvFormat, where: str) -> Source:
     if path.is_dir():
         return BagSource(path)
     try:
@@ -46,9 +70,8 @@ def open_source(path: Path, mapping: MappingFile) -> Source:
         raise InputError(f"{path}: an empty file, {ALLOWED}")
     if start.startswith(_BAGS):
         return BagSource(path)
-    if (table := _binary_table(path, start, mapping)) is not None:
-        return table
-    form = mapping.mapping.csv
+    if (table := _binary_table(path, start, form)) is not None:
+        return ChosenRows(table)
     packed = start.startswith(_GZIP)
     if packed:
         start = _unpacked_start(path)
@@ -56,16 +79,16 @@ def open_source(path: Path, mapping: MappingFile) -> Source:
     if b"\x00" in start and not wide:
         inside = " inside" if packed else ""
         raise InputError(f"{path}: no text{inside}, {ALLOWED}")
-    return CsvSource(path, form, str(mapping.path), packed=packed)
+    return ChosenRows(CsvSource(path, form, where, packed=packed))
 
 
-def _binary_table(path: Path, start: bytes, mapping: MappingFile) -> Source | None:
+def _binary_table(path: Path, start: bytes, form: CsvFormat) -> TableSource | None:
     if start.startswith(_HDF5) or start.startswith(_MATLAB_HDF5):
         return Hdf5Source(path, matlab=not start.startswith(_HDF5) or path.suffix == ".mat")
     if start.startswith(_PARQUET):
         return ParquetSource(path)
     if start.startswith(_ZIP):
-        return SpreadsheetSource(path, mapping.mapping.csv)
+        return SpreadsheetSource(path, form)
     if start.startswith(_OLD_OFFICE):
         raise InputError(f"{path}: an old spreadsheet (.xls), allowed: saved as .xlsx or .csv")
     if start.startswith(_MATLAB_5) or path.suffix == ".mat":

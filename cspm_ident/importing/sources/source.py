@@ -64,15 +64,24 @@ def check_columns(
     times: Collection[str],
     columns: Collection[str],
     path: Path,
+    keys: Collection[str] = (),
     shown: int = 40,
 ) -> list[str]:
     """Return the wanted columns, each once.
 
+    Args:
+        numbers: columns wanted as numbers.
+        times: columns wanted as times.
+        columns: those of the file.
+        path: the file.
+        keys: columns that choose rows.
+        shown: how many an error names.
+
     Raises:
-        InputError: the file has one of them not, or twice, or it is wanted as number and as time.
+        InputError: the file has one of them not, or twice, or it is wanted as two things.
     """
     names = [*columns]
-    for name in (wanted := list(dict.fromkeys([*numbers, *times]))):
+    for name in (wanted := list(dict.fromkeys([*numbers, *times, *keys]))):
         if name not in names:
             more = f" and {len(names) - shown} more" if len(names) > shown else ""
             raise InputError(
@@ -82,4 +91,8 @@ def check_columns(
             raise InputError(f"{path}: column '{name}' occurs twice, allowed: each name once")
         if name in numbers and name in times:
             raise InputError(f"{path}: column '{name}' is clock and channel, allowed: one of both")
+        if name in keys and (name in numbers or name in times):
+            raise InputError(
+                f"{path}: column '{name}' chooses rows and is read as well, allowed: one of both"
+            )
     return wanted

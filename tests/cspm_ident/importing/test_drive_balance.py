@@ -70,6 +70,29 @@ def test_a_torque_that_is_not_the_pull_is_reported(factor, reported):
     assert found.drum.mean == pytest.approx(factor, rel=0.1)
 
 
+@pytest.mark.parametrize("size", [1.0, 0.2])
+def test_a_loop_that_answers_its_load_cells_noise_is_not_reported(size):
+    """Torque has ten times the noise of the pull, and is right on average unless scaled."""
+    torque, angle, load = winch(pull=0.025)
+    noise = np.random.default_rng(3).normal(0.0, 1.0, len(load.values))
+    loop = torque._replace(values=torque.values + 10.0 * noise)
+    measured = load._replace(values=load.values + noise)
+    found = drive_balance(
+        loop, angle, measured._replace(values=measured.values * size), elastic=False
+    )
+    assert found.drum.mean > 2.0
+    assert found.level == pytest.approx(1.0 / size, rel=0.1)
+    kinds = [one.kind for one in balance_suspicions("w", found)]
+    assert kinds == ([] if size == 1.0 else ["torque"])
+
+
+def test_a_pull_that_is_none_on_average_has_no_level():
+    torque, angle, load = winch(pull=0.025)
+    swing = load._replace(values=load.values - load.values.mean())
+    assert drive_balance(torque, angle, swing, elastic=False).level is None
+    assert drive_balance(torque, angle, None, elastic=False).level is None
+
+
 def test_what_does_not_move_or_is_short_is_not_judged():
     torque, angle, _ = winch()
     still = angle._replace(values=0.0 * angle.values)

@@ -8,7 +8,14 @@ from import_samples import imported
 
 from cspm_ident.importing.checks.catalogue import CHECKS, check_table
 from cspm_ident.importing.checks.suspicion import Suspicion
-from cspm_ident.importing.mapping import ChannelSource, Clock, CsvFormat, Mapping, Segment
+from cspm_ident.importing.mapping import (
+    BesideFile,
+    ChannelSource,
+    Clock,
+    CsvFormat,
+    Mapping,
+    Segment,
+)
 from cspm_ident.importing.units import TIME_UNITS, unit_of
 from cspm_msgs_py.yaml_file import parse_yaml, validate
 
@@ -34,6 +41,13 @@ EXAMPLES = {
 }
 
 
+FILES = re.findall(
+    r"<!-- file: (\S+) -->\n```\n(.*?)```",
+    (DOCS / "import-tables.md").read_text(encoding="utf-8"),
+    re.DOTALL,
+)
+
+
 @pytest.mark.parametrize("name", sorted(EXAMPLES))
 def test_every_example_is_a_mapping_and_its_table_is_read(tmp_path, name):
     page, text = EXAMPLES[name]
@@ -43,13 +57,15 @@ def test_every_example_is_a_mapping_and_its_table_is_read(tmp_path, name):
     assert (table is None) == (page != "tables")
     if table is not None:
         (tmp_path / "a.csv").write_text(table[1], encoding="utf-8")
+        for other, content in FILES:
+            (tmp_path / other).write_text(content, encoding="utf-8")
         found = imported(tmp_path / "a.csv", text)
         assert len(found.stamps["/winches/state"]) == 2
         assert found.rows["/winches/state"][-1, 0] in (0.0998, 1001.5, 0.1, 0.01)
 
 
 def test_every_key_is_documented():
-    models = (Mapping, ChannelSource, Clock, CsvFormat, Segment)
+    models = (Mapping, ChannelSource, Clock, CsvFormat, Segment, BesideFile)
     keys = {key for model in models for key in model.model_fields}
     assert sorted(key for key in keys if f"`{key}`" not in PAGE) == []
 

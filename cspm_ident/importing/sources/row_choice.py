@@ -1,0 +1,67 @@
+"""Rows of a log with a line per drive: `q[drive=3]` is column `q` where column `drive` is 3."""
+
+from __future__ import annotations
+
+import re
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+_CHOICE = re.compile(r"(?P<column>.+)\[(?P<key>[^\[\]=]+)=(?P<value>[^\[\]=]*)\]")
+
+
+class RowChoice(NamedTuple):
+    """A column, and which of its rows: those in which the column `key` has a value."""
+
+    column: str
+    key: str
+    value: str
+
+    @property
+    def name(self) -> str:
+        """As a mapping writes it."""
+        return f"{self.column}[{self.key}={self.value}]"
+
+
+def row_choice(name: str) -> RowChoice | None:
+    """Return what a name in a mapping chooses; None for the name of a whole column."""
+    found = _CHOICE.fullmatch(name)
+    if found is None:
+        return None
+    return RowChoice(found["column"], found["key"].strip(), found["value"].strip())
+
+
+class Labels:
+    """The texts of a column that chooses rows, by number, in the order in which they come.
+
+    Attributes:
+        known: the texts; numbers without needless digits, so that 3, 3.0 and 03 are one.
+        textual, unit: as those of `TimeCells`.
+    """
+
+    textual = True
+    unit = None
+
+    def __init__(self) -> None:
+        """Begin without any text."""
+        self.known: list[str] = []
+
+    def read(self, cells: NDArray[np.str_], line: int = 1) -> NDArray[np.int32]:
+        """Return the number of each cell's text, shape (n,), of cells (n,); `line` has no use."""
+        texts, places = np.unique(cells, return_inverse=True)
+        numbers = np.array([self._number(plain(str(text))) for text in texts], dtype=np.int32)
+        return numbers[places]
+
+    def _number(self, text: str) -> int:
+        if text not in self.known:
+            self.known.append(text)
+        return self.known.index(text)
+
+
+def plain(text: str) -> str:
+    """Return a text without blanks around it, and a number without needless digits."""
+    try:
+        return f"{float(text):.12g}"
+    except ValueError:
+        return text.strip()

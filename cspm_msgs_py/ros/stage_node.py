@@ -12,6 +12,7 @@ from cspm_msgs_py.graph import Edges
 from cspm_msgs_py.ros.contract_node import ContractNode
 from cspm_msgs_py.ros.guard_ports import GuardPorts
 from cspm_msgs_py.ros.outbox import Outbox
+from cspm_msgs_py.ros.own_senders import OwnSenders
 from cspm_msgs_py.ros.rendezvous import FollowerSide
 from cspm_msgs_py.schedule import Schedule
 from cspm_msgs_py.stepping.lockstep import Acknowledgement, Follower
@@ -60,14 +61,8 @@ class StageNode:
         publish = {n: outbox.publisher(topics[n], edges[n].readers) for n in plan.outputs}
         status = node.status_publisher(edges[DIAGNOSTICS.name].readers)
         self._follower = Follower(stage, schedule, publish, status)
-        sent = {topic for name in own for topic in schedule.nodes[name].outputs}
-        awaited = sorted(sent & {*plan.inputs, *plan.held})
-        self._plant = FollowerSide(
-            node,
-            schedule.period_ns,
-            self._end,
-            ready=lambda: all(node.node.count_publishers(topic) for topic in awaited),
-        )
+        senders = OwnSenders(node, schedule, own, (*plan.inputs, *plan.held))
+        self._plant = FollowerSide(node, schedule.period_ns, self._end, ready=senders.ready)
         receive = self._receive_and_tell if tells_progress else self._receive
         for name in (*plan.inputs, *plan.held):
             refuse = partial(self._refuse, name)

@@ -19,6 +19,8 @@ LEAVING_S = 5.0
 SILENCE_S = 2.0
 _LOOK_EVERY_S = 0.05
 _TAIL = 4000
+_COLOUR = re.compile(r"\x1b\[[\d;]*m")
+_MIDDLEWARE = re.compile(r"\[RTPS_\w+ (?:Error|Warning)\]")
 _WARNING = re.compile(r"\[(?:WARN|ERROR|FATAL)\] \[[\d.]+\] \[(.+?)\]: (.+)\n")
 
 
@@ -97,9 +99,8 @@ class NodeProcesses:
     def _last_words(self, name: str) -> str:
         # A host that fails before it has forked any node speaks for all.
         files = [self._log / f"{name}.log", self._log / HOST_LOG]
-        text = next(filter(None, (file.read_text(errors="replace") for file in files)), "")[-_TAIL:]
-        lines = [line for line in text.splitlines() if line.strip()]
-        return lines[-1] if lines else ""
+        texts = (file.read_text(errors="replace") for file in files)
+        return last_words(next(filter(None, texts), "")[-_TAIL:])
 
     def wait(self, seconds: float) -> bool:
         """Wait for all to end; return whether they did."""
@@ -125,6 +126,15 @@ class NodeProcesses:
 
     def __exit__(self, *_: object) -> None:
         self.close()
+
+
+def last_words(text: str) -> str:
+    """Return the last line that a program printed, but for the middleware's remarks; "" if none.
+
+    Fast DDS reports ports in shared memory that it cannot have, and takes others.
+    """
+    lines = [_COLOUR.sub("", line).strip() for line in text.splitlines()]
+    return next((each for each in reversed(lines) if each and not _MIDDLEWARE.search(each)), "")
 
 
 def _is_stopped(process: int | None) -> bool:

@@ -52,4 +52,4 @@ class LockstepRun(NodesOfRun):
         # A player speaks for all who are absent, in one row of messages.
         reporting = self.edges[DIAGNOSTICS.name].senders
         statuses = set(reporting) - {PLAYER, *self.own}
-        return RecorderNode(node, schedule, topics, writer, statuses, silent=self.own)
+        return RecorderNode(node, schedule, topics, writer, statuses, own=self.own)

@@ -8,6 +8,7 @@ from cspm_msgs_py.errors import CspmError
 from cspm_msgs_py.recording.writer import RecordingWriter
 from cspm_msgs_py.ros.contract_node import ContractNode, ros_class
 from cspm_msgs_py.ros.intake import Intake
+from cspm_msgs_py.ros.own_senders import OwnSenders
 from cspm_msgs_py.ros.rendezvous import FollowerSide
 from cspm_msgs_py.schedule import CLOCK, Schedule
 from cspm_msgs_py.stepping.lockstep import RECORDED_EVERY
@@ -27,16 +28,17 @@ class RecorderNode:
         topics: Mapping[str, Topic],
         writer: RecordingWriter,
         reporting: Collection[str],
-        silent: Collection[str] = (),
+        own: Collection[str] = (),
     ) -> None:
         """Connect the recording to the run's topics.
 
-        `reporting` nodes send their statuses themselves; of `silent` ones there are none.
+        `reporting` nodes send their statuses themselves; `own` ones, programs of the user's, none.
         """
         self._node = node
-        self._plant = FollowerSide(node, schedule.period_ns, self._end)
+        senders = OwnSenders(node, schedule, own, schedule.topics)
+        self._plant = FollowerSide(node, schedule.period_ns, self._end, ready=senders.ready)
         self._recorder = LockstepRecorder(
-            schedule, dict(topics), writer, self._plant.report, node.complain, reporting, silent
+            schedule, dict(topics), writer, self._plant.report, node.complain, reporting, own
         )
         self._intake = Intake(node.node)
         for name in schedule.topics:

@@ -44,11 +44,13 @@ class Stranger:
         self._said = ""
 
     def hold_up(self, _):
-        """Let nothing go on before it has talked."""
+        """Let nothing go on before it has talked to all."""
         self._said = self._said or self._process.stdout.readline()
         assert self._said == "talking\n"
 
     def __enter__(self):
+        """Wait until it is there: a run may be over before a program has started."""
+        assert self._process.stdout.readline() == "here\n"
         return self
 
     def __exit__(self, kind, *_):

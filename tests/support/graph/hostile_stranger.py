@@ -5,6 +5,7 @@ Each kind of talk is a function that is called again and again while the run goe
 
 import random
 import sys
+import time
 import warnings
 from contextlib import suppress
 from functools import partial
@@ -30,6 +31,7 @@ THESIS = Path(__file__).resolve().parents[3] / "scenarios" / "testbeds" / "thesi
 MS, SECOND = 1_000_000, 1_000_000_000
 LATEST_NS = (2**31 - 1) * SECOND
 TURN_S, LONGEST_S = 0.01, 300.0
+CALM_S = 0.5
 # More than a run's own messages, fewer than a reader keeps waiting, and more than that.
 FLOOD, DELUGE = 700, 6000
 REPORTS = 50  # more than a node makes in these runs
@@ -51,6 +53,7 @@ class Stranger:
         now_ns: the last instant of the run that was heard [ns].
         heard: the last bytes heard, by topic.
         turns: how often it talked.
+        known: whether it has talked to all readers of a run.
     """
 
     def __init__(self, node, kinds, seed):
@@ -58,6 +61,7 @@ class Stranger:
         found = load_testbed(THESIS).testbed.topics
         self.topics = {n: t for n, t in found.items() if n not in (CLOCK.name, DIAGNOSTICS.name)}
         self.now_ns, self.heard, self.turns = 0, {}, 0
+        self._readers, self._changed, self.known = [], 0.0, False
         self._node, self.others, self._decode = node.node, [], {}
         node.subscribe_rows(CLOCK, self._note, lambda _: None)
         if "types" in kinds:
@@ -87,9 +91,16 @@ class Stranger:
     @property
     def heard_by_any(self):
         """Whether a run is there; who speaks of other types cannot know."""
-        return bool(self.others) or any(
-            each.get_subscription_count() for each in self._node.publishers
-        )
+        return bool(self.others) or any(self._counts())
+
+    def heard_by_all(self):
+        """Whether all of a run's readers are there: no other has come for a while."""
+        if (readers := self._counts()) != self._readers:
+            self._readers, self._changed = readers, time.monotonic()
+        return bool(self.others) or time.monotonic() - self._changed >= CALM_S
+
+    def _counts(self):
+        return [each.get_subscription_count() for each in self._node.publishers]
 
     def some_heard(self):
         """Return name and last bytes of a few topics: reading noise takes a run its time."""
@@ -215,12 +226,15 @@ def main(kinds, seed):
 
         def talk():
             if stranger.turns or stranger.heard_by_any:
+                everybody = stranger.heard_by_all()
                 for each in chosen:
                     each(stranger)
-                if not stranger.turns:
+                if everybody and not stranger.known:
+                    stranger.known = True
                     print("talking", flush=True)  # noqa: T201 - to the test
                 stranger.turns += 1
 
+        print("here", flush=True)  # noqa: T201 - to the test
         session.every(TURN_S, talk)
         session.spin_until(lambda: session.stopped, LONGEST_S)
 

@@ -22,6 +22,7 @@ from cspm_ident.importing.mapping import load_mapping
 from cspm_ident.importing.preparation import prepare
 from cspm_msgs_py.recording import Recording
 from cspm_msgs_py.recording.attached_testbed import attached_testbed
+from cspm_msgs_py.testbed import TestbedFile
 from cspm_msgs_py.topics import POSE, Topic
 from cspm_msgs_py.yaml_file import dump_yaml
 
@@ -29,6 +30,7 @@ SCENARIOS = (
     *("calm", "worst_case", "worst_case_steep", "verification_mid", "one_winch"),
     *("emps", "stadium_camera", "planar_kntu", "cogiro", "rig_stiffness_sway"),
 )
+LOCKED = ("verification_mid",)
 SEEDS = range(11, 16)
 DURATION = 20.0
 SENSORS = (
@@ -68,8 +70,7 @@ def suspected(place: Path, scenario: str, seed: int, console: Console) -> list[s
         if not recording.exists():
             cspm.simulate(scenario, seed=seed, duration=duration).save(recording)
         export(recording, place)
-    with Recording(recording) as opened:
-        machine = attached_testbed(opened.attachments, recording)
+    machine = machine_of(recording, scenario)
     with ColumnStore() as store:
         report = prepare(
             place / "lab.csv",
@@ -81,6 +82,16 @@ def suspected(place: Path, scenario: str, seed: int, console: Console) -> list[s
         ).report
     console.print(f"{place.name}: {len(report.suspicions)} suspicions")
     return [f"{each.where}: {each.kind}: {each.text}" for each in report.suspicions]
+
+
+def machine_of(recording: Path, scenario: str) -> TestbedFile:
+    """Return the machine as its owner describes it: brakes that hold its winches are said."""
+    with Recording(recording) as opened:
+        machine = cspm.Testbed(attached_testbed(opened.attachments, recording))
+    if scenario in LOCKED:
+        for name in machine.description.cable_names:
+            machine = machine.with_parameter(f"cables.{name}.locked", True)
+    return machine.file
 
 
 def export(recording: Path, place: Path) -> None:

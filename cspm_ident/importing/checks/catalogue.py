@@ -55,7 +55,10 @@ CHECKS: dict[str, Check] = {
         " twice what torque, tension and weight allow, again and again",
         "`unit`, `sign` or `offset`, or `unit` of the clock",
     ),
-    "constant": Check("nothing changes", "leave it out, or state it as `constant`"),
+    "constant": Check(
+        "nothing changes, and no brake is said to hold the winch (`locked`)",
+        "leave it out, or state it as `constant`",
+    ),
     "empty": Check("no number at all", "leave it out"),
     "saturated": Check(
         "values pile up at the end of the range", "`invalid: [VALUE]`, or `drop` the stretch"

@@ -50,6 +50,8 @@ def value_suspicions(
     if not len(values):
         return [Suspicion(where, "empty", "no number at all")]
     if np.ptp(values) == 0.0:
+        if _is_locked(topic, field, testbed):
+            return []
         text = f"constant at {values[0]:.6g}{f' {quantity}' if quantity != '1' else ''}"
         return [Suspicion(where, "constant", text, {"value": float(values[0])})]
     found = []
@@ -57,6 +59,14 @@ def value_suspicions(
         found += _saturated(where, quantity, values, _known_limit(topic, field, testbed))
     found += _coarse(where, topic, field, quantity, values, testbed)
     return found + _implausible(where, topic, field, quantity, values, testbed)
+
+
+def _is_locked(topic: Topic, field: str, testbed: Testbed) -> bool:
+    """Return whether a channel is of a winch that the test-bed says its brake holds."""
+    joint = field.partition("/")[2]
+    if not topic.name.startswith("/winches/"):
+        return False
+    return bool(testbed.cables[testbed.cable_names.index(joint)].locked)
 
 
 def _known_limit(topic: Topic, field: str, testbed: Testbed) -> float:

@@ -2,7 +2,7 @@
 
 import numpy as np
 import pytest
-from import_samples import THESIS, imported, table
+from import_samples import ONE_WINCH, THESIS, imported, table
 from scipy.signal import lfilter
 
 from cspm_ident.importing.checks.robust_line import robust_line
@@ -149,6 +149,22 @@ def test_constant_saturated_and_coarse_channels(tmp_path):
     coarse = found(tmp_path, N=lambda n: np.round(n / 5.0) * 5.0)
     assert "9 levels, 5 N apart" in texts(coarse, "coarse")[0]
     assert texts(coarse, "resolution") == ["resolution 5 N, the test-bed says 0.005: factor 1000"]
+
+
+def test_a_winch_that_its_brake_holds_may_stay_where_it_is(tmp_path):
+    still = {name: lambda values: 0.0 * values for name in "qvu"}
+    parts = [f"{STATE} {part}/surge" for part in ("position", "velocity", "effort")]
+    assert {(part, "constant") for part in parts} <= found(tmp_path, **still).suspected
+    text = ONE_WINCH.read_text(encoding="utf-8")
+    held = tmp_path / "held.yaml"
+    held.write_text(text.replace("  - name: surge\n", "  - name: surge\n    locked: true\n"))
+    columns = healthy() | {"N": np.full(len(healthy()["t"]), 3.0)}
+    columns |= {name: np.zeros(len(columns["t"])) for name in "qvu"}
+    path = table(tmp_path / "a.csv", columns)
+    said = imported(path, MAPPING, held, trial=True)
+    assert {one.where for one in said.report.suspicions if one.kind == "constant"} == {
+        f"{TENSION} effort/surge"
+    }
 
 
 def test_a_channel_that_was_filtered_has_no_grid(tmp_path):

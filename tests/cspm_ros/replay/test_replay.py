@@ -374,7 +374,7 @@ def test_a_pause_is_no_lack_of_patience(recording):
 
     def look(player):
         """Pause for 1 s once the replay is under way."""
-        if player.position_ns > 0.2e9 and len(looks) < 20:
+        if player.position_ns > 0.02e9 and len(looks) < 20:
             player.pause(time.monotonic())
             looks.append(player.paused)
             if len(looks) == 20:

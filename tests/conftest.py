@@ -1,7 +1,10 @@
 """Machines that several test files use."""
 
+import fcntl
 import os
 import sys
+import tempfile
+from pathlib import Path
 
 # Workers of pytest share the processors; linear algebra with threads of its own only gets in their
 # way: a fit of a system took 71 s of processor time with two threads, and 36 s with one.
@@ -17,6 +20,17 @@ from cspm_msgs_py.testbed import load_testbed
 # The first call of a kernel may compile it, which takes longer than any sensible deadline.
 hypothesis.settings.register_profile("cspm", deadline=None, derandomize=True)
 hypothesis.settings.load_profile("cspm")
+
+
+@pytest.fixture(autouse=True)
+def alone_in_real_time(request):
+    """Run tests that keep the wall clock one at a time: each wants a processor when it is due."""
+    if request.node.get_closest_marker("realtime") is None:
+        yield
+        return
+    with (Path(tempfile.gettempdir()) / "cspm-test-realtime").open("w") as turn:
+        fcntl.flock(turn, fcntl.LOCK_EX)
+        yield
 
 
 @pytest.fixture(scope="session")

@@ -12,7 +12,7 @@ from cspm_msgs_py.schedule import FORCE_CONTROLLER, MOTION_CONTROLLER, TENSION, 
 from cspm_ros.runtime.progress_file import read_report
 
 load_ros()
-pytestmark = pytest.mark.slow
+pytestmark = [pytest.mark.slow, pytest.mark.realtime]
 SWAY_2 = 5
 
 

@@ -36,7 +36,7 @@ from cspm_ros.runtime.exit_watchdog import IN_ORDER
 from cspm_ros.runtime.progress_file import read_report
 
 load_ros()
-pytestmark = pytest.mark.slow
+pytestmark = [pytest.mark.slow, pytest.mark.realtime]
 
 MS = 1_000_000
 MEASURED = (FRAME_POSE, BAR_POSE, WINCH_STATE, TENSION)

@@ -12,7 +12,7 @@ from cspm_msgs_py.wire import WireWriter
 from cspm_ros.runtime.exit_watchdog import IN_ORDER
 
 load_ros()
-pytestmark = pytest.mark.slow
+pytestmark = [pytest.mark.slow, pytest.mark.realtime]
 
 RISE, START_S = 0.02, 1.0
 

@@ -33,7 +33,7 @@ from cspm_msgs_py.topics import EMERGENCY_STOP  # noqa: E402
 from cspm_ros.runtime.exit_watchdog import IN_ORDER  # noqa: E402
 from cspm_ros.runtime.realtime_run import run_realtime  # noqa: E402 - after ROS is known to be there
 
-pytestmark = pytest.mark.slow
+pytestmark = [pytest.mark.slow, pytest.mark.realtime]
 
 MS = 1_000_000
 PERIOD = 5 * MS

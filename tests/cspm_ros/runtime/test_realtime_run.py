@@ -32,7 +32,7 @@ from cspm_ros.runtime.exit_watchdog import IN_ORDER
 from cspm_run.recorded_timing import timing_of
 
 load_ros()
-pytestmark = pytest.mark.slow
+pytestmark = [pytest.mark.slow, pytest.mark.realtime]
 
 MS = 1_000_000
 

@@ -44,7 +44,7 @@ load_ros()
 
 from rclpy.parameter import Parameter  # noqa: E402
 
-pytestmark = pytest.mark.slow
+pytestmark = [pytest.mark.slow, pytest.mark.realtime]
 
 MS = 1_000_000
 PERIOD = 5 * MS

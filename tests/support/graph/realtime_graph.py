@@ -187,8 +187,15 @@ class Witness:
         return self.until_said(name, lambda s: s.values.get("state") == state, state)
 
     def until_running(self, *guards):
-        """Listen until the run is under way and all is well."""
+        """Listen until the run is under way and all is well.
+
+        A busy computer may keep a node waiting for half a second at the start. Its safe state is
+        then left as a user would leave it.
+        """
         for name in guards:
+            said = self.until_said(name, lambda s: s.values.get("state"), "a state")
+            if " stale: " in said.values.get("reason", ""):
+                self.until_reset(name.partition("/")[0])
             self.until_said(
                 name, lambda s: s.level < 2 and s.values.get("state") == "running", "running"
             )

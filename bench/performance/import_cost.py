@@ -1,0 +1,124 @@
+"""What an import of a long table and of a large bag takes.
+
+`python -m bench.performance.import_cost [GIGABYTES …]` imports a table of 600 s at 1 kHz with 39
+channels three times, and for each size a bag of joint states, and prints times and peak memory.
+"""
+
+from __future__ import annotations
+
+import statistics
+import sys
+import tempfile
+import time
+from pathlib import Path
+
+import numpy as np
+import pandas as pd
+from rich.console import Console
+from rich.table import Table
+from rosbags.rosbag2 import StoragePlugin, Writer
+from rosbags.typesys import Stores, get_typestore
+
+from bench.performance.child import start_cspm, watched
+from cspm_msgs_py.testbed import load_testbed
+from cspm_msgs_py.topics import POSE
+from cspm_msgs_py.yaml_file import dump_yaml
+from cspm_run.library import find_testbed
+
+SECONDS, RATE, REPEATS = 600, 1000, 3
+_TYPES = get_typestore(Stores.ROS2_JAZZY)
+_KIND = "sensor_msgs/msg/JointState"
+_PARTS = ("position", "velocity", "effort")
+_UNITS = ("rad", "rad/s", "N·m")
+
+
+def main() -> None:
+    """Measure and print."""
+    sizes = [float(word) for word in sys.argv[1:]] or [0.25, 1.0]
+    shown = Table("source", "size", "time", "peak memory")
+    with tempfile.TemporaryDirectory(prefix="cspm-bench-") as folder:
+        place = Path(folder)
+        write_table(place)
+        found = [imported(place, "lab.csv", f"table_{k}") for k in range(REPEATS)]
+        size = (place / "lab.csv").stat().st_size / 1e9
+        seconds = statistics.median(each for each, _ in found)
+        shown.add_row("table", f"{size:.2f} GB", f"{seconds:.1f} s", f"{found[0][1]:.0f} MB")
+    for size in sizes:
+        with tempfile.TemporaryDirectory(prefix="cspm-bench-") as folder:
+            place = Path(folder)
+            write_bag(place, size)
+            seconds, peak = imported(place, "bag", "out")
+            shown.add_row("bag", f"{size:g} GB", f"{seconds:.1f} s", f"{peak:.0f} MB")
+    Console().print(shown)
+
+
+def cables() -> tuple[str, ...]:
+    """Return the names of the thesis's cables."""
+    return load_testbed(find_testbed("thesis")).testbed.cable_names
+
+
+def imported(place: Path, source: str, name: str) -> tuple[float, float]:
+    """Return time [s] and peak resident memory [MB] of an import."""
+    paths = [str(place / source), "--mapping", str(place / "lab.yaml"), "--testbed", "thesis"]
+    began = time.perf_counter()
+    child = start_cspm(["import", *paths, "--out", str(place / name)], {})
+    peak = max(watched(child, lambda process: process.memory_info().rss / 1e6))
+    return time.perf_counter() - began, peak
+
+
+def write_table(place: Path) -> None:
+    """Write the table and its mapping: all winches, all load cells, the bar's pose."""
+    rng = np.random.default_rng(1)
+    t = np.arange(SECONDS * RATE) / RATE
+    columns, channels = {"t": t}, {}
+    for topic, parts, units in (
+        ("/winches/state", _PARTS, _UNITS),
+        ("/cables/tension", ("effort",), ("N",)),
+    ):
+        fields = [
+            (f"{part}/{c}", u) for part, u in zip(parts, units, strict=True) for c in cables()
+        ]
+        columns |= {f"{topic} {f}": _signal(rng, t) for f, _ in fields}
+        channels[topic] = {f: {"column": f"{topic} {f}", "unit": unit} for f, unit in fields}
+    pose = {name: 0.01 * _signal(rng, t) for name in POSE[:6]}
+    pose["qw"] = np.sqrt(1.0 - sum(pose[name] ** 2 for name in POSE[3:6]))
+    columns |= pose
+    channels["/bar/pose"] = {
+        name: {"column": name, "unit": "1" if name.startswith("q") else "m"} for name in POSE
+    }
+    pd.DataFrame(columns).round(6).to_csv(place / "lab.csv", index=False)
+    described = {"name": "lab", "clocks": {"pc": {"column": "t"}}, "channels": channels}
+    (place / "lab.yaml").write_text(dump_yaml(described), encoding="utf-8")
+
+
+def _signal(rng: np.random.Generator, t: np.ndarray) -> np.ndarray:
+    rate, phase = rng.uniform(1.0, 5.0), rng.uniform(0.0, 6.0)
+    return 1.0 + 0.3 * np.sin(rate * t + phase) + rng.normal(0.0, 1e-3, len(t))
+
+
+def write_bag(place: Path, gigabytes: float) -> None:
+    """Write a bag of joint states of all winches, and its mapping."""
+    names = list(cables())
+    header, state = _TYPES.types["std_msgs/msg/Header"], _TYPES.types[_KIND]
+    stamp = _TYPES.types["builtin_interfaces/msg/Time"]
+    written, k = 0.0, 0
+    with Writer(place / "bag", version=9, storage_plugin=StoragePlugin.MCAP) as writer:
+        sender = writer.add_connection("/drives", _KIND, typestore=_TYPES)
+        while written < gigabytes * 1e9:
+            now = k * 1_000_000
+            values = [np.sin(np.arange(8.0) + k * f) for f in (1e-3, 2e-3, 3e-3)]
+            head = header(stamp(*divmod(now, 10**9)), "")
+            content = _TYPES.serialize_cdr(state(head, names, *values), _KIND)
+            writer.write(sender, now, content)
+            written, k = written + len(content), k + 1
+    channels = {
+        f"{part}/{name}": {"column": f"/drives:{part}[{name}]", "unit": unit}
+        for part, unit in zip(_PARTS, _UNITS, strict=True)
+        for name in names
+    }
+    described = {"name": "lab", "channels": {"/winches/state": channels}}
+    (place / "lab.yaml").write_text(dump_yaml(described), encoding="utf-8")
+
+
+if __name__ == "__main__":
+    main()

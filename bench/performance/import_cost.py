@@ -10,6 +10,7 @@ import statistics
 import sys
 import tempfile
 import time
+from functools import cache
 from pathlib import Path
 
 import numpy as np
@@ -28,8 +29,7 @@ from cspm_run.library import find_testbed
 SECONDS, RATE, REPEATS = 600, 1000, 3
 _TYPES = get_typestore(Stores.ROS2_JAZZY)
 _KIND = "sensor_msgs/msg/JointState"
-_PARTS = ("position", "velocity", "effort")
-_UNITS = ("rad", "rad/s", "N·m")
+_UNITS = {"position": "rad", "velocity": "rad/s", "effort": "N·m"}
 
 
 def main() -> None:
@@ -52,6 +52,7 @@ def main() -> None:
     Console().print(shown)
 
 
+@cache
 def cables() -> tuple[str, ...]:
     """Return the names of the thesis's cables."""
     return load_testbed(find_testbed("thesis")).testbed.cable_names
@@ -66,20 +67,26 @@ def imported(place: Path, source: str, name: str) -> tuple[float, float]:
     return time.perf_counter() - began, peak
 
 
+def joint_channels(column: str, units: dict[str, str]) -> dict[str, dict[str, str]]:
+    """Return the channels of a JointState, their columns named by a pattern of part and name."""
+    return {
+        f"{part}/{name}": {"column": column.format(part=part, name=name), "unit": unit}
+        for part, unit in units.items()
+        for name in cables()
+    }
+
+
 def write_table(place: Path) -> None:
     """Write the table and its mapping: all winches, all load cells, the bar's pose."""
     rng = np.random.default_rng(1)
     t = np.arange(SECONDS * RATE) / RATE
-    columns, channels = {"t": t}, {}
-    for topic, parts, units in (
-        ("/winches/state", _PARTS, _UNITS),
-        ("/cables/tension", ("effort",), ("N",)),
-    ):
-        fields = [
-            (f"{part}/{c}", u) for part, u in zip(parts, units, strict=True) for c in cables()
-        ]
-        columns |= {f"{topic} {f}": _signal(rng, t) for f, _ in fields}
-        channels[topic] = {f: {"column": f"{topic} {f}", "unit": unit} for f, unit in fields}
+    channels = {
+        "/winches/state": joint_channels("drive {part} {name}", _UNITS),
+        "/cables/tension": joint_channels("cell {name}", {"effort": "N"}),
+    }
+    columns = {"t": t}
+    for each in (*channels["/winches/state"].values(), *channels["/cables/tension"].values()):
+        columns[each["column"]] = _signal(rng, t)
     pose = {name: 0.01 * _signal(rng, t) for name in POSE[:6]}
     pose["qw"] = np.sqrt(1.0 - sum(pose[name] ** 2 for name in POSE[3:6]))
     columns |= pose
@@ -111,12 +118,8 @@ def write_bag(place: Path, gigabytes: float) -> None:
             content = _TYPES.serialize_cdr(state(head, names, *values), _KIND)
             writer.write(sender, now, content)
             written, k = written + len(content), k + 1
-    channels = {
-        f"{part}/{name}": {"column": f"/drives:{part}[{name}]", "unit": unit}
-        for part, unit in zip(_PARTS, _UNITS, strict=True)
-        for name in names
-    }
-    described = {"name": "lab", "channels": {"/winches/state": channels}}
+    channels = {"/winches/state": joint_channels("/drives:{part}[{name}]", _UNITS)}
+    described = {"name": "lab", "channels": channels}
     (place / "lab.yaml").write_text(dump_yaml(described), encoding="utf-8")
 
 

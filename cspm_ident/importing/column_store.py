@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from copy import copy
 from pathlib import Path
 from tempfile import TemporaryDirectory
 from types import TracebackType
@@ -25,9 +26,17 @@ class ColumnStore:
         self._folder = TemporaryDirectory(prefix="cspm-import-")
         self._kinds: dict[str, np.dtype[Any]] = {}
         self._paths: dict[str, Path] = {}
+        self._prefix = ""
+
+    def under(self, prefix: str) -> ColumnStore:
+        """Return this store as one in which all names begin with a prefix."""
+        found = copy(self)
+        found._prefix = self._prefix + prefix
+        return found
 
     def append(self, name: str, piece: Array) -> None:
         """Add a piece, shape (n,), to the column of that name."""
+        name = self._prefix + name
         if name not in self._paths:
             self._paths[name] = Path(self._folder.name) / f"{len(self._paths)}.bin"
             self._kinds[name] = piece.dtype
@@ -36,6 +45,7 @@ class ColumnStore:
 
     def column(self, name: str) -> Array:
         """Return a column, shape (n,), read from disk as it is used; empty if nothing was added."""
+        name = self._prefix + name
         if name not in self._paths or not self._paths[name].stat().st_size:
             return np.zeros(0, dtype=self._kinds.get(name, np.dtype(np.float64)))
         return np.memmap(self._paths[name], dtype=self._kinds[name], mode="r")

@@ -211,7 +211,7 @@ def _check_file(column: str, name: str, clock: Clock, files: Collection[str], wh
 
 def _same_rows(stamp: str, column: str, source: Source) -> str:
     """Return the column of stamps in those rows that a column takes."""
-    choice = None if column in source.columns else row_choice(column)
+    choice = row_choice(column, source.columns)
     if choice is None or row_choice(stamp) is not None:
         return stamp
     return choice._replace(column=stamp).name

@@ -18,7 +18,7 @@ from cspm_ident.importing.gathering import Gathered, gather_topics, stamps_of_cl
 from cspm_ident.importing.import_plan import ImportPlan, PlannedTopic, plan_import
 from cspm_ident.importing.mapping import MappingFile
 from cspm_ident.importing.report import ImportReport, topic_report
-from cspm_ident.importing.sources.joined_source import file_of
+from cspm_ident.importing.sources.joined_source import file_of, in_file
 from cspm_ident.importing.sources.opening import open_source
 from cspm_ident.importing.sources.row_choice import row_choice
 from cspm_ident.importing.sources.source import Progress, Source
@@ -148,9 +148,9 @@ def _beside(mapping: MappingFile) -> dict[str, str]:
 
 def _unused(source: Source, plan: ImportPlan, files: Collection[str]) -> list[str]:
     used = {*plan.numbers, *plan.times}
-    for choice in filter(None, map(row_choice, (*plan.numbers, *plan.times))):
-        own = file_of(choice.column, files)
-        used |= {choice.column, f"{own}:{choice.key}" if own else choice.key}
+    choices = [row_choice(name, source.columns) for name in used]
+    for choice in filter(None, choices):
+        used |= {choice.column, in_file(file_of(choice.column, files), choice.key)}
     if source.stamped:
         topics = {name.rpartition(":")[0] for name in used}
         return [name for name in source.columns if name.rpartition(":")[0] not in topics]

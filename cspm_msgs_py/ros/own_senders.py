@@ -6,16 +6,15 @@ import time
 from collections.abc import Collection
 
 from cspm_msgs_py.ros.contract_node import ContractNode
+from cspm_msgs_py.ros.rendezvous import SETTLE_S
 from cspm_msgs_py.schedule import Schedule
-
-# How long a sender that we see may take to see us: until then its messages may be lost.
-SEEN_BOTH_WAYS_S = 0.5
 
 
 class OwnSenders:
     """Whether all that a node reads from programs of the user's can be sent to it.
 
-    These do not announce themselves, and nobody but they can see whom they reach.
+    These do not announce themselves, and nobody but they can see whom they reach: what a sender
+    that we see sends before it sees us is lost.
     """
 
     def __init__(
@@ -47,4 +46,4 @@ class OwnSenders:
             return True
         now = time.monotonic()
         self._since = now if self._since is None else self._since
-        return now - self._since >= SEEN_BOTH_WAYS_S
+        return now - self._since >= SETTLE_S

@@ -23,7 +23,7 @@ _NANOSECONDS = 1_000_000_000
 _LOOK_EVERY_S = 0.05
 _READY, _APART = -1, -2
 # How long it may take on one machine until all who are there are seen.
-_SETTLE_S = 0.5
+SETTLE_S = 0.5
 
 
 class FollowerSide:
@@ -124,7 +124,7 @@ class PlantSide:
         self._publisher = node.node.create_publisher(self._header, END, contract_qos())
         self._starter = node.node.create_publisher(self._header, START, contract_qos())
         node.subscribe_objects(PROGRESS, self._header, self._take)
-        self._settled = time.monotonic() + _SETTLE_S
+        self._settled = time.monotonic() + SETTLE_S
         self.absent = set(others)
         self.apart: set[str] = set()
 

@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from cspm_ident.importing.checks.series import SensorSeries
 from cspm_ident.importing.checks.suspicion import Suspicion
-from cspm_ident.importing.checks.value_suspicions import OVER, resolution
+from cspm_ident.importing.checks.value_suspicions import OVER, cable_of, resolution
 from cspm_msgs_py.testbed import Testbed
 from cspm_msgs_py.topics import Topic
 
@@ -74,9 +74,8 @@ def lasting_acceleration(series: SensorSeries) -> tuple[float, float] | None:
 
 def _limit(topic: Topic, field: str, testbed: Testbed) -> float:
     """Return what drives and cables can give [rad/s² or m/s²], infinite where that is not known."""
-    part, _, joint = field.partition("/")
-    if topic.name == "/winches/state" and part == "position":
-        cable = testbed.cables[testbed.cable_names.index(joint)]
+    if topic.name == "/winches/state" and field.startswith("position/"):
+        cable = cable_of(field, testbed)
         if cable.tension_limits is None:
             return np.inf
         pull = cable.tension_limits[1] * cable.drum_radius / cable.gear_ratio

@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 
 from cspm_ident.importing.checks.suspicion import Suspicion
 from cspm_msgs_py.sensor_spec import MEASURED, quantities
-from cspm_msgs_py.testbed import Testbed
+from cspm_msgs_py.testbed import Cable, Testbed
 from cspm_msgs_py.topics import Topic
 
 Array = NDArray[np.float64]
@@ -63,18 +63,19 @@ def value_suspicions(
 
 def _is_locked(topic: Topic, field: str, testbed: Testbed) -> bool:
     """Return whether a channel is of a winch that the test-bed says its brake holds."""
-    joint = field.partition("/")[2]
-    if not topic.name.startswith("/winches/"):
-        return False
-    return bool(testbed.cables[testbed.cable_names.index(joint)].locked)
+    return topic.name.startswith("/winches/") and cable_of(field, testbed).locked
+
+
+def cable_of(field: str, testbed: Testbed) -> Cable:
+    """Return the cable, with its winch, that a field of a JointState is of."""
+    return testbed.cables[testbed.cable_names.index(field.partition("/")[2])]
 
 
 def _known_limit(topic: Topic, field: str, testbed: Testbed) -> float:
     """Return the torque at which the test-bed's drives hold theirs, infinite for other channels."""
-    part, _, joint = field.partition("/")
-    if part != "effort" or not topic.name.startswith("/winches/"):
+    if not field.startswith("effort/") or not topic.name.startswith("/winches/"):
         return np.inf
-    return float(testbed.cables[testbed.cable_names.index(joint)].torque_limit)
+    return float(cable_of(field, testbed).torque_limit)
 
 
 def _saturated(where: str, quantity: str, values: Array, limit: float) -> list[Suspicion]:
@@ -150,10 +151,9 @@ def _implausible(
         limit = _BODY_ANGLE
     if largest > limit:
         add(f"up to {largest:.6g} {quantity}, more than {limit:.4g}: unit?", largest=largest)
-    joint = field.partition("/")[2]
-    if not joint:
+    if "/" not in field:
         return found
-    cable = testbed.cables[testbed.cable_names.index(joint)]
+    cable = cable_of(field, testbed)
     if quantity == "N·m":
         _against_limit(add, largest, cable.torque_limit, quantity, "torque limit")
     if quantity == "N" and cable.tension_limits:

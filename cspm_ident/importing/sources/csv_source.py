@@ -6,7 +6,7 @@ import csv
 import gzip
 import re
 import zlib
-from collections.abc import Collection, Iterator, Mapping
+from collections.abc import Iterator, Mapping
 from pathlib import Path
 from typing import Any, TextIO, cast
 
@@ -17,7 +17,7 @@ from cspm_ident.importing.column_store import ColumnStore
 from cspm_ident.importing.mapping import CsvFormat
 from cspm_ident.importing.sources.row_choice import Labels
 from cspm_ident.importing.sources.row_shape import RowShape
-from cspm_ident.importing.sources.source import Progress, check_columns
+from cspm_ident.importing.sources.source import Progress
 from cspm_ident.importing.sources.table_source import TableSource
 from cspm_ident.importing.sources.time_cells import TimeCells
 from cspm_msgs_py.errors import InputError
@@ -66,20 +66,19 @@ class CsvSource(TableSource):
         self._width = len(self.columns)
         self._rows = RowShape(path, self.columns, self._delimiter, form)
 
-    def read(
+    def _store(
         self,
-        numbers: Collection[str],
+        wanted: list[str],
         times: Mapping[str, str | None],
+        keys: Mapping[str, Labels],
         store: ColumnStore,
         progress: Progress,
     ) -> None:
-        """Store columns; see `Source`."""
-        wanted = check_columns(numbers, times, self.columns, self.path, self.keys)
         places = {self.columns.index(name): name for name in wanted}
         clocks: dict[int, TimeCells | Labels] = {
-            place: self.keys.get(name) or TimeCells(self.path, name, times[name])
+            place: keys.get(name) or TimeCells(self.path, name, times[name])
             for place, name in places.items()
-            if name in self.keys or name in times
+            if name in keys or name in times
         }
         total, done = self.path.stat().st_size, 0
         total *= _PACKED if self._packed else 1

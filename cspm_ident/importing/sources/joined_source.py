@@ -27,7 +27,7 @@ class JoinedSource:
         self.path = first.path
         self.kind = ", ".join([first.kind, *(f"{k}: {s.kind}" for k, s in others.items())])
         self.columns = tuple(
-            _joined(name, column) for name, one in self._sources.items() for column in one.columns
+            in_file(name, column) for name, one in self._sources.items() for column in one.columns
         )
         self.notes: list[str] = []
         self.time_units: dict[str, str] = {}
@@ -51,26 +51,23 @@ class JoinedSource:
         total = len(self._sources)
         for count, (name, source) in enumerate(self._sources.items()):
             own = {
-                column.removeprefix(f"{name}:") if name else column: column
+                column.removeprefix(in_file(name, "")): column
                 for column in (*numbers, *times)
                 if file_of(column, self._sources) == name
             }
             if not own:
                 raise InputError(
                     f"{source.path}: the mapping takes no column of it, allowed: at least one of"
-                    f" {', '.join(_joined(name, each) for each in source.columns[:20])}"
+                    f" {', '.join(in_file(name, each) for each in source.columns[:20])}"
                 )
-            with ColumnStore() as apart:
-                source.read(
-                    [each for each, column in own.items() if column in numbers],
-                    {each: times[column] for each, column in own.items() if column in times},
-                    apart,
-                    partial(_onwards, progress, count, total),
-                )
-                for each, column in own.items():
-                    store.append(column, apart.column(each))
-            self.time_units |= {_joined(name, k): unit for k, unit in source.time_units.items()}
-            self.notes += [_joined(name, note) for note in source.notes]
+            source.read(
+                [each for each, column in own.items() if column in numbers],
+                {each: times[column] for each, column in own.items() if column in times},
+                store.under(in_file(name, "")),
+                partial(_onwards, progress, count, total),
+            )
+            self.time_units |= {in_file(name, k): unit for k, unit in source.time_units.items()}
+            self.notes += [in_file(name, note) for note in source.notes]
 
     def close(self) -> None:
         """Let go of the files."""
@@ -82,5 +79,6 @@ def _onwards(progress: Progress, done: int, total: int, share: float) -> None:
     progress((done + share) / total)
 
 
-def _joined(name: str, text: str) -> str:
+def in_file(name: str, text: str) -> str:
+    """Return the name of a column, or another text, of a file; `name` is empty for the first."""
     return f"{name}:{text}" if name else text

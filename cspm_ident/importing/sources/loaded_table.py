@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Collection, Mapping
+from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
@@ -10,7 +10,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from cspm_ident.importing.column_store import ColumnStore
-from cspm_ident.importing.sources.source import Progress, check_columns
+from cspm_ident.importing.sources.row_choice import Labels
+from cspm_ident.importing.sources.source import Progress
 from cspm_ident.importing.sources.table_source import TableSource
 from cspm_ident.importing.sources.time_cells import TimeCells
 from cspm_ident.importing.time_text import ISO_TIME
@@ -38,19 +39,18 @@ class LoadedTable(TableSource):
         """Return a column, shape (n,)."""
         return self._vectors[name]
 
-    def read(
+    def _store(
         self,
-        numbers: Collection[str],
+        wanted: list[str],
         times: Mapping[str, str | None],
+        keys: Mapping[str, Labels],
         store: ColumnStore,
         progress: Progress,
     ) -> None:
-        """Store columns; see `Source`."""
-        wanted = check_columns(numbers, times, self.columns, self.path, self.keys)
         for count, name in enumerate(wanted, start=1):
             vector = self._vector(name)
-            if name in self.keys:
-                found: Vector = self.keys[name].read(vector.astype(str))
+            if name in keys:
+                found: Vector = keys[name].read(vector.astype(str))
             elif name in times:
                 found = self._times(name, vector, times[name])
             else:

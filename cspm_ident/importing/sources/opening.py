@@ -9,7 +9,6 @@ from pathlib import Path
 
 from cspm_ident.importing.mapping import CsvFormat, MappingFile
 from cspm_ident.importing.sources.bag_source import BagSource
-from cspm_ident.importing.sources.chosen_rows import ChosenRows
 from cspm_ident.importing.sources.csv_source import CsvSource
 from cspm_ident.importing.sources.hdf5_source import Hdf5Source
 from cspm_ident.importing.sources.joined_source import JoinedSource
@@ -17,7 +16,6 @@ from cspm_ident.importing.sources.mat_source import MatSource
 from cspm_ident.importing.sources.parquet_source import ParquetSource
 from cspm_ident.importing.sources.source import Source
 from cspm_ident.importing.sources.spreadsheet_source import SpreadsheetSource
-from cspm_ident.importing.sources.table_source import TableSource
 from cspm_msgs_py.errors import InputError
 
 _HDF5 = b"\x89HDF\r\n\x1a\n"
@@ -71,7 +69,7 @@ def _opened(path: Path, form: CsvFormat, where: str) -> Source:
     if start.startswith(_BAGS):
         return BagSource(path)
     if (table := _binary_table(path, start, form)) is not None:
-        return ChosenRows(table)
+        return table
     packed = start.startswith(_GZIP)
     if packed:
         start = _unpacked_start(path)
@@ -79,10 +77,10 @@ def _opened(path: Path, form: CsvFormat, where: str) -> Source:
     if b"\x00" in start and not wide:
         inside = " inside" if packed else ""
         raise InputError(f"{path}: no text{inside}, {ALLOWED}")
-    return ChosenRows(CsvSource(path, form, where, packed=packed))
+    return CsvSource(path, form, where, packed=packed)
 
 
-def _binary_table(path: Path, start: bytes, form: CsvFormat) -> TableSource | None:
+def _binary_table(path: Path, start: bytes, form: CsvFormat) -> Source | None:
     if start.startswith(_HDF5) or start.startswith(_MATLAB_HDF5):
         return Hdf5Source(path, matlab=not start.startswith(_HDF5) or path.suffix == ".mat")
     if start.startswith(_PARQUET):

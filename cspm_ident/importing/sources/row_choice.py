@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import re
+from collections.abc import Collection
 from typing import NamedTuple
 
 import numpy as np
@@ -24,9 +25,9 @@ class RowChoice(NamedTuple):
         return f"{self.column}[{self.key}={self.value}]"
 
 
-def row_choice(name: str) -> RowChoice | None:
-    """Return what a name in a mapping chooses; None for the name of a whole column."""
-    found = _CHOICE.fullmatch(name)
+def row_choice(name: str, columns: Collection[str] = ()) -> RowChoice | None:
+    """Return what a name in a mapping chooses; None for that of one of `columns`, or of another."""
+    found = None if name in columns else _CHOICE.fullmatch(name)
     if found is None:
         return None
     return RowChoice(found["column"], found["key"].strip(), found["value"].strip())

@@ -8,8 +8,9 @@ from run_samples import bundle_of
 load_ros()
 
 from cspm_msgs_py.ros.contract_node import ros_class  # noqa: E402 - after ROS is known to be there
-from cspm_msgs_py.ros.own_senders import SEEN_BOTH_WAYS_S, OwnSenders  # noqa: E402
+from cspm_msgs_py.ros.own_senders import OwnSenders  # noqa: E402
 from cspm_msgs_py.ros.qos import contract_qos  # noqa: E402
+from cspm_msgs_py.ros.rendezvous import SETTLE_S  # noqa: E402
 from cspm_msgs_py.ros.session import Session  # noqa: E402
 from cspm_msgs_py.schedule import MOTION_CONTROLLER, schedule_of  # noqa: E402
 
@@ -31,13 +32,13 @@ def test_a_sender_is_there_once_it_had_time_to_see_its_readers():
         publisher = other.create_publisher(kind, WRENCH, contract_qos())
         begun = time.monotonic()
         assert session.spin_until(senders.ready, PATIENCE_S)
-        assert time.monotonic() - begun >= SEEN_BOTH_WAYS_S
+        assert time.monotonic() - begun >= SETTLE_S
         other.destroy_publisher(publisher)
         assert session.spin_until(lambda: not senders.ready(), PATIENCE_S)
         again = time.monotonic()
         other.create_publisher(kind, WRENCH, contract_qos())
         assert session.spin_until(senders.ready, PATIENCE_S)
-        assert time.monotonic() - again >= SEEN_BOTH_WAYS_S
+        assert time.monotonic() - again >= SETTLE_S
 
 
 def test_what_a_node_does_not_read_from_them_is_not_waited_for():

@@ -6,12 +6,12 @@ channels three times, and for each size a bag of joint states, and prints times 
 
 from __future__ import annotations
 
-import statistics
 import sys
 import tempfile
 import time
 from functools import cache
 from pathlib import Path
+from typing import NamedTuple
 
 import numpy as np
 import pandas as pd
@@ -35,21 +35,24 @@ _UNITS = {"position": "rad", "velocity": "rad/s", "effort": "N·m"}
 def main() -> None:
     """Measure and print."""
     sizes = [float(word) for word in sys.argv[1:]] or [0.25, 1.0]
-    shown = Table("source", "size", "time", "peak memory")
+    shown = Table("source", "size GB", "time s", "resident MB", "own MB")
     with tempfile.TemporaryDirectory(prefix="cspm-bench-") as folder:
         place = Path(folder)
         write_table(place)
         found = [imported(place, "lab.csv", f"table_{k}") for k in range(REPEATS)]
         size = (place / "lab.csv").stat().st_size / 1e9
-        seconds = statistics.median(each for each, _ in found)
-        shown.add_row("table", f"{size:.2f} GB", f"{seconds:.1f} s", f"{found[0][1]:.0f} MB")
+        shown.add_row("table", *cells(size, sorted(found)[REPEATS // 2]))
     for size in sizes:
         with tempfile.TemporaryDirectory(prefix="cspm-bench-") as folder:
             place = Path(folder)
             write_bag(place, size)
-            seconds, peak = imported(place, "bag", "out")
-            shown.add_row("bag", f"{size:g} GB", f"{seconds:.1f} s", f"{peak:.0f} MB")
+            shown.add_row("bag", *cells(size, imported(place, "bag", "out")))
     Console().print(shown)
+
+
+def cells(gigabytes: float, cost: Cost) -> tuple[str, ...]:
+    """Return a row of the table, without its name."""
+    return f"{gigabytes:.2f}", f"{cost.seconds:.1f}", f"{cost.resident:.0f}", f"{cost.own:.0f}"
 
 
 @cache
@@ -58,13 +61,26 @@ def cables() -> tuple[str, ...]:
     return load_testbed(find_testbed("thesis")).testbed.cable_names
 
 
-def imported(place: Path, source: str, name: str) -> tuple[float, float]:
-    """Return time [s] and peak resident memory [MB] of an import."""
+class Cost(NamedTuple):
+    """What an import took: time [s], and the largest memory [MB].
+
+    `resident` counts pages of files that were read, which the system takes back; `own` does not.
+    """
+
+    seconds: float
+    resident: float
+    own: float
+
+
+def imported(place: Path, source: str, name: str) -> Cost:
+    """Import a file as a process of its own, and return what it took."""
     paths = [str(place / source), "--mapping", str(place / "lab.yaml"), "--testbed", "thesis"]
     began = time.perf_counter()
     child = start_cspm(["import", *paths, "--out", str(place / name)], {})
-    peak = max(watched(child, lambda process: process.memory_info().rss / 1e6))
-    return time.perf_counter() - began, peak
+    looks = list(watched(child, lambda process: process.memory_info()))
+    seconds = time.perf_counter() - began
+    resident = max(look.rss for look in looks) / 1e6
+    return Cost(seconds, resident, max(look.rss - look.shared for look in looks) / 1e6)
 
 
 def joint_channels(column: str, units: dict[str, str]) -> dict[str, dict[str, str]]:

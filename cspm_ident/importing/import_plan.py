@@ -191,18 +191,21 @@ def _field(
 
 def _own_clock(column: str, clocks: dict[str, Clock], files: Collection[str], where: str) -> str:
     """Return the first clock that can be of a column's file."""
-    own = file_of(column, files)
     for name, clock in clocks.items():
-        if all(file_of(each, files) == own for each in clock.columns):
+        if _is_of_its_file(clock, column, files):
             return name
+    own = file_of(column, files) or "that is imported"
     raise InputError(
-        f"{where}: no clock of file '{own or 'that is imported'}', allowed: one whose column is in"
-        " the channel's own file"
+        f"{where}: no clock of file '{own}', allowed: one whose column is in the channel's own file"
     )
 
 
+def _is_of_its_file(clock: Clock, column: str, files: Collection[str]) -> bool:
+    return all(file_of(each, files) == file_of(column, files) for each in clock.columns)
+
+
 def _check_file(column: str, name: str, clock: Clock, files: Collection[str], where: str) -> None:
-    if any(file_of(each, files) != file_of(column, files) for each in clock.columns):
+    if not _is_of_its_file(clock, column, files):
         raise InputError(
             f"{where}: clock '{name}' is of another file than column '{column}', allowed: a clock"
             " of its own file"

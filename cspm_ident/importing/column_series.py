@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
@@ -17,9 +18,14 @@ class ColumnSeries:
     """One column in SI with its stamps; several may share the same `times`.
 
     Attributes:
-        values: shape (n,), on disk; a single number for a constant.
+        read: opens the values; they leave memory with the last reference to what it returns.
         times: of the rows; None for a constant.
     """
 
-    values: Array
+    read: Callable[[], Array]
     times: Times | None
+
+    @property
+    def values(self) -> Array:
+        """The values, shape (n,), on disk; a single number for a constant."""
+        return self.read()

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from copy import copy
 from pathlib import Path
 from tempfile import TemporaryDirectory
@@ -13,6 +14,14 @@ from numpy.typing import NDArray
 from typing_extensions import Self
 
 Array = NDArray[Any]
+PIECE = 200_000
+"""Rows that are worked on at a time."""
+
+
+def pieces(count: int) -> Iterator[slice]:
+    """Yield slices that cover a number of rows, a piece each."""
+    for start in range(0, count, PIECE):
+        yield slice(start, min(start + PIECE, count))
 
 
 class ColumnStore:

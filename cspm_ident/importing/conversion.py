@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 
 from cspm_ident.importing.mapping import ChannelSource
 from cspm_ident.importing.units import COUNTS, unit_of, units_for
-from cspm_ident.importing.unwrapping import Unwrapped, unwrap
+from cspm_ident.importing.unwrapping import Unwrapper
 from cspm_msgs_py.errors import InputError
 
 Array = NDArray[np.float64]
@@ -43,8 +43,12 @@ class Conversion:
             text += f" {'+' if self.offset > 0 else '−'} {abs(self.offset):.9g}"
         return text if self.wrap is None else f"{text}, unwrapped at {self.wrap:g}"
 
-    def apply(self, raw: Array) -> tuple[Array, Unwrapped | None]:
-        """Return SI values, shape (n,), and what unwrapping found.
+    def unwrapper(self) -> Unwrapper | None:
+        """Return what makes the raw numbers continuous, None if they are."""
+        return None if self.wrap is None else Unwrapper(self.wrap)
+
+    def apply(self, raw: Array, unwrapper: Unwrapper | None) -> Array:
+        """Return SI values of the next piece of a column, shape (n,).
 
         Raw values that are `invalid` or infinite become NaN.
         """
@@ -52,10 +56,9 @@ class Conversion:
         for value in self.invalid:
             bad |= raw == value
         values = np.where(bad, np.nan, raw)
-        found = None if self.wrap is None else unwrap(values, self.wrap)
-        if found is not None:
-            values = found.values
-        return self.factor * values + self.offset, found
+        if unwrapper is not None:
+            values = unwrapper.take(values)
+        return self.factor * values + self.offset
 
 
 def conversion_of(source: ChannelSource, quantity: str, where: str) -> Conversion:

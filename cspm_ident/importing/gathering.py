@@ -3,18 +3,19 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import partial
 
 import numpy as np
 
 from cspm_ident.importing.column_series import ColumnSeries
-from cspm_ident.importing.column_store import ColumnStore
+from cspm_ident.importing.column_store import ColumnStore, pieces
 from cspm_ident.importing.import_plan import ImportPlan, PlannedField, PlannedTopic
 from cspm_ident.importing.joint_parts import without_empty_parts
 from cspm_ident.importing.mapping import Clock, MappingFile
 from cspm_ident.importing.mending import Mended, mend
 from cspm_ident.importing.time_base import Times, set_stamps, single_precision, times_of
 from cspm_ident.importing.topic_messages import TopicMessages, gather
-from cspm_ident.importing.unwrapping import Unwrapped
+from cspm_ident.importing.unwrapping import Unwrapper
 from cspm_msgs_py.errors import InputError
 
 _Key = tuple[str, tuple[str, ...], int]
@@ -27,14 +28,14 @@ class Gathered:
     Attributes:
         topics: as they are recorded, in the order of the mapping.
         messages: by topic.
-        unwrapped: what unwrapping found, by topic and field.
+        unwrapped: what made counters continuous, by topic and field.
         mended: what was changed, by topic and field.
         empty: topic and field of what was planned and has no number.
     """
 
     topics: list[PlannedTopic]
     messages: dict[str, TopicMessages]
-    unwrapped: dict[str, dict[str, Unwrapped]]
+    unwrapped: dict[str, dict[str, Unwrapper]]
     mended: dict[str, dict[str, Mended]]
     empty: list[str]
 
@@ -142,17 +143,20 @@ def _series(
     found.unwrapped[topic], found.mended[topic] = {}, {}
     for field in planned.fields:
         if field.conversion is None or field.column is None or field.source is None:
-            series[field.name] = ColumnSeries(np.array(field.constant), None)
+            series[field.name] = ColumnSeries(partial(np.array, field.constant), None)
             continue
-        raw = store.column(field.column)
+        raw, unwrapper = store.column(field.column), field.conversion.unwrapper()
         clock = times[(field.clock, field.stamps, len(raw))]
-        values, unwrapped = field.conversion.apply(np.asarray(raw))
-        if unwrapped is not None:
-            found.unwrapped[topic][field.name] = unwrapped
-        values, mended = mend(values, clock, field.source)
-        if mended is not None:
-            found.mended[topic][field.name] = mended
         name = f"{topic} {field.name}"
-        store.append(name, values)
-        series[field.name] = ColumnSeries(store.column(name), clock)
+        for part in pieces(len(raw)):
+            store.append(name, field.conversion.apply(np.asarray(raw[part]), unwrapper))
+        if unwrapper is not None:
+            found.unwrapped[topic][field.name] = unwrapper
+        if field.source.is_mended:
+            values, mended = mend(store.column(name), clock, field.source)
+            if mended is not None:
+                found.mended[topic][field.name] = mended
+                name = f"{name} mended"
+                store.append(name, values)
+        series[field.name] = ColumnSeries(partial(store.column, name), clock)
     return series

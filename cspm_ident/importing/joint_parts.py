@@ -2,13 +2,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import replace
 
 import numpy as np
 from numpy.typing import NDArray
 
 from cspm_ident.importing.column_series import ColumnSeries
+from cspm_ident.importing.column_store import pieces
 from cspm_ident.importing.import_plan import PlannedTopic
 
 Array = NDArray[np.float64]
@@ -37,28 +38,53 @@ def without_empty_parts(
 
 def _is_empty(part: str, series: Mapping[str, ColumnSeries]) -> bool:
     return all(
-        bool(np.isnan(one.values).all())
-        for name, one in series.items()
-        if name.partition("/")[0] == part
+        _has_no_number(one.values) for name, one in series.items() if name.partition("/")[0] == part
     )
 
 
-def not_yet_there(
-    columns: Mapping[str, Array], parts: tuple[str, ...]
-) -> dict[str, NDArray[np.bool_]]:
-    """Return by part the first messages that have it not yet, though they have another part.
+def _has_no_number(values: Array) -> bool:
+    flat = np.atleast_1d(values)
+    return all(bool(np.isnan(flat[piece]).all()) for piece in pieces(len(flat)))
 
-    A part that never comes is not among them.
+
+def absent_numbers(
+    values: Callable[[slice], Mapping[str, Array]], count: int, parts: tuple[str, ...]
+) -> tuple[NDArray[np.bool_], dict[str, int]]:
+    """Return which messages miss a number, and by part how many of the first have it not yet.
+
+    The first messages may lack a part if they have another one, and if it comes later.
 
     Args:
-        columns: values by field, each of shape (n,).
+        values: returns the values by field of a slice of the messages, each of shape (n,).
+        count: number of messages.
         parts: of the topic.
     """
-    missing = {
-        part: np.all([np.isnan(v) for f, v in columns.items() if f.startswith(f"{part}/")], axis=0)
+    begins = dict.fromkeys(parts, count)
+    for piece in pieces(count):
+        for part, gone in _missing_parts(values(piece), parts).items():
+            if begins[part] == count and not gone.all():
+                begins[part] = piece.start + int(np.argmin(gone))
+    late = {part: 0 for part, begin in begins.items() if 0 < begin < count}
+    absent = np.zeros(count, dtype=bool)
+    for piece in pieces(count):
+        columns = values(piece)
+        missing = _missing_parts(columns, parts)
+        nothing = np.all(list(missing.values()), axis=0)
+        rows = np.arange(piece.start, piece.stop)
+        excused = {part: (rows < begins[part]) & ~nothing for part in late}
+        for name, column in columns.items():
+            gone, first = np.isnan(column), excused.get(name.partition("/")[0])
+            absent[piece] |= gone if first is None else gone & ~first
+        late = {part: found + int(excused[part].sum()) for part, found in late.items()}
+    return absent, {part: found for part, found in late.items() if found}
+
+
+def _missing_parts(
+    columns: Mapping[str, Array], parts: tuple[str, ...]
+) -> dict[str, NDArray[np.bool_]]:
+    """Return by part which messages have nothing of it, from values by field."""
+    gone = {
+        part: [np.isnan(v) for field, v in columns.items() if field.startswith(f"{part}/")]
         for part in parts
     }
-    leading = {part: np.logical_and.accumulate(gone) for part, gone in missing.items()}
-    nothing = np.all(list(missing.values()), axis=0) if missing else np.zeros(0, dtype=bool)
-    late = {part: first & ~nothing for part, first in leading.items() if not first.all()}
-    return {part: first for part, first in late.items() if first.any()}
+    return {part: np.all(each, axis=0) for part, each in gone.items() if each}

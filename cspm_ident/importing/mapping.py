@@ -133,6 +133,12 @@ class ChannelSource(StrictModel):
     invalid: tuple[float, ...] = ()
     spikes: Literal["keep", "mask"] = "keep"
     jumps: Literal["keep", "join"] = "keep"
+
+    @property
+    def is_mended(self) -> bool:
+        """Whether impossible samples are to be changed."""
+        return self.spikes != "keep" or self.jumps != "keep"
+
     clock: str | None = None
 
     @model_validator(mode="after")

@@ -55,8 +55,6 @@ def mend(values: Array, times: Times, source: ChannelSource) -> tuple[Array, Men
         times: of its rows.
         source: says whether spikes are masked and jumps joined.
     """
-    if source.spikes == "keep" and source.jumps == "keep":
-        return values, None
     found, rows = find_outliers(values, times.stamp_ns)
     out = values.copy()
     masked = np.sort(np.concatenate([found.spikes, found.zeros]))

@@ -71,7 +71,10 @@ def paired(series: dict[str, ColumnSeries], mapping: Mapping, where: str) -> Pai
     groups = list(clocks.values())
     rows = [np.flatnonzero(times.known) for times, _ in groups]
     no_time = sum(int((~times.known).sum()) for times, _ in groups)
-    stamps = [times.stamp_ns[at] for (times, _), at in zip(groups, rows, strict=True)]
+    stamps = [
+        times.stamp_ns if times.known.all() else times.stamp_ns[at]
+        for (times, _), at in zip(groups, rows, strict=True)
+    ]
     names = [names for _, names in groups]
     unpaired, tolerance, common = 0, None, stamps[0]
     if any(not np.array_equal(common, other) for other in stamps[1:]):

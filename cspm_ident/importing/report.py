@@ -5,22 +5,20 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping as MappingOf
 from dataclasses import asdict, dataclass
+from functools import partial
 from typing import Any
 
 import numpy as np
 
 from cspm_ident.importing.checks.pace import Pace, pace_of
 from cspm_ident.importing.checks.suspicion import Suspicion
-from cspm_ident.importing.checks.value_suspicions import (
-    resolution,
-)
+from cspm_ident.importing.checks.value_suspicions import resolution
+from cspm_ident.importing.field_statistics import statistics_of
 from cspm_ident.importing.import_plan import PlannedField, PlannedTopic
 from cspm_ident.importing.topic_messages import SkippedMessages, TopicMessages
-from cspm_ident.importing.unwrapping import Unwrapped
+from cspm_ident.importing.unwrapping import Unwrapper
 
 FIRST_ROWS = 5
-_SAFE_STEP = 0.25
-_HELD_SAMPLE = 100_000
 
 
 @dataclass(frozen=True)
@@ -109,7 +107,7 @@ def topic_report(
     planned: PlannedTopic,
     messages: TopicMessages,
     raw: MappingOf[str, Any],
-    unwrapped: MappingOf[str, Unwrapped],
+    unwrapped: MappingOf[str, Unwrapper],
     origin_ns: int,
 ) -> TopicReport:
     """Return what becomes of a topic.
@@ -118,16 +116,14 @@ def topic_report(
         planned: the topic.
         messages: its messages.
         raw: columns as they were read, by name.
-        unwrapped: what unwrapping found, by field.
+        unwrapped: what made counters continuous, by field.
         origin_ns: times count from it [ns].
     """
     fields = []
     for field in planned.fields:
-        values = messages.values(field.name)
         places = messages.places[field.name]
         first = [] if places is None else raw[field.column or ""][places[:FIRST_ROWS]].tolist()
-        known = values[~np.isnan(values)]
-        some = known if len(known) else np.full(1, np.nan)
+        found = statistics_of(partial(messages.values, field.name), len(messages.stamp_ns))
         fields.append(
             FieldReport(
                 field=field.name,
@@ -135,12 +131,12 @@ def topic_report(
                 quantity=field.conversion.quantity if field.conversion else "",
                 formula=field.conversion.formula if field.conversion else _constant(field),
                 raw=first,
-                converted=values[:FIRST_ROWS].tolist(),
-                low=float(some.min()),
-                high=float(some.max()),
-                mean=float(some.mean()),
-                deviation=float(some.std()),
-                resolution=resolution(values) if field.conversion else None,
+                converted=messages.values(field.name, slice(FIRST_ROWS)).tolist(),
+                low=found.low,
+                high=found.high,
+                mean=found.mean,
+                deviation=found.deviation,
+                resolution=resolution(found.head) if field.conversion else None,
                 turns=unwrapped[field.name].turns if field.name in unwrapped else 0,
             )
         )

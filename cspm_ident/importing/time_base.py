@@ -8,10 +8,11 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from cspm_ident.importing.column_store import pieces
 from cspm_ident.importing.mapping import Clock
 from cspm_ident.importing.time_text import TEXT_UNITS, TIME_OF_DAY
 from cspm_ident.importing.units import TIME_FACTORS, TIME_ZEROS
-from cspm_ident.importing.unwrapping import unwrap
+from cspm_ident.importing.unwrapping import Unwrapper
 from cspm_msgs_py.errors import InputError
 from cspm_msgs_py.layout import LATEST_SECOND
 from cspm_msgs_py.message import NANOSECONDS
@@ -69,17 +70,18 @@ def single_precision(raw: NDArray[Any], unit: str) -> float:
 
     Whole numbers below the end of that precision are exact, and say nothing.
     """
-    known = np.asarray(raw, dtype=np.float64)
-    known = known[np.isfinite(known)]
-    if not len(known) or unit in TEXT_UNITS:
+    if unit in TEXT_UNITS:
         return 0.0
-    largest = float(np.abs(known).max())
-    if largest >= float(np.finfo(np.float32).max):
-        return 0.0
-    single = known.astype(np.float32)
+    largest, whole = 0.0, True
+    for part in pieces(len(raw)):
+        known = np.asarray(raw[part], dtype=np.float64)
+        known = known[np.isfinite(known)]
+        largest = max(largest, float(np.abs(known).max(initial=0.0)))
+        if largest >= float(np.finfo(np.float32).max) or (known.astype(np.float32) != known).any():
+            return 0.0
+        whole = whole and not (known % 1.0).any()
     spacing = float(np.spacing(np.float32(largest)))
-    whole = spacing <= 1.0 and not (known % 1.0).any()
-    return 0.0 if whole or (single != known).any() else spacing * TIME_FACTORS[unit]
+    return 0.0 if whole and spacing <= 1.0 else spacing * TIME_FACTORS[unit]
 
 
 def times_of(
@@ -98,18 +100,22 @@ def times_of(
     Raises:
         InputError: there is no time at all, or a stamp that no recording can hold.
     """
-    if not raw:
-        seconds = np.arange(count, dtype=np.longdouble) / np.longdouble(clock.rate or 1.0)
-    elif len(raw) == 1:
-        seconds = _seconds(_continuous(raw[0], clock, units[0]), units[0])
-    else:
-        parts = [_seconds(one, unit) for one, unit in zip(raw, units, strict=True)]
-        seconds = np.sum(parts, axis=0, dtype=np.longdouble)
-    known = ~np.isnan(seconds)
+    reader = _ClockReader(clock, units)
+    stamp_ns, known = np.zeros(count, dtype=np.int64), np.zeros(count, dtype=bool)
+    for part in pieces(count):
+        seconds = reader.seconds([one[part] for one in raw], part)
+        known[part] = ~np.isnan(seconds)
+        stamp_ns[part][known[part]] = _nanoseconds(seconds[known[part]], where)
     if not known.any():
         raise InputError(f"{where}: no row has a time, allowed: at least one")
-    seconds = np.where(known, seconds, seconds[known][0])
-    seconds = _corrected(seconds, clock)
+    if not known.all():
+        stamp_ns[~known] = stamp_ns[np.argmax(known)]
+    return Times(stamp_ns, known, clock.disorder)
+
+
+def _nanoseconds(seconds: NDArray[Any], where: str) -> Stamps:
+    if not len(seconds):
+        return np.zeros(0, dtype=np.int64)
     low, high = float(seconds.min()), float(seconds.max())
     # What rounds to 0 ns is 0.
     if low < -0.5e-9 or high > LATEST_SECOND:
@@ -117,16 +123,44 @@ def times_of(
             f"{where}: times from {low:.9g} s to {high:.9g} s, allowed: 0 to {LATEST_SECOND} s;"
             " is the unit right? `offset` moves them"
         )
-    return Times(np.rint(seconds * NANOSECONDS).astype(np.int64), known, clock.disorder)
+    return np.asarray(np.rint(seconds * NANOSECONDS).astype(np.int64))
 
 
-def _continuous(raw: NDArray[Any], clock: Clock, unit: str) -> NDArray[Any]:
-    """Return a column of times without the steps of a counter or of midnight."""
-    if unit == TIME_OF_DAY:
-        return np.asarray(unwrap(np.asarray(raw), 86400.0 * NANOSECONDS).values)
-    if clock.wrap is not None:
-        return np.asarray(unwrap(np.asarray(raw), clock.wrap).values)
-    return raw
+class _ClockReader:
+    """Reads the pieces of a clock's columns in turn."""
+
+    def __init__(self, clock: Clock, units: Sequence[str]) -> None:
+        self._clock, self._units = clock, units
+        self._first: np.longdouble | None = None
+        wrap = 86400.0 * NANOSECONDS if list(units) == [TIME_OF_DAY] else clock.wrap
+        # A counter or midnight is unwrapped where the clock is one column.
+        self._unwrapper = Unwrapper(wrap) if wrap is not None and len(units) == 1 else None
+
+    def seconds(self, raw: Sequence[NDArray[Any]], part: slice) -> NDArray[Any]:
+        """Return the times [s] of the next rows as the clock corrects them, NaN where unknown."""
+        if not raw:
+            rows = np.arange(part.start, part.stop, dtype=np.longdouble)
+            found = rows / np.longdouble(self._clock.rate or 1.0)
+        elif len(raw) == 1:
+            whole = np.asarray(raw[0])
+            whole = whole if self._unwrapper is None else self._unwrapper.take(whole)
+            found = _seconds(whole, self._units[0])
+        else:
+            parts = [_seconds(one, unit) for one, unit in zip(raw, self._units, strict=True)]
+            found = np.sum(parts, axis=0, dtype=np.longdouble)
+        known = np.flatnonzero(~np.isnan(found))
+        if self._first is None and len(known):
+            self._first = found[known[0]]
+        return found if self._first is None else self._corrected(found, self._first)
+
+    def _corrected(self, seconds: NDArray[Any], first: np.longdouble) -> NDArray[Any]:
+        clock = self._clock
+        if clock.points:
+            (raw0, true0), (raw1, true1) = (map(np.longdouble, point) for point in clock.points)
+            seconds = true0 + (seconds - raw0) * ((true1 - true0) / (raw1 - raw0))
+        elif clock.skew:
+            seconds = first + (seconds - first) * (1 + np.longdouble(clock.skew))
+        return np.asarray(seconds + np.longdouble(clock.offset))
 
 
 def _seconds(raw: NDArray[Any], unit: str) -> NDArray[Any]:
@@ -138,18 +172,18 @@ def _seconds(raw: NDArray[Any], unit: str) -> NDArray[Any]:
     return np.asarray(raw / np.rint(np.longdouble(1 / factor)))
 
 
-def _corrected(seconds: NDArray[Any], clock: Clock) -> NDArray[Any]:
-    if clock.points:
-        (raw0, true0), (raw1, true1) = (map(np.longdouble, point) for point in clock.points)
-        seconds = true0 + (seconds - raw0) * ((true1 - true0) / (raw1 - raw0))
-    elif clock.skew:
-        seconds = seconds[0] + (seconds - seconds[0]) * (1 + np.longdouble(clock.skew))
-    return np.asarray(seconds + np.longdouble(clock.offset))
+def out_of_order(stamp_ns: Stamps, kept: NDArray[np.bool_]) -> NDArray[np.intp]:
+    """Return which of the kept rows have a stamp that is not later than all kept before.
 
-
-def later_than_all_before(stamp_ns: Stamps) -> NDArray[np.bool_]:
-    """Return which stamps are later than every one before them, shape (n,)."""
-    if not len(stamp_ns):
-        return np.zeros(0, dtype=bool)
-    before = np.maximum.accumulate(stamp_ns)[:-1]
-    return np.concatenate([[True], stamp_ns[1:] > before])
+    Args:
+        stamp_ns: shape (n,).
+        kept: shape (n,).
+    """
+    found, latest = [np.zeros(0, dtype=np.intp)], np.iinfo(np.int64).min
+    for part in pieces(len(stamp_ns)):
+        rows = np.flatnonzero(kept[part])
+        stamps = np.concatenate([[latest], stamp_ns[part][rows]])
+        reached = np.maximum.accumulate(stamps)
+        found.append(rows[stamps[1:] <= reached[:-1]] + part.start)
+        latest = reached[-1]
+    return np.concatenate(found)

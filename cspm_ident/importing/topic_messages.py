@@ -5,7 +5,7 @@ No sample is moved in time and none is made; see `pairing`.
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from typing import Any
 
 import numpy as np
@@ -14,10 +14,10 @@ from scipy.spatial.transform import Rotation
 
 from cspm_ident.importing.column_series import ColumnSeries
 from cspm_ident.importing.import_plan import ANGLES, PlannedTopic
-from cspm_ident.importing.joint_parts import not_yet_there
+from cspm_ident.importing.joint_parts import absent_numbers
 from cspm_ident.importing.mapping import Mapping, Segment
 from cspm_ident.importing.pairing import Tolerance, paired
-from cspm_ident.importing.time_base import later_than_all_before
+from cspm_ident.importing.time_base import out_of_order
 from cspm_msgs_py.errors import InputError
 from cspm_msgs_py.topics import Topic
 
@@ -63,6 +63,13 @@ class TopicMessages:
     left_out: SkippedMessages
     tolerance: Tolerance | None = None
     late_parts: dict[str, int] = field(default_factory=dict)
+
+    def only(self, chosen: slice | NDArray[np.bool_]) -> TopicMessages:
+        """Return some of the messages."""
+        # Fields of one clock share their rows, which may be many.
+        rows = {id(at): at[chosen] for at in self.places.values() if at is not None}
+        places = {name: None if at is None else rows[id(at)] for name, at in self.places.items()}
+        return replace(self, stamp_ns=self.stamp_ns[chosen], places=places)
 
     def values(self, field: str, chosen: slice = slice(None)) -> Array:
         """Return a field of the chosen messages, shape (n,) [SI]."""
@@ -114,16 +121,19 @@ def gather(
         dropped.append(int(hit.sum()))
         keep &= ~hit
     left["segments"] = tuple(dropped)
-    absent, late = _absent(series, places, len(stamps), planned.topic.parts)
+    measured = {name: at for name, at in places.items() if at is not None}
+
+    def values(piece: slice) -> dict[str, Array]:
+        return {name: series[name].values[at[piece]] for name, at in measured.items()}
+
+    absent, late = absent_numbers(values, len(stamps), planned.topic.parts)
     keep, left["missing"] = _complete(stamps, keep, absent, mapping, where, origin_ns)
     keep, left["disorder"] = _in_order(stamps, keep, series, where, origin_ns, trial=trial)
     if not keep.any():
         raise InputError(f"{where}: no message is left, allowed: at least one")
-    places = {name: None if at is None else at[keep] for name, at in places.items()}
     skipped = SkippedMessages(**left)
-    return TopicMessages(
-        planned.topic, stamps[keep], series, places, skipped, pairs.tolerance, late
-    )
+    found = TopicMessages(planned.topic, stamps, series, places, skipped, pairs.tolerance, late)
+    return found if keep.all() else found.only(keep)
 
 
 def _inside(segment: Segment, topic: str, stamps: Index, origin_ns: int) -> NDArray[np.bool_]:
@@ -155,23 +165,6 @@ def _complete(
     return keep & ~absent, count
 
 
-def _absent(
-    series: dict[str, ColumnSeries],
-    places: dict[str, Index | None],
-    count: int,
-    parts: tuple[str, ...],
-) -> tuple[NDArray[np.bool_], dict[str, int]]:
-    """Return which messages miss a number, and by part how many of the first have it not yet."""
-    columns = {name: series[name].values[at] for name, at in places.items() if at is not None}
-    late = not_yet_there(columns, parts)
-    absent = np.zeros(count, dtype=bool)
-    for name, values in columns.items():
-        first = late.get(name.partition("/")[0])
-        missing = np.isnan(values)
-        absent |= missing if first is None else missing & ~first
-    return absent, {part: int(first.sum()) for part, first in late.items()}
-
-
 def _in_order(
     stamps: Index,
     keep: NDArray[np.bool_],
@@ -182,8 +175,7 @@ def _in_order(
     trial: bool,
 ) -> tuple[NDArray[np.bool_], int]:
     """Return what to keep, and how many messages went because their stamps are out of order."""
-    chosen = np.flatnonzero(keep)
-    late = chosen[~later_than_all_before(stamps[chosen])]
+    late = out_of_order(stamps, keep)
     policies = {one.times.disorder for one in series.values() if one.times is not None}
     if not len(late) or policies == {"keep"}:
         return keep, 0

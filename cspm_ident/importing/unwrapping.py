@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import Any, NamedTuple
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -10,34 +10,34 @@ from numpy.typing import NDArray
 Array = NDArray[Any]
 
 
-class Unwrapped(NamedTuple):
-    """A continuous signal.
+class Unwrapper:
+    """Makes a counter continuous, piece by piece: every step is taken the shorter way round.
 
     Attributes:
-        values: shape (n,), in the unit of the counter.
-        turns: how often it passed its end, both ways together.
+        turns: how often the counter passed its end, both ways together.
         largest_step: largest step between neighbours, as a share of the counter's range; near 0.5
             the direction of a step is a guess.
     """
 
-    values: Array
-    turns: int
-    largest_step: float
+    def __init__(self, period: float) -> None:
+        """Begin with what the counter counts to before it starts again."""
+        self.turns, self.largest_step = 0, 0.0
+        self._period, self._passed = period, 0.0
+        self._last: Array | None = None
 
-
-def unwrap(values: Array, period: float) -> Unwrapped:
-    """Return a counter's values with every step the shorter way round; NaN is passed over.
-
-    Args:
-        values: shape (n,), any float type, which is kept.
-        period: what the counter counts to before it starts again.
-    """
-    out = values.copy()
-    known = np.flatnonzero(~np.isnan(values))
-    if len(known) < 2:
-        return Unwrapped(out, 0, 0.0)
-    step = np.diff(values[known])
-    turns = -np.round(step / values.dtype.type(period))
-    out[known[1:]] += np.cumsum(turns) * values.dtype.type(period)
-    rest = np.abs(step + turns * values.dtype.type(period))
-    return Unwrapped(out, int(np.abs(turns).sum()), float(rest.max() / period))
+    def take(self, values: Array) -> Array:
+        """Return the next piece, shape (n,), continuous; NaN is passed over, the type is kept."""
+        out: Array = values.copy()
+        known = np.flatnonzero(~np.isnan(values))
+        if not len(known):
+            return out
+        numbers, period = values[known], values.dtype.type(self._period)
+        step = np.diff(numbers, prepend=numbers[:1] if self._last is None else self._last)
+        turns = -np.round(step / period)
+        passed = self._passed + np.cumsum(turns)
+        out[known] += passed * period
+        self.turns += int(np.abs(turns).sum())
+        rest = float(np.abs(step + turns * period).max())
+        self.largest_step = max(self.largest_step, rest / self._period)
+        self._last, self._passed = numbers[-1:], passed[-1]
+        return out

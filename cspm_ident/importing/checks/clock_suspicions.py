@@ -5,8 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 from itertools import pairwise
 
-import numpy as np
-
+from cspm_ident.importing.checks.pace import Pace
 from cspm_ident.importing.checks.suspicion import Suspicion
 from cspm_ident.importing.topic_messages import TopicMessages
 from cspm_msgs_py.errors import InputError
@@ -16,11 +15,14 @@ ROUNDED = 0.01
 """Of a step: then rounding of times is seen in every derivative."""
 
 
-def message_suspicions(messages: TopicMessages, unmeasured: list[str]) -> list[Suspicion]:
+def message_suspicions(
+    messages: TopicMessages, pace: Pace, unmeasured: list[str]
+) -> list[Suspicion]:
     """Return how the messages of a topic were made of other than what they should be.
 
     Args:
         messages: the topic.
+        pace: of its stamps.
         unmeasured: its fields that nobody measured.
     """
     name, found = messages.topic.name, []
@@ -29,11 +31,7 @@ def message_suspicions(messages: TopicMessages, unmeasured: list[str]) -> list[S
         text = f"{unset} stamps were never set (0) and are repaired from the time of the log"
         found.append(Suspicion(name, "unset", text, {"count": float(unset)}))
     rounded = max((one.times.rounded_s for one in messages.series.values() if one.times), default=0)
-    step = (
-        float(np.median(np.diff(messages.stamp_ns))) / NANOSECONDS
-        if len(messages.stamp_ns) > 1
-        else 0.0
-    )
+    step = pace.step_s[1] if pace.step_s else 0.0
     if rounded > ROUNDED * step > 0.0:
         text = f"times were stored in single precision, rounded to {rounded:.3g} s"
         found.append(Suspicion(name, "single", text, {"rounded": rounded}))

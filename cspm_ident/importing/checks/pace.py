@@ -16,6 +16,8 @@ _SCATTERED = -0.25
 """Halfway between -1/2, the correlation of neighbouring steps where stamps scatter about an even
 clock, and 0, where each step errs for itself."""
 _FEWEST = 50
+STRETCH = 500_000
+"""Messages that are looked at together, so that memory is bounded."""
 
 
 class Pace(NamedTuple):
@@ -49,7 +51,41 @@ class Pace(NamedTuple):
 
 
 def pace_of(stamp_ns: Stamps, origin_ns: int) -> Pace:
-    """Return what a series of stamps, shape (n,), looks like, seen from an origin [ns]."""
+    """Return what a series of stamps, shape (n,), looks like, seen from an origin [ns].
+
+    A long one is looked at stretch by stretch: medians are then medians of those of stretches.
+    """
+    starts = range(0, max(len(stamp_ns) - 1, 1), STRETCH)
+    found = [_pace(stamp_ns[start : start + STRETCH + 1], origin_ns) for start in starts]
+    return found[0] if len(found) == 1 else _joined(found)
+
+
+def _joined(parts: list[Pace]) -> Pace:
+    """Return the pace of stretches that share their ends."""
+    steps = np.array([part.messages - 1 for part in parts])
+    moving = [(part.messages - 1, part.rate_hz) for part in parts if part.rate_hz]
+    of_steps = np.array([part.step_s for part in parts if part.step_s])
+    gap = max((part for part in parts if part.gaps), key=_longest, default=None)
+    return Pace(
+        messages=int(steps.sum()) + 1,
+        first_s=parts[0].first_s,
+        last_s=parts[-1].last_s,
+        rate_hz=sum(n for n, _ in moving) / sum(n / r for n, r in moving) if moving else None,
+        step_s=(of_steps[:, 0].min(), float(np.median(of_steps[:, 1])), of_steps[:, 2].max()),
+        irregular=float(np.average([part.irregular for part in parts], weights=steps)),
+        gaps=sum(part.gaps for part in parts),
+        gap_at_s=gap.gap_at_s if gap else None,
+        duplicates=sum(part.duplicates for part in parts),
+        backwards=sum(part.backwards for part in parts),
+        jitter_s=float(np.median([part.jitter_s for part in parts])),
+    )
+
+
+def _longest(part: Pace) -> float:
+    return part.step_s[2] if part.step_s else 0.0
+
+
+def _pace(stamp_ns: Stamps, origin_ns: int) -> Pace:
     if not len(stamp_ns):
         return Pace(0, 0.0, 0.0, None, None, 0.0, 0, None, 0, 0)
     first, last = ((int(stamp_ns[i]) - origin_ns) * 1e-9 for i in (0, -1))

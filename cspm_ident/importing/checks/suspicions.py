@@ -2,6 +2,9 @@
 
 from __future__ import annotations
 
+from collections import Counter
+from collections.abc import Mapping
+
 import numpy as np
 from numpy.typing import NDArray
 
@@ -15,6 +18,7 @@ from cspm_ident.importing.checks.pace import pace_of
 from cspm_ident.importing.checks.pose_lateness import comparable, pose_lateness
 from cspm_ident.importing.checks.relations import relation_suspicions
 from cspm_ident.importing.checks.series import series_of
+from cspm_ident.importing.checks.stretches import joined, stretches
 from cspm_ident.importing.checks.stuck import frozen_suspicions
 from cspm_ident.importing.checks.suspicion import Suspicion
 from cspm_ident.importing.checks.time_suspicions import held_suspicions, time_suspicions
@@ -22,7 +26,7 @@ from cspm_ident.importing.checks.value_suspicions import quaternion_suspicions, 
 from cspm_ident.importing.gathering import Gathered
 from cspm_ident.importing.import_plan import PlannedTopic
 from cspm_ident.importing.topic_messages import TopicMessages
-from cspm_ident.importing.unwrapping import Unwrapped
+from cspm_ident.importing.unwrapping import Unwrapper
 from cspm_msgs_py.testbed import Testbed
 from cspm_msgs_py.topics import POSE
 
@@ -48,34 +52,51 @@ def suspicions_of(
         testbed: the machine.
         origin_ns: the instant from which times count [ns].
     """
+    alone, together, present = [], [], Counter[str]()
+    compared = comparable(gathered.messages, testbed)
+    judged = not compared
+    for messages in stretches(gathered.messages):
+        present.update(messages.keys())
+        topics = [planned for planned in gathered.topics if planned.topic.name in messages]
+        alone.append(
+            [one for each in topics for one in _of_stretch(each, messages, testbed, origin_ns)]
+        )
+        poses = (
+            pose_lateness(messages, testbed, origin_ns) if comparable(messages, testbed) else None
+        )
+        judged = judged or poses is not None
+        together.append(relation_suspicions(messages, testbed, poses))
+    of_fields = joined(alone, present)
     found: list[Suspicion] = []
     for planned in gathered.topics:
+        found += _of_topic(planned, gathered, testbed, origin_ns)
         name = planned.topic.name
-        found += _of_topic(planned, gathered.messages[name], testbed, origin_ns)
-        found += _of_fields(planned, gathered, testbed, origin_ns)
+        found += [one for one in of_fields if one.where.partition(" ")[0] == name]
     found += overlap_suspicions(gathered.messages)
-    compared = comparable(gathered.messages, testbed)
-    poses = pose_lateness(gathered.messages, testbed, origin_ns) if compared else None
-    unjudged = [_UNJUDGED] if compared and poses is None else []
-    return found + relation_suspicions(gathered.messages, testbed, poses), unjudged
+    return found + joined(together, present), [] if judged else [_UNJUDGED]
 
 
 def _of_topic(
-    planned: PlannedTopic, messages: TopicMessages, testbed: Testbed, origin_ns: int
+    planned: PlannedTopic, gathered: Gathered, testbed: Testbed, origin_ns: int
 ) -> list[Suspicion]:
+    """Return what looks wrong in a topic as a whole, and what became of its counters."""
     name = planned.topic.name
-    sensor = testbed.sensors.get(name)
+    messages, sensor = gathered.messages[name], testbed.sensors.get(name)
     unmeasured = [field.name for field in planned.fields if field.is_unmeasured]
-    found = message_suspicions(messages, unmeasured)
     pace = pace_of(messages.stamp_ns, origin_ns)
+    found = message_suspicions(messages, pace, unmeasured)
     found += time_suspicions(name, pace, sensor.rate if sensor else None)
     head = messages.rows(slice(_HELD_SAMPLE))
     found += _held(planned, head)
-    if name in (_TENSION, *_POSES):
-        found += _frozen(planned, messages, origin_ns)
     if "qw" in planned.topic.fields:
         quaternions = head[:, POSE.index("qx") : POSE.index("qw") + 1]
         found += quaternion_suspicions(name, quaternions)
+    for field, unwrapped in gathered.unwrapped[name].items():
+        found += _unwrap_suspicions(f"{name} {field}", unwrapped)
+    for field, mended in gathered.mended[name].items():
+        if (times := messages.series[field].times) is not None:
+            seconds = np.asarray((times.stamp_ns - origin_ns) * 1e-9, dtype=np.float64)
+            found += mended_suspicions(f"{name} {field}", mended, seconds)
     return found
 
 
@@ -103,31 +124,30 @@ def _frozen(planned: PlannedTopic, messages: TopicMessages, origin_ns: int) -> l
     return [one for where, rows in columns for one in frozen_suspicions(where, rows, seconds)]
 
 
-def _of_fields(
-    planned: PlannedTopic, gathered: Gathered, testbed: Testbed, origin_ns: int
+def _of_stretch(
+    planned: PlannedTopic,
+    stretch: Mapping[str, TopicMessages],
+    testbed: Testbed,
+    origin_ns: int,
 ) -> list[Suspicion]:
-    name, found = planned.topic.name, []
-    messages = gathered.messages[name]
+    """Return what looks wrong in the numbers of a topic."""
+    name = planned.topic.name
+    messages = stretch[name]
+    found = _frozen(planned, messages, origin_ns) if name in (_TENSION, *_POSES) else []
     for field in planned.fields:
         if field.conversion is None:
             continue
-        values, where = messages.values(field.name), f"{name} {field.name}"
-        quantity = field.conversion.quantity
+        values, quantity = messages.values(field.name), field.conversion.quantity
         found += value_suspicions(planned.topic, field.name, quantity, values, testbed)
         series = series_of(messages, field.name, origin_ns)
         found += acceleration_suspicions(planned.topic, field.name, quantity, series, testbed)
-        unwrapped = gathered.unwrapped[name].get(field.name)
-        found += _unwrap_suspicions(where, unwrapped)
+        where = f"{name} {field.name}"
         found += outlier_suspicions(where, field, values, messages.stamp_ns, origin_ns)
-        mended, times = gathered.mended[name].get(field.name), messages.series[field.name].times
-        if mended is not None and times is not None:
-            seconds = np.asarray((times.stamp_ns - origin_ns) * 1e-9, dtype=np.float64)
-            found += mended_suspicions(where, mended, seconds)
     return found
 
 
-def _unwrap_suspicions(where: str, found: Unwrapped | None) -> list[Suspicion]:
-    if found is None or found.largest_step <= _SAFE_STEP:
+def _unwrap_suspicions(where: str, found: Unwrapper) -> list[Suspicion]:
+    if found.largest_step <= _SAFE_STEP:
         return []
     text = f"a step of {found.largest_step:.2f} of the counter's range: which way round is a guess"
     return [Suspicion(where, "wrap", text, {"step": found.largest_step})]

@@ -20,13 +20,13 @@ OVER = 2.0
 MOST_CABLE = 20.0  # m that one winch winds in a recording
 _SMALL = 1e-3
 _PILE = 5.0
-_SAMPLE = 20_000
+SAMPLE = 20_000
 _BODY_ANGLE = 2 * np.pi
 
 
 def resolution(values: Array) -> float | None:
     """Return the step of which all differences are multiples, None where there is none."""
-    levels = np.unique(values[~np.isnan(values)][:_SAMPLE])
+    levels = np.unique(values[~np.isnan(values)][:SAMPLE])
     steps = np.diff(levels)
     if not len(steps):
         return None
@@ -117,7 +117,7 @@ def _coarse(
         text = f"resolution {step:.4g} {quantity}, the test-bed says {stated:.4g}"
         text += f": factor {step / stated:.4g}"
         found.append(Suspicion(where, "resolution", text, {"found": step, "stated": stated}))
-    steps = (values[:_SAMPLE] - values[0]) / stated
+    steps = (values[:SAMPLE] - values[0]) / stated
     if not step and np.mean(np.abs(steps - np.round(steps)) > 0.1) > 0.5:
         text = f"on no grid, where the test-bed's resolution is {stated:.4g} {quantity}:"
         text += " filtered or resampled before?"

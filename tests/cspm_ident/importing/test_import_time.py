@@ -1,15 +1,18 @@
 """Stamps: from columns, rates and messages, and which samples make a message."""
 
+from unittest import mock
+
 import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 from import_samples import imported, table
 
+from cspm_ident.importing import column_store
 from cspm_ident.importing.checks.pace import pace_of
 from cspm_ident.importing.mapping import Clock
-from cspm_ident.importing.time_base import later_than_all_before, times_of
-from cspm_ident.importing.unwrapping import unwrap
+from cspm_ident.importing.time_base import out_of_order, times_of
+from cspm_ident.importing.unwrapping import Unwrapper
 from cspm_msgs_py.errors import InputError
 
 STATE, TENSION = "/winches/state", "/cables/tension"
@@ -109,16 +112,25 @@ def test_times_that_no_recording_holds(raw, clock, text):
 @given(st.lists(st.integers(-2000, 2000), min_size=1, max_size=50), st.integers(-(10**6), 10**6))
 def test_unwrapping_restores_what_moves_less_than_half_a_turn(steps, start):
     truth = np.cumsum([start, *steps]).astype(float)
-    found = unwrap(np.mod(truth, 4096.0), 4096.0)
-    assert np.array_equal(found.values - found.values[0], truth - truth[0])
-    assert found.largest_step == np.abs(steps).max() / 4096.0
+    counter = Unwrapper(4096.0)
+    raw = np.mod(truth, 4096.0)
+    found = np.concatenate([counter.take(raw[:20]), counter.take(raw[20:])])
+    assert np.array_equal(found - found[0], truth - truth[0])
+    assert counter.largest_step == np.abs(steps).max() / 4096.0
 
 
 def test_unwrapping_passes_over_what_is_missing():
-    found = unwrap(np.array([4090.0, np.nan, 4.0, np.nan]), 4096.0)
-    np.testing.assert_array_equal(found.values, [4090.0, np.nan, 4100.0, np.nan])
-    assert found.turns == 1
-    assert unwrap(np.array([np.nan, 3.0]), 10.0).turns == 0
+    counter = Unwrapper(4096.0)
+    found = counter.take(np.array([4090.0, np.nan, 4.0, np.nan]))
+    np.testing.assert_array_equal(found, [4090.0, np.nan, 4100.0, np.nan])
+    assert counter.turns == 1
+    # A piece without a number changes nothing, and the next one goes on where the last known was.
+    assert np.isnan(counter.take(np.array([np.nan]))).all()
+    np.testing.assert_array_equal(counter.take(np.array([5.0])), [4101.0])
+    assert counter.turns == 1
+    fresh = Unwrapper(10.0)
+    fresh.take(np.array([np.nan, 3.0]))
+    assert fresh.turns == 0
 
 
 def test_pace_of_regular_and_irregular_stamps():
@@ -134,10 +146,17 @@ def test_pace_of_regular_and_irregular_stamps():
     assert pace_of(np.array([7]), 7).step_s is None
 
 
-@given(st.lists(st.integers(0, 20), max_size=30))
-def test_later_than_all_before(values):
-    found = later_than_all_before(np.array(values, dtype=np.int64))
-    assert found.tolist() == [v > max(values[:i], default=-1) for i, v in enumerate(values)]
+@given(st.lists(st.tuples(st.integers(0, 20), st.booleans()), max_size=30), st.integers(1, 40))
+def test_stamps_out_of_order_are_those_not_later_than_all_kept_before(rows, size):
+    stamps = np.array([stamp for stamp, _ in rows], dtype=np.int64)
+    kept = np.array([keep for _, keep in rows], dtype=bool)
+    expected, latest = [], -1
+    for i, (stamp, keep) in enumerate(rows):
+        if keep and stamp <= latest:
+            expected.append(i)
+        latest = max(latest, stamp) if keep else latest
+    with mock.patch.object(column_store, "PIECE", size):
+        assert out_of_order(stamps, kept).tolist() == expected
 
 
 def test_stamps_out_of_order_are_refused_dropped_or_kept(tmp_path):

@@ -42,19 +42,20 @@ BASE = {
 )
 def test_units(unit, quantity, si):
     conversion = conversion_of(ChannelSource(column="a", unit=unit), quantity, "")
-    assert conversion.apply(np.ones(1))[0][0] == pytest.approx(si, rel=1e-12)
+    assert conversion.apply(np.ones(1), None)[0] == pytest.approx(si, rel=1e-12)
 
 
 def test_sign_scale_offset_counts_and_invalid():
     source = ChannelSource(column="a", unit="counts", counts_per_turn=100.0, sign=-1, offset=0.5)
     found = conversion_of(source, "rad", "")
-    np.testing.assert_allclose(found.apply(np.array([0.0, 50.0]))[0], [0.5, 0.5 - np.pi])
+    assert found.unwrapper() is None
+    np.testing.assert_allclose(found.apply(np.array([0.0, 50.0]), None), [0.5, 0.5 - np.pi])
     assert found.formula == "-0.0628318531 rad/counts · raw + 0.5"
     source = ChannelSource(
         column="a", unit="mV", scale=3.0, offset=-1.0, invalid=(9999.0,), wrap=10000.0
     )
     found = conversion_of(source, "N", "")
-    values = found.apply(np.array([9000.0, 9999.0, np.inf, 1000.0]))[0]
+    values = found.apply(np.array([9000.0, 9999.0, np.inf, 1000.0]), found.unwrapper())
     np.testing.assert_allclose(values, [26.0, np.nan, np.nan, 32.0])
     assert found.formula == "0.003 N/mV · raw − 1, unwrapped at 10000"
 

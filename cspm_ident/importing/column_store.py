@@ -47,10 +47,20 @@ class ColumnStore:
         """Add a piece, shape (n,), to the column of that name."""
         name = self._prefix + name
         if name not in self._paths:
-            self._paths[name] = Path(self._folder.name) / f"{len(self._paths)}.bin"
-            self._kinds[name] = piece.dtype
+            self._begin(name, piece.dtype)
         with self._paths[name].open("ab") as file:
             file.write(np.ascontiguousarray(piece, dtype=self._kinds[name]).data)
+
+    def new(self) -> str:
+        """Return a name that no column has, for integers."""
+        name = f"#{len(self._paths)}"
+        self._begin(self._prefix + name, np.dtype(np.int64))
+        return name
+
+    def _begin(self, name: str, kind: np.dtype[Any]) -> None:
+        self._paths[name] = Path(self._folder.name) / f"{len(self._paths)}.bin"
+        self._paths[name].touch()
+        self._kinds[name] = kind
 
     def column(self, name: str) -> Array:
         """Return a column, shape (n,), read from disk as it is used; empty if nothing was added."""

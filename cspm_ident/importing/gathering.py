@@ -103,7 +103,9 @@ def stamps_of_clocks(
         key = (field.clock, field.stamps, count)
         if key not in found:
             units = [shown.get(name) or said[name] or "s" for name in field.stamps]
-            found[key] = _times(field, count, plan.clocks[field.clock], units, store, mapping)
+            times = _times(field, count, plan.clocks[field.clock], units, store, mapping)
+            # Parts of a message have a clock each, and mostly one and the same.
+            found[key] = next((other for other in found.values() if times.equals(other)), times)
     return found
 
 
@@ -130,7 +132,7 @@ def _times(
     rounded = max(
         (single_precision(one, unit) for one, unit in zip(raw, units, strict=True)), default=0.0
     )
-    times = times_of(raw, count, clock, units, where)
+    times = times_of(raw, count, clock, units, store, where)
     return times._replace(unset=unset, rounded_s=rounded)
 
 

@@ -69,10 +69,10 @@ def paired(series: dict[str, ColumnSeries], mapping: Mapping, where: str) -> Pai
         if one.times is not None:
             clocks.setdefault(id(one.times), (one.times, []))[1].append(name)
     groups = list(clocks.values())
-    rows = [np.flatnonzero(times.known) for times, _ in groups]
-    no_time = sum(int((~times.known).sum()) for times, _ in groups)
+    rows = [times.rows for times, _ in groups]
+    no_time = sum(len(times.stamp_ns) - len(times.rows) for times, _ in groups)
     stamps = [
-        times.stamp_ns if times.known.all() else times.stamp_ns[at]
+        times.stamp_ns if len(at) == len(times.stamp_ns) else times.stamp_ns[at]
         for (times, _), at in zip(groups, rows, strict=True)
     ]
     names = [names for _, names in groups]

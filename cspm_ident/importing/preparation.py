@@ -61,7 +61,7 @@ def prepare(
         plan = plan_import(mapping, testbed.testbed, source)
         source.read(plan.numbers, plan.times, store, progress)
     times = stamps_of_clocks(plan, store, mapping, source.time_units)
-    origin = min(int(t.stamp_ns[t.known].min()) for t in times.values())
+    origin = min(each.first_ns for each in times.values())
     gathered = gather_topics(plan, times, store, mapping, origin, trial=trial)
     for planned in gathered.topics:
         messages = gathered.messages[planned.topic.name]

@@ -8,7 +8,7 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from cspm_ident.importing.column_store import pieces
+from cspm_ident.importing.column_store import ColumnStore, pieces
 from cspm_ident.importing.mapping import Clock
 from cspm_ident.importing.time_text import TEXT_UNITS, TIME_OF_DAY
 from cspm_ident.importing.units import TIME_FACTORS, TIME_ZEROS
@@ -24,18 +24,28 @@ class Times(NamedTuple):
     """Stamps of rows.
 
     Attributes:
-        stamp_ns: shape (n,) [ns]; meaningless where not `known`.
-        known: whether a row has a time, shape (n,).
+        stamp_ns: shape (n,), on disk [ns]; meaningless in rows without time.
+        rows: which rows have a time, rising, shape (k,), on disk.
+        first_ns: the earliest of those.
         disorder: what the clock says of stamps that are not later than one before.
         unset: how many stamps nobody had set, and were taken from the time of their log.
         rounded_s: to what times stored in single precision were rounded [s]; 0 in double.
     """
 
     stamp_ns: Stamps
-    known: NDArray[np.bool_]
+    rows: Stamps
+    first_ns: int
     disorder: str = "refuse"
     unset: int = 0
     rounded_s: float = 0.0
+
+    def equals(self, other: Times) -> bool:
+        """Return whether the stamps of other rows are the same, and as trustworthy."""
+        return (
+            self[2:] == other[2:]
+            and np.array_equal(self.stamp_ns, other.stamp_ns)
+            and np.array_equal(self.rows, other.rows)
+        )
 
 
 def set_stamps(
@@ -54,15 +64,24 @@ def set_stamps(
     Raises:
         InputError: none was set.
     """
-    stamp_ns, log_ns = np.asarray(stamp_ns), np.asarray(log_ns)
-    zero = stamp_ns == 0
-    if not zero.any() or len(zero) == 1:
+    lags, zeros = [], [np.zeros(0, dtype=np.intp)]
+    for part in pieces(len(stamp_ns)):
+        stamps, logged = np.asarray(stamp_ns[part]), np.asarray(log_ns[part])
+        zeros.append(np.flatnonzero(stamps == 0) + part.start)
+        if stamps.any():
+            lags.append(np.median((logged - stamps)[stamps != 0]))
+    rows = np.concatenate(zeros)
+    if not len(rows) or len(stamp_ns) == 1:
         return stamp_ns, 0
-    if zero.all():
+    if not lags:
         raise InputError(f"{where}: every stamp is 0, allowed: stamps, or `stamp: log`")
-    guess = log_ns - np.median(log_ns[~zero] - stamp_ns[~zero])
-    unset = zero & (np.abs(guess) > np.ptp(log_ns))
-    return np.where(unset, guess, stamp_ns), int(unset.sum())
+    guess = np.asarray(log_ns[rows]) - np.median(lags)
+    unset = np.abs(guess) > log_ns.max() - log_ns.min()
+    if not unset.any():
+        return stamp_ns, 0
+    found = np.array(stamp_ns)
+    found[rows[unset]] = guess[unset]
+    return found, int(unset.sum())
 
 
 def single_precision(raw: NDArray[Any], unit: str) -> float:
@@ -85,7 +104,12 @@ def single_precision(raw: NDArray[Any], unit: str) -> float:
 
 
 def times_of(
-    raw: Sequence[NDArray[Any]], count: int, clock: Clock, units: Sequence[str], where: str
+    raw: Sequence[NDArray[Any]],
+    count: int,
+    clock: Clock,
+    units: Sequence[str],
+    store: ColumnStore,
+    where: str,
 ) -> Times:
     """Return the stamps of a clock's rows.
 
@@ -95,22 +119,27 @@ def times_of(
         count: number of rows.
         clock: how to read them.
         units: of each column.
+        store: keeps the stamps.
         where: names the clock in errors.
 
     Raises:
         InputError: there is no time at all, or a stamp that no recording can hold.
     """
     reader = _ClockReader(clock, units)
-    stamp_ns, known = np.zeros(count, dtype=np.int64), np.zeros(count, dtype=bool)
+    names = [store.new(), store.new()]
+    first = LATEST_SECOND * NANOSECONDS
     for part in pieces(count):
         seconds = reader.seconds([one[part] for one in raw], part)
-        known[part] = ~np.isnan(seconds)
-        stamp_ns[part][known[part]] = _nanoseconds(seconds[known[part]], where)
-    if not known.any():
+        rows = np.flatnonzero(~np.isnan(seconds))
+        stamps = np.zeros(len(seconds), dtype=np.int64)
+        stamps[rows] = _nanoseconds(seconds[rows], where)
+        first = min(first, int(stamps[rows].min(initial=first)))
+        for name, piece in zip(names, (stamps, rows + part.start), strict=True):
+            store.append(name, piece)
+    stamp_ns, known = map(store.column, names)
+    if not len(known):
         raise InputError(f"{where}: no row has a time, allowed: at least one")
-    if not known.all():
-        stamp_ns[~known] = stamp_ns[np.argmax(known)]
-    return Times(stamp_ns, known, clock.disorder)
+    return Times(stamp_ns, known, first, clock.disorder)
 
 
 def _nanoseconds(seconds: NDArray[Any], where: str) -> Stamps:

@@ -29,7 +29,9 @@ def stamps(raw, **clock):
     raw = [] if raw is None else [np.asarray(raw, dtype=np.longdouble)]
     count = len(raw[0]) if raw else 4
     units = [clock.get("unit", "s")]
-    return times_of(raw, count, Clock(**clock), units, "m.yaml: clocks.c").stamp_ns.tolist()
+    where = "m.yaml: clocks.c"
+    with column_store.ColumnStore() as store:
+        return times_of(raw, count, Clock(**clock), units, store, where).stamp_ns.tolist()
 
 
 @pytest.mark.parametrize(
@@ -50,8 +52,10 @@ def test_units_of_time(unit, value):
 
 def test_a_rate_counts_rows_without_drift():
     assert stamps(None, rate=1000 / 3) == [0, 3_000_000, 6_000_000, 9_000_000]
-    one_hour = times_of([], 3_600_001, Clock(rate=1000.0), [], "").stamp_ns[-1]
-    assert one_hour == 3_600_000_000_000
+    with column_store.ColumnStore() as store:
+        times = times_of([], 3_600_001, Clock(rate=1000.0), [], store, "")
+        assert (times.first_ns, times.stamp_ns[-1]) == (0, 3_600_000_000_000)
+        assert np.array_equal(times.rows, np.arange(3_600_001))
 
 
 def test_offset_skew_and_points():

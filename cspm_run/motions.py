@@ -20,6 +20,9 @@ Array = NDArray[np.float64]
 
 # How many poses along the reference are looked at: less than a second apart in the longest run.
 REFERENCE_POSES = 301
+FARTHEST = 3.0
+"""How far from its winches a bar is to go, in sizes of the machine. Cables reach no farther than
+one; with mm for m it is some hundred."""
 
 
 def motions_of(scenario: Scenario, testbed: Testbed, folder: Path) -> dict[str, Motion]:
@@ -47,9 +50,36 @@ def motions_of(scenario: Scenario, testbed: Testbed, folder: Path) -> dict[str, 
             motions[BAR_REFERENCE], scenario.operation, scenario.duration
         )
         check_attitude(motions[BAR_REFERENCE])
+    if testbed.bar and isinstance(scenario.control, ClosedLoop):
+        _check_reach(motions, scenario, testbed)
     if testbed.winch_frame is None and motions["/winch_frame/reference"].knots.any():
         raise InputError("winch_frame: this test-bed has none, allowed: no motion and no mean pose")
     return motions
+
+
+def _check_reach(motions: dict[str, Motion], scenario: Scenario, testbed: Testbed) -> None:
+    """Check that the bar is to go where its cables could be.
+
+    Raises:
+        InputError: it is to be farther from its winches than three times the machine's size.
+    """
+    assert isinstance(scenario.control, ClosedLoop)
+    points = [cable.exit for cable in testbed.cables if cable.exit is not None]
+    box = np.array([*points, scenario.control.motion.design_pose[:3]])
+    size, centre = float(np.linalg.norm(np.ptp(box, axis=0))), box.mean(axis=0)
+    times = np.linspace(0.0, scenario.duration, REFERENCE_POSES)
+    bar, frame = (
+        np.array([motions[name].at(time)[:3] for time in times])
+        for name in (BAR_REFERENCE, FRAME_REFERENCE)
+    )
+    apart = np.linalg.norm(bar - frame - centre, axis=1)
+    if apart.max() > FARTHEST * size:
+        at = int(np.argmax(apart))
+        raise InputError(
+            f"motions of target and winch_frame: the bar is to be {apart[at]:.4g} m from its"
+            f" winches at {times[at]:.4g} s, allowed: {FARTHEST * size:.4g} m, three times the"
+            " machine's size; positions are in m, were they mm?"
+        )
 
 
 def reference_poses(

@@ -99,7 +99,10 @@ def _number(cell: str, name: str, place: str) -> float:
     if not isfinite(value):
         raise InputError(f"{place}: column {name}: {cell.strip()[:60]!r}, allowed: a finite number")
     if name in ("roll", "pitch") and abs(value) >= pi / 2:
-        raise InputError(f"{place}: column {name}: {value:g} rad, allowed: between -π/2 and π/2")
+        raise InputError(
+            f"{place}: column {name}: {value:g} rad, allowed: between -π/2 and π/2; degrees have to"
+            " be converted"
+        )
     return value
 
 

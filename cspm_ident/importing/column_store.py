@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from copy import copy
+from mmap import MADV_DONTNEED, mmap
 from pathlib import Path
 from tempfile import TemporaryDirectory
 from types import TracebackType
@@ -18,10 +19,21 @@ PIECE = 200_000
 """Rows that are worked on at a time."""
 
 
-def pieces(count: int) -> Iterator[slice]:
-    """Yield slices that cover a number of rows, a piece each."""
+def pieces(count: int, *columns: Array) -> Iterator[slice]:
+    """Yield slices that cover a number of rows, a piece each; release columns after each."""
     for start in range(0, count, PIECE):
         yield slice(start, min(start + PIECE, count))
+        release(*columns)
+
+
+def release(*columns: Array) -> None:
+    """Let the pages of columns of a store leave memory; they are read again when used."""
+    for column in columns:
+        owner: Any = column
+        while isinstance(owner, np.ndarray):
+            owner = owner.base
+        if isinstance(owner, mmap):
+            owner.madvise(MADV_DONTNEED)
 
 
 class ColumnStore:

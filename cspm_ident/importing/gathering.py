@@ -8,7 +8,7 @@ from functools import partial
 import numpy as np
 
 from cspm_ident.importing.column_series import ColumnSeries
-from cspm_ident.importing.column_store import ColumnStore, pieces
+from cspm_ident.importing.column_store import ColumnStore, pieces, release
 from cspm_ident.importing.import_plan import ImportPlan, PlannedField, PlannedTopic
 from cspm_ident.importing.joint_parts import without_empty_parts
 from cspm_ident.importing.mapping import Clock, MappingFile
@@ -106,6 +106,7 @@ def stamps_of_clocks(
             times = _times(field, count, plan.clocks[field.clock], units, store, mapping)
             # Parts of a message have a clock each, and mostly one and the same.
             found[key] = next((other for other in found.values() if times.equals(other)), times)
+            release(found[key].stamp_ns, found[key].rows)
     return found
 
 
@@ -150,7 +151,7 @@ def _series(
         raw, unwrapper = store.column(field.column), field.conversion.unwrapper()
         clock = times[(field.clock, field.stamps, len(raw))]
         name = f"{topic} {field.name}"
-        for part in pieces(len(raw)):
+        for part in pieces(len(raw), raw):
             store.append(name, field.conversion.apply(np.asarray(raw[part]), unwrapper))
         if unwrapper is not None:
             found.unwrapped[topic][field.name] = unwrapper

@@ -140,6 +140,7 @@ def topic_report(
                 turns=unwrapped[field.name].turns if field.name in unwrapped else 0,
             )
         )
+    messages.release()
     stamps = messages.stamp_ns
     first_s = ((stamps[:FIRST_ROWS] - origin_ns) * 1e-9).tolist()
     pace = pace_of(stamps, origin_ns)

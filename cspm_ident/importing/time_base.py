@@ -65,7 +65,7 @@ def set_stamps(
         InputError: none was set.
     """
     lags, zeros = [], [np.zeros(0, dtype=np.intp)]
-    for part in pieces(len(stamp_ns)):
+    for part in pieces(len(stamp_ns), stamp_ns, log_ns):
         stamps, logged = np.asarray(stamp_ns[part]), np.asarray(log_ns[part])
         zeros.append(np.flatnonzero(stamps == 0) + part.start)
         if stamps.any():
@@ -92,7 +92,7 @@ def single_precision(raw: NDArray[Any], unit: str) -> float:
     if unit in TEXT_UNITS:
         return 0.0
     largest, whole = 0.0, True
-    for part in pieces(len(raw)):
+    for part in pieces(len(raw), raw):
         known = np.asarray(raw[part], dtype=np.float64)
         known = known[np.isfinite(known)]
         largest = max(largest, float(np.abs(known).max(initial=0.0)))
@@ -128,7 +128,7 @@ def times_of(
     reader = _ClockReader(clock, units)
     names = [store.new(), store.new()]
     first = LATEST_SECOND * NANOSECONDS
-    for part in pieces(count):
+    for part in pieces(count, *raw):
         seconds = reader.seconds([one[part] for one in raw], part)
         rows = np.flatnonzero(~np.isnan(seconds))
         stamps = np.zeros(len(seconds), dtype=np.int64)
@@ -209,7 +209,7 @@ def out_of_order(stamp_ns: Stamps, kept: NDArray[np.bool_]) -> NDArray[np.intp]:
         kept: shape (n,).
     """
     found, latest = [np.zeros(0, dtype=np.intp)], np.iinfo(np.int64).min
-    for part in pieces(len(stamp_ns)):
+    for part in pieces(len(stamp_ns), stamp_ns):
         rows = np.flatnonzero(kept[part])
         stamps = np.concatenate([[latest], stamp_ns[part][rows]])
         reached = np.maximum.accumulate(stamps)

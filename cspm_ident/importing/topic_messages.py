@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 from scipy.spatial.transform import Rotation
 
 from cspm_ident.importing.column_series import ColumnSeries
+from cspm_ident.importing.column_store import release
 from cspm_ident.importing.import_plan import ANGLES, PlannedTopic
 from cspm_ident.importing.joint_parts import absent_numbers
 from cspm_ident.importing.mapping import Mapping, Segment
@@ -70,6 +71,10 @@ class TopicMessages:
         rows = {id(at): at[chosen] for at in self.places.values() if at is not None}
         places = {name: None if at is None else rows[id(at)] for name, at in self.places.items()}
         return replace(self, stamp_ns=self.stamp_ns[chosen], places=places)
+
+    def release(self) -> None:
+        """Let what was read of stamps and rows leave memory."""
+        release(self.stamp_ns, *(at for at in self.places.values() if at is not None))
 
     def values(self, field: str, chosen: slice = slice(None)) -> Array:
         """Return a field of the chosen messages, shape (n,) [SI]."""

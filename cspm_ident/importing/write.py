@@ -73,6 +73,8 @@ def _append(
         ):
             appends[sender](stamp, stamp, rows[i])
         places = ends
+        for one in each:
+            one.release()
         progress(sum(places) / total)
 
 

@@ -51,6 +51,8 @@ def stretches(messages: Mapping[str, TopicMessages]) -> Iterator[dict[str, Topic
             for name, one in messages.items()
             if cuts[name][k + 1] > cuts[name][k]
         }
+        for one in messages.values():
+            one.release()
 
 
 def joined(found: Sequence[Sequence[Suspicion]], present: Mapping[str, int]) -> list[Suspicion]:

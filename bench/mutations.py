@@ -102,7 +102,7 @@ MUTATIONS = (
     Mutation(
         "threshold: chance counts as certain on what was held out",
         "cspm_ident/diagnosis/validation/holdout_degradation.py",
-        "< -thresholds.holdout_sigma * whole.error",
+        "< -thresholds.certain_sigma * whole.error",
         "< 0.0 * whole.error",
         "tests/cspm_ident/diagnosis/validation/test_diagnosis_harm.py",
     ),

@@ -236,7 +236,7 @@ def is_doubtful(
         unexplained: residuals that no effect explains.
         aliased: cables with aliased tension, which alternates from one reading to the next. Any
             finding that depends on these is doubtful.
-        thresholds: `doubtful_share`.
+        thresholds: `minor_share`.
         left: what all findings leave of its held-out residuals beyond the noise, as a share of
             what they take; see `rest_share`.
     """
@@ -244,7 +244,7 @@ def is_doubtful(
     if misread & set(finding.elements):
         return True
     gained, constant = finding.gain.total, is_constant(finding.hypothesis.effect)
-    share = thresholds.doubtful_share
+    share = thresholds.minor_share
     if left > (1.0 if constant else share):
         return True
     return any(

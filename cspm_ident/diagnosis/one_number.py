@@ -80,7 +80,7 @@ def _promising(own: JudgedSearch, found: list[Finding]) -> Iterator[Hypothesis]:
     scopes = [search.scopes.of(c, numbers, base)[0] for _, c in best.values()]
     squares = [float(fits.sums.gains_beyond(base, [fits.own_columns(h)])[0]) for h in scopes]
     for k in np.argsort(squares)[::-1][:_TRIED]:
-        if squares[k] >= own.thresholds.rival_gain_share * taken and fits.is_plausible([scopes[k]]):
+        if squares[k] >= own.thresholds.majority_share * taken and fits.is_plausible([scopes[k]]):
             yield scopes[k]
 
 

@@ -22,6 +22,10 @@ _Kind = TypeVar("_Kind", bound="BlockRegression")
 
 # Number of folds of the cross-validation.
 FOLDS = 6
+LEAST_FREEDOM = 0.1
+"""Degrees of freedom below which Student's factor exceeds 10¹², so that there is no interval."""
+CORRELATION_LIMIT = 0.8
+"""Largest correlation of successive blocks that is allowed for: few blocks determine no more."""
 
 
 class Gain(NamedTuple):
@@ -311,7 +315,7 @@ class BlockRegression:
         """
         errors, free = self._left_out(paired(self._beyond(base, columns))).spread()
         factor = np.full(len(free), np.inf)
-        known = free > self.thresholds.interval_least_freedom
+        known = free > LEAST_FREEDOM
         factor[known] = t_distribution.ppf(0.975, free[known])
         return np.asarray(factor * errors / self._lengths[columns])
 
@@ -336,7 +340,7 @@ class BlockRegression:
         """
         heard = np.arange(self.blocks)
         found = self._left_out(self._beyond(base, columns))
-        while (most := found.dominant(self.thresholds.dominant_block_share)) is not None:
+        while (most := found.dominant(self.thresholds.majority_share)) is not None:
             heard = np.delete(heard, most)
             others = self._beyond(base, columns, heard)
             if np.trace(others.sum(axis=0)[:-1, :-1]) <= RANK:
@@ -345,7 +349,7 @@ class BlockRegression:
         return found
 
     def _left_out(self, parts: Array) -> Jackknife:
-        return left_out(parts, self.thresholds.block_correlation_limit)
+        return left_out(parts, CORRELATION_LIMIT)
 
     def _beyond(self, base: Index, columns: Index, blocks: Index | None = None) -> Array:
         """Return blocks' products of columns and target, the part spanned by a base removed."""

@@ -15,6 +15,8 @@ from cspm_ident.diagnosis.residuals.regressors import Candidate, Place
 from cspm_ident.diagnosis.thresholds import DEFAULT_THRESHOLDS, Thresholds
 
 Array = NDArray[np.float64]
+NESTED_SHARE = 0.999
+"""Of the squares: identity but for rounding and the single precision of columns."""
 Index = NDArray[np.intp]
 
 
@@ -32,12 +34,12 @@ def overlap(sums: BlockRegression, base: Index, own: Index, other: Index) -> boo
     parts = (own, other, np.union1d(own, other))
     without = sums.squares_of(base)
     gains = [without - sums.squares_of(np.concatenate([base, part])) for part in parts]
-    return gains[0] + gains[1] - gains[2] >= sums.thresholds.rival_gain_share * gains[0]
+    return gains[0] + gains[1] - gains[2] >= sums.thresholds.majority_share * gains[0]
 
 
 def contains(sums: BlockRegression, base: Index, wide: Index, narrow: Index) -> bool:
     """Return whether `narrow` is a case of `wide`, as Coulomb friction is of Stribeck friction."""
-    return bool(np.all(sums.spanned(base, wide, narrow) > sums.thresholds.nested_share))
+    return bool(np.all(sums.spanned(base, wide, narrow) > NESTED_SHARE))
 
 
 def distance(
@@ -48,17 +50,16 @@ def distance(
     Args:
         worse: additional Σ residual² of each block, (blocks,).
         undecided: total below which the model-form error leaves the comparison undecided.
-        wider: additional parameters. Each counts as in Schwarz's criterion, with a limit on the
-            number of block pairs, so that long recordings do not count more.
-        thresholds: `tie_sigma` and `schwarz_most_pairs`.
+        wider: additional parameters. Each counts as in Schwarz's criterion, by pairs of
+            blocks, of one recording at most: in more data model-form error decides, not noise.
+        thresholds: `tie_sigma` and `block_count`.
     """
     worse = paired(worse)
     apart = max(0.0, behind(worse))
     if worse.sum() < undecided:
         apart = min(apart, thresholds.tie_sigma) * max(0.0, worse.sum() / undecided)
-    return float(
-        np.hypot(apart, np.sqrt(wider * np.log(min(len(worse), thresholds.schwarz_most_pairs))))
-    )
+    pairs = min(len(worse), thresholds.block_count // 2)
+    return float(np.hypot(apart, np.sqrt(wider * np.log(pairs))))
 
 
 def chance(sums: BlockRegression, base: Index, parts: Sequence[Index]) -> float:

@@ -157,7 +157,7 @@ def is_seen_to_end(
         for c in candidates
         if c.effect.signature.spectrum
     }
-    share = thresholds.spectrum_end_share
+    share = thresholds.whole_share
     return all(
         c.nonlinear[c.effect.signature.spectrum] < share * most for c, most in longest.items()
     )
@@ -276,11 +276,11 @@ def boldness(
     If one does, separate parameters are unlikely.
     """
     if one.onset and (other is None or not other.onset):
-        return thresholds.onset_sigma
+        return thresholds.certain_sigma
     if other is None:
         return 0.0
     unlikely = one.common != other.common and one.common is not has_one_system(one.effect)
-    return thresholds.extent_sigma if unlikely else 0.0
+    return thresholds.tie_sigma if unlikely else 0.0
 
 
 def unusual(weights: Mapping[Candidate, Array], hypothesis: Hypothesis) -> float:
@@ -326,7 +326,7 @@ def is_spread(
     """
     same = one.effect.id == whole.effect.id and one.candidates[0].shape == whole.candidates[0].shape
     elements = len(whole.elements)
-    least = thresholds.spread_element_share * elements
+    least = thresholds.majority_share * elements
     return same and elements > 2 and len(one.elements) >= least
 
 

@@ -201,7 +201,7 @@ class Fits:
             return False
         known = np.concatenate([self.own_columns(h) for h in late])
         own = self.sums.spanned(self.columns([]), known, self.own_columns(hypothesis))
-        same = bool(np.all(own > self.thresholds.timing_collinear_share))
+        same = bool(np.all(own > 1.0 - self.thresholds.minor_share))
         return same and self.are_early([*others, hypothesis])
 
     def is_negligible(self, hypothesis: Hypothesis, chosen: Sequence[Hypothesis]) -> bool:

@@ -153,7 +153,7 @@ def _improvement(diagnosis: Diagnosis, finding: Finding) -> str:
     limits = diagnosis.thresholds
     at_noise = best.tabled is None and best.is_at_noise(limits)
     noise = "That is the noise floor." if at_noise else f"Noise is {_share(best, best.noise)}."
-    if best.steady is not None and best.steady < limits.steady_error_share * best.after:
+    if best.steady is not None and best.steady < (1.0 - limits.minor_share) * best.after:
         away = f"Apart from where the shaft reverses it is {_share(best, best.steady)}."
         noise = f"{away} {noise}"
     before, after = _share(best, best.before), _share(best, best.after)

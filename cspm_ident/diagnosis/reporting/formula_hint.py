@@ -31,7 +31,7 @@ def sketch(
         knots: of the signal, shape (k,).
         values: of the shape there, (k,).
         name: of the signal, without unit.
-        thresholds: `formula_share`.
+        thresholds: `minor_share`.
     """
     spread = float(np.sum((values - values.mean()) ** 2))
     if spread <= 0.0:
@@ -41,7 +41,7 @@ def sketch(
         table = np.column_stack([function(knots), np.ones(len(knots))])
         found = np.linalg.lstsq(table, values, rcond=None)[0]
         share = 1.0 - float(np.sum((values - table @ found) ** 2)) / spread
-        if share >= thresholds.formula_share and (best is None or share > best[0]):
+        if share >= 1.0 - thresholds.minor_share and (best is None or share > best[0]):
             best = share, f"{found[0]:.3g}·{form.format(x=name)}"
     return None if best is None else best[1]
 
@@ -52,14 +52,14 @@ def is_even(knots: Array, values: Array, thresholds: Thresholds = DEFAULT_THRESH
     Args:
         knots: of the signal, ascending, shape (k,).
         values: of the shape there, (k,).
-        thresholds: `formula_share` and `formula_range_share`.
+        thresholds: `minor_share` and `majority_share`.
     """
     reach = min(-float(knots[0]), float(knots[-1]))
-    if reach < thresholds.formula_range_share * float(np.max(np.abs(knots))):
+    if reach < thresholds.majority_share * float(np.max(np.abs(knots))):
         return False
     points = np.linspace(-reach, reach, 41)
     whole = np.interp(points, knots, values)
     whole = whole - whole.mean()
     odd = 0.5 * (whole - whole[::-1])
-    most = (1.0 - thresholds.formula_share) * float(np.sum(whole**2))
+    most = thresholds.minor_share * float(np.sum(whole**2))
     return float(np.sum(odd**2)) <= most

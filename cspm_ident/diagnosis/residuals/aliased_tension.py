@@ -10,6 +10,10 @@ from cspm_ident.diagnosis.thresholds import DEFAULT_THRESHOLDS, Thresholds
 from cspm_ident.signals.measurement import Measurement
 from cspm_sim.effects import Channel
 
+ANTICORRELATION = 2.0 / 3.0
+"""Correlation of successive steps, negated, of differentiated white readings; white ones have 1/2.
+More of it is an alternation."""
+
 
 def chatters_of(
     measurement: Measurement, thresholds: Thresholds = DEFAULT_THRESHOLDS
@@ -32,12 +36,12 @@ def chatters_of(
     follows = np.sum(steps[1:] * steps[:-1], axis=0) / np.maximum(squares, 1e-300)
     # The amplitude of an alternating signal is half its step.
     amplitudes = 0.5 * np.sqrt(squares / len(steps))
-    least = thresholds.aliased_amplitude_share * np.mean(np.abs(tension.values), axis=0)
+    least = thresholds.majority_share * np.mean(np.abs(tension.values), axis=0)
     highest = 0.5 / float(np.median(np.diff(tension.times)))
     return tuple(
         Line(Place(Channel.TENSION, name), 0, highest, float(amplitude), 0.0, alternates=True)
         for name, share, amplitude, enough in zip(
             measurement.machine.cable_names, follows, amplitudes, amplitudes > least, strict=True
         )
-        if share < -thresholds.aliased_anticorrelation and enough
+        if share < -ANTICORRELATION and enough
     )

@@ -74,7 +74,7 @@ def suspension_equations(
         thresholds: those of residuals.
     """
     measured = timeline.measurement
-    dofs = moving(measured.bar_pose, thresholds.moving_pose_noise_ratio)
+    dofs = moving(measured.bar_pose, thresholds.certain_sigma)
     return [
         equation.compact
         for stretch in machine_signals(timeline)

@@ -19,6 +19,8 @@ Array = NDArray[np.float64]
 
 # Scale of the drift in its fit.
 _SCALE = 2.5e-5
+LEAST_SHIFT_S = 2e-6
+"""Clocks that differ by less over a recording shift nothing in a rope's torque."""
 # Least length of a column, and least relative singular value.
 _NOTHING, _RANK = 1e-300, 1e-9
 # Least number of rows for a fit of a drift with the other regressors.
@@ -82,6 +84,5 @@ def _record(equation: Equation) -> Record:
 
 def _is_plausible(drift: ClockDrift, thresholds: Thresholds) -> bool:
     low, high = drift.interval
-    least = thresholds.least_clock_shift_s
-    reported = not low <= 0.0 <= high and abs(drift.rate) * drift.apart > least
+    reported = not low <= 0.0 <= high and abs(drift.rate) * drift.apart > LEAST_SHIFT_S
     return reported and abs(drift.rate) <= thresholds.healthy_clock_drift

@@ -31,6 +31,10 @@ Array = NDArray[np.float64]
 _BESIDE = 101
 # Number of pieces in which an external force keeps its phase and size; a decaying one does not.
 _PIECES = 8
+HIGHEST_HZ = 10.0
+"""Poses are smoothed to this band where lines are looked for."""
+WIDTH_HZ = 0.1
+"""Distance up to which two lines are one: the resolution of a spectrum over 10 s."""
 
 
 class Line(NamedTuple):
@@ -54,7 +58,7 @@ class Line(NamedTuple):
 
     def is_same(self, other: Line, thresholds: Thresholds = DEFAULT_THRESHOLDS) -> bool:
         """Return whether two lines have the same residual and frequency, within the line width."""
-        near = abs(self.frequency - other.frequency) <= thresholds.line_width_hz
+        near = abs(self.frequency - other.frequency) <= WIDTH_HZ
         return self.place == other.place and near
 
 
@@ -71,7 +75,7 @@ def lines_of(
         thresholds: those of lines.
     """
     fitted = as_found(measurement, weights)
-    stretches = machine_signals(Timeline(fitted, pose_band=thresholds.line_highest_hz))
+    stretches = machine_signals(Timeline(fitted, pose_band=HIGHEST_HZ))
     equations = fine_equations(stretches, fitted, read_actions(fitted.machine), thresholds)
     lowest = _driven_up_to(stretches, thresholds)
     series = [(e.place, c, e.times, e.target[:, c]) for e in equations for c in _channels(e)]
@@ -87,15 +91,20 @@ def _channels(equation: Equation) -> range:
     return range(equation.target.shape[1])
 
 
+def _noise_ratio(thresholds: Thresholds) -> float:
+    """Return the multiple of its median that a bin of noise exceeds at the rate of false alarms."""
+    return -float(np.log2(max(thresholds.line_false_alarm_rate, 1e-300)))
+
+
 def _driven_up_to(stretches: Sequence[MachineSignals], thresholds: Thresholds) -> float:
     """Return the frequency above which neither winches nor frame move [Hz]."""
     highest = 0.0
     for signals in stretches:
         for moved in (signals.frame.poses, signals.angles):
             frequencies, power = periodogram(moved, 1.0 / signals.step, "hann", axis=0)
-            power[power < thresholds.line_noise_ratio * np.median(power, axis=0)] = 0.0
+            power[power < _noise_ratio(thresholds) * np.median(power, axis=0)] = 0.0
             summed = np.cumsum(power.sum(axis=1))
-            edge = np.searchsorted(summed, thresholds.line_driven_share * summed[-1])
+            edge = np.searchsorted(summed, thresholds.whole_share * summed[-1])
             highest = max(highest, float(frequencies[edge]))
     return highest
 
@@ -124,7 +133,7 @@ def highest_line(
         values, 1.0 / float(np.median(np.diff(times))), "hann", detrend="linear"
     )
     floor = median_filter(power, _BESIDE, mode="nearest") / np.log(2.0)
-    looked = (frequencies > lowest) & (frequencies < thresholds.line_highest_hz)
+    looked = (frequencies > lowest) & (frequencies < HIGHEST_HZ)
     if not looked.any():
         return None
     height = np.where(looked, power / np.maximum(floor, 1e-300), 0.0)

@@ -56,7 +56,7 @@ def shaft_equations(
         known: effects in the test-bed file.
         knots: of the free functions; None: without these.
         winches: names of the winches.
-        thresholds: `moving_shaft_noise_ratio` and `reversal_speed_share`.
+        thresholds: `certain_sigma` and `reversal_speed_share`.
     """
     found: list[Equation] = []
     for i, cable in enumerate(measurement.machine.cables):
@@ -72,7 +72,7 @@ def shaft_equations(
                 rows[:, WinchSignal.ANGLE] = moved.angles[:, 0]
                 rows[:, WinchSignal.SPEED] = moved.speeds[:, 0]
             half = max(2, round(HALF_WIDTH_S / signals.angle.interval))
-            angles, ratio = rows[:, WinchSignal.ANGLE], thresholds.moving_shaft_noise_ratio
+            angles, ratio = rows[:, WinchSignal.ANGLE], thresholds.certain_sigma
             if len(rows) < 2 * half + 1 or not _turns(angles, signals.angle, ratio):
                 continue
             sensors = (WINCHES,) if signals.tension is None else (WINCHES, TENSION)

@@ -52,7 +52,7 @@ def alternatives_of(
             continue
         late = fits.delayed_columns(np.setdiff1d(columns, own), hypothesis.onset)
         worse = late.held_out(rival, fits.beside(base, *beside)) - reference
-        if worse.sum() > limits.rival_gain_share * gained:
+        if worse.sum() > limits.majority_share * gained:
             continue
         apart = distance(worse, undecided, wider, limits)
         if apart <= limits.tie_sigma:

@@ -15,6 +15,8 @@ from cspm_ident.diagnosis.regression.significance import Significance
 from cspm_ident.diagnosis.residuals.regressors import Candidate
 
 Array = NDArray[np.float64]
+HALF_WIDTH = 1.96
+"""Standard errors of a normal deviate in half an interval of 95 %."""
 Index = NDArray[np.intp]
 
 
@@ -82,7 +84,7 @@ class Scopes:
         each, half = self._each(hypothesis, base)
         sums, kept, own = self._fits.shared(base, hypothesis)
         same = sums.weights(np.concatenate([kept, own]))[len(kept) :]
-        near = np.abs(each - same) <= self._fits.thresholds.agreement_half_widths * half
+        near = np.abs(each - same) <= self._fits.thresholds.certain_sigma / HALF_WIDTH * half
         there = np.any(np.abs(each) > half, axis=1)
         return bool(np.all(near) and np.count_nonzero(there) > 1)
 

@@ -38,7 +38,7 @@ def best_pairs(
     own = sorted(best.values(), key=lambda candidate: candidate.element)
     pairs = [pair for pair in combinations(own, 2) if pair[0].element == pair[1].element]
     gains = sums.gains_beyond(base, [gram.columns_of(pair) for pair in pairs])
-    most = sums.thresholds.screened_pairs
+    most = sums.thresholds.screened_candidates
     return [
         (Hypothesis(one.effect, (one,)), Hypothesis(other.effect, (other,)))
         for one, other in (pairs[k] for k in np.argsort(-gains)[:most])

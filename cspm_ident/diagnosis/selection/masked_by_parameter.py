@@ -49,14 +49,14 @@ def absorbed_pairs(
     own = gram.columns_of(hypothesis.candidates)
     gained = float(sums.gains_beyond(base, [own])[0])
     shows = _most(gram, sums, base, own)
-    most = (1.0 - sums.thresholds.masked_collinear_share) * _left(shows, base, own)
+    most = (1.0 - sums.thresholds.whole_share) * _left(shows, base, own)
     beside = {n: np.concatenate([base, gram.columns_of([n])]) for n in numbers}
     hiding = [n for n in numbers if _left(shows, beside[n], own) <= most]
     pairs = list(product(effects, hiding))
     gains = sums.gains_beyond(base, [gram.columns_of(pair) for pair in pairs])
     best: dict[tuple[str, str], tuple[Candidate, Candidate]] = {}
     for k in np.argsort(-gains):
-        if gains[k] >= sums.thresholds.masked_gain_share * gained:
+        if gains[k] >= sums.thresholds.whole_share * gained:
             effect, number = pairs[k]
             best.setdefault((effect.effect_id, number.effect_id), pairs[k])
     return [
@@ -93,6 +93,6 @@ def _needed(
     """Return whether each of two candidates is significant beside the other."""
     first, second = gram.columns_of([one]), gram.columns_of([other])
     return all(
-        sums.p_value(np.concatenate([base, beside]), own) < sums.thresholds.masked_significance
+        sums.p_value(np.concatenate([base, beside]), own) < sums.thresholds.false_alarm_rate
         for beside, own in ((first, second), (second, first))
     )

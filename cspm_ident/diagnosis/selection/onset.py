@@ -22,7 +22,7 @@ FINE_S = 0.1
 def first_block(sums: BlockRegression, base: Index, own: Index) -> tuple[int, float]:
     """Return the first block in which columns act, and the sum of squared residuals for it.
 
-    The block is 0 unless a later one gains more by the share `parsimony_gain_share`.
+    The block is 0 unless a later one gains more by the share `minor_share`.
 
     Args:
         sums: the block regression of all columns.
@@ -32,7 +32,7 @@ def first_block(sums: BlockRegression, base: Index, own: Index) -> tuple[int, fl
     left = sums.left_from(base, own)[:-2]
     best = int(np.argmin(left))
     gained = sums.squares_of(base) - left[0]
-    if left[best] < left[0] - sums.thresholds.parsimony_gain_share * max(gained, 0.0):
+    if left[best] < left[0] - sums.thresholds.minor_share * max(gained, 0.0):
         return best, float(left[best])
     return 0, float(left[0])
 
@@ -56,7 +56,7 @@ def onset_of(
         others: all other fitted candidates, with their onsets [s].
         low: earliest possible time [s].
         high: latest possible time [s].
-        thresholds: `onset_interval_sigma`.
+        thresholds: `certain_sigma`.
     """
     terms = [*own, *others]
     places = {term: [e for e in equations if term in e.columns] for term in own}
@@ -75,6 +75,6 @@ def onset_of(
     sums = sums.delayed(columns, int(blocks[best]))
     both = np.concatenate([base, columns])
     scatter = float(np.std(sums.held_out(both)))
-    possible = edges[blocks[left <= left[best] + thresholds.onset_interval_sigma * scatter]]
+    possible = edges[blocks[left <= left[best] + thresholds.certain_sigma * scatter]]
     step = edges[1] - edges[0]
     return Onset(float(edges[blocks[best]]), float(possible[0] - step), float(possible[-1] + step))

@@ -60,7 +60,7 @@ def _says_else(
     if any(not set(hypothesis.candidates).isdisjoint(h.candidates) for h in instead):
         return False
     others = [h for h in chosen if h is not hypothesis]
-    least = fits.thresholds.rival_gain_share * fits.gain(hypothesis, fits.columns(others)).total
+    least = fits.thresholds.majority_share * fits.gain(hypothesis, fits.columns(others)).total
     return fits.gain(hypothesis, fits.columns(instead)).total > least
 
 
@@ -75,7 +75,7 @@ def _is_better(
         gained = (fits.sums.held_out(base) - left).sum()
         return bool(better.total > -limits.model_form_error_share * gained)
     both, own = (np.concatenate([fits.own_columns(h) for h in each]) for each in (pair, replaced))
-    wider = np.all(fits.sums.spanned(base, both, own) > limits.collinear_share)
+    wider = np.all(fits.sums.spanned(base, both, own) > 1.0 - limits.material_share)
     return bool(better.total > limits.tie_sigma * better.error and not wider)
 
 
@@ -85,7 +85,7 @@ def _are_both_needed(
     """Return whether each is significant beside the other, and no small share of their gain."""
     both = np.concatenate([fits.own_columns(h) for h in pair])
     gained = fits.sums.gain(fits.columns(beside), both).total
-    least = fits.thresholds.parsimony_gain_share * gained
+    least = fits.thresholds.minor_share * gained
     for one, other in (pair, pair[::-1]):
         base = fits.columns([*beside, other])
         gain = fits.gain(one, base)

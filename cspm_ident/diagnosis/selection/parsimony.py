@@ -49,7 +49,7 @@ def simplest(
     reference = left = fits.held_out(best, base)
     gained = gain_of(fits.sums.held_out(base) - reference)
     fewest, sigma = best, fits.thresholds.tie_sigma
-    little = min(sigma * gained.error, fits.thresholds.parsimony_gain_share * gained.total)
+    little = min(sigma * gained.error, fits.thresholds.minor_share * gained.total)
     for rival in rivals:
         if not fits.is_plausible([*chosen, rival]) or fits.contradicts(rival, chosen):
             continue
@@ -73,7 +73,7 @@ def _allowed(fits: Fits, one: Hypothesis, other: Hypothesis, chosen: Sequence[Hy
     share is -inf where one is not likelier.
     """
     limits = fits.thresholds
-    simpler, form_error = limits.parsimony_gain_share, limits.model_form_error_share
+    simpler, form_error = limits.minor_share, limits.model_form_error_share
     healthy = [fits.is_negligible(each, [*chosen, each]) for each in (one, other)]
     if healthy[0] != healthy[1]:
         return simpler if healthy[0] else -np.inf

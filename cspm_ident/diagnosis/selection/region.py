@@ -58,7 +58,7 @@ def region_of(
         )
     ]
     narrowest = min(regions, key=lambda region: region.share, default=None)
-    if narrowest is None or narrowest.share > thresholds.region_widest_share:
+    if narrowest is None or narrowest.share > thresholds.majority_share:
         return None
     return narrowest
 
@@ -87,10 +87,10 @@ def _narrowest(driver: str, values: Array, gains: Array, thresholds: Thresholds)
     order = np.array_split(np.argsort(values), _BINS)
     sums = np.array([gains[rows].sum() for rows in order])
     held = np.concatenate([[0.0], np.cumsum(sums)])
-    if -sums[sums < 0.0].sum() >= thresholds.region_loss_share * held[-1]:
+    if -sums[sums < 0.0].sum() >= thresholds.minor_share * held[-1]:
         return None
     between = (held[None, :] - held[:, None]) / held[-1]
-    starts, ends = np.nonzero(np.triu(between >= thresholds.region_gain_share))
+    starts, ends = np.nonzero(np.triu(between >= (1.0 - thresholds.minor_share)))
     best = int(np.argmin(ends - starts))
     first, last = int(starts[best]), int(ends[best])
     low, high = values[order[first][0]], values[order[last - 1][-1]]

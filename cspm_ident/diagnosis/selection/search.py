@@ -214,7 +214,7 @@ class Search:
         others = [self.fits.own_columns(h) for h in chosen if h is not hypothesis]
         own = self.fits.own_columns(hypothesis)
         spanned = self.sums.spanned(self.gram.nuisance, np.concatenate(others), own)
-        return bool(np.any(spanned > self.thresholds.collinear_share))
+        return bool(np.any(spanned > 1.0 - self.thresholds.material_share))
 
     def _is_there(
         self, hypothesis: Hypothesis, base: Index, gain: Gain, chosen: Sequence[Hypothesis]
@@ -253,7 +253,7 @@ class Search:
         base = self.fits.columns(chosen)
         free = self._free(chosen)
         gains = self.sums.gains_beyond(base, [self._of(c) for c in free])
-        likely = screened(free, gains, self.thresholds.screened_effects)
+        likely = screened(free, gains, self.thresholds.screened_candidates)
         scopes = [h for c in likely for h in self.scopes.of(c, free, base)]
         late = [d for h in scopes for d in self._late(h, free, base)]
         best = self._surest([*scopes, *late], chosen, base)
@@ -291,7 +291,7 @@ class Search:
             if best is not None:
                 spread = is_spread(best[1], hypothesis, limits)
                 wider = is_wider(hypothesis, best[1]) and not spread
-                least = best[0].sum() + limits.wider_scope_sigma * gain_of(gained).error * wider
+                least = best[0].sum() + limits.certain_sigma * gain_of(gained).error * wider
                 sigmas = boldness(hypothesis, best[1], limits)
                 if sigmas:
                     least = best[0].sum() + sigmas * gain_of(gained - best[0]).error
@@ -310,8 +310,8 @@ class Search:
         # A wrong parameter of the test-bed file acts all the time.
         if is_number(hypothesis):
             return
-        first = self.thresholds.blocks_before_onset
-        last = self.sums.blocks - self.thresholds.blocks_after_onset
+        first = self.thresholds.onset_blocks
+        last = self.sums.blocks - 2 * first
         late: list[tuple[float, Hypothesis]] = []
         for shape in shapes_of(hypothesis, free):
             onset, left = first_block(self.sums, base, self.fits.own_columns(shape))

@@ -74,7 +74,7 @@ def _once(
         drivers = [d for d in gram.terms if isinstance(d, Driver) and d.place == place]
         gains = {d: sums.gain_within(base, gram.columns_of([d])) for d in drivers if d.of_time}
         several = len(squares) >= limits.unknown_fewest_blocks
-        if gains and several and share > limits.dominant_block_share:
+        if gains and several and share > limits.majority_share:
             excess = most - float(np.median(squares))
             driver = max(gains, key=lambda d: gains[d].total)
             yield Unexplained(driver, Gain(excess, excess), share)
@@ -109,7 +109,7 @@ def _drifting(
         base = _columns(gram, [h for h in (*chosen, *healthy) if h is not hypothesis])
         own = gram.columns_of(hypothesis.candidates)
         drift, p_value = sums.drift(base, own)
-        held = drift.total <= sums.thresholds.doubtful_share * sums.gain(base, own).total
+        held = drift.total <= sums.thresholds.minor_share * sums.gain(base, own).total
         if held or p_value >= sums.thresholds.false_alarm_rate / len(chosen):
             continue
         times = [d for d in _concerned(gram, hypothesis, own) if d.of_time]

@@ -26,29 +26,9 @@ class ReportingThresholds:
         "Multiple of its noise up to which what is left of a residual is at the noise.",
         "White noise of 200 rows exceeds it with probability 0.001.",
     )
-    excited_noise_ratio: float = ratio(
-        3.0,
-        "Multiple of its noise that a measured quantity has to exceed to judge a model by it.",
-        "Three standard deviations of normal noise; below, a model of nothing is as good.",
-    )
     immaterial_share: float = share(
         0.05,
         "Share of the measured quantity up to which a difference below the sensor's accuracy is"
         " immaterial.",
         "A usual tolerance of models for control; both limits have to hold.",
-    )
-    steady_error_share: float = share(
-        0.8,
-        "Share of an error below which that apart from reversals is stated beside it.",
-        "Set by hand, for the statement only.",
-    )
-    formula_share: float = share(
-        0.9,
-        "Share of a free function's squares that a formula has to account for as a hint.",
-        "Set by hand, for the hint only.",
-    )
-    formula_range_share: float = share(
-        0.5,
-        "Share of a signal's longer side that its shorter side needs to show a symmetry.",
-        "Majority, for the hint only.",
     )

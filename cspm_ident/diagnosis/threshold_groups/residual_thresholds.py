@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-from cspm_ident.diagnosis.threshold_groups.threshold_field import count, quantity, ratio, share
+from cspm_ident.diagnosis.threshold_groups.threshold_field import count, quantity, share
 
 
 @dataclass(frozen=True)
@@ -42,16 +42,6 @@ class ResidualThresholds:
         "Share of a shaft's RMS speed below which it may stick and its direction is noise.",
         "Set by hand: below it, dry friction may take any value up to its breakaway.",
     )
-    moving_shaft_noise_ratio: float = ratio(
-        3.0,
-        "Encoder noise that the standard deviation of a shaft's angle has to exceed.",
-        "Three standard deviations of normal noise; a braked shaft takes any torque.",
-    )
-    moving_pose_noise_ratio: float = ratio(
-        2.5,
-        "Sample-to-sample noise that the spread of a pose coordinate has to exceed to be moving.",
-        "Coloured noise alone spreads by 1.2 to 1.5 of its sample-to-sample part.",
-    )
     common_acceleration_share: float = share(
         0.7,
         "Share of a regressor's square that accelerations by tensions and by poses must have in"
@@ -64,40 +54,6 @@ class ResidualThresholds:
         "Largest drift of the load cells' clock that a healthy rig has; faster is a fault.",
         "Clocks that nothing disciplines: 25 ppm.",
     )
-    least_clock_shift_s: float = quantity(
-        2e-6,
-        "s",
-        "Smallest shift of the load cells' clock over a recording that is taken out.",
-        "What clocks do to a rope's torque within a recording is no longer than this.",
-    )
-    aliased_anticorrelation: float = share(
-        2.0 / 3.0,
-        "Correlation of successive tension steps, negated, above which a tension is aliased.",
-        "White readings have 1/2, differentiated white ones 2/3.",
-    )
-    aliased_amplitude_share: float = share(
-        0.5,
-        "Share of the mean tension that an aliased tension has to swing by.",
-        "What swings by less does not go slack, so that it averages out.",
-    )
-    line_highest_hz: float = quantity(
-        10.0,
-        "Hz",
-        "Highest frequency at which periodic forces from outside are looked for.",
-        "Poses are smoothed to this band when lines are looked for.",
-        low=0.5,
-        high=100.0,
-    )
-    line_driven_share: float = share(
-        0.99,
-        "Share of the squares of angles and frame poses that lies below the driven frequency.",
-        "Set by hand: lines are looked for above what winches and frame are moved at.",
-    )
-    line_noise_ratio: float = ratio(
-        10.0,
-        "Multiple of a spectrum's median below which it is noise and not driven motion.",
-        "A bin of white noise exceeds 10 medians with probability 0.001.",
-    )
     line_false_alarm_rate: float = share(
         1e-3,
         "Probability that noise makes any line as high, over all frequencies and residuals.",
@@ -107,10 +63,4 @@ class ResidualThresholds:
         0.8,
         "Coherence of a line's complex amplitude over eight pieces of the series.",
         "Set by hand: a force from outside keeps phase and size, what rings down does not.",
-    )
-    line_width_hz: float = quantity(
-        0.1,
-        "Hz",
-        "Distance up to which two lines are one.",
-        "Set by hand: resolution of a spectrum over 10 s.",
     )

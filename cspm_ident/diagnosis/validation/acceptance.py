@@ -250,7 +250,7 @@ def _left_open(
     if not unexplained:
         return tuple(e for e in silent if _would_be_unexplained(search, e, kept))
     limits = search.thresholds
-    most = limits.rival_gain_share * max(each.gain.total for each in unexplained)
+    most = limits.majority_share * max(each.gain.total for each in unexplained)
     large = [each for each in silent if each.gain.total >= most]
     return tuple(e for e in large if is_doubtful(e, unexplained, thresholds=limits))
 

@@ -278,7 +278,7 @@ def _needed(finding: Finding, thresholds: Thresholds) -> float:
     if finding.holdout is HoldOut.DOMINANT:
         return np.inf
     lenient = finding.is_faint or is_number(finding.hypothesis)
-    return 1.0 if lenient else thresholds.useful_error_share
+    return 1.0 if lenient else thresholds.whole_share
 
 
 def _allowed(measured: Measurement, candidate: Candidate, weights: Array, half: Array) -> Array:

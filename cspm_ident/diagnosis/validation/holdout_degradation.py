@@ -69,9 +69,9 @@ def harm(without: Squares, with_it: Squares, thresholds: Thresholds = DEFAULT_TH
     before = np.array([without[place].sum() for place in both])
     taken = np.array([without[place] - with_it[place] for place in both])
     by_place = taken.sum(axis=1) if both else np.zeros(0)
-    if not both or np.any(by_place > thresholds.majority_residual_share * before):
+    if not both or np.any(by_place > thresholds.majority_share * before):
         return 0.0
     whole = gain_of(taken.sum(axis=0))
-    significant = whole.total < -thresholds.holdout_sigma * whole.error
-    worse = significant or np.any(by_place < -thresholds.degraded_residual_ratio * before)
+    significant = whole.total < -thresholds.certain_sigma * whole.error
+    worse = significant or np.any(by_place < -before)
     return float(np.sum(np.maximum(-by_place, 0.0))) if worse else 0.0

@@ -92,7 +92,7 @@ class _Lowered:
     @property
     def most(self) -> bool:
         """Whether the finding explains most of one residual."""
-        share = self._thresholds.majority_residual_share
+        share = self._thresholds.majority_share
         return bool(np.any(self._taken > share * self._without))
 
     @property
@@ -103,13 +103,13 @@ class _Lowered:
         """
         if self._could_take_much or not self._shows:
             return False
-        share = self._thresholds.confirmed_expected_share
+        share = self._thresholds.majority_share
         return bool(self._taken.sum() >= share * self._expected.sum())
 
     @property
     def says_nothing(self) -> bool:
         """Whether the predicted reduction is insignificant, and so is any increase."""
-        against = self._taken.sum() < -self._thresholds.holdout_sigma * self._error
+        against = self._taken.sum() < -self._thresholds.certain_sigma * self._error
         return not self._shows and not bool(against)
 
     @property
@@ -119,4 +119,4 @@ class _Lowered:
     @property
     def _shows(self) -> bool:
         """Whether the predicted reduction is significant against the scatter of blocks."""
-        return bool(self._expected.sum() > self._thresholds.holdout_sigma * self._error)
+        return bool(self._expected.sum() > self._thresholds.certain_sigma * self._error)

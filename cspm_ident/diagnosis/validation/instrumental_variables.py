@@ -48,7 +48,7 @@ def instruments_of(
     angle = measurement.angle
     if angle is None or measurement.wanted is None:
         return None
-    least = thresholds.still_noise_ratio * difference_noise(angle.values)
+    least = thresholds.certain_sigma * difference_noise(angle.values)
     moves = np.std(angle.values, axis=0) > least
     if not moves.any() or _is_driven(measurement.bar_pose, measurement.wanted, thresholds):
         return None
@@ -65,7 +65,7 @@ def _is_driven(bar: Samples | None, wanted: Samples, thresholds: Thresholds) -> 
     beyond = np.std(position - basis @ (basis.T @ position), axis=0)
     share = np.sum(beyond**2) / np.sum(np.var(position, axis=0))
     far = np.any(beyond > thresholds.driven_noise_ratio * noise)
-    return bool(far and share > thresholds.undemanded_motion_share)
+    return bool(far and share > thresholds.minor_share)
 
 
 def shows_in_reference_motion(
@@ -103,12 +103,12 @@ def shows_in_reference_motion(
     if not found:
         return True
     explained, predicted, squares = np.array(found).T
-    if predicted.sum() <= thresholds.instrument_relevance_share * squares.sum():
+    if predicted.sum() <= thresholds.minor_share * squares.sum():
         return False
     scale = explained.sum() / predicted.sum()
     error = np.linalg.norm(explained - scale * predicted) / predicted.sum()
-    doubt = thresholds.instrument_sigma * error
-    least = 1.0 - max(doubt, thresholds.instrument_shortfall_share)
+    doubt = thresholds.certain_sigma * error
+    least = 1.0 - max(doubt, 1.0 - thresholds.majority_share)
     return bool(scale > doubt and scale >= least)
 
 

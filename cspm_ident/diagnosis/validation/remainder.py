@@ -105,7 +105,7 @@ class Remainder(NamedTuple):
 
     def is_excited(self, thresholds: Thresholds = DEFAULT_THRESHOLDS) -> bool:
         """Return whether the measured quantity exceeds its noise, so that a model can be judged."""
-        return self.is_judged and self.measured > thresholds.excited_noise_ratio * self.noise
+        return self.is_judged and self.measured > thresholds.certain_sigma * self.noise
 
     def is_at_noise(self, thresholds: Thresholds = DEFAULT_THRESHOLDS) -> bool:
         """Return whether what is left is noise, or immaterial; not with an unknown noise.

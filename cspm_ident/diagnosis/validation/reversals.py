@@ -151,12 +151,12 @@ def near_rest(
     Args:
         weights: of each element, the coefficients near rest and while sliding, and half widths of
             their 95 % intervals.
-        thresholds: `breakaway_half_width_share`.
+        thresholds: `majority_share`.
     """
     found = np.array([own for own, _ in weights])
     half = np.array([own for _, own in weights])
     sliding = found[:, 1]
-    if not np.all(half <= thresholds.breakaway_half_width_share * sliding[:, None]):
+    if not np.all(half <= thresholds.majority_share * sliding[:, None]):
         return None
     return NearRest(found[:, 0], half[:, 0], sliding)
 

@@ -26,7 +26,7 @@ def test_every_threshold_moves_down_and_up_within_its_range():
         assert known[move.name].metadata["low"] <= move.value <= known[move.name].metadata["high"]
         assert getattr(move.thresholds, move.name) == move.value != known[move.name].default
     assert Move("tie_sigma", 3.0) in found
-    assert Move("collinear_share", 1.0) in found
+    assert Move("whole_share", 1.0) in found
     assert Move("most_effects", 2) in found
     assert Move("most_effects", 4) in found
     assert Move("tie_sigma", 3.0).is_up
@@ -73,7 +73,7 @@ def test_a_threshold_that_is_not_read_needs_no_diagnosis():
     own = dict(outcomes(found("friction", to_3={"refused": "why"}), "friction"))
     assert own[Move("tie_sigma", 1.0)] == "nothing"
     assert own[Move("tie_sigma", 3.0)] == "refused"
-    assert own[Move("holdout_sigma", 1.5)] == "not read"
+    assert own[Move("certain_sigma", 1.5)] == "not read"
     assert own[Move("trusted_probability", 0.45)] == "nothing"
 
 
@@ -102,7 +102,7 @@ def test_the_page_lists_what_changes_nothing_and_what_is_not_read():
     page = sensitivity_page([one], same)
     silent, _, unread = page.partition("Not read on this set: ")
     assert "`tie_sigma`" in silent
-    assert "`holdout_sigma`" in unread.splitlines()[0]
+    assert "`certain_sigma`" in unread.splitlines()[0]
     other = sensitivity_page(
         [one], {"friction": dict(outcomes(found("friction", to_3=worse), "friction"))}
     )

@@ -40,7 +40,7 @@ def test_an_effect_of_some_speeds_is_found_there(low, high):
     a_bin = 0.04
     assert low - a_bin <= found.low < found.high <= high + a_bin
     assert found.share == pytest.approx((high - low) / 2.0, abs=0.03)
-    assert found.held >= DEFAULT_THRESHOLDS.region_gain_share
+    assert found.held >= 1.0 - DEFAULT_THRESHOLDS.minor_share
 
 
 def test_when_a_machine_moved_is_no_region():

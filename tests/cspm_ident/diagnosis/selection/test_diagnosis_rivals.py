@@ -213,11 +213,11 @@ def test_further_parameters_have_to_pay():
     (named,) = named_in(target)
     assert named.hypothesis.effect.id == "winch_viscous_friction"
     (rival,) = named.alternatives
-    # A single further parameter costs as much as the logarithm of the blocks, of 20 at most.
+    # A single further parameter costs as much as the logarithm of the pairs of blocks.
     assert rival.behind > np.sqrt(np.log(20))
 
 
-@pytest.mark.parametrize(("blocks", "counted"), [(20, 10), (40, 20), (4000, 20)])
+@pytest.mark.parametrize(("blocks", "counted"), [(20, 10), (48, 24), (4000, 24)])
 def test_what_explains_the_same_with_a_number_more_is_tied_however_long_is_measured(
     blocks, counted
 ):

@@ -26,7 +26,7 @@ from cspm_sim.effects import Channel, catalogue
 
 THESIS = load_testbed(SCENARIOS / "testbeds" / "thesis.yaml")
 OUTPUT = Output(Input.SHAFT, "winches/angle/surge_2", "rad", "surge_2", Channel.SHAFT)
-WORTH_IT = DEFAULT_THRESHOLDS.useful_error_share
+WORTH_IT = DEFAULT_THRESHOLDS.whole_share
 EFFECTS = ("winch_coulomb_friction", "winch_viscous_friction", "bar_mass")
 
 

@@ -284,10 +284,14 @@ class Evidence:
         return int(rows.stamp_ns[rows.log_ns <= at_ns].max())
 
     def longest_gap(self, topic, start_ns, end_ns):
-        """Return the longest time between two messages' reception in a span of time [ns]."""
-        logs = self.rows[topic].log_ns
-        logs = logs[(logs >= start_ns) & (logs <= end_ns)]
-        return int(np.diff(logs).max()) if len(logs) > 1 else 0
+        """Return the longest time without a message between two that overlaps a span [ns].
+
+        A pause that begins before the span or ends after it counts whole.
+        """
+        logs = np.sort(self.rows[topic].log_ns)
+        first = max(np.searchsorted(logs, start_ns, side="right") - 1, 0)
+        last = np.searchsorted(logs, end_ns, side="left") + 1
+        return int(np.diff(logs[first:last]).max(initial=0))
 
     def torques(self, start_ns=0, end_ns=2**62):
         """Return stamps [ns] and rows of the torque commands stamped within a span of time."""

@@ -179,7 +179,9 @@ class Witness:
     def until_said(self, name, condition, what, seconds=PATIENCE_S):
         """Listen until what a part says of itself from now on meets a condition; return it."""
         self.latest.pop(name, None)
-        self.until(lambda: name in self.latest and condition(self.latest[name]), f"{name}: {what}")
+        self.until(
+            lambda: name in self.latest and condition(self.latest[name]), f"{name}: {what}", seconds
+        )
         return self.latest[name]
 
     def until_state(self, name, state):

@@ -19,7 +19,7 @@ def print_data_look(console: Console, checks: Sequence[Mapping[str, Any]]) -> No
         checks: as `DataCheck.data` gives them.
     """
     wrong = [each for each in checks if not each["ok"]]
-    say(console, f"data: {len(checks) - len(wrong)} of {len(checks)} checks are well")
+    say(console, f"data: {len(checks) - len(wrong)} of {len(checks)} checks passed")
     for each in wrong:
         name = Path(each["recording"]).name
         say(console, f"• {name}, {each['check']}: {each['what']}; {each['remedy']}")

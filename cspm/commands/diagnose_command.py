@@ -106,8 +106,9 @@ def believed_line(machine: Testbed, file: Path | None) -> str:
     A simulated recording carries the machine that was simulated, whose effects are then believed.
     """
     if file is not None:
-        return f"compared with {machine.name} of {file}"
-    own = f"compared with {machine.name}, the test-bed that the recording carries"
+        place = "" if str(file) == machine.name else f" ({file})"
+        return f"compared with the test-bed {machine.name}{place}"
+    own = f"compared with the test-bed {machine.name}, which the recording carries"
     if not machine.effects:
         return own
     names = ", ".join(dict.fromkeys(entry.effect for entry in machine.effects))

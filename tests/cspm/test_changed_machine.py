@@ -57,5 +57,6 @@ def test_the_verdict_names_what_it_compares_with():
     worn = changed_machine(THESIS, (), [FRICTION]).testbed
     assert "these are believed, not looked for; --testbed FILE" in believed_line(worn, None)
     assert "winch_coulomb_friction" in believed_line(worn, None)
-    assert believed_line(plain, None).endswith("the test-bed that the recording carries")
-    assert believed_line(worn, Path("own.yaml")) == "compared with thesis of own.yaml"
+    assert believed_line(plain, None).endswith("the test-bed thesis, which the recording carries")
+    assert believed_line(worn, Path("own.yaml")) == "compared with the test-bed thesis (own.yaml)"
+    assert believed_line(worn, Path("thesis")) == "compared with the test-bed thesis"

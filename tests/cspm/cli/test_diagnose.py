@@ -116,7 +116,7 @@ def test_nothing_is_found_where_nothing_is_missing(cspm, capsys):
     assert "winch_backlash" in {each["effect"] for each in found["not_excited"]}
     assert "verdict: consistent" in out
     assert all(each["ok"] for each in found["data_checks"])
-    assert "data: 10 of 10 checks are well" in out
+    assert "data: 10 of 10 checks passed" in out
 
 
 @pytest.fixture(scope="module")

@@ -45,13 +45,16 @@ def geometry(cables: Array, bar_pose: ArrayLike, frame_pose: ArrayLike) -> Cable
     """Return lengths and Jacobians for `cables`, the plant's cable parameter rows (n, columns).
 
     Raises:
-        SingularityError: an exit and its attachment coincide, where a cable has no direction.
+        SingularityError: an exit and its attachment coincide, where a cable has no direction, or an
+            attachment lies inside its cable's pulley.
     """
     n = len(cables)
     out = CableGeometry(np.empty(n), np.empty((n, 6)), np.empty((n, 6)))
     cable_geometry(cables, _pose(bar_pose), _pose(frame_pose), out.lengths, out.bar, out.frame)
     if not (out.lengths > LENGTH_TOLERANCE).all():
         i = int(np.argmin(out.lengths))
+        if np.isnan(out.lengths[i]):
+            raise SingularityError(f"cable {i}: its attachment lies inside its pulley")
         raise SingularityError(f"cable {i}: length 0 m, its direction does not exist")
     return out
 
@@ -59,6 +62,14 @@ def geometry(cables: Array, bar_pose: ArrayLike, frame_pose: ArrayLike) -> Cable
 def inverse_kinematics(cables: Array, bar_pose: ArrayLike, frame_pose: ArrayLike) -> Array:
     """Return the cable lengths (n,) [m], thesis (2-5)."""
     return geometry(cables, bar_pose, frame_pose).lengths
+
+
+def lengths_between_points(cables: Array) -> Array:
+    """Return the lengths (n,) [m] of cables between points of one frame; 0 without a cable."""
+    n, origin = len(cables), np.zeros(6)
+    lengths, jacobian = np.empty(n), np.empty((n, 6))
+    cable_geometry(cables, origin, origin, lengths, jacobian, jacobian.copy())
+    return lengths
 
 
 def euler_rate_map(pose: ArrayLike) -> Array:

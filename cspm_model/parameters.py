@@ -51,12 +51,16 @@ def _cable_row(cable: Cable, gravity: float) -> tuple[Array, Array]:
     row[cable_kernel.RADIUS] = cable.drum_radius / cable.gear_ratio
     row[cable_kernel.INERTIA] = cable.rotor_inertia
     row[cable_kernel.TORQUE_LIMIT] = cable.torque_limit
+    row[cable_kernel.PARTS] = cable.parts
     law, damping = cable.stiffness, cable.damping
     if not (cable.exit and cable.attachment and law and damping and cable.tension_limits):
         return row, table
     row[cable_kernel.HAS_CABLE] = 1.0
     row[cable_kernel.EXIT : cable_kernel.EXIT + 3] = cable.exit
     row[cable_kernel.ATTACHMENT : cable_kernel.ATTACHMENT + 3] = cable.attachment
+    if cable.pulley:
+        row[cable_kernel.PULLEY_RADIUS] = cable.pulley.radius
+        row[cable_kernel.PULLEY_AXIS : cable_kernel.PULLEY_AXIS + 3] = cable.pulley.direction
     row[cable_kernel.OFFSET_LENGTH] = cable.offset_length
     row[cable_kernel.AXIAL_RIGIDITY] = law.axial_rigidity
     row[cable_kernel.FLOOR_TENSION] = law.floor_tension

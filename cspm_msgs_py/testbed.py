@@ -40,6 +40,7 @@ from cspm_msgs_py.testbed_keys.plausible import (
     Tension,
     Torque,
 )
+from cspm_msgs_py.testbed_keys.pulley import Parts, Pulley
 from cspm_msgs_py.testbed_keys.winch_load import WinchLoad
 from cspm_msgs_py.topics import Topic, contract_topics
 from cspm_msgs_py.yaml_file import StrictModel, parse_yaml, read_text, validate
@@ -154,13 +155,16 @@ class AxialDamping(StrictModel):
 class Cable(StrictModel):
     """One winch with its drum, gear and cable. A winch without cable has no `exit`, or a `load`.
 
-    A `locked` winch is held by its brake: its motor angle is constant, measured or not.
+    A `locked` winch is held by its brake: its motor angle is constant, measured or not. Of `parts`
+    between two blocks each carries the tension.
     `breaking_force` [N] is its maker's; `safety_factor` takes the place of the machine's.
     """
 
     name: Name
     exit: Point | None = None
     attachment: Point | None = None
+    pulley: Pulley | None = None
+    parts: Parts = 1
     offset_length: NonNegativeFloat = 0.0
     stiffness: (
         Annotated[ExponentialStiffness | LinearStiffness, Field(discriminator="law")] | None
@@ -197,12 +201,16 @@ class Cable(StrictModel):
                 f"load: of {self.name}, whose cable carries what its attachment does, allowed: of a"
                 " winch without cable"
             )
-        if missing and self.breaking_force is not None:
-            raise ValueError(
-                f"breaking_force: {self.breaking_force:g} N of {self.name}, a winch without cable,"
-                " allowed: none"
-            )
+        if missing:
+            self._check_absent()
         return self
+
+    def _check_absent(self) -> None:
+        """Refuse what belongs to a cable, of a winch without one."""
+        values = self.breaking_force, self.pulley, None if self.parts == 1 else self.parts
+        for key, value in zip(("breaking_force", "pulley", "parts"), values, strict=True):
+            if value is not None:
+                raise ValueError(f"{key}: of {self.name}, a winch without cable, allowed: none")
 
     @property
     def has_cable(self) -> bool:

@@ -54,7 +54,8 @@ def read_actions(testbed: Testbed) -> list[Action]:
 
     Raises:
         InputError: an effect, one of its elements or parameters is unknown or out of bounds, or an
-            effect with memory is listed twice on one element.
+            effect with memory is listed twice on one element, or one at an attachment acts on a
+            cable of several parts.
     """
     actions = [action for entry in testbed.effects for action in _of_entry(entry, testbed)]
     seen = set()
@@ -63,12 +64,23 @@ def read_actions(testbed: Testbed) -> list[Action]:
         if action.effect.physics.states and place in seen:
             raise InputError(f"{action.where}: twice on {action.name}, allowed: once per element")
         seen.add(place)
+        _check_parts(action, testbed)
     actions += [
         Action(effect, i, cable.name, values)
         for i, cable in enumerate(testbed.cables)
         for effect, values in load_effects(cable, testbed.gravity)
     ]
     return [action for action in actions if not action.effect.is_absent(action.values)]
+
+
+def _check_parts(action: Action, testbed: Testbed) -> None:
+    """Refuse what is derived for a single span, on a cable of several parts."""
+    if Hook.ATTACHMENT in action.effect.physics.kernels:
+        parts = testbed.cables[action.element].parts
+        if parts > 1:
+            raise InputError(
+                f"{action.where}: {action.name} has {parts} parts, allowed: cables of one part"
+            )
 
 
 def altered_testbed(testbed: Testbed, actions: Iterable[Action]) -> Testbed:

@@ -146,6 +146,70 @@ def manipulability(
 @analyze.command(
     epilog="""Examples:
 
+cspm analyze reference calm --out reference
+
+cspm analyze reference my_scenario.yaml --set target.motion.scale=0.5 --json reference.json
+
+Exit code: 0 done, 2 unusable input."""
+)
+def reference(
+    scenario: ScenarioName = DEFAULT_SCENARIO,
+    overrides: Annotated[
+        list[str] | None,
+        typer.Option(
+            "--set", metavar="KEY=VALUE", help="A value of the scenario or test-bed; repeated."
+        ),
+    ] = None,
+    testbed: MachineFile = None,
+    out: Folder = None,
+    json: Json = None,
+) -> None:
+    """Look whether the machine can follow the reference: wrench, tensions, speeds and torques.
+
+    As if bar and cables followed it exactly; the picture shades where no tensions will do.
+    """
+    from cspm.commands.analyze_reference_command import analyze_reference_command
+    from cspm_run.library import find_scenario
+
+    path = find_scenario(scenario)
+    analyze_reference_command(path, overrides or [], testbed, out, json)
+
+
+@analyze.command(
+    epilog="""Examples:
+
+cspm analyze sag --linear-density 0.001
+
+cspm analyze sag cogiro --linear-density 0.05 --pose 2,0,1,0,0,0 --json sag.json
+
+Exit code: 0 done, 1 no tensions hold bar and cables, 2 unusable input."""
+)
+def sag(
+    scenario: ScenarioName = DEFAULT_SCENARIO,
+    testbed: MachineFile = None,
+    pose: At = None,
+    linear_density: Annotated[
+        float | None,
+        typer.Option(
+            metavar="KG/M",
+            help="Of all cables; otherwise that of the test-bed's effect cable_sag.",
+        ),
+    ] = None,
+    json: Json = None,
+) -> None:
+    """Report how cables with weight hold the bar at rest: tensions, sag and what stiffness is left.
+
+    Beside the tensions of straight cables without weight, which controllers assume.
+    """
+    from cspm.commands.analyze_sag_command import analyze_sag_command
+    from cspm.commands.analyzed_machine import read_machine
+
+    analyze_sag_command(read_machine(scenario, testbed, pose), linear_density, json)
+
+
+@analyze.command(
+    epilog="""Examples:
+
 cspm analyze design --out design
 
 cspm analyze design calm --computing 0.002 --json design.json

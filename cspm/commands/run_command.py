@@ -29,6 +29,7 @@ from cspm_ros.runtime.stall_watchdog import PATIENCE_S, check_patience
 from cspm_run.bundle import Bundle
 from cspm_run.bundle_dofs import free_of
 from cspm_run.console import make_console, say
+from cspm_run.demanded_reference import unmet_line
 from cspm_run.library import named_testbed
 from cspm_run.plants import SIM
 from cspm_run.recorded_run import INPROCESS, run
@@ -107,6 +108,9 @@ def run_command(
         say(Console(stderr=True), f"warning: {line}")
     for line in free_of(bundle):
         say(console, line)
+    unmet = unmet_line(bundle)
+    if unmet:
+        say(console, unmet)
     result = _run_with_progress(bundle, folder, console, runner)
     print_summary(console, result, bundle.scenario.requirement)
     if json is not None:

@@ -8,8 +8,9 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from cspm_control.analysis.pose_grid import Grid
+from cspm_control.analysis.workspace_kernels import POINT, all_structures
 from cspm_model.kernels import bar as bar_kernel
-from cspm_model.kernels.cable import ATTACHMENT, EXIT
+from cspm_model.kernels.cable import ATTACHMENT, EXIT, PARTS, PULLEY_RADIUS
 from cspm_model.parameters import nominal_parameters
 from cspm_model.spanned_axes import spanned_axes, structures_at
 from cspm_msgs_py.errors import InputError
@@ -23,7 +24,7 @@ class CableStructure(NamedTuple):
 
     Attributes:
         axes: rows of the wrench that the cables are to meet: those that they give independently.
-        exits: (n, 3), [m].
+        outlets: where cables leave the frame, (n, OUTLET_COLUMNS) of `workspace_kernels`.
         attachments: (n, 3) in bar_ned [m].
         limits: tensions (n, 2) [N].
         weight: of the bar [N].
@@ -31,11 +32,16 @@ class CableStructure(NamedTuple):
     """
 
     axes: tuple[int, ...]
-    exits: Array
+    outlets: Array
     attachments: Array
     limits: Array
     weight: float
     com: Array
+
+    @property
+    def exits(self) -> Array:
+        """The points of the outlets, (n, 3) [m]."""
+        return self.outlets[:, POINT : POINT + 3]
 
 
 def cable_structure(testbed: Testbed, pose: ArrayLike) -> CableStructure:
@@ -57,7 +63,7 @@ def cable_structure(testbed: Testbed, pose: ArrayLike) -> CableStructure:
         )
     return CableStructure(
         axes,
-        np.ascontiguousarray(cables[:, EXIT : EXIT + 3]),
+        np.hstack([cables[:, EXIT : EXIT + 3], cables[:, PULLEY_RADIUS : PARTS + 1]]),
         cables[:, ATTACHMENT : ATTACHMENT + 3],
         np.array([cable.tension_limits for cable in testbed.cables], dtype=float),
         float(bar[bar_kernel.MASS] * bar[bar_kernel.GRAVITY]),
@@ -70,12 +76,10 @@ def structures(machine: CableStructure, grid: Grid) -> Array:
 
     Orientations are fastest.
     """
-    arms = np.einsum("qij,nj->qni", grid.rotations, machine.attachments)
-    spans = grid.positions[:, None, None, :] + arms - machine.exits
-    pulls = -spans / np.linalg.norm(spans, axis=-1, keepdims=True)
-    rows = np.concatenate([pulls, np.cross(np.broadcast_to(arms, pulls.shape), pulls)], axis=-1)
-    every = np.swapaxes(rows, -1, -2)[..., list(machine.axes), :]
-    return every.reshape(-1, *every.shape[-2:])
+    arms = np.ascontiguousarray(np.einsum("qij,nj->qni", grid.rotations, machine.attachments))
+    out = np.empty((grid.size, len(machine.axes), len(machine.outlets)))
+    all_structures(grid.positions, arms, machine.outlets, np.array(machine.axes), out)
+    return out
 
 
 def wanted_at_rest(machine: CableStructure, grid: Grid) -> Array:

@@ -47,7 +47,7 @@ def static_workspace(
     arms = np.ascontiguousarray(np.einsum("qij,nj->qni", grid.rotations, machine.attachments))
     out = np.zeros(grid.size, dtype=np.bool_)
     fixed = (
-        *(grid.positions, arms, machine.exits, np.array(machine.axes)),
+        *(grid.positions, arms, machine.outlets, np.array(machine.axes)),
         wanted_at_rest(machine, grid),
     )
     work = partial(_chunk, kernel, (*fixed, machine.limits[:, 1].copy(), *extra, out))
@@ -76,4 +76,4 @@ def _workers() -> int:
 
 
 def _bases(machine: CableStructure) -> NDArray[np.int64]:
-    return np.array(list(combinations(range(len(machine.exits)), len(machine.axes))))
+    return np.array(list(combinations(range(len(machine.outlets)), len(machine.axes))))

@@ -12,9 +12,18 @@ import numpy as np
 from numba import njit
 from numpy.typing import NDArray
 
+from cspm_model.kernels.pulley import around_pulley
+
 Array = NDArray[np.float64]
 Integers = NDArray[np.int64]
 Mask = NDArray[np.bool_]
+
+# Columns of an outlet, where a cable leaves the winch frame.
+POINT = 0  # [m]
+PULLEY_RADIUS = 3  # [m]; 0 without a pulley
+PULLEY_AXIS = 4
+PARTS = 7
+OUTLET_COLUMNS = 8
 
 # A pivot below this share of the largest entry: the columns are no basis.
 SMALLEST_PIVOT = 1e-9
@@ -23,21 +32,37 @@ ROUND_OFF = 1e-9
 
 
 @njit(cache=True, error_model="numpy", nogil=True)
-def structure(position: Array, arms: Array, exits: Array, axes: Integers, out: Array) -> None:
+def structure(position: Array, arms: Array, outlets: Array, axes: Integers, out: Array) -> None:
     """Write −Jᵀ of (2-13), rows `axes` of force and moment in world axes, to `out` (m, n).
 
-    `arms` (n, 3) run from the bar's origin to the attachments, world axes.
+    `arms` (n, 3) run from the bar's origin to the attachments, world axes; `outlets` are
+    (n, OUTLET_COLUMNS).
     """
     for i in range(arms.shape[0]):
         bx, by, bz = arms[i, 0], arms[i, 1], arms[i, 2]
-        x = position[0] + bx - exits[i, 0]
-        y = position[1] + by - exits[i, 1]
-        z = position[2] + bz - exits[i, 2]
-        inverse = -1.0 / sqrt(x * x + y * y + z * z)
-        x, y, z = x * inverse, y * inverse, z * inverse
+        x = position[0] + bx - outlets[i, POINT]
+        y = position[1] + by - outlets[i, POINT + 1]
+        z = position[2] + bz - outlets[i, POINT + 2]
+        scale = -outlets[i, PARTS]
+        if outlets[i, PULLEY_RADIUS] > 0.0:
+            axis = outlets[i, PULLEY_AXIS], outlets[i, PULLEY_AXIS + 1], outlets[i, PULLEY_AXIS + 2]
+            _, (x, y, z) = around_pulley((x, y, z), axis, outlets[i, PULLEY_RADIUS])
+        else:
+            scale = scale / sqrt(x * x + y * y + z * z)
+        x, y, z = x * scale, y * scale, z * scale
         column = (x, y, z, by * z - bz * y, bz * x - bx * z, bx * y - by * x)
         for row in range(axes.shape[0]):
             out[row, i] = column[axes[row]]
+
+
+@njit(cache=True, error_model="numpy", nogil=True)
+def all_structures(
+    positions: Array, arms: Array, outlets: Array, axes: Integers, out: Array
+) -> None:
+    """Write `structure` of all poses to `out` (P·Q, m, n)."""
+    count = arms.shape[0]
+    for pose in range(out.shape[0]):
+        structure(positions[pose // count], arms[pose % count], outlets, axes, out[pose])
 
 
 @njit(cache=True, error_model="numpy", nogil=True)
@@ -80,7 +105,7 @@ def pseudo_inverse_holds(
     last: int,
     positions: Array,
     arms: Array,
-    exits: Array,
+    outlets: Array,
     axes: Integers,
     wrenches: Array,
     most: Array,
@@ -93,7 +118,7 @@ def pseudo_inverse_holds(
         last: the one after the last.
         positions: (P, 3) [m].
         arms: (Q, n, 3) [m], one set per orientation.
-        exits: (n, 3) [m].
+        outlets: (n, OUTLET_COLUMNS).
         axes: rows of the wrench that are to be met, (m,).
         wrenches: wanted of the cables, (Q, m) [N, N·m].
         most: highest tensions (n,) [N].
@@ -103,7 +128,7 @@ def pseudo_inverse_holds(
     rows, system = np.empty((m, n)), np.empty((m, m + 1))
     for pose in range(first, last):
         wrench = wrenches[pose % count]
-        structure(positions[pose // count], arms[pose % count], exits, axes, rows)
+        structure(positions[pose // count], arms[pose % count], outlets, axes, rows)
         size = 0.0
         for i in range(m):
             size = max(size, abs(wrench[i]))
@@ -130,7 +155,7 @@ def general_holds(
     last: int,
     positions: Array,
     arms: Array,
-    exits: Array,
+    outlets: Array,
     axes: Integers,
     wrenches: Array,
     most: Array,
@@ -144,7 +169,7 @@ def general_holds(
         last: the one after the last.
         positions: (P, 3) [m].
         arms: (Q, n, 3) [m], one set per orientation.
-        exits: (n, 3) [m].
+        outlets: (n, OUTLET_COLUMNS).
         axes: rows of the wrench that are to be met, (m,).
         wrenches: wanted of the cables, (Q, m) [N, N·m].
         most: highest tensions (n,) [N].
@@ -157,7 +182,7 @@ def general_holds(
     start = 0
     for pose in range(first, last):
         wrench = wrenches[pose % count]
-        structure(positions[pose // count], arms[pose % count], exits, axes, rows)
+        structure(positions[pose // count], arms[pose % count], outlets, axes, rows)
         size = 0.0
         for i in range(m):
             size = max(size, abs(wrench[i]))

@@ -58,7 +58,7 @@ class Governed(NamedTuple):
     known_wrench: Array
 
 
-class _Demand(NamedTuple):
+class Demand(NamedTuple):
     """At each of k knots: wrench = structure·tensions is wanted, and mass per acceleration."""
 
     structure: Array
@@ -104,7 +104,7 @@ def plan_deviation(
         ends = window.start == 0, window.stop == len(times)
         for _ in range(MOST_ROUNDS):
             before = deviation[window].copy()
-            demand = _demand(machine, wanted[window] + before, frames[window])
+            demand = demand_along(machine, wanted[window] + before, frames[window])
             deviation[window] = _least_deviation(machine, demand, before, ends, excess[window])
             if (np.abs(deviation[window] - before)[:, :6] < SETTLED * machine.tolerances).all():
                 break
@@ -113,7 +113,7 @@ def plan_deviation(
 
 def _blocked(machine: Governed, wanted: Array, frames: Array) -> NDArray[np.bool_]:
     """Return at which knots no tensions within the limits give the reference's acceleration."""
-    demand = _demand(machine, wanted, frames)
+    demand = demand_along(machine, wanted, frames)
     weights, tensions = np.ones(len(machine.axes)), np.empty(len(machine.cables))
     # Each knot for itself, whatever the one before.
     none = np.zeros(0)
@@ -143,11 +143,11 @@ def _windows(blocked: NDArray[np.bool_], reach: int) -> list[slice]:
     return [slice(int(a), int(b)) for a, b in edges.reshape(-1, 2)]
 
 
-def _demand(machine: Governed, motion: Array, frames: Array) -> _Demand:
+def demand_along(machine: Governed, motion: Array, frames: Array) -> Demand:
     """Return what motion rows (k, 18) require at the winch frame's poses (k, 6)."""
     axes, n = list(machine.axes), len(machine.cables)
     count, m = len(motion), len(axes)
-    found = _Demand(np.empty((count, m, n)), np.empty((count, m)), np.empty((count, m, m)))
+    found = Demand(np.empty((count, m, n)), np.empty((count, m)), np.empty((count, m, m)))
     lengths, jacobians, wrench, more = np.empty(n), np.empty((2, n, 6)), np.empty(6), np.empty(6)
     for k, row in enumerate(motion):
         pose, rate, acceleration = row.reshape(3, 6)
@@ -164,7 +164,7 @@ def _demand(machine: Governed, motion: Array, frames: Array) -> _Demand:
 
 
 def _least_deviation(
-    machine: Governed, demand: _Demand, planned: Array, ends: tuple[bool, bool], excess: Array
+    machine: Governed, demand: Demand, planned: Array, ends: tuple[bool, bool], excess: Array
 ) -> Array:
     """Return the deviation rows (k, 18) nearest to zero that tensions within the limits can give.
 
@@ -206,7 +206,7 @@ def _cost(count: int, m: int, n: int, counted: int) -> scipy.sparse.spmatrix:
 
 
 def _wrenches(
-    demand: _Demand, before: Array, scale: Array
+    demand: Demand, before: Array, scale: Array
 ) -> tuple[scipy.sparse.spmatrix, NDArray[np.float64]]:
     """Return rows and right side of: tensions give what the deviation's acceleration requires."""
     size = before.size

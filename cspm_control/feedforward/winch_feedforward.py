@@ -17,6 +17,9 @@ from cspm_model.kernels.cable import (
     INERTIA,
     LENGTH,
     OFFSET_LENGTH,
+    PARTS,
+    PULLEY_AXIS,
+    PULLEY_RADIUS,
     RADIUS,
     RATE,
     SPAN_COLUMNS,
@@ -25,7 +28,9 @@ from cspm_model.kernels.cable import (
     law_scale,
 )
 from cspm_model.kernels.machine import PlantParameters
+from cspm_model.kernels.pulley import pulley_turning
 from cspm_model.kernels.rotation import (
+    Matrix,
     Placement,
     Vector,
     cross,
@@ -110,15 +115,43 @@ def winding_accelerations(
     spans = np.empty((cables.shape[0], SPAN_COLUMNS))
     cable_spans(cables, base, _placement(bar), spans)
     for i in range(cables.shape[0]):
+        lengths[i] = spans[i, LENGTH]
+        if cables[i, PULLEY_RADIUS] > 0.0:
+            winding[i] = _over_pulley(cables[i], spans[i], bar, frame, base[1])
+            continue
         exit_arm = rotate(base[1], cables[i, EXIT], cables[i, EXIT + 1], cables[i, EXIT + 2])
         arm = spans[i, ARM], spans[i, ARM + 1], spans[i, ARM + 2]
         (vx, vy, vz), (ax, ay, az) = _point_motion(bar, arm)
         (wx, wy, wz), (bx, by, bz) = _point_motion(frame, exit_arm)
         ux, uy, uz = spans[i, DIRECTION], spans[i, DIRECTION + 1], spans[i, DIRECTION + 2]
-        squared = (vx - wx) ** 2 + (vy - wy) ** 2 + (vz - wz) ** 2
+        parts = cables[i, PARTS]
+        squared = parts * parts * ((vx - wx) ** 2 + (vy - wy) ** 2 + (vz - wz) ** 2)
         along = ux * (ax - bx) + uy * (ay - by) + uz * (az - bz)
-        lengths[i] = spans[i, LENGTH]
         winding[i] = -along - (squared - spans[i, RATE] ** 2) / lengths[i]
+
+
+@njit(cache=True, error_model="numpy")
+def _over_pulley(cable: Array, span: Array, bar: Array, frame: Array, rotation: Matrix) -> float:
+    """Return −l̈ [m/s²] of a cable over a pulley.
+
+    With the attachment's velocity w and acceleration against the frame: l̈ = u·ẇ + u̇·w.
+    """
+    arm = span[ARM], span[ARM + 1], span[ARM + 2]
+    ax, ay, az = rotate(rotation, cable[EXIT], cable[EXIT + 1], cable[EXIT + 2])
+    rx, ry, rz = bar[0] + arm[0] - frame[0], bar[1] + arm[1] - frame[1], bar[2] + arm[2] - frame[2]
+    (vx, vy, vz), (px, py, pz) = _point_motion(bar, arm)
+    (ex, ey, ez), (qx, qy, qz) = _point_motion(frame, (rx, ry, rz))
+    wx, wy, wz = vx - ex, vy - ey, vz - ez
+    cx, cy, cz = cross(frame[10], frame[11], frame[12], wx, wy, wz)
+    axis = rotate(rotation, cable[PULLEY_AXIS], cable[PULLEY_AXIS + 1], cable[PULLEY_AXIS + 2])
+    apart = rx - ax, ry - ay, rz - az
+    tx, ty, tz = pulley_turning(apart, axis, cable[PULLEY_RADIUS], (wx, wy, wz))
+    along = (
+        span[DIRECTION] * (px - qx - 2.0 * cx)
+        + span[DIRECTION + 1] * (py - qy - 2.0 * cy)
+        + span[DIRECTION + 2] * (pz - qz - 2.0 * cz)
+    )
+    return -along - cable[PARTS] * (tx * wx + ty * wy + tz * wz)
 
 
 @njit(cache=True, error_model="numpy")

@@ -27,9 +27,10 @@ from cspm_ident.signals.measurement import Measurement
 from cspm_ident.signals.samples import Samples
 from cspm_model.elastic_law import elongation_at, law_at
 from cspm_model.equilibrium import unstretched_lengths
-from cspm_model.kernels.cable import ATTACHMENT, EXIT, OFFSET_LENGTH, RADIUS
+from cspm_model.kernels.cable import OFFSET_LENGTH, RADIUS
 from cspm_model.kernels.machine import PlantParameters
 from cspm_model.kernels.rotation import quaternion_from_euler
+from cspm_model.kinematics import lengths_between_points
 from cspm_model.parameters import nominal_parameters
 from cspm_msgs_py.scenario import DESIGN_POSE, AngleProfile, ClosedLoop, Scenario
 from cspm_msgs_py.scenario_keys.bodies import Body
@@ -147,8 +148,7 @@ def _rig(
         angles[:, i] = gaussian_filter1d(np.interp(along, at, values), sigma, mode="nearest")
         tensions[:, i] = path.tension
     if any(cable.has_cable for cable in machine.cables):
-        apart = cables[:, ATTACHMENT : ATTACHMENT + 3] - cables[:, EXIT : EXIT + 3]
-        lengths = np.linalg.norm(apart, axis=1)
+        lengths = lengths_between_points(cables)
         start = unstretched_lengths(parameters, lengths, tensions[0])
         wound = start * np.exp(-angles * cables[:, RADIUS] / lengths)
         elastic = wound + cables[:, OFFSET_LENGTH]

@@ -174,6 +174,11 @@ def _check_rig(path: Path, testbed: Testbed) -> None:
         raise InputError(
             f"{path}: {testbed.name} has a bar or a winch frame, allowed: cables fixed in the world"
         )
+    bent = [cable.name for cable in testbed.cables if cable.pulley or cable.parts > 1]
+    if bent:
+        raise InputError(
+            f"{path}: {bent[0]} has a pulley or several parts, allowed: straight cables of one part"
+        )
     if not any(cable.has_cable for cable in testbed.cables):
         raise InputError(f"{path}: {testbed.name} has winches alone, allowed: winches with cables")
 

@@ -6,6 +6,7 @@ from numba import njit
 from numpy import float64
 from numpy.typing import NDArray
 
+from cspm_model.kernels.pulley import around_pulley
 from cspm_model.kernels.rotation import Placement, Vector, cross, rotate
 
 Array = NDArray[float64]
@@ -32,13 +33,17 @@ TORQUE_LIMIT = 20
 # What only effects read.
 GEAR_RATIO = 21
 GRAVITY_HERE = 22
-CABLE_COLUMNS = 23
+# Of the way between exit and attachment.
+PULLEY_RADIUS = 23  # 0 without a pulley
+PULLEY_AXIS = 24  # unit vector, winch frame axes
+PARTS = 27  # of the cable, between two blocks
+CABLE_COLUMNS = 28
 
 
 # Columns of a cable's span.
-DIRECTION = 0  # u, from exit to attachment, world axes
+DIRECTION = 0  # u, from exit to attachment, world axes; times the number of its parts
 ARM = 3  # R·b, from the body's origin to the attachment, world axes
-LENGTH = 6
+LENGTH = 6  # of all parts
 RATE = 7
 TENSION = 8
 SPAN_COLUMNS = 9
@@ -64,6 +69,15 @@ def cable_spans(cables: Array, frame: Placement, body: Placement, spans: Array) 
         # A winch without cable has no length and no direction.
         inverse = 1.0 / length if length > 0.0 else 0.0
         ux, uy, uz = x * inverse, y * inverse, z * inverse
+        if cables[i, PULLEY_RADIUS] > 0.0:
+            axis = rotate(
+                fr, cables[i, PULLEY_AXIS], cables[i, PULLEY_AXIS + 1], cables[i, PULLEY_AXIS + 2]
+            )
+            length, (ux, uy, uz) = around_pulley((x, y, z), axis, cables[i, PULLEY_RADIUS])
+            # The cable's line meets the attachment, not the exit.
+            ax, ay, az = ax + x, ay + y, az + z
+        parts = cables[i, PARTS]
+        length, ux, uy, uz = parts * length, parts * ux, parts * uy, parts * uz
         ex, ey, ez = cross(fw[0], fw[1], fw[2], ax, ay, az)
         wx, wy, wz = cross(bw[0], bw[1], bw[2], bx, by, bz)
         spans[i, 0], spans[i, 1], spans[i, 2] = ux, uy, uz

@@ -5,7 +5,15 @@ from numba import njit
 from numpy import float64
 from numpy.typing import NDArray
 
-from cspm_model.kernels.cable import ARM, DIRECTION, EXIT, LENGTH, SPAN_COLUMNS, cable_spans
+from cspm_model.kernels.cable import (
+    ARM,
+    DIRECTION,
+    EXIT,
+    LENGTH,
+    PULLEY_RADIUS,
+    SPAN_COLUMNS,
+    cable_spans,
+)
 from cspm_model.kernels.rotation import cross, rotate, rotation_from_euler
 
 Array = NDArray[float64]
@@ -32,6 +40,13 @@ def cable_geometry(
         ax, ay, az = rotate(
             base_rotation, cables[i, EXIT], cables[i, EXIT + 1], cables[i, EXIT + 2]
         )
+        if cables[i, PULLEY_RADIUS] > 0.0:
+            # The cable's line meets the attachment, not the exit.
+            ax, ay, az = (
+                bar_pose[0] + bx - frame_pose[0],
+                bar_pose[1] + by - frame_pose[1],
+                bar_pose[2] + bz - frame_pose[2],
+            )
         lengths[i] = spans[i, LENGTH]
         bar[i, 0], bar[i, 1], bar[i, 2] = ux, uy, uz
         bar[i, 3], bar[i, 4], bar[i, 5] = cross(bx, by, bz, ux, uy, uz)

@@ -20,6 +20,7 @@ from cspm_model.kernels.cable import (
     HAS_CABLE,
     LENGTH,
     OFFSET_LENGTH,
+    PARTS,
     RADIUS,
     RATE,
     TENSION,
@@ -174,8 +175,8 @@ def fill_cable_signals(
     signals[WOUND_RADIUS] = cables[i, RADIUS]
     signals[DRUM_GEAR] = cables[i, GEAR_RATIO]
     x, y = spans[i, DIRECTION], spans[i, DIRECTION + 1]
-    signals[HORIZONTAL] = sqrt(x * x + y * y)
-    signals[DOWNWARD] = spans[i, DIRECTION + 2]
+    signals[HORIZONTAL] = sqrt(x * x + y * y) / cables[i, PARTS]
+    signals[DOWNWARD] = spans[i, DIRECTION + 2] / cables[i, PARTS]
     signals[CABLE_GRAVITY] = cables[i, GRAVITY_HERE]
     signals[CABLE_STEP] = period
     for d in range(ELASTIC_TENSION, CABLE_SIGNALS):

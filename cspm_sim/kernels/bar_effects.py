@@ -7,7 +7,7 @@ from numpy import float64, int64
 from numpy.typing import NDArray
 
 from cspm_model.kernels.bar import GRAVITY, bar_acceleration
-from cspm_model.kernels.cable import ARM, DIRECTION, EXIT, LENGTH, TENSION
+from cspm_model.kernels.cable import ARM, DIRECTION, EXIT, LENGTH, PARTS, TENSION
 from cspm_model.kernels.native import caller_returning
 from cspm_model.kernels.rotation import Placement, Vector, cross, rotate
 from cspm_sim.kernels.hooks import ATTACHMENT, BAR, HOOK, PENDANT, first_effect, run_effects
@@ -78,7 +78,7 @@ def attachment_wrench(
         for d in range(3):
             signals[END_EXIT_VELOCITY + d] = exit_velocity[d]
             signals[END_VELOCITY + d] = end_velocity[d] - exit_velocity[d]
-            signals[END_DIRECTION + d] = spans[i, DIRECTION + d]
+            signals[END_DIRECTION + d] = spans[i, DIRECTION + d] / cables[i, PARTS]
             signals[END_FORCE + d] = 0.0
         signals[END_LENGTH] = spans[i, LENGTH]
         signals[END_TENSION] = spans[i, TENSION]

@@ -32,8 +32,9 @@ def build_model(testbed: Testbed, extras: Extras, timestep: float) -> Any:  # no
     """Return the compiled model; `timestep` in s.
 
     Raises:
-        InputError: MuJoCo refuses the machine.
+        InputError: MuJoCo refuses the machine, or a cable runs over a pulley or in several parts.
     """
+    _check_straight(testbed)
     root = Element("mujoco", model=testbed.name)
     option = ElementTree.SubElement(
         root,
@@ -117,3 +118,12 @@ def _add_winches(
             gainprm="0",
             biastype="none",
         )
+
+
+def _check_straight(testbed: Testbed) -> None:
+    for cable in testbed.cables:
+        if cable.pulley or cable.parts > 1:
+            raise InputError(
+                f"test-bed {testbed.name}: {cable.name} has a pulley or several parts, allowed with"
+                " --plant mujoco: straight cables of one part; the own plant has both"
+            )

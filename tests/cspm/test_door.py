@@ -21,7 +21,7 @@ MODULES = (
         "catalogue",
     ),
     *("parameters", "diagnosis", "comparison", "identification.winches", "importing"),
-    *("analysis.linear", "analysis.manipulability"),
+    *("analysis.linear", "analysis.manipulability", "analysis.sag", "analysis.reference"),
 )
 
 

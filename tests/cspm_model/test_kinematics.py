@@ -2,7 +2,7 @@ import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
-from machines import random_poses
+from machines import build, pulley_content, random_poses
 from scipy.optimize import least_squares
 from scipy.spatial.transform import Rotation
 
@@ -24,6 +24,7 @@ FRAMES = random_poses(6, seed=21, centre=(0.1, -0.2, 0.05), reach=0.2, angle=0.3
 @pytest.fixture(scope="module")
 def cables(thesis, point, general):
     machines = {"thesis": thesis, "point": point, "general": general}
+    machines["pulleys"] = build(pulley_content())
     return {name: plant_parameters(testbed).cables for name, testbed in machines.items()}
 
 
@@ -49,7 +50,7 @@ def moved(pose, twist, step):
 
 
 @pytest.mark.parametrize("axis", range(6))
-@pytest.mark.parametrize("name", ["thesis", "point", "general"])
+@pytest.mark.parametrize("name", ["thesis", "point", "general", "pulleys"])
 def test_jacobians_are_the_slopes_of_the_lengths(cables, name, axis):
     step, twist = 1e-6, np.eye(6)[axis]
     for pose, frame in zip(random_poses(6, seed=5), FRAMES, strict=True):
@@ -63,7 +64,7 @@ def test_jacobians_are_the_slopes_of_the_lengths(cables, name, axis):
         assert found.frame[:, axis] == pytest.approx(frame_slope, abs=1e-8)
 
 
-@pytest.mark.parametrize("name", ["thesis", "general"])
+@pytest.mark.parametrize("name", ["thesis", "general", "pulleys"])
 def test_the_euler_jacobian_is_the_slope_over_the_pose_itself(cables, name):
     step = 1e-6
     for pose, frame in zip(random_poses(6, seed=6), FRAMES, strict=True):
@@ -75,9 +76,10 @@ def test_the_euler_jacobian_is_the_slope_over_the_pose_itself(cables, name):
             assert found[:, dof] == pytest.approx((ends[0] - ends[1]) / (2 * step), abs=1e-8)
 
 
-def test_moving_everything_together_changes_no_length(cables):
+@pytest.mark.parametrize("name", ["general", "pulleys"])
+def test_moving_everything_together_changes_no_length(cables, name):
     for pose, frame in zip(random_poses(6, seed=7), FRAMES, strict=True):
-        both = geometry(cables["general"], pose, frame)
+        both = geometry(cables[name], pose, frame)
         for axis in range(3):
             assert both.bar[:, axis] == pytest.approx(-both.frame[:, axis], abs=1e-15)
         # A common turn about the world's origin moves each body's origin too.

@@ -103,6 +103,18 @@ def general_content(stiffness=EXPONENTIAL):
     }
 
 
+def pulley_content():
+    """The general machine with pulleys on half of its cables and several parts of three."""
+    content = general_content()
+    for i, (radius, axis) in enumerate(
+        [(0.03, (0, 0, -1)), (0.02, (0.4, 0.2, -2)), (0.05, (1, 0, 0)), (0.04, (0.1, -0.3, 0.9))]
+    ):
+        content["cables"][2 * i]["pulley"] = {"radius": radius, "axis": list(axis)}
+    for i, parts in ((0, 2), (1, 3), (3, 2)):
+        content["cables"][i]["parts"] = parts
+    return content
+
+
 def entry(effect, elements=(), **parameters):
     """One entry of a machine's `effects`."""
     return {"effect": effect, "elements": list(elements), "parameters": parameters}

@@ -4,6 +4,7 @@ import json
 import re
 
 import pytest
+from run_samples import SCENARIOS
 
 from cspm.analysis import workspace
 from cspm.commands.analyzed_machine import read_machine
@@ -129,8 +130,81 @@ def test_where_the_bar_cannot_rest_no_acceleration_is_reported(cspm, tmp_path):
     assert "none" in out
 
 
+def test_reference_prints_draws_and_writes_what_it_needs(cspm, tmp_path):
+    code, out, err = cspm(
+        *("analyze", "reference", "worst_case_steep", "--set", "duration=20"),
+        *("--out", "asked", "--json", "asked.json"),
+    )
+    assert (code, err) == (0, "")
+    data = json.loads((tmp_path / "asked.json").read_text())
+    assert f"wrench out of reach {data['unmet_share']:.1%} of the time, most in" in out
+    assert data["unmet_share"] > 0.0
+    assert f"at {data['worst']['time']:.4g} s" in out
+    assert "motor torque within limits" in out
+    assert (tmp_path / "asked" / "reference.png").stat().st_size > 20_000
+
+
+def test_a_motor_that_the_reference_overloads_is_named(cspm):
+    code, out, _ = cspm(
+        *("analyze", "reference", "ipanema", "--set", "testbed.cables.c3.torque_limit=2.0")
+    )
+    assert code == 0
+    assert "the wrench is met within the tension limits all the time" in out
+    assert re.search(r"motor torque over its limit: c3 \d{3}%", out)
+
+
+def test_a_run_without_a_reference_for_its_bar_is_refused(refused):
+    assert refused("analyze", "reference", "one_winch").startswith(
+        "one_winch: no bar follows a reference, allowed: control.mode closed_loop"
+    )
+
+
+def test_a_run_says_before_it_starts_where_its_reference_is_out_of_reach(cspm):
+    arguments = ("--duration", "20", "--no-record")
+    code, out, _ = cspm("run", "worst_case_steep", *arguments)
+    assert code == 0
+    assert re.search(r"reference out of reach of the tension limits, as at 1\d\.\d* s;", out)
+    _, within, _ = cspm("run", "ipanema", "--no-record")
+    assert "out of reach" not in within
+
+
+def test_sag_prints_and_writes_what_heavy_cables_do(cspm, tmp_path):
+    code, out, err = cspm(
+        *("analyze", "sag", "cogiro", "--linear-density", "0.05", "--json", "sag.json")
+    )
+    assert (code, err) == (0, "")
+    data = json.loads((tmp_path / "sag.json").read_text())
+    worst = max(data["cables"], key=lambda each: each["sag"])
+    assert f"largest sag {1e3 * worst['sag']:.3g} mm, of {worst['name']}\n" in out
+    assert 0.01 < worst["sag"] < 0.03
+    assert {each["linear_density"] for each in data["cables"]} == {0.05}
+
+
+@pytest.mark.parametrize(
+    ("arguments", "text"),
+    [
+        ([], "thesis_refitted: no linear density of hoist_1, allowed: --linear-density KG_PER_M"),
+        (["--linear-density", "0"], "linear density 0 kg/m: allowed: above 0"),
+    ],
+)
+def test_sag_without_a_density_is_refused(refused, arguments, text):
+    assert refused("analyze", "sag", *arguments).startswith(text)
+
+
+def test_sag_takes_the_density_of_the_testbeds_effect(cspm, tmp_path):
+    text = (SCENARIOS / "testbeds" / "cogiro.yaml").read_text()
+    effect = "effects: [{effect: cable_sag, parameters: {linear_density: 0.03}}]\n"
+    (tmp_path / "heavy.yaml").write_text(text + effect)
+    code, _, err = cspm(
+        *("analyze", "sag", "cogiro", "--testbed", "heavy.yaml", "--json", "sag.json")
+    )
+    assert (code, err) == (0, "")
+    data = json.loads((tmp_path / "sag.json").read_text())
+    assert {each["linear_density"] for each in data["cables"]} == {0.03}
+
+
 def test_commands_of_analyze_are_listed(cspm):
     code, out, _ = cspm("analyze", "--help")
     assert code == 0
-    for name in ("linear", "workspace", "design", "manipulability"):
+    for name in ("linear", "workspace", "design", "manipulability", "sag", "reference"):
         assert name in out

@@ -5,7 +5,7 @@ from itertools import combinations
 import numpy as np
 import pytest
 from altered_machines import CENTRE, THESIS, with_bar, with_cables
-from machines import build, general_content, point_content
+from machines import build, general_content, point_content, pulley_content
 from scipy.optimize import linprog
 
 from cspm_control.analysis.cable_structure import cable_structure, structures, wanted_at_rest
@@ -26,6 +26,7 @@ MACHINES = {
     "thesis": THESIS,
     "general": GENERAL,
     "centre_of_mass_off": with_bar(THESIS, com=(0.02, 0.0, 0.01)),
+    "pulleys": build(pulley_content()),
 }
 
 
@@ -52,7 +53,7 @@ def structure_at(testbed, axes, pose):
 def test_structures_and_wrenches_are_those_of_the_plant(name):
     testbed, grid = MACHINES[name], ragged(0, 2)
     machine = cable_structure(testbed, CENTRE)
-    assert len(machine.axes) == (6 if name == "general" else 5)
+    assert len(machine.axes) == (6 if name in ("general", "pulleys") else 5)
     found = structures(machine, grid)
     turns = len(grid.pitch) * len(grid.yaw)
     for i, pose in enumerate(poses_of(grid)):

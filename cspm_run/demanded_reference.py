@@ -1,0 +1,77 @@
+"""What the reference of a run needs of its machine."""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+from cspm_control.analysis.reference_demand import (
+    ReferenceDemand,
+    first_unmet,
+    reference_demand,
+)
+from cspm_control.stages.make import governed, wanted_tension_limits
+from cspm_model.motion import Motion
+from cspm_msgs_py.errors import InputError
+from cspm_msgs_py.scenario import ClosedLoop
+from cspm_msgs_py.schedule import BAR_REFERENCE, FRAME_REFERENCE
+from cspm_run.bundle import Bundle
+from cspm_run.motions import REFERENCE_POSES, motions_of
+
+# A fortieth of the fastest wave's period; no more instants than these, so that it takes moments.
+SPACING = 0.02
+MOST = 3000
+
+
+def demanded(bundle: Bundle) -> tuple[NDArray[np.float64], ReferenceDemand]:
+    """Return tension limits (n, 2) [N] and what the reference needs.
+
+    Raises:
+        InputError: no bar follows a reference.
+    """
+    scenario, testbed = bundle.scenario, bundle.testbed.testbed
+    if not isinstance(scenario.control, ClosedLoop) or testbed.bar is None:
+        raise InputError(
+            f"{scenario.name}: no bar follows a reference, allowed: control.mode closed_loop and a"
+            " test-bed with a bar"
+        )
+    limits, motions = _given(bundle)
+    duration = scenario.duration
+    found = reference_demand(
+        governed(scenario, testbed, limits),
+        motions[BAR_REFERENCE],
+        motions[FRAME_REFERENCE],
+        duration,
+        max(SPACING, duration / MOST),
+    )
+    return limits, found
+
+
+def unmet_line(bundle: Bundle) -> str | None:
+    """Return a line on where the reference asks for what no tensions give; None where nowhere."""
+    scenario, testbed = bundle.scenario, bundle.testbed.testbed
+    if not isinstance(scenario.control, ClosedLoop) or testbed.bar is None:
+        return None
+    limits, motions = _given(bundle)
+    first = first_unmet(
+        governed(scenario, testbed, limits),
+        motions[BAR_REFERENCE],
+        motions[FRAME_REFERENCE],
+        scenario.duration,
+        REFERENCE_POSES,
+    )
+    if first is None:
+        return None
+    return (
+        f"reference out of reach of the tension limits, as at {first:.4g} s;"
+        " cspm analyze reference shows where"
+    )
+
+
+def _given(bundle: Bundle) -> tuple[NDArray[np.float64], dict[str, Motion]]:
+    """Return tension limits (n, 2) [N] and the motions."""
+    assert isinstance(bundle.scenario.control, ClosedLoop)
+    testbed = bundle.testbed.testbed
+    with bundle.unpacked() as folder:
+        motions = motions_of(bundle.scenario, testbed, folder)
+    return wanted_tension_limits(bundle.scenario.control, testbed), motions

@@ -10,8 +10,8 @@ from pathlib import Path
 
 ROOT = Path(__file__).resolve().parents[2]
 EXAMPLES, PAGE = ROOT / "examples", ROOT / "docs" / "reference" / "examples.md"
-# In the order in which a newcomer needs them; `driver.py` and `own_stage.py` are of other pages,
-# docs/how-to/bring-hardware.md and run-on-ros.md.
+# In the order in which a newcomer needs them; `driver.py`, `own_stage.py` and `ros_reference.py`
+# are of other pages, docs/how-to/bring-hardware.md and run-on-ros.md.
 ORDER = (
     *("first_run", "find_friction", "own_controller", "own_reference", "own_effect"),
     *("compare_recordings", "identify_winch", "sweep_gain", "read_into_pandas"),

@@ -52,6 +52,7 @@ NOT_RUN: dict[str, str] = {
     "cspm run examples/clamped_bar.yaml": f"{ROS}; {ROS_TESTS}/runtime/test_external_plant.py",
     "python examples/driver.py": f"{ROS}; {ROS_TESTS}/runtime/test_external_plant.py",
     "python examples/own_stage.py": f"{ROS}; {ROS_TESTS}/external/test_own_nodes.py",
+    "python examples/ros_reference.py": f"{ROS}; {ROS_TESTS}/external/test_own_nodes.py",
     "cspm run rest --mode processes": f"{ROS}; {ROS_TESTS}/external/test_own_nodes.py",
     "ros2 ": f"{ROS}; {ROS_TESTS}/runtime/test_ros_install.py",
     "colcon build": "tests/project/test_colcon.py",

@@ -13,7 +13,7 @@ from run_samples import bundle_of
 from cspm_msgs_py.diagnostics import decode_diagnostics
 from cspm_msgs_py.errors import InputError
 from cspm_msgs_py.recording import Recording, overview
-from cspm_msgs_py.schedule import MOTION_CONTROLLER
+from cspm_msgs_py.schedule import MOTION_CONTROLLER, WAVE_TRAJECTORY
 from cspm_run.resim import resimulate
 
 load_ros()
@@ -22,23 +22,24 @@ from cspm_ros.runtime.process_run import run_processes  # noqa: E402 - after ROS
 
 pytestmark = [pytest.mark.compiled, pytest.mark.slow]
 
-EXAMPLE = Path(__file__).resolve().parents[3] / "examples" / "own_stage.py"
+EXAMPLES = Path(__file__).resolve().parents[3] / "examples"
 STEPS, PERIOD_NS = 200, 10_000_000
 
 
 @pytest.fixture
-def own_node():
-    """A domain in which the example runs."""
+def own_node(request):
+    """A domain in which an example runs."""
     domain = new_domain()
     environment = os.environ | {
         "ROS_DOMAIN_ID": str(domain),
         "ROS_AUTOMATIC_DISCOVERY_RANGE": "LOCALHOST",
     }
-    with subprocess.Popen([sys.executable, EXAMPLE], env=environment) as process:
+    with subprocess.Popen([sys.executable, EXAMPLES / request.param], env=environment) as process:
         yield domain
         process.kill()
 
 
+@pytest.mark.parametrize("own_node", ["own_stage.py"], indirect=True)
 def test_its_commands_are_obeyed_and_recorded(own_node, tmp_path):
     own = {"domain_id": own_node, "own_nodes": (MOTION_CONTROLLER,)}
     result = run_processes(bundle_of("rest"), tmp_path / "bag", steps=STEPS, **own)
@@ -58,3 +59,19 @@ def test_its_commands_are_obeyed_and_recorded(own_node, tmp_path):
         InputError, match=r"motion_controller: a ROS node\), allowed: one made with"
     ):
         resimulate(tmp_path / "bag", lambda now, total: None)
+
+
+@pytest.mark.parametrize("own_node", ["ros_reference.py"], indirect=True)
+def test_a_bar_follows_the_references_of_a_ros_node(own_node, tmp_path):
+    own = {"domain_id": own_node, "own_nodes": (WAVE_TRAJECTORY,)}
+    result = run_processes(bundle_of("rest"), tmp_path / "bag", steps=3000, **own)
+    assert result.failure is None
+    with Recording(tmp_path / "bag") as recording:
+        references = recording.rows("/bar/reference")
+        poses = recording.rows("/truth/bar/pose")
+    assert references.stamp_ns.tolist() == [1_000_000 * k for k in range(3000)]
+    turn = 1e-9 * references.stamp_ns
+    assert references.rows[:, 0] == pytest.approx(0.02 * (1.0 - np.cos(turn)), abs=1e-12)
+    wanted = np.interp(poses.stamp_ns, references.stamp_ns, references.rows[:, 0])
+    assert np.abs(poses.rows[:, 0] - wanted).max() < 2e-3
+    assert poses.rows[-1, 0] > 0.035

@@ -7,6 +7,8 @@ import pytest
 
 import cspm
 from cspm_control.analysis.cable_structure import cable_structure
+from cspm_control.analysis.pose_grid import Grid
+from cspm_control.analysis.workspace import static_workspace
 from cspm_model.equilibrium import find_equilibrium, gravity_wrench
 from cspm_model.kinematics import geometry
 from cspm_model.parameters import nominal_parameters
@@ -15,6 +17,7 @@ from cspm_msgs_py.testbed import load_testbed
 from cspm_run.bundle_dofs import free_of
 
 TESTBEDS = Path(__file__).resolve().parents[2] / "scenarios" / "testbeds"
+REST = np.array([0.0, 0.0, -1.0, 0.0, 0.0, 0.0])
 ALL = ("surge", "sway", "heave", "roll", "pitch", "yaw")
 CONTROLLED = {
     "planar_kntu": ("surge", "heave", "pitch"),
@@ -71,6 +74,39 @@ def test_at_rest_all_forces_and_moments_balance(name):
     assert (rest.tensions >= limits[:, 0] - 1e-9).all()
     axes = cable_structure(testbed, pose).axes
     np.testing.assert_allclose(rest.bar_pose[list(axes)], pose[list(axes)])
+
+
+def test_a_point_mass_is_held_below_the_polygon_of_its_exits_and_nowhere_else():
+    """The known static workspace of a point mass on cables (Riechel, Ebert-Uphoff, ICRA 2004)."""
+    testbed = load_testbed(TESTBEDS / "stadium_camera.yaml").testbed
+    machine = cable_structure(testbed, (0.0, 0.0, 2.0, 0.0, 0.0, 0.0))
+    # As strong as need be: near a side of the polygon two cables carry all.
+    machine = machine._replace(limits=np.tile([0.0, 1e6], (4, 1)))
+    aside = np.linspace(-4.9, 4.9, 15)
+    grid = Grid(aside, aside, np.array([-1.0, 0.5, 3.0]), np.zeros(1), np.zeros(1))
+    held = static_workspace(machine, grid, "general")[..., 0, 0]
+    x, y, z = np.meshgrid(aside, aside, grid.z, indexing="ij")
+    assert (held == ((np.abs(x) <= 4.0) & (np.abs(y) <= 3.0) & (z > 0.0))).all()
+    assert 0.2 < held.mean() < 0.5
+
+
+def test_a_robot_with_pulleys_and_a_block_follows_its_reference():
+    straight = cspm.load_testbed("ipanema")
+    bent = straight
+    for i in range(4):
+        pulley = {"radius": 0.05, "axis": [0, 0, -1]}
+        bent = bent.with_parameter(f"cables[{i}].pulley", pulley)
+    bent = bent.with_parameter("cables[4].parts", 2)
+    run = cspm.simulate("ipanema", testbed=bent, duration=3.0)
+    assert run.failure is None
+    for dof in ("surge", "sway", "heave"):
+        assert run.errors[dof]["rms"] < 0.02, dof
+    lengths = [
+        geometry(nominal_parameters(each.file.testbed).cables, REST, np.zeros(6)).lengths
+        for each in (straight, bent)
+    ]
+    assert (lengths[1][:4] - lengths[0][:4] > 0.02).all()
+    assert lengths[1][4] == pytest.approx(2.0 * lengths[0][4])
 
 
 def test_a_suspended_plate_hangs_tilted_beside_its_middle():

@@ -163,12 +163,13 @@ def modelled(search: Search, kept: Sequence[Finding], data: Data) -> Model:
     since = max((onset.time for onset in onsets if onset is not None), default=-np.inf)
     weights, upper_ends = _fitted(search, kept, data, since)
     immaterial = _immaterial(search, kept, data)
+    weights = of_scales(weights, {place.place for place in search.gram.places})
+    weights = of_clocks(of_drives(weights, 2.0 * data.searched[0].torque_age))
+    # With the interval that is reported, which includes what the reference clock may be off.
     negligible = [
         small or _may_be_negligible(each, weights)
         for each, small in zip(kept, immaterial, strict=True)
     ]
-    weights = of_scales(weights, {place.place for place in search.gram.places})
-    weights = of_clocks(of_drives(weights, 2.0 * data.searched[0].torque_age))
     weights = {
         c: (_allowed(data.searched[0], c, own, half), half) for c, (own, half) in weights.items()
     }

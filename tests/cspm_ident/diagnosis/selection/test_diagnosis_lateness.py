@@ -10,6 +10,7 @@ from cspm_ident.diagnosis.regression.hypothesis import (
     is_timing,
     may_be_negligible,
 )
+from cspm_ident.diagnosis.regression.parameter_estimates import of_clocks
 from cspm_ident.diagnosis.residuals.free_shapes import Knots
 from cspm_ident.diagnosis.residuals.regressors import Candidate, Place
 from cspm_ident.diagnosis.residuals.residual_equation import Equation
@@ -109,6 +110,13 @@ def test_early_readings_beside_late_ones_say_the_same_again():
 def test_a_delay_counts_from_where_its_interval_leaves_what_clocks_may_be_apart(half, reported):
     for sign in (1.0, -1.0):
         found = {POSE: (np.array([sign * 1.5 * CLOCK]), np.array([half]))}
+        assert may_be_negligible(found) is not reported
+
+
+@pytest.mark.parametrize(("delay", "reported"), [(1.9 * CLOCK, False), (2.1 * CLOCK, True)])
+def test_a_delay_between_two_clocks_counts_from_twice_what_one_may_be_off(delay, reported):
+    for sign in (1.0, -1.0):
+        found = of_clocks({TENSION: (np.array([sign * delay]), np.array([0.01 * CLOCK]))})
         assert may_be_negligible(found) is not reported
 
 

@@ -41,6 +41,34 @@ class Comparison:
         """
         return tuple(self.result.channels)
 
+    def __repr__(self) -> str:
+        """Return how many quantities were compared, and the worst of them."""
+        worst = self._worst_first()
+        if not worst:
+            return "<Comparison: nothing compared>"
+        return f"<Comparison of {len(self.channels)} quantities, worst {worst[0].name}>"
+
+    def _repr_html_(self) -> str:
+        """Show the quantities as a table in a notebook, the worst first."""
+        from cspm.notebook import table
+
+        heads = ("quantity", "block", "error, RMS", "times its noise", "VAF")
+        rows = (
+            (
+                each.name,
+                each.block,
+                f"{each.rms:.3g} {each.unit}",
+                f"{each.rms / each.floor:.1f}" if each.floor else "",
+                "" if each.vaf is None else f"{each.vaf:.2f} %",
+            )
+            for each in self._worst_first()
+        )
+        return table("Measured against simulated", heads, rows)
+
+    def _worst_first(self) -> list[ChannelFit]:
+        ratios = {each: each.rms / each.floor if each.floor else 0.0 for each in self.channels}
+        return sorted(self.channels, key=lambda each: -ratios[each])
+
     def channel(self, name: str, block: str = "whole") -> ChannelFit:
         """Return a quantity of a block, such as `cables/tension/sway_3`.
 

@@ -123,6 +123,11 @@ class Diagnosis:
         """What is there, too small to matter."""
         return tuple(_without_numbers(each) for each in self.result.negligible)
 
+    def __repr__(self) -> str:
+        """Return the verdict and what was found where."""
+        found = (f"{each.effect} on {', '.join(each.elements)}" for each in self.findings)
+        return f"<Diagnosis: {'; '.join((self.verdict, *found))}>"
+
     def _repr_html_(self) -> str:
         """Show the verdict and what was found as a table in a notebook."""
         from cspm.notebook import table

@@ -28,7 +28,7 @@ PICTURES = ("motion_loops.png", "force_loops.png")
 SAME_GAINS = 1e-3
 
 
-@dataclass(frozen=True, eq=False)
+@dataclass(frozen=True, eq=False, repr=False)
 class Design:
     """A scenario's control loops.
 

@@ -34,7 +34,7 @@ MODEL = "model.json"
 PARTS = ("plant", "motion", "tension")
 
 
-@dataclass(frozen=True, eq=False)
+@dataclass(frozen=True, eq=False, repr=False)
 class Linear:
     """The linear models of a machine about a state of rest.
 

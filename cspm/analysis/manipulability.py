@@ -21,7 +21,7 @@ from cspm_msgs_py.new_folder import refuse_existing
 PICTURE = "manipulability.png"
 
 
-@dataclass(frozen=True, eq=False)
+@dataclass(frozen=True, eq=False, repr=False)
 class ManipulabilityAnalysis:
     """How well cables move the bar at a pose.
 

@@ -21,7 +21,7 @@ from cspm_run.plants import SIM
 PICTURE = "reference.png"
 
 
-@dataclass(frozen=True, eq=False)
+@dataclass(frozen=True, eq=False, repr=False)
 class ReferenceAnalysis:
     """What a reference needs of a machine.
 

@@ -32,7 +32,7 @@ from cspm_msgs_py.new_folder import refuse_existing
 PICTURES = ("workspace.png", "maps.png")
 
 
-@dataclass(frozen=True, eq=False)
+@dataclass(frozen=True, eq=False, repr=False)
 class Workspace:
     """Where cables can hold the bar.
 

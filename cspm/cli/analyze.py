@@ -7,10 +7,11 @@ from typing import Annotated
 
 import typer
 
-from cspm.cli.app import Json, app
+from cspm.cli.app import MARKUP, Json, app
 
 analyze = typer.Typer(
     no_args_is_help=True,
+    rich_markup_mode=MARKUP,
     help="What a machine and its controllers can do, beside what the thesis says of its own.",
 )
 app.add_typer(analyze, name="analyze")

@@ -2,10 +2,11 @@
 
 from __future__ import annotations
 
+import shutil
 from datetime import datetime
 from itertools import chain, count
 from pathlib import Path
-from typing import Annotated
+from typing import Annotated, Literal
 
 import typer
 import typer.core
@@ -15,6 +16,12 @@ from cspm_run.console import VOICE, Voice
 from cspm_run.summary import STANDARD_OUTPUT
 
 RUN_FAILED = 1
+# Frames leave 12 characters for a text on a terminal of 60 columns, and 26 of 80; plain help has
+# twice as many.
+_FRAMED_FROM = 100
+MARKUP: Literal["rich"] | None = (
+    "rich" if shutil.get_terminal_size().columns >= _FRAMED_FROM else None
+)
 
 
 class _Listed(typer.core.TyperGroup):
@@ -35,6 +42,7 @@ class _Listed(typer.core.TyperGroup):
 app = typer.Typer(
     cls=_Listed,
     pretty_exceptions_enable=False,
+    rich_markup_mode=MARKUP,
     context_settings={"help_option_names": ["-h", "--help"]},
 )
 

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Annotated, Any, TypeAlias
 
 import typer
 
-from cspm.cli.app import RUN_FAILED, Json, LeaveOutRegimes, app
+from cspm.cli.app import MARKUP, RUN_FAILED, Json, LeaveOutRegimes, app
 from cspm_msgs_py.errors import InputError
 
 if TYPE_CHECKING:
@@ -20,6 +20,7 @@ RigCommand: TypeAlias = "Callable[[RigRequest, Path | None], bool]"
 
 identify = typer.Typer(
     no_args_is_help=True,
+    rich_markup_mode=MARKUP,
     help="Fit parameters to recordings, with 95 % intervals, and write them into a test-bed file.",
 )
 app.add_typer(identify, name="identify")

@@ -28,7 +28,7 @@ class Outcome(Protocol):
 Result = TypeVar("Result", bound=Outcome, covariant=True)
 
 
-@dataclass(frozen=True, eq=False)
+@dataclass(frozen=True, eq=False, repr=False)
 class Identification(Generic[Result]):
     """What was identified.
 

@@ -40,3 +40,17 @@ def test_a_diagnosis_shows_what_it_found(monkeypatch):
         ["bar_mass", "bar", "reported", "98 %", "The bar is heavier."],
         ["unknown", "sway_1, sway_2", "reported", "", ""],
     ]
+
+
+def test_in_a_terminal_results_are_one_short_line(tmp_path):
+    recording = cspm.simulate("one_winch", duration=6).save(tmp_path / "rig")
+    compared = cspm.compare(recording)
+    worst = max(compared.channels, key=lambda each: each.rms / each.floor)
+    expected = f"<Comparison of {len(compared.channels)} quantities, worst {worst.name}>"
+    assert repr(compared) == expected
+    heads, first, *rows = cells(compared._repr_html_())
+    assert heads == ["quantity", "block", "error, RMS", "times its noise", "VAF"]
+    assert first[0] == worst.name
+    assert len(rows) + 1 == len(compared.channels)
+    found = cspm.diagnose(recording, closed_loop=False)
+    assert repr(found) == f"<Diagnosis: {found.verdict}>"

@@ -1,6 +1,9 @@
 """What every command has: quiet, help by -h, data on standard output, exit codes in its help."""
 
 import json
+import os
+import subprocess
+import sys
 
 import pytest
 import typer
@@ -64,3 +67,19 @@ def test_a_run_names_the_next_command(cspm, tmp_path):
     code, out, _ = cspm("run", "rest", "--duration", "0.05", "--out", "my run")
     assert code == 0
     assert "next: cspm view 'my run'" in out
+
+
+@pytest.mark.parametrize(("columns", "framed"), [("60", False), ("80", False), ("120", True)])
+def test_help_has_frames_only_where_there_is_room(columns, framed):
+    found = subprocess.run(
+        [sys.executable, "-m", "cspm", "run", "--help"],
+        env=os.environ | {"COLUMNS": columns},
+        capture_output=True,
+        text=True,
+        check=True,
+    )
+    assert ("│" in found.stdout) is framed
+    lines = found.stdout.splitlines()
+    assert max(map(len, lines)) <= int(columns)
+    (first,) = (line for line in lines if "How to run" in line)
+    assert len(first[first.index("How to run") :].rstrip(" │")) >= 20

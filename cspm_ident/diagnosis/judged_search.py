@@ -110,7 +110,8 @@ class JudgedSearch(NamedTuple):
         """Return unexplained functions of residuals that the findings leave beyond their noise.
 
         In few blocks a function with many knots follows noise. Beside a large error of a parameter
-        it follows what columns of first order leave.
+        it follows what columns of first order leave. With too few rows to know the noise, nothing
+        can be said to exceed it.
 
         Args:
             unexplained: beside the findings, to first order.
@@ -127,7 +128,7 @@ class JudgedSearch(NamedTuple):
         accuracy = accuracy_of(self.judges[0].machine, place)
         found = remainders_of(rows, independent_noise(rows), self.last.noise[place], accuracy)
         own = [each for each in found if each.component in driver.signal]
-        return all(each.is_judged and each.is_at_noise(self.thresholds) for each in own)
+        return all(not each.is_judged or each.is_at_noise(self.thresholds) for each in own)
 
 
 def searched_and_judged(

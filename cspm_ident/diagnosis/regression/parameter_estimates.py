@@ -40,8 +40,8 @@ def of_shafts(
         thresholds: of intervals.
     """
     found = dict(weights)
-    for winch in {e.place.element for part in parts for e in part if e.turning.any()}:
-        place = Place(Channel.SHAFT, winch)
+    turning = {e.place for part in parts for e in part if e.turning.any()}
+    for place in (each for each in turning if each.channel is Channel.SHAFT):
         own = [c for c in weights if (c.effect.signature.regression.channel, c.element) == place]
         if not own:
             continue

@@ -13,7 +13,7 @@ from cspm_ident.diagnosis.reporting.quantity import amount_words
 from cspm_ident.diagnosis.reporting.statement import channel_of
 from cspm_ident.diagnosis.validation.holdout_residuals import HeldOut
 from cspm_ident.diagnosis.validation.rest import concerned
-from cspm_sim.effects import Block, Effect, Elements
+from cspm_sim.effects import Block, Channel, Effect, Elements
 
 _DOUBT = (
     " Doubtful: beside it is much that nothing in the catalogue explains. This may be a part of"
@@ -154,7 +154,8 @@ def _improvement(diagnosis: Diagnosis, finding: Finding) -> str:
     at_noise = best.tabled is None and best.is_at_noise(limits)
     noise = "That is the noise floor." if at_noise else f"Noise is {_share(best, best.noise)}."
     if best.steady is not None and best.steady < (1.0 - limits.minor_share) * best.after:
-        away = f"Apart from where the shaft reverses it is {_share(best, best.steady)}."
+        turns = "the shaft reverses" if best.place.channel is Channel.SHAFT else "the cable snaps"
+        away = f"Apart from where {turns} it is {_share(best, best.steady)}."
         noise = f"{away} {noise}"
     before, after = _share(best, best.before), _share(best, best.after)
     moves = "falls" if best.after < best.before else "rises"

@@ -233,6 +233,18 @@ class Suspension:
         return np.asarray(linear - (self._damper - self._steady_damper))
 
     @cached_property
+    def curvature(self) -> Array:
+        """What linearising the law about the steady damper leaves out, (k, n) [N]: large in snaps.
+
+        By law and measured tension alone, so that the poses' noise does not enter.
+        """
+        law = self._law
+        force = self._steady_damper - self._damping * self._rates_by_tension
+        apart = force / np.maximum(law[:, :, 1], 1e-9)
+        there = law_at(self.parameters, self._carrying + apart, self._elastic_lengths)
+        return np.asarray(there[:, :, 0] - law[:, :, 0] - force)
+
+    @cached_property
     def _mass_in_world(self) -> tuple[Array, Array, Array]:
         """Centre of mass from the origin, inertia about it, and ω × Iω, in world axes.
 

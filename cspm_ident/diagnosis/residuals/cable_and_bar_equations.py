@@ -185,16 +185,12 @@ class _Stretch:
         # Without the start's part, the target is as small as its noise even in a hold-out fold with
         # the whole stretch.
         target = target - start * (start @ target) / (start @ start)
-        return Equation(
-            place,
-            weighed(self._signals.times),
-            target[:, None],
-            columns,
-            weighed(self._signals.tensions[:, i])[:, None],
-            np.stack([*unknown, start], axis=1)[:, None],
-            signals=drivers,
-            shared=len(unknown),
-        )
+        free = np.stack([*unknown, start], axis=1)[:, None]
+        times, measured = weighed(self._signals.times), weighed(self._signals.tensions[:, i])
+        whole = Equation(place, times, target[:, None], columns, measured[:, None], free)
+        whole = replace(whole, signals=drivers, shared=len(unknown))
+        curved = weighed(self._here.curvature[:, i])
+        return whole.without_snaps(curved, self._thresholds.minor_share)
 
     def _bar_equation(
         self, missing: Array, columns: dict[Candidate | Driver, Array], knots: Knots | None

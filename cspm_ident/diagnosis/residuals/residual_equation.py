@@ -58,8 +58,8 @@ class Equation:
             channels, m).
         shared: number of nuisance regressors, the first ones, common to all stretches of a
             recording.
-        turning: rows with a reversal of the shaft, (k,), or empty. The shaft may stick there, and
-            dry friction then holds with any torque.
+        turning: rows that no term describes, (k,), or empty: with a reversal of the shaft, which
+            may stick there, held by dry friction with any torque; or with a snap of the cable.
         signals: measured signals that it may depend on, by name and unit, each of shape (k,).
     """
 
@@ -119,6 +119,16 @@ class Equation:
         near: Array = np.abs(self.times[:, None] - moments)
         return self._only(np.asarray((near > distance).all(axis=1)))
 
+    def without_snaps(self, errors: Array, most: float) -> Equation:
+        """Return the equation with the rows marked whose error, (k,), exceeds the target's noise.
+
+        Args:
+            errors: of the equation's linearisation.
+            most: share of the rows up to which they are marked: beyond it there is no other motion.
+        """
+        snapping = ~(np.abs(errors) <= self.noise[0])
+        return replace(self, turning=snapping) if snapping.mean() <= most else self
+
     def weighted(self, weights: Array) -> Equation:
         """Return the equation with each row times a weight, shape (k,)."""
         rows = weights[:, None]
@@ -139,7 +149,7 @@ class Equation:
 
     @property
     def steady(self) -> Equation:
-        """The rows without a reversal of the shaft."""
+        """The rows without a reversal of the shaft or a snap of the cable."""
         return self._only(~self.turning) if self.turning.any() else self
 
     def _only(self, rows: Rows) -> Equation:
@@ -157,7 +167,7 @@ class Equation:
 
 
 def steady(parts: Sequence[Sequence[Equation]]) -> list[list[Equation]]:
-    """Return equations without the rows in which a shaft reverses."""
+    """Return equations without the rows in which a shaft reverses or a cable snaps."""
     return [[equation.steady for equation in part] for part in parts]
 
 

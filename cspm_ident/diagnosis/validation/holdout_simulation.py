@@ -158,7 +158,9 @@ def improvement_by(
 ) -> Improvement | None:
     """Return the improvement of simulations by an effect; None where none depends on it.
 
-    It is that of the quantity that improves most, in the blocks that the effect acts on.
+    It is that of the quantity that improves most, in the blocks that the effect acts on. It is
+    measured against the simulation without this effect or that without any, whichever is better:
+    of two effects that compensate each other neither improves anything.
 
     Args:
         baselines: those of the simulated recordings.
@@ -173,11 +175,16 @@ def improvement_by(
     }
     sensed = any(c.effect.physics.sense is not None for c in own)
     fewer = {c: weights for c, weights in found.items() if c not in own}
-    before = {f.output: (0.0, f.before) for f in fits}
+    before = {f.output: f.before for f in fits}
     if fewer:
-        before = _errors(baselines.parts, baselines.since, fewer)
+        errors = _errors(baselines.parts, baselines.since, fewer)
+        before = {
+            output: float(np.fmin(errors[output][1], nominal))
+            for output, nominal in before.items()
+            if output in errors
+        }
     shown = [
-        Improvement(fit.output.name, fit.output.unit, before[fit.output][1], fit.after)
+        Improvement(fit.output.name, fit.output.unit, before[fit.output], fit.after)
         for fit in fits
         if fit.output in before and (sensed or _is_affected(fit.output, kinds))
     ]

@@ -1,5 +1,7 @@
 """Equations that are cut, scaled and weighted hold their columns once, and mean the same."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
@@ -57,3 +59,16 @@ def test_compact_columns_take_half_the_memory_and_say_the_same(equation):
     assert made.columns[FIRST].nbytes == equation.columns[FIRST].nbytes // 2
     assert made.scaled(np.array([0.2])).columns[FIRST].dtype == np.float64
     assert np.allclose(made.columns[FIRST], equation.columns[FIRST], rtol=1e-7, atol=0.0)
+
+
+@pytest.mark.parametrize(("large", "marked"), [(3, True), (12, False)])
+def test_rows_with_a_snap_are_marked_unless_all_motion_is_snaps(equation, large, marked):
+    errors = np.full(40, 0.5 * equation.noise[0])
+    errors[5 : 5 + large] = -2.0 * equation.noise[0]
+    made = replace(equation, turning=np.zeros(40, dtype=bool)).without_snaps(errors, most=0.1)
+    assert made.turning.sum() == (large if marked else 0)
+    assert len(made.steady.times) == 40 - made.turning.sum()
+    if marked:
+        assert not set(made.steady.times) & set(equation.times[5 : 5 + large])
+    errors[0] = np.nan
+    assert not marked or replace(equation).without_snaps(errors, most=0.1).turning[0]

@@ -7,6 +7,7 @@ from run_samples import bundle_of
 from cspm_ident.block_simulation import Input
 from cspm_ident.diagnosis.finding import Improvement
 from cspm_ident.diagnosis.residuals.regressors import Candidate
+from cspm_ident.diagnosis.validation import holdout_simulation
 from cspm_ident.diagnosis.validation.holdout_simulation import (
     Baselines,
     Output,
@@ -55,3 +56,15 @@ def test_a_pose_depends_on_cables_where_motor_angles_drive_both(effect, element,
     own = {Candidate(catalogue()[effect], element): np.array([0.1])}
     found = improvement_by(Baselines((), (), {}, {}), [fit], own, own)
     assert found == (Improvement(pose.name, pose.unit, 0.4, 0.3) if reported else None)
+
+
+@pytest.mark.parametrize(("nominal", "without"), [(0.25, 0.25), (9.0, 0.4)])
+def test_of_two_effects_that_compensate_neither_improves(monkeypatch, nominal, without):
+    """Without one of them the simulation is worse than without both."""
+    pose = Output(Input.TENSION, "bar/pose/heave", "m", "bar", Channel.WRENCH)
+    fit = SimulatedFit(pose, 1.0, before=nominal, retuned=nominal, after=0.24, floor=0.1)
+    mass, other = (Candidate(catalogue()[name], "bar") for name in ("bar_mass", "bar_com"))
+    found = {mass: np.array([0.2]), other: np.array([-0.2])}
+    monkeypatch.setattr(holdout_simulation, "_errors", lambda *_: {pose: (1.0, 0.4)})
+    improvement = improvement_by(Baselines((), (), {}, {}), [fit], found, [mass])
+    assert improvement == Improvement(pose.name, pose.unit, without, 0.24)

@@ -50,6 +50,11 @@ def test_what_acts_nowhere_or_without_a_stated_accuracy_is_not_immaterial():
     assert acts_immaterially({RUBBING: np.array([1e-6])}, own, *given)
 
 
+def test_a_sensor_that_is_said_to_be_exact_has_no_stated_accuracy():
+    assert np.isnan(accuracy_of(rig(0.0), PLACE))
+    assert accuracy_of(rig(1e-9), PLACE) == pytest.approx(1e-9)
+
+
 def test_accuracy_is_that_of_the_sensor_in_the_residual():
     assert accuracy_of(rig(0.3), PLACE) == pytest.approx(0.3)
     tension = THESIS.sensors["/cables/tension"].noise[0]

@@ -127,8 +127,7 @@ def _sag(
 def ernst_share(across: float, tension: float, weight: float, rigidity: float) -> float:
     """Return which share of its stiffness sag leaves a cable: Ernst's equivalent modulus.
 
-    Source: Ernst, Der E-Modul von Seilen unter Berücksichtigung des Durchhanges, Der Bauingenieur
-    40(2), 1965.
+    Source: Ernst, Der Bauingenieur 40(2), 1965.
 
     Args:
         across: horizontal distance of its ends [m].

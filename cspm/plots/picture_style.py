@@ -9,6 +9,11 @@ import matplotlib as mpl
 
 # Blue, orange and nearly black: colour-blind readers tell them apart, and a grey print too.
 COLOURS = ("#0072b2", "#e69f00", "#222222")
+# Of many lines: Okabe and Ito, Color universal design, 2008.
+PALETTE = (
+    *("#0072b2", "#e69f00", "#009e73", "#cc79a7"),
+    *("#56b4e9", "#d55e00", "#222222", "#999999"),
+)
 TENSION = "#555555"
 BAND = "#d9ead3"
 DPI = 110

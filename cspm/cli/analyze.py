@@ -63,8 +63,8 @@ def linear(
 
     Once with cable directions held, as the thesis does, and once exactly.
     """
-    from cspm.commands.analyze_linear_command import analyze_linear_command
-    from cspm.commands.analyzed_machine import read_machine
+    from cspm.commands.analysis.analyze_linear_command import analyze_linear_command
+    from cspm.commands.analysis.analyzed_machine import read_machine
 
     analyze_linear_command(read_machine(scenario, testbed, pose), out, json)
 
@@ -110,8 +110,8 @@ def workspace(
     Beyond: tensions from their lowest limit, room for an acceleration, conditioning,
     manipulability.
     """
-    from cspm.commands.analyze_workspace_command import analyze_workspace_command
-    from cspm.commands.analyzed_machine import read_acceleration, read_machine
+    from cspm.commands.analysis.analyze_workspace_command import analyze_workspace_command
+    from cspm.commands.analysis.analyzed_machine import read_acceleration, read_machine
 
     required = None if acceleration is None else read_acceleration(acceleration)
     machine = read_machine(scenario, testbed, pose)
@@ -138,8 +138,8 @@ def manipulability(
 
     And what acceleration gravity and the cables' limits leave in each DOF.
     """
-    from cspm.commands.analyze_manipulability_command import analyze_manipulability_command
-    from cspm.commands.analyzed_machine import read_machine
+    from cspm.commands.analysis.analyze_manipulability_command import analyze_manipulability_command
+    from cspm.commands.analysis.analyzed_machine import read_machine
 
     analyze_manipulability_command(read_machine(scenario, testbed, pose), out, json)
 
@@ -169,7 +169,7 @@ def reference(
 
     As if bar and cables followed it exactly; the picture shades where no tensions will do.
     """
-    from cspm.commands.analyze_reference_command import analyze_reference_command
+    from cspm.commands.analysis.analyze_reference_command import analyze_reference_command
     from cspm_run.library import find_scenario
 
     path = find_scenario(scenario)
@@ -202,8 +202,8 @@ def sag(
 
     Beside the tensions of straight cables without weight, which controllers assume.
     """
-    from cspm.commands.analyze_sag_command import analyze_sag_command
-    from cspm.commands.analyzed_machine import read_machine
+    from cspm.commands.analysis.analyze_sag_command import analyze_sag_command
+    from cspm.commands.analysis.analyzed_machine import read_machine
 
     analyze_sag_command(read_machine(scenario, testbed, pose), linear_density, json)
 
@@ -242,7 +242,7 @@ def design(
     Gains that the scenario does not give are designed first, at its design pose; the loops are
     looked at where --pose says.
     """
-    from cspm.commands.analyze_design_command import analyze_design_command
-    from cspm.commands.analyzed_machine import read_machine
+    from cspm.commands.analysis.analyze_design_command import analyze_design_command
+    from cspm.commands.analysis.analyzed_machine import read_machine
 
     analyze_design_command(read_machine(scenario, testbed, pose), computing, out, json)

@@ -26,10 +26,9 @@ from cspm_msgs_py.recording.run_record import EXTERNAL, RECORD_NAME
 from cspm_msgs_py.scenario import load_scenario
 from cspm_msgs_py.schedule import schedule_of
 from cspm_ros.runtime.stall_watchdog import PATIENCE_S, check_patience
+from cspm_run.before_run import free_of, unmet_line
 from cspm_run.bundle import Bundle
-from cspm_run.bundle_dofs import free_of
 from cspm_run.console import make_console, say
-from cspm_run.demanded_reference import unmet_line
 from cspm_run.library import named_testbed
 from cspm_run.plants import SIM
 from cspm_run.recorded_run import INPROCESS, run

@@ -207,7 +207,7 @@ def test_missing_values_are_refused(path, text):
         ("winch_frame.mass", "winch_frame.mass: unknown key, allowed: dimensions"),
         (
             f"{C0}.radius",
-            "cables[0].radius: unknown key, allowed: name, exit, attachment, offset_le",
+            "cables[0].radius: unknown key, allowed: name, exit, attachment, pulley",
         ),
         (
             f"{C0}.stiffness.e",

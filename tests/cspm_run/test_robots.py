@@ -14,7 +14,7 @@ from cspm_model.kinematics import geometry
 from cspm_model.parameters import nominal_parameters
 from cspm_msgs_py.errors import InputError
 from cspm_msgs_py.testbed import load_testbed
-from cspm_run.bundle_dofs import free_of
+from cspm_run.before_run import free_of
 
 TESTBEDS = Path(__file__).resolve().parents[2] / "scenarios" / "testbeds"
 REST = np.array([0.0, 0.0, -1.0, 0.0, 0.0, 0.0])

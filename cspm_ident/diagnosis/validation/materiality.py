@@ -22,7 +22,7 @@ _SENSORS = {Channel.DRIVE: TORQUE, Channel.SHAFT: TORQUE, Channel.TENSION: TENSI
 
 
 def accuracy_of(machine: Testbed, place: Place) -> float:
-    """Return the noise of the sensor whose quantity a residual compares; nan if not stated, or 0.
+    """Return the noise of the sensor whose quantity a residual compares; nan if not stated.
 
     Args:
         machine: as described; its sensors have a noise and a resolution.
@@ -30,8 +30,7 @@ def accuracy_of(machine: Testbed, place: Place) -> float:
     """
     topic = _SENSORS.get(place.channel)
     declared = None if topic is None else declared_noise(machine, topic, 1)
-    # No sensor is exact: a file that says so has left its noise and resolution open.
-    return float(declared[0]) if declared is not None and declared[0] > 0.0 else float("nan")
+    return float("nan") if declared is None else float(declared[0])
 
 
 def acts_immaterially(

@@ -39,6 +39,8 @@ _ROWS_A_BIN = 6
 _FEWEST_BINS = 3
 # Rows further apart than this multiple of the usual step are no neighbours.
 _GAP = 1.5
+# Resolution of a sensor that is said to be exact, as a share of what was measured: 16 bits.
+_FINEST = 2.0**-16
 # Number of stretches among which the one with most of the remainder is sought.
 _STRETCHES = 10
 
@@ -128,7 +130,8 @@ def is_immaterial(
 ) -> bool:
     """Return whether a difference is too small to matter.
 
-    It is if it is both a small share of the measured quantity and below the sensor's accuracy.
+    It is if it is both a small share of the measured quantity and below the sensor's accuracy, or
+    the resolution of 16 bits of what was measured where a file says that its sensor is exact.
 
     Args:
         size: root mean square of the difference, in the unit that was measured.
@@ -137,7 +140,8 @@ def is_immaterial(
         thresholds: `immaterial_share`.
     """
     small = size <= thresholds.immaterial_share * measured
-    return bool(small and not size > accuracy)
+    coarse = size > _FINEST * measured
+    return bool(small and not (coarse and size > accuracy))
 
 
 def remainders_of(

@@ -7,7 +7,7 @@ import pytest
 from run_samples import SCENARIOS
 
 from cspm.analysis import workspace
-from cspm.commands.analyzed_machine import read_machine
+from cspm.commands.analysis.analyzed_machine import read_machine
 from cspm_control.analysis.pose_grid import GRIDS
 
 LIMITED = {"surge", "sway", "pitch", "yaw"}

@@ -10,6 +10,7 @@ from cspm_ident.diagnosis.regression.hypothesis import bounded
 from cspm_ident.diagnosis.regression.parameter_estimates import of_scales
 from cspm_ident.diagnosis.residuals.regressors import Candidate, Place
 from cspm_ident.diagnosis.thresholds import DEFAULT_THRESHOLDS
+from cspm_ident.diagnosis.validation import remainder
 from cspm_ident.diagnosis.validation.materiality import accuracy_of, acts_immaterially
 from cspm_msgs_py.sensor_spec import Sensor
 from cspm_sim.effects import Channel, catalogue
@@ -50,9 +51,11 @@ def test_what_acts_nowhere_or_without_a_stated_accuracy_is_not_immaterial():
     assert acts_immaterially({RUBBING: np.array([1e-6])}, own, *given)
 
 
-def test_a_sensor_that_is_said_to_be_exact_has_no_stated_accuracy():
-    assert np.isnan(accuracy_of(rig(0.0), PLACE))
-    assert accuracy_of(rig(1e-9), PLACE) == pytest.approx(1e-9)
+@pytest.mark.parametrize(("share", "expected"), [(0.9, True), (1.1, False)])
+def test_a_sensor_that_is_said_to_be_exact_resolves_16_bits(share, expected):
+    size = share * 2.0**-16
+    assert remainder.is_immaterial(size, 1.0, 0.0, DEFAULT_THRESHOLDS) is expected
+    assert remainder.is_immaterial(size, 1.0, 1e-3, DEFAULT_THRESHOLDS)
 
 
 def test_accuracy_is_that_of_the_sensor_in_the_residual():

@@ -14,7 +14,7 @@ from rich.table import Table
 
 from cspm.analysis.machine import AnalyzedMachine
 from cspm.analysis.workspace import grids_of, workspace_of
-from cspm.commands.claim_table import claim_table
+from cspm.commands.analysis.claim_table import claim_table
 from cspm_control.analysis.claim import Claim
 from cspm_control.analysis.published_workspace import OURS
 from cspm_control.analysis.workspace import ALGORITHMS

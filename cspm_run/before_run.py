@@ -1,4 +1,4 @@
-"""What the reference of a run needs of its machine."""
+"""What a run leaves uncontrolled, and what its reference needs of its machine."""
 
 from __future__ import annotations
 
@@ -16,11 +16,22 @@ from cspm_msgs_py.errors import InputError
 from cspm_msgs_py.scenario import ClosedLoop
 from cspm_msgs_py.schedule import BAR_REFERENCE, FRAME_REFERENCE
 from cspm_run.bundle import Bundle
-from cspm_run.motions import REFERENCE_POSES, motions_of
+from cspm_run.controlled_dofs import left_free
+from cspm_run.motions import REFERENCE_POSES, motions_of, reference_poses
 
 # A fortieth of the fastest wave's period; no more instants than these, so that it takes moments.
 SPACING = 0.02
 MOST = 3000
+
+
+def free_of(bundle: Bundle) -> list[str]:
+    """Return a line per kind of coordinate that a resolved run leaves free, and why."""
+    scenario, testbed = bundle.scenario, bundle.testbed.testbed
+    if not isinstance(scenario.control, ClosedLoop) or testbed.bar is None:
+        return []
+    with bundle.unpacked() as folder:
+        poses = reference_poses(scenario, testbed, folder)
+    return left_free(scenario.control, testbed, poses)
 
 
 def demanded(bundle: Bundle) -> tuple[NDArray[np.float64], ReferenceDemand]:

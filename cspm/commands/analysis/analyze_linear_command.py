@@ -13,7 +13,7 @@ from rich.table import Table
 
 from cspm.analysis.linear import linear_of
 from cspm.analysis.machine import AnalyzedMachine
-from cspm.commands.claim_table import claim_table
+from cspm.commands.analysis.claim_table import claim_table
 from cspm_control.analysis.claim import Claim
 from cspm_control.analysis.gain import condition
 from cspm_control.analysis.linear import (

@@ -201,16 +201,15 @@ class Cable(StrictModel):
                 f"load: of {self.name}, whose cable carries what its attachment does, allowed: of a"
                 " winch without cable"
             )
-        if missing:
-            self._check_absent()
+        if missing and self.breaking_force is not None:
+            raise ValueError(
+                f"breaking_force: {self.breaking_force:g} N of {self.name}, a winch without cable,"
+                " allowed: none"
+            )
+        if missing and (self.pulley or self.parts > 1):
+            key = "pulley" if self.pulley else "parts"
+            raise ValueError(f"{key}: of {self.name}, a winch without cable, allowed: none")
         return self
-
-    def _check_absent(self) -> None:
-        """Refuse what belongs to a cable, of a winch without one."""
-        values = self.breaking_force, self.pulley, None if self.parts == 1 else self.parts
-        for key, value in zip(("breaking_force", "pulley", "parts"), values, strict=True):
-            if value is not None:
-                raise ValueError(f"{key}: of {self.name}, a winch without cable, allowed: none")
 
     @property
     def has_cable(self) -> bool:

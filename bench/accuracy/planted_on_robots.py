@@ -57,12 +57,11 @@ def diagnosed(case: Planted, folder: Path) -> tuple[str, ...]:
     said = []
     for each in found.findings:
         right = (each.effect, each.elements) == (case.effect, (case.cable,))
-        if right and each.parameters[case.parameter].ci95:
-            low, high = each.parameters[case.parameter].ci95
+        number = each.parameters.get(case.parameter)
+        if right and number is not None and number.ci95:
+            low, high = number.ci95
             mark = "" if low <= case.value <= high else " ✗"
-            said.append(
-                f"{each.parameters[case.parameter].value:.4g} ({low:.4g} to {high:.4g}){mark}"
-            )
+            said.append(f"{number.value:.4g} ({low:.4g} to {high:.4g}){mark}")
         else:
             said.append(f"{each.effect} on {', '.join(each.elements)} ✗")
     place = f"{case.effect} on {case.cable}"

@@ -19,8 +19,6 @@ from cspm_msgs_py.testbed import Testbed
 
 Array = NDArray[np.float64]
 
-UNMET = "#e69f00"
-
 
 def draw_reference(
     path: Path, name: str, testbed: Testbed, limits: Array, demand: ReferenceDemand
@@ -46,8 +44,7 @@ def draw_reference(
             _range(axes, demand.times, demand.tensions[:, members])
             _limit(axes, float(limits[members, 0].max()), float(limits[members, 1].min()))
             axes.set_ylabel(f"{kind.replace('_', ' ')}\n[N]")
-        every = range(len(torque_limits))
-        _range(rows[-2], demand.times, demand.speeds[:, every])
+        _range(rows[-2], demand.times, demand.speeds)
         rows[-2].set_ylabel("motor speed\n[rad/s]")
         shares = 100.0 * demand.torques / torque_limits
         _range(rows[-1], demand.times, shares)
@@ -82,4 +79,6 @@ def _shade(axes: Axes, demand: ReferenceDemand) -> None:
     pairs: Sequence[tuple[int, int]] = [(int(a), int(b)) for a, b in edges.reshape(-1, 2)]
     for first, end in pairs:
         last = demand.times[min(end, len(demand.times) - 1)]
-        axes.axvspan(float(demand.times[first]), float(last), color=UNMET, alpha=0.4, linewidth=0)
+        axes.axvspan(
+            float(demand.times[first]), float(last), color=COLOURS[1], alpha=0.4, linewidth=0
+        )

@@ -11,7 +11,7 @@ from cspm_control.allocation.analytic_centre import analytic_centre
 from cspm_control.allocation.tension_distribution import RESIDUAL_TOLERANCE
 from cspm_control.analysis.wrench_set import wrench_set
 from cspm_control.controllers.bar_dynamics import INERTIA as INERTIA_TENSOR
-from cspm_control.controllers.bar_dynamics import MASS, wrench_for
+from cspm_control.controllers.bar_dynamics import MASS
 from cspm_control.controllers.governor import Governed, demand_along
 from cspm_control.feedforward.winch_feedforward import winding_accelerations
 from cspm_model.kernels.cable import INERTIA, RADIUS
@@ -76,14 +76,9 @@ def first_unmet(
     By the facets of the wrench sets alone, so that a run need not compile a distribution for it.
     """
     times = np.linspace(0.0, duration, count)
-    wrenches, structures = np.empty((count, 6)), np.empty((count, 6, len(machine.cables)))
-    for k, time in enumerate(times):
-        pose, rate, acceleration = bar.at(time).reshape(3, 6)
-        wrench_for(pose, rate, acceleration, machine.bar, wrenches[k])
-        structures[k] = -geometry(machine.cables, pose, frame.at(time)[:6]).bar.T
-    axes = list(machine.axes)
-    wanted = (wrenches - machine.known_wrench)[:, axes]
-    met = wrench_set(structures[:, axes], machine.limits, wanted).holds
+    motion, frames = (np.array([each.at(time) for time in times]) for each in (bar, frame))
+    demand = demand_along(machine, motion, frames[:, :6])
+    met = wrench_set(demand.structure, machine.limits, demand.wrench).holds
     return None if met.all() else float(times[int(np.argmin(met))])
 
 

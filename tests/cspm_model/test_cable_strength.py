@@ -81,7 +81,7 @@ def test_a_winch_without_cable_has_nothing_that_breaks():
     with pytest.raises(InputError) as caught:
         build({"name": "bare", "cables": [{"name": "w", **WINCH, "breaking_force": 9.0}]})
     assert str(caught.value) == (
-        "test.yaml: cables[0].breaking_force: of w, a winch without cable, allowed: none"
+        "test.yaml: cables[0].breaking_force: 9 N of w, a winch without cable, allowed: none"
     )
 
 

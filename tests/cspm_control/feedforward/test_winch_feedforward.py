@@ -85,13 +85,15 @@ def feedforward(bandwidth=None):
     return WinchFeedforward(MACHINE, bandwidth, period=PERIOD)
 
 
-@pytest.mark.parametrize("cables", [CABLES, PULLEYS], ids=["straight", "pulleys"])
-def test_the_winding_acceleration_is_the_second_difference_of_lengths(cables):
+@pytest.mark.parametrize(
+    ("cables", "least"), [(CABLES, 0.1), (PULLEYS, 0.02)], ids=["straight", "pulleys"]
+)
+def test_the_winding_acceleration_is_the_second_difference_of_lengths(cables, least):
     h = 1e-4
     before, here, after = (geometry(time, cables=cables)[0] for time in (-h, 0.0, h))
     found = geometry(cables=cables)[1]
     np.testing.assert_allclose(found, -(before - 2.0 * here + after) / h**2, rtol=1e-4, atol=1e-5)
-    assert np.abs(found).min() > 0.02
+    assert np.abs(found).min() > least
 
 
 def test_without_stretch_it_is_the_rotor_that_is_turned_and_the_change_of_tension():

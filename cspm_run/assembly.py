@@ -10,38 +10,23 @@ import numpy as np
 from numpy.typing import NDArray
 
 from cspm_control.controllers.torque_profile import TorqueGenerator
-from cspm_control.design.gains import (
-    check_separation,
-    design_force_gains,
-    design_motion_gains,
-    design_widest_gains,
-    force_margins,
-    motion_margins,
-)
-from cspm_control.design.state_feedback import design_feedback_gains
-from cspm_control.stages.make import controlled_axes, make_controller
+from cspm_control.stages.make import make_controller
 from cspm_control.stages.own_code import own_stage
 from cspm_control.stages.target_stage import TargetStage
 from cspm_control.stages.wave_stage import WaveStage
 from cspm_control.waves.wave_trajectory import WaveTrajectory
 from cspm_model.motion import Motion
-from cspm_model.parameters import nominal_parameters
-from cspm_msgs_py.dofs import Dof
 from cspm_msgs_py.errors import InputError
 from cspm_msgs_py.scenario import (
     AngleProfile,
     ClosedLoop,
     Control,
-    FeedbackControl,
     LockedWinches,
-    MotionControl,
-    PidGains,
     Scenario,
     TorqueProfile,
 )
 from cspm_msgs_py.scenario_keys.events import check_cables, cuts_by_step
 from cspm_msgs_py.schedule import (
-    BAR_POSE,
     BAR_REFERENCE,
     MOTION_CONTROLLER,
     RATE_OF_SENSOR,
@@ -54,6 +39,7 @@ from cspm_msgs_py.schedule import (
 from cspm_msgs_py.stepping.stage import Stage
 from cspm_msgs_py.testbed import Testbed
 from cspm_run.controlled_dofs import with_controlled_dofs
+from cspm_run.designed_gains import with_gains
 from cspm_run.motions import motions_of, reference_poses
 from cspm_run.plants import SIM, make_plant
 from cspm_sim.any_plant import AnyPlant
@@ -135,9 +121,7 @@ def resolve(scenario: Scenario, testbed: Testbed, folder: Path | None = None) ->
         control = with_controlled_dofs(
             scenario, testbed, reference_poses(scenario, testbed, folder)
         )
-    # Half the nodes of a run need no parameters, for which scipy's integrators have to be loaded.
-    if not control.force.gains or _lacks_gains(control.motion):
-        control = _with_gains(control, scenario, testbed)
+    control = with_gains(control, scenario, testbed)
     missing = set(testbed.cable_names) ^ set(control.force.gains or {})
     if missing:
         raise InputError(
@@ -154,65 +138,6 @@ def _check_controllers(scenario: Scenario, testbed: Testbed) -> None:
         unknown = [name for name in scenario.controllers if name not in nodes]
         if unknown:
             raise InputError(f"controllers: {unknown[0]}, allowed: {', '.join(nodes) or 'none'}")
-
-
-def _lacks_gains(motion: object) -> bool:
-    if not isinstance(motion, MotionControl | FeedbackControl):
-        return False
-    return set(motion.gains or {}) < set(motion.controlled)
-
-
-def _with_gains(control: ClosedLoop, scenario: Scenario, testbed: Testbed) -> ClosedLoop:
-    """Return a closed loop whose missing gains are designed."""
-    parameters = nominal_parameters(testbed)
-    motion, force = control.motion, control.force
-    pose = motion.design_pose
-    force_gains = force.gains or design_force_gains(testbed, parameters, pose, force.bandwidth)
-    control = control.model_copy(update={"force": force.model_copy(update={"gains": force_gains})})
-    if isinstance(motion, MotionControl) and _lacks_gains(motion):
-        gains = _motion_gains(control, scenario, testbed, designed=force.gains is None)
-        control = control.model_copy(update={"motion": motion.model_copy(update={"gains": gains})})
-    elif isinstance(motion, FeedbackControl):
-        designed = design_feedback_gains(motion, testbed, 1.0 / scenario.rates.motion_controller)
-        gains = designed | (motion.gains or {})
-        control = control.model_copy(update={"motion": motion.model_copy(update={"gains": gains})})
-    return control
-
-
-def _motion_gains(
-    control: ClosedLoop, scenario: Scenario, testbed: Testbed, *, designed: bool
-) -> dict[Dof, PidGains]:
-    """Return the gains of the motion controller; `designed` says that those of force are too."""
-    motion, axes = control.motion, controlled_axes(control)
-    assert isinstance(motion, MotionControl)
-    parameters, pose = nominal_parameters(testbed), motion.design_pose
-    force = force_margins(testbed, parameters, pose, control.force.gains or {})
-    crossover = {dof: motion.crossover[dof] for dof in motion.controlled if dof in motion.crossover}
-    wanted = design_motion_gains(testbed, parameters, pose, crossover, axes)
-    if designed and wanted:
-        check_separation(motion_margins(testbed, parameters, pose, wanted, axes), force)
-    wanted |= motion.gains or {}
-    widest = design_widest_gains(
-        testbed,
-        parameters,
-        pose,
-        [dof for dof in motion.controlled if dof not in wanted],
-        dead_time=_motion_dead_time(scenario, testbed),
-        force_bandwidth=min(found.bandwidth for found in force.values()),
-        axes=axes,
-    )
-    return {dof: wanted.get(dof) or widest[dof] for dof in motion.controlled}
-
-
-def _motion_dead_time(scenario: Scenario, testbed: Testbed) -> float:
-    """Return by how much the motion loop's sampling and sensor delay it [s].
-
-    A held output and the difference that approximates the derivative cost half a period each. A
-    loop that runs with every step of the plant counts as continuous, as the thesis designs it.
-    """
-    rates = scenario.rates
-    slower = 1.0 / min(rates.motion_controller, rates.motion_capture) - 1.0 / rates.plant
-    return slower + (0.0 if scenario.sensors == "ideal" else testbed.sensors[BAR_POSE].delay)
 
 
 def assemble(scenario: Scenario, testbed: Testbed, folder: Path, plant: str = SIM) -> Assembly:

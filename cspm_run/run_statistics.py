@@ -57,6 +57,12 @@ class RunStatistics:
         return (float(used.min()), float(used.max())) if used.size else (0.0, 0.0)
 
     @property
+    def lowest_tensions(self) -> Array:
+        """Lowest tension of each cable (n,) [N]; before the first step 0."""
+        used = self._used()[:, 0, 6:]
+        return np.asarray(used.min(axis=0)) if len(used) else np.zeros(self.envelope.shape[2] - 6)
+
+    @property
     def highest_tensions(self) -> Array:
         """Highest tension of each cable (n,) [N]; before the first step 0."""
         used = self._used()[:, 1, 6:]

@@ -29,7 +29,7 @@ class _Listed(typer.core.TyperGroup):
 
     order = (
         *("demo", "new", "run", "view", "info", "recover", "resim", "import", "compare"),
-        *("identify", "diagnose", "analyze"),
+        *("identify", "diagnose", "campaign", "analyze"),
         *("replay", "check-drivers", "node"),
     )
 

@@ -37,6 +37,7 @@ def main() -> None:
     import_module("cspm.cli.demo")
     import_module("cspm.cli.ros")
     import_module("cspm.cli.new")
+    import_module("cspm.cli.campaign")
     run_app(app, "cspm")
 
 

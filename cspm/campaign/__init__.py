@@ -1,0 +1,26 @@
+"""Campaigns: many runs of one description, spread over processors and machines.
+
+from cspm.campaign import run_campaign
+
+done = run_campaign("robustness.yaml", "robustness")
+done.rows[0]["errors.surge.max"]
+"""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Any
+
+if TYPE_CHECKING:
+    from cspm.campaign.campaign import Campaign as Campaign
+    from cspm.campaign.campaign import run_campaign as run_campaign
+
+__all__ = ["Campaign", "run_campaign"]
+
+
+def __getattr__(name: str) -> Any:  # noqa: ANN401 - whatever the door leads to
+    if name not in __all__:
+        raise AttributeError(f"module 'cspm.campaign' has no attribute {name!r}")
+    # Only now is the engine loaded.
+    from cspm.campaign import campaign
+
+    return getattr(campaign, name)

@@ -1,0 +1,199 @@
+"""One run of a campaign, as a worker makes it."""
+
+from __future__ import annotations
+
+import faulthandler
+import hashlib
+import os
+import platform
+import tempfile
+import time
+from collections.abc import Iterator
+from contextlib import contextmanager
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+from cspm.campaign.code_version import code_version
+from cspm.campaign.inputs import unpacked
+from cspm.campaign.measures import (
+    Metric,
+    diagnosis_columns,
+    load_metric,
+    own_columns,
+    run_columns,
+)
+from cspm.changed_machine import changed_machine, of_testbed
+from cspm.diagnosis import diagnose
+from cspm.scenario import Scenario
+from cspm.simulation import Run, bundle_of, simulate_in_memory
+from cspm_msgs_py.errors import CspmError, InputError
+from cspm_msgs_py.scenario import load_scenario
+from cspm_msgs_py.testbed import TestbedFile, load_testbed
+from cspm_run.bundle import SCENARIO, Bundle
+
+DONE, FAILED, REFUSED = "done", "failed", "refused"
+STATUS, FAILURE = "status", "failure"
+Row = dict[str, Any]
+
+
+@dataclass(frozen=True)
+class Task:
+    """What a worker needs for one run; plain data, by value.
+
+    Attributes:
+        number: the run's place in the campaign.
+        packed: see `Inputs`.
+        places: where the files that are named below are in it.
+        scenario: file.
+        testbed: file, if not the scenario's.
+        overrides: `KEY=VALUE` each.
+        effects: `EFFECT@ELEMENTS:PARAMETER=VALUE,…` each.
+        plant: whose equations.
+        metrics: the user's own functions.
+        diagnose: whether the run is diagnosed by its base machine.
+        time_limit_s: after which the worker gives itself up [s].
+        code: what `code_version` is to be.
+    """
+
+    number: int
+    packed: bytes
+    places: dict[str, str]
+    scenario: str
+    testbed: str | None
+    overrides: tuple[str, ...]
+    effects: tuple[str, ...]
+    plant: str
+    metrics: tuple[str, ...]
+    diagnose: bool
+    time_limit_s: float
+    code: str
+
+
+class CodeError(CspmError):
+    """A worker runs other code than the campaign."""
+
+
+def run_task(task: Task) -> Row:
+    """Return the columns of a run.
+
+    What the user's values or functions do wrong is in the row: it would be so again.
+
+    Raises:
+        CodeError: this process runs other code.
+    """
+    if code_version() != task.code:
+        raise CodeError(f"{platform.node()}: {code_version()}, allowed: {task.code}")
+    begun, processor = time.perf_counter(), time.process_time()
+    with _limited(task.time_limit_s):
+        row = _row(task)
+    return row | {
+        "elapsed_s": time.perf_counter() - begun,
+        "processor_s": time.process_time() - processor,
+        "computer": platform.node(),
+    }
+
+
+def bundle_for(task: Task) -> tuple[Bundle, TestbedFile]:
+    """Return what a task runs, and its machine before any change.
+
+    Raises:
+        InputError: a value that is not allowed.
+    """
+    with _named_by_origin(task):
+        scenario, machine, changed = _described(task)
+        return bundle_of(scenario, changed, task.plant), machine
+
+
+def check_values(task: Task) -> None:
+    """Check that scenario and test-bed can have a task's values.
+
+    Raises:
+        InputError: a value that is not allowed.
+    """
+    with _named_by_origin(task):
+        _described(task)
+
+
+def _described(task: Task) -> tuple[Scenario, TestbedFile, TestbedFile]:
+    """Return a task's scenario, its machine, and the machine with all changes."""
+    folder = Path(unpacked(task.packed).name)
+
+    def here(text: str) -> str:
+        for path, place in task.places.items():
+            text = text.replace(path, str(folder / place))
+        return text
+
+    of_scenario, of_machine = of_testbed([here(each) for each in task.overrides])
+    path = folder / task.places[task.scenario]
+    scenario = Scenario(path, load_scenario(path, of_scenario))
+    machine = scenario.testbed_file
+    if task.testbed is not None:
+        machine = load_testbed(folder / task.places[task.testbed])
+    return scenario, machine, changed_machine(machine, of_machine, task.effects)
+
+
+def _row(task: Task) -> Row:
+    row: Row = {STATUS: DONE, FAILURE: None}
+    try:
+        bundle, machine = bundle_for(task)
+        row |= _about(bundle)
+        metrics = {name: _metric(name, task) for name in task.metrics}
+        keep_all = bool(metrics) or task.diagnose
+        run = simulate_in_memory(bundle, {}, lambda _: None, None if keep_all else ())
+        row |= run_columns(run)
+        if run.failure is not None:
+            return row | {STATUS: FAILED, FAILURE: run.failure}
+        row |= own_columns(run, metrics)
+        row |= _diagnosed(run, machine) if task.diagnose else {}
+    except CspmError as err:
+        row |= {STATUS: REFUSED, FAILURE: str(err)}
+    return row
+
+
+def _about(bundle: Bundle) -> Row:
+    text = bundle.attachments()[SCENARIO]
+    return {
+        "scenario": bundle.scenario.name,
+        "testbed": bundle.testbed.testbed.name,
+        "seed": bundle.scenario.seed,
+        "duration_s": bundle.scenario.duration,
+        "scenario_sha256": hashlib.sha256(text).hexdigest(),
+        "testbed_sha256": bundle.testbed.sha256,
+    }
+
+
+def _metric(name: str, task: Task) -> Metric:
+    file = name.rpartition(":")[0]
+    place = task.places.get(file)
+    return load_metric(name, Path(unpacked(task.packed).name) / place if place else None)
+
+
+def _diagnosed(run: Run, machine: TestbedFile) -> Row:
+    with tempfile.TemporaryDirectory(prefix="cspm-campaign-") as place:
+        recording = run.save(Path(place) / "run")
+        return diagnosis_columns(diagnose(recording, testbed=machine, closed_loop=False))
+
+
+@contextmanager
+def _named_by_origin(task: Task) -> Iterator[None]:
+    """Name the user's files in errors, not their copies."""
+    folder = Path(unpacked(task.packed).name)
+    try:
+        yield
+    except InputError as err:
+        text = str(err)
+        for path, place in task.places.items():
+            text = text.replace(str(folder / place), path)
+        raise InputError(text) from None
+
+
+@contextmanager
+def _limited(time_limit_s: float) -> Iterator[None]:
+    """End this process after so long: a thread of C's does, whatever Python is busy with."""
+    with open(os.devnull, "w") as nowhere:
+        faulthandler.dump_traceback_later(time_limit_s, exit=True, file=nowhere)
+        try:
+            yield
+        finally:
+            faulthandler.cancel_dump_traceback_later()

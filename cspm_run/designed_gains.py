@@ -1,0 +1,120 @@
+"""The gains that a scenario leaves open, designed for its machine."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+from functools import lru_cache
+
+from cspm_control.design.gains import (
+    check_separation,
+    design_force_gains,
+    design_motion_gains,
+    design_widest_gains,
+    force_margins,
+    motion_margins,
+)
+from cspm_control.design.state_feedback import design_feedback_gains
+from cspm_control.stages.make import controlled_axes
+from cspm_model.parameters import nominal_parameters
+from cspm_msgs_py.dofs import Dof
+from cspm_msgs_py.scenario import (
+    ClosedLoop,
+    FeedbackControl,
+    MotionControl,
+    PidGains,
+    Scenario,
+)
+from cspm_msgs_py.schedule import BAR_POSE
+from cspm_msgs_py.testbed import Testbed
+
+# Machines and controllers whose gains are kept: runs that differ in their seeds share a design.
+_KEPT = 64
+
+
+@dataclass(frozen=True)
+class _Question:
+    """What gains depend on; equal where its text is."""
+
+    text: str
+    control: ClosedLoop = field(compare=False)
+    scenario: Scenario = field(compare=False)
+    testbed: Testbed = field(compare=False)
+
+
+def with_gains(control: ClosedLoop, scenario: Scenario, testbed: Testbed) -> ClosedLoop:
+    """Return a closed loop whose missing gains are designed.
+
+    Args:
+        control: the scenario's, with its controlled DOFs.
+        scenario: whose rates and sensors count.
+        testbed: the machine.
+
+    Raises:
+        InputError: no gains meet what is asked for.
+    """
+    # Half the nodes of a run need no parameters, for which scipy's integrators have to be loaded.
+    if control.force.gains and not _lacks_gains(control.motion):
+        return control
+    described = (control, scenario.rates, testbed)
+    text = "\n".join([*(each.model_dump_json() for each in described), scenario.sensors])
+    return _designed(_Question(text, control, scenario, testbed))
+
+
+def _lacks_gains(motion: object) -> bool:
+    if not isinstance(motion, MotionControl | FeedbackControl):
+        return False
+    return set(motion.gains or {}) < set(motion.controlled)
+
+
+@lru_cache(maxsize=_KEPT)
+def _designed(question: _Question) -> ClosedLoop:
+    control, scenario, testbed = question.control, question.scenario, question.testbed
+    parameters = nominal_parameters(testbed)
+    motion, force = control.motion, control.force
+    pose = motion.design_pose
+    force_gains = force.gains or design_force_gains(testbed, parameters, pose, force.bandwidth)
+    control = control.model_copy(update={"force": force.model_copy(update={"gains": force_gains})})
+    if isinstance(motion, MotionControl) and _lacks_gains(motion):
+        gains = _motion_gains(control, scenario, testbed, designed=force.gains is None)
+        control = control.model_copy(update={"motion": motion.model_copy(update={"gains": gains})})
+    elif isinstance(motion, FeedbackControl):
+        designed = design_feedback_gains(motion, testbed, 1.0 / scenario.rates.motion_controller)
+        gains = designed | (motion.gains or {})
+        control = control.model_copy(update={"motion": motion.model_copy(update={"gains": gains})})
+    return control
+
+
+def _motion_gains(
+    control: ClosedLoop, scenario: Scenario, testbed: Testbed, *, designed: bool
+) -> dict[Dof, PidGains]:
+    """Return the gains of the motion controller; `designed` says that those of force are too."""
+    motion, axes = control.motion, controlled_axes(control)
+    assert isinstance(motion, MotionControl)
+    parameters, pose = nominal_parameters(testbed), motion.design_pose
+    force = force_margins(testbed, parameters, pose, control.force.gains or {})
+    crossover = {dof: motion.crossover[dof] for dof in motion.controlled if dof in motion.crossover}
+    wanted = design_motion_gains(testbed, parameters, pose, crossover, axes)
+    if designed and wanted:
+        check_separation(motion_margins(testbed, parameters, pose, wanted, axes), force)
+    wanted |= motion.gains or {}
+    widest = design_widest_gains(
+        testbed,
+        parameters,
+        pose,
+        [dof for dof in motion.controlled if dof not in wanted],
+        dead_time=_motion_dead_time(scenario, testbed),
+        force_bandwidth=min(found.bandwidth for found in force.values()),
+        axes=axes,
+    )
+    return {dof: wanted.get(dof) or widest[dof] for dof in motion.controlled}
+
+
+def _motion_dead_time(scenario: Scenario, testbed: Testbed) -> float:
+    """Return by how much the motion loop's sampling and sensor delay it [s].
+
+    A held output and the difference that approximates the derivative cost half a period each. A
+    loop that runs with every step of the plant counts as continuous, as the thesis designs it.
+    """
+    rates = scenario.rates
+    slower = 1.0 / min(rates.motion_controller, rates.motion_capture) - 1.0 / rates.plant
+    return slower + (0.0 if scenario.sensors == "ideal" else testbed.sensors[BAR_POSE].delay)

@@ -82,8 +82,8 @@ def _sensitivity_parts(campaign: Campaign, found: dict[str, Any]) -> list[str]:
         is_certain = entry is not None and entry["p"] < 0.05 / tests
         return f"{entry['rho']:+.2f}" if is_certain else "·"
 
-    rows = [(axis, *(cell(axis, metric) for metric in metrics)) for axis in axes]
-    heads = ("", *(reading_of(metric).name for metric in metrics))
+    rows = [(reading_of(each).name, *(cell(axis, each) for axis in axes)) for each in metrics]
+    heads = ("", *axes)
     return [
         "<h2>What moves them</h2>",
         "<p>Spearman's rank correlation, −1 to 1; a dot where chance explains it.</p>",

@@ -29,7 +29,7 @@ cspm campaign robustness.yaml --out campaigns/monday --workers 4
 
 cspm campaign robustness.yaml --scheduler tls://head:8786
 
-Exit code: 0 done, 1 interrupted or runs lost, 2 unusable input."""
+Exit code: 0 done, 1 interrupted, or runs lost or refused, 2 unusable input."""
 )
 def campaign(
     file: Annotated[

@@ -60,6 +60,7 @@ def campaign_command(request: CampaignRequest, json: Path | None) -> bool:
     from cspm.campaign.campaign import run_campaign
     from cspm.campaign.campaign_page import write_campaign_page
     from cspm.campaign.summary import summary_of
+    from cspm.campaign.task import DONE, FAILED, STATUS
 
     with interruptible() as stopped, shown(console, "reading the campaign") as progress:
         done = run_campaign(
@@ -82,7 +83,7 @@ def campaign_command(request: CampaignRequest, json: Path | None) -> bool:
         kept = f"{len(done.rows)} of {len(done.variants)} runs are kept"
         say(console, f"interrupted: {kept}; the same command goes on")
         return False
-    return not any(row["status"] == "lost" for row in done.rows)
+    return all(row[STATUS] in (DONE, FAILED) for row in done.rows)
 
 
 def list_command(file: Path, json: Path | None) -> None:

@@ -193,6 +193,8 @@ class Signature:
         rescales: whether it multiplies the quantity that its main residual compares. Its column is
             then that quantity as the model has it, in the unit that was measured: no gain can
             shrink the residual by which it is judged.
+        shares_noise: whether its columns are readings from which its residual is made as well, so
+            that their noise alone correlates both.
         negligible: how far parameters, by name, may lie from where the effect is absent in a
             healthy machine; less is taken into account and not reported.
     """
@@ -207,6 +209,7 @@ class Signature:
     from_coefficients: Callable[[Sequence[float], Values], dict[str, float]] | None = None
     tied: bool = False
     rescales: bool = False
+    shares_noise: bool = False
     negligible: Mapping[str, float] = field(default_factory=dict)
 
 

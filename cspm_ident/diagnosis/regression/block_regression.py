@@ -311,13 +311,14 @@ class BlockRegression:
 
         The jackknife is over pairs of blocks, because residuals are correlated over more than a
         block. The correlation of successive pairs is included. Infinite where a single pair
-        determines a weight.
+        determines a weight, and 0 where nothing excites it, so that it has none.
         """
         errors, free = self._left_out(paired(self._beyond(base, columns))).spread()
         factor = np.full(len(free), np.inf)
         known = free > LEAST_FREEDOM
         factor[known] = t_distribution.ppf(0.975, free[known])
-        return np.asarray(factor * errors / self._lengths[columns])
+        half = factor * errors / self._lengths[columns]
+        return np.where(self.excited[columns], half, 0.0)
 
     def p_value(self, base: Index, columns: Index) -> float:
         """Return the p-value of the weights under the hypothesis that all are 0.

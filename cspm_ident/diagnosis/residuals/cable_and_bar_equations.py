@@ -268,12 +268,14 @@ class _Stretch:
     def _regressed(
         self, effect: Effect, i: int, shapes: Sequence[dict[str, float]]
     ) -> Iterator[tuple[dict[str, float], Place, Array]]:
+        shares_noise = effect.signature.shares_noise
         for regression in (effect.signature.regression, *effect.signature.partners):
             for place, rows in self._rows_of(effect, regression.channel, i):
                 for shape in shapes:
                     columns = partial(regression.columns, **shape)
                     on_bar = rows is self._here.bar_rows
-                    yield shape, place, self._quieter(columns) if on_bar else columns(rows)
+                    found = self._quieter(columns) if on_bar else columns(rows)
+                    yield shape, place, self._moved(found) if shares_noise else found
 
     def _rows_of(self, effect: Effect, channel: Channel, i: int) -> Iterator[tuple[Place, Array]]:
         """Yield the residuals that an effect on element i changes, with its input signals."""
@@ -301,6 +303,11 @@ class _Stretch:
         quieter = np.where(reported <= posed, ways[0], ways[1])
         least = self._thresholds.common_acceleration_share * np.minimum(reported, posed)
         return np.where(common >= least, quieter, 0.0)
+
+    def _moved(self, columns: Array) -> Array:
+        """Return regressors (k, 6, m) without the coordinates whose readings are noise alone."""
+        moves = np.array([dof in self._dofs for dof in DOFS])
+        return np.asarray(columns * moves[None, :, None])
 
     def _read(self, effect: Effect, i: int, name: str) -> Iterator[tuple[Place, Array]]:
         """Yield a sensor fault's change of the weighted residuals, by finite differences."""

@@ -389,7 +389,10 @@ class Search:
         return unexplained(self.gram, self.sums, self.significance, reported, [*clocks, *healthy])
 
     def _shows(self, candidate: Candidate) -> bool:
-        return bool(self.sums.excited[self._of(candidate)].all())
+        excited = self.sums.excited[self._of(candidate)]
+        # Of springs at the bar, those along coordinates that rest are left out.
+        partly = candidate.effect.signature.shares_noise
+        return bool(excited.any() if partly else excited.all())
 
     def _of(self, term: Candidate | Driver) -> Index:
         return self.gram.columns_of([term])

@@ -223,9 +223,19 @@ def _immaterial(search: Search, kept: Sequence[Finding], data: Data) -> list[boo
 def _is_possible(
     hypothesis: Hypothesis, own: Weights, measured: Measurement, thresholds: Thresholds
 ) -> bool:
-    """Return whether a machine can have these weights, and data show their onset and end."""
+    """Return whether a machine can have these weights, and data show their onset and end.
+
+    What is compatible with no machine at all, such as a bar without mass, is on its bound, and no
+    estimate: an inertia that shares the noise of its residual is fitted away with it.
+    """
+    numbers = own if hypothesis.effect.is_correction else {}
+    ends = [{c: w + sign * half for c, (w, half) in numbers.items()} for sign in (-1.0, 1.0)]
+    bounded_ends = [each for each in ends if all(np.all(np.isfinite(w)) for w in each.values())]
     return (
-        is_possible(measured, {c: weights for c, (weights, _) in own.items()})
+        all(
+            is_possible(measured, each)
+            for each in ({c: weights for c, (weights, _) in own.items()}, *bounded_ends)
+        )
         and is_seen_to_begin(hypothesis, own)
         and is_seen_to_end(own, thresholds)
     )

@@ -32,10 +32,11 @@ _ROWS = 20_000
 def is_proportional(effect: Effect) -> bool:
     """Return whether an effect is proportional to smooth motion or tension, as fed-back noise is.
 
-    This holds for parameters of the file, sensors and the frame. Friction and play depend on
-    direction or position instead.
+    This holds for parameters of the file, sensors, the frame and springs at the bar. Friction and
+    play depend on direction or position instead.
     """
-    return effect.is_correction or effect.block is Block.FRAME
+    is_known = effect.is_correction or effect.block is Block.FRAME
+    return is_known or effect.signature.shares_noise
 
 
 def instruments_of(

@@ -71,6 +71,8 @@ EFFECT = Effect(
         coefficients=_weights,
         from_coefficients=_values,
         tied=True,
+        # The moment that turns the bar is its inertia times the second derivative of these angles.
+        shares_noise=True,
     ),
     description=Description(
         noun="restoring forces",

@@ -1,0 +1,119 @@
+"""Campaigns as a user runs them, and clusters that others have started."""
+
+import subprocess
+import sys
+import time
+from pathlib import Path
+
+import pytest
+from cspm_process import CSPM
+from pyarrow import parquet
+
+DASK = Path(sys.executable).with_name("dask")
+PATIENCE_S = 240
+
+SWEEP = """\
+scenario: calm
+set: {duration: 0.5}
+grid: {seed: {from: 1, to: 4}}
+"""
+
+
+def written(folder, text=SWEEP, name="sweep.yaml"):
+    path = folder / name
+    path.write_text(text)
+    return path
+
+
+def run(file, *options, cwd=None, **keys):
+    """Run a campaign to its end; return exit code, output and errors."""
+    done = subprocess.run(
+        [CSPM, "campaign", file, *map(str, options)],
+        capture_output=True,
+        text=True,
+        cwd=cwd or file.parent,
+        timeout=2 * PATIENCE_S,
+        **keys,
+    )
+    return done.returncode, done.stdout, done.stderr
+
+
+def begun(file, *options, **keys):
+    return subprocess.Popen(
+        [CSPM, "campaign", file, *map(str, options)],
+        stdout=subprocess.PIPE,
+        stderr=subprocess.PIPE,
+        text=True,
+        cwd=file.parent,
+        **keys,
+    )
+
+
+def rows(folder):
+    return parquet.read_table(folder / "runs.parquet").to_pylist()
+
+
+def until(condition, what):
+    """Wait for a condition."""
+    end = time.monotonic() + PATIENCE_S
+    while not condition():
+        if time.monotonic() > end:
+            pytest.fail(f"{what}: not within {PATIENCE_S} s")
+        time.sleep(0.05)
+
+
+def journalled(folder):
+    """Return how many runs a campaign has kept."""
+    place = folder / "runs.jsonl"
+    return len(place.read_text().splitlines()) if place.exists() else 0
+
+
+class Cluster:
+    """A dask scheduler and workers as programs of their own, on loopback."""
+
+    def __init__(self, folder, *options, protocol="tcp"):
+        self._folder, self._options = folder, options
+        self._file = folder / "scheduler.json"
+        self._started = []
+        self.scheduler = self.start(
+            "scheduler",
+            *("--host", f"{protocol}://127.0.0.1:0", "--dashboard-address", "127.0.0.1:0"),
+            *("--scheduler-file", self._file),
+        )
+        until(self._file.exists, "the scheduler's file")
+
+    @property
+    def address(self):
+        import json
+
+        until(lambda: self._file.read_text().rstrip().endswith("}"), "the whole file")
+        return json.loads(self._file.read_text())["address"]
+
+    def start(self, kind, *options, **keys):
+        log = (self._folder / f"{kind}_{len(self._started)}.log").open("w")
+        process = subprocess.Popen(
+            [DASK, kind, *map(str, (*options, *self._options))],
+            stdout=log,
+            stderr=log,
+            cwd=self._folder,
+            **keys,
+        )
+        self._started.append(process)
+        return process
+
+    def worker(self, *options, **keys):
+        own = ("--scheduler-file", self._file, "--nthreads", 1, "--no-dashboard")
+        return self.start("worker", *own, "--host", "127.0.0.1", *options, **keys)
+
+    def __enter__(self):
+        return self
+
+    def __exit__(self, *_):
+        for process in reversed(self._started):
+            process.terminate()
+        for process in reversed(self._started):
+            try:
+                process.wait(20)
+            except subprocess.TimeoutExpired:
+                process.kill()
+                process.wait()

@@ -11,7 +11,7 @@ import argparse
 import json
 from collections import Counter
 from collections.abc import Mapping, Sequence
-from concurrent.futures import ProcessPoolExecutor, as_completed
+from concurrent.futures import as_completed
 from pathlib import Path
 from typing import NamedTuple
 
@@ -21,6 +21,7 @@ from rich.table import Table
 
 import cspm
 from bench.blind.scoring.share import share_of, share_words, upper_bound
+from cspm.campaign.cluster import worker_pool
 
 SCENARIOS = (
     *("calm", "worst_case", "worst_case_steep", "worst_case_six_dof", "one_winch"),
@@ -95,7 +96,7 @@ def main() -> None:
     options = parser.parse_args()
     options.folder.mkdir(parents=True, exist_ok=True)
     console, found = Console(), {}
-    with ProcessPoolExecutor(options.processes) as pool:
+    with worker_pool(options.processes) as pool:
         begun = {pool.submit(verdict, case, options.folder): case for case in cases()}
         for done, each in enumerate(as_completed(begun), start=1):
             found[begun[each]] = each.result()

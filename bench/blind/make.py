@@ -6,9 +6,8 @@ import json
 import os
 import shutil
 from collections.abc import Iterator, Mapping, Sequence
-from concurrent.futures import FIRST_COMPLETED, Future, ProcessPoolExecutor, wait
+from concurrent.futures import FIRST_COMPLETED, Future, wait
 from dataclasses import dataclass
-from multiprocessing import get_context
 from pathlib import Path
 from typing import Any
 
@@ -21,6 +20,7 @@ from bench.blind.reality.reality import conceal
 from bench.blind.reality.sensors import QUALITIES, REAL
 from bench.blind.strata import STRATA
 from bench.blind.truth import RECORDINGS, SCHEMA, SPLITS, truth_sha256
+from cspm.campaign.cluster import worker_pool
 from cspm_msgs_py.errors import DivergenceError, InputError
 
 SHORTEST, LONGEST = 15.0, 200.0  # [s]
@@ -112,8 +112,8 @@ def _recorded(
             yield there + done
         return
     running: set[Future[None]] = set()
-    # MuJoCo's control callback is one per process, which must not have been forked with threads.
-    with ProcessPoolExecutor(jobs, get_context("spawn")) as pool:
+    # MuJoCo's control callback is one per process, so that each has a run at a time.
+    with worker_pool(jobs) as pool:
         while missing or running:
             # What waits in a pool cannot be called off when the user ends the command.
             while missing and len(running) < jobs:

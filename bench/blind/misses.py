@@ -12,7 +12,6 @@ from __future__ import annotations
 import argparse
 from collections import Counter
 from collections.abc import Mapping, Sequence
-from concurrent.futures import ProcessPoolExecutor
 from dataclasses import replace
 from itertools import product
 from pathlib import Path
@@ -30,6 +29,7 @@ from bench.blind.stored_results import read_results
 from bench.blind.truth import RECORDINGS, read_truth
 from bench.markdown import markdown_table
 from bench.page import into_page
+from cspm.campaign.cluster import worker_pool
 from cspm_ident.diagnosis.regression.block_regression import Gain, gain_of
 from cspm_ident.diagnosis.regression.hypothesis import Hypothesis, freedom, shapes_of
 from cspm_ident.diagnosis.residuals.regressors import Candidate
@@ -89,7 +89,7 @@ def main() -> None:
     clear = [o for o in outcomes if is_clear(o.kind, o.multiple)]
     missed = [o for o in clear if not (o.block and o.first and o.tied)]
     misses = []
-    with ProcessPoolExecutor() as pool:
+    with worker_pool() as pool:
         tasks = [
             pool.submit(miss_of, o, items[o.name], options.folder / RECORDINGS / o.name)
             for o in missed

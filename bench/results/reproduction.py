@@ -10,7 +10,7 @@ import argparse
 import csv
 import os
 from collections.abc import Mapping, Sequence
-from concurrent.futures import ProcessPoolExecutor, as_completed
+from concurrent.futures import as_completed
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -22,6 +22,7 @@ from bench.markdown import markdown_table
 from bench.page import into_page
 from bench.results.result_tables import THESIS_TABLES
 from bench.results.tracking import Case
+from cspm.campaign.cluster import worker_pool
 from cspm_control.analysis.cable_groups import cable_groups
 from cspm_msgs_py.dofs import CONTROLLED_AXES, DOFS
 from cspm_msgs_py.scenario import load_scenario
@@ -188,7 +189,7 @@ def main() -> None:
         (name, *what, seed) for name, what in SPREAD.items() for seed in range(1, options.seeds + 1)
     ]
     console, found = Console(), []
-    with ProcessPoolExecutor(options.workers) as pool:
+    with worker_pool(options.workers) as pool:
         futures = [pool.submit(measure, *job) for job in jobs]
         for done, future in enumerate(as_completed(futures), 1):
             found.append(future.result())

@@ -2,13 +2,13 @@
 
 from __future__ import annotations
 
-import signal
 import time
 from collections.abc import Callable, Iterable, Iterator
-from multiprocessing import get_context
+from concurrent.futures import as_completed
 from typing import Any, NamedTuple
 
 from bench.results.result_store import Measurement, Store
+from cspm.campaign.cluster import worker_pool
 
 
 class Done(NamedTuple):
@@ -60,13 +60,9 @@ def _measured(tasks: list[_Task], workers: int) -> Iterator[Done]:
     if workers == 1 or len(tasks) < 2:
         yield from map(_measure, tasks)
         return
-    # Ctrl-C is the parent's: on leaving, the pool ends its processes.
-    with get_context("spawn").Pool(min(workers, len(tasks)), _leave_interrupts) as pool:
-        yield from pool.imap_unordered(_measure, tasks)
-
-
-def _leave_interrupts() -> None:
-    signal.signal(signal.SIGINT, signal.SIG_IGN)
+    with worker_pool(min(workers, len(tasks))) as pool:
+        for done in as_completed([pool.submit(_measure, task) for task in tasks]):
+            yield done.result()
 
 
 def _measure(task: _Task) -> Done:

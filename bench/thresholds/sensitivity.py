@@ -6,7 +6,7 @@ import hashlib
 import json
 import os
 from collections.abc import Callable, Iterator, Mapping, Sequence
-from concurrent.futures import ProcessPoolExecutor, as_completed
+from concurrent.futures import Executor, as_completed
 from dataclasses import fields, replace
 from functools import cache
 from pathlib import Path
@@ -15,6 +15,7 @@ from typing import Any, NamedTuple
 from bench.results.result_store import spoken
 from bench.thresholds.development_set import Development, case_of, measured
 from bench.thresholds.move import Move, moves, watched
+from cspm.campaign.cluster import worker_pool
 from cspm_ident.diagnosis.diagnose import diagnose
 from cspm_ident.diagnosis.reporting.verdict import diagnosis_data
 from cspm_ident.diagnosis.threshold_groups.reporting_thresholds import ReportingThresholds
@@ -73,7 +74,7 @@ def diagnose_all(
     Returns:
         By file of `Task`, what was found.
     """
-    with ProcessPoolExecutor(processes) as pool:
+    with worker_pool(processes) as pool:
         base = [Task(case.name, None) for case in cases]
         found = _run(pool, base, folder, tell)
         moved = [
@@ -86,7 +87,7 @@ def diagnose_all(
 
 
 def _run(
-    pool: ProcessPoolExecutor, tasks: Sequence[Task], folder: Path, tell: Tell
+    pool: Executor, tasks: Sequence[Task], folder: Path, tell: Tell
 ) -> dict[str, dict[str, Any]]:
     code = fingerprint()
     begun = {pool.submit(kept, task, str(folder), code): task for task in tasks}

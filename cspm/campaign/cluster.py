@@ -4,7 +4,9 @@ from __future__ import annotations
 
 import logging
 import os
+import signal
 from collections.abc import Iterator
+from concurrent.futures import Executor
 from contextlib import contextmanager
 from typing import Any
 
@@ -15,8 +17,10 @@ from cspm.campaign.code_version import code_version
 from cspm_msgs_py.errors import InputError
 
 # How long a scheduler, and its first worker, may take to answer [s].
-_PATIENCE_S = 60
+_PATIENCE_S = 30
 _LOOPBACK = "127.0.0.1"
+# Run by each worker before its first task.
+_PRELOAD = "from cspm.campaign.cluster import leave_interrupts; leave_interrupts()"
 _SETTINGS = {
     # The campaign itself counts the tries of a run; see `work`.
     "distributed.scheduler.allowed-failures": 0,
@@ -45,10 +49,28 @@ def local_client(workers: int) -> Iterator[Client]:
             dashboard_address=f"{_LOOPBACK}:0",
             security=True,
             silence_logs=logging.CRITICAL,
+            preload=[_PRELOAD],
         ) as cluster,
         Client(cluster) as client,
     ):
         yield client
+
+
+def leave_interrupts() -> None:
+    """Leave Ctrl-C to the campaign: a terminal sends it to every process that it has started."""
+    signal.signal(signal.SIGINT, signal.SIG_IGN)
+
+
+@contextmanager
+def worker_pool(workers: int | None = None) -> Iterator[Executor]:
+    """Give an executor whose tasks run in processes of a cluster on this computer.
+
+    Args:
+        workers: how many processes; None: one per processor.
+    """
+    # Equal arguments do not mean equal results: some tasks write files.
+    with local_client(workers or default_workers()) as client:
+        yield client.get_executor(pure=False)
 
 
 @contextmanager
@@ -58,6 +80,9 @@ def remote_client(address: str) -> Iterator[Client]:
     Raises:
         InputError: nobody answers, there is no worker, or one is unfit.
     """
+    # What goes wrong is said in the campaign's own words.
+    for name in ("distributed", "distributed.client"):
+        logging.getLogger(name).setLevel(logging.CRITICAL)
     try:
         client = Client(address, timeout=_PATIENCE_S)
     except (OSError, TypeError, ValueError, RuntimeError) as err:

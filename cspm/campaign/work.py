@@ -8,6 +8,7 @@ from collections.abc import Callable, Iterable, Iterator
 from itertools import count, islice
 
 from distributed import Client, Future, KilledWorker, wait
+from distributed.client import FuturesCancelledError
 
 from cspm.campaign.cluster import workers_of
 from cspm.campaign.task import FAILURE, STATUS, CodeError, Row, Task, run_task
@@ -20,6 +21,7 @@ _AHEAD = 3
 _LOOK_S = 1.0
 # Longer than any hiccup of a scheduler that lives [s].
 _SILENCE_S = 20.0
+_GONE = "the scheduler is lost; the runs that ended are kept, and the same command goes on"
 
 
 def work(
@@ -92,7 +94,8 @@ def _round(
                 future = ended.popleft()
                 yield underway.pop(future), _row_of(future)
     finally:
-        client.cancel([*underway], force=True) if client.status == "running" else None
+        if client.status == "running":
+            client.cancel([*underway], force=True)
 
 
 def _submit(client: Client, task: Task, number: int) -> Future:
@@ -106,6 +109,8 @@ def _some_ended(futures: Iterable[Future]) -> list[Future]:
         return [*wait([*futures], timeout=_LOOK_S, return_when="FIRST_COMPLETED").done]
     except TimeoutError:
         return []
+    except FuturesCancelledError:
+        raise CspmError(_GONE) from None
 
 
 def _row_of(future: Future) -> Row | None:
@@ -142,4 +147,4 @@ class _Watch:
                 self._tell("the scheduler has no worker: waiting for one")
                 self._told = True
         elif now - self._alive > _SILENCE_S:
-            raise CspmError("the scheduler is lost; the runs that ended are kept")
+            raise CspmError(_GONE)

@@ -1,5 +1,6 @@
 """Campaigns as a user runs them, and clusters that others have started."""
 
+import json
 import subprocess
 import sys
 import time
@@ -84,20 +85,18 @@ class Cluster:
 
     @property
     def address(self):
-        import json
-
         until(lambda: self._file.read_text().rstrip().endswith("}"), "the whole file")
         return json.loads(self._file.read_text())["address"]
 
     def start(self, kind, *options, **keys):
-        log = (self._folder / f"{kind}_{len(self._started)}.log").open("w")
-        process = subprocess.Popen(
-            [DASK, kind, *map(str, (*options, *self._options))],
-            stdout=log,
-            stderr=log,
-            cwd=self._folder,
-            **keys,
-        )
+        with (self._folder / f"{kind}_{len(self._started)}.log").open("w") as log:
+            process = subprocess.Popen(
+                [DASK, kind, *map(str, (*options, *self._options))],
+                stdout=log,
+                stderr=log,
+                cwd=self._folder,
+                **keys,
+            )
         self._started.append(process)
         return process
 

@@ -94,7 +94,7 @@ def test_what_was_done_is_kept_when_the_scheduler_is_killed(tmp_path):
         cluster.scheduler.send_signal(signal.SIGKILL)
         _, err = program.communicate(timeout=campaigns.PATIENCE_S)
     assert program.returncode == 1
-    assert "the scheduler is lost; the runs that ended are kept" in err
+    assert "the scheduler is lost; the runs that ended are kept, and" in err
     assert "Traceback" not in err
     assert len(campaigns.rows(folder)) == campaigns.journalled(folder) >= 2
 
@@ -198,8 +198,7 @@ def may_make_namespaces():
 @pytest.mark.skipif(not may_make_namespaces(), reason="needs the right to make network namespaces")
 def test_scheduler_and_worker_on_different_computers(tmp_path):
     file, started = campaigns.written(tmp_path), []
-    log = (tmp_path / "dask.log").open("w")
-    with Namespaces() as net:
+    with Namespaces() as net, (tmp_path / "dask.log").open("w") as log:
         address = "tcp://10.91.0.1:8786"
         options = ("--host", "10.91.0.1", "--port", "8786", "--no-dashboard")
         commands = [

@@ -26,6 +26,9 @@ _SETTINGS = {
     "distributed.scheduler.allowed-failures": 0,
     # A worker holds only the run that it makes, so that no other is suspected when it dies.
     "distributed.scheduler.worker-saturation": 1.0,
+    # A run is one call: its frames say nothing, and looking at them takes its processor.
+    "distributed.worker.profile.enabled": False,
+    "distributed.admin.system-monitor.interval": "5s",
     "distributed.admin.large-graph-warning-threshold": "1GB",
 }
 

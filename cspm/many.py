@@ -16,7 +16,8 @@ from cspm.scenario import as_scenario, with_changes
 from cspm.simulation import Run, bundle_of, simulate_in_memory, warn_of
 from cspm.testbed import as_file
 from cspm_msgs_py.errors import InputError
-from cspm_run.plants import PLANTS, SIM
+from cspm_msgs_py.recording.run_record import SIM
+from cspm_run.plants import PLANTS
 
 Variant = Mapping[str, Any]
 

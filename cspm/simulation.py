@@ -23,14 +23,15 @@ from cspm_control.stages.own_code import load_controller
 from cspm_msgs_py.errors import InputError
 from cspm_msgs_py.new_folder import refuse_existing
 from cspm_msgs_py.recording.rows import Rows
-from cspm_msgs_py.recording.run_record import EXTERNAL, OWN_CONTROLLERS
+from cspm_msgs_py.recording.run_record import EXTERNAL, OWN_CONTROLLERS, SIM
 from cspm_msgs_py.recording.writer import RecordingWriter
 from cspm_msgs_py.testbed import TestbedFile
 from cspm_msgs_py.topics import Topic
 from cspm_run.assembly import resolve
 from cspm_run.bundle import Bundle, make_bundle
+from cspm_run.json_file import write_json
 from cspm_run.memory_recorder import MemoryRecorder
-from cspm_run.plants import PLANTS, SIM, refuse_cuts
+from cspm_run.plants import PLANTS, refuse_cuts
 from cspm_run.recorded_run import (
     INPROCESS,
     metadata,
@@ -40,7 +41,7 @@ from cspm_run.recorded_run import (
 )
 from cspm_run.recorded_run import simulate as step_through
 from cspm_run.run_result import RunResult
-from cspm_run.summary import summary_data, write_json
+from cspm_run.summary import summary_data
 
 GRAPH, PROCESSES, REALTIME = "graph", "processes", "realtime"
 MODES = (INPROCESS, GRAPH, PROCESSES, REALTIME)

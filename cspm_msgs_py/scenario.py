@@ -185,9 +185,6 @@ class LqrControl(FeedbackControl):
     integral_limits: tuple[PositiveFloat, PositiveFloat] = (20.0, 5.0)
 
 
-MOTION_LAWS = ("pid", "computed_wrench", "pd_plus", "lqr")
-
-
 def law(motion: object) -> object:
     """Return a motion controller's law: the thesis's by default."""
     if isinstance(motion, dict):

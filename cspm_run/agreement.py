@@ -15,13 +15,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from cspm_msgs_py.dofs import DOFS
+from cspm_msgs_py.recording.run_record import MUJOCO, SIM
 from cspm_msgs_py.scenario import load_scenario
 from cspm_msgs_py.testbed import load_testbed
 from cspm_run.assembly import assemble, resolve
 from cspm_run.bundle import make_bundle
 from cspm_run.library import find_scenario
 from cspm_run.loop import Loop
-from cspm_run.plants import MUJOCO, SIM
 
 Array = NDArray[np.float64]
 

@@ -17,6 +17,7 @@ from cspm_control.stages.wave_stage import WaveStage
 from cspm_control.waves.wave_trajectory import WaveTrajectory
 from cspm_model.motion import Motion
 from cspm_msgs_py.errors import InputError
+from cspm_msgs_py.recording.run_record import SIM
 from cspm_msgs_py.scenario import (
     AngleProfile,
     ClosedLoop,
@@ -41,7 +42,7 @@ from cspm_msgs_py.testbed import Testbed
 from cspm_run.controlled_dofs import with_controlled_dofs
 from cspm_run.designed_gains import with_gains
 from cspm_run.motions import motions_of, reference_poses
-from cspm_run.plants import SIM, make_plant
+from cspm_run.plants import make_plant
 from cspm_sim.any_plant import AnyPlant
 from cspm_sim.plant import Plant
 from cspm_sim.sensor_fault import sensor_faults

@@ -13,12 +13,12 @@ from cspm_msgs_py.edited import file_of
 from cspm_msgs_py.errors import InputError
 from cspm_msgs_py.motion_spec import FileMotion, VesselMotion
 from cspm_msgs_py.recording.attached_testbed import TESTBED, attached_testbed
+from cspm_msgs_py.recording.run_record import SIM
 from cspm_msgs_py.scenario import Scenario, parse_scenario
 from cspm_msgs_py.scenario_keys.bodies import Body
 from cspm_msgs_py.scenario_keys.own_controller import OwnController, path_of
 from cspm_msgs_py.testbed import Testbed, TestbedFile
 from cspm_msgs_py.yaml_file import dump_yaml
-from cspm_run.plants import SIM
 
 SCENARIO = "scenario.yaml"
 

@@ -4,10 +4,12 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterable
 from pathlib import Path
-from typing import overload
+from typing import TYPE_CHECKING, overload
 
 from cspm_msgs_py.errors import InputError
-from cspm_msgs_py.testbed import TestbedFile, load_testbed
+
+if TYPE_CHECKING:
+    from cspm_msgs_py.testbed import TestbedFile
 
 # Groups of scenarios with a folder of their own.
 GROUPS = ("steep", "operation", "robots")
@@ -70,6 +72,9 @@ def named_testbed(name: Path | str | None) -> TestbedFile | None:
     Raises:
         InputError: there is none, which names the library; or a key with a fault.
     """
+    # Names alone are wanted by help, which need not wait for the models of files.
+    from cspm_msgs_py.testbed import load_testbed
+
     return None if name is None else load_testbed(find_testbed(str(name)))
 
 

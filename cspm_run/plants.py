@@ -11,13 +11,12 @@ from numpy.typing import NDArray
 
 from cspm_model.motion import Motion
 from cspm_msgs_py.errors import InputError
+from cspm_msgs_py.recording.run_record import MUJOCO, SIM
 from cspm_msgs_py.testbed import Testbed
 from cspm_sim.any_plant import AnyPlant
 
 Array = NDArray[np.float64]
 
-SIM = "sim"
-MUJOCO = "mujoco"
 PLANTS = (SIM, MUJOCO)
 # Earlier ones end the process when a control callback fails, and integrate damping otherwise.
 OLDEST_MUJOCO = 4

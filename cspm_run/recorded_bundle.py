@@ -7,11 +7,10 @@ from dataclasses import replace
 from pathlib import Path
 
 from cspm_msgs_py.recording.reader import Recording
-from cspm_msgs_py.recording.run_record import simulated_plant
+from cspm_msgs_py.recording.run_record import SIM, simulated_plant
 from cspm_msgs_py.scenario import parse_scenario
 from cspm_run.assembly import resolve
 from cspm_run.bundle import SCENARIO, Bundle, read_bundle
-from cspm_run.plants import SIM
 
 
 def recorded_bundle(path: Path, overrides: Sequence[str] = ()) -> Bundle:

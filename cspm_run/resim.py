@@ -14,11 +14,11 @@ from cspm_msgs_py.recording.reader import Recording
 from cspm_msgs_py.recording.run_record import (
     OWN_NODE,
     RECORD_NAME,
+    SIM,
     own_controllers,
     simulated_plant,
 )
 from cspm_run.bundle import read_bundle, with_own_code
-from cspm_run.plants import SIM
 from cspm_run.recorded_run import run
 
 

@@ -2,9 +2,6 @@
 
 from __future__ import annotations
 
-import json
-import sys
-from pathlib import Path
 from typing import Any
 
 from rich import box
@@ -16,9 +13,6 @@ from cspm_msgs_py.dofs import DOFS
 from cspm_msgs_py.scenario import Requirement
 from cspm_run.console import say
 from cspm_run.run_result import RunResult
-
-# Names standard output instead of a file.
-STANDARD_OUTPUT = Path("-")
 
 
 def summary_data(result: RunResult) -> dict[str, Any]:
@@ -40,15 +34,6 @@ def summary_data(result: RunResult) -> dict[str, Any]:
         "messages": result.messages,
         "warnings": list(result.warnings),
     } | ({"realtime": result.timing} if result.timing else {})
-
-
-def write_json(path: Path, data: Any) -> None:  # noqa: ANN401 - any plain data
-    """Write plain data as JSON; to standard output where the path is `-`."""
-    text = json.dumps(data, indent=2) + "\n"
-    if path == STANDARD_OUTPUT:
-        sys.stdout.write(text)
-    else:
-        path.write_text(text, encoding="utf-8")
 
 
 def print_summary(console: Console, result: RunResult, requirement: Requirement) -> None:

@@ -13,10 +13,10 @@ from cspm.simulation import bundle_of
 from cspm.testbed import AnyTestbed, as_file
 from cspm_control.analysis.reference_demand import ReferenceDemand
 from cspm_msgs_py.new_folder import refuse_existing
+from cspm_msgs_py.recording.run_record import SIM
 from cspm_msgs_py.testbed import Testbed
 from cspm_run.before_run import demanded
 from cspm_run.bundle import Bundle
-from cspm_run.plants import SIM
 
 PICTURE = "reference.png"
 

@@ -23,10 +23,10 @@ from cspm.campaign.work import work
 from cspm.progress import Progress, silent
 from cspm.simulation import simulate_in_memory
 from cspm_msgs_py.errors import InputError
+from cspm_msgs_py.recording.run_record import SIM
 from cspm_msgs_py.scenario import load_scenario
 from cspm_msgs_py.yaml_file import parse_yaml, read_text
 from cspm_run.library import find_scenario, find_testbed, scenario_names, testbed_names
-from cspm_run.plants import SIM
 
 SCHEMA = "cspm.campaign/1"
 # A run that takes longer hangs: starting, and the slowest plant and controllers there are [s].

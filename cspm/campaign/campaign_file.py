@@ -9,9 +9,10 @@ from pydantic import Field, PositiveInt, model_validator
 from typing_extensions import Self
 
 from cspm_msgs_py.errors import InputError
+from cspm_msgs_py.recording.run_record import SIM
 from cspm_msgs_py.yaml_file import StrictModel, parse_yaml, read_text, validate
 from cspm_run.library import find_scenario, find_testbed
-from cspm_run.plants import PLANTS, SIM
+from cspm_run.plants import PLANTS
 
 # Keys of axes that are no keys of scenario or test-bed.
 SCENARIO, TESTBED, EFFECTS = "scenario", "testbed", "effects"

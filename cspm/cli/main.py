@@ -14,8 +14,8 @@ import typer
 
 from cspm.cli.app import RUN_FAILED, Json, app, new_folder
 from cspm.cli.shared_options import add_shared_options
+from cspm_msgs_py.control_spec.motion_laws import MOTION_LAWS
 from cspm_msgs_py.errors import CspmError, DamageError, InputError
-from cspm_msgs_py.scenario import MOTION_LAWS
 from cspm_run.library import find_scenario, scenario_names
 
 MODES = ("inprocess", "graph", "processes", "realtime")

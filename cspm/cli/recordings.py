@@ -19,7 +19,7 @@ def info(
     json: Json = None,
 ) -> None:
     """Show a recording's topics, rates in Hz, longest gaps in ms, duration and scenario."""
-    from cspm.commands.run_command import info_command
+    from cspm.commands.info_command import info_command
 
     info_command(bag, json)
 
@@ -46,7 +46,7 @@ def recover(
 
     At most the last 0.2 s before the kill are lost.
     """
-    from cspm.commands.run_command import recover_command
+    from cspm.commands.info_command import recover_command
 
     recover_command(bag, out, json)
 

@@ -16,8 +16,8 @@ from cspm_ident.comparison.channel_fit import ChannelFit
 from cspm_ident.comparison.compare import Comparison
 from cspm_msgs_py.new_folder import refuse_existing
 from cspm_run.console import make_console, say
+from cspm_run.json_file import write_json
 from cspm_run.library import named_testbed
-from cspm_run.summary import write_json
 
 
 @dataclass(frozen=True)

@@ -19,7 +19,7 @@ from cspm.simulation import Run, simulate
 from cspm.testbed import Testbed, load_testbed
 from cspm_msgs_py.new_folder import refuse_existing
 from cspm_run.console import make_console, say
-from cspm_run.summary import write_json
+from cspm_run.json_file import write_json
 from cspm_sim.effects import catalogue
 
 SCENARIO = "calm"

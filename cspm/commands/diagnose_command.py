@@ -37,8 +37,8 @@ from cspm_msgs_py.errors import InputError
 from cspm_msgs_py.new_folder import refuse_existing
 from cspm_msgs_py.testbed import Testbed
 from cspm_run.console import make_console, say
+from cspm_run.json_file import write_json
 from cspm_run.library import named_testbed
-from cspm_run.summary import write_json
 from cspm_sim.effects import catalogue
 
 

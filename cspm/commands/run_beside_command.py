@@ -17,11 +17,12 @@ from rich.table import Table
 
 from cspm.changed_machine import of_testbed
 from cspm.commands.run_command import bundle_from, summarise
+from cspm_msgs_py.control_spec.motion_laws import MOTION_LAWS
 from cspm_msgs_py.dofs import DOFS
 from cspm_msgs_py.errors import CspmError, InputError
 from cspm_msgs_py.new_folder import refuse_existing
+from cspm_msgs_py.recording.run_record import SIM
 from cspm_msgs_py.scenario import (
-    MOTION_LAWS,
     ClosedLoop,
     MotionLaw,
     Requirement,
@@ -31,11 +32,11 @@ from cspm_msgs_py.scenario import (
 from cspm_msgs_py.schedule import MOTION_CONTROLLER
 from cspm_run.bundle import Bundle
 from cspm_run.console import make_console, say
-from cspm_run.plants import SIM
+from cspm_run.json_file import write_json
 from cspm_run.recorded_run import run
 from cspm_run.run_result import RunResult
 from cspm_run.stage_warm_up import compile_apart, is_compiled
-from cspm_run.summary import summary_data, write_json
+from cspm_run.summary import summary_data
 
 PICTURE = "runs.png"
 REFRESH_S = 0.2

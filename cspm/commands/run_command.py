@@ -8,11 +8,9 @@ import tempfile
 from collections.abc import Sequence
 from pathlib import Path
 
-from rich import box
 from rich.console import Console
 from rich.markup import escape
 from rich.progress import BarColumn, Progress, TaskID, TextColumn, TimeRemainingColumn
-from rich.table import Table
 
 from cspm.changed_machine import changed_machine, of_testbed
 from cspm.scenario import Scenario
@@ -20,22 +18,20 @@ from cspm.simulation import PROCESSES, REALTIME, Runner, bundle_of, ros_runner
 from cspm_model.cable_strength import limit_warnings
 from cspm_msgs_py.errors import CspmError, InputError
 from cspm_msgs_py.new_folder import refuse_existing
-from cspm_msgs_py.recording.overview import Overview, overview
-from cspm_msgs_py.recording.recover import recover
-from cspm_msgs_py.recording.run_record import EXTERNAL, RECORD_NAME
+from cspm_msgs_py.recording.run_record import EXTERNAL, SIM
 from cspm_msgs_py.scenario import load_scenario
 from cspm_msgs_py.schedule import schedule_of
 from cspm_ros.runtime.stall_watchdog import PATIENCE_S, check_patience
 from cspm_run.before_run import free_of, unmet_line
 from cspm_run.bundle import Bundle
 from cspm_run.console import make_console, say
+from cspm_run.json_file import write_json
 from cspm_run.library import named_testbed
-from cspm_run.plants import SIM
 from cspm_run.recorded_run import INPROCESS, run
 from cspm_run.resim import resimulate
 from cspm_run.run_result import RunResult
 from cspm_run.stage_warm_up import compile_beside
-from cspm_run.summary import print_summary, summary_data, write_json
+from cspm_run.summary import print_summary, summary_data
 
 
 def run_command(
@@ -166,85 +162,6 @@ def summarise(folder: Path, bundle: Bundle, result: RunResult) -> None:
     period = 1.0 / bundle.scenario.rates.plant
     names = bundle.testbed.testbed.cable_names
     draw_run(folder / "run.png", result, bundle.scenario.requirement, names, period)
-
-
-def info_command(bag: Path, json: Path | None) -> None:
-    """Print a summary of a recording."""
-    console = make_console()
-    found = overview(bag)
-    table = Table(title=escape(str(found.path)), box=box.SIMPLE)
-    table.add_column("topic", no_wrap=True)
-    # The one that gives way where the terminal is narrow.
-    table.add_column("type", overflow="ellipsis")
-    for column in ("messages", "rate [Hz]", "longest gap [ms]", "at [s]"):
-        table.add_column(escape(column), justify="right", no_wrap=True)
-    for topic in found.topics:
-        table.add_row(
-            escape(topic.name),
-            escape(topic.ros_type),
-            str(topic.count),
-            "" if topic.rate_hz is None else f"{topic.rate_hz:.1f}",
-            "" if topic.gap_ns is None else f"{topic.gap_ns * 1e-6:.3f}",
-            "" if topic.gap_at_ns is None else f"{(topic.gap_at_ns - found.start_ns) * 1e-9:.3f}",
-        )
-    console.print(table)
-    say(
-        console,
-        f"{found.message_count} messages over {found.duration_s:.3f} s,"
-        f" {found.size_bytes / 1e6:.1f} MB, {found.storage} {found.profile}, written by"
-        f" {found.library or 'unknown'}",
-    )
-    record = found.metadata.get(RECORD_NAME, {})
-    if "source" in record:
-        say(
-            console,
-            f"imported from {record['source']} (SHA-256 {record.get('source_sha256', 'unknown')}),"
-            f" mapping {record.get('mapping', 'unknown')}, test-bed {found.testbed}",
-        )
-    elif found.scenario or found.testbed:
-        say(
-            console,
-            f"scenario {found.scenario}, seed {record.get('seed', 'unknown')}, test-bed"
-            f" {found.testbed}, mode {record.get('mode', 'unknown')}, plant"
-            f" {record.get('plant', SIM)}",
-        )
-    _say_troubles(console, bag, found)
-    if json is not None:
-        write_json(json, dataclasses.asdict(found) | {"path": str(found.path)})
-
-
-def _say_troubles(console: Console, bag: Path, found: Overview) -> None:
-    for topic, count in found.refused.items():
-        say(console, f"refused: {count} messages on {topic}, which no node of the run obeyed")
-    for fault in found.faults:
-        say(console, f"fault: {fault}")
-    if found.faults and found.complete:
-        say(console, f"`cspm recover {bag}` restores what can be read")
-    if not found.complete:
-        say(console, f"cut short: `cspm recover {bag}` restores its index")
-
-
-def recover_command(bag: Path, out: Path | None, json: Path | None) -> None:
-    """Restore a recording, and print what was restored."""
-    console = make_console()
-    report = recover(bag, out)
-    if report.bare:
-        names = ", ".join(path.name for path in report.bare)
-        say(console, f"{names}: holds nothing, left out")
-    if not report.restored:
-        done = "metadata.yaml was written" if report.described else "nothing to restore"
-        say(console, f"{report.path}: complete, {done}")
-    else:
-        say(
-            console,
-            f"{report.path}: {report.messages} messages up to {report.end_ns * 1e-9:.3f} s,"
-            f" {report.lost_bytes} bytes at the end unusable, {report.damaged} damaged chunks left"
-            f" out; the original is kept as {', '.join(path.name for path in report.kept)}",
-        )
-    if json is not None:
-        listed = ("restored", "kept", "bare")
-        paths = {name: [str(p) for p in getattr(report, name)] for name in listed}
-        write_json(json, dataclasses.asdict(report) | paths | {"path": str(report.path)})
 
 
 def resim_command(bag: Path, json: Path | None, controllers: Sequence[Path] = ()) -> bool:

@@ -19,7 +19,7 @@ from cspm.view.viewer_page import viewer_page
 from cspm_msgs_py.errors import InputError
 from cspm_msgs_py.testbed import Testbed, load_testbed
 from cspm_run.console import make_console, say
-from cspm_run.summary import write_json
+from cspm_run.json_file import write_json
 
 MOST_RECORDINGS = 2
 

@@ -6,7 +6,7 @@ from cspm_msgs_py.recording.reader import Recording
 
 RECORD_NAME = "cspm"
 # In the plant's place: somebody's drivers, not a simulation.
-EXTERNAL = "external"
+SIM, MUJOCO, EXTERNAL = "sim", "mujoco", "external"
 # The key under which controllers of somebody's own are named: objects, which no recording carries,
 # or files, which one carries and nobody runs unasked.
 OWN_CONTROLLERS = "own_controllers"

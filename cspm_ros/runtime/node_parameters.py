@@ -13,6 +13,7 @@ from rclpy.node import Node
 
 from cspm_msgs_py.errors import InputError
 from cspm_msgs_py.graph import PLAYER, RECORDER
+from cspm_msgs_py.recording.run_record import SIM
 from cspm_msgs_py.scenario import load_scenario
 from cspm_msgs_py.schedule import PLANT, Schedule
 from cspm_msgs_py.testbed import load_testbed
@@ -21,7 +22,7 @@ from cspm_ros.runtime.stall_watchdog import LEAST_PATIENCE_S, PATIENCE_S
 from cspm_run.assembly import resolve
 from cspm_run.bundle import Bundle, make_bundle
 from cspm_run.library import find_scenario
-from cspm_run.plants import PLANTS, SIM
+from cspm_run.plants import PLANTS
 from cspm_run.recorded_bundle import recorded_bundle
 
 LOCKSTEP, REALTIME = "lockstep", "realtime"

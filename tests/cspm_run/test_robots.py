@@ -116,7 +116,7 @@ def test_a_suspended_plate_hangs_tilted_beside_its_middle():
 
 def bundle_of(name, **control):
     from cspm.simulation import bundle_of as bundle
-    from cspm_run.plants import SIM
+    from cspm_msgs_py.recording.run_record import SIM
 
     scenario = cspm.load_scenario(name)
     for key, value in control.items():

@@ -17,7 +17,7 @@ from cspm_model.parameters import nominal_parameters
 from cspm_model.spanned_axes import gyration_radius
 from cspm_msgs_py.new_folder import refuse_existing
 from cspm_run.console import make_console, say
-from cspm_run.summary import write_json
+from cspm_run.json_file import write_json
 
 UNITS = {
     "force": ("N per N", "N·m per N"),

@@ -27,7 +27,7 @@ from cspm_control.analysis.workspace_result import (
 from cspm_msgs_py.interruption import interruptible
 from cspm_msgs_py.new_folder import refuse_existing
 from cspm_run.console import make_console, say
-from cspm_run.summary import write_json
+from cspm_run.json_file import write_json
 
 WAYS = {
     "pseudo_inverse": "pseudo-inverse, t ≥ 0",

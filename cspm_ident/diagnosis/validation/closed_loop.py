@@ -16,10 +16,9 @@ from cspm_ident.signals.samples import Samples
 from cspm_msgs_py.dofs import DOFS
 from cspm_msgs_py.errors import CspmError
 from cspm_msgs_py.recording.reader import Recording
-from cspm_msgs_py.recording.run_record import own_controllers
+from cspm_msgs_py.recording.run_record import SIM, own_controllers
 from cspm_msgs_py.scenario import ClosedLoop
 from cspm_msgs_py.testbed import TestbedFile
-from cspm_run.plants import SIM
 from cspm_run.recorded_bundle import recorded_bundle
 from cspm_run.recorded_run import run
 

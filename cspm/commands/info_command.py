@@ -1,0 +1,96 @@
+"""The commands that say what a recording holds, and restore one."""
+
+from __future__ import annotations
+
+import dataclasses
+from pathlib import Path
+
+from rich import box
+from rich.console import Console
+from rich.markup import escape
+from rich.table import Table
+
+from cspm_msgs_py.recording.overview import Overview, overview
+from cspm_msgs_py.recording.recover import recover
+from cspm_msgs_py.recording.run_record import RECORD_NAME, SIM
+from cspm_run.console import make_console, say
+from cspm_run.json_file import write_json
+
+
+def info_command(bag: Path, json: Path | None) -> None:
+    """Print a summary of a recording."""
+    console = make_console()
+    found = overview(bag)
+    table = Table(title=escape(str(found.path)), box=box.SIMPLE)
+    table.add_column("topic", no_wrap=True)
+    # The one that gives way where the terminal is narrow.
+    table.add_column("type", overflow="ellipsis")
+    for column in ("messages", "rate [Hz]", "longest gap [ms]", "at [s]"):
+        table.add_column(escape(column), justify="right", no_wrap=True)
+    for topic in found.topics:
+        table.add_row(
+            escape(topic.name),
+            escape(topic.ros_type),
+            str(topic.count),
+            "" if topic.rate_hz is None else f"{topic.rate_hz:.1f}",
+            "" if topic.gap_ns is None else f"{topic.gap_ns * 1e-6:.3f}",
+            "" if topic.gap_at_ns is None else f"{(topic.gap_at_ns - found.start_ns) * 1e-9:.3f}",
+        )
+    console.print(table)
+    say(
+        console,
+        f"{found.message_count} messages over {found.duration_s:.3f} s,"
+        f" {found.size_bytes / 1e6:.1f} MB, {found.storage} {found.profile}, written by"
+        f" {found.library or 'unknown'}",
+    )
+    record = found.metadata.get(RECORD_NAME, {})
+    if "source" in record:
+        say(
+            console,
+            f"imported from {record['source']} (SHA-256 {record.get('source_sha256', 'unknown')}),"
+            f" mapping {record.get('mapping', 'unknown')}, test-bed {found.testbed}",
+        )
+    elif found.scenario or found.testbed:
+        say(
+            console,
+            f"scenario {found.scenario}, seed {record.get('seed', 'unknown')}, test-bed"
+            f" {found.testbed}, mode {record.get('mode', 'unknown')}, plant"
+            f" {record.get('plant', SIM)}",
+        )
+    _say_troubles(console, bag, found)
+    if json is not None:
+        write_json(json, dataclasses.asdict(found) | {"path": str(found.path)})
+
+
+def _say_troubles(console: Console, bag: Path, found: Overview) -> None:
+    for topic, count in found.refused.items():
+        say(console, f"refused: {count} messages on {topic}, which no node of the run obeyed")
+    for fault in found.faults:
+        say(console, f"fault: {fault}")
+    if found.faults and found.complete:
+        say(console, f"`cspm recover {bag}` restores what can be read")
+    if not found.complete:
+        say(console, f"cut short: `cspm recover {bag}` restores its index")
+
+
+def recover_command(bag: Path, out: Path | None, json: Path | None) -> None:
+    """Restore a recording, and print what was restored."""
+    console = make_console()
+    report = recover(bag, out)
+    if report.bare:
+        names = ", ".join(path.name for path in report.bare)
+        say(console, f"{names}: holds nothing, left out")
+    if not report.restored:
+        done = "metadata.yaml was written" if report.described else "nothing to restore"
+        say(console, f"{report.path}: complete, {done}")
+    else:
+        say(
+            console,
+            f"{report.path}: {report.messages} messages up to {report.end_ns * 1e-9:.3f} s,"
+            f" {report.lost_bytes} bytes at the end unusable, {report.damaged} damaged chunks left"
+            f" out; the original is kept as {', '.join(path.name for path in report.kept)}",
+        )
+    if json is not None:
+        listed = ("restored", "kept", "bare")
+        paths = {name: [str(p) for p in getattr(report, name)] for name in listed}
+        write_json(json, dataclasses.asdict(report) | paths | {"path": str(report.path)})

@@ -17,7 +17,7 @@ from cspm_ident.comparison.compare import Comparison as Result
 from cspm_ident.comparison.compare import compare as compare_measurement
 from cspm_msgs_py.errors import InputError
 from cspm_msgs_py.new_folder import refuse_existing
-from cspm_run.json_file import write_json
+from cspm_run.output.json_file import write_json
 
 DRIVES = (Input.WINCH.value, Input.TORQUE.value, Input.TENSION.value)
 

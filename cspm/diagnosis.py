@@ -25,7 +25,7 @@ from cspm_ident.diagnosis.validation.controller_parity import Parity, controller
 from cspm_ident.experiment.experiment_files import write_experiments
 from cspm_ident.signals.measurement import Measurement
 from cspm_msgs_py.new_folder import refuse_existing
-from cspm_run.json_file import write_json
+from cspm_run.output.json_file import write_json
 
 REPORT = "diagnosis.json"
 PICTURE = "diagnosis.png"

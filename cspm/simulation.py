@@ -29,8 +29,9 @@ from cspm_msgs_py.testbed import TestbedFile
 from cspm_msgs_py.topics import Topic
 from cspm_run.assembly import resolve
 from cspm_run.bundle import Bundle, make_bundle
-from cspm_run.json_file import write_json
 from cspm_run.memory_recorder import MemoryRecorder
+from cspm_run.output.json_file import write_json
+from cspm_run.output.summary import summary_data
 from cspm_run.plants import PLANTS, refuse_cuts
 from cspm_run.recorded_run import (
     INPROCESS,
@@ -41,7 +42,6 @@ from cspm_run.recorded_run import (
 )
 from cspm_run.recorded_run import simulate as step_through
 from cspm_run.run_result import RunResult
-from cspm_run.summary import summary_data
 
 GRAPH, PROCESSES, REALTIME = "graph", "processes", "realtime"
 MODES = (INPROCESS, GRAPH, PROCESSES, REALTIME)

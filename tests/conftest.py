@@ -6,6 +6,8 @@ import sys
 import tempfile
 from pathlib import Path
 
+from error_lines import said
+
 # Workers of pytest share the processors; linear algebra with threads of its own only gets in their
 # way: a fit of a system took 71 s of processor time with two threads, and 36 s with one.
 os.environ.setdefault("OMP_NUM_THREADS", "1")
@@ -89,7 +91,7 @@ def refused(cspm):
     def call(*arguments, code=2):
         found, _, err = cspm(*arguments)
         assert (found, err.count("\n")) == (code, 1), err
-        assert err.startswith("cspm: ")
-        return err.removeprefix("cspm: ").removesuffix("\n")
+        assert said(err).startswith("")
+        return said(err).removesuffix("\n")
 
     return call

@@ -46,10 +46,10 @@ class Case(NamedTuple):
         return f"{self.scenario}_{self.duration:g}s"
 
 
-def cases() -> list[Case]:
-    """Return all recordings, no two with the same seed."""
+def cases(first_seed: int = FIRST_SEED) -> list[Case]:
+    """Return all recordings, no two with the same seed, of which this is the first."""
     pairs = [(scenario, duration) for scenario in SCENARIOS for duration in DURATIONS]
-    return [Case(scenario, FIRST_SEED + k, s) for k, (scenario, s) in enumerate(pairs)]
+    return [Case(scenario, first_seed + k, s) for k, (scenario, s) in enumerate(pairs)]
 
 
 def verdict(case: Case, folder: Path) -> dict[str, str]:
@@ -93,11 +93,14 @@ def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("--processes", type=int, default=1, help="diagnoses at a time")
     parser.add_argument("--folder", type=Path, default=FOLDER, help="recordings and verdicts")
+    parser.add_argument("--first-seed", type=int, default=FIRST_SEED, help="others give fresh data")
     options = parser.parse_args()
     options.folder.mkdir(parents=True, exist_ok=True)
     console, found = Console(), {}
     with worker_pool(options.processes) as pool:
-        begun = {pool.submit(verdict, case, options.folder): case for case in cases()}
+        begun = {
+            pool.submit(verdict, case, options.folder): case for case in cases(options.first_seed)
+        }
         for done, each in enumerate(as_completed(begun), start=1):
             found[begun[each]] = each.result()
             console.print(f"{done} of {len(begun)}: {begun[each].name}: {each.result()['verdict']}")

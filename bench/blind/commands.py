@@ -25,8 +25,8 @@ from bench.blind.scorings import enter_scoring
 from bench.blind.stored_results import read_results, tried
 from bench.blind.truth import SEALED, read_truth, truth_sha256
 from cspm_msgs_py.errors import InputError
-from cspm_run.console import make_console, say
-from cspm_run.json_file import write_json
+from cspm_run.output.console import make_console, say
+from cspm_run.output.json_file import write_json
 from cspm_run.plants import require_mujoco
 
 

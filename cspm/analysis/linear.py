@@ -24,7 +24,7 @@ from cspm_control.analysis.published_linear import EXACT, FROZEN, linear_claims
 from cspm_model.linearisation import StateSpace
 from cspm_msgs_py.errors import InputError
 from cspm_msgs_py.new_folder import refuse_existing
-from cspm_run.json_file import write_json
+from cspm_run.output.json_file import write_json
 
 if TYPE_CHECKING:
     import control

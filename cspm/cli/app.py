@@ -12,8 +12,8 @@ import typer
 import typer.core
 
 from cspm_msgs_py.errors import InputError
-from cspm_run.console import VOICE, Voice
-from cspm_run.json_file import STANDARD_OUTPUT
+from cspm_run.output.console import VOICE, Voice
+from cspm_run.output.json_file import STANDARD_OUTPUT
 
 RUN_FAILED = 1
 # Frames leave 12 characters for a text on a terminal of 60 columns, and 26 of 80; plain help has

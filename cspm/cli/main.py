@@ -13,7 +13,7 @@ from typing import Annotated, NoReturn
 import typer
 
 from cspm.cli.app import RUN_FAILED, Json, app, new_folder
-from cspm.cli.shared_options import add_shared_options
+from cspm.cli.shared_options import COMMAND, add_shared_options
 from cspm_msgs_py.control_spec.motion_laws import MOTION_LAWS
 from cspm_msgs_py.errors import CspmError, DamageError, InputError
 from cspm_run.library import find_scenario, scenario_names
@@ -43,27 +43,35 @@ def main() -> None:
 
 def run_app(commands: typer.Typer, name: str) -> NoReturn:
     """Run commands as the program `name`; every error is one line on stderr and an exit code."""
+    # What a command sets, its name and about its output, ends with it.
+    context = copy_context()
+
+    def fail(text: str, code: int) -> NoReturn:
+        _fail(context.get(COMMAND) or name, text, code)
+
     try:
         root = typer.main.get_command(commands)
         add_shared_options(root)
-        # What a command sets about its output ends with it.
-        code = copy_context().run(root.main, prog_name=name, standalone_mode=False)
+        code = context.run(root.main, prog_name=name, standalone_mode=False)
     except DamageError as err:
-        _fail(f"{err}; {err.remedy}", err.exit_code)
+        fail(f"{err}; {err.remedy}", err.exit_code)
     except CspmError as err:
-        _fail(str(err), err.exit_code)
+        fail(str(err), err.exit_code)
     except _UsageError as err:
         command = err.ctx.command_path if err.ctx else name
-        _fail(f"{err.format_message().rstrip('.')}; see `{command} --help`", BAD_USAGE)
+        line = f"{err.format_message().rstrip('.')}; see `{command} --help`"
+        _fail(command, line, BAD_USAGE)
     except OSError as err:
-        _fail(f"{err.filename or 'system'}: {err.strerror or err}", RUN_FAILED)
+        fail(f"{err.filename or 'system'}: {err.strerror or err}", RUN_FAILED)
     except typer.Abort:
         code = INTERRUPTED
     sys.exit(code)
 
 
-def _fail(text: str, code: int) -> NoReturn:
-    print(f"cspm: {' '.join(text.split())}", file=sys.stderr)  # noqa: T201 - the command line's voice
+def _fail(command: str, text: str, code: int) -> NoReturn:
+    """Print one line that begins with the command's name, and end with a code."""
+    line = " ".join(text.split()).removeprefix(f"{command.rpartition(' ')[2]}: ")
+    print(f"{command}: {line}", file=sys.stderr)  # noqa: T201 - the command line's voice
     sys.exit(code)
 
 

@@ -3,13 +3,16 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
+from contextvars import ContextVar
 from typing import Annotated, Any
 
 import typer
 from typer.core import TyperCommand, TyperGroup
 
-from cspm_run.console import VOICE, Voice
+from cspm_run.output.console import VOICE, Voice
 
+# Of the command that runs, with all its words; a command line runs in a context of its own.
+COMMAND: ContextVar[str] = ContextVar("command", default="")
 _CODES = "Exit code: 0 done, 1 failed, 2 unusable input."
 
 
@@ -29,7 +32,9 @@ def _leaves(command: Any) -> Iterator[TyperCommand]:  # noqa: ANN401 - as above
         yield command
 
 
-def _hush(wanted: bool) -> None:
+def _begin(context: typer.Context, wanted: bool) -> None:
+    """Note which command begins, and silence it if that is wanted."""
+    COMMAND.set(context.command_path)
     if wanted:
         VOICE.set(Voice.NOWHERE)
 
@@ -41,7 +46,7 @@ def _quiet_alone(
             "--quiet",
             "-q",
             is_eager=True,
-            callback=_hush,
+            callback=_begin,
             help="Print nothing but errors.",
         ),
     ] = False,

@@ -15,8 +15,8 @@ from rich.table import Table
 from cspm.commands.progress_shown import shown
 from cspm_msgs_py.errors import InputError
 from cspm_msgs_py.interruption import interruptible
-from cspm_run.console import make_console, say
-from cspm_run.json_file import write_json
+from cspm_run.output.console import make_console, say
+from cspm_run.output.json_file import write_json
 
 if TYPE_CHECKING:
     from cspm.campaign.campaign import Campaign

@@ -15,8 +15,8 @@ from cspm_ros.check_drivers.driver_report import count_line, drivers_console, to
 from cspm_ros.check_drivers.guided_pull import GuidedPull, pulled_cables
 from cspm_ros.check_drivers.time_bar import time_bar
 from cspm_ros.replay.terminal_keys import TerminalKeys
-from cspm_run.console import say
-from cspm_run.json_file import write_json
+from cspm_run.output.console import say
+from cspm_run.output.json_file import write_json
 
 if TYPE_CHECKING:
     from cspm_ros.check_drivers.driver_listener import DriverListener

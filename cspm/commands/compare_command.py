@@ -10,14 +10,15 @@ from rich import box
 from rich.console import Console
 from rich.table import Table
 
+from cspm.commands.progress_shown import shown
 from cspm.comparison import compare
 from cspm_ident.block_simulation import Input
 from cspm_ident.comparison.channel_fit import ChannelFit
 from cspm_ident.comparison.compare import Comparison
 from cspm_msgs_py.new_folder import refuse_existing
-from cspm_run.console import make_console, say
-from cspm_run.json_file import write_json
 from cspm_run.library import named_testbed
+from cspm_run.output.console import make_console, say
+from cspm_run.output.json_file import write_json
 
 
 @dataclass(frozen=True)
@@ -51,7 +52,7 @@ def compare_command(request: CompareRequest, json: Path | None) -> None:
     """
     console = make_console()
     refuse_existing(request.out)
-    with console.status("reading") as status:
+    with shown(console, "reading") as progress:
         compared = compare(
             request.recording,
             testbed=None if request.testbed is None else named_testbed(request.testbed),
@@ -59,7 +60,7 @@ def compare_command(request: CompareRequest, json: Path | None) -> None:
             horizon=request.horizon,
             delays=request.delays,
             repeat=request.repeat,
-            progress=lambda _, what: status.update(what),
+            progress=progress,
         )
         written = None if request.out is None else compared.write(request.out)
     print_comparison(console, compared.result)

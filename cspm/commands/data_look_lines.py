@@ -8,7 +8,7 @@ from typing import Any
 
 from rich.console import Console
 
-from cspm_run.console import say
+from cspm_run.output.console import say
 
 
 def print_data_look(console: Console, checks: Sequence[Mapping[str, Any]]) -> None:

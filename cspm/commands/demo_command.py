@@ -10,6 +10,7 @@ from typing import Any
 import numpy as np
 from rich.console import Console
 
+from cspm.commands.progress_shown import shown
 from cspm.commands.view_command import page_of
 from cspm.demo.concealment import Concealed, drawn
 from cspm.demo.guess import choices, guessed
@@ -18,8 +19,8 @@ from cspm.recorded import Recording
 from cspm.simulation import Run, simulate
 from cspm.testbed import Testbed, load_testbed
 from cspm_msgs_py.new_folder import refuse_existing
-from cspm_run.console import make_console, say
-from cspm_run.json_file import write_json
+from cspm_run.output.console import make_console, say
+from cspm_run.output.json_file import write_json
 from cspm_sim.effects import catalogue
 
 SCENARIO = "calm"
@@ -81,9 +82,10 @@ def _recorded(
     machine = described
     for each in truth:
         machine = machine.with_effect(each.effect, each.element, **each.parameters)
-    with console.status("the machine runs, and its model"):
-        real = simulate(SCENARIO, testbed=machine, duration=DURATION_S)
-        model = simulate(SCENARIO, testbed=described, duration=DURATION_S)
+    with shown(console, "the machine runs") as progress:
+        real = simulate(SCENARIO, testbed=machine, duration=DURATION_S, progress=progress)
+    with shown(console, "its model runs") as progress:
+        model = simulate(SCENARIO, testbed=described, duration=DURATION_S, progress=progress)
     request.out.mkdir(parents=True)
     recording = real.save(request.out / RECORDED)
     say(console, f"   It follows the other ship for {DURATION_S:g} s: {recording.path}")
@@ -126,12 +128,12 @@ def _guess(
 
 
 def _diagnosed(console: Console, recording: Recording, described: Testbed) -> Diagnosis:
-    with console.status("diagnosing") as status:
+    with shown(console, "diagnosing") as progress:
         found = diagnose(
             recording,
             testbed=described,
             closed_loop=False,
-            progress=lambda _, what: status.update(f"diagnosing: {what}"),
+            progress=lambda share, what: progress(share, f"diagnosing: {what}"),
         )
     say(console, f"4  The diagnosis, of the recording alone: {found.verdict}")
     for each in found.findings:
@@ -177,8 +179,9 @@ def _improved(
         page = page_of([recording.path], None, request.out / VERDICT / REPORT)
         (request.out / PAGE).write_text(page, encoding="utf-8")
         return {}
-    with console.status("running the improved model"):
-        run = simulate(SCENARIO, testbed=found.improved_testbed, duration=DURATION_S)
+    with shown(console, "the improved model runs") as progress:
+        better = found.improved_testbed
+        run = simulate(SCENARIO, testbed=better, duration=DURATION_S, progress=progress)
         saved = run.save(request.out / IMPROVED)
         pair = [recording.path, saved.path]
         page = page_of(pair, None, request.out / VERDICT / REPORT)

@@ -13,6 +13,7 @@ from rich.console import Console
 from rich.table import Table
 
 from cspm.commands.data_look_lines import print_data_look
+from cspm.commands.progress_shown import shown
 from cspm.diagnosis import diagnose
 from cspm_ident.diagnosis.diagnosis import Diagnosis
 from cspm_ident.diagnosis.reporting.empirical_statement import stage_errors, stage_names
@@ -36,9 +37,9 @@ from cspm_ident.diagnosis.validation.controller_parity import Parity
 from cspm_msgs_py.errors import InputError
 from cspm_msgs_py.new_folder import refuse_existing
 from cspm_msgs_py.testbed import Testbed
-from cspm_run.console import make_console, say
-from cspm_run.json_file import write_json
 from cspm_run.library import named_testbed
+from cspm_run.output.console import make_console, say
+from cspm_run.output.json_file import write_json
 from cspm_sim.effects import catalogue
 
 
@@ -71,21 +72,17 @@ def diagnose_command(request: DiagnoseRequest, json: Path | None) -> None:
     """
     console = make_console()
     refuse_existing(request.out)
-    with console.status("reading") as status:
-
-        def show(_: float, what: str) -> None:
-            status.update(what)
-
+    with shown(console, "reading") as progress:
         found = diagnose(
             request.recordings,
             testbed=None if request.testbed is None else named_testbed(request.testbed),
             held_out=request.held_out,
             closed_loop=request.closed_loop,
             leave_out_regimes=request.leave_out_regimes,
-            progress=show,
+            progress=progress,
         )
         if request.out is not None:
-            found.write(request.out, show)
+            found.write(request.out, progress)
     print_data_look(console, found.data["data_checks"])
     say(console, believed_line(found.result.searched[0].machine, request.testbed))
     print_diagnosis(console, found.result, found.data, request.out)

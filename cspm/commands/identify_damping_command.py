@@ -13,7 +13,7 @@ from cspm.commands.identify_outcome import hand_out, interval_text
 from cspm.identification.cables import identified_damping
 from cspm.rig import RigRequest
 from cspm_ident.rig.damping import DAMPING, DampingResult
-from cspm_run.console import say
+from cspm_run.output.console import say
 
 
 def identify_damping_command(request: RigRequest, json: Path | None) -> bool:

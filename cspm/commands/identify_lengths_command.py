@@ -9,11 +9,12 @@ from rich.console import Console
 from rich.table import Table
 
 from cspm.commands.identify_outcome import hand_out, interval_text
+from cspm.commands.progress_shown import shown
 from cspm.identification.lengths import identify_lengths
 from cspm_ident.lengths.identify_lengths import LATE, SAG, SCALE, CableLength, LengthsResult
 from cspm_msgs_py.new_folder import refuse_existing
-from cspm_run.console import make_console, say
 from cspm_run.library import named_testbed
+from cspm_run.output.console import make_console, say
 
 
 def identify_lengths_command(
@@ -31,7 +32,7 @@ def identify_lengths_command(
         InputError: recordings, test-bed or options cannot be used.
     """
     refuse_existing(out)
-    with make_console().status("lengths"):
+    with shown(make_console(), "lengths"):
         found = identify_lengths(
             recordings,
             held_out=held_out,

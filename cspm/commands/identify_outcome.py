@@ -10,8 +10,8 @@ from rich.console import Console
 
 from cspm.commands.data_look_lines import print_data_look
 from cspm.identification.identified import Identification, Outcome
-from cspm_run.console import make_console, say
-from cspm_run.json_file import write_json
+from cspm_run.output.console import make_console, say
+from cspm_run.output.json_file import write_json
 
 Found = TypeVar("Found", bound=Outcome)
 

@@ -15,7 +15,7 @@ from cspm.rig import RigRequest
 from cspm_ident.rig.flanks import DOWN, UP
 from cspm_ident.rig.stiffness import MEAN, StiffnessResult
 from cspm_ident.rig.stiffness_fit import NAMES
-from cspm_run.console import say
+from cspm_run.output.console import say
 
 LAW = "k = min(a/l^b (e^(c t) - e^(d t)), E A/l)"
 

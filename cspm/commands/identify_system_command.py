@@ -13,14 +13,15 @@ from rich.markup import escape
 from rich.table import Table
 
 from cspm.commands.identify_outcome import hand_out, interval_text
+from cspm.commands.progress_shown import shown
 from cspm.identification.system import identify_system
 from cspm_ident.estimation import Prior
 from cspm_ident.system.identification import SystemResult
 from cspm_ident.system.prediction_test import Judgement
 from cspm_msgs_py.dofs import DOFS
 from cspm_msgs_py.new_folder import refuse_existing
-from cspm_run.console import make_console, say
 from cspm_run.library import named_testbed
+from cspm_run.output.console import make_console, say
 
 
 @dataclass(frozen=True)
@@ -64,7 +65,7 @@ def identify_system_command(request: SystemRequest, json: Path | None) -> bool:
     """
     console = make_console()
     refuse_existing(request.out)
-    with console.status("") as status:
+    with shown(console, "reading") as progress:
         found = identify_system(
             request.recordings,
             held_out=request.held_out,
@@ -76,7 +77,7 @@ def identify_system_command(request: SystemRequest, json: Path | None) -> bool:
             profiled=request.profiled,
             horizon=request.horizon,
             leave_out_regimes=request.leave_out_regimes,
-            progress=lambda _, what: status.update(escape(what)),
+            progress=progress,
         )
     return hand_out(found, print_system, request.out, json)
 

@@ -13,11 +13,12 @@ from rich.markup import escape
 from rich.table import Table
 
 from cspm.commands.identify_outcome import hand_out, interval_text
+from cspm.commands.progress_shown import shown
 from cspm.identification.winches import identify_winch
 from cspm_ident.winch.identified_winch import IdentifiedWinch, WinchesResult
 from cspm_msgs_py.new_folder import refuse_existing
-from cspm_run.console import make_console, say
 from cspm_run.library import named_testbed
+from cspm_run.output.console import make_console, say
 
 # Unit at the shaft to unit at the drum's rim, and the power of the radius that converts them.
 _AT_RIM = {"kg·m²": ("kg", 2), "N·m·s/rad": ("N·s/m", 2), "N·m": ("N", 1)}
@@ -61,7 +62,7 @@ def identify_winch_command(request: WinchRequest, json: Path | None) -> bool:
         InputError: recordings, test-bed or options cannot be used.
     """
     refuse_existing(request.out)
-    with make_console().status("") as status:
+    with shown(make_console(), "reading") as progress:
         found = identify_winch(
             request.recordings,
             held_out=request.held_out,
@@ -72,7 +73,7 @@ def identify_winch_command(request: WinchRequest, json: Path | None) -> bool:
             reversals=request.reversals,
             band=request.band,
             leave_out_regimes=request.leave_out_regimes,
-            progress=lambda _, what: status.update(escape(what)),
+            progress=progress,
         )
     return hand_out(found, print_winches, request.out, json)
 

@@ -8,17 +8,17 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from rich.console import Console
-from rich.progress import BarColumn, Progress, TaskProgressColumn, TextColumn, TimeRemainingColumn
 
 from cspm.commands.import_tables import print_report
+from cspm.commands.progress_shown import shown
 from cspm.importing import write_import
 from cspm_ident.importing.column_store import ColumnStore
 from cspm_ident.importing.mapping import load_mapping
 from cspm_ident.importing.preparation import prepare
 from cspm_msgs_py.new_folder import refuse_existing
-from cspm_run.console import make_console, say
-from cspm_run.json_file import write_json
 from cspm_run.library import named_testbed
+from cspm_run.output.console import make_console, say
+from cspm_run.output.json_file import write_json
 
 
 @dataclass(frozen=True)
@@ -44,15 +44,14 @@ def import_command(request: Import, json: Path | None) -> None:
         named_testbed(request.testbed),
     )
     with ColumnStore() as store:
-        with _progress(console, f"reading {request.source.name}") as progress:
-            prepared = prepare(
-                request.source, mapping, testbed, store, progress, trial=request.out is None
-            )
+        trial = request.out is None
+        with _shares(console, f"reading {request.source.name}") as show:
+            prepared = prepare(request.source, mapping, testbed, store, show, trial=trial)
         print_report(console, prepared.report)
         counts: dict[str, int] = {}
         if request.out is not None:
-            with _progress(console, f"writing {request.out.name}") as progress:
-                counts = write_import(request.out, prepared, mapping, testbed, progress)
+            with _shares(console, f"writing {request.out.name}") as show:
+                counts = write_import(request.out, prepared, mapping, testbed, show)
             say(console, f"recording {request.out}: {sum(counts.values())} messages")
         else:
             say(console, "trial: nothing was written")
@@ -62,15 +61,7 @@ def import_command(request: Import, json: Path | None) -> None:
 
 
 @contextmanager
-def _progress(console: Console, what: str) -> Iterator[Callable[[float], None]]:
-    with Progress(
-        TextColumn("{task.description}", markup=False),
-        BarColumn(),
-        TaskProgressColumn(),
-        TimeRemainingColumn(),
-        console=console,
-        transient=True,
-        disable=not console.is_terminal,
-    ) as bar:
-        task = bar.add_task(what, total=1.0)
-        yield lambda share: bar.update(task, completed=share)
+def _shares(console: Console, what: str) -> Iterator[Callable[[float], None]]:
+    """Give what takes the share of one piece of work that is done."""
+    with shown(console, what) as progress:
+        yield lambda share: progress(share, what)

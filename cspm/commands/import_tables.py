@@ -10,7 +10,7 @@ from rich.table import Table
 from cspm_ident.importing.checks.pace import Pace
 from cspm_ident.importing.checks.suspicion import Suspicion
 from cspm_ident.importing.report import FieldReport, ImportReport, TopicReport
-from cspm_run.console import say
+from cspm_run.output.console import say
 
 
 def print_report(console: Console, report: ImportReport) -> None:

@@ -13,8 +13,8 @@ from rich.table import Table
 from cspm_msgs_py.recording.overview import Overview, overview
 from cspm_msgs_py.recording.recover import recover
 from cspm_msgs_py.recording.run_record import RECORD_NAME, SIM
-from cspm_run.console import make_console, say
-from cspm_run.json_file import write_json
+from cspm_run.output.console import make_console, say
+from cspm_run.output.json_file import write_json
 
 
 def info_command(bag: Path, json: Path | None) -> None:

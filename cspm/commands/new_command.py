@@ -14,7 +14,7 @@ from cspm_ident.diagnosis.reporting.machine_drawing import drawing
 from cspm_msgs_py.errors import InputError
 from cspm_msgs_py.scenario import load_scenario
 from cspm_msgs_py.testbed import load_testbed
-from cspm_run.console import make_console, say
+from cspm_run.output.console import make_console, say
 
 # Of the frame's least side in the plane of motion.
 RADIUS_SHARE = 0.1

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import threading
 import time
 from collections.abc import Iterator
 from contextlib import contextmanager
@@ -12,7 +13,7 @@ from rich.progress import BarColumn, TaskProgressColumn, TextColumn, TimeRemaini
 from rich.progress import Progress as Bar
 
 from cspm.progress import Progress
-from cspm_run.console import say
+from cspm_run.output.console import say
 
 # Between two lines where nobody watches [s].
 LINE_S = 10.0
@@ -30,7 +31,8 @@ def shown(console: Console, what: str) -> Iterator[Progress]:
         what: is done; names the work until it reports another name.
     """
     if not console.is_terminal:
-        yield _Lines(console, what).report
+        with _lines(console, what) as report:
+            yield report
         return
     with Bar(
         TextColumn("{task.description}"),
@@ -44,20 +46,28 @@ def shown(console: Console, what: str) -> Iterator[Progress]:
         yield lambda share, now: bar.update(task, completed=share, description=escape(now or what))
 
 
-class _Lines:
-    """Reports a line after each so many seconds."""
+@contextmanager
+def _lines(console: Console, what: str) -> Iterator[Progress]:
+    """Give a progress function of which the last report is printed every so many seconds."""
+    ended, begun = threading.Event(), time.monotonic()
+    last = (0.0, what)
 
-    def __init__(self, console: Console, what: str) -> None:
-        self._console, self._what = console, what
-        self._begun = self._last = time.monotonic()
+    def report(share: float, now: str) -> None:
+        nonlocal last
+        last = (share, now or what)
 
-    def report(self, share: float, what: str) -> None:
-        """Say how far the work is, unless that was said lately."""
-        now = time.monotonic()
-        if now - self._last < LINE_S:
-            return
-        self._last = now
-        say(self._console, progress_line(what or self._what, share, now - self._begun))
+    def tell() -> None:
+        while not ended.wait(LINE_S):
+            share, doing = last
+            say(console, progress_line(doing, share, time.monotonic() - begun))
+
+    teller = threading.Thread(target=tell, name="progress", daemon=True)
+    teller.start()
+    try:
+        yield report
+    finally:
+        ended.set()
+        teller.join()
 
 
 def progress_line(what: str, share: float, elapsed_s: float) -> str:

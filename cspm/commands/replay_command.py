@@ -14,8 +14,8 @@ from cspm.replaying import Replay, ReplayRequest, opened, played
 from cspm_msgs_py.bag import BagStream
 from cspm_ros.replay.player import UNLIMITED, Player, neighbour_rate
 from cspm_ros.replay.terminal_keys import RIGHT, TerminalKeys
-from cspm_run.console import make_console, say
-from cspm_run.json_file import write_json
+from cspm_run.output.console import make_console, say
+from cspm_run.output.json_file import write_json
 
 KEYS = "space: pause · s or →: one instant · + −: rate · q: end"
 

@@ -12,10 +12,10 @@ from pathlib import Path
 
 from rich.console import Console
 from rich.markup import escape
-from rich.progress import BarColumn, Progress, TextColumn, TimeRemainingColumn
 from rich.table import Table
 
 from cspm.changed_machine import of_testbed
+from cspm.commands.progress_shown import shown
 from cspm.commands.run_command import bundle_from, summarise
 from cspm_msgs_py.control_spec.motion_laws import MOTION_LAWS
 from cspm_msgs_py.dofs import DOFS
@@ -31,12 +31,12 @@ from cspm_msgs_py.scenario import (
 )
 from cspm_msgs_py.schedule import MOTION_CONTROLLER
 from cspm_run.bundle import Bundle
-from cspm_run.console import make_console, say
-from cspm_run.json_file import write_json
+from cspm_run.output.console import make_console, say
+from cspm_run.output.json_file import write_json
+from cspm_run.output.summary import summary_data
 from cspm_run.recorded_run import run
 from cspm_run.run_result import RunResult
 from cspm_run.stage_warm_up import compile_apart, is_compiled
-from cspm_run.summary import summary_data
 
 PICTURE = "runs.png"
 REFRESH_S = 0.2
@@ -225,33 +225,25 @@ def _run_all(
     bundles: Mapping[str, Bundle], folder: Path | None, console: Console
 ) -> dict[str, RunResult]:
     context = multiprocessing.get_context("spawn")
-    columns = TextColumn("{task.description}"), BarColumn(), TimeRemainingColumn()
     with (
         context.Manager() as manager,
         ProcessPoolExecutor(len(bundles), mp_context=context) as pool,
-        Progress(*columns, console=console, transient=True) as bar,
+        shown(console, "simulating") as progress,
     ):
         if not is_compiled():
-            _compile(list(bundles.values()), pool, bar)
+            progress(0.0, "compiling, once")
+            # What fails here the run itself reports.
+            wait(compile_apart(list(bundles.values()), pool))
         reached: MutableMapping[str, float] = manager.dict()
-        tasks = {name: bar.add_task(escape(name)) for name in bundles}
         futures = {
             name: pool.submit(_run_one, name, bundle, folder, reached)
             for name, bundle in bundles.items()
         }
         while not all(future.done() for future in futures.values()):
             _wait(list(futures.values()))
-            for name, bundle in bundles.items():
-                total = bundle.scenario.duration
-                bar.update(tasks[name], completed=reached.get(name, 0.0), total=total)
+            shares = [reached.get(n, 0.0) / b.scenario.duration for n, b in bundles.items()]
+            progress(sum(shares) / len(shares), ", ".join(bundles))
     return {name: future.result() for name, future in futures.items()}
-
-
-def _compile(bundles: Sequence[Bundle], pool: ProcessPoolExecutor, bar: Progress) -> None:
-    task = bar.add_task("compiling, once", total=None)
-    # What fails here the run itself reports.
-    wait(compile_apart(bundles, pool))
-    bar.remove_task(task)
 
 
 def _wait(futures: Sequence[Future[RunResult]]) -> None:

@@ -5,14 +5,14 @@ from __future__ import annotations
 import dataclasses
 import shlex
 import tempfile
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from pathlib import Path
 
 from rich.console import Console
-from rich.markup import escape
-from rich.progress import BarColumn, Progress, TaskID, TextColumn, TimeRemainingColumn
 
 from cspm.changed_machine import changed_machine, of_testbed
+from cspm.commands.progress_shown import shown
+from cspm.progress import Progress
 from cspm.scenario import Scenario
 from cspm.simulation import PROCESSES, REALTIME, Runner, bundle_of, ros_runner
 from cspm_model.cable_strength import limit_warnings
@@ -24,14 +24,14 @@ from cspm_msgs_py.schedule import schedule_of
 from cspm_ros.runtime.stall_watchdog import PATIENCE_S, check_patience
 from cspm_run.before_run import free_of, unmet_line
 from cspm_run.bundle import Bundle
-from cspm_run.console import make_console, say
-from cspm_run.json_file import write_json
 from cspm_run.library import named_testbed
+from cspm_run.output.console import make_console, say
+from cspm_run.output.json_file import write_json
+from cspm_run.output.summary import print_summary, summary_data
 from cspm_run.recorded_run import INPROCESS, run
 from cspm_run.resim import resimulate
 from cspm_run.run_result import RunResult
 from cspm_run.stage_warm_up import compile_beside
-from cspm_run.summary import print_summary, summary_data
 
 
 def run_command(
@@ -170,9 +170,11 @@ def resim_command(bag: Path, json: Path | None, controllers: Sequence[Path] = ()
     `controllers` are the user's own copies of the controllers' files that took part.
     """
     console = make_console()
-    with _progress(console) as bar:
-        task = bar.add_task(f"repeating {escape(bag.name)}", total=None, speed=0.0)
-        found = resimulate(bag, lambda now, total: _show(bar, task, now, total), controllers)
+    what = f"repeating {bag.name}"
+    with shown(console, what) as progress:
+        found = resimulate(
+            bag, lambda now, total: _in_seconds(progress, what, total)(now), controllers
+        )
     if found.difference is None:
         end = "" if found.cut_ns is None else f", up to {found.cut_ns * 1e-9:g} s, where it was cut"
         say(console, f"identical: all {found.messages} messages, bit for bit{end}")
@@ -193,12 +195,8 @@ def _run_with_progress(
 ) -> RunResult:
     """Run a scenario by a runner that needs ROS, or else in this process."""
     scenario = bundle.scenario
-    with _progress(console) as bar:
-        task = bar.add_task(escape(scenario.name), total=scenario.duration, speed=0.0)
-
-        def show(now: float) -> None:
-            _show(bar, task, now, scenario.duration)
-
+    with shown(console, scenario.name) as progress:
+        show = _in_seconds(progress, scenario.name, scenario.duration)
         if runner is None:
             return run(bundle, folder, show)
         if folder is not None:
@@ -209,18 +207,6 @@ def _run_with_progress(
             return dataclasses.replace(result, folder=None)
 
 
-def _progress(console: Console) -> Progress:
-    return Progress(
-        TextColumn("{task.description}"),
-        BarColumn(),
-        TextColumn("{task.completed:.1f} s, {task.fields[speed]:.1f} × real time"),
-        TimeRemainingColumn(),
-        console=console,
-        transient=True,
-    )
-
-
-def _show(bar: Progress, task: TaskID, simulated: float, total: float) -> None:
-    elapsed = bar.tasks[task].elapsed
-    speed = simulated / elapsed if elapsed else 0.0
-    bar.update(task, completed=simulated, total=total, speed=speed)
+def _in_seconds(progress: Progress, what: str, total: float) -> Callable[[float], None]:
+    """Return what takes the time simulated so far [s] of `total`."""
+    return lambda now: progress(min(1.0, now / total), f"{what}, {now:.1f} s")

@@ -11,6 +11,7 @@ from pathlib import Path
 from rich.console import Console
 
 import cspm.recorded
+from cspm.commands.progress_shown import shown
 from cspm.recorded import Recording
 from cspm.view.frames import frames_of
 from cspm.view.marks import read_marks
@@ -18,8 +19,8 @@ from cspm.view.view_server import ViewServer, listening
 from cspm.view.viewer_page import viewer_page
 from cspm_msgs_py.errors import InputError
 from cspm_msgs_py.testbed import Testbed, load_testbed
-from cspm_run.console import make_console, say
-from cspm_run.json_file import write_json
+from cspm_run.output.console import make_console, say
+from cspm_run.output.json_file import write_json
 
 MOST_RECORDINGS = 2
 
@@ -58,7 +59,7 @@ def view_command(request: ViewRequest, json: Path | None) -> None:
         count = len(request.recordings)
         raise InputError(f"view: {count} recordings, allowed: 1, or 2 to lay over one another")
     _refuse_file(request.html)
-    with console.status("reading"):
+    with shown(console, "reading"):
         page = page_of(request.recordings, request.testbed, request.diagnosis)
     if request.html is not None:
         _write(console, request.html, page)

@@ -66,7 +66,8 @@ def main(name: str, args: Sequence[str], began: float | None = None) -> int:
     try:
         start_node(name, args, began)
     except CspmError as err:
-        print(f"cspm: {' '.join(str(err).split())}", file=sys.stderr)  # noqa: T201
+        line = " ".join(str(err).split()).removeprefix(f"node {name}: ")
+        print(f"cspm node {name}: {line}", file=sys.stderr)  # noqa: T201
         return err.exit_code
     except KeyboardInterrupt:
         # Before the node takes signals itself.

@@ -14,10 +14,10 @@ from cspm.plots.run_figure import draw_run
 from cspm_model.kernels.rotation import euler_from_quaternion
 from cspm_msgs_py.dofs import DOFS
 from cspm_msgs_py.scenario import Requirement
-from cspm_run.json_file import write_json
+from cspm_run.output.json_file import write_json
+from cspm_run.output.summary import print_summary, summary_data
 from cspm_run.recorded_run import run
 from cspm_run.run_statistics import BINS, RunStatistics
-from cspm_run.summary import print_summary, summary_data
 
 REQUIREMENT = Requirement()
 UNWINDING = "control={mode: torque, torque: {surge_1: {offset: -0.2}}}"

@@ -12,6 +12,7 @@ from configparser import ConfigParser
 from importlib.metadata import distribution
 from pathlib import Path
 
+import error_lines
 import pytest
 
 from cspm_ros.runtime import node_main
@@ -143,7 +144,7 @@ def test_a_node_of_the_installation_reads_its_parameters(installed, tmp_path, na
         timeout=120,
     )
     assert done.returncode == 2, done.stderr
-    assert done.stderr.startswith("cspm: nowhere: no such scenario, allowed: calm, ")
+    assert error_lines.said(done.stderr).startswith("nowhere: no such scenario, allowed: calm, ")
     assert done.stderr.count("\n") == 1
 
 

@@ -40,6 +40,7 @@ NOT_RUN: dict[str, str] = {
     "cspm diagnose today --held-out": "a minute; tests/cspm/cli/test_diagnose.py",
     "cspm diagnose monday tuesday": "a minute; tests/cspm/cli/test_diagnose.py",
     "cspm run worst_case --testbed verdict": "needs that verdict; tests/project/test_tutorials.py",
+    "cspm campaign": "minutes, or several computers; tests/cspm/campaign",
     "cspm analyze workspace": "a minute; tests/cspm_control/analysis",
     "python -m bench": "minutes to hours; tests/bench runs a small case of each",
     # A server, a graph, or drives.

@@ -29,8 +29,8 @@ from cspm_control.design.gains import (
 )
 from cspm_msgs_py.new_folder import refuse_existing
 from cspm_msgs_py.scenario import ClosedLoop
-from cspm_run.console import make_console, say
-from cspm_run.json_file import write_json
+from cspm_run.output.console import make_console, say
+from cspm_run.output.json_file import write_json
 
 WAYS = {
     DESIGNED: "designed",

@@ -24,8 +24,8 @@ from cspm_control.analysis.linear import (
 )
 from cspm_control.analysis.published_linear import EXACT, FROZEN
 from cspm_msgs_py.new_folder import refuse_existing
-from cspm_run.console import make_console, say
-from cspm_run.json_file import write_json
+from cspm_run.output.console import make_console, say
+from cspm_run.output.json_file import write_json
 
 HEADINGS = {FROZEN: "ours, directions held", EXACT: "ours, exact"}
 

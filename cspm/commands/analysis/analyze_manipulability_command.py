@@ -16,8 +16,8 @@ from cspm_control.analysis.manipulability import Ellipsoid, Manipulability
 from cspm_model.parameters import nominal_parameters
 from cspm_model.spanned_axes import gyration_radius
 from cspm_msgs_py.new_folder import refuse_existing
-from cspm_run.console import make_console, say
-from cspm_run.json_file import write_json
+from cspm_run.output.console import make_console, say
+from cspm_run.output.json_file import write_json
 
 UNITS = {
     "force": ("N per N", "N·m per N"),

@@ -12,8 +12,8 @@ from cspm.analysis.reference import ReferenceAnalysis, reference_of
 from cspm.commands.run_command import bundle_from
 from cspm_msgs_py.new_folder import refuse_existing
 from cspm_msgs_py.recording.run_record import SIM
-from cspm_run.console import make_console, say
-from cspm_run.json_file import write_json
+from cspm_run.output.console import make_console, say
+from cspm_run.output.json_file import write_json
 
 
 def analyze_reference_command(

@@ -9,8 +9,8 @@ from rich.table import Table
 
 from cspm.analysis.machine import AnalyzedMachine
 from cspm.analysis.sag import SagAnalysis, sag_of
-from cspm_run.console import make_console, say
-from cspm_run.json_file import write_json
+from cspm_run.output.console import make_console, say
+from cspm_run.output.json_file import write_json
 
 
 def analyze_sag_command(

@@ -9,12 +9,12 @@ from pathlib import Path
 import typer
 from rich import box
 from rich.console import Console
-from rich.progress import BarColumn, Progress, TaskProgressColumn, TextColumn, TimeRemainingColumn
 from rich.table import Table
 
 from cspm.analysis.machine import AnalyzedMachine
 from cspm.analysis.workspace import grids_of, workspace_of
 from cspm.commands.analysis.claim_table import claim_table
+from cspm.commands.progress_shown import shown
 from cspm_control.analysis.claim import Claim
 from cspm_control.analysis.published_workspace import OURS
 from cspm_control.analysis.workspace import ALGORITHMS
@@ -26,8 +26,8 @@ from cspm_control.analysis.workspace_result import (
 )
 from cspm_msgs_py.interruption import interruptible
 from cspm_msgs_py.new_folder import refuse_existing
-from cspm_run.console import make_console, say
-from cspm_run.json_file import write_json
+from cspm_run.output.console import make_console, say
+from cspm_run.output.json_file import write_json
 
 WAYS = {
     "pseudo_inverse": "pseudo-inverse, t ≥ 0",
@@ -61,7 +61,7 @@ def analyze_workspace_command(
     """
     refuse_existing(folder)
     console = make_console()
-    with interruptible() as stopped, _bars(console, machine, coarse) as advance:
+    with interruptible() as stopped, _counted(console, machine, coarse) as advance:
         found = workspace_of(machine, acceleration, coarse, advance, stopped)
     if found is None:
         raise typer.Abort
@@ -73,22 +73,21 @@ def analyze_workspace_command(
 
 
 @contextmanager
-def _bars(
+def _counted(
     console: Console, machine: AnalyzedMachine, coarse: int
 ) -> Iterator[Callable[[str, int], None]]:
-    """Yield a callback with one progress bar per algorithm; silent without a terminal."""
-    with Progress(
-        *(TextColumn("{task.description}"), BarColumn(), TaskProgressColumn()),
-        TimeRemainingColumn(),
-        console=console,
-        transient=True,
-        disable=not console.is_terminal,
-    ) as bar:
-        tasks, grids = {}, grids_of(machine)
-        for name in ALGORITHMS:
-            size = grids[name].every(coarse).size
-            tasks[name] = bar.add_task(f"{WAYS[name]}, {size:,} poses", total=size)
-        yield lambda name, count: bar.advance(tasks[name], count)
+    """Yield what takes an algorithm's name, and how many further poses it is through with."""
+    grids = grids_of(machine)
+    total = sum(grids[name].every(coarse).size for name in ALGORITHMS)
+    done = 0
+    with shown(console, "workspace") as progress:
+
+        def advance(name: str, count: int) -> None:
+            nonlocal done
+            done += count
+            progress(done / total, f"{WAYS[name]}, {total:,} poses in all")
+
+        yield advance
 
 
 def _show(console: Console, found: WorkspaceResult, claims: Sequence[Claim]) -> None:

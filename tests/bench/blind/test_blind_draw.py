@@ -8,6 +8,7 @@ from itertools import combinations, pairwise
 from pathlib import Path
 
 import pytest
+from error_lines import said
 
 from cspm_msgs_py.errors import InputError
 from cspm_msgs_py.testbed import load_testbed
@@ -154,13 +155,13 @@ def test_the_command_line_refuses_in_one_line(monkeypatch, capsys, tmp_path):
     with pytest.raises(SystemExit) as caught:
         cli.main()
     assert caught.value.code == 2
-    assert capsys.readouterr().err == "cspm: --split all: allowed: dev, tune, sealed\n"
+    assert said(capsys.readouterr().err) == "--split all: allowed: dev, tune, sealed\n"
     monkeypatch.setattr(sys, "argv", ["bench.blind", "run", out])
     with pytest.raises(SystemExit) as caught:
         cli.main()
     assert caught.value.code == 2
-    line = f"cspm: {out}: no recordings, allowed: a folder of `python -m bench.blind make`\n"
-    assert capsys.readouterr().err == line
+    line = f"{out}: no recordings, allowed: a folder of `python -m bench.blind make`\n"
+    assert said(capsys.readouterr().err) == line
 
 
 def test_a_truth_among_the_recordings_and_one_of_another_benchmark_are_refused(tmp_path):

@@ -106,5 +106,5 @@ def test_memory_of_a_short_run_is_seen_from_outside():
 def test_a_run_that_fails_is_reported():
     from bench.performance.child import finish, start_cspm
 
-    with pytest.raises(RuntimeError, match="cspm ended with 2: cspm: nowhere: no such scenario"):
+    with pytest.raises(RuntimeError, match="ended with 2: cspm run: nowhere: no such scenario"):
         finish(start_cspm(["run", "nowhere"], {}))

@@ -5,6 +5,7 @@ from importlib.metadata import version
 from pathlib import Path
 
 import pytest
+from error_lines import said
 from loops import WILD
 from matplotlib.image import imread
 from recording_samples import write_sample
@@ -377,4 +378,4 @@ def test_several_scenarios_run_side_by_side(cspm, tmp_path):
 def test_what_cannot_run_side_by_side_is_one_line(cspm, words, line):
     code, out, err = cspm("run", *words, "--no-record", "--duration", "0.1")
     assert (code, out) == (2, "")
-    assert err.startswith(f"cspm: {line}")
+    assert said(err).startswith(line)

@@ -6,6 +6,7 @@ import sys
 
 import pytest
 from emps_samples import DATA, ESTIMATION, MAPPING, PULSES, TESTBED
+from error_lines import said
 from run_samples import SCENARIOS
 
 from cspm.cli import main as cli
@@ -228,7 +229,7 @@ def test_a_recording_counts_once_whatever_its_name_and_has_to_be_long_enough(csp
     ):
         code, _, err = cspm(capsys, "diagnose", *arguments)
         assert code == 2
-        assert err.startswith(f"cspm: {message}")
+        assert said(err).startswith(message)
 
 
 @pytest.mark.parametrize(
@@ -244,7 +245,7 @@ def test_unusable_input_is_one_line(cspm, capsys, arguments, message):
     (cspm.folder / "taken").mkdir(exist_ok=True)
     code, out, err = cspm(capsys, "diagnose", *arguments)
     assert (code, out) == (2, "")
-    assert err.startswith(f"cspm: {message}")
+    assert said(err).startswith(message)
     assert err.count("\n") == 1
 
 

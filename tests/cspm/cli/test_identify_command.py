@@ -3,6 +3,7 @@
 import json
 
 import pytest
+from error_lines import said
 from machines import THESIS
 from matplotlib.image import imread
 from rig_samples import record
@@ -33,7 +34,7 @@ def refused(cspm):
     def call(*arguments):
         code, _, err = cspm("identify", *arguments)
         assert (code, err.count("\n")) == (2, 1), err
-        return err.removeprefix("cspm: ").removesuffix("\n")
+        return said(err).removesuffix("\n")
 
     return call
 

@@ -6,6 +6,7 @@ import sys
 
 import numpy as np
 import pytest
+from error_lines import said
 from import_samples import ONE_WINCH, table
 from run_samples import recorded
 
@@ -148,7 +149,7 @@ def test_what_cannot_be_done_is_one_line_and_leaves_nothing(lab, tmp_path):
     ):
         code, _, err = lab(*arguments, **how)
         assert (code, err.count("\n")) == (2, 1)
-        assert err.startswith(f"cspm: {reported}")
+        assert said(err).startswith(reported)
     assert sorted(tmp_path.iterdir()) == before
 
 
@@ -158,7 +159,7 @@ def test_a_failure_while_writing_leaves_no_half_recording(lab, tmp_path, monkeyp
 
     monkeypatch.setattr(write, "_append", fail)
     code, _, err = lab("--out", "bag")
-    assert (code, err) == (1, "cspm: bag: No space left on device\n")
+    assert (code, err) == (1, "cspm import: bag: No space left on device\n")
     assert not (tmp_path / "bag").exists()
 
 

@@ -118,4 +118,4 @@ ONLY_ONE = (
 )
 def test_what_cannot_be_compared_is_one_line(cspm, words, line):
     code, out, err = cspm("run", *words, "--no-record", "--duration", "0.1")
-    assert (code, out, err) == (2, "", f"cspm: {line}\n")
+    assert (code, out, err) == (2, "", f"cspm run: {line}\n")

@@ -8,6 +8,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from browser import look
+from error_lines import said
 from machines import THESIS
 from run_samples import run_to
 
@@ -280,7 +281,7 @@ def test_the_command_prints_writes_and_reports(command, folder, tmp_path):
 def test_wrong_options_are_one_line(command, folder, words, line):
     code, _, err = command("compare", folder, *words)
     assert (code, err.count("\n")) == (2, 1)
-    assert err.startswith(f"cspm: {line}")
+    assert said(err).startswith(line)
 
 
 @pytest.mark.slow

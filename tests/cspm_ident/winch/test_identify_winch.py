@@ -6,6 +6,7 @@ import json
 import numpy as np
 import pytest
 from emps_samples import DATA, ESTIMATION, MAPPING, PUBLISHED, PULSES, TESTBED, recorded
+from error_lines import said
 from machines import THESIS
 from matplotlib.image import imread
 from run_samples import SCENARIOS, bundle_of
@@ -109,7 +110,7 @@ def test_the_fitted_file_runs_and_predicts_a_second_recording(cspm, bag, tmp_pat
     assert (code, err) == (0, "")
     code, _, err = cspm("identify", "winch", bag, "--held-out", "again")
     assert code == 2
-    assert err.startswith("cspm: again: another test-bed than ")
+    assert said(err).startswith("again: another test-bed than ")
 
 
 @recorded
@@ -208,7 +209,7 @@ def test_bad_input_is_one_line(cspm, short):
     def refused(*words):
         code, _, err = cspm("identify", "winch", short, *words)
         assert (code, err.count("\n")) == (2, 1), err
-        return err.removeprefix("cspm: ").removesuffix("\n")
+        return said(err).removesuffix("\n")
 
     assert refused("--winches", "hoist") == f"{short}: no cable hoist, allowed: surge"
     assert refused("--effects", "cable_creep").startswith(

@@ -4,6 +4,7 @@ import re
 import sys
 
 import pytest
+from error_lines import said
 from run_samples import SCENARIOS
 
 from cspm.cli import main as cli
@@ -23,7 +24,7 @@ def refused(monkeypatch, capsys):
             cli.main()
         out, err = capsys.readouterr()
         assert (caught.value.code, out, err.count("\n")) == (2, "", 1), err
-        return err.removeprefix("cspm: ").removesuffix("\n")
+        return said(err).removesuffix("\n")
 
     return call
 

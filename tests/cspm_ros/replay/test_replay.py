@@ -24,6 +24,7 @@ from bag_samples import (
     write_rosbag1,
     write_rosbag2,
 )
+from error_lines import said
 from ros_graph import assert_same, difference, load_ros, new_domain
 from run_samples import SCENARIOS, bundle_of
 
@@ -460,9 +461,9 @@ def test_unusable_input_is_one_line(cspm, domain, recording, arguments, line):
 def test_bags_that_say_nothing_of_the_run_are_not_for_nodes(cspm, domain, tmp_path):
     write_mcap(tmp_path / "bag.mcap", sample_messages(40))
     code, _, err = cspm("replay", "bag.mcap", "--through", "all")
-    assert (code, err) == (
+    assert (code, said(err)) == (
         2,
-        "cspm: bag.mcap: carries no scenario.yaml and no testbed.yaml, allowed: a recording made"
+        "bag.mcap: carries no scenario.yaml and no testbed.yaml, allowed: a recording made"
         " by cspm\n",
     )
     assert cspm("replay", "nowhere")[0] == 2
@@ -479,7 +480,7 @@ def test_a_damaged_bag_ends_in_one_line(cspm, domain, recording, tmp_path):
     for through in ([], ["--through", "force_controller"]):
         code, _, err = cspm("replay", "damaged.mcap", *through)
         assert (code, err.count("\n")) == (2, 1)
-        assert err.startswith("cspm: damaged.mcap: ")
+        assert said(err).startswith("damaged.mcap: ")
 
 
 def test_help_teaches(cspm):

@@ -11,6 +11,7 @@ from importlib.util import find_spec
 
 import numpy as np
 import pytest
+from error_lines import said
 from loops import WILD
 from recorded_lockstep_runs import late
 from ros_graph import assert_same, content, difference, done, load_ros, new_domain
@@ -361,6 +362,6 @@ def test_the_command_line_reports_a_divergence(tmp_path):
     code, _, err = done("run", "rest", "--mode", "graph", "--out", tmp_path / "bag", *settings)
     assert code == 1
     [line] = [line for line in err.splitlines() if not line.startswith("[WARN]")]
-    assert line.startswith("cspm: diverged at t = 0.")
+    assert said(line).startswith("diverged at t = 0.")
     with Recording(tmp_path / "bag") as recording:
         assert recording.complete

@@ -8,6 +8,7 @@ from itertools import cycle
 import psutil
 import pytest
 from cspm_process import grown
+from error_lines import said
 from ros_graph import (
     NODES,
     assert_same,
@@ -174,7 +175,7 @@ NO_SUCH_SCENARIO = "nothing: no such scenario, allowed: calm, "
 def test_an_unusable_parameter_is_one_line(capfd, monkeypatch, name, setting, line):
     code, err = reported(capfd, monkeypatch, name, "--ros-args", "-p", setting)
     assert code == 2
-    assert err.startswith(f"cspm: {line}")
+    assert said(err).startswith(line)
     assert err.count("\n") == 1
 
 
@@ -188,23 +189,24 @@ def test_an_unusable_parameter_is_one_line(capfd, monkeypatch, name, setting, li
     ],
 )
 def test_arguments_that_ros_does_not_understand_are_one_line(capfd, monkeypatch, args, what):
-    assert reported(capfd, monkeypatch, "plant", "--ros-args", *args) == (
+    code, err = reported(capfd, monkeypatch, "plant", "--ros-args", *args)
+    assert (code, said(err)) == (
         2,
-        f"cspm: --ros-args: {what}, allowed: -p NAME:=VALUE, -r OLD:=NEW, --params-file FILE and"
+        f"--ros-args: {what}, allowed: -p NAME:=VALUE, -r OLD:=NEW, --params-file FILE and"
         " what else ROS 2 takes\n",
     )
 
 
 def test_a_node_that_is_none_is_one_line(capfd, monkeypatch):
     code, err = reported(capfd, monkeypatch, "motor")
-    assert (code, err.partition(":")[0]) == (2, "cspm")
+    assert (code, err.partition(":")[0]) == (2, "cspm node motor")
     *nodes, recorder = NODES
     allowed = ", ".join((*nodes, "target_tracker", recorder, "player"))
-    assert err == f"cspm: node motor: allowed: {allowed}\n"
+    assert said(err) == f"allowed: {allowed}\n"
     code, err = reported(capfd, monkeypatch, "plant", "-p", "steps:=5")
     assert code == 2
     assert err == (
-        "cspm: node plant: -p, allowed: nothing, or --ros-args and what ROS 2 takes after it\n"
+        "cspm node plant: -p, allowed: nothing, or --ros-args and what ROS 2 takes after it\n"
     )
 
 
@@ -225,7 +227,8 @@ def test_whole_numbers_do_for_times_and_nothing_for_lists(capfd, monkeypatch):
     assert code == 1
     (line,) = [line for line in err.splitlines() if not line.startswith("[WARN]")]
     assert re.match(
-        r"cspm: not all nodes joined within \S+ s: plant waits for force_controller, recorder;"
+        r"cspm node plant: not all nodes joined within \S+ s: plant waits for force_controller,"
+        r" recorder;"
         r" allowed: 1 times the longer of patience \(1 s\) and what this start cost \(\S+ s\); for"
         r" more use --patience SECONDS, for a node the parameter patience$",
         line,

@@ -5,6 +5,7 @@ import threading
 from dataclasses import replace
 
 import pytest
+from error_lines import said
 from first_in_line import going_first
 from realtime_graph import (
     OWN_RUN,
@@ -122,7 +123,7 @@ def test_an_emergency_stop_from_outside_is_obeyed_at_once(tmp_path):
         command.process.send_signal(signal.SIGINT)
         code, _, err = command.done()
     assert code == 1
-    assert err.startswith("cspm: force_controller: safe state hold since ")
+    assert said(err).startswith("force_controller: safe state hold since ")
     evidence = Evidence(command.folder)
     ((since, _),) = evidence.alarms(FORCE_CONTROLLER)
     with Recording(command.folder) as recording:
@@ -163,7 +164,7 @@ def test_hardware_that_dies_is_missed(warm, tmp_path):
         command.process.send_signal(signal.SIGTERM)
         code, _, err = command.done()
     assert code == 1
-    assert err.startswith("cspm: force_controller: safe state hold since ")
+    assert said(err).startswith("force_controller: safe state hold since ")
 
 
 def test_an_existing_folder_is_left_alone(tmp_path):

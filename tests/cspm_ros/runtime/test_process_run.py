@@ -14,6 +14,7 @@ from pathlib import Path
 import psutil
 import pytest
 from cspm_process import child, grown
+from error_lines import said
 from loops import WILD
 from process_runs import processes, use_site
 from ros_graph import (
@@ -126,7 +127,7 @@ def test_a_divergence_ends_the_run_and_keeps_its_recording(tmp_path):
     assert code == 1
     kept = run(bundle_of("rest", *WILD), tmp_path / "inprocess")
     begin, _, end = kept.failure.partition("; before it: ")
-    assert err.startswith(f"cspm: diverged at {begin}; before it: ")
+    assert said(err).startswith(f"diverged at {begin}; before it: ")
     assert err.count("\n") == 1
     assert end
     assert_same(tmp_path / "inprocess", folder)

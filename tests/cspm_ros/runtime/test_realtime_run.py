@@ -9,6 +9,7 @@ from contextlib import ExitStack
 
 import numpy as np
 import pytest
+from error_lines import said
 from realtime_graph import (
     APART,
     GUARDS,
@@ -112,7 +113,7 @@ def test_a_dead_node_is_named_and_what_the_others_did_is_recorded(tmp_path):
         command.nodes()[FORCE_CONTROLLER].kill()
         code, out, err = command.done()
     assert code == 1
-    assert err.startswith("cspm: force_controller ended by signal SIGKILL before the run did")
+    assert said(err).startswith("force_controller ended by signal SIGKILL before the run did")
     assert err.count("\n") == 1
     assert overview(command.folder).complete
     evidence = Evidence(command.folder)
@@ -220,6 +221,6 @@ def test_nobody_runs_a_node_that_the_scenario_does_not_have(warm, tmp_path):
         graph.start("wave_trajectory", nodes=())
         assert graph.join() == {"wave_trajectory": 2}
         assert graph.log("wave_trajectory").read_text() == (
-            "cspm: node wave_trajectory: scenario one_winch has none, allowed: plant,"
+            "cspm node wave_trajectory: scenario one_winch has none, allowed: plant,"
             " force_controller, recorder\n"
         )

@@ -6,6 +6,7 @@ import sys
 from pathlib import Path
 
 import pytest
+from error_lines import said
 from run_samples import SCENARIOS
 
 from cspm.cli import main as cli
@@ -144,8 +145,8 @@ def test_a_file_in_the_form_of_version_0_1_is_refused_with_what_moved(own, cspm,
     code, out, err = cspm("diagnose", "--explain", "bar_mass")
     name = old.split("=")[0]
     assert (code, out) == (2, "")
-    assert err == (
-        f"cspm: {VARIABLE}: {path}: '{name}' is no argument of Effect since version 0.2, allowed:"
+    assert said(err) == (
+        f"{VARIABLE}: {path}: '{name}' is no argument of Effect since version 0.2, allowed:"
         f" {part}; Effect takes id, block, parameters, elements, physics, signature, description\n"
     )
 
@@ -168,7 +169,7 @@ def test_a_file_that_is_not_there_is_refused(own, cspm, tmp_path, monkeypatch, m
     catalogue.cache_clear()
     code, out, err = cspm("diagnose", "--explain", "bar_mass")
     assert (code, out, err.count("\n")) == (2, "", 1)
-    assert err.startswith(f"cspm: {VARIABLE}: {tmp_path / missing}: no such file, allowed: .py")
+    assert said(err).startswith(f"{VARIABLE}: {tmp_path / missing}: no such file, allowed: .py")
     monkeypatch.setenv(VARIABLE, str(tmp_path))
     with pytest.raises(InputError, match=r"has no effect, allowed: files with an EFFECT$"):
         catalogue()

@@ -6,6 +6,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from error_lines import said
 from run_samples import bundle_of
 
 from cspm.cli import main as cli
@@ -66,7 +67,7 @@ def test_resim_repeats_it_on_the_plant_that_made_it(monkeypatch, recording):
 
 def test_an_unknown_plant_is_refused(monkeypatch, capsys):
     assert command(monkeypatch, "run", "rest", "--plant", "real", "--no-record") == 2
-    assert capsys.readouterr().err == "cspm: --plant real: allowed: sim, mujoco, external\n"
+    assert said(capsys.readouterr().err) == "--plant real: allowed: sim, mujoco, external\n"
     bundle = bundle_of("rest")
     with pytest.raises(InputError, match=r"^plant real: allowed: sim, mujoco$"):
         assemble(bundle.scenario, bundle.testbed.testbed, Path(), "real")

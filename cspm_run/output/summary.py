@@ -11,7 +11,7 @@ from rich.table import Table
 
 from cspm_msgs_py.dofs import DOFS
 from cspm_msgs_py.scenario import Requirement
-from cspm_run.console import say
+from cspm_run.output.console import say
 from cspm_run.run_result import RunResult
 
 

@@ -6,7 +6,7 @@ from typing import Annotated
 
 import typer
 
-from cspm.cli.app import app
+from cspm.cli.app import Json, app
 from cspm_msgs_py.errors import InputError
 
 
@@ -31,6 +31,7 @@ def new(
     ] = "2,2,2",
     mass: Annotated[float, typer.Option(metavar="KG", help="Mass of the platform.")] = 5.0,
     run: Annotated[bool, typer.Option(help="Whether to run the scenario.")] = True,
+    json: Json = None,
 ) -> None:
     """Write the first test-bed and scenario of your own robot, check, draw and run them."""
     from cspm.commands.new_command import new_command
@@ -39,4 +40,4 @@ def new(
         x, y, z = (float(value) for value in size.split(","))
     except ValueError:
         raise InputError(f"--size {size}: allowed: three numbers in m, such as 2,2,2") from None
-    new_command(name, kind, (x, y, z), mass, run=run)
+    new_command(name, kind, (x, y, z), mass, json, run=run)

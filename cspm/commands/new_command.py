@@ -15,13 +15,20 @@ from cspm_msgs_py.errors import InputError
 from cspm_msgs_py.scenario import load_scenario
 from cspm_msgs_py.testbed import load_testbed
 from cspm_run.output.console import make_console, say
+from cspm_run.output.json_file import write_json
 
 # Of the frame's least side in the plane of motion.
 RADIUS_SHARE = 0.1
 
 
 def new_command(
-    name: str, kind: str, size: tuple[float, float, float], mass: float, *, run: bool
+    name: str,
+    kind: str,
+    size: tuple[float, float, float],
+    mass: float,
+    json: Path | None = None,
+    *,
+    run: bool,
 ) -> None:
     """Write test-bed and scenario of a new robot, check and draw it, and run it.
 
@@ -30,6 +37,7 @@ def new_command(
         kind: one of `KINDS`.
         size: of its frame, x y z [m].
         mass: of its platform [kg].
+        json: file for the names of what is written; None writes none.
         run: whether to run the scenario.
 
     Raises:
@@ -57,5 +65,8 @@ def new_command(
     say(console, f"written {machine}, {scenario}, {picture}")
     if run:
         run_command(scenario, (), None, None)
+    if json is not None:
+        files = {"testbed": machine, "scenario": scenario, "picture": picture}
+        write_json(json, {key: str(path) for key, path in files.items()})
     say(console, f"next: edit {machine}, then cspm run {scenario} --out first")
     say(console, f"      cspm diagnose first; cspm analyze workspace {scenario} --coarse 2")

@@ -9,9 +9,9 @@ from matplotlib.axes import Axes
 from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.figure import Figure
 
+from cspm.plots.picture_style import save
 from cspm_ident.rig.damping import DAMPING, DampingResult
 
-DPI = 110
 SHOWN = 5.0  # s
 
 
@@ -33,7 +33,7 @@ def draw_damping(path: Path, result: DampingResult) -> None:
         axes.margins(x=0)
     rows[1].legend(fontsize="small", ncols=2)
     rows[-1].set_xlabel("time [s]")
-    figure.savefig(path, dpi=DPI)
+    save(figure, path)
 
 
 def _line(axes: Axes, result: DampingResult) -> None:

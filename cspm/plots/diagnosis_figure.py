@@ -8,11 +8,11 @@ import numpy as np
 from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.figure import Figure
 
+from cspm.plots.picture_style import save
 from cspm_ident.diagnosis.diagnosis import Diagnosis
 from cspm_ident.diagnosis.reporting.statement import channel_of
 from cspm_ident.diagnosis.reporting.verdict import verdict_of
 
-DPI = 90
 _STAGES = (
     ("before", "o", "tab:red"),
     ("retuned", "s", "tab:orange"),
@@ -48,4 +48,4 @@ def draw_diagnosis(path: Path, found: Diagnosis) -> None:
     axes.set_title("\n".join([f"verdict: {verdict_of(found).value}", *names]), fontsize="medium")
     axes.grid(axis="x", alpha=0.3)
     figure.legend(loc="outside lower center", ncols=3, fontsize="small")
-    figure.savefig(path, dpi=DPI)
+    save(figure, path)

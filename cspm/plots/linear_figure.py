@@ -10,12 +10,11 @@ from matplotlib.axes import Axes
 from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.figure import Figure
 
-from cspm.plots.picture_style import PALETTE
+from cspm.plots.picture_style import PALETTE, save
 from cspm_control.analysis.gain import ZERO_SHARE
 from cspm_control.analysis.linear import FREQUENCIES, LinearAnalyses, SubsystemAnalysis
 from cspm_msgs_py.dofs import DOFS
 
-DPI = 90
 LOWEST_DB = -160.0
 # Curves closer than this over all frequencies are drawn as one, which has all their names.
 ALIKE = 5e-3
@@ -33,7 +32,7 @@ def draw_linear(path: Path, found: LinearAnalyses, cables: tuple[str, ...]) -> N
         _gains(axes[0, column], frozen, exact)
         axes[0, column].set_title(f"{name} sub-system")
         _relative(axes[1, column], frozen, exact, DOFS if name == "motion" else cables)
-    figure.savefig(path, dpi=DPI)
+    save(figure, path)
 
 
 def _gains(axes: Axes, frozen: SubsystemAnalysis, exact: SubsystemAnalysis) -> None:

@@ -10,10 +10,10 @@ from matplotlib.axes import Axes
 from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.figure import Figure
 
+from cspm.plots.picture_style import save
 from cspm_control.analysis.loop_view import LOWEST_FREQUENCY, LoopView
 from cspm_control.analysis.loops import CASCADE, DESIGNED, LATE, SAMPLED, LoopAnalysis
 
-DPI = 90
 LOWEST_DB = -80.0
 HIGHEST_FREQUENCY = 5e3  # rad/s
 HIGHEST_PHASE = 30.0  # °
@@ -67,7 +67,7 @@ def _draw(
     rows[0, 0].set_ylim(bottom=LOWEST_DB)
     handles, labels = rows[0, 0].get_legend_handles_labels()
     figure.legend(handles, labels, loc="outside lower center", ncols=len(ways))
-    figure.savefig(path, dpi=DPI)
+    save(figure, path)
 
 
 def _bode(gain: Axes, phase: Axes, view: LoopView, style: str, label: str) -> None:

@@ -12,6 +12,7 @@ from matplotlib.figure import Figure
 from matplotlib.ticker import LogLocator, NullFormatter
 from numpy.typing import NDArray
 
+from cspm.plots.picture_style import save
 from cspm_control.analysis.cable_structure import CableStructure, structures
 from cspm_control.analysis.manipulability import manipulability
 from cspm_control.analysis.pose_grid import Grid, both_ways
@@ -19,7 +20,6 @@ from cspm_model.kernels.machine import PlantParameters
 
 Array = NDArray[np.float64]
 
-DPI = 90
 # Scale of the force ellipses, each drawn at its pose: per N/N, of the range of poses.
 SIZE = 0.3
 TURN = np.linspace(0.0, 2.0 * np.pi, 97)
@@ -50,7 +50,7 @@ def draw_manipulability(
     side.set(xlabel="surge [m]", ylabel="heave, down [m]", title="from the side")
     side.invert_yaxis()
     _accelerations(linear, angular, machine, parameters, pose, grid.z)
-    figure.savefig(path, dpi=DPI)
+    save(figure, path)
 
 
 def _spread(values: Array, count: int) -> Array:

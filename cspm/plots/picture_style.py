@@ -4,8 +4,10 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from contextlib import contextmanager
+from pathlib import Path
 
 import matplotlib as mpl
+from matplotlib.figure import Figure
 
 # Blue, orange and nearly black: colour-blind readers tell them apart, and a grey print too.
 COLOURS = ("#0072b2", "#e69f00", "#222222")
@@ -33,3 +35,19 @@ def large_letters() -> Iterator[None]:
         }
     ):
         yield
+
+
+def save(figure: Figure, path: Path) -> None:
+    """Write a figure as PNG, and beside it as SVG, the same bytes for the same figure.
+
+    Args:
+        figure: what is drawn.
+        path: of the PNG; the SVG has its name, with another ending.
+
+    Raises:
+        OSError: a file cannot be written.
+    """
+    figure.savefig(path, dpi=DPI)
+    # Letters stay letters, which are found, copied and set in the reader's type.
+    with mpl.rc_context({"svg.fonttype": "none", "svg.hashsalt": "cspm"}):
+        figure.savefig(path.with_suffix(".svg"), metadata={"Date": None})

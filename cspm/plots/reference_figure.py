@@ -11,7 +11,7 @@ from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.figure import Figure
 from numpy.typing import NDArray
 
-from cspm.plots.picture_style import COLOURS, DPI, large_letters
+from cspm.plots.picture_style import COLOURS, large_letters, save
 from cspm.plots.run_panels import draw_envelope
 from cspm_control.analysis.cable_groups import cable_groups
 from cspm_control.analysis.reference_demand import ReferenceDemand
@@ -60,7 +60,7 @@ def draw_reference(
             else "within all limits"
         )
         figure.suptitle(f"reference of {name}: {verdict}; limits dashed")
-        figure.savefig(path, dpi=DPI)
+        save(figure, path)
 
 
 def _range(axes: Axes, times: Array, columns: Array) -> None:

@@ -11,7 +11,7 @@ from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.figure import Figure
 from numpy.typing import NDArray
 
-from cspm.plots.picture_style import DPI, large_letters
+from cspm.plots.picture_style import large_letters, save
 from cspm.plots.run_panels import binned, draw_errors, draw_tensions
 from cspm_control.analysis.cable_groups import cable_groups
 from cspm_msgs_py.scenario import Requirement
@@ -52,7 +52,7 @@ def draw_run(
             axes.set_ylabel(label)
         rows[-1].set_xlabel("time [s]")
         figure.suptitle(f"{result.scenario}, seed {result.seed}")
-        figure.savefig(path, dpi=DPI)
+        save(figure, path)
 
 
 def _fill(

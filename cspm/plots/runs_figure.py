@@ -10,7 +10,7 @@ from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.figure import Figure
 from numpy.typing import NDArray
 
-from cspm.plots.picture_style import DPI
+from cspm.plots.picture_style import save
 from cspm.plots.run_panels import binned, draw_errors, draw_tensions
 from cspm_control.analysis.cable_groups import cable_groups
 from cspm_msgs_py.scenario import Requirement
@@ -54,7 +54,7 @@ def draw_runs(
         grid[row, 0].set_ylabel(label)
     for row in range(len(ERRORS)):
         grid[row, -1].legend(loc="upper left", bbox_to_anchor=(1.0, 1.0), frameon=False)
-    figure.savefig(path, dpi=DPI)
+    save(figure, path)
 
 
 def _draw_run(

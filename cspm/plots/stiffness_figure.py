@@ -9,10 +9,9 @@ from matplotlib.axes import Axes
 from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.figure import Figure
 
+from cspm.plots.picture_style import save
 from cspm_ident.rig.flanks import UP
 from cspm_ident.rig.stiffness import SpecimenStiffness, StiffnessResult
-
-DPI = 110
 
 
 def draw_stiffness(path: Path, result: StiffnessResult) -> None:
@@ -82,4 +81,4 @@ def _finish(figure: Figure, path: Path, rows: tuple[Axes, ...]) -> None:
     for axes in rows:
         axes.grid(alpha=0.3)
         axes.margins(x=0)
-    figure.savefig(path, dpi=DPI)
+    save(figure, path)

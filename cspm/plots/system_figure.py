@@ -8,10 +8,10 @@ from pathlib import Path
 from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.figure import Figure
 
+from cspm.plots.picture_style import save
 from cspm_ident.system.prediction_test import Judgement
 from cspm_msgs_py.dofs import DOFS
 
-DPI = 90
 _MM, _MRAD = 1e3, 1e3
 _TRANSLATIONS = 3
 _TITLE_PAD = 22  # points, above a legend
@@ -43,4 +43,4 @@ def draw_system(path: Path, judgements: Sequence[Judgement]) -> None:
             axes.grid(alpha=0.3)
             axes.margins(x=0)
         rows[-1][column].set_xlabel("time [s]")
-    figure.savefig(path, dpi=DPI)
+    save(figure, path)

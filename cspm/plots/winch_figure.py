@@ -8,9 +8,9 @@ from matplotlib.axes import Axes
 from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.figure import Figure
 
+from cspm.plots.picture_style import save
 from cspm_ident.winch.identified_winch import DESCRIBED, FITTED, IdentifiedWinch, WinchJudgement
 
-DPI = 100
 # Most samples that a figure shows.
 _MOST = 4000
 _COLOURS = {DESCRIBED: "C1", FITTED: "C0"}
@@ -34,7 +34,7 @@ def draw_winch(path: Path, winch: IdentifiedWinch) -> None:
         _over_time(torque, rest, each)
         _over_speed(against, each)
         rest.sharex(torque)
-    figure.savefig(path, dpi=DPI)
+    save(figure, path)
 
 
 def _over_time(torque: Axes, rest: Axes, each: WinchJudgement) -> None:

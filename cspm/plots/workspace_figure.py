@@ -12,13 +12,13 @@ from matplotlib.figure import Figure
 from matplotlib.patches import Patch
 from numpy.typing import NDArray
 
+from cspm.plots.picture_style import save
 from cspm_control.analysis.pose_grid import GRID_AXES, Grid
 from cspm_control.analysis.pose_map import PoseMap
 from cspm_control.analysis.workspace_result import WorkspaceResult
 
 Array = NDArray[np.float64]
 
-DPI = 90
 # Solid, so that what lies above has the colour of the legend.
 COLOURS = {"general": "#8fb8dc", "pseudo_inverse": "#f2d16b"}
 LABELS = {"general": "any tensions from 0", "pseudo_inverse": "pseudo-inverse, from 0"}
@@ -41,7 +41,7 @@ def draw_workspace(path: Path, found: WorkspaceResult) -> None:
     handles = [Patch(color=COLOURS[name], label=LABELS[name]) for name in COLOURS]
     handles += [Patch(fill=False, edgecolor=colour, label=label) for colour, label in TIGHTER]
     figure.legend(handles=handles, loc="outside lower center", ncols=4)
-    figure.savefig(path, dpi=DPI)
+    save(figure, path)
 
 
 def draw_maps(path: Path, found: WorkspaceResult) -> None:
@@ -58,7 +58,7 @@ def draw_maps(path: Path, found: WorkspaceResult) -> None:
         for place, (title, name) in zip(row, columns, strict=True):
             held = np.where(each.static["general"], getattr(each, name), np.nan)
             _map(place, each, held, title)
-    figure.savefig(path, dpi=DPI)
+    save(figure, path)
 
 
 def _space(

@@ -13,7 +13,7 @@ from typing import Annotated, NoReturn
 import typer
 
 from cspm.cli.app import RUN_FAILED, Json, app, new_folder
-from cspm.cli.shared_options import COMMAND, add_shared_options
+from cspm.cli.shared_options import COMMAND, Browser, Port, add_shared_options
 from cspm_msgs_py.control_spec.motion_laws import MOTION_LAWS
 from cspm_msgs_py.errors import CspmError, DamageError, InputError
 from cspm_run.library import find_scenario, scenario_names
@@ -120,6 +120,8 @@ cspm run worst_case --set sensors=ideal --set rates.motion_controller=100
 cspm run calm --testbed fitted/fitted_testbed.yaml
 
 cspm run calm --mode graph
+
+cspm run calm --view --effect winch_coulomb_friction@sway_3:torque=0.02
 
 cspm run calm --mode realtime --plant external
 
@@ -234,6 +236,16 @@ def run(
             f" show them side by side: {', '.join(MOTION_LAWS)}.",
         ),
     ] = None,
+    view: Annotated[
+        bool,
+        typer.Option(
+            "--view",
+            help="Show the run in a browser as it happens; in this process at the clock's pace,"
+            " with pause, and with knobs for gains, sea and effects that begin it again.",
+        ),
+    ] = False,
+    port: Port = None,
+    browser: Browser = None,
     json: Json = None,
 ) -> None:
     """Simulate a scenario: record it, draw it, and report how well the bar followed.
@@ -255,7 +267,14 @@ def run(
     folder = out if out is not None else new_folder("+".join(Path(s).stem for s in scenarios))
     place = folder if record else None
     paths = [find_scenario(scenario) for scenario in scenarios]
-    if len(paths) == 1 and laws is None:
+    if view:
+        from cspm.commands.run_view_command import WatchRequest, check_watchable, run_view_command
+
+        check_watchable(len(paths), record=record, beside=laws is not None)
+        opened = sys.stdout.isatty() if browser is None else browser
+        more = (plant, mode, testbed, effects or (), port, opened)
+        finished = run_view_command(WatchRequest(paths[0], settings, folder, json, *more))
+    elif len(paths) == 1 and laws is None:
         finished = run_command(
             paths[0],
             settings,

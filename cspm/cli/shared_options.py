@@ -13,6 +13,25 @@ from cspm_run.output.console import VOICE, Voice
 
 # Of the command that runs, with all its words; a command line runs in a context of its own.
 COMMAND: ContextVar[str] = ContextVar("command", default="")
+Port = Annotated[
+    int | None,
+    typer.Option(
+        metavar="NUMBER",
+        min=0,
+        max=65535,
+        help="Port to listen on; 0 takes any.",
+        show_default="the first free one from 8080",
+    ),
+]
+Browser = Annotated[
+    bool | None,
+    typer.Option(
+        "--browser/--no-browser",
+        help="Whether to open a browser.",
+        show_default="at a terminal",
+    ),
+]
+
 _CODES = "Exit code: 0 done, 1 failed, 2 unusable input."
 
 

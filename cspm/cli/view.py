@@ -9,30 +9,13 @@ from typing import Annotated
 import typer
 
 from cspm.cli.app import Json, app
+from cspm.cli.shared_options import Browser, Port
 
 Host = Annotated[
     str,
     typer.Option(
         metavar="ADDRESS",
         help="Address to listen on. Others than 127.0.0.1 show the view to the network.",
-    ),
-]
-Port = Annotated[
-    int | None,
-    typer.Option(
-        metavar="NUMBER",
-        min=0,
-        max=65535,
-        help="Port to listen on; 0 takes any.",
-        show_default="the first free one from 8080",
-    ),
-]
-Browser = Annotated[
-    bool | None,
-    typer.Option(
-        "--browser/--no-browser",
-        help="Whether to open a browser.",
-        show_default="at a terminal",
     ),
 ]
 

@@ -114,10 +114,15 @@ def serve(console: Console, server: ViewServer, browser: bool) -> None:
     say(console, f"view {server.url} (Ctrl-C ends)")
     sys.stdout.flush()
     if browser:
-        webbrowser.open(server.url)
+        open_browser(server.url)
     try:
         server.serve_forever()
     except KeyboardInterrupt:
         say(console, "")
     finally:
         server.server_close()
+
+
+def open_browser(url: str) -> None:
+    """Open a page in the browser that the system prefers, if there is one."""
+    webbrowser.open(url)

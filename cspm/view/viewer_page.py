@@ -17,7 +17,10 @@ from cspm.view.marks import Mark
 from cspm_msgs_py.testbed import Cable, Testbed
 
 SCRIPTS = ("data.js", "palette.js", "camera.js", "scene.js", "plots.js", "player.js")
-# What the page may do when it is opened: draw. It can load nothing and reach nobody.
+LIVE_SCRIPT = "live.js"
+# What the page may do when it is opened: draw. It can load nothing and reach nobody, but for the
+# server that shows a run as it happens.
+_OWN_SERVER = "; connect-src 'self'"
 _CLOSED = "default-src 'none'; style-src 'unsafe-inline'; script-src 'unsafe-inline'"
 
 
@@ -25,6 +28,8 @@ def viewer_page(
     machine: Testbed,
     runs: Sequence[Frames],
     marks: Sequence[Mark] = (),
+    *,
+    live: bool = False,
 ) -> str:
     """Return the page as HTML.
 
@@ -32,31 +37,41 @@ def viewer_page(
         machine: whose geometry to draw.
         runs: one, or two to lay over one another.
         marks: parts to point at.
+        live: whether it asks its server for what came since.
     """
     title = " and ".join(run.name for run in runs)
-    blocks: list[bytes] = []
+    heads, numbers = packed(runs)
     data = {
         "title": title,
         "machine": machine_shape(machine),
-        "runs": [_run(run, blocks) for run in runs],
+        "runs": heads,
         "marks": [mark.data() for mark in marks],
     }
     folder = files("cspm.view") / "page"
     body = (folder / "body.html").read_text(encoding="utf-8")
-    scripts = "\n".join((folder / name).read_text(encoding="utf-8") for name in SCRIPTS)
+    names = (*SCRIPTS, LIVE_SCRIPT) if live else SCRIPTS
+    scripts = "\n".join((folder / name).read_text(encoding="utf-8") for name in names)
+    policy = f"{_CLOSED}{_OWN_SERVER if live else ''}"
     return "\n".join(
         (
             "<!doctype html><html lang=en><head><meta charset=utf-8>",
             "<meta name=viewport content='width=device-width, initial-scale=1'>",
-            f'<meta http-equiv=Content-Security-Policy content="{_CLOSED}">',
+            f'<meta http-equiv=Content-Security-Policy content="{policy}">',
             f"<title>{escape(title)}: cspm view</title>",
             f"<style>{(folder / 'viewer.css').read_text(encoding='utf-8')}</style></head>",
             body,
             f"<script type=application/json id=view>{_inside_html(data)}</script>",
-            f"<script type=text/plain id=numbers>{b64encode(b''.join(blocks)).decode()}</script>",
+            f"<script type=text/plain id=numbers>{numbers}</script>",
             f"<script>{scripts}</script></html>",
         )
     )
+
+
+def packed(runs: Sequence[Frames]) -> tuple[list[dict[str, Any]], str]:
+    """Return the heads of runs, and all their numbers as little-endian floats in base 64."""
+    blocks: list[bytes] = []
+    heads = [_run(run, blocks) for run in runs]
+    return heads, b64encode(b"".join(blocks)).decode()
 
 
 def machine_shape(machine: Testbed) -> dict[str, Any]:

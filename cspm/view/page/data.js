@@ -3,8 +3,8 @@
 
 const view = JSON.parse(document.getElementById("view").textContent);
 
-function readNumbers() {
-  const text = atob(document.getElementById("numbers").textContent.trim());
+function readNumbers(packed) {
+  const text = atob(packed.trim());
   const bytes = Uint8Array.from(text, letter => letter.charCodeAt(0));
   return new Float32Array(bytes.buffer);
 }
@@ -22,7 +22,7 @@ function unpack(runs, numbers) {
   }
 }
 
-unpack(view.runs, readNumbers());
+unpack(view.runs, readNumbers(document.getElementById("numbers").textContent));
 
 /** Seconds that a run lasts. */
 const duration = run => Math.max(0, run.count - 1) * run.period;

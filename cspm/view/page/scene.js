@@ -5,7 +5,7 @@ const machine = view.machine;
 const TRAIL_S = 6;
 const FACES = [[0, 1, 3, 2], [4, 6, 7, 5], [0, 4, 5, 1], [2, 3, 7, 6], [0, 2, 6, 4], [1, 5, 7, 3]];
 const tensionTitle = "Cable tensions", angleTitle = "Motor angles";
-const most = greatestTension();
+let most = greatestTension();
 
 function greatestTension() {
   let found = 0;

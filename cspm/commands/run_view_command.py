@@ -1,0 +1,159 @@
+"""Run a scenario while browsers on this computer watch it: `cspm run --view`."""
+
+from __future__ import annotations
+
+import threading
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+
+from rich.console import Console
+
+from cspm.commands.run_command import bundle_from, summarise
+from cspm.commands.view_command import open_browser
+from cspm.simulation import ros_runner
+from cspm.view.knobs import effects_on, knobs_of, turned
+from cspm.view.live_run import LiveRun, Restart
+from cspm.view.live_server import LiveServer
+from cspm.view.view_server import LOOPBACK, listening
+from cspm_msgs_py.errors import InputError
+from cspm_msgs_py.new_folder import refuse_existing
+from cspm_msgs_py.recording.run_record import EXTERNAL
+from cspm_run.bundle import Bundle
+from cspm_run.output.console import make_console, say
+from cspm_run.output.json_file import write_json
+from cspm_run.output.summary import print_summary, summary_data
+from cspm_run.recorded_run import INPROCESS, run
+from cspm_run.run_result import RunResult
+from cspm_run.stage_warm_up import compile_beside
+
+
+@dataclass(frozen=True)
+class WatchRequest:
+    """Options of the command.
+
+    Attributes:
+        scenario: file.
+        overrides: replaced values, `KEY=VALUE`.
+        folder: a new folder for the recording; a run that begins again gets one with a number.
+        json: file for the printed results of the last run; None writes none.
+        plant: the plant's equations.
+        mode: how to run.
+        machine: a test-bed file instead of the scenario's.
+        effects: physics planted in the machine.
+        port: to listen on; None takes the first free one from 8080.
+        browser: whether to open a browser.
+    """
+
+    scenario: Path
+    overrides: Sequence[str]
+    folder: Path
+    json: Path | None
+    plant: str
+    mode: str
+    machine: Path | None
+    effects: Sequence[str]
+    port: int | None
+    browser: bool
+
+
+def run_view_command(request: WatchRequest) -> bool:
+    """Run a scenario, show it as it happens, and again whenever a knob is turned.
+
+    Returns:
+        Whether the last run went to its end.
+
+    Raises:
+        InputError: scenario, test-bed, folder or port cannot be used.
+        CspmError: a node failed.
+    """
+    console = make_console()
+    refuse_existing(request.folder)
+    described = _described(request, request.effects)
+    compile_beside(described)
+    own = request.mode == INPROCESS
+    knobs = knobs_of(described.scenario, request.effects, paced=own) if own else []
+    live = LiveRun(knobs, can_pause=own)
+    machine = described.testbed.testbed
+    server = listening(LOOPBACK, request.port, lambda *at: LiveServer(live, machine, *at))
+    threading.Thread(target=server.serve_forever, name="view", daemon=True).start()
+    try:
+        say(console, f"view {server.url} (Ctrl-C ends)")
+        if request.browser:
+            open_browser(server.url)
+        return _watched(console, request, live)
+    finally:
+        server.shutdown()
+        server.server_close()
+
+
+def _described(request: WatchRequest, effects: Sequence[str]) -> Bundle:
+    return bundle_from(request.scenario, request.overrides, request.machine, request.plant, effects)
+
+
+def _watched(console: Console, request: WatchRequest, live: LiveRun) -> bool:
+    """Run until Ctrl-C, and begin again at each change."""
+    number, finished = 1, False
+    try:
+        while True:
+            bundle = turned(_described(request, effects_on(live.knobs)), live.knobs)
+            folder = request.folder
+            if number > 1:
+                folder = folder.with_name(f"{folder.name}_{number}")
+                refuse_existing(folder)
+            live.begin(folder)
+            number += 1
+            try:
+                result = _runner(console, request)(bundle, folder, live.hold)
+            except Restart:
+                say(console, f"{folder}: ended early, the run begins again")
+                continue
+            live.end()
+            finished = not result.interrupted and result.failure is None
+            _conclude(console, request, bundle, result)
+            if result.interrupted:
+                return finished
+            live.wait()
+    except KeyboardInterrupt:
+        say(console, "")
+        return finished
+
+
+def _runner(
+    console: Console, request: WatchRequest
+) -> Callable[[Bundle, Path, Callable[[float], None]], RunResult]:
+    if request.mode == INPROCESS:
+        return run
+    from cspm_ros.runtime.stall_watchdog import PATIENCE_S
+
+    return ros_runner(
+        request.mode,
+        lambda waiting: say(console, waiting or "all is there"),
+        external=request.plant == EXTERNAL,
+        apart=False,
+        patience_s=PATIENCE_S,
+        needed_by=f"--mode {request.mode}",
+    )
+
+
+def _conclude(console: Console, request: WatchRequest, bundle: Bundle, result: RunResult) -> None:
+    print_summary(console, result, bundle.scenario.requirement)
+    if result.failure:
+        say(console, result.failure)
+    if request.json is not None:
+        write_json(request.json, summary_data(result))
+    if result.folder is not None:
+        summarise(result.folder, bundle, result)
+        say(console, f"recording {result.folder}; the view stays until Ctrl-C")
+
+
+def check_watchable(scenarios: int, *, record: bool, beside: bool) -> None:
+    """Refuse what cannot be watched.
+
+    Raises:
+        InputError: several runs at once, or nothing is recorded.
+    """
+    if scenarios > 1 or beside:
+        raise InputError("--view: with several runs, allowed: one scenario, no --controllers")
+    if not record:
+        raise InputError("--view --no-record: allowed: one of both, since recordings are shown")

@@ -11,8 +11,8 @@ from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
 
-from cspm.recorded import Recording
 from cspm.view.frames import Frames, frames_of
+from cspm.view.growing import GrowingRecording
 from cspm.view.knobs import PACE, Knob
 from cspm.view.viewer_page import packed
 from cspm_msgs_py.errors import InputError
@@ -45,7 +45,8 @@ class LiveRun:
         self._paused = self._ended = self._turned = False
         self._due = self._simulated = 0.0
         self._frames: Frames | None = None
-        self._size, self._next_reading = -1, 0.0
+        self._recording: GrowingRecording | None = None
+        self._readings, self._next_reading = 0, 0.0
 
     def begin(self, folder: Path) -> None:
         """Watch a recording that is about to be made."""
@@ -53,7 +54,8 @@ class LiveRun:
             self._folder, self._generation = folder, self._generation + 1
             self._ended = self._turned = False
             self._due, self._simulated = time.monotonic(), 0.0
-            self._frames, self._size, self._next_reading = None, -1, 0.0
+            self._frames, self._recording = None, GrowingRecording(folder)
+            self._next_reading = 0.0
 
     def hold(self, simulated: float) -> None:
         """Wait until the clock has come to the time simulated so far [s], and while paused.
@@ -107,7 +109,7 @@ class LiveRun:
     def answer(self, after: str) -> bytes | None:
         """Return as JSON what is new since a version, None where nothing is."""
         frames = self._read()
-        version = f"{self._generation}-{self._size}-{self._paused}-{self._ended}"
+        version = f"{self._generation}-{self._readings}-{self._paused}-{self._ended}"
         if version == after:
             return None
         heads, numbers = packed([frames] if frames else [])
@@ -131,19 +133,20 @@ class LiveRun:
         }
 
     def _read(self) -> Frames | None:
-        """Return the frames of the recording so far; one that grows is read anew now and then."""
+        """Return the frames of the recording so far; one that grows is read on now and then."""
         with self._reading:
-            begun, generation = time.monotonic(), self._generation
-            size = sum(each.stat().st_size for each in self._folder.glob("*.mcap"))
-            if size == self._size or begun < self._next_reading:
+            begun, recording = time.monotonic(), self._recording
+            if recording is None or begun < self._next_reading:
                 return self._frames
             try:
-                recording = Recording(self._folder)
+                if not recording.update():
+                    return self._frames
                 found = frames_of(recording, self._folder.name)
             except (InputError, IndexError):
+                # Not there yet, or without a message that could be shown.
                 return self._frames
-            if generation == self._generation:
-                self._frames, self._size = found, size
+            if recording is self._recording:
+                self._frames, self._readings = found, self._readings + 1
                 took = time.monotonic() - begun
                 self._next_reading = begun + took / _BUSY_SHARE
             return self._frames

@@ -157,21 +157,31 @@ class Recording(Closing):
         """
         return self.rows_of([name])[name]
 
-    def rows_of(self, names: Iterable[str], until_ns: int | None = None) -> dict[str, Rows]:
+    @property
+    def chunks(self) -> int:
+        """How many complete chunks there are; more, while the recording is being made."""
+        return sum(len(file.chunks) for file in self.files)
+
+    def rows_of(
+        self, names: Iterable[str], until_ns: int | None = None, after: int = 0
+    ) -> dict[str, Rows]:
         """Return the messages of several topics, reading the recording once.
 
         Args:
             names: of the topics.
             until_ns: the latest log time that is wanted [ns]; None: all are.
+            after: how many chunks of a recording of one file are left out at its start.
 
         Raises:
             InputError: a topic is missing, has no row of numbers or another definition, or the
                 recording is damaged.
         """
-        collectors = self._collect(list(names), only_first=False, until_ns=until_ns)
+        collectors = self._collect(list(names), only_first=False, until_ns=until_ns, after=after)
         found = {name: collector.result() for name, collector in collectors.items()}
         if until_ns is not None:
             return {name: rows.until(until_ns) for name, rows in found.items()}
+        if after:
+            return found
         for name, rows in found.items():
             self._check_count(name, len(rows.log_ns))
         return found
@@ -203,21 +213,21 @@ class Recording(Closing):
         return Payloads(logs[order], [payloads[i] for i in order])
 
     def _collect(
-        self, names: list[str], *, only_first: bool, until_ns: int | None = None
+        self, names: list[str], *, only_first: bool, until_ns: int | None = None, after: int = 0
     ) -> dict[str, RowCollector]:
         collectors = {}
         for name in names:
             ros_type = self._type_of_topic(name)
             self._check_schema(name, ros_type)
             collectors[name] = RowCollector(name, ros_type, str(self.path))
-        for name, messages in self._messages(names, until_ns):
+        for name, messages in self._messages(names, until_ns, after):
             collectors[name].add(messages)
             if only_first:
                 break
         return collectors
 
     def _messages(
-        self, names: list[str], until_ns: int | None = None
+        self, names: list[str], until_ns: int | None = None, after: int = 0
     ) -> Iterator[tuple[str, Messages]]:
         """Yield each topic's messages chunk by chunk, leaving out chunks that begin later."""
         for file in self.files:
@@ -226,7 +236,7 @@ class Recording(Closing):
                 for name in names
             }
             wanted = {channel for channels in ids.values() for channel in channels}
-            for place in file.chunks:
+            for place in file.chunks[after:]:
                 if until_ns is not None and _span_of(file, place)[0] > until_ns:
                     continue
                 index = file.index(place)

@@ -44,6 +44,7 @@ NOT_RUN: dict[str, str] = {
     "cspm analyze workspace": "a minute; tests/cspm_control/analysis",
     "python -m bench": "minutes to hours; tests/bench runs a small case of each",
     # A server, a graph, or drives.
+    "cspm run calm --view": "serves until it is ended; tests/cspm/view",
     "cspm view recordings/": "serves until it is ended; tests/cspm/view",
     "cspm view today --diagnosis": "serves until it is ended; tests/cspm/view",
     "cspm view measured simulated": "serves until it is ended; tests/cspm/view",

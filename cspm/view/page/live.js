@@ -79,7 +79,10 @@ function addKnobs() {
     live.pause.addEventListener("click", () => send("pause", !live.state.paused));
     live.knobs.append(live.pause);
   }
-  live.knobs.append(...live.state.knobs.map(knob));
+  live.words = document.createElement("span");
+  live.words.id = "state";
+  live.words.setAttribute("role", "status");
+  live.knobs.append(live.words, ...live.state.knobs.map(knob));
   document.querySelector("header").after(live.knobs);
   showState();
 }
@@ -90,8 +93,7 @@ function showState() {
   if (live.pause) live.pause.textContent = live.state.paused ? "Go on" : "Pause the run";
   const words = live.gone ? "the program has ended" : live.state.ended ? "the run has ended" :
     live.state.paused ? "the run is paused" : "the run goes on";
-  by("finding").textContent = words;
-  by("finding").hidden = false;
+  live.words.textContent = words;
 }
 
 // Who looks back in time does not want to be taken to the end.

@@ -17,6 +17,7 @@ import pytest
 from machines import THESIS, build, general_content, point_content, rig_content
 
 from cspm.cli import main as cli
+from cspm.commands import progress_shown
 from cspm_msgs_py.testbed import load_testbed
 
 # The first call of a kernel may compile it, which takes longer than any sensible deadline.
@@ -33,6 +34,12 @@ def alone_in_real_time(request):
     with (Path(tempfile.gettempdir()) / "cspm-test-realtime").open("w") as turn:
         fcntl.flock(turn, fcntl.LOCK_EX)
         yield
+
+
+@pytest.fixture(autouse=True)
+def in_few_words(monkeypatch):
+    """Leave out the lines of progress, which come when a machine is slow."""
+    monkeypatch.setattr(progress_shown, "LINE_S", 1e9)
 
 
 @pytest.fixture(scope="session")

@@ -325,7 +325,8 @@ def test_a_node_is_asked_to_end_once(tmp_path):
 
 
 def test_no_answer_comes_from_who_is_stopped_and_not_from_who_is_slow(tmp_path):
-    (tmp_path / f"{FORCE_CONTROLLER}.log").write_text("cspm node x: it waits\n")
+    log = "cspm node x: nothing moved for 4 s: it waits\n"
+    (tmp_path / f"{FORCE_CONTROLLER}.log").write_text(log)
     host = Host(
         plant=Program("sleep", "600"),
         force_controller=Program("false"),
@@ -341,5 +342,5 @@ def test_no_answer_comes_from_who_is_stopped_and_not_from_who_is_slow(tmp_path):
         processes.wait(60.0)
     assert reported == (
         "no answer from plant; force_controller ended with exit code 1 before the run did: cspm"
-        " node x: it waits"
+        " node x: nothing moved for 4 s: it waits"
     )

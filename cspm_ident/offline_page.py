@@ -36,7 +36,7 @@ a {color: var(--accent)}
 ul {padding-left: 1.2em; line-height: 1.5}
 code {overflow-wrap: anywhere}
 .verdict {font-size: 1.15em; line-height: 1.5; border-left: 6px solid var(--accent);
-  padding: 0.2em 1em}
+  padding: 0.2em 1em; overflow-wrap: anywhere}
 summary {cursor: pointer; padding: 0.4em 0; font-weight: bold}
 :focus-visible {outline: 3px solid var(--accent); outline-offset: 2px}
 .wide {overflow-x: auto}

@@ -29,7 +29,8 @@ def write_campaign_page(campaign: Campaign) -> Path:
     found = summary_of(campaign)
     parts = [f"<p class=verdict>{escape(headline(campaign, found))}</p>"]
     if found["metrics"]:
-        parts += [_spread_table(found), figure_html(_distributions(campaign, found))]
+        drawn = figure_html(_distributions(campaign, found))
+        parts += [_spread_table(found), _scrolled(drawn, "distributions of the metrics")]
     if found["sensitivities"]:
         parts += _sensitivity_parts(campaign, found)
     if found["verdicts"]:
@@ -88,8 +89,13 @@ def _sensitivity_parts(campaign: Campaign, found: dict[str, Any]) -> list[str]:
         "<h2>What moves them</h2>",
         "<p>Spearman's rank correlation, −1 to 1; a dot where chance explains it.</p>",
         table_html(heads, rows, "rank correlations"),
-        figure_html(_scatter(campaign, axes, metrics)),
+        _scrolled(figure_html(_scatter(campaign, axes, metrics)), "a metric over an axis"),
     ]
+
+
+def _scrolled(content: str, label: str) -> str:
+    """Return content that is wider than some screens, such as a menu of long names."""
+    return f'<div class=wide tabindex=0 role=region aria-label="{label}">{content}</div>'
 
 
 def _scatter(campaign: Campaign, axes: Sequence[str], metrics: Sequence[str]) -> go.Figure:

@@ -9,6 +9,8 @@ import campaigns
 import numpy as np
 import pandas
 import pytest
+from accessibility import serious_findings
+from driven_browser import driven_browser
 
 import cspm
 
@@ -126,6 +128,18 @@ def test_the_command_on_the_page_repeats_the_run(sweep):
     page = (sweep[0] / "campaigns/sweep/campaign.html").read_text()
     assert worst["command"] in page
     assert "8 of 8 runs: 8 done" in page
+
+
+def test_the_page_is_drawn_for_everybody(sweep, tmp_path):
+    page = (sweep[0] / "campaigns/sweep/campaign.html").as_uri()
+    drawn = "return document.querySelectorAll('.main-svg').length;"
+    with driven_browser(tmp_path / "profile") as browser:
+        for width in (1200, 400):
+            browser.open(page, width=width)
+            campaigns.until(lambda: browser.run(drawn) > 2, "the plots")
+            assert browser.run("return document.documentElement.scrollWidth;") <= width
+            assert serious_findings(browser) == []
+        assert browser.errors() == []
 
 
 def test_pandas_reads_the_table(sweep):

@@ -9,6 +9,7 @@ import urllib.request
 
 import numpy as np
 import pytest
+from accessibility import serious_findings
 from cspm_process import child
 from driven_browser import driven_browser
 from error_lines import said
@@ -161,6 +162,7 @@ def test_a_page_follows_a_run_holds_it_and_begins_it_again(tmp_path):
             browser.open(url, width=400)
             until(lambda: browser.run(STATE) == "the run goes on", "the page of 400 px")
             assert browser.run("return document.documentElement.scrollWidth;") <= 400
+            assert serious_findings(browser) == []
             assert browser.errors() == []
         own = url.rstrip("/")
         turn = json.dumps({"name": "gain", "value": 0.5}).encode()

@@ -27,36 +27,19 @@ def peak(run):
     return {"tension": run.tension.values.max(), "nothing": float("nan")}
 
 
-def fails(run):
-    if run.summary["seed"] == 2:
+def troubled(run):
+    seed, mark = run.summary["seed"], Path(os.environ["MARK"])
+    if seed == 2:
         raise ValueError("no settling")
-    return 1.0
-
-
-def dies(run):
-    if run.summary["seed"] == 2:
+    if seed == 3:
         os._exit(9)
-    return 1.0
-
-
-def dies_once(run):
-    mark = Path(os.environ["MARK"])
-    if run.summary["seed"] == 2 and not mark.exists():
+    if seed == 5 and not mark.exists():
         mark.touch()
         os._exit(9)
-    return 1.0
-
-
-def hangs(run):
-    while run.summary["seed"] == 2:
+    while seed == 4:
         pass
     return 1.0
 '''
-
-
-def with_metric(folder, name):
-    campaigns.written(folder, METRICS, "metrics.py")
-    return campaigns.written(folder, f"{campaigns.SWEEP}metrics: ['metrics.py:{name}']\n")
 
 
 @pytest.fixture(scope="module")
@@ -164,40 +147,51 @@ def test_another_campaign_in_its_folder_is_refused(sweep, tmp_path):
     assert "begun with another file, allowed: a new folder, by --out" in err
 
 
-def test_what_one_run_gets_wrong_is_in_its_row(tmp_path):
-    code, out, err = campaigns.run(with_metric(tmp_path, "fails"))
+@pytest.fixture(scope="module")
+def troubled(tmp_path_factory):
+    """Seeds of which 2 raises, 3 kills its worker, 4 hangs, and 5 kills its worker once."""
+    folder = tmp_path_factory.mktemp("troubled")
+    campaigns.written(folder, METRICS, "metrics.py")
+    text = campaigns.SWEEP.replace("to: 4", "to: 6") + "metrics: ['metrics.py:troubled']\n"
+    environment = os.environ | {"MARK": str(folder / "mark")}
+    options = ("--workers", 2, "--time-limit", 25)
+    file = campaigns.written(folder, text)
+    code, out, err = campaigns.run(file, *options, env=environment)
+    rows = {row["seed"]: row for row in campaigns.rows(folder / "campaigns/sweep")}
+    assert [*rows] == [1, 2, 3, 4, 5, 6]
+    return rows, code, out, err
+
+
+def test_all_other_runs_are_complete_and_the_command_says_that_some_are_not(troubled):
+    rows, code, _, err = troubled
+    assert {seed: row["status"] for seed, row in rows.items()} == {
+        1: "done",
+        2: "refused",
+        3: "lost",
+        4: "lost",
+        5: "done",
+        6: "done",
+    }
     assert (code, err) == (1, "")
-    rows = campaigns.rows(tmp_path / "campaigns/sweep")
-    assert [row["status"] for row in rows] == ["done", "refused", "done", "done"]
-    assert rows[1]["failure"].endswith("metrics.py:fails: ValueError: no settling")
+
+
+def test_what_one_run_gets_wrong_is_in_its_row(troubled):
+    rows, _, out, _ = troubled
+    assert rows[2]["failure"].endswith("metrics.py:troubled: ValueError: no settling")
     assert "run 1 refused" in out
 
 
-def test_a_run_that_kills_its_worker_is_given_up_after_three_tries(tmp_path):
-    code, out, _ = campaigns.run(with_metric(tmp_path, "dies"), "--workers", 2)
-    rows = campaigns.rows(tmp_path / "campaigns/sweep")
-    assert [row["status"] for row in rows] == ["done", "lost", "done", "done"]
-    assert "run 1: its worker was lost 3 times, given up" in out
-    assert code == 1
+@pytest.mark.parametrize("seed", [3, 4])
+def test_a_run_that_kills_or_stops_its_worker_is_given_up_after_three_tries(troubled, seed):
+    rows, _, out, _ = troubled
+    assert f"run {seed - 1}: its worker was lost 3 times, given up" in out
+    assert "died, ran out of memory or took too long" in rows[seed]["failure"]
 
 
-def test_a_worker_that_dies_costs_its_run_once_more(tmp_path):
-    file = with_metric(tmp_path, "dies_once")
-    environment = os.environ | {"MARK": str(tmp_path / "mark")}
-    code, out, _ = campaigns.run(file, "--workers", 1, env=environment)
-    rows = campaigns.rows(tmp_path / "campaigns/sweep")
-    assert [row["status"] for row in rows] == ["done"] * 4
-    assert "run 1: its worker was lost, try 2 of 3" in out
-    assert code == 0
-
-
-def test_a_run_that_hangs_is_given_up(tmp_path):
-    options = ("--workers", 1, "--time-limit", 20)
-    code, _, _ = campaigns.run(with_metric(tmp_path, "hangs"), *options)
-    rows = campaigns.rows(tmp_path / "campaigns/sweep")
-    assert [row["status"] for row in rows] == ["done", "lost", "done", "done"]
-    assert "took too long" in rows[1]["failure"]
-    assert code == 1
+def test_a_worker_that_dies_costs_its_run_once_more(troubled):
+    _, _, out, _ = troubled
+    assert "run 4: its worker was lost, try 2 of 3" in out
+    assert "run 4: its worker was lost, try 3 of 3" not in out
 
 
 @pytest.mark.parametrize("how", [signal.SIGINT, signal.SIGKILL])

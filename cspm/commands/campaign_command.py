@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass
 from importlib.util import find_spec
 from pathlib import Path
@@ -111,16 +112,21 @@ def _check_engine() -> None:
             )
 
 
+def spread_table(title: str, metrics: Mapping[str, Mapping[str, Any]]) -> Table:
+    """Return the spread of each metric; it fits into 60 columns."""
+    table = Table(title=escape(title), box=box.SIMPLE, pad_edge=False, padding=(0, 1, 0, 0))
+    table.add_column("", overflow="fold")
+    for head in ("least", "median", "95 %", "largest"):
+        table.add_column(head, justify="right", no_wrap=True)
+    table.add_column("unit", no_wrap=True)
+    for name, each in metrics.items():
+        numbers = (each["scale"] * each[key] for key in ("least", "median", "p95", "largest"))
+        table.add_row(escape(name), *(f"{number:.3g}" for number in numbers), each["unit"])
+    return table
+
+
 def _print(console: Console, done: Campaign, found: dict[str, Any]) -> None:
-    table = Table(title=f"{escape(done.file.name)}: {len(done.rows)} runs", box=box.SIMPLE)
-    for head in ("", "least", "median", "95 %", "largest", "unit"):
-        table.add_column(head, justify="left" if head in ("", "unit") else "right", no_wrap=True)
-    for name, each in found["metrics"].items():
-        cells = (
-            f"{each['scale'] * each[key]:.4g}" for key in ("least", "median", "p95", "largest")
-        )
-        table.add_row(escape(name), *cells, each["unit"])
-    console.print(table)
+    console.print(spread_table(f"{done.file.name}: {len(done.rows)} runs", found["metrics"]))
     for row in done.failures[:_MOST_FAILURES]:
         say(console, f"run {row['run']} {row['status']}: {row['failure']}")
         say(console, f"  {done.command_of(row['run'])}")

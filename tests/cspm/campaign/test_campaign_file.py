@@ -1,9 +1,13 @@
 """What a campaign's file may say, and what each fault is answered with."""
 
+import io
+
 import pytest
+from rich.console import Console
 
 from cspm.campaign.campaign_file import load_campaign
 from cspm.campaign.variants import variants_of
+from cspm.commands.campaign_command import spread_table
 from cspm_msgs_py.errors import InputError
 
 
@@ -73,3 +77,15 @@ def test_an_effect_without_parameter_is_refused(tmp_path):
     text = "scenario: calm\ngrid: {effects.winch_coulomb_friction@sway_3: [0.02]}"
     with pytest.raises(InputError, match=r"allowed: effects\.EFFECT@ELEMENTS:PARAMETER"):
         variants_of(load_campaign(written(tmp_path, text)))
+
+
+def test_the_table_of_a_campaign_is_whole_on_a_terminal_of_60_columns():
+    each = {"scale": 1e3, "unit": "mrad", "least": 1.23456e-7, "median": 0.0123456}
+    row = each | {"p95": 0.123456, "largest": 12.3456}
+    names = ["errors.pitch.max", "infeasible_share", "tension.min"]
+    console = Console(width=60, file=io.StringIO())
+    console.print(spread_table("a campaign: 3 runs", dict.fromkeys(names, row)))
+    text = console.file.getvalue()
+    for word in (*names, "0.000123", "12.3", "123", "1.23e+04", "mrad", "largest"):
+        assert word in text
+    assert "…" not in text

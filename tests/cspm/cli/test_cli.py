@@ -32,7 +32,7 @@ def test_run_leaves_recording_summary_and_picture(cspm, tmp_path):
     code, out, err = cspm("run", "rest", "--duration", "0.3", "--seed", "7", "--out", "bag")
     assert (code, err) == (0, "")
     files = {path.name for path in (tmp_path / "bag").iterdir()}
-    assert files == {"bag_0.mcap", "metadata.yaml", "summary.json", "run.png"}
+    assert files == {"bag_0.mcap", "metadata.yaml", "summary.json", "run.png", "run.svg"}
     summary = json.loads((tmp_path / "bag" / "summary.json").read_text())
     assert (summary["scenario"], summary["seed"], summary["mode"]) == ("rest", 7, "inprocess")
     assert summary["duration_s"] == pytest.approx(0.3)
@@ -203,7 +203,7 @@ def test_a_divergence_is_one_line_and_leaves_a_readable_recording(refused, cspm,
     assert "; before it: wrench infeasible since 0." in line
     assert "bar at [" in line
     files = {path.name for path in (tmp_path / "bag").iterdir()}
-    assert files == {"bag_0.mcap", "metadata.yaml", "summary.json", "run.png"}
+    assert files == {"bag_0.mcap", "metadata.yaml", "summary.json", "run.png", "run.svg"}
     assert overview(tmp_path / "bag").complete
     assert cspm("resim", "bag")[0] == 0
 

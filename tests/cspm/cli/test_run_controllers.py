@@ -26,6 +26,7 @@ def test_one_scenario_runs_under_each_controller(cspm, tmp_path):
         *LAWS,
         "summary.json",
         "runs.png",
+        "runs.svg",
     }
     for law in LAWS:
         with Recording(tmp_path / "all" / law) as recording:

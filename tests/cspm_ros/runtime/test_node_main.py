@@ -139,8 +139,7 @@ NO_SUCH_SCENARIO = "nothing: no such scenario, allowed: calm, "
         (
             "motion_controller",
             "scenario:=one_winch",
-            "node motion_controller: scenario one_winch has none, allowed: plant, force_controller,"
-            " recorder",
+            "scenario one_winch has none, allowed: plant, force_controller, recorder",
         ),
         (
             "plant",

@@ -16,7 +16,7 @@ from pathlib import Path
 from rich.console import Console
 from rich.text import Text
 
-PICTURE = Path(__file__).resolve().parents[2] / "docs" / "figures" / "demo.svg"
+PICTURE = Path(__file__).resolve().parents[2] / "docs" / "assets" / "demo.svg"
 COMMAND = ("cspm", "demo", "--seed", "3", "--effect", "winch_coulomb_friction", "--no-guess")
 WIDTH = 96
 # Rich names a font in the network, which no picture loads.

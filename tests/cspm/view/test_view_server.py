@@ -1,6 +1,8 @@
 """The viewer's server: one page, to browsers on this computer only."""
 
 import http.client
+import socket
+import struct
 import threading
 
 import pytest
@@ -64,3 +66,34 @@ def test_a_taken_port_is_one_line(server):
         listening(LOOPBACK, server.server_port, lambda *at: ViewServer("", *at))
     line = f"--host 127.0.0.1 --port {server.server_port}: Address already in use, allowed: an"
     assert str(caught.value).startswith(line)
+
+
+@pytest.mark.parametrize("error", [BrokenPipeError, ConnectionResetError])
+def test_a_browser_that_goes_too_early_is_no_news(server, capsys, error):
+    try:
+        raise error
+    except error:
+        server.handle_error(None, (LOOPBACK, 1))
+    assert capsys.readouterr().err == ""
+
+
+def test_any_other_error_is_told(server, capsys):
+    try:
+        raise KeyError("lost")
+    except KeyError:
+        server.handle_error(None, (LOOPBACK, 1))
+    assert "KeyError: 'lost'" in capsys.readouterr().err
+
+
+def test_a_connection_that_is_cut_says_nothing(server, capfd):
+    """With a page larger than what the system keeps for a reader who does not read."""
+    server.page = b"x" * 50_000_000
+    ended = threading.Event()
+    shut = server.shutdown_request
+    server.shutdown_request = lambda request: (shut(request), ended.set())
+    with socket.create_connection((LOOPBACK, server.server_port), timeout=30) as link:
+        link.sendall(f"GET / HTTP/1.1\r\nHost: {LOOPBACK}:{server.server_port}\r\n\r\n".encode())
+        assert link.recv(100)
+        link.setsockopt(socket.SOL_SOCKET, socket.SO_LINGER, struct.pack("ii", 1, 0))
+    assert ended.wait(60)
+    assert capfd.readouterr().err == ""

@@ -124,11 +124,13 @@ def table_html(
     of_text = [all(" class=text" in row[i] for row in body) for i in range(len(heads))]
     top = [_cell("th scope=col", *each) for each in zip(heads, of_text, strict=True)]
     lines = ["<tr>" + "".join(cells) + "</tr>" for cells in (top, *body)]
+    return scrolled(f"<table>{''.join(lines)}</table>", label)
+
+
+def scrolled(content: str, label: str) -> str:
+    """Return content that is wider than some screens, in a region that scrolls by keyboard too."""
     name = escape(label, quote=True)
-    return (
-        f'<div class=wide tabindex=0 role=region aria-label="{name}">'
-        f"<table>{''.join(lines)}</table></div>"
-    )
+    return f'<div class=wide tabindex=0 role=region aria-label="{name}">{content}</div>'
 
 
 def _cell(tag: str, content: str, text: bool) -> str:

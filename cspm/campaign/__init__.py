@@ -1,9 +1,11 @@
 """Campaigns: many runs of one description, spread over processors and machines.
 
-from cspm.campaign import run_campaign
+    from cspm.campaign import run_campaign
 
-done = run_campaign("robustness.yaml", "robustness")
-done.rows[0]["errors.surge.max"]
+    done = run_campaign("robustness.yaml", "robustness")
+    done.rows[0]["errors.surge.max"]
+
+The engine, dask.distributed, comes with the extra `campaign`.
 """
 
 from __future__ import annotations

@@ -2,10 +2,12 @@
 
 from __future__ import annotations
 
+import json
 import shlex
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import AbstractContextManager
 from dataclasses import dataclass
+from itertools import islice
 from pathlib import Path
 from typing import Any
 
@@ -13,7 +15,7 @@ from distributed import Client
 
 from cspm.campaign.campaign_file import CampaignFile, Kept, load_campaign
 from cspm.campaign.campaign_folder import RECORDINGS, CampaignFolder, Row
-from cspm.campaign.cluster import default_workers, local_client, remote_client
+from cspm.campaign.cluster import local_client, remote_client
 from cspm.campaign.code_version import code_version
 from cspm.campaign.inputs import Inputs, pack
 from cspm.campaign.measures import load_metric
@@ -25,7 +27,7 @@ from cspm.simulation import simulate_in_memory
 from cspm_msgs_py.errors import InputError
 from cspm_msgs_py.recording.run_record import SIM
 from cspm_msgs_py.scenario import load_scenario
-from cspm_msgs_py.yaml_file import parse_yaml, read_text
+from cspm_msgs_py.yaml_file import read_text
 from cspm_run.library import find_scenario, find_testbed, scenario_names, testbed_names
 
 SCHEMA = "cspm.campaign/1"
@@ -33,6 +35,7 @@ SCHEMA = "cspm.campaign/1"
 _START_S, _PER_SECOND, _JUDGED = 120.0, 2.0, 10.0
 # Distinct values that are checked before anything runs.
 _MOST_CHECKS = 40
+_DURATION = "duration="
 
 
 @dataclass(frozen=True)
@@ -102,7 +105,7 @@ def run_campaign(
                 tell(f"dashboard {client.dashboard_link}")
                 total = len(plan.variants)
                 for number, row in work(client, map(plan.task, missing), stop, tell):
-                    folder.keep(number, plan.named(number) | row)
+                    folder.keep(number, plan.variants[number].values | row)
                     progress(len(folder.rows) / total, f"run {len(folder.rows)} of {total}")
         rows = [folder.rows[number] for number in sorted(folder.rows)]
         done = Campaign(plan.file, folder.path, plan.variants, rows, stop())
@@ -120,6 +123,7 @@ class Plan:
         file: its content.
         variants: the runs.
         inputs: what they read.
+        durations: of the scenarios, by file [s].
         time_limit_s: after which a run counts as hung [s]; None: by its duration.
     """
 
@@ -127,6 +131,7 @@ class Plan:
     file: CampaignFile
     variants: list[Variant]
     inputs: Inputs
+    durations: dict[str, float]
     time_limit_s: float | None = None
 
     @property
@@ -139,27 +144,27 @@ class Plan:
             "code": code_version(),
         }
 
-    def named(self, number: int) -> Row:
-        """Return the columns of what is varied in a run."""
-        return dict(self.variants[number].values)
-
     def task(self, variant: Variant) -> Task:
         """Return a run as a worker takes it."""
         file, limit = self.file, self.time_limit_s
         return Task(
-            number=variant.number,
+            variant=variant,
             packed=self.inputs.packed,
             places=self.inputs.places,
-            scenario=variant.scenario,
-            testbed=variant.testbed,
-            overrides=variant.overrides,
-            effects=variant.effects,
             plant=file.plant,
             metrics=file.metrics,
             diagnose=file.diagnose,
-            time_limit_s=_limit(variant, file) if limit is None else limit,
+            time_limit_s=self._limit(variant) if limit is None else limit,
             code=code_version(),
         )
+
+    def _limit(self, variant: Variant) -> float:
+        """Return how long a run may take [s]."""
+        changed = [each for each in variant.overrides if each.startswith(_DURATION)]
+        own = float(json.loads(changed[0].removeprefix(_DURATION))) if changed else None
+        duration = self.durations[variant.scenario] if own is None else own
+        judged = _JUDGED if self.file.diagnose or self.file.metrics else 1.0
+        return judged * (_START_S + _PER_SECOND * duration)
 
     def check(self, variants: Sequence[Variant]) -> None:
         """Check the first run whole, and values that others have.
@@ -172,7 +177,7 @@ class Plan:
             load_metric(name, path if path.is_absolute() else None)
         try:
             bundle_for(self.task(variants[0]))
-            for each in _with_other_values(variants):
+            for each in islice(_with_other_values(variants), _MOST_CHECKS):
                 check_values(self.task(each))
         except InputError as err:
             raise InputError(f"{self.path}: {err}") from None
@@ -190,7 +195,9 @@ def plan_of(path: Path, time_limit: float | None = None) -> Plan:
     except InputError as err:
         raise InputError(f"{path}: {err}") from None
     _check_kept(path, file.recordings, len(variants))
-    return Plan(path, file, variants, pack(variants, file.metrics), time_limit)
+    scenarios = dict.fromkeys(each.scenario for each in variants)
+    durations = {each: load_scenario(Path(each)).duration for each in scenarios}
+    return Plan(path, file, variants, pack(variants, file.metrics), durations, time_limit)
 
 
 def command_of(variant: Variant, plant: str) -> str:
@@ -209,7 +216,7 @@ def command_of(variant: Variant, plant: str) -> str:
 def _client(workers: int | None, scheduler: str | None) -> AbstractContextManager[Client]:
     if scheduler is not None:
         return remote_client(scheduler)
-    return local_client(workers or default_workers())
+    return local_client(workers)
 
 
 def _short(path: str, find: Callable[[str], Path], names: Sequence[str]) -> str:
@@ -218,24 +225,13 @@ def _short(path: str, find: Callable[[str], Path], names: Sequence[str]) -> str:
     return stem if stem in names and find(stem).resolve() == Path(path) else path
 
 
-def _limit(variant: Variant, file: CampaignFile) -> float:
-    """Return how long a run may take [s]."""
-    changed = [each for each in variant.overrides if each.startswith("duration=")]
-    scenario = load_scenario(Path(variant.scenario)) if not changed else None
-    duration = scenario.duration if scenario else float(parse_yaml(changed[0][9:], "duration"))
-    judged = _JUDGED if file.diagnose or file.metrics else 1.0
-    return _START_S * judged + _PER_SECOND * duration * judged
-
-
 def _with_other_values(variants: Sequence[Variant]) -> Iterator[Variant]:
-    """Return variants in which a value comes for the first time, so many of them."""
+    """Return variants in which a value comes for the first time."""
     seen: set[tuple[str, str]] = set()
-    count = 0
     for variant in variants:
         new = {(key, repr(value)) for key, value in variant.values.items()} - seen
-        if new and count < _MOST_CHECKS:
+        if new:
             seen |= new
-            count += 1
             yield variant
 
 

@@ -48,13 +48,11 @@ class CampaignFolder:
         except OSError as err:
             raise InputError(f"{path}: {err.strerror}, allowed: a folder to write to") from None
         try:
-            fcntl.flock(self._lock, fcntl.LOCK_EX | fcntl.LOCK_NB)
-        except BlockingIOError:
+            self._hold()
+            self._check(description)
+        except InputError:
             self._lock.close()
-            raise InputError(
-                f"{path}: another campaign is writing to it, allowed: another folder, by --out"
-            ) from None
-        self._check(description)
+            raise
         self.rows: dict[int, Row] = {row[NUMBER]: row for row in self._journalled()}
         self._journal = (path / JOURNAL).open("a", encoding="utf-8")
         self._written = time.monotonic()
@@ -95,19 +93,25 @@ class CampaignFolder:
         os.replace(beside, self.path / TABLE)
         self._written = time.monotonic()
 
+    def _hold(self) -> None:
+        try:
+            fcntl.flock(self._lock, fcntl.LOCK_EX | fcntl.LOCK_NB)
+        except BlockingIOError:
+            raise InputError(
+                f"{self.path}: another campaign is writing to it, allowed: another folder, by --out"
+            ) from None
+
     def _check(self, description: dict[str, Any]) -> None:
         place = self.path / DESCRIPTION
         if not place.exists():
             others = [each.name for each in self.path.iterdir() if each.name != _LOCK]
             if others:
-                self._lock.close()
                 raise InputError(f"{self.path}: holds {others[0]}, allowed: a new or empty folder")
             place.write_text(json.dumps(description, indent=2) + "\n", encoding="utf-8")
             return
         found = json.loads(place.read_text(encoding="utf-8"))
         differing = [key for key, value in description.items() if found.get(key) != value]
         if differing:
-            self._lock.close()
             raise InputError(
                 f"{self.path}: begun with another {differing[0].replace('_', ' ')}, allowed: a new"
                 " folder, by --out"

@@ -12,25 +12,28 @@ from plotly.subplots import make_subplots
 
 from cspm.campaign.campaign import Campaign
 from cspm.campaign.campaign_folder import PAGE
-from cspm.campaign.summary import axes_of, reading_of, summary_of
+from cspm.campaign.summary import SPREAD, axes_of, reading_of, spread_cells
 from cspm.plots.picture_style import COLOURS
-from cspm_ident.offline_page import LAYOUT, figure_html, table_html, write_offline_page
+from cspm_ident.offline_page import LAYOUT, figure_html, scrolled, table_html, write_offline_page
 
 _ACROSS, _HEIGHT = 3, 260
 _MOST_LISTED = 30
 
 
-def write_campaign_page(campaign: Campaign) -> Path:
+def write_campaign_page(campaign: Campaign, found: dict[str, Any]) -> Path:
     """Write `campaign.html` into a campaign's folder, and return its path.
+
+    Args:
+        campaign: what was run.
+        found: what `summary_of` says of it.
 
     Raises:
         OSError: the file cannot be written.
     """
-    found = summary_of(campaign)
     parts = [f"<p class=verdict>{escape(headline(campaign, found))}</p>"]
     if found["metrics"]:
         drawn = figure_html(_distributions(campaign, found))
-        parts += [_spread_table(found), _scrolled(drawn, "distributions of the metrics")]
+        parts += [_spread_table(found), scrolled(drawn, "distributions of the metrics")]
     if found["sensitivities"]:
         parts += _sensitivity_parts(campaign, found)
     if found["verdicts"]:
@@ -50,12 +53,10 @@ def headline(campaign: Campaign, found: dict[str, Any]) -> str:
 
 
 def _spread_table(found: dict[str, Any]) -> str:
-    heads = ("", "least", "median", "95 %", "largest", "unit")
-    rows = []
-    for each in found["metrics"].values():
-        numbers = (each["scale"] * each[key] for key in ("least", "median", "p95", "largest"))
-        rows.append((each["what"], *(f"{number:.4g}" for number in numbers), each["unit"]))
-    return table_html(heads, rows, "spread of the metrics")
+    rows = [
+        (each["what"], *spread_cells(each, 4), each["unit"]) for each in found["metrics"].values()
+    ]
+    return table_html(("", *SPREAD, "unit"), rows, "spread of the metrics")
 
 
 def _distributions(campaign: Campaign, found: dict[str, Any]) -> go.Figure:
@@ -89,13 +90,8 @@ def _sensitivity_parts(campaign: Campaign, found: dict[str, Any]) -> list[str]:
         "<h2>What moves them</h2>",
         "<p>Spearman's rank correlation, −1 to 1; a dot where chance explains it.</p>",
         table_html(heads, rows, "rank correlations"),
-        _scrolled(figure_html(_scatter(campaign, axes, metrics)), "a metric over an axis"),
+        scrolled(figure_html(_scatter(campaign, axes, metrics)), "a metric over an axis"),
     ]
-
-
-def _scrolled(content: str, label: str) -> str:
-    """Return content that is wider than some screens, such as a menu of long names."""
-    return f'<div class=wide tabindex=0 role=region aria-label="{label}">{content}</div>'
 
 
 def _scatter(campaign: Campaign, axes: Sequence[str], metrics: Sequence[str]) -> go.Figure:

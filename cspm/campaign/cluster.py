@@ -34,18 +34,18 @@ _SETTINGS = {
 
 
 @contextmanager
-def local_client(workers: int) -> Iterator[Client]:
+def local_client(workers: int | None = None) -> Iterator[Client]:
     """Give a client of a new cluster on this computer: a scheduler and processes, on loopback.
 
     Their connections are encrypted, and nobody without the certificate of this run can use them.
 
     Args:
-        workers: how many processes, a run at a time each.
+        workers: how many processes, a run at a time each; None: one per processor.
     """
     with (
         dask.config.set(_SETTINGS),
         LocalCluster(
-            n_workers=workers,
+            n_workers=workers or _processors(),
             threads_per_worker=1,
             processes=True,
             host=_LOOPBACK,
@@ -72,7 +72,7 @@ def worker_pool(workers: int | None = None) -> Iterator[Executor]:
         workers: how many processes; None: one per processor.
     """
     # Equal arguments do not mean equal results: some tasks write files.
-    with local_client(workers or default_workers()) as client:
+    with local_client(workers) as client:
         yield client.get_executor(pure=False)
 
 
@@ -131,8 +131,8 @@ def workers_of(client: Client) -> dict[str, Any]:
     return found
 
 
-def default_workers() -> int:
-    """Return how many processes a local cluster has: one per processor."""
+def _processors() -> int:
+    """Return how many processors this process may use."""
     return len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
 
 

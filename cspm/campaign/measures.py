@@ -4,18 +4,18 @@ from __future__ import annotations
 
 import hashlib
 import math
-import sys
 from collections.abc import Callable, Mapping
 from functools import lru_cache
 from importlib import import_module
-from importlib.util import module_from_spec, spec_from_file_location
 from pathlib import Path
+from types import ModuleType
 from typing import Any
 
 from cspm.diagnosis import Diagnosis
 from cspm.simulation import Run
 from cspm_msgs_py.dofs import DOFS
 from cspm_msgs_py.errors import InputError
+from cspm_sim.effects.own_files import run_file
 
 Metric = Callable[[Run], Any]
 Columns = dict[str, Any]
@@ -98,15 +98,8 @@ def load_metric(name: str, file: Path | None) -> Metric:
 
 
 @lru_cache(maxsize=16)
-def _module_at(path: Path, content: bytes) -> Any:  # noqa: ANN401 - a module
-    name = f"cspm_metric_{hashlib.sha256(content).hexdigest()[:12]}"
-    spec = spec_from_file_location(name, path)
-    assert spec is not None
-    assert spec.loader is not None
-    module = module_from_spec(spec)
-    sys.modules[name] = module
-    spec.loader.exec_module(module)
-    return module
+def _module_at(path: Path, content: bytes) -> ModuleType:
+    return run_file(path, f"cspm_metric_{hashlib.sha256(content).hexdigest()[:12]}")
 
 
 def _number(value: object, name: str) -> float | None:

@@ -21,6 +21,8 @@ Row = Mapping[str, Any]
 _LINEAR = DOFS[:3]
 _SHARES = ("slack_share", "infeasible_share")
 _WORST = 5
+# Heads of a table of spreads, with their keys in `summary_of`.
+SPREAD = {"least": "least", "median": "median", "95 %": "p95", "largest": "largest"}
 # What differs between runs without being a cause.
 _DRAWN = "seed"
 # Runs below which no correlation is worth its number.
@@ -69,6 +71,11 @@ def metrics_of(rows: Sequence[Row], axes: Sequence[str]) -> list[str]:
     errors = [f"errors.{dof}.max" for dof in DOFS]
     wanted = (*errors, "tension.min", "tension.max", *_SHARES, *own)
     return [name for name in wanted if name in names]
+
+
+def spread_cells(spread: Mapping[str, Any], digits: int) -> list[str]:
+    """Return the numbers of one metric's spread in its unit, in the order of `SPREAD`."""
+    return [f"{spread['scale'] * spread[key]:.{digits}g}" for key in SPREAD.values()]
 
 
 def axes_of(campaign: Campaign) -> list[str]:

@@ -12,8 +12,8 @@ from collections.abc import Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
 
+from cspm.campaign.campaign_folder import Row
 from cspm.campaign.code_version import code_version
 from cspm.campaign.inputs import unpacked
 from cspm.campaign.measures import (
@@ -23,6 +23,7 @@ from cspm.campaign.measures import (
     own_columns,
     run_columns,
 )
+from cspm.campaign.variants import Variant
 from cspm.changed_machine import changed_machine, of_testbed
 from cspm.diagnosis import diagnose
 from cspm.scenario import Scenario
@@ -34,7 +35,6 @@ from cspm_run.bundle import SCENARIO, Bundle
 
 DONE, FAILED, REFUSED = "done", "failed", "refused"
 STATUS, FAILURE = "status", "failure"
-Row = dict[str, Any]
 
 
 @dataclass(frozen=True)
@@ -42,13 +42,9 @@ class Task:
     """What a worker needs for one run; plain data, by value.
 
     Attributes:
-        number: the run's place in the campaign.
+        variant: the run, its files named as the user has them.
         packed: see `Inputs`.
-        places: where the files that are named below are in it.
-        scenario: file.
-        testbed: file, if not the scenario's.
-        overrides: `KEY=VALUE` each.
-        effects: `EFFECT@ELEMENTS:PARAMETER=VALUE,…` each.
+        places: where these files are in it.
         plant: whose equations.
         metrics: the user's own functions.
         diagnose: whether the run is diagnosed by its base machine.
@@ -56,13 +52,9 @@ class Task:
         code: what `code_version` is to be.
     """
 
-    number: int
+    variant: Variant
     packed: bytes
     places: dict[str, str]
-    scenario: str
-    testbed: str | None
-    overrides: tuple[str, ...]
-    effects: tuple[str, ...]
     plant: str
     metrics: tuple[str, ...]
     diagnose: bool
@@ -124,13 +116,14 @@ def _described(task: Task) -> tuple[Scenario, TestbedFile, TestbedFile]:
             text = text.replace(path, str(folder / place))
         return text
 
-    of_scenario, of_machine = of_testbed([here(each) for each in task.overrides])
-    path = folder / task.places[task.scenario]
+    variant = task.variant
+    of_scenario, of_machine = of_testbed([here(each) for each in variant.overrides])
+    path = folder / task.places[variant.scenario]
     scenario = Scenario(path, load_scenario(path, of_scenario))
     machine = scenario.testbed_file
-    if task.testbed is not None:
-        machine = load_testbed(folder / task.places[task.testbed])
-    return scenario, machine, changed_machine(machine, of_machine, task.effects)
+    if variant.testbed is not None:
+        machine = load_testbed(folder / task.places[variant.testbed])
+    return scenario, machine, changed_machine(machine, of_machine, variant.effects)
 
 
 def _row(task: Task) -> Row:

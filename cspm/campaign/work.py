@@ -3,15 +3,15 @@
 from __future__ import annotations
 
 import time
-from collections import deque
 from collections.abc import Callable, Iterable, Iterator
-from itertools import count, islice
+from itertools import islice
 
 from distributed import Client, Future, KilledWorker, wait
 from distributed.client import FuturesCancelledError
 
+from cspm.campaign.campaign_folder import Row
 from cspm.campaign.cluster import workers_of
-from cspm.campaign.task import FAILURE, STATUS, CodeError, Row, Task, run_task
+from cspm.campaign.task import FAILURE, STATUS, CodeError, Task, run_task
 from cspm_msgs_py.errors import CspmError, InputError
 
 LOST = "lost"
@@ -48,7 +48,7 @@ def work(
         if row is None:
             suspects.append(task)
         else:
-            yield task.number, row
+            yield task.variant.number, row
     for task in suspects:
         yield from _alone(client, task, stop, tell)
 
@@ -58,16 +58,16 @@ def _alone(
 ) -> Iterator[tuple[int, Row]]:
     """Try a run again whose worker was lost once."""
     for tried in range(2, TRIES + 1):
-        tell(f"run {task.number}: its worker was lost, try {tried} of {TRIES}")
+        tell(f"run {task.variant.number}: its worker was lost, try {tried} of {TRIES}")
         for _, row in _round(client, [task], 1, stop, tell):
             if row is not None:
-                yield task.number, row
+                yield task.variant.number, row
                 return
         if stop():
             return
-    tell(f"run {task.number}: its worker was lost {TRIES} times, given up")
+    tell(f"run {task.variant.number}: its worker was lost {TRIES} times, given up")
     reason = f"the worker was lost {TRIES} times: it died, ran out of memory or took too long"
-    yield task.number, {STATUS: LOST, FAILURE: reason}
+    yield task.variant.number, {STATUS: LOST, FAILURE: reason}
 
 
 def _round(
@@ -80,27 +80,24 @@ def _round(
     """Yield tasks as they end, without columns where the worker was lost."""
     rest, watch = iter(tasks), _Watch(client, tell)
     underway: dict[Future, Task] = {}
-    ended: deque[Future] = deque()
-    names = count()
     try:
         while not stop():
             for task in islice(rest, ahead - len(underway)):
-                underway[_submit(client, task, next(names))] = task
+                underway[_submit(client, task)] = task
             if not underway:
                 return
-            ended.extend(_some_ended(underway))
+            ended = _some_ended(underway)
             watch.look()
-            while ended:
-                future = ended.popleft()
+            for future in ended:
                 yield underway.pop(future), _row_of(future)
     finally:
         if client.status == "running":
             client.cancel([*underway], force=True)
 
 
-def _submit(client: Client, task: Task, number: int) -> Future:
+def _submit(client: Client, task: Task) -> Future:
     # A name of its own for each try: results are never those of another one.
-    key = f"run-{task.number}-{number}-{time.time_ns()}"
+    key = f"run-{task.variant.number}-{time.time_ns()}"
     return client.submit(run_task, task, key=key, pure=False)
 
 
@@ -130,15 +127,19 @@ class _Watch:
 
     def __init__(self, client: Client, tell: Callable[[str], None]) -> None:
         self._client, self._tell = client, tell
-        self._alive, self._manned, self._told = time.monotonic(), time.monotonic(), False
+        self._looked = self._alive = self._manned = time.monotonic()
+        self._told = False
 
     def look(self) -> None:
-        """Tell of missing workers.
+        """Tell of missing workers, unless that was looked at lately.
 
         Raises:
             CspmError: the scheduler has been gone for long.
         """
         now = time.monotonic()
+        if now - self._looked < _LOOK_S:
+            return
+        self._looked = now
         if self._client.status == "running":
             self._alive = now
             if workers_of(self._client):

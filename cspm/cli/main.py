@@ -255,7 +255,7 @@ def run(
     if mode not in MODES:
         raise InputError(f"--mode {mode}: allowed: {', '.join(MODES)}")
     from cspm.commands.run_beside_command import Settings, run_beside_command
-    from cspm.commands.run_command import run_command
+    from cspm.commands.run_command import RunnerOptions, run_command
     from cspm_msgs_py.recording.run_record import EXTERNAL
     from cspm_run.plants import PLANTS
 
@@ -272,7 +272,8 @@ def run(
 
         check_watchable(len(paths), record=record, beside=laws is not None)
         opened = sys.stdout.isatty() if browser is None else browser
-        more = (plant, mode, testbed, effects or (), port, opened)
+        options = RunnerOptions(plant, mode, one_process, patience, own_node or ())
+        more = (options, testbed, effects or (), port, opened)
         finished = run_view_command(WatchRequest(paths[0], settings, folder, json, *more))
     elif len(paths) == 1 and laws is None:
         finished = run_command(

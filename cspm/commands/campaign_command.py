@@ -59,6 +59,7 @@ def campaign_command(request: CampaignRequest, json: Path | None) -> bool:
     console = make_console()
     _check_engine()
     from cspm.campaign.campaign import run_campaign
+    from cspm.campaign.campaign_folder import TABLE
     from cspm.campaign.campaign_page import write_campaign_page
     from cspm.campaign.summary import summary_of
     from cspm.campaign.task import DONE, FAILED, STATUS
@@ -75,9 +76,9 @@ def campaign_command(request: CampaignRequest, json: Path | None) -> bool:
             stop=stopped,
         )
     found = summary_of(done)
-    page = write_campaign_page(done)
+    page = write_campaign_page(done, found)
     _print(console, done, found)
-    say(console, f"table {done.folder / 'runs.parquet'}, page {page}")
+    say(console, f"table {done.folder / TABLE}, page {page}")
     if json is not None:
         write_json(json, found)
     if done.interrupted and len(done.rows) < len(done.variants):
@@ -114,14 +115,15 @@ def _check_engine() -> None:
 
 def spread_table(title: str, metrics: Mapping[str, Mapping[str, Any]]) -> Table:
     """Return the spread of each metric; it fits into 60 columns."""
+    from cspm.campaign.summary import SPREAD, spread_cells
+
     table = Table(title=escape(title), box=box.SIMPLE, pad_edge=False, padding=(0, 1, 0, 0))
     table.add_column("", overflow="fold")
-    for head in ("least", "median", "95 %", "largest"):
+    for head in SPREAD:
         table.add_column(head, justify="right", no_wrap=True)
     table.add_column("unit", no_wrap=True)
     for name, each in metrics.items():
-        numbers = (each["scale"] * each[key] for key in ("least", "median", "p95", "largest"))
-        table.add_row(escape(name), *(f"{number:.3g}" for number in numbers), each["unit"])
+        table.add_row(escape(name), *spread_cells(each, 3), each["unit"])
     return table
 
 

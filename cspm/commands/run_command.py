@@ -66,39 +66,13 @@ def run_command(
         CspmError: the run diverged, or a node failed; recording and figure are kept.
     """
     console = make_console()
-    if patience is not None:
-        check_patience(patience)
-        if mode == INPROCESS:
-            raise InputError(
-                f"--patience --mode {mode}: allowed: --mode graph, processes or {REALTIME}"
-            )
+    check_patience_option(patience, mode)
     bundle = bundle_from(path, overrides, machine, plant, effects)
     compile_beside(bundle)
-    external = plant == EXTERNAL
-    if external and mode != REALTIME:
-        raise InputError(f"--plant {EXTERNAL} --mode {mode}: allowed: --mode {REALTIME}")
-    if one_process is not None and mode != REALTIME:
-        option = "--one-process" if one_process else "--process-per-node"
-        raise InputError(f"{option} --mode {mode}: allowed: --mode {REALTIME}")
-    _check_own_nodes(own_nodes, mode, bundle)
+    options = RunnerOptions(plant, mode, one_process, patience, own_nodes)
+    options.check(bundle)
     refuse_existing(folder)
-    runner = None
-    if mode != INPROCESS:
-
-        def notify(waiting: str) -> None:
-            say(console, waiting or "all is there")
-
-        patience_s = PATIENCE_S if patience is None else patience
-        apart, needed_by = one_process is False, f"--mode {mode}"
-        runner = ros_runner(
-            mode,
-            notify,
-            external=external,
-            apart=apart,
-            patience_s=patience_s,
-            needed_by=needed_by,
-            own_nodes=own_nodes,
-        )
+    runner = options.runner(console)
     for line in limit_warnings(bundle.testbed.testbed):
         say(Console(stderr=True), f"warning: {line}")
     for line in free_of(bundle):
@@ -107,11 +81,8 @@ def run_command(
     if unmet:
         say(console, unmet)
     result = _run_with_progress(bundle, folder, console, runner)
-    print_summary(console, result, bundle.scenario.requirement)
-    if json is not None:
-        write_json(json, summary_data(result))
+    tell_result(console, bundle, result, json)
     if result.folder is not None:
-        summarise(result.folder, bundle, result)
         say(console, f"recording {result.folder}, picture {result.folder.name}/run.png")
         say(console, f"next: cspm view {shlex.quote(str(folder))}")
     if result.failure:
@@ -121,6 +92,84 @@ def run_command(
         kept = "; the recording is complete so far" if result.folder else ""
         say(console, f"interrupted after {result.simulated:g} s{kept}")
     return not result.interrupted
+
+
+@dataclasses.dataclass(frozen=True)
+class RunnerOptions:
+    """Options that decide what makes a run's steps.
+
+    Attributes:
+        plant: the plant's equations.
+        mode: how to run.
+        one_process: in real time, whether all nodes share a process; None for yes.
+        patience: with ROS, longest stall [s]; None for the default.
+        own_nodes: controllers that are ROS programs of the user's, by node name.
+    """
+
+    plant: str
+    mode: str
+    one_process: bool | None = None
+    patience: float | None = None
+    own_nodes: Sequence[str] = ()
+
+    def check(self, bundle: Bundle) -> None:
+        """Refuse options that do not go together, or with what is run.
+
+        Raises:
+            InputError: one line.
+        """
+        if self.plant == EXTERNAL and self.mode != REALTIME:
+            raise InputError(f"--plant {EXTERNAL} --mode {self.mode}: allowed: --mode {REALTIME}")
+        if self.one_process is not None and self.mode != REALTIME:
+            option = "--one-process" if self.one_process else "--process-per-node"
+            raise InputError(f"{option} --mode {self.mode}: allowed: --mode {REALTIME}")
+        _check_own_nodes(self.own_nodes, self.mode, bundle)
+
+    def runner(self, console: Console) -> Runner | None:
+        """Return what runs a scenario as ROS nodes; None in this process, without ROS.
+
+        Raises:
+            InputError: ROS is not installed.
+        """
+        if self.mode == INPROCESS:
+            return None
+
+        def notify(waiting: str) -> None:
+            say(console, waiting or "all is there")
+
+        return ros_runner(
+            self.mode,
+            notify,
+            external=self.plant == EXTERNAL,
+            apart=self.one_process is False,
+            patience_s=PATIENCE_S if self.patience is None else self.patience,
+            needed_by=f"--mode {self.mode}",
+            own_nodes=self.own_nodes,
+        )
+
+
+def check_patience_option(patience: float | None, mode: str) -> None:
+    """Refuse a patience that is none, or in a mode that has none.
+
+    Raises:
+        InputError: one line.
+    """
+    if patience is None:
+        return
+    check_patience(patience)
+    if mode == INPROCESS:
+        raise InputError(
+            f"--patience --mode {mode}: allowed: --mode graph, processes or {REALTIME}"
+        )
+
+
+def tell_result(console: Console, bundle: Bundle, result: RunResult, json: Path | None) -> None:
+    """Print what a run amounted to, write it where wanted, and put a picture beside a recording."""
+    print_summary(console, result, bundle.scenario.requirement)
+    if json is not None:
+        write_json(json, summary_data(result))
+    if result.folder is not None:
+        summarise(result.folder, bundle, result)
 
 
 def _check_own_nodes(names: Sequence[str], mode: str, bundle: Bundle) -> None:

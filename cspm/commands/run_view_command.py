@@ -3,28 +3,28 @@
 from __future__ import annotations
 
 import threading
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
 from rich.console import Console
 
-from cspm.commands.run_command import bundle_from, summarise
+from cspm.commands.run_command import (
+    RunnerOptions,
+    bundle_from,
+    check_patience_option,
+    tell_result,
+)
 from cspm.commands.view_command import open_browser
-from cspm.simulation import ros_runner
 from cspm.view.knobs import effects_on, knobs_of, turned
 from cspm.view.live_run import LiveRun, Restart
 from cspm.view.live_server import LiveServer
 from cspm.view.view_server import LOOPBACK, listening
 from cspm_msgs_py.errors import InputError
 from cspm_msgs_py.new_folder import refuse_existing
-from cspm_msgs_py.recording.run_record import EXTERNAL
 from cspm_run.bundle import Bundle
 from cspm_run.output.console import make_console, say
-from cspm_run.output.json_file import write_json
-from cspm_run.output.summary import print_summary, summary_data
 from cspm_run.recorded_run import INPROCESS, run
-from cspm_run.run_result import RunResult
 from cspm_run.stage_warm_up import compile_beside
 
 
@@ -37,8 +37,7 @@ class WatchRequest:
         overrides: replaced values, `KEY=VALUE`.
         folder: a new folder for the recording; a run that begins again gets one with a number.
         json: file for the printed results of the last run; None writes none.
-        plant: the plant's equations.
-        mode: how to run.
+        options: what makes the steps.
         machine: a test-bed file instead of the scenario's.
         effects: physics planted in the machine.
         port: to listen on; None takes the first free one from 8080.
@@ -49,8 +48,7 @@ class WatchRequest:
     overrides: Sequence[str]
     folder: Path
     json: Path | None
-    plant: str
-    mode: str
+    options: RunnerOptions
     machine: Path | None
     effects: Sequence[str]
     port: int | None
@@ -68,10 +66,13 @@ def run_view_command(request: WatchRequest) -> bool:
         CspmError: a node failed.
     """
     console = make_console()
-    refuse_existing(request.folder)
+    options = request.options
+    check_patience_option(options.patience, options.mode)
     described = _described(request, request.effects)
     compile_beside(described)
-    own = request.mode == INPROCESS
+    options.check(described)
+    refuse_existing(request.folder)
+    own = options.mode == INPROCESS
     knobs = knobs_of(described.scenario, request.effects, paced=own) if own else []
     live = LiveRun(knobs, can_pause=own)
     machine = described.testbed.testbed
@@ -88,7 +89,9 @@ def run_view_command(request: WatchRequest) -> bool:
 
 
 def _described(request: WatchRequest, effects: Sequence[str]) -> Bundle:
-    return bundle_from(request.scenario, request.overrides, request.machine, request.plant, effects)
+    return bundle_from(
+        request.scenario, request.overrides, request.machine, request.options.plant, effects
+    )
 
 
 def _watched(console: Console, request: WatchRequest, live: LiveRun) -> bool:
@@ -104,47 +107,23 @@ def _watched(console: Console, request: WatchRequest, live: LiveRun) -> bool:
             live.begin(folder)
             number += 1
             try:
-                result = _runner(console, request)(bundle, folder, live.hold)
+                runner = request.options.runner(console) or run
+                result = runner(bundle, folder, live.hold)
             except Restart:
                 say(console, f"{folder}: ended early, the run begins again")
                 continue
             live.end()
             finished = not result.interrupted and result.failure is None
-            _conclude(console, request, bundle, result)
+            tell_result(console, bundle, result, request.json)
+            if result.failure:
+                say(console, result.failure)
+            say(console, f"recording {folder}; the view stays until Ctrl-C")
             if result.interrupted:
                 return finished
             live.wait()
     except KeyboardInterrupt:
         say(console, "")
         return finished
-
-
-def _runner(
-    console: Console, request: WatchRequest
-) -> Callable[[Bundle, Path, Callable[[float], None]], RunResult]:
-    if request.mode == INPROCESS:
-        return run
-    from cspm_ros.runtime.stall_watchdog import PATIENCE_S
-
-    return ros_runner(
-        request.mode,
-        lambda waiting: say(console, waiting or "all is there"),
-        external=request.plant == EXTERNAL,
-        apart=False,
-        patience_s=PATIENCE_S,
-        needed_by=f"--mode {request.mode}",
-    )
-
-
-def _conclude(console: Console, request: WatchRequest, bundle: Bundle, result: RunResult) -> None:
-    print_summary(console, result, bundle.scenario.requirement)
-    if result.failure:
-        say(console, result.failure)
-    if request.json is not None:
-        write_json(request.json, summary_data(result))
-    if result.folder is not None:
-        summarise(result.folder, bundle, result)
-        say(console, f"recording {result.folder}; the view stays until Ctrl-C")
 
 
 def check_watchable(scenarios: int, *, record: bool, beside: bool) -> None:

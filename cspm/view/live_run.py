@@ -108,17 +108,13 @@ class LiveRun:
 
     def answer(self, after: str) -> bytes | None:
         """Return as JSON what is new since a version, None where nothing is."""
-        frames = self._read()
+        frames = self.frames()
         version = f"{self._generation}-{self._readings}-{self._paused}-{self._ended}"
         if version == after:
             return None
         heads, numbers = packed([frames] if frames else [])
         data = {"version": version, "runs": heads, "numbers": numbers, "state": self._state()}
         return json.dumps(data).encode()
-
-    def frames(self) -> Frames | None:
-        """Return what is recorded so far, if anything."""
-        return self._read()
 
     @property
     def _pace(self) -> float:
@@ -132,7 +128,7 @@ class LiveRun:
             "knobs": [each.data() for each in self.knobs],
         }
 
-    def _read(self) -> Frames | None:
+    def frames(self) -> Frames | None:
         """Return the frames of the recording so far; one that grows is read on now and then."""
         with self._reading:
             begun, recording = time.monotonic(), self._recording

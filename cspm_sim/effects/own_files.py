@@ -10,6 +10,7 @@ from dataclasses import fields
 from hashlib import sha256
 from importlib.util import module_from_spec, spec_from_file_location
 from pathlib import Path
+from types import ModuleType
 
 from cspm_msgs_py.errors import InputError
 from cspm_sim.effects.effect import Description, Effect, Physics, Signature
@@ -45,9 +46,16 @@ def _effects_at(place: Path) -> Iterator[Effect]:
     yield from found
 
 
-def _effect_of(path: Path) -> Iterator[Effect]:
-    """Yield what a file declares, if anything."""
-    name = f"cspm_own_effects_{sha256(str(path.resolve()).encode()).hexdigest()[:12]}_{path.stem}"
+def run_file(path: Path, name: str) -> ModuleType:
+    """Run a Python file, and return it as a module; one that fails is forgotten.
+
+    Args:
+        path: of the file.
+        name: of the module, where `dataclass` and `pickle` look for what a class belongs to.
+
+    Raises:
+        Exception: whatever the file raises.
+    """
     spec = spec_from_file_location(name, path)
     assert spec is not None
     assert spec.loader is not None
@@ -55,8 +63,18 @@ def _effect_of(path: Path) -> Iterator[Effect]:
     sys.modules[name] = module
     try:
         spec.loader.exec_module(module)
-    except Exception as err:
+    except Exception:
         del sys.modules[name]
+        raise
+    return module
+
+
+def _effect_of(path: Path) -> Iterator[Effect]:
+    """Yield what a file declares, if anything."""
+    name = f"cspm_own_effects_{sha256(str(path.resolve()).encode()).hexdigest()[:12]}_{path.stem}"
+    try:
+        module = run_file(path, name)
+    except Exception as err:
         moved = _moved_argument(err)
         if moved:
             raise InputError(f"{VARIABLE}: {path}: {moved}") from err

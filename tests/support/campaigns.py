@@ -3,15 +3,13 @@
 import json
 import subprocess
 import sys
-import time
 from pathlib import Path
 
-import pytest
 from cspm_process import CSPM
 from pyarrow import parquet
+from waiting import PATIENCE_S, until
 
 DASK = Path(sys.executable).with_name("dask")
-PATIENCE_S = 240
 
 SWEEP = """\
 scenario: calm
@@ -52,15 +50,6 @@ def begun(file, *options, **keys):
 
 def rows(folder):
     return parquet.read_table(folder / "runs.parquet").to_pylist()
-
-
-def until(condition, what):
-    """Wait for a condition."""
-    end = time.monotonic() + PATIENCE_S
-    while not condition():
-        if time.monotonic() > end:
-            pytest.fail(f"{what}: not within {PATIENCE_S} s")
-        time.sleep(0.05)
 
 
 def journalled(folder):

@@ -11,6 +11,7 @@ import pandas
 import pytest
 from accessibility import serious_findings
 from driven_browser import driven_browser
+from waiting import PATIENCE_S, until
 
 import cspm
 
@@ -119,7 +120,7 @@ def test_the_page_is_drawn_for_everybody(sweep, tmp_path):
     with driven_browser(tmp_path / "profile") as browser:
         for width in (1200, 400):
             browser.open(page, width=width)
-            campaigns.until(lambda: browser.run(drawn) > 2, "the plots")
+            until(lambda: browser.run(drawn) > 2, "the plots")
             assert browser.run("return document.documentElement.scrollWidth;") <= width
             assert serious_findings(browser) == []
         assert browser.errors() == []
@@ -199,10 +200,10 @@ def test_an_interrupted_campaign_goes_on_where_it_was(tmp_path, how):
     text = campaigns.SWEEP.replace("to: 4", "to: 200")
     file, folder = campaigns.written(tmp_path, text), tmp_path / "campaigns/sweep"
     program = campaigns.begun(file, "--workers", 1, start_new_session=True)
-    campaigns.until(lambda: campaigns.journalled(folder) >= 2, "two runs")
+    until(lambda: campaigns.journalled(folder) >= 2, "two runs")
     # A terminal sends Ctrl-C to the workers as well.
     os.killpg(program.pid, how) if how == signal.SIGINT else program.send_signal(how)
-    out, err = program.communicate(timeout=campaigns.PATIENCE_S)
+    out, err = program.communicate(timeout=PATIENCE_S)
     kept = campaigns.journalled(folder)
     assert 2 <= kept < 200
     if how == signal.SIGINT:
@@ -212,9 +213,9 @@ def test_an_interrupted_campaign_goes_on_where_it_was(tmp_path, how):
         assert len(campaigns.rows(folder)) == kept
     first = (folder / "runs.jsonl").read_text().splitlines()[:kept]
     again = campaigns.begun(file)
-    campaigns.until(lambda: campaigns.journalled(folder) > kept, "one more run")
+    until(lambda: campaigns.journalled(folder) > kept, "one more run")
     again.send_signal(signal.SIGINT)
-    again.communicate(timeout=campaigns.PATIENCE_S)
+    again.communicate(timeout=PATIENCE_S)
     lines = (folder / "runs.jsonl").read_text().splitlines()
     assert lines[:kept] == first
     numbers = [json.loads(line)["run"] for line in lines]

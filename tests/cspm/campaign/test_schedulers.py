@@ -13,6 +13,7 @@ from cryptography import x509
 from cryptography.hazmat.primitives import hashes, serialization
 from cryptography.hazmat.primitives.asymmetric import ec
 from cryptography.x509.oid import NameOID
+from waiting import PATIENCE_S, until
 
 import cspm
 
@@ -74,10 +75,10 @@ def test_a_worker_that_is_killed_costs_its_run_once_more(tmp_path):
     with campaigns.Cluster(tmp_path) as cluster:
         first = cluster.worker("--no-nanny")
         program = campaigns.begun(file, "--scheduler", cluster.address)
-        campaigns.until(lambda: campaigns.journalled(folder) >= 2, "two runs")
+        until(lambda: campaigns.journalled(folder) >= 2, "two runs")
         first.send_signal(signal.SIGKILL)
         cluster.worker()
-        out, _ = program.communicate(timeout=campaigns.PATIENCE_S)
+        out, _ = program.communicate(timeout=PATIENCE_S)
     assert program.returncode == 0, out
     rows = campaigns.rows(folder)
     assert [row["seed"] for row in rows] == [*range(1, 41)]
@@ -90,9 +91,9 @@ def test_what_was_done_is_kept_when_the_scheduler_is_killed(tmp_path):
     with campaigns.Cluster(tmp_path) as cluster:
         cluster.worker()
         program = campaigns.begun(file, "--scheduler", cluster.address)
-        campaigns.until(lambda: campaigns.journalled(folder) >= 2, "two runs")
+        until(lambda: campaigns.journalled(folder) >= 2, "two runs")
         cluster.scheduler.send_signal(signal.SIGKILL)
-        _, err = program.communicate(timeout=campaigns.PATIENCE_S)
+        _, err = program.communicate(timeout=PATIENCE_S)
     assert program.returncode == 1
     assert "the scheduler is lost; the runs that ended are kept, and" in err
     assert "Traceback" not in err
@@ -215,7 +216,7 @@ def test_scheduler_and_worker_on_different_computers(tmp_path):
                 capture_output=True,
                 text=True,
                 cwd=tmp_path,
-                timeout=2 * campaigns.PATIENCE_S,
+                timeout=2 * PATIENCE_S,
             )
         finally:
             for process in reversed(started):

@@ -83,3 +83,18 @@ def test_help_has_frames_only_where_there_is_room(columns, framed):
     assert max(map(len, lines)) <= int(columns)
     (first,) = (line for line in lines if "How to run" in line)
     assert len(first[first.index("How to run") :].rstrip(" │")) >= 20
+
+
+@pytest.mark.parametrize(
+    ("words", "line"),
+    [
+        (["run", "nowhere"], "cspm run: nowhere: no such scenario, allowed: "),
+        (["identify", "winch", "nowhere"], "cspm identify winch: nowhere: no such file or folder"),
+        # A line that names its command itself names it once.
+        (["diagnose"], "cspm diagnose: no recording, allowed: one or more, or --explain EFFECT"),
+    ],
+)
+def test_an_error_begins_with_the_whole_command(cspm, words, line):
+    code, _, err = cspm(*words)
+    assert code == 2
+    assert err.startswith(line)

@@ -13,6 +13,7 @@ from accessibility import serious_findings
 from cspm_process import child
 from driven_browser import driven_browser
 from error_lines import said
+from waiting import PATIENCE_S, until
 
 import cspm
 from cspm.simulation import bundle_of
@@ -21,7 +22,6 @@ from cspm.view.knobs import GAIN, PACE, SEA, Knob, effects_on, knobs_of, turned
 from cspm.view.live_run import LiveRun, Restart
 from cspm_msgs_py.errors import InputError
 
-LONG_S = 240
 WORN = "winch_coulomb_friction@sway_3:torque=0.02"
 
 
@@ -84,7 +84,7 @@ def test_a_paused_run_waits_until_it_may_go_on():
     thread.start()
     assert not passed.wait(0.2)
     live.turn("pause", False)
-    assert passed.wait(LONG_S)
+    assert passed.wait(PATIENCE_S)
     thread.join()
 
 
@@ -106,6 +106,9 @@ def test_what_is_no_knob_is_refused():
     ("words", "line"),
     [
         (["worst_case"], "--view: with several runs, allowed: one scenario, no --controllers"),
+        (["--plant", "external"], "--plant external --mode inprocess: allowed: --mode realtime"),
+        (["--own-node", "plant"], "--own-node --mode inprocess: allowed: --mode processes"),
+        (["--process-per-node"], "--process-per-node --mode inprocess: allowed: --mode realtime"),
         (["--no-record"], "--view --no-record: allowed: one of both, since recordings are shown"),
     ],
 )
@@ -116,14 +119,6 @@ def test_what_cannot_be_watched_is_refused(cspm, words, line):
 
 COUNT = "return view.runs[0].count;"
 STATE = "return live.words ? live.words.textContent : '';"
-
-
-def until(condition, what):
-    end = time.monotonic() + LONG_S
-    while not condition():
-        if time.monotonic() > end:
-            pytest.fail(f"{what}: not within {LONG_S} s")
-        time.sleep(0.1)
 
 
 def asked(url, data=None, **headers):
@@ -172,7 +167,7 @@ def test_a_page_follows_a_run_holds_it_and_begins_it_again(tmp_path):
         assert asked(f"{url}knob", turn, Origin=own)[0] == 204
     finally:
         program.send_signal(signal.SIGINT)
-        out, err = program.communicate(timeout=LONG_S)
+        out, err = program.communicate(timeout=PATIENCE_S)
     assert err == ""
     assert "begins again" in out
     half = cspm.open(tmp_path / "watched_2").attachments["scenario.yaml"].decode()
@@ -197,7 +192,7 @@ def test_the_view_of_a_run_that_has_ended_stays_until_ctrl_c(tmp_path):
     assert asked(f"{url}run?after={found['version']}")[0] == 204
     assert asked(f"{url}etc/passwd")[0] == 404
     program.send_signal(signal.SIGINT)
-    _, err = program.communicate(timeout=LONG_S)
+    _, err = program.communicate(timeout=PATIENCE_S)
     assert (program.returncode, err) == (0, "")
     assert (tmp_path / "short" / "run.png").exists()
 

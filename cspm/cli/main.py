@@ -70,7 +70,9 @@ def run_app(commands: typer.Typer, name: str) -> NoReturn:
 
 def _fail(command: str, text: str, code: int) -> NoReturn:
     """Print one line that begins with the command's name, and end with a code."""
-    line = " ".join(text.split()).removeprefix(f"{command.rpartition(' ')[2]}: ")
+    line, words = " ".join(text.split()), command.split()
+    for first in range(1, len(words)):
+        line = line.removeprefix(f"{' '.join(words[first:])}: ")
     print(f"{command}: {line}", file=sys.stderr)  # noqa: T201 - the command line's voice
     sys.exit(code)
 

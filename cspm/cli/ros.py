@@ -8,6 +8,7 @@ from typing import Annotated
 import typer
 
 from cspm.cli.app import RUN_FAILED, Json, app
+from cspm.cli.shared_options import COMMAND
 from cspm_msgs_py.errors import InputError
 
 
@@ -29,6 +30,7 @@ def node(context: typer.Context) -> None:
     if {"--help", "-h"} & {name, *rest}:
         typer.echo(context.get_help())
         raise typer.Exit(0)
+    COMMAND.set(f"{context.command_path} {name}")
     from cspm.graph import run_node
 
     run_node(name, rest)

@@ -3,8 +3,10 @@
 from __future__ import annotations
 
 import threading
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
+from contextlib import suppress
 from dataclasses import dataclass
+from itertools import count
 from pathlib import Path
 
 from rich.console import Console
@@ -21,6 +23,7 @@ from cspm.view.live_run import LiveRun, Restart
 from cspm.view.live_server import LiveServer
 from cspm.view.view_server import LOOPBACK, listening
 from cspm_msgs_py.errors import InputError
+from cspm_msgs_py.interruption import interruptible
 from cspm_msgs_py.new_folder import refuse_existing
 from cspm_run.bundle import Bundle
 from cspm_run.output.console import make_console, say
@@ -96,18 +99,15 @@ def _described(request: WatchRequest, effects: Sequence[str]) -> Bundle:
 
 def _watched(console: Console, request: WatchRequest, live: LiveRun) -> bool:
     """Run until Ctrl-C, and begin again at each change."""
-    number, finished = 1, False
-    try:
-        while True:
+    runner, finished = request.options.runner(console) or run, False
+    # Between two runs too, where nothing else hears a signal.
+    with interruptible() as stopped, suppress(KeyboardInterrupt):
+        for folder in _folders(request.folder):
+            if stopped():
+                break
             bundle = turned(_described(request, effects_on(live.knobs)), live.knobs)
-            folder = request.folder
-            if number > 1:
-                folder = folder.with_name(f"{folder.name}_{number}")
-                refuse_existing(folder)
             live.begin(folder)
-            number += 1
             try:
-                runner = request.options.runner(console) or run
                 result = runner(bundle, folder, live.hold)
             except Restart:
                 say(console, f"{folder}: ended early, the run begins again")
@@ -117,13 +117,24 @@ def _watched(console: Console, request: WatchRequest, live: LiveRun) -> bool:
             tell_result(console, bundle, result, request.json)
             if result.failure:
                 say(console, result.failure)
-            say(console, f"recording {folder}; the view stays until Ctrl-C")
             if result.interrupted:
-                return finished
-            live.wait()
-    except KeyboardInterrupt:
-        say(console, "")
-        return finished
+                break
+            say(console, f"recording {folder}; the view stays until Ctrl-C")
+            live.wait(stopped)
+    return finished
+
+
+def _folders(first: Path) -> Iterator[Path]:
+    """Yield the folders of the runs: as asked for, then with numbers.
+
+    Raises:
+        InputError: one with a number is there.
+    """
+    yield first
+    for number in count(2):
+        folder = first.with_name(f"{first.name}_{number}")
+        refuse_existing(folder)
+        yield folder
 
 
 def check_watchable(scenarios: int, *, record: bool, beside: bool) -> None:

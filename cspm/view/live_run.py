@@ -6,7 +6,7 @@ import json
 import signal
 import threading
 import time
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
@@ -80,10 +80,10 @@ class LiveRun:
         with self._changed:
             self._ended, self._next_reading = True, 0.0
 
-    def wait(self) -> None:
-        """Wait until a knob is turned."""
+    def wait(self, stopped: Callable[[], bool]) -> None:
+        """Wait until a knob is turned, or it is to end."""
         with self._changed:
-            while not self._turned:
+            while not self._turned and not stopped():
                 self._changed.wait(_NAP_S)
 
     def turn(self, name: str, value: object) -> None:
@@ -132,7 +132,8 @@ class LiveRun:
         """Return the frames of the recording so far; one that grows is read on now and then."""
         with self._reading:
             begun, recording = time.monotonic(), self._recording
-            if recording is None or begun < self._next_reading:
+            # One that is paused is looked at often: it grows no more, and shows its end at once.
+            if recording is None or (begun < self._next_reading and not self._paused):
                 return self._frames
             try:
                 if not recording.update():

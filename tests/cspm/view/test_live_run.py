@@ -121,6 +121,12 @@ COUNT = "return view.runs[0].count;"
 STATE = "return live.words ? live.words.textContent : '';"
 
 
+def frames_within(browser, seconds):
+    before = browser.run(COUNT)
+    browser.run(f"await new Promise(done => setTimeout(done, {1000 * seconds}));")
+    return browser.run(COUNT) - before
+
+
 def asked(url, data=None, **headers):
     request = urllib.request.Request(url, data, headers)
     try:
@@ -148,10 +154,9 @@ def test_a_page_follows_a_run_holds_it_and_begins_it_again(tmp_path):
             until(lambda: browser.run(COUNT) > first, "more frames")
             browser.run("document.getElementById('hold').click();")
             until(lambda: browser.run(STATE) == "the run is paused", "the pause")
-            browser.run("await new Promise(done => setTimeout(done, 1500));")
-            held = browser.run(COUNT)
-            browser.run("await new Promise(done => setTimeout(done, 1500));")
-            assert browser.run(COUNT) == held
+            until(lambda: frames_within(browser, 1.5) == 0, "a page that has caught up")
+            assert frames_within(browser, 1.5) == 0
+            assert browser.run(STATE) == "the run is paused"
             browser.run("send('sea', 0.5);")
             until(lambda: browser.run("return view.runs[0].name;") == "watched_2", "another run")
             browser.open(url, width=400)

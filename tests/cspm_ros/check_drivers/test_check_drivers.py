@@ -61,7 +61,7 @@ class TestMachine:
 
 class TestRefusals:
     def test_unusable_arguments_end_in_one_line(self, refused):
-        assert refused().startswith("check-drivers: allowed: a scenario or a test-bed")
+        assert refused().startswith("allowed: a scenario or a test-bed")
         assert refused("--scenario", "none").startswith("none: no such scenario, allowed: ")
         assert (
             refused("--testbed", "none.yaml") == "none.yaml: no such file, allowed: a test-bed file"
@@ -91,4 +91,4 @@ class TestRefusals:
     def test_another_ros_is_refused(self, refused, monkeypatch):
         monkeypatch.setenv("ROS_DISTRO", "humble")
         reported = refused("--scenario", "rest")
-        assert reported.startswith("check-drivers: ROS_DISTRO is humble, allowed: jazzy")
+        assert reported.startswith("ROS_DISTRO is humble, allowed: jazzy")

@@ -117,6 +117,6 @@ def test_a_network_that_goes_away_for_good_ends_the_run_and_is_reported(tmp_path
         waits = rf"{name} waits for \S"
         assert re.search(rf"since \d+ s {waits}", err)
         last = err.splitlines()[-1]
-        assert re.match(rf"cspm node \w+: nothing moved for {PATIENCE_S:g} s: {waits}", last)
+        assert re.match(rf"cspm node {name}: nothing moved for {PATIENCE_S:g} s: {waits}", last)
     recover(folder)
     assert resimulate(folder, lambda now, total: None).difference is None

@@ -296,8 +296,8 @@ def test_a_node_that_is_stopped_is_named(tmp_path, node):
         processes(LONG, tmp_path / "bag", witness, patience_s=4.0)
     others = "|".join(set(NODES) - {node})
     assert re.match(
-        rf"no answer from {node}; (?:{others}) ended with exit code 1 before the run did: cspm:"
-        rf" nothing moved for 4 s: (?:{others}) waits for \S.*$",
+        rf"no answer from {node}; ({others}) ended with exit code 1 before the run did:"
+        rf" cspm node \1: nothing moved for 4 s: \1 waits for \S.*$",
         str(caught.value),
     )
     assert gone(list(witness.nodes.values()), 0.0)
@@ -321,7 +321,7 @@ def test_what_a_node_cannot_do_is_reported_as_its_last_words(tmp_path):
     with pytest.raises(CspmError) as caught:
         processes(bundle_of("one_winch"), tmp_path / "bag", steps=10)
     assert str(caught.value) == (
-        "recorder ended with exit code 2 before the run did: cspm:"
+        "recorder ended with exit code 2 before the run did: cspm node recorder:"
         f" {tmp_path}/bag: exists, allowed: a new folder"
     )
     assert list((tmp_path / "bag").iterdir()) == []

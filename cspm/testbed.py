@@ -6,6 +6,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import TypeAlias
 
+from cspm_model.urdf import urdf
 from cspm_msgs_py import edited
 from cspm_msgs_py.errors import InputError
 from cspm_msgs_py.testbed import EffectEntry, TestbedFile
@@ -119,6 +120,16 @@ class Testbed:
             InputError: the test-bed has no such effect.
         """
         return Testbed(edited.without_effect(self.file, effect))
+
+    def urdf(self) -> str:
+        """Return the machine as an URDF document, with the tag of ros2_control: `cspm urdf`.
+
+        Examples:
+            >>> import cspm
+            >>> cspm.load_testbed("thesis").urdf().splitlines()[1]
+            '<robot name="thesis">'
+        """
+        return urdf(self.description)
 
     def save(self, path: str | Path) -> Path:
         """Write the file; return its path.

@@ -194,3 +194,31 @@ def check_drivers(
     machine = machine_of(scenario, testbed, overrides or ())
     fine = check_drivers_command(machine, seconds, sim_time=sim_time, pull=pull, json=json)
     raise typer.Exit(0 if fine else RUN_FAILED)
+
+
+@app.command(
+    epilog="""Examples:
+
+cspm urdf thesis > thesis.urdf
+
+cspm urdf lab.yaml --out lab.urdf
+
+Exit code: 0 done, 2 unusable input."""
+)
+def urdf(
+    testbed: Annotated[
+        str, typer.Argument(metavar="TESTBED", help="A machine of the library, or its file.")
+    ],
+    out: Annotated[
+        Path | None,
+        typer.Option(metavar="FILE", help="A new file; without it to standard output."),
+    ] = None,
+) -> None:
+    """Write a machine as URDF, for robot_state_publisher, RViz, Foxglove and ros2_control.
+
+    Its joints are the winches, named as in /winches/state. Bar, target and winch frame are joints
+    of the type floating: their poses come on topics, not from angles.
+    """
+    from cspm.commands.urdf_command import urdf_command
+
+    urdf_command(testbed, out)

@@ -25,6 +25,7 @@ from cspm_msgs_py.errors import CspmError, InputError
 from cspm_msgs_py.rate_limited_warnings import RateLimitedWarnings
 from cspm_msgs_py.ros.domain_claim import DomainClaim
 from cspm_msgs_py.ros.intake import Intake
+from cspm_msgs_py.ros.local_name import local
 from cspm_msgs_py.ros.qos import contract_qos
 from cspm_msgs_py.ros.tagged_taker import Tagged
 from cspm_msgs_py.ros.wake_up import WakeUp
@@ -101,7 +102,7 @@ class ContractNode:
     def raw_publisher(self, topic: Topic, readers: Collection[str] = ()) -> Callable[[bytes], None]:
         """Return what publishes a topic's CDR bytes."""
         qos = contract_qos(SENDER_DEPTH)
-        made = self.node.create_publisher(ros_class(topic.ros_type), topic.name, qos)
+        made = self.node.create_publisher(ros_class(topic.ros_type), local(topic.name), qos)
         self._publishers[topic.name] = (made, frozenset(readers))
         # What `Publisher.publish` does with bytes, without its checks of each message.
         publish: Callable[[bytes], None] = made.handle.publish_raw
@@ -119,7 +120,7 @@ class ContractNode:
         message_class = ros_class(topic.ros_type)
         if self.intake is None:
             qos = contract_qos(depth)
-            self.node.create_subscription(message_class, topic.name, take, qos, raw=True)
+            self.node.create_subscription(message_class, local(topic.name), take, qos, raw=True)
             return
         self.intake.subscribe(
             topic,
@@ -138,7 +139,7 @@ class ContractNode:
     ) -> None:
         """Have `take` called with each message as rclpy's object; `depth` wait, or all if None."""
         if self.intake is None:
-            self.node.create_subscription(message_class, topic, take, contract_qos(depth))
+            self.node.create_subscription(message_class, local(topic), take, contract_qos(depth))
         else:
             self.intake.subscribe_objects(topic, message_class, take, depth)
 
@@ -195,7 +196,7 @@ class ContractNode:
         message_class = ros_class(topic.ros_type)
         if self.intake is None:
             numbered, qos = _Numbered(take), contract_qos(None)
-            self.node.create_subscription(message_class, topic.name, numbered, qos, raw=True)
+            self.node.create_subscription(message_class, local(topic.name), numbered, qos, raw=True)
         else:
             self.intake.subscribe_rows(topic, message_class, take_row, take)
 
@@ -262,20 +263,22 @@ class ContractNode:
             for publisher in self.node.publishers
         )
 
-    def claim(self, run: str, topic: str) -> None:
+    def claim(self, run: str, topic: str) -> bool:
         """Claim the node's domain for a run of this name, until the node is closed.
 
-        Runs whose start is announced on another `topic` are kept apart. A second call does nothing.
+        Runs whose start is announced on another `topic` are kept apart. A second call does nothing
+        and returns false.
 
         Raises:
             InputError: another run has it.
         """
         if self._claimed:
-            return
+            return False
         domain = int(self.node.context.get_domain_id())
-        claim = DomainClaim(domain, self.node.resolve_topic_name(topic), run)
+        claim = DomainClaim(domain, self.node.resolve_topic_name(local(topic)), run)
         self.closing.callback(claim.close)
         self._claimed = True
+        return True
 
     def every(self, seconds: float, call: Callable[[], None]) -> Any:  # noqa: ANN401 - rclpy's timer
         """Have `call` called at an interval of wall time; return the timer."""

@@ -10,6 +10,7 @@ import time
 from collections.abc import Callable
 
 from cspm_msgs_py.ros.contract_node import ContractNode, ros_class
+from cspm_msgs_py.ros.local_name import local
 from cspm_msgs_py.ros.qos import contract_qos
 from cspm_msgs_py.topics import QOS_DEPTH
 
@@ -26,7 +27,7 @@ class FaultLine:
         """Connect a node; `take` gets what others report, in one line."""
         self._node, self._take = node, take
         self._header = ros_class(_HEADER)
-        self._publisher = node.node.create_publisher(self._header, FAULT, contract_qos())
+        self._publisher = node.node.create_publisher(self._header, local(FAULT), contract_qos())
         self._last, self._sent = "", -_AGAIN_S
         if take is not None:
             node.subscribe_objects(FAULT, self._header, self._hear, QOS_DEPTH)

@@ -10,6 +10,7 @@ from rclpy.qos import ReliabilityPolicy
 
 from cspm_msgs_py.graph import Edges
 from cspm_msgs_py.ros.contract_node import ContractNode
+from cspm_msgs_py.ros.local_name import local
 from cspm_msgs_py.stepping.publisher_binding import PublisherBinding
 from cspm_msgs_py.topics import Topic
 
@@ -47,7 +48,7 @@ class GraphPublishers:
             self._looked = now
             self._found = {
                 bytes(info.endpoint_gid): str(info.node_name)
-                for info in self._node.get_publishers_info_by_topic(self._topic.name)
+                for info in self._node.get_publishers_info_by_topic(local(self._topic.name))
                 if info.topic_type == self._topic.ros_type
                 and info.qos_profile.reliability != ReliabilityPolicy.BEST_EFFORT
             }

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable
 
 from cspm_msgs_py.ros.contract_node import ContractNode, ros_class
+from cspm_msgs_py.ros.local_name import local
 from cspm_msgs_py.ros.qos import contract_qos
 from cspm_msgs_py.stepping.stage import Guard
 from cspm_msgs_py.topics import BRAKE, EMERGENCY_STOP, QOS_DEPTH, SAFE
@@ -36,8 +37,8 @@ class GuardPorts:
         self._guard, self._now_ns = guard, now_ns
         self._release, self._begun = reset or guard.reset, begun
         self._bool = ros_class(BRAKE.ros_type)
-        self._brake = node.node.create_publisher(self._bool, BRAKE.name, contract_qos())
-        self._safe = node.node.create_publisher(self._bool, SAFE.name, contract_qos())
+        self._brake = node.node.create_publisher(self._bool, local(BRAKE.name), contract_qos())
+        self._safe = node.node.create_publisher(self._bool, local(SAFE.name), contract_qos())
         stop_class = ros_class(EMERGENCY_STOP.ros_type)
         node.subscribe_objects(EMERGENCY_STOP.name, stop_class, self._stop, QOS_DEPTH)
         node.node.create_service(ros_class("std_srvs/srv/Trigger"), RESET, self._reset)

@@ -24,6 +24,7 @@ from cspm_msgs_py.ros.inlets import (
     RowInlet,
     TaggedInlet,
 )
+from cspm_msgs_py.ros.local_name import local
 from cspm_msgs_py.ros.qos import contract_qos
 from cspm_msgs_py.ros.rcl_message import take_address
 from cspm_msgs_py.ros.row_taker import RowTaker
@@ -152,7 +153,7 @@ class Intake:
             handle = rclpy_implementation.Subscription(
                 node.handle,
                 message_class,
-                node.resolve_topic_name(topic),
+                node.resolve_topic_name(local(topic)),
                 contract_qos(depth, reliability=reliability).get_c_qos_profile(),
             )
         if self._wake_up is not None:

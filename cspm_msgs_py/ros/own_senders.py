@@ -6,6 +6,7 @@ import time
 from collections.abc import Collection
 
 from cspm_msgs_py.ros.contract_node import ContractNode
+from cspm_msgs_py.ros.local_name import local
 from cspm_msgs_py.ros.rendezvous import SETTLE_S
 from cspm_msgs_py.schedule import Schedule
 
@@ -39,7 +40,7 @@ class OwnSenders:
 
     def ready(self) -> bool:
         """Return whether all senders have been there for half a second."""
-        if not all(self._node.count_publishers(topic) for topic in self._topics):
+        if not all(self._node.count_publishers(local(topic)) for topic in self._topics):
             self._since = None
             return False
         if not self._topics:

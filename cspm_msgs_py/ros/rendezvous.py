@@ -15,6 +15,7 @@ from collections.abc import Callable, Collection
 
 from cspm_msgs_py.errors import InputError
 from cspm_msgs_py.ros.contract_node import ContractNode, ros_class
+from cspm_msgs_py.ros.local_name import local
 from cspm_msgs_py.ros.qos import contract_qos
 
 PROGRESS, START, END = "/run/progress", "/run/start", "/run/end"
@@ -57,10 +58,10 @@ class FollowerSide:
         self._period_ns = period_ns
         self._on_end = on_end
         self._header = ros_class(_HEADER)
-        self._publisher = node.node.create_publisher(self._header, PROGRESS, contract_qos())
+        self._publisher = node.node.create_publisher(self._header, local(PROGRESS), contract_qos())
         self._on_start = on_start
-        node.node.create_subscription(self._header, START, self._start, contract_qos(None))
-        node.node.create_subscription(self._header, END, self._end, contract_qos(None))
+        node.node.create_subscription(self._header, local(START), self._start, contract_qos(None))
+        node.node.create_subscription(self._header, local(END), self._end, contract_qos(None))
         self._connected = False
         self._timer = node.every(_LOOK_EVERY_S, self._announce)
         self.end_ns: int | None = None
@@ -121,8 +122,8 @@ class PlantSide:
         self._others = frozenset(others)
         self._on_progress = on_progress
         self._header = ros_class(_HEADER)
-        self._publisher = node.node.create_publisher(self._header, END, contract_qos())
-        self._starter = node.node.create_publisher(self._header, START, contract_qos())
+        self._publisher = node.node.create_publisher(self._header, local(END), contract_qos())
+        self._starter = node.node.create_publisher(self._header, local(START), contract_qos())
         node.subscribe_objects(PROGRESS, self._header, self._take)
         self._settled = time.monotonic() + SETTLE_S
         self.absent = set(others)
@@ -135,7 +136,7 @@ class PlantSide:
         nothing: others may be waiting for them.
         """
         if self.absent:
-            there = self._senders(self._node.node.resolve_topic_name(PROGRESS))
+            there = self._senders(self._node.node.resolve_topic_name(local(PROGRESS)))
             away = sorted(self.absent - set(there))
             return away or self._node.unmatched() or sorted(self.absent)
         for publisher in (self._starter, self._publisher):
@@ -149,7 +150,7 @@ class PlantSide:
     def doubled(self) -> list[str]:
         """Return which of the run's names stand for more than one node, as in two runs at once."""
         names = {self._publisher.topic_name: {self._node.name}}
-        names[self._node.node.resolve_topic_name(PROGRESS)] = set(self._others)
+        names[self._node.node.resolve_topic_name(local(PROGRESS))] = set(self._others)
         return [
             f"one node {name} instead of {count} (ROS_DOMAIN_ID keeps runs apart)"
             for topic, wanted in names.items()

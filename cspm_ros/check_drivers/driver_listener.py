@@ -13,6 +13,7 @@ from cspm_msgs_py.errors import InputError
 from cspm_msgs_py.graph import RECORDER
 from cspm_msgs_py.ros.contract_node import ContractNode, ros_class
 from cspm_msgs_py.ros.intake import Intake
+from cspm_msgs_py.ros.local_name import local
 from cspm_msgs_py.ros.session import Session
 from cspm_msgs_py.schedule import TORQUE_COMMAND
 from cspm_msgs_py.sensor_spec import MEASURED
@@ -164,10 +165,12 @@ class DriverListener:
             ear.take()
 
     def _publishers(self, name: str) -> list[Endpoint]:
-        return [_endpoint(info) for info in self._node.node.get_publishers_info_by_topic(name)]
+        return [
+            _endpoint(info) for info in self._node.node.get_publishers_info_by_topic(local(name))
+        ]
 
     def _subscriptions(self, name: str) -> list[Endpoint]:
-        found = self._node.node.get_subscriptions_info_by_topic(name)
+        found = self._node.node.get_subscriptions_info_by_topic(local(name))
         return [each for each in map(_endpoint, found) if each.node != RECORDER]
 
 

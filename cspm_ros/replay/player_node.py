@@ -12,6 +12,7 @@ from rclpy.duration import Duration
 from cspm_msgs_py.bag import BagStream
 from cspm_msgs_py.errors import CspmError, InputError
 from cspm_msgs_py.ros.contract_node import ContractNode, ros_class
+from cspm_msgs_py.ros.local_name import local
 from cspm_msgs_py.ros.qos import contract_qos
 from cspm_msgs_py.topics import CLOCK, SENDER_DEPTH
 from cspm_msgs_py.wire import WireWriter
@@ -108,7 +109,7 @@ class PlayerNode:
         self._publishers = {
             name: node.node.create_publisher(
                 ros_class(ros_type),
-                names.get(name) or selection.remap.get(name, name),
+                local(names.get(name) or selection.remap.get(name, name)),
                 contract_qos(SENDER_DEPTH),
             )
             for name, ros_type in types.items()

@@ -26,6 +26,8 @@ from cspm_run.plants import PLANTS
 from cspm_run.recorded_bundle import recorded_bundle
 
 LOCKSTEP, REALTIME = "lockstep", "realtime"
+# The mode of a run in lockstep with a process per node.
+PROCESSES = "processes"
 
 
 def _value(default: object, text: str, *choices: str, least: float | None = None) -> Any:  # noqa: ANN401 - a dataclass field
@@ -44,7 +46,7 @@ class NodeParameters:
     own_nodes: tuple[str, ...] = _value((), "lockstep: those of the nodes that are your programs")
     steps: int = _value(0, "end after so many plant steps; 0: the scenario's duration", least=0)
     folder: str = _value("", "recorder: a new folder for the recording")
-    mode: str = _value("processes", "recorder: the mode named in the recording")
+    mode: str = _value("", "recorder: the mode named in the recording; empty: as paced")
     report: str = _value("", "plant or leader: a file that it keeps up to date with how far it is")
     patience: float = _value(
         PATIENCE_S,
@@ -59,6 +61,11 @@ class NodeParameters:
     start: float = _value(0.0, "player: where in the bag to begin [s]")
     paused: bool = _value(False, "player: whether to begin paused")
     lockstep: bool = _value(False, "player: take the plant's place in a run in lockstep")
+
+    @property
+    def recorded_mode(self) -> str:
+        """The mode that a recording of this run names."""
+        return self.mode or (REALTIME if self.pace == REALTIME else PROCESSES)
 
     def bundle(self) -> Bundle:
         """Return the run's description, resolved.

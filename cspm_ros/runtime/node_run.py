@@ -85,7 +85,9 @@ def _run_lockstep(
         return
     if node.name == RECORDER:
         folder = Path(parameters.folder or f"recordings/{bundle.scenario.name}")
-        writer = stack.enter_context(new_recording(bundle, folder, parameters.mode, run.own))
+        writer = stack.enter_context(
+            new_recording(bundle, folder, parameters.recorded_mode, run.own)
+        )
         recorder = run.recorder(node, writer)
         stack.callback(recorder.close)
         _spin(session, _watch(recorder, node, parameters, began), lambda: recorder.ended)
@@ -118,7 +120,7 @@ def _run_realtime(
             raise CspmError(plant.failure)
     elif node.name == RECORDER:
         folder = Path(parameters.folder or f"recordings/{bundle.scenario.name}")
-        writer = stack.enter_context(run.new_recording(folder, parameters.mode))
+        writer = stack.enter_context(run.new_recording(folder, parameters.recorded_mode))
         recorder, leader = run.recorder(node, writer, steps)
         stack.callback(recorder.close)
         if leader is not None:

@@ -6,12 +6,14 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
 
+from cspm_model.urdf import urdf
 from cspm_msgs_py.graph import Edges, graph_of
 from cspm_msgs_py.ros.contract_node import ContractNode
 from cspm_msgs_py.ros.rendezvous import START
 from cspm_msgs_py.scenario import ClosedLoop
 from cspm_msgs_py.schedule import Schedule, schedule_of
 from cspm_msgs_py.topics import Topic
+from cspm_ros.runtime.robot_description import publish_description
 from cspm_run.assembly import assemble_simulator
 from cspm_run.bundle import Bundle
 from cspm_sim.plant_run import PlantRun
@@ -50,10 +52,13 @@ class NodesOfRun:
     def claim(self, node: ContractNode) -> None:
         """Claim the ROS domain for this run, in the name of the node that leads it.
 
+        It says from now on what the machine looks like.
+
         Raises:
             InputError: another run has it.
         """
-        node.claim(self.bundle.scenario.name, START)
+        if node.claim(self.bundle.scenario.name, START):
+            publish_description(node, urdf(self.bundle.testbed.testbed))
 
     def plant_run(self, steps: int, place: Path) -> PlantRun:
         """Return what the plant's node is made of.

@@ -20,14 +20,19 @@ from cspm_ros.processes.background import SHARE_BEHIND
 from cspm_ros.processes.hosted_process import NodeHost
 from cspm_ros.processes.node_processes import LEAVING_S, SILENCE_S, NodeProcesses
 from cspm_ros.runtime.exit_watchdog import IN_ORDER
-from cspm_ros.runtime.node_parameters import LOCKSTEP, REALTIME, NodeParameters, write_parameters
+from cspm_ros.runtime.node_parameters import (
+    LOCKSTEP,
+    PROCESSES,
+    REALTIME,
+    NodeParameters,
+    write_parameters,
+)
 from cspm_ros.runtime.progress_file import Report, read_report
 from cspm_ros.runtime.stall_watchdog import PATIENCE_S, Patience, StartWatch
 from cspm_run.bundle import SCENARIO, Bundle
 from cspm_run.recorded_result import recorded_result
 from cspm_run.run_result import RunResult
 
-PROCESSES = "processes"
 # Where the leader announces the start; the module that owns the name loads ROS.
 START = "/run/start"
 _LOOK_EVERY_S = 0.1

@@ -36,7 +36,7 @@ def test_every_command_has_the_same_options_and_names_its_exit_codes(cspm, comma
         assert (code, err) == (0, ""), words
         for part in ("--quiet", "-h", "Exit code"):
             assert part in out, words
-        assert "--json" in out or words in (("node",), ("new",)), words
+        assert "--json" in out or words in (("node",), ("urdf",)), words
         assert "BAG" not in out, words
 
 

@@ -17,6 +17,7 @@ from cspm_msgs_py.stepping.stage import Send
 Array = NDArray[np.float64]
 
 EMERGENCY_STOP = "emergency stop set"
+_SILENCE = "emergency stop silent"
 
 
 class GuardedStage:
@@ -38,6 +39,10 @@ class GuardedStage:
         """
         self._safe_state = safe_state
         self._stale_ns = round(safety.stale_after * 1e9)
+        beat = safety.stop_heartbeat
+        self._beat_ns = None if beat is None else round(beat * 1e9)
+        # When the emergency stop was last heard, at first when its silence began [ns].
+        self._beaten_ns: int | None = None
         self._half_period_ns = period_ns // 2
         self._width = 3 * winches
         self._latch = Latch()
@@ -64,6 +69,7 @@ class GuardedStage:
 
     def emergency_stop(self, now_ns: int, pressed: bool) -> None:
         """Take the state of the emergency stop, which refuses a reset while it is set."""
+        self._beaten_ns = now_ns
         self._latch.stand(now_ns, EMERGENCY_STOP, EMERGENCY_STOP if pressed else None)
 
     def watch(
@@ -87,6 +93,7 @@ class GuardedStage:
             late = age > self._stale_ns
             if late or self._latch.open:
                 self._latch.stand(now_ns, ("stale", topic), self._stale(topic, age, late))
+        self._watch_stop(now_ns)
         if inputs is not None:
             self._winches = inputs.get(WINCH_STATE)
         elif now_ns - self._stepped_ns > self._stale_ns:
@@ -94,6 +101,17 @@ class GuardedStage:
         recent = 0 <= now_ns - self._sent_ns < self._half_period_ns
         if self._latch.open and now_ns != self._sent_ns and not (self._entered and recent):
             self._send_safe(now_ns, send)
+
+    def _watch_stop(self, now_ns: int) -> None:
+        """Hear whether the emergency stop is still there, where it has to repeat itself."""
+        if self._beat_ns is None:
+            return
+        if self._beaten_ns is None:
+            self._beaten_ns = now_ns
+        silent, allowed = now_ns - self._beaten_ns, self._beat_ns
+        if silent > allowed or self._latch.open:
+            text = f"{_SILENCE} for {-(-silent // 1_000_000)} ms, allowed: {allowed * 1e-6:g} ms"
+            self._latch.stand(now_ns, _SILENCE, text if silent > allowed else None)
 
     def reset(self, now_ns: int) -> str | None:
         """Leave the safe state; return why not in one line while a reason lasts."""

@@ -25,6 +25,7 @@ class Safety(StrictModel):
             other within one period of the force controller, which never acts.
         watchdog: the plant goes to the safe state by itself without a torque command for so long
             [s].
+        stop_heartbeat: longest silence of the emergency stop [s]; None: it may be silent.
         workspace: largest distance of a body from its mean position [m]; None: the machine's size.
         pose_speed: largest speed of a body's points [m/s]; None: what the cables can give the bar.
         following_error: largest distance of the bar's points from where they are wanted [m]; None:
@@ -39,6 +40,7 @@ class Safety(StrictModel):
     tension_trip: PositiveFloat | None = None
     torque_slew: PositiveFloat | None = None
     watchdog: Wait = 0.05
+    stop_heartbeat: Wait | None = None
     workspace: PositiveFloat | None = None
     pose_speed: PositiveFloat | None = None
     following_error: PositiveFloat | None = None

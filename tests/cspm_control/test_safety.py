@@ -250,3 +250,44 @@ def test_an_input_is_stale_after_the_time_that_the_file_says():
     assert stage.safe
     reason = f"{WINCH_STATE} stale: 51 ms old, allowed: 50 ms"
     assert stage.status().message.endswith(reason)
+
+
+# The emergency stop that repeats itself
+
+
+SILENT = "emergency stop silent for 101 ms, allowed: 100 ms"
+
+
+def test_an_emergency_stop_that_falls_silent_trips_until_it_is_heard_again():
+    stage, sent = torque_stage("safety.stop_heartbeat=0.1"), Sent()
+    stage.step(0, winch_row(), sent)
+    for now in range(0, 301, 50):
+        stage.emergency_stop(now * MS, False)
+        stage.watch(now * MS, {}, sent, winch_row())
+    stage.watch(400 * MS, {}, sent, winch_row())
+    assert not stage.safe
+    stage.watch(401 * MS, {}, sent, winch_row())
+    assert stage.safe
+    assert stage.status().message.endswith(SILENT)
+    stage.watch(500 * MS, {}, sent, winch_row())
+    assert stage.reset(500 * MS).startswith("reset refused: emergency stop silent for 200 ms")
+    stage.emergency_stop(510 * MS, False)
+    stage.watch(511 * MS, {}, sent, winch_row())
+    assert stage.safe
+    assert stage.reset(511 * MS) is None
+
+
+def test_an_emergency_stop_that_was_never_heard_trips_too():
+    stage, sent = torque_stage("safety.stop_heartbeat=0.1"), Sent()
+    stage.watch(1000 * MS, {}, sent, winch_row())
+    stage.watch(1100 * MS, {}, sent, winch_row())
+    assert not stage.safe
+    stage.watch(1101 * MS, {}, sent, winch_row())
+    assert stage.status().message.endswith(SILENT)
+
+
+def test_without_a_heartbeat_it_may_be_silent():
+    stage, sent = torque_stage(), Sent()
+    for now in (0, 10_000, 100_000):
+        stage.watch(now * MS, {}, sent, winch_row())
+    assert not stage.safe

@@ -5,6 +5,7 @@ torque. What the computer's scheduling adds is read from the same recording, as 
 between two messages of the node that has to react.
 """
 
+import re
 import signal
 
 import numpy as np
@@ -51,6 +52,8 @@ PERIOD = 5 * MS
 WATCHDOG = "plant/watchdog"
 GUARDS = (FORCE_CONTROLLER, WATCHDOG)
 REFERENCE, TRUTH = "/bar/reference", "/truth/bar/pose"
+# Longest silence of the emergency stop [s].
+HEARTBEAT = 2.0
 # How far the bar may move [m] until somebody holds it; a falling one sinks 0.44 m in STALE_AFTER.
 SAG = 0.02
 # Who falls silent, and what is missing in the end.
@@ -336,6 +339,34 @@ def test_the_emergency_stop_acts_within_two_periods_until_it_is_reset(warm, tmp_
         took = int(evidence.torques()[0][safe[0]]) - pressed_ns
         assert took <= 2 * PERIOD + gap + pressing
     note(f"emergency stop, {state}: to safe torque {took * 1e-6:.1f} ms")
+
+
+def test_an_emergency_stop_that_falls_silent_acts_like_one_that_is_pressed(warm, tmp_path):
+    bundle = slow_bundle(f"safety.stop_heartbeat={HEARTBEAT}")
+    with (
+        Graph(warm, bundle, tmp_path) as graph,
+        Witness(graph.domain, topics_of(bundle, TENSION)) as witness,
+    ):
+        beat = witness.repeat_stop(0.1 * HEARTBEAT)
+        graph.start()
+        under_way(witness)
+        witness.node.forget(beat)
+        reported = witness.until_state(FORCE_CONTROLLER, "hold")
+        silence = re.fullmatch(
+            rf"emergency stop silent for (\d+) ms, allowed: {1e3 * HEARTBEAT:g} ms",
+            reported.values["reason"],
+        )
+        assert int(silence[1]) > 1e3 * HEARTBEAT
+        refused, why = witness.reset(FORCE_CONTROLLER)
+        assert (refused, why.partition(" for ")[0]) == (
+            False,
+            "reset refused: emergency stop silent",
+        )
+        witness.repeat_stop(0.1 * HEARTBEAT)
+        witness.until_reset(FORCE_CONTROLLER)
+        under_way(witness)
+        assert set(graph.end().values()) <= IN_ORDER
+    assert np.ptp(heave(Evidence(graph.folder))) < SAG
 
 
 # Foreign messages

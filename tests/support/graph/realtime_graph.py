@@ -212,6 +212,11 @@ class Witness:
         self.until(lambda: self._stop.get_subscription_count() > 0, "a reader of the stop")
         self._stop.publish(ros_class(EMERGENCY_STOP.ros_type)(data=pressed))
 
+    def repeat_stop(self, seconds):
+        """Say at an interval that the emergency stop is released; return the timer."""
+        released = ros_class(EMERGENCY_STOP.ros_type)(data=False)
+        return self.node.every(seconds, lambda: self._stop.publish(released))
+
     def reset(self, node):
         """Call a node's service `reset`; return success and message."""
         kind = ros_class("std_srvs/srv/Trigger")

@@ -2,10 +2,13 @@
 
 from __future__ import annotations
 
+import os
+from collections.abc import Callable, Iterable
+from concurrent.futures import ThreadPoolExecutor
 from enum import Enum
 from itertools import pairwise
 from threading import Lock
-from typing import NamedTuple
+from typing import NamedTuple, TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
@@ -25,6 +28,8 @@ from cspm_sim.rest import memory_at_rest
 
 Array = NDArray[np.float64]
 Window = tuple[int, int]
+Given = TypeVar("Given")
+Made = TypeVar("Made")
 
 _OFFSET_ROUNDS = 3
 _OFFSET_STEP_M = 1e-6
@@ -68,6 +73,12 @@ class Simulated(NamedTuple):
     angles: Array
     speeds: Array
     failed: list[Window]
+
+
+def side_by_side(call: Callable[[Given], Made], items: Iterable[Given]) -> list[Made]:
+    """Return what a call that simulates makes of each item: the kernels share the processors."""
+    with ThreadPoolExecutor(os.cpu_count()) as pool:
+        return list(pool.map(call, items))
 
 
 class BlockSimulation:
@@ -209,8 +220,10 @@ class BlockSimulation:
         out = np.zeros(len(self.testbed.cables))
         measured = tensions[start : end + 1]
         for _ in range(_OFFSET_ROUNDS):
-            simulated = self._simulate(Input.CABLE, start, end, out).tensions
-            shifted = self._simulate(Input.CABLE, start, end, out + _OFFSET_STEP_M).tensions
+            simulated, shifted = side_by_side(
+                lambda each: self._simulate(Input.CABLE, start, end, each).tensions,
+                (out, out + _OFFSET_STEP_M),
+            )
             slope = np.nanmean(shifted - simulated, axis=0) / _OFFSET_STEP_M
             missing = np.nanmean(measured - simulated, axis=0)
             change = np.divide(missing, slope, out=np.zeros(len(out)), where=slope < 0.0)

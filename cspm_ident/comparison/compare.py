@@ -2,16 +2,20 @@
 
 from __future__ import annotations
 
-import os
 from collections.abc import Callable, Mapping
-from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass, replace
 from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
-from cspm_ident.block_simulation import BlockSimulation, Input, Simulated, Window
+from cspm_ident.block_simulation import (
+    BlockSimulation,
+    Input,
+    Simulated,
+    Window,
+    side_by_side,
+)
 from cspm_ident.comparison.channel_fit import ChannelFit
 from cspm_ident.comparison.floor import lasting_rms, propagated
 from cspm_ident.comparison.metrics import error_bins
@@ -213,12 +217,10 @@ def _runs(
     noise: Mapping[str, Array],
 ) -> dict[str, _Run]:
     """Return each block's run; the kernels let Python go on, so that they share processors."""
-    with ThreadPoolExecutor(os.cpu_count()) as pool:
-        jobs = {
-            block: pool.submit(_run, simulation, drive, horizons[drive], noise)
-            for block, drive in blocks.items()
-        }
-        return {block: job.result() for block, job in jobs.items()}
+    runs = side_by_side(
+        lambda drive: _run(simulation, drive, horizons[drive], noise), blocks.values()
+    )
+    return dict(zip(blocks, runs, strict=True))
 
 
 def _run(

@@ -2,14 +2,17 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable, Hashable
 from dataclasses import dataclass, field
 from functools import cached_property
 from itertools import pairwise
+from typing import Any, TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
 
 Array = NDArray[np.float64]
+Made = TypeVar("Made")
 
 # A hole is where samples lie farther apart than this many usual intervals.
 HOLE = 5.5
@@ -66,7 +69,7 @@ class Samples:
     Attributes:
         times: when each is valid [s] after the recording's start, increasing, shape (n,); not to be
             written to.
-        values: shape (n, width).
+        values: shape (n, width); not to be written to.
         stamps: the same times, where what follows from them is shared with other values; made if
             not given.
 
@@ -77,6 +80,7 @@ class Samples:
     times: Array
     values: Array
     stamps: Stamps | None = field(default=None, repr=False)
+    _kept: dict[Hashable, Any] = field(default_factory=dict, init=False, repr=False)
 
     def __post_init__(self) -> None:
         """Refuse stamps of other times."""
@@ -123,7 +127,18 @@ class Samples:
 
     def column(self, index: int) -> Samples:
         """Return one column, shape (n, 1)."""
-        return self.of_others(self.values[:, index : index + 1])
+        return self.kept(index, lambda: self.of_others(self.values[:, index : index + 1]))
+
+    def kept(self, key: Hashable, make: Callable[[], Made]) -> Made:
+        """Return what `make` returned at the first call with a key; it lives as long as these.
+
+        Equations of one recording are written again for each machine that it is held against: what
+        follows from the readings alone is then there.
+        """
+        if key not in self._kept:
+            self._kept[key] = make()
+        made: Made = self._kept[key]
+        return made
 
     def of_others(self, values: Array) -> Samples:
         """Return other values, shape (n, any), at the same times."""

@@ -62,6 +62,10 @@ class Smooth:
 
 def smooth(samples: Samples, band: float | None = None) -> Smooth:
     """Return the samples without what lies above `band` [Hz]; absent: see `band_of`."""
+    return samples.kept((smooth, band), lambda: _smoothed(samples, band))
+
+
+def _smoothed(samples: Samples, band: float | None) -> Smooth:
     values, kept = filtered(samples, band)
     skip = max(1, int(samples.rate / (_KNOTS * kept)))
     spans, pieces, firsts = [], [], []

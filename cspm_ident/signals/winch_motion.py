@@ -44,6 +44,11 @@ def winch_motion(angle: Samples, speed: Samples | None, times: Array) -> WinchMo
     summed up, which the encoder does not. So each gives the band in which it is better, where both
     agree in the band that they share.
     """
+    key = winch_motion, speed, times.tobytes()
+    return angle.kept(key, lambda: _winch_motion(angle, speed, times))
+
+
+def _winch_motion(angle: Samples, speed: Samples | None, times: Array) -> WinchMotion:
     if speed is None or not _agree(angle, speed):
         alone = smooth(angle, ENCODER_BAND_HZ)
         return WinchMotion(alone.at(times), alone.at(times, 1), alone.band)

@@ -3,12 +3,13 @@
 from __future__ import annotations
 
 from collections.abc import Collection, Mapping, Sequence
+from functools import partial
 from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
-from cspm_ident.block_simulation import BlockSimulation, Input, Simulated
+from cspm_ident.block_simulation import BlockSimulation, Input, Simulated, side_by_side
 from cspm_ident.comparison.floor import lasting_rms, propagated
 from cspm_ident.diagnosis.finding import Improvement
 from cspm_ident.diagnosis.residuals.corrected_measurement import as_found
@@ -209,8 +210,9 @@ def _errors(parts: Sequence[Measurement], since: Sequence[float], weights: Weigh
         measurement = as_found(part, weights)
         timeline = Timeline(measurement)
         simulation = BlockSimulation(timeline, measurement.machine)
-        for drive in _drives(simulation):
-            simulated = simulation.run(drive, simulation.windows(drive, HORIZONS[drive]))
+        drives = _drives(simulation)
+        runs = side_by_side(partial(_run, simulation), drives)
+        for drive, simulated in zip(drives, runs, strict=True):
             for output, samples, column, i in _outputs(measurement, drive, simulated):
                 inside = (start <= samples.times) & (samples.times <= timeline.times[-1])
                 at = np.interp(samples.times[inside], timeline.times, column)
@@ -225,6 +227,10 @@ def _errors(parts: Sequence[Measurement], since: Sequence[float], weights: Weigh
         for output, pairs in found.items()
         if all(len(m) > 1 for m, _ in pairs)
     }
+
+
+def _run(simulation: BlockSimulation, drive: Input) -> Simulated:
+    return simulation.run(drive, simulation.windows(drive, HORIZONS[drive]))
 
 
 def _drives(simulation: BlockSimulation) -> list[Input]:
@@ -244,10 +250,13 @@ def _floors(parts: Sequence[Measurement], weights: Weights) -> dict[Output, floa
     simulation = BlockSimulation(timeline, measurement.machine)
     found = {}
     topics = {"angle": WINCHES, "tension": TENSION, "pose": BAR}
-    for drive in _drives(simulation):
+
+    def scattered(drive: Input) -> tuple[Input, Simulated, int]:
         windows = simulation.windows(drive, HORIZONS[drive])
         scatter = propagated(timeline, simulation.testbed, drive, windows, noise)
-        steps = sum(end - start for start, end in windows)
+        return drive, scatter, sum(end - start for start, end in windows)
+
+    for drive, scatter, steps in side_by_side(scattered, _drives(simulation)):
         for output, _, column, i in _outputs(measurement, drive, scatter):
             topic = topics[output.name.split("/")[1]]
             found[output] = float(np.hypot(noise[topic][i], lasting_rms(column, steps)))

@@ -233,9 +233,9 @@ def test_a_fault_of_a_value_ends_it_before_anything_runs(tmp_path):
 
 def test_each_run_may_be_diagnosed_by_the_machine_before_its_effects(tmp_path):
     text = """\
-scenario: calm
-set: {duration: 20}
-grid: {effects: [null, 'winch_coulomb_friction@sway_3:torque=0.03']}
+scenario: one_winch
+set: {duration: 15}
+grid: {effects: [null, 'winch_coulomb_friction@surge:torque=0.03']}
 diagnose: true
 """
     code, out, _ = campaigns.run(campaigns.written(tmp_path, text))
@@ -243,7 +243,7 @@ diagnose: true
     assert code == 0, out
     assert healthy["diagnosis.verdict"] == "consistent"
     assert worn["diagnosis.effect"] == "winch_coulomb_friction"
-    assert worn["diagnosis.elements"] == "sway_3"
+    assert worn["diagnosis.elements"] == "surge"
 
 
 def test_the_runs_are_listed_as_commands(tmp_path):

@@ -178,8 +178,9 @@ class FakeNode:
         self.published, self.timers = [], []
 
     def create_publisher(self, _, name, __):
+        # As a node in the root namespace resolves it.
         def publish(payload):
-            self.published.append((name, payload))
+            self.published.append((f"/{name.removeprefix('/')}", payload))
 
         return SimpleNamespace(
             handle=SimpleNamespace(publish_raw=publish),

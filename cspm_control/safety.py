@@ -108,10 +108,10 @@ class GuardedStage:
             return
         if self._beaten_ns is None:
             self._beaten_ns = now_ns
-        silent, allowed = now_ns - self._beaten_ns, self._beat_ns
-        if silent > allowed or self._latch.open:
-            text = f"{_SILENCE} for {-(-silent // 1_000_000)} ms, allowed: {allowed * 1e-6:g} ms"
-            self._latch.stand(now_ns, _SILENCE, text if silent > allowed else None)
+        silent, allowed, reason = now_ns - self._beaten_ns, self._beat_ns, None
+        if silent > allowed:
+            reason = f"{_SILENCE} for {-(-silent // 1_000_000)} ms, allowed: {allowed * 1e-6:g} ms"
+        self._latch.stand(now_ns, _SILENCE, reason)
 
     def reset(self, now_ns: int) -> str | None:
         """Leave the safe state; return why not in one line while a reason lasts."""

@@ -115,7 +115,7 @@ def opened(request: ReplayRequest) -> Iterator[BagStream]:
         InputError: options that exclude each other, no such bag, or no ROS.
     """
     request.check()
-    with open_bag(request.bag) as bag:
+    with open_bag(request.bag, own_types=True) as bag:
         find_ros("replay")
         yield bag
 

@@ -69,9 +69,9 @@ def type_hash(ros_type: str) -> str:
     return typestore().hash_rihs01(ros_type)
 
 
-def serialize(message: Any) -> bytes:  # noqa: ANN401 - classes are generated at run time
-    """Return a message's CDR bytes, little endian, padding zero."""
-    return bytes(typestore().serialize_cdr(message, message.__msgtype__))
+def serialize(message: Any, store: Typestore | None = None) -> bytes:  # noqa: ANN401 - generated
+    """Return a message's CDR bytes, little endian, padding zero; `store` as for `deserialize`."""
+    return bytes((store or typestore()).serialize_cdr(message, message.__msgtype__))
 
 
 def deserialize(payload: bytes, ros_type: str, store: Typestore | None = None) -> Any:  # noqa: ANN401 - see message_class

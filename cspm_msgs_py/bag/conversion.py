@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from cspm_msgs_py.bag.ros1_runs import ENCODING as ROS1_ENCODING
 from cspm_msgs_py.bag.run import StoredChannel
@@ -21,11 +21,14 @@ from cspm_msgs_py.ros_types import (
     typestore,
 )
 
+if TYPE_CHECKING:
+    from rosbags.typesys.store import Typestore
+
 Convert = Callable[[bytes], bytes]
 """Returns a stored message as little-endian CDR; raises InputError if it does not hold its type."""
 
 _LITTLE_ENDIAN_CDR = b"\x00\x01"
-_HEADER = "std_msgs/msg/Header"
+HEADER = "std_msgs/msg/Header"
 _SEQUENCE_NUMBER = ("seq", (1, ("uint32", 0)))
 
 
@@ -46,14 +49,16 @@ def converter(channel: StoredChannel) -> Convert:
     Raises:
         InputError: why they cannot be turned into such.
     """
+    from rosbags.typesys import Stores, get_typestore
+
     ros_type = ros2_type(channel)
     message_class(ros_type)
     if channel.encoding == MESSAGE_ENCODING:
         _check_cdr(channel, ros_type)
-        return _from_cdr(ros_type)
+        return from_cdr(ros_type)
     if channel.encoding == ROS1_ENCODING:
         _check_ros1(channel, ros_type)
-        return _from_ros1(ros_type)
+        return from_ros1(ros_type, get_typestore(Stores.ROS2_JAZZY))  # its own, for its limit
     raise InputError(
         f"messages are encoded as {channel.encoding!r}, allowed: {MESSAGE_ENCODING},"
         f" {ROS1_ENCODING}"
@@ -89,7 +94,7 @@ def _check_ros1(channel: StoredChannel, ros_type: str) -> None:
         raise InputError(f"schema of {ros_type} is not a message definition") from None
     known = typestore().fielddefs
     for name, (_, fields) in found.items():
-        expected = [_SEQUENCE_NUMBER] if name == _HEADER else []
+        expected = [_SEQUENCE_NUMBER] if name == HEADER else []
         expected += _compared(known[name][1]) if name in known else []
         if name not in known or _compared(fields) != expected:
             raise InputError(f"{ros_type}: {name} has other fields in ROS 2 Jazzy")
@@ -100,19 +105,19 @@ def _compared(fields: Sequence[tuple[str, Any]]) -> list[tuple[str, Any]]:
     return [(field.lower(), kind) for field, kind in fields if field != NO_FIELDS]
 
 
-def _from_cdr(ros_type: str) -> Convert:
+def from_cdr(ros_type: str, store: Typestore | None = None) -> Convert:
+    """Return what turns CDR into little-endian CDR; `store` has the type, or it is of Jazzy."""
+
     def convert(payload: bytes) -> bytes:
         if payload[:2] == _LITTLE_ENDIAN_CDR:
             return payload
-        return serialize(deserialize(payload, ros_type))
+        return serialize(deserialize(payload, ros_type, store), store)
 
     return convert
 
 
-def _from_ros1(ros_type: str) -> Convert:
-    from rosbags.typesys import Stores, get_typestore
-
-    store = get_typestore(Stores.ROS2_JAZZY)  # its own, for the limit below
+def from_ros1(ros_type: str, store: Typestore) -> Convert:
+    """Return what turns the bytes of ROS 1 into CDR; `store` has the type and is for this only."""
 
     def convert(payload: bytes) -> bytes:
         # Sizing a sequence of messages does not look at their bytes: without a limit a damaged

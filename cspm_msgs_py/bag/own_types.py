@@ -2,23 +2,27 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, NamedTuple
 
+from cspm_msgs_py.bag.conversion import HEADER, Convert, from_cdr, from_ros1
 from cspm_msgs_py.bag.ros1_runs import ENCODING as ROS1_ENCODING
 from cspm_msgs_py.bag.run import StoredChannel
 from cspm_msgs_py.errors import InputError
-from cspm_msgs_py.ros_types import MESSAGE_ENCODING, definitions_in, deserialize, typestore
+from cspm_msgs_py.ros_types import MESSAGE_ENCODING, definitions_in, typestore
 
 if TYPE_CHECKING:
     from rosbags.typesys.store import Typestore
 
-Decode = Callable[[bytes], Any]
-"""Returns the message that stored bytes hold; raises InputError if they do not hold its type."""
+
+class OwnType(NamedTuple):
+    """How a channel's messages are read: the definitions, and what makes them CDR."""
+
+    store: Typestore
+    convert: Convert
 
 
-def decoder(channel: StoredChannel, ros_type: str) -> Decode:
-    """Return what reads a channel's messages by the definition that the bag holds.
+def own_type(channel: StoredChannel, ros_type: str) -> OwnType:
+    """Return how a channel's messages are read by the definition that the bag holds.
 
     Args:
         channel: with its definition.
@@ -35,9 +39,8 @@ def decoder(channel: StoredChannel, ros_type: str) -> Decode:
             f" {ROS1_ENCODING}"
         )
     store = _store(channel, ros_type)
-    if channel.encoding == MESSAGE_ENCODING:
-        return lambda payload: deserialize(payload, ros_type, store)
-    return lambda payload: _from_ros1(payload, ros_type, store)
+    convert = from_cdr if channel.encoding == MESSAGE_ENCODING else from_ros1
+    return OwnType(store, convert(ros_type, store))
 
 
 def _store(channel: StoredChannel, ros_type: str) -> Typestore:
@@ -46,6 +49,9 @@ def _store(channel: StoredChannel, ros_type: str) -> Typestore:
     found = definitions_in(ros_type, channel.schema_encoding, channel.definition)
     store = get_typestore(Stores.EMPTY)
     known = typestore().fielddefs
+    if channel.encoding == ROS1_ENCODING:
+        # On the way to CDR it loses its sequence number.
+        found.pop(HEADER, None)
     # Some writers leave out what they think everybody has.
     missing = {name: known[name] for name in known if name not in found}
     try:
@@ -55,13 +61,3 @@ def _store(channel: StoredChannel, ros_type: str) -> Typestore:
             f"schema of {ros_type} cannot be used ({' '.join(str(err).split())})"
         ) from None
     return store
-
-
-def _from_ros1(payload: bytes, ros_type: str, store: Typestore) -> Any:  # noqa: ANN401 - made at run time
-    store.max_sequence_length = len(payload)
-    try:
-        return store.deserialize_ros1(payload, ros_type)
-    except Exception as err:
-        raise InputError(
-            f"{len(payload)} bytes that are no {ros_type} ({type(err).__name__})"
-        ) from None

@@ -7,11 +7,11 @@ from contextlib import ExitStack
 from dataclasses import dataclass
 from functools import partial
 from pathlib import Path
-from typing import Any, NamedTuple
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 from cspm_msgs_py.bag.conversion import Convert, converter, ros2_type
 from cspm_msgs_py.bag.files import open_files
-from cspm_msgs_py.bag.own_types import Decode, decoder
+from cspm_msgs_py.bag.own_types import OwnType, own_type
 from cspm_msgs_py.bag.run import (
     BagMessage,
     Run,
@@ -23,7 +23,10 @@ from cspm_msgs_py.bag.run import (
 )
 from cspm_msgs_py.closing import Closing
 from cspm_msgs_py.errors import InputError
-from cspm_msgs_py.ros_types import deserialize
+from cspm_msgs_py.ros_types import deserialize, typestore
+
+if TYPE_CHECKING:
+    from rosbags.typesys.store import Typestore
 
 _EARLIEST_NS = -(2**63)
 
@@ -66,7 +69,7 @@ class BagStream(Closing):
             self.start_ns = min(run.first_ns for run in runs)
             self.end_ns = max(run.last_ns for run in runs)
             plan = _plan(self._files, own_types=own_types)
-            self.topics, self.unplayable, self._routes, self._decoders = plan
+            self.topics, self.unplayable, self._routes, self._own = plan
         except BaseException:
             self.close()
             raise
@@ -110,9 +113,11 @@ class BagStream(Closing):
         Raises:
             InputError: it does not hold its type.
         """
-        if topic in self._decoders:
-            return self._decoders[topic](payload)
-        return deserialize(payload, self.topics[topic].ros_type)
+        return deserialize(payload, self.topics[topic].ros_type, self.store(topic))
+
+    def store(self, topic: str) -> Typestore:
+        """Return the definitions by which a topic's messages are read."""
+        return self._own[topic].store if topic in self._own else typestore()
 
     def _wanted(self, topics: Collection[str] | None) -> Collection[str]:
         if topics is None and not self.topics:
@@ -141,7 +146,7 @@ def open_bag(path: Path, *, own_types: bool = False, tolerant: bool = False) -> 
     Args:
         path: a folder or file.
         own_types: also read types that ROS 2 Jazzy has not, or has otherwise, by the definitions in
-            the bag. Their payloads are as stored; `BagStream.message` reads them.
+            the bag; `BagStream.message` reads them.
         tolerant: leave out chunks of MCAP files that cannot be read; `BagStream.faults` says which.
 
     Raises:
@@ -161,12 +166,12 @@ _Routes = Mapping[int, _Route]
 
 
 class _Plan(NamedTuple):
-    """Topics, reasons against reading the others, routes by file, and decoders of own types."""
+    """Topics, reasons against reading the others, routes by file, and own types by topic."""
 
     topics: dict[str, BagTopic]
     unplayable: dict[str, str]
     routes: list[_Routes]
-    decoders: dict[str, Decode]
+    own: dict[str, OwnType]
 
 
 def _plan(files: Sequence[StoredFile], *, own_types: bool) -> _Plan:
@@ -190,18 +195,18 @@ def _plan(files: Sequence[StoredFile], *, own_types: bool) -> _Plan:
         for name, known in types.items()
         if name not in unplayable
     }
-    return _Plan(topics, unplayable, routes, own.decoders if own else {})
+    return _Plan(topics, unplayable, routes, own.types if own else {})
 
 
 class _OwnTypes:
-    """Decoders by topic of what is read by the bag's own definitions."""
+    """What is read by the bag's own definitions, by topic."""
 
     def __init__(self) -> None:
-        self.decoders: dict[str, Decode] = {}
+        self.types: dict[str, OwnType] = {}
         self._known: dict[str, tuple[str, str]] = {}
 
     def route(self, channel: StoredChannel) -> _Route:
-        """Return the route of a channel's messages as they are stored.
+        """Return the route of a channel's messages.
 
         Raises:
             InputError: its definition is missing, cannot be read, or is not that of another sender.
@@ -209,9 +214,9 @@ class _OwnTypes:
         said = (channel.encoding, channel.definition)
         if self._known.setdefault(channel.topic, said) != said:
             raise InputError("recorded with two definitions of its type, allowed: one")
-        if channel.topic not in self.decoders:
-            self.decoders[channel.topic] = decoder(channel, ros2_type(channel))
-        return _Route(channel.topic, bytes)
+        if channel.topic not in self.types:
+            self.types[channel.topic] = own_type(channel, ros2_type(channel))
+        return _Route(channel.topic, self.types[channel.topic].convert)
 
 
 def _converters(

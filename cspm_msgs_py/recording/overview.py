@@ -1,11 +1,11 @@
-"""What is in a recording: topics, rates, gaps, duration, origin. For any rosbag2 or MCAP."""
+"""What is in a recording: topics, rates, gaps, duration, origin. For any bag."""
 
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Iterator
-from dataclasses import dataclass, field, replace
+from contextlib import ExitStack
+from dataclasses import dataclass, field
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -18,7 +18,9 @@ from cspm_msgs_py.yaml_file import parse_yaml
 Times = NDArray[np.int64]
 # Times are outside of what is compressed.
 _COMPRESSIONS = ("none", "message")
-_SQLITE = b"SQLite format 3\x00"
+_ALL_COMPRESSIONS = (*_COMPRESSIONS, "file")
+_SQLITE, _ROS1 = b"SQLite format 3\x00", b"#ROSBAG V"
+_EARLIEST_NS = -(2**63)
 
 
 @dataclass(frozen=True)
@@ -52,8 +54,8 @@ class Overview:
 
     Attributes:
         path: what was looked at.
-        storage: `mcap` or `sqlite3`.
-        profile: profile of the MCAP file, such as `ros2`; empty for sqlite3.
+        storage: `mcap`, `sqlite3`, or `rosbag1`.
+        profile: profile of the MCAP file, such as `ros2`; empty for others.
         library: what wrote it.
         complete: whether it was closed; if not, `cspm recover` restores its index.
         faults: what is damaged or missing, one line each.
@@ -98,27 +100,27 @@ def overview(path: Path) -> Overview:
     """Return what is in a recording.
 
     Raises:
-        InputError: it is missing, damaged, or neither MCAP nor sqlite3.
+        InputError: it is missing, damaged, or no bag.
     """
     path = Path(path)
     faults: list[str] = []
     if path.is_dir():
-        bag = read_bag(path, compressions=_COMPRESSIONS)
+        bag = read_bag(path, compressions=_ALL_COMPRESSIONS)
         faults += bag.faults
-        if bag.storage == "sqlite3":
-            return replace(_sqlite_overview(path), faults=faults)
-    if path.is_file() and _starts_with(path, _SQLITE):
-        return _sqlite_overview(path)
+        if bag.storage == "sqlite3" or bag.compression == "file":
+            return _bag_overview(path)
+    if path.is_file() and _starts_with(path, _SQLITE, _ROS1):
+        return _bag_overview(path)
     with Recording(path, compressions=_COMPRESSIONS) as recording:
         faults += [f"{file}: not closed, and holds no message" for file in recording.bare]
         damaged = [fault for file in recording.files for fault in file.drop_damaged()]
         return _mcap_overview(recording, faults, damaged)
 
 
-def _starts_with(path: Path, magic: bytes) -> bool:
+def _starts_with(path: Path, *magics: bytes) -> bool:
     try:
         with path.open("rb") as file:
-            return file.read(len(magic)) == magic
+            return file.read(max(map(len, magics))).startswith(magics)
     except OSError as err:
         raise InputError(f"{path}: {err.strerror}") from None
 
@@ -229,46 +231,42 @@ def _own_name(recording: Recording, attachment: str) -> str | None:
     return None if name is None else str(name)
 
 
-def _sqlite_overview(path: Path) -> Overview:
-    from rosbags.rosbag2 import Reader
+def _bag_overview(path: Path) -> Overview:
+    """Return what is in a bag that is no plain MCAP, as far as all writers say it."""
+    # It reads recordings as well.
+    from cspm_msgs_py.bag.conversion import ros2_type
+    from cspm_msgs_py.bag.files import open_files
 
-    types: dict[str, str] = {}
+    types: dict[str, list[str]] = {}
     times: dict[str, list[int]] = {}
-    try:
-        for file in _sqlite_files(path):
-            with Reader(file) as bag:
-                for connection in bag.connections:
-                    types[connection.topic] = connection.msgtype
-                    times.setdefault(connection.topic, [])
-                for connection, time, _ in bag.messages():
-                    times[connection.topic].append(time)
-    except Exception as err:
-        raise InputError(
-            f"{path}: not a readable sqlite3 bag ({' '.join(str(err).split())})"
-        ) from None
+    with ExitStack() as stack:
+        files, faults = open_files(path, stack, tolerant=True)
+        for file in files:
+            names = {channel.id: channel.topic for channel in file.channels}
+            for channel in file.channels:
+                types.setdefault(channel.topic, []).append(ros2_type(channel))
+                times.setdefault(channel.topic, [])
+            for run in file.runs:
+                for log_ns, channel_id, _ in run.read(names.keys(), _EARLIEST_NS):
+                    times[names[channel_id]].append(log_ns)
+        faults = [*faults, *(fault for file in files for fault in file.faults)]
     arrays = [(name, np.array(found, dtype=np.int64)) for name, found in times.items()]
     gaps = _gaps_of(types, lambda: arrays)
-    return _sqlite_result(path, [gaps[name].topic(name, kind) for name, kind in types.items()])
+    topics = [gaps[name].topic(name, ", ".join({*kinds})) for name, kinds in types.items()]
+    return _bag_result(path, topics, faults)
 
 
-def _sqlite_files(path: Path) -> list[Path]:
-    """Return what is opened one after the other: a folder, or its files if it has no metadata."""
-    if path.is_dir() and not (path / FILE_NAME).exists():
-        return read_bag(path, compressions=_COMPRESSIONS).files
-    return [path]
-
-
-def _sqlite_result(path: Path, topics: list[TopicOverview]) -> Overview:
-    files: Any = path.glob("*.db3") if path.is_dir() else [path]
+def _bag_result(path: Path, topics: list[TopicOverview], faults: list[str]) -> Overview:
+    files = [file for file in path.iterdir() if file.is_file()] if path.is_dir() else [path]
     return Overview(
         path=path,
-        storage="sqlite3",
+        storage=_storage_of(path),
         profile="",
         library="",
         complete=True,
-        faults=[],
+        faults=faults,
         unread_bytes=0,
-        size_bytes=sum(file.stat().st_size for file in files),
+        size_bytes=sum(file.stat().st_size for file in files if file.name != FILE_NAME),
         start_ns=min((t.first_ns for t in topics if t.first_ns is not None), default=0),
         end_ns=max((t.last_ns for t in topics if t.last_ns is not None), default=0),
         message_count=sum(topic.count for topic in topics),
@@ -278,3 +276,9 @@ def _sqlite_result(path: Path, topics: list[TopicOverview]) -> Overview:
         scenario=None,
         testbed=None,
     )
+
+
+def _storage_of(path: Path) -> str:
+    if path.is_dir():
+        return read_bag(path, compressions=_ALL_COMPRESSIONS).storage
+    return "rosbag1" if _starts_with(path, _ROS1) else "sqlite3"

@@ -14,11 +14,13 @@ from cspm_msgs_py.errors import CspmError, InputError
 from cspm_msgs_py.ros.contract_node import ContractNode, ros_class
 from cspm_msgs_py.ros.local_name import local
 from cspm_msgs_py.ros.qos import contract_qos
+from cspm_msgs_py.ros_types import typestore
 from cspm_msgs_py.topics import CLOCK, SENDER_DEPTH
 from cspm_msgs_py.wire import WireWriter
 from cspm_ros.replay.bag_selection import Selection, check_clock, is_topic_name
 from cspm_ros.replay.player import Instant, Player, instants
 from cspm_ros.runtime.discovery import Discovery
+from cspm_ros.schema_types.schema_class import message_class_of
 
 PLAY_EVERY_S = 0.001
 _LOOK_EVERY_S = 0.05
@@ -101,18 +103,18 @@ class PlayerNode:
         self._node = node
         self.span_ns = start_ns, end_ns = selection.span_ns(bag)
         names, self.unplayable = _sorted_out(bag, selection)
-        types = {name: bag.topics[name].ros_type for name in names}
+        types = {name: (bag.topics[name].ros_type, bag.store(name)) for name in names}
         self._clock_topic = CLOCK.name if _lacks_clock(bag, names, selection) else None
         if self._clock_topic:
             check_clock(bag)
-            types[CLOCK.name] = CLOCK.ros_type
+            types[CLOCK.name] = CLOCK.ros_type, typestore()
         self._publishers = {
             name: node.node.create_publisher(
-                ros_class(ros_type),
+                message_class_of(ros_type, store),
                 local(names.get(name) or selection.remap.get(name, name)),
                 contract_qos(SENDER_DEPTH),
             )
-            for name, ros_type in types.items()
+            for name, (ros_type, store) in types.items()
         }
         self._publish = {n: made.handle.publish_raw for n, made in self._publishers.items()}
         self._encode_clock = WireWriter(CLOCK).encode
@@ -168,22 +170,16 @@ def _sorted_out(bag: BagStream, selection: Selection) -> tuple[dict[str, str], d
     """
     found, unplayable = {}, selection.unplayable(bag)
     for name, new in selection.names(bag).items():
-        ros_type = bag.topics[name].ros_type
         if not is_topic_name(new):
             unplayable[name] = "ROS 2 can have no topic of this name, allowed: one renamed"
-        elif not _is_installed(ros_type):
-            unplayable[name] = f"{ros_type} is not installed"
+            continue
+        try:
+            message_class_of(bag.topics[name].ros_type, bag.store(name))
+        except InputError as err:
+            unplayable[name] = str(err)
         else:
             found[name] = new
     if not found:
         first, why = next(iter(unplayable.items()), ("nothing", "all is left out"))
         raise InputError(f"{bag.path}: no topic of it can be played, {first}: {why}")
     return found, unplayable
-
-
-def _is_installed(ros_type: str) -> bool:
-    try:
-        ros_class(ros_type)
-    except (ImportError, AttributeError):
-        return False
-    return True

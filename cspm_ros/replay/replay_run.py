@@ -161,7 +161,7 @@ def run_player(
     if not parameters.bag:
         raise InputError("parameter bag: empty, allowed: a bag's folder or file")
     path, rate, paused = Path(parameters.bag), parameters.rate, parameters.paused
-    with open_bag(path) as bag:
+    with open_bag(path, own_types=True) as bag:
         if parameters.lockstep:
             _run_in_step(session, node, bag, parameters, began)
             return

@@ -4,6 +4,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from bag_samples import TYPES, WRITERS, sample_messages, stream
 from mcap.writer import Writer
 from recording_samples import ATTACHMENTS, METADATA, STEP_NS, TOPICS, write_sample
 
@@ -111,6 +112,28 @@ def test_recordings_of_others(name, storage, profile, messages, topics):
         pose = next(t for t in found.topics if t.name == "/test/geometry_msgs/pose_stamped")
         assert (pose.ros_type, pose.count) == ("geometry_msgs/msg/PoseStamped", 2)
         assert pose.gap_ns == pose.last_ns - pose.first_ns == 9_400_000_000
+
+
+@pytest.mark.parametrize("kind", WRITERS)
+def test_whatever_replay_plays_is_looked_at(tmp_path, kind):
+    """The stream of the player is the independent road."""
+    written = sample_messages(200)
+    path = WRITERS[kind](tmp_path / "bag", written)
+    found, played = overview(path), stream(path)
+    times = {name: [m.log_ns for m in played if m.topic == name] for name in TYPES}
+    assert {topic.name: topic.count for topic in found.topics} == {
+        name: len(logs) for name, logs in times.items()
+    }
+    assert {topic.name: topic.ros_type for topic in found.topics} == TYPES
+    assert found.message_count == 200
+    clock = next(topic for topic in found.topics if topic.name == "/clock")
+    logs = times["/clock"]
+    assert (clock.first_ns, clock.last_ns) == (logs[0], logs[-1])
+    assert clock.gap_ns == max(np.diff(logs))
+    assert found.storage == STORAGES[kind.split()[0].strip(",")]
+
+
+STORAGES = {"MCAP": "mcap", "mcap": "mcap", "SQLITE3": "sqlite3", "ROS": "rosbag1"}
 
 
 def test_what_cannot_be_read_gives_one_line(tmp_path):

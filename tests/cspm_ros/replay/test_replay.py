@@ -43,6 +43,7 @@ from cspm_ros.replay.replay_run import replay_through  # noqa: E402
 from cspm_ros.runtime import stall_watchdog as watch  # noqa: E402
 from cspm_ros.runtime.discovery import Discovery  # noqa: E402
 from cspm_ros.runtime.node_main import start_node  # noqa: E402
+from cspm_ros.schema_types import schema_class  # noqa: E402
 from cspm_run.recorded_run import run  # noqa: E402
 
 CSPM = Path(sys.executable).with_name("cspm")
@@ -245,12 +246,20 @@ def test_the_clock_goes_ahead_of_the_messages_of_its_instant(tmp_path, monkeypat
     assert without == [(name, payload) for _, name, payload in messages]
 
 
-def test_types_that_are_not_installed_are_reported(recording, monkeypatch):
+def test_types_that_cannot_be_sent_are_reported(recording, monkeypatch):
+    """Without generated code Fast DDS sends by the definition; others cannot."""
     monkeypatch.setitem(sys.modules, "trajectory_msgs.msg", None)
     fake = FakeNode()
+    ros_type = "trajectory_msgs/msg/MultiDOFJointTrajectory"
     with open_bag(recording) as bag:
+        assert PlayerNode(fake, bag, Selection(), 1.0).unplayable == {}
+        schema_class.schema_class.cache_clear()
+        monkeypatch.setattr(schema_class, "rmw_name", lambda: "rmw_zenoh_cpp")
         node = PlayerNode(fake, bag, Selection(), 1.0)
-        missing = "trajectory_msgs/msg/MultiDOFJointTrajectory is not installed"
+        missing = (
+            f"{ros_type} is not installed, which rmw_zenoh_cpp cannot do without, allowed:"
+            " rmw_fastrtps_cpp"
+        )
         assert node.unplayable == {
             "/winch_frame/reference": missing,
             "/bar/reference": missing,

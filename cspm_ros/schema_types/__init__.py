@@ -1,0 +1,1 @@
+"""Message types by their definitions alone, for packages that are not installed."""

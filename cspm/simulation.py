@@ -41,6 +41,7 @@ from cspm_run.recorded_run import (
     steps_of,
 )
 from cspm_run.recorded_run import simulate as step_through
+from cspm_run.recorded_scene import RecordedScene
 from cspm_run.run_result import RunResult
 
 GRAPH, PROCESSES, REALTIME = "graph", "processes", "realtime"
@@ -121,9 +122,13 @@ class Run(Signals):
         if isinstance(self._source, Recording):
             shutil.copytree(self._source.path, place)
         else:
-            topics, attachments = self._source.topics, self._bundle.attachments()
+            topics = self._source.topics
             with RecordingWriter(
-                place, topics, attachments=attachments, metadata=self._about
+                place,
+                topics,
+                attachments=self._bundle.attachments(),
+                metadata=self._about,
+                derived=RecordedScene(self._bundle.testbed.testbed, topics),
             ) as writer:
                 self._source.write_to(writer)
         write_json(place / "summary.json", self.summary)

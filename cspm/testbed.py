@@ -6,7 +6,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import TypeAlias
 
-from cspm_model.urdf import urdf
+from cspm_model.scene.urdf import urdf
 from cspm_msgs_py import edited
 from cspm_msgs_py.errors import InputError
 from cspm_msgs_py.testbed import EffectEntry, TestbedFile

@@ -20,9 +20,11 @@ from cspm_msgs_py.topics import DIAGNOSTICS
 
 RECORDER = "recorder"
 PLAYER = "player"
+# Draws for others' viewers, beside any run.
+VIEWER = "viewer"
 # Of every closed loop; where the target is measured its tracker stands beside them.
 STAGES = (WAVE_TRAJECTORY, MOTION_CONTROLLER, TENSION_DISTRIBUTION, FORCE_CONTROLLER)
-NODES = (PLANT, *STAGES, TARGET_TRACKER, RECORDER, PLAYER)
+NODES = (PLANT, *STAGES, TARGET_TRACKER, RECORDER, PLAYER, VIEWER)
 
 
 @dataclass(frozen=True)

@@ -40,6 +40,7 @@ class Topic:
         fields: names of the row's columns, in order; one per number in the message.
         joint_names: names inside the message (cables, or the moving body), in order.
         parts: for JointState, which of position, velocity, effort are filled.
+        latched: sent once, and kept for readers who come later.
     """
 
     name: str
@@ -48,6 +49,7 @@ class Topic:
     fields: tuple[str, ...]
     joint_names: tuple[str, ...] = ()
     parts: tuple[str, ...] = ()
+    latched: bool = False
 
     @property
     def width(self) -> int:
@@ -84,6 +86,13 @@ EMERGENCY_STOP = Topic("/emergency_stop", "std_msgs/msg/Bool", "", ())
 BRAKE = Topic("/winches/brake", "std_msgs/msg/Bool", "", ())
 # Whether the winches are in their safe state, so that nobody's wanted wrench is followed.
 SAFE = Topic("/winches/safe", "std_msgs/msg/Bool", "", ())
+
+TF = Topic("/tf", "tf2_msgs/msg/TFMessage", "", ())
+TF_STATIC = Topic("/tf_static", TF.ros_type, "", (), latched=True)
+ROBOT_DESCRIPTION = Topic("/robot_description", "std_msgs/msg/String", "", (), latched=True)
+MARKERS = Topic("/markers", "visualization_msgs/msg/MarkerArray", "", ())
+# What others' viewers draw from. It follows from other topics: nothing reads it in a run.
+SCENE = {topic.name: topic for topic in (TF_STATIC, ROBOT_DESCRIPTION, TF, MARKERS)}
 
 
 def contract_topics(

@@ -20,6 +20,7 @@ from cspm_run.bundle import Bundle
 from cspm_run.compiled.compiled_loop import TakeBlock
 from cspm_run.controlled_dofs import controlled_dofs
 from cspm_run.loop import Loop
+from cspm_run.recorded_scene import RecordedScene
 from cspm_run.run_result import RunResult
 from cspm_run.run_statistics import RunStatistics
 from cspm_run.stepping import Stepping
@@ -133,8 +134,13 @@ def recording_of(
     Raises:
         InputError: the folder exists or cannot be created.
     """
-    attachments, about = bundle.attachments(), metadata(bundle, mode, own_nodes)
-    return RecordingWriter(folder, topics, attachments=attachments, metadata=about)
+    return RecordingWriter(
+        folder,
+        topics,
+        attachments=bundle.attachments(),
+        metadata=metadata(bundle, mode, own_nodes),
+        derived=RecordedScene(bundle.testbed.testbed, topics),
+    )
 
 
 def recorded_topics(bundle: Bundle) -> dict[str, Topic]:

@@ -18,6 +18,7 @@ from cspm_msgs_py.recording.run_record import (
     own_controllers,
     simulated_plant,
 )
+from cspm_msgs_py.topics import SCENE
 from cspm_run.bundle import read_bundle, with_own_code
 from cspm_run.recorded_run import run
 
@@ -88,11 +89,12 @@ def _repeat(
         folder = Path(place) / "again"
         run(bundle, folder, lambda now: progress(now, duration), steps=clock.count)
         with Recording(folder) as repeated:
-            difference = first_difference(recording, repeated)
+            # The scene follows from the rest; older recordings have none.
+            difference = first_difference(recording, repeated, but=SCENE)
             cut = difference is not None and _is_cut(recording, repeated, difference)
     return Resimulation(
         difference=None if cut else difference,
-        messages=sum(topic.count for topic in recording.topics.values()),
+        messages=sum(topic.count for name, topic in recording.topics.items() if name not in SCENE),
         cut_ns=recording.end_ns if cut else None,
         recorded_version=record.get("package_version", "unknown"),
     )
@@ -117,5 +119,6 @@ def _last_instant(recording: Recording) -> tuple[int, list[str]]:
     file = recording.files[-1]
     messages = file.messages(file.chunks[-1])
     last = messages.logs == messages.logs.max()
-    topics = [file.topic_of(channel) for channel in messages.channels[last].tolist()]
+    found = [file.topic_of(channel) for channel in messages.channels[last].tolist()]
+    topics = [name for name in found if name not in SCENE]
     return int(messages.logs.max()), topics

@@ -18,6 +18,7 @@ from launch_ros.actions import Node
 EXTERNAL = "external"
 PRESCRIBED = "prescribed"
 TRACKER = "target_tracker"
+VIEWER = "viewer"
 OTHERS = (
     "wave_trajectory",
     "motion_controller",
@@ -64,6 +65,12 @@ def generate_launch_description() -> LaunchDescription:
                 default_value="",
                 description="values put over the scenario's, key.path=value, with spaces between",
             ),
+            DeclareLaunchArgument(
+                "viewer",
+                default_value="false",
+                choices=["true", "false"],
+                description="send frames and markers to RViz and Foxglove as well",
+            ),
             OpaqueFunction(function=nodes),
         ]
     )
@@ -76,6 +83,8 @@ def nodes(context: LaunchContext) -> list[Node]:
         for name in ("scenario", "pace", "plant", "target", "record", "patience")
     )
     others = OTHERS if target == PRESCRIBED else (TRACKER, *OTHERS)
+    if LaunchConfiguration("viewer").perform(context) == "true":
+        others = (*others, VIEWER)
     dated = f"recordings/{Path(scenario).stem}-{datetime.now():%Y%m%d-%H%M%S}"
     # Launch reads texts as YAML, so that the nodes get a number.
     parameters: dict[str, Any] = {

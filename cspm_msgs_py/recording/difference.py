@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import struct
 from collections import Counter
-from collections.abc import Iterator
+from collections.abc import Collection, Iterator, Mapping
 from dataclasses import dataclass, replace
 from itertools import zip_longest
 from typing import Any, NamedTuple
@@ -58,31 +58,39 @@ class _Place(NamedTuple):
 
 
 def first_difference(
-    first: Recording, second: Recording, *, log_times: bool = True
+    first: Recording,
+    second: Recording,
+    *,
+    log_times: bool = True,
+    but: Collection[str] = (),
 ) -> Difference | None:
     """Return where two recordings first differ, None if every message is identical.
 
     Compared are topics, types, and per topic the sequence of messages: all fields by their bits
     (NaN equals the same NaN, 0.0 differs from -0.0) and, unless `log_times` is False, when they
-    were recorded. Chunks, compression, order across topics and padding do not matter.
+    were recorded. Chunks, compression, order across topics and padding do not matter. Topics in
+    `but` are left out.
 
     Raises:
         InputError: one of the two is damaged.
     """
-    found = _topic_difference(first, second)
+    found = _topic_difference(first, second, but)
     if found:
         return found
     places = [_places(first), _places(second)]
     equal = sum(1 for _ in _equal_chunks(*places))
     streams = [_Stream(own[equal:]) for own in places]
-    found = _message_difference(first, streams, log_times=log_times)
+    types = {name: info.ros_type for name, info in first.topics.items() if name not in but}
+    found = _message_difference(types, streams, log_times=log_times)
     if found is None or found.index is None:
         return found
     return replace(found, index=found.index + _count(places[0][:equal], found.topic))
 
 
-def _topic_difference(first: Recording, second: Recording) -> Difference | None:
-    for name in {**first.topics, **second.topics}:
+def _topic_difference(
+    first: Recording, second: Recording, but: Collection[str]
+) -> Difference | None:
+    for name in [name for name in {**first.topics, **second.topics} if name not in but]:
         one, other = first.topics.get(name), second.topics.get(name)
         if one is None or other is None:
             state = ["missing" if info is None else "present" for info in (one, other)]
@@ -150,9 +158,8 @@ class _Stream:
 
 
 def _message_difference(
-    first: Recording, streams: list[_Stream], *, log_times: bool
+    types: Mapping[str, str], streams: list[_Stream], *, log_times: bool
 ) -> Difference | None:
-    types = {name: info.ros_type for name, info in first.topics.items()}
     one, other = streams
     done: Counter[str] = Counter()
     while running := [stream for stream in streams if not stream.exhausted]:

@@ -52,14 +52,14 @@ class FileEntry:
     count: int
 
 
-def contract_qos() -> list[dict[str, Any]]:
+def contract_qos(*, latched: bool = False) -> list[dict[str, Any]]:
     """Return the QoS profile of the contract's topics as rosbag2 writes it."""
     return [
         {
             "history": "keep_last",
             "depth": QOS_DEPTH,
             "reliability": QOS_RELIABILITY,
-            "durability": "volatile",
+            "durability": "transient_local" if latched else "volatile",
             "deadline": dict(_INFINITE),
             "lifespan": dict(_INFINITE),
             "liveliness": "automatic",

@@ -31,6 +31,7 @@ from cspm_msgs_py.recording.block import (
     merge,
 )
 from cspm_msgs_py.recording.channel_buffer import ChannelBuffer
+from cspm_msgs_py.recording.derived import Derived
 from cspm_msgs_py.recording.mcap_file import REFUSED
 from cspm_msgs_py.recording.rosbag2_metadata import (
     ROS_DISTRO,
@@ -66,6 +67,7 @@ class RecordingWriter:
         attachments: Mapping[str, bytes],
         metadata: Mapping[str, str],
         block_ns: int = BLOCK_NS,
+        derived: Derived | None = None,
     ) -> None:
         """Create the folder and the head of the file.
 
@@ -75,13 +77,15 @@ class RecordingWriter:
             attachments: files to keep in the recording, by name.
             metadata: the record named `cspm`.
             block_ns: log time per chunk [ns].
+            derived: makes more messages of each block.
 
         Raises:
             InputError: the folder exists or cannot be created, or a topic's type is unknown.
         """
         self.folder = folder = Path(folder).absolute()
         self.path = folder / f"{folder.name}_0.mcap"
-        self._topics = list(topics.values())
+        self._derived = derived
+        self._topics = [*topics.values(), *(derived.topics.values() if derived else ())]
         self._hashes = [type_hash(topic.ros_type) for topic in self._topics]
         self._records = [_records(topic, i + 1) for i, topic in enumerate(self._topics)]
         self._block_ns = block_ns
@@ -198,6 +202,8 @@ class RecordingWriter:
     def _write_block(self, block: _Block, compressor: zstandard.ZstdCompressor) -> None:
         for i in range(self._announced, len(block)):
             self._add_channel(i, {REFUSED: "true"})
+        if self._derived is not None:
+            self._derive(self._derived, block)
         parts = [
             BlockPart(i + 1, self._topics[i].name, self._counts[i], batch, self._records[i])
             for i, batch in enumerate(block)
@@ -208,6 +214,14 @@ class RecordingWriter:
             self._sink.add_chunk(compress(content, index, compressor), index)
             for part in parts:
                 self._counts[part.channel - 1] += len(part.batch.logs)
+
+    def _derive(self, derived: Derived, block: _Block) -> None:
+        """Add to a block what follows from it."""
+        # Messages that were refused have channels of the same names behind these.
+        of_topic = dict(zip(self._by_name, block, strict=False))
+        for name, log_ns, payload in derived.of(of_topic):
+            of_topic[name].logs.append(log_ns)
+            of_topic[name].contents.append(payload)
 
     def close(self) -> None:
         """Write what is left, the index and the counts; a second call does nothing.
@@ -263,19 +277,24 @@ class RecordingWriter:
     def _add_channel(self, i: int, about: Mapping[str, str]) -> None:
         """Describe channel `i`, counted from 0, before its first message."""
         topic, types = self._topics[i], [topic.ros_type for topic in self._topics]
-        qos = dump_yaml(contract_qos())
+        qos = dump_yaml(contract_qos(latched=topic.latched))
         known = {"offered_qos_profiles": qos, "topic_type_hash": self._hashes[i], **about}
         schema = list(dict.fromkeys(types)).index(topic.ros_type) + 1
         self._sink.add_channel(ChannelRecord(i + 1, topic.name, MESSAGE_ENCODING, known, schema))
         self._announced = i + 1
 
     def _write_metadata(self) -> None:
-        qos = contract_qos()
         counts = Counter[str]()
         for topic, count in zip(self._topics, self._counts, strict=True):
             counts[topic.name] += count
         entries = [
-            TopicEntry(name, self._topics[i].ros_type, self._hashes[i], qos, counts[name])
+            TopicEntry(
+                name,
+                self._topics[i].ros_type,
+                self._hashes[i],
+                contract_qos(latched=self._topics[i].latched),
+                counts[name],
+            )
             for i, name in enumerate(self._by_name)
         ]
         first, last = self._sink.span_ns

@@ -15,7 +15,7 @@ from cspm_msgs_py.ros.contract_node import ContractNode, ros_class
 from cspm_msgs_py.ros.local_name import local
 from cspm_msgs_py.ros.qos import contract_qos
 from cspm_msgs_py.ros_types import typestore
-from cspm_msgs_py.topics import CLOCK, SENDER_DEPTH
+from cspm_msgs_py.topics import CLOCK, SCENE, SENDER_DEPTH
 from cspm_msgs_py.wire import WireWriter
 from cspm_ros.replay.bag_selection import Selection, check_clock, is_topic_name
 from cspm_ros.replay.player import Instant, Player, instants
@@ -112,7 +112,7 @@ class PlayerNode:
             name: node.node.create_publisher(
                 message_class_of(ros_type, store),
                 local(names.get(name) or selection.remap.get(name, name)),
-                contract_qos(SENDER_DEPTH),
+                contract_qos(SENDER_DEPTH, latched=name in SCENE and SCENE[name].latched),
             )
             for name, (ros_type, store) in types.items()
         }

@@ -7,7 +7,7 @@ import time
 from collections.abc import Sequence
 
 from cspm_msgs_py.errors import CspmError, InputError
-from cspm_msgs_py.graph import NODES, PLAYER, RECORDER
+from cspm_msgs_py.graph import NODES, PLAYER, RECORDER, VIEWER
 from cspm_msgs_py.schedule import (
     FORCE_CONTROLLER,
     MOTION_CONTROLLER,
@@ -113,6 +113,11 @@ def recorder() -> None:
 def player() -> None:
     """Run the player."""
     sys.exit(main(PLAYER, sys.argv[1:]))
+
+
+def viewer() -> None:
+    """Run the viewer's node."""
+    sys.exit(main(VIEWER, sys.argv[1:]))
 
 
 if __name__ == "__main__":

@@ -11,7 +11,7 @@ from contextlib import ExitStack
 from pathlib import Path
 
 from cspm_msgs_py.errors import CspmError, InputError
-from cspm_msgs_py.graph import NODES, PLAYER, RECORDER
+from cspm_msgs_py.graph import NODES, PLAYER, RECORDER, VIEWER
 from cspm_msgs_py.ros.contract_node import ContractNode
 from cspm_msgs_py.ros.leader import Leader
 from cspm_msgs_py.ros.session import FAREWELL_S, Session
@@ -23,6 +23,7 @@ from cspm_ros.runtime.node_parameters import REALTIME, NodeParameters, read_para
 from cspm_ros.runtime.progress_file import Report
 from cspm_ros.runtime.realtime_nodes import RealtimeRun
 from cspm_ros.runtime.stall_watchdog import LOOK_EVERY_S, Patience, Waiting, Watch
+from cspm_ros.scene.viewer_node import ViewerNode
 from cspm_run.recorded_run import new_recording
 
 # Where nobody is in a hurry: longer than lost packets take; or as long as starting took.
@@ -57,6 +58,9 @@ def run_node(name: str, args: Sequence[str], began: float) -> None:
             _stop_when_stdin_closes(session)
         if name == PLAYER:
             run_player(session, node, parameters, began)
+        elif name == VIEWER:
+            ViewerNode(node, parameters.bundle().testbed.testbed)
+            session.spin_until(lambda: session.stopped)
         elif parameters.pace == REALTIME:
             session.poll()
             _run_realtime(session, node, parameters, stack)

@@ -6,7 +6,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
 
-from cspm_model.urdf import urdf
+from cspm_model.scene.urdf import urdf
 from cspm_msgs_py.graph import Edges, graph_of
 from cspm_msgs_py.ros.contract_node import ContractNode
 from cspm_msgs_py.ros.rendezvous import START

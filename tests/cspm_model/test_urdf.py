@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
 
-from cspm_model.urdf import PLUGIN, attachment_link, exit_link, urdf
+from cspm_model.scene.urdf import PLUGIN, attachment_link, exit_link, urdf
 from cspm_msgs_py.testbed import load_testbed, parse_testbed
 
 TESTBEDS = Path(__file__).parents[2] / "scenarios" / "testbeds"

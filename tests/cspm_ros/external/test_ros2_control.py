@@ -13,7 +13,7 @@ import pytest
 from realtime_graph import Evidence, Graph, slow_bundle, warm_processes
 from ros_graph import load_ros
 
-from cspm_model.urdf import SYSTEM
+from cspm_model.scene.urdf import SYSTEM
 from cspm_msgs_py.graph import RECORDER
 from cspm_msgs_py.recording import Recording
 from cspm_msgs_py.schedule import PLANT

@@ -200,7 +200,7 @@ def test_a_node_that_is_none_is_one_line(capfd, monkeypatch):
     code, err = reported(capfd, monkeypatch, "motor")
     assert (code, err.partition(":")[0]) == (2, "cspm node motor")
     *nodes, recorder = NODES
-    allowed = ", ".join((*nodes, "target_tracker", recorder, "player"))
+    allowed = ", ".join((*nodes, "target_tracker", recorder, "player", "viewer"))
     assert said(err) == f"allowed: {allowed}\n"
     code, err = reported(capfd, monkeypatch, "plant", "-p", "steps:=5")
     assert code == 2

@@ -1,0 +1,1 @@
+"""What tools that draw robots need of a machine: URDF, frames and markers."""

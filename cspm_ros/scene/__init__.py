@@ -1,0 +1,1 @@
+"""The node that shows a run to RViz, Foxglove and their like."""

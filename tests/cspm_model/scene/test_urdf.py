@@ -12,7 +12,7 @@ from scipy.spatial.transform import Rotation
 from cspm_model.scene.urdf import PLUGIN, attachment_link, exit_link, urdf
 from cspm_msgs_py.testbed import load_testbed, parse_testbed
 
-TESTBEDS = Path(__file__).parents[2] / "scenarios" / "testbeds"
+TESTBEDS = Path(__file__).parents[3] / "scenarios" / "testbeds"
 FILES = sorted(TESTBEDS.glob("*.yaml"))
 # MuJoCo wants masses everywhere, and otherwise joins fixed links to their parents.
 FOR_MUJOCO = (

@@ -27,6 +27,7 @@ from cspm_msgs_py.safety_spec import Safety
 from cspm_msgs_py.scenario_keys.bodies import ORIGIN, Body, Pose, Target
 from cspm_msgs_py.scenario_keys.curves import Sine
 from cspm_msgs_py.scenario_keys.events import CableCut, check_times
+from cspm_msgs_py.scenario_keys.faults import Fault
 from cspm_msgs_py.scenario_keys.operation import Operation, check_operation
 from cspm_msgs_py.scenario_keys.own_controller import OwnControllers
 from cspm_msgs_py.yaml_file import StrictModel, parse_yaml, read_yaml, validate
@@ -310,6 +311,7 @@ class Scenario(StrictModel):
     controllers: OwnControllers = {}
     safety: Safety = Safety()
     events: tuple[CableCut, ...] = ()
+    faults: tuple[Fault, ...] = ()
     operation: tuple[Operation, ...] = ()
     requirement: Requirement = Requirement()
 

@@ -44,6 +44,7 @@ from cspm_run.designed_gains import with_gains
 from cspm_run.motions import motions_of, reference_poses
 from cspm_run.plants import make_plant
 from cspm_sim.any_plant import AnyPlant
+from cspm_sim.faults import Faults
 from cspm_sim.plant import Plant
 from cspm_sim.sensor_fault import sensor_faults
 from cspm_sim.sensors import AnySensor, SensorModel
@@ -61,7 +62,8 @@ class Assembly:
 
     `references` holds the prescribed motions by topic, `/winch_frame/reference` and
     `/bar/reference`, or `/target/reference` where the target is measured; `stages` the controllers
-    in the order in which they compute; `target` the motion of a target that is measured.
+    in the order in which they compute; `target` the motion of a target that is measured;
+    `faults` what fails, if anything does.
     """
 
     scenario: Scenario
@@ -72,6 +74,7 @@ class Assembly:
     references: dict[str, WaveTrajectory]
     stages: list[Stage]
     target: Motion | None = None
+    faults: Faults | None = None
 
     @property
     def period_ns(self) -> int:
@@ -166,6 +169,7 @@ def assemble(scenario: Scenario, testbed: Testbed, folder: Path, plant: str = SI
             _stage(node, scenario, testbed, folder, motions, references) for node in schedule.nodes
         ],
         target=_target(schedule, motions),
+        faults=faults_of(scenario, testbed, plant),
     )
 
 
@@ -192,6 +196,26 @@ def assemble_simulator(
     motions = motions_of(scenario, testbed, folder)
     target = _target(schedule_of(scenario, testbed), motions)
     return _plant(scenario, testbed, motions, plant), _sensors(scenario, testbed), target
+
+
+def faults_of(
+    scenario: Scenario, testbed: Testbed, plant: str, *, realtime: bool = False
+) -> Faults | None:
+    """Return what fails in a run, None where nothing can.
+
+    Args:
+        scenario: with its timetable.
+        testbed: the machine.
+        plant: whose equations are simulated.
+        realtime: whether the run is one in real time, into which others may be put.
+
+    Raises:
+        InputError: a fault that the machine cannot have.
+    """
+    if not scenario.faults and not realtime:
+        return None
+    timetable, seed, cuts = scenario.faults, scenario.seed, plant == SIM
+    return Faults(timetable, testbed, seed, realtime=realtime, cuts=cuts)
 
 
 def assemble_stage(node: str, scenario: Scenario, testbed: Testbed, folder: Path) -> Stage:

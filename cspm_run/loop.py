@@ -63,6 +63,7 @@ class Loop:
             period_ns=parts.period_ns,
             controlled=parts.controlled,
             target=parts.target,
+            faults=parts.faults,
         )
         self.known = self.simulator.measured
         self.known[TORQUE_COMMAND] = self.simulator.torque

@@ -49,7 +49,7 @@ class Stepping:
         self._by_stages(1)
         ready = first_compiled_step(self._loop.schedule)
         while plant.steps < self._steps and not stopped():
-            if plant.steps == ready and isinstance(plant, Plant):
+            if plant.steps == ready and isinstance(plant, Plant) and not self._has_faults:
                 self._begin_compiled()
             began = time.perf_counter()
             try:
@@ -57,6 +57,11 @@ class Stepping:
             finally:
                 self.elapsed += time.perf_counter() - began
             progress(plant.time)
+
+    @property
+    def _has_faults(self) -> bool:
+        """Whether something can fail, which the compiled steps know nothing of."""
+        return self._loop.simulator.faults is not None
 
     def history(self) -> str:
         """Return what preceded the present instant, in words."""

@@ -39,3 +39,10 @@ class AnyPlant(Protocol):
 
     def applied_torque(self, torque: Array) -> Array:
         """Return what the drives deliver for a torque command, (n,) [N·m]."""
+
+    def part(self, cable: str) -> None:
+        """Let a cable part now.
+
+        Raises:
+            InputError: the plant cannot.
+        """

@@ -235,6 +235,11 @@ class Plant:
     def _observe(self) -> None:
         plant_tensions(self.state, self.frame, self.parameters, self.scratch, self.outputs)
 
+    def part(self, cable: str) -> None:
+        """Let a cable part now."""
+        self._cuts[self.steps] = [self.testbed.cable_names.index(cable)]
+        self._part()
+
     def _part(self) -> None:
         """Let the cables part whose step has come; what remains of them is not wound."""
         for i in self._cuts.pop(self.steps, ()):

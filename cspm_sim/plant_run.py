@@ -10,6 +10,7 @@ from cspm_msgs_py.graph import Edges
 from cspm_msgs_py.schedule import PLANT, Schedule
 from cspm_msgs_py.topics import DIAGNOSTICS, Topic
 from cspm_sim.any_plant import AnyPlant
+from cspm_sim.faults import Faults
 from cspm_sim.sensors import AnySensor
 from cspm_sim.simulator import Publish, Simulator
 
@@ -27,6 +28,7 @@ class PlantRun:
         nodes: the nodes of this run.
         controlled: whether a closed loop is to keep the bar upright.
         target: the motion of the target where it is measured.
+        faults: what fails, if anything can.
     """
 
     plant: AnyPlant
@@ -37,6 +39,7 @@ class PlantRun:
     nodes: tuple[str, ...]
     controlled: bool
     target: Motion | None = None
+    faults: Faults | None = None
 
     @property
     def topics(self) -> dict[str, Topic]:
@@ -71,4 +74,5 @@ class PlantRun:
             period_ns=self.schedule.period_ns,
             controlled=self.controlled,
             target=self.target,
+            faults=self.faults,
         )

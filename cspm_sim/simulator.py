@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterable, Mapping
 from typing import NamedTuple
 
 import numpy as np
@@ -13,6 +13,7 @@ from cspm_msgs_py.diagnostics import Level, Status
 from cspm_msgs_py.errors import DivergenceError
 from cspm_msgs_py.schedule import CLOCK
 from cspm_sim.any_plant import AnyPlant
+from cspm_sim.faults import Faults
 from cspm_sim.kernels.phases import COUNTS, LAST_TAUT_NS, SLACK, SLACK_STEPS, STEPS
 from cspm_sim.sensors import AnySensor
 from cspm_sim.truth import Quantity, Truth
@@ -41,6 +42,7 @@ class Simulator:
         sensors: by topic.
         period_ns: the plant's [ns].
         controlled: whether a closed loop is to keep the bar upright.
+        faults: what fails; None: nothing can.
         truth: the true quantities.
         slack_limit: tensions up to which a cable is slack, (n,) [N].
         torque: motor torques (n,) [N·m] that the plant holds.
@@ -57,6 +59,7 @@ class Simulator:
         period_ns: int,
         controlled: bool,
         target: Motion | None = None,
+        faults: Faults | None = None,
     ) -> None:
         """Take the parts.
 
@@ -67,8 +70,10 @@ class Simulator:
             period_ns: the plant's [ns].
             controlled: whether a closed loop is to keep the bar upright.
             target: the motion of the target where the bar's reference is measured.
+            faults: what fails, if anything can.
         """
         self.plant = plant
+        self.faults = faults
         self.sensors = sensors
         self.period_ns = period_ns
         self.controlled = controlled
@@ -102,13 +107,15 @@ class Simulator:
         now, step = self.now_ns, self.plant.steps
         if self._clock is not None:
             self._clock(now, now, NO_ROW)
+        if self.faults is not None:
+            for name in self.faults.advance(now):
+                self.plant.part(name)
         self.truth.update(self.torque)
         for quantity, publish_truth, sensor, publish_measured in self._taps:
             if publish_truth is not None:
                 publish_truth(now, now, quantity.row)
             arrival = sensor.observe(step, now, quantity.values) if sensor else None
-            if arrival is not None:
-                stamp, measured = arrival
+            for stamp, measured in self._arrived(quantity.topic, now, arrival):
                 self.measured[quantity.topic] = measured
                 if publish_measured is not None:
                     publish_measured(now, stamp, measured)
@@ -126,8 +133,26 @@ class Simulator:
             DivergenceError: the plant left the range of its equations, or the bar that is to be
                 controlled has turned over.
         """
-        self.plant.step(self.torque)
+        if self.faults is None:
+            self.plant.step(self.torque)
+        else:
+            self._step_with(self.faults)
         self.check_upright()
+
+    def _step_with(self, faults: Faults) -> None:
+        locked = self.plant.locked
+        self.plant.locked = locked or faults.brake
+        try:
+            self.plant.step(faults.torque(self.torque))
+        finally:
+            self.plant.locked = locked
+
+    def _arrived(
+        self, topic: str, now_ns: int, arrival: tuple[int, Array] | None
+    ) -> Iterable[tuple[int, Array]]:
+        if self.faults is not None:
+            return self.faults.sensed(topic, now_ns, arrival)
+        return () if arrival is None else (arrival,)
 
     def check_upright(self) -> None:
         """Check that a controlled bar is upright.
@@ -151,6 +176,11 @@ class Simulator:
         if self.plant.cut:
             values["cut"] = ", ".join(self.plant.cut)
             level, message = Level.WARN, "cable cut"
+        if self.faults is not None:
+            found = self.faults.described()
+            if any(found.values()):
+                values |= found
+                level, message = Level.WARN, f"fault: {found['fault_events'] or found['faults']}"
         return Status(level, "plant", message, values)
 
     def history(self) -> list[str]:

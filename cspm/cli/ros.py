@@ -199,6 +199,55 @@ def check_drivers(
 @app.command(
     epilog="""Examples:
 
+cspm inject sensor_frozen --on /bar/pose --for 0.5
+
+cspm inject winch_weak --on surge_2 --amount 0.5
+
+cspm inject cable_cut --on hoist_1
+
+cspm inject node_killed --on force_controller
+
+Exit code: 0 the run has it, 1 no answer, 2 unusable input."""
+)
+def inject(
+    fault: Annotated[
+        str,
+        typer.Argument(
+            metavar="FAULT",
+            help="sensor_frozen, sensor_noisy, sensor_biased, sensor_late, sensor_dropped,"
+            " winch_weak, cable_cut, brake or node_killed.",
+        ),
+    ],
+    on: Annotated[
+        str,
+        typer.Option(metavar="NAME", help="What fails: a measured topic, a cable, or a node."),
+    ] = "",
+    amount: Annotated[
+        float | None,
+        typer.Option(
+            metavar="NUMBER",
+            help="Noise or bias in the sensor's unit, lateness in s, or the share of torque left.",
+        ),
+    ] = None,
+    lasts: Annotated[
+        float | None,
+        typer.Option("--for", metavar="SECONDS", help="How long; without it to the run's end."),
+    ] = None,
+    json: Json = None,
+) -> None:
+    """Let something fail in a run in real time that is under way, to see what the rest does.
+
+    Faults are recorded in /diagnostics. A scenario's `faults:` has them at given times, in every
+    mode.
+    """
+    from cspm.commands.inject_command import inject_command
+
+    inject_command(fault, on, amount, lasts, json)
+
+
+@app.command(
+    epilog="""Examples:
+
 cspm urdf thesis > thesis.urdf
 
 cspm urdf lab.yaml --out lab.urdf

@@ -10,12 +10,15 @@ from collections.abc import Callable, Sequence
 from contextlib import ExitStack
 from pathlib import Path
 
+from rcl_interfaces.msg import ParameterDescriptor
+
 from cspm_msgs_py.errors import CspmError, InputError
 from cspm_msgs_py.graph import NODES, PLAYER, RECORDER, VIEWER
 from cspm_msgs_py.ros.contract_node import ContractNode
 from cspm_msgs_py.ros.leader import Leader
 from cspm_msgs_py.ros.session import FAREWELL_S, Session
 from cspm_msgs_py.schedule import PLANT, Schedule, schedule_of
+from cspm_ros.inject.injection import PROCESS, process_name
 from cspm_ros.replay.replay_run import run_player
 from cspm_ros.runtime.exit_watchdog import exit_watchdog
 from cspm_ros.runtime.lockstep_nodes import LockstepRun
@@ -54,6 +57,9 @@ def run_node(name: str, args: Sequence[str], began: float) -> None:
         stack.callback(start_exit_watchdog, max(_LEAVING_S, time.perf_counter() - began))
         node = session.node(name)
         parameters = read_parameters(node.node)
+        described = ParameterDescriptor(description="host and number of its process")
+        described.read_only = True
+        node.node.declare_parameter(PROCESS, process_name(), described, ignore_override=True)
         if parameters.until_stdin_closes:
             _stop_when_stdin_closes(session)
         if name == PLAYER:

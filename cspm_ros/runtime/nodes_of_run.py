@@ -14,7 +14,7 @@ from cspm_msgs_py.scenario import ClosedLoop
 from cspm_msgs_py.schedule import Schedule, schedule_of
 from cspm_msgs_py.topics import Topic
 from cspm_ros.runtime.robot_description import publish_description
-from cspm_run.assembly import assemble_simulator
+from cspm_run.assembly import assemble_simulator, faults_of
 from cspm_run.bundle import Bundle
 from cspm_sim.plant_run import PlantRun
 
@@ -60,12 +60,13 @@ class NodesOfRun:
         if node.claim(self.bundle.scenario.name, START):
             publish_description(node, urdf(self.bundle.testbed.testbed))
 
-    def plant_run(self, steps: int, place: Path) -> PlantRun:
+    def plant_run(self, steps: int, place: Path, *, realtime: bool = False) -> PlantRun:
         """Return what the plant's node is made of.
 
         Args:
             steps: how many plant steps to make.
             place: where the bundle is unpacked.
+            realtime: whether the run is one in real time, into which faults may be put.
         """
         scenario, testbed = self.bundle.scenario, self.bundle.testbed.testbed
         plant, sensors, target = assemble_simulator(scenario, testbed, place, self.bundle.plant)
@@ -78,4 +79,5 @@ class NodesOfRun:
             nodes=tuple(name for name in self.members if name not in self.own),
             controlled=isinstance(scenario.control, ClosedLoop),
             target=target,
+            faults=faults_of(scenario, testbed, self.bundle.plant, realtime=realtime),
         )

@@ -20,6 +20,7 @@ from cspm_msgs_py.ros.leader import Leader
 from cspm_msgs_py.ros.realtime_node import RealtimeNode, RealtimeWaveNode
 from cspm_msgs_py.schedule import CLOCK, PLANT, WAVE_TRAJECTORY
 from cspm_msgs_py.topics import BRAKE, DIAGNOSTICS, EMERGENCY_STOP, SAFE, Topic
+from cspm_ros.inject.fault_port import FaultPort
 from cspm_ros.runtime.nodes_of_run import NodesOfRun
 from cspm_ros.runtime.realtime_recorder_node import RealtimeRecorderNode
 from cspm_ros.runtime.warm_up import warm_up
@@ -68,7 +69,9 @@ class RealtimeRun(NodesOfRun):
         check_real_time(bundle.scenario.safety, self.schedule)
         with bundle.unpacked() as place:
             warm_up(PLANT, bundle, place)
-            run = self.plant_run(steps, place)
+            run = self.plant_run(steps, place, realtime=True)
+        if run.faults is not None:
+            FaultPort(node.node, run.faults)
         return RealtimePlantNode(node, run, make_watchdog(bundle.scenario, run.plant))
 
     def stage(self, node: ContractNode) -> RealtimeNode | RealtimeWaveNode:

@@ -168,6 +168,14 @@ class MujocoPlant:
         if self._drive is not None:
             self._drive.advance(self._limited(torque), period)
 
+    def part(self, cable: str) -> None:
+        """Refuse to cut a cable.
+
+        Raises:
+            InputError: always.
+        """
+        raise InputError(f"{cable}: this plant cannot cut a cable, allowed: plant sim")
+
     def applied_torque(self, torque: Array) -> Array:
         """Return what the drives deliver at this instant for a torque command, (n,) [N·m]."""
         limited = self._limited(torque)

@@ -1,0 +1,164 @@
+"""Faults put into runs: from a timetable in every mode, and from outside in real time."""
+
+import os
+import subprocess
+
+import numpy as np
+import pytest
+from cspm_process import CSPM
+from realtime_graph import Evidence, Graph, Witness, slow_bundle, warm_processes
+from ros_graph import assert_same, load_ros, new_domain
+from run_samples import bundle_of
+
+load_ros()
+
+from cspm_msgs_py.diagnostics import decode_diagnostics  # noqa: E402
+from cspm_msgs_py.errors import InputError  # noqa: E402
+from cspm_msgs_py.recording import Recording  # noqa: E402
+from cspm_msgs_py.scenario_keys.faults import Fault  # noqa: E402
+from cspm_msgs_py.schedule import FORCE_CONTROLLER, PLANT, TENSION  # noqa: E402
+from cspm_ros.inject.injection import inject, kill_node  # noqa: E402
+from cspm_ros.runtime.exit_watchdog import IN_ORDER  # noqa: E402
+from cspm_ros.runtime.graph_run import run_graph  # noqa: E402
+from cspm_run.recorded_run import run  # noqa: E402
+from cspm_run.resim import resimulate  # noqa: E402
+
+WATCHDOG = "plant/watchdog"
+GUARDS = (FORCE_CONTROLLER, WATCHDOG)
+SAG = 0.1
+"""How far the bar may move [m]. A winch at half torque lets it sink 3 cm until the safe state
+holds it; one that falls freely sinks 1.2 m in the time after which silence counts."""
+STEPS = 300
+TIMETABLE = (
+    'faults=[{"at": 0.05, "fault": "sensor_biased", "on": "/bar/pose", "amount": 0.001,'
+    ' "lasts": 0.05}, {"at": 0.12, "fault": "winch_weak", "on": "sway_1", "amount": 0.5},'
+    ' {"at": 0.2, "fault": "brake", "lasts": 0.02}]'
+)
+
+
+def plant_statuses(folder):
+    with Recording(folder) as recording:
+        payloads = recording.payloads("/diagnostics").payloads
+    found = [status for payload in payloads for status in decode_diagnostics(payload).statuses]
+    return [status for status in found if status.name == PLANT]
+
+
+def test_a_timetable_is_the_same_in_every_mode_and_is_repeated(tmp_path):
+    bundle = bundle_of("calm", TIMETABLE)
+    run(bundle, tmp_path / "one", steps=STEPS)
+    run_graph(bundle, tmp_path / "graph", steps=STEPS, domain_id=new_domain())
+    assert_same(tmp_path / "one", tmp_path / "graph")
+    assert resimulate(tmp_path / "one", lambda *_: None).difference is None
+    events = "; ".join(s.values.get("fault_events", "") for s in plant_statuses(tmp_path / "one"))
+    assert "began at 0.050 s: sensor_biased on /bar/pose, 0.001, for 0.05 s" in events
+    assert "ended at 0.100 s: sensor_biased on /bar/pose, 0.001, for 0.05 s" in events
+    assert "began at 0.200 s: brake, for 0.02 s" in events
+
+
+def test_what_fails_is_what_the_recording_shows(tmp_path):
+    for name, faults in {"healthy": (), "faulty": (TIMETABLE,)}.items():
+        run(bundle_of("calm", "sensors=ideal", *faults), tmp_path / name, steps=STEPS)
+    rows = {}
+    for name in ("healthy", "faulty"):
+        with Recording(tmp_path / name) as recording:
+            rows[name] = {
+                topic: recording.rows(topic).rows
+                for topic in ("/bar/pose", "/truth/bar/pose", "/winches/state")
+            }
+    healthy, faulty = rows["healthy"], rows["faulty"]
+    assert (healthy["/bar/pose"][:50] == faulty["/bar/pose"][:50]).all()
+    bias = faulty["/bar/pose"] - faulty["/truth/bar/pose"]
+    assert bias[50:100, :3] == pytest.approx(0.001 + np.zeros((50, 3)), abs=1e-12)
+    assert bias[100:200] == pytest.approx(np.zeros((100, 7)), abs=1e-12)
+    speeds = faulty["/winches/state"][:, 8:16]
+    assert not speeds[202:220].any()
+    assert speeds[195].all()
+
+
+def test_a_fault_that_lockstep_cannot_have_is_refused(tmp_path):
+    late = 'faults=[{"fault": "sensor_dropped", "on": "/bar/pose"}]'
+    with pytest.raises(InputError, match=r"^faults\[0\]: sensor_dropped, allowed in lockstep"):
+        run(bundle_of("calm", late), tmp_path / "never", steps=STEPS)
+
+
+def fault(kind, **options):
+    return Fault(fault=kind, **options)
+
+
+@pytest.mark.slow
+@pytest.mark.realtime
+def test_each_fault_is_ridden_out_or_answered_with_the_safe_state(tmp_path):
+    """In one run, one after the other; recorded are all of them, and the bar never falls."""
+    bundle = slow_bundle()
+    tension = bundle.testbed.testbed.topics[TENSION]
+    ridden_out = [
+        fault("sensor_frozen", on="/bar/pose", lasts=0.3),
+        fault("sensor_noisy", on="/bar/pose", amount=1e-4, lasts=0.3),
+        fault("brake", lasts=0.3),
+    ]
+    answered = {
+        "/bar/pose": fault("sensor_dropped", on="/bar/pose", lasts=1.5),
+        "/winches/state": fault("sensor_dropped", on="/winches/state", lasts=1.5),
+        "/cables/tension": fault("sensor_late", on="/cables/tension", amount=1.0, lasts=1.5),
+        "torque without motion": fault("winch_weak", on="surge_2", amount=0.5, lasts=1.0),
+        "jump": fault("sensor_biased", on="/bar/pose", amount=0.5, lasts=0.3),
+    }
+    with (
+        Graph(warm_processes(), bundle, tmp_path) as graph,
+        Witness(graph.domain, [tension]) as witness,
+    ):
+        graph.start()
+        witness.until_running(*GUARDS)
+        for each in ridden_out:
+            inject(each, domain_id=graph.domain)
+            witness.until_said(PLANT, lambda s, e=each: str(e) in s.message, str(each))
+            witness.until_more(TENSION, 120)
+            witness.until_running(*GUARDS)
+        for each in answered.values():
+            inject(each, domain_id=graph.domain)
+            witness.until_state(FORCE_CONTROLLER, "hold")
+            witness.until_said(PLANT, lambda s: not s.values.get("faults"), "no fault")
+            witness.until_reset(FORCE_CONTROLLER)
+            witness.until_running(*GUARDS)
+        with pytest.raises(InputError, match=r"^on surge_9, allowed: hoist_1, "):
+            inject(fault("winch_weak", on="surge_9", amount=0.5), domain_id=graph.domain)
+        assert kill_node(FORCE_CONTROLLER, domain_id=graph.domain) in {
+            process.pid for process in graph.processes.values()
+        }
+        assert witness.until_state(WATCHDOG, "hold").values["reason"]
+        assert set(graph.end().values()) <= {*IN_ORDER, -9}
+    evidence = Evidence(graph.folder)
+    assert np.ptp(evidence.rows["/truth/bar/pose"].rows[:, 2]) < SAG
+    limits = np.array([cable.tension_limits[1] for cable in bundle.testbed.testbed.cables])
+    assert (evidence.rows["/truth/cables/tension"].rows <= limits).all()
+    events = "; ".join(s.values.get("fault_events", "") for s in evidence.statuses)
+    for each in (*ridden_out, *answered.values()):
+        assert f"{each}" in events
+    reasons = "; ".join(reason for _, reason in evidence.alarms(FORCE_CONTROLLER))
+    for words in ("/winches/state stale", "/cables/tension stale", "torque without motion"):
+        assert words in reasons
+
+
+def test_the_command_says_what_is_allowed(tmp_path):
+    environment = os.environ | {"ROS_DOMAIN_ID": str(new_domain())}
+
+    def said(*arguments):
+        command = [CSPM, "inject", *arguments]
+        found = subprocess.run(
+            command, env=environment, cwd=tmp_path, capture_output=True, text=True, check=False
+        )
+        assert found.returncode == 2
+        (line,) = found.stderr.splitlines()
+        return line
+
+    kinds = "sensor_frozen, sensor_noisy, sensor_biased, sensor_late, sensor_dropped, winch_weak,"
+    assert said("gremlins") == (
+        f"cspm inject: gremlins: allowed: {kinds} cable_cut, brake, node_killed"
+    )
+    assert said("node_killed", "--for", "1") == (
+        "cspm inject: node_killed: with --amount or --for, allowed: --on NODE alone"
+    )
+    domain = environment["ROS_DOMAIN_ID"]
+    assert said("brake") == (
+        f"cspm inject: no node plant in ROS domain {domain}, allowed: while a run is under way"
+    )

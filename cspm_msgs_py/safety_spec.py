@@ -19,7 +19,8 @@ class Safety(StrictModel):
     Attributes:
         state: `hold`: the winches hold the bar by their motors; `brake`: zero torque, brakes set.
         ramp_time: from the tension measured last to the balancing one [s], in `hold`.
-        stale_after: an input older than this is stale [s]; in lockstep inputs are waited for.
+        stale_after: an input older than this is stale [s], and so is one of a noisy sensor that
+            repeats itself for longer; in lockstep inputs are waited for.
         tension_trip: a measured tension above it trips [N]; None: twice each cable's upper limit.
         torque_slew: fastest change of a torque command [N·m/s]; None: from one torque limit to the
             other within one period of the force controller, which never acts.

@@ -10,19 +10,21 @@ The defaults follow from the machine:
 - The bar is within half the size of its reference. In the first minute of the shipped scenarios it
   is within 0.44 (`worst_case_steep`), but for those in which the loop loses it: `worst_case_4m`,
   `worst_case_steep_4m` and `worst_case_literal`, more than 1 m off.
+- A reading repeats no longer than silence is allowed, where the sensor's noise makes that certain.
 - Torque may be off by a twentieth of the motor's limit, or half of what the tension needs. Healthy
   runs of the shipped scenarios are off by 0.014 of the limit; dry friction comes on top.
 """
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Collection, Mapping
 from dataclasses import dataclass, field
 
 import numpy as np
 from numpy.typing import NDArray
 
 from cspm_control.plausibility.pose_limits import FollowingError, PoseLimits
+from cspm_control.plausibility.repeated_reading import RepeatedReading
 from cspm_control.plausibility.torque_balance import TorqueBalance
 from cspm_msgs_py.scenario import Scenario
 from cspm_msgs_py.schedule import (
@@ -34,6 +36,7 @@ from cspm_msgs_py.schedule import (
     WINCH_STATE,
     schedule_of,
 )
+from cspm_msgs_py.sensor_spec import quantities
 from cspm_msgs_py.testbed import Testbed
 
 Array = NDArray[np.float64]
@@ -50,18 +53,20 @@ class MachinePlausibility:
         poses: limits of bodies, by the topic of their poses.
         following: of the bar, where the node reads its reference.
         balance: of the winches, where the node reads tensions and states.
+        repeated: of sensors with noise, by topic.
     """
 
     poses: Mapping[str, PoseLimits] = field(default_factory=dict)
     following: FollowingError | None = None
     balance: TorqueBalance | None = None
+    repeated: Mapping[str, RepeatedReading] = field(default_factory=dict)
 
     def fault(
         self, topic: str, stamp_ns: int, row: Array, rows: Mapping[str, Array], *, running: bool
     ) -> str | None:
         """Take a message; see `cspm_msgs_py.stepping.plausibility`."""
-        if topic in self.poses:
-            fault = self.poses[topic].fault(stamp_ns, row)
+        for judges in (self.repeated, self.poses):
+            fault = judges[topic].fault(stamp_ns, row) if topic in judges else None
             if fault is not None:
                 return fault
         if topic == BAR_POSE and self.following is not None and BAR_REFERENCE in rows:
@@ -100,7 +105,25 @@ def make_plausibility(node: str, scenario: Scenario, testbed: Testbed) -> Machin
         following = FollowingError(body_points(testbed)[1], most)
     if {WINCH_STATE, TENSION} <= read:
         balance = torque_balance(scenario, testbed)
-    return MachinePlausibility(poses, following, balance)
+    return MachinePlausibility(poses, following, balance, _repeated(scenario, testbed, read))
+
+
+def _repeated(
+    scenario: Scenario, testbed: Testbed, read: Collection[str]
+) -> dict[str, RepeatedReading]:
+    """Return what finds sensors that are stuck, of those that a node reads."""
+    if scenario.sensors == "ideal":
+        return {}
+    found = {}
+    for topic, sensor in testbed.sensors.items():
+        if topic in read:
+            each = testbed.topics[topic]
+            width = 6 if each.ros_type.endswith("PoseStamped") else each.width
+            times = width // len(quantities(each))
+            noise, steps = np.repeat(sensor.noise, times), np.repeat(sensor.resolution, times)
+            allowed = scenario.safety.stale_after
+            found[topic] = RepeatedReading(topic, noise, steps, allowed)
+    return found
 
 
 def body_points(testbed: Testbed) -> tuple[Array, Array]:

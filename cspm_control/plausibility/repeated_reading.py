@@ -1,0 +1,65 @@
+"""Readings that repeat although the sensor is noisy: a sensor that sends and measures no more."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+Array = NDArray[np.float64]
+# Of readings that are independent, one in so many is said to be repeated by mistake: at 1 kHz one
+# in thirty years.
+_ONCE_IN = 1e12
+
+
+class RepeatedReading:
+    """Finds a reading that stays the same, to the last bit, for as long as silence is allowed.
+
+    Noise of standard deviation σ, rounded to r, gives two equal readings of a quantity at rest with
+    the probability r/(2·√π·σ), that of all quantities with the product.
+    """
+
+    def __init__(self, topic: str, noise: ArrayLike, resolution: ArrayLike, allowed: float) -> None:
+        """Take what the sensor is like.
+
+        Args:
+            topic: what it measures.
+            noise: standard deviation of each quantity, shape (k,); 0 for one without noise.
+            resolution: of each, shape (k,); 0 for any value.
+            allowed: how long a reading may be old [s].
+        """
+        self._topic, self._allowed_ns = topic, round(allowed * 1e9)
+        self._least = repeats_needed(noise, resolution)
+        self._row: Array | None = None
+        self._since_ns, self._count = 0, 0
+
+    def fault(self, stamp_ns: int, row: Array) -> str | None:
+        """Take a row; return for how long it has been the same, None while it need not be stuck."""
+        if self._row is None or (row != self._row).any():
+            self._row, self._since_ns, self._count = row.copy(), stamp_ns, 0
+            return None
+        self._count += 1
+        age = stamp_ns - self._since_ns
+        if self._count < self._least or age <= self._allowed_ns:
+            return None
+        return (
+            f"{self._topic}: the same reading for {age * 1e-6:.0f} ms, allowed:"
+            f" {self._allowed_ns * 1e-6:g} ms (safety.stale_after)"
+        )
+
+
+def repeats_needed(noise: ArrayLike, resolution: ArrayLike) -> float:
+    """Return how often a reading has to repeat until it cannot be chance; infinite without noise.
+
+    Args:
+        noise: standard deviations, shape (k,).
+        resolution: steps, shape (k,).
+    """
+    deviations, steps = np.asarray(noise, dtype=float), np.asarray(resolution, dtype=float)
+    noisy = deviations > 0.0
+    chances = np.minimum(1.0, steps[noisy] / (2.0 * math.sqrt(math.pi) * deviations[noisy]))
+    chance = float(np.prod(chances))
+    if chance >= 1.0:
+        return math.inf
+    return 1.0 if chance == 0.0 else math.ceil(math.log(_ONCE_IN) / -math.log(chance))

@@ -12,6 +12,7 @@ environment chooses the graph, by `ROS_DOMAIN_ID`. It reaches no further than th
 
 from __future__ import annotations
 
+import sys
 from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
 
@@ -22,10 +23,12 @@ from cspm.recorded import AnyRecording, path_of
 from cspm.replaying import Replay as Replay
 from cspm.replaying import ReplayRequest, opened, played
 from cspm.scenario import AnyScenario
+from cspm.summary_files import finish_recording
 from cspm.testbed import AnyTestbed
+from cspm_msgs_py.graph import RECORDER
 from cspm_ros.replay.bag_selection import Selection
 from cspm_ros.replay.player import Player
-from cspm_ros.runtime.node_main import start_node
+from cspm_ros.runtime.node_main import main, start_node
 
 __all__ = ["DriverReport", "Replay", "check_drivers", "replay", "run_node"]
 
@@ -88,7 +91,7 @@ def run_node(name: str, args: Sequence[str] = ()) -> None:
 
     Args:
         name: `plant`, `wave_trajectory`, `motion_controller`, `tension_distribution`,
-            `force_controller`, `target_tracker`, `recorder` or `player`.
+            `force_controller`, `target_tracker`, `recorder`, `player` or `viewer`.
         args: what follows the name on the command line, such as `--ros-args`, `-p`,
             `scenario:=calm`; see `docs/how-to/run-on-ros.md`.
 
@@ -96,7 +99,13 @@ def run_node(name: str, args: Sequence[str] = ()) -> None:
         InputError: no such node, no ROS, or arguments that cannot be used.
         CspmError: the run failed.
     """
-    start_node(name, args)
+    if (recorded := start_node(name, args)) is not None:
+        finish_recording(recorded)
+
+
+def recorder() -> None:
+    """Run the recorder as a program, for `ros2 run`."""
+    sys.exit(main(RECORDER, sys.argv[1:], finish=finish_recording))
 
 
 def check_drivers(

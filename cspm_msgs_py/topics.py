@@ -86,6 +86,9 @@ EMERGENCY_STOP = Topic("/emergency_stop", "std_msgs/msg/Bool", "", ())
 BRAKE = Topic("/winches/brake", "std_msgs/msg/Bool", "", ())
 # Whether the winches are in their safe state, so that nobody's wanted wrench is followed.
 SAFE = Topic("/winches/safe", "std_msgs/msg/Bool", "", ())
+# Of all nodes in a domain, whatever their namespace.
+ROSOUT = Topic("/rosout", "rcl_interfaces/msg/Log", "", ())
+PARAMETER_EVENTS = Topic("/parameter_events", "rcl_interfaces/msg/ParameterEvent", "", ())
 
 TF = Topic("/tf", "tf2_msgs/msg/TFMessage", "", ())
 TF_STATIC = Topic("/tf_static", TF.ros_type, "", (), latched=True)

@@ -89,15 +89,23 @@ def _repeat(
         folder = Path(place) / "again"
         run(bundle, folder, lambda now: progress(now, duration), steps=clock.count)
         with Recording(folder) as repeated:
-            # The scene follows from the rest; older recordings have none.
-            difference = first_difference(recording, repeated, but=SCENE)
-            cut = difference is not None and _is_cut(recording, repeated, difference)
+            difference, cut = _compared(recording, repeated)
     return Resimulation(
         difference=None if cut else difference,
-        messages=sum(topic.count for name, topic in recording.topics.items() if name not in SCENE),
+        messages=sum(topic.count for topic in recording.topics.values()),
         cut_ns=recording.end_ns if cut else None,
         recorded_version=record.get("package_version", "unknown"),
     )
+
+
+def _compared(recording: Recording, repeated: Recording) -> tuple[Difference | None, bool]:
+    """Return where two recordings first differ, and whether it is only that the first was cut."""
+    # The scene follows from blocks of the rest. Older recordings have none.
+    absent = [name for name in SCENE if name not in recording.topics]
+    found = first_difference(recording, repeated, but=absent)
+    if found is not None and found.topic in SCENE:
+        found = first_difference(recording, repeated, but=SCENE) or found
+    return found, found is not None and _is_cut(recording, repeated, found)
 
 
 def _is_cut(recording: Recording, repeated: Recording, difference: Difference) -> bool:

@@ -16,7 +16,8 @@ from rich.table import Table
 
 from cspm.changed_machine import of_testbed
 from cspm.commands.progress_shown import shown
-from cspm.commands.run_command import bundle_from, summarise
+from cspm.commands.run_command import bundle_from
+from cspm.summary_files import summarise
 from cspm_msgs_py.control_spec.motion_laws import MOTION_LAWS
 from cspm_msgs_py.dofs import DOFS
 from cspm_msgs_py.errors import CspmError, InputError

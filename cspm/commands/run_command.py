@@ -15,6 +15,7 @@ from cspm.commands.progress_shown import shown
 from cspm.progress import Progress
 from cspm.scenario import Scenario
 from cspm.simulation import PROCESSES, REALTIME, Runner, bundle_of, ros_runner
+from cspm.summary_files import summarise
 from cspm_model.cable_strength import limit_warnings
 from cspm_msgs_py.errors import CspmError, InputError
 from cspm_msgs_py.new_folder import refuse_existing
@@ -200,17 +201,6 @@ def bundle_from(
     scenario = Scenario(path, load_scenario(path, of_scenario))
     file = named_testbed(machine) if machine else scenario.testbed_file
     return bundle_of(scenario, changed_machine(file, own, effects), plant)
-
-
-def summarise(folder: Path, bundle: Bundle, result: RunResult) -> None:
-    """Put `summary.json` and `run.png` beside a recording."""
-    # Loading matplotlib takes a quarter of a second, which the first step need not wait for.
-    from cspm.plots.run_figure import draw_run
-
-    write_json(folder / "summary.json", summary_data(result))
-    period = 1.0 / bundle.scenario.rates.plant
-    names = bundle.testbed.testbed.cable_names
-    draw_run(folder / "run.png", result, bundle.scenario.requirement, names, period)
 
 
 def resim_command(bag: Path, json: Path | None, controllers: Sequence[Path] = ()) -> bool:

@@ -111,12 +111,15 @@ def make_plausibility(node: str, scenario: Scenario, testbed: Testbed) -> Machin
 def _repeated(
     scenario: Scenario, testbed: Testbed, read: Collection[str]
 ) -> dict[str, RepeatedReading]:
-    """Return what finds sensors that are stuck, of those that a node reads."""
+    """Return what finds sensors that are stuck, of those that a node reads.
+
+    Drives are none of them: one at rest may say so exactly.
+    """
     if scenario.sensors == "ideal":
         return {}
     found = {}
     for topic, sensor in testbed.sensors.items():
-        if topic in read:
+        if topic in read and topic != WINCH_STATE:
             each = testbed.topics[topic]
             width = 6 if each.ros_type.endswith("PoseStamped") else each.width
             times = width // len(quantities(each))

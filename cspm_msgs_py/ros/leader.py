@@ -3,8 +3,9 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Collection
+from typing import Any
 
-from cspm_msgs_py.ros.contract_node import ContractNode
+from cspm_msgs_py.ros.contract_node import ContractNode, ros_class
 from cspm_msgs_py.ros.rendezvous import PlantSide
 
 _LOOK_EVERY_S = 0.02
@@ -14,6 +15,8 @@ _NOTICE_NS = 200_000_000
 
 class Leader:
     """Waits for all nodes and inputs, sets the start, and announces the end.
+
+    Services `~/start` and `~/stop` (std_srvs/Trigger) of its node do so on demand.
 
     Attributes:
         start_ns: when the run begins [ns], None while something is missing.
@@ -48,6 +51,14 @@ class Leader:
         self._timer = node.every(_LOOK_EVERY_S, self._look)
         self.start_ns: int | None = None
         self.end_ns: int | None = None
+        self._called = True
+        trigger = ros_class("std_srvs/srv/Trigger")
+        node.node.create_service(trigger, "~/start", self._on_start_called)
+        node.node.create_service(trigger, "~/stop", self._on_stop_called)
+
+    def wait_for_call(self) -> None:
+        """Start only once somebody calls `~/start`."""
+        self._called = False
 
     def waiting(self) -> list[str]:
         """Return what is missing before the run can start."""
@@ -55,7 +66,8 @@ class Leader:
         missing, apart = self._missing(), ", ".join(sorted(self._side.apart))
         if apart and not missing:
             missing = [f"drivers to reach {apart}"]
-        return [*self._side.unmatched(), *missing]
+        found = [*self._side.unmatched(), *missing]
+        return found if found or self._called else [f"a call of /{self._node.name}/start"]
 
     @property
     def elapsed(self) -> float:
@@ -75,6 +87,20 @@ class Leader:
             self._timer.cancel()
             self._side.tell_end_at(self.end_ns)
             self._on_end(self.end_ns)
+
+    def _on_start_called(self, _: Any, response: Any) -> Any:  # noqa: ANN401 - rosidl's classes
+        self._called = True
+        waits = self.waits()
+        response.success, response.message = not waits, waits or "running"
+        return response
+
+    def _on_stop_called(self, _: Any, response: Any) -> Any:  # noqa: ANN401 - rosidl's classes
+        began = self.start_ns is not None
+        if began:
+            self.end()
+        text = f"ended after {self.elapsed:.3f} s" if began else f"not begun: {self.waits()}"
+        response.success, response.message = began, text
+        return response
 
     def _look(self) -> None:
         now = self._node.now_ns()

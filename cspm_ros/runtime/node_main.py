@@ -4,10 +4,11 @@ from __future__ import annotations
 
 import sys
 import time
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
+from pathlib import Path
 
 from cspm_msgs_py.errors import CspmError, InputError
-from cspm_msgs_py.graph import NODES, PLAYER, RECORDER, VIEWER
+from cspm_msgs_py.graph import NODES, PLAYER, VIEWER
 from cspm_msgs_py.schedule import (
     FORCE_CONTROLLER,
     MOTION_CONTROLLER,
@@ -26,8 +27,8 @@ The node {name} of cspm. Parameters: scenario (a name or a file), pace (lockstep
 nodes (which take part) and more: `ros2 param describe /{name} NAME` explains each."""
 
 
-def start_node(name: str, args: Sequence[str], began: float | None = None) -> None:
-    """Run a node until its run ends or a signal comes.
+def start_node(name: str, args: Sequence[str], began: float | None = None) -> Path | None:
+    """Run a node until its run ends or a signal comes; return what a recorder has recorded.
 
     Args:
         name: one of `NODES`.
@@ -49,22 +50,29 @@ def start_node(name: str, args: Sequence[str], began: float | None = None) -> No
     # Loading ROS comes after looking for it.
     from cspm_ros.runtime.node_run import run_node
 
-    run_node(name, [name, *args], began)
+    return run_node(name, [name, *args], began)
 
 
-def main(name: str, args: Sequence[str], began: float | None = None) -> int:
+def main(
+    name: str,
+    args: Sequence[str],
+    began: float | None = None,
+    finish: Callable[[Path], None] = lambda _: None,
+) -> int:
     """Run a node as a program; return its exit code, errors as one line on stderr.
 
     Args:
         name: one of `NODES`.
         args: as for `start_node`.
         began: as for `start_node`.
+        finish: called with what a recorder has recorded.
     """
     if {"--help", "-h"} & set(args):
         print(_HELP.format(name=name))  # noqa: T201 - the program's voice
         return 0
     try:
-        start_node(name, args, began)
+        if (recorded := start_node(name, args, began)) is not None:
+            finish(recorded)
     except CspmError as err:
         line = " ".join(str(err).split()).removeprefix(f"node {name}: ")
         print(f"cspm node {name}: {line}", file=sys.stderr)  # noqa: T201
@@ -103,11 +111,6 @@ def tension_distribution() -> None:
 def force_controller() -> None:
     """Run the force controller."""
     sys.exit(main(FORCE_CONTROLLER, sys.argv[1:]))
-
-
-def recorder() -> None:
-    """Run the recorder."""
-    sys.exit(main(RECORDER, sys.argv[1:]))
 
 
 def player() -> None:

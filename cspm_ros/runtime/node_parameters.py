@@ -53,6 +53,9 @@ class NodeParameters:
         "give up when nothing moves for so long, once the run is under way [s]",
         least=LEAST_PATIENCE_S,
     )
+    start_on_call: bool = _value(
+        False, "real time, leader: begin only once somebody calls its service ~/start"
+    )
     until_stdin_closes: bool = _value(False, "stop when standard input is closed")
     bag: str = _value("", "player: what to play; others: a recording that names the scenario")
     rate: float = _value(1.0, "player: bag time per wall time; 0, in lockstep: as nodes can")
@@ -66,6 +69,11 @@ class NodeParameters:
     def recorded_mode(self) -> str:
         """The mode that a recording of this run names."""
         return self.mode or (REALTIME if self.pace == REALTIME else PROCESSES)
+
+    @property
+    def recording_folder(self) -> Path:
+        """The folder that a recorder fills; unless given, one named after the scenario."""
+        return Path(self.folder or f"recordings/{self.bundle().scenario.name}")
 
     def bundle(self) -> Bundle:
         """Return the run's description, resolved.

@@ -37,8 +37,10 @@ _STDIN_BYTES = 4096
 _LEAVING_S = 3.0
 
 
-def run_node(name: str, args: Sequence[str], began: float) -> None:
+def run_node(name: str, args: Sequence[str], began: float) -> Path | None:
     """Run a node until its run ends or a signal comes.
+
+    Return the recording of a recorder that nobody follows from outside, as `cspm run` does.
 
     Args:
         name: one of `NODES`.
@@ -72,6 +74,8 @@ def run_node(name: str, args: Sequence[str], began: float) -> None:
             _run_realtime(session, node, parameters, stack)
         else:
             _run_lockstep(session, node, parameters, stack, began)
+    followed = parameters.until_stdin_closes
+    return parameters.recording_folder if name == RECORDER and not followed else None
 
 
 def _watch(part: Waiting, node: ContractNode, parameters: NodeParameters, began: float) -> Watch:
@@ -94,7 +98,7 @@ def _run_lockstep(
         _run_plant(session, node, parameters, run, began)
         return
     if node.name == RECORDER:
-        folder = Path(parameters.folder or f"recordings/{bundle.scenario.name}")
+        folder = parameters.recording_folder
         writer = stack.enter_context(
             new_recording(bundle, folder, parameters.recorded_mode, run.own)
         )
@@ -117,6 +121,8 @@ def _run_realtime(
     path = Path(parameters.report) if parameters.report else None
     if node.name == PLANT:
         plant = run.plant(node, steps)
+        if parameters.start_on_call:
+            plant.leader.wait_for_call()
         session.every(
             LOOK_EVERY_S,
             lambda: _report(path, plant.leader, plant.waiting(), plant.failure),
@@ -129,10 +135,12 @@ def _run_realtime(
         if plant.failure is not None:
             raise CspmError(plant.failure)
     elif node.name == RECORDER:
-        folder = Path(parameters.folder or f"recordings/{bundle.scenario.name}")
+        folder = parameters.recording_folder
         writer = stack.enter_context(run.new_recording(folder, parameters.recorded_mode))
         recorder, leader = run.recorder(node, writer, steps)
         stack.callback(recorder.close)
+        if leader is not None and parameters.start_on_call:
+            leader.wait_for_call()
         if leader is not None:
             session.every(
                 LOOK_EVERY_S,

@@ -9,11 +9,13 @@ import time
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
 from pathlib import Path
+from typing import overload
 
 from cspm_control.safety import check_real_time
 from cspm_msgs_py.errors import CspmError, InputError
 from cspm_msgs_py.graph import RECORDER
 from cspm_msgs_py.interruption import interruptible
+from cspm_msgs_py.recording.overview import overview
 from cspm_msgs_py.ros.domain_claim import refuse_claimed
 from cspm_msgs_py.schedule import PLANT, schedule_of
 from cspm_ros.processes.background import SHARE_BEHIND
@@ -121,7 +123,10 @@ def run_processes(
                 mode == REALTIME,
                 Patience(math.inf if external else patience_s),
             )
-            report = follower.follow(progress, notify, stop_wanted)
+            try:
+                report = follower.follow(progress, notify, stop_wanted)
+            except CspmError as err:
+                raise type(err)(with_remedy(str(err), folder)) from None
             interrupted = stop_wanted()
     return recorded_result(
         bundle,
@@ -130,9 +135,27 @@ def run_processes(
         simulated=report.simulated,
         elapsed=report.elapsed,
         interrupted=interrupted,
-        failure=report.failure or follower.failure,
+        failure=with_remedy(report.failure or follower.failure, folder),
         timed=mode == REALTIME,
     )
+
+
+@overload
+def with_remedy(failure: str, folder: Path) -> str: ...
+@overload
+def with_remedy(failure: None, folder: Path) -> None: ...
+@overload
+def with_remedy(failure: str | None, folder: Path) -> str | None: ...
+def with_remedy(failure: str | None, folder: Path) -> str | None:
+    """Return why a run failed, and what restores a recording that was cut short by it."""
+    if failure is None:
+        return None
+    try:
+        complete = overview(folder).complete
+    except InputError:
+        # There is none, or nothing in it.
+        return failure
+    return failure if complete else f"{failure}; `cspm recover {folder}` restores its index"
 
 
 class _Follower:

@@ -19,7 +19,15 @@ from cspm_msgs_py.ros.contract_node import ContractNode
 from cspm_msgs_py.ros.leader import Leader
 from cspm_msgs_py.ros.realtime_node import RealtimeNode, RealtimeWaveNode
 from cspm_msgs_py.schedule import CLOCK, PLANT, WAVE_TRAJECTORY
-from cspm_msgs_py.topics import BRAKE, DIAGNOSTICS, EMERGENCY_STOP, SAFE, Topic
+from cspm_msgs_py.topics import (
+    BRAKE,
+    DIAGNOSTICS,
+    EMERGENCY_STOP,
+    PARAMETER_EVENTS,
+    ROSOUT,
+    SAFE,
+    Topic,
+)
 from cspm_ros.inject.fault_port import FaultPort
 from cspm_ros.runtime.nodes_of_run import NodesOfRun
 from cspm_ros.runtime.realtime_recorder_node import RealtimeRecorderNode
@@ -54,7 +62,8 @@ class RealtimeRun(NodesOfRun):
             for name in schedule.topics
             if name != CLOCK and (PLANT in self.members or not name.startswith("/truth/"))
         }
-        return found | {topic.name: topic for topic in (DIAGNOSTICS, EMERGENCY_STOP, BRAKE, SAFE)}
+        others = (DIAGNOSTICS, EMERGENCY_STOP, BRAKE, SAFE, ROSOUT, PARAMETER_EVENTS)
+        return found | {topic.name: topic for topic in others}
 
     def measured(self) -> list[str]:
         """Return the measured topics that the controllers need."""

@@ -9,6 +9,7 @@ from run_samples import bundle_of, recorded
 
 import cspm
 from cspm_msgs_py.recording import Recording as Reader
+from cspm_msgs_py.topics import SCENE
 from cspm_run.recorded_run import run as run_to_disk
 
 DURATION = 0.4
@@ -261,5 +262,5 @@ def test_no_two_kinds_of_reading_differ(calm, tmp_path):
     saved = calm.save(tmp_path / "rows")
     rows = recorded(saved.path)
     with Reader(saved.path) as reader:
-        assert set(rows) == set(reader.topics) - {"/diagnostics"}
+        assert set(rows) == set(reader.topics) - {"/diagnostics", *SCENE}
     assert np.array_equal(rows["/cables/tension"].rows, calm.signal("/cables/tension"))

@@ -127,6 +127,7 @@ def test_the_names_of_all_nodes_are_the_contracts():
         "target_tracker",
         "recorder",
         "player",
+        "viewer",
     )
 
 

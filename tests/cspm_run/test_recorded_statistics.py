@@ -7,6 +7,7 @@ from run_samples import bundle_of
 from cspm_msgs_py.diagnostics import encode_diagnostics
 from cspm_msgs_py.errors import InputError
 from cspm_msgs_py.recording import Recording
+from cspm_msgs_py.topics import SCENE
 from cspm_run.recorded_run import new_recording, run
 from cspm_run.recorded_statistics import recording_statistics
 
@@ -57,7 +58,7 @@ def keep_only(source, folder, bundle, wanted):
     """Copy some topics of a recording; the others remain without messages."""
     topics = bundle.testbed.testbed.topics
     with Recording(source) as recording, new_recording(bundle, folder, "copy") as writer:
-        for name in filter(wanted, recording.topics):
+        for name in filter(wanted, [each for each in recording.topics if each not in SCENE]):
             if topics[name].fields or name == "/clock":
                 found = recording.rows(name)
                 for log, stamp, row in zip(*found[:3], strict=True):

@@ -92,7 +92,8 @@ def test_summary_has_the_contracts_keys_and_survives_json(measured, tmp_path):
     assert data["warnings"] == []
     assert data["controlled"] == ["surge", "sway", "heave", "pitch", "yaw"]
     counts = {name: len(found.stamp_ns) for name, found in rows.items()}
-    assert data["messages"] == counts | {"/diagnostics": 5 * 6}  # five nodes report
+    shown = {"/tf_static": 1, "/robot_description": 1, "/tf": 12, "/markers": 6}
+    assert data["messages"] == counts | shown | {"/diagnostics": 5 * 6}  # five nodes report
     write_json(tmp_path / "summary.json", data)
     assert json.loads((tmp_path / "summary.json").read_text()) == data
 

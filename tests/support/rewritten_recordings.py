@@ -2,14 +2,22 @@
 
 from run_samples import bundle_of
 
+from cspm_msgs_py.message import carries_row
 from cspm_msgs_py.recording import Recording, RecordingWriter
 
 
 def rewrite(folder, target, change=None, *, attachments=None, metadata=None):
-    """Write a recording anew; `change(topic, index, row)` returns the row, or None to drop it."""
+    """Write a recording anew; `change(topic, index, row)` returns the row, or None to drop it.
+
+    What follows from its messages, the scene for viewers, is left out.
+    """
     with Recording(folder) as recording:
         names = list(recording.topics)
-        topics = {name: recording.topic(name) for name in names if name != "/diagnostics"}
+        topics = {
+            name: recording.topic(name)
+            for name, info in recording.topics.items()
+            if carries_row(info.ros_type)
+        }
         rows = recording.rows_of(topics)
         statuses = recording.payloads("/diagnostics")
         attached = recording.attachments if attachments is None else attachments

@@ -5,6 +5,7 @@ from pathlib import Path
 
 import numpy as np
 
+from cspm_msgs_py.message import carries_row
 from cspm_msgs_py.recording import Recording
 from cspm_msgs_py.scenario import load_scenario
 from cspm_msgs_py.testbed import load_testbed
@@ -46,7 +47,7 @@ def _bundle(path, overrides):
 def recorded(folder):
     """Return the rows of every topic of a recording that carries rows, and nothing else."""
     with Recording(folder) as recording:
-        names = [name for name in recording.topics if name != "/diagnostics"]
+        names = [name for name, info in recording.topics.items() if carries_row(info.ros_type)]
         return recording.rows_of(names)
 
 

@@ -3,7 +3,6 @@
 import math
 
 import numpy as np
-import pytest
 from run_samples import bundle_of
 
 from cspm_control.plausibility.make import make_plausibility
@@ -46,7 +45,7 @@ def test_the_chance_of_a_repetition_is_that_of_rounded_noise():
     drawn = np.round((rng.uniform() + deviation * rng.standard_normal(400_000)) / step)
     chance = float((drawn[1:] == drawn[:-1]).mean())
     needed = repeats_needed([deviation], [step])
-    assert needed == pytest.approx(math.log(1e12) / -math.log(chance), rel=0.03, abs=1.0)
+    assert abs(needed - math.log(1e12) / -math.log(chance)) < 1.5
     assert repeats_needed([deviation] * 8, [step] * 8) < needed
 
 
@@ -58,7 +57,6 @@ def test_nodes_judge_the_sensors_that_they_read():
         return set(make_plausibility(node, scenario, machine).repeated)
 
     assert POSE in topics("motion_controller")
-    assert "/winches/state" in topics("force_controller")
-    assert POSE not in topics("force_controller")
+    assert topics("force_controller") == {"/cables/tension"}
     ideal = bundle_of("rest", "sensors=ideal").scenario
     assert topics("motion_controller", ideal) == set()

@@ -5,6 +5,7 @@ from ros_graph import load_ros, new_domain
 
 load_ros()
 
+from cspm_msgs_py.ros.contract_node import ros_class  # noqa: E402 - after ROS is known
 from cspm_msgs_py.ros.leader import Leader  # noqa: E402 - after ROS is known to be there
 from cspm_msgs_py.ros.rendezvous import FollowerSide  # noqa: E402
 from cspm_msgs_py.ros.session import Session  # noqa: E402
@@ -137,3 +138,45 @@ def test_it_can_be_ended_before_its_time(domain):
         run.leader.end()
         run.until(lambda: follower.side.end_ns is not None)
         assert follower.side.end_ns == run.leader.end_ns < run.leader.start_ns + SECOND * 60
+
+
+def asked(session, client):
+    """Call a Trigger; return success and message."""
+    answer = client.call_async(ros_class("std_srvs/srv/Trigger").Request())
+    assert session.spin_until(answer.done, PATIENCE_S)
+    return answer.result().success, answer.result().message
+
+
+def test_others_start_and_stop_it(domain):
+    trigger = ros_class("std_srvs/srv/Trigger")
+    with Session(domain_id=domain) as session:
+        run = Run(session, ["recorder"], duration_ns=1000 * SECOND)
+        run.leader.wait_for_call()
+        caller = session.node("panel").node
+        start, stop = (
+            caller.create_client(trigger, f"/plant/{name}") for name in ("start", "stop")
+        )
+        assert session.spin_until(
+            lambda: start.service_is_ready() and stop.service_is_ready(), PATIENCE_S
+        )
+        follower = Follower(session, "recorder")
+        run.until(lambda: run.leader.waiting() == ["a call of /plant/start"])
+        assert asked(session, stop) == (False, "not begun: waits for a call of /plant/start")
+        assert asked(session, start) == (True, "running")
+        run.until(lambda: run.leader.start_ns is not None and run.leader.elapsed > 0.0)
+        success, message = asked(session, stop)
+        assert success
+        assert message == f"ended after {run.leader.elapsed:.3f} s"
+        run.until(lambda: follower.side.end_ns == run.leader.end_ns)
+
+
+def test_a_start_before_all_are_there_says_who_is_missing(domain):
+    trigger = ros_class("std_srvs/srv/Trigger")
+    with Session(domain_id=domain) as session:
+        run = Run(session, ["recorder"])
+        run.leader.wait_for_call()
+        start = session.node("panel").node.create_client(trigger, "/plant/start")
+        assert session.spin_until(start.service_is_ready, PATIENCE_S)
+        assert asked(session, start) == (False, "waits for recorder")
+        Follower(session, "recorder")
+        run.until(lambda: run.leader.start_ns is not None)

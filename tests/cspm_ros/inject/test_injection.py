@@ -134,6 +134,9 @@ def test_each_fault_is_ridden_out_or_answered_with_the_safe_state(tmp_path):
     events = "; ".join(s.values.get("fault_events", "") for s in evidence.statuses)
     for each in (*ridden_out, *answered.values()):
         assert f"{each}" in events
+    with Recording(graph.folder) as recording:
+        for name in ("/rosout", "/parameter_events"):
+            assert recording.topics[name].count > 0
     reasons = "; ".join(reason for _, reason in evidence.alarms(FORCE_CONTROLLER))
     for words in ("/winches/state stale", "/cables/tension stale", "torque without motion"):
         assert words in reasons

@@ -49,6 +49,7 @@ NOT_RUN: dict[str, str] = {
     "cspm view today --diagnosis": "serves until it is ended; tests/cspm/view",
     "cspm view measured simulated": "serves until it is ended; tests/cspm/view",
     "cspm replay": f"{ROS}; {ROS_TESTS}/replay",
+    "cspm run calm --mode graph": f"{ROS}; {ROS_TESTS}/scene, {ROS_TESTS}/runtime",
     "cspm node": f"{ROS}; {ROS_TESTS}/runtime",
     "cspm check-drivers": f"{ROS}; {ROS_TESTS}/check_drivers",
     "cspm run examples/clamped_bar.yaml": f"{ROS}; {ROS_TESTS}/runtime/test_external_plant.py",

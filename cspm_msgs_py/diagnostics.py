@@ -44,19 +44,22 @@ class Diagnostics(NamedTuple):
 
 
 def encode_diagnostics(
-    stamp_ns: int, statuses: Iterable[tuple[int, str, str, Mapping[str, str]]]
+    stamp_ns: int,
+    statuses: Iterable[tuple[int, str, str, Mapping[str, str]]],
+    hardware_id: str = "",
 ) -> bytes:
     """Return the CDR bytes of a `diagnostic_msgs/DiagnosticArray`.
 
     Args:
         stamp_ns: the instant at which the findings hold [ns].
         statuses: severity, reporting part, message, particulars; see `Status`.
+        hardware_id: the machine's name.
     """
     status, pair = (
         message_class(f"diagnostic_msgs/msg/{n}") for n in ("DiagnosticStatus", "KeyValue")
     )
     found = [
-        status(int(level), name, message, "", [pair(key, value) for key, value in values.items()])
+        status(int(level), name, message, hardware_id, [pair(*each) for each in values.items()])
         for level, name, message, values in statuses
     ]
     return serialize(message_class(DIAGNOSTICS.ros_type)(header_of(stamp_ns, ""), found))
@@ -77,3 +80,13 @@ def decode_diagnostics(payload: bytes) -> Diagnostics:
             for s in message.status
         ],
     )
+
+
+def hardware_id_of(payload: bytes) -> str:
+    """Return the machine that the first finding of a `DiagnosticArray` names; empty for none.
+
+    Raises:
+        InputError: the bytes are no such message.
+    """
+    message = deserialize(payload, DIAGNOSTICS.ros_type)
+    return str(message.status[0].hardware_id) if message.status else ""

@@ -72,6 +72,7 @@ def run(
     progress: Callable[[float], None] = lambda _: None,
     *,
     steps: int | None = None,
+    hardware_id: str | None = None,
 ) -> RunResult:
     """Run a scenario in this process.
 
@@ -80,6 +81,7 @@ def run(
         folder: where to record; None records nothing.
         progress: called now and then with the time simulated so far [s].
         steps: end after so many plant steps; None runs the scenario's duration.
+        hardware_id: in statuses; None for the machine's name.
 
     Raises:
         InputError: scenario and test-bed do not fit, or the folder exists.
@@ -88,9 +90,9 @@ def run(
     parts = parts_of(bundle)
     steps = steps or steps_of(bundle)
     if folder is None:
-        return simulate(parts, None, progress, steps)
+        return simulate(parts, None, progress, steps, hardware_id)
     with new_recording(bundle, folder, INPROCESS) as writer:
-        return simulate(parts, writer, progress, steps)
+        return simulate(parts, writer, progress, steps, hardware_id)
 
 
 def parts_of(bundle: Bundle) -> Assembly:
@@ -174,6 +176,7 @@ def simulate(
     writer: Recorder | None,
     progress: Callable[[float], None],
     steps: int,
+    hardware_id: str | None = None,
 ) -> RunResult:
     """Step assembled parts to the end, and return the statistics; see `run`.
 
@@ -182,6 +185,7 @@ def simulate(
         writer: takes topics of the parts' schedule; None records nothing.
         progress: called now and then with the time simulated so far [s].
         steps: of the plant.
+        hardware_id: in statuses; None for the machine's name.
     """
     scenario, plant = parts.scenario, parts.plant
     statistics = RunStatistics(steps, len(plant.tensions))
@@ -194,12 +198,14 @@ def simulate(
         take = {name: channel.append_rows for name, channel in channels.items()}
 
     alarms: list[str] = []
+    named = parts.testbed.name if hardware_id is None else hardware_id
 
     def publish_status(now_ns: int, status: Status) -> None:
         if status.level == Level.ERROR and not alarms:
             alarms.append(f"{status.name}: {status.message}")
         if writer is not None and writer.takes(DIAGNOSTICS.name):
-            writer.append_payload(DIAGNOSTICS.name, now_ns, encode_diagnostics(now_ns, [status]))
+            payload = encode_diagnostics(now_ns, [status], named)
+            writer.append_payload(DIAGNOSTICS.name, now_ns, payload)
 
     loop = Loop(parts, publish, publish_status)
     stepping, failure = Stepping(loop, statistics, take, steps), None

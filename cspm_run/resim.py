@@ -8,6 +8,7 @@ from dataclasses import dataclass, replace
 from importlib.metadata import version
 from pathlib import Path
 
+from cspm_msgs_py.diagnostics import hardware_id_of
 from cspm_msgs_py.errors import InputError
 from cspm_msgs_py.recording.difference import Difference, first_difference
 from cspm_msgs_py.recording.reader import Recording
@@ -18,7 +19,7 @@ from cspm_msgs_py.recording.run_record import (
     own_controllers,
     simulated_plant,
 )
-from cspm_msgs_py.topics import SCENE
+from cspm_msgs_py.topics import DIAGNOSTICS, SCENE
 from cspm_run.bundle import read_bundle, with_own_code
 from cspm_run.recorded_run import run
 
@@ -87,7 +88,13 @@ def _repeat(
     duration = clock.count / bundle.scenario.rates.plant
     with tempfile.TemporaryDirectory(prefix="cspm-resim-") as place:
         folder = Path(place) / "again"
-        run(bundle, folder, lambda now: progress(now, duration), steps=clock.count)
+        run(
+            bundle,
+            folder,
+            lambda now: progress(now, duration),
+            steps=clock.count,
+            hardware_id=_hardware_id(recording),
+        )
         with Recording(folder) as repeated:
             difference, cut = _compared(recording, repeated)
     return Resimulation(
@@ -96,6 +103,14 @@ def _repeat(
         cut_ns=recording.end_ns if cut else None,
         recorded_version=record.get("package_version", "unknown"),
     )
+
+
+def _hardware_id(recording: Recording) -> str | None:
+    """Return the name that statuses of a recording give the machine; older ones have none."""
+    if DIAGNOSTICS.name not in recording.topics:
+        return None
+    payloads = recording.payloads(DIAGNOSTICS.name).payloads
+    return hardware_id_of(payloads[0]) if payloads else None
 
 
 def _compared(recording: Recording, repeated: Recording) -> tuple[Difference | None, bool]:

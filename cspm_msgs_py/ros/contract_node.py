@@ -48,6 +48,7 @@ class ContractNode:
         node: rclpy's node.
         intake: where its messages are taken from, if no executor brings them.
         closing: what is closed with the node.
+        hardware_id: the machine's name, for what the node reports.
         failure: why the session is to end, in one line, if `fail` was called.
     """
 
@@ -73,6 +74,7 @@ class ContractNode:
         self._steady = Clock(clock_type=ClockType.STEADY_TIME)
         self._complaints = RateLimitedWarnings(self.warn)
         self.closing, self._claimed = ExitStack(), False
+        self.hardware_id = ""
         self.failure: str | None = None
 
     def poll(self, timers: WallTimers, wake_up: WakeUp | None) -> None:
@@ -111,7 +113,11 @@ class ContractNode:
     def status_publisher(self, readers: Collection[str] = ()) -> Callable[[int, Status], None]:
         """Return what publishes a status on `/diagnostics` (stamp [ns], status)."""
         publish = self.raw_publisher(DIAGNOSTICS, readers)
-        return lambda stamp_ns, status: publish(encode_diagnostics(stamp_ns, [status]))
+
+        def send(stamp_ns: int, status: Status) -> None:
+            publish(encode_diagnostics(stamp_ns, [status], self.hardware_id))
+
+        return send
 
     def subscribe(
         self, topic: Topic, take: Callable[[bytes], None], depth: int = QOS_DEPTH

@@ -24,6 +24,7 @@ class LockstepRun(NodesOfRun):
         Raises:
             InputError: somebody's driver is to send a topic, who cannot keep the schedule.
         """
+        self.name_machine(node)
         self.claim(node)
         check_lockstep(self.schedule)
         with self.bundle.unpacked() as place:
@@ -32,6 +33,7 @@ class LockstepRun(NodesOfRun):
 
     def stage(self, node: ContractNode) -> StageNode:
         """Return the node of the controller that `node` is named after."""
+        self.name_machine(node)
         bundle, schedule = self.bundle, self.schedule
         with bundle.unpacked() as place:
             stage = assemble_stage(node.name, bundle.scenario, bundle.testbed.testbed, place)

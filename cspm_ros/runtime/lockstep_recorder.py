@@ -13,7 +13,7 @@ from collections.abc import Callable, Collection
 import numpy as np
 from numpy.typing import NDArray
 
-from cspm_msgs_py.diagnostics import decode_diagnostics, encode_diagnostics
+from cspm_msgs_py.diagnostics import decode_diagnostics, encode_diagnostics, hardware_id_of
 from cspm_msgs_py.errors import InputError
 from cspm_msgs_py.recording.channel_buffer import ChannelBuffer
 from cspm_msgs_py.recording.writer import BLOCK_NS, RecordingWriter
@@ -237,7 +237,7 @@ class LockstepRecorder:
             self._reports[node] = number
         self._next_status[node] += self._status_divider(node)
         # Between processes the middleware pads what it carries.
-        canonical = encode_diagnostics(stamp, [status])
+        canonical = encode_diagnostics(stamp, [status], hardware_id_of(payload))
         self._statuses.append((stamp, self._order.index(node), canonical))
         self._count(1)
 

@@ -49,6 +49,10 @@ class NodesOfRun:
         """All topics of the machine, by name."""
         return self.bundle.testbed.testbed.topics
 
+    def name_machine(self, node: ContractNode) -> None:
+        """Have a node name the machine in what it reports."""
+        node.hardware_id = self.bundle.testbed.testbed.name
+
     def claim(self, node: ContractNode) -> None:
         """Claim the ROS domain for this run, in the name of the node that leads it.
 

@@ -73,6 +73,7 @@ class RealtimeRun(NodesOfRun):
 
     def plant(self, node: ContractNode, steps: int) -> RealtimePlantNode:
         """Return the plant's node; `steps` is how many plant steps to make."""
+        self.name_machine(node)
         self.claim(node)
         bundle = self.bundle
         check_real_time(bundle.scenario.safety, self.schedule)
@@ -85,6 +86,7 @@ class RealtimeRun(NodesOfRun):
 
     def stage(self, node: ContractNode) -> RealtimeNode | RealtimeWaveNode:
         """Return the node of the controller that `node` is named after."""
+        self.name_machine(node)
         bundle, schedule = self.bundle, self.schedule
         topics, edges = self.testbed_topics, self.edges
         safety = bundle.scenario.safety
@@ -123,6 +125,7 @@ class RealtimeRun(NodesOfRun):
         self, node: ContractNode, writer: RecordingWriter, steps: int
     ) -> tuple[RealtimeRecorderNode, Leader | None]:
         """Return the recorder's node, and the leader if it leads."""
+        self.name_machine(node)
         period_ns = self.schedule.period_ns
         made = RealtimeRecorderNode(node, period_ns, self.topics(), self.edges, writer)
         if self.leader != RECORDER:

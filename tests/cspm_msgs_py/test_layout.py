@@ -9,7 +9,13 @@ from hypothesis import strategies as st
 from recording_samples import ROW_TOPICS
 from rosbags.typesys import Stores, get_typestore
 
-from cspm_msgs_py.diagnostics import Level, Status, decode_diagnostics, encode_diagnostics
+from cspm_msgs_py.diagnostics import (
+    Level,
+    Status,
+    decode_diagnostics,
+    encode_diagnostics,
+    hardware_id_of,
+)
 from cspm_msgs_py.errors import InputError
 from cspm_msgs_py.layout import layout_of
 from cspm_msgs_py.message import carries_row, message_of, topic_of
@@ -234,3 +240,12 @@ def test_a_pose_topic_serialises_equally_through_both_roads():
     topic = Topic("/p", "geometry_msgs/msg/PoseStamped", "x_ned", POSE)
     row = np.arange(7.0)
     assert layout_of(topic).encode([3], [row])[0].tobytes() == serialize(message_of(topic, 3, row))
+
+
+def test_diagnostics_name_the_machine():
+    status = Status(Level.OK, "plant", "ok", {"a": "b"})
+    payload = encode_diagnostics(7, [status], "thesis")
+    assert hardware_id_of(payload) == "thesis"
+    assert decode_diagnostics(payload).statuses == [status]
+    assert hardware_id_of(encode_diagnostics(7, [status])) == ""
+    assert hardware_id_of(encode_diagnostics(7, [], "thesis")) == ""

@@ -13,12 +13,14 @@ from rosbags.rosbag2 import Writer
 from rosbags.rosbag2.enums import StoragePlugin
 from run_samples import bundle_of
 
+from cspm_msgs_py.diagnostics import hardware_id_of
 from cspm_msgs_py.edited import with_effect
 from cspm_msgs_py.errors import InputError
 from cspm_msgs_py.recording import Recording, recover
 from cspm_msgs_py.recording.attached_testbed import attached_testbed
 from cspm_msgs_py.recording.mcap_file import McapFile
 from cspm_msgs_py.testbed import EffectEntry
+from cspm_msgs_py.topics import SCENE
 from cspm_run.recorded_run import run
 from cspm_run.resim import resimulate
 
@@ -247,3 +249,16 @@ def test_a_concealed_machine_is_what_the_recording_does_not_carry(folder, tmp_pa
         assert recording.attachments == open_run.attachments
         assert recording.metadata == open_run.metadata
     assert again(tmp_path / "concealed").difference is not None
+
+
+def test_recordings_from_before_machines_were_named_are_repeated(tmp_path, folder):
+    """Statuses without a machine, and no scene, as older versions recorded."""
+    bundle = bundle_of("worst_case", "rates.motion_controller=100")
+    run(bundle, tmp_path / "old", steps=STEPS, hardware_id="")
+    rewrite(tmp_path / "old", tmp_path / "older")
+    found = again(tmp_path / "older")
+    assert found.difference is None
+    with Recording(tmp_path / "older") as older, Recording(folder) as new:
+        assert set(new.topics) - set(older.topics) == set(SCENE)
+        payloads = [each.payloads("/diagnostics").payloads for each in (older, new)]
+    assert [hardware_id_of(each[0]) for each in payloads] == ["", bundle.testbed.testbed.name]

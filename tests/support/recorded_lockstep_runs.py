@@ -40,7 +40,7 @@ class Case:
             self.sent[name] = [encode(stamp, row) for log, stamp, row in heard if log <= last_ns]
         for now, status in network.statuses:
             if now <= last_ns:
-                payload = encode_diagnostics(now, [status])
+                payload = encode_diagnostics(now, [status], bundle.testbed.testbed.name)
                 self.sent.setdefault(("/diagnostics", status.name), []).append(payload)
 
 

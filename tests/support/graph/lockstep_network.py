@@ -39,6 +39,7 @@ class Network:
     def __init__(self, scenario, testbed, steps, make_recorder=None, depth=QOS_DEPTH):
         parts = assemble(scenario, testbed, Path())
         self.schedule, self._topics = parts.schedule, testbed.topics
+        self._machine = testbed.name
         members = (PLANT, *self.schedule.nodes, *[RECORDER] * (make_recorder is not None))
         self._edges = graph_of(self.schedule, members)
         self._writers = {name: WireWriter(self._topics[name]) for name in self.schedule.topics}
@@ -133,7 +134,8 @@ class Network:
     def _status(self, now, status):
         self.statuses.append((now, status))
         if self.recorder is not None:
-            self._put(((STATUS, status.name), RECORDER), encode_diagnostics(now, [status]))
+            payload = encode_diagnostics(now, [status], self._machine)
+            self._put(((STATUS, status.name), RECORDER), payload)
 
     def _put(self, key, message):
         queue = self.queues.setdefault(key, deque())

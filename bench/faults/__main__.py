@@ -93,7 +93,7 @@ def _put_all(minutes: float, seed: int, testbed: Testbed) -> int:
     return count
 
 
-def _judge(folder: Path, testbed: Testbed) -> list[str]:
+def unsafe_in(folder: Path, testbed: Testbed) -> list[str]:
     """Return what was unsafe in a recorded run, a line each."""
     with Recording(folder) as recording:
         pose = recording.rows("/truth/bar/pose").rows[:, :3]
@@ -134,7 +134,7 @@ def main() -> int:
         finally:
             run.send_signal(2)
             run.wait()
-        unsafe = _judge(folder, testbed)
+        unsafe = unsafe_in(folder, testbed)
         print(f"{count} faults, seed {options.seed}: {'; '.join(unsafe) or 'nothing unsafe'}")
     return 1 if unsafe else 0
 

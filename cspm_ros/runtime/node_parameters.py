@@ -56,6 +56,9 @@ class NodeParameters:
     start_on_call: bool = _value(
         False, "real time, leader: begin only once somebody calls its service ~/start"
     )
+    goal_duration: float = _value(
+        10.0, "real time, wave_trajectory: how long the bar takes to a goal [s]", least=0.1
+    )
     until_stdin_closes: bool = _value(False, "stop when standard input is closed")
     bag: str = _value("", "player: what to play; others: a recording that names the scenario")
     rate: float = _value(1.0, "player: bag time per wall time; 0, in lockstep: as nodes can")

@@ -153,7 +153,7 @@ def _run_realtime(
             session.deliver(FAREWELL_S)
     else:
         _check_part(node, bundle.scenario.name, schedule)
-        stage = run.stage(node)
+        stage = run.stage(node, parameters.goal_duration)
         session.spin_until(lambda: stage.ended or session.stopped)
 
 

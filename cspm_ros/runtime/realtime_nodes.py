@@ -11,6 +11,7 @@ from cspm_control.stages.angle_stage import AngleStage
 from cspm_control.stages.motion_stage import MotionStage
 from cspm_control.stages.own_stage import GuardedOwnStage, OwnStage
 from cspm_control.stages.torque_stage import TorqueStage
+from cspm_control.stages.wave_stage import WaveStage
 from cspm_msgs_py.errors import InputError
 from cspm_msgs_py.graph import RECORDER
 from cspm_msgs_py.recording.run_record import EXTERNAL
@@ -18,7 +19,7 @@ from cspm_msgs_py.recording.writer import RecordingWriter
 from cspm_msgs_py.ros.contract_node import ContractNode
 from cspm_msgs_py.ros.leader import Leader
 from cspm_msgs_py.ros.realtime_node import RealtimeNode, RealtimeWaveNode
-from cspm_msgs_py.schedule import CLOCK, PLANT, WAVE_TRAJECTORY
+from cspm_msgs_py.schedule import BAR_REFERENCE, CLOCK, PLANT, WAVE_TRAJECTORY
 from cspm_msgs_py.topics import (
     BRAKE,
     DIAGNOSTICS,
@@ -29,6 +30,7 @@ from cspm_msgs_py.topics import (
     Topic,
 )
 from cspm_ros.inject.fault_port import FaultPort
+from cspm_ros.runtime.goal_port import add_goals
 from cspm_ros.runtime.nodes_of_run import NodesOfRun
 from cspm_ros.runtime.realtime_recorder_node import RealtimeRecorderNode
 from cspm_ros.runtime.warm_up import warm_up
@@ -36,6 +38,9 @@ from cspm_run.assembly import assemble_stage
 from cspm_run.plant_guard import make_watchdog
 from cspm_run.recorded_run import recording_of
 from cspm_sim.realtime_plant_node import RealtimePlantNode
+
+# Slow enough for a bar that goes as far as the thesis's machine reaches.
+GOAL_S = 10.0
 
 
 class RealtimeRun(NodesOfRun):
@@ -84,8 +89,13 @@ class RealtimeRun(NodesOfRun):
             FaultPort(node.node, run.faults)
         return RealtimePlantNode(node, run, make_watchdog(bundle.scenario, run.plant))
 
-    def stage(self, node: ContractNode) -> RealtimeNode | RealtimeWaveNode:
-        """Return the node of the controller that `node` is named after."""
+    def stage(
+        self, node: ContractNode, goal_duration: float = GOAL_S
+    ) -> RealtimeNode | RealtimeWaveNode:
+        """Return the node of the controller that `node` is named after.
+
+        `goal_duration` is how long the bar takes to a goal [s].
+        """
         self.name_machine(node)
         bundle, schedule = self.bundle, self.schedule
         topics, edges = self.testbed_topics, self.edges
@@ -95,6 +105,9 @@ class RealtimeRun(NodesOfRun):
             warm_up(node.name, bundle, place)
             stage = assemble_stage(node.name, bundle.scenario, bundle.testbed.testbed, place)
         if node.name == WAVE_TRAJECTORY:
+            if isinstance(stage, WaveStage) and BAR_REFERENCE in stage.trajectories:
+                machine = bundle.testbed.testbed
+                add_goals(node, stage, bundle.scenario, machine, goal_duration)
             return RealtimeWaveNode(node, stage, schedule, topics, edges)
         guard = stage if isinstance(stage, GuardedStage) else None
         timed = TorqueStage | AngleStage | MotionStage | OwnStage | GuardedOwnStage

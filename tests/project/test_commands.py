@@ -51,6 +51,7 @@ NOT_RUN: dict[str, str] = {
     "cspm replay": f"{ROS}; {ROS_TESTS}/replay",
     "cspm run calm --mode graph": f"{ROS}; {ROS_TESTS}/scene, {ROS_TESTS}/runtime",
     "cspm node": f"{ROS}; {ROS_TESTS}/runtime",
+    "cspm inject": f"{ROS}; {ROS_TESTS}/inject",
     "cspm check-drivers": f"{ROS}; {ROS_TESTS}/check_drivers",
     "cspm run examples/clamped_bar.yaml": f"{ROS}; {ROS_TESTS}/runtime/test_external_plant.py",
     "python examples/driver.py": f"{ROS}; {ROS_TESTS}/runtime/test_external_plant.py",

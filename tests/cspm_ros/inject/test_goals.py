@@ -1,0 +1,63 @@
+"""A bar that is led to a pose and back in real time, over the middleware."""
+
+import numpy as np
+import pytest
+from realtime_graph import Evidence, Graph, Witness, slow_bundle, warm_processes
+from ros_graph import load_ros
+
+load_ros()
+
+from cspm_msgs_py.message import message_of  # noqa: E402
+from cspm_msgs_py.ros.contract_node import ros_class  # noqa: E402
+from cspm_msgs_py.ros_types import serialize  # noqa: E402
+from cspm_msgs_py.schedule import FORCE_CONTROLLER, WAVE_TRAJECTORY  # noqa: E402
+from cspm_msgs_py.topics import Topic  # noqa: E402
+from cspm_ros.runtime.exit_watchdog import IN_ORDER  # noqa: E402
+from cspm_ros.runtime.goal_port import GOAL  # noqa: E402
+
+pytestmark = [pytest.mark.slow, pytest.mark.realtime]
+
+PLACE = np.array([0.05, -0.04, 2.05])
+REFERENCE, TRUTH = "/bar/reference", "/truth/bar/pose"
+
+
+def goal(place, frame=GOAL.frame_id):
+    topic = Topic(GOAL.name, GOAL.ros_type, frame, GOAL.fields)
+    return serialize(message_of(topic, 0, np.array([*place, 0.0, 0.0, 0.0, 1.0])))
+
+
+def test_the_bar_goes_to_a_goal_and_back(tmp_path):
+    bundle = slow_bundle()
+    reference = bundle.testbed.testbed.topics[REFERENCE]
+    trigger = ros_class("std_srvs/srv/Trigger")
+    with (
+        Graph(warm_processes(), bundle, tmp_path) as graph,
+        Witness(graph.domain, [reference]) as witness,
+    ):
+        graph.start(goal_duration=3.0)
+        send = witness.publisher(GOAL)
+        home = witness.node.node.create_client(trigger, f"/{WAVE_TRAJECTORY}/home")
+        witness.until_running(FORCE_CONTROLLER)
+        witness.until(lambda: witness.node.node.count_subscribers(GOAL.name) > 0, "a reader")
+        witness.until(home.service_is_ready, "the service")
+        for wrong in (goal([9.0, 0.0, 2.0]), goal(PLACE, "map")):
+            send(wrong)
+        witness.until_more(REFERENCE, 50)
+        send(goal(PLACE))
+        witness.until_more(REFERENCE, 500)
+        answer = home.call_async(trigger.Request())
+        witness.until(answer.done, "an answer")
+        assert answer.result().success
+        witness.until_more(REFERENCE, 500)
+        witness.until_running(FORCE_CONTROLLER)
+        assert set(graph.end().values()) <= IN_ORDER
+        said = graph.log(WAVE_TRAJECTORY).read_text()
+    assert "/bar/goal: no tensions within the limits hold the bar at rest at [" in said
+    assert "/bar/goal: frame 'map', allowed: 'world_ned' (z down)" in said
+    evidence = Evidence(graph.folder)
+    wanted, found = evidence.rows[REFERENCE].rows[:, :3], evidence.rows[TRUTH].rows[:, :3]
+    away = np.linalg.norm(wanted - PLACE, axis=1)
+    assert away.min() == 0.0
+    assert np.linalg.norm(found - PLACE, axis=1).min() < 0.005
+    assert wanted[-1] == pytest.approx(wanted[0], abs=1e-6)
+    assert found[-1] == pytest.approx(found[0], abs=0.01)

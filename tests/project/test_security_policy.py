@@ -63,6 +63,14 @@ def test_the_viewer_sends_to_viewers_alone(shipped):
     assert own <= {"/rosout", "/parameter_events"}
 
 
+def test_what_real_time_has_besides_is_allowed_too(shipped):
+    assert "/bar/goal" in shipped["wave_trajectory"]["subscribers"]
+    offered = {"plant": ("reset", "start", "stop"), "wave_trajectory": ("home",)}
+    for node, services in offered.items():
+        for service in services:
+            assert f"/{node}/{service}" in shipped[node]["services"]
+
+
 def test_each_node_has_an_enclave_of_its_own():
     enclaves = list(ET.parse(POLICY).getroot().iter("enclave"))
     nodes = [enclave.find("profiles/profile").get("node") for enclave in enclaves]

@@ -5,7 +5,7 @@ from __future__ import annotations
 from pathlib import Path
 
 from cspm_msgs_py.interruption import interruptible
-from cspm_msgs_py.recording import Recording
+from cspm_msgs_py.recording import Recording, overview
 from cspm_msgs_py.recording.run_record import RECORD_NAME
 from cspm_run.bundle import Bundle
 from cspm_run.output.json_file import write_json
@@ -31,9 +31,13 @@ def summarise(folder: Path, bundle: Bundle, result: RunResult) -> None:
 def finish_recording(folder: Path) -> None:
     """Put both beside a recording of nodes that were started by hand, or by `ros2 launch`.
 
+    One without a message, of a run that did not begin, has neither.
+
     Raises:
-        InputError: it cannot be read, or holds no message.
+        InputError: it cannot be read.
     """
+    if not overview(folder).message_count:
+        return
     with Recording(folder) as recording:
         mode = recording.metadata[RECORD_NAME]["mode"]
         seconds = 1e-9 * (recording.end_ns - recording.start_ns)

@@ -17,21 +17,39 @@ def judged(reading, rows, period=10):
     return [reading.fault(i * period * MS, np.asarray(row)) for i, row in enumerate(rows)]
 
 
+def noise(count=40, width=1):
+    """Readings of white noise, which end with one of ones."""
+    rng = np.random.default_rng(5)
+    return [*(1.0 + 1e-3 * rng.standard_normal((count, width))), np.ones(width)]
+
+
 def test_a_noisy_sensor_may_repeat_as_long_as_silence_is_allowed():
-    found = judged(RepeatedReading(POSE, [0.001], [0.0], ALLOWED), [[1.0]] * 7)
-    assert found[:6] == [None] * 6
-    assert found[6] == f"{POSE}: {FROZEN}"
+    rows = [*noise(), *[[1.0]] * 6]
+    found = judged(RepeatedReading(POSE, [0.001], [0.0], ALLOWED), rows)
+    assert found[:-1] == [None] * (len(rows) - 1)
+    assert found[-1] == f"{POSE}: {FROZEN}"
+
+
+def test_what_never_was_noisy_may_repeat_for_ever():
+    """A driver that repeats a constant, and one that simulates without noise and comes to rest."""
+    constant = [[1.0]] * 300
+    settling = [*(1.0 + np.exp(-np.arange(100.0)[:, None] / 9.0)), *[[1.0]] * 200]
+    for rows in (constant, settling):
+        reading = RepeatedReading(POSE, [0.001], [0.0], ALLOWED)
+        assert judged(reading, rows) == [None] * len(rows)
 
 
 def test_one_bit_of_difference_begins_again():
-    rows = [[1.0]] * 5 + [[np.nextafter(1.0, 2.0)]] * 6
-    assert judged(RepeatedReading(POSE, [0.001], [0.0], ALLOWED), rows) == [None] * 11
+    rows = [*noise(), *[[1.0]] * 5, *[[np.nextafter(1.0, 2.0)]] * 6]
+    assert judged(RepeatedReading(POSE, [0.001], [0.0], ALLOWED), rows) == [None] * len(rows)
     both = RepeatedReading(POSE, [0.001, 0.001], [0.0, 0.0], ALLOWED)
-    assert judged(both, [[1.0, float(i % 2)] for i in range(30)]) == [None] * 30
+    halved = [*noise(width=2), *[[1.0, float(i % 2)] for i in range(60)]]
+    assert judged(both, halved) == [None] * len(halved)
 
 
 def test_an_exact_sensor_may_repeat_for_ever():
-    assert judged(RepeatedReading(POSE, [0.0], [0.001], ALLOWED), [[1.0]] * 500) == [None] * 500
+    rows = [*noise(), *[[1.0]] * 500]
+    assert judged(RepeatedReading(POSE, [0.0], [0.001], ALLOWED), rows) == [None] * len(rows)
     assert repeats_needed([0.0], [0.0]) == math.inf
 
 

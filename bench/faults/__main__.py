@@ -2,7 +2,7 @@
 
 A run in real time on ROS 2, at 200 Hz. A fault is drawn, put in, and waited for to end; where a
 part went to its safe state it is reset. Safe means that tensions stay below their limit, the bar
-near where it hangs, and it slower than it falls. The last fault kills a controller.
+near where it hangs, and it slower than it falls.
 """
 
 from __future__ import annotations

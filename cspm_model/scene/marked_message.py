@@ -9,12 +9,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from cspm_msgs_py.errors import InputError
+from cspm_msgs_py.message import NANOSECONDS
 from cspm_msgs_py.ros_types import message_class, serialize
 
-_NANOSECONDS = 1_000_000_000
 # No such second, half or quarter occurs by chance in a message that is otherwise constant.
 _FIRST_MARK = 0x2A5B_3C01
-Fill = Callable[[Sequence[int], NDArray[np.float64], NDArray[np.float64]], bytes]
 
 
 class MarkedMessage:
@@ -63,7 +62,7 @@ class MarkedMessage:
     ) -> bytes:
         """Return the message with these stamps [ns] and numbers, in the order of `build`."""
         content = self._content
-        pairs = np.array([divmod(stamp, _NANOSECONDS) for stamp in stamps_ns], "<u4")
+        pairs = np.array([divmod(stamp, NANOSECONDS) for stamp in stamps_ns], "<u4")
         content[self._stamps] = pairs.view(np.uint8)
         content[self._doubles] = np.asarray(doubles, "<f8").view(np.uint8).reshape(-1, 8)
         content[self._singles] = np.asarray(singles, "<f4").view(np.uint8).reshape(-1, 4)

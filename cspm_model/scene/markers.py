@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 
 from cspm_model.scene.marked_message import MarkedMessage
 from cspm_model.scene.transforms import turned
+from cspm_msgs_py.message import header_of
 from cspm_msgs_py.ros_types import message_class
 from cspm_msgs_py.testbed import Bar, Testbed
 from cspm_msgs_py.topics import MARKERS, WORLD_FRAME
@@ -140,7 +141,7 @@ def _marker(
 ) -> Any:  # noqa: ANN401
     header, duration = message_class("std_msgs/msg/Header"), message_class(_DURATION)
     empty = np.zeros(0, np.uint8)
-    image = message_class("sensor_msgs/msg/CompressedImage")(header(_zero(), ""), "", empty)
+    image = message_class("sensor_msgs/msg/CompressedImage")(header_of(0, ""), "", empty)
     return message_class("visualization_msgs/msg/Marker")(
         header=header(stamp, WORLD_FRAME),
         ns=namespace,
@@ -165,7 +166,3 @@ def _marker(
 
 
 _DURATION = "builtin_interfaces/msg/Duration"
-
-
-def _zero() -> Any:  # noqa: ANN401 - generated classes
-    return message_class("builtin_interfaces/msg/Time")(0, 0)

@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 
 from cspm_model.scene.marked_message import MarkedMessage
 from cspm_model.scene.urdf import ROOT, attachment_link, exit_link
+from cspm_msgs_py.message import time_of
 from cspm_msgs_py.ros_types import message_class, serialize
 from cspm_msgs_py.testbed import Testbed
 from cspm_msgs_py.topics import BAR_FRAME, TARGET_FRAME, TF, WINCH_FRAME, WORLD_FRAME
@@ -39,7 +40,7 @@ class Transforms:
 
 def static_transforms(testbed: Testbed) -> bytes:
     """Return the frames that never move: `world_ned`, and each cable's exit and attachment."""
-    stamp = message_class("builtin_interfaces/msg/Time")(0, 0)
+    stamp = time_of(0)
     carrier = WORLD_FRAME if testbed.winch_frame is None else WINCH_FRAME
     anchor = WORLD_FRAME if testbed.bar is None else BAR_FRAME
     found = [_transform(stamp, ROOT, WORLD_FRAME, (0.0, 0.0, 0.0, *_DOWN))]

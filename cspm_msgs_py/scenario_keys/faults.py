@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from typing import Literal
+from typing import Literal, get_args
 
 from pydantic import NonNegativeFloat, PositiveFloat
 
@@ -18,9 +18,10 @@ Kind = Literal[
     "sensor_late",
     "sensor_dropped",
     "winch_weak",
-    "brake",
     "cable_cut",
+    "brake",
 ]
+KINDS: tuple[str, ...] = get_args(Kind)
 # What `amount` is, where a kind has one.
 AMOUNTS: dict[str, str] = {
     "sensor_noisy": "standard deviation of what is added, in the sensor's unit",
@@ -28,11 +29,10 @@ AMOUNTS: dict[str, str] = {
     "sensor_late": "by how much messages come later than their stamps say, s",
     "winch_weak": "share of the torque that is left",
 }
-ON_SENSORS = ("sensor_frozen", "sensor_noisy", "sensor_biased", "sensor_late", "sensor_dropped")
+ON_SENSORS = tuple(kind for kind in KINDS if kind.startswith("sensor_"))
 ON_CABLES = ("winch_weak", "cable_cut")
 # In lockstep every message is waited for.
 ONLY_IN_REAL_TIME = ("sensor_late", "sensor_dropped")
-KINDS = (*ON_SENSORS, *ON_CABLES, "brake")
 
 
 class Fault(StrictModel):

@@ -31,6 +31,7 @@ from cspm_msgs_py.topics import (
 )
 from cspm_ros.inject.fault_port import FaultPort
 from cspm_ros.runtime.goal_port import add_goals
+from cspm_ros.runtime.node_parameters import GOAL_S
 from cspm_ros.runtime.nodes_of_run import NodesOfRun
 from cspm_ros.runtime.realtime_recorder_node import RealtimeRecorderNode
 from cspm_ros.runtime.warm_up import warm_up
@@ -38,9 +39,6 @@ from cspm_run.assembly import assemble_stage
 from cspm_run.plant_guard import make_watchdog
 from cspm_run.recorded_run import recording_of
 from cspm_sim.realtime_plant_node import RealtimePlantNode
-
-# Slow enough for a bar that goes as far as the thesis's machine reaches.
-GOAL_S = 10.0
 
 
 class RealtimeRun(NodesOfRun):

@@ -6,7 +6,6 @@ It reads what is published and sends to viewers only: no run waits for it, or no
 from __future__ import annotations
 
 from collections.abc import Callable
-from functools import partial
 
 from cspm_model.scene.scene import Scene
 from cspm_msgs_py.errors import InputError
@@ -65,7 +64,8 @@ class ViewerNode:
         message_class = message_class_of(topic.ros_type, typestore())
         qos = contract_qos(1, latched=topic.latched)
         made = self._node.node.create_publisher(message_class, local(topic.name), qos)
-        return partial(made.handle.publish_raw)
+        publish: Callable[[bytes], None] = made.handle.publish_raw
+        return publish
 
     def _draw(self) -> None:
         self._heard = False

@@ -1,7 +1,5 @@
 """The policy that is shipped: what the graph needs, and nothing beyond it."""
 
-import importlib.util
-import sys
 from pathlib import Path
 from xml.etree import ElementTree as ET
 
@@ -21,12 +19,8 @@ POLICY = ROOT / "launch" / "security" / "policy.xml"
 
 
 @pytest.fixture(scope="module")
-def script():
-    spec = importlib.util.spec_from_file_location("security_policy", SCRIPT)
-    module = importlib.util.module_from_spec(spec)
-    sys.modules["security_policy"] = module
-    spec.loader.exec_module(module)
-    return module
+def script(loaded):
+    return loaded(SCRIPT)
 
 
 @pytest.fixture(scope="module")

@@ -1,9 +1,7 @@
 """The layouts that are shipped: made by their script, and of topics that there are."""
 
-import importlib.util
 import json
 import re
-import sys
 from pathlib import Path
 from xml.etree import ElementTree as ET
 
@@ -26,24 +24,16 @@ def topics():
     return {**testbed.topics, **SCENE}
 
 
-def script():
-    spec = importlib.util.spec_from_file_location("viewer_layouts", SCRIPT)
-    module = importlib.util.module_from_spec(spec)
-    sys.modules["viewer_layouts"] = module
-    spec.loader.exec_module(module)
-    return module
-
-
-def test_the_files_are_those_of_the_script(tmp_path):
+def test_the_files_are_those_of_the_script(loaded, tmp_path):
     """Foxglove's own kit writes its layout, so that its form is that of Foxglove."""
-    script().main("thesis", tmp_path)
+    loaded(SCRIPT).main("thesis", tmp_path)
     for made in tmp_path.iterdir():
         assert made.read_text() == (VIEWS / made.name).read_text(), made.name
     assert len(list(tmp_path.iterdir())) == len(list(VIEWS.iterdir())) == 3
 
 
-def test_a_machine_without_cables_in_space_has_layouts_too(tmp_path):
-    script().main("one_winch", tmp_path)
+def test_a_machine_without_cables_in_space_has_layouts_too(loaded, tmp_path):
+    loaded(SCRIPT).main("one_winch", tmp_path)
     assert "/cables/tension/" in (tmp_path / "plotjuggler.xml").read_text()
 
 

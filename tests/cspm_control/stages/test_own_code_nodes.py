@@ -59,7 +59,7 @@ def test_internals_are_not_expected_of_own_controllers(tmp_path):
 
 def test_real_time(place, tmp_path):
     bundle = bundle_of(place / "mine.yaml", *PATIENT)
-    result = run_realtime(bundle, tmp_path / "bag", steps=1000, domain_id=new_domain())
+    result = run_realtime(bundle, tmp_path / "bag", steps=3000, domain_id=new_domain())
     assert result.failure is None
     assert result.statistics.slack_share == 0.0
     assert result.messages["/winches/torque_command"] > 100

@@ -34,8 +34,10 @@ from cspm_msgs_py.bag import open_bag  # noqa: E402
 from cspm_msgs_py.errors import CspmError, InputError  # noqa: E402
 from cspm_msgs_py.recording import Recording  # noqa: E402
 from cspm_msgs_py.ros.contract_node import ros_class  # noqa: E402
+from cspm_msgs_py.ros.qos import contract_qos  # noqa: E402
 from cspm_msgs_py.ros.session import Session  # noqa: E402
-from cspm_msgs_py.topics import CLOCK, Topic  # noqa: E402
+from cspm_msgs_py.ros_types import typestore  # noqa: E402
+from cspm_msgs_py.topics import CLOCK, QOS_DEPTH, SCENE  # noqa: E402
 from cspm_msgs_py.wire import WireReader  # noqa: E402
 from cspm_ros.replay.bag_selection import Selection  # noqa: E402
 from cspm_ros.replay.player_node import PlayerNode  # noqa: E402
@@ -52,7 +54,7 @@ COMMANDS = ("/wrench_command", "/tension_command", "/winches/torque_command")
 REFERENCES = ("/winch_frame/reference", "/bar/reference")
 SLOW_RATES = ("rates.motion_controller=100", "rates.tension_distribution=500")
 STEPS = 250
-PATIENCE_S = 30.0
+PATIENCE_S = 120.0
 
 
 @pytest.fixture
@@ -81,7 +83,9 @@ class Listener:
     def __init__(self, node, types):
         self.heard = {name: [] for name in types}
         for name, ros_type in types.items():
-            node.subscribe(Topic(name, ros_type, "", ()), self.heard[name].append)
+            take, qos = self.heard[name].append, contract_qos(QOS_DEPTH)
+            message_class = schema_class.message_class_of(ros_type, typestore())
+            node.node.create_subscription(message_class, name, take, qos, raw=True)
 
     @property
     def count(self):
@@ -260,10 +264,11 @@ def test_types_that_cannot_be_sent_are_reported(recording, monkeypatch):
             f"{ros_type} is not installed, which rmw_zenoh_cpp cannot do without, allowed:"
             " rmw_fastrtps_cpp"
         )
-        assert node.unplayable == {
-            "/winch_frame/reference": missing,
-            "/bar/reference": missing,
+        # Of tf2_msgs no generated code can be installed by pip.
+        reported = {
+            name: why for name, why in node.unplayable.items() if not name.startswith("/tf")
         }
+        assert reported == {"/winch_frame/reference": missing, "/bar/reference": missing}
         selection = Selection(left_out=[name for name in bag.topics if name != "/bar/reference"])
         with pytest.raises(InputError) as caught:
             PlayerNode(fake, bag, selection, 1.0)
@@ -327,7 +332,7 @@ def test_controllers_reproduce_the_recorded_commands_bit_for_bit(tmp_path, overr
     )
     with Recording(tmp_path / "first") as first:
         counts = {name: first.topics[name].count for name in COMMANDS}
-        total = sum(topic.count for topic in first.topics.values())
+        total = sum(topic.count for name, topic in first.topics.items() if name not in SCENE)
     assert {name: each.compared for name, each in found.reproductions.items()} == counts
     assert found.identical
     assert all(each.different == 0 for each in found.reproductions.values())

@@ -279,7 +279,10 @@ def test_a_node_that_is_killed_is_named(tmp_path, node):
     )
     with pytest.raises(CspmError) as caught:
         processes(LONG, tmp_path / "bag", witness)
-    assert str(caught.value) == f"{node} ended by signal SIGKILL before the run did"
+    assert str(caught.value) == (
+        f"{node} ended by signal SIGKILL before the run did;"
+        f" `cspm recover {tmp_path / 'bag'}` restores its index"
+    )
     assert caught.value.exit_code == 1
     assert len(witness.nodes) == len(NODES)
     assert gone(list(witness.nodes.values()), 0.0)
@@ -309,7 +312,10 @@ def test_a_node_that_is_asked_to_end_is_named(tmp_path):
     witness = Witness(lambda nodes: nodes["motion_controller"].terminate())
     with pytest.raises(CspmError) as caught:
         processes(LONG, tmp_path / "bag", witness)
-    assert str(caught.value) == "motion_controller ended with exit code 0 before the run did"
+    assert str(caught.value) == (
+        "motion_controller ended with exit code 0 before the run did;"
+        f" `cspm recover {tmp_path / 'bag'}` restores its index"
+    )
     assert_readable(tmp_path / "bag", witness)
 
 

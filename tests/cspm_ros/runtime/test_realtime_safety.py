@@ -324,7 +324,9 @@ def test_the_emergency_stop_acts_within_two_periods_until_it_is_reset(warm, tmp_
         under_way(witness)
         assert set(graph.end().values()) <= IN_ORDER
     evidence = Evidence(graph.folder)
-    assert evidence.stops == [False, True, False]
+    # The recorder may not know the publisher yet when the first is sent.
+    assert evidence.stops[-2:] == [True, False]
+    assert set(evidence.stops[:-2]) <= {False}
     ((since, reason),) = evidence.alarms(FORCE_CONTROLLER)
     assert reason == "emergency stop set"
     stamps, _ = evidence.torques(since + MS)

@@ -188,19 +188,23 @@ class Witness:
         """Listen until a guard says that it is in a state; return what it says."""
         return self.until_said(name, lambda s: s.values.get("state") == state, state)
 
-    def until_running(self, *guards):
+    def until_running(self, *guards, passing=(" stale: ",)):
         """Listen until the run is under way and all is well.
 
-        A busy computer may keep a node waiting for half a second at the start. Its safe state is
-        then left as a user would leave it.
+        A busy computer may keep a node waiting for half a second at the start, and what a fault
+        leaves behind may be reported after a reset. The safe state is then left as a user would
+        leave it.
         """
+
+        def settled(said):
+            return passed(said) or (said.level < 2 and said.values.get("state") == "running")
+
+        def passed(said):
+            return any(each in said.values.get("reason", "") for each in passing)
+
         for name in guards:
-            said = self.until_said(name, lambda s: s.values.get("state"), "a state")
-            if " stale: " in said.values.get("reason", ""):
+            while passed(self.until_said(name, settled, "running")):
                 self.until_reset(name.partition("/")[0])
-            self.until_said(
-                name, lambda s: s.level < 2 and s.values.get("state") == "running", "running"
-            )
 
     def until_more(self, topic, count):
         """Listen until so many more messages of a topic came."""

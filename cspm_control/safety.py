@@ -166,8 +166,8 @@ class GuardedStage:
             return None
         if not np.isfinite(row).all():
             return None
-        angles, speeds, _ = np.split(row, 3)
-        return Winches(angles, speeds)
+        count = self._width // 3
+        return Winches(row[:count], row[count : 2 * count])
 
 
 def check_real_time(safety: Safety, schedule: Schedule) -> None:

@@ -9,7 +9,7 @@ from cspm_msgs_py.recording.overview import overview
 from cspm_run.bundle import Bundle
 from cspm_run.controlled_dofs import controlled_dofs
 from cspm_run.recorded_statistics import recording_statistics
-from cspm_run.recorded_timing import first_alarm, timing_of
+from cspm_run.recorded_timing import first_alarm, timing_of, torque_delays
 from cspm_run.run_result import RunResult
 
 
@@ -49,4 +49,5 @@ def recorded_result(
         failure=failure or first_alarm(folder),
         warnings=strength_warnings(testbed, statistics.highest_tensions),
         timing=timing_of(folder) if timed else {},
+        delays=torque_delays(folder) if timed else None,
     )

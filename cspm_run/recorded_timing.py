@@ -7,11 +7,13 @@ from pathlib import Path
 
 from cspm_msgs_py.diagnostics import Level, Status, decode_diagnostics
 from cspm_msgs_py.recording.reader import Recording
+from cspm_msgs_py.stepping.delay_histogram import DelayHistogram
 from cspm_msgs_py.topics import DIAGNOSTICS
 
 # Totals since the start: the last counts. Largest since the last message: the largest counts.
 TOTALS = ("deadlines_missed", "late_steps", "stale_inputs", "refused", "lost")
 LARGEST = ("worst_latency_ms",)
+_DELAYS = "torque_delays"
 
 
 def first_alarm(path: Path) -> str | None:
@@ -41,6 +43,16 @@ def timing_of(path: Path) -> dict[str, dict[str, float]]:
                 reported = found.setdefault(status.name, {})
                 reported[key] = max(reported.get(key, 0.0), float(text))
     return found
+
+
+def torque_delays(path: Path) -> DelayHistogram | None:
+    """Return how late torque commands came to the plant, None where it did not report it.
+
+    Raises:
+        InputError: the recording cannot be read.
+    """
+    found = [s.values[_DELAYS] for s in _statuses(path) if _DELAYS in s.values]
+    return DelayHistogram.from_text(found[-1]) if found else None
 
 
 def _statuses(path: Path) -> Iterator[Status]:

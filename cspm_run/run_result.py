@@ -5,6 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass, field
 from pathlib import Path
 
+from cspm_msgs_py.stepping.delay_histogram import DelayHistogram
 from cspm_run.run_statistics import RunStatistics
 
 
@@ -27,6 +28,7 @@ class RunResult:
         failure: what went wrong, in one line, if anything did.
         warnings: what is not as it should be though the run went on, a line each.
         timing: in real time, what each node reported of its deadlines and inputs, by node.
+        delays: in real time, how late torque commands came to the simulated plant.
     """
 
     scenario: str
@@ -43,6 +45,7 @@ class RunResult:
     failure: str | None = None
     warnings: tuple[str, ...] = ()
     timing: dict[str, dict[str, float]] = field(default_factory=dict)
+    delays: DelayHistogram | None = None
 
     @property
     def real_time_factor(self) -> float:

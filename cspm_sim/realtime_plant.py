@@ -11,6 +11,7 @@ from cspm_msgs_py.diagnostics import Level, Status
 from cspm_msgs_py.errors import DivergenceError, InputError
 from cspm_msgs_py.schedule import TORQUE_COMMAND, Schedule
 from cspm_msgs_py.stepping.admission import Admission
+from cspm_msgs_py.stepping.delay_histogram import DelayHistogram
 from cspm_msgs_py.stepping.publisher_binding import PublisherBinding
 from cspm_sim.simulator import Simulator
 from cspm_sim.watchdog import Watchdog
@@ -31,6 +32,7 @@ class RealtimePlant:
         failure: what ended the run, in one line, if anything did.
         missed: steps for which no torque command came in time.
         late: steps made more than a period too late.
+        delays: from the state that a torque command was computed for to its arrival.
         refused: how many messages were unusable, and why the last was.
     """
 
@@ -69,6 +71,7 @@ class RealtimePlant:
         self._commanded = False
         self.failure: str | None = None
         self.missed = self.late = 0
+        self.delays = DelayHistogram()
         self.refused = (0, "")
 
     @property
@@ -98,8 +101,16 @@ class RealtimePlant:
             raise InputError(fault)
         self._watchdog.command(now_ns, torque)
         self._simulator.torque = torque
+        if self._start_ns is not None:
+            self._note_command(stamp_ns - self._start_ns, now_ns - stamp_ns)
+
+    def _note_command(self, state_ns: int, delay_ns: int) -> None:
+        """Note a command for a state at so many ns since the start, so much later."""
         period = self._schedule.period_ns
-        if self._start_ns is not None and stamp_ns > self._start_ns + (self._step - 0.5) * period:
+        # In the safe state torques answer no measurement, and have a time of their own.
+        if state_ns >= 0 and state_ns % period == 0:
+            self.delays.add(delay_ns)
+        if state_ns > (self._step - 0.5) * period:
             self._commanded = True
 
     def refuse(self, now_ns: int, reason: str) -> None:
@@ -150,6 +161,7 @@ class RealtimePlant:
                 "deadlines_missed": str(self.missed),
                 "late_steps": str(self.late),
                 "refused": str(self.refused[0]),
+                "torque_delays": str(self.delays),
             }
             if self.refused[0] and level == Level.OK:
                 level, message = Level.WARN, f"refused: {self.refused[1]}"

@@ -14,6 +14,7 @@ from cspm_msgs_py.ros.tagged_taker import Tagged, TaggedTaker, UntaggedTaker
 from cspm_msgs_py.stepping.sequence_numbers import SequenceNumbers
 
 Array = NDArray[np.float64]
+Words = NDArray[np.int64]
 # In one look, so that a flood does not keep its reader from all else.
 _AT_ONCE = 2000
 
@@ -103,14 +104,77 @@ class TaggedInlet:
         taken = self._taker.take()
         if taken is None:
             return False
+        self._hand_on(taken)
+        return True
+
+    def _hand_on(self, taken: Tagged) -> None:
         if self._numbers is not None and taken.number is not None:
             self._numbers.add(taken.number)
         self._receive(taken)
-        return True
 
     def take(self) -> None:
         """Hand on what has come, of a flood its beginning."""
         _take_each(self.take_one)
+
+
+class RowStore(Protocol):
+    """Who keeps a topic's rows."""
+
+    @property
+    def publisher(self) -> bytes | None:
+        """Whose messages are stored without a look at each (16 bytes); None: nobody's."""
+
+    def room(self) -> tuple[Words, Array]:
+        """Return where the next go: stamps and times of reception [ns], (n, 2), rows, (n, width).
+
+        There is room for one at least.
+        """
+
+    def stored(self, count: int) -> None:
+        """Note that so many were put there."""
+
+
+class StoreInlet(TaggedInlet):
+    """One subscription of which one publisher's messages are stored, and others handed on."""
+
+    def __init__(
+        self,
+        topic: str,
+        handle: rclpy_implementation.Subscription,
+        taker: TaggedTaker | UntaggedTaker,
+        receive: Callable[[Tagged], None],
+        row_taker: RowTaker,
+        store: RowStore,
+    ) -> None:
+        super().__init__(topic, handle, taker, receive, numbered=True)
+        self._row_taker, self._store = row_taker, store
+        # The publisher's identity and its next number.
+        self._own = np.zeros(3, dtype=np.int64)
+
+    def take(self) -> None:
+        """Hand on or store what has come, of a flood its beginning."""
+        left = _AT_ONCE
+        while left > 0:
+            following = self._numbers.following if self._numbers is not None else None
+            publisher = self._store.publisher
+            if publisher is None or following is None:
+                super().take()
+                return
+            self._own[:2] = np.frombuffer(publisher, dtype=np.int64)
+            self._own[2] = following
+            times, rows = self._store.room()
+            count, other = self._row_taker.take_own(self._own, times, rows)
+            self._note(count)
+            if other is not None:
+                self._hand_on(other)
+            elif count < len(rows):
+                return
+            left -= count + 1
+
+    def _note(self, count: int) -> None:
+        if count and self._numbers is not None:
+            self._numbers.skip(count)
+            self._store.stored(count)
 
 
 class BlockInlet:

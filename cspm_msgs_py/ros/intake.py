@@ -22,6 +22,8 @@ from cspm_msgs_py.ros.inlets import (
     Inlet,
     ObjectInlet,
     RowInlet,
+    RowStore,
+    StoreInlet,
     TaggedInlet,
 )
 from cspm_msgs_py.ros.local_name import local
@@ -128,14 +130,23 @@ class Intake:
         message_class: type,
         receive: Callable[[Tagged], None],
         *,
-        numbered: bool = False,
         depth: int | None = DEPTH,
+        store: RowStore | None = None,
     ) -> None:
-        """Have `receive` called with each message and its publisher's identity; see `subscribe`."""
+        """Have `receive` called with each message and its publisher's identity; see `subscribe`.
+
+        With a `store` messages are numbered. It takes rows of the publisher that it names, and
+        `receive` all else.
+        """
         handle = self._handle(topic.name, message_class, QOS_RELIABILITY, depth)
         taker = make_taker(handle, message_class)
         self._takers.append(taker)
-        self._inlets.append(TaggedInlet(topic.name, handle, taker, receive, numbered))
+        rows = None if store is None else self._taker(topic, handle)
+        if store is None or rows is None:
+            numbered = store is not None
+            self._inlets.append(TaggedInlet(topic.name, handle, taker, receive, numbered))
+            return
+        self._inlets.append(StoreInlet(topic.name, handle, taker, receive, rows, store))
 
     def subscribe_objects(
         self, topic: str, message_class: type, receive: Callable[[Any], None], depth: int | None

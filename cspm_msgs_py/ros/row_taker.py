@@ -15,10 +15,12 @@ from cspm_msgs_py.errors import CspmError
 from cspm_msgs_py.layout import layout_of
 from cspm_msgs_py.ros import take_kernel as kernel
 from cspm_msgs_py.ros.rcl_message import RclMessage, clear_error
+from cspm_msgs_py.ros.tagged_taker import Tagged
 from cspm_msgs_py.topics import POSE, Topic
 from cspm_msgs_py.wire import mask_of
 
 Array = NDArray[np.float64]
+Words = NDArray[np.int64]
 _MOST_ROWS = 64
 
 
@@ -117,6 +119,28 @@ class RowTaker:
         count, end = kernel.take_rows(*self._arguments, self._due, self._rows[:most])
         ended = end in (kernel.TAKEN, kernel.NOTHING)
         return TakenRows(self._rows[:count], None if ended else self._other(end))
+
+    def take_own(self, own: Words, times: Words, rows: Array) -> tuple[int, Tagged | None]:
+        """Take messages as long as they are the next ones of one publisher.
+
+        Args:
+            own: its identity and its next number, (3,); moves on with them.
+            times: takes their stamps and times of reception [ns], (most, 2).
+            rows: takes their rows, (most, width).
+
+        Returns:
+            how many came so, and the message after them, if that is not as it should be.
+
+        Raises:
+            CspmError: rcl refuses.
+        """
+        count, end = kernel.take_own_rows(*self._arguments, own, times, rows)
+        if end in (kernel.TAKEN, kernel.NOTHING):
+            return count, None
+        state = self._message.state
+        gid = state[kernel.FOUND_GID : kernel.FOUND_GID + 2].tobytes()
+        payload, number = self._other(end)
+        return count, Tagged(payload, int(state[kernel.FOUND_RECEIVED]), number, gid)
 
     def _other(self, end: int) -> TakenBytes:
         """Return the message that lies in the buffer."""

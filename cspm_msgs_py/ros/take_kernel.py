@@ -24,7 +24,7 @@ Array = NDArray[np.float64]
 # Places in `form`, which says how to take a topic's messages and what stands where in them.
 TAKE, SUBSCRIPTION, MESSAGE, INFO, BUFFER, SIZE, SECONDS, QUATERNION = range(8)
 # Places in `state`, the words that the middleware writes beside the content.
-FOUND_BUFFER, FOUND_LENGTH, FOUND_NUMBER = 0, 1, 10
+FOUND_BUFFER, FOUND_LENGTH, FOUND_RECEIVED, FOUND_NUMBER, FOUND_GID = 0, 1, 9, 10, 13
 # Places in `found` and `due`: stamp [ns], sender's number, and from one stamp to the next [ns].
 STAMP, NUMBER, STEP = range(3)
 UNKNOWN = -1  # number of a middleware that counts nothing
@@ -135,6 +135,47 @@ def take_rows(
             return count, STRANGE
         due[STAMP] += due[STEP]
         due[NUMBER] += 1
+    return len(rows), TAKEN
+
+
+@njit(cache=True)
+def take_own_rows(
+    form: Words,
+    state: Words,
+    content: Bits,
+    same: Bits,
+    places: Words,
+    found: Words,
+    own: Words,
+    times: Words,
+    rows: Array,
+) -> tuple[int, int]:
+    """Take messages as `take_row` while each is the next one of one publisher.
+
+    Args:
+        form: this and the next five as in `take_row`.
+        state: likewise.
+        content: likewise.
+        same: likewise.
+        places: likewise.
+        found: likewise.
+        own: the publisher's identity and its next number, (3,); moves on with them.
+        times: takes their stamps and times of reception [ns], (most, 2).
+        rows: takes their rows, (most, width).
+
+    Returns:
+        how many were taken so, and how that ended.
+    """
+    for count in range(len(rows)):
+        end = take_row(form, state, content, same, places, found, rows[count])
+        if end != TAKEN:
+            return count, end
+        known = state[FOUND_GID] == own[0] and state[FOUND_GID + 1] == own[1]
+        if not known or found[NUMBER] != own[2]:
+            return count, STRANGE
+        times[count, 0] = found[STAMP]
+        times[count, 1] = state[FOUND_RECEIVED]
+        own[2] += 1
     return len(rows), TAKEN
 
 

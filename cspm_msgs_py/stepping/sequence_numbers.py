@@ -19,6 +19,15 @@ class SequenceNumbers:
         self._expected: list[int] = []
         self.lost = 0
 
+    @property
+    def following(self) -> int | None:
+        """The number that follows the last one, None before the first."""
+        return self._expected[0] if self._expected else None
+
+    def skip(self, count: int) -> None:
+        """Take the numbers of so many messages that followed the last one, none missing."""
+        self._expected[0] += count
+
     def add(self, number: int) -> None:
         """Take the number of the message that came next."""
         expected = self._expected

@@ -32,8 +32,11 @@ PROCESSES = "processes"
 GOAL_S = 10.0
 
 
-def _value(default: object, text: str, *choices: str, least: float | None = None) -> Any:  # noqa: ANN401 - a dataclass field
-    return field(default=default, metadata={"text": text, "choices": choices, "least": least})
+def _value(
+    default: object, text: str, *choices: str, least: float | None = None, most: float = math.inf
+) -> Any:  # noqa: ANN401 - a dataclass field
+    limits = {"least": least, "most": most}
+    return field(default=default, metadata={"text": text, "choices": choices, **limits})
 
 
 @dataclass(frozen=True)
@@ -57,6 +60,9 @@ class NodeParameters:
     )
     start_on_call: bool = _value(
         False, "real time, leader: begin only once somebody calls its service ~/start"
+    )
+    priority: int = _value(
+        0, "real time: SCHED_FIFO priority, with locked memory; 0: ordinary", least=0, most=99
     )
     goal_duration: float = _value(
         GOAL_S, "real time, wave_trajectory: how long the bar takes to a goal [s]", least=0.1
@@ -130,17 +136,19 @@ def read_parameters(node: Node) -> NodeParameters:
     found = {}
     for each in fields(NodeParameters):
         found[each.name] = value = _declare(node, each)
-        choices, least = each.metadata["choices"], each.metadata["least"]
+        choices, least, most = (each.metadata[key] for key in ("choices", "least", "most"))
         outside = choices and value not in choices
-        if outside or (least is not None and not least <= value < math.inf):
+        if outside or (least is not None and not (least <= value <= most and value < math.inf)):
             raise InputError(f"parameter {each.name}: {value}, allowed: {_allowed(each)}")
     return NodeParameters(**found)
 
 
 def _allowed(each: Field[Any]) -> str:
     """Return a parameter's choices or range in words, empty if it has neither."""
-    choices, least = each.metadata["choices"], each.metadata["least"]
-    return ", ".join(choices) if choices or least is None else f"{least} or more"
+    choices, least, most = (each.metadata[key] for key in ("choices", "least", "most"))
+    if choices or least is None:
+        return ", ".join(choices)
+    return f"{least} or more" if most == math.inf else f"{least} to {most}"
 
 
 def _declare(node: Node, each: Field[Any]) -> Any:  # noqa: ANN401 - of the field's type

@@ -19,6 +19,7 @@ from cspm_msgs_py.ros.leader import Leader
 from cspm_msgs_py.ros.session import FAREWELL_S, Session
 from cspm_msgs_py.schedule import PLANT, Schedule, schedule_of
 from cspm_ros.inject.injection import PROCESS, process_name
+from cspm_ros.processes.foreground import put_ahead
 from cspm_ros.replay.replay_run import run_player
 from cspm_ros.runtime.exit_watchdog import exit_watchdog
 from cspm_ros.runtime.lockstep_nodes import LockstepRun
@@ -121,6 +122,7 @@ def _run_realtime(
     path = Path(parameters.report) if parameters.report else None
     if node.name == PLANT:
         plant = run.plant(node, steps)
+        _go_ahead(node, parameters)
         if parameters.start_on_call:
             plant.leader.wait_for_call()
         session.every(
@@ -138,6 +140,7 @@ def _run_realtime(
         folder = parameters.recording_folder
         writer = stack.enter_context(run.new_recording(folder, parameters.recorded_mode))
         recorder, leader = run.recorder(node, writer, steps)
+        _go_ahead(node, parameters)
         stack.callback(recorder.close)
         if leader is not None and parameters.start_on_call:
             leader.wait_for_call()
@@ -154,7 +157,14 @@ def _run_realtime(
     else:
         _check_part(node, bundle.scenario.name, schedule)
         stage = run.stage(node, parameters.goal_duration)
+        _go_ahead(node, parameters)
         session.spin_until(lambda: stage.ended or session.stopped)
+
+
+def _go_ahead(node: ContractNode, parameters: NodeParameters) -> None:
+    """Take the priority that was asked for, once all is compiled: that has time."""
+    if parameters.priority and (refused := put_ahead(parameters.priority)):
+        node.warn(f"priority {parameters.priority}: not permitted: {refused}")
 
 
 def _check_part(node: ContractNode, scenario: str, schedule: Schedule) -> None:

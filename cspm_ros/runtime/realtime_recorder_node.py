@@ -29,7 +29,7 @@ if TYPE_CHECKING:
     from cspm_ros.check_drivers.driver_statics import DriverStatics
 
 _LISTENING = "a second of each driver's messages"
-_TAKE_EVERY_S = 0.002
+_TAKE_EVERY_S = 0.01
 _WRITE_EVERY_S = 0.02
 
 
@@ -115,7 +115,7 @@ class RealtimeRecorderNode:
         """Write what came, and leave the topics."""
         self._intake.take()
         for buffer in self._buffers.values():
-            buffer.write(len(buffer.payloads))
+            buffer.write()
         self._intake.close()
 
     def _begin(self, _: int) -> None:
@@ -135,7 +135,7 @@ class RealtimeRecorderNode:
                 self._statics.hear(name, message.received_ns, message.payload)
             buffer.add(message)
 
-        self._intake.subscribe_tagged(topic, message_class, take_row, numbered=True)
+        self._intake.subscribe_tagged(topic, message_class, take_row, store=buffer)
 
     def _buffer(self, topic: Topic) -> TopicBuffer:
         """Return what collects a topic's rows, and knows which count."""
@@ -151,8 +151,11 @@ class RealtimeRecorderNode:
         def fault(stamp_ns: int) -> str | None:
             return admission.fault(stamp_ns, node.now_ns(), safe=self._lenient)
 
+        def own() -> bytes | None:
+            return binding.bound if self._begun else None
+
         channel, refuse = self._writer.channel(name), partial(self._refuse_row, name)
-        return TopicBuffer(topic, channel, refuse, stranger, fault)
+        return TopicBuffer(topic, channel, refuse, stranger, fault, own)
 
     @property
     def _lenient(self) -> bool:
@@ -179,8 +182,7 @@ class RealtimeRecorderNode:
         self._publish_status(self._node.now_ns(), status)
 
     def _write_next(self) -> None:
-        buffer = next(self._next)
-        buffer.write(len(buffer.payloads))
+        next(self._next).write()
 
     def _looks_right(self, payload: bytes) -> bool:
         try:

@@ -16,15 +16,15 @@ from cspm_msgs_py.ros.tagged_taker import Tagged
 from cspm_msgs_py.topics import Topic
 from cspm_msgs_py.wire import WireReader
 
+# What comes in a tenth of a second at 2 kHz; it is written more often.
+_MOST_ROWS = 200
+
 
 class TopicBuffer:
-    """Collects payloads, and hands them to the recording's channel in blocks.
+    """Collects messages, and hands them to the recording's channel in blocks.
 
-    What does not count is handed on as it came.
-
-    Attributes:
-        payloads: what waits to be written, in order.
-        logs: log time of each [ns].
+    What does not count is handed on as it came. Rows of the topic's own publisher are stored as
+    such; a message that comes as bytes has them written first.
     """
 
     def __init__(
@@ -34,6 +34,7 @@ class TopicBuffer:
         refuse: Callable[[int, bytes, str], None],
         stranger: Callable[[bytes | None], str | None] = lambda _: None,
         fault: Callable[[int], str | None] = lambda _: None,
+        own: Callable[[], bytes | None] = lambda: None,
     ) -> None:
         """Take where the messages of a topic go.
 
@@ -41,17 +42,42 @@ class TopicBuffer:
             topic: the topic.
             channel: its channel.
             refuse: gets log time [ns], bytes and reason of a message that does not count.
-            stranger: returns why messages of a publisher do not count, by its identity.
+            stranger: notes a message of a publisher, by its identity; returns why it does not
+                count, None if it does.
             fault: returns why a message of this stamp [ns] does not count.
+            own: returns the identity of the publisher whose messages count, None if unknown.
         """
         self.topic = topic
         self._layout: Layout = layout_of(topic)
         self._reader = WireReader(topic)
         self._channel = channel
         self._refuse, self._stranger, self._fault = refuse, stranger, fault
+        self._own = own
         self._latest = 0
-        self.payloads: list[bytes] = []
-        self.logs: list[int] = []
+        self._payloads: list[bytes] = []
+        self._logs: list[int] = []
+        self._times = np.empty((_MOST_ROWS, 2), dtype=np.int64)
+        self._rows = np.empty((_MOST_ROWS, topic.width))
+        self._used = 0
+
+    @property
+    def publisher(self) -> bytes | None:
+        """Whose messages are stored without a look at each (16 bytes); None: nobody's."""
+        return self._own()
+
+    def room(self) -> tuple[NDArray[np.int64], NDArray[np.float64]]:
+        """Return where the next go: stamps and times of reception [ns], (n, 2), rows, (n, width).
+
+        There is room for one at least.
+        """
+        if self._payloads or self._used == _MOST_ROWS:
+            self.write()
+        return self._times[self._used :], self._rows[self._used :]
+
+    def stored(self, count: int) -> None:
+        """Note that so many were put there."""
+        self._used += count
+        self._stranger(self._own())
 
     def add(self, message: Tagged) -> None:
         """Take a message."""
@@ -59,21 +85,38 @@ class TopicBuffer:
         if strange is not None:
             self._refuse(message.received_ns, message.payload, strange)
             return
-        self.payloads.append(message.payload)
-        self.logs.append(message.received_ns)
+        if self._used:
+            self.write()
+        self._payloads.append(message.payload)
+        self._logs.append(message.received_ns)
 
-    def write(self, count: int) -> None:
-        """Write the first `count` messages."""
-        payloads, logs = self.payloads[:count], self.logs[:count]
-        del self.payloads[:count], self.logs[:count]
-        if not payloads:
-            return
-        decoded = self._decode_all(payloads)
-        if decoded is not None and self._in_order(decoded[0]):
-            stamps, rows = decoded[0].tolist(), decoded[1]
-            for part in _within_blocks(logs):
-                self._channel.append_rows(logs[part], stamps[part], rows[part].tobytes())
-            return
+    def write(self) -> None:
+        """Write what was collected."""
+        if self._used:
+            stamps, logs = self._times[: self._used].T
+            rows, self._used = self._rows[: self._used], 0
+            if not self._write_rows(logs.tolist(), stamps, rows):
+                payloads = [each.tobytes() for each in self._layout.encode(stamps, rows)]
+                self._write_each(logs.tolist(), payloads)
+        if self._payloads:
+            payloads, self._payloads = self._payloads, []
+            taken, self._logs = self._logs, []
+            decoded = self._decode_all(payloads)
+            if decoded is None or not self._write_rows(taken, *decoded):
+                self._write_each(taken, payloads)
+
+    def _write_rows(
+        self, logs: list[int], stamps: NDArray[np.int64], rows: NDArray[np.float64]
+    ) -> bool:
+        """Write messages if all count; return whether they do."""
+        if not self._in_order(stamps):
+            return False
+        times = stamps.tolist()
+        for part in _within_blocks(logs):
+            self._channel.append_rows(logs[part], times[part], rows[part].tobytes())
+        return True
+
+    def _write_each(self, logs: list[int], payloads: list[bytes]) -> None:
         for log, payload in zip(logs, payloads, strict=True):
             self._write_one(log, payload)
 

@@ -11,8 +11,12 @@ from rich.table import Table
 
 from cspm_msgs_py.dofs import DOFS
 from cspm_msgs_py.scenario import Requirement
+from cspm_msgs_py.stepping.delay_histogram import UP_TO_MS, DelayHistogram
 from cspm_run.output.console import say
 from cspm_run.run_result import RunResult
+
+# Of the bounds by which delays are counted.
+_SHOWN_MS = (1.0, 2.0, 5.0, 20.0)
 
 
 def summary_data(result: RunResult) -> dict[str, Any]:
@@ -20,7 +24,7 @@ def summary_data(result: RunResult) -> dict[str, Any]:
     statistics = result.statistics
     low, high = statistics.tension_range
     errors = zip(DOFS, statistics.max_error, statistics.rms_error, strict=True)
-    return {
+    found = {
         "scenario": result.scenario,
         "seed": result.seed,
         "mode": result.mode,
@@ -33,7 +37,12 @@ def summary_data(result: RunResult) -> dict[str, Any]:
         "controlled": list(result.controlled),
         "messages": result.messages,
         "warnings": list(result.warnings),
-    } | ({"realtime": result.timing} if result.timing else {})
+    }
+    if result.timing:
+        found["realtime"] = result.timing
+    if result.delays is not None:
+        found["torque_delays"] = {"up_to_ms": [*UP_TO_MS, None], "commands": result.delays.counts}
+    return found
 
 
 def print_summary(console: Console, result: RunResult, requirement: Requirement) -> None:
@@ -46,6 +55,8 @@ def print_summary(console: Console, result: RunResult, requirement: Requirement)
         console.print(_error_table(result, data["errors"], requirement))
     if result.timing:
         console.print(_timing_table(result.timing))
+    if result.delays is not None and result.delays.total:
+        console.print(_delays(result.delays), soft_wrap=True)
     tension = f"tensions {data['tension']['min']:.2f} to {data['tension']['max']:.2f} N"
     console.print(
         f"{tension} · any cable slack {data['slack_share']:.2%} of the time · wanted wrench not met"
@@ -86,6 +97,12 @@ def _timing_table(timing: dict[str, dict[str, float]]) -> Table:
     for node, reported in timing.items():
         table.add_row(node, *(f"{reported[key]:g}" if key in reported else "" for key in keys))
     return table
+
+
+def _delays(delays: DelayHistogram) -> str:
+    """Return in words how late torque commands came."""
+    within = [f"{1.0 - delays.share_above(bound):.2%} within {bound:g} ms" for bound in _SHOWN_MS]
+    return f"torque commands after their measurement: {', '.join(within)}"
 
 
 def _verdict(error: dict[str, float], limit: float) -> str:

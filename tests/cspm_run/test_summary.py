@@ -14,6 +14,7 @@ from cspm.plots.run_figure import draw_run
 from cspm_model.kernels.rotation import euler_from_quaternion
 from cspm_msgs_py.dofs import DOFS
 from cspm_msgs_py.scenario import Requirement
+from cspm_msgs_py.stepping.delay_histogram import UP_TO_MS, DelayHistogram
 from cspm_run.output.json_file import write_json
 from cspm_run.output.summary import print_summary, summary_data
 from cspm_run.recorded_run import run
@@ -102,6 +103,24 @@ def printed(result, width=100):
     text = StringIO()
     print_summary(Console(file=text, width=width), result, REQUIREMENT)
     return text.getvalue()
+
+
+def test_delays_are_shown_and_kept_where_there_are_any(measured):
+    result, _ = measured
+    delays = DelayHistogram()
+    for delay_ns in (200_000, 700_000, 1_500_000, 30_000_000):
+        delays.add(delay_ns)
+    late = replace(result, delays=delays)
+    line = "torque commands after their measurement: 50.00% within 1 ms, 75.00% within 2 ms,"
+    assert f"{line} 75.00% within 5 ms, 75.00% within 20 ms\n" in printed(late)
+    kept = summary_data(late)["torque_delays"]
+    assert dict(zip(kept["up_to_ms"], kept["commands"], strict=True)) == {
+        **dict.fromkeys([*UP_TO_MS, None], 0),
+        **dict.fromkeys([0.25, 1.0, 2.0, 50.0], 1),
+    }
+    none = replace(result, delays=DelayHistogram())
+    assert "after their measurement" not in printed(none) + printed(result)
+    assert "torque_delays" not in summary_data(result)
 
 
 def lines_of(text):

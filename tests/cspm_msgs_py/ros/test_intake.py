@@ -177,6 +177,22 @@ class Counter:
             self.receive_other(payload, number)
 
 
+class Store:
+    """Keeps rows of one publisher, in room for a few at a time."""
+
+    def __init__(self, publisher=None):
+        self.publisher, self.rows, self.stamps, self.received = publisher, [], [], []
+        self._times, self._room = np.empty((7, 2), dtype=np.int64), np.empty((7, TENSION.width))
+
+    def room(self):
+        return self._times, self._room
+
+    def stored(self, count):
+        self.rows += self._room[:count].tolist()
+        self.stamps += self._times[:count, 0].tolist()
+        self.received += self._times[:count, 1].tolist()
+
+
 ROADS = [pytest.param("rcl", marks=pytest.mark.compiled), "rclpy"]
 
 
@@ -221,6 +237,51 @@ def test_rows_come_whether_rcl_is_called_or_rclpy(session):
     sent = [[float(stamp), 0.5] for stamp in range(1, 301)]
     assert rows == [(s, sent[s - 1], s + (s > 200)) for s in range(1, 301)]
     assert (others, counter.rows, counter.others) == ([201], sent, [201])
+
+
+@pytest.mark.usefixtures("road")
+def test_a_store_gets_the_rows_of_its_publisher_and_all_else_is_handed_on(session, request):
+    """Strangers' messages, malformed ones and whatever came before the publisher was known."""
+    node, other = session._nodes[0], session.node("stranger")
+    intake, store, others = Intake(session.node("reader").node), Store(), []
+    intake.subscribe_tagged(TENSION, ros_class(TENSION.ros_type), others.append, store=store)
+    send, strange = (sender_of(session, each, TENSION) for each in (node, other))
+    raw, before = node.raw_publisher(TENSION, ["reader"]), node.now_ns()
+
+    def there(count):
+        def look():
+            intake.take()
+            return len(others) + len(store.rows) == count
+
+        assert session.spin_until(look, PATIENCE_S)
+
+    send(1)
+    there(1)
+    store.publisher = others[0].gid
+    for stamp in range(2, 32):
+        send(stamp)
+    there(31)
+    strange(77)
+    there(32)
+    for stamp in range(32, 42):
+        send(stamp)
+    raw(b"none at all.")
+    there(43)
+    decode = WireReader(TENSION).decode
+    handed = [each.payload for each in others if each.payload != b"none at all."]
+    stamps = [decode(payload)[0] for payload in handed]
+    if "rcl]" in request.node.name:
+        # After another's number nobody knows the next one of the sender's.
+        assert stamps == [1, 77, 32]
+        assert store.rows == [[1.0, 2.0]] * len(store.rows)
+        assert before <= store.received[0] <= store.received[-1] <= node.now_ns()
+        assert store.received == sorted(store.received)
+    else:
+        assert store.stamps == []
+    assert sorted(stamps + store.stamps) == [*range(1, 42), 77]
+    assert len(others) - len(handed) == 1
+    assert intake.lost == {TENSION.name: 0}
+    intake.close()
 
 
 @pytest.mark.usefixtures("road")

@@ -34,6 +34,21 @@ def test_what_is_missing(numbers, missing):
     assert lost(numbers) == missing
 
 
+def test_skipping_is_adding_those_that_follow():
+    skipped, added = SequenceNumbers(), SequenceNumbers()
+    assert skipped.following is None
+    for each in (skipped, added):
+        each.add(7)
+    assert skipped.following == 8
+    skipped.skip(3)
+    for number in (8, 9, 10):
+        added.add(number)
+    assert skipped.following == added.following == 11
+    for each in (skipped, added):
+        each.add(13)
+    assert skipped.lost == added.lost == 2
+
+
 def test_any_order_of_senders_far_from_each_other_loses_nothing_but_what_is_left_out():
     rng = np.random.default_rng(3)
     for _ in range(50):

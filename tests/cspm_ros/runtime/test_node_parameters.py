@@ -35,6 +35,7 @@ def node_with():
     [
         ("pace", "allowed: lockstep, realtime"),
         ("steps", "allowed: 0 or more"),
+        ("priority", "allowed: 0 to 99"),
         ("patience", f"allowed: {LEAST_PATIENCE_S} or more"),
         ("folder", ""),
     ],

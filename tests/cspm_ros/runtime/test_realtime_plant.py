@@ -357,3 +357,20 @@ def test_the_watchdogs_torques_are_what_the_plant_does(tmp_path):
             other.step(bench.simulator.torque)
     assert bench.dog.safe
     np.testing.assert_array_equal(other.bar_state, bench.parts.plant.bar_state)
+
+
+def test_delays_are_those_of_commands_that_answer_a_state(tmp_path):
+    bench = Bench(parts_of(tmp_path, "rest"), 50)
+    bench.plant.start(START)
+    bench.at(0)
+    bench.command(0, late_ns=400_000)
+    bench.at(1)
+    bench.command(1, late_ns=1)
+    # A period and a half after its state, and in the safe state at a time of its own.
+    bench.at(3)
+    bench.command(2, late_ns=MS // 2)
+    bench.plant.receive_torque(bench.now + 1_234, bench.hanging, bench.now + 9_999)
+    counts = bench.plant.delays.counts
+    assert (counts[0], counts[1], counts[3], sum(counts)) == (1, 1, 1, 3)
+    bench.at(100)
+    assert bench.reported[0][1].values["torque_delays"] == "0 0 0 0 0 0 0 0 0 0"

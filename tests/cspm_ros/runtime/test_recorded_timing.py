@@ -5,8 +5,9 @@ import pytest
 from cspm_msgs_py.diagnostics import Level, Status, encode_diagnostics
 from cspm_msgs_py.errors import InputError
 from cspm_msgs_py.recording.writer import RecordingWriter
+from cspm_msgs_py.stepping.delay_histogram import DelayHistogram
 from cspm_msgs_py.topics import DIAGNOSTICS
-from cspm_run.recorded_timing import first_alarm, timing_of
+from cspm_run.recorded_timing import first_alarm, timing_of, torque_delays
 
 
 def record(folder, *statuses):
@@ -44,9 +45,24 @@ def test_who_reports_nothing_of_time_is_left_out(tmp_path):
     assert timing_of(folder) == {}
 
 
+def test_of_delays_the_last_report_counts(tmp_path):
+    first, last = DelayHistogram(), DelayHistogram()
+    first.add(500_000)
+    for delay_ns in (500_000, 1_500_000, 90_000_000):
+        last.add(delay_ns)
+    folder = record(
+        tmp_path / "r",
+        said("plant", torque_delays=first),
+        said("plant", torque_delays=last),
+        said("recorder", lost=0),
+    )
+    assert torque_delays(folder).counts == last.counts
+
+
 def test_a_recording_without_diagnostics_shows_nothing(tmp_path):
     folder = record(tmp_path / "r")
     assert timing_of(folder) == {}
+    assert torque_delays(folder) is None
     assert first_alarm(folder) is None
 
 

@@ -10,13 +10,14 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
+from functools import cached_property
 from typing import Any
 
 import numpy as np
 from numba import types
 from numpy.typing import NDArray
 
-from cspm_model.kernels.native import places_of
+from cspm_model.kernels.native import address_of, places_of
 
 Places = NDArray[np.int64]
 
@@ -53,6 +54,11 @@ class Phase:
     ready: Callable[[], bool] = _always
     refresh: Callable[[], None] = _nothing
     room: Callable[[int], int] | None = None
+
+    @cached_property
+    def address(self) -> int:
+        """The kernel's address."""
+        return address_of(self.kernel, PHASE)
 
 
 def make_phase(kernel: Any, *arrays: NDArray[Any], **more: Any) -> Phase:  # noqa: ANN401

@@ -13,8 +13,7 @@ from numpy.typing import NDArray
 
 from cspm_control.phases.make import stage_phase
 from cspm_control.stages.make import make_controller
-from cspm_model.kernels.native import address_of
-from cspm_model.phase import PHASE, Slots
+from cspm_model.phase import Slots
 from cspm_msgs_py.schedule import WAVE_TRAJECTORY, schedule_of
 from cspm_msgs_py.stepping.stage import Stage
 from cspm_msgs_py.topics import POSE, WRENCH
@@ -94,4 +93,5 @@ def compile_stages(bundles: Sequence[Bundle]) -> None:
 def _compile_phase(stage: Stage, slots: Slots, period_ns: int) -> None:
     phase = stage_phase(stage, slots, period_ns)
     if phase is not None:
-        address_of(phase.kernel, PHASE)
+        # Looking it up compiles it.
+        _ = phase.address

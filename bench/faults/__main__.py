@@ -20,12 +20,15 @@ import numpy as np
 from rclpy.client import Client
 
 from bench.performance.slow_machine import slow_overrides
-from cspm_msgs_py.errors import InputError
+from cspm_msgs_py.diagnostics import Level, decode_diagnostics
+from cspm_msgs_py.errors import CspmError, InputError
 from cspm_msgs_py.recording import Recording
-from cspm_msgs_py.ros.contract_node import ros_class
+from cspm_msgs_py.ros.contract_node import ContractNode, ros_class
 from cspm_msgs_py.ros.session import Session
 from cspm_msgs_py.scenario_keys.faults import Fault
+from cspm_msgs_py.schedule import FORCE_CONTROLLER, PLANT
 from cspm_msgs_py.testbed import Testbed
+from cspm_msgs_py.topics import DIAGNOSTICS
 from cspm_ros.inject.injection import inject
 from cspm_run.recorded_bundle import recorded_bundle
 
@@ -35,7 +38,7 @@ _PATIENT = ("safety.stale_after=0.5", "safety.watchdog=0.5")
 _SETTLES_S, _STARTS_S = 1.5, 60.0
 # The bar hangs still; one that falls is at 1 m/s after 5 cm.
 FARTHEST_M, FASTEST = 0.15, 1.0
-GUARDED = ("force_controller", "plant")
+GUARDED = (FORCE_CONTROLLER, PLANT)
 
 
 def drawn(rng: np.random.Generator, testbed: Testbed) -> Fault:
@@ -64,6 +67,20 @@ def _sequence(minutes: float, seed: int, testbed: Testbed) -> Iterator[Fault]:
         yield drawn(rng, testbed)
 
 
+def _until_running(session: Session, node: ContractNode) -> None:
+    """Wait until the force controller says that it runs."""
+    running: set[str] = set()
+
+    def note(payload: bytes) -> None:
+        for status in decode_diagnostics(payload).statuses:
+            if status.level < Level.ERROR and status.values.get("state") == "running":
+                running.add(status.name)
+
+    node.subscribe(DIAGNOSTICS, note)
+    if not session.spin_until(lambda: FORCE_CONTROLLER in running, _STARTS_S):
+        raise CspmError(f"{FORCE_CONTROLLER} does not run after {_STARTS_S:g} s")
+
+
 def _wait(session: Session, seconds: float) -> None:
     session.spin_until(lambda: session.stopped, seconds)
 
@@ -80,8 +97,9 @@ def _put_all(minutes: float, seed: int, testbed: Testbed) -> int:
     """Put faults into the run in this domain; return how many there were."""
     count = 0
     with Session(domain_id=DOMAIN) as session:
-        node, kind = session.node("fault_sequence").node, ros_class("std_srvs/srv/Trigger")
-        clients = {name: node.create_client(kind, f"/{name}/reset") for name in GUARDED}
+        node, kind = session.node("fault_sequence"), ros_class("std_srvs/srv/Trigger")
+        clients = {name: node.node.create_client(kind, f"/{name}/reset") for name in GUARDED}
+        _until_running(session, node)
         for fault in _sequence(minutes, seed, testbed):
             if session.stopped:
                 break
@@ -150,7 +168,6 @@ def _machine(folder: Path) -> Testbed:
                 raise
             time.sleep(0.5)
         else:
-            time.sleep(5.0)
             return found
 
 

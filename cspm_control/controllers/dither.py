@@ -2,9 +2,11 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 
 import numpy as np
+from numba import njit
 from numpy.typing import NDArray
 
 from cspm_msgs_py.control_spec.force import Dither as DitherSpec
@@ -21,6 +23,9 @@ class Dither:
     """amplitude·sin(2π·frequency·t) on each torque, t being the time stamped on it.
 
     Nothing is remembered, so that every way of running a scenario sends the same torques.
+
+    Attributes:
+        arrays: amplitudes [N·m], frequencies [Hz] and torque limits [N·m], each (n,).
     """
 
     def __init__(self, amplitudes: Array, frequencies: Array, torque_limits: Array) -> None:
@@ -31,8 +36,11 @@ class Dither:
             frequencies: shape (n,) [Hz].
             torque_limits: shape (n,) [N·m].
         """
-        self._amplitudes, self._frequencies = amplitudes, frequencies
-        self._limits = torque_limits
+        self.arrays = (
+            np.asarray(amplitudes, dtype=float),
+            np.asarray(frequencies, dtype=float),
+            np.asarray(torque_limits, dtype=float),
+        )
 
     def added_to(self, torque: Array, now_ns: int) -> Array:
         """Return torques (n,) [N·m] with the sine of an instant [ns] on them.
@@ -44,11 +52,22 @@ class Dither:
         Near a limit the amplitude is what is left up to it: a sine cut on one side would change the
         mean torque.
         """
-        seconds, rest = divmod(now_ns, NANOSECONDS)
+        dithered = np.array(torque, dtype=float)
+        add_dither(now_ns, *self.arrays, dithered)
+        return dithered
+
+
+@njit(cache=True, error_model="numpy")
+def add_dither(
+    now_ns: int, amplitudes: Array, frequencies: Array, limits: Array, torque: Array
+) -> None:
+    """Add the sine of an instant [ns] to torques (n,) [N·m]; arrays as `Dither.arrays`."""
+    seconds, rest = now_ns // NANOSECONDS, now_ns % NANOSECONDS
+    for i in range(torque.shape[0]):
         # Whole cycles are left out first: the clock of a real machine counts 10⁹ s and more.
-        cycles = (self._frequencies * seconds) % 1.0 + self._frequencies * (rest / NANOSECONDS)
-        room = np.minimum(self._amplitudes, self._limits - np.abs(torque))
-        return np.asarray(torque + room * np.sin(2.0 * np.pi * cycles))
+        cycles = (frequencies[i] * seconds) % 1.0 + frequencies[i] * (rest / NANOSECONDS)
+        room = min(amplitudes[i], limits[i] - abs(torque[i]))
+        torque[i] += room * math.sin(2.0 * math.pi * cycles)
 
 
 def make_dither(

@@ -6,6 +6,7 @@ import numpy as np
 from numba import njit
 from numpy.typing import NDArray
 
+from cspm_control.controllers.dither import add_dither
 from cspm_control.controllers.force_controller import pi_torques
 from cspm_control.stages.force_stage import (
     CLIPPED_STEPS,
@@ -28,8 +29,10 @@ from cspm_msgs_py.schedule import (
 Array = NDArray[np.float64]
 Places = NDArray[np.int64]
 
-# Integers: columns in the row (-1: none), whether winches are released, and if torques are slewed.
-WANTED, MEASURED, WINCHES, OUT, INTERNALS, RELEASES, SLEWS, INTEGERS = range(8)
+# Integers: columns in the row (-1: none), whether winches are released and torques slewed, the
+# period [ns], and whether there is a dither.
+WANTED, MEASURED, WINCHES, OUT, INTERNALS = range(5)
+RELEASES, SLEWS, PERIOD, DITHERS, INTEGERS = range(5, 10)
 
 
 @njit(cache=True, error_model="numpy", _nrt=False)
@@ -45,6 +48,9 @@ def _kernel(step: int, row: Array, places: Places) -> int:
     out = row[first : first + n]
     period = numbers[0]
     limited = pi_torques(wanted, measured, ahead, gains, limits, period, integral, terms, out)
+    if integers[DITHERS] != 0:
+        amplitudes, frequencies = vector_at(places, 15), vector_at(places, 16)
+        add_dither(step * integers[PERIOD], amplitudes, frequencies, limits, out)
     finish(row, integers, counts, places)
     counts[STEPS] += 1
     counts[LIMITED_STEPS] += limited > 0
@@ -95,9 +101,9 @@ def finish(row: Array, integers: Places, counts: Places, places: Places) -> None
             row[integers[INTERNALS] + n + i] = terms[1, i]
 
 
-def force_phase(stage: ForceStage, slots: Slots) -> Phase | None:
-    """Return the stage as a phase, None where Python computes."""
-    extras = stage.bias, stage.friction, stage.winch, stage.dither
+def force_phase(stage: ForceStage, slots: Slots, period_ns: int) -> Phase | None:
+    """Return the stage as a phase of a step of `period_ns` [ns], None where Python computes."""
+    extras = stage.bias, stage.friction, stage.winch
     if any(extra is not None for extra in extras):
         return None
     n, step, found = len(stage.wanted), stage.limits.torque_step, stage.controller
@@ -106,6 +112,10 @@ def force_phase(stage: ForceStage, slots: Slots) -> Phase | None:
     integers[WINCHES], integers[OUT] = slots.first(WINCH_STATE), slots.first(TORQUE_COMMAND)
     damping = stage.release_damping
     integers[RELEASES], integers[SLEWS] = damping is not None, step is not None
+    integers[PERIOD], integers[DITHERS] = period_ns, stage.dither is not None
+    amplitudes, frequencies = np.zeros(n), np.zeros(n)
+    if stage.dither is not None:
+        amplitudes, frequencies, _ = stage.dither.arrays
     if stage.internals:
         integers[INTERNALS] = slots.first(FORCE_INTERNALS)
     return make_phase(
@@ -114,5 +124,6 @@ def force_phase(stage: ForceStage, slots: Slots) -> Phase | None:
         *(found.gains, found.torque_limits, found.terms, np.zeros(n), found.integral),
         *(stage.wanted, stage.measured, stage.tension_limits, stage.limits.trip, stage.torque),
         *(stage.released, np.zeros(n) if damping is None else damping),
+        *(amplitudes, frequencies),
         ready=lambda: stage.steady,
     )

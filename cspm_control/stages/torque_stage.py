@@ -19,7 +19,12 @@ Array = NDArray[np.float64]
 
 
 class TorqueStage(GuardedStage):
-    """Sends the prescribed motor torques; it knows no tension but that of its last torques."""
+    """Sends the prescribed motor torques; it knows no tension but that of its last torques.
+
+    Attributes:
+        generator: what prescribes them.
+        torque: last torques, (n,) [N·m].
+    """
 
     def __init__(
         self,
@@ -31,9 +36,9 @@ class TorqueStage(GuardedStage):
     ) -> None:
         """Take the torques, cable wound per radian (n,) [m], and the guard's arguments."""
         super().__init__(safe_state, safety, period_ns, len(radii))
-        self._generator = generator
+        self.generator = generator
         self._radii = radii
-        self._torque: Array | None = None
+        self.torque, self._has_torque = np.zeros(len(radii)), False
         self._start_ns = 0
 
     def start(self, start_ns: int) -> None:
@@ -46,8 +51,14 @@ class TorqueStage(GuardedStage):
         if self._latch.open:
             self._send_safe(now_ns, send)
             return
-        self._torque = self._generator.step(now_ns - self._start_ns)
-        self._send(now_ns, self._torque, send)
+        self.torque[:] = self.generator.step(now_ns - self._start_ns)
+        self._has_torque = True
+        self._send(now_ns, self.torque.copy(), send)
+
+    @property
+    def steady(self) -> bool:
+        """Whether it commands torques, and has done so since the time began."""
+        return self._has_torque and not self._latch.open and self._start_ns == 0
 
     def status(self) -> Status:
         """Return that all is well, since a prescribed torque has nothing to follow; or not."""
@@ -58,4 +69,4 @@ class TorqueStage(GuardedStage):
         """Nothing to start: the torques are those of the instant."""
 
     def _present_tensions(self) -> Array | None:
-        return None if self._torque is None else self._torque / self._radii
+        return self.torque / self._radii if self._has_torque else None

@@ -5,8 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable
 from dataclasses import dataclass
 
-from cspm_model.kernels.native import address_of
-from cspm_model.phase import PHASE, Phase
+from cspm_model.phase import Phase
 
 
 @dataclass
@@ -41,4 +40,4 @@ class Job:
     def address(self) -> int:
         """Return the kernel's address, 0 where Python is to do it."""
         phase = self.phase
-        return address_of(phase.kernel, PHASE) if phase is not None and phase.ready() else 0
+        return phase.address if phase is not None and phase.ready() else 0

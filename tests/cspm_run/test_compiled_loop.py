@@ -6,6 +6,8 @@ from loop_pairs import assert_same, with_stages
 from loops import WILD
 from run_samples import SCENARIOS, bundle_of
 
+from cspm_control.phases.make import stage_phase
+from cspm_model.phase import Slots
 from cspm_msgs_py.diagnostics import Level
 from cspm_msgs_py.scenario import load_scenario
 from cspm_msgs_py.testbed import EffectEntry
@@ -26,6 +28,8 @@ def test_every_scenario_is_the_same_bit_for_bit(name):
     assert_same(bundle_of(name, SHORT, sooner, "operation=[]"), STEPS)
 
 
+SINES = "[{amplitude: 0.05, frequency: 3, phase: 0.4}, {amplitude: 0.02, frequency: 11}]"
+TORQUES = f"{{mode: torque, torque: {{sway_3: {{offset: -0.2, sines: {SINES}}}}}}}"
 COMPUTED = "control.motion={law: computed_wrench, mass_adaptation: {}}"
 VARIANTS = {
     "internals": ("worst_case", "control.record_internals=true", "control.motion.gains=null"),
@@ -45,6 +49,18 @@ VARIANTS = {
     ),
     "removal": ("worst_case", "control.tension_distribution={method: removal}"),
     "slew": ("worst_case", "safety.torque_slew=1.0"),
+    "dither": ("worst_case", "control.force.dither={amplitude: 0.02, frequency: 37}"),
+    "dither and slew": (
+        "worst_case",
+        "control.force.dither={amplitude: {sway_3: 0.05}, frequency: 120}",
+        "safety.torque_slew=5.0",
+    ),
+    "torques": ("rest", f"control={TORQUES}"),
+    "torques and a cut cable": (
+        "rest",
+        f"control={TORQUES}",
+        "events=[{at: 0.1, cut: sway_3}]",
+    ),
     "trips": ("worst_case", "safety.tension_trip=8.5"),
     "trips and brakes": ("worst_case", "safety={tension_trip: 8.5, state: brake}"),
     "other rates": ("worst_case", "rates.motion_capture=200", "rates.winches=500"),
@@ -92,6 +108,20 @@ def test_every_kind_of_effect_is_the_same_bit_for_bit(effect):
     )
     changed = found.testbed.testbed.model_copy(update={"effects": (entry,)})
     assert_same(found, STEPS, lambda parts: assemble(parts.scenario, changed, SCENARIOS))
+
+
+@pytest.mark.compiled
+@pytest.mark.parametrize("name", ["dither", "dither and slew", "torques", "slew"])
+def test_torques_are_computed_in_compiled_code(name):
+    """Each of these settings has its phase: none of them is left to Python."""
+    scenario, *settings = VARIANTS[name]
+    bundle = bundle_of(scenario, SHORT, *settings)
+    parts = assemble(bundle.scenario, bundle.testbed.testbed, SCENARIOS)
+    (stage,) = (each for each in parts.stages if each.node == "force_controller")
+    slots = Slots()
+    topics = bundle.testbed.testbed.topics
+    slots.add({name: topics[name].width for name in parts.schedule.topics})
+    assert stage_phase(stage, slots, parts.schedule.period_ns) is not None
 
 
 class Python:

@@ -150,6 +150,9 @@ class StoreInlet(TaggedInlet):
         self._row_taker, self._store = row_taker, store
         # The publisher's identity and its next number.
         self._own = np.zeros(3, dtype=np.int64)
+        # Compiles or loads what takes them, so that the run's first messages need not wait for it.
+        times, rows = store.room()
+        row_taker.take_own(self._own, times[:0], rows[:0])
 
     def take(self) -> None:
         """Hand on or store what has come, of a flood its beginning."""

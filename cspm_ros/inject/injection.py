@@ -10,6 +10,7 @@ from typing import Any
 
 from rcl_interfaces.msg import Parameter, ParameterType, ParameterValue
 from rcl_interfaces.srv import GetParameters, SetParameters
+from rclpy.client import Client
 
 from cspm_msgs_py.errors import CspmError, InputError
 from cspm_msgs_py.graph import NODES
@@ -22,7 +23,8 @@ from cspm_ros.inject.fault_port import NAME
 
 PROCESS = "process"
 """The parameter by which each node in a process of its own says host and number of it."""
-_FINDING_S, _ANSWER_S = 5.0, 5.0
+# Nodes that are late in everything are late to answer.
+_FINDING_S, _ANSWER_S, _ATTEMPTS = 10.0, 1.0, 10
 
 
 def process_name() -> str:
@@ -94,6 +96,9 @@ def _kill(name: str, number: int) -> int:
 def _asked(session: Session, name: str, kind: Any, service: str, request: Any) -> Any:  # noqa: ANN401
     """Return a node's answer to a request of its parameters' services.
 
+    Before it, empty ones are sent until one is answered: an answer to somebody whom the node does
+    not know yet is lost, and the request itself must not be made twice.
+
     Raises:
         InputError: no such node.
         CspmError: it does not answer, or a signal came.
@@ -105,7 +110,18 @@ def _asked(session: Session, name: str, kind: Any, service: str, request: Any) -
         raise InputError(
             f"no node {name} in ROS domain {domain}, allowed: while a run is under way"
         )
-    future = client.call_async(request)
-    if not session.spin_until(future.done, _ANSWER_S):
-        raise CspmError(f"{name} does not answer within {_ANSWER_S:g} s")
-    return future.result()
+    for each, times in ((kind.Request(), _ATTEMPTS), (request, 1)):
+        answer = _answered(session, client, each, times)
+        if answer is None:
+            raise CspmError(f"{name} does not answer within {_ATTEMPTS * _ANSWER_S:g} s")
+    return answer
+
+
+def _answered(session: Session, client: Client, request: Any, times: int) -> Any:  # noqa: ANN401
+    """Return the answer to a request that is made so often at most, None if there is none."""
+    for _ in range(times):
+        future = client.call_async(request)
+        if session.spin_until(future.done, _ANSWER_S * _ATTEMPTS / times):
+            return future.result()
+        client.remove_pending_request(future)
+    return None

@@ -3,7 +3,7 @@
 from pathlib import Path
 
 import pytest
-from realtime_graph import Evidence, Graph, Witness, warm_processes
+from realtime_graph import LATE, Evidence, Graph, Witness, warm_processes
 from ros_graph import load_ros
 from scripted_lab import ScriptedLab, clamped_bundle
 
@@ -14,6 +14,7 @@ from cspm_ros.runtime.progress_file import read_report
 load_ros()
 pytestmark = [pytest.mark.slow, pytest.mark.realtime]
 SWAY_2 = 5
+PASSING = (*LATE, " jumped by ")
 
 
 @pytest.fixture(scope="module")
@@ -49,10 +50,11 @@ class Run:
         """Reset once the lab is itself again."""
         self.witness.until(lambda: self.lab.arrived, "the bar in its place")
         self.witness.until_reset(FORCE_CONTROLLER)
-        self.witness.until_running(FORCE_CONTROLLER)
+        # The jump back may be reported after it.
+        self.witness.until_running(FORCE_CONTROLLER, passing=PASSING)
         # Longer than a window of torques after their brakes may have opened.
         self.witness.until_more(TENSION, 200)
-        self.witness.until_running(FORCE_CONTROLLER)
+        self.witness.until_running(FORCE_CONTROLLER, passing=PASSING)
 
 
 def waiting(graph):
@@ -108,7 +110,11 @@ def test_each_kind_of_nonsense_leads_to_the_safe_state_with_its_reason(warm, tmp
         run.graph.send(RECORDER, 2)
         assert set(run.graph.join().values()) == {0}
     recorded = [reason for _, reason in Evidence(tmp_path / "recording").alarms(FORCE_CONTROLLER)]
-    assert recorded == reasons
+    # In this order, and besides them nothing but what passes by itself.
+    later = iter(recorded)
+    assert all(reason in later for reason in reasons)
+    others = [reason for reason in recorded if reason not in reasons]
+    assert all(any(each in reason for each in PASSING) for reason in others)
 
 
 def test_a_run_does_not_begin_outside_the_workspace(warm, tmp_path):

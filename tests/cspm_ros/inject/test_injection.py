@@ -7,7 +7,7 @@ from functools import partial
 import numpy as np
 import pytest
 from cspm_process import CSPM
-from realtime_graph import Evidence, Graph, Witness, slow_bundle, warm_processes
+from realtime_graph import LATE, Evidence, Graph, Witness, slow_bundle, warm_processes
 from ros_graph import assert_same, load_ros, new_domain
 from run_samples import bundle_of
 
@@ -126,7 +126,7 @@ def test_each_fault_is_ridden_out_or_answered_with_the_safe_state(tmp_path):
             witness.until_said(PLANT, lambda s: not s.values.get("faults"), "no fault")
             witness.until_reset(FORCE_CONTROLLER)
             # The jump back is reported after it.
-            witness.until_running(*GUARDS, passing=(" stale: ", " jumped by "))
+            witness.until_running(*GUARDS, passing=(*LATE, " jumped by "))
         with pytest.raises(InputError, match=r"^on surge_9, allowed: hoist_1, "):
             inject(fault("winch_weak", on="surge_9", amount=0.5), domain_id=graph.domain)
         assert kill_node(FORCE_CONTROLLER, domain_id=graph.domain) in {

@@ -147,6 +147,10 @@ class Graph:
             process.close()
 
 
+# What a busy computer does to a run that is in order.
+LATE = (" stale: ", "no /winches/torque_command for ")
+
+
 class Witness:
     """A foreign node on a run's domain: it hears diagnostics and counts messages, and may speak."""
 
@@ -188,7 +192,7 @@ class Witness:
         """Listen until a guard says that it is in a state; return what it says."""
         return self.until_said(name, lambda s: s.values.get("state") == state, state)
 
-    def until_running(self, *guards, passing=(" stale: ",)):
+    def until_running(self, *guards, passing=LATE):
         """Listen until the run is under way and all is well.
 
         A busy computer may keep a node waiting for half a second at the start, and what a fault

@@ -60,13 +60,13 @@ def main() -> None:
     parser.add_argument("--one-process", action="store_true", help="all nodes in one process")
     parser.add_argument("--figure", type=Path, help="a picture of the histograms")
     arguments = parser.parse_args()
-    alone = wakes(ALONE_S)
+    machine, alone = describe_machine(), wakes(ALONE_S)
     runner = run_realtime if arguments.one_process else partial(run_processes, mode="realtime")
     with tempfile.TemporaryDirectory(prefix="cspm-bench-") as place:
         bundle = calm(60.0 * arguments.minutes)
         result = runner(bundle, Path(place) / "run", domain_id=DOMAIN_ID)
     console = Console(width=100)
-    for key, value in describe_machine().items():
+    for key, value in machine.items():
         console.print(f"{key}: {value}")
     _print(console, result, alone)
     if arguments.figure is not None and result.delays is not None:

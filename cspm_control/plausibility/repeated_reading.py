@@ -19,8 +19,9 @@ _ONCE_IN = 1e12
 class RepeatedReading:
     """Finds a noisy reading that stays the same, to the last bit, for as long as silence may last.
 
-    Only where readings have shown noise before: a driver that repeats a constant from the start, or
-    simulates without noise, is not stuck.
+    Only where readings have shown noise before, however long ago: while the bar moves its motion
+    hides the noise. A driver that repeats a constant from the start, or simulates without noise, is
+    not stuck.
 
     Noise of standard deviation σ, rounded to r, gives two equal readings of a quantity at rest with
     the probability r/(2·√π·σ), that of all quantities with the product.
@@ -40,6 +41,7 @@ class RepeatedReading:
         self._row: Array | None = None
         self._change: Array | None = None
         self._turns: Array | None = None
+        self._noisy = False
         self._since_ns, self._count = 0, 0
 
     def fault(self, stamp_ns: int, row: Array) -> str | None:
@@ -50,16 +52,12 @@ class RepeatedReading:
             return None
         self._count += 1
         age = stamp_ns - self._since_ns
-        if self._count < self._least or age <= self._allowed_ns or not self._was_noisy:
+        if self._count < self._least or age <= self._allowed_ns or not self._noisy:
             return None
         return (
             f"{self._topic}: the same reading for {age * 1e-6:.0f} ms, allowed:"
             f" {self._allowed_ns * 1e-6:g} ms (safety.stale_after)"
         )
-
-    @property
-    def _was_noisy(self) -> bool:
-        return self._turns is not None and bool(self._turns.max() >= _TURNS)
 
     def _note(self, row: Array) -> None:
         """Take another reading: count the turns of late of each quantity, and keep it."""
@@ -69,6 +67,7 @@ class RepeatedReading:
                 turned = change * self._change < 0.0
                 before = np.zeros(len(row)) if self._turns is None else self._turns
                 self._turns = before * (1.0 - 1.0 / _WINDOW) + turned
+                self._noisy = self._noisy or bool(self._turns.max() >= _TURNS)
             self._change = change
         self._row = row.copy()
 

@@ -30,6 +30,14 @@ def test_a_noisy_sensor_may_repeat_as_long_as_silence_is_allowed():
     assert found[-1] == f"{POSE}: {FROZEN}"
 
 
+def test_a_motion_that_hides_the_noise_does_not_hide_a_stuck_sensor():
+    moving = 1.0 + 0.05 * np.arange(1.0, 201.0)[:, None]
+    rows = [*noise(), *moving, *[moving[-1]] * 6]
+    found = judged(RepeatedReading(POSE, [0.001], [0.0], ALLOWED), rows)
+    assert found[:-1] == [None] * (len(rows) - 1)
+    assert found[-1] == f"{POSE}: {FROZEN}"
+
+
 def test_what_never_was_noisy_may_repeat_for_ever():
     """A driver that repeats a constant, and one that simulates without noise and comes to rest."""
     constant = [[1.0]] * 300

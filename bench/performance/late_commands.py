@@ -16,27 +16,15 @@ from rich.table import Table
 
 from bench.performance.graph_speed import DOMAIN_ID
 from bench.performance.host import describe_machine
-from bench.performance.thesis_machine import SCENARIOS
-from cspm_msgs_py.scenario import load_scenario
+from bench.performance.thesis_machine import shipped
 from cspm_msgs_py.stepping.delay_histogram import UP_TO_MS, DelayHistogram
-from cspm_msgs_py.testbed import load_testbed
 from cspm_ros.runtime.process_run import run_processes
 from cspm_ros.runtime.realtime_run import run_realtime
-from cspm_run.assembly import resolve
-from cspm_run.bundle import Bundle, make_bundle
 from cspm_run.run_result import RunResult
 
 PERIOD_NS = 1_000_000
 SLOW = ("motion_capture", "motion_controller", "tension_distribution")
 ALONE_S = 20.0
-
-
-def calm(duration: float) -> Bundle:
-    """Return the calm sea at the rates of the thesis's machine, for `duration` [s]."""
-    overrides = [f"duration={duration}", *(f"rates.{name}=100" for name in SLOW)]
-    scenario = load_scenario(SCENARIOS / "calm.yaml", overrides)
-    testbed = load_testbed(SCENARIOS / scenario.testbed)
-    return make_bundle(resolve(scenario, testbed.testbed), testbed, SCENARIOS)
 
 
 def wakes(seconds: float) -> DelayHistogram:
@@ -63,7 +51,8 @@ def main() -> None:
     machine, alone = describe_machine(), wakes(ALONE_S)
     runner = run_realtime if arguments.one_process else partial(run_processes, mode="realtime")
     with tempfile.TemporaryDirectory(prefix="cspm-bench-") as place:
-        bundle = calm(60.0 * arguments.minutes)
+        rates = [f"rates.{name}=100" for name in SLOW]
+        bundle = shipped("calm", f"duration={60.0 * arguments.minutes}", *rates)
         result = runner(bundle, Path(place) / "run", domain_id=DOMAIN_ID)
     console = Console(width=100)
     for key, value in machine.items():

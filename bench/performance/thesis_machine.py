@@ -29,7 +29,12 @@ FRICTION = (
 
 def worst_case(duration: float) -> Bundle:
     """Return the worst case, resolved, for `duration` [s]."""
-    scenario = load_scenario(SCENARIOS / "worst_case.yaml", [f"duration={duration}"])
+    return shipped("worst_case", f"duration={duration}")
+
+
+def shipped(name: str, *overrides: str) -> Bundle:
+    """Return one of the shipped scenarios, resolved."""
+    scenario = load_scenario(SCENARIOS / f"{name}.yaml", overrides)
     testbed = load_testbed(SCENARIOS / scenario.testbed)
     return make_bundle(resolve(scenario, testbed.testbed), testbed, SCENARIOS)
 

@@ -147,6 +147,7 @@ class StoreInlet(TaggedInlet):
         store: RowStore,
     ) -> None:
         super().__init__(topic, handle, taker, receive, numbered=True)
+        self._numbers = self._own_numbers = SequenceNumbers()
         self._row_taker, self._store = row_taker, store
         # The publisher's identity and its next number.
         self._own = np.zeros(3, dtype=np.int64)
@@ -158,8 +159,7 @@ class StoreInlet(TaggedInlet):
         """Hand on or store what has come, of a flood its beginning."""
         left = _AT_ONCE
         while left > 0:
-            following = self._numbers.following if self._numbers is not None else None
-            publisher = self._store.publisher
+            publisher, following = self._store.publisher, self._own_numbers.following
             if publisher is None or following is None:
                 super().take()
                 return
@@ -167,17 +167,14 @@ class StoreInlet(TaggedInlet):
             self._own[2] = following
             times, rows = self._store.room()
             count, other = self._row_taker.take_own(self._own, times, rows)
-            self._note(count)
+            if count:
+                self._own_numbers.skip(count)
+                self._store.stored(count)
             if other is not None:
                 self._hand_on(other)
             elif count < len(rows):
                 return
             left -= count + 1
-
-    def _note(self, count: int) -> None:
-        if count and self._numbers is not None:
-            self._numbers.skip(count)
-            self._store.stored(count)
 
 
 class BlockInlet:

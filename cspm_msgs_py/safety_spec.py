@@ -29,6 +29,8 @@ class Safety(StrictModel):
         stop_heartbeat: longest silence of the emergency stop [s]; None: it may be silent.
         workspace: largest distance of a body from its mean position [m]; None: the machine's size.
         pose_speed: largest speed of a body's points [m/s]; None: what the cables can give the bar.
+        pose_acceleration: largest acceleration of a body's points [m/s²], beyond which a pose
+            trembles by more than its sensor's noise; None: what the cables can give the bar.
         following_error: largest distance of the bar's points from where they are wanted [m]; None:
             half the machine's size.
         torque_mismatch: torque at the motor shaft by which tension and motion may be missed [N·m];
@@ -44,5 +46,6 @@ class Safety(StrictModel):
     stop_heartbeat: Wait | None = None
     workspace: PositiveFloat | None = None
     pose_speed: PositiveFloat | None = None
+    pose_acceleration: PositiveFloat | None = None
     following_error: PositiveFloat | None = None
     torque_mismatch: PositiveFloat | None = None

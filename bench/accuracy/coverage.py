@@ -13,17 +13,21 @@ from __future__ import annotations
 import argparse
 import json
 from collections.abc import Callable, Iterator, Sequence
+from concurrent.futures import Executor, as_completed
+from functools import partial
 from pathlib import Path
 from typing import NamedTuple, Protocol
 
 import numpy as np
 from rich.console import Console
+from rich.progress import Progress
 from rich.table import Table
 from scipy.optimize import least_squares
 from scipy.signal import lfilter
 from scipy.stats import beta
 
 from bench.accuracy.rig_coverage import RigDamping, RigStiffness
+from cspm.campaign.cluster import worker_pool
 from cspm_ident.estimation import Interval, Parameter, Problem, Record, fit, fit_linear
 
 PLAIN = "plain least squares"
@@ -204,6 +208,7 @@ def measure_coverage(
     seed: int,
     advance: Callable[[], None] = lambda: None,
     kept: Path | None = None,
+    pool: Executor | None = None,
 ) -> list[Count]:
     """Simulate and estimate `runs` times; run k uses the random numbers of (seed, k).
 
@@ -214,24 +219,43 @@ def measure_coverage(
         advance: called after each run.
         kept: a file to which each run's intervals are added as a line of JSON, and from which those
             of runs already made are taken.
+        pool: makes the runs; None: this process, one after another.
     """
     study = (type(experiment).__name__, seed)
     known = _kept_runs(kept, *study)
+    for _ in known.keys() & range(runs):
+        advance()
+    missing = [run for run in range(runs) if run not in known]
+    for run, drawn in _runs(experiment, seed, missing, pool):
+        known[run] = drawn
+        _keep(kept, *study, run, drawn)
+        advance()
     inside: dict[str, np.ndarray] = {}
     for run in range(runs):
-        if run not in known:
-            drawn = experiment.intervals(np.random.default_rng([seed, run]))
-            known[run] = dict(drawn)
-            _keep(kept, *study, run, known[run])
         for method, ends in known[run].items():
             held = (ends[:, 0] <= experiment.truth) & (experiment.truth <= ends[:, 1])
             inside[method] = inside.get(method, 0) + held.astype(int)
-        advance()
     return [
         Count(method, name, int(found), runs)
         for method, counts in inside.items()
         for name, found in zip(experiment.names, counts, strict=True)
     ]
+
+
+def _runs(
+    experiment: Experiment, seed: int, missing: Sequence[int], pool: Executor | None
+) -> Iterator[tuple[int, dict[str, np.ndarray]]]:
+    """Yield runs and their intervals, as they are made."""
+    if pool is None:
+        yield from ((run, _run(experiment, seed, run)) for run in missing)
+        return
+    begun = {pool.submit(_run, experiment, seed, run): run for run in missing}
+    for each in as_completed(begun):
+        yield begun[each], each.result()
+
+
+def _run(experiment: Experiment, seed: int, run: int) -> dict[str, np.ndarray]:
+    return dict(experiment.intervals(np.random.default_rng([seed, run])))
 
 
 def _kept_runs(kept: Path | None, experiment: str, seed: int) -> dict[int, dict[str, np.ndarray]]:
@@ -258,6 +282,31 @@ def _keep(
 
 def main() -> None:
     """Run the command line."""
+    arguments = _arguments()
+    console = Console()
+    experiments: tuple[Experiment, ...] = (Winch(arguments.seconds), Spring())
+    if arguments.system:
+        # It needs MuJoCo.
+        from bench.accuracy.system_coverage import System
+
+        experiments = (System(),)
+    elif arguments.rig:
+        experiments = (RigStiffness(), RigDamping())
+    with worker_pool(arguments.workers) as pool, Progress(console=console, transient=True) as bar:
+        for experiment in experiments:
+            task = bar.add_task(type(experiment).__name__, total=arguments.runs)
+            counts = measure_coverage(
+                experiment,
+                arguments.runs,
+                arguments.seed,
+                advance=partial(bar.advance, task),
+                kept=arguments.keep,
+                pool=pool,
+            )
+            console.print(table_of(experiment.__class__.__doc__, counts))
+
+
+def _arguments() -> argparse.Namespace:
     parser = argparse.ArgumentParser(prog="python -m bench.accuracy.coverage", description=__doc__)
     parser.add_argument("--runs", type=int, default=200, metavar="N", help="per experiment")
     parser.add_argument(
@@ -276,19 +325,10 @@ def main() -> None:
         metavar="FILE",
         help="add each run's intervals to it, and leave out the runs that it has",
     )
-    arguments = parser.parse_args()
-    console = Console()
-    experiments: tuple[Experiment, ...] = (Winch(arguments.seconds), Spring())
-    if arguments.system:
-        # It needs MuJoCo.
-        from bench.accuracy.system_coverage import System
-
-        experiments = (System(),)
-    elif arguments.rig:
-        experiments = (RigStiffness(), RigDamping())
-    for experiment in experiments:
-        counts = measure_coverage(experiment, arguments.runs, arguments.seed, kept=arguments.keep)
-        console.print(table_of(experiment.__class__.__doc__, counts))
+    parser.add_argument(
+        "--workers", type=int, metavar="N", help="processes (default: one per processor)"
+    )
+    return parser.parse_args()
 
 
 def table_of(title: str | None, counts: Sequence[Count]) -> Table:

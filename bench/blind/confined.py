@@ -11,8 +11,10 @@ from __future__ import annotations
 import json
 import os
 import site
+import stat
 import sys
 import sysconfig
+import threading
 import traceback
 from pathlib import Path
 
@@ -56,12 +58,25 @@ def confine(room: Path) -> None:
     sys.addaudithook(guard)
 
 
+def end_with_parent() -> None:
+    """End this process, from now on, when the other end of the pipe at its input is closed."""
+    if stat.S_ISFIFO(os.fstat(0).st_mode):
+        threading.Thread(target=_end_at_last_byte, daemon=True).start()
+
+
+def _end_at_last_byte() -> None:
+    while os.read(0, 1):
+        pass
+    os._exit(1)
+
+
 def main() -> None:
     """Diagnose the recording named first by the methods named after it.
 
     Of each, its diagnosis and its processor time [s], or why there are none.
     """
     recording, *methods = sys.argv[1:]
+    end_with_parent()
     confine(Path.cwd())
     from bench.blind.scoring.method import Methods
 

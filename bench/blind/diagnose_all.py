@@ -10,21 +10,18 @@ import sys
 import tempfile
 import time
 from collections.abc import Callable, Mapping, Sequence
-from concurrent.futures import ThreadPoolExecutor, as_completed
+from concurrent.futures import as_completed
 from pathlib import Path
-from threading import Event
 
 from bench.blind.jobs import jobs_of
 from bench.blind.scoring.method import CSPM, require_method
 from bench.blind.truth import RECORDINGS, results_of
+from cspm.campaign.cluster import worker_pool
 from cspm_msgs_py.errors import InputError
 
 DIAGNOSIS, TIMES, FAILURE = "diagnosis.json", "times.json", "failure.txt"
 _KEPT = ("PATH", "LANG", "LD_LIBRARY_PATH", "VIRTUAL_ENV")
 _THREADS = ("NUMBA_NUM_THREADS", "OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS")
-
-# Within which a process is killed when the run is ended [s].
-_NOTICED_S = 0.2
 
 Tell = Callable[[str, int, int], None]
 
@@ -61,19 +58,18 @@ def run(
             f"{folder}: no {RECORDINGS}, allowed: a folder of `python -m bench.blind make`"
         )
     tell(f"diagnosing {len(names)} recordings", 0, len(names))
-    ended = Event()
-    with ThreadPoolExecutor(processes) as pool:
+    # Made here, so that nothing is left of a worker that is ended.
+    with tempfile.TemporaryDirectory(prefix="cspm-blind-") as rooms, worker_pool(processes) as pool:
+        program = (sys.executable, Path(rooms))
         begun = {
-            pool.submit(_diagnose, recordings / name, _places(folder, methods, name), ended): name
+            pool.submit(
+                _diagnose, *program, recordings / name, _places(folder, methods, name)
+            ): name
             for name in names
         }
-        try:
-            for done, task in enumerate(as_completed(begun), start=1):
-                task.result()
-                tell(f"diagnosed {begun[task]}", done, len(names))
-        finally:
-            ended.set()
-            pool.shutdown(cancel_futures=True)
+        for done, task in enumerate(as_completed(begun), start=1):
+            task.result()
+            tell(f"diagnosed {begun[task]}", done, len(names))
     return _failures(folder, methods, names)
 
 
@@ -91,45 +87,35 @@ def _failures(folder: Path, methods: Sequence[str], names: Sequence[str]) -> dic
     return failed
 
 
-def _diagnose(recording: Path, places: Mapping[str, Path], ended: Event) -> None:
+def _diagnose(python: str, rooms: Path, recording: Path, places: Mapping[str, Path]) -> None:
     """Diagnose a recording by the methods without a result; each result goes to its place.
 
-    Nothing is kept of a process during which the run was ended.
+    Nothing is kept of a process whose worker is ended: it ends with it, by its pipe.
     """
     missing = {method: place for method, place in places.items() if not place.exists()}
-    if not missing or ended.is_set():
+    if not missing:
         return
-    with tempfile.TemporaryDirectory(prefix="cspm-blind-") as room:
+    with tempfile.TemporaryDirectory(dir=rooms) as room:
         copy = Path(room) / recording.name
         shutil.copytree(recording, copy)
         begun = time.perf_counter()
-        process = subprocess.Popen(
-            [sys.executable, "-m", "bench.blind.confined", copy.name, *missing],
+        with subprocess.Popen(
+            [python, "-m", "bench.blind.confined", copy.name, *missing],
             cwd=room,
             env=environment(Path(room)),
+            stdin=subprocess.PIPE,
             stdout=subprocess.DEVNULL,
             stderr=subprocess.PIPE,
             text=True,
-            # Ctrl-C is the parent's, which then keeps nothing of what it kills.
+            # Ctrl-C is the command's, whose workers then end.
             start_new_session=True,
-        )
-        error = _said(process, ended)
+        ) as process:
+            assert process.stderr is not None
+            error = process.stderr.read()
         wall = time.perf_counter() - begun
-        if ended.is_set():
-            return
         said = error.strip() or f"exit {process.returncode}, nothing said"
         for method, place in missing.items():
             _keep(Path(room), method, place, said, wall)
-
-
-def _said(process: subprocess.Popen[str], ended: Event) -> str:
-    """Wait for a process, and return what it said of errors; kill it when the run is ended."""
-    while True:
-        try:
-            return process.communicate(timeout=_NOTICED_S)[1]
-        except subprocess.TimeoutExpired:
-            if ended.is_set():
-                process.kill()
 
 
 def _keep(room: Path, method: str, place: Path, said: str, wall: float) -> None:

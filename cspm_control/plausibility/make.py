@@ -7,9 +7,13 @@ The defaults follow from the machine:
 - No point is faster than √(2·a·size), with a what all cables at their upper limits and gravity
   give the bar: falling, or pulled, from one end of the workspace to the other. On the thesis's
   machine that is 11.9 m/s, where the shipped scenarios reach 2.1 m/s.
+- A pose trembles no more than its sensor's noise and those accelerations explain; off the middle of
+  the bar a force accelerates a point more, because the bar turns.
 - The bar is within half the size of its reference. In the first minute of the shipped scenarios it
   is within 0.44 (`worst_case_steep`), but for those in which the loop loses it: `worst_case_4m`,
   `worst_case_steep_4m` and `worst_case_literal`, more than 1 m off.
+- A motor accelerates no more than its largest torque and the tension at which the guard trips turn
+  its rotor.
 - A reading repeats no longer than silence is allowed, where the sensor's noise makes that certain.
 - Torque may be off by a twentieth of the motor's limit, or half of what the tension needs. Healthy
   runs of the shipped scenarios are off by 0.014 of the limit; dry friction comes on top.
@@ -23,9 +27,12 @@ from dataclasses import dataclass, field
 import numpy as np
 from numpy.typing import NDArray
 
+from cspm_control.plausibility.drive_motion import DriveMotion
 from cspm_control.plausibility.pose_limits import FollowingError, PoseLimits
+from cspm_control.plausibility.pose_noise import PoseNoise, point_accelerations, points_noise
 from cspm_control.plausibility.repeated_reading import RepeatedReading
 from cspm_control.plausibility.torque_balance import TorqueBalance
+from cspm_msgs_py.safety_spec import Safety
 from cspm_msgs_py.scenario import Scenario
 from cspm_msgs_py.schedule import (
     BAR_POSE,
@@ -36,7 +43,7 @@ from cspm_msgs_py.schedule import (
     WINCH_STATE,
     schedule_of,
 )
-from cspm_msgs_py.sensor_spec import quantities
+from cspm_msgs_py.sensor_spec import Sensor, quantities
 from cspm_msgs_py.testbed import Testbed
 
 Array = NDArray[np.float64]
@@ -51,13 +58,17 @@ class MachinePlausibility:
 
     Attributes:
         poses: limits of bodies, by the topic of their poses.
+        noise: what those poses may tremble, likewise.
         following: of the bar, where the node reads its reference.
+        motion: of the winches, where the node reads their states.
         balance: of the winches, where the node reads tensions and states.
         repeated: of sensors with noise, by topic.
     """
 
     poses: Mapping[str, PoseLimits] = field(default_factory=dict)
+    noise: Mapping[str, PoseNoise] = field(default_factory=dict)
     following: FollowingError | None = None
+    motion: DriveMotion | None = None
     balance: TorqueBalance | None = None
     repeated: Mapping[str, RepeatedReading] = field(default_factory=dict)
 
@@ -65,12 +76,16 @@ class MachinePlausibility:
         self, topic: str, stamp_ns: int, row: Array, rows: Mapping[str, Array], *, running: bool
     ) -> str | None:
         """Take a message; see `cspm_msgs_py.stepping.plausibility`."""
-        for judges in (self.repeated, self.poses):
+        for judges in (self.repeated, self.poses, self.noise):
             fault = judges[topic].fault(stamp_ns, row) if topic in judges else None
             if fault is not None:
                 return fault
         if topic == BAR_POSE and self.following is not None and BAR_REFERENCE in rows:
             return self.following.fault(row, rows[BAR_REFERENCE], running=running)
+        if topic == WINCH_STATE and self.motion is not None:
+            fault = self.motion.fault(stamp_ns, row)
+            if fault is not None:
+                return fault
         if topic == WINCH_STATE and self.balance is not None and TENSION in rows:
             return self.balance.fault(stamp_ns, row, rows[TENSION], running=running)
         return None
@@ -90,22 +105,49 @@ def make_plausibility(node: str, scenario: Scenario, testbed: Testbed) -> Machin
     schedule = schedule_of(scenario, testbed)
     plan, safety = schedule.nodes[node], scenario.safety
     read = {*plan.inputs, *plan.held}
-    poses = {}
+    poses, noise = {}, {}
     if testbed.bar is not None:
-        size, points = machine_size(testbed), body_points(testbed)
         speed = safety.pose_speed or fastest(testbed)
-        for topic, (middle, of_body) in _bodies(scenario, points).items():
+        reach = safety.workspace or machine_size(testbed)
+        for topic, (middle, points) in _bodies(scenario, body_points(testbed)).items():
             if topic in read:
                 period_ns = schedule.topics[topic].divider * schedule.period_ns
-                reach = safety.workspace or size
-                poses[topic] = PoseLimits(topic, middle, of_body, reach, speed, period_ns)
-    following = balance = None
+                poses[topic] = PoseLimits(topic, middle, points, reach, speed, period_ns)
+                noise[topic] = _pose_noise(topic, points, safety, testbed, period_ns)
+    following = motion = balance = None
     if {BAR_POSE, BAR_REFERENCE} <= read:
         most = safety.following_error or FOLLOWING_SHARE * machine_size(testbed)
         following = FollowingError(body_points(testbed)[1], most)
+    if WINCH_STATE in read:
+        each = schedule.topics[WINCH_STATE]
+        motion = drive_motion(scenario, testbed, each.divider * schedule.period_ns)
     if {WINCH_STATE, TENSION} <= read:
         balance = torque_balance(scenario, testbed)
-    return MachinePlausibility(poses, following, balance, _repeated(scenario, testbed, read))
+    repeated = _repeated(scenario, testbed, read)
+    return MachinePlausibility(poses, noise, following, motion, balance, repeated)
+
+
+def _pose_noise(
+    topic: str, points: Array, safety: Safety, testbed: Testbed, period_ns: int
+) -> PoseNoise:
+    """Return what finds noise on a body's pose; its origin is one of the points."""
+    points = np.vstack([np.zeros(3), points])
+    if safety.pose_acceleration:
+        accelerations = np.full(len(points), safety.pose_acceleration)
+    elif topic == BAR_POSE:
+        accelerations = bar_accelerations(points, testbed)
+    else:
+        accelerations = np.full(len(points), largest_acceleration(testbed))
+    noise = np.zeros(len(points))
+    if topic in testbed.sensors:
+        position, orientation = _deviations(testbed.sensors[topic])
+        noise = points_noise(points, position, orientation)
+    return PoseNoise(topic, points, accelerations, noise, period_ns)
+
+
+def _deviations(sensor: Sensor) -> Array:
+    """Return the standard deviation of each quantity; a step of r is uniform noise of r/√12."""
+    return np.hypot(sensor.noise, np.array(sensor.resolution) / np.sqrt(12.0))
 
 
 def _repeated(
@@ -145,15 +187,52 @@ def machine_size(testbed: Testbed) -> float:
 
 def fastest(testbed: Testbed) -> float:
     """Return the speed [m/s] beyond which no point of a machine with a bar moves."""
+    return float(np.sqrt(2.0 * largest_acceleration(testbed) * machine_size(testbed)))
+
+
+def largest_acceleration(testbed: Testbed) -> float:
+    """Return what gravity and all cables at their upper limits give a bar without turning it."""
     assert testbed.bar is not None
-    pull = sum(
-        cable.tension_limits[1]
-        if cable.tension_limits
-        else cable.torque_limit * cable.gear_ratio / cable.drum_radius
-        for cable in testbed.cables
+    return float(_pulls(testbed).sum() / testbed.bar.mass + testbed.gravity)
+
+
+def bar_accelerations(points: Array, testbed: Testbed) -> Array:
+    """Return what gravity and all cables, at their upper limits, give points of it, (k,) [m/s²]."""
+    bar = testbed.bar
+    assert bar is not None
+    attachments, pulls = body_points(testbed)[1], _pulls(testbed)
+    found = point_accelerations(
+        points, attachments, pulls, bar.mass, bar.inertia.matrix, np.array(bar.com)
     )
-    acceleration = pull / testbed.bar.mass + testbed.gravity
-    return float(np.sqrt(2.0 * acceleration * machine_size(testbed)))
+    return found + testbed.gravity
+
+
+def _pulls(testbed: Testbed) -> Array:
+    """Return how hard each cable can pull [N]."""
+    return np.array(
+        [
+            cable.tension_limits[1]
+            if cable.tension_limits
+            else cable.torque_limit * cable.gear_ratio / cable.drum_radius
+            for cable in testbed.cables
+            if cable.has_cable
+        ]
+    )
+
+
+def drive_motion(scenario: Scenario, testbed: Testbed, period_ns: int) -> DriveMotion:
+    """Return what the motors of a machine can do, with readings in so many ns."""
+    cables, trip = testbed.cables, scenario.safety.tension_trip
+    torques = []
+    for cable in cables:
+        tension = trip or 2.0 * (cable.tension_limits[1] if cable.tension_limits else 0.0)
+        torques.append(cable.torque_limit + tension * cable.drum_radius / cable.gear_ratio)
+    accelerations = np.array(torques) / np.array([cable.rotor_inertia for cable in cables])
+    noise = (0.0, 0.0)
+    if WINCH_STATE in testbed.sensors:
+        angle, speed, _ = _deviations(testbed.sensors[WINCH_STATE])
+        noise = (angle, speed)
+    return DriveMotion(testbed.cable_names, accelerations, noise, period_ns)
 
 
 def torque_balance(scenario: Scenario, testbed: Testbed) -> TorqueBalance:

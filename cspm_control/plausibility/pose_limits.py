@@ -66,7 +66,8 @@ class PoseLimits:
 class FollowingError:
     """Finds a bar that does not follow its reference.
 
-    After the safe state, in which nobody follows, the bar has to come near first.
+    After the safe state, in which nobody follows, the bar has to come near first: to half of the
+    limit, because one that was held at the limit sags beyond before it is drawn nearer.
     """
 
     def __init__(self, points: Array, limit: float) -> None:
@@ -76,11 +77,8 @@ class FollowingError:
     def fault(self, pose: Array, reference: Array, *, running: bool) -> str | None:
         """Take rows of pose (7,) and reference (19,) [m]; return how far off, None if near."""
         error = farthest(pose, reference, self._points)
-        if error <= self._limit:
-            self._armed = True
-            return None
-        if not (running and self._armed):
-            self._armed = False
+        self._armed = error <= 0.5 * self._limit or (running and self._armed)
+        if error <= self._limit or not self._armed:
             return None
         return (
             f"{BAR_POSE}: {error:.3g} m from {BAR_REFERENCE}, allowed: at most {self._limit:.3g} m"
@@ -94,8 +92,8 @@ def farthest(row: Array, other: Array, points: Array) -> float:
     most = 0.0
     for i in range(points.shape[0]):
         square = 0.0
-        first = _placed(row, points[i])
-        second = _placed(other, points[i])
+        first = placed(row, points[i])
+        second = placed(other, points[i])
         for axis in range(3):
             square += (first[axis] - second[axis]) ** 2
         most = max(most, square)
@@ -103,7 +101,7 @@ def farthest(row: Array, other: Array, points: Array) -> float:
 
 
 @njit(cache=True, error_model="numpy")
-def _placed(row: Array, point: Array) -> tuple[float, float, float]:
+def placed(row: Array, point: Array) -> tuple[float, float, float]:
     """Return the world's coordinates of a body's point: p + 2·(w·(v×r) + v×(v×r)) + r."""
     x, y, z, w = row[3], row[4], row[5], row[6]
     cx = y * point[2] - z * point[1]

@@ -14,7 +14,7 @@ from cspm_sim.plant import Plant
 DOCS = Path(__file__).resolve().parents[2] / "docs"
 FILES = "\n".join(
     (DOCS / "reference" / f"{name}.md").read_text(encoding="utf-8")
-    for name in ("testbed-file", "scenario-file", "control-section")
+    for name in ("testbed-file", "scenario-file", "control-section", "safety")
 )
 EXAMPLE = re.compile(r"<!-- (testbed|scenario): (\S+) -->\n```yaml\n(.*?)```", re.DOTALL)
 NUMBERS = re.compile(r"<!-- numbers: (\w+) -->\n.*?<!-- end -->", re.DOTALL)

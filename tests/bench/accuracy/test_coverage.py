@@ -15,6 +15,7 @@ from bench.accuracy.coverage import (
     measure_coverage,
     table_of,
 )
+from cspm.campaign.cluster import worker_pool
 
 RUNS = 60
 # With a coverage of 90 to 97 % no more than one in a thousand experiments of 60 runs ends outside.
@@ -99,6 +100,21 @@ def test_runs_that_were_kept_are_not_made_again(tmp_path):
     third = Dice()
     measure_coverage(third, 3, seed=1, kept=file)
     assert third.options == 3
+
+
+@pytest.mark.slow
+def test_runs_in_other_processes_give_the_same(tmp_path):
+    """Each run has random numbers of its own, whoever makes it, in which order ever."""
+    file = tmp_path / "runs.jsonl"
+    done = []
+    measure_coverage(Spring(), 1, seed=3, kept=file)
+    with worker_pool(2) as pool:
+        found = measure_coverage(
+            Spring(), 4, seed=3, advance=lambda: done.append(1), kept=file, pool=pool
+        )
+    assert len(done) == 4
+    assert len(file.read_text(encoding="utf-8").splitlines()) == 4
+    assert found == measure_coverage(Spring(), 4, seed=3)
 
 
 def test_a_table_of_many_parameters_fits_a_narrow_terminal():

@@ -5,6 +5,7 @@ import os
 import signal
 import subprocess
 import sys
+import time
 from itertools import combinations
 
 import numpy as np
@@ -213,13 +214,16 @@ def test_a_slice_is_diagnosed_and_scored(bench, tmp_path):
 
 
 STAND_IN = """#!{python}
-import json, sys, time
+import json, sys
 from pathlib import Path
 recording, *methods = sys.argv[3:]
 if recording == "a":
     sys.exit("Traceback\\nValueError: lost")
 if recording == "endless":
-    time.sleep(3600)
+    Path({begun!r}).touch()
+    sys.stdin.read()
+    Path({begun!r}).unlink()
+    sys.exit(1)
 for name in methods:
     Path(name + ".json").write_text(json.dumps({{"diagnosis": {{"verdict": name}}, "cpu_s": 1.0}}))
 """
@@ -229,7 +233,9 @@ for name in methods:
 def recorded(tmp_path, monkeypatch):
     """Give what makes recordings by name, which a stand-in of the diagnosis is given."""
     stand_in = tmp_path / "python"
-    stand_in.write_text(STAND_IN.format(python=sys.executable))
+    stand_in.write_text(
+        STAND_IN.format(python=sys.executable, begun=str(tmp_path / "endless-begun"))
+    )
     stand_in.chmod(0o755)
     monkeypatch.setattr(sys, "executable", str(stand_in))
 
@@ -263,16 +269,44 @@ def test_a_diagnosis_that_fails_says_why_and_the_others_go_on(recorded):
 
 def test_an_interrupted_run_keeps_what_is_whole_and_kills_the_rest(recorded):
     place = recorded("b", "endless")
+    begun = place / "endless-begun"
 
     def interrupt(text, done, total):
         if done == 1:
+            within(begun.exists)
             raise KeyboardInterrupt
 
     with pytest.raises(KeyboardInterrupt):
         run(place, interrupt, jobs=2)
+    within(lambda: not begun.exists())
     assert sorted(p.name for p in (place / "results").iterdir()) == ["b"]
     with pytest.raises(InputError, match=r"^--jobs 0: allowed: 1 or more$"):
         run(place, jobs=0)
+
+
+def within(condition, seconds=60.0):
+    """Wait until a condition holds."""
+    end = time.monotonic() + seconds
+    while not condition():
+        assert time.monotonic() < end
+        time.sleep(0.02)
+
+
+def test_a_confined_process_ends_with_the_one_that_began_it(tmp_path):
+    program = (
+        "from bench.blind.confined import end_with_parent\nend_with_parent()\n"
+        "import threading\nprint('begun', flush=True)\nthreading.Event().wait()"
+    )
+    with subprocess.Popen(
+        [sys.executable, "-c", program],
+        env=environment(tmp_path),
+        stdin=subprocess.PIPE,
+        stdout=subprocess.PIPE,
+    ) as process:
+        assert process.stdout.readline() == b"begun\n"
+        assert process.poll() is None
+        process.stdin.close()
+        assert process.wait(60.0) == 1
 
 
 def confined(code, room):

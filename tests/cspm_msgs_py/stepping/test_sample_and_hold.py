@@ -148,6 +148,20 @@ def test_what_cannot_be_true_is_refused_and_not_heard():
     assert part.stamps_ms == [20.0]
 
 
+def test_the_guard_holds_by_no_state_that_cannot_be_true():
+    part = Part(FORCE_CONTROLLER, guarded=True, plausibility=Doubt())
+    part.receive(WINCH_STATE, 0.0)
+    part.tick(1.0)
+    assert WINCH_STATE in part.stage.watched[-1][2]
+    with pytest.raises(InputError, match=r"^/winches/state: -1$"):
+        part.receive(WINCH_STATE, 2.0, row=np.full(3 * N, -1.0))
+    part.tick(3.0)
+    assert WINCH_STATE not in part.stage.watched[-1][2]
+    part.receive(WINCH_STATE, 4.0)
+    part.tick(5.0)
+    assert WINCH_STATE in part.stage.watched[-1][2]
+
+
 def test_numbers_are_judged_by_whether_the_run_is_on():
     doubt = Doubt()
     part = motion(plausibility=doubt)

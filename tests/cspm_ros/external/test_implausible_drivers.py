@@ -89,10 +89,9 @@ def test_each_kind_of_nonsense_leads_to_the_safe_state_with_its_reason(warm, tmp
         assert "/bar/pose: 2e+03 m from its mean position, allowed: at most 1 m" in reasons[-1]
         # Longer than inputs may be old: without a pose nobody wants a tension.
         witness.until_more(TENSION, 200)
-        assert witness.reset(FORCE_CONTROLLER) == (
-            False,
-            "reset refused: no fresh /tension_command",
-        )
+        refused = (False, "reset refused: no fresh /tension_command")
+        # A busy computer may keep another input from being fresh for a moment.
+        witness.until(lambda: witness.reset(FORCE_CONTROLLER) == refused, refused[1])
         lab.jump(0.0, 0.0, 2.0)
         run.go_on()
 

@@ -1,0 +1,1 @@
+"""What a run costs, version by version: benchmarks for `asv`."""

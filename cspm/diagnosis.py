@@ -3,16 +3,18 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Mapping
+from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass, field
 from functools import cached_property
 from pathlib import Path
 from typing import Any
 
-from cspm.measured import looked_at
+from cspm.measured import read_for
 from cspm.parameters import Parameter, Parameters
 from cspm.progress import Progress, by_steps, silent
 from cspm.recorded import AnyRecording
 from cspm.testbed import AnyTestbed, Testbed, as_file
+from cspm_ident.data_look.look import look_at, without_regimes
 from cspm_ident.diagnosis.diagnose import diagnose as diagnose_measurements
 from cspm_ident.diagnosis.diagnosis import Diagnosis as Result
 from cspm_ident.diagnosis.finding import Finding as FoundEffect
@@ -217,13 +219,18 @@ def diagnose(
     """
     limits = thresholds_of(thresholds or {})
     step = by_steps(progress)
-    searched, judged, checks = looked_at(
-        recordings, held_out, testbed, leave_out_regimes=leave_out_regimes, step=step
-    )
-    found = diagnose_measurements(searched, judged, step, thresholds=limits)
-    loop = _closed_loop(found, (judged or searched)[0], step) if closed_loop else ()
-    step("controllers")
-    parity = tuple(controller_parity(searched[0].path))
+    searched, judged = read_for(recordings, held_out, testbed, step=step)
+    # Neither needs what is found: another thread makes them meanwhile.
+    with ThreadPoolExecutor(1) as aside:
+        look = aside.submit(look_at, searched, judged)
+        stepped = aside.submit(controller_parity, searched[0].path)
+        if leave_out_regimes:
+            step("looking at the data")
+            searched, judged = (without_regimes(each, look.result()) for each in (searched, judged))
+        found = diagnose_measurements(searched, judged, step, thresholds=limits)
+        loop = _closed_loop(found, (judged or searched)[0], step) if closed_loop else ()
+        step("controllers")
+        checks, parity = look.result(), tuple(stepped.result())
     data = diagnosis_data(found, _path(testbed)) | {
         "data_checks": [each.data() for each in checks],
         "closed_loop": [each._asdict() for each in loop],

@@ -9,6 +9,7 @@ from cspm.recorded import AnyRecording, Recording, path_of
 from cspm.testbed import AnyTestbed, as_file
 from cspm_ident.data_look.data_check import DataCheck
 from cspm_ident.data_look.look import look_at, without_regimes
+from cspm_ident.data_look.shared_rows import refuse_shared_rows
 from cspm_ident.recording_roles import check_roles
 from cspm_ident.signals.measurement import Measurement, read_measurement
 from cspm_msgs_py.errors import InputError
@@ -22,6 +23,26 @@ def measured(recordings: Iterable[AnyRecording], testbed: AnyTestbed | None) -> 
     """
     file = None if testbed is None else as_file(testbed)
     return [read_measurement(path_of(each), file) for each in recordings]
+
+
+def read_for(
+    recordings: AnyRecording | Iterable[AnyRecording],
+    held_out: AnyRecording | Iterable[AnyRecording],
+    testbed: AnyTestbed | None,
+    *,
+    step: Callable[[str], None] = lambda _: None,
+) -> tuple[list[Measurement], list[Measurement]]:
+    """Return what is searched and what is held out; arguments and errors are those of `looked_at`.
+
+    Raises:
+        InputError: no recording, no test-bed, other cables than the test-bed's, or recordings that
+            share rows.
+    """
+    step("reading")
+    searched, judged = measured(listed(recordings), testbed), measured(listed(held_out), testbed)
+    check_roles(searched, judged)
+    refuse_shared_rows(searched, judged)
+    return searched, judged
 
 
 def looked_at(
@@ -45,9 +66,7 @@ def looked_at(
         InputError: no recording, no test-bed, other cables than the test-bed's, or recordings that
             share rows.
     """
-    step("reading")
-    searched, judged = measured(listed(recordings), testbed), measured(listed(held_out), testbed)
-    check_roles(searched, judged)
+    searched, judged = read_for(recordings, held_out, testbed, step=step)
     step("looking at the data")
     checks = look_at(searched, judged)
     if leave_out_regimes:

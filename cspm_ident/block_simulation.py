@@ -2,17 +2,15 @@
 
 from __future__ import annotations
 
-import os
-from collections.abc import Callable, Iterable
-from concurrent.futures import ThreadPoolExecutor
 from enum import Enum
 from itertools import pairwise
 from threading import Lock
-from typing import NamedTuple, TypeVar
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
+from cspm_ident.side_by_side import side_by_side
 from cspm_ident.signals.cable_motion import damping_of
 from cspm_ident.signals.timeline import Timeline, whole_stretches
 from cspm_model.equilibrium import Equilibrium, find_equilibrium, unstretched_lengths
@@ -28,8 +26,6 @@ from cspm_sim.rest import memory_at_rest
 
 Array = NDArray[np.float64]
 Window = tuple[int, int]
-Given = TypeVar("Given")
-Made = TypeVar("Made")
 
 _OFFSET_ROUNDS = 3
 _OFFSET_STEP_M = 1e-6
@@ -73,12 +69,6 @@ class Simulated(NamedTuple):
     angles: Array
     speeds: Array
     failed: list[Window]
-
-
-def side_by_side(call: Callable[[Given], Made], items: Iterable[Given]) -> list[Made]:
-    """Return what a call that simulates makes of each item: the kernels share the processors."""
-    with ThreadPoolExecutor(os.cpu_count()) as pool:
-        return list(pool.map(call, items))
 
 
 class BlockSimulation:

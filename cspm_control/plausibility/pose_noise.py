@@ -8,17 +8,18 @@ from collections import deque
 import numpy as np
 from numba import njit
 from numpy.typing import ArrayLike, NDArray
-from scipy import stats
 
 from cspm_control.plausibility.pose_limits import placed
 
 Array = NDArray[np.float64]
-# Of readings that are independent, one in so many is said to be noisy by mistake.
-_ONCE_IN = 1e12
 # Of three poses in a row the middle one is judged; more than half of so many have to be off. One
 # outlier is in three of them.
-_WINDOW = 10
-_MOST = _WINDOW // 2
+WINDOW = 10
+_MOST = WINDOW // 2
+# So many standard deviations of one coordinate a point may be off. Of any six of ten there are two
+# that share no pose: all six are off with C(10, 6)·p² at most. That is once in 10¹² poses
+# with p = 6.9·10⁻⁸ that a point is farther off (the chi distribution of three coordinates).
+DEVIATIONS = 6.02
 
 
 class PoseNoise:
@@ -42,9 +43,9 @@ class PoseNoise:
             period_ns: of the topic [ns]; poses follow one another no sooner.
         """
         self._topic, self._points, self._period_ns = topic, points, period_ns
-        self._accelerations, self._noise = accelerations, noise * deviations()
+        self._accelerations, self._noise = accelerations, noise * DEVIATIONS
         self._poses: deque[tuple[int, Array]] = deque(maxlen=3)
-        self._off: deque[bool] = deque(maxlen=_WINDOW)
+        self._off: deque[bool] = deque(maxlen=WINDOW)
         # Compiled now and not by the first message.
         off_line(np.zeros(7), np.zeros(7), np.zeros(7), 0.5, points)
 
@@ -77,18 +78,6 @@ class PoseNoise:
         gain = math.sqrt(1.0 + weight**2 + (1.0 - weight) ** 2)
         allowed = 0.5 * before * after * self._accelerations + gain * self._noise
         return off_line(first, row, last, weight, self._points), allowed
-
-
-def deviations() -> float:
-    """Return how many standard deviations of one coordinate a point may be off.
-
-    More than half of a window are off by mistake once in `_ONCE_IN` readings at most: among any so
-    many there are some that share no pose, which are independent.
-    """
-    least = _MOST + 1
-    independent = math.ceil(least / 3)
-    chance = (1.0 / (_ONCE_IN * math.comb(_WINDOW, least))) ** (1.0 / independent)
-    return math.sqrt(float(stats.chi2.isf(chance, 3)))
 
 
 def points_noise(points: Array, position: float, orientation: float) -> Array:

@@ -14,11 +14,11 @@ from cspm_ident.block_simulation import (
     Input,
     Simulated,
     Window,
-    side_by_side,
 )
 from cspm_ident.comparison.channel_fit import ChannelFit
 from cspm_ident.comparison.floor import lasting_rms, propagated
 from cspm_ident.comparison.metrics import error_bins
+from cspm_ident.side_by_side import side_by_side
 from cspm_ident.signals.clock_drift import ClockDrift, on_one_clock
 from cspm_ident.signals.delays import Delay, find_delays
 from cspm_ident.signals.measurement import BAR, SPEED, TENSION, WINCHES, Measurement

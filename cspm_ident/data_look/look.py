@@ -14,7 +14,6 @@ from cspm_ident.data_look.data_check import DataCheck
 from cspm_ident.data_look.motion_checks import excitation_check, length_check, standstill_check
 from cspm_ident.data_look.regime_check import regime_check, without_stretches
 from cspm_ident.data_look.sensor_check import sensor_check
-from cspm_ident.data_look.shared_rows import refuse_shared_rows
 from cspm_ident.data_look.stamp_check import stamp_check
 from cspm_ident.signals.measurement import Measurement
 
@@ -40,11 +39,7 @@ def look_at(
     Args:
         searched: recordings to search or fit.
         held_out: those for the hold-out test.
-
-    Raises:
-        InputError: recordings share rows; see `refuse_shared_rows`.
     """
-    refuse_shared_rows(searched, held_out)
     return tuple(check(each) for each in (*searched, *held_out) for check in CHECKS)
 
 

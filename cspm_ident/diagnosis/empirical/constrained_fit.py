@@ -20,6 +20,8 @@ FOLDS = 5
 SMOOTHNESS = (1e-6, 1e-4, 1e-2, 1.0)
 # Weight that settles which of two functions has what both could have, relative to the data's.
 _RIDGE = 1e-6
+# Relative accuracy of the solver under bounds.
+_SOLVED = 1e-9
 
 
 class Sums(NamedTuple):
@@ -69,42 +71,62 @@ def folds_of(times: Array, block_s: float) -> Index:
     return np.asarray((times - times.min()) // block_s, dtype=np.intp) % FOLDS
 
 
-def fitted(sums: Sums, plan: Plan, without: int | None = None) -> Array:
+class _Form(NamedTuple):
+    """What a plan's fit has in common whichever rows it is of.
+
+    Attributes:
+        penalty: on curvature per row, (m, m).
+        maps: from what is fitted to the values at all knots, (m, p).
+        least: lower bound of what is fitted, (p,).
+    """
+
+    penalty: Array
+    maps: Array
+    least: Array
+
+
+def fitted(sums: Sums, plan: Plan) -> Array:
     """Return the values at all knots, term by term.
 
     Args:
         sums: of the columns of all terms, side by side.
         plan: how to fit.
-        without: the fold that is left out; None: none.
     """
-    keep = np.arange(FOLDS) != (-1 if without is None else without)
-    gram, right = sums.gram[keep].sum(axis=0), sums.target[keep].sum(axis=0)
-    rough = block_diag(*(term.roughness for term in plan.terms))
-    gram = gram + plan.smoothness * sums.rows[keep].sum() * rough.T @ rough
-    maps = block_diag(*(t.map(c) for t, c in zip(plan.terms, plan.constraints, strict=True)))
-    inner = maps.T @ gram @ maps
-    inner += _RIDGE * max(float(np.trace(inner)), 1e-300) / len(inner) * np.eye(len(inner))
-    bounded = np.concatenate(
-        [
-            np.full(t.map(c).shape[1], 0.0 if c is not Constraint.FREE else -np.inf)
-            for t, c in zip(plan.terms, plan.constraints, strict=True)
-        ]
-    )
-    if not np.isfinite(bounded).any():
-        return np.asarray(maps @ cho_solve(cho_factor(inner), maps.T @ right))
-    upper = cholesky(inner)
-    aim = solve_triangular(upper, maps.T @ right, trans="T")
-    return np.asarray(maps @ lsq_linear(upper, aim, (bounded, np.inf)).x)
+    return _solved(sums, _form(plan), np.arange(FOLDS))
 
 
 def errors(sums: Sums, plan: Plan) -> Array:
     """Return the mean square of each fold, fitted to the others, (folds,)."""
-    found = []
+    form, found = _form(plan), []
     for k in range(FOLDS):
-        values = fitted(sums, plan, k)
+        values = _solved(sums, form, np.delete(np.arange(FOLDS), k))
         left = sums.squares[k] - 2.0 * values @ sums.target[k] + values @ sums.gram[k] @ values
         found.append(max(0.0, float(left)) / max(1.0, float(sums.rows[k])))
     return np.array(found)
+
+
+def _form(plan: Plan) -> _Form:
+    rough = block_diag(*(term.roughness for term in plan.terms))
+    each = [t.map(c) for t, c in zip(plan.terms, plan.constraints, strict=True)]
+    least = [
+        np.full(own.shape[1], 0.0 if c is not Constraint.FREE else -np.inf)
+        for own, c in zip(each, plan.constraints, strict=True)
+    ]
+    return _Form(plan.smoothness * rough.T @ rough, block_diag(*each), np.concatenate(least))
+
+
+def _solved(sums: Sums, form: _Form, folds: Index) -> Array:
+    """Return the values at all knots that fit the rows of some folds."""
+    gram, right = sums.gram[folds].sum(axis=0), sums.target[folds].sum(axis=0)
+    gram = gram + sums.rows[folds].sum() * form.penalty
+    maps = form.maps
+    inner = maps.T @ gram @ maps
+    inner += _RIDGE * max(float(np.trace(inner)), 1e-300) / len(inner) * np.eye(len(inner))
+    if not np.isfinite(form.least).any():
+        return np.asarray(maps @ cho_solve(cho_factor(inner), maps.T @ right))
+    upper = cholesky(inner)
+    aim = solve_triangular(upper, maps.T @ right, trans="T")
+    return np.asarray(maps @ lsq_linear(upper, aim, (form.least, np.inf)).x)
 
 
 def nothing(sums: Sums) -> Array:
@@ -113,9 +135,12 @@ def nothing(sums: Sums) -> Array:
 
 
 def is_better(before: Array, after: Array) -> bool:
-    """Return whether errors by fold fall by more than one standard error of their difference."""
-    fall = before - after
-    return bool(fall.mean() > fall.std(ddof=1) / np.sqrt(len(fall)))
+    """Return whether errors by fold fall by more than one standard error of their difference.
+
+    What the solver leaves is no fall: a constraint that does not act gives the same fit.
+    """
+    fall, same = before - after, _SOLVED * before.mean()
+    return bool(fall.mean() > max(same, fall.std(ddof=1) / np.sqrt(len(fall))))
 
 
 def simplest(sums: Sums, plans: Sequence[Plan]) -> tuple[Plan, Array]:

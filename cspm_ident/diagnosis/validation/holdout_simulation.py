@@ -9,11 +9,12 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from cspm_ident.block_simulation import BlockSimulation, Input, Simulated, side_by_side
+from cspm_ident.block_simulation import BlockSimulation, Input, Simulated
 from cspm_ident.comparison.floor import lasting_rms, propagated
 from cspm_ident.diagnosis.finding import Improvement
 from cspm_ident.diagnosis.residuals.corrected_measurement import as_found
 from cspm_ident.diagnosis.residuals.regressors import Candidate
+from cspm_ident.side_by_side import side_by_side
 from cspm_ident.signals.measurement import BAR, TENSION, WINCHES, Measurement
 from cspm_ident.signals.noise_source import noise_of
 from cspm_ident.signals.samples import Samples

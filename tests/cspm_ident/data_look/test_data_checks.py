@@ -19,6 +19,7 @@ from cspm_ident.data_look.look import CHECKS, look_at, without_regimes
 from cspm_ident.data_look.motion_checks import excitation_check, length_check, standstill_check
 from cspm_ident.data_look.regime_check import regime_check
 from cspm_ident.data_look.sensor_check import sensor_check
+from cspm_ident.data_look.shared_rows import refuse_shared_rows
 from cspm_ident.data_look.stamp_check import stamp_check
 from cspm_ident.signals.measurement import Measurement
 from cspm_ident.signals.samples import Samples
@@ -154,9 +155,9 @@ def test_a_copied_stretch_is_refused_in_either_role(healthy):
     copy = dataclasses.replace(healthy.within(0.0, 6.0), path=Path("copy"), sha256="other")
     text = "--held-out copy: shares 100 % of its rows with run_1, which is searched"
     with pytest.raises(InputError, match=text):
-        look_at([healthy], [copy])
+        refuse_shared_rows([healthy], [copy])
     with pytest.raises(InputError, match="copy: shares 100 % of its rows with run_1, which would"):
-        look_at([healthy, copy])
+        refuse_shared_rows([healthy, copy], [])
 
 
 def test_what_stands_still_alike_is_no_copy(healthy):
@@ -167,7 +168,7 @@ def test_what_stands_still_alike_is_no_copy(healthy):
             measurement = changed(measurement, name, lambda at, v: put(v, at < 4.0))
         return measurement
 
-    assert look_at([quiet(healthy)], [quiet(recording(3))])
+    refuse_shared_rows([quiet(healthy)], [quiet(recording(3))])
 
 
 def test_plain_data_have_what_the_contract_names(healthy):

@@ -34,9 +34,10 @@ def worst_case(duration: float) -> Bundle:
 
 def shipped(name: str, *overrides: str) -> Bundle:
     """Return one of the shipped scenarios, resolved."""
-    scenario = load_scenario(SCENARIOS / f"{name}.yaml", overrides)
-    testbed = load_testbed(SCENARIOS / scenario.testbed)
-    return make_bundle(resolve(scenario, testbed.testbed), testbed, SCENARIOS)
+    file = SCENARIOS / f"{name}.yaml"
+    scenario = load_scenario(file, overrides)
+    testbed = load_testbed(file.parent / scenario.testbed)
+    return make_bundle(resolve(scenario, testbed.testbed), testbed, file.parent)
 
 
 def roll_damping() -> tuple[EffectEntry, ...]:

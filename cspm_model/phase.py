@@ -46,6 +46,7 @@ class Phase:
         ready: whether the kernel may go on where the object is now.
         refresh: brings the arrays up to date with the object.
         room: given a step, returns from which step on Python has to prepare something anew.
+        parts: phases that the kernel calls, kept while this one is.
     """
 
     kernel: Any
@@ -54,6 +55,7 @@ class Phase:
     ready: Callable[[], bool] = _always
     refresh: Callable[[], None] = _nothing
     room: Callable[[int], int] | None = None
+    parts: tuple[Phase, ...] = ()
 
     @cached_property
     def address(self) -> int:

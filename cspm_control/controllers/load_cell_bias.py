@@ -21,6 +21,9 @@ WANDER = 0.003
 # Motors slower than this [rad/s] do not show the sign of their dry friction.
 CREEP = 0.05
 BIAS, UNKNOWNS = 0, 3
+# Numbers of the filters: the largest bias believed [N], the time between steps [s], what is left of
+# the smoothed values after one, and the variance of a sample [N²].
+LARGEST, PERIOD, FADE, NOISE = range(4)
 
 
 class LoadCellBias:
@@ -46,48 +49,58 @@ class LoadCellBias:
             period: time between steps [s].
         """
         n = len(radii)
-        self._radii, self._inertias = radii, inertias
-        self._largest, self._period = largest, period
-        self._fade = exp(-BAND * period)
-        self._noise = UNEXPLAINED**2 * 2.0 / (BAND * period)
-        self._means = np.zeros((n, UNKNOWNS))
+        noise = UNEXPLAINED**2 * 2.0 / (BAND * period)
+        self.numbers = np.array([largest, period, exp(-BAND * period), noise])
+        self.winches = np.stack([radii, inertias])
         prior = np.array([0.5 * largest, GAIN, DRY]) ** 2
-        self._spreads = np.tile(np.diag(prior), (n, 1, 1))
-        self._smoothed = np.zeros((n, UNKNOWNS + 1))
-        self._last = np.zeros((2, n))
-        self._started = False
+        self.means, self.spreads = np.zeros((n, UNKNOWNS)), np.tile(np.diag(prior), (n, 1, 1))
+        self.smoothed, self.last = np.zeros((n, UNKNOWNS + 1)), np.zeros((2, n))
+        self.started = np.zeros(1, dtype=bool)
 
     @property
     def values(self) -> Array:
         """What each load cell says too much, (n,) [N], at most the largest believed."""
-        return np.clip(self._means[:, BIAS], -self._largest, self._largest)
+        return np.clip(self.means[:, BIAS], -self.numbers[LARGEST], self.numbers[LARGEST])
 
     def restart(self) -> None:
         """Forget the last sample but not what was learnt: torques have not been ours since."""
-        self._started = False
+        self.started[0] = False
 
     def step(self, measured: Array, speeds: Array, torques: Array) -> None:
         """Take tensions (n,) [N], motor speeds (n,) [rad/s], and the torques (n,) [N·m] till now.
 
         Torques are those held since the last step; positive winds in.
         """
-        if self._started:
-            _smooth(
-                0.5 * (measured + self._last[0]),
-                speeds,
-                (speeds - self._last[1]) / self._period,
-                torques,
-                self._radii,
-                self._inertias,
-                self._fade,
-                self._smoothed,
-            )
-            self._spreads[:, BIAS, BIAS] += WANDER**2 * self._period
-            _learn(self._smoothed, self._noise, self._means, self._spreads)
-        else:
-            self._smoothed[:] = 0.0
-        self._last[0], self._last[1] = measured, speeds
-        self._started = True
+        learn_bias(
+            *(measured, speeds, torques, self.winches, self.numbers, self.started),
+            *(self.last, self.smoothed, self.means, self.spreads),
+        )
+
+
+@njit(cache=True, error_model="numpy")
+def learn_bias(
+    measured: Array,
+    speeds: Array,
+    torques: Array,
+    winches: Array,
+    numbers: Array,
+    started: NDArray[np.bool_],
+    last: Array,
+    smoothed: Array,
+    means: Array,
+    spreads: Array,
+) -> None:
+    """Do what `LoadCellBias.step` does, on its arrays."""
+    if started[0]:
+        tensions = 0.5 * (measured + last[0])
+        accelerations = (speeds - last[1]) / numbers[PERIOD]
+        fade, out = numbers[FADE], smoothed
+        _smooth(tensions, speeds, accelerations, torques, winches[0], winches[1], fade, out)
+        spreads[:, BIAS, BIAS] += WANDER**2 * numbers[PERIOD]
+        _learn(smoothed, numbers[NOISE], means, spreads)
+    else:
+        smoothed[:] = 0.0
+    last[0], last[1], started[0] = measured, speeds, True
 
 
 @njit(cache=True, error_model="numpy")

@@ -68,44 +68,38 @@ class FrictionFeedforward:
 
     def __init__(self, cables: Array, friction: Array, smooth_below: float) -> None:
         """Take the cables' parameter rows, friction (n, COLUMNS), and v, a cable's speed [m/s]."""
-        self._cables, self._friction = cables, friction
-        self._smooth_below = smooth_below
+        self.cables, self.friction, self.smooth_below = cables, friction, smooth_below
 
     def torque(self, bar: Array, frame: Array, tensions: Array) -> Array:
         """Return torques (n,) [N·m] for reference rows (19,) and wanted tensions (n,) [N]."""
         torque = np.empty(len(tensions))
-        _friction_torque(
-            _pose(bar),
-            _pose(frame),
-            bar[TWIST],
-            frame[TWIST],
-            tensions,
-            self._cables,
-            self._friction,
-            self._smooth_below,
-            torque,
-        )
+        friction_torque(bar, frame, tensions, self.cables, self.friction, self.smooth_below, torque)
         return torque
 
 
-def _pose(row: Array) -> Array:
-    """Return x y z φ θ ψ of a reference row."""
-    return np.array([*row[POSITION], *euler_from_quaternion(row[QUATERNION])])
+@njit(cache=True, error_model="numpy")
+def _write_pose(row: Array, out: Array) -> None:
+    """Write x y z φ θ ψ of a reference row."""
+    out[:3] = row[POSITION]
+    out[3], out[4], out[5] = euler_from_quaternion(row[QUATERNION])
 
 
 @njit(cache=True, error_model="numpy")
-def _friction_torque(
-    bar_pose: Array,
-    frame_pose: Array,
-    bar_twist: Array,
-    frame_twist: Array,
+def friction_torque(
+    bar: Array,
+    frame: Array,
     tensions: Array,
     cables: Array,
     friction: Array,
     smooth_below: float,
     out: Array,
 ) -> None:
+    """Write what `FrictionFeedforward.torque` returns."""
     n = len(tensions)
+    bar_pose, frame_pose = np.empty(6), np.empty(6)
+    _write_pose(bar, bar_pose)
+    _write_pose(frame, frame_pose)
+    bar_twist, frame_twist = bar[TWIST], frame[TWIST]
     lengths, of_bar, of_frame = np.empty(n), np.empty((n, 6)), np.empty((n, 6))
     cable_geometry(cables, bar_pose, frame_pose, lengths, of_bar, of_frame)
     for i in range(n):

@@ -44,6 +44,8 @@ Array = NDArray[np.float64]
 # What is remembered per cable: the wanted tension after one and two filters [N], the elongation
 # [m] that it makes, and how fast that grows [m/s].
 ONCE, TWICE, ELONGATION, STRETCHING, MEMORY = 0, 1, 2, 3, 4
+# Numbers of the filters: share of a new value, and the time between steps [s].
+FRESH, PERIOD = 0, 1
 # Newton steps from here [m] to the elongation of a cable at rest; half of them are never needed.
 FIRST_ELONGATION, NEWTON_STEPS = 1e-3, 50
 LEAST_ELONGATION = 1e-9
@@ -68,39 +70,65 @@ class WinchFeedforward:
 
         Without the bandwidth cables are taken as stiff: ε̈ = 0.
         """
-        self._cables, self._tables = parameters.cables, parameters.tables
-        self._fresh = 0.0 if stretch_bandwidth is None else 1.0 - exp(-stretch_bandwidth * period)
-        self._period = period
-        self._memory = np.zeros((len(self._cables), MEMORY))
-        self._first: Array | None = None
+        self.cables, self.tables = parameters.cables, parameters.tables
+        fresh = 0.0 if stretch_bandwidth is None else 1.0 - exp(-stretch_bandwidth * period)
+        self.numbers = np.array([fresh, period])
+        n = len(self.cables)
+        self.memory, self.first = np.zeros((n, MEMORY)), np.zeros(n)
+        self._begun = False
 
     def restart(self) -> None:
         """Let the next tensions be the first ones, at which the cables rest."""
-        self._first = None
+        self._begun = False
 
     def torque(self, bar: Array, frame: Array, tensions: Array) -> Array:
         """Return torques (n,) [N·m] for reference rows (19,) and wanted tensions (n,) [N]."""
-        n = len(tensions)
-        lengths, winding, stretching = np.empty(n), np.empty(n), np.zeros(n)
-        winding_accelerations(self._cables, bar, frame, lengths, winding)
-        if self._first is None:
-            self._first = tensions.copy()
-            _rest(self._cables, self._tables, lengths, tensions, self._memory)
-        if self._fresh > 0.0:
-            _stretch(
-                self._cables,
-                self._tables,
-                lengths,
-                tensions,
-                self._fresh,
-                self._period,
-                self._memory,
-                stretching,
-            )
-        radii, inertias = self._cables[:, RADIUS], self._cables[:, INERTIA]
-        share = lengths / (lengths - self._memory[:, ELONGATION])
-        moved: Array = inertias / radii * share * (stretching + winding)
-        return radii * (tensions - self._first) + moved
+        if not self._begun:
+            self.first[:], self._begun = tensions, True
+            _rest(self.cables, self.tables, bar, frame, tensions, self.memory)
+        torque = np.empty(len(tensions))
+        winch_torque(
+            *(bar, frame, tensions, self.cables, self.tables),
+            *(self.numbers, self.memory, self.first, torque),
+        )
+        return torque
+
+
+@njit(cache=True, error_model="numpy")
+def winch_torque(
+    bar: Array,
+    frame: Array,
+    tensions: Array,
+    cables: Array,
+    tables: Array,
+    numbers: Array,
+    memory: Array,
+    first: Array,
+    out: Array,
+) -> None:
+    """Write what `WinchFeedforward.torque` returns from the second call on; advance the memory.
+
+    Args:
+        bar: reference row (19,), as that of `frame`.
+        frame: of the winch frame.
+        tensions: wanted, (n,) [N].
+        cables: parameter rows.
+        tables: of the stiffness law.
+        numbers: share of a new value in each filter, 0 without filters, and the period [s].
+        memory: per cable, (n, MEMORY).
+        first: tensions of the first step, (n,) [N].
+        out: torques, (n,) [N·m].
+    """
+    n = len(tensions)
+    lengths, winding, stretching = np.empty(n), np.empty(n), np.zeros(n)
+    winding_accelerations(cables, bar, frame, lengths, winding)
+    if numbers[FRESH] > 0.0:
+        _stretch(cables, tables, lengths, tensions, numbers, memory, stretching)
+    for i in range(n):
+        radius, inertia = cables[i, RADIUS], cables[i, INERTIA]
+        share = lengths[i] / (lengths[i] - memory[i, ELONGATION])
+        moved = inertia / radius * share * (stretching[i] + winding[i])
+        out[i] = radius * (tensions[i] - first[i]) + moved
 
 
 @njit(cache=True, error_model="numpy")
@@ -174,9 +202,14 @@ def _point_motion(row: Array, arm: Vector) -> tuple[Vector, Vector]:
 
 
 @njit(cache=True, error_model="numpy")
-def _rest(cables: Array, tables: Array, lengths: Array, tensions: Array, memory: Array) -> None:
+def _rest(
+    cables: Array, tables: Array, bar: Array, frame: Array, tensions: Array, memory: Array
+) -> None:
     """Write the memory of cables that have long carried these tensions."""
-    for i in range(len(tensions)):
+    n = len(tensions)
+    lengths, winding = np.empty(n), np.empty(n)
+    winding_accelerations(cables, bar, frame, lengths, winding)
+    for i in range(n):
         elongation = FIRST_ELONGATION
         for _ in range(NEWTON_STEPS):
             elastic = lengths[i] - elongation + cables[i, OFFSET_LENGTH]
@@ -193,12 +226,12 @@ def _stretch(
     tables: Array,
     lengths: Array,
     tensions: Array,
-    fresh: float,
-    period: float,
+    numbers: Array,
     memory: Array,
     out: Array,
 ) -> None:
     """Advance the memory by one step, implicitly, and write ε̈ (n,) [m/s²]."""
+    fresh, period = numbers[FRESH], numbers[PERIOD]
     for i in range(len(tensions)):
         cable = memory[i]
         cable[ONCE] += fresh * (tensions[i] - cable[ONCE])

@@ -35,7 +35,7 @@ Array = NDArray[np.float64]
 STEPS, LIMITED_STEPS, CLIPPED_STEPS, SLEWED_STEPS, COUNTS = range(5)
 _NO_ROW = np.zeros(0)
 # The reference of a frame that does not move: pose, twist, acceleration.
-_STILL = np.array([0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 1.0] + 12 * [0.0])
+STILL = np.array([0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 1.0] + 12 * [0.0])
 
 
 @dataclass(frozen=True)
@@ -188,9 +188,9 @@ class ForceStage(GuardedStage):
         if self.friction is None and self.winch is None:
             return None
         for topic in (BAR_REFERENCE, FRAME_REFERENCE):
-            row = inputs.get(topic, _STILL)
-            if row.shape != _STILL.shape:
-                return f"{topic}: a row of shape {row.shape}, allowed: {_STILL.shape}"
+            row = inputs.get(topic, STILL)
+            if row.shape != STILL.shape:
+                return f"{topic}: a row of shape {row.shape}, allowed: {STILL.shape}"
             if not np.isfinite(row).all():
                 return f"{topic}: {row[~np.isfinite(row)][0]}, allowed: finite numbers"
         return None
@@ -201,7 +201,7 @@ class ForceStage(GuardedStage):
         ahead = [each for each in (self.friction, self.winch) if each is not None]
         if bar is None or not ahead:
             return None
-        frame = inputs.get(FRAME_REFERENCE, _STILL)
+        frame = inputs.get(FRAME_REFERENCE, STILL)
         first, *more = [each.torque(bar, frame, self.wanted) for each in ahead]
         for torque in more:
             first = first + torque

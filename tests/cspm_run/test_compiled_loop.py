@@ -6,13 +6,15 @@ from loop_pairs import assert_same, with_stages
 from loops import WILD
 from run_samples import SCENARIOS, bundle_of
 
+from bench.results.tracking import Case
 from cspm_control.phases.make import stage_phase
-from cspm_model.phase import Slots
+from cspm_model.phase import DONE, LEAVE, Slots
 from cspm_msgs_py.diagnostics import Level
 from cspm_msgs_py.scenario import load_scenario
 from cspm_msgs_py.testbed import EffectEntry
 from cspm_run.assembly import assemble
 from cspm_run.library import find_scenario
+from cspm_run.recorded_run import parts_of
 
 NAMES = sorted(p.stem for p in SCENARIOS.rglob("*.yaml") if "testbed:" in p.read_text())
 STEPS = 260
@@ -60,6 +62,20 @@ VARIANTS = {
         "rest",
         f"control={TORQUES}",
         "events=[{at: 0.1, cut: sway_3}]",
+    ),
+    "winch feedforward": ("worst_case", "control.force.winch_feedforward={}"),
+    "stretched winch feedforward": (
+        "worst_case",
+        "control.force.winch_feedforward={stretch_bandwidth: 200}",
+        "control.record_internals=true",
+    ),
+    "load cell bias": ("worst_case", "control.force.load_cell_bias={}"),
+    "all ahead and trips": (
+        "worst_case",
+        "control.force.winch_feedforward={stretch_bandwidth: 50}",
+        "control.force.load_cell_bias={}",
+        "control.force.dither={amplitude: 0.02, frequency: 37}",
+        "safety.tension_trip=8.5",
     ),
     "trips": ("worst_case", "safety.tension_trip=8.5"),
     "trips and brakes": ("worst_case", "safety={tension_trip: 8.5, state: brake}"),
@@ -111,7 +127,17 @@ def test_every_kind_of_effect_is_the_same_bit_for_bit(effect):
 
 
 @pytest.mark.compiled
-@pytest.mark.parametrize("name", ["dither", "dither and slew", "torques", "slew"])
+@pytest.mark.parametrize(
+    "name",
+    [
+        "dither",
+        "dither and slew",
+        "torques",
+        "slew",
+        "stretched winch feedforward",
+        "load cell bias",
+    ],
+)
 def test_torques_are_computed_in_compiled_code(name):
     """Each of these settings has its phase: none of them is left to Python."""
     scenario, *settings = VARIANTS[name]
@@ -122,6 +148,41 @@ def test_torques_are_computed_in_compiled_code(name):
     topics = bundle.testbed.testbed.topics
     slots.add({name: topics[name].width for name in parts.schedule.topics})
     assert stage_phase(stage, slots, parts.schedule.period_ns) is not None
+
+
+@pytest.mark.compiled
+@pytest.mark.parametrize("more", [(), ("control.force.winch_feedforward={}",)])
+def test_friction_fed_forward_is_the_same_bit_for_bit(more):
+    """Its amount is that of the machine that the controllers believe in."""
+    friction = (
+        ("winch_coulomb_friction", (), {"torque": 0.01}),
+        ("winch_load_friction", (), {"coefficient": 0.05}),
+    )
+    settings = SHORT, "control.force.friction_feedforward={}", *more
+    bundle = Case("worst_case", settings, friction).bundle()
+    run = assert_same(bundle, STEPS)
+    assert not run.failure
+    parts = parts_of(bundle)
+    (stage,) = (each for each in parts.stages if each.node == "force_controller")
+    assert stage.friction is not None
+
+
+@pytest.mark.compiled
+@pytest.mark.parametrize("topic", ["/bar/reference", "/winch_frame/reference"])
+def test_a_reference_that_is_no_number_is_left_to_python(topic):
+    bundle = bundle_of("worst_case", SHORT, "control.force.winch_feedforward={}")
+    parts, topics = parts_of(bundle), bundle.testbed.testbed.topics
+    (stage,) = (each for each in parts.stages if each.node == "force_controller")
+    slots = Slots()
+    slots.add({name: topics[name].width for name in parts.schedule.topics})
+    phase = stage_phase(stage, slots, parts.schedule.period_ns)
+    row = np.zeros(slots.width)
+    for name in ("/bar/reference", "/winch_frame/reference"):
+        row[slots[name]][6] = 1.0
+    row[slots["/bar/reference"]][2] = 2.0
+    assert phase.kernel(0, row, phase.places) == DONE
+    row[slots[topic]][4] = np.nan
+    assert phase.kernel(0, row, phase.places) == LEAVE
 
 
 class Python:

@@ -8,7 +8,6 @@ from machines import build, pulley_content
 from run_samples import bundle_of
 
 from bench.results.tracking import Case, follow
-from cspm_control.feedforward import winch_feedforward
 from cspm_control.feedforward.winch_feedforward import WinchFeedforward, winding_accelerations
 from cspm_control.stages.make import make_controller
 from cspm_model.equilibrium import unstretched_lengths
@@ -268,13 +267,15 @@ def test_stretch_pays_where_cables_are_soft_and_its_opposite_does_not(monkeypatc
     ahead = Case(PAST, (*SLOW, STRETCHED), **soft)
     with_it = heave_error(ahead)
     assert with_it < 0.8 * without
-    right = winch_feedforward._stretch
+    right = WinchFeedforward.torque
 
-    def inverted(*arguments):
-        right(*arguments)
-        arguments[-1][:] *= -1.0
+    def inverted(self, *arguments):
+        found, numbers = right(self, *arguments), self.numbers
+        self.numbers = np.array([0.0, PERIOD])
+        stiff, self.numbers = right(self, *arguments), numbers
+        return 2.0 * stiff - found
 
-    monkeypatch.setattr(winch_feedforward, "_stretch", inverted)
+    monkeypatch.setattr(WinchFeedforward, "torque", inverted)
     assert heave_error(ahead) > 1.2 * without
 
 

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 
 import numpy as np
+from numba import njit
 from numpy.typing import NDArray
 
 from cspm_msgs_py.errors import InputError
@@ -18,7 +19,12 @@ LARGEST_BANDWIDTH = 0.2
 
 
 class AngleGenerator:
-    """Motor angles as functions of time, from the start's on."""
+    """Motor angles as functions of time, from the start's on.
+
+    Attributes:
+        arrays: where each path's knots begin, (n + 1,), and of all knots times [s] and angles
+            [rad], (k,) each.
+    """
 
     def __init__(self, paths: Mapping[str, AnglePath], cables: Sequence[str]) -> None:
         """Take the paths by cable name; cables without one stay.
@@ -31,13 +37,17 @@ class AngleGenerator:
                 raise InputError(
                     f"control.angle.{name}: no such cable, allowed: {', '.join(cables)}"
                 )
-        self._paths = [_knots(paths.get(name, STILL)) for name in cables]
+        paths_of = [_knots(paths.get(name, STILL)) for name in cables]
+        starts = np.cumsum([0, *(len(times) for times, _ in paths_of)])
+        times, angles = (np.concatenate(each) for each in zip(*paths_of, strict=True))
+        self.arrays = (starts.astype(np.int64), times, angles)
 
     def step(self, stamp_ns: int) -> tuple[Array, Array]:
         """Return the angles (n,) [rad] at `stamp_ns` and their rates (n,) [rad/s]."""
-        time = stamp_ns * 1e-9
-        found = [_on_path(times, angles, time) for times, angles in self._paths]
-        return np.array([angle for angle, _ in found]), np.array([rate for _, rate in found])
+        count = len(self.arrays[0]) - 1
+        wanted, rates = np.empty(count), np.empty(count)
+        path_angles(stamp_ns * 1e-9, *self.arrays, wanted, rates)
+        return wanted, rates
 
 
 def _knots(path: AnglePath) -> tuple[Array, Array]:
@@ -48,13 +58,33 @@ def _knots(path: AnglePath) -> tuple[Array, Array]:
     return whole[:, 0].copy(), whole[:, 1].copy()
 
 
-def _on_path(times: Array, angles: Array, time: float) -> tuple[float, float]:
-    """Return angle and rate; at a corner the rate is that of the line to come."""
-    i = int(np.searchsorted(times, time, side="right")) - 1
-    if i + 1 >= len(times):
-        return float(angles[-1]), 0.0
-    rate = float((angles[i + 1] - angles[i]) / (times[i + 1] - times[i]))
-    return float(angles[i] + rate * (time - times[i])), rate
+@njit(cache=True, error_model="numpy", _nrt=False)
+def path_angles(
+    seconds: float,
+    starts: NDArray[np.int64],
+    times: Array,
+    angles: Array,
+    wanted: Array,
+    rates: Array,
+) -> None:
+    """Write angles and rates; at a corner the rate is that of the line to come.
+
+    Knots of path i are those from `starts[i]` to before `starts[i + 1]`.
+    """
+    for i in range(wanted.shape[0]):
+        last = starts[i + 1] - 1
+        # The last knot that is not later.
+        k, high = starts[i], last
+        while k < high:
+            middle = (k + high + 1) // 2
+            if times[middle] <= seconds:
+                k = middle
+            else:
+                high = middle - 1
+        wanted[i], rates[i] = angles[last], 0.0
+        if k < last:
+            rates[i] = (angles[k + 1] - angles[k]) / (times[k + 1] - times[k])
+            wanted[i] = angles[k] + rates[i] * (seconds - times[k])
 
 
 class AngleServo:
@@ -85,27 +115,54 @@ class AngleServo:
                 f"control.bandwidth: {bandwidth:g} rad/s, allowed with a force controller at"
                 f" {1.0 / period:g} Hz: at most {largest:g} rad/s"
             )
-        self._limits = torque_limits
-        self._period = period
-        self._kp = 3.0 * inertias * bandwidth**2
-        self._ki = inertias * bandwidth**3
-        self._kd = 3.0 * inertias * bandwidth
-        self._integral = np.zeros(len(inertias))
+        self.torque_limits, self.period = torque_limits, period
+        self.gains = np.stack(
+            [
+                3.0 * inertias * bandwidth**2,
+                inertias * bandwidth**3,
+                3.0 * inertias * bandwidth,
+            ]
+        )
+        self.integral = np.zeros(len(inertias))
         self.saturated = 0
 
     def restart(self, torques: Array) -> None:
         """Begin anew, with the torques (n,) [N·m] that hold the motors."""
-        self._integral[:] = torques
+        self.integral[:] = torques
 
     def step(self, wanted: Array, rates: Array, angles: Array, speeds: Array) -> Array:
         """Return motor torques (n,) [N·m] for wanted and measured angles [rad] and rates [rad/s].
 
         `saturated` then says how many torques stand at their limit.
         """
-        error = wanted - angles
-        torque = self._kp * error + self._kd * (rates - speeds) + self._integral
-        limited: Array = np.clip(torque, -self._limits, self._limits)
-        free = (limited == torque) | ((torque > 0.0) != (error > 0.0))
-        self._integral += free * self._ki * error * self._period
-        self.saturated = int((limited != torque).sum())
-        return limited
+        torque = np.empty(len(wanted))
+        self.saturated = servo_torques(
+            *(wanted, rates, angles, speeds, self.gains, self.torque_limits, self.period),
+            *(self.integral, torque),
+        )
+        return torque
+
+
+@njit(cache=True, error_model="numpy", _nrt=False)
+def servo_torques(
+    wanted: Array,
+    rates: Array,
+    angles: Array,
+    speeds: Array,
+    gains: Array,
+    limits: Array,
+    period: float,
+    integral: Array,
+    out: Array,
+) -> int:
+    """Write what `AngleServo.step` returns; return how many torques stand at their limit."""
+    saturated = 0
+    for i in range(out.shape[0]):
+        error = wanted[i] - angles[i]
+        torque = gains[0, i] * error + gains[2, i] * (rates[i] - speeds[i]) + integral[i]
+        out[i] = min(limits[i], max(-limits[i], torque))
+        if out[i] != torque:
+            saturated += 1
+        if out[i] == torque or (torque > 0.0) != (error > 0.0):
+            integral[i] += gains[1, i] * error * period
+    return saturated

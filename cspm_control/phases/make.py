@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
+from cspm_control.phases.angle_phase import angle_phase
 from cspm_control.phases.distribution_phase import distribution_phase
 from cspm_control.phases.force_phase import force_phase
 from cspm_control.phases.motion_phase import motion_phase
 from cspm_control.phases.target_phase import target_phase
 from cspm_control.phases.torque_phase import torque_phase
 from cspm_control.phases.wave_phase import wave_phase
+from cspm_control.stages.angle_stage import AngleStage
 from cspm_control.stages.distribution_stage import DistributionStage
 from cspm_control.stages.force_stage import ForceStage
 from cspm_control.stages.motion_stage import MotionStage
@@ -30,6 +32,8 @@ def stage_phase(stage: Stage, slots: Slots, period_ns: int) -> Phase | None:
         return distribution_phase(stage, slots)
     if isinstance(stage, ForceStage):
         return force_phase(stage, slots, period_ns)
+    if isinstance(stage, AngleStage):
+        return angle_phase(stage, slots, period_ns)
     if isinstance(stage, TorqueStage):
         return torque_phase(stage, slots, period_ns)
     return None

@@ -22,6 +22,13 @@ class AngleStage(GuardedStage):
     """Sends the torques that keep the motors on their paths.
 
     Angles count from those measured first, since an encoder's zero is anywhere.
+
+    Attributes:
+        generator, servo: what computes torques, as `__init__` takes it.
+        trip_tensions: highest that are measured while all is well, (n,) [N].
+        first: angles less those wanted at the first step, (n,) [rad].
+        tensions: measured last, (n,) [N].
+        counts: steps since the last status, and those with a torque at its limit.
     """
 
     def __init__(
@@ -48,12 +55,12 @@ class AngleStage(GuardedStage):
             period_ns: of the stage [ns].
         """
         super().__init__(safe_state, safety, period_ns, len(names))
-        self._generator, self._servo = generator, servo
-        self._radii, self._trip, self._names = radii, trip, names
-        self._first: Array | None = None
-        self._tensions: Array | None = None
+        self.generator, self.servo, self.trip_tensions = generator, servo, trip
+        self._radii, self._names = radii, names
+        self.first, self.tensions = np.zeros(len(names)), np.zeros(len(names))
+        self._begun = self._has_tensions = False
         self._start_ns = 0
-        self._steps = self._limited = 0
+        self.counts = np.zeros(2, dtype=np.int64)
 
     def start(self, start_ns: int) -> None:
         """Let the paths begin at an instant [ns]; without a call they begin at 0."""
@@ -69,35 +76,40 @@ class AngleStage(GuardedStage):
         if self._latch.open:
             self._send_safe(now_ns, send)
             return
-        self._tensions = None if tensions is None else tensions.copy()
+        self._has_tensions = tensions is not None
+        if tensions is not None:
+            self.tensions[:] = tensions
         angles, speeds, _ = np.split(winches, 3)
-        wanted, rates = self._generator.step(now_ns - self._start_ns)
-        if self._first is None:
-            self._first = angles - wanted
-            self._servo.restart(self._holding())
-        torque = self._servo.step(wanted + self._first, rates, angles, speeds)
-        self._steps += 1
-        self._limited += self._servo.saturated > 0
+        wanted, rates = self.generator.step(now_ns - self._start_ns)
+        if not self._begun:
+            self.first[:], self._begun = angles - wanted, True
+            self.servo.restart(self._holding())
+        torque = self.servo.step(wanted + self.first, rates, angles, speeds)
+        self.counts += 1, self.servo.saturated > 0
         self._send(now_ns, torque, send)
+
+    @property
+    def steady(self) -> bool:
+        """Whether it commands torques, and has done so since the time began."""
+        return self._begun and not self._latch.open and self._start_ns == 0
 
     def status(self) -> Status:
         """Return the servos' statistics since the last call."""
-        values = {"saturated_share": f"{self._limited / max(1, self._steps):.3f}"}
-        limited = self._limited > 0
-        self._steps = self._limited = 0
+        steps, limited = self.counts.tolist()
+        values = {"saturated_share": f"{limited / max(1, steps):.3f}"}
+        self.counts[:] = 0
         level, text = (Level.WARN, "torque at its limit") if limited else (Level.OK, "ok")
         return self._latch.status(self._safe_state.name, Status(level, self.node, text, values))
 
     def _restart(self) -> None:
         # From where the motors are now, so that a reset brings no jump.
-        self._first = None
+        self._begun = False
 
     def _present_tensions(self) -> Array | None:
-        return self._tensions
+        return self.tensions.copy() if self._has_tensions else None
 
     def _holding(self) -> Array:
-        tensions = self._tensions
-        return np.zeros(len(self._radii)) if tensions is None else self._radii * tensions
+        return self._radii * self.tensions if self._has_tensions else np.zeros(len(self._radii))
 
     def _fault(self, winches: Array, tensions: Array | None) -> str | None:
         if winches.shape != (self._width,):
@@ -111,11 +123,11 @@ class AngleStage(GuardedStage):
         if tensions.shape != (n,):
             return f"{TENSION}: a row of shape {tensions.shape}, allowed: {(n,)}"
         # Written so that NaN fails as well; minus infinity is below no trip.
-        good = (tensions > -np.inf) & (tensions <= self._trip)
+        good = (tensions > -np.inf) & (tensions <= self.trip_tensions)
         if good.all():
             return None
         i = int(np.argmin(good))
         if np.isfinite(tensions[i]):
-            most = f"at most {self._trip[i]:g} N"
+            most = f"at most {self.trip_tensions[i]:g} N"
             return f"{TENSION}: {tensions[i]:.1f} N in {self._names[i]}, allowed: {most}"
         return f"{TENSION}: {tensions[i]} N in {self._names[i]}, allowed: finite numbers"

@@ -32,6 +32,8 @@ def test_every_scenario_is_the_same_bit_for_bit(name):
 
 SINES = "[{amplitude: 0.05, frequency: 3, phase: 0.4}, {amplitude: 0.02, frequency: 11}]"
 TORQUES = f"{{mode: torque, torque: {{sway_3: {{offset: -0.2, sines: {SINES}}}}}}}"
+PATH = "{points: [[0, 0], [0.06, 0.3], [0.1, 0.3], [0.17, 0]], cycles: 2}"
+ANGLES = f"{{mode: angle, bandwidth: 60, angle: {{hoist_1: {PATH}, sway_3: {PATH}}}}}"
 COMPUTED = "control.motion={law: computed_wrench, mass_adaptation: {}}"
 VARIANTS = {
     "internals": ("worst_case", "control.record_internals=true", "control.motion.gains=null"),
@@ -63,6 +65,8 @@ VARIANTS = {
         f"control={TORQUES}",
         "events=[{at: 0.1, cut: sway_3}]",
     ),
+    "angles": ("rest", f"control={ANGLES}"),
+    "angles and trips": ("rest", f"control={ANGLES}", "safety.tension_trip=9.5"),
     "winch feedforward": ("worst_case", "control.force.winch_feedforward={}"),
     "stretched winch feedforward": (
         "worst_case",
@@ -91,12 +95,13 @@ def test_every_setting_is_the_same_bit_for_bit(name):
 
 
 @pytest.mark.compiled
-def test_it_trips_in_compiled_steps():
+@pytest.mark.parametrize(("name", "most"), [("trips", "8.5 N"), ("angles and trips", "9.5 N")])
+def test_it_trips_in_compiled_steps(name, most):
     """The variants above do trip, and do so after the staged steps."""
-    run = assert_same(bundle_of(*VARIANTS["trips"]), STEPS)
+    run = assert_same(bundle_of(*VARIANTS[name]), STEPS)
     alarms = [s for s in run.statuses if s.level == Level.ERROR]
     assert alarms
-    assert "allowed: at most 8.5 N" in alarms[0].message
+    assert f"allowed: at most {most}" in alarms[0].message
 
 
 @pytest.mark.compiled
@@ -133,6 +138,7 @@ def test_every_kind_of_effect_is_the_same_bit_for_bit(effect):
         "dither",
         "dither and slew",
         "torques",
+        "angles",
         "slew",
         "stretched winch feedforward",
         "load cell bias",

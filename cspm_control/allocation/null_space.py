@@ -15,6 +15,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 import numpy as np
+from numba import njit
 from numpy.typing import NDArray
 
 from cspm_control.allocation.closed_form import nearest_tensions
@@ -26,52 +27,58 @@ Array = NDArray[np.float64]
 KEY = "control.tension_distribution.null_space"
 # A pull of which less than this share is left is no new direction.
 LEAST_LEFT = 1e-6
+# What `prescribed` returns where the null space has turned away, and what is said then.
+TURNED = -2
+TURNED_TEXT = (
+    "tension distribution: the null space has turned by 90° from that at the design pose,"
+    " allowed with method prescribed: poses nearer to control.motion.design_pose"
+)
 
 
-class PrescribedNullSpace:
-    """t = A⁺w + N·λ with constant λ."""
+def prescribed_memory(coordinates: Sequence[float], structure: Array) -> Array:
+    """Return what `prescribed` remembers: λ, and the basis at the design pose row by row.
 
-    def __init__(self, coordinates: Sequence[float], structure: Array) -> None:
-        """Take λ, and the design pose's structure.
+    Args:
+        coordinates: λ [N].
+        structure: A at the design pose, shape (m, n).
 
-        Args:
-            coordinates: λ [N].
-            structure: A at the design pose, shape (m, n).
+    Raises:
+        InputError: not as many coordinates as the null space has dimensions, or no full row rank
+            at the design pose.
+    """
+    m, n = structure.shape
+    if len(coordinates) != n - m:
+        raise InputError(
+            f"{KEY}: {len(coordinates)} numbers, allowed: {n - m}, the {n} cables less the"
+            f" wrench's {m} controlled directions"
+        )
+    return np.concatenate(
+        [np.array(coordinates, dtype=float), null_space_basis(structure).T.ravel()]
+    )
 
-        Raises:
-            InputError: not as many coordinates as the null space has dimensions, or no full row
-                rank at the design pose.
-        """
-        m, n = structure.shape
-        if len(coordinates) != n - m:
-            raise InputError(
-                f"{KEY}: {len(coordinates)} numbers, allowed: {n - m}, the {n} cables less the"
-                f" wrench's {m} controlled directions"
-            )
-        self._coordinates = np.array(coordinates, dtype=float)
-        self._basis = null_space_basis(structure)
-        self._free = np.ones(n)
 
-    def __call__(
-        self,
-        structure: Array,
-        wrench: Array,
-        limits: Array,
-        weights: Array,
-        memory: Array,
-        out: Array,
-    ) -> int:
-        """Write the tensions (n,) [N], which may be beyond the limits; return −1 without full rank.
+@njit(cache=True, error_model="numpy")
+def prescribed(
+    structure: Array, wrench: Array, limits: Array, weights: Array, memory: Array, out: Array
+) -> int:
+    """Write the tensions t = A⁺w + N·λ (n,) [N], which may be beyond the limits.
 
-        Raises:
-            SingularityError: a direction of the null space is at right angles to all of the design
-                pose's.
-        """
-        if not nearest_tensions(structure, wrench, np.zeros(len(out)), self._free, out):
-            return -1
-        inner = carried_basis(structure, self._basis) @ self._coordinates
-        nearest_tensions(structure, wrench, inner, self._free, out)
-        return 0
+    Returns −1 without full rank, `TURNED` where a direction of the null space is at right angles to
+    all of the design pose's.
+    """
+    m, n = structure.shape
+    k = n - m
+    if not nearest_tensions(structure, wrench, np.zeros(n), np.ones(n), out):
+        return -1
+    basis = np.empty((k, n))
+    if not _carried(structure, memory[k:].reshape((k, n)), basis):
+        return TURNED
+    inner = np.zeros(n)
+    for j in range(k):
+        for i in range(n):
+            inner[i] += basis[j, i] * memory[j]
+    nearest_tensions(structure, wrench, inner, np.ones(n), out)
+    return 0
 
 
 def null_space_basis(structure: Array) -> Array:
@@ -111,14 +118,28 @@ def carried_basis(structure: Array, basis: Array) -> Array:
     Raises:
         SingularityError: a direction of the null space is at right angles to all of `basis`.
     """
-    projected = without_wrench(structure, basis)
-    squares, directions = np.linalg.eigh(projected.T @ projected)
-    if len(squares) and squares[0] < LEAST_LEFT:
-        raise SingularityError(
-            "tension distribution: the null space has turned by 90° from that at the design pose,"
-            " allowed with method prescribed: poses nearer to control.motion.design_pose"
-        )
-    return np.asarray(projected @ (directions / np.sqrt(squares)) @ directions.T)
+    found = np.empty(basis.T.shape)
+    if not _carried(structure, np.ascontiguousarray(basis.T), found):
+        raise SingularityError(TURNED_TEXT)
+    return found.T
+
+
+@njit(cache=True, error_model="numpy")
+def _carried(structure: Array, rows: Array, out: Array) -> bool:
+    """Write the basis nearest to another, directions in rows (k, n); False where there is none."""
+    k, n = rows.shape
+    if k == 0:
+        return True
+    projected, still = np.empty((k, n)), np.zeros(structure.shape[0])
+    for j in range(k):
+        nearest_tensions(structure, still, rows[j], np.ones(n), projected[j])
+    squares, directions = np.linalg.eigh(projected @ np.ascontiguousarray(projected.T))
+    if squares[0] < LEAST_LEFT:
+        return False
+    # The polar factor: what is left, times the inverse root of its squares.
+    scaled = directions / np.sqrt(squares)
+    out[:] = np.ascontiguousarray(scaled) @ np.ascontiguousarray(directions.T) @ projected
+    return True
 
 
 def without_wrench(structure: Array, tensions: Array) -> Array:

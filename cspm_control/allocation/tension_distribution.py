@@ -17,7 +17,7 @@ from cspm_control.allocation.closed_form import (
     pseudo_inverse,
     removal,
 )
-from cspm_control.allocation.null_space import PrescribedNullSpace
+from cspm_control.allocation.null_space import TURNED, TURNED_TEXT, prescribed, prescribed_memory
 from cspm_control.allocation.preferred_tension import AT_LIMIT, PreferredTension
 from cspm_model.kernels.kinematics import cable_geometry
 from cspm_model.kernels.native import address_of, caller_of
@@ -149,7 +149,9 @@ class TensionDistribution:
         pose_row(design_pose, bar)
         pose_row(np.zeros(6), frame)
         fill_structure(bar, frame, self.cables, self.axes, self.structure)
-        return PrescribedNullSpace(how.null_space, self.structure)
+        self.memory = prescribed_memory(how.null_space, self.structure)
+        self._address = address_of(prescribed, METHOD)
+        return prescribed
 
     def without(self, lost: NDArray[np.bool_]) -> TensionDistribution:
         """Return the same of a machine without the cables where `lost` (n,) is true."""
@@ -164,6 +166,8 @@ class TensionDistribution:
             SingularityError: at these poses no tensions give some wrench.
         """
         saturated = self._distribute(wrench, bar_pose, frame_pose)
+        if saturated == TURNED:
+            raise SingularityError(TURNED_TEXT)
         if saturated < 0:
             place = ", ".join(f"{value:.4g}" for value in bar_pose)
             raise SingularityError(

@@ -16,7 +16,7 @@ from cspm_ident.comparison.channel_fit import ChannelFit
 from cspm_ident.comparison.compare import Comparison as Result
 from cspm_ident.comparison.compare import compare as compare_measurement
 from cspm_msgs_py.errors import InputError
-from cspm_msgs_py.new_folder import refuse_existing
+from cspm_msgs_py.new_folder import new_folder
 from cspm_run.output.json_file import write_json
 
 DRIVES = (Input.WINCH.value, Input.TORQUE.value, Input.TENSION.value)
@@ -93,12 +93,10 @@ class Comparison:
         Raises:
             InputError: the folder exists.
         """
-        place = Path(folder)
-        refuse_existing(place)
+        place = new_folder(folder)
         # Loading plotly takes a second that a table alone need not wait for.
         from cspm_ident.comparison.page import write_page
 
-        place.mkdir(parents=True)
         write_json(place / "comparison.json", self.data())
         write_page(place / "report.html", self.result)
         return place / "report.html"

@@ -26,7 +26,7 @@ from cspm_ident.diagnosis.validation.closed_loop import ClosedLoopFit, simulate_
 from cspm_ident.diagnosis.validation.controller_parity import Parity, controller_parity
 from cspm_ident.experiment.experiment_files import write_experiments
 from cspm_ident.signals.measurement import Measurement
-from cspm_msgs_py.new_folder import refuse_existing
+from cspm_msgs_py.new_folder import new_folder
 from cspm_run.output.json_file import write_json
 
 REPORT = "diagnosis.json"
@@ -164,9 +164,7 @@ class Diagnosis:
         Raises:
             InputError: the folder exists.
         """
-        place = Path(folder)
-        refuse_existing(place)
-        place.mkdir(parents=True)
+        place = new_folder(folder)
         write_experiments(place, self.result, self.data, by_steps(progress))
         # Drawing takes a second to load that a verdict alone need not wait for.
         from cspm.plots.diagnosis_figure import draw_diagnosis

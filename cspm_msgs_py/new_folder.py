@@ -15,3 +15,15 @@ def refuse_existing(folder: Path | None) -> None:
     """
     if folder is not None and folder.exists():
         raise InputError(f"{folder}: exists, allowed: a new folder")
+
+
+def new_folder(folder: str | Path) -> Path:
+    """Make a folder, and those above it, and return its path.
+
+    Raises:
+        InputError: the folder exists.
+    """
+    place = Path(folder)
+    refuse_existing(place)
+    place.mkdir(parents=True)
+    return place

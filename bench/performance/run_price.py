@@ -1,6 +1,6 @@
 """What a simulated second costs: against duration, cables, effects, MuJoCo and the processor.
 
-    python -m bench.performance.run_price
+    python -m bench.performance.run_price [--figure FILE.png]
 
 Processor time of all threads, without what building the run costs, at the rates of each scenario.
 With JAX (`pip install jax`) also the floating-point operations of a plant step, which its compiler
@@ -9,15 +9,21 @@ counts, beside what this core makes of them in products of matrices.
 
 from __future__ import annotations
 
+import argparse
 import statistics
+import tempfile
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import replace
+from pathlib import Path
+from typing import NamedTuple
 
+import matplotlib.pyplot as plt
 import numpy as np
 from rich.console import Console
 from rich.table import Table
 
+from bench.performance.plant_speed import measure_against_mujoco
 from bench.performance.thesis_machine import (
     FRICTION,
     PERIOD_NS,
@@ -25,6 +31,7 @@ from bench.performance.thesis_machine import (
     roll_damping,
     shipped,
 )
+from cspm.plots.picture_style import COLOURS, large_letters, save
 from cspm_msgs_py.recording.run_record import MUJOCO
 from cspm_run.bundle import Bundle
 from cspm_run.recorded_run import run, steps_of
@@ -39,37 +46,93 @@ _MACHINES = (
     "robots/robocrane",
     "robots/cogiro",
 )
+_SETTINGS = {
+    "worst_case, analytic centre": "control.tension_distribution={method: analytic_centre}",
+    "worst_case, winch feedforward": "control.force.winch_feedforward={stretch_bandwidth: 200}",
+}
 _MATRIX = 512
+
+
+class Price(NamedTuple):
+    """What a simulated second of something costs of the processor [ms]."""
+
+    what: str
+    cables: int
+    cost: float
 
 
 def main() -> None:
     """Run the command line."""
-    console = Console()
-    table = Table("closed loop, not recorded", "cables", "processor time of a second [ms]")
-    for duration in (10.0, 60.0, 300.0):
-        bundle = shipped("worst_case", f"duration={duration}")
-        table.add_row(f"worst_case, {duration:g} s", "8", f"{_price(bundle):.2f}")
-    for name in _MACHINES:
-        bundle = shipped(name, "duration=20")
-        cables = len(bundle.testbed.testbed.cables)
-        table.add_row(f"{name}, 20 s", str(cables), f"{_price(bundle):.2f}")
-    bundle = replace(shipped("worst_case", "duration=20"), plant=MUJOCO)
-    table.add_row("worst_case, 20 s, MuJoCo's plant, loop in Python", "8", f"{_price(bundle):.2f}")
-    console.print(table)
+    parser = argparse.ArgumentParser(
+        prog="python -m bench.performance.run_price",
+        description=__doc__,
+        formatter_class=argparse.RawDescriptionHelpFormatter,
+    )
+    parser.add_argument("--figure", type=Path, help="a picture of the prices, PNG and SVG")
+    options = parser.parse_args()
+    console, prices = Console(), []
+    for each in _prices():
+        prices.append(each)
+        console.print(f"{each.what}, {each.cables} cables: {each.cost:.2f} ms", highlight=False)
     console.print(_plants())
     console.print(_operations())
+    if options.figure is not None:
+        _draw(options.figure, prices)
 
 
-def _price(bundle: Bundle) -> float:
+def _prices() -> Iterator[Price]:
+    """Yield the price of the plant alone, of closed loops, and of recorded and other ones."""
+    plants = {
+        each.what: 1e3 / statistics.median(each.samples)
+        for each in measure_against_mujoco(_REPEATS, lambda _: None)
+        if each.what.startswith("MuJoCo, ")
+    }
+    yield Price("plant alone", 8, _step(ThesisMachine(())))
+    for name, cost in plants.items():
+        yield Price(f"{name} steps alone, no winches", 8, cost)
+    for duration in (10.0, 60.0, 300.0):
+        yield Price(f"worst_case, {duration:g} s", 8, _price(_worst(duration)))
+    for name in _MACHINES:
+        bundle = shipped(name, "duration=20")
+        count = len(bundle.testbed.testbed.cables)
+        yield Price(name.rpartition("/")[2], count, _price(bundle))
+    for what, setting in _SETTINGS.items():
+        yield Price(what, 8, _price(_worst(20.0, setting)))
+    yield Price("worst_case, recorded", 8, _price(_worst(20.0), recorded=True))
+    in_python = replace(_worst(20.0), plant=MUJOCO)
+    yield Price("worst_case, MuJoCo's plant, loop in Python", 8, _price(in_python))
+
+
+def _worst(duration: float, *settings: str) -> Bundle:
+    return shipped("worst_case", f"duration={duration:g}", *settings)
+
+
+def _draw(path: Path, prices: Sequence[Price]) -> None:
+    """Draw the prices as bars, the plant's first."""
+    with large_letters():
+        figure, axes = plt.subplots(figsize=(11.0, 0.45 * len(prices) + 1.2), layout="constrained")
+        names = [f"{each.what} ({each.cables})" for each in prices]
+        bars = axes.barh(names, [each.cost for each in prices], color=COLOURS[0])
+        axes.bar_label(bars, [f"{each.cost:.3g}" for each in prices], padding=4)
+        axes.set_xscale("log")
+        axes.margins(x=0.12)
+        axes.invert_yaxis()
+        axes.set_xlabel("processor time of a simulated second, ms")
+        save(figure, path)
+
+
+def _price(bundle: Bundle, *, recorded: bool = False) -> float:
     """Return what a simulated second costs [ms] beyond what building the run does."""
     steps = steps_of(bundle)
-    run(bundle, None, steps=_FEW_STEPS)
+
+    def spent(count: int) -> float:
+        with tempfile.TemporaryDirectory(prefix="cspm-bench-") as place:
+            folder = Path(place) / "run" if recorded else None
+            return _spent(lambda: run(bundle, folder, steps=count))
+
+    spent(_FEW_STEPS)
     seconds = bundle.scenario.duration * (1.0 - _FEW_STEPS / steps)
-    costs = [
-        _spent(lambda: run(bundle, None, steps=steps))
-        - _spent(lambda: run(bundle, None, steps=_FEW_STEPS))
-        for _ in range(_REPEATS)
-    ]
+    costs = [spent(steps) - spent(_FEW_STEPS) for _ in range(_REPEATS)]
     return 1e3 * statistics.median(costs) / seconds
 
 

@@ -19,7 +19,7 @@ from cspm_control.analysis.loops import LoopAnalysis, analyse_loops, pid_law
 from cspm_control.analysis.sampled_loops import LoopTiming, loop_timing
 from cspm_msgs_py.control_spec.force import PiGains
 from cspm_msgs_py.errors import InputError
-from cspm_msgs_py.new_folder import refuse_existing
+from cspm_msgs_py.new_folder import new_folder
 from cspm_msgs_py.scenario import ClosedLoop
 from cspm_run.assembly import resolve
 
@@ -63,11 +63,9 @@ class Design:
         Raises:
             InputError: the folder exists.
         """
-        place = Path(folder)
-        refuse_existing(place)
+        place = new_folder(folder)
         from cspm.plots.loop_figure import draw_force_loops, draw_motion_loops
 
-        place.mkdir(parents=True)
         draw_motion_loops(place / PICTURES[0], self.result)
         draw_force_loops(place / PICTURES[1], self.result, list(self.groups.values()))
         return tuple(place / name for name in PICTURES)

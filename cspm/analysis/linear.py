@@ -23,7 +23,7 @@ from cspm_control.analysis.mode import Mode
 from cspm_control.analysis.published_linear import EXACT, FROZEN, linear_claims
 from cspm_model.linearisation import StateSpace
 from cspm_msgs_py.errors import InputError
-from cspm_msgs_py.new_folder import refuse_existing
+from cspm_msgs_py.new_folder import new_folder
 from cspm_run.output.json_file import write_json
 
 if TYPE_CHECKING:
@@ -84,11 +84,9 @@ class Linear:
         Raises:
             InputError: the folder exists.
         """
-        place = Path(folder)
-        refuse_existing(place)
+        place = new_folder(folder)
         from cspm.plots.linear_figure import draw_linear
 
-        place.mkdir(parents=True)
         draw_linear(place / PICTURE, self.result, self.machine.testbed.cable_names)
         write_json(place / MODEL, _models_data(self.result))
         return place / PICTURE, place / MODEL

@@ -16,7 +16,7 @@ from cspm_control.analysis.cable_structure import cable_structure
 from cspm_control.analysis.manipulability import Ellipsoid, Manipulability, manipulability
 from cspm_control.analysis.pose_grid import workspace_grids
 from cspm_model.parameters import nominal_parameters
-from cspm_msgs_py.new_folder import refuse_existing
+from cspm_msgs_py.new_folder import new_folder
 
 PICTURE = "manipulability.png"
 
@@ -46,11 +46,9 @@ class ManipulabilityAnalysis:
         Raises:
             InputError: the folder exists.
         """
-        place = Path(folder)
-        refuse_existing(place)
+        place = new_folder(folder)
         from cspm.plots.manipulability_figure import draw_manipulability
 
-        place.mkdir(parents=True)
         machine = self.machine
         cables = cable_structure(machine.testbed, machine.pose)
         grids = workspace_grids(machine.testbed.name, cables.exits, cables.axes, machine.pose)

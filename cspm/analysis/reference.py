@@ -12,7 +12,7 @@ from cspm.scenario import AnyScenario, as_scenario
 from cspm.simulation import bundle_of
 from cspm.testbed import AnyTestbed, as_file
 from cspm_control.analysis.reference_demand import ReferenceDemand
-from cspm_msgs_py.new_folder import refuse_existing
+from cspm_msgs_py.new_folder import new_folder
 from cspm_msgs_py.recording.run_record import SIM
 from cspm_msgs_py.testbed import Testbed
 from cspm_run.before_run import demanded
@@ -85,11 +85,9 @@ class ReferenceAnalysis:
         Raises:
             InputError: the folder exists.
         """
-        place = Path(folder)
-        refuse_existing(place)
+        place = new_folder(folder)
         from cspm.plots.reference_figure import draw_reference
 
-        place.mkdir(parents=True)
         draw_reference(place / PICTURE, self.name, self.testbed, self.limits, self.demand)
         return place / PICTURE
 

@@ -27,7 +27,7 @@ from cspm_control.analysis.workspace_result import (
 )
 from cspm_control.waves.build import build_motion
 from cspm_msgs_py.errors import InputError
-from cspm_msgs_py.new_folder import refuse_existing
+from cspm_msgs_py.new_folder import new_folder
 
 PICTURES = ("workspace.png", "maps.png")
 
@@ -70,11 +70,9 @@ class Workspace:
         Raises:
             InputError: the folder exists.
         """
-        place = Path(folder)
-        refuse_existing(place)
+        place = new_folder(folder)
         from cspm.plots.workspace_figure import draw_maps, draw_workspace
 
-        place.mkdir(parents=True)
         draw_workspace(place / PICTURES[0], self.result)
         draw_maps(place / PICTURES[1], self.result)
         return tuple(place / name for name in PICTURES)

@@ -9,14 +9,20 @@ from __future__ import annotations
 import argparse
 import tempfile
 import time
+from collections.abc import Mapping, Sequence
 from pathlib import Path
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 from rich.console import Console
 from rich.table import Table
 
+from bench.performance.plant_speed import plant_step
+from bench.performance.thesis_machine import PERIOD_NS, ThesisMachine, roll_damping
 from cspm.campaign.campaign import run_campaign
 
+# Of the plant, on the machine for which the goals were set.
+REFERENCE_SPEED = 850.0
+MANY = 10_000
 _FILE = """\
 scenario: {scenario}
 set: {{duration: {duration}}}
@@ -33,6 +39,7 @@ class Cost(NamedTuple):
         per_run_s: wall time for each further run [s].
         overhead: share of the workers' time that was not spent in runs.
         processor_s: of one run, in the mean [s].
+        plant_s: what the plant's steps of a run take alone, measured before and after [s].
     """
 
     workers: int
@@ -40,6 +47,12 @@ class Cost(NamedTuple):
     per_run_s: float
     overhead: float
     processor_s: float
+    plant_s: float
+
+    @property
+    def times_plant(self) -> float:
+        """A run's processor time in that of its plant's steps alone."""
+        return self.processor_s / self.plant_s
 
 
 def measured(scenario: str, duration: float, runs: int, workers: int) -> Cost:
@@ -62,25 +75,37 @@ def measured(scenario: str, duration: float, runs: int, workers: int) -> Cost:
             if what.startswith("run "):
                 ends.append(time.perf_counter() - begun)
 
+        machine = ThesisMachine(roll_damping())
+        before = plant_step(machine)
         done = run_campaign(file, Path(place) / "out", workers=workers, progress=note)
+        step = 0.5e-6 * (before + plant_step(machine))
+    plant = step * duration / (PERIOD_NS * 1e-9)
+    return _cost(workers, ends, done.rows, plant)
+
+
+def _cost(
+    workers: int, ends: Sequence[float], every: Sequence[Mapping[str, Any]], plant: float
+) -> Cost:
     # The first runs of the workers, which import and compile, are those of the least numbers.
-    rows = done.rows[workers:]
+    rows = every[workers:]
     wall = ends[-1] - ends[workers - 1]
     busy = sum(row["elapsed_s"] for row in rows)
     mean = sum(row["processor_s"] for row in rows) / len(rows)
-    return Cost(workers, ends[workers - 1], wall / len(rows), 1.0 - busy / (workers * wall), mean)
+    overhead = 1.0 - busy / (workers * wall)
+    return Cost(workers, ends[workers - 1], wall / len(rows), overhead, mean, plant)
 
 
 def table_of(costs: list[Cost]) -> Table:
     """Return a row per campaign, and how its rate compares with that of the first."""
     heads = ("workers", "start [s]", "wall per run [s]", "processor per run [s]")
-    table = Table(*heads, "overhead", "times the first")
+    table = Table(*heads, "of its plant's", "overhead", "times the first")
     for each in costs:
         table.add_row(
             str(each.workers),
             f"{each.start_s:.1f}",
             f"{each.per_run_s:.3f}",
             f"{each.processor_s:.3f}",
+            f"{each.times_plant:.1f} ×",
             f"{each.overhead:.1%}",
             f"{costs[0].per_run_s / each.per_run_s:.2f}",
         )
@@ -98,7 +123,15 @@ def main() -> None:
     costs = [
         measured(options.scenario, options.duration, options.runs, each) for each in options.workers
     ]
-    Console().print(table_of(costs))
+    console = Console()
+    console.print(table_of(costs))
+    last = costs[-1]
+    here = MANY * last.per_run_s / 60.0
+    faster = last.plant_s / (options.duration / REFERENCE_SPEED)
+    console.print(
+        f"{MANY} runs with {last.workers} workers: {here:.0f} min here; where the plant steps at"
+        f" {REFERENCE_SPEED:g} × real time and all else likewise, {here / faster:.0f} min"
+    )
 
 
 if __name__ == "__main__":

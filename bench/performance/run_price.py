@@ -23,10 +23,9 @@ import numpy as np
 from rich.console import Console
 from rich.table import Table
 
-from bench.performance.plant_speed import measure_against_mujoco
+from bench.performance.plant_speed import measure_against_mujoco, plant_step
 from bench.performance.thesis_machine import (
     FRICTION,
-    PERIOD_NS,
     ThesisMachine,
     roll_damping,
     shipped,
@@ -37,7 +36,6 @@ from cspm_run.bundle import Bundle
 from cspm_run.recorded_run import run, steps_of
 
 _REPEATS, _FEW_STEPS = 3, 100
-_PLANT_S = 20.0
 # Of the thesis's machine and others, by their number of cables.
 _MACHINES = (
     "one_winch",
@@ -87,7 +85,7 @@ def _prices() -> Iterator[Price]:
         for each in measure_against_mujoco(_REPEATS, lambda _: None)
         if each.what.startswith("MuJoCo, ")
     }
-    yield Price("plant alone", 8, _step(ThesisMachine(())))
+    yield Price("plant alone", 8, plant_step(ThesisMachine(())))
     for name, cost in plants.items():
         yield Price(f"{name} steps alone, no winches", 8, cost)
     for duration in (10.0, 60.0, 300.0):
@@ -145,20 +143,8 @@ def _plants() -> Table:
         ("the file's roll damping", base, len(base)),
         ("and friction on all winches", base + FRICTION, len(base) + 16),
     ):
-        table.add_row(name, str(count), f"{_step(ThesisMachine(effects)):.2f}")
+        table.add_row(name, str(count), f"{plant_step(ThesisMachine(effects)):.2f}")
     return table
-
-
-def _step(machine: ThesisMachine) -> float:
-    """Return the processor time of a plant step [µs]."""
-    steps = round(_PLANT_S / (PERIOD_NS * 1e-9))
-
-    def advance() -> None:
-        machine.rewind()
-        machine.advance(0, steps)
-
-    advance()
-    return 1e6 * statistics.median(_spent(advance) for _ in range(_REPEATS)) / steps
 
 
 def _operations() -> str:
@@ -170,7 +156,7 @@ def _operations() -> str:
         return "floating-point operations: not counted, JAX is not installed"
     batch = PlantVariants(1)
     count = operations_of(make_rate(batch.plant.parameters, batch.frame_pose), batch.states[0])
-    took, most = _step(ThesisMachine(())), _rate_of_products()
+    took, most = plant_step(ThesisMachine(())), _rate_of_products()
     return (
         f"a plant step has {count:.0f} floating-point operations: {1e-3 * count / took:.2f} · 10⁹"
         f" a second, where products of matrices make {1e-9 * most:.0f} · 10⁹ (limit:"

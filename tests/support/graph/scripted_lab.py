@@ -11,21 +11,26 @@ CLAMPED = Path(__file__).resolve().parents[3] / "examples" / "clamped_bar.yaml"
 RATE = 200
 # The way that a body moves from one message to the next: 2 m/s.
 STEP = 0.01
+# Of the load cells [N], as in the test-bed file.
+NOISE = 0.02
 
 
 def clamped_bundle(*overrides):
     """Return the scenario of the clamped bar, patient with a busy computer."""
     return bundle_of(
-        CLAMPED, "duration=100", "safety.stale_after=0.5", "safety.watchdog=0.5", *overrides
+        CLAMPED, "duration=600", "safety.stale_after=0.5", "safety.watchdog=0.5", *overrides
     )
 
 
 class ScriptedLab:
     """Sends poses, winches and tensions while its session is spun; tensions follow the torques.
 
+    Load cells have noise: one that repeats itself is taken for one that measures no more.
+
     Attributes:
         bar: position of the bar, (3,) [m]; it goes there at 2 m/s, or at once by `jump`.
         reported: what is added to the torques that the drives report, (n,) [N·m].
+        at_fault: the drive that reports wrong torques, by its number.
     """
 
     def __init__(self, session, testbed):
@@ -34,7 +39,8 @@ class ScriptedLab:
         self.radii = np.array([cable.drum_radius / cable.gear_ratio for cable in self._cables])
         self.bar, self._at = np.array([0.0, 0.0, 2.0]), np.array([0.0, 0.0, 2.0])
         self.torques = 5.0 * self.radii
-        self.reported = np.zeros(len(self.radii))
+        self.reported, self.at_fault = np.zeros(len(self.radii)), 0
+        self._rng = np.random.default_rng(1)
         topics = testbed.topics
         self._send = {
             name: self._node.publisher(topics[name])
@@ -48,12 +54,23 @@ class ScriptedLab:
         self.bar = np.array([x, y, z])
         self._at = self.bar.copy()
 
+    def go(self, x):
+        """Move the bar along x."""
+        self.bar[0] = x
+
+    def report(self, wrong=0.0):
+        """Let the drive at fault report so much more torque than it has [N·m]."""
+        self.reported[self.at_fault] = wrong
+
     @property
     def arrived(self):
         return bool((self.bar == self._at).all())
 
     def _command(self, _, row):
         self.torques = np.maximum(row, 0.0)
+
+    def _noise(self):
+        return NOISE * self._rng.standard_normal(len(self.radii))
 
     def _measure(self):
         way = self.bar - self._at
@@ -63,7 +80,7 @@ class ScriptedLab:
             FRAME_POSE: np.array([0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 1.0]),
             BAR_POSE: np.array([*self._at, 0.0, 0.0, 0.0, 1.0]),
             WINCH_STATE: np.concatenate([still, self.torques + self.reported]),
-            TENSION: self.torques / self.radii,
+            TENSION: self.torques / self.radii + self._noise(),
         }
         stamp = self._node.now_ns()
         for name, row in rows.items():

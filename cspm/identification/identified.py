@@ -14,7 +14,7 @@ from cspm.rig import FITTED
 from cspm.testbed import AnyTestbed, Testbed, as_file
 from cspm_ident.data_look.data_check import DataCheck
 from cspm_ident.estimation.estimate import Estimate
-from cspm_msgs_py.new_folder import new_folder
+from cspm_msgs_py.new_folder import refuse_existing
 from cspm_msgs_py.testbed import TestbedFile
 
 
@@ -74,8 +74,10 @@ class Identification(Generic[Result]):
         Raises:
             InputError: the folder exists, or the numbers are no machine's.
         """
-        place = new_folder(folder)
+        place = Path(folder)
+        refuse_existing(place)
         file = self.fitted()
+        place.mkdir(parents=True)
         written = {}
         if file is not None:
             (place / FITTED).write_text(file.text, encoding="utf-8")

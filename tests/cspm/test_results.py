@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 
 import cspm
+from cspm.identification.identified import Identification
 from cspm.parameters import Parameter, Parameters
 from cspm.progress import by_steps
 
@@ -128,3 +129,13 @@ def test_a_stage_of_the_cascade_is_a_controller_in_its_own_place():
         cspm.builtin_controller("rudder", "calm")
     with pytest.raises(cspm.InputError, match="tension_distribution: needs /wrench_command"):
         own["tension_distribution"].step(0.0, {})
+
+
+def test_numbers_that_are_no_machines_leave_no_folder(tmp_path):
+    def refused():
+        raise cspm.InputError("no machine")
+
+    found = Identification(None, Parameters([]), refused, lambda place: {})
+    with pytest.raises(cspm.InputError, match=r"^no machine$"):
+        found.write(tmp_path / "out")
+    assert not (tmp_path / "out").exists()

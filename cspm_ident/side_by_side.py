@@ -14,8 +14,7 @@ Made = TypeVar("Made")
 def side_by_side(call: Callable[[Given], Made], items: Iterable[Given]) -> list[Made]:
     """Return what a call makes of each item, in their order; threads share the processors.
 
-    Worth it where a call's time goes into compiled code, which leaves Python to others: kernels,
-    and numpy and scipy on long arrays.
+    Worth it where a call's time goes into kernels, which leave Python to others.
     """
     with ThreadPoolExecutor(os.cpu_count()) as pool:
         return list(pool.map(call, items))

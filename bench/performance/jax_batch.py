@@ -9,14 +9,13 @@ frame at rest and torques held; the last states are compared. Processor time of 
 from __future__ import annotations
 
 import argparse
-import time
-from collections.abc import Callable
 from functools import partial
 
 import numpy as np
 from rich.console import Console
 from rich.table import Table
 
+from bench.performance.processor_time import spent
 from bench.performance.thesis_machine import PERIOD_NS, worst_case
 from cspm_model.kernels.cable import RADIUS
 from cspm_model.motion import Motion
@@ -100,16 +99,10 @@ def measured(variants: int, steps: int) -> tuple[str, str, str, str]:
 
     own = partial(batch.advance, steps)
     difference = np.abs(in_lanes() - own()).max()
-    turns = [(_cost(own), _cost(in_lanes)) for _ in range(_REPEATS)]
+    turns = [(spent(own), spent(in_lanes)) for _ in range(_REPEATS)]
     ours, theirs = (1e6 * np.median(each) / steps / variants for each in zip(*turns, strict=True))
     ratio = np.median([b / a for a, b in turns])
     return f"{ours:.2f}", f"{theirs:.2f}", f"{ratio:.2f}", f"{difference:.1e}"
-
-
-def _cost(work: Callable[[], object]) -> float:
-    begun = time.process_time()
-    work()
-    return time.process_time() - begun
 
 
 if __name__ == "__main__":

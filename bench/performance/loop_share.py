@@ -2,21 +2,16 @@
 
 from __future__ import annotations
 
-import tempfile
-import time
 from collections.abc import Callable
 from dataclasses import replace
-from pathlib import Path
 
 import cspm
 from bench.performance.measured_figure import Advance, Figure
+from bench.performance.processor_time import FEW_STEPS, loop_cost, run_steps, spent
 from bench.performance.thesis_machine import SCENARIOS, ThesisMachine, roll_damping, worst_case
 from cspm_run.bundle import Bundle
-from cspm_run.recorded_run import run
 
 GROUP = "speed as a share of the plant's alone, worst case"
-# Building a run is no part of its steps.
-FEW_STEPS = 100
 VARIANTS = 8
 # Plant steps per second of simulated time.
 RATE = 1000
@@ -28,15 +23,15 @@ def measure_loop_share(repetitions: int, duration: float, advance: Advance) -> l
     machine = ThesisMachine(roll_damping())
     plain, centre = worst_case(duration), _with_centre(duration)
     loops: dict[str, tuple[float, Callable[[], float]]] = {
-        "closed loop, pseudo-inverse": (1 / 5, lambda: _cost(plain, recorded=False)),
-        "closed loop, analytic centre": (1 / 8, lambda: _cost(centre, recorded=False)),
-        "recorded, pseudo-inverse": (1 / 15, lambda: _cost(plain, recorded=True)),
+        "closed loop, pseudo-inverse": (1 / 5, lambda: loop_cost(plain, recorded=False)),
+        "closed loop, analytic centre": (1 / 8, lambda: loop_cost(centre, recorded=False)),
+        "recorded, pseudo-inverse": (1 / 15, lambda: loop_cost(plain, recorded=True)),
         f"{VARIANTS} variants, pseudo-inverse": (1 / 2.5, lambda: _batch_cost(duration)),
     }
     shares: dict[str, list[float]] = {name: [] for name in loops}
     for bundle in (plain, centre):
         # What is loaded once is no part of it either.
-        _run(bundle, FEW_STEPS, recorded=True)
+        run_steps(bundle, FEW_STEPS, recorded=True)
     for _ in range(repetitions):
         for name, (_, cost) in loops.items():
             alone = _plant_cost(machine, duration)
@@ -57,31 +52,10 @@ def _with_centre(duration: float) -> Bundle:
     return replace(found, scenario=found.scenario.model_copy(update={"control": control}))
 
 
-def _spent(work: Callable[[], object]) -> float:
-    begun = time.process_time()
-    work()
-    return time.process_time() - begun
-
-
 def _plant_cost(machine: ThesisMachine, duration: float) -> float:
     """Return what a simulated second costs [s]."""
     machine.rewind()
-    return _spent(lambda: machine.advance(0, round(RATE * duration))) / duration
-
-
-def _cost(bundle: Bundle, *, recorded: bool) -> float:
-    """Return what a simulated second costs [s] beyond what building the run does."""
-    steps = round(RATE * bundle.scenario.duration)
-    spent = [_spent(lambda n=n: _run(bundle, n, recorded)) for n in (FEW_STEPS, steps)]
-    return (spent[1] - spent[0]) / (steps - FEW_STEPS) * RATE
-
-
-def _run(bundle: Bundle, steps: int, recorded: bool) -> None:
-    if not recorded:
-        run(bundle, None, steps=steps)
-        return
-    with tempfile.TemporaryDirectory(prefix="cspm-bench-") as place:
-        run(bundle, Path(place) / "loop", steps=steps)
+    return spent(lambda: machine.advance(0, round(RATE * duration))) / duration
 
 
 def _batch_cost(duration: float) -> float:
@@ -94,5 +68,5 @@ def _batch_cost(duration: float) -> float:
             pass
 
     short = FEW_STEPS / RATE
-    spent = [_spent(lambda long=long: batch(long)) for long in (short, duration)]
-    return (spent[1] - spent[0]) / (VARIANTS * (duration - short))
+    first, last = (spent(lambda long=long: batch(long)) for long in (short, duration))
+    return (last - first) / (VARIANTS * (duration - short))

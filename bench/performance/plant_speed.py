@@ -9,6 +9,7 @@ from functools import partial
 
 from bench.performance.measured_figure import Advance, Figure
 from bench.performance.mujoco_machine import MujocoMachine
+from bench.performance.processor_time import spent
 from bench.performance.thesis_machine import FRICTION, PERIOD_NS, ThesisMachine, roll_damping
 
 STEPS = 2000
@@ -20,14 +21,12 @@ AGAINST = "plant against MuJoCo, 1 kHz"
 def plant_step(machine: ThesisMachine) -> float:
     """Return the processor time of a step of the plant, the median of several turns [µs]."""
 
-    def advance() -> float:
+    def advance() -> None:
         machine.rewind()
-        begun = time.process_time()
         machine.advance(0, 10 * STEPS)
-        return time.process_time() - begun
 
     advance()
-    return 1e6 * statistics.median(advance() for _ in range(5)) / (10 * STEPS)
+    return 1e6 * statistics.median(spent(advance) for _ in range(5)) / (10 * STEPS)
 
 
 def measure_plant(repetitions: int, advance: Advance) -> list[Figure]:

@@ -11,9 +11,7 @@ from __future__ import annotations
 
 import argparse
 import statistics
-import tempfile
-import time
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import replace
 from pathlib import Path
 from typing import NamedTuple
@@ -24,6 +22,7 @@ from rich.console import Console
 from rich.table import Table
 
 from bench.performance.plant_speed import measure_against_mujoco, plant_step
+from bench.performance.processor_time import FEW_STEPS, loop_cost, run_steps, spent
 from bench.performance.thesis_machine import (
     FRICTION,
     ThesisMachine,
@@ -33,9 +32,8 @@ from bench.performance.thesis_machine import (
 from cspm.plots.picture_style import COLOURS, large_letters, save
 from cspm_msgs_py.recording.run_record import MUJOCO
 from cspm_run.bundle import Bundle
-from cspm_run.recorded_run import run, steps_of
 
-_REPEATS, _FEW_STEPS = 3, 100
+_REPEATS = 3
 # Of the thesis's machine and others, by their number of cables.
 _MACHINES = (
     "one_winch",
@@ -121,17 +119,8 @@ def _draw(path: Path, prices: Sequence[Price]) -> None:
 
 def _price(bundle: Bundle, *, recorded: bool = False) -> float:
     """Return what a simulated second costs [ms] beyond what building the run does."""
-    steps = steps_of(bundle)
-
-    def spent(count: int) -> float:
-        with tempfile.TemporaryDirectory(prefix="cspm-bench-") as place:
-            folder = Path(place) / "run" if recorded else None
-            return _spent(lambda: run(bundle, folder, steps=count))
-
-    spent(_FEW_STEPS)
-    seconds = bundle.scenario.duration * (1.0 - _FEW_STEPS / steps)
-    costs = [spent(steps) - spent(_FEW_STEPS) for _ in range(_REPEATS)]
-    return 1e3 * statistics.median(costs) / seconds
+    run_steps(bundle, FEW_STEPS, recorded)
+    return 1e3 * statistics.median(loop_cost(bundle, recorded=recorded) for _ in range(_REPEATS))
 
 
 def _plants() -> Table:
@@ -171,14 +160,8 @@ def _rate_of_products() -> float:
     matrix = np.random.default_rng(1).standard_normal((_MATRIX, _MATRIX))
     with threadpool_limits(1):
         matrix @ matrix
-        took = min(_spent(lambda: matrix @ matrix) for _ in range(10))
+        took = min(spent(lambda: matrix @ matrix) for _ in range(10))
     return 2.0 * _MATRIX**3 / took
-
-
-def _spent(work: Callable[[], object]) -> float:
-    begun = time.process_time()
-    work()
-    return time.process_time() - begun
 
 
 if __name__ == "__main__":

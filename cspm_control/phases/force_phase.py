@@ -148,7 +148,7 @@ def force_phase(stage: ForceStage, slots: Slots, period_ns: int) -> Phase:
     amplitudes, frequencies = np.zeros(n), np.zeros(n)
     if stage.dither is not None:
         amplitudes, frequencies, _ = stage.dither.arrays
-    phase = make_phase(
+    return make_phase(
         _kernel,
         *(integers, stage.counts, np.array([found.period, step or 0.0])),
         *(found.gains, found.torque_limits, found.terms, ahead, found.integral),
@@ -158,9 +158,8 @@ def force_phase(stage: ForceStage, slots: Slots, period_ns: int) -> Phase:
         *(each.places if each else _NO_PLACES for each in before),
         corrected,
         ready=lambda: stage.steady,
+        parts=tuple(each for each in before if each),
     )
-    phase.parts = tuple(each for each in before if each)
-    return phase
 
 
 def _integers(stage: ForceStage, slots: Slots, period_ns: int) -> Places:

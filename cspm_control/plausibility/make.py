@@ -32,6 +32,7 @@ from cspm_control.plausibility.pose_limits import FollowingError, PoseLimits
 from cspm_control.plausibility.pose_noise import PoseNoise, point_accelerations, points_noise
 from cspm_control.plausibility.repeated_reading import RepeatedReading
 from cspm_control.plausibility.torque_balance import TorqueBalance
+from cspm_control.stages.make import tension_trips
 from cspm_msgs_py.safety_spec import Safety
 from cspm_msgs_py.scenario import Scenario
 from cspm_msgs_py.schedule import (
@@ -60,7 +61,7 @@ class MachinePlausibility:
         poses: limits of bodies, by the topic of their poses.
         noise: what those poses may tremble, likewise.
         following: of the bar, where the node reads its reference.
-        motion: of the winches, where the node reads their states.
+        motion: of the winches, by the topic of their states.
         balance: of the winches, where the node reads tensions and states.
         repeated: of sensors with noise, by topic.
     """
@@ -68,7 +69,7 @@ class MachinePlausibility:
     poses: Mapping[str, PoseLimits] = field(default_factory=dict)
     noise: Mapping[str, PoseNoise] = field(default_factory=dict)
     following: FollowingError | None = None
-    motion: DriveMotion | None = None
+    motion: Mapping[str, DriveMotion] = field(default_factory=dict)
     balance: TorqueBalance | None = None
     repeated: Mapping[str, RepeatedReading] = field(default_factory=dict)
 
@@ -76,16 +77,12 @@ class MachinePlausibility:
         self, topic: str, stamp_ns: int, row: Array, rows: Mapping[str, Array], *, running: bool
     ) -> str | None:
         """Take a message; see `cspm_msgs_py.stepping.plausibility`."""
-        for judges in (self.repeated, self.poses, self.noise):
+        for judges in (self.repeated, self.poses, self.noise, self.motion):
             fault = judges[topic].fault(stamp_ns, row) if topic in judges else None
             if fault is not None:
                 return fault
         if topic == BAR_POSE and self.following is not None and BAR_REFERENCE in rows:
             return self.following.fault(row, rows[BAR_REFERENCE], running=running)
-        if topic == WINCH_STATE and self.motion is not None:
-            fault = self.motion.fault(stamp_ns, row)
-            if fault is not None:
-                return fault
         if topic == WINCH_STATE and self.balance is not None and TENSION in rows:
             return self.balance.fault(stamp_ns, row, rows[TENSION], running=running)
         return None
@@ -114,13 +111,14 @@ def make_plausibility(node: str, scenario: Scenario, testbed: Testbed) -> Machin
                 period_ns = schedule.topics[topic].divider * schedule.period_ns
                 poses[topic] = PoseLimits(topic, middle, points, reach, speed, period_ns)
                 noise[topic] = _pose_noise(topic, points, safety, testbed, period_ns)
-    following = motion = balance = None
+    following = balance = None
+    motion = {}
     if {BAR_POSE, BAR_REFERENCE} <= read:
         most = safety.following_error or FOLLOWING_SHARE * machine_size(testbed)
         following = FollowingError(body_points(testbed)[1], most)
     if WINCH_STATE in read:
         each = schedule.topics[WINCH_STATE]
-        motion = drive_motion(scenario, testbed, each.divider * schedule.period_ns)
+        motion[WINCH_STATE] = drive_motion(scenario, testbed, each.divider * schedule.period_ns)
     if {WINCH_STATE, TENSION} <= read:
         balance = torque_balance(scenario, testbed)
     repeated = _repeated(scenario, testbed, read)
@@ -222,12 +220,12 @@ def _pulls(testbed: Testbed) -> Array:
 
 def drive_motion(scenario: Scenario, testbed: Testbed, period_ns: int) -> DriveMotion:
     """Return what the motors of a machine can do, with readings in so many ns."""
-    cables, trip = testbed.cables, scenario.safety.tension_trip
-    torques = []
-    for cable in cables:
-        tension = trip or 2.0 * (cable.tension_limits[1] if cable.tension_limits else 0.0)
-        torques.append(cable.torque_limit + tension * cable.drum_radius / cable.gear_ratio)
-    accelerations = np.array(torques) / np.array([cable.rotor_inertia for cable in cables])
+    cables, trips = testbed.cables, tension_trips(scenario, testbed)
+    # What has no limit carries no bar, and nothing pulls at it.
+    tensions = np.where(np.isfinite(trips), trips, 0.0)
+    radii = np.array([cable.drum_radius / cable.gear_ratio for cable in cables])
+    torques = np.array([cable.torque_limit for cable in cables]) + radii * tensions
+    accelerations = torques / np.array([cable.rotor_inertia for cable in cables])
     noise = (0.0, 0.0)
     if WINCH_STATE in testbed.sensors:
         angle, speed, _ = _deviations(testbed.sensors[WINCH_STATE])

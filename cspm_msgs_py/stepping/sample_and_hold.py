@@ -200,8 +200,10 @@ class SampleAndHold:
             known = self._came if self._computed_ns is not None else ()
             ages = {name: self._age(name, now_ns) for name in known}
             self._stamp = now_ns
-            # Nobody holds a winch by a state that cannot be true.
-            believed = {k: row for k, row in self._rows.items() if k not in self._implausible}
+            believed = self._rows
+            if self._implausible:
+                # Nobody holds a winch by a state that cannot be true.
+                believed = {k: row for k, row in self._rows.items() if k not in self._implausible}
             self._guard.watch(now_ns, ages, self._send, believed)
         if now_ns >= self._status_due:
             self._status_due = now_ns + 1_000_000_000 // DIAGNOSTICS_RATE

@@ -94,7 +94,9 @@ def driven_browser(folder):
         line = next(each for each in process.stdout if "successfully on port" in each)
         address = f"http://127.0.0.1:{line.rstrip().rstrip('.').rsplit(' ', 1)[1]}"
         options = {"binary": browser, "args": [*_FLAGS, f"--user-data-dir={folder}"]}
-        wanted = {"goog:chromeOptions": options, "goog:loggingPrefs": {"browser": "ALL"}}
+        patience = {"script": 1000 * _PATIENCE_S, "pageLoad": 1000 * _PATIENCE_S}
+        logs = {"browser": "ALL"}
+        wanted = {"goog:chromeOptions": options, "goog:loggingPrefs": logs, "timeouts": patience}
         begun = _post(f"{address}/session", {"capabilities": {"alwaysMatch": wanted}})
         session = begun["value"]["sessionId"]
         try:

@@ -8,7 +8,7 @@ of marked values and searching for the marks: the serialiser alone knows the rul
 from __future__ import annotations
 
 import struct
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from functools import cache, cached_property
 from itertools import groupby
@@ -72,17 +72,7 @@ class Layout:
         Raises:
             InputError: a stamp is outside what a ROS stamp can hold.
         """
-        seconds, nanoseconds = np.divmod(stamp_ns, NANOSECONDS)
-        if (
-            len(seconds)
-            and not -LATEST_SECOND - 1 <= seconds.min() <= seconds.max() <= LATEST_SECOND
-        ):
-            worst = stamp_ns[np.argmax(np.abs(seconds))]
-            raise InputError(
-                f"{self.topic.name}: stamp {worst} ns, allowed: ±{LATEST_SECOND} s (int32 seconds)"
-            )
-        records["sec"] = seconds
-        records["nanosec"] = nanoseconds
+        records["sec"], records["nanosec"] = split_stamps(stamp_ns, lambda _: self.topic.name)
         for i, columns in enumerate(self.columns):
             records[f"run{i}"] = rows[:, columns]
 
@@ -146,6 +136,26 @@ class Layout:
         """Return which of the CDR bytes, shape (n, size), are this topic's message, shape (n,)."""
         same = payload[:, self.constant] == self.template[self.constant]
         return np.asarray(same.all(axis=1))
+
+
+def split_stamps(stamp_ns: Stamps, name: Callable[[int], str]) -> tuple[Stamps, Stamps]:
+    """Return seconds and nanoseconds of stamps [ns], all of shape (n,).
+
+    Args:
+        stamp_ns: the stamps.
+        name: of the topic of the message at an index.
+
+    Raises:
+        InputError: a stamp is outside what a ROS stamp can hold.
+    """
+    seconds, nanoseconds = np.divmod(stamp_ns, NANOSECONDS)
+    if len(seconds) and not -LATEST_SECOND - 1 <= seconds.min() <= seconds.max() <= LATEST_SECOND:
+        worst = int(np.argmax(np.abs(seconds)))
+        raise InputError(
+            f"{name(worst)}: stamp {stamp_ns[worst]} ns, allowed: ±{LATEST_SECOND} s"
+            " (int32 seconds)"
+        )
+    return seconds, nanoseconds
 
 
 @cache

@@ -3,7 +3,9 @@
 from __future__ import annotations
 
 import zlib
-from collections.abc import Sequence
+from collections.abc import Callable, Iterable, Sequence
+from functools import lru_cache
+from itertools import chain
 from typing import NamedTuple
 
 import numpy as np
@@ -12,13 +14,14 @@ from mcap.records import Chunk
 from numpy.typing import NDArray
 
 from cspm_msgs_py.errors import InputError
-from cspm_msgs_py.layout import Layout
+from cspm_msgs_py.layout import Layout, split_stamps
 from cspm_msgs_py.recording.records import HEAD, MESSAGE_PREFIX, Opcode
 from cspm_msgs_py.recording.sink import Index
 
 Bytes = NDArray[np.uint8]
 Times = NDArray[np.int64]
 _PREFIX = MESSAGE_PREFIX.itemsize
+_STAMP = np.dtype([("sec", "<i4"), ("nanosec", "<u4")])
 
 
 class Batch(NamedTuple):
@@ -35,117 +38,138 @@ class Batch(NamedTuple):
     contents: list[bytes]
 
 
-class RowRecords:
-    """Makes the Message records of a channel that carries rows."""
-
-    def __init__(self, layout: Layout, channel: int) -> None:
-        """Prepare what all records of the channel share.
-
-        Args:
-            layout: layout of the channel's topic.
-            channel: its id.
-        """
-        self._layout = layout
-        self._dtype = _record_dtype(layout)
-        self.template = np.zeros(self._dtype.itemsize, dtype=np.uint8)
-        self.template[_PREFIX:] = layout.template
-        head = self.template.view(self._dtype)[0]
-        head["opcode"] = Opcode.MESSAGE
-        head["length"] = len(self.template) - HEAD.size
-        head["channel"] = channel
-
-    def sizes(self, batch: Batch) -> Times:
-        """Return the length of each record, shape (n,)."""
-        return np.full(len(batch.logs), len(self.template), dtype=np.int64)
-
-    def place(self, out: Bytes, starts: Times, logs: Times, sequence: int, batch: Batch) -> None:
-        """Write the batch's records into a chunk's content.
-
-        Args:
-            out: the content, shape (size,).
-            starts: offset of each record, shape (n,).
-            logs: log times [ns], shape (n,).
-            sequence: number of messages before this batch.
-            batch: the messages.
-
-        Raises:
-            InputError: a row of another length, or a stamp that a ROS stamp cannot hold.
-        """
-        topic, count = self._layout.topic, len(logs)
-        content = b"".join(batch.contents)
-        if len(content) != 8 * topic.width * count:
-            raise InputError(
-                f"{topic.name}: a row of another length, allowed: {topic.width} float64"
-            )
-        bytes_ = np.repeat(self.template[None], count, axis=0)
-        records = bytes_.view(self._dtype)[:, 0]
-        records["sequence"] = _sequence(sequence, count)
-        records["log"] = records["publish"] = logs
-        rows = np.frombuffer(content).reshape(count, topic.width)
-        self._layout.fill(records, _times(topic.name, batch.stamps), rows)
-        size = len(self.template)
-        # Row i of `windows` is the `size` bytes from offset i on, so one assignment places all.
-        windows = np.ndarray((len(out) - size + 1, size), np.uint8, out, strides=(1, 1))
-        windows[starts] = bytes_
-
-
-class PayloadRecords:
-    """Makes the Message records of a channel whose payloads are given."""
-
-    def __init__(self, channel: int) -> None:
-        """Remember the channel's id."""
-        self._channel = channel
-
-    def sizes(self, batch: Batch) -> Times:
-        """Return the length of each record, shape (n,)."""
-        return np.array([_PREFIX + len(payload) for payload in batch.contents], dtype=np.int64)
-
-    def place(self, out: Bytes, starts: Times, logs: Times, sequence: int, batch: Batch) -> None:
-        """Write the batch's records into a chunk's content; see `RowRecords.place`."""
-        prefix = np.zeros(len(logs), dtype=MESSAGE_PREFIX)
-        prefix["opcode"] = Opcode.MESSAGE
-        prefix["length"] = self.sizes(batch) - HEAD.size
-        prefix["channel"] = self._channel
-        prefix["sequence"] = _sequence(sequence, len(logs))
-        prefix["log"] = prefix["publish"] = logs
-        for start, head, payload in zip(starts.tolist(), prefix, batch.contents, strict=True):
-            record = head.tobytes() + payload
-            out[start : start + len(record)] = np.frombuffer(record, dtype=np.uint8)
-
-
 class BlockPart(NamedTuple):
-    """The batch of one channel, its id, the messages it had before, and its record maker."""
+    """A channel's part of a block.
+
+    Attributes:
+        channel: its id.
+        name: its topic.
+        sequence: how many messages it had before.
+        batch: its messages.
+        layout: of its rows; None where payloads are given.
+    """
 
     channel: int
     name: str
     sequence: int
     batch: Batch
-    records: RowRecords | PayloadRecords
+    layout: Layout | None
 
 
-def merge(parts: Sequence[BlockPart]) -> tuple[bytes, dict[int, Index]]:
+def merge(
+    parts: Sequence[BlockPart], place_rows: Callable[..., None]
+) -> tuple[bytes, dict[int, Index]]:
     """Return a chunk's content, ordered by log time, and the index of each channel.
 
     Messages of one log time are ordered by channel, those of one channel by arrival: the content
-    does not depend on how the channels' appends were interleaved.
+    does not depend on how the channels' appends were interleaved. `place_rows` is the kernel of
+    `row_kernel`, which readers need not load.
 
     Raises:
         InputError: a time or a row that a recording cannot hold.
     """
-    logs = np.concatenate([_log_times(part) for part in parts])
-    sizes = np.concatenate([part.records.sizes(part.batch) for part in parts])
+    counts = [len(part.batch.logs) for part in parts]
+    logs, sizes = _log_times(parts), _sizes(parts, counts)
     order = np.argsort(logs, kind="stable")
     starts = np.empty(len(logs), dtype=np.int64)
     starts[order] = np.cumsum(sizes[order]) - sizes[order]
-    entries = np.stack([logs, starts], axis=1).astype("<u8")
     out = np.empty(int(sizes.sum()), dtype=np.uint8)
-    index, first = {}, 0
+    heads = _heads(parts, counts, sizes, logs)
+    of_rows: NDArray[np.bool_] = np.repeat([part.layout is not None for part in parts], counts)
+    with_rows = [part for part in parts if part.layout is not None]
+    if with_rows:
+        place_rows(out, starts[of_rows], *_row_data(heads[of_rows], with_rows))
+    _place_payloads(out, starts[~of_rows], heads[~of_rows], parts)
+    return out.tobytes(), _index(parts, counts, logs, starts)
+
+
+def _heads(
+    parts: Sequence[BlockPart], counts: Sequence[int], sizes: Times, logs: Times
+) -> NDArray[np.void]:
+    """Return what precedes each payload, shape (n,)."""
+    heads = np.zeros(len(logs), dtype=MESSAGE_PREFIX)
+    heads["opcode"] = Opcode.MESSAGE
+    heads["length"] = sizes - HEAD.size
+    heads["channel"] = np.repeat([part.channel for part in parts], counts)
+    before = np.array([part.sequence for part in parts]) - np.cumsum(counts) + counts
+    heads["sequence"] = (np.repeat(before, counts) + np.arange(len(logs))) & 0xFFFF_FFFF
+    heads["log"] = heads["publish"] = logs
+    return heads
+
+
+def _sizes(parts: Sequence[BlockPart], counts: Sequence[int]) -> Times:
+    """Return the length of each record, shape (n,)."""
+    sizes = np.repeat([part.layout.size if part.layout else 0 for part in parts], counts)
+    end = 0
+    for part, count in zip(parts, counts, strict=True):
+        end += count
+        if part.layout is None:
+            sizes[end - count : end] = [len(payload) for payload in part.batch.contents]
+    return _PREFIX + sizes
+
+
+def _row_data(heads: NDArray[np.void], parts: Sequence[BlockPart]) -> tuple[Bytes | Times, ...]:
+    """Return the further arguments of `place_rows` for channels that carry rows.
+
+    Raises:
+        InputError: a row of another length, or a stamp that a ROS stamp cannot hold.
+    """
+    forms, runs, templates = _forms(tuple(part.layout for part in parts if part.layout))
     for part in parts:
-        own = slice(first, first + len(part.batch.logs))
-        part.records.place(out, starts[own], logs[own], part.sequence, part.batch)
-        index[part.channel] = _in_order(entries[own])
-        first = own.stop
-    return out.tobytes(), index
+        _check_length(part)
+    counts = np.array([len(part.batch.logs) for part in parts])
+    forms = np.column_stack([counts, forms])
+    numbers = b"".join(chain.from_iterable(part.batch.contents for part in parts))
+    as_bytes = heads.view(np.uint8), _stamps(parts).view(np.uint8)
+    return *as_bytes, np.frombuffer(numbers, dtype=np.uint8), forms, runs, templates
+
+
+@lru_cache(maxsize=64)
+def _forms(layouts: tuple[Layout, ...]) -> tuple[Times, Times, Bytes]:
+    """Return `forms` without their counts, `runs` and `templates` of `place_rows`."""
+    runs = [(offset, 8 * count) for layout in layouts for offset, count in layout.runs]
+    firsts = np.cumsum([0, *(len(layout.runs) for layout in layouts)]).tolist()
+    forms = [
+        (layout.size, layout.seconds, first, len(layout.runs))
+        for layout, first in zip(layouts, firsts, strict=False)
+    ]
+    templates = [layout.template for layout in layouts]
+    places = np.array(runs, dtype=np.int64).reshape(len(runs), 2)
+    return np.array(forms, dtype=np.int64), places, np.concatenate(templates)
+
+
+def _check_length(part: BlockPart) -> None:
+    assert part.layout is not None
+    width, count = part.layout.topic.width, len(part.batch.logs)
+    if sum(map(len, part.batch.contents)) != 8 * width * count:
+        raise InputError(f"{part.name}: a row of another length, allowed: {width} float64")
+
+
+def _stamps(parts: Sequence[BlockPart]) -> NDArray[np.void]:
+    """Return seconds and nanoseconds of the parts' stamps, shape (n,).
+
+    Raises:
+        InputError: a stamp that a ROS stamp cannot hold.
+    """
+    stamps = _times(parts, [part.batch.stamps for part in parts])
+    ends = np.cumsum([len(part.batch.stamps) for part in parts])
+    names = [part.name for part in parts]
+    seconds, nanoseconds = split_stamps(
+        stamps, lambda i: names[int(np.searchsorted(ends, i, side="right"))]
+    )
+    found = np.empty(len(stamps), dtype=_STAMP)
+    found["sec"], found["nanosec"] = seconds, nanoseconds
+    return found
+
+
+def _place_payloads(
+    out: Bytes, starts: Times, heads: NDArray[np.void], parts: Sequence[BlockPart]
+) -> None:
+    """Write the records of channels whose payloads are given."""
+    given = chain.from_iterable(part.batch.contents for part in parts if part.layout is None)
+    for start, head, payload in zip(starts.tolist(), heads, given, strict=True):
+        record = head.tobytes() + payload
+        out[start : start + len(record)] = np.frombuffer(record, dtype=np.uint8)
 
 
 def compress(
@@ -162,40 +186,47 @@ def compress(
     )
 
 
-def _record_dtype(layout: Layout) -> np.dtype[np.void]:
-    """Return the structure of a Message record: its prefix and the layout's fields."""
-    fields = dict(layout.dtype.fields or {})
-    names = list(MESSAGE_PREFIX.names or ()) + list(fields)
-    prefix = dict(MESSAGE_PREFIX.fields or {})
-    return np.dtype(
-        {
-            "names": names,
-            "formats": [f[0] for f in prefix.values()] + [f[0] for f in fields.values()],
-            "offsets": [f[1] for f in prefix.values()] + [_PREFIX + f[1] for f in fields.values()],
-            "itemsize": _PREFIX + layout.size,
-        }
-    )
-
-
-def _sequence(first: int, count: int) -> Times:
-    return np.arange(first, first + count) & 0xFFFF_FFFF
-
-
-def _times(name: str, times: list[int]) -> Times:
-    try:
-        return np.array(times, dtype=np.int64)
-    except OverflowError:
-        raise InputError(f"{name}: a time beyond ±{2**63 - 1} ns") from None
-
-
-def _log_times(part: BlockPart) -> Times:
-    logs = _times(part.name, part.batch.logs)
+def _log_times(parts: Sequence[BlockPart]) -> Times:
+    logs = _times(parts, [part.batch.logs for part in parts])
     if logs.min() < 0:
-        raise InputError(f"{part.name}: log time {logs.min()} ns, allowed: 0 or later")
+        name, first = next((p.name, min(p.batch.logs)) for p in parts if min(p.batch.logs) < 0)
+        raise InputError(f"{name}: log time {first} ns, allowed: 0 or later")
     return logs
 
 
-def _in_order(entries: Index) -> Index:
-    """Return a channel's index entries by offset, hence by log time."""
-    starts = entries[:, 1]
-    return entries if (starts[1:] > starts[:-1]).all() else entries[np.argsort(starts)]
+def _times(parts: Sequence[BlockPart], times: Sequence[list[int]]) -> Times:
+    """Return times of the parts [ns], one after another.
+
+    Raises:
+        InputError: one beyond what 64 bits hold.
+    """
+    try:
+        return _joined(times)
+    except OverflowError:
+        most = 2**63 - 1
+        name = next(
+            part.name
+            for part, own in zip(parts, times, strict=True)
+            if not -most - 1 <= min(own) <= max(own) <= most
+        )
+        raise InputError(f"{name}: a time beyond ±{most} ns") from None
+
+
+def _joined(lists: Iterable[list[int]]) -> Times:
+    return np.array(list(chain.from_iterable(lists)), dtype=np.int64)
+
+
+def _index(
+    parts: Sequence[BlockPart], counts: Sequence[int], logs: Times, starts: Times
+) -> dict[int, Index]:
+    """Return each channel's log times and offsets by offset, hence by log time, by its id."""
+    entries = np.stack([logs, starts], axis=1).astype("<u8")
+    ends = np.cumsum(counts)
+    rising = np.append(starts[1:] > starts[:-1], True)
+    rising[ends - 1] = True
+    index = {}
+    for part, count, end in zip(parts, counts, ends.tolist(), strict=True):
+        index[part.channel] = entries[end - count : end]
+    if not rising.all():
+        return {channel: own[np.argsort(own[:, 1])] for channel, own in index.items()}
+    return index

@@ -20,16 +20,9 @@ from mcap.records import Channel as ChannelRecord
 from typing_extensions import Self
 
 from cspm_msgs_py.errors import CspmError, InputError
-from cspm_msgs_py.layout import layout_of
+from cspm_msgs_py.layout import Layout, layout_of
 from cspm_msgs_py.message import carries_row
-from cspm_msgs_py.recording.block import (
-    Batch,
-    BlockPart,
-    PayloadRecords,
-    RowRecords,
-    compress,
-    merge,
-)
+from cspm_msgs_py.recording.block import Batch, BlockPart, compress, merge
 from cspm_msgs_py.recording.channel_buffer import ChannelBuffer
 from cspm_msgs_py.recording.derived import Derived
 from cspm_msgs_py.recording.mcap_file import REFUSED
@@ -82,12 +75,16 @@ class RecordingWriter:
         Raises:
             InputError: the folder exists or cannot be created, or a topic's type is unknown.
         """
+        # Compiled before the first block; those who only read need not wait for numba.
+        from cspm_msgs_py.recording.row_kernel import place_rows
+
+        self._place_rows = place_rows
         self.folder = folder = Path(folder).absolute()
         self.path = folder / f"{folder.name}_0.mcap"
         self._derived = derived
         self._topics = [*topics.values(), *(derived.topics.values() if derived else ())]
         self._hashes = [type_hash(topic.ros_type) for topic in self._topics]
-        self._records = [_records(topic, i + 1) for i, topic in enumerate(self._topics)]
+        self._layouts = [_layout(topic) for topic in self._topics]
         self._block_ns = block_ns
         self._channels = [ChannelBuffer(topic.name, self._turn) for topic in self._topics]
         self._by_name = {channel.name: channel for channel in self._channels}
@@ -120,7 +117,7 @@ class RecordingWriter:
             InputError: the topic was not declared or carries no row of numbers.
         """
         channel = self._declared(name)
-        if isinstance(self._records[self._channels.index(channel)], PayloadRecords):
+        if self._layouts[self._channels.index(channel)] is None:
             raise InputError(f"{name}: carries no row of numbers, allowed: append_payload")
         return channel
 
@@ -132,7 +129,7 @@ class RecordingWriter:
             CspmError: writing failed earlier.
         """
         channel = self._declared(name)
-        if isinstance(self._records[self._channels.index(channel)], RowRecords):
+        if self._layouts[self._channels.index(channel)] is not None:
             raise InputError(f"{name}: carries a row of numbers, allowed: channel({name!r}).append")
         channel.append_payload(log_ns, payload)
 
@@ -152,7 +149,7 @@ class RecordingWriter:
             self._topics.append(self._topics[like])
             self._hashes.append(self._hashes[like])
             self._counts.append(0)
-            self._records.append(PayloadRecords(len(self._topics)))
+            self._layouts.append(None)
             self._channels.append(channel)
         channel.append_payload(log_ns, payload)
 
@@ -205,12 +202,12 @@ class RecordingWriter:
         if self._derived is not None:
             self._derive(self._derived, block)
         parts = [
-            BlockPart(i + 1, self._topics[i].name, self._counts[i], batch, self._records[i])
+            BlockPart(i + 1, self._topics[i].name, self._counts[i], batch, self._layouts[i])
             for i, batch in enumerate(block)
             if batch.logs
         ]
         if parts:
-            content, index = merge(parts)
+            content, index = merge(parts, self._place_rows)
             self._sink.add_chunk(compress(content, index, compressor), index)
             for part in parts:
                 self._counts[part.channel - 1] += len(part.batch.logs)
@@ -303,7 +300,6 @@ class RecordingWriter:
         )
 
 
-def _records(topic: Topic, channel: int) -> RowRecords | PayloadRecords:
-    if carries_row(topic.ros_type):
-        return RowRecords(layout_of(topic), channel)
-    return PayloadRecords(channel)
+def _layout(topic: Topic) -> Layout | None:
+    """Return the layout of a topic's rows; None where it carries none."""
+    return layout_of(topic) if carries_row(topic.ros_type) else None

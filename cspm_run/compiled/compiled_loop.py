@@ -62,13 +62,17 @@ class CompiledLoop:
             take: where messages go, by topic; topics that are absent are not sent.
             block_ns: at multiples of it messages are handed on [ns].
         """
-        self._loop, self._take = loop, take
+        self._loop = loop
         self._period_ns, self._block_ns = loop.schedule.period_ns, block_ns
         self._list = make_jobs(loop, statistics, self._row, self._send)
         self._jobs = self._list.jobs
         kept = {topic: job for topic, job in self._list.senders.items() if topic in take}
         steps, count = -(-block_ns // self._period_ns) + 1, len(self._jobs)
         self._block = SignalBlock(self._list.slots, steps, count, kept)
+        slots, delays = self._list.slots, self._list.delays
+        widths = (slots[topic].stop - slots[topic].start for topic in kept)
+        self._takers = [(take[topic], width) for topic, width in zip(kept, widths, strict=True)]
+        self._delays_ns = np.array([delays.get(topic, 0) for topic in kept]) * self._period_ns
         self.step = loop.simulator.plant.steps
         self._cursor = np.array([self.step, 0, 0], dtype=np.int64)
         self._timetable = np.zeros((count, COLUMNS), dtype=np.int64)
@@ -160,7 +164,14 @@ class CompiledLoop:
         return row
 
     def _hand_on(self, steps: int) -> None:
-        for topic, found, rows in self._block.sent(steps):
-            logs = found * self._period_ns
-            stamps = logs - self._list.delays.get(topic, 0) * self._period_ns
-            self._take[topic](logs.tolist(), stamps.tolist(), rows.tobytes())
+        sent = self._block.sent(steps)
+        counts = sent.counts.tolist()
+        logs = sent.steps * self._period_ns
+        stamps = (logs - np.repeat(self._delays_ns, counts)).tolist()
+        logs, content = logs.tolist(), sent.numbers.tobytes()
+        first = place = 0
+        for (take, width), count in zip(self._takers, counts, strict=True):
+            if count:
+                end, stop = first + count, place + 8 * width * count
+                take(logs[first:end], stamps[first:end], content[place:stop])
+                first, place = end, stop

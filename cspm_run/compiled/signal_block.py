@@ -9,17 +9,25 @@ import numpy as np
 from numpy.typing import NDArray
 
 from cspm_model.phase import Slots
+from cspm_run.compiled.sent_kernel import COLUMNS, FIRST, SENDER, WIDTH, gather
 
 Array = NDArray[np.float64]
 Flags = NDArray[np.uint8]
+Words = NDArray[np.int64]
 
 
-class SentRows(NamedTuple):
-    """A topic's messages of a block: steps of arrival (n,), and rows (n, width)."""
+class Sent(NamedTuple):
+    """The messages of a block, topic after topic; views that the next block overwrites.
 
-    topic: str
-    steps: NDArray[np.int64]
-    rows: Array
+    Attributes:
+        counts: messages of each topic, (topics,).
+        steps: of their arrival, (n,).
+        numbers: their rows, one after another.
+    """
+
+    counts: Words
+    steps: Words
+    numbers: Array
 
 
 class RowView(Mapping[str, Array]):
@@ -53,11 +61,19 @@ class SignalBlock:
 
     def __init__(self, slots: Slots, steps: int, jobs: int, topics: Mapping[str, int]) -> None:
         """Make room; `topics` are those that are kept, with the job that sends each."""
-        self._slots, self._topics = slots, topics
+        self._slots = slots
         self._index = {topic: i for i, topic in enumerate(topics)}
         self.rows = np.zeros((1 + steps, slots.width))
         self.done: Flags = np.zeros((steps, jobs), dtype=np.uint8)
         self._by_python: Flags = np.zeros((steps, len(topics)), dtype=np.uint8)
+        self._topics = np.zeros((len(topics), COLUMNS), dtype=np.int64)
+        for row, (topic, job) in zip(self._topics, topics.items(), strict=True):
+            columns = slots[topic]
+            row[SENDER], row[FIRST] = job, columns.start
+            row[WIDTH] = columns.stop - columns.start
+        self._counts = np.zeros(len(topics), dtype=np.int64)
+        self._found = np.zeros(len(topics) * steps, dtype=np.int64)
+        self._numbers = np.zeros(int(self._topics[:, WIDTH].sum()) * steps)
         self.begin = 0
 
     def start(self, step: int, last: Array) -> None:
@@ -78,11 +94,10 @@ class SignalBlock:
         if topic in self._index:
             self._by_python[step - self.begin, self._index[topic]] = 1
 
-    def sent(self, steps: int) -> Iterator[SentRows]:
-        """Yield the messages of each topic of the first `steps` steps."""
-        for i, (topic, job) in enumerate(self._topics.items()):
-            flags = self.done[:steps, job] | self._by_python[:steps, i]
-            found = np.flatnonzero(flags)
-            if len(found):
-                columns = self._slots[topic]
-                yield SentRows(topic, self.begin + found, self.rows[1 + found, columns])
+    def sent(self, steps: int) -> Sent:
+        """Return the messages of the first `steps` steps."""
+        flags, out = (self.done, self._by_python), (self._counts, self._found, self._numbers)
+        gather(self.rows, *flags, self._topics, steps, *out)
+        messages = int(self._counts.sum())
+        numbers = int(self._counts @ self._topics[:, WIDTH])
+        return Sent(self._counts, self.begin + self._found[:messages], self._numbers[:numbers])

@@ -230,6 +230,9 @@ def test_what_a_recording_cannot_hold_fails_at_the_latest_when_closing(
     tmp_path, log, stamp, width, text
 ):
     writer = new_writer(tmp_path / "x")
+    # What is said names the channel, of several in one block.
+    append_clock(writer.channel("/clock"), 3)
+    writer.channel("/target/pose").append(0, 0, np.zeros(7))
     writer.channel("/bar/pose").append(log, stamp, np.zeros(width))
     with pytest.raises(CspmError, match=r"x_0.mcap: recording failed \(" + text):
         writer.close()

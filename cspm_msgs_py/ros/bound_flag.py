@@ -7,7 +7,7 @@ from collections.abc import Callable
 from cspm_msgs_py.errors import InputError
 from cspm_msgs_py.ros.contract_node import ContractNode
 from cspm_msgs_py.ros.graph_publishers import GraphPublishers
-from cspm_msgs_py.ros.tagged_taker import Tagged
+from cspm_msgs_py.ros.rcl.tagged_taker import Tagged
 from cspm_msgs_py.stepping.publisher_binding import PublisherBinding
 from cspm_msgs_py.topics import Topic
 

@@ -27,12 +27,14 @@ from cspm_msgs_py.ros.domain_claim import DomainClaim
 from cspm_msgs_py.ros.intake import Intake
 from cspm_msgs_py.ros.local_name import local
 from cspm_msgs_py.ros.qos import contract_qos
-from cspm_msgs_py.ros.tagged_taker import Tagged
+from cspm_msgs_py.ros.rcl.rcl_message import publish_address
+from cspm_msgs_py.ros.rcl.row_sender import RowSender
+from cspm_msgs_py.ros.rcl.tagged_taker import Tagged
 from cspm_msgs_py.ros.wake_up import WakeUp
 from cspm_msgs_py.ros.wall_timers import WallTimers
 from cspm_msgs_py.stepping.steady_time import SteadyTime
 from cspm_msgs_py.topics import DIAGNOSTICS, QOS_DEPTH, SENDER_DEPTH, Topic
-from cspm_msgs_py.wire import WireReader, WireWriter
+from cspm_msgs_py.wire import WireReader
 
 Array = NDArray[np.float64]
 _SIM_TIME = "use_sim_time"
@@ -93,22 +95,25 @@ class ContractNode:
 
         `readers` are the nodes that `matched` is to see.
         """
-        writer, publish = WireWriter(topic), self.raw_publisher(topic, readers)
-        encode = writer.encode
+        sender = RowSender(topic, self._publisher(topic, readers), publish_address())
+        self.closing.callback(sender.close)
 
         def send(_: int, stamp_ns: int, row: Array) -> None:
-            publish(encode(stamp_ns, row))
+            sender.send(stamp_ns, row)
 
         return send
 
     def raw_publisher(self, topic: Topic, readers: Collection[str] = ()) -> Callable[[bytes], None]:
         """Return what publishes a topic's CDR bytes."""
+        # What `Publisher.publish` does with bytes, without its checks of each message.
+        publish: Callable[[bytes], None] = self._publisher(topic, readers).handle.publish_raw
+        return publish
+
+    def _publisher(self, topic: Topic, readers: Collection[str]) -> Publisher:
         qos = contract_qos(SENDER_DEPTH)
         made = self.node.create_publisher(ros_class(topic.ros_type), local(topic.name), qos)
         self._publishers[topic.name] = (made, frozenset(readers))
-        # What `Publisher.publish` does with bytes, without its checks of each message.
-        publish: Callable[[bytes], None] = made.handle.publish_raw
-        return publish
+        return made
 
     def status_publisher(self, readers: Collection[str] = ()) -> Callable[[int, Status], None]:
         """Return what publishes a status on `/diagnostics` (stamp [ns], status)."""

@@ -9,8 +9,8 @@ import numpy as np
 from numpy.typing import NDArray
 from rclpy.impl.implementation_singleton import rclpy_implementation
 
-from cspm_msgs_py.ros.row_taker import RowTaker, TakenRow
-from cspm_msgs_py.ros.tagged_taker import Tagged, TaggedTaker, UntaggedTaker
+from cspm_msgs_py.ros.rcl.row_taker import RowTaker, TakenRow
+from cspm_msgs_py.ros.rcl.tagged_taker import Tagged, TaggedTaker, UntaggedTaker
 from cspm_msgs_py.stepping.sequence_numbers import SequenceNumbers
 
 Array = NDArray[np.float64]

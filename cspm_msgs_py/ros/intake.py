@@ -28,9 +28,9 @@ from cspm_msgs_py.ros.inlets import (
 )
 from cspm_msgs_py.ros.local_name import local
 from cspm_msgs_py.ros.qos import contract_qos
-from cspm_msgs_py.ros.rcl_message import take_address
-from cspm_msgs_py.ros.row_taker import RowTaker
-from cspm_msgs_py.ros.tagged_taker import Tagged, TaggedTaker, UntaggedTaker, make_taker
+from cspm_msgs_py.ros.rcl.rcl_message import take_address
+from cspm_msgs_py.ros.rcl.row_taker import RowTaker
+from cspm_msgs_py.ros.rcl.tagged_taker import Tagged, TaggedTaker, UntaggedTaker, make_taker
 from cspm_msgs_py.ros.wake_up import WakeUp
 from cspm_msgs_py.topics import QOS_RELIABILITY, Topic
 

@@ -7,7 +7,7 @@ import os
 import select
 import sys
 
-from cspm_msgs_py.ros.rcl_message import rcl_library
+from cspm_msgs_py.ros.rcl.rcl_message import rcl_library
 
 
 class WakeUp:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from cspm_control.phases.compiled_stage import compiled_stage
 from cspm_control.safety import GuardedStage
 from cspm_msgs_py.graph import PLAYER, followers
 from cspm_msgs_py.recording.writer import RecordingWriter
@@ -37,9 +38,10 @@ class LockstepRun(NodesOfRun):
         bundle, schedule = self.bundle, self.schedule
         with bundle.unpacked() as place:
             stage = assemble_stage(node.name, bundle.scenario, bundle.testbed.testbed, place)
+        plan, period_ns = schedule.nodes[node.name], schedule.period_ns
         return StageNode(
             node,
-            stage,
+            compiled_stage(stage, plan, bundle.testbed.testbed.topics, period_ns),
             schedule,
             self.testbed_topics,
             self.edges,

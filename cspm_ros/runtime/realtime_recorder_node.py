@@ -18,8 +18,8 @@ from cspm_msgs_py.ros.fault_line import FaultLine
 from cspm_msgs_py.ros.graph_publishers import bind, census_of
 from cspm_msgs_py.ros.intake import Intake
 from cspm_msgs_py.ros.leader import Leader
+from cspm_msgs_py.ros.rcl.tagged_taker import Tagged
 from cspm_msgs_py.ros.rendezvous import FollowerSide
-from cspm_msgs_py.ros.tagged_taker import Tagged
 from cspm_msgs_py.schedule import DIAGNOSTICS_RATE
 from cspm_msgs_py.stepping.admission import Admission
 from cspm_msgs_py.topics import DIAGNOSTICS, SAFE, Topic

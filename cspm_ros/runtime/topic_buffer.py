@@ -12,7 +12,7 @@ from cspm_msgs_py.errors import InputError
 from cspm_msgs_py.layout import Layout, layout_of
 from cspm_msgs_py.recording.channel_buffer import ChannelBuffer
 from cspm_msgs_py.recording.writer import BLOCK_NS
-from cspm_msgs_py.ros.tagged_taker import Tagged
+from cspm_msgs_py.ros.rcl.tagged_taker import Tagged
 from cspm_msgs_py.topics import Topic
 from cspm_msgs_py.wire import WireReader
 

@@ -6,7 +6,7 @@ import ctypes
 from typing import TYPE_CHECKING, Any
 
 from cspm_msgs_py.errors import InputError
-from cspm_msgs_py.ros.rcl_message import rcl_library
+from cspm_msgs_py.ros.rcl.rcl_message import rcl_library
 from cspm_ros.schema_types.c_structures import Member, Members, TypeSupport
 
 if TYPE_CHECKING:

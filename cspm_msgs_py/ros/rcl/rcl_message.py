@@ -1,4 +1,4 @@
-"""What rcl's own functions take messages into, without rclpy's objects in between."""
+"""What rcl's own functions take messages into and send them from."""
 
 from __future__ import annotations
 
@@ -71,6 +71,11 @@ class RclMessage:
         place = (ctypes.c_uint64 * words).from_address(self.buffer)
         return np.frombuffer(memoryview(place), np.uint64)
 
+    def fill(self, content: bytes) -> None:
+        """Make it a message of these bytes, for which there has to be room."""
+        ctypes.memmove(self.buffer, content, len(content))
+        self._message.length = len(content)
+
     @property
     def content(self) -> bytes:
         """The message that was taken last."""
@@ -81,20 +86,29 @@ class RclMessage:
         self._finish(ctypes.c_void_p(self.address))
 
 
-@cache
 def take_address() -> int | None:
     """Return the address of `rcl_take_serialized_message`, None where it cannot be called."""
+    return _address("rcl_take_serialized_message")
+
+
+def publish_address() -> int | None:
+    """Return the address of `rcl_publish_serialized_message`, None where it cannot be called."""
+    return _address("rcl_publish_serialized_message")
+
+
+@cache
+def _address(name: str) -> int | None:
     # What is compiled assumes this order and size of words, and that it is compiled.
     if numba.config.DISABLE_JIT or sys.byteorder != "little" or sys.maxsize != 2**63 - 1:
         return None
     try:
-        take = rcl_library("librcl.so").rcl_take_serialized_message
+        function = getattr(rcl_library("librcl.so"), name)
         rcutils = rcl_library("librcutils.so")
         found = rcutils.rcutils_uint8_array_init, rcutils.rcutils_uint8_array_fini
         _ = (*found, rcutils.rcutils_get_default_allocator)
     except (OSError, AttributeError):
         return None
-    return ctypes.cast(take, ctypes.c_void_p).value
+    return ctypes.cast(function, ctypes.c_void_p).value
 
 
 def clear_error() -> None:

@@ -93,7 +93,7 @@ def take_row(
     for i in range(len(places)):
         copied[2 * i] = halves[places[i]]
         copied[2 * i + 1] = halves[places[i] + 1]
-    if not _is_sound(row, form[QUATERNION] != 0):
+    if not _is_valid(row, form[QUATERNION] != 0):
         return STRANGE
     found[STAMP] = seconds * _NANOSECONDS + nanoseconds
     found[NUMBER] = state[FOUND_NUMBER]
@@ -180,7 +180,7 @@ def take_own_rows(
 
 
 @njit(cache=True)
-def _is_sound(row: Array, has_pose: bool) -> bool:
+def _is_valid(row: Array, has_pose: bool) -> bool:
     """Return whether all is finite and the quaternion behind a position, if any, of length 1."""
     for number in row:
         if not math.isfinite(number):

@@ -17,11 +17,11 @@ from cspm_msgs_py.wire import WireReader, WireWriter
 
 load_ros()
 
-from cspm_msgs_py.ros import rcl_message  # noqa: E402 - after ROS is known to be there
 from cspm_msgs_py.ros.contract_node import ros_class  # noqa: E402
 from cspm_msgs_py.ros.intake import Intake  # noqa: E402
-from cspm_msgs_py.ros.rcl_message import take_address  # noqa: E402
-from cspm_msgs_py.ros.row_taker import RowTaker, TakenBytes, TakenRow  # noqa: E402
+from cspm_msgs_py.ros.rcl import rcl_message  # noqa: E402 - after ROS is known to be there
+from cspm_msgs_py.ros.rcl.rcl_message import publish_address, take_address  # noqa: E402
+from cspm_msgs_py.ros.rcl.row_taker import RowTaker, TakenBytes, TakenRow  # noqa: E402
 from cspm_msgs_py.ros.session import Session  # noqa: E402
 
 pytestmark = pytest.mark.compiled
@@ -194,9 +194,15 @@ def test_what_rcl_refuses_is_reported():
     assert not is_set()
 
 
-def test_without_rcls_own_functions_or_compiled_code_there_is_no_address(monkeypatch):
-    found, look = take_address(), take_address.__wrapped__
-    assert found == look()
+@pytest.mark.parametrize("find", [take_address, publish_address])
+def test_without_rcls_own_functions_or_compiled_code_there_is_no_address(monkeypatch, find):
+    found = find()
+
+    def look():
+        rcl_message._address.cache_clear()
+        return find()
+
+    assert found == look() is not None
     with monkeypatch.context() as patch:
         patch.setattr(rcl_message.numba.config, "DISABLE_JIT", 1)
         assert look() is None
@@ -206,6 +212,10 @@ def test_without_rcls_own_functions_or_compiled_code_there_is_no_address(monkeyp
     with monkeypatch.context() as patch:
         patch.setattr(rcl_message.ctypes, "CDLL", no_library)
         assert look() is None
+
+
+def test_taking_and_publishing_are_two_functions():
+    assert take_address() != publish_address()
 
 
 def no_library(*_, **__):

@@ -7,7 +7,7 @@ from typing import NamedTuple
 
 from rclpy.impl.implementation_singleton import rclpy_implementation
 
-from cspm_msgs_py.ros.rcl_message import RclMessage, rcl_library
+from cspm_msgs_py.ros.rcl.rcl_message import RclMessage, rcl_library
 
 _TAKEN = 0
 _WORDS = 64

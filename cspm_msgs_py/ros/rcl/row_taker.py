@@ -13,9 +13,9 @@ from numpy.typing import NDArray
 
 from cspm_msgs_py.errors import CspmError
 from cspm_msgs_py.layout import layout_of
-from cspm_msgs_py.ros import take_kernel as kernel
-from cspm_msgs_py.ros.rcl_message import RclMessage, clear_error
-from cspm_msgs_py.ros.tagged_taker import Tagged
+from cspm_msgs_py.ros.rcl import take_kernel as kernel
+from cspm_msgs_py.ros.rcl.rcl_message import RclMessage, clear_error
+from cspm_msgs_py.ros.rcl.tagged_taker import Tagged
 from cspm_msgs_py.topics import POSE, Topic
 from cspm_msgs_py.wire import mask_of
 

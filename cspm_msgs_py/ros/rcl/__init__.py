@@ -1,0 +1,1 @@
+"""Messages sent and taken by functions of rcl itself, without rclpy's objects in between."""

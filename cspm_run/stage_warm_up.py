@@ -20,6 +20,7 @@ from cspm_msgs_py.topics import POSE, WRENCH
 from cspm_run.bundle import Bundle
 from cspm_run.compiled.compiled_loop import first_compiled_step
 from cspm_run.recorded_run import run
+from cspm_sim.kernels.plant import plant_step
 
 Array = NDArray[np.float64]
 
@@ -43,8 +44,11 @@ def rest_rows(node: str, bundle: Bundle) -> dict[str, Array]:
 
 
 def is_compiled() -> bool:
-    """Return whether a run of this version has compiled anything yet."""
-    return Path(config.CACHE_DIR).exists()
+    """Return whether the plant of this version was compiled before.
+
+    Importing kernels makes their folders; looking at effects compiles some of these.
+    """
+    return any(Path(config.CACHE_DIR).rglob(f"*.{plant_step.__name__}-*.nbi"))
 
 
 def compile_beside(bundle: Bundle) -> None:

@@ -30,21 +30,29 @@ PUSH = (0.02, 0.02, 0.02, 0.05, 0.05, 0.05)
 
 
 class MujocoMachine:
-    """A MuJoCo model and its state."""
+    """A MuJoCo model and its state.
 
-    def __init__(self, plant: Plant, integrator: str) -> None:
-        """Hang the bar of `plant` where it hangs now; `integrator` as MuJoCo calls it."""
-        self._model = mujoco.MjModel.from_xml_string(_description(plant, integrator))
-        self._data = mujoco.MjData(self._model)
+    Attributes:
+        data: the state.
+    """
+
+    def __init__(self, plant: Plant, integrator: str, *, pulled: bool = False) -> None:
+        """Hang the bar of `plant` where it hangs now; `integrator` as MuJoCo calls it.
+
+        With `pulled` the tendons pull by `data.ctrl` [N] more than their springs do.
+        """
+        text = _description(plant, integrator, pulled=pulled)
+        self._model = mujoco.MjModel.from_xml_string(text)
+        self.data = mujoco.MjData(self._model)
 
     def rewind(self) -> None:
         """Go back to the first instant."""
-        mujoco.mj_resetData(self._model, self._data)
-        self._data.qvel[:] = PUSH
+        mujoco.mj_resetData(self._model, self.data)
+        self.data.qvel[:] = PUSH
 
     def advance(self, steps: int) -> None:
         """Make `steps` steps in one call."""
-        mujoco.mj_step(self._model, self._data, nstep=steps)
+        mujoco.mj_step(self._model, self.data, nstep=steps)
 
     def least_stretch(self, steps: int) -> float:
         """Return the least elongation of any tendon at any of the first `steps` steps [m]."""
@@ -52,12 +60,12 @@ class MujocoMachine:
         least = np.inf
         for _ in range(steps):
             self.advance(1)
-            stretch = self._data.ten_length - self._model.tendon_lengthspring[:, 1]
+            stretch = self.data.ten_length - self._model.tendon_lengthspring[:, 1]
             least = min(least, float(stretch.min()))
         return least
 
 
-def _description(plant: Plant, integrator: str) -> str:
+def _description(plant: Plant, integrator: str, *, pulled: bool) -> str:
     bar = plant.testbed.bar
     if bar is None:
         raise ValueError("a machine with a bar is needed")
@@ -72,6 +80,7 @@ def _description(plant: Plant, integrator: str) -> str:
         <body pos="{_numbers(plant.bar_state[:3])}"><freejoint/>{_inertial(bar)}{ends}</body>
       </worldbody>
       <tendon>{"".join(_tendon(plant, i) for i in cables)}</tendon>
+      <actuator>{"".join(_pull(i) for i in cables) if pulled else ""}</actuator>
     </mujoco>"""
 
 
@@ -88,6 +97,11 @@ def _inertial(bar: Bar) -> str:
     return f'<inertial pos="{_numbers(bar.com)}" mass="{bar.mass}" fullinertia="{_numbers(full)}"/>'
 
 
+def _pull(i: int) -> str:
+    # A motor's force lengthens a tendon.
+    return f'<motor tendon="cable{i}" gear="-1"/>'
+
+
 def _tendon(plant: Plant, i: int) -> str:
     rows, tables = plant.parameters.cables, plant.parameters.tables
     elastic_length = plant.unstretched_lengths[i] + rows[i, OFFSET_LENGTH]
@@ -97,7 +111,8 @@ def _tendon(plant: Plant, i: int) -> str:
     damping = rows[i, DAMPING_CONSTANT] - rows[i, DAMPING_SLOPE] * elastic_length
     rest = plant.lengths[i] - tension / stiffness
     return (
-        f'<spatial stiffness="{stiffness}" damping="{damping}" springlength="0 {rest}">'
+        f'<spatial name="cable{i}" stiffness="{stiffness}" damping="{damping}"'
+        f' springlength="0 {rest}">'
         f'<site site="exit{i}"/><site site="end{i}"/></spatial>'
     )
 

@@ -21,6 +21,7 @@ import numpy as np
 from rich.console import Console
 from rich.table import Table
 
+from bench.performance.mujoco_loop import loop_prices
 from bench.performance.plant_speed import measure_against_mujoco, plant_step
 from bench.performance.processor_time import FEW_STEPS, loop_cost, run_steps, spent
 from bench.performance.thesis_machine import (
@@ -86,6 +87,8 @@ def _prices() -> Iterator[Price]:
     yield Price("plant alone", 8, plant_step(ThesisMachine(())))
     for name, cost in plants.items():
         yield Price(f"{name} steps alone, no winches", 8, cost)
+    for name, cost in loop_prices():
+        yield Price(name, 8, cost)
     for duration in (10.0, 60.0, 300.0):
         yield Price(f"worst_case, {duration:g} s", 8, _price(_worst(duration)))
     for name in _MACHINES:

@@ -140,7 +140,9 @@ def _forms(layouts: tuple[Layout, ...]) -> tuple[Times, Times, Bytes]:
 
 def _check_length(part: BlockPart) -> None:
     assert part.layout is not None
-    width, count = part.layout.topic.width, len(part.batch.logs)
+    width, count, stamps = part.layout.topic.width, len(part.batch.logs), len(part.batch.stamps)
+    if stamps != count:
+        raise InputError(f"{part.name}: {stamps} stamps of {count} messages, allowed: one of each")
     if sum(map(len, part.batch.contents)) != 8 * width * count:
         raise InputError(f"{part.name}: a row of another length, allowed: {width} float64")
 

@@ -239,6 +239,13 @@ def test_what_a_recording_cannot_hold_fails_at_the_latest_when_closing(
     writer.close()
 
 
+def test_rows_without_a_stamp_of_their_own_are_refused(tmp_path):
+    writer = new_writer(tmp_path / "x")
+    writer.channel("/bar/pose").append_rows([0, STEP_NS], [0], np.zeros(14).tobytes())
+    with pytest.raises(CspmError, match=r"\(/bar/pose: 1 stamps of 2 messages, allowed: one of"):
+        writer.close()
+
+
 def test_a_full_disk_is_one_line_and_what_was_written_can_be_recovered(tmp_path, monkeypatch):
     writer = new_writer(tmp_path / "x")
     write, written = McapSink._write, []

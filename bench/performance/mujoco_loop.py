@@ -8,8 +8,8 @@ winches. Without these they lose the bar after some seconds, so that turns are s
 
 from __future__ import annotations
 
-import statistics
 from collections.abc import Callable, Iterator
+from functools import partial
 from typing import Any
 
 import mujoco
@@ -42,18 +42,18 @@ _call_phase = caller_of(PHASE)
 
 
 STEPS = 500
-_TURNS = 5
 
 
-def loop_prices() -> Iterator[tuple[str, float]]:
-    """Yield what a simulated second costs of the processor [ms], by integrator and controllers."""
+def loop_ways() -> Iterator[tuple[str, int, Callable[[], float]]]:
+    """Yield each integrator with each kind of controllers, the cables, and what prices it.
+
+    A price is what a simulated second costs of the processor [ms].
+    """
+    ways = {"Python": MujocoLoop.by_python, "C callbacks": MujocoLoop.by_callback}
     for integrator in _CALLS:
-        for name, way in (
-            ("Python", MujocoLoop.by_python),
-            ("C callbacks", MujocoLoop.by_callback),
-        ):
-            found = statistics.median(_cost(integrator, way) for _ in range(_TURNS))
-            yield f"MuJoCo, {integrator}, controllers in {name}, no winches", found
+        for name, way in ways.items():
+            what = f"MuJoCo, {integrator}, controllers in {name}, no winches"
+            yield what, 8, partial(_cost, integrator, way)
 
 
 def _cost(integrator: str, way: Callable[[MujocoLoop, int], None]) -> float:

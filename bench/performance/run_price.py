@@ -11,18 +11,21 @@ from __future__ import annotations
 
 import argparse
 import statistics
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import replace
+from functools import partial
 from pathlib import Path
 from typing import NamedTuple
 
 import matplotlib.pyplot as plt
 import numpy as np
 from rich.console import Console
+from rich.progress import track
 from rich.table import Table
 
-from bench.performance.mujoco_loop import loop_prices
-from bench.performance.plant_speed import measure_against_mujoco, plant_step
+from bench.performance.mujoco_loop import loop_ways
+from bench.performance.mujoco_machine import MujocoMachine
+from bench.performance.plant_speed import STEPS, plant_step
 from bench.performance.processor_time import FEW_STEPS, loop_cost, run_steps, spent
 from bench.performance.thesis_machine import (
     FRICTION,
@@ -58,6 +61,10 @@ class Price(NamedTuple):
     cost: float
 
 
+# What is measured, its number of cables, and what returns its price [ms].
+Way = tuple[str, int, Callable[[], float]]
+
+
 def main() -> None:
     """Run the command line."""
     parser = argparse.ArgumentParser(
@@ -67,9 +74,8 @@ def main() -> None:
     )
     parser.add_argument("--figure", type=Path, help="a picture of the prices, PNG and SVG")
     options = parser.parse_args()
-    console, prices = Console(), []
-    for each in _prices():
-        prices.append(each)
+    console, prices = Console(), _prices()
+    for each in prices:
         console.print(f"{each.what}, {each.cables} cables: {each.cost:.2f} ms", highlight=False)
     console.print(_plants())
     console.print(_operations())
@@ -77,29 +83,43 @@ def main() -> None:
         _draw(options.figure, prices)
 
 
-def _prices() -> Iterator[Price]:
-    """Yield the price of the plant alone, of closed loops, and of recorded and other ones."""
-    plants = {
-        each.what: 1e3 / statistics.median(each.samples)
-        for each in measure_against_mujoco(_REPEATS, lambda _: None)
-        if each.what.startswith("MuJoCo, ")
-    }
-    yield Price("plant alone", 8, plant_step(ThesisMachine(())))
-    for name, cost in plants.items():
-        yield Price(f"{name} steps alone, no winches", 8, cost)
-    for name, cost in loop_prices():
-        yield Price(name, 8, cost)
+def _prices() -> list[Price]:
+    """Return the price of the plant alone, of closed loops, and of recorded and other ones.
+
+    Each is the median of several rounds, so that what the machine does meanwhile touches all.
+    """
+    ways = [*_plants_alone(), *loop_ways(), *_closed_loops()]
+    rounds = [[measure() for _, _, measure in ways] for _ in track(range(_REPEATS), "measuring")]
+    medians = [statistics.median(costs) for costs in zip(*rounds, strict=True)]
+    return [Price(what, n, cost) for (what, n, _), cost in zip(ways, medians, strict=True)]
+
+
+def _plants_alone() -> Iterator[Way]:
+    machine = ThesisMachine(())
+    yield "plant alone", 8, lambda: plant_step(machine)
+    for integrator in ("RK4", "Euler"):
+        other = MujocoMachine(machine.plant, integrator)
+        what = f"MuJoCo, {integrator}, steps alone, no winches"
+        yield what, 8, lambda other=other: _mujoco_step(other)  # type: ignore[misc]
+
+
+def _mujoco_step(machine: MujocoMachine) -> float:
+    machine.rewind()
+    return 1e6 * spent(lambda: machine.advance(STEPS)) / STEPS
+
+
+def _closed_loops() -> Iterator[Way]:
     for duration in (10.0, 60.0, 300.0):
-        yield Price(f"worst_case, {duration:g} s", 8, _price(_worst(duration)))
+        yield f"worst_case, {duration:g} s", 8, partial(_price, _worst(duration))
     for name in _MACHINES:
         bundle = shipped(name, "duration=20")
         count = len(bundle.testbed.testbed.cables)
-        yield Price(name.rpartition("/")[2], count, _price(bundle))
+        yield name.rpartition("/")[2], count, partial(_price, bundle)
     for what, setting in _SETTINGS.items():
-        yield Price(what, 8, _price(_worst(20.0, setting)))
-    yield Price("worst_case, recorded", 8, _price(_worst(20.0), recorded=True))
+        yield what, 8, partial(_price, _worst(20.0, setting))
+    yield "worst_case, recorded", 8, partial(_price, _worst(20.0), recorded=True)
     in_python = replace(_worst(20.0), plant=MUJOCO)
-    yield Price("worst_case, MuJoCo's plant, loop in Python", 8, _price(in_python))
+    yield "worst_case, MuJoCo's plant, loop in Python", 8, partial(_price, in_python)
 
 
 def _worst(duration: float, *settings: str) -> Bundle:
@@ -123,7 +143,7 @@ def _draw(path: Path, prices: Sequence[Price]) -> None:
 def _price(bundle: Bundle, *, recorded: bool = False) -> float:
     """Return what a simulated second costs [ms] beyond what building the run does."""
     run_steps(bundle, FEW_STEPS, recorded)
-    return 1e3 * statistics.median(loop_cost(bundle, recorded=recorded) for _ in range(_REPEATS))
+    return 1e3 * loop_cost(bundle, recorded=recorded)
 
 
 def _plants() -> Table:

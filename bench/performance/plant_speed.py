@@ -8,7 +8,7 @@ from collections.abc import Callable
 from functools import partial
 
 from bench.performance.measured_figure import Advance, Figure
-from bench.performance.mujoco_machine import MujocoMachine
+from bench.performance.mujoco_model.machine import MujocoMachine
 from bench.performance.processor_time import spent
 from bench.performance.thesis_machine import FRICTION, PERIOD_NS, ThesisMachine, roll_damping
 

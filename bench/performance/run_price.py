@@ -23,8 +23,8 @@ from rich.console import Console
 from rich.progress import track
 from rich.table import Table
 
-from bench.performance.mujoco_loop import loop_ways
-from bench.performance.mujoco_machine import MujocoMachine
+from bench.performance.mujoco_model.loop import loop_ways
+from bench.performance.mujoco_model.machine import MujocoMachine
 from bench.performance.plant_speed import STEPS, plant_step
 from bench.performance.processor_time import FEW_STEPS, loop_cost, run_steps, spent
 from bench.performance.thesis_machine import (

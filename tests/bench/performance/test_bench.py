@@ -82,7 +82,7 @@ def test_slack_in_the_measured_machine_would_be_seen():
 
 
 def test_the_bar_hangs_in_mujoco_where_it_hangs_in_the_plant(monkeypatch):
-    from bench.performance import mujoco_machine
+    from bench.performance.mujoco_model import machine as mujoco_machine
     from bench.performance.thesis_machine import ThesisMachine
 
     plant = ThesisMachine(()).plant

@@ -4,7 +4,7 @@ import mujoco
 import numpy as np
 import pytest
 
-from bench.performance.mujoco_loop import MujocoLoop, loop_ways
+from bench.performance.mujoco_model.loop import MujocoLoop, loop_ways
 
 STEPS = 300
 

@@ -17,7 +17,7 @@ import numpy as np
 from numba import cfunc, types
 from numpy.typing import NDArray
 
-from bench.performance.mujoco_machine import MujocoMachine
+from bench.performance.mujoco_model.machine import MujocoMachine
 from bench.performance.processor_time import spent
 from bench.performance.thesis_machine import PERIOD_NS, shipped
 from cspm_control.phases.make import stage_phase

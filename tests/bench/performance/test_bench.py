@@ -89,8 +89,8 @@ def test_the_bar_hangs_in_mujoco_where_it_hangs_in_the_plant(monkeypatch):
     monkeypatch.setattr(mujoco_machine, "PUSH", (0.0,) * 6)
     machine = mujoco_machine.MujocoMachine(plant, "RK4")
     stretch = machine.least_stretch(100)
-    assert machine._data.qpos == pytest.approx([0.0, 0.0, plant.bar_state[2], 1, 0, 0, 0], abs=1e-9)
-    assert machine._data.ten_length == pytest.approx(plant.lengths, abs=1e-9)
+    assert machine.data.qpos == pytest.approx([0.0, 0.0, plant.bar_state[2], 1, 0, 0, 0], abs=1e-9)
+    assert machine.data.ten_length == pytest.approx(plant.lengths, abs=1e-9)
     assert 0.0 < stretch < 0.01
 
 

@@ -55,11 +55,10 @@ class RowSender:
         self._message = message = RclMessage(-(-layout.size // 8))
         content = message.room(-(-layout.size // 8)).view(np.uint32)
         message.fill(layout.template.tobytes())
-        places = [first // 4 + 2 * i for first, count in layout.runs for i in range(count)]
         form = np.zeros(FORM, dtype=np.int64)
         form[PUBLISH], form[PUBLISHER] = publish, publisher.handle.pointer
         form[MESSAGE], form[SECONDS] = message.address, layout.seconds // 4
-        self._arguments = form, content, np.array(places, dtype=np.int64)
+        self._arguments = form, content, layout.halves
 
     def send(self, stamp_ns: int, row: Array) -> None:
         """Send a row (width,) that is valid at an instant [ns].
@@ -68,9 +67,10 @@ class RowSender:
             InputError: a stamp outside what a ROS stamp can hold, or a row of another shape.
         """
         numbers = np.asarray(row, dtype=np.float64)
-        if self._message is not None and numbers.shape == self._row.shape:
+        fits = numbers.shape == self._row.shape and 0 <= stamp_ns < _LATEST
+        if self._message is not None and fits:
             self._row[:] = numbers
-            if 0 <= stamp_ns < _LATEST and send_row(*self._arguments, stamp_ns, self._row) == SENT:
+            if send_row(*self._arguments, stamp_ns, self._row) == SENT:
                 return
             clear_error()
         self._publish(self._writer.encode(stamp_ns, row))

@@ -73,10 +73,8 @@ class RowTaker:
         self._message = message = RclMessage(self._words)
         addresses = take, subscription, message.address, message.info_address, message.buffer
         has_pose = topic.fields[: len(POSE)] == POSE
-        # CDR aligns all numbers to 4 bytes at least: where they stand is counted in such.
         form = (*addresses, layout.size, layout.seconds // 4, has_pose)
-        places = [first // 4 + 2 * i for first, count in layout.runs for i in range(count)]
-        self._places = np.array(places, dtype=np.int64)
+        self._places = layout.halves
         self._form = np.array(form, dtype=np.int64)
         self._found, self._due = np.zeros(2, dtype=np.int64), np.zeros(3, dtype=np.int64)
         self._row, self._rows = np.empty(topic.width), np.empty((_MOST_ROWS, topic.width))

@@ -35,10 +35,10 @@ def test_the_bar_goes_to_a_goal_and_back(tmp_path):
         Witness(graph.domain, [reference]) as witness,
     ):
         graph.start(goal_duration=3.0)
-        send = witness.publisher(GOAL)
+        send = witness.publisher(GOAL, (WAVE_TRAJECTORY,))
         home = witness.node.node.create_client(trigger, f"/{WAVE_TRAJECTORY}/home")
         witness.until_running(FORCE_CONTROLLER)
-        witness.until(lambda: witness.node.node.count_subscribers(GOAL.name) > 0, "a reader")
+        witness.until_connected()
         witness.until(home.service_is_ready, "the service")
         for wrong in (goal([9.0, 0.0, 2.0]), goal(PLACE, "map")):
             send(wrong)

@@ -22,6 +22,7 @@ from ros_graph import load_ros
 from rosbags.highlevel import AnyReader
 
 from cspm_control.safe_state import balancing_tensions
+from cspm_msgs_py.graph import RECORDER
 from cspm_msgs_py.message import message_of
 from cspm_msgs_py.recording import Recording
 from cspm_msgs_py.recording.recover import recover
@@ -420,11 +421,13 @@ def test_foreign_messages_are_answered_with_the_safe_state_and_its_reason(warm, 
         Witness(graph.domain, topics_of(bundle, TENSION)) as witness,
     ):
         send = {
-            topic.name: witness.publisher(topic)
-            for topic in (tension, command, twist, pose, torque, truth)
+            topic.name: witness.publisher(topic, (RECORDER,))
+            for topic in (tension, command, pose, torque, truth)
         }
+        send[twist.name] = witness.publisher(twist)
         graph.start()
         under_way(witness)
+        witness.until_connected()
         # What is no topic of this run changes nothing.
         for _ in range(20):
             send[twist.name](message(twist, witness.node.now_ns(), np.full(6, np.nan)))

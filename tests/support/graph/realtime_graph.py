@@ -248,9 +248,13 @@ class Witness:
             self.until_said(FORCE_CONTROLLER, lambda _: True, "a status")
         assert answer == (True, "running")
 
-    def publisher(self, topic):
-        """Return what publishes the CDR bytes of a topic, connected to its readers."""
-        return self.node.raw_publisher(topic)
+    def publisher(self, topic, readers=()):
+        """Return what publishes the CDR bytes of a topic; see `until_connected` for readers."""
+        return self.node.raw_publisher(topic, readers)
+
+    def until_connected(self):
+        """Listen until the nodes that were named as readers hear our publishers."""
+        self.until(lambda: not self.node.unmatched(), "readers to be connected")
 
     def __enter__(self):
         return self

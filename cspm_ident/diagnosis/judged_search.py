@@ -37,6 +37,7 @@ from cspm_ident.diagnosis.validation.remainder import (
     remainders_of,
 )
 from cspm_ident.diagnosis.validation.reversals import with_wider
+from cspm_ident.freed_memory import give_back
 from cspm_ident.signals.measurement import Measurement
 from cspm_sim.effects import Effect
 
@@ -147,6 +148,7 @@ def searched_and_judged(
         search_parts=_found_only(last.search_parts, found),
         judge_parts=_found_only(last.judge_parts, found),
     )
+    give_back()
     search, rows = last.search, in_noise(last.search_parts, last.noise)
     acceptance = accepted(search, found, judge, recordings.searched, rows, last.block)
     retuned = search.retuned()

@@ -201,11 +201,14 @@ def _samples(
         return {"frame_pose" if name == FRAME else "bar_pose": found}
     kinds = {WINCHES: {"position": "angle", "velocity": "speed", "effort": "torque"}}
     kinds[TENSION], kinds[COMMAND] = {"effort": "tension"}, {"effort": "command"}
-    out = {}
+    out: dict[str, Samples] = {}
     for part, kind in kinds[name].items():
         if part in topic.parts:
             columns = [topic.fields.index(f"{part}/{cable}") for cable in machine.cable_names]
-            out[kind] = ordered(times, rows.rows[:, columns])
+            found = ordered(times, rows.rows[:, columns])
+            same = (s for s in out.values() if np.array_equal(s.times, found.times))
+            beside = next(same, None)
+            out[kind] = found if beside is None else beside.of_others(found.values)
     return {kind: samples for kind, samples in out.items() if len(samples.times)}
 
 

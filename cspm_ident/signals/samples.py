@@ -32,9 +32,11 @@ class Stamps:
 
     Attributes:
         times: increasing, shape (n,) [s]; not to be written to.
+        shared: what others made of these times, for all values that have them.
     """
 
     times: Array
+    shared: dict[Hashable, Array] = field(default_factory=dict, init=False, repr=False)
 
     @cached_property
     def interval(self) -> float:
@@ -60,6 +62,11 @@ class Stamps:
         Where stamps follow no even clock, they and the samples' order are returned.
         """
         return [_clocked(self.times[span]) for span in self.spans]
+
+    @cached_property
+    def even(self) -> Stamps:
+        """The stamps without their scatter."""
+        return Stamps(np.concatenate([times for times, _ in self.clocks]))
 
 
 @dataclass(frozen=True, eq=False)
@@ -92,6 +99,11 @@ class Samples:
         return Stamps(self.times) if self.stamps is None else self.stamps
 
     @property
+    def shared(self) -> dict[Hashable, Array]:
+        """What others made of the times alone, for all values that have them."""
+        return self._stamps.shared
+
+    @property
     def interval(self) -> float:
         """The usual time between two samples [s], their median; 0 with fewer than two."""
         return self._stamps.interval
@@ -119,11 +131,11 @@ class Samples:
         """
         return self._stamps.clocks
 
-    @cached_property
+    @property
     def even(self) -> Samples:
         """The same values at stamps without their scatter."""
-        stamps = [times for times, _ in self.clocks]
-        return Samples(np.concatenate(stamps), self.values) if stamps else self
+        stamps = self._stamps.even
+        return Samples(stamps.times, self.values, stamps)
 
     def column(self, index: int) -> Samples:
         """Return one column, shape (n, 1)."""

@@ -61,11 +61,15 @@ class Smooth:
 
 
 def smooth(samples: Samples, band: float | None = None) -> Smooth:
-    """Return the samples without what lies above `band` [Hz]; absent: see `band_of`."""
-    return samples.kept((smooth, band), lambda: _smoothed(samples, band))
+    """Return the samples without what lies above `band` [Hz]; absent: see `band_of`.
+
+    What was returned is kept with the samples.
+    """
+    return samples.kept((smooth, band), lambda: smoothed(samples, band))
 
 
-def _smoothed(samples: Samples, band: float | None) -> Smooth:
+def smoothed(samples: Samples, band: float | None = None) -> Smooth:
+    """Return the same as `smooth`, which is not kept: of a long recording it is much memory."""
     values, kept = filtered(samples, band)
     skip = max(1, int(samples.rate / (_KNOTS * kept)))
     spans, pieces, firsts = [], [], []
@@ -79,7 +83,10 @@ def _smoothed(samples: Samples, band: float | None) -> Smooth:
         firsts.append(values[span][0])
         # Basis splines: polynomials of each piece are four times the memory. Less the first value,
         # so that what stands still has no speed, not even one of rounding.
-        pieces.append(make_interp_spline(times[knots], values[span][knots] - firsts[-1]))
+        piece = make_interp_spline(times[knots], values[span][knots] - firsts[-1])
+        # Other values at the same times have the same knots, of which one copy is enough.
+        own = samples.shared.setdefault((span.start, skip), piece.t)
+        pieces.append(BSpline.construct_fast(own, piece.c, piece.k))
     begun = np.array(firsts).reshape(len(firsts), values.shape[1])
     return Smooth(np.array(spans).reshape(len(spans), 2), tuple(pieces), begun, kept)
 

@@ -259,8 +259,7 @@ class Timeline:
 
         A drive reports the torque that it applied up to the stamp. A single lost reading is a hole
         as well: a rough torque does not follow from its neighbours, and a light shaft takes another
-            speed,
-        which its angles show only some time later.
+        speed, which its angles show only some time later.
         """
         samples = self.measurement.torque
         if samples is None:

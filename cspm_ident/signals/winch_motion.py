@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from hashlib import sha256
 from typing import NamedTuple
 
 import numpy as np
@@ -9,7 +10,7 @@ from numpy.typing import NDArray
 from scipy.interpolate import CubicHermiteSpline
 
 from cspm_ident.signals.samples import Samples
-from cspm_ident.signals.smoothing import Smooth, smooth
+from cspm_ident.signals.smoothing import Smooth, smooth, smoothed
 
 Array = NDArray[np.float64]
 
@@ -44,12 +45,12 @@ def winch_motion(angle: Samples, speed: Samples | None, times: Array) -> WinchMo
     summed up, which the encoder does not. So each gives the band in which it is better, where both
     agree in the band that they share.
     """
-    key = winch_motion, speed, times.tobytes()
+    key = winch_motion, speed, sha256(times).digest()
     return angle.kept(key, lambda: _winch_motion(angle, speed, times))
 
 
 def _winch_motion(angle: Samples, speed: Samples | None, times: Array) -> WinchMotion:
-    if speed is None or not _agree(angle, speed):
+    if speed is None or not angle.kept((_agree, speed), lambda: _agree(angle, speed)):
         alone = smooth(angle, ENCODER_BAND_HZ)
         return WinchMotion(alone.at(times), alone.at(times, 1), alone.band)
     even = speed.even
@@ -62,7 +63,7 @@ def _winch_motion(angle: Samples, speed: Samples | None, times: Array) -> WinchM
         path = _turned(even.times, column)
         rest[:, i] = angle.values[:, i] - path(at)
         summed[:, i] = path(times)
-    slow = smooth(angle.of_others(rest), CROSSOVER_HZ)
+    slow = smoothed(angle.of_others(rest), CROSSOVER_HZ)
     return WinchMotion(summed + slow.at(times), fast + slow.at(times, 1), float("inf"))
 
 
@@ -80,7 +81,7 @@ def _turned(times: Array, speeds: Array) -> CubicHermiteSpline:
 
 def _agree(angle: Samples, speed: Samples) -> bool:
     """Return whether the speeds are the angles' derivatives, in the band that both show well."""
-    slow_angle, slow_speed = smooth(angle, CROSSOVER_HZ), smooth(speed, CROSSOVER_HZ)
+    slow_angle, slow_speed = smoothed(angle, CROSSOVER_HZ), smoothed(speed, CROSSOVER_HZ)
     times = _inside(slow_angle, speed.times)
     derived, said = slow_angle.at(times, 1), slow_speed.at(times)
     apart, whole = np.nanvar(derived - said, axis=0), np.nanvar(said, axis=0)

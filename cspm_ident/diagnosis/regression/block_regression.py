@@ -60,11 +60,9 @@ class BlockRegression:
         lengths = np.sqrt(squares.sum(axis=0))
         lengths[lengths == 0.0] = 1.0
         lengths[-1] = 1.0
-        scales = [lengths[at >= 0] for at in self._at]
-        self._grams = [
-            place.grams / (scale[:, None] * scale)
-            for place, scale in zip(gram.places, scales, strict=True)
-        ]
+        # Scaled on access, so that only one copy is held in memory.
+        self._grams = [place.grams for place in gram.places]
+        self._scales = [lengths[at >= 0] for at in self._at]
         self._lengths = lengths[:-1]
         self._prior = np.append(usual_precision(gram) / self._lengths**2, 0.0)
         self._starts: Index = np.zeros(width + 1, dtype=np.intp)
@@ -74,25 +72,28 @@ class BlockRegression:
     def _of(self, rows: Index, columns: Index) -> Array:
         """Return each block's products of two sets of columns, (blocks, rows, columns)."""
         found = np.zeros((self.blocks, len(rows), len(columns)))
-        for grams, at in zip(self._grams, self._at, strict=True):
+        for grams, at, scale in zip(self._grams, self._at, self._scales, strict=True):
             down, across = np.flatnonzero(at[rows] >= 0), np.flatnonzero(at[columns] >= 0)
             if len(down) and len(across):
-                own = grams[:, at[rows[down]][:, None], at[columns[across]]]
+                first, second = at[rows[down]], at[columns[across]]
+                own = grams[:, first[:, None], second] / (scale[first][:, None] * scale[second])
                 found[:, down[:, None], across] += own
         down, across = self._starts[rows], self._starts[columns]
         return silenced(found, down, across) if down.any() or across.any() else found
 
-    def _summed(self, rows: Index, blocks: slice) -> Array:
-        """Return products of some columns with all over some blocks, (rows, width + 1)."""
+    def _summed(self, rows: Index) -> Array:
+        """Return products of some columns with all over all blocks, (rows, width + 1)."""
         found = np.zeros((len(rows), len(self._at[0])))
-        for grams, at in zip(self._grams, self._at, strict=True):
+        for grams, at, scale in zip(self._grams, self._at, self._scales, strict=True):
             down, across = np.flatnonzero(at[rows] >= 0), np.flatnonzero(at >= 0)
             if len(down):
-                own = grams[blocks, at[rows[down]]]
+                first = at[rows[down]]
                 if self._starts.any():
-                    starts = self._starts - (blocks.start or 0)
-                    own = silenced(own, starts[rows[down]], starts[across])
-                found[down[:, None], across] += own.sum(axis=0)
+                    starts = self._starts[rows[down]], self._starts[across]
+                    own = silenced(grams[:, first], *starts).sum(axis=0)
+                else:
+                    own = grams.sum(axis=0)[first]
+                found[down[:, None], across] += own / (scale[first][:, None] * scale)
         return found
 
     def _like(self: _Kind) -> _Kind:
@@ -105,6 +106,7 @@ class BlockRegression:
         """Return the sums of other products, (blocks, m + 1, m + 1), of columns so long."""
         other = self._like()
         other._grams, other._at = [blocks], [np.arange(blocks.shape[1])]
+        other._scales = [np.ones(blocks.shape[1])]
         other._lengths, other._undelayed = lengths, None
         other._prior = np.zeros(blocks.shape[1])
         other._starts = np.zeros(blocks.shape[1], dtype=np.intp)
@@ -115,8 +117,8 @@ class BlockRegression:
         if not block:
             return self
         other = self._like()
-        other._grams, other._at, other._lengths = self._grams, self._at, self._lengths
-        other._prior = self._prior
+        other._grams, other._at, other._scales = self._grams, self._at, self._scales
+        other._lengths, other._prior = self._lengths, self._prior
         other._starts = self._starts.copy()
         other._starts[columns] = np.maximum(self._starts[columns], block)
         other._undelayed = self if self._undelayed is None else self._undelayed
@@ -165,30 +167,15 @@ class BlockRegression:
         """Sums of all blocks, (width + 1, width + 1)."""
         if self._undelayed is None:
             every = np.arange(len(self._starts))
-            return SymmetricTable(self._expected(every, self._summed(every, slice(None))))
+            return SymmetricTable(self._expected(every, self._summed(every)))
         late = np.flatnonzero(self._starts)
-        found = self._expected(late, self._summed(late, slice(None)))
+        found = self._expected(late, self._summed(late))
         return self._undelayed._whole.replacing(late, found)
 
     def _expected(self, rows: Index, products: Array) -> Array:
         """Return rows of products, (rows, width + 1), with what is known of weights beforehand."""
         products[np.arange(len(rows)), rows] += self._prior[rows]
         return products
-
-    @cached_property
-    def _others(self) -> list[SymmetricTable]:
-        """Sums of all blocks but those of each fold and their neighbours."""
-        if self._undelayed is None:
-            own = np.arange(len(self._starts))
-            return [
-                SymmetricTable(self._whole.base - self._summed(own, self._near(fold)))
-                for fold in self._folds
-            ]
-        late = self._whole.replaced
-        return [
-            table.replacing(late, self._whole.others - self._summed(late, self._near(fold)))
-            for table, fold in zip(self._undelayed._others, self._folds, strict=True)
-        ]
 
     def _near(self, fold: Index) -> slice:
         """Return the blocks of a fold and their neighbours."""
@@ -225,12 +212,12 @@ class BlockRegression:
 
     def weights(self, columns: Index) -> Array:
         """Return the least-squares weights of columns."""
-        return np.asarray(self._weights(columns, self._whole) / self._lengths[columns])
+        return np.asarray(self._weights(columns) / self._lengths[columns])
 
     def weights_beyond(self, base: Index, columns: Index) -> Array:
         """Return the weights of columns fitted to a base's residual, the base's weights held."""
         both = self._whole.at(columns, base)
-        left = self._whole.last(columns) - both @ self._weights(base, self._whole)
+        left = self._whole.last(columns) - both @ self._weights(base)
         inverse = pseudo_inverse(self._whole.at(columns, columns))
         return np.asarray(inverse @ left / self._lengths[columns])
 
@@ -256,8 +243,11 @@ class BlockRegression:
         """
         both = np.append(columns, len(self._starts) - 1)
         parts, out = self._of(both, both), np.zeros(self.blocks)
-        for fold, others in zip(self._folds, self._others, strict=True):
-            out[fold] = squares_by_block(parts[fold], self._weights(columns, others))
+        whole = self._whole.at(both, both)
+        for fold in self._folds:
+            others = whole - parts[self._near(fold)].sum(axis=0)
+            weights = pseudo_inverse(others[:-1, :-1]) @ others[:-1, -1]
+            out[fold] = squares_by_block(parts[fold], weights)
         return out
 
     def gain(self, base: Index, columns: Index) -> Gain:
@@ -276,7 +266,7 @@ class BlockRegression:
     def _fitted(self, columns: Index) -> Array:
         """Return Σ residual² of each block, fitted to all of them."""
         both = np.append(columns, len(self._starts) - 1)
-        return squares_by_block(self._of(both, both), self._weights(columns, self._whole))
+        return squares_by_block(self._of(both, both), self._weights(columns))
 
     def drift(self, base: Index, columns: Index) -> tuple[Gain, float]:
         """Return the gain, and its p-value, of letting weights change over the blocks.
@@ -366,7 +356,7 @@ class BlockRegression:
 
     def squares_of(self, columns: Index) -> float:
         """Return Σ residual² after a fit of columns."""
-        weights = self._weights(columns, self._whole)
+        weights = self._weights(columns)
         return float(self.squares - self._whole.last(columns) @ weights)
 
     def spanned(self, base: Index, wide: Index, narrow: Index) -> Array:
@@ -395,8 +385,9 @@ class BlockRegression:
         gained = np.einsum("bi,bi->b", reported, weights[..., 0])
         return np.asarray(self.squares_of(base) - gained)
 
-    def _weights(self, columns: Index, table: SymmetricTable) -> Array:
-        return np.asarray(pseudo_inverse(table.at(columns, columns)) @ table.last(columns))
+    def _weights(self, columns: Index) -> Array:
+        inverse = pseudo_inverse(self._whole.at(columns, columns))
+        return np.asarray(inverse @ self._whole.last(columns))
 
 
 def gain_of(better: Array) -> Gain:

@@ -346,18 +346,13 @@ class Suspension:
             rows[:, column] = values
         return rows
 
-    @cached_property
-    def _velocities(self) -> tuple[Array, Array]:
-        """Velocities of attachments relative to exits, and of exits, (k, n, 3) [m/s]."""
-        exits = self.parameters.cables[:, EXIT : EXIT + 3]
-        return end_velocities(self._spans, self.bar, self._frame, exits)
-
     def end_rows(self, i: int) -> Array:
         """Return `EndSignal` columns of cable i."""
-        spans, (apart, exits) = self._spans, self._velocities
-        parts = (spans.directions, apart, spans.arms, spans.lengths)
-        gravity = np.full(len(self.signals.times), self._testbed.gravity)
-        return np.column_stack([*(part[:, i] for part in parts), gravity, exits[:, i]])
+        spans, place = self._spans.only(i), self.parameters.cables[i : i + 1, EXIT : EXIT + 3]
+        apart, exits = end_velocities(spans, self.bar, self._frame, place)
+        gravity = np.full((len(self.signals.times), 1), self._testbed.gravity)
+        parts = (spans.directions[:, 0], apart[:, 0], spans.arms[:, 0], spans.lengths)
+        return np.hstack([*parts, gravity, exits[:, 0]])
 
     @cached_property
     def bar_rows(self) -> Array:

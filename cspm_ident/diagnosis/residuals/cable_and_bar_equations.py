@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from dataclasses import replace
 from functools import partial
+from itertools import chain
 
 import numpy as np
 from numpy.typing import NDArray
@@ -27,6 +28,7 @@ from cspm_ident.diagnosis.residuals.sensor_readings import (
 )
 from cspm_ident.diagnosis.residuals.virtual_load_cell import DrawnTension
 from cspm_ident.diagnosis.thresholds import DEFAULT_THRESHOLDS, Thresholds
+from cspm_ident.side_by_side import side_by_side
 from cspm_ident.signals.measurement import TENSION, WINCHES, Measurement
 from cspm_ident.signals.timeline import Timeline
 from cspm_ident.winch.weak_form import weigh
@@ -141,11 +143,10 @@ class _Stretch:
     ) -> list[Equation]:
         tensions, wrench = self._targets(known)
         columns: dict[Place, dict[Candidate | Driver, Array]] = {}
-        for effect in effects:
-            for candidate, place, found in self._columns(effect):
-                beside = columns.setdefault(place, {})
-                # A winch fault may change the cable as well as the virtual load cell's tension.
-                beside[candidate] = beside[candidate] + found if candidate in beside else found
+        for candidate, place, found in chain(*side_by_side(self._columns, effects)):
+            beside = columns.setdefault(place, {})
+            # A winch fault may change the cable as well as the virtual load cell's tension.
+            beside[candidate] = beside[candidate] + found if candidate in beside else found
         out = [
             self._cable_equation(
                 i, tensions[:, i], columns.get(Place(Channel.TENSION, name), {}), knots
@@ -251,8 +252,14 @@ class _Stretch:
                     wrench -= found @ weights
         return tensions, wrench
 
-    def _columns(self, effect: Effect) -> Iterator[tuple[Candidate, Place, Array]]:
-        """Yield the change of each weighted residual per unit of an effect's weights."""
+    def _columns(self, effect: Effect) -> list[tuple[Candidate, Place, Array]]:
+        """Return the change of each weighted residual per unit of an effect's weights.
+
+        In single precision, since in a long recording they take most of the memory.
+        """
+        return [(own, at, found.astype("f4")) for own, at, found in self._changes(effect)]
+
+    def _changes(self, effect: Effect) -> Iterator[tuple[Candidate, Place, Array]]:
         for i, name in enumerate(elements_of(effect, self._machine.cable_names, (BAR, FRAME))):
             if effect.physics.sense is not None:
                 for place, found in self._read(effect, i, name):

@@ -83,7 +83,7 @@ def drive_equations(
         missing = reported - rows[:, WinchSignal.TORQUE]
         equation = _equation(cable.name, missing, rows, effects, own, held, knots)
         if equation is not None:
-            found.append(equation)
+            found.append(equation.compact)
     return found
 
 

@@ -17,6 +17,7 @@ from cspm_ident.diagnosis.residuals.residual_equation import Equation
 from cspm_ident.diagnosis.residuals.virtual_load_cell import drawn_tension
 from cspm_ident.diagnosis.residuals.winch_torque import shaft_equations
 from cspm_ident.diagnosis.thresholds import DEFAULT_THRESHOLDS, Thresholds
+from cspm_ident.freed_memory import give_back
 from cspm_ident.signals.measurement import Measurement
 from cspm_ident.signals.timeline import Timeline
 from cspm_sim.effect_entries import read_actions
@@ -62,9 +63,11 @@ def equations_of(
         late = suspension_equations(
             Timeline(reported), effects, known, knots, drawn=drawn, thresholds=thresholds
         )
+        give_back()
     progress("torque equations of the winches")
     found = drive_equations(measurement, effects, known, knots)
     found += shaft_equations(measurement, effects, known, knots, winches, thresholds)
+    give_back()
     return found + late
 
 

@@ -13,6 +13,7 @@ from cspm_ident.diagnosis.residuals.regressors import Candidate, Place, elements
 from cspm_ident.diagnosis.residuals.residual_equation import Equation
 from cspm_ident.diagnosis.residuals.sensor_readings import reading_rows
 from cspm_ident.diagnosis.thresholds import DEFAULT_THRESHOLDS, Thresholds
+from cspm_ident.side_by_side import side_by_side
 from cspm_ident.signals.measurement import TENSION, WINCHES, Measurement
 from cspm_ident.signals.samples import Samples
 from cspm_ident.signals.winch_motion import winch_motion
@@ -58,30 +59,38 @@ def shaft_equations(
         winches: names of the winches.
         thresholds: `certain_sigma` and `reversal_speed_share`.
     """
-    found: list[Equation] = []
-    for i, cable in enumerate(measurement.machine.cables):
-        if cable.name not in winches:
+    cables = measurement.machine.cables
+    own = [i for i, cable in enumerate(cables) if cable.name in winches]
+
+    def of_winch(i: int) -> list[Equation]:
+        actions = [action for action in known if action.element == i]
+        return [
+            table.equation(effects, actions, knots).compact
+            for table in _tables(measurement, i, thresholds)
+        ]
+
+    return [equation for found in side_by_side(of_winch, own) for equation in found]
+
+
+def _tables(measurement: Measurement, i: int, thresholds: Thresholds) -> Iterator[_Shaft]:
+    """Yield the rows of winch i, one table for each stretch in which it turns."""
+    cable, ratio = measurement.machine.cables[i], thresholds.certain_sigma
+    try:
+        signals = winch_signals(measurement, cable.name, measurement.torque_age)
+    except InputError:
+        return
+    for times, rows in signal_rows(signals):
+        if measurement.speed is not None:
+            moved = winch_motion(signals.angle, measurement.speed.column(i), times)
+            rows[:, WinchSignal.ANGLE] = moved.angles[:, 0]
+            rows[:, WinchSignal.SPEED] = moved.speeds[:, 0]
+        half = max(2, round(HALF_WIDTH_S / signals.angle.interval))
+        angles = rows[:, WinchSignal.ANGLE]
+        if len(rows) < 2 * half + 1 or not _turns(angles, signals.angle, ratio):
             continue
-        try:
-            signals = winch_signals(measurement, cable.name, measurement.torque_age)
-        except InputError:
-            continue
-        for times, rows in signal_rows(signals):
-            if measurement.speed is not None:
-                moved = winch_motion(signals.angle, measurement.speed.column(i), times)
-                rows[:, WinchSignal.ANGLE] = moved.angles[:, 0]
-                rows[:, WinchSignal.SPEED] = moved.speeds[:, 0]
-            half = max(2, round(HALF_WIDTH_S / signals.angle.interval))
-            angles, ratio = rows[:, WinchSignal.ANGLE], thresholds.certain_sigma
-            if len(rows) < 2 * half + 1 or not _turns(angles, signals.angle, ratio):
-                continue
-            sensors = (WINCHES,) if signals.tension is None else (WINCHES, TENSION)
-            lost = _lost(signals.torque, measurement.torque_age, times)
-            still = thresholds.reversal_speed_share
-            table = _Shaft(rows, cable, half, times, lost, sensors, still)
-            own = [action for action in known if action.element == i]
-            found.append(table.equation(effects, own, knots).compact)
-    return found
+        sensors = (WINCHES,) if signals.tension is None else (WINCHES, TENSION)
+        lost = _lost(signals.torque, measurement.torque_age, times)
+        yield _Shaft(rows, cable, half, times, lost, sensors, thresholds.reversal_speed_share)
 
 
 def may_reverse(speeds: Array, share: float, width: int) -> NDArray[np.bool_]:

@@ -92,6 +92,13 @@ class Measurement:
         return {name: samples for name, samples in found.items() if samples is not None}
 
     @property
+    def _parts(self) -> dict[str, Any]:
+        """What was measured, by attribute."""
+        names = ("frame_pose", "bar_pose", "angle", "speed", "torque", "tension", "command")
+        parts = {name: getattr(self, name) for name in names}
+        return {name: samples for name, samples in parts.items() if samples is not None}
+
+    @property
     def knows_frame(self) -> bool:
         """Whether the winch frame's pose is known: measured, or fixed as no sensor is listed."""
         return self.frame_pose is not None or FRAME not in self.machine.sensors
@@ -108,16 +115,16 @@ class Measurement:
 
     def within(self, start: float, end: float) -> Measurement:
         """Return what was measured from `start` to `end` [s]."""
-        names = ("frame_pose", "bar_pose", "angle", "speed", "torque", "tension", "command")
-        parts = {name: getattr(self, name) for name in names}
-        return replace(self, **{n: s.within(start, end) for n, s in parts.items() if s is not None})
+        return replace(self, **{n: s.within(start, end) for n, s in self._parts.items()})
+
+    def since(self, start: float) -> Measurement:
+        """Return what was measured from `start` [s] on; of the same samples at every call."""
+        return replace(self, **{n: s.since(start) for n, s in self._parts.items()})
 
     def without(self, start: float, end: float) -> Measurement:
         """Return what was measured outside `start` to `end` [s], where each sensor has a hole."""
-        names = ("frame_pose", "bar_pose", "angle", "speed", "torque", "tension", "command")
-        parts = {name: getattr(self, name) for name in (*names, "wanted")}
-        left = {n: s.without(start, end) for n, s in parts.items() if s is not None}
-        return replace(self, **left)
+        parts = self._parts if self.wanted is None else {**self._parts, "wanted": self.wanted}
+        return replace(self, **{n: s.without(start, end) for n, s in parts.items()})
 
     def with_testbed(self, testbed: TestbedFile) -> Measurement:
         """Return the same, said to be of another description of the machine."""

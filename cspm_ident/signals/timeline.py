@@ -12,8 +12,8 @@ from numpy.typing import NDArray
 from scipy.ndimage import binary_dilation
 
 from cspm_ident.signals.measurement import Measurement
-from cspm_ident.signals.samples import Samples
-from cspm_ident.signals.smoothing import Smooth, band_of, smooth
+from cspm_ident.signals.samples import Samples, digest
+from cspm_ident.signals.smoothing import Smooth, band_of, smooth, smoothed
 from cspm_ident.signals.winch_motion import WinchMotion, winch_motion
 from cspm_model.kernels.trajectory import body_rates_along, twists_along
 from cspm_model.motion import Motion
@@ -127,16 +127,12 @@ class Timeline:
         times = Timeline(measured, period_ns, self.delays).times
         tension, angle, winches = measured.tension, measured.angle, None
         if angle is not None:
-            slow = smooth(angle, band)
-            winches = WinchMotion(slow.at(times), slow.at(times, 1), band)
-        smoothed = Smoothed(
-            self.pose_band,
-            self._frame,
-            self._bar,
-            winches,
-            None if tension is None else smooth(tension, band),
-        )
-        other = Timeline(measured, period_ns, self.delays, smoothed=smoothed)
+            # Of what is smoothed so only the steps are kept: a long recording's is much memory.
+            key = Timeline.slowly, band, digest(times)
+            winches = angle.kept(key, lambda: _slow_motion(angle, band, times))
+        pull = None if tension is None else smoothed(tension, band)
+        known = Smoothed(self.pose_band, self._frame, self._bar, winches, pull)
+        other = Timeline(measured, period_ns, self.delays, smoothed=known)
         other.drifts = self.drifts
         return other
 
@@ -304,6 +300,11 @@ class Timeline:
             return self._smoothed.tension
         samples = self.measurement.tension
         return None if samples is None else smooth(samples)
+
+
+def _slow_motion(angle: Samples, band: float, times: Array) -> WinchMotion:
+    slow = smoothed(angle, band)
+    return WinchMotion(slow.at(times), slow.at(times, 1), band)
 
 
 def joined(samples: Samples, times: Array) -> Array:

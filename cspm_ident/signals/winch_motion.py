@@ -2,14 +2,13 @@
 
 from __future__ import annotations
 
-from hashlib import sha256
 from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 from scipy.interpolate import CubicHermiteSpline
 
-from cspm_ident.signals.samples import Samples
+from cspm_ident.signals.samples import Samples, digest
 from cspm_ident.signals.smoothing import Smooth, smooth, smoothed
 
 Array = NDArray[np.float64]
@@ -20,6 +19,8 @@ ENCODER_BAND_HZ = 100.0
 CROSSOVER_HZ = 5.0
 # Of the crossover's periods: so near a stretch's ends the filters have one side only.
 _ENDS = 2.0
+# Instants at which both are compared, ten per period of the fastest motion that is left.
+_AGREEING_HZ = 10.0 * CROSSOVER_HZ
 # Largest share of the speed's variance at which encoder and speed may disagree to be joined.
 _DISAGREEMENT = 0.02
 
@@ -43,13 +44,15 @@ def winch_motion(angle: Samples, speed: Samples | None, times: Array) -> WinchMo
 
     An encoder's steps hide fast motion, which the drive's speed shows; the speed drifts when it is
     summed up, which the encoder does not. So each gives the band in which it is better, where both
-    agree in the band that they share.
+    agree in the band that they share. What was returned is kept with the angles.
     """
-    key = winch_motion, speed, sha256(times).digest()
-    return angle.kept(key, lambda: _winch_motion(angle, speed, times))
+    return angle.kept(
+        (winch_motion, speed, digest(times)), lambda: joined_motion(angle, speed, times)
+    )
 
 
-def _winch_motion(angle: Samples, speed: Samples | None, times: Array) -> WinchMotion:
+def joined_motion(angle: Samples, speed: Samples | None, times: Array) -> WinchMotion:
+    """Return the same as `winch_motion`, not kept: of a long recording it is much memory."""
     if speed is None or not angle.kept((_agree, speed), lambda: _agree(angle, speed)):
         alone = smooth(angle, ENCODER_BAND_HZ)
         return WinchMotion(alone.at(times), alone.at(times, 1), alone.band)
@@ -82,7 +85,8 @@ def _turned(times: Array, speeds: Array) -> CubicHermiteSpline:
 def _agree(angle: Samples, speed: Samples) -> bool:
     """Return whether the speeds are the angles' derivatives, in the band that both show well."""
     slow_angle, slow_speed = smoothed(angle, CROSSOVER_HZ), smoothed(speed, CROSSOVER_HZ)
-    times = _inside(slow_angle, speed.times)
+    # Both are slow: their variances need no more instants.
+    times = _inside(slow_angle, speed.times[:: max(1, int(speed.rate / _AGREEING_HZ))])
     derived, said = slow_angle.at(times, 1), slow_speed.at(times)
     apart, whole = np.nanvar(derived - said, axis=0), np.nanvar(said, axis=0)
     # A winch at rest shows no motion; its speed is noise, and small.

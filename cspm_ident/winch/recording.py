@@ -2,21 +2,36 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
 from cspm_ident.signals.measurement import Measurement
 from cspm_ident.signals.samples import Samples
-from cspm_ident.signals.smoothing import smooth
+from cspm_ident.signals.smoothing import smoothed
 from cspm_ident.signals.timeline import joined
+from cspm_ident.signals.winch_motion import joined_motion
 from cspm_msgs_py.errors import InputError
 from cspm_sim.effects import Effect
 from cspm_sim.effects.signals import WinchSignal
 from cspm_sim.effects.winch_load import load_effects
 
 Array = NDArray[np.float64]
+
+
+class Moved(NamedTuple):
+    """A shaft's motion at equal steps.
+
+    Attributes:
+        times: shape (n,) [s].
+        motion: angle [rad], speed [rad/s] and acceleration [rad/s²], shape (n, 3).
+    """
+
+    times: Array
+    motion: Array
 
 
 @dataclass(frozen=True, eq=False)
@@ -100,7 +115,9 @@ def winch_signals(measurement: Measurement, cable: str, torque_age: float = 0.0)
     )
 
 
-def signal_rows(signals: WinchSignals, band: float | None = None) -> list[tuple[Array, Array]]:
+def signal_rows(
+    signals: WinchSignals, band: float | None = None, moved: Sequence[Moved] | None = None
+) -> list[tuple[Array, Array]]:
     """Return the winch's signals at equal steps, one table for each stretch without a hole.
 
     Angle, speed and acceleration come from one smooth function, unless `signals` name the drive's
@@ -109,26 +126,24 @@ def signal_rows(signals: WinchSignals, band: float | None = None) -> list[tuple[
     Args:
         signals: the readings.
         band: kept of the angle [Hz]; by default what exceeds its noise.
+        moved: the shaft's motion where it is known, see `moved_along`; the band does not count.
 
     Returns:
         Pairs of times [s], shape (n,), and signals, shape (n, len(WinchSignal)).
     """
-    smoothed = smooth(signals.angle, band)
-    reported = signals.speed
-    step = signals.angle.interval
+    angle, reported = signals.angle, signals.speed
     tables = []
-    for start, end in smoothed.spans:
-        times = start + step * np.arange(int((end - start) / step + 1e-6) + 1)
-        times = np.minimum(times, end)
-        rows = np.zeros((len(times), len(WinchSignal)))
-        columns = (WinchSignal.ANGLE, WinchSignal.SPEED, WinchSignal.ACCELERATION)
-        for derivative, column in enumerate(columns):
-            rows[:, column] = smoothed.at(times, derivative)[:, 0]
+    for times, motion in moved_along(angle, band) if moved is None else moved:
+        # Column by column in memory, as they are read.
+        rows = np.zeros((len(times), len(WinchSignal)), order="F")
+        rows[:, [WinchSignal.ANGLE, WinchSignal.SPEED, WinchSignal.ACCELERATION]] = motion
         if reported is not None:
             rows[:, WinchSignal.SPEED] = joined(reported, times)[:, 0]
-            rows[:, WinchSignal.ACCELERATION] = np.gradient(rows[:, WinchSignal.SPEED], step)
+            rows[:, WinchSignal.ACCELERATION] = np.gradient(
+                rows[:, WinchSignal.SPEED], angle.interval
+            )
         rows[:, WinchSignal.TORQUE] = joined(signals.torque, times + signals.torque_age)[:, 0]
-        rows[:, WinchSignal.TORQUE_RATE] = np.gradient(rows[:, WinchSignal.TORQUE], step)
+        rows[:, WinchSignal.TORQUE_RATE] = np.gradient(rows[:, WinchSignal.TORQUE], angle.interval)
         if signals.tension is not None:
             rows[:, WinchSignal.TENSION] = joined(signals.tension, times)[:, 0]
         rows[:, WinchSignal.RADIUS] = signals.radius
@@ -136,6 +151,32 @@ def signal_rows(signals: WinchSignals, band: float | None = None) -> list[tuple[
         rows[:, WinchSignal.TIME] = times
         tables += _whole(times, rows)
     return tables
+
+
+def moved_along(
+    angle: Samples, band: float | None = None, drive: Samples | None = None
+) -> list[Moved]:
+    """Return how a shaft moved, for each stretch without a hole.
+
+    Args:
+        angle: of the encoder, one column [rad].
+        band: kept of it [Hz]; by default what exceeds its noise.
+        drive: speed that the drive reports, one column [rad/s]: angle and speed then come from both
+            sensors, see `winch_motion`.
+    """
+    slow, step, found = smoothed(angle, band), angle.interval, []
+    for start, end in slow.spans:
+        times = start + step * np.arange(int((end - start) / step + 1e-6) + 1)
+        times = angle.shared.setdefault((moved_along, start, end), np.minimum(times, end))
+        moved = np.empty((len(times), 3), order="F")
+        if drive is None:
+            moved[:, 0], moved[:, 1] = slow.at(times)[:, 0], slow.at(times, 1)[:, 0]
+        else:
+            motion = joined_motion(angle, drive, times)
+            moved[:, 0], moved[:, 1] = motion.angles[:, 0], motion.speeds[:, 0]
+        moved[:, 2] = slow.at(times, 2)[:, 0]
+        found.append(Moved(times, moved))
+    return found
 
 
 def _whole(times: Array, rows: Array) -> list[tuple[Array, Array]]:

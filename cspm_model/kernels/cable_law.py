@@ -9,7 +9,7 @@ from cspm_model.kernels.cable import elastic_tension, law_scale
 Array = NDArray[float64]
 
 
-@njit(cache=True, error_model="numpy", _nrt=False)
+@njit(cache=True, error_model="numpy", nogil=True, _nrt=False)
 def law_tensions(
     elongations: Array, elastic_lengths: Array, cables: Array, tables: Array, out: Array
 ) -> None:

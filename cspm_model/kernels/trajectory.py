@@ -20,14 +20,14 @@ Array = NDArray[float64]
 Motions = tuple[Array, Array, Array, Array]
 
 
-@njit(cache=True, error_model="numpy")
+@njit(cache=True, error_model="numpy", nogil=True)
 def eulers_along(quaternions: Array, out: Array) -> None:
     """Write φ θ ψ, (k, 3), of quaternions x y z w, (k, 4)."""
     for k in range(len(quaternions)):
         out[k, 0], out[k, 1], out[k, 2] = euler_from_quaternion(quaternions[k])
 
 
-@njit(cache=True, error_model="numpy")
+@njit(cache=True, error_model="numpy", nogil=True)
 def twists_along(poses: Array, rates: Array, out: Array) -> None:
     """Write v and ω in world axes, (k, 6), of poses x y z φ θ ψ and their rates, (k, 6) each."""
     for k in range(len(poses)):
@@ -37,7 +37,7 @@ def twists_along(poses: Array, rates: Array, out: Array) -> None:
         out[k, 3], out[k, 4], out[k, 5] = turning
 
 
-@njit(cache=True, error_model="numpy")
+@njit(cache=True, error_model="numpy", nogil=True)
 def body_rates_along(poses: Array, turning: Array, out: Array) -> None:
     """Write ω in body axes, (k, 3), of ω in world axes, (k, 3), at poses (k, 6)."""
     for k in range(len(poses)):
@@ -46,7 +46,7 @@ def body_rates_along(poses: Array, turning: Array, out: Array) -> None:
         out[k, 0], out[k, 1], out[k, 2] = rate
 
 
-@njit(cache=True, error_model="numpy")
+@njit(cache=True, error_model="numpy", nogil=True)
 def lengths_along(
     cables: Array,
     bars: Array,
@@ -84,7 +84,7 @@ def _placement(body: Motions, k: int) -> Placement:
     )
 
 
-@njit(cache=True, error_model="numpy")
+@njit(cache=True, error_model="numpy", nogil=True)
 def spans_along(cables: Array, frame: Motions, bar: Motions, out: Array) -> None:
     """Write all cables' spans, (k, n, SPAN_COLUMNS), without tensions; see `cable_spans`.
 

@@ -7,7 +7,7 @@ from numpy.typing import NDArray
 Array = NDArray[float64]
 
 
-@njit(cache=True, error_model="numpy", _nrt=False)
+@njit(cache=True, error_model="numpy", nogil=True, _nrt=False)
 def relaxed(targets: Array, kept: Array, out: Array) -> None:
     """Write states that approach targets, (k, n) each, from `out[0]` on.
 

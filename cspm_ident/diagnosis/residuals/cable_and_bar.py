@@ -321,7 +321,9 @@ class Suspension:
 
     def cable_rows(self, i: int) -> Array:
         """Return `CableSignal` columns of cable i."""
-        rows, cables = np.zeros((len(self.signals.times), len(CableSignal))), self.parameters.cables
+        count, cables = len(self.signals.times), self.parameters.cables
+        # Column by column in memory, as they are read.
+        rows = np.zeros((count, len(CableSignal)), order="F")
         lengths, wound = self._spans.lengths[:, i], self._wound[:, i]
         directions = self._spans.directions[:, i]
         for column, values in {
@@ -357,26 +359,26 @@ class Suspension:
     @cached_property
     def bar_rows(self) -> Array:
         """`BarSignal` columns, with accelerations from the tensions."""
-        return self._bar_rows(*self._acceleration_by_tension)
-
-    @cached_property
-    def posed_bar_rows(self) -> Array:
-        """`BarSignal` columns, with accelerations from the poses."""
-        return self._bar_rows(self.bar.acceleration, self.bar.alpha)
-
-    def _bar_rows(self, acceleration: Array, alpha: Array) -> Array:
         bar, state = self._testbed.bar, self.bar
         assert bar is not None
         count = len(self.signals.times)
-        rows = np.zeros((count, int(BarSignal.POSE) + 6))
+        # Column by column in memory, as they are read.
+        rows = np.zeros((count, int(BarSignal.POSE) + 6), order="F")
         rows[:, :3], rows[:, 3:6] = state.velocity, state.omega
-        rows[:, 6:9], rows[:, 9:12] = acceleration, alpha
+        rows[:, 6:9], rows[:, 9:12] = self._acceleration_by_tension
         rows[:, BarSignal.ROTATION : BarSignal.ROTATION + 9] = state.rotation.reshape(count, 9)
         rows[:, BarSignal.COM : BarSignal.COM + 3] = bar.com
         rows[:, BarSignal.MASS] = bar.mass
         rows[:, BarSignal.GRAVITY] = self._testbed.gravity
         rows[:, BarSignal.TIME] = self.signals.times
         rows[:, BarSignal.POSE :] = self.signals.bar.poses
+        return rows
+
+    @property
+    def posed_bar_rows(self) -> Array:
+        """`BarSignal` columns, with accelerations from the poses."""
+        rows: Array = self.bar_rows.copy(order="F")
+        rows[:, 6:9], rows[:, 9:12] = self.bar.acceleration, self.bar.alpha
         return rows
 
     def frame_rows(self, i: int) -> Array:

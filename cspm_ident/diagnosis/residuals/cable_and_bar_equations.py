@@ -303,13 +303,14 @@ class _Stretch:
         What both sensors have in common is not noise. Regressors with too small a common part are
         set to zero.
         """
-        ways = [columns(rows) for rows in (self._here.bar_rows, self._here.posed_bar_rows)]
+        ways = columns(self._here.bar_rows), columns(self._here.posed_bar_rows)
         by_tension, by_pose = (self._weighed(way, Channel.WRENCH) for way in ways)
         common = np.einsum("kij,kij->j", by_tension, by_pose)
         reported, posed = (np.sum(way**2, axis=(0, 1)) for way in (by_tension, by_pose))
-        quieter = np.where(reported <= posed, ways[0], ways[1])
+        quieter = np.where(reported <= posed, *ways)
         least = self._thresholds.common_acceleration_share * np.minimum(reported, posed)
-        return np.where(common >= least, quieter, 0.0)
+        quieter[:, :, common < least] = 0.0
+        return quieter
 
     def _moved(self, columns: Array) -> Array:
         """Return regressors (k, 6, m) without the coordinates whose readings are noise alone."""

@@ -50,6 +50,7 @@ def equations_of(
     Raises:
         InputError: the machine's effects cannot be used.
     """
+    give_back()
     measurement = settled(measurement)
     known = read_actions(measurement.machine)
     winches, suspended = _reached(measurement, touched)

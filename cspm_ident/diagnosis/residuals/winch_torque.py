@@ -16,8 +16,7 @@ from cspm_ident.diagnosis.thresholds import DEFAULT_THRESHOLDS, Thresholds
 from cspm_ident.side_by_side import side_by_side
 from cspm_ident.signals.measurement import TENSION, WINCHES, Measurement
 from cspm_ident.signals.samples import Samples
-from cspm_ident.signals.winch_motion import winch_motion
-from cspm_ident.winch.recording import signal_rows, winch_signals
+from cspm_ident.winch.recording import moved_along, signal_rows, winch_signals
 from cspm_ident.winch.weak_form import HALF_WIDTH_S, make_window, weigh
 from cspm_msgs_py.errors import InputError
 from cspm_msgs_py.testbed import Cable
@@ -79,11 +78,11 @@ def _tables(measurement: Measurement, i: int, thresholds: Thresholds) -> Iterato
         signals = winch_signals(measurement, cable.name, measurement.torque_age)
     except InputError:
         return
-    for times, rows in signal_rows(signals):
-        if measurement.speed is not None:
-            moved = winch_motion(signals.angle, measurement.speed.column(i), times)
-            rows[:, WinchSignal.ANGLE] = moved.angles[:, 0]
-            rows[:, WinchSignal.SPEED] = moved.speeds[:, 0]
+    drive = None if measurement.speed is None else measurement.speed.column(i)
+    moved = signals.angle.kept(
+        (moved_along, drive), lambda: moved_along(signals.angle, None, drive)
+    )
+    for times, rows in signal_rows(signals, moved=moved):
         half = max(2, round(HALF_WIDTH_S / signals.angle.interval))
         angles = rows[:, WinchSignal.ANGLE]
         if len(rows) < 2 * half + 1 or not _turns(angles, signals.angle, ratio):

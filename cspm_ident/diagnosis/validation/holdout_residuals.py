@@ -192,7 +192,7 @@ def residuals_of(
         [
             equation.within(start, np.inf)
             for equation in equations_of(
-                as_found(m.within(start - LEAD_S, np.inf), weights), (), thresholds=thresholds
+                as_found(m.since(start - LEAD_S), weights), (), thresholds=thresholds
             )
         ]
         for m, start in measurements

@@ -28,7 +28,11 @@ def _kernel(parameters: Array, signals: Array) -> None:
 
 def _columns(signals: Array, order: float) -> Array:
     turned = order * signals[:, WinchSignal.ANGLE]
-    return np.asarray(-np.stack([np.sin(turned), np.cos(turned)], -1)[:, None])
+    # Column by column in memory: a long recording has these of many orders.
+    both = np.empty((2, len(turned)))
+    np.sin(turned, out=both[0])
+    np.cos(turned, out=both[1])
+    return np.negative(both, out=both).T[:, None]
 
 
 def _weights(values: Values) -> tuple[float, float]:

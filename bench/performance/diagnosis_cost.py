@@ -1,6 +1,7 @@
 """Time and memory of `cspm diagnose --no-closed-loop`, watched from outside.
 
-Processor time is given beside time by the clock, which other programs make longer.
+Processor time is given beside time by the clock, which other programs make longer, and the plant's
+speed before and after, which tells how fast the processor is.
 """
 
 from __future__ import annotations
@@ -13,18 +14,27 @@ from typing import NamedTuple
 
 from bench.accuracy.planted_effects import PlantedCase, record
 from bench.performance.child import start_cspm, watched
-from bench.performance.thesis_machine import SCENARIOS
+from bench.performance.plant_speed import plant_step
+from bench.performance.thesis_machine import PERIOD_NS, SCENARIOS, ThesisMachine, roll_damping
 
 SEED = 100
 PLANTED = PlantedCase("winch_coulomb_friction", ("surge_2",), {"torque": 0.031})
 
 
 class Cost(NamedTuple):
-    """What a command took: by the clock [s], of the processor [s], and at most of memory [B]."""
+    """What a command took.
+
+    Attributes:
+        clock: by the clock [s].
+        processor: of the processor [s].
+        memory: at most [B].
+        plant: the plant's speed before and after, the mean, as multiple of real time.
+    """
 
     clock: float
     processor: float
     memory: int
+    plant: float
 
 
 def main() -> None:
@@ -35,7 +45,8 @@ def main() -> None:
     parser.add_argument("--recorded", type=float, nargs="+", default=[60.0, 600.0], metavar="S")
     parser.add_argument("--recording", type=Path, help="one of the worst case that there is")
     arguments = parser.parse_args()
-    print("| recording | took [s] | of the processor [s] | memory [GB] |\n|---|---:|---:|---:|")
+    columns = ("recording", "took [s]", "of the processor [s]", "memory [GB]", "plant [×]")
+    print(f"| {' | '.join(columns)} |\n|---|---:|---:|---:|---:|")
     with tempfile.TemporaryDirectory() as place:
         if arguments.recording is not None:
             print_cost(arguments.recording.name, cost_of(arguments.recording, Path(place)))
@@ -48,7 +59,7 @@ def main() -> None:
 
 def print_cost(name: str, cost: Cost) -> None:
     """Print a row of the table."""
-    row = f"{cost.clock:.0f} | {cost.processor:.0f} | {cost.memory / 1e9:.2f}"
+    row = f"{cost.clock:.0f} | {cost.processor:.0f} | {cost.memory / 1e9:.2f} | {cost.plant:.0f}"
     print(f"| {name} | {row} |", flush=True)
 
 
@@ -56,11 +67,14 @@ def cost_of(recorded: Path, out: Path) -> Cost:
     """Diagnose with the file that knows of no effect, into `out`; pages are not drawn."""
     testbed = str(SCENARIOS / "testbeds" / "thesis.yaml")
     words = ["diagnose", str(recorded), "--testbed", testbed, "--no-closed-loop"]
-    begun = time.perf_counter()
+    machine = ThesisMachine(roll_damping())
+    before, begun = plant_step(machine), time.perf_counter()
     child = start_cspm([*words, "--json", str(out / "diagnosis.json")], {})
     looks = list(watched(child, lambda p: (p.memory_info().rss, sum(p.cpu_times()[:2]))))
     memory, processor = (max(column) for column in zip(*looks, strict=True))
-    return Cost(time.perf_counter() - begun, processor, memory)
+    took = time.perf_counter() - begun
+    step_us = 0.5 * (before + plant_step(machine))
+    return Cost(took, processor, memory, 1e-3 * PERIOD_NS / step_us)
 
 
 if __name__ == "__main__":

@@ -180,7 +180,7 @@ class Samples:
 
 
 def digest(times: Array) -> bytes:
-    """Return what stands for some times (k,) in a key: themselves would be kept with it."""
+    """Return a digest of times (k,), for keys: these are kept, and with them all that they hold."""
     return sha256(times.tobytes()).digest()
 
 

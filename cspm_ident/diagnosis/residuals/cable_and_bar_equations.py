@@ -18,7 +18,7 @@ from cspm_ident.diagnosis.residuals.machine_signals import (
     machine_signals,
 )
 from cspm_ident.diagnosis.residuals.regressors import Candidate, Place, elements_of, shapes_of
-from cspm_ident.diagnosis.residuals.residual_equation import Equation
+from cspm_ident.diagnosis.residuals.residual_equation import AT_ONCE, Equation
 from cspm_ident.diagnosis.residuals.residual_window import quiet_window
 from cspm_ident.diagnosis.residuals.sensor_readings import (
     moving,
@@ -143,7 +143,7 @@ class _Stretch:
     ) -> list[Equation]:
         tensions, wrench = self._targets(known)
         columns: dict[Place, dict[Candidate | Driver, Array]] = {}
-        for candidate, place, found in chain(*side_by_side(self._columns, effects)):
+        for candidate, place, found in chain(*side_by_side(self._columns, effects, AT_ONCE)):
             beside = columns.setdefault(place, {})
             # A winch fault may change the cable as well as the virtual load cell's tension.
             beside[candidate] = beside[candidate] + found if candidate in beside else found

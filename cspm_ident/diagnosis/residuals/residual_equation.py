@@ -16,6 +16,9 @@ Array = NDArray[np.float64]
 Term = Candidate | Driver
 Rows = slice | NDArray[np.bool_]
 
+# Equations written side by side: each takes all signals of a recording for a moment.
+AT_ONCE = 2
+
 
 class Made(Mapping[Term, Array]):
     """Regressors computed from others on access, so that only one copy is held in memory.

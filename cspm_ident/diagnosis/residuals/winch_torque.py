@@ -10,7 +10,7 @@ from scipy.ndimage import maximum_filter1d, minimum_filter1d
 
 from cspm_ident.diagnosis.residuals.free_shapes import Driver, Knots
 from cspm_ident.diagnosis.residuals.regressors import Candidate, Place, elements_of, shapes_of
-from cspm_ident.diagnosis.residuals.residual_equation import Equation
+from cspm_ident.diagnosis.residuals.residual_equation import AT_ONCE, Equation
 from cspm_ident.diagnosis.residuals.sensor_readings import reading_rows
 from cspm_ident.diagnosis.thresholds import DEFAULT_THRESHOLDS, Thresholds
 from cspm_ident.side_by_side import side_by_side
@@ -68,7 +68,7 @@ def shaft_equations(
             for table in _tables(measurement, i, thresholds)
         ]
 
-    return [equation for found in side_by_side(of_winch, own) for equation in found]
+    return [equation for found in side_by_side(of_winch, own, AT_ONCE) for equation in found]
 
 
 def _tables(measurement: Measurement, i: int, thresholds: Thresholds) -> Iterator[_Shaft]:

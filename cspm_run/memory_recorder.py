@@ -19,7 +19,7 @@ Array = NDArray[np.float64]
 
 
 class KeptChannel:
-    """What one topic receives; made to be quick, as `cspm_msgs_py.recording.channel.Channel`."""
+    """What one topic receives; made to be quick, as `ChannelBuffer` is."""
 
     __slots__ = ("contents", "logs", "stamps")
 

@@ -9,6 +9,8 @@ from collections.abc import Callable, Collection, Mapping
 SILENT_NS = 100_000_000
 _MOST_STRANGERS = 100
 _UNKNOWN = "an unknown node"
+# What ROS names a publisher's node before it has heard of it, which comes apart from its messages.
+NOT_YET_NAMED = "_NODE_NAME_UNKNOWN_"
 
 Publishers = Callable[[], Mapping[bytes, str]]
 
@@ -79,6 +81,27 @@ class PublisherBinding:
             self._heard_ns = now_ns
             return None
         return self._stranger(gid)
+
+    def stranger(
+        self, gid: bytes | None, now_ns: int, *, begun: bool, safe: bool = False
+    ) -> str | None:
+        """Return `fault`; None while nobody is bound and it is not known whose a message is.
+
+        Before the run who is missing is reported by its leader, and messages of a node come before
+        its name does.
+
+        Args:
+            gid: identity of its publisher, see `fault`.
+            now_ns: the present instant [ns].
+            begun: whether the run has begun.
+            safe: whether the winches are in their safe state.
+        """
+        found = self.fault(gid, now_ns, safe=safe)
+        known = self.bound is not None or (begun and self._is_named(gid))
+        return found if known else None
+
+    def _is_named(self, gid: bytes | None) -> bool:
+        return gid is None or self._publishers().get(gid, NOT_YET_NAMED) != NOT_YET_NAMED
 
     def _may_send(self, node: str) -> bool:
         return not self._senders or node in self._senders

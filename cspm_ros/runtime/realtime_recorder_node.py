@@ -144,9 +144,8 @@ class RealtimeRecorderNode:
         admission = Admission(name)
 
         def stranger(gid: bytes | None) -> str | None:
-            found = binding.fault(gid, node.now_ns(), safe=self._lenient)
-            # Before the run nobody is bound, and who is missing is reported by its leader.
-            return found if self._begun or binding.bound is not None else None
+            now_ns = node.now_ns()
+            return binding.stranger(gid, now_ns, begun=self._begun, safe=self._lenient)
 
         def fault(stamp_ns: int) -> str | None:
             return admission.fault(stamp_ns, node.now_ns(), safe=self._lenient)

@@ -2,7 +2,7 @@
 
 import pytest
 
-from cspm_msgs_py.stepping.publisher_binding import SILENT_NS, PublisherBinding
+from cspm_msgs_py.stepping.publisher_binding import NOT_YET_NAMED, SILENT_NS, PublisherBinding
 
 A, B, C = b"a" * 16, b"b" * 16, b"c" * 16
 TOPIC = "/bar/pose"
@@ -94,4 +94,28 @@ def test_where_identities_are_unknown_one_publisher_is_believed_and_two_are_not(
     graph.nodes[B] = "other"
     assert made.fault(None, 0) == (
         f"{TOPIC}: waits for one publisher of {TOPIC} instead of 2 (camera, other)"
+    )
+
+
+@pytest.mark.parametrize("early", [{}, {A: NOT_YET_NAMED}])
+def test_a_sender_is_no_stranger_before_its_name_is_there(early):
+    graph = Graph()
+    graph.nodes = dict(early)
+    made = binding(graph, "plant")
+    assert "not bound" in made.fault(A, 0)
+    assert made.stranger(A, 0, begun=True) is None
+    graph.nodes = {A: "plant"}
+    assert made.stranger(A, 0, begun=True) is None
+    assert made.bound == A
+    # From then on a sender without a name is one.
+    assert made.stranger(B, 0, begun=True) == (
+        f"{TOPIC}: a second publisher, of an unknown node, allowed: that of plant alone"
+    )
+
+
+def test_a_named_stranger_is_one_from_the_start_of_the_run_on():
+    made = binding(Graph(a="stranger"), "plant")
+    assert made.stranger(A, 0, begun=False) is None
+    assert made.stranger(A, 0, begun=True) == (
+        f"{TOPIC}: not bound to a publisher, waits for a publisher of {TOPIC} by plant"
     )

@@ -147,7 +147,7 @@ class Equation:
     @property
     def compact(self) -> Equation:
         """The equation with regressors in single precision; their sums are in double."""
-        columns = {term: found.astype("f4") for term, found in self.columns.items()}
+        columns = {term: found.astype("f4", copy=False) for term, found in self.columns.items()}
         return replace(self, columns=columns)
 
     @property

@@ -82,7 +82,7 @@ class PublisherBinding:
             return None
         return self._stranger(gid)
 
-    def stranger(
+    def fault_if_known(
         self, gid: bytes | None, now_ns: int, *, begun: bool, safe: bool = False
     ) -> str | None:
         """Return `fault`; None while nobody is bound and it is not known whose a message is.

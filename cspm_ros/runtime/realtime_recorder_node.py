@@ -145,7 +145,7 @@ class RealtimeRecorderNode:
 
         def stranger(gid: bytes | None) -> str | None:
             now_ns = node.now_ns()
-            return binding.stranger(gid, now_ns, begun=self._begun, safe=self._lenient)
+            return binding.fault_if_known(gid, now_ns, begun=self._begun, safe=self._lenient)
 
         def fault(stamp_ns: int) -> str | None:
             return admission.fault(stamp_ns, node.now_ns(), safe=self._lenient)

@@ -103,19 +103,19 @@ def test_a_sender_is_no_stranger_before_its_name_is_there(early):
     graph.nodes = dict(early)
     made = binding(graph, "plant")
     assert "not bound" in made.fault(A, 0)
-    assert made.stranger(A, 0, begun=True) is None
+    assert made.fault_if_known(A, 0, begun=True) is None
     graph.nodes = {A: "plant"}
-    assert made.stranger(A, 0, begun=True) is None
+    assert made.fault_if_known(A, 0, begun=True) is None
     assert made.bound == A
     # From then on a sender without a name is one.
-    assert made.stranger(B, 0, begun=True) == (
+    assert made.fault_if_known(B, 0, begun=True) == (
         f"{TOPIC}: a second publisher, of an unknown node, allowed: that of plant alone"
     )
 
 
 def test_a_named_stranger_is_one_from_the_start_of_the_run_on():
     made = binding(Graph(a="stranger"), "plant")
-    assert made.stranger(A, 0, begun=False) is None
-    assert made.stranger(A, 0, begun=True) == (
+    assert made.fault_if_known(A, 0, begun=False) is None
+    assert made.fault_if_known(A, 0, begun=True) == (
         f"{TOPIC}: not bound to a publisher, waits for a publisher of {TOPIC} by plant"
     )

@@ -103,9 +103,19 @@ def run_node(name: str, args: Sequence[str] = ()) -> None:
         finish_recording(recorded)
 
 
+def run_program(name: str, args: Sequence[str]) -> int:
+    """Run a node as a program, errors as one line on stderr; return its exit code.
+
+    Args:
+        name: as for `run_node`.
+        args: as for `run_node`.
+    """
+    return main(name, args, finish=finish_recording)
+
+
 def recorder() -> None:
     """Run the recorder as a program, for `ros2 run`."""
-    sys.exit(main(RECORDER, sys.argv[1:], finish=finish_recording))
+    sys.exit(run_program(RECORDER, sys.argv[1:]))
 
 
 def check_drivers(

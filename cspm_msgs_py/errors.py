@@ -6,6 +6,11 @@ class CspmError(Exception):
 
     exit_code = 1
 
+    @property
+    def line(self) -> str:
+        """What a program prints: what went wrong, and the remedy where there is one."""
+        return str(self)
+
 
 class InputError(CspmError):
     """Bad usage or bad input: the line says what, where, and what is allowed."""
@@ -21,6 +26,11 @@ class DamageError(InputError):
     """
 
     remedy = "`cspm recover` leaves the damaged part out"
+
+    @property
+    def line(self) -> str:
+        """As for every error, with the remedy."""
+        return f"{self}; {self.remedy}"
 
 
 class DivergenceError(CspmError):

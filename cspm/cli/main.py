@@ -15,7 +15,7 @@ import typer
 from cspm.cli.app import RUN_FAILED, Json, app, new_folder
 from cspm.cli.shared_options import COMMAND, Browser, Port, add_shared_options
 from cspm_msgs_py.control_spec.motion_laws import MOTION_LAWS
-from cspm_msgs_py.errors import CspmError, DamageError, InputError
+from cspm_msgs_py.errors import CspmError, InputError
 from cspm_run.library import find_scenario, scenario_names
 
 MODES = ("inprocess", "graph", "processes", "realtime")
@@ -53,10 +53,8 @@ def run_app(commands: typer.Typer, name: str) -> NoReturn:
         root = typer.main.get_command(commands)
         add_shared_options(root)
         code = context.run(root.main, prog_name=name, standalone_mode=False)
-    except DamageError as err:
-        fail(f"{err}; {err.remedy}", err.exit_code)
     except CspmError as err:
-        fail(str(err), err.exit_code)
+        fail(err.line, err.exit_code)
     except _UsageError as err:
         command = err.ctx.command_path if err.ctx else name
         line = f"{err.format_message().rstrip('.')}; see `{command} --help`"

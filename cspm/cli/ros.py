@@ -31,9 +31,9 @@ def node(context: typer.Context) -> None:
         typer.echo(context.get_help())
         raise typer.Exit(0)
     COMMAND.set(f"{context.command_path} {name}")
-    from cspm.graph import run_node
+    from cspm.graph import run_program
 
-    run_node(name, rest)
+    raise typer.Exit(run_program(name, rest))
 
 
 @app.command(

@@ -27,13 +27,19 @@ The node {name} of cspm. Parameters: scenario (a name or a file), pace (lockstep
 nodes (which take part) and more: `ros2 param describe /{name} NAME` explains each."""
 
 
-def start_node(name: str, args: Sequence[str], began: float | None = None) -> Path | None:
+def start_node(
+    name: str,
+    args: Sequence[str],
+    began: float | None = None,
+    failed: Callable[[CspmError], None] = lambda _: None,
+) -> Path | None:
     """Run a node until its run ends or a signal comes; return what a recorder has recorded.
 
     Args:
         name: one of `NODES`.
         args: what follows the name on the command line, such as `--ros-args -p scenario:=calm`.
         began: when starting began, on `time.perf_counter` [s]; None: now.
+        failed: called with a failure of the run before the node leaves the graph.
 
     Raises:
         InputError: no such node, no ROS, or arguments that cannot be used.
@@ -50,7 +56,7 @@ def start_node(name: str, args: Sequence[str], began: float | None = None) -> Pa
     # Loading ROS comes after looking for it.
     from cspm_ros.runtime.node_run import run_node
 
-    return run_node(name, [name, *args], began)
+    return run_node(name, [name, *args], began, failed)
 
 
 def main(
@@ -70,12 +76,19 @@ def main(
     if {"--help", "-h"} & set(args):
         print(_HELP.format(name=name))  # noqa: T201 - the program's voice
         return 0
+    said: list[CspmError] = []
+
+    def say(err: CspmError) -> None:
+        line = " ".join(err.line.split()).removeprefix(f"node {name}: ")
+        print(f"cspm node {name}: {line}", file=sys.stderr, flush=True)  # noqa: T201
+        said.append(err)
+
     try:
-        if (recorded := start_node(name, args, began)) is not None:
+        if (recorded := start_node(name, args, began, say)) is not None:
             finish(recorded)
     except CspmError as err:
-        line = " ".join(str(err).split()).removeprefix(f"node {name}: ")
-        print(f"cspm node {name}: {line}", file=sys.stderr)  # noqa: T201
+        if err not in said:
+            say(err)
         return err.exit_code
     except KeyboardInterrupt:
         # Before the node takes signals itself.

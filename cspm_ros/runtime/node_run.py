@@ -38,7 +38,9 @@ _STDIN_BYTES = 4096
 _LEAVING_S = 3.0
 
 
-def run_node(name: str, args: Sequence[str], began: float) -> Path | None:
+def run_node(
+    name: str, args: Sequence[str], began: float, failed: Callable[[CspmError], None]
+) -> Path | None:
     """Run a node until its run ends or a signal comes.
 
     Return the recording of a recorder that nobody follows from outside, as `cspm run` does.
@@ -47,6 +49,7 @@ def run_node(name: str, args: Sequence[str], began: float) -> Path | None:
         name: one of `NODES`.
         args: command line, ROS style: `--ros-args -p scenario:=calm`.
         began: when the program did, on `time.perf_counter` [s].
+        failed: called with a failure before the node leaves the graph, which may never end.
 
     Raises:
         InputError: no such node, or parameters that cannot be used.
@@ -55,9 +58,16 @@ def run_node(name: str, args: Sequence[str], began: float) -> Path | None:
     if name not in NODES:
         raise InputError(f"node {name}: allowed: {', '.join(NODES)}")
     with ExitStack() as stack:
-        start_exit_watchdog = stack.enter_context(exit_watchdog())
+        begin_to_leave = stack.enter_context(exit_watchdog())
         session = stack.enter_context(Session(args))
-        stack.callback(start_exit_watchdog, max(_LEAVING_S, time.perf_counter() - began))
+
+        def leave(_: type[BaseException] | None, err: BaseException | None, __: object) -> None:
+            if isinstance(err, CspmError):
+                failed(err)
+            begin_to_leave(max(_LEAVING_S, started - began), err is not None)
+
+        stack.push(leave)
+        started = time.perf_counter()
         node = session.node(name)
         parameters = read_parameters(node.node)
         described = ParameterDescriptor(description="host and number of its process")

@@ -243,7 +243,7 @@ def test_each_explains_itself(capsys, name):
 
 
 def test_an_early_interrupt_is_no_traceback(monkeypatch, capsys):
-    def interrupted(name, args, began):
+    def interrupted(name, args, began, failed):
         raise KeyboardInterrupt
 
     monkeypatch.setattr(node_main, "start_node", interrupted)

@@ -2,6 +2,7 @@
 
 import os
 import subprocess
+import time
 from functools import partial
 
 import numpy as np
@@ -29,6 +30,7 @@ GUARDS = (FORCE_CONTROLLER, WATCHDOG)
 SAG = 0.1
 """How far the bar may move [m]. A winch at half torque lets it sink 3 cm until the safe state
 holds it; one that falls freely sinks 1.2 m in the time after which silence counts."""
+ATTEMPTS = 5
 STEPS = 300
 TIMETABLE = (
     'faults=[{"at": 0.05, "fault": "sensor_biased", "on": "/bar/pose", "amount": 0.001,'
@@ -91,6 +93,17 @@ def reported(each, status):
     return any(str(each) in status.values.get(name, "") for name in ("faults", "fault_events"))
 
 
+def answered(each, witness, domain, reason):
+    """Put a fault into the run; return whether it is why the machine was in its safe state then."""
+    inject(each, domain_id=domain)
+    over_ns = time.time_ns() + int(each.lasts * 1e9)
+    witness.until_said_after(PLANT, over_ns, lambda s: not s.values.get("faults"), f"end of {each}")
+    said = witness.until_said_after(FORCE_CONTROLLER, over_ns, lambda _: True, "a status")
+    # Both the jump and the jump back are reported.
+    witness.until_running(*GUARDS, passing=(*LATE, reason))
+    return said.values.get("state") == "hold" and reason in said.values["reason"]
+
+
 @pytest.mark.slow
 @pytest.mark.realtime
 def test_each_fault_is_ridden_out_or_answered_with_the_safe_state(tmp_path):
@@ -102,12 +115,12 @@ def test_each_fault_is_ridden_out_or_answered_with_the_safe_state(tmp_path):
         fault("sensor_noisy", on="/bar/pose", amount=1e-4, lasts=0.3),
         fault("brake", lasts=0.3),
     ]
-    answered = {
-        "/bar/pose": fault("sensor_dropped", on="/bar/pose", lasts=1.5),
-        "/winches/state": fault("sensor_dropped", on="/winches/state", lasts=1.5),
-        "/cables/tension": fault("sensor_late", on="/cables/tension", amount=1.0, lasts=1.5),
+    answers = {
+        "/tension_command stale": fault("sensor_dropped", on="/bar/pose", lasts=1.5),
+        "/winches/state stale": fault("sensor_dropped", on="/winches/state", lasts=1.5),
+        "/cables/tension stale": fault("sensor_late", on="/cables/tension", amount=1.0, lasts=1.5),
         "torque without motion": fault("winch_weak", on="surge_2", amount=0.5, lasts=1.0),
-        "jump": fault("sensor_biased", on="/bar/pose", amount=0.5, lasts=0.3),
+        " jumped by ": fault("sensor_biased", on="/bar/pose", amount=0.5, lasts=0.3),
     }
     with (
         Graph(warm_processes(), bundle, tmp_path) as graph,
@@ -120,13 +133,9 @@ def test_each_fault_is_ridden_out_or_answered_with_the_safe_state(tmp_path):
             witness.until_said(PLANT, partial(reported, each), str(each))
             witness.until_more(TENSION, 120)
             witness.until_running(*GUARDS)
-        for each in answered.values():
-            inject(each, domain_id=graph.domain)
-            witness.until_state(FORCE_CONTROLLER, "hold")
-            witness.until_said(PLANT, lambda s: not s.values.get("faults"), "no fault")
-            witness.until_reset(FORCE_CONTROLLER)
-            # The jump back is reported after it.
-            witness.until_running(*GUARDS, passing=(*LATE, " jumped by "))
+        for reason, each in answers.items():
+            # A busy computer may be in its safe state already, for being late.
+            assert any(answered(each, witness, graph.domain, reason) for _ in range(ATTEMPTS)), each
         with pytest.raises(InputError, match=r"^on surge_9, allowed: hoist_1, "):
             inject(fault("winch_weak", on="surge_9", amount=0.5), domain_id=graph.domain)
         assert kill_node(FORCE_CONTROLLER, domain_id=graph.domain) in {
@@ -139,14 +148,14 @@ def test_each_fault_is_ridden_out_or_answered_with_the_safe_state(tmp_path):
     limits = np.array([cable.tension_limits[1] for cable in bundle.testbed.testbed.cables])
     assert (evidence.rows["/truth/cables/tension"].rows <= limits).all()
     events = "; ".join(s.values.get("fault_events", "") for s in evidence.statuses)
-    for each in (*ridden_out, *answered.values()):
+    for each in (*ridden_out, *answers.values()):
         assert f"{each}" in events
     with Recording(graph.folder) as recording:
         for name in ("/rosout", "/parameter_events"):
             assert recording.topics[name].count > 0
     reasons = "; ".join(reason for _, reason in evidence.alarms(FORCE_CONTROLLER))
-    for words in ("/winches/state stale", "/cables/tension stale", "torque without motion"):
-        assert words in reasons
+    for reason in answers:
+        assert reason in reasons
 
 
 def test_the_command_says_what_is_allowed(tmp_path):

@@ -158,7 +158,7 @@ class Witness:
         self._stack = ExitStack()
         self.session = self._stack.enter_context(Session(domain_id=domain))
         self.node = self.session.node("witness")
-        self.latest, self._clients = {}, {}
+        self.latest, self.stamps_ns, self._clients = {}, {}, {}
         self.counts = defaultdict(int)
         self.node.subscribe(DIAGNOSTICS, self._note)
         for topic in topics:
@@ -168,8 +168,10 @@ class Witness:
         )
 
     def _note(self, payload):
-        for status in decode_diagnostics(payload).statuses:
+        diagnostics = decode_diagnostics(payload)
+        for status in diagnostics.statuses:
             self.latest[status.name] = status
+            self.stamps_ns[status.name] = diagnostics.stamp_ns
 
     def _count(self, name):
         self.counts[name] += 1
@@ -187,6 +189,12 @@ class Witness:
             lambda: name in self.latest and condition(self.latest[name]), f"{name}: {what}", seconds
         )
         return self.latest[name]
+
+    def until_said_after(self, name, time_ns, condition, what):
+        """Listen until what a part says after a time [ns] meets a condition; return it."""
+        return self.until_said(
+            name, lambda said: self.stamps_ns[name] > time_ns and condition(said), what
+        )
 
     def until_state(self, name, state):
         """Listen until a guard says that it is in a state; return what it says."""

@@ -60,14 +60,14 @@ def run_node(
     with ExitStack() as stack:
         begin_to_leave = stack.enter_context(exit_watchdog())
         session = stack.enter_context(Session(args))
+        leaving_s = max(_LEAVING_S, time.perf_counter() - began)
 
         def leave(_: type[BaseException] | None, err: BaseException | None, __: object) -> None:
             if isinstance(err, CspmError):
                 failed(err)
-            begin_to_leave(max(_LEAVING_S, started - began), err is not None)
+            begin_to_leave(leaving_s, err is not None)
 
         stack.push(leave)
-        started = time.perf_counter()
         node = session.node(name)
         parameters = read_parameters(node.node)
         described = ParameterDescriptor(description="host and number of its process")

@@ -56,8 +56,8 @@ class Finding:
     """Something that the described machine lacks, or was suspected of.
 
     Attributes:
-        status: `reported`; `tied`, alternatives explain the data as well; `doubtful`, something
-            unknown is beside it; `rejected`, held-out data do not confirm it; `negligible`, it is
+        status: `reported`; `tied`, alternatives explain the data as well; `undecided`, the data
+            cannot tell whether it is there; `rejected`, no model has it; `negligible`, it is
             there, but too small to matter.
         effect: id from the catalogue, or `unknown`.
         elements: the cables or bodies that have it.
@@ -69,7 +69,7 @@ class Finding:
         alternatives: what explains the data as well.
         onset: when it began [s]; None where it was there all the time.
         region: where in the signals it shows; empty where it does everywhere.
-        reason: why it is rejected; empty where it is not.
+        reason: why it is undecided or rejected; empty where it is neither.
     """
 
     status: str
@@ -116,9 +116,9 @@ class Diagnosis:
         )
 
     @property
-    def rejected(self) -> tuple[Finding, ...]:
-        """What was suspected and is not confirmed on held-out data."""
-        return tuple(_without_numbers(each) for each in self.result.rejected)
+    def considered(self) -> tuple[Finding, ...]:
+        """What was considered and is not reported, each with its reason."""
+        return tuple(_without_numbers(each) for each in self.result.considered)
 
     @property
     def negligible(self) -> tuple[Finding, ...]:
@@ -285,6 +285,6 @@ def _finding(entry: Mapping[str, Any], status: Status) -> Finding:
 
 
 def _without_numbers(found: FoundEffect) -> Finding:
-    reason = "" if found.rejection is None else found.rejection.value
+    reason = "" if found.reason is None else found.reason.value
     subsystem = found.hypothesis.effect.block.value
     return Finding(found.status.value, found.effect, found.elements, subsystem, reason=reason)

@@ -16,6 +16,7 @@ from cspm.commands.data_look_lines import print_data_look
 from cspm.commands.progress_shown import shown
 from cspm.diagnosis import diagnose
 from cspm_ident.diagnosis.diagnosis import Diagnosis
+from cspm_ident.diagnosis.finding import Status
 from cspm_ident.diagnosis.reporting.empirical_statement import stage_errors, stage_names
 from cspm_ident.diagnosis.reporting.finding_statement import statement_of
 from cspm_ident.diagnosis.reporting.statement import (
@@ -150,12 +151,8 @@ def explain_command(name: str) -> None:
     make_console().print(Markdown(effect_section(effects[name])))
 
 
-def _print_named(
-    console: Console, found: Diagnosis, experiments: Sequence[Sequence[str]], *, doubtful: bool
-) -> None:
+def _print_named(console: Console, found: Diagnosis, experiments: Sequence[Sequence[str]]) -> None:
     for finding, own in zip(found.reported, experiments, strict=True):
-        if finding.is_doubtful != doubtful:
-            continue
         say(console, f"• {statement_of(found, finding)}")
         for rival, experiment in zip(finding.alternatives, own, strict=True):
             say(console, f"  as well explained by {rival.words}; to distinguish: {experiment}")
@@ -191,7 +188,7 @@ def print_diagnosis(
         say(console, SENTENCES[verdict])
     experiments = _experiments(found, data, folder)
     _print_cut_short(console, found)
-    _print_named(console, found, experiments, doubtful=False)
+    _print_named(console, found, experiments)
     for each in found.unexplained:
         say(console, f"• {unknown_statement(found, each)}")
     for entry in data["empirical"]:
@@ -200,13 +197,10 @@ def print_diagnosis(
         say(console, f"• {line_statement(line)}")
     for left in found.undescribed[:_MOST_REMAINDERS]:
         say(console, f"• {remainder_statement(left)}")
-    _print_named(console, found, experiments, doubtful=True)
-    for finding in found.rejected:
-        say(
-            console,
-            f"not kept: {finding.hypothesis.words}"
-            " did not help on held-out data, or is noise that controllers feed back",
-        )
+    for finding in found.considered:
+        assert finding.reason is not None
+        known = "cannot tell" if finding.status is Status.UNDECIDED else "rejected"
+        say(console, f"{known}: {finding.hypothesis.words}, which {finding.reason.value}")
     for finding in found.negligible:
         say(
             console,
@@ -253,13 +247,13 @@ def _print_fits(console: Console, found: Diagnosis) -> None:
     rows = [
         _Row(
             channel_of(f),
-            (*stage_errors(found, f), f.ceiling, f.noise),
+            (*stage_errors(found, f), f.noise),
             unit_of(f),
             f.is_at_noise(limits) is not False,
         )
         for f in found.fit
     ]
-    headings = (*stages, "black box", "noise")
+    headings = (*stages, "noise")
     _print_table(console, f"residuals of the equations, {judged}", headings, len(stages), rows)
     rows = [
         _Row(

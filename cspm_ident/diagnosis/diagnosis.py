@@ -84,7 +84,7 @@ class Diagnosis:
 
     @property
     def reported(self) -> tuple[Finding, ...]:
-        """Findings in the report, tied and doubtful ones included, the most important first."""
+        """Findings in the report, tied ones included, the most important first."""
         return tuple(each for each in self.findings if each.is_reported)
 
     @property
@@ -93,6 +93,6 @@ class Diagnosis:
         return tuple(each for each in self.findings if each.status is Status.NEGLIGIBLE)
 
     @property
-    def rejected(self) -> tuple[Finding, ...]:
-        """Findings that are not in the model."""
-        return tuple(each for each in self.findings if each.status is Status.REJECTED)
+    def considered(self) -> tuple[Finding, ...]:
+        """Findings that are undecided or rejected, each with its reason."""
+        return tuple(each for each in self.findings if each.reason is not None)

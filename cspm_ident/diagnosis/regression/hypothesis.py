@@ -334,3 +334,11 @@ def members_of(candidates: Iterable[Candidate], hypothesis: Hypothesis) -> list[
     """Return a finding's candidates with their final shapes."""
     own = hypothesis.effect.id, hypothesis.elements
     return [c for c in candidates if c.effect_id == own[0] and c.element in own[1]]
+
+
+def parameters_in(hypothesis: Hypothesis) -> int:
+    """Return the number of free parameters of a hypothesis, those on a grid and an onset included.
+
+    A whole number, such as the order of a ripple, is one of few and counts as well.
+    """
+    return hypothesis.causes * len(hypothesis.effect.parameters) + bool(hypothesis.onset)

@@ -228,9 +228,11 @@ def _hypotheses(found: Diagnosis, data: dict[str, Any]) -> str:
     rows: list[tuple[str, ...]] = []
     for finding, entry in zip(found.reported, named_in(data), strict=True):
         rows += _ranked(finding, entry)
-    for finding in found.rejected:
+    for finding in found.considered:
+        assert finding.reason is not None
         size = _in_errors(finding.gain.total, finding.gain.error)
-        rows.append((finding.hypothesis.words, "not kept", "", size, "no help on held-out data"))
+        words = finding.hypothesis.words
+        rows.append((words, finding.status.value, "", size, finding.reason.value))
     for driver, gain, share, _ in found.unexplained:
         name = f"a function of {driver.signal}, {driver.place.element}"
         size = _in_errors(gain.total, gain.error)
@@ -274,15 +276,14 @@ def _in_errors(total: float, error: float) -> str:
 
 def _fit(found: Diagnosis) -> str:
     judged = "recordings held out" if found.held_out else "the last part, which was not searched"
-    heads = ("residual", *stage_names(found), "black box", "noise", "unit")
+    heads = ("residual", *stage_names(found), "noise", "unit")
     rows = []
     for fit in found.fit:
-        numbers = (*stage_errors(found, fit), fit.ceiling, fit.noise)
+        numbers = (*stage_errors(found, fit), fit.noise)
         rows.append((channel_of(fit), *(f"{n:.3g}" for n in numbers), unit_of(fit)))
     text = (
         f"<p>Root mean square on {judged}. <i>Re-tuned</i> is the file with its own numbers fitted"
-        " and nothing added; <i>black box</i> is free functions of every signal instead of"
-        " physics; <i>noise</i> is the white part of what is left.</p>"
+        " and nothing added; <i>noise</i> is the white part of what is left.</p>"
     )
     if found.tables:
         text += (

@@ -8,6 +8,7 @@ import numpy as np
 from ruamel.yaml.comments import CommentedMap, CommentedSeq
 
 from cspm_ident.diagnosis.diagnosis import Diagnosis
+from cspm_ident.diagnosis.parameter import parameters_of
 from cspm_ident.diagnosis.reporting.empirical_statement import table_entries
 from cspm_ident.fitted_testbed import FittedNumber
 from cspm_msgs_py.testbed import EffectEntry, TestbedFile, parse_testbed
@@ -39,7 +40,7 @@ def improved_testbed(diagnosis: Diagnosis, source: str) -> TestbedFile:
             entry["parameters"] = CommentedMap(
                 {
                     n.name: FittedNumber(n.value, n.ci95 or _UNBOUNDED, hashes).content()
-                    for n in finding.parameters_on(own)
+                    for n in parameters_of(own)
                 }
             )
             entries.append(entry)

@@ -9,7 +9,8 @@ from pathlib import Path
 from typing import Any
 
 from cspm_ident.diagnosis.diagnosis import Diagnosis
-from cspm_ident.diagnosis.finding import Finding, Region, Unexplained
+from cspm_ident.diagnosis.finding import Finding, Region, Status, Unexplained
+from cspm_ident.diagnosis.parameter import Parameter
 from cspm_ident.diagnosis.regression.hypothesis import Rival
 from cspm_ident.diagnosis.reporting.empirical_statement import empirical_entries
 from cspm_ident.diagnosis.reporting.finding_statement import statement_of
@@ -60,12 +61,12 @@ SENTENCES = {
 
 
 def verdict_of(diagnosis: Diagnosis) -> Verdict:
-    """Return the verdict; doubtful findings are ignored.
+    """Return the verdict; undecided findings are ignored.
 
     The model is consistent only where all that is left on held-out data is noise or immaterial, and
     some measured quantity exceeds its noise enough to show a difference.
     """
-    certain = [each for each in diagnosis.reported if not each.is_doubtful]
+    certain = diagnosis.reported
     if not certain:
         if diagnosis.unexplained or diagnosis.lines or diagnosis.beyond_noise:
             return Verdict.UNKNOWN
@@ -83,8 +84,6 @@ def probability_of(finding: Finding, thresholds: Thresholds = DEFAULT_THRESHOLDS
     A rival's odds are exp(−k²/2), where it lies k standard deviations behind the finding.
     """
     trusted = thresholds.trusted_probability
-    if finding.is_doubtful:
-        trusted *= thresholds.doubtful_factor
     return trusted / (1.0 + sum(_odds(rival) for rival in finding.alternatives))
 
 
@@ -129,6 +128,7 @@ def diagnosis_data(diagnosis: Diagnosis, testbed: Path | None = None) -> dict[st
         "not_excited": [
             {"effect": name, "elements": list(elements)} for name, elements in diagnosis.not_excited
         ],
+        "considered": [_considered(each) for each in diagnosis.considered],
         "detection_limits": [limit._asdict() for limit in diagnosis.limits],
         "empirical": empirical_entries(diagnosis),
         "fit": [_simulated_fit(each) for each in diagnosis.simulated],
@@ -144,23 +144,14 @@ def named_in(data: Mapping[str, Any]) -> list[dict[str, Any]]:
 
 
 def _findings(diagnosis: Diagnosis) -> list[dict[str, Any]]:
-    """Return the findings, the most important first.
-
-    A doubtful finding never comes first. It follows the unexplained residual that makes it
-    doubtful, unless a certain finding precedes it and the unexplained residual is smaller.
-    """
+    """Return the findings that are named, then what is unknown."""
     found = diagnosis.reported
     named = [_finding(diagnosis, each) for each in found]
-    # Findings are in descending order of gain.
-    ahead = next((k for k, each in enumerate(found) if each.is_doubtful), len(found))
-    if ahead:
-        most = max((each.gain.total for each in diagnosis.unexplained), default=0.0)
-        ahead = sum(each.gain.total >= most for each in found)
     unknown = [_unknown(diagnosis, each) for each in diagnosis.unexplained]
     lines = map(_line, diagnosis.lines)
     # Beside a finding, what is left is reported with the residuals: no model is exact.
-    left = [] if ahead else map(_remainder, diagnosis.undescribed)
-    return [*named[:ahead], *unknown, *lines, *left, *named[ahead:]]
+    left = [] if named else map(_remainder, diagnosis.undescribed)
+    return [*named, *unknown, *lines, *left]
 
 
 def _recording(role: str, measurement: Measurement) -> dict[str, Any]:
@@ -184,16 +175,9 @@ def _finding(diagnosis: Diagnosis, finding: Finding) -> dict[str, Any]:
         "onset_ci95_s": [onset.low, onset.high] if onset is not None else None,
         "region": _region(finding.region),
         "shows_at": shown_place(diagnosis, finding),
-        "parameters": [
-            {
-                "element": n.element,
-                "name": n.name,
-                "value": n.value,
-                "unit": n.unit,
-                "ci95": None if n.ci95 is None else list(n.ci95),
-            }
-            for n in finding.parameters
-        ],
+        "presence": "tied" if finding.alternatives else "certain",
+        "conditional_on": _beside(diagnosis, finding),
+        "parameters": [_parameter(each) for each in finding.parameters],
         "alternatives": [
             {
                 "effect": rival.hypothesis.effect.id,
@@ -204,6 +188,36 @@ def _finding(diagnosis: Diagnosis, finding: Finding) -> dict[str, Any]:
             }
             for rival in finding.alternatives
         ],
+    }
+
+
+def _beside(diagnosis: Diagnosis, finding: Finding) -> list[dict[str, Any]]:
+    """Return what was fitted together with a finding, so that its numbers depend on it."""
+    return [
+        {"effect": each.effect, "elements": list(each.elements), "status": each.status.value}
+        for each in diagnosis.findings
+        if each is not finding and each.status is not Status.REJECTED
+    ]
+
+
+def _considered(finding: Finding) -> dict[str, Any]:
+    reason = finding.reason
+    return {
+        "effect": finding.effect,
+        "elements": list(finding.elements),
+        "status": finding.status.value,
+        "reason": None if reason is None else reason.value,
+        "parameters": [_parameter(each) for each in finding.parameters],
+    }
+
+
+def _parameter(own: Parameter) -> dict[str, Any]:
+    return {
+        "element": own.element,
+        "name": own.name,
+        "value": own.value,
+        "unit": own.unit,
+        "ci95": None if own.ci95 is None else list(own.ci95),
     }
 
 
@@ -271,7 +285,6 @@ def _equation_fit(fit: HeldOut, thresholds: Thresholds) -> dict[str, Any]:
     found = _fit(channel_of(fit), drive, fit.measured, *numbers)
     if fit.tabled is not None:
         found["held_out"]["nrmse_named"] = fit.after / max(fit.measured, fit.noise, 1e-300)
-    found["held_out"]["nrmse_black_box"] = fit.ceiling / max(fit.measured, 1e-300)
     found["at_noise"] = fit.is_at_noise(thresholds)
     found["left"] = [_left(each, thresholds) for each in fit.remainders]
     return found

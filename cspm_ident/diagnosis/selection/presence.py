@@ -1,0 +1,59 @@
+"""Which hypotheses of a model are certain, which are exchanged, and which may be absent."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+
+from cspm_ident.diagnosis.regression.hypothesis import Hypothesis, Rival, parameters_in
+from cspm_ident.diagnosis.selection.model_set import NESTED_SHARE, Model, ModelSet, behind_by
+from cspm_ident.diagnosis.thresholds import Thresholds
+
+
+def is_missed(models: ModelSet, chosen: Model, own: Hypothesis, thresholds: Thresholds) -> bool:
+    """Return whether some model that predicts as well lacks a hypothesis and has nothing instead.
+
+    Then the recordings cannot tell whether it is there.
+    """
+    return any(
+        not list(_instead(models, chosen, other, own, thresholds))
+        for other in _without(models, chosen, own)
+    )
+
+
+def exchanged(
+    models: ModelSet, chosen: Model, own: Hypothesis, thresholds: Thresholds
+) -> tuple[Rival, ...]:
+    """Return the hypotheses that other models of the set have in place of one, the closest first.
+
+    One that contains it, as Stribeck friction contains Coulomb's, is no contradiction.
+    """
+    best: dict[tuple[str, tuple[str, ...]], Rival] = {}
+    for other in _without(models, chosen, own):
+        behind = max(0.0, behind_by(other, chosen))
+        for each in _instead(models, chosen, other, own, thresholds):
+            wider = parameters_in(each) > parameters_in(own)
+            if wider and models.spanned(each, own) > NESTED_SHARE:
+                continue
+            key = each.effect.key, each.elements
+            if key not in best or behind < best[key].behind:
+                best[key] = Rival(each, behind)
+    return tuple(sorted(best.values(), key=lambda rival: rival.behind))
+
+
+def _without(models: ModelSet, chosen: Model, own: Hypothesis) -> Iterator[Model]:
+    """Yield the members without a hypothesis that have at most one more parameter."""
+    for each in models.members:
+        if own not in each.hypotheses and each.parameters <= chosen.parameters + 1:
+            yield each
+
+
+def _instead(
+    models: ModelSet, chosen: Model, other: Model, own: Hypothesis, thresholds: Thresholds
+) -> Iterator[Hypothesis]:
+    """Yield what another model has that explains most of the same as one of the chosen's."""
+    for each in other.hypotheses:
+        if each in chosen.hypotheses:
+            continue
+        both = models.spanned(each, own), models.spanned(own, each)
+        if max(both) >= thresholds.majority_share:
+            yield each

@@ -1,0 +1,85 @@
+"""What held-out data say of each finding with its reported parameters.
+
+Regressors select findings, linearised about the described machine. Their parameters are then
+refitted, linearised about a machine that has them, and the residuals of that machine are judged.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+
+import numpy as np
+from numpy.typing import NDArray
+
+from cspm_ident.diagnosis.finding import Reason
+from cspm_ident.diagnosis.regression.block_regression import gain_of
+from cspm_ident.diagnosis.residuals.regressors import Candidate, Place
+from cspm_ident.diagnosis.thresholds import DEFAULT_THRESHOLDS, Thresholds
+from cspm_ident.diagnosis.validation.holdout_residuals import residuals_of
+from cspm_ident.diagnosis.validation.holdout_simulation import LONGEST_S, Baselines
+
+Array = NDArray[np.float64]
+# Of each residual, shape (blocks,).
+Losses = Mapping[Place, Array]
+
+
+def losses_left(
+    baselines: Baselines,
+    found: Mapping[Candidate, Array],
+    noise: Mapping[Place, Array],
+    block_s: float,
+    thresholds: Thresholds = DEFAULT_THRESHOLDS,
+) -> dict[Place, Array]:
+    """Return the losses of held-out residuals by block, as those that select models.
+
+    They are n·log(1 + Σ residual²/n) of n values in units of their noise.
+
+    Args:
+        baselines: the held-out data.
+        found: weights of a machine's effects.
+        noise: noise of each residual, its unit.
+        block_s: length of the blocks [s].
+        thresholds: those of residuals.
+    """
+    blocks = int(np.ceil(LONGEST_S / block_s))
+    left: dict[Place, Array] = {}
+    for part, since in zip(baselines.parts, baselines.since, strict=True):
+        residuals = residuals_of([(part, since)], found, noise, thresholds)
+        for place, equations in residuals.items():
+            squares, counts = np.zeros(blocks), np.zeros(blocks)
+            for equation in equations:
+                at = np.clip((equation.times - since) // block_s, 0, blocks - 1).astype(np.intp)
+                squares += np.bincount(at, np.sum(equation.left**2, axis=1), blocks)
+                counts += equation.left.shape[1] * np.bincount(at, minlength=blocks)
+            rows = np.maximum(counts, 1.0)
+            own = (rows * np.log1p(squares / rows))[counts > 0.0]
+            left[place] = np.concatenate([left.get(place, np.zeros(0)), own])
+    return left
+
+
+def objection(
+    without: Losses, with_it: Losses, thresholds: Thresholds = DEFAULT_THRESHOLDS
+) -> Reason | None:
+    """Return why held-out data do not confirm a finding; None where they do.
+
+    A finding is contradicted where it significantly raises a residual of any place, and confirmed
+    where it lowers one beyond the scatter of its blocks, or all of them together.
+
+    Args:
+        without: losses without the finding, by residual and block.
+        with_it: losses with it, likewise.
+        thresholds: `certain_sigma` and `tie_sigma`.
+    """
+    taken = [without[p] - with_it[p] for p in without if p in with_it]
+    taken = [each for each in taken if len(each) == len(taken[0])] if taken else []
+    gains = [gain_of(each) for each in (*taken, np.sum(taken, axis=0))] if taken else []
+    if any(gain.total < -thresholds.certain_sigma * gain.error for gain in gains):
+        return Reason.RAISES_HOLDOUT
+    confirmed = any(gain.total > thresholds.tie_sigma * gain.error for gain in gains)
+    return None if confirmed else Reason.NOT_CONFIRMED
+
+
+def raised(without: Losses, with_it: Losses) -> float:
+    """Return by how much a finding raises the losses of the residuals that it raises."""
+    changes = (float(np.sum(with_it[p]) - np.sum(without[p])) for p in without if p in with_it)
+    return sum(max(0.0, each) for each in changes)

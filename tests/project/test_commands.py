@@ -27,6 +27,7 @@ ROS, ROS_TESTS = "needs a ROS 2 graph", "tests/cspm_ros"
 NOT_RUN: dict[str, str] = {
     # The front door builds an environment.
     "make run": "builds an environment and simulates 200 s twice; run at each release",
+    "make test": "these tests themselves",
     ".venv/bin/cspm demo": "of the environment that `make run` builds; see how-to/demo",
     # A minute and more.
     "cspm run verification_mid": "a minute, for what is compared; tests/cspm_run/test_scenarios.py",
@@ -181,6 +182,16 @@ def test_every_exception_is_of_a_command_that_a_page_prints() -> None:
     printed = [step.text for page in pages() for step in steps_of(page.read_text(encoding="utf-8"))]
     unused = [each for each in NOT_RUN if not any(text.startswith(each) for text in printed)]
     assert unused == []
+
+
+def test_the_readme_has_the_two_commands_of_the_makefile_with_their_durations() -> None:
+    text = (ROOT / "README.md").read_text(encoding="utf-8")
+    section = text.split("## Two commands\n")[1].split("\n## ")[0]
+    first, *later = BLOCK.findall(section)
+    found = [line.partition("#") for line in first[3].splitlines()]
+    assert [command.strip() for command, _, _ in found] == ["make run", "make test"]
+    assert all(re.match(r" \d+ minutes", said) for _, _, said in found)
+    assert [body.strip() for *_, body in later] == [".venv/bin/cspm demo"]
 
 
 def test_tests_that_stand_for_a_command_exist() -> None:

@@ -170,12 +170,15 @@ def _identified(
 
 
 def _speeds(
-    searched: Sequence[Measurement], signals: Sequence[WinchSignals], name: str
+    recordings: Sequence[Measurement], signals: Sequence[WinchSignals], name: str
 ) -> list[Samples | None]:
-    """Return the speeds that drives report, where they are the angles' derivatives."""
-    index = searched[0].machine.cable_names.index(name)
+    """Return the speeds that drives report, where they are the angles' derivatives.
+
+    There may be no recording, as where none is held out.
+    """
     found: list[Samples | None] = []
-    for each, own in zip(searched, signals, strict=True):
+    for each, own in zip(recordings, signals, strict=True):
+        index = each.machine.cable_names.index(name)
         speed = None if each.speed is None else each.speed.column(index)
         found.append(speed if speed is not None and speed_agrees(own.angle, speed) else None)
     return found

@@ -1,15 +1,20 @@
 """Accelerations against the noise of the angle, and of stamps that scatter."""
 
 import dataclasses
+from pathlib import Path
 
 import numpy as np
 import pytest
+from run_samples import SCENARIOS
 from winch_samples import EFFECTS, STEP, Winch, closed_loop
 
+from cspm_ident.signals.measurement import Measurement
 from cspm_ident.signals.prediction_noise import prediction_noise
 from cspm_ident.signals.samples import Samples
 from cspm_ident.winch import identify_winch
+from cspm_ident.winch.identify_winches import identify_winches
 from cspm_ident.winch.motion_source import motion_source, speed_agrees
+from cspm_msgs_py.testbed import load_testbed
 
 WINCH = Winch()
 
@@ -74,6 +79,26 @@ def test_the_drives_speed_shows_them_instead(made):
     assert found.shows_acceleration
     estimate = identify_winch(found.signals, EFFECTS, reversals=False).estimate
     np.testing.assert_allclose(estimate.values[:3], WINCH.values[:3], rtol=0.05)
+
+
+@pytest.mark.parametrize("held_out", [0, 1])
+def test_the_drives_speed_serves_with_recordings_held_out_and_without(made, held_out):
+    every = [
+        Measurement(
+            Path(name),
+            name,
+            load_testbed(SCENARIOS / "testbeds" / "emps.yaml"),
+            angle=scattered(made.angle),
+            speed=scattered(speed_of(made)),
+            torque=made.torque,
+        )
+        for name in ("searched", "judging")[: 1 + held_out]
+    ]
+    found = identify_winches(every[:1], held_out=every[1:], torque_age=made.torque_age)
+    (winch,) = found.winches
+    assert winch.from_speed
+    assert [each.held_out for each in winch.judgements] == [False, True][: 1 + held_out]
+    np.testing.assert_allclose(winch.fit.estimate.values[:3], WINCH.values[:3], rtol=0.05)
 
 
 def test_a_speed_in_another_unit_is_none(made):

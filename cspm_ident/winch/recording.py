@@ -9,17 +9,21 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from cspm_ident.signals.measurement import Measurement
+from cspm_ident.signals.measurement import TENSION, Measurement
 from cspm_ident.signals.samples import Samples
 from cspm_ident.signals.smoothing import smoothed
 from cspm_ident.signals.timeline import joined
 from cspm_ident.signals.winch_motion import joined_motion
 from cspm_msgs_py.errors import InputError
+from cspm_msgs_py.testbed import Testbed
 from cspm_sim.effects import Effect
 from cspm_sim.effects.signals import WinchSignal
 from cspm_sim.effects.winch_load import load_effects
 
 Array = NDArray[np.float64]
+
+# Standard deviations of a load cell's noise, beyond which it reads a force.
+_PULLING_NOISES = 3.0
 
 
 class Moved(NamedTuple):
@@ -41,7 +45,8 @@ class WinchSignals:
     Attributes:
         angle: [rad], one column.
         torque: as the drive reports it, positive winds in [N·m], one column.
-        tension: of its cable [N], one column; None where it has no cable.
+        tension: that pulls at the drum [N], one column. None where no cable is described, and no
+            force was read or a load is known.
         radius: drum radius / gear ratio [m].
         gear: gear ratio.
         torque_age: how long before its stamp the reported torque acted, on average [s]: half a
@@ -84,35 +89,58 @@ def winch_signals(measurement: Measurement, cable: str, torque_age: float = 0.0)
         torque_age: see `WinchSignals`.
 
     Raises:
-        InputError: no such cable, or no angle, torque or (where there is a cable) tension recorded.
+        InputError: no such cable, no angle or torque recorded, or no tension of a described cable.
     """
     machine, path = measurement.machine, measurement.path
     if cable not in machine.cable_names:
         raise InputError(f"{path}: no cable {cable}, allowed: {', '.join(machine.cable_names)}")
     index = list(machine.cable_names).index(cable)
     description = machine.cables[index]
-    angle, torque, tension = measurement.angle, measurement.torque, measurement.tension
+    angle, torque = measurement.angle, measurement.torque
     if angle is None or torque is None:
         raise InputError(
             f"{path}: {cable} has no angle or no torque in /winches/state, "
             "allowed: recordings with both"
         )
-    if description.stiffness is None:
-        tension = None
-    elif tension is None:
-        raise InputError(
-            f"{path}: {cable} pulls a cable whose tension was not recorded, "
-            "allowed: recordings with /cables/tension"
-        )
     return WinchSignals(
         angle.column(index),
         torque.column(index),
-        tension.column(index) if tension is not None else None,
+        _pulling(measurement, index),
         description.drum_radius / description.gear_ratio,
         description.gear_ratio,
         torque_age,
         load=tuple(load_effects(description, machine.gravity)),
     )
+
+
+def _pulling(measurement: Measurement, index: int) -> Samples | None:
+    """Return the tension that pulls at a winch's drum [N]; see `WinchSignals`.
+
+    A load cell tells it, also where the file describes no cable.
+
+    Raises:
+        InputError: the tension of a described cable was not recorded.
+    """
+    description, tension = measurement.machine.cables[index], measurement.tension
+    if tension is None:
+        if not description.has_cable:
+            return None
+        raise InputError(
+            f"{measurement.path}: {description.name} pulls a cable whose tension was not recorded, "
+            "allowed: recordings with /cables/tension"
+        )
+    pull = tension.column(index)
+    if description.has_cable:
+        return pull
+    return pull if description.load is None and _pulls(pull, measurement.machine) else None
+
+
+def _pulls(tension: Samples, machine: Testbed) -> bool:
+    """Return whether a load cell reads more than its noise [N]."""
+    sensor = machine.sensors.get(TENSION)
+    noise = 0.0 if sensor is None else float(np.max(sensor.noise))
+    read = tension.values[np.isfinite(tension.values)]
+    return bool(len(read)) and float(np.sqrt(np.mean(read**2))) > _PULLING_NOISES * noise
 
 
 def signal_rows(

@@ -55,7 +55,8 @@ def cell_drift(
     names = own.machine.cable_names
     late, known = [_lateness()], read_actions(own.machine)
     equations = shaft_equations(own, late, known, None, names, thresholds)
-    rows = [each.steady for each in equations]
+    # Winches without cable may have no load cell.
+    rows = [each.steady for each in equations if each.columns]
     records = [_record(each) for each in rows if len(each.times) >= _FEWEST]
     if not records:
         return None

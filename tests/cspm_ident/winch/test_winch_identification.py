@@ -11,7 +11,7 @@ from cspm_ident.signals.samples import Samples
 from cspm_ident.winch import identify_winch, torque_error, winch_signals
 from cspm_ident.winch.weak_form import make_window, weigh
 from cspm_msgs_py.errors import InputError
-from cspm_msgs_py.testbed import load_testbed
+from cspm_msgs_py.testbed import load_testbed, parse_testbed
 
 WINCH = Winch()
 SCENARIOS = Path(__file__).resolve().parents[3] / "scenarios"
@@ -207,6 +207,31 @@ def test_readings_come_from_the_recording():
     ):
         with pytest.raises(InputError, match=words):
             winch_signals(recorded, cable_name)
+
+
+def test_a_force_at_a_winch_without_described_cable_counts_where_it_stands_out_of_noise():
+    times = np.arange(50) * STEP
+    text = (SCENARIOS / "testbeds" / "emps.yaml").read_text(encoding="utf-8")
+    cell = "  /cables/tension: {noise: 0.5, resolution: 0.0, rate: 1000}\n"
+    loaded = text.replace(
+        "cables:\n  - name: carriage", "cables:\n  - load: {mass: 1.0}\n    name: carriage"
+    )
+    still, pulled = np.random.default_rng(1).normal(0.0, 0.5, (50, 1)), np.full((50, 1), 20.0)
+    partly = np.where(np.arange(50)[:, None] < 9, np.nan, pulled)
+    for file, force, counts in (
+        (text, pulled, True),
+        (text, partly, True),
+        (text, still, False),
+        (text, np.zeros((50, 1)), False),
+        (text, np.full((50, 1), np.nan), False),
+        (loaded, pulled, False),
+    ):
+        bed = parse_testbed(file.replace("effects:\n", f"{cell}effects:\n"), "t.yaml")
+        parts = {"angle": Samples(times, pulled), "torque": Samples(times, pulled)}
+        recorded = Measurement(Path("some"), "", bed, **parts, tension=Samples(times, force))
+        found = winch_signals(recorded, "carriage").tension
+        assert (found is not None) == counts
+        assert found is None or np.array_equal(found.values, force, equal_nan=True)
 
 
 def test_default_interval_is_the_bootstrap():

@@ -29,6 +29,15 @@ def sea(tmp_path_factory):
     return read_measurement(folder)
 
 
+@pytest.fixture(scope="module")
+def unplaced(rig):
+    """The same, said to be of a winch without exit and attachment."""
+    (cable,) = rig.machine.cables
+    parts = ("exit", "attachment", "stiffness", "damping", "tension_limits")
+    bare = cable.model_copy(update=dict.fromkeys(parts))
+    return rig.with_machine(rig.machine.model_copy(update={"cables": (bare,)}))
+
+
 def drifting(measurement, rate, offset=OFFSET):
     times = measurement.tension.times
     late = Samples(times * (1.0 + rate) + offset, measurement.tension.values)
@@ -61,6 +70,29 @@ def test_a_clock_that_does_not_drift_and_machines_with_a_bar_are_left_alone(rig,
     assert on_drives_clock(moved) is moved
     blind = replace(rig, tension=None)
     assert on_drives_clock(blind) is blind
+
+
+def test_a_load_cell_counts_though_nobody_knows_where_the_cable_goes(rig, unplaced):
+    (known,), (found,) = (
+        shaft_equations(each, (), (), None, each.machine.cable_names) for each in (rig, unplaced)
+    )
+    np.testing.assert_array_equal(found.target, known.target)
+    assert np.std(found.target) < 0.05 * np.std(0.025 * found.signals["tension [N]"])
+    assert cell_drift(drifting(unplaced, 6e-6)) == cell_drift(drifting(rig, 6e-6))
+
+
+def test_a_winch_without_cable_shows_no_drift(unplaced):
+    times = unplaced.tension.times
+    idle = unplaced.with_samples("tension", Samples(times, np.zeros((len(times), 1))))
+    assert cell_drift(idle) is None
+    assert on_drives_clock(idle) is idle
+
+
+@pytest.mark.slow
+def test_a_healthy_winch_with_a_load_cell_alone_is_consistent(unplaced):
+    found = diagnose([unplaced])
+    assert not found.reported
+    assert not found.unexplained
 
 
 def test_too_short_a_recording_shows_no_drift(rig):

@@ -285,6 +285,5 @@ def _finding(entry: Mapping[str, Any], status: Status) -> Finding:
 
 
 def _without_numbers(found: FoundEffect) -> Finding:
-    reason = "" if found.reason is None else found.reason.value
-    subsystem = found.hypothesis.effect.block.value
-    return Finding(found.status.value, found.effect, found.elements, subsystem, reason=reason)
+    status, subsystem = found.status.value, found.hypothesis.effect.block.value
+    return Finding(status, found.effect, found.elements, subsystem, reason=found.reason_words)

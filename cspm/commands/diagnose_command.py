@@ -198,9 +198,8 @@ def print_diagnosis(
     for left in found.undescribed[:_MOST_REMAINDERS]:
         say(console, f"• {remainder_statement(left)}")
     for finding in found.considered:
-        assert finding.reason is not None
         known = "cannot tell" if finding.status is Status.UNDECIDED else "rejected"
-        say(console, f"{known}: {finding.hypothesis.words}, which {finding.reason.value}")
+        say(console, f"{known}, {finding.hypothesis.words}: {finding.reason_words}")
     for finding in found.negligible:
         say(
             console,

@@ -156,6 +156,11 @@ class Finding:
         return self.status in (Status.REPORTED, Status.TIED)
 
     @property
+    def reason_words(self) -> str:
+        """Why it is undecided or rejected, in words; empty if it is neither."""
+        return "" if self.reason is None else self.reason.value
+
+    @property
     def parameters(self) -> tuple[Parameter, ...]:
         """All parameters, element by element."""
         return tuple(p for own in self.coefficients for p in parameters_of(own))

@@ -229,10 +229,9 @@ def _hypotheses(found: Diagnosis, data: dict[str, Any]) -> str:
     for finding, entry in zip(found.reported, named_in(data), strict=True):
         rows += _ranked(finding, entry)
     for finding in found.considered:
-        assert finding.reason is not None
         size = _in_errors(finding.gain.total, finding.gain.error)
-        words = finding.hypothesis.words
-        rows.append((words, finding.status.value, "", size, finding.reason.value))
+        words, known = finding.hypothesis.words, finding.status.value
+        rows.append((words, known, "", size, finding.reason_words))
     for driver, gain, share, _ in found.unexplained:
         name = f"a function of {driver.signal}, {driver.place.element}"
         size = _in_errors(gain.total, gain.error)

@@ -201,12 +201,11 @@ def _beside(diagnosis: Diagnosis, finding: Finding) -> list[dict[str, Any]]:
 
 
 def _considered(finding: Finding) -> dict[str, Any]:
-    reason = finding.reason
     return {
         "effect": finding.effect,
         "elements": list(finding.elements),
         "status": finding.status.value,
-        "reason": None if reason is None else reason.value,
+        "reason": finding.reason_words,
         "parameters": [_parameter(each) for each in finding.parameters],
     }
 

@@ -8,10 +8,12 @@ from typing import Annotated
 import typer
 
 from cspm.cli.app import Json, LeaveOutRegimes, app
+from cspm.cli.held_out import OPTION, JudgedCommand
 from cspm_msgs_py.errors import InputError
 
 
 @app.command(
+    cls=JudgedCommand,
     epilog="""Examples:
 
 cspm diagnose today --held-out yesterday --out verdict
@@ -30,9 +32,10 @@ def diagnose(
     held_out: Annotated[
         list[Path] | None,
         typer.Option(
+            OPTION,
             metavar="REC",
-            help="A recording on which to judge what was found; may be repeated. Otherwise the last"
-            " three tenths of each recording are kept for that.",
+            help="A recording on which to judge what was found; may be repeated, after the"
+            " recordings to search. Otherwise the last three tenths of each are kept for that.",
         ),
     ] = None,
     testbed: Annotated[

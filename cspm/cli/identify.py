@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING, Annotated, Any, TypeAlias
 import typer
 
 from cspm.cli.app import MARKUP, RUN_FAILED, Json, LeaveOutRegimes, app
+from cspm.cli.held_out import HeldOut, JudgedCommand
 from cspm_msgs_py.errors import InputError
 
 if TYPE_CHECKING:
@@ -78,10 +79,6 @@ IntoCables = Annotated[
         metavar="NAME,NAME",
         help="The cables there that get the law; otherwise those identified.",
     ),
-]
-HeldOut = Annotated[
-    list[Path] | None,
-    typer.Option("--held-out", metavar="REC", help="Judges without being fitted; repeatable."),
 ]
 Cutoff = Annotated[
     float | None,
@@ -189,6 +186,7 @@ def damping(request: RigRequest, json: Path | None) -> bool:
 
 
 @identify.command(
+    cls=JudgedCommand,
     epilog="""Examples:
 
 cspm import DATA_EMPS.mat --mapping scenarios/mappings/emps.yaml --testbed
@@ -198,7 +196,7 @@ cspm identify winch emps --held-out emps_pulses --out fitted
 
 cspm run emps --testbed fitted/fitted_testbed.yaml
 
-cspm identify winch bag --winches surge_1,surge_2 --effects winch_viscous_friction"""
+cspm identify winch bag --winches surge_1,surge_2 --effects winch_viscous_friction""",
 )
 def winch(
     recordings: Annotated[
@@ -271,11 +269,12 @@ def winch(
 
 
 @identify.command(
+    cls=JudgedCommand,
     epilog="""Example:
 
 cspm run calm --out calm_60s
 
-cspm identify lengths calm_60s --out lengths"""
+cspm identify lengths calm_60s --out lengths""",
 )
 def lengths(
     recordings: Annotated[
@@ -298,6 +297,7 @@ def lengths(
 
 
 @identify.command(
+    cls=JudgedCommand,
     epilog="""Examples:
 
 cspm run factor_six_mid --out mid

@@ -12,7 +12,7 @@ from rich import box
 from rich.console import Console
 from rich.table import Table
 
-from cspm.commands.data_look_lines import print_data_look
+from cspm.commands.data_look_lines import SEARCHED, SPLIT, print_data_look, print_roles
 from cspm.commands.progress_shown import shown
 from cspm.diagnosis import diagnose
 from cspm_ident.diagnosis.diagnosis import Diagnosis
@@ -73,6 +73,8 @@ def diagnose_command(request: DiagnoseRequest, json: Path | None) -> None:
     """
     console = make_console()
     refuse_existing(request.out)
+    role = SEARCHED if request.held_out else SPLIT
+    print_roles(console, request.recordings, request.held_out, role)
     with shown(console, "reading") as progress:
         found = diagnose(
             request.recordings,

@@ -8,6 +8,7 @@ from rich import box
 from rich.console import Console
 from rich.table import Table
 
+from cspm.commands.data_look_lines import FITTED, print_roles
 from cspm.commands.identify_outcome import hand_out, interval_text
 from cspm.commands.progress_shown import shown
 from cspm.identification.lengths import identify_lengths
@@ -31,8 +32,10 @@ def identify_lengths_command(
     Raises:
         InputError: recordings, test-bed or options cannot be used.
     """
+    console = make_console()
     refuse_existing(out)
-    with shown(make_console(), "lengths"):
+    print_roles(console, recordings, held_out, FITTED)
+    with shown(console, "lengths"):
         found = identify_lengths(
             recordings,
             held_out=held_out,

@@ -12,6 +12,7 @@ from rich.console import Console
 from rich.markup import escape
 from rich.table import Table
 
+from cspm.commands.data_look_lines import FITTED, print_roles
 from cspm.commands.identify_outcome import hand_out, interval_text
 from cspm.commands.progress_shown import shown
 from cspm.identification.system import identify_system
@@ -65,6 +66,7 @@ def identify_system_command(request: SystemRequest, json: Path | None) -> bool:
     """
     console = make_console()
     refuse_existing(request.out)
+    print_roles(console, request.recordings, request.held_out, FITTED)
     with shown(console, "reading") as progress:
         found = identify_system(
             request.recordings,

@@ -12,6 +12,7 @@ from rich.console import Console
 from rich.markup import escape
 from rich.table import Table
 
+from cspm.commands.data_look_lines import FITTED, print_roles
 from cspm.commands.identify_outcome import hand_out, interval_text
 from cspm.commands.progress_shown import shown
 from cspm.identification.winches import identify_winch
@@ -61,8 +62,10 @@ def identify_winch_command(request: WinchRequest, json: Path | None) -> bool:
     Raises:
         InputError: recordings, test-bed or options cannot be used.
     """
+    console = make_console()
     refuse_existing(request.out)
-    with shown(make_console(), "reading") as progress:
+    print_roles(console, request.recordings, request.held_out, FITTED)
+    with shown(console, "reading") as progress:
         found = identify_winch(
             request.recordings,
             held_out=request.held_out,

@@ -236,7 +236,6 @@ def test_a_recording_counts_once_whatever_its_name_and_has_to_be_long_enough(csp
     ("arguments", "message"),
     [
         ((), "no recording, allowed: one or more, or --explain EFFECT"),
-        (("nowhere",), "nowhere: "),
         (("--explain", "gremlins"), "--explain gremlins: allowed: bar_com, "),
         (("one", "--out", "taken"), "taken: exists, allowed: a new folder"),
     ],

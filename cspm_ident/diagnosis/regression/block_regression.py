@@ -7,11 +7,10 @@ from typing import NamedTuple, TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.stats import t as t_distribution
 
-from cspm_ident.diagnosis.regression.block_comparison import paired
 from cspm_ident.diagnosis.regression.block_gram import BlockGram, silenced, squares_by_block
 from cspm_ident.diagnosis.regression.jackknife import RANK, Jackknife, left_out, pseudo_inverse
+from cspm_ident.diagnosis.regression.long_run import LongRun, long_run
 from cspm_ident.diagnosis.regression.symmetric_table import SymmetricTable
 from cspm_ident.diagnosis.regression.usual_precision import usual_precision
 from cspm_ident.diagnosis.thresholds import DEFAULT_THRESHOLDS, Thresholds
@@ -22,10 +21,6 @@ _Kind = TypeVar("_Kind", bound="BlockRegression")
 
 # Number of folds of the cross-validation.
 FOLDS = 6
-LEAST_FREEDOM = 0.1
-"""Degrees of freedom below which Student's factor exceeds 10¹², so that there is no interval."""
-CORRELATION_LIMIT = 0.8
-"""Largest correlation of successive blocks that is allowed for: few blocks determine no more."""
 
 
 class Gain(NamedTuple):
@@ -293,22 +288,22 @@ class BlockRegression:
         small for few blocks. The weights of the base are held.
         """
         scale = self._lengths[columns]
-        covariance = self._left_out(self._beyond(base, columns)).covariance
+        covariance = left_out(self._beyond(base, columns)).covariance
         return np.asarray(covariance / np.outer(scale, scale))
 
     def half_width(self, base: Index, columns: Index) -> Array:
         """Return half the widths of 95 % intervals of the weights of columns beside a base.
 
-        The jackknife is over pairs of blocks, because residuals are correlated over more than a
-        block. The correlation of successive pairs is included. Infinite where a single pair
-        determines a weight, and 0 where nothing excites it, so that it has none.
+        Infinite where a single block determines a weight, and 0 where nothing excites it, so that
+        it has none.
         """
-        errors, free = self._left_out(paired(self._beyond(base, columns))).spread()
-        factor = np.full(len(free), np.inf)
-        known = free > LEAST_FREEDOM
-        factor[known] = t_distribution.ppf(0.975, free[known])
-        half = factor * errors / self._lengths[columns]
-        return np.where(self.excited[columns], half, 0.0)
+        return self.long_run(base, columns).half_widths
+
+    def long_run(self, base: Index, columns: Index) -> LongRun:
+        """Return these intervals with what they rest on; blocks may be correlated."""
+        both = np.concatenate([base, columns, [len(self._starts) - 1]])
+        found = long_run(self._of(both, both), len(columns))
+        return found._replace(half_widths=found.half_widths / self._lengths[columns])
 
     def p_value(self, base: Index, columns: Index) -> float:
         """Return the p-value of the weights under the hypothesis that all are 0.
@@ -330,17 +325,14 @@ class BlockRegression:
         another may dominate, for example where a rope is first pulled taut.
         """
         heard = np.arange(self.blocks)
-        found = self._left_out(self._beyond(base, columns))
+        found = left_out(self._beyond(base, columns))
         while (most := found.dominant(self.thresholds.majority_share)) is not None:
             heard = np.delete(heard, most)
             others = self._beyond(base, columns, heard)
             if np.trace(others.sum(axis=0)[:-1, :-1]) <= RANK:
                 break
-            found = self._left_out(others)
+            found = left_out(others)
         return found
-
-    def _left_out(self, parts: Array) -> Jackknife:
-        return left_out(parts, CORRELATION_LIMIT)
 
     def _beyond(self, base: Index, columns: Index, blocks: Index | None = None) -> Array:
         """Return blocks' products of columns and target, the part spanned by a base removed."""

@@ -21,30 +21,13 @@ class Jackknife(NamedTuple):
         weights: from all blocks, shape (m,).
         covariance: of the weights, shape (m, m).
         blocks: effective number of blocks with information on all weights together.
-        blocks_of: effective number of blocks with information on each weight, shape (m,).
         shares: each block's share of the information, shape (blocks,).
-        correlation: of the changes that two successive blocks make to each weight, (m,). Negative
-            correlations count as 0.
     """
 
     weights: Array
     covariance: Array
     blocks: float
-    blocks_of: Array
     shares: Array
-    correlation: Array
-
-    def spread(self) -> tuple[Array, Array]:
-        """Return standard errors (m,) and their degrees of freedom (m,) for correlated blocks.
-
-        The mean of a first-order process has (1 + ρ)/(1 − ρ) times the variance of independent
-        blocks. This covers disturbances such as a slowly varying wind, of which a short recording
-        has few states. The estimate of ρ is rough. So one degree of freedom is kept where there are
-        blocks for it: with fewer, Student's factor would make every weight insignificant.
-        """
-        more = (1.0 + self.correlation) / (1.0 - self.correlation)
-        errors = np.sqrt(np.maximum(np.diag(self.covariance), 1e-300) * more)
-        return errors, np.maximum(self.blocks_of / more, np.minimum(self.blocks_of, 2.0)) - 1.0
 
     def dominant(self, share: float) -> int | None:
         """Return the index of the block with more than a share of the information, or None.
@@ -69,12 +52,11 @@ class Jackknife(NamedTuple):
         return float(f_distribution.sf(wald / count, count, self.blocks - count))
 
 
-def left_out(parts: Array, most_correlation: float) -> Jackknife:
+def left_out(parts: Array) -> Jackknife:
     """Return the block jackknife of the weights (Bell and McCaffrey, Surv. Methodol. 28(2), 2002).
 
     Args:
         parts: Gram matrix of each block, of regressors and target, shape (blocks, m + 1, m + 1).
-        most_correlation: upper limit of the correlation of successive blocks.
     """
     whole, count = parts.sum(axis=0), parts.shape[1] - 1
     inverse = pseudo_inverse(whole[:-1, :-1])
@@ -91,33 +73,7 @@ def left_out(parts: Array, most_correlation: float) -> Jackknife:
     apart, blocks = without - weights, max(1, int(np.count_nonzero(heard)))
     covariance = (blocks - 1) / blocks * apart.T @ apart
     together = 1.0 / max(float(np.sum(shares**2)), RANK)
-    correlation = _successive_correlation(apart, most_correlation)
-    return Jackknife(
-        weights, covariance, together, _informative_blocks(reported, inverse), shares, correlation
-    )
-
-
-def _informative_blocks(reported: Array, inverse: Array) -> Array:
-    """Return the effective number of blocks with information on each weight, (m,).
-
-    From each block's share in the weight's variance under white noise (Satterthwaite, Biometrics
-    Bull. 2(6), 1946). These shares are never negative, even for collinear regressors.
-
-    Args:
-        reported: the inverse Gram matrix times that of each block, (blocks, m, m).
-        inverse: of the Gram matrix of all blocks, (m, m).
-    """
-    variance = np.einsum("bij,ij->bi", reported, inverse)
-    whole = np.diag(inverse)
-    shares = np.divide(variance, whole, out=np.zeros_like(variance), where=whole > RANK)
-    return np.asarray(1.0 / np.maximum(np.sum(shares**2, axis=0), RANK))
-
-
-def _successive_correlation(apart: Array, most: float) -> Array:
-    """Return the correlation of rows (blocks, m) with the next row, clipped to 0 … `most`."""
-    squares = np.maximum(np.sum(apart**2, axis=0), 1e-300)
-    correlation = np.sum(apart[1:] * apart[:-1], axis=0) / squares
-    return np.asarray(np.clip(correlation, 0.0, most))
+    return Jackknife(weights, covariance, together, shares)
 
 
 def pseudo_inverse(gram: Array) -> Array:

@@ -8,7 +8,6 @@ import pytest
 from cspm_ident.diagnosis.regression.block_comparison import paired
 from cspm_ident.diagnosis.regression.block_gram import gather
 from cspm_ident.diagnosis.regression.block_regression import BlockRegression
-from cspm_ident.diagnosis.regression.jackknife import Jackknife
 from cspm_ident.diagnosis.residuals.regressors import Candidate, Place
 from cspm_ident.diagnosis.residuals.residual_equation import Equation
 from cspm_sim.effects import Channel, catalogue
@@ -178,7 +177,7 @@ def test_intervals_hold_and_end_for_columns_that_resemble_each_other():
 
 
 def test_intervals_hold_for_what_wanders_for_longer_than_blocks():
-    """A constant beside a wind of 3 s in pairs of 2 s, 24 s long: 65 % if pairs were apart."""
+    """A constant beside a wind of 3 s in blocks of 1 s, 24 s long."""
     inside = 0
     for seed in range(200):
         equation = made(seed, (0.0, 0.0, 0.0), colour=1.0 - STEP / 3.0)[0]
@@ -295,19 +294,6 @@ def test_what_a_single_block_shows_has_no_interval():
     base, own = np.array([0]), np.array([2])
     assert np.isinf(in_few_blocks([9]).half_width(base, own)[0])
     assert np.isfinite(in_few_blocks([3, 9]).half_width(base, own)[0])
-
-
-@pytest.mark.parametrize(
-    ("correlation", "blocks", "free"),
-    [(0.0, 20.0, 19.0), (0.5, 20.0, 20.0 / 3.0 - 1.0), (0.8, 10.0, 1.0), (0.8, 1.5, 0.5)],
-)
-def test_correlated_blocks_leave_one_degree_of_freedom_if_there_is_one(correlation, blocks, free):
-    reported = Jackknife(
-        np.ones(1), np.eye(1), blocks, np.array([blocks]), np.ones(1), np.array([correlation])
-    )
-    errors, freedom = reported.spread()
-    assert freedom == pytest.approx([free])
-    assert errors**2 == pytest.approx([(1.0 + correlation) / (1.0 - correlation)])
 
 
 def test_a_weight_that_drifts_is_distinguished_from_one_that_does_not():

@@ -57,10 +57,10 @@ class Stamps:
         return [slice(a, b) for a, b in pairwise(edges)]
 
     @cached_property
-    def clocks(self) -> list[tuple[Array, NDArray[np.intp]]]:
+    def clocks(self) -> list[tuple[Array, Array]]:
         """Of each stretch the stamps without their scatter, and its samples' numbers by the clock.
 
-        Where stamps follow no even clock, they and the samples' order are returned.
+        Where stamps follow no even clock, they themselves are returned, and numbers in between.
         """
         return [_clocked(self.times[span]) for span in self.spans]
 
@@ -125,10 +125,10 @@ class Samples:
         return self._stamps.spans
 
     @property
-    def clocks(self) -> list[tuple[Array, NDArray[np.intp]]]:
+    def clocks(self) -> list[tuple[Array, Array]]:
         """Of each stretch the stamps without their scatter, and its samples' numbers by the clock.
 
-        Where stamps follow no even clock, they and the samples' order are returned.
+        Where stamps follow no even clock, they themselves are returned, and numbers in between.
         """
         return self._stamps.clocks
 
@@ -184,18 +184,17 @@ def digest(times: Array) -> bytes:
     return sha256(times.tobytes()).digest()
 
 
-def _clocked(times: Array) -> tuple[Array, NDArray[np.intp]]:
-    order = np.arange(len(times))
+def _clocked(times: Array) -> tuple[Array, Array]:
     if len(times) < _FEWEST:
-        return times, order
+        return times, np.arange(float(len(times)))
     interval = float(np.median(np.diff(times)))
     place = np.concatenate([[0], np.cumsum(np.maximum(1, np.round(np.diff(times) / interval)))])
     # Rates drift: a clock is a straight line over some seconds only.
     line = np.polynomial.Chebyshev.fit(place, times, _DRIFT_ORDER)(place)
     scatter = np.abs(times - line).max() / interval
     if scatter > _SCATTER:
-        return times, order
-    return np.asarray(line if scatter > _EXACT else times), place.astype(np.intp)
+        return times, (times - times[0]) / interval
+    return np.asarray(line if scatter > _EXACT else times), place
 
 
 def ordered(times: Array, values: Array) -> Samples:

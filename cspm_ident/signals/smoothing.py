@@ -95,7 +95,8 @@ def filtered(samples: Samples, band: float | None = None) -> tuple[Array, float]
     """Return the smoothed values at the samples themselves, and the band that was kept [Hz].
 
     The filter runs forwards and backwards along the sensor's own clock: stamps that scatter about
-    it are taken for late, lost samples are put in by straight lines.
+    it are taken for late, lost samples are put in by straight lines. So are all where stamps follow
+    no even clock.
     """
     rate = samples.rate
     band = band_of(samples) if band is None else band
@@ -106,12 +107,13 @@ def filtered(samples: Samples, band: float | None = None) -> tuple[Array, float]
     for span, (_, place) in zip(samples.spans, samples.clocks, strict=True):
         if span.stop - span.start < 4:
             continue
-        whole = np.arange(place[-1] + 1)
+        whole = np.arange(round(place[-1]) + 1)
         padding = min(len(whole) - 1, round(3.0 / samples.interval))
         # One column after the other: of a long recording all at once are much memory.
         for column in out[span].T:
             filled = np.interp(whole, place, column)
-            column[:] = sosfiltfilt(sos, filled, padtype="odd", padlen=padding)[place]
+            slow = sosfiltfilt(sos, filled, padtype="odd", padlen=padding)
+            column[:] = np.interp(place, whole, slow)
     return out, band
 
 

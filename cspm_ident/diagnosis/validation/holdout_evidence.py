@@ -32,7 +32,7 @@ def losses_left(
 ) -> dict[Place, Array]:
     """Return the losses of held-out residuals by block, as those that select models.
 
-    They are n·log(1 + Σ residual²/n) of n values in units of their noise.
+    They are n·log(1 + Σ residual²/n) of n values in units of their noise, nan without any.
 
     Args:
         baselines: the held-out data.
@@ -51,8 +51,8 @@ def losses_left(
                 at = np.clip((equation.times - since) // block_s, 0, blocks - 1).astype(np.intp)
                 squares += np.bincount(at, np.sum(equation.left**2, axis=1), blocks)
                 counts += equation.left.shape[1] * np.bincount(at, minlength=blocks)
-            rows = np.maximum(counts, 1.0)
-            own = (rows * np.log1p(squares / rows))[counts > 0.0]
+            rows = np.where(counts > 0.0, counts, np.nan)
+            own = rows * np.log1p(squares / rows)
             left[place] = np.concatenate([left.get(place, np.zeros(0)), own])
     return left
 
@@ -70,9 +70,11 @@ def objection(
         with_it: losses with it, likewise.
         thresholds: `certain_sigma` and `tie_sigma`.
     """
-    taken = [without[p] - with_it[p] for p in without if p in with_it]
-    taken = [each for each in taken if len(each) == len(taken[0])] if taken else []
-    gains = [gain_of(each) for each in (*taken, np.sum(taken, axis=0))] if taken else []
+    taken = np.array([without[p] - with_it[p] for p in without if p in with_it])
+    if not taken.size:
+        return Reason.NOT_CONFIRMED
+    whole = np.nansum(taken, axis=0)[~np.isnan(taken).all(axis=0)]
+    gains = [gain_of(each[~np.isnan(each)]) for each in taken] + [gain_of(whole)]
     if any(gain.total < -thresholds.certain_sigma * gain.error for gain in gains):
         return Reason.RAISES_HOLDOUT
     confirmed = any(gain.total > thresholds.tie_sigma * gain.error for gain in gains)
@@ -81,5 +83,5 @@ def objection(
 
 def raised(without: Losses, with_it: Losses) -> float:
     """Return by how much a finding raises the losses of the residuals that it raises."""
-    changes = (float(np.sum(with_it[p]) - np.sum(without[p])) for p in without if p in with_it)
+    changes = (float(np.nansum(with_it[p] - without[p])) for p in without if p in with_it)
     return sum(max(0.0, each) for each in changes)

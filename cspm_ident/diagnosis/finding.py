@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
 from enum import Enum
 from typing import NamedTuple
@@ -13,6 +14,7 @@ from cspm_ident.diagnosis.parameter import Coefficients, Parameter, parameters_o
 from cspm_ident.diagnosis.regression.block_regression import Gain
 from cspm_ident.diagnosis.regression.hypothesis import Hypothesis, Rival
 from cspm_ident.diagnosis.residuals.free_shapes import Driver
+from cspm_ident.diagnosis.residuals.regressors import Candidate
 
 Array = NDArray[np.float64]
 
@@ -121,6 +123,7 @@ class Finding:
         gain: in hold-out blocks, beside all other selected hypotheses.
         share: largest share of a residual's squares that it explains.
         alternatives: hypotheses that explain the same equally well.
+        spread: how far its weights lie apart in models that predict as well, by candidate.
         status: see `Status`.
         reason: why it is undecided or rejected; None if it is neither.
         coefficients: as fitted, one entry per element.
@@ -135,6 +138,7 @@ class Finding:
     alternatives: tuple[Rival, ...] = ()
     status: Status = Status.REPORTED
     reason: Reason | None = None
+    spread: Mapping[Candidate, Array] = field(default_factory=dict, compare=False)
     coefficients: tuple[Coefficients, ...] = field(default=(), compare=False)
     onset: Onset | None = None
     region: Region | None = None

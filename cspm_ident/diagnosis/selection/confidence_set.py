@@ -1,6 +1,6 @@
 """Model confidence set: the models that predict no worse than the best.
 
-Hansen, Lunde, Nason, Econometrica 79(2), 2011, with their statistic T_max.
+Hansen, Lunde, Nason, Econometrica 79(2), 2011, with their range statistic T_R.
 """
 
 from __future__ import annotations
@@ -19,28 +19,37 @@ _EQUAL_WITHIN = 1e-9
 def confidence_set(losses: Array, rate: float) -> NDArray[np.bool_]:
     """Return which models are not worse than the best with a probability of 1 − rate, (models,).
 
-    The model that is worst beside the others is left out, until none is significantly worse. Blocks
-    are resampled in runs of the third root of their number (Politis, Romano, J. Am. Stat. Assoc.
-    89(428), 1994), so that correlated blocks do not count as independent.
+    The model that is worst beside one of the others is left out, until none is significantly worse.
+    Blocks are resampled in runs of the third root of their number (Politis, Romano, J. Am. Stat.
+    Assoc. 89(428), 1994), so that correlated blocks do not count as independent.
 
     Args:
         losses: Σ residual² of each model's predictions, shape (models, blocks).
         rate: of sets that lack the best model.
     """
+    sizes, chances = _differences(losses)
     kept = np.arange(len(losses))
-    least = _EQUAL_WITHIN * float(np.abs(losses).mean(axis=1).min(initial=np.inf))
-    means = losses.mean(axis=1)
-    resampled = losses @ _counts(losses.shape[1]).T / losses.shape[1]
     while len(kept) > 1:
-        apart = means[kept] - means[kept].mean()
-        scatter = resampled[kept] - resampled[kept].mean(axis=0) - apart[:, None]
-        errors = np.maximum(np.sqrt(np.mean(scatter**2, axis=1)), least)
-        sizes = apart / errors
-        chance = float(np.mean((scatter / errors[:, None]).max(axis=0) >= sizes.max()))
-        if chance >= rate:
+        both = np.ix_(kept, kept)
+        largest = chances[both].max(axis=(0, 1))
+        if float(np.mean(largest >= sizes[both].max())) >= rate:
             break
-        kept = np.delete(kept, int(np.argmax(sizes)))
+        kept = np.delete(kept, int(np.argmax(sizes[both].max(axis=1))))
     return np.isin(np.arange(len(losses)), kept)
+
+
+def _differences(losses: Array) -> tuple[Array, Array]:
+    """Return by how many standard errors models differ, (m, m), and resampled models by chance.
+
+    The latter, (m, m, resamplings), are from the difference of all blocks. The standard errors are
+    those of the resamplings.
+    """
+    means = losses.mean(axis=1)
+    drawn = (losses - means[:, None]) @ _counts(losses.shape[1]).T / losses.shape[1]
+    scatter = np.abs(drawn[:, None] - drawn)
+    least = _EQUAL_WITHIN * float(np.abs(means).min(initial=np.inf))
+    errors = np.maximum(np.sqrt(np.mean(scatter**2, axis=2)), least)
+    return (means[:, None] - means) / errors, scatter / errors[:, :, None]
 
 
 def _counts(blocks: int) -> Array:

@@ -22,6 +22,8 @@ Allowed = Callable[[Sequence[Hypothesis], Weights], bool]
 
 # Models that enter the confidence set: the best of all, and the best of each size.
 _BEST, _BEST_OF_SIZE = 40, 12
+# Subsets whose weights are computed at once.
+_AT_ONCE = 500
 NESTED_SHARE = 0.999
 """Of the squares: identity but for rounding and the single precision of columns."""
 
@@ -32,10 +34,12 @@ class Model(NamedTuple):
     Attributes:
         hypotheses: beside those that every model has.
         losses: of each block that was not fitted, (blocks,); see `model_set`.
+        weights: fitted to all blocks.
     """
 
     hypotheses: tuple[Hypothesis, ...]
     losses: Array
+    weights: Weights
 
     @property
     def parameters(self) -> int:
@@ -91,13 +95,14 @@ def model_set(
     Models are compared by n·log(1 + Σ residual²/n) of every residual and block, n its rows, in
     units of their noise: the likelihood where each block has an error of its own, unknown in size,
     beside the noise. So no block, and no residual far beyond its noise, decides for all others.
+    No law is exact, so that a difference within the model-form error does not separate two models.
 
     Args:
         gram: Gram matrices of all residuals.
         base: hypotheses that every model has.
         free: hypotheses that a model may have.
         allowed: whether a machine can have hypotheses with these weights.
-        thresholds: `set_rate`.
+        thresholds: `false_alarm_rate`.
         most: largest number of hypotheses in a model.
     """
     scores = SubsetScores(side_by_side(gram, base, free))
@@ -108,35 +113,49 @@ def model_set(
         for each in subsets_of(len(heard), most, spans[np.ix_(heard, heard)], NESTED_SHARE)
     ]
 
-    def is_allowed(subset: Subset) -> bool:
+    def is_allowed(subset: Subset, weights: Sequence[Array]) -> bool:
         chosen = [free[k] for k in subset]
-        return not chosen or allowed(chosen, _weights(chosen, scores.weights(subset)))
+        return not chosen or allowed(chosen, _weights(chosen, weights))
 
-    entered = _entered(subsets, scores.squares(subsets), is_allowed)
+    entered = _entered(subsets, scores, is_allowed)
     rows = np.maximum(np.stack([place.rows for place in gram.places]), 1.0)
-    losses = np.array(
-        [(rows * np.log1p(scores.squares_at(each) / rows)).sum(axis=0) for each in entered]
-    )
-    members = [
-        Model(tuple(free[i] for i in entered[k]), losses[k])
-        for k in np.flatnonzero(confidence_set(losses, thresholds.set_rate))
-    ]
+    losses = (rows * np.log1p(scores.squares_at(entered) / rows)).sum(axis=1)
+    near = _within_form_error(losses.sum(axis=1), entered, thresholds)
+    kept = np.flatnonzero(near | confidence_set(losses, thresholds.false_alarm_rate))
+    fitted = scores.weights([entered[k] for k in kept])
+    members = []
+    for k, weights in zip(kept, fitted, strict=True):
+        chosen = tuple(free[i] for i in entered[k])
+        members.append(Model(chosen, losses[k], _weights(chosen, weights)))
     ranked = sorted(members, key=lambda each: each.losses.sum())
     return ModelSet(tuple(ranked), tuple(free), spans)
 
 
+def _within_form_error(
+    totals: Array, subsets: Sequence[Subset], thresholds: Thresholds
+) -> NDArray[np.bool_]:
+    """Return which models are behind the best by no more than laws deviate from what they model."""
+    best, none = float(totals.min()), float(totals[subsets.index(())])
+    return np.asarray(totals <= best + thresholds.model_form_error_share * (none - best))
+
+
 def _entered(
-    subsets: Sequence[Subset], totals: Array, is_allowed: Callable[[Subset], bool]
+    subsets: Sequence[Subset],
+    scores: SubsetScores,
+    is_allowed: Callable[[Subset, Sequence[Array]], bool],
 ) -> list[Subset]:
     """Return the subsets that are compared: the best of all, and the best of each size."""
+    ranked = [subsets[k] for k in np.argsort(scores.squares(subsets), kind="stable")]
     found: list[Subset] = []
     of_size: dict[int, int] = {}
-    for k in map(int, np.argsort(totals, kind="stable")):
-        size = len(subsets[k])
-        wanted = len(found) < _BEST or of_size.get(size, 0) < _BEST_OF_SIZE
-        if wanted and is_allowed(subsets[k]):
-            found.append(subsets[k])
-            of_size[size] = of_size.get(size, 0) + 1
+    for first in range(0, len(ranked), _AT_ONCE):
+        some = ranked[first : first + _AT_ONCE]
+        for subset, weights in zip(some, scores.weights(some), strict=True):
+            size = len(subset)
+            wanted = len(found) < _BEST or of_size.get(size, 0) < _BEST_OF_SIZE
+            if wanted and is_allowed(subset, weights):
+                found.append(subset)
+                of_size[size] = of_size.get(size, 0) + 1
     return found
 
 

@@ -4,9 +4,15 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 
+import numpy as np
+from numpy.typing import NDArray
+
 from cspm_ident.diagnosis.regression.hypothesis import Hypothesis, Rival, parameters_in
+from cspm_ident.diagnosis.residuals.regressors import Candidate
 from cspm_ident.diagnosis.selection.model_set import NESTED_SHARE, Model, ModelSet, behind_by
 from cspm_ident.diagnosis.thresholds import Thresholds
+
+Array = NDArray[np.float64]
 
 
 def is_missed(models: ModelSet, chosen: Model, own: Hypothesis, thresholds: Thresholds) -> bool:
@@ -38,6 +44,19 @@ def exchanged(
             if key not in best or behind < best[key].behind:
                 best[key] = Rival(each, behind)
     return tuple(sorted(best.values(), key=lambda rival: rival.behind))
+
+
+def spread(models: ModelSet, chosen: Model, own: Hypothesis) -> dict[Candidate, Array]:
+    """Return by how far the weights of a hypothesis lie apart, at most, in models that have it.
+
+    Models of many more parameters are left out: their weights are uncertain for that reason alone.
+    """
+    near = [each for each in models.members if each.parameters <= chosen.parameters + 1]
+    there = [each.weights for each in near if own in each.hypotheses]
+    return {
+        c: np.max([np.abs(weights[c] - chosen.weights[c]) for weights in there], axis=0)
+        for c in own.candidates
+    }
 
 
 def _without(models: ModelSet, chosen: Model, own: Hypothesis) -> Iterator[Model]:

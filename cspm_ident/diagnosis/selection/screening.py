@@ -65,15 +65,16 @@ def gains_of(table: Array, slices: Sequence[slice]) -> Array:
         table: products of regressors and target, which comes last, beyond a base.
         slices: the regressors of each group.
     """
-    own = np.diag(table)[:-1]
-    single = np.where(own > RANK, table[:-1, -1] ** 2 / np.maximum(own, RANK), 0.0)
     found = np.zeros(len(slices))
-    for k, each in enumerate(slices):
-        if each.stop - each.start == 1:
-            found[k] = single[each.start]
-            continue
-        grams = table[each, each] + RANK * np.eye(each.stop - each.start)
-        found[k] = table[each, -1] @ np.linalg.solve(grams, table[each, -1])
+    widths = [each.stop - each.start for each in slices]
+    for width in sorted(set(widths)):
+        rows = [k for k, own in enumerate(widths) if own == width]
+        at = np.array([slices[k].start for k in rows])[:, None] + np.arange(width)
+        grams = table[at[:, :, None], at[:, None, :]] + RANK * np.eye(width)
+        crossed = table[at, -1]
+        found[rows] = np.einsum(
+            "ki,ki->k", crossed, np.linalg.solve(grams, crossed[:, :, None])[:, :, 0]
+        )
     return found
 
 

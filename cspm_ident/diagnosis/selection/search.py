@@ -32,7 +32,7 @@ from cspm_ident.diagnosis.regression.significance import Significance
 from cspm_ident.diagnosis.residuals.regressors import Candidate
 from cspm_ident.diagnosis.selection.model_set import Model, ModelSet, Weights, model_set
 from cspm_ident.diagnosis.selection.onset import first_block
-from cspm_ident.diagnosis.selection.presence import exchanged, is_missed
+from cspm_ident.diagnosis.selection.presence import exchanged, is_missed, spread
 from cspm_ident.diagnosis.selection.screening import gains_of, screened
 from cspm_ident.diagnosis.selection.search_result import SearchResult
 from cspm_ident.diagnosis.selection.unexplained import unexplained
@@ -43,15 +43,20 @@ Index = NDArray[np.intp]
 
 # Hypotheses about a residual that may begin late, the most promising ones.
 _LATE = 4
-# A model of one residual is searched beside those of the others, and once more beside all.
-_ROUNDS = 2
 
 
 class Choice(NamedTuple):
-    """The model that was chosen for one residual, and those that predict as well."""
+    """The model that was chosen for one residual, and those that predict as well.
+
+    Attributes:
+        model: the chosen one.
+        models: with it those that predict as well.
+        place: the residual; None for clock errors of healthy size.
+    """
 
     model: Model
     models: ModelSet
+    place: PlaceGram | None = None
 
 
 class Search:
@@ -134,23 +139,20 @@ class Search:
         return unexplained(self.gram, self.sums, self.significance, reported, healthy)
 
     def _choices(self) -> list[Choice]:
-        """Return the models of all residuals, each chosen beside those before it."""
-        choices, gram = self._clocks(), self._undelayed.gram
+        """Return the models of all residuals, each chosen beside those of the others.
+
+        Once all are chosen, each is chosen anew where others came after it.
+        """
+        choices = self._clocks()
         visited = self._by_gain()
-        for _turn in range(_ROUNDS):
-            before = len(choices)
-            for k, place in enumerate(visited):
-                self._progress(f"residual {k + 1} of {len(visited)}")
-                found = self._choice(place, _together(choices))
-                if found is not None:
-                    choices.append(found)
-            new = [
-                c for each in choices[before:] for h in each.model.hypotheses for c in h.candidates
-            ]
-            touched = gram.places_of(gram.columns_of(new))
-            visited = [each for each in visited if each.place in touched]
-            if not visited:
-                break
+        for k, place in enumerate(visited):
+            self._progress(f"residual {k + 1} of {len(visited)}")
+            choices += self._choice(place, _together(choices))
+        for own in [each for each in choices[:-1] if each.place is not None]:
+            assert own.place is not None
+            self._progress(f"residual of {own.place.place.element}, beside the others")
+            others = [each for each in choices if each is not own]
+            choices = [*others, *self._choice(own.place, _together(others))]
         return choices
 
     def _clocks(self) -> list[Choice]:
@@ -182,19 +184,22 @@ class Search:
             gains.append(gains_of(table / (scale[:, None] * scale), slices).max(initial=0.0))
         return [gram.places[k] for k in np.argsort(gains)[::-1]]
 
-    def _choice(self, place: PlaceGram, chosen: Sequence[Hypothesis]) -> Choice | None:
-        """Return the model of a residual beside hypotheses; None where none may be enough."""
+    def _choice(self, place: PlaceGram, chosen: Sequence[Hypothesis]) -> list[Choice]:
+        """Return the model of a residual beside hypotheses; empty where nothing is needed.
+
+        Where no smaller model is needed, larger ones, which are many, are not tried.
+        """
         free = self._free(place, chosen)
         pool = screened(self._undelayed.gram, chosen, free, self.thresholds.screened_candidates)
         given = self._undelayed.gram, chosen
-        pairs = model_set(*given, pool, self._is_allowed, self.thresholds, 2)
-        if pairs.has_none:
-            return None
+        most = self.thresholds.most_effects
+        small = model_set(*given, pool, self._is_allowed, self.thresholds, most - 1)
+        if small.has_none:
+            return []
         pool = [*pool, *self._late(pool, chosen), *self._each_alone(pool)]
         pool = [h for h in pool if not self._is_banned(h)]
-        most = self.thresholds.most_effects
         models = model_set(*given, pool, self._is_allowed, self.thresholds, most)
-        return Choice(models.chosen, models) if models.chosen.hypotheses else None
+        return [Choice(models.chosen, models, place)] if models.chosen.hypotheses else []
 
     def _is_banned(self, own: Hypothesis) -> bool:
         mine = own.effect.key, own.elements, own.common, bool(own.onset)
@@ -265,12 +270,14 @@ class Search:
         found, limits = self.finding_of(own, chosen), self.thresholds
         alternatives: list[Rival] = []
         missed = True
-        for model, models in choices:
+        apart: dict[Candidate, Array] = {}
+        for model, models, _ in choices:
             for each in model.hypotheses:
                 if _is_part(each, own):
                     alternatives += exchanged(models, model, each, limits)
                     missed &= is_missed(models, model, each, limits)
-        found = replace(found, alternatives=tuple(alternatives))
+                    apart |= spread(models, model, each)
+        found = replace(found, alternatives=tuple(alternatives), spread=apart)
         return found.undecided(Reason.MISSED) if missed else found
 
     def _shows(self, candidate: Candidate) -> bool:

@@ -7,6 +7,7 @@ A subset is fitted to all blocks but those of a fold and their neighbours, and p
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
+from functools import cached_property
 from itertools import combinations
 
 import numpy as np
@@ -72,24 +73,30 @@ class SubsetScores:
                 found[rows] += np.einsum("si,si->s", weights @ products, weights)
         return found
 
-    def squares_at(self, subset: Subset) -> Array:
-        """Return Σ residual² as predicted by a subset, by residual and block, (places, blocks)."""
-        found = np.zeros(self._sides.products.shape[:2])
+    def squares_at(self, subsets: Sequence[Subset]) -> Array:
+        """Return Σ residual² as predicted, by residual and block, (subsets, places, blocks)."""
+        found = np.zeros((len(subsets), *self._sides.products.shape[:2]))
         for fold, trained, turn in zip(self._folds, self.trained, self._predicting, strict=True):
-            ((_, weights),) = self._fitted(trained, [subset])
-            vector = turn @ weights[0]
+            vectors = np.zeros((len(subsets), len(trained)))
+            for rows, weights in self._fitted(trained, subsets):
+                vectors[rows] = weights
+            vectors = vectors @ turn.T
             products = self._sides.products[:, fold]
-            found[:, fold] = (products @ vector) @ vector
+            found[:, :, fold] = np.einsum("pbsi,si->spb", vectors @ products, vectors)
         return np.maximum(found, 0.0)
 
-    def weights(self, subset: Subset) -> list[Array]:
-        """Return the weights of each hypothesis of a subset, fitted to all blocks."""
-        ((_, weights),) = self._fitted(self._schur, [subset])
+    def weights(self, subsets: Sequence[Subset]) -> list[list[Array]]:
+        """Return the weights of each hypothesis of each subset, fitted to all blocks."""
         lengths = self._sides.lengths[self._sides.fixed :]
-        own = weights[0, :-1] / np.where(lengths > 0.0, lengths, 1.0)
-        return [own[self.own[k]] for k in subset]
+        scale = np.where(lengths > 0.0, lengths, 1.0)
+        found: list[list[Array]] = [[] for _ in subsets]
+        for rows, weights in self._fitted(self._schur, subsets):
+            own = weights[:, :-1] / scale
+            for row, values in zip(rows, own, strict=True):
+                found[row] = [values[self.own[k]] for k in subsets[row]]
+        return found
 
-    @property
+    @cached_property
     def own(self) -> list[slice]:
         """The regressors of each free hypothesis among all free ones."""
         fixed = self._sides.fixed

@@ -16,12 +16,6 @@ class SelectionThresholds:
         "Largest number of hypotheses about one residual that are fitted together.",
         "Set by hand, for computing time: all 6195 subsets of up to four of twenty.",
     )
-    set_rate: float = share(
-        0.05,
-        "Share of model confidence sets that lack the model that predicts best.",
-        "Usual level; Hansen, Lunde, Nason, Econometrica 79(2), 2011.",
-        low=0.001,
-    )
     screened_candidates: int = count(
         20,
         "Number of hypotheses about one residual of which all subsets are scored.",

@@ -26,6 +26,7 @@ from cspm_ident.diagnosis.regression.parameter_estimates import (
     of_clocks,
     of_drives,
     of_forms,
+    of_models,
     of_scales,
     of_shafts,
 )
@@ -120,8 +121,9 @@ def modelled(search: Search, kept: Sequence[Finding], data: Data) -> Model:
     weights = {
         c: (_allowed(data.searched[0], c, own, half), half) for c, (own, half) in weights.items()
     }
-    zero = [_is_insignificant(each.hypothesis, weights) for each in kept]
+    weights = of_models(weights, [each.spread for each in kept])
     weights = of_forms(weights, _model_form_errors(search, kept, weights), limits)
+    zero = [_is_insignificant(each.hypothesis, weights) for each in kept]
     found = []
     for each, onset, small, none in zip(kept, onsets, negligible, zero, strict=True):
         own = {c: weights[c] for c in members_of(weights, each.hypothesis)}
@@ -172,19 +174,9 @@ def _immaterial(search: Search, kept: Sequence[Finding], data: Data) -> list[boo
 def _is_possible(
     hypothesis: Hypothesis, own: Weights, measured: Measurement, thresholds: Thresholds
 ) -> bool:
-    """Return whether a machine can have these weights, and data show their onset and end.
-
-    What is compatible with no machine at all, such as a bar without mass, is on its bound, and no
-    estimate: an inertia that shares the noise of its residual is fitted away with it.
-    """
-    numbers = own if hypothesis.effect.is_correction else {}
-    ends = [{c: w + sign * half for c, (w, half) in numbers.items()} for sign in (-1.0, 1.0)]
-    bounded_ends = [each for each in ends if all(np.all(np.isfinite(w)) for w in each.values())]
+    """Return whether a machine can have these weights, and data show their onset and end."""
     return (
-        all(
-            is_possible(measured, each)
-            for each in ({c: weights for c, (weights, _) in own.items()}, *bounded_ends)
-        )
+        is_possible(measured, {c: weights for c, (weights, _) in own.items()})
         and is_seen_to_begin(hypothesis, own)
         and is_seen_to_end(own, thresholds)
     )

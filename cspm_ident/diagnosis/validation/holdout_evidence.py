@@ -62,8 +62,9 @@ def objection(
 ) -> Reason | None:
     """Return why held-out data do not confirm a finding; None where they do.
 
-    A finding is contradicted where it significantly raises a residual of any place, and confirmed
-    where it lowers one beyond the scatter of its blocks, or all of them together.
+    A finding is contradicted where it significantly raises a residual of any place. It is confirmed
+    where it lowers all of them together beyond the scatter of their blocks, or one of them by so
+    much that it is no chance among many.
 
     Args:
         without: losses without the finding, by residual and block.
@@ -74,11 +75,12 @@ def objection(
     if not taken.size:
         return Reason.NOT_CONFIRMED
     whole = np.nansum(taken, axis=0)[~np.isnan(taken).all(axis=0)]
-    gains = [gain_of(each[~np.isnan(each)]) for each in taken] + [gain_of(whole)]
-    if any(gain.total < -thresholds.certain_sigma * gain.error for gain in gains):
+    gains, total = [gain_of(each[~np.isnan(each)]) for each in taken], gain_of(whole)
+    certain, together = thresholds.certain_sigma, thresholds.tie_sigma
+    if any(gain.total < -certain * gain.error for gain in (*gains, total)):
         return Reason.RAISES_HOLDOUT
-    confirmed = any(gain.total > thresholds.tie_sigma * gain.error for gain in gains)
-    return None if confirmed else Reason.NOT_CONFIRMED
+    confirmed = any(gain.total > certain * gain.error for gain in gains)
+    return None if confirmed or total.total > together * total.error else Reason.NOT_CONFIRMED
 
 
 def raised(without: Losses, with_it: Losses) -> float:

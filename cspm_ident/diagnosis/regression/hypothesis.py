@@ -89,15 +89,6 @@ def is_constant(effect: Effect) -> bool:
     return bool(np.array_equal(columns[:-1], columns[1:]) and columns.any())
 
 
-def is_exact(effect: Effect) -> bool:
-    """Return whether an effect has no model-form error in its time course.
-
-    True for a correction of a parameter or a reading, except for timing corrections. Also true for
-    a constant, whose model-form error would be a function of time.
-    """
-    return (effect.is_correction and not is_timing(effect)) or is_constant(effect)
-
-
 def is_negligible(members: Mapping[Candidate, Array]) -> bool:
     """Return whether weights of an effect on its elements are within a healthy machine's range.
 
@@ -204,12 +195,6 @@ def factors_of(effect: Effect) -> NDArray[np.bool_]:
     return np.array([usual and parameter.absent == 1.0 for parameter in effect.linear])
 
 
-def is_tied(candidate: Candidate, weights: Array, half: Array) -> bool:
-    """Return whether dependent weights agree, within their intervals, with a set of parameters."""
-    values = candidate.effect.values(weights.tolist(), **candidate.nonlinear)
-    return bool(np.all(np.abs(candidate.effect.weights(values) - weights) <= half))
-
-
 def joined(chosen: Sequence[Hypothesis], found: Hypothesis) -> list[Hypothesis]:
     """Return hypotheses with a further one; merge those of the same effect, shape and onset."""
     shape, out = found.candidates[0].shape, []
@@ -261,45 +246,6 @@ def is_number(hypothesis: Hypothesis) -> bool:
     return hypothesis.effect.physics.alter is not None
 
 
-def is_wider(one: Hypothesis, other: Hypothesis) -> bool:
-    """Return whether one hypothesis assumes more faults than the other, whatever the effects."""
-    return one.causes > other.causes
-
-
-def boldness(
-    one: Hypothesis, other: Hypothesis | None = None, thresholds: Thresholds = DEFAULT_THRESHOLDS
-) -> float:
-    """Return the standard errors by which one must explain more than another, or than nothing.
-
-    Non-zero for an onset, which is selected among many, and for an unlikely element scope, where
-    the other has none. Common parameters on all elements are unlikely unless one system reads them.
-    If one does, separate parameters are unlikely.
-    """
-    if one.onset and (other is None or not other.onset):
-        return thresholds.certain_sigma
-    if other is None:
-        return 0.0
-    unlikely = one.common != other.common and one.common is not has_one_system(one.effect)
-    return thresholds.tie_sigma if unlikely else 0.0
-
-
-def unusual(weights: Mapping[Candidate, Array], hypothesis: Hypothesis) -> float:
-    """Return the largest error of a parameter of the file, in units of its usual error.
-
-    At least 1: of errors that are usual, the smaller is no likelier. 1 where no usual error is
-    given.
-    """
-    found = [1.0]
-    for candidate in hypothesis.candidates:
-        values = candidate.effect.values(weights[candidate].tolist(), **candidate.nonlinear)
-        found += [
-            abs(values[p.name] - (p.absent or 0.0)) / p.usual
-            for p in candidate.effect.parameters
-            if p.usual is not None
-        ]
-    return max(found)
-
-
 def is_timing(effect: Effect) -> bool:
     """Return whether an effect makes readings older than their stamps."""
     return effect.physics.sense is not None and effect.physics.sense.lateness is not None
@@ -315,19 +261,6 @@ def is_early(weights: Mapping[Candidate, Array], hypothesis: Hypothesis) -> bool
         return False
     own = {c: weights[c] for c in hypothesis.candidates}
     return min(sense.lateness(0.0, each) for each in own.values()) < 0.0 and not is_negligible(own)
-
-
-def is_spread(
-    one: Hypothesis, whole: Hypothesis, thresholds: Thresholds = DEFAULT_THRESHOLDS
-) -> bool:
-    """Return whether one has the same effect on at least half of more than two elements.
-
-    Then one cause on all elements is as likely as separate faults on those alone.
-    """
-    same = one.effect.id == whole.effect.id and one.candidates[0].shape == whole.candidates[0].shape
-    elements = len(whole.elements)
-    least = thresholds.majority_share * elements
-    return same and elements > 2 and len(one.elements) >= least
 
 
 def members_of(candidates: Iterable[Candidate], hypothesis: Hypothesis) -> list[Candidate]:

@@ -246,7 +246,7 @@ def _hypotheses(found: Diagnosis, data: dict[str, Any]) -> str:
     count = (
         f"<p>{found.tested} hypotheses were looked at. Probabilities are those among"
         f" what explains the same, times {trusted:g}: the share of findings without a rival that"
-        " were right in blind recordings; a tenth of it beside as much that nothing explains.</p>"
+        " were right in blind recordings.</p>"
     )
     return count + table_html(heads, rows, "hypotheses and their evidence")
 

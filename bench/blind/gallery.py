@@ -166,7 +166,9 @@ def _named(found: Diagnosis) -> Iterator[str]:
     """Yield what is said of the findings and their rivals."""
     for finding in found.reported:
         yield statement_of(found, finding)
-        yield from (f"as well explained by {rival.words}" for rival in finding.alternatives)
+        yield from (
+            f"as well explained by {rival.hypothesis.words}" for rival in finding.alternatives
+        )
 
 
 def _amounts(concealed: Mapping[str, Any]) -> str:

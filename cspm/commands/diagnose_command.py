@@ -158,7 +158,10 @@ def _print_named(console: Console, found: Diagnosis, experiments: Sequence[Seque
     for finding, own in zip(found.reported, experiments, strict=True):
         say(console, f"• {statement_of(found, finding)}")
         for rival, experiment in zip(finding.alternatives, own, strict=True):
-            say(console, f"  as well explained by {rival.words}; to distinguish: {experiment}")
+            say(
+                console,
+                f"  as well explained by {rival.hypothesis.words}; to distinguish: {experiment}",
+            )
 
 
 def _experiments(found: Diagnosis, data: Mapping[str, Any], folder: Path | None) -> list[list[str]]:

@@ -58,26 +58,12 @@ class Rival(NamedTuple):
 
     Attributes:
         hypothesis: the alternative.
-        behind: standard deviations of a normal by which it is worse over hold-out blocks. Its
-            additional parameters are counted; 0 where it is as good or better.
-        beside: a wrong parameter of the file that masks a part of it; None where there is none.
+        behind: standard errors by which a model with it predicts worse; 0 where it is as good or
+            better.
     """
 
     hypothesis: Hypothesis
     behind: float
-    beside: Hypothesis | None = None
-
-    @property
-    def candidates(self) -> tuple[Candidate, ...]:
-        """All candidates it assumes, those of the wrong parameter included."""
-        beside = () if self.beside is None else self.beside.candidates
-        return (*self.hypothesis.candidates, *beside)
-
-    @property
-    def words(self) -> str:
-        """Effects and elements, as readable text."""
-        beside = "" if self.beside is None else f" beside a wrong {self.beside.effect.id}"
-        return f"{self.hypothesis.words}{beside}"
 
 
 def is_constant(effect: Effect) -> bool:

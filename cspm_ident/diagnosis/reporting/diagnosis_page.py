@@ -122,13 +122,11 @@ def _verdict(verdict: Verdict, data: dict[str, Any]) -> str:
 
 
 def _rival(alternative: dict[str, Any]) -> str:
-    """Return an alternative in plain words, with its probability."""
-    beside = alternative["beside"]
-    with_it = f", beside another {catalogue()[beside].words} than the file's" if beside else ""
+    """Return an alternative in plain words."""
     where = ", ".join(alternative["elements"])
     effect = catalogue()[alternative["effect"]]
     words = f"another {effect.words}" if effect.physics.alter is not None else effect.words
-    return f"{words} ({alternative['effect']} on {where}{with_it})"
+    return f"{words} ({alternative['effect']} on {where})"
 
 
 def _where(found: Diagnosis) -> str:
@@ -261,7 +259,7 @@ def _ranked(finding: Finding, entry: dict[str, Any]) -> Iterable[tuple[str, ...]
     for rival, reported in sorted(rivals, key=lambda each: each[0].behind):
         behind = f"{rival.behind:.1f} behind"
         yield (
-            rival.words,
+            rival.hypothesis.words,
             "explains it as well",
             f"{reported['probability']:.2f}",
             behind,

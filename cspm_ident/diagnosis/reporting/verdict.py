@@ -190,7 +190,6 @@ def _finding(diagnosis: Diagnosis, finding: Finding) -> dict[str, Any]:
             {
                 "effect": rival.hypothesis.effect.id,
                 "elements": list(rival.hypothesis.elements),
-                "beside": None if rival.beside is None else rival.beside.effect.id,
                 "probability": probability * _odds(rival),
                 "separating_experiment": None,
             }

@@ -66,17 +66,6 @@ def test_what_rivals_leave_is_shared_by_how_far_they_lie_behind():
         (other,) = tied["alternatives"]
         assert other["probability"] == pytest.approx(odds * tied["probability"])
         assert tied["probability"] + other["probability"] == pytest.approx(TRUSTED)
-        assert other["beside"] is None
-
-
-def test_an_alternative_that_needs_a_wrong_number_names_it(tmp_path):
-    beside = Hypothesis(WIDER.effect, (WIDER,))
-    found = diagnosis(alternatives=[Rival(Hypothesis(LOADED.effect, (LOADED,)), 0.0, beside)])
-    (tied,) = diagnosis_data(found)["findings"]
-    assert tied["alternatives"][0]["effect"] == "winch_load_friction"
-    assert tied["alternatives"][0]["beside"] == "winch_drum_radius"
-    words = "winch_load_friction on surge_2 beside a wrong winch_drum_radius"
-    assert words in section(page_of(tmp_path, found), "hypotheses")
 
 
 def test_a_curve_is_what_the_found_columns_leave():

@@ -192,8 +192,9 @@ def test_one_term_deleted_from_a_real_machine_is_named_first(emps, deleted):
 @pytest.mark.compiled
 def test_what_differs_by_direction_explains_more_than_the_published_offset(emps):
     found = emps()
+    assert found["verdict"] == "effect"
     (finding,) = named(found)
-    assert finding["effect"] == DIRECTIONAL
+    assert (finding["effect"], finding["presence"]) == (DIRECTIONAL, "certain")
     (fit,) = found["residuals"]
     assert 0.07 < fit["held_out"]["nrmse_before"] < 0.08
     assert fit["held_out"]["nrmse_after"] < 0.045

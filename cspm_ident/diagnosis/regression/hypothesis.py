@@ -258,6 +258,23 @@ def members_of(candidates: Iterable[Candidate], hypothesis: Hypothesis) -> list[
 def parameters_in(hypothesis: Hypothesis) -> int:
     """Return the number of free parameters of a hypothesis, those on a grid and an onset included.
 
-    A whole number, such as the order of a ripple, is one of few and counts as well.
+    That elements share their parameters, though no one system reads them, counts as one more.
     """
-    return hypothesis.causes * len(hypothesis.effect.parameters) + bool(hypothesis.onset)
+    alike = hypothesis.common and not has_one_system(hypothesis.effect)
+    return hypothesis.causes * len(hypothesis.effect.parameters) + bool(hypothesis.onset) + alike
+
+
+def unusual(weights: Mapping[Candidate, Array]) -> float:
+    """Return the largest error of a number of the file, in units of its usual error, at least 1.
+
+    Of errors that are usual, the smaller is no likelier.
+    """
+    found = [1.0]
+    for candidate, own in weights.items():
+        values = candidate.effect.values(own.tolist(), **candidate.nonlinear)
+        found += [
+            abs(values[p.name] - (p.absent or 0.0)) / p.usual
+            for p in candidate.effect.parameters
+            if p.usual is not None
+        ]
+    return max(found)

@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from cspm_ident.diagnosis.regression.block_gram import BlockGram
-from cspm_ident.diagnosis.regression.hypothesis import Hypothesis, parameters_in
+from cspm_ident.diagnosis.regression.hypothesis import Hypothesis, parameters_in, unusual
 from cspm_ident.diagnosis.residuals.regressors import Candidate
 from cspm_ident.diagnosis.selection.confidence_set import confidence_set
 from cspm_ident.diagnosis.selection.side_by_side import side_by_side
@@ -54,16 +54,25 @@ class ModelSet(NamedTuple):
         members: the best first.
         free: the hypotheses of which they are made.
         spans: share of the second of each pair of these that the first spans, (free, free).
+        undecided: difference of total losses that the model-form error may make.
     """
 
     members: tuple[Model, ...]
     free: tuple[Hypothesis, ...]
     spans: Array
+    undecided: float
 
     @property
     def chosen(self) -> Model:
-        """The member of fewest parameters, and of these the best: what more has is not needed."""
-        return min(self.members, key=lambda each: (each.parameters, each.losses.sum()))
+        """The member of fewest parameters, and of these the best: what more has is not needed.
+
+        Of those that the model-form error does not separate, it is the least unusual.
+        """
+        fewest = min(each.parameters for each in self.members)
+        few = [each for each in self.members if each.parameters == fewest]
+        best = min(float(each.losses.sum()) for each in few)
+        near = [each for each in few if each.losses.sum() <= best + self.undecided]
+        return min(near, key=lambda each: (unusual(each.weights), each.losses.sum()))
 
     @property
     def has_none(self) -> bool:
@@ -120,7 +129,10 @@ def model_set(
     entered = _entered(subsets, scores, is_allowed)
     rows = np.maximum(np.stack([place.rows for place in gram.places]), 1.0)
     losses = (rows * np.log1p(scores.squares_at(entered) / rows)).sum(axis=1)
-    near = _within_form_error(losses.sum(axis=1), entered, thresholds)
+    totals = losses.sum(axis=1)
+    best, none = float(totals.min()), float(totals[entered.index(())])
+    undecided = thresholds.model_form_error_share * (none - best)
+    near = totals <= best + undecided
     kept = np.flatnonzero(near | confidence_set(losses, thresholds.false_alarm_rate))
     fitted = scores.weights([entered[k] for k in kept])
     members = []
@@ -128,15 +140,7 @@ def model_set(
         chosen = tuple(free[i] for i in entered[k])
         members.append(Model(chosen, losses[k], _weights(chosen, weights)))
     ranked = sorted(members, key=lambda each: each.losses.sum())
-    return ModelSet(tuple(ranked), tuple(free), spans)
-
-
-def _within_form_error(
-    totals: Array, subsets: Sequence[Subset], thresholds: Thresholds
-) -> NDArray[np.bool_]:
-    """Return which models are behind the best by no more than laws deviate from what they model."""
-    best, none = float(totals.min()), float(totals[subsets.index(())])
-    return np.asarray(totals <= best + thresholds.model_form_error_share * (none - best))
+    return ModelSet(tuple(ranked), tuple(free), spans, undecided)
 
 
 def _entered(

@@ -13,7 +13,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from cspm_ident.diagnosis.finding import Finding, Reason, Unexplained
+from cspm_ident.diagnosis.finding import Finding, Reason, Status, Unexplained
 from cspm_ident.diagnosis.regression.block_gram import BlockGram, PlaceGram
 from cspm_ident.diagnosis.regression.block_regression import BlockRegression
 from cspm_ident.diagnosis.regression.hypothesis import (
@@ -193,13 +193,32 @@ class Search:
         pool = screened(self._undelayed.gram, chosen, free, self.thresholds.screened_candidates)
         given = self._undelayed.gram, chosen
         most = self.thresholds.most_effects
+        pool = [*pool, *self._late(pool, chosen), *self._each_alone(pool)]
+        pool = [h for h in pool if not self._is_banned(h)]
         small = model_set(*given, pool, self._is_allowed, self.thresholds, most - 1)
         if small.has_none:
             return []
-        pool = [*pool, *self._late(pool, chosen), *self._each_alone(pool)]
-        pool = [h for h in pool if not self._is_banned(h)]
         models = model_set(*given, pool, self._is_allowed, self.thresholds, most)
-        return [Choice(models.chosen, models, place)] if models.chosen.hypotheses else []
+        model = self._material(models.chosen, chosen)
+        return [Choice(model, models, place)] if model.hypotheses else []
+
+    def _material(self, model: Model, chosen: Sequence[Hypothesis]) -> Model:
+        """Return a model without what takes too little of any residual to matter."""
+        together, least = [*chosen, *model.hypotheses], self.thresholds.material_share
+        late = self
+        for each in together:
+            late = late._begun(each)
+        kept = [h for h in model.hypotheses if late.finding_of(h, together).share >= least]
+        return model._replace(hypotheses=tuple(kept))
+
+    def _begun(self, own: Hypothesis) -> Search:
+        """Return the search with a hypothesis acting from its onset on."""
+        if not own.onset:
+            return self
+        other = copy(self)
+        other.fits = self.fits.delayed(own)
+        other._look_for(self._effects)
+        return other
 
     def _is_banned(self, own: Hypothesis) -> bool:
         mine = own.effect.key, own.elements, own.common, bool(own.onset)
@@ -257,11 +276,17 @@ class Search:
         return found
 
     def _is_allowed(self, hypotheses: Sequence[Hypothesis], weights: Weights) -> bool:
-        """Return whether the catalogue allows weights, and no reading is newer than its stamp."""
+        """Return whether the catalogue allows weights, and no reading is newer than its stamp.
+
+        No effect acts twice on an element or with two shapes.
+        """
         late = any(is_timing(h.effect) and is_early(weights, h) for h in hypotheses)
         same = len({(c.effect_id, c.element) for c in weights})
         twice = same < sum(len(h.candidates) for h in hypotheses)
-        return not late and not twice and all(is_allowed(c, own) for c, own in weights.items())
+        shapes = {(c.effect_id, c.shape) for c in weights}
+        several = len(shapes) > len({effect_id for effect_id, _ in shapes})
+        possible = all(is_allowed(c, own) for c, own in weights.items())
+        return possible and not (late or twice or several)
 
     def _finding(
         self, own: Hypothesis, chosen: Sequence[Hypothesis], choices: Sequence[Choice]
@@ -278,6 +303,8 @@ class Search:
                     missed &= is_missed(models, model, each, limits)
                     apart |= spread(models, model, each)
         found = replace(found, alternatives=tuple(alternatives), spread=apart)
+        if found.share < limits.material_share:
+            return replace(found, status=Status.NEGLIGIBLE)
         return found.undecided(Reason.MISSED) if missed else found
 
     def _shows(self, candidate: Candidate) -> bool:

@@ -115,7 +115,7 @@ def modelled(search: Search, kept: Sequence[Finding], data: Data) -> Model:
     weights = of_clocks(of_drives(weights, 2.0 * data.searched[0].torque_age))
     # With the interval that is reported, which includes what the reference clock may be off.
     negligible = [
-        small or each.share < limits.material_share or _may_be_negligible(each, weights)
+        small or each.status is Status.NEGLIGIBLE or _may_be_negligible(each, weights)
         for each, small in zip(kept, immaterial, strict=True)
     ]
     weights = {

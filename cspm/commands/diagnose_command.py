@@ -17,6 +17,7 @@ from cspm.commands.progress_shown import shown
 from cspm.diagnosis import diagnose
 from cspm_ident.diagnosis.diagnosis import Diagnosis
 from cspm_ident.diagnosis.finding import Status
+from cspm_ident.diagnosis.reporting.completeness import completeness_sentence
 from cspm_ident.diagnosis.reporting.empirical_statement import stage_errors, stage_names
 from cspm_ident.diagnosis.reporting.finding_statement import statement_of
 from cspm_ident.diagnosis.reporting.statement import (
@@ -195,6 +196,8 @@ def print_diagnosis(
     experiments = _experiments(found, data, folder)
     _print_cut_short(console, found)
     _print_named(console, found, experiments)
+    if complete := completeness_sentence(found):
+        say(console, complete)
     for each in found.unexplained:
         say(console, f"• {unknown_statement(found, each)}")
     for entry in data["empirical"]:

@@ -11,6 +11,9 @@ from cspm_ident.diagnosis.thresholds import DEFAULT_THRESHOLDS, Thresholds
 
 Array = NDArray[np.float64]
 
+# Periods that are tried, as multiples of a turn, and from where on a gear may be the reason.
+_RATIOS, _GEARED = 400, 2.0
+
 _FORMS: dict[str, Callable[[Array], Array]] = {
     "{x}": lambda x: x,
     "|{x}|": np.abs,
@@ -43,7 +46,35 @@ def sketch(
         share = 1.0 - float(np.sum((values - table @ found) ** 2)) / spread
         if share >= 1.0 - thresholds.minor_share and (best is None or share > best[0]):
             best = share, f"{found[0]:.3g}·{form.format(x=name)}"
-    return None if best is None else best[1]
+    return _wave(knots, values, name, thresholds) if best is None else best[1]
+
+
+def _wave(knots: Array, values: Array, name: str, thresholds: Thresholds) -> str | None:
+    """Return a wave of an angle with a period of its own, where the range holds half of one.
+
+    Gravity on a joint is such a wave of the motor's angle where the file lacks the gear ratio. A
+    period of fewer than four knots would fit anything.
+    """
+    shortest = max(1.0, 2.0 * float(np.diff(knots).max()) / np.pi)
+    longest = float(np.ptp(knots)) / np.pi
+    if name != "angle" or longest < shortest:
+        return None
+    fits = [
+        (*_fitted_wave(knots, values, ratio), ratio)
+        for ratio in np.geomspace(shortest, longest, _RATIOS)
+    ]
+    left, size, ratio = min(fits)
+    if left > thresholds.minor_share * float(np.sum((values - values.mean()) ** 2)):
+        return None
+    gear = " (is gear_ratio missing?)" if ratio > _GEARED else ""
+    return f"{size:.3g}·cosine of {name}/{ratio:.3g}{gear}"
+
+
+def _fitted_wave(knots: Array, values: Array, ratio: float) -> tuple[float, float]:
+    """Return the squares that a wave leaves of a shape, and its amplitude."""
+    waves = np.column_stack([np.cos(knots / ratio), np.sin(knots / ratio), np.ones(len(knots))])
+    found = np.linalg.lstsq(waves, values, rcond=None)[0]
+    return float(np.sum((values - waves @ found) ** 2)), float(np.hypot(found[0], found[1]))
 
 
 def is_even(knots: Array, values: Array, thresholds: Thresholds = DEFAULT_THRESHOLDS) -> bool:

@@ -12,6 +12,7 @@ from cspm_ident.diagnosis.diagnosis import Diagnosis
 from cspm_ident.diagnosis.finding import Finding, Region, Status, Unexplained
 from cspm_ident.diagnosis.parameter import Parameter
 from cspm_ident.diagnosis.regression.hypothesis import Rival
+from cspm_ident.diagnosis.reporting.completeness import explained_share, left_entries
 from cspm_ident.diagnosis.reporting.empirical_statement import empirical_entries
 from cspm_ident.diagnosis.reporting.finding_statement import statement_of
 from cspm_ident.diagnosis.reporting.shown_place import shown_place
@@ -55,7 +56,7 @@ SENTENCES = {
     Verdict.EFFECT: "Physics is missing in the model.",
     Verdict.PARAMETER: "A number of the test-bed file is wrong; no physics is missing.",
     Verdict.TIE: "Something is missing, and several causes explain these recordings equally well.",
-    Verdict.UNKNOWN: "Something is missing that the catalogue does not have.",
+    Verdict.UNKNOWN: "Something is missing, and nothing of the catalogue could be named for it.",
     Verdict.NOT_EXCITED: "These recordings cannot tell: nothing that was measured moves enough"
     " beyond its noise to decide.",
 }
@@ -136,6 +137,8 @@ def diagnosis_data(diagnosis: Diagnosis, testbed: Path | None = None) -> dict[st
         "not_excited": [
             {"effect": name, "elements": list(elements)} for name, elements in diagnosis.not_excited
         ],
+        "explained": explained_share(diagnosis) if diagnosis.reported else None,
+        "left": left_entries(diagnosis),
         "considered": [_considered(each) for each in diagnosis.considered],
         "detection_limits": [limit._asdict() for limit in diagnosis.limits],
         "empirical": empirical_entries(diagnosis),

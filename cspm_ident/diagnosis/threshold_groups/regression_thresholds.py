@@ -13,13 +13,13 @@ class RegressionThresholds:
 
     false_alarm_rate: float = share(
         0.01,
-        "Probability that anything unknown is reported of a healthy machine, or that an effect at"
-        " its detection limit is noise.",
-        "Bonferroni over signals; over effects and elements, weighted.",
+        "Share of model confidence sets that lack the best model; probability that anything unknown"
+        " is reported of a healthy machine, or that an effect at its detection limit is noise.",
+        "Hansen, Lunde, Nason (2011); Bonferroni over signals, effects and elements.",
     )
     material_share: float = share(
         0.05,
-        "Share of a residual's squares that an effect takes at its detection limit.",
+        "Share of a residual's squares that an effect has to take to be reported.",
         "Effect size set by hand: 2.5 % of the residual's RMS.",
         high=0.99,
     )

@@ -13,7 +13,8 @@ class ValidationThresholds:
 
     driven_noise_ratio: float = ratio(
         10.0,
-        "Multiple of its noise by which undemanded bar motion has a cause other than feedback.",
+        "Multiple of its noise by which undemanded bar motion has a cause other than feedback,"
+        " and a simulated cable or pose shows that something is missing.",
         "Set by hand.",
     )
     breakaway_excess_share: float = share(

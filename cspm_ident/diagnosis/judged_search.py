@@ -10,10 +10,8 @@ from numpy.typing import NDArray
 
 from cspm_ident.diagnosis.finding import Finding, Reason, Unexplained
 from cspm_ident.diagnosis.regression.hypothesis import Hypothesis
-from cspm_ident.diagnosis.residuals.corrected_measurement import as_found
 from cspm_ident.diagnosis.residuals.data_split import span_of
 from cspm_ident.diagnosis.residuals.free_shapes import Driver
-from cspm_ident.diagnosis.residuals.recorded_equations import equations_of
 from cspm_ident.diagnosis.residuals.regressors import Candidate, Place
 from cspm_ident.diagnosis.residuals.residual_equation import Equation, in_noise, steady
 from cspm_ident.diagnosis.selection.refinement import needs_refining
@@ -28,6 +26,7 @@ from cspm_ident.diagnosis.selection.search_pass import (
 from cspm_ident.diagnosis.selection.search_result import SearchResult
 from cspm_ident.diagnosis.thresholds import Thresholds
 from cspm_ident.diagnosis.validation.found_model import Data, Model
+from cspm_ident.diagnosis.validation.holdout_residuals import equations_with
 from cspm_ident.diagnosis.validation.instrumental_variables import (
     instruments_of,
     is_proportional,
@@ -101,10 +100,7 @@ class JudgedSearch(NamedTuple):
         """
         first, parts = self.first, self.rows
         if any(needs_refining(each.hypothesis.effect) for each in self.found.findings):
-            exact = [
-                equations_of(as_found(m, model.values), (), thresholds=self.thresholds)
-                for m in data.searched
-            ]
+            exact = [equations_with(m, model.values, self.thresholds) for m in data.searched]
             first, parts = {}, in_noise(data.searched_part(exact), self.last.noise)
         left: dict[Place, list[Equation]] = {}
         for part in steady(parts):

@@ -152,6 +152,8 @@ def bounded(candidate: Candidate, weights: Array, half: Array) -> Array:
         half: half the widths of their 95 % intervals.
     """
     effect = candidate.effect
+    # What nothing excites has neither a weight nor an interval, but for rounding.
+    weights = np.where(half == 0.0, 0.0, weights)
     if effect.signature.coefficients:
         return weights
     absent = np.array([p.absent or 0.0 for p in effect.linear])

@@ -20,6 +20,7 @@ from cspm_ident.diagnosis.thresholds import DEFAULT_THRESHOLDS, Thresholds
 from cspm_ident.freed_memory import give_back
 from cspm_ident.signals.measurement import Measurement
 from cspm_ident.signals.timeline import Timeline
+from cspm_msgs_py.errors import ConvergenceError, InputError, SingularityError
 from cspm_sim.effect_entries import read_actions
 from cspm_sim.effects import Channel, Effect, Elements
 
@@ -48,7 +49,7 @@ def equations_of(
         thresholds: those of residuals.
 
     Raises:
-        InputError: the machine's effects cannot be used.
+        InputError: the machine's effects cannot be used, or its cables cannot bear the tensions.
     """
     give_back()
     measurement = settled(measurement)
@@ -61,9 +62,11 @@ def equations_of(
         drawn = None if measurement.tension else drawn_tension(measurement, known)
         drawn = drawn and drawn.less(assumed)
         reported = measurement if drawn is None else drawn.measurement
-        late = suspension_equations(
-            Timeline(reported), effects, known, knots, drawn=drawn, thresholds=thresholds
-        )
+        given = Timeline(reported), effects, known, knots
+        try:
+            late = suspension_equations(*given, drawn=drawn, thresholds=thresholds)
+        except (ConvergenceError, SingularityError) as err:
+            raise InputError(f"{measurement.path}: {err}") from None
         give_back()
     progress("torque equations of the winches")
     found = drive_equations(measurement, effects, known, knots)

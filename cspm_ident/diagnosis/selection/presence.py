@@ -52,7 +52,7 @@ def spread(models: ModelSet, chosen: Model, own: Hypothesis) -> dict[Candidate, 
     Models of many more parameters are left out: their weights are uncertain for that reason alone.
     """
     near = [each for each in models.members if each.parameters <= chosen.parameters + 1]
-    there = [each.weights for each in near if own in each.hypotheses]
+    there = [chosen.weights, *(each.weights for each in near if own in each.hypotheses)]
     return {
         c: np.max([np.abs(weights[c] - chosen.weights[c]) for weights in there], axis=0)
         for c in own.candidates

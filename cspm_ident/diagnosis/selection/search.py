@@ -199,17 +199,24 @@ class Search:
         if small.has_none:
             return []
         models = model_set(*given, pool, self._is_allowed, self.thresholds, most)
-        model = self._material(models.chosen, chosen)
+        model = self._needed(models.chosen, chosen, len(free))
         return [Choice(model, models, place)] if model.hypotheses else []
 
-    def _material(self, model: Model, chosen: Sequence[Hypothesis]) -> Model:
-        """Return a model without what takes too little of any residual to matter."""
-        together, least = [*chosen, *model.hypotheses], self.thresholds.material_share
-        late = self
+    def _needed(self, model: Model, chosen: Sequence[Hypothesis], looked_at: int) -> Model:
+        """Return a model without what is too small to matter, empty if it may be chance.
+
+        The confidence set compares models, and does not count how many hypotheses were looked at:
+        Wald's test of all regressors does, with Bonferroni's correction.
+        """
+        together, late = [*chosen, *model.hypotheses], self
         for each in together:
             late = late._begun(each)
+        least = self.thresholds.material_share
         kept = [h for h in model.hypotheses if late.finding_of(h, together).share >= least]
-        return model._replace(hypotheses=tuple(kept))
+        own = self.gram.columns_of(c for h in kept for c in h.candidates)
+        chance = late.sums.p_value(self.fits.columns(chosen), own) if kept else 1.0
+        sure = chance < self.thresholds.false_alarm_rate / max(1, looked_at)
+        return model._replace(hypotheses=tuple(kept) if sure else ())
 
     def _begun(self, own: Hypothesis) -> Search:
         """Return the search with a hypothesis acting from its onset on."""

@@ -18,6 +18,7 @@ from cspm_ident.diagnosis.validation.holdout_simulation import LEAD_S
 from cspm_ident.diagnosis.validation.materiality import accuracy_of
 from cspm_ident.diagnosis.validation.remainder import Remainder, independent_noise, remainders_of
 from cspm_ident.signals.measurement import Measurement
+from cspm_msgs_py.errors import InputError
 
 Array = NDArray[np.float64]
 
@@ -143,6 +144,19 @@ def _steady(equations: Sequence[Equation]) -> float | None:
     return rms([equation.steady for equation in equations])
 
 
+def equations_with(
+    measurement: Measurement, weights: Mapping[Candidate, Array], thresholds: Thresholds
+) -> list[Equation]:
+    """Return the residuals of a machine that has the findings, without regressors.
+
+    If no such machine bears what was measured, the findings are ignored.
+    """
+    try:
+        return equations_of(as_found(measurement, weights), (), thresholds=thresholds)
+    except InputError:
+        return equations_of(measurement, (), thresholds=thresholds)
+
+
 def residuals_of(
     measurements: Sequence[tuple[Measurement, float]],
     weights: Mapping[Candidate, Array],
@@ -160,9 +174,7 @@ def residuals_of(
     parts = [
         [
             equation.within(start, np.inf)
-            for equation in equations_of(
-                as_found(m.since(start - LEAD_S), weights), (), thresholds=thresholds
-            )
+            for equation in equations_with(m.since(start - LEAD_S), weights, thresholds)
         ]
         for m, start in measurements
     ]

@@ -100,11 +100,11 @@ MUTATIONS = (
         "tests/cspm_ident/estimation/test_autoregression.py",
     ),
     Mutation(
-        "threshold: chance counts as a function of a signal",
-        "cspm_ident/diagnosis/validation/remainder.py",
-        "return self.share > self.chance",
-        "return self.share > 0.0",
-        "tests/cspm_ident/diagnosis/validation/test_remainder.py",
+        "threshold: chance counts as certain on what was held out",
+        "cspm_ident/diagnosis/validation/holdout_degradation.py",
+        "< -thresholds.certain_sigma * whole.error",
+        "< 0.0 * whole.error",
+        "tests/cspm_ident/diagnosis/validation/test_diagnosis_harm.py",
     ),
     Mutation(
         "threshold: each candidate has all false alarms to itself",

@@ -56,8 +56,8 @@ class Finding:
     """Something that the described machine lacks, or was suspected of.
 
     Attributes:
-        status: `reported`; `tied`, alternatives explain the data as well; `undecided`, the data
-            cannot tell whether it is there; `rejected`, no model has it; `negligible`, it is
+        status: `reported`; `tied`, alternatives explain the data as well; `doubtful`, something
+            unknown is beside it; `rejected`, held-out data do not confirm it; `negligible`, it is
             there, but too small to matter.
         effect: id from the catalogue, or `unknown`.
         elements: the cables or bodies that have it.
@@ -69,7 +69,7 @@ class Finding:
         alternatives: what explains the data as well.
         onset: when it began [s]; None where it was there all the time.
         region: where in the signals it shows; empty where it does everywhere.
-        reason: why it is undecided or rejected; empty where it is neither.
+        reason: why it is rejected; empty where it is not.
     """
 
     status: str
@@ -116,9 +116,9 @@ class Diagnosis:
         )
 
     @property
-    def considered(self) -> tuple[Finding, ...]:
-        """What was considered and is not reported, each with its reason."""
-        return tuple(_without_numbers(each) for each in self.result.considered)
+    def rejected(self) -> tuple[Finding, ...]:
+        """What was suspected and is not confirmed on held-out data."""
+        return tuple(_without_numbers(each) for each in self.result.rejected)
 
     @property
     def negligible(self) -> tuple[Finding, ...]:
@@ -286,4 +286,4 @@ def _finding(entry: Mapping[str, Any], status: Status) -> Finding:
 
 def _without_numbers(found: FoundEffect) -> Finding:
     status, subsystem = found.status.value, found.hypothesis.effect.block.value
-    return Finding(status, found.effect, found.elements, subsystem, reason=found.reason_words)
+    return Finding(status, found.effect, found.elements, subsystem, reason=found.reason_not_kept)

@@ -14,7 +14,7 @@ from pathlib import Path
 
 from bench.performance.thesis_machine import SCENARIOS
 from cspm_ident.diagnosis.diagnose import diagnose
-from cspm_ident.diagnosis.parameter import Parameter, parameters_of
+from cspm_ident.diagnosis.parameter import Parameter
 from cspm_ident.diagnosis.reporting.verdict import verdict_of
 from cspm_ident.signals.measurement import read_measurement
 from cspm_msgs_py.scenario import load_scenario
@@ -119,9 +119,9 @@ def judge(case: PlantedCase, folder: Path) -> tuple[str, str, str]:
     lines = []
     for finding in found.reported:
         for own in finding.coefficients:
-            numbers = ", ".join(map(number_words, parameters_of(own)))
+            numbers = ", ".join(map(number_words, finding.parameters_on(own)))
             lines.append(f"{finding.effect} {own.candidate.element}: {numbers}")
-        lines += [f"or {rival.hypothesis.words}" for rival in finding.alternatives]
+        lines += [f"or {rival.words}" for rival in finding.alternatives]
     lines += [f"unknown, {d.place.element}: {d.signal}" for d, *_ in found.unexplained]
     return verdict_of(found).value, "<br>".join(lines), f"{took:.0f}"
 

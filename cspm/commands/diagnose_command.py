@@ -16,7 +16,6 @@ from cspm.commands.data_look_lines import SEARCHED, SPLIT, print_data_look, prin
 from cspm.commands.progress_shown import shown
 from cspm.diagnosis import diagnose
 from cspm_ident.diagnosis.diagnosis import Diagnosis
-from cspm_ident.diagnosis.finding import Status
 from cspm_ident.diagnosis.reporting.completeness import completeness_sentence
 from cspm_ident.diagnosis.reporting.empirical_statement import stage_errors, stage_names
 from cspm_ident.diagnosis.reporting.finding_statement import statement_of
@@ -25,7 +24,6 @@ from cspm_ident.diagnosis.reporting.statement import (
     drive_of,
     line_statement,
     remainder_statement,
-    simulated_statement,
     tension_statement,
     unit_of,
     unknown_statement,
@@ -155,14 +153,15 @@ def explain_command(name: str) -> None:
     make_console().print(Markdown(effect_section(effects[name])))
 
 
-def _print_named(console: Console, found: Diagnosis, experiments: Sequence[Sequence[str]]) -> None:
+def _print_named(
+    console: Console, found: Diagnosis, experiments: Sequence[Sequence[str]], *, doubtful: bool
+) -> None:
     for finding, own in zip(found.reported, experiments, strict=True):
+        if finding.is_doubtful != doubtful:
+            continue
         say(console, f"• {statement_of(found, finding)}")
         for rival, experiment in zip(finding.alternatives, own, strict=True):
-            say(
-                console,
-                f"  as well explained by {rival.hypothesis.words}; to distinguish: {experiment}",
-            )
+            say(console, f"  as well explained by {rival.words}; to distinguish: {experiment}")
 
 
 def _experiments(found: Diagnosis, data: Mapping[str, Any], folder: Path | None) -> list[list[str]]:
@@ -195,7 +194,7 @@ def print_diagnosis(
         say(console, SENTENCES[verdict])
     experiments = _experiments(found, data, folder)
     _print_cut_short(console, found)
-    _print_named(console, found, experiments)
+    _print_named(console, found, experiments, doubtful=False)
     if complete := completeness_sentence(found):
         say(console, complete)
     for each in found.unexplained:
@@ -206,12 +205,9 @@ def print_diagnosis(
         say(console, f"• {line_statement(line)}")
     for left in found.undescribed[:_MOST_REMAINDERS]:
         say(console, f"• {remainder_statement(left)}")
-    if not (found.reported or found.unexplained or found.lines or found.undescribed):
-        for fit in found.simulated_beyond[:1]:
-            say(console, f"• {simulated_statement(fit)}")
-    for finding in found.considered:
-        known = "cannot tell" if finding.status is Status.UNDECIDED else "rejected"
-        say(console, f"{known}, {finding.hypothesis.words}: {finding.reason_words}")
+    _print_named(console, found, experiments, doubtful=True)
+    for finding in found.rejected:
+        say(console, f"not kept, {finding.hypothesis.words}: {finding.reason_not_kept}")
     for finding in found.negligible:
         say(
             console,
@@ -258,13 +254,13 @@ def _print_fits(console: Console, found: Diagnosis) -> None:
     rows = [
         _Row(
             channel_of(f),
-            (*stage_errors(found, f), f.noise),
+            (*stage_errors(found, f), f.ceiling, f.noise),
             unit_of(f),
             f.is_at_noise(limits) is not False,
         )
         for f in found.fit
     ]
-    headings = (*stages, "noise")
+    headings = (*stages, "black box", "noise")
     _print_table(console, f"residuals of the equations, {judged}", headings, len(stages), rows)
     rows = [
         _Row(

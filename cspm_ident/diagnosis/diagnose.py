@@ -16,8 +16,16 @@ from cspm_ident.diagnosis.empirical.table_holdout import (
     simulated_tables,
     with_tables,
 )
-from cspm_ident.diagnosis.finding import Finding, Shape, Status, Unexplained
+from cspm_ident.diagnosis.finding import (
+    Finding,
+    HoldOut,
+    Shape,
+    Status,
+    Unexplained,
+    reported_status,
+)
 from cspm_ident.diagnosis.judged_search import JudgedSearch, searched_and_judged
+from cspm_ident.diagnosis.one_number import with_one_number
 from cspm_ident.diagnosis.residuals.aliased_tension import chatters_of
 from cspm_ident.diagnosis.residuals.data_split import first_part, whole_part
 from cspm_ident.diagnosis.residuals.free_shapes import Knots
@@ -34,9 +42,10 @@ from cspm_ident.diagnosis.selection.search_pass import (
     hums_of,
 )
 from cspm_ident.diagnosis.thresholds import DEFAULT_THRESHOLDS, Thresholds
+from cspm_ident.diagnosis.validation.acceptance import Acceptance, with_rivals
 from cspm_ident.diagnosis.validation.detection_limits import detection_limits
 from cspm_ident.diagnosis.validation.found_model import Data, Model, modelled
-from cspm_ident.diagnosis.validation.holdout_residuals import HeldOut, judged
+from cspm_ident.diagnosis.validation.holdout_residuals import HeldOut, free_functions, judged
 from cspm_ident.diagnosis.validation.holdout_simulation import (
     SimulatedFit,
     baselines_of,
@@ -46,6 +55,7 @@ from cspm_ident.diagnosis.validation.remainder import (
     is_immaterial,
 )
 from cspm_ident.diagnosis.validation.residual_curves import held_out_curves
+from cspm_ident.diagnosis.validation.rest import concerned, rest_share
 from cspm_ident.signals.measurement import Measurement
 from cspm_sim.effects import Effect, catalogue
 
@@ -78,11 +88,10 @@ def diagnose(
     own = searched_and_judged(recordings, effects, progress, thresholds)
     progress("parameters, and simulation of held-out data")
     data = _data(own)
-    model = modelled(own.search, own.found.findings, data)
-    while gone := model.rejected:
-        own = own.without(gone)
-        model = modelled(own.search, own.found.findings, data)
-    return _diagnosis(own, model, data, effects)
+    acceptance, model = _useful(own, data)
+    own = own._replace(acceptance=acceptance)
+    acceptance, model = with_one_number(own, model, data) or (acceptance, model)
+    return _diagnosis(own._replace(acceptance=acceptance), model, data, effects)
 
 
 def _data(own: JudgedSearch) -> Data:
@@ -95,9 +104,9 @@ def _data(own: JudgedSearch) -> Data:
 
 def _diagnosis(own: JudgedSearch, model: Model, data: Data, effects: Sequence[Effect]) -> Diagnosis:
     """Return what is reported of a judged search and the model of its kept findings."""
-    recordings, search = own.recordings, own.search
+    recordings, search, acceptance = own.recordings, own.search, own.acceptance
     left = own.searched_left(data, model)
-    unexplained = own.beyond_noise(own.found.unexplained, left)
+    unexplained = own.beyond_noise(acceptance.unexplained(search, own.found), left)
     lines = _aliased_lines(recordings, own.thresholds)
     first, fit, limits = own.first, _fit(own, model, left), own.thresholds
     open_places = {e.driver.place for e in unexplained} | _not_at_noise(fit, limits)
@@ -105,8 +114,8 @@ def _diagnosis(own: JudgedSearch, model: Model, data: Data, effects: Sequence[Ef
     return Diagnosis(
         searched=recordings.searched,
         held_out=recordings.held_out,
-        findings=_findings(own, model),
-        unexplained=_with_shapes(search, own.found.findings, own.last.knots, unexplained),
+        findings=_findings(own, model, unexplained, lines, fit),
+        unexplained=_with_shapes(search, acceptance.tested, own.last.knots, unexplained),
         tested=own.found.tested,
         tables=tables,
         fit=_with_tables(own, model, tables, fit),
@@ -115,7 +124,7 @@ def _diagnosis(own: JudgedSearch, model: Model, data: Data, effects: Sequence[Ef
             *lines,
             *(line for line in _lasting(own, model) if _matters(line, fit, own.thresholds)),
         ),
-        limits=detection_limits(search, own.found.findings),
+        limits=detection_limits(search, acceptance.kept),
         not_excited=_not_excited(search, effects),
         places=tuple(place.place for place in search.gram.places),
         curves=held_out_curves(steady(own.last.judge_parts), first),
@@ -130,16 +139,33 @@ def _aliased_lines(recordings: Recordings, thresholds: Thresholds) -> tuple[Line
     return tuple(line for each in every for line in chatters_of(each, thresholds))
 
 
-def _findings(own: JudgedSearch, model: Model) -> tuple[Finding, ...]:
-    """Return all findings: those of the model with status and region, then the rejected ones."""
+def _findings(
+    own: JudgedSearch,
+    model: Model,
+    unexplained: Sequence[Unexplained],
+    lines: Sequence[Line],
+    fit: Sequence[HeldOut],
+) -> tuple[Finding, ...]:
+    """Return all findings: reported with status and region, negligible, and rejected.
+
+    Args:
+        own: the judged search.
+        model: of the findings that are kept.
+        unexplained: residuals that these leave unexplained.
+        lines: of aliased tensions.
+        fit: held-out residuals with and without the model.
+    """
+    aliased = {line.place.element for line in lines}
 
     def described(finding: Finding) -> Finding:
+        left = rest_share(concerned(fit, finding), own.thresholds)
+        status = reported_status(finding, unexplained, aliased, own.thresholds, left)
         region = region_of(own.rows, finding.hypothesis.candidates, own.first, own.thresholds)
-        tied = finding.alternatives and finding.status is Status.REPORTED
-        return replace(finding, status=Status.TIED if tied else finding.status, region=region)
+        return replace(finding, status=status, region=region)
 
-    ranked = sorted(model.findings, key=lambda each: (not each.is_reported, -each.gain.total))
-    return (*map(described, ranked), *own.rejected)
+    reported = map(described, _reported(own.search, own.acceptance, model))
+    negligible = (each for each in model.findings if each.status is Status.NEGLIGIBLE)
+    return (*reported, *negligible, *own.acceptance.rejected, *own.acceptance.fed_back)
 
 
 def _tables(
@@ -162,7 +188,8 @@ def _fit(
     own: JudgedSearch, model: Model, left: Mapping[Place, Sequence[Equation]]
 ) -> tuple[HeldOut, ...]:
     """Return how large the held-out residuals are with and without the model."""
-    given = own.retuned, model.values, own.last.noise, left
+    free = free_functions(own.search.gram, own.judge)
+    given = own.retuned, model.values, own.last.noise, free, left
     return judged(own.judges, own.starts, *given, own.thresholds)
 
 
@@ -189,6 +216,32 @@ def _simulated(
     if not tables:
         return model.simulated
     return with_tables_simulated(model.simulated, data.baselines, {**model.values, **tables})
+
+
+def _useful(own: JudgedSearch, data: Data) -> tuple[Acceptance, Model]:
+    """Return the acceptance and the model after rejecting findings until none is useless.
+
+    A rival takes the place of a rejected finding where one passes the hold-out test.
+    """
+    search, acceptance = own.search, own.acceptance
+    model = modelled(search, acceptance.kept, data)
+    while gone := model.useless:
+        acceptance = with_rivals(search, own.judge, acceptance.rejecting(gone), gone)
+        model = modelled(search, acceptance.kept, data)
+    return acceptance, model
+
+
+def _reported(search: Search, acceptance: Acceptance, model: Model) -> list[Finding]:
+    """Return the reported findings, the largest gain first.
+
+    Findings on which the hold-out test is silent come last. Gains and alternatives are those beside
+    the accepted findings.
+    """
+    hypotheses = [each.hypothesis for each in acceptance.kept]
+    found = [each for each in model.findings if each.status is not Status.NEGLIGIBLE]
+    if acceptance.has_rejected:
+        found = [search.judged_again(each, hypotheses) for each in found]
+    return sorted(found, key=lambda each: (each.holdout is HoldOut.SILENT, -each.gain.total))
 
 
 def _matters(line: Line, fit: Sequence[HeldOut], thresholds: Thresholds) -> bool:

@@ -8,7 +8,6 @@ from dataclasses import dataclass, field
 import numpy as np
 from numpy.typing import NDArray
 
-from cspm_ident.block_simulation import Input
 from cspm_ident.diagnosis.finding import Finding, Status, Unexplained
 from cspm_ident.diagnosis.residuals.regressors import Candidate, Place
 from cspm_ident.diagnosis.residuals.spectral_lines import Line
@@ -79,24 +78,13 @@ class Diagnosis:
         return tuple(each for each in self.beyond_noise if each.place not in described)
 
     @property
-    def simulated_beyond(self) -> tuple[SimulatedFit, ...]:
-        """Simulations of cables and bar far from what was measured, the farthest first.
-
-        Those of winches integrate torques twice, and leave their noise in any machine.
-        """
-        far = self.thresholds.driven_noise_ratio
-        own = (e for e in self.simulated if e.output.drive is not Input.SHAFT)
-        beyond = (e for e in own if e.final > far * e.floor > 0.0)
-        return tuple(sorted(beyond, key=lambda each: -each.final / each.floor))
-
-    @property
     def is_excited(self) -> bool:
         """Whether any residual is known well enough, and moves enough, to judge the model by it."""
         return any(each.is_excited(self.thresholds) for each in self.remainders)
 
     @property
     def reported(self) -> tuple[Finding, ...]:
-        """Findings in the report, tied ones included, the most important first."""
+        """Findings in the report, tied and doubtful ones included, the most important first."""
         return tuple(each for each in self.findings if each.is_reported)
 
     @property
@@ -105,6 +93,6 @@ class Diagnosis:
         return tuple(each for each in self.findings if each.status is Status.NEGLIGIBLE)
 
     @property
-    def considered(self) -> tuple[Finding, ...]:
-        """Findings that are undecided or rejected, each with its reason."""
-        return tuple(each for each in self.findings if each.reason is not None)
+    def rejected(self) -> tuple[Finding, ...]:
+        """Findings that are not in the model."""
+        return tuple(each for each in self.findings if each.status is Status.REJECTED)

@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
-from dataclasses import dataclass, field, replace
+from collections.abc import Collection, Sequence
+from dataclasses import dataclass, field
 from enum import Enum
 from typing import NamedTuple
 
@@ -12,37 +12,56 @@ from numpy.typing import NDArray
 
 from cspm_ident.diagnosis.parameter import Coefficients, Parameter, parameters_of
 from cspm_ident.diagnosis.regression.block_regression import Gain
-from cspm_ident.diagnosis.regression.hypothesis import Hypothesis, Rival
+from cspm_ident.diagnosis.regression.hypothesis import (
+    Hypothesis,
+    Rival,
+    is_constant,
+    may_be_none,
+)
 from cspm_ident.diagnosis.residuals.free_shapes import Driver
-from cspm_ident.diagnosis.residuals.regressors import Candidate
+from cspm_ident.diagnosis.thresholds import DEFAULT_THRESHOLDS, Thresholds
 
 Array = NDArray[np.float64]
+
+# Elements whose equations contain every tension.
+_FED_BY_ALL = frozenset({"bar", "winch_frame"})
 
 
 class Status(Enum):
     """The status of a finding.
 
-    Reported and tied ones are in the report: a tied one has alternatives that explain the data
-    equally well. An undecided one is fitted beside them, but the data cannot tell whether it is
-    there. A negligible one is no larger than in a healthy machine. A rejected one is in no model.
+    Reported, tied and doubtful ones are in the report: a tied one has alternatives that explain the
+    data equally well, and a doubtful one has large unexplained residuals beside it. A negligible
+    one is in the model, but no larger than in a healthy machine. A rejected one is in neither.
     """
 
     REPORTED = "reported"
     TIED = "tied"
-    UNDECIDED = "undecided"
+    DOUBTFUL = "doubtful"
     NEGLIGIBLE = "negligible"
     REJECTED = "rejected"
 
 
-class Reason(Enum):
-    """Why a finding is undecided or rejected."""
+class Rejection(Enum):
+    """The reason for the rejection of a finding."""
 
-    MISSED = "models without it predict as well"
-    INSIGNIFICANT = "all its 95 % intervals contain zero"
-    NOT_CONFIRMED = "lowers no held-out residual beyond its scatter"
+    HOLDOUT_TEST = "does not lower the residuals of held-out data"
+    NOT_TESTABLE = "held-out data cannot test it, and no unexplained residual is as large"
     FED_BACK = "is noise that controllers feed back"
     IMPOSSIBLE = "has parameters that no such machine has"
-    RAISES_HOLDOUT = "raises a held-out residual"
+    INSIGNIFICANT = "has only parameters whose 95 % intervals contain zero"
+    DEGRADES_HOLDOUT = "raises the residuals of held-out data"
+    NO_IMPROVEMENT = "lowers the error of no simulation of held-out data"
+
+
+class HoldOut(Enum):
+    """The result of the hold-out test of a finding."""
+
+    NOT_TESTED = "not tested"
+    CONFIRMED = "lowers a residual"
+    DOMINANT = "takes more than half of a squared residual"
+    FAINT = "moves too little for a single residual, and lowers all together as predicted"
+    SILENT = "moves too little to say anything"
 
 
 class Onset(NamedTuple):
@@ -123,9 +142,9 @@ class Finding:
         gain: in hold-out blocks, beside all other selected hypotheses.
         share: largest share of a residual's squares that it explains.
         alternatives: hypotheses that explain the same equally well.
-        spread: how far its weights lie apart in models that predict as well, by candidate.
         status: see `Status`.
-        reason: why it is undecided or rejected; None if it is neither.
+        rejection: the reason for its rejection; None if it is not rejected.
+        holdout: result of the hold-out test.
         coefficients: as fitted, one entry per element.
         onset: when it began; None where it acts all the time or began between recordings.
         region: range of a signal that holds most of its gain; None where no range does.
@@ -137,8 +156,8 @@ class Finding:
     share: float
     alternatives: tuple[Rival, ...] = ()
     status: Status = Status.REPORTED
-    reason: Reason | None = None
-    spread: Mapping[Candidate, Array] = field(default_factory=dict, compare=False)
+    rejection: Rejection | None = None
+    holdout: HoldOut = HoldOut.NOT_TESTED
     coefficients: tuple[Coefficients, ...] = field(default=(), compare=False)
     onset: Onset | None = None
     region: Region | None = None
@@ -156,23 +175,84 @@ class Finding:
 
     @property
     def is_reported(self) -> bool:
-        """Whether it is in the report; tied findings are."""
-        return self.status in (Status.REPORTED, Status.TIED)
+        """Whether it is in the report; tied and doubtful findings are."""
+        return self.status in (Status.REPORTED, Status.TIED, Status.DOUBTFUL)
 
     @property
-    def reason_words(self) -> str:
-        """Why it is undecided or rejected, in words; empty if it is neither."""
-        return "" if self.reason is None else self.reason.value
+    def is_doubtful(self) -> bool:
+        """Whether large unexplained residuals beside it make it doubtful."""
+        return self.status is Status.DOUBTFUL
+
+    @property
+    def is_faint(self) -> bool:
+        """Whether it moves held-out data too little for the hold-out test of a single residual."""
+        return self.holdout in (HoldOut.FAINT, HoldOut.SILENT)
+
+    @property
+    def reason_not_kept(self) -> str:
+        """Why it was rejected, in words; empty if it was not."""
+        return "" if self.rejection is None else self.rejection.value
 
     @property
     def parameters(self) -> tuple[Parameter, ...]:
         """All parameters, element by element."""
-        return tuple(p for own in self.coefficients for p in parameters_of(own))
+        return tuple(p for own in self.coefficients for p in self.parameters_on(own))
 
-    def undecided(self, reason: Reason) -> Finding:
-        """Return the finding as one of which the data cannot tell whether it is there."""
-        return replace(self, status=Status.UNDECIDED, reason=reason)
+    def parameters_on(self, own: Coefficients) -> list[Parameter]:
+        """Return the parameters on the element of the coefficients `own`."""
+        return parameters_of(own, doubtful=self.is_doubtful)
 
-    def rejected(self, reason: Reason) -> Finding:
-        """Return the finding, rejected."""
-        return replace(self, status=Status.REJECTED, reason=reason)
+
+def reported_status(
+    finding: Finding,
+    unexplained: Sequence[Unexplained],
+    aliased: Collection[str] = (),
+    thresholds: Thresholds = DEFAULT_THRESHOLDS,
+    left: float = 0.0,
+) -> Status:
+    """Return the status of a finding that is reported; see `is_doubtful`.
+
+    It is doubtful as well where the intervals of all its coefficients contain zero. They include
+    the model-form error, which is then as large as the effect.
+    """
+    intervals = {c.candidate: (c.values, c.half_widths) for c in finding.coefficients}
+    drifts = finding.hypothesis.effect.physics.sense is not None
+    if may_be_none(intervals) and not (drifts or finding.hypothesis.effect.signature.saturates):
+        return Status.DOUBTFUL
+    if is_doubtful(finding, unexplained, aliased, thresholds, left):
+        return Status.DOUBTFUL
+    return Status.TIED if finding.alternatives else Status.REPORTED
+
+
+def is_doubtful(
+    finding: Finding,
+    unexplained: Sequence[Unexplained],
+    aliased: Collection[str] = (),
+    thresholds: Thresholds = DEFAULT_THRESHOLDS,
+    left: float = 0.0,
+) -> bool:
+    """Return whether unexplained residuals are large relative to the gain of a finding.
+
+    An unexplained function of a signal does not make a constant doubtful, unless it gains
+    more than the constant. An unexplained function of time does, as the constant may have drifted.
+
+    Args:
+        finding: the finding to judge.
+        unexplained: residuals that no effect explains.
+        aliased: cables with aliased tension, which alternates from one reading to the next. Any
+            finding that depends on these is doubtful.
+        thresholds: `minor_share`.
+        left: what all findings leave of its held-out residuals beyond the noise, as a share of
+            what they take; see `rest_share`.
+    """
+    misread = {*aliased, *_FED_BY_ALL} if aliased else set()
+    if misread & set(finding.elements):
+        return True
+    gained, constant = finding.gain.total, is_constant(finding.hypothesis.effect)
+    share = thresholds.minor_share
+    if left > (1.0 if constant else share):
+        return True
+    return any(
+        each.gain.total > gained * (1.0 if constant and not each.driver.of_time else share)
+        for each in unexplained
+    )

@@ -8,10 +8,14 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from cspm_ident.diagnosis.finding import Finding, Reason, Unexplained
-from cspm_ident.diagnosis.regression.hypothesis import Hypothesis
+from cspm_ident.diagnosis.finding import (
+    Unexplained,
+)
+from cspm_ident.diagnosis.regression.block_gram import BlockGram, gather
+from cspm_ident.diagnosis.residuals.corrected_measurement import as_found
 from cspm_ident.diagnosis.residuals.data_split import span_of
 from cspm_ident.diagnosis.residuals.free_shapes import Driver
+from cspm_ident.diagnosis.residuals.recorded_equations import equations_of
 from cspm_ident.diagnosis.residuals.regressors import Candidate, Place
 from cspm_ident.diagnosis.residuals.residual_equation import Equation, in_noise, steady
 from cspm_ident.diagnosis.selection.refinement import needs_refining
@@ -25,19 +29,15 @@ from cspm_ident.diagnosis.selection.search_pass import (
 )
 from cspm_ident.diagnosis.selection.search_result import SearchResult
 from cspm_ident.diagnosis.thresholds import Thresholds
+from cspm_ident.diagnosis.validation.acceptance import Acceptance, accepted
 from cspm_ident.diagnosis.validation.found_model import Data, Model
-from cspm_ident.diagnosis.validation.holdout_residuals import equations_with
-from cspm_ident.diagnosis.validation.instrumental_variables import (
-    instruments_of,
-    is_proportional,
-    shows_in_reference_motion,
-)
 from cspm_ident.diagnosis.validation.materiality import accuracy_of
 from cspm_ident.diagnosis.validation.remainder import (
     independent_noise,
     remainders_of,
 )
 from cspm_ident.diagnosis.validation.reversals import with_wider
+from cspm_ident.freed_memory import give_back
 from cspm_ident.signals.measurement import Measurement
 from cspm_sim.effects import Effect
 
@@ -45,14 +45,15 @@ Array = NDArray[np.float64]
 
 
 class JudgedSearch(NamedTuple):
-    """A search whose findings are held against held-out data.
+    """A search whose findings were held against held-out data.
 
     Attributes:
         recordings: those searched and those held out.
         thresholds: of the diagnosis.
-        last: the last search pass.
+        last: the last search pass, with the columns of findings and alternatives only.
         found: its result.
-        rejected: findings that were found before, and rejected.
+        acceptance: the findings after the hold-out test.
+        judge: Gram matrices of held-out residuals.
         rows: equations of the searched data, in units of their noise.
         retuned: weights of the test-bed file's own parameters, without any added effect.
     """
@@ -61,7 +62,8 @@ class JudgedSearch(NamedTuple):
     thresholds: Thresholds
     last: SearchPass
     found: SearchResult
-    rejected: tuple[Finding, ...]
+    acceptance: Acceptance
+    judge: BlockGram
     rows: Parts
     retuned: Mapping[Candidate, Array]
 
@@ -82,16 +84,8 @@ class JudgedSearch(NamedTuple):
 
     @property
     def first(self) -> dict[Candidate, Array]:
-        """The weights of the findings in the search."""
-        return self.search.fits.values(self.hypotheses)
-
-    def without(self, rejected: Sequence[Finding]) -> JudgedSearch:
-        """Return the search repeated without hypotheses that were rejected."""
-        gone = (*self.rejected, *rejected)
-        search = self.search.without([each.hypothesis for each in gone])
-        last = self.last._replace(search=search)
-        found = with_wider(search.run(), self.rows, last.block, self.thresholds)
-        return self._replace(last=last, found=found, rejected=gone)
+        """The weights of the kept findings in the search."""
+        return self.search.fits.values([each.hypothesis for each in self.acceptance.kept])
 
     def searched_left(self, data: Data, model: Model) -> dict[Place, list[Equation]]:
         """Return what a model leaves of the searched data, without reversals, by residual.
@@ -99,36 +93,17 @@ class JudgedSearch(NamedTuple):
         Columns of first order serve where no parameter was refined.
         """
         first, parts = self.first, self.rows
-        if any(needs_refining(each.hypothesis.effect) for each in self.found.findings):
-            exact = [equations_with(m, model.values, self.thresholds) for m in data.searched]
+        if any(needs_refining(each.hypothesis.effect) for each in self.acceptance.kept):
+            exact = [
+                equations_of(as_found(m, model.values), (), thresholds=self.thresholds)
+                for m in data.searched
+            ]
             first, parts = {}, in_noise(data.searched_part(exact), self.last.noise)
         left: dict[Place, list[Equation]] = {}
         for part in steady(parts):
             for each in part:
                 left.setdefault(each.place, []).append(each.less(first))
         return left
-
-    @property
-    def fed_back(self) -> list[Finding]:
-        """Findings in proportion to motion or tension that the reference motion does not show."""
-        limits, values = self.thresholds, self.first
-        wanted = [instruments_of(each, limits) for each in self.recordings.searched]
-        given = self.rows, wanted
-        return [
-            each.rejected(Reason.FED_BACK)
-            for each in self.found.findings
-            if is_proportional(each.hypothesis.effect)
-            and not each.hypothesis.onset
-            and not self.search.fits.is_negligible(each.hypothesis, self.hypotheses)
-            and not shows_in_reference_motion(
-                *given, each.hypothesis.candidates, values, self.last.block, limits
-            )
-        ]
-
-    @property
-    def hypotheses(self) -> list[Hypothesis]:
-        """Those of the findings."""
-        return [each.hypothesis for each in self.found.findings]
 
     def beyond_noise(
         self, unexplained: Sequence[Unexplained], left: Mapping[Place, Sequence[Equation]]
@@ -163,12 +138,38 @@ def searched_and_judged(
     progress: Progress,
     thresholds: Thresholds,
 ) -> JudgedSearch:
-    """Search recordings, with findings that controllers feed back from noise rejected."""
+    """Search recordings, and hold what is found against held-out data."""
     last, found = searched_for(recordings, effects, progress, thresholds)
-    rows = in_noise(last.search_parts, last.noise)
-    found = with_wider(found, rows, last.block, thresholds)
-    retuned = last.search.without([]).retuned()
-    own = JudgedSearch(recordings, thresholds, last, found, (), rows, retuned)
-    while fed_back := own.fed_back:
-        own = own.without(fed_back)
-    return own
+    found = with_wider(found, in_noise(last.search_parts, last.noise), last.block, thresholds)
+    progress("held-out data")
+    judge = _judge(in_noise(last.judge_parts, last.noise), found, last.block)
+    # Columns take most of the memory, so those of what was not found are freed.
+    last = last._replace(
+        search_parts=_found_only(last.search_parts, found),
+        judge_parts=_found_only(last.judge_parts, found),
+    )
+    give_back()
+    search, rows = last.search, in_noise(last.search_parts, last.noise)
+    acceptance = accepted(search, found, judge, recordings.searched, rows, last.block)
+    retuned = search.retuned()
+    return JudgedSearch(recordings, thresholds, last, found, acceptance, judge, rows, retuned)
+
+
+def _judge(parts: Parts, found: SearchResult, block: float) -> BlockGram:
+    """Return Gram matrices of held-out residuals, findings, alternatives and free functions."""
+    terms = _candidates(found) | {
+        t for part in parts for e in part for t in e.columns if isinstance(t, Driver)
+    }
+    return gather([[e.only(terms) for e in part] for part in parts], block)
+
+
+def _candidates(found: SearchResult) -> set[Candidate | Driver]:
+    own = [each.hypothesis.candidates for each in found.findings]
+    rivals = [rival.candidates for each in found.findings for rival in each.alternatives]
+    return {candidate for each in (*own, *rivals) for candidate in each}
+
+
+def _found_only(parts: Parts, found: SearchResult) -> Parts:
+    """Return equations with the columns of findings and alternatives only, to free memory."""
+    terms = _candidates(found)
+    return [[equation.only(terms) for equation in part] for part in parts]

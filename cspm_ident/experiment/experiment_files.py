@@ -89,5 +89,5 @@ def _ties(found: Diagnosis, data: dict[str, Any]) -> Iterator[tuple[dict[str, An
     for finding, reported in zip(found.reported, named_in(data), strict=True):
         truth = {own.candidate: own.values for own in finding.coefficients}
         for rival, entry in zip(finding.alternatives, reported["alternatives"], strict=True):
-            title = f"Distinguishes {finding.hypothesis.words} from {rival.hypothesis.words}"
-            yield entry, Question(truth, rival.hypothesis.candidates), title
+            title = f"Distinguishes {finding.hypothesis.words} from {rival.words}"
+            yield entry, Question(truth, rival.candidates), title

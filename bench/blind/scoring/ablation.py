@@ -19,6 +19,8 @@ from bench.blind.white_regression import WhiteSums
 from cspm_ident.block_simulation import BlockSimulation, Input
 from cspm_ident.diagnosis.diagnose import diagnose
 from cspm_ident.diagnosis.diagnosis import Diagnosis
+from cspm_ident.diagnosis.finding import Finding
+from cspm_ident.diagnosis.validation.found_model import Model
 from cspm_ident.signals.measurement import Measurement
 from cspm_ident.signals.samples import Samples
 from cspm_ident.signals.timeline import Timeline
@@ -53,8 +55,9 @@ class Ablation(NamedTuple):
             yield
 
 
-def _unjudged(*_: object) -> None:
-    """Return that held-out data do not contradict a finding."""
+def _untested(_: object, __: object, found: Sequence[Finding]) -> tuple[Finding, ...]:
+    """Return findings that no held-out data have rejected."""
+    return tuple(found)
 
 
 def _without_corrections() -> list[Effect]:
@@ -103,7 +106,8 @@ ABLATIONS: Mapping[str, Ablation] = {
     # All findings are kept that a machine may have, whatever held-out data show.
     "held-out": Ablation(
         replaced={
-            "validation.found_model.objection": _unjudged,
+            "validation.acceptance.holdout_tested": _untested,
+            "validation.found_model.Model.useless": Model.untenable,
         }
     ),
 }

@@ -182,6 +182,11 @@ class BlockRegression:
         return len(self._grams[0])
 
     @property
+    def lengths(self) -> Array:
+        """Length of each column, (width,); 1 where it is zero."""
+        return np.asarray(self._lengths)
+
+    @property
     def squares(self) -> float:
         """Σ y²."""
         return float(self._whole.diagonal()[-1])
@@ -190,6 +195,15 @@ class BlockRegression:
     def excited(self) -> NDArray[np.bool_]:
         """Whether each column is non-zero anywhere, (width,)."""
         return np.asarray((self._whole.diagonal() - self._prior)[:-1] > 0.0)
+
+    def freedom(self, columns: Index) -> float:
+        """Return how many weights the data determine, rather than what is known of them before.
+
+        The effective number of parameters of a ridge regression (Hastie, Tibshirani, Friedman, The
+        Elements of Statistical Learning, 2nd ed., 2009, eq. 3.50).
+        """
+        inverse = pseudo_inverse(self._whole.at(columns, columns))
+        return float(len(columns) - np.diag(inverse) @ self._prior[columns])
 
     def weights(self, columns: Index) -> Array:
         """Return the least-squares weights of columns."""
@@ -336,6 +350,18 @@ class BlockRegression:
         """Return Σ residual² after a fit of columns."""
         weights = self._weights(columns)
         return float(self.squares - self._whole.last(columns) @ weights)
+
+    def spanned(self, base: Index, wide: Index, narrow: Index) -> Array:
+        """Return the share of each narrow column, beyond a base, that wide columns span."""
+        both = np.concatenate([base, wide])
+
+        def left(by: Index) -> Array:
+            inverse = pseudo_inverse(self._whole.at(by, by))
+            cross = self._whole.at(by, narrow)
+            spanned = np.einsum("ij,ik,kj->j", cross, inverse, cross)
+            return np.asarray(self._whole.diagonal()[narrow] - spanned)
+
+        return np.asarray(1.0 - left(both) / np.maximum(left(base), RANK))
 
     def left_from(self, base: Index, columns: Index) -> Array:
         """Return Σ residual² where `columns` act only from each block on, shape (blocks,)."""

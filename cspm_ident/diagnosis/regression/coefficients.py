@@ -6,6 +6,7 @@ from collections.abc import Collection, Sequence
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.stats import norm
 
 from cspm_ident.diagnosis.regression.block_gram import BlockGram
 from cspm_ident.diagnosis.regression.block_regression import BlockRegression
@@ -13,6 +14,8 @@ from cspm_ident.diagnosis.residuals.regressors import Candidate
 
 Array = NDArray[np.float64]
 Index = NDArray[np.intp]
+# Probability on either side of a 95 % interval.
+_OUTSIDE = 0.025
 # By candidate: weights of its columns, and half the widths of their 95 % intervals.
 Weights = dict[Candidate, tuple[Array, Array]]
 
@@ -53,6 +56,14 @@ def weights_of(
     values = gram.parted(candidates, free[number])
     widths = gram.parted(candidates, sums.half_width(beside, own)[number])
     return {c: (values[c], widths[c]) for c in candidates}
+
+
+def at_once(weights: Weights) -> Weights:
+    """Return weights with 95 % intervals for all candidates jointly (Bonferroni)."""
+    if not weights:
+        return weights
+    wider = float(norm.isf(_OUTSIDE / len(weights)) / norm.isf(_OUTSIDE))
+    return {c: (own, wider * half) for c, (own, half) in weights.items()}
 
 
 def _numbers(gram: BlockGram, candidates: Sequence[Candidate], common: Collection[str]) -> Index:

@@ -58,12 +58,26 @@ class Rival(NamedTuple):
 
     Attributes:
         hypothesis: the alternative.
-        behind: standard errors by which a model with it predicts worse; 0 where it is as good or
-            better.
+        behind: standard deviations of a normal by which it is worse over hold-out blocks. Its
+            additional parameters are counted; 0 where it is as good or better.
+        beside: a wrong parameter of the file that masks a part of it; None where there is none.
     """
 
     hypothesis: Hypothesis
     behind: float
+    beside: Hypothesis | None = None
+
+    @property
+    def candidates(self) -> tuple[Candidate, ...]:
+        """All candidates it assumes, those of the wrong parameter included."""
+        beside = () if self.beside is None else self.beside.candidates
+        return (*self.hypothesis.candidates, *beside)
+
+    @property
+    def words(self) -> str:
+        """Effects and elements, as readable text."""
+        beside = "" if self.beside is None else f" beside a wrong {self.beside.effect.id}"
+        return f"{self.hypothesis.words}{beside}"
 
 
 def is_constant(effect: Effect) -> bool:
@@ -73,6 +87,15 @@ def is_constant(effect: Effect) -> bool:
     with np.errstate(all="ignore"):
         columns = effect.regressors(signals, **shape)
     return bool(np.array_equal(columns[:-1], columns[1:]) and columns.any())
+
+
+def is_exact(effect: Effect) -> bool:
+    """Return whether an effect has no model-form error in its time course.
+
+    True for a correction of a parameter or a reading, except for timing corrections. Also true for
+    a constant, whose model-form error would be a function of time.
+    """
+    return (effect.is_correction and not is_timing(effect)) or is_constant(effect)
 
 
 def is_negligible(members: Mapping[Candidate, Array]) -> bool:
@@ -152,8 +175,6 @@ def bounded(candidate: Candidate, weights: Array, half: Array) -> Array:
         half: half the widths of their 95 % intervals.
     """
     effect = candidate.effect
-    # What nothing excites has neither a weight nor an interval, but for rounding.
-    weights = np.where(half == 0.0, 0.0, weights)
     if effect.signature.coefficients:
         return weights
     absent = np.array([p.absent or 0.0 for p in effect.linear])
@@ -181,6 +202,12 @@ def factors_of(effect: Effect) -> NDArray[np.bool_]:
     """Return which weights of a correction are factors, less 1: of the file or of a reading."""
     usual = effect.is_correction and not effect.signature.coefficients
     return np.array([usual and parameter.absent == 1.0 for parameter in effect.linear])
+
+
+def is_tied(candidate: Candidate, weights: Array, half: Array) -> bool:
+    """Return whether dependent weights agree, within their intervals, with a set of parameters."""
+    values = candidate.effect.values(weights.tolist(), **candidate.nonlinear)
+    return bool(np.all(np.abs(candidate.effect.weights(values) - weights) <= half))
 
 
 def joined(chosen: Sequence[Hypothesis], found: Hypothesis) -> list[Hypothesis]:
@@ -234,6 +261,45 @@ def is_number(hypothesis: Hypothesis) -> bool:
     return hypothesis.effect.physics.alter is not None
 
 
+def is_wider(one: Hypothesis, other: Hypothesis) -> bool:
+    """Return whether one hypothesis assumes more faults than the other, whatever the effects."""
+    return one.causes > other.causes
+
+
+def boldness(
+    one: Hypothesis, other: Hypothesis | None = None, thresholds: Thresholds = DEFAULT_THRESHOLDS
+) -> float:
+    """Return the standard errors by which one must explain more than another, or than nothing.
+
+    Non-zero for an onset, which is selected among many, and for an unlikely element scope, where
+    the other has none. Common parameters on all elements are unlikely unless one system reads them.
+    If one does, separate parameters are unlikely.
+    """
+    if one.onset and (other is None or not other.onset):
+        return thresholds.certain_sigma
+    if other is None:
+        return 0.0
+    unlikely = one.common != other.common and one.common is not has_one_system(one.effect)
+    return thresholds.tie_sigma if unlikely else 0.0
+
+
+def unusual(weights: Mapping[Candidate, Array], hypothesis: Hypothesis) -> float:
+    """Return the largest error of a parameter of the file, in units of its usual error.
+
+    At least 1: of errors that are usual, the smaller is no likelier. 1 where no usual error is
+    given.
+    """
+    found = [1.0]
+    for candidate in hypothesis.candidates:
+        values = candidate.effect.values(weights[candidate].tolist(), **candidate.nonlinear)
+        found += [
+            abs(values[p.name] - (p.absent or 0.0)) / p.usual
+            for p in candidate.effect.parameters
+            if p.usual is not None
+        ]
+    return max(found)
+
+
 def is_timing(effect: Effect) -> bool:
     """Return whether an effect makes readings older than their stamps."""
     return effect.physics.sense is not None and effect.physics.sense.lateness is not None
@@ -251,32 +317,20 @@ def is_early(weights: Mapping[Candidate, Array], hypothesis: Hypothesis) -> bool
     return min(sense.lateness(0.0, each) for each in own.values()) < 0.0 and not is_negligible(own)
 
 
+def is_spread(
+    one: Hypothesis, whole: Hypothesis, thresholds: Thresholds = DEFAULT_THRESHOLDS
+) -> bool:
+    """Return whether one has the same effect on at least half of more than two elements.
+
+    Then one cause on all elements is as likely as separate faults on those alone.
+    """
+    same = one.effect.id == whole.effect.id and one.candidates[0].shape == whole.candidates[0].shape
+    elements = len(whole.elements)
+    least = thresholds.majority_share * elements
+    return same and elements > 2 and len(one.elements) >= least
+
+
 def members_of(candidates: Iterable[Candidate], hypothesis: Hypothesis) -> list[Candidate]:
     """Return a finding's candidates with their final shapes."""
     own = hypothesis.effect.id, hypothesis.elements
     return [c for c in candidates if c.effect_id == own[0] and c.element in own[1]]
-
-
-def parameters_in(hypothesis: Hypothesis) -> int:
-    """Return the number of free parameters of a hypothesis, those on a grid and an onset included.
-
-    That elements share their parameters, though no one system reads them, counts as one more.
-    """
-    alike = hypothesis.common and not has_one_system(hypothesis.effect)
-    return hypothesis.causes * len(hypothesis.effect.parameters) + bool(hypothesis.onset) + alike
-
-
-def unusual(weights: Mapping[Candidate, Array]) -> float:
-    """Return the largest error of a number of the file, in units of its usual error, at least 1.
-
-    Of errors that are usual, the smaller is no likelier.
-    """
-    found = [1.0]
-    for candidate, own in weights.items():
-        values = candidate.effect.values(own.tolist(), **candidate.nonlinear)
-        found += [
-            abs(values[p.name] - (p.absent or 0.0)) / p.usual
-            for p in candidate.effect.parameters
-            if p.usual is not None
-        ]
-    return max(found)

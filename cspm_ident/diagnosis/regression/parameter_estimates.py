@@ -2,10 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Container, Iterable, Mapping, Sequence
+from collections.abc import Container, Mapping, Sequence
 
 import numpy as np
-from numpy.typing import NDArray
 
 from cspm_ident.diagnosis.regression.block_gram import gather
 from cspm_ident.diagnosis.regression.block_regression import BlockRegression
@@ -17,7 +16,6 @@ from cspm_ident.diagnosis.thresholds import DEFAULT_THRESHOLDS, Thresholds
 from cspm_model.robust_statistics import huber_fit
 from cspm_sim.effects import Channel
 
-Array = NDArray[np.float64]
 Parts = Sequence[Sequence[Equation]]
 
 
@@ -110,23 +108,6 @@ def of_clocks(weights: Weights) -> Weights:
         if effect.signature.negligible:
             own = np.array([effect.signature.negligible.get(p.name, 0.0) for p in effect.linear])
             found[candidate] = values, np.hypot(half, own)
-    return found
-
-
-def of_models(weights: Weights, spreads: Iterable[Mapping[Candidate, Array]]) -> Weights:
-    """Return the weights, with intervals that include their spread over equally good models.
-
-    The spread holds for regressors about the described machine, and for the same shape.
-
-    Args:
-        weights: as found.
-        spreads: of each finding's candidates.
-    """
-    found = dict(weights)
-    for candidate, apart in (item for each in spreads for item in each.items()):
-        if candidate in found:
-            values, half = found[candidate]
-            found[candidate] = values, np.hypot(half, apart)
     return found
 
 

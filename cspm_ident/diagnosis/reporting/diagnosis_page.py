@@ -122,11 +122,13 @@ def _verdict(verdict: Verdict, data: dict[str, Any]) -> str:
 
 
 def _rival(alternative: dict[str, Any]) -> str:
-    """Return an alternative in plain words."""
+    """Return an alternative in plain words, with its probability."""
+    beside = alternative["beside"]
+    with_it = f", beside another {catalogue()[beside].words} than the file's" if beside else ""
     where = ", ".join(alternative["elements"])
     effect = catalogue()[alternative["effect"]]
     words = f"another {effect.words}" if effect.physics.alter is not None else effect.words
-    return f"{words} ({alternative['effect']} on {where})"
+    return f"{words} ({alternative['effect']} on {where}{with_it})"
 
 
 def _where(found: Diagnosis) -> str:
@@ -226,10 +228,9 @@ def _hypotheses(found: Diagnosis, data: dict[str, Any]) -> str:
     rows: list[tuple[str, ...]] = []
     for finding, entry in zip(found.reported, named_in(data), strict=True):
         rows += _ranked(finding, entry)
-    for finding in found.considered:
+    for finding in found.rejected:
         size = _in_errors(finding.gain.total, finding.gain.error)
-        words, known = finding.hypothesis.words, finding.status.value
-        rows.append((words, known, "", size, finding.reason_words))
+        rows.append((finding.hypothesis.words, "not kept", "", size, finding.reason_not_kept))
     for driver, gain, share, _ in found.unexplained:
         name = f"a function of {driver.signal}, {driver.place.element}"
         size = _in_errors(gain.total, gain.error)
@@ -244,7 +245,7 @@ def _hypotheses(found: Diagnosis, data: dict[str, Any]) -> str:
     count = (
         f"<p>{found.tested} hypotheses were looked at. Probabilities are those among"
         f" what explains the same, times {trusted:g}: the share of findings without a rival that"
-        " were right in blind recordings.</p>"
+        " were right in blind recordings; a tenth of it beside as much that nothing explains.</p>"
     )
     return count + table_html(heads, rows, "hypotheses and their evidence")
 
@@ -259,7 +260,7 @@ def _ranked(finding: Finding, entry: dict[str, Any]) -> Iterable[tuple[str, ...]
     for rival, reported in sorted(rivals, key=lambda each: each[0].behind):
         behind = f"{rival.behind:.1f} behind"
         yield (
-            rival.hypothesis.words,
+            rival.words,
             "explains it as well",
             f"{reported['probability']:.2f}",
             behind,
@@ -273,14 +274,15 @@ def _in_errors(total: float, error: float) -> str:
 
 def _fit(found: Diagnosis) -> str:
     judged = "recordings held out" if found.held_out else "the last part, which was not searched"
-    heads = ("residual", *stage_names(found), "noise", "unit")
+    heads = ("residual", *stage_names(found), "black box", "noise", "unit")
     rows = []
     for fit in found.fit:
-        numbers = (*stage_errors(found, fit), fit.noise)
+        numbers = (*stage_errors(found, fit), fit.ceiling, fit.noise)
         rows.append((channel_of(fit), *(f"{n:.3g}" for n in numbers), unit_of(fit)))
     text = (
         f"<p>Root mean square on {judged}. <i>Re-tuned</i> is the file with its own numbers fitted"
-        " and nothing added; <i>noise</i> is the white part of what is left.</p>"
+        " and nothing added; <i>black box</i> is free functions of every signal instead of"
+        " physics; <i>noise</i> is the white part of what is left.</p>"
     )
     if found.tables:
         text += (

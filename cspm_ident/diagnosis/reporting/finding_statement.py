@@ -7,7 +7,7 @@ from collections.abc import Sequence
 from cspm_ident.channel_words import channel_words
 from cspm_ident.diagnosis.diagnosis import Diagnosis
 from cspm_ident.diagnosis.finding import Finding, Improvement, Onset, Region
-from cspm_ident.diagnosis.parameter import Coefficients, Parameter, parameters_of
+from cspm_ident.diagnosis.parameter import Coefficients, Parameter
 from cspm_ident.diagnosis.reporting.machine_part import Kind, kind_of
 from cspm_ident.diagnosis.reporting.quantity import amount_words
 from cspm_ident.diagnosis.reporting.statement import channel_of
@@ -15,18 +15,25 @@ from cspm_ident.diagnosis.validation.holdout_residuals import HeldOut
 from cspm_ident.diagnosis.validation.rest import concerned
 from cspm_sim.effects import Block, Channel, Effect, Elements
 
+_DOUBT = (
+    " Doubtful: beside it is much that nothing in the catalogue explains. This may be a part of"
+    " that, so its numbers have no interval."
+)
 # Of a wave: how often it comes back per turn. It is reported though it was searched on a grid.
 _ORDER = "order"
+_FAINT = " What was not searched moves so little that it shows little of it."
 
 
 def statement_of(diagnosis: Diagnosis, finding: Finding) -> str:
     """Return a finding's elements, effect, size, onset, region and improvement, in sentences."""
     effect, region = finding.hypothesis.effect, finding.region
+    doubt = _FAINT if finding.is_faint else ""
+    doubt += _DOUBT if finding.is_doubtful else ""
     where = f" It shows where {region_words(region)}." if region is not None else ""
     return (
         f"{_subject(effect, finding.elements)} {_difference(effect)}:"
         f" {_sizes(finding)}.{_since(finding)}{_elsewhere(diagnosis, finding)}"
-        f" {_improvement(diagnosis, finding)}{where}"
+        f" {_improvement(diagnosis, finding)}{where}{doubt}"
     )
 
 
@@ -65,7 +72,7 @@ def _size(finding: Finding, own: Coefficients) -> str:
 
     Parameters whose interval contains the value without the effect are listed without a number.
     """
-    effect, numbers = own.candidate.effect, parameters_of(own)
+    effect, numbers = own.candidate.effect, finding.parameters_on(own)
     known = [n for n in numbers if n.low < n.high] or numbers
     if all(n.is_open for n in known):
         reported = ", ".join(f"{_name(effect, n)} {amount_words(n.value, n.unit)}" for n in known)

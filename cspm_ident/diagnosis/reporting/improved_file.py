@@ -8,7 +8,6 @@ import numpy as np
 from ruamel.yaml.comments import CommentedMap, CommentedSeq
 
 from cspm_ident.diagnosis.diagnosis import Diagnosis
-from cspm_ident.diagnosis.parameter import parameters_of
 from cspm_ident.diagnosis.reporting.empirical_statement import table_entries
 from cspm_ident.fitted_testbed import FittedNumber
 from cspm_msgs_py.testbed import EffectEntry, TestbedFile, parse_testbed
@@ -40,7 +39,7 @@ def improved_testbed(diagnosis: Diagnosis, source: str) -> TestbedFile:
             entry["parameters"] = CommentedMap(
                 {
                     n.name: FittedNumber(n.value, n.ci95 or _UNBOUNDED, hashes).content()
-                    for n in parameters_of(own)
+                    for n in finding.parameters_on(own)
                 }
             )
             entries.append(entry)

@@ -96,10 +96,10 @@ def remainder_statement(left: Remainder) -> str:
     unit = "N·m" if turns else "N"
     where = _CHANNELS[left.place.channel].format(left.place.element)
     where += f" in {left.component}" if left.component else ""
+    percent = 100.0 * left.rms / max(left.measured, 1e-300)
     words = (
         f"On held-out data {where} differs from the model by {amount_words(left.rms, unit)},"
-        f" {left.ratio:.2g} times its noise and {share_words(left.rms, left.measured)} what was"
-        " measured"
+        f" {left.ratio:.2g} times its noise and {percent:.2g} % of what was measured"
     )
     if left.share >= _SHOWN:
         words += f"; {100 * left.share:.0f} % of the squares are a function of {left.driver}"
@@ -109,21 +109,6 @@ def remainder_statement(left: Remainder) -> str:
             f" {left.stretch.start:.3g} and {left.stretch.end:.3g} s"
         )
     return f"{words}. Nothing in the catalogue explains it."
-
-
-def share_words(size: float, whole: float) -> str:
-    """Return a size as a share of a whole, or in multiples of it where it is larger."""
-    ratio = size / max(whole, 1e-300)
-    return f"{100.0 * ratio:.2g} % of" if ratio < 1.0 else f"{ratio:.2g} times"
-
-
-def simulated_statement(fit: SimulatedFit) -> str:
-    """Return how far a simulation of held-out data is from what was measured."""
-    return (
-        f"Simulated from measured {drive_of(fit)}, {fit.output.name} differs by"
-        f" {amount_words(fit.final, fit.output.unit)} on held-out data,"
-        f" {fit.final / fit.floor:.2g} times its noise. Nothing in the catalogue explains it."
-    )
 
 
 def formula_of(

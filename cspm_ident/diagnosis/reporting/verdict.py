@@ -2,15 +2,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from enum import Enum
 from math import exp
 from pathlib import Path
 from typing import Any
 
 from cspm_ident.diagnosis.diagnosis import Diagnosis
-from cspm_ident.diagnosis.finding import Finding, Region, Status, Unexplained
-from cspm_ident.diagnosis.parameter import Parameter
+from cspm_ident.diagnosis.finding import Finding, Region, Unexplained
 from cspm_ident.diagnosis.regression.hypothesis import Rival
 from cspm_ident.diagnosis.reporting.completeness import explained_share, left_entries
 from cspm_ident.diagnosis.reporting.empirical_statement import empirical_entries
@@ -22,7 +21,6 @@ from cspm_ident.diagnosis.reporting.statement import (
     formula_of,
     line_statement,
     remainder_statement,
-    simulated_statement,
     unknown_statement,
 )
 from cspm_ident.diagnosis.residuals.spectral_lines import Line
@@ -56,22 +54,21 @@ SENTENCES = {
     Verdict.EFFECT: "Physics is missing in the model.",
     Verdict.PARAMETER: "A number of the test-bed file is wrong; no physics is missing.",
     Verdict.TIE: "Something is missing, and several causes explain these recordings equally well.",
-    Verdict.UNKNOWN: "Something is missing, and nothing of the catalogue could be named for it.",
+    Verdict.UNKNOWN: "Something is missing that the catalogue does not have.",
     Verdict.NOT_EXCITED: "These recordings cannot tell: nothing that was measured moves enough"
     " beyond its noise to decide.",
 }
 
 
 def verdict_of(diagnosis: Diagnosis) -> Verdict:
-    """Return the verdict; undecided findings are ignored.
+    """Return the verdict; doubtful findings are ignored.
 
-    The model is consistent only where all that is left on held-out data is noise or immaterial, no
-    simulation of cables or bar is far from what was measured, and some measured quantity exceeds
-    its noise enough to show a difference.
+    The model is consistent only where all that is left on held-out data is noise or immaterial, and
+    some measured quantity exceeds its noise enough to show a difference.
     """
-    certain = diagnosis.reported
+    certain = [each for each in diagnosis.reported if not each.is_doubtful]
     if not certain:
-        if any(_open(diagnosis)):
+        if diagnosis.unexplained or diagnosis.lines or diagnosis.beyond_noise:
             return Verdict.UNKNOWN
         return Verdict.CONSISTENT if diagnosis.is_excited else Verdict.NOT_EXCITED
     if any(each.alternatives for each in certain):
@@ -81,18 +78,14 @@ def verdict_of(diagnosis: Diagnosis) -> Verdict:
     return Verdict.EFFECT
 
 
-def _open(diagnosis: Diagnosis) -> Sequence[Sequence[object]]:
-    """Return what shows that something is missing."""
-    residuals = diagnosis.unexplained, diagnosis.lines, diagnosis.beyond_noise
-    return (*residuals, diagnosis.simulated_beyond)
-
-
 def probability_of(finding: Finding, thresholds: Thresholds = DEFAULT_THRESHOLDS) -> float:
     """Return the probability of a finding against its alternatives and causes not considered.
 
     A rival's odds are exp(−k²/2), where it lies k standard deviations behind the finding.
     """
     trusted = thresholds.trusted_probability
+    if finding.is_doubtful:
+        trusted *= thresholds.doubtful_factor
     return trusted / (1.0 + sum(_odds(rival) for rival in finding.alternatives))
 
 
@@ -139,7 +132,6 @@ def diagnosis_data(diagnosis: Diagnosis, testbed: Path | None = None) -> dict[st
         ],
         "explained": explained_share(diagnosis) if diagnosis.reported else None,
         "left": left_entries(diagnosis),
-        "considered": [_considered(each) for each in diagnosis.considered],
         "detection_limits": [limit._asdict() for limit in diagnosis.limits],
         "empirical": empirical_entries(diagnosis),
         "fit": [_simulated_fit(each) for each in diagnosis.simulated],
@@ -155,14 +147,23 @@ def named_in(data: Mapping[str, Any]) -> list[dict[str, Any]]:
 
 
 def _findings(diagnosis: Diagnosis) -> list[dict[str, Any]]:
-    """Return the findings that are named, then what is unknown."""
-    named = [_finding(diagnosis, each) for each in diagnosis.reported]
+    """Return the findings, the most important first.
+
+    A doubtful finding never comes first. It follows the unexplained residual that makes it
+    doubtful, unless a certain finding precedes it and the unexplained residual is smaller.
+    """
+    found = diagnosis.reported
+    named = [_finding(diagnosis, each) for each in found]
+    # Findings are in descending order of gain.
+    ahead = next((k for k, each in enumerate(found) if each.is_doubtful), len(found))
+    if ahead:
+        most = max((each.gain.total for each in diagnosis.unexplained), default=0.0)
+        ahead = sum(each.gain.total >= most for each in found)
     unknown = [_unknown(diagnosis, each) for each in diagnosis.unexplained]
     lines = map(_line, diagnosis.lines)
     # Beside a finding, what is left is reported with the residuals: no model is exact.
-    left = [] if named else map(_remainder, diagnosis.undescribed)
-    found = [*named, *unknown, *lines, *left]
-    return found or [_simulated_remainder(each) for each in diagnosis.simulated_beyond[:1]]
+    left = [] if ahead else map(_remainder, diagnosis.undescribed)
+    return [*named[:ahead], *unknown, *lines, *left, *named[ahead:]]
 
 
 def _recording(role: str, measurement: Measurement) -> dict[str, Any]:
@@ -186,47 +187,26 @@ def _finding(diagnosis: Diagnosis, finding: Finding) -> dict[str, Any]:
         "onset_ci95_s": [onset.low, onset.high] if onset is not None else None,
         "region": _region(finding.region),
         "shows_at": shown_place(diagnosis, finding),
-        "presence": "tied" if finding.alternatives else "certain",
-        "conditional_on": _beside(diagnosis, finding),
-        "parameters": [_parameter(each) for each in finding.parameters],
+        "parameters": [
+            {
+                "element": n.element,
+                "name": n.name,
+                "value": n.value,
+                "unit": n.unit,
+                "ci95": None if n.ci95 is None else list(n.ci95),
+            }
+            for n in finding.parameters
+        ],
         "alternatives": [
             {
                 "effect": rival.hypothesis.effect.id,
                 "elements": list(rival.hypothesis.elements),
+                "beside": None if rival.beside is None else rival.beside.effect.id,
                 "probability": probability * _odds(rival),
                 "separating_experiment": None,
             }
             for rival in finding.alternatives
         ],
-    }
-
-
-def _beside(diagnosis: Diagnosis, finding: Finding) -> list[dict[str, Any]]:
-    """Return what was fitted together with a finding, so that its numbers depend on it."""
-    return [
-        {"effect": each.effect, "elements": list(each.elements), "status": each.status.value}
-        for each in diagnosis.findings
-        if each is not finding and each.status is not Status.REJECTED
-    ]
-
-
-def _considered(finding: Finding) -> dict[str, Any]:
-    return {
-        "effect": finding.effect,
-        "elements": list(finding.elements),
-        "status": finding.status.value,
-        "reason": finding.reason_words,
-        "parameters": [_parameter(each) for each in finding.parameters],
-    }
-
-
-def _parameter(own: Parameter) -> dict[str, Any]:
-    return {
-        "element": own.element,
-        "name": own.name,
-        "value": own.value,
-        "unit": own.unit,
-        "ci95": None if own.ci95 is None else list(own.ci95),
     }
 
 
@@ -267,21 +247,6 @@ def _remainder(left: Remainder) -> dict[str, Any]:
     }
 
 
-def _simulated_remainder(fit: SimulatedFit) -> dict[str, Any]:
-    """Return the finding of a simulation that is far from what was measured."""
-    return {
-        "subsystem": _BLOCKS[fit.output.kind].value,
-        "elements": [fit.output.element],
-        "effect": UNKNOWN,
-        "probability": None,
-        "statement": simulated_statement(fit),
-        "onset_s": None,
-        "region": {},
-        "parameters": [],
-        "alternatives": [],
-    }
-
-
 def _unknown(diagnosis: Diagnosis, unexplained: Unexplained) -> dict[str, Any]:
     driver, _, _, shape = unexplained
     assert shape is not None
@@ -309,6 +274,7 @@ def _equation_fit(fit: HeldOut, thresholds: Thresholds) -> dict[str, Any]:
     found = _fit(channel_of(fit), drive, fit.measured, *numbers)
     if fit.tabled is not None:
         found["held_out"]["nrmse_named"] = fit.after / max(fit.measured, fit.noise, 1e-300)
+    found["held_out"]["nrmse_black_box"] = fit.ceiling / max(fit.measured, 1e-300)
     found["at_noise"] = fit.is_at_noise(thresholds)
     found["left"] = [_left(each, thresholds) for each in fit.remainders]
     return found

@@ -20,7 +20,6 @@ from cspm_ident.diagnosis.thresholds import DEFAULT_THRESHOLDS, Thresholds
 from cspm_ident.freed_memory import give_back
 from cspm_ident.signals.measurement import Measurement
 from cspm_ident.signals.timeline import Timeline
-from cspm_msgs_py.errors import ConvergenceError, InputError, SingularityError
 from cspm_sim.effect_entries import read_actions
 from cspm_sim.effects import Channel, Effect, Elements
 
@@ -49,7 +48,7 @@ def equations_of(
         thresholds: those of residuals.
 
     Raises:
-        InputError: the machine's effects cannot be used, or its cables cannot bear the tensions.
+        InputError: the machine's effects cannot be used.
     """
     give_back()
     measurement = settled(measurement)
@@ -62,11 +61,9 @@ def equations_of(
         drawn = None if measurement.tension else drawn_tension(measurement, known)
         drawn = drawn and drawn.less(assumed)
         reported = measurement if drawn is None else drawn.measurement
-        given = Timeline(reported), effects, known, knots
-        try:
-            late = suspension_equations(*given, drawn=drawn, thresholds=thresholds)
-        except (ConvergenceError, SingularityError) as err:
-            raise InputError(f"{measurement.path}: {err}") from None
+        late = suspension_equations(
+            Timeline(reported), effects, known, knots, drawn=drawn, thresholds=thresholds
+        )
         give_back()
     progress("torque equations of the winches")
     found = drive_equations(measurement, effects, known, knots)

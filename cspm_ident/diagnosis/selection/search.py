@@ -1,62 +1,51 @@
-"""Search of a catalogue for the effects that explain the residuals of some recordings.
+"""Stepwise selection of the effects that explain the residuals of some recordings.
 
-Residual by residual, every subset of the hypotheses that act there is scored by its predictions.
+It also returns their alternatives and the residuals that no effect of the catalogue explains.
 """
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterable, Sequence
 from copy import copy
 from dataclasses import replace
-from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
-from cspm_ident.diagnosis.finding import Finding, Reason, Status, Unexplained
-from cspm_ident.diagnosis.regression.block_gram import BlockGram, PlaceGram
-from cspm_ident.diagnosis.regression.block_regression import BlockRegression
+from cspm_ident.diagnosis.finding import Finding, Unexplained
+from cspm_ident.diagnosis.regression.block_gram import BlockGram
+from cspm_ident.diagnosis.regression.block_regression import BlockRegression, Gain, gain_of
 from cspm_ident.diagnosis.regression.hypothesis import (
     Hypothesis,
-    Rival,
+    boldness,
     has_one_system,
-    is_allowed,
-    is_early,
-    is_negligible,
     is_number,
-    is_timing,
+    is_spread,
+    is_wider,
     joined,
+    may_be_none,
+    members_of,
+    shapes_of,
 )
 from cspm_ident.diagnosis.regression.joint_fit import Fits
 from cspm_ident.diagnosis.regression.significance import Significance
+from cspm_ident.diagnosis.residuals.free_shapes import Driver
 from cspm_ident.diagnosis.residuals.regressors import Candidate
-from cspm_ident.diagnosis.selection.model_set import Model, ModelSet, Weights, model_set
+from cspm_ident.diagnosis.selection.alternatives import alternatives_of
+from cspm_ident.diagnosis.selection.common_clock import clocks_of
+from cspm_ident.diagnosis.selection.element_scope import Scopes
+from cspm_ident.diagnosis.selection.merge import one_instead
 from cspm_ident.diagnosis.selection.onset import first_block
-from cspm_ident.diagnosis.selection.presence import exchanged, is_missed, spread
-from cspm_ident.diagnosis.selection.screening import gains_of, screened
+from cspm_ident.diagnosis.selection.pair_exchange import pair_instead
+from cspm_ident.diagnosis.selection.parsimony import simplest
+from cspm_ident.diagnosis.selection.rivals import rivals_of
+from cspm_ident.diagnosis.selection.screening import screened
 from cspm_ident.diagnosis.selection.search_result import SearchResult
 from cspm_ident.diagnosis.selection.unexplained import unexplained
 from cspm_ident.diagnosis.thresholds import DEFAULT_THRESHOLDS, Thresholds
 
 Array = NDArray[np.float64]
 Index = NDArray[np.intp]
-
-# Hypotheses about a residual that may begin late, the most promising ones.
-_LATE = 4
-
-
-class Choice(NamedTuple):
-    """The model that was chosen for one residual, and those that predict as well.
-
-    Attributes:
-        model: the chosen one.
-        models: with it those that predict as well.
-        place: the residual; None for clock errors of healthy size.
-    """
-
-    model: Model
-    models: ModelSet
-    place: PlaceGram | None = None
 
 
 class Search:
@@ -67,20 +56,16 @@ class Search:
         gram: BlockGram,
         progress: Callable[[str], None] = lambda _: None,
         thresholds: Thresholds = DEFAULT_THRESHOLDS,
-        banned: Sequence[Hypothesis] = (),
     ) -> None:
-        """Store the Gram matrices of all residuals; `progress` receives the name of each step.
-
-        Hypotheses that are `banned` are not searched.
-        """
+        """Store the Gram matrices of all residuals; `progress` receives the name of each step."""
         self.thresholds, self._progress = thresholds, progress
         self.fits = Fits(gram, BlockRegression(gram, thresholds))
-        self._banned, self._undelayed = banned, self.fits
         self._look_for([c for c in gram.terms if isinstance(c, Candidate) and self._shows(c)])
 
     def _look_for(self, candidates: Sequence[Candidate]) -> None:
         self._effects = candidates
         self.significance = Significance(self.fits, candidates)
+        self.scopes = Scopes(self.fits, self.significance, candidates)
 
     @property
     def gram(self) -> BlockGram:
@@ -92,243 +77,322 @@ class Search:
         """The regression on these."""
         return self.fits.sums
 
+    def delayed(self, hypothesis: Hypothesis) -> Search:
+        """Return the same search with a hypothesis acting only from its onset on."""
+        if not hypothesis.onset:
+            return self
+        other = copy(self)
+        other._begin(hypothesis)
+        return other
+
+    def run(self) -> SearchResult:
+        """Select effects one by one, each on all elements where it is significant."""
+        chosen = self._chosen()
+        found = [self.finding_of(hypothesis, chosen) for hypothesis in chosen]
+        found.sort(key=lambda each: -each.gain.total)
+        self._progress("what is left")
+        return SearchResult(tuple(found), self.unexplained(chosen), len(self._effects))
+
+    def first(self) -> Hypothesis | None:
+        """Return the significant hypothesis of the largest gain, or None."""
+        return self._best(self._clocks())
+
     @property
     def heard(self) -> tuple[Candidate, ...]:
         """Candidates whose columns are not zero."""
         return tuple(self._effects)
 
-    def run(self) -> SearchResult:
-        """Return the effects of the models of all residuals, their ties and what is unexplained."""
-        choices = self._choices()
-        chosen = _together(choices)
-        for each in chosen:
-            if each.onset:
-                self.fits = self.fits.delayed(each)
-        self._look_for(self._effects)
-        found = [self._finding(each, chosen, choices) for each in chosen]
-        found.sort(key=lambda each: -each.gain.total)
-        self._progress("what is left")
-        return SearchResult(tuple(found), self.unexplained(chosen), len(self._effects))
-
-    def without(self, banned: Sequence[Hypothesis]) -> Search:
-        """Return the search as it was before it ran, without some hypotheses."""
-        other = copy(self)
-        other.fits, other._banned = self._undelayed, banned
-        other._look_for(self._effects)
-        return other
-
     def retuned(self) -> dict[Candidate, Array]:
-        """Return fitted weights of the test-bed file's own parameters, without any added effect."""
+        """Return fitted weights of the test-bed file's own parameters, without any added effect.
+
+        Only significant corrections are included.
+        """
         narrow = copy(self)
-        narrow._progress = lambda _: None
         narrow._look_for([c for c in self._effects if c.effect.physics.alter is not None])
-        own = [c for h in _together(narrow._choices()) for c in h.candidates]
+        own = [c for h in narrow._chosen() for c in h.candidates]
         return self.gram.parted(own, self.sums.weights(self.gram.with_nuisance(own)))
 
-    def finding_of(self, hypothesis: Hypothesis, chosen: Sequence[Hypothesis]) -> Finding:
-        """Return a finding with its gain and share beside other hypotheses."""
-        base = self.fits.columns(h for h in chosen if h is not hypothesis)
-        own = self.fits.own_columns(hypothesis)
-        gain = self.sums.gain(base, own)
-        return Finding(hypothesis, gain, self.significance.share(base, own))
-
-    def unexplained(self, chosen: Sequence[Hypothesis]) -> tuple[Unexplained, ...]:
-        """Return the residuals that hypotheses leave unexplained; see `unexplained`."""
-        healthy = [h for h in chosen if self.fits.is_negligible(h, chosen)]
-        reported = [h for h in chosen if h not in healthy]
-        return unexplained(self.gram, self.sums, self.significance, reported, healthy)
-
-    def _choices(self) -> list[Choice]:
-        """Return the models of all residuals, each chosen beside those of the others.
-
-        Once all are chosen, each is chosen anew where others came after it.
-        """
-        choices = self._clocks()
-        visited = self._by_gain()
-        for k, place in enumerate(visited):
-            self._progress(f"residual {k + 1} of {len(visited)}")
-            choices += self._choice(place, _together(choices))
-        for own in [each for each in choices[:-1] if each.place is not None]:
-            assert own.place is not None
-            self._progress(f"residual of {own.place.place.element}, beside the others")
-            others = [each for each in choices if each is not own]
-            choices = [*others, *self._choice(own.place, _together(others))]
-        return choices
-
-    def _clocks(self) -> list[Choice]:
-        """Return the clock errors of healthy size, on signals that one system reads, if any."""
-        clocks = [
-            h
-            for h in self._on_all(self._effects, 1)
-            if has_one_system(h.effect) and h.effect.signature.negligible
-        ]
-
-        def is_healthy(_: Sequence[Hypothesis], weights: Weights) -> bool:
-            return is_negligible(weights)
-
-        if not clocks:
-            return []
-        models = model_set(self._undelayed.gram, [], clocks, is_healthy, self.thresholds, 1)
-        return [] if models.has_none else [Choice(models.chosen, models)]
-
-    def _by_gain(self) -> list[PlaceGram]:
-        """Return the residuals, first that of which one hypothesis alone explains most."""
-        gains, gram = [], self._undelayed.gram
-        searched = gram.columns_of(self._effects)
-        for place in gram.places:
-            own = np.flatnonzero(np.isin(place.columns, searched))
-            table = place.whole[np.ix_(np.append(own, -1), np.append(own, -1))]
-            scale = np.sqrt(np.maximum(np.diag(table), 1e-300))
-            scale[-1] = 1.0
-            slices = [slice(k, k + 1) for k in range(len(own))]
-            gains.append(gains_of(table / (scale[:, None] * scale), slices).max(initial=0.0))
-        return [gram.places[k] for k in np.argsort(gains)[::-1]]
-
-    def _choice(self, place: PlaceGram, chosen: Sequence[Hypothesis]) -> list[Choice]:
-        """Return the model of a residual beside hypotheses; empty where nothing is needed.
-
-        Where no smaller model is needed, larger ones, which are many, are not tried.
-        """
-        free = self._free(place, chosen)
-        pool = screened(self._undelayed.gram, chosen, free, self.thresholds.screened_candidates)
-        given = self._undelayed.gram, chosen
+    def _chosen(self) -> list[Hypothesis]:
+        chosen = self._clocks()
         most = self.thresholds.most_effects
-        pool = [*pool, *self._late(pool, chosen), *self._each_alone(pool)]
-        pool = [h for h in pool if not self._is_banned(h)]
-        small = model_set(*given, pool, self._is_allowed, self.thresholds, most - 1)
-        if small.has_none:
-            return []
-        models = model_set(*given, pool, self._is_allowed, self.thresholds, most)
-        model = self._needed(models.chosen, chosen, len(free))
-        return [Choice(model, models, place)] if model.hypotheses else []
+        while sum(not self.fits.is_negligible(h, chosen) for h in chosen) < most:
+            self._progress(f"effect {len(chosen) + 1}")
+            best = self._best(chosen)
+            found = self._beside_clocks(chosen) if best is None else (best,)
+            if not found:
+                break
+            for each in found:
+                self._begin(each)
+                chosen = joined(chosen, each)
+        return self._merged(self._needed(self._exchanged(chosen)))
 
-    def _needed(self, model: Model, chosen: Sequence[Hypothesis], looked_at: int) -> Model:
-        """Return a model without what is too small to matter, empty if it may be chance.
+    def _beside_clocks(self, chosen: Sequence[Hypothesis]) -> tuple[Hypothesis, ...]:
+        """Return a clock effect of healthy size and a hypothesis significant only beside it.
 
-        The confidence set compares models, and does not count how many hypotheses were looked at:
-        Wald's test of all regressors does, with Bonferroni's correction.
+        The result is empty without such a pair, or where no residual is unexplained.
         """
-        together, late = [*chosen, *model.hypotheses], self
-        for each in together:
-            late = late._begun(each)
-        least = self.thresholds.material_share
-        kept = [h for h in model.hypotheses if late.finding_of(h, together).share >= least]
-        own = self.gram.columns_of(c for h in kept for c in h.candidates)
-        chance = late.sums.p_value(self.fits.columns(chosen), own) if kept else 1.0
-        sure = chance < self.thresholds.false_alarm_rate / max(1, looked_at)
-        return model._replace(hypotheses=tuple(kept) if sure else ())
+        if not self._unexplained(chosen, ()):
+            return ()
+        for clock in clocks_of(self._free(chosen)):
+            found = self._best([*chosen, clock])
+            if found is None:
+                continue
+            both = [*chosen, clock, found]
+            late = self.delayed(found)
+            base, gain = self._others(clock, both), late._gain(clock, both)
+            significant = late.significance.counts(base, clock, gain, len(chosen) + 1)
+            healthy = late.fits.is_negligible(clock, both)
+            if significant and healthy:
+                return clock, found
+        return ()
 
-    def _begun(self, own: Hypothesis) -> Search:
-        """Return the search with a hypothesis acting from its onset on."""
-        if not own.onset:
-            return self
-        other = copy(self)
-        other.fits = self.fits.delayed(own)
-        other._look_for(self._effects)
-        return other
+    def _clocks(self) -> list[Hypothesis]:
+        """Return the clock effect of healthy size, on signals that one system reads.
 
-    def _is_banned(self, own: Hypothesis) -> bool:
-        mine = own.effect.key, own.elements, own.common, bool(own.onset)
+        The list is empty if none is significant. It is searched first, because a fault may explain
+        the same residual equally well.
+        """
+        late = (
+            h
+            for h in clocks_of(self._effects)
+            if has_one_system(h.effect) and self.fits.is_negligible(h, [h])
+        )
+        best = self._surest(late, (), self.fits.columns([]))
+        return [] if best is None else [best]
+
+    def _merged(self, chosen: list[Hypothesis]) -> list[Hypothesis]:
+        """Return the selection after each merge of several faults into one effect."""
+        while merging := one_instead(self.fits, self.significance, chosen, self._free(chosen)):
+            one, *few = merging
+            chosen = joined([h for h in chosen if h not in few], one)
+        return chosen
+
+    def _needed(self, chosen: Sequence[Hypothesis]) -> list[Hypothesis]:
+        """Return the selection without redundant hypotheses, removing the weakest first.
+
+        The first were selected without the later ones, so all scopes and tests are repeated.
+        """
+        kept = list(chosen)
+        for k, hypothesis in enumerate(kept):
+            kept[k] = self.scopes.pruned(hypothesis, self._others(hypothesis, kept))
+        while (needless := self._needless(kept)) is not None:
+            del kept[needless]
+        return kept
+
+    def _needless(self, chosen: Sequence[Hypothesis]) -> int | None:
+        """Return the index of the weakest redundant hypothesis, or None.
+
+        Redundant is a hypothesis of one of three kinds:
+
+        1. Its gain is within the model-form error of the laws beside it, in every residual.
+        2. It is collinear with the others, and all its 95 % intervals contain zero.
+        3. It fails the significance test beside the others.
+
+        A delay stays if without it other readings would precede their stamps.
+        """
+        weights = self.fits.weights(chosen) if len(chosen) > 1 else {}
+        gains = [self._gain(hypothesis, chosen) for hypothesis in chosen]
+        may_be_untruth = self.fits.may_be_untruth(chosen)
+        for k in np.argsort([gain.total for gain in gains]):
+            own = chosen[k]
+            needless = (
+                may_be_untruth[k]
+                or (
+                    not self.fits.is_negligible(own, chosen)
+                    and may_be_none({c: weights[c] for c in members_of(weights, own)})
+                    and self._is_hidden(own, chosen)
+                )
+                or not self._is_there(own, self._others(own, chosen), gains[k], chosen)
+            )
+            rest = [h for h in chosen if h is not own]
+            if needless and (self.fits.are_early(chosen) or not self.fits.are_early(rest)):
+                return int(k)
+        return None
+
+    def _is_hidden(self, hypothesis: Hypothesis, chosen: Sequence[Hypothesis]) -> bool:
+        """Return whether a column of a hypothesis is collinear with those of the others."""
+        others = [self.fits.own_columns(h) for h in chosen if h is not hypothesis]
+        own = self.fits.own_columns(hypothesis)
+        spanned = self.sums.spanned(self.gram.nuisance, np.concatenate(others), own)
+        return bool(np.any(spanned > 1.0 - self.thresholds.material_share))
+
+    def _is_there(
+        self, hypothesis: Hypothesis, base: Index, gain: Gain, chosen: Sequence[Hypothesis]
+    ) -> bool:
+        """Return whether a hypothesis, or a plausible rival of smaller gain, is significant."""
+        known = len(chosen) - 1
+        if self.significance.counts(base, hypothesis, gain, known):
+            return True
+        others = [h for h in chosen if h is not hypothesis]
+        rivals = self._rivals(hypothesis, self._effects, base) if gain.total > 0.0 else []
         return any(
-            mine == (b.effect.key, b.elements, b.common, bool(b.onset)) for b in self._banned
+            self.significance.counts(base, rival, rival_gain, known)
+            for rival in rivals
+            if (rival_gain := self.fits.gain(rival, base)).total < gain.total
+            and self.fits.is_plausible([*others, rival])
         )
 
-    def _free(self, place: PlaceGram, chosen: Sequence[Hypothesis]) -> list[Hypothesis]:
-        """Return hypotheses that act on a residual: an effect on one element, or on all at once.
+    def _others(self, hypothesis: Hypothesis, chosen: Sequence[Hypothesis]) -> Index:
+        return self.fits.columns(h for h in chosen if h is not hypothesis)
 
-        No effect acts twice on an element, and none with two shapes.
-        """
+    def _gain(self, hypothesis: Hypothesis, chosen: Sequence[Hypothesis]) -> Gain:
+        return self.fits.gain(hypothesis, self._others(hypothesis, chosen))
+
+    def _exchanged(self, chosen: list[Hypothesis]) -> list[Hypothesis]:
+        """Return the selection after a pair exchange on one element, if that is better."""
+        kept = [h for h in chosen if self.fits.is_negligible(h, chosen)]
+        return pair_instead(self.fits, self.significance, chosen, kept, self._free(kept)) or chosen
+
+    def _begin(self, hypothesis: Hypothesis) -> None:
+        """Let the hypothesis's columns act from its onset only, from now on."""
+        if hypothesis.onset:
+            self.fits = self.fits.delayed(hypothesis)
+            self._look_for(self._effects)
+
+    def _best(self, chosen: Sequence[Hypothesis]) -> Hypothesis | None:
+        base = self.fits.columns(chosen)
+        free = self._free(chosen)
+        gains = self.sums.gains_beyond(base, [self._of(c) for c in free])
+        likely = screened(free, gains, self.thresholds.screened_candidates)
+        scopes = [h for c in likely for h in self.scopes.of(c, free, base)]
+        late = [d for h in scopes for d in self._late(h, free, base)]
+        best = self._surest([*scopes, *late], chosen, base)
+        if best is None:
+            return None
+        begun = self.delayed(best)
+        rivals = begun._rivals(best, free, base)
+        found = simplest(begun.fits, best, rivals, base, chosen)
+        return self.delayed(found).scopes.pruned(found, base)
+
+    def _free(self, chosen: Sequence[Hypothesis]) -> list[Candidate]:
+        """Return candidates that may be added: no effect twice on an element or with two shapes."""
         taken = {(c.effect_id, c.element) for h in chosen for c in h.candidates}
         shapes = {c.effect_id: c.shape for h in chosen for c in h.candidates}
-        free = [
+        return [
             c
             for c in self._effects
             if (c.effect_id, c.element) not in taken and shapes.get(c.effect_id, c.shape) == c.shape
         ]
-        here = [
-            c for c in free if np.isin(self._undelayed.gram.columns_of([c]), place.columns).any()
-        ]
-        alone = [Hypothesis(c.effect, (c,)) for c in here]
-        known = {(c.effect_id, c.shape) for c in here}
-        groups = self._on_all([c for c in free if (c.effect_id, c.shape) in known])
-        return [h for h in (*alone, *groups) if not self._is_banned(h)]
 
-    def _on_all(self, candidates: Sequence[Candidate], fewest: int = 2) -> list[Hypothesis]:
-        """Return effects on all elements with common parameters, where there are enough."""
-        groups: dict[tuple[str, object], list[Candidate]] = {}
-        for each in candidates:
-            groups.setdefault((each.effect_id, each.shape), []).append(each)
-        return [
-            Hypothesis(own[0].effect, tuple(own), common=len(own) > 1)
-            for own in groups.values()
-            if len(own) >= fewest
-        ]
+    def _surest(
+        self, hypotheses: Iterable[Hypothesis], chosen: Sequence[Hypothesis], base: Index
+    ) -> Hypothesis | None:
+        """Return the significant hypothesis of the largest gain in hold-out blocks, or None.
 
-    def _each_alone(self, pool: Sequence[Hypothesis]) -> list[Hypothesis]:
-        """Return hypotheses with common parameters as such with parameters of each element."""
-        return [replace(h, common=False) for h in pool if h.common]
-
-    def _late(self, pool: Sequence[Hypothesis], chosen: Sequence[Hypothesis]) -> list[Hypothesis]:
-        """Return the most promising hypotheses with an onset, where one explains more.
-
-        A wrong number of the test-bed file acts all the time.
+        A wider element scope and an onset must each gain more by a number of standard errors.
         """
+        before, limits = self.sums.held_out(base), self.thresholds
+        best: tuple[Array, Hypothesis] | None = None
+        for hypothesis in hypotheses:
+            gained = self.delayed(hypothesis)._sure_gain(hypothesis, chosen, base, before)
+            if gained is None:
+                continue
+            needed = boldness(hypothesis, thresholds=limits) * gain_of(gained).error
+            if best is not None:
+                spread = is_spread(best[1], hypothesis, limits)
+                wider = is_wider(hypothesis, best[1]) and not spread
+                least = best[0].sum() + limits.certain_sigma * gain_of(gained).error * wider
+                sigmas = boldness(hypothesis, best[1], limits)
+                if sigmas:
+                    least = best[0].sum() + sigmas * gain_of(gained - best[0]).error
+                needed = max(needed, least)
+            if gained.sum() > needed:
+                best = gained, hypothesis
+        return None if best is None else best[1]
+
+    def _late(
+        self, hypothesis: Hypothesis, free: Sequence[Candidate], base: Index
+    ) -> Iterable[Hypothesis]:
+        """Yield the hypothesis with an onset, if one is better than acting all the time.
+
+        Its shape is the one that leaves the smallest sum of squares.
+        """
+        # A wrong parameter of the test-bed file acts all the time.
+        if is_number(hypothesis):
+            return
         first = self.thresholds.onset_blocks
         last = self.sums.blocks - 2 * first
-        base, found = self.fits.columns(chosen), []
-        for each in [h for h in pool if not is_number(h) and not h.common][:_LATE]:
-            onset, _ = first_block(self.sums, base, self.fits.own_columns(each))
+        late: list[tuple[float, Hypothesis]] = []
+        for shape in shapes_of(hypothesis, free):
+            onset, left = first_block(self.sums, base, self.fits.own_columns(shape))
             if first <= onset <= last:
-                found.append(replace(each, onset=onset))
-        return found
+                late.append((left, replace(shape, onset=onset)))
+        if late:
+            yield min(late, key=lambda each: each[0])[1]
 
-    def _is_allowed(self, hypotheses: Sequence[Hypothesis], weights: Weights) -> bool:
-        """Return whether the catalogue allows weights, and no reading is newer than its stamp.
+    def _sure_gain(
+        self, hypothesis: Hypothesis, chosen: Sequence[Hypothesis], base: Index, before: Array
+    ) -> Array | None:
+        """Return the gain of a hypothesis in each hold-out block, (blocks,).
 
-        No effect acts twice on an element or with two shapes.
+        It is None if the hypothesis is implausible, contradicts others or is not significant.
         """
-        late = any(is_timing(h.effect) and is_early(weights, h) for h in hypotheses)
-        same = len({(c.effect_id, c.element) for c in weights})
-        twice = same < sum(len(h.candidates) for h in hypotheses)
-        shapes = {(c.effect_id, c.shape) for c in weights}
-        several = len(shapes) > len({effect_id for effect_id, _ in shapes})
-        possible = all(is_allowed(c, own) for c, own in weights.items())
-        return possible and not (late or twice or several)
+        together = [*chosen, hypothesis]
+        if not self.fits.is_plausible(together) or self.fits.contradicts(hypothesis, chosen):
+            return None
+        gained = before - self.fits.held_out(hypothesis, base)
+        known = len(chosen)
+        return (
+            gained if self.significance.counts(base, hypothesis, gain_of(gained), known) else None
+        )
 
-    def _finding(
-        self, own: Hypothesis, chosen: Sequence[Hypothesis], choices: Sequence[Choice]
-    ) -> Finding:
-        """Return a finding: certain, tied with alternatives, or undecided."""
-        found, limits = self.finding_of(own, chosen), self.thresholds
-        alternatives: list[Rival] = []
-        missed = True
-        apart: dict[Candidate, Array] = {}
-        for model, models, _ in choices:
-            for each in model.hypotheses:
-                if _is_part(each, own):
-                    alternatives += exchanged(models, model, each, limits)
-                    missed &= is_missed(models, model, each, limits)
-                    apart |= spread(models, model, each)
-        found = replace(found, alternatives=tuple(alternatives), spread=apart)
-        if found.share < limits.material_share:
-            return replace(found, status=Status.NEGLIGIBLE)
-        return found.undecided(Reason.MISSED) if missed else found
+    def _rivals(
+        self, hypothesis: Hypothesis, free: Sequence[Candidate], base: Index
+    ) -> list[Hypothesis]:
+        return rivals_of(self.gram, self.sums, base, hypothesis, free)
+
+    def judged_again(self, finding: Finding, chosen: Sequence[Hypothesis]) -> Finding:
+        """Return a finding with gain, share and alternatives beside the hypotheses that are kept.
+
+        Rejected hypotheses no longer exclude alternatives, and may be alternatives themselves.
+        """
+        again = self.finding_of(finding.hypothesis, chosen)
+        known = {rival.words for rival in finding.alternatives}
+        further = (rival for rival in again.alternatives if rival.words not in known)
+        alternatives = (*finding.alternatives, *further)
+        return replace(finding, gain=again.gain, share=again.share, alternatives=alternatives)
+
+    def finding_of(self, hypothesis: Hypothesis, chosen: Sequence[Hypothesis]) -> Finding:
+        """Return the finding of a hypothesis beside others: gain, share and alternatives."""
+        others = [h for h in chosen if h is not hypothesis]
+        base, own = self.fits.columns(others), self.fits.own_columns(hypothesis)
+        gain = self.sums.gain(base, own)
+        return Finding(
+            hypothesis,
+            gain,
+            self.significance.share(base, own),
+            tuple(alternatives_of(self.fits, self._effects, hypothesis, others)),
+        )
+
+    def unexplained(
+        self, chosen: Sequence[Hypothesis], healthy: Sequence[Hypothesis] = ()
+    ) -> tuple[Unexplained, ...]:
+        """Return the residuals that hypotheses leave unexplained; see `unexplained`.
+
+        A residual that a clock error of healthy size explains is not unexplained. It need not gain
+        in hold-out blocks, because clocks wander from one part of a recording to another.
+        """
+        beside = list(healthy)
+        left = self._unexplained(chosen, beside)
+        for clock in clocks_of(self._free([*chosen, *healthy])) if left else ():
+            if self.fits.is_negligible(clock, [*chosen, *beside, clock]):
+                less = self._unexplained(chosen, [*beside, clock])
+                if len(less) < len(left):
+                    beside, left = [*beside, clock], less
+        return left
+
+    def _unexplained(
+        self, chosen: Sequence[Hypothesis], healthy: Sequence[Hypothesis]
+    ) -> tuple[Unexplained, ...]:
+        clocks = [h for h in chosen if self.fits.is_negligible(h, [*chosen, *healthy])]
+        reported = [h for h in chosen if h not in clocks]
+        return unexplained(self.gram, self.sums, self.significance, reported, [*clocks, *healthy])
 
     def _shows(self, candidate: Candidate) -> bool:
-        excited = self.sums.excited[self.gram.columns_of([candidate])]
+        excited = self.sums.excited[self._of(candidate)]
         # Of springs at the bar, those along coordinates that rest are left out.
         partly = candidate.effect.signature.shares_noise
         return bool(excited.any() if partly else excited.all())
 
-
-def _is_part(one: Hypothesis, whole: Hypothesis) -> bool:
-    return one.effect.key == whole.effect.key and set(one.candidates) <= set(whole.candidates)
-
-
-def _together(choices: Sequence[Choice]) -> list[Hypothesis]:
-    """Return the hypotheses of all models; those of one effect and onset become one."""
-    chosen: list[Hypothesis] = []
-    for each in choices:
-        for hypothesis in each.model.hypotheses:
-            chosen = joined(chosen, hypothesis)
-    return chosen
+    def _of(self, term: Candidate | Driver) -> Index:
+        return self.gram.columns_of([term])

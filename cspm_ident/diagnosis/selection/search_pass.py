@@ -79,8 +79,9 @@ def searched_for(
     """Return the last search pass and its result.
 
     The law of a cable is linearised about its tension. A virtual load cell's tension contains the
-    winch's friction. If effects of winches are found, a second pass linearises about the tension
-    without them.
+    winch's friction. If the effect of largest gain is a winch effect, a second pass linearises
+    about the tension without it. If the search then finds further winch effects, one more pass
+    follows.
 
     Args:
         recordings: the recordings to search.
@@ -92,11 +93,17 @@ def searched_for(
         InputError: the recordings have no residual to search, or are too short.
     """
     search_pass = _search_pass(recordings, {}, effects, progress, thresholds)
+    if recordings.are_drawn:
+        first = search_pass.search.first()
+        assumed = _of_winches(search_pass.search, () if first is None else (first,))
+        if assumed:
+            # Columns take most of the memory, so they are freed before the next pass.
+            del search_pass
+            search_pass = _search_pass(recordings, assumed, effects, progress, thresholds)
     found = search_pass.search.run()
     if recordings.are_drawn:
         assumed = _of_winches(search_pass.search, [each.hypothesis for each in found.findings])
-        if assumed:
-            # Columns take most of the memory, so they are freed before the next pass.
+        if not assumed.keys() <= search_pass.assumed.keys():
             del search_pass
             search_pass = _search_pass(recordings, assumed, effects, progress, thresholds)
             found = search_pass.search.run()

@@ -12,14 +12,14 @@ class SelectionThresholds:
     """How effects are chosen among the candidates, and what stays unknown."""
 
     most_effects: int = count(
-        4,
-        "Largest number of hypotheses about one residual that are fitted together.",
-        "Set by hand, for computing time: all 6195 subsets of up to four of twenty.",
+        3,
+        "Number of effects, beside those of a healthy machine, after which the search ends.",
+        "Set by hand.",
     )
     screened_candidates: int = count(
-        20,
-        "Number of hypotheses about one residual of which all subsets are scored.",
-        "Set by hand, for computing time: those that explain most alone or beside the best.",
+        12,
+        "Number of effects, and of pairs on one element, that are examined in each search pass.",
+        "Set by hand, for computing time: those that take most alone.",
     )
     onset_blocks: int = count(
         5,

@@ -11,10 +11,14 @@ from cspm_ident.diagnosis.threshold_groups.threshold_field import ratio, share
 class ValidationThresholds:
     """Which findings are accepted, and which are rejected."""
 
+    confirmed_share: float = share(
+        0.03,
+        "Share of a held-out residual's squares that a finding has to take.",
+        "Set by hand, below the effect size of the search.",
+    )
     driven_noise_ratio: float = ratio(
         10.0,
-        "Multiple of its noise by which undemanded bar motion has a cause other than feedback,"
-        " and a simulated cable or pose shows that something is missing.",
+        "Multiple of its noise by which undemanded bar motion has a cause other than feedback.",
         "Set by hand.",
     )
     breakaway_excess_share: float = share(

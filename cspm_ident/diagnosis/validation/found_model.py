@@ -9,13 +9,14 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from cspm_ident.diagnosis.finding import Finding, Onset, Reason, Status
+from cspm_ident.diagnosis.finding import Finding, HoldOut, Onset, Rejection, Status
 from cspm_ident.diagnosis.parameter import Coefficients
 from cspm_ident.diagnosis.regression.coefficients import Weights
 from cspm_ident.diagnosis.regression.hypothesis import (
     Hypothesis,
     bounded,
     is_constant,
+    is_number,
     is_seen_to_begin,
     is_seen_to_end,
     may_be_negligible,
@@ -26,7 +27,6 @@ from cspm_ident.diagnosis.regression.parameter_estimates import (
     of_clocks,
     of_drives,
     of_forms,
-    of_models,
     of_scales,
     of_shafts,
 )
@@ -37,7 +37,7 @@ from cspm_ident.diagnosis.selection.onset import onset_of
 from cspm_ident.diagnosis.selection.refinement import Cut, needs_refining, refine, spectra
 from cspm_ident.diagnosis.selection.search import Search
 from cspm_ident.diagnosis.thresholds import Thresholds
-from cspm_ident.diagnosis.validation.holdout_evidence import losses_left, objection, raised
+from cspm_ident.diagnosis.validation.holdout_degradation import harm, squares_left
 from cspm_ident.diagnosis.validation.holdout_simulation import (
     Baselines,
     SimulatedFit,
@@ -73,19 +73,53 @@ class Data(NamedTuple):
     assumed: Mapping[Candidate, Array]
 
 
+class Assessment(NamedTuple):
+    """A finding in a model, with the reasons against it.
+
+    Attributes:
+        finding: with its coefficients, onset, and improvement of simulations; negligible where it
+            may be no larger than in a healthy machine.
+        is_possible: whether a machine can have it, and data show its onset, if it has one, and the
+            end of its memory.
+        is_insignificant: whether all its coefficients may be zero, and it is not negligible.
+        needed: ratio of simulated errors with and without the finding that it has to reach.
+        degradation: squares by which it raises hold-out residuals; 0 where it does not.
+    """
+
+    finding: Finding
+    is_possible: bool = True
+    is_insignificant: bool = False
+    needed: float = 1.0
+    degradation: float = 0.0
+
+    @property
+    def excess(self) -> float:
+        """Ratio of simulated errors less the needed one; −∞ where no simulation depends on it."""
+        gained = self.finding.improvement
+        return -np.inf if gained is None else gained.with_it / gained.without - self.needed
+
+    def rejected(self, reason: Rejection) -> Finding:
+        """Return the finding, rejected."""
+        return replace(self.finding, status=Status.REJECTED, rejection=reason)
+
+
 class Model(NamedTuple):
     """The findings as a model.
 
     Attributes:
-        findings: with coefficients, onset, status and improvement of simulations. Rejected ones
-            cannot be in the model, which is then not simulated.
+        assessments: those of the findings, in their order.
         weights: those of all candidates, with half widths of their 95 % intervals.
-        simulated: fits of the held-out data by quantity; empty if a finding is rejected.
+        simulated: fits of the held-out data by quantity; empty if a finding is untenable.
     """
 
-    findings: tuple[Finding, ...]
+    assessments: tuple[Assessment, ...]
     weights: Weights
     simulated: tuple[SimulatedFit, ...] = ()
+
+    @property
+    def findings(self) -> tuple[Finding, ...]:
+        """The findings of the model, assessed."""
+        return tuple(each.finding for each in self.assessments)
 
     @property
     def values(self) -> dict[Candidate, Array]:
@@ -93,9 +127,27 @@ class Model(NamedTuple):
         return {candidate: weight for candidate, (weight, _) in self.weights.items()}
 
     @property
-    def rejected(self) -> list[Finding]:
-        """The findings that the model cannot have."""
-        return [each for each in self.findings if each.status is Status.REJECTED]
+    def untenable(self) -> list[Finding]:
+        """Rejected without held-out data: impossible findings, else the last insignificant one.
+
+        A model with any of them is not simulated.
+        """
+        impossible = [each for each in self.assessments if not each.is_possible]
+        if impossible:
+            return [each.rejected(Rejection.IMPOSSIBLE) for each in impossible]
+        unsure = [each for each in self.assessments if each.is_insignificant]
+        return [each.rejected(Rejection.INSIGNIFICANT) for each in unsure[-1:]]
+
+    @property
+    def useless(self) -> list[Finding]:
+        """Rejected: untenable findings, else the most degrading one, else one of no improvement."""
+        if self.untenable or not self.assessments:
+            return self.untenable
+        worst = max(self.assessments, key=lambda each: each.degradation)
+        if worst.degradation:
+            return [worst.rejected(Rejection.DEGRADES_HOLDOUT)]
+        worst = max(self.assessments, key=lambda each: each.excess)
+        return [worst.rejected(Rejection.NO_IMPROVEMENT)] if worst.excess > 0.0 else []
 
 
 def modelled(search: Search, kept: Sequence[Finding], data: Data) -> Model:
@@ -115,29 +167,26 @@ def modelled(search: Search, kept: Sequence[Finding], data: Data) -> Model:
     weights = of_clocks(of_drives(weights, 2.0 * data.searched[0].torque_age))
     # With the interval that is reported, which includes what the reference clock may be off.
     negligible = [
-        small or each.status is Status.NEGLIGIBLE or _may_be_negligible(each, weights)
+        small or _may_be_negligible(each, weights)
         for each, small in zip(kept, immaterial, strict=True)
     ]
     weights = {
         c: (_allowed(data.searched[0], c, own, half), half) for c, (own, half) in weights.items()
     }
-    weights = of_models(weights, [each.spread for each in kept])
-    weights = of_forms(weights, _model_form_errors(search, kept, weights), limits)
     zero = [_is_insignificant(each.hypothesis, weights) for each in kept]
-    found = []
+    weights = of_forms(weights, _model_form_errors(search, kept, weights), limits)
+    assessments = []
     for each, onset, small, none in zip(kept, onsets, negligible, zero, strict=True):
         own = {c: weights[c] for c in members_of(weights, each.hypothesis)}
+        status = Status.NEGLIGIBLE if small else each.status
         fitted = tuple(Coefficients(c, *of, upper_ends.get(c)) for c, of in own.items())
-        finding = replace(each, onset=onset, coefficients=fitted)
-        if not _is_possible(each.hypothesis, own, data.searched[0], limits):
-            finding = finding.rejected(Reason.IMPOSSIBLE)
-        elif small:
-            finding = replace(finding, status=Status.NEGLIGIBLE)
-        elif none:
-            finding = finding.undecided(Reason.INSIGNIFICANT)
-        found.append(finding)
-    model = Model(tuple(found), weights)
-    return model if model.rejected else _simulated(model, data, limits)
+        finding = replace(each, status=status, onset=onset, coefficients=fitted)
+        possible = _is_possible(each.hypothesis, own, data.searched[0], limits)
+        needed = _needed(each, limits)
+        assessments.append(Assessment(finding, possible, none and not small, needed))
+    if any(each.is_insignificant or not each.is_possible for each in assessments):
+        return Model(tuple(assessments), weights)
+    return _simulated(assessments, weights, data, limits)
 
 
 def _fitted(
@@ -174,46 +223,49 @@ def _immaterial(search: Search, kept: Sequence[Finding], data: Data) -> list[boo
 def _is_possible(
     hypothesis: Hypothesis, own: Weights, measured: Measurement, thresholds: Thresholds
 ) -> bool:
-    """Return whether a machine can have these weights, and data show their onset and end."""
+    """Return whether a machine can have these weights, and data show their onset and end.
+
+    What is compatible with no machine at all, such as a bar without mass, is on its bound, and no
+    estimate: an inertia that shares the noise of its residual is fitted away with it.
+    """
+    numbers = own if hypothesis.effect.is_correction else {}
+    ends = [{c: w + sign * half for c, (w, half) in numbers.items()} for sign in (-1.0, 1.0)]
+    bounded_ends = [each for each in ends if all(np.all(np.isfinite(w)) for w in each.values())]
     return (
-        is_possible(measured, {c: weights for c, (weights, _) in own.items()})
+        all(
+            is_possible(measured, each)
+            for each in ({c: weights for c, (weights, _) in own.items()}, *bounded_ends)
+        )
         and is_seen_to_begin(hypothesis, own)
         and is_seen_to_end(own, thresholds)
     )
 
 
-def _simulated(model: Model, data: Data, thresholds: Thresholds) -> Model:
-    """Return a model whose findings are held against held-out data.
+def _simulated(
+    assessments: Sequence[Assessment], weights: Weights, data: Data, thresholds: Thresholds
+) -> Model:
+    """Return a model of tenable findings, each validated by simulations of held-out data.
 
-    Of those that raise a held-out residual, the worst is rejected. Negligible findings are exempt:
-    a healthy machine has them too, too small to confirm.
+    Negligible findings are exempt: a healthy machine has them too, too small to improve any.
     """
-    values = model.values
+    values = {c: w for c, (w, _) in weights.items()}
     simulated = simulate_held_out(data.baselines, values)
 
     def left(found: Mapping[Candidate, Array]) -> dict[Place, Array]:
-        return losses_left(data.baselines, found, data.noise, data.block, thresholds)
+        return squares_left(data.baselines, found, data.noise, data.block, thresholds)
 
     every = left(values)
-    judged, harm = [], []
-    for each in model.findings:
-        own = {own.candidate for own in each.coefficients}
-        worse = 0.0
-        if each.status is not Status.NEGLIGIBLE:
-            without = left({c: w for c, w in values.items() if c not in own})
-            reason = objection(without, every, thresholds)
+    judged = []
+    for each in assessments:
+        if each.finding.status is not Status.NEGLIGIBLE:
+            own = {own.candidate for own in each.finding.coefficients}
             improvement = improvement_by(data.baselines, simulated, values, own)
-            each = replace(each, improvement=improvement)
-            if reason is Reason.RAISES_HOLDOUT:
-                worse = raised(without, every)
-            elif reason is not None and each.status is not Status.UNDECIDED:
-                each = each.undecided(reason)
+            without = left({c: w for c, w in values.items() if c not in own})
+            worse = harm(without, every, thresholds)
+            finding = replace(each.finding, improvement=improvement)
+            each = each._replace(finding=finding, degradation=worse)
         judged.append(each)
-        harm.append(worse)
-    if any(harm):
-        worst = int(np.argmax(harm))
-        judged[worst] = judged[worst].rejected(Reason.RAISES_HOLDOUT)
-    return Model(tuple(judged), model.weights, simulated)
+    return Model(tuple(judged), weights, simulated)
 
 
 def _is_insignificant(hypothesis: Hypothesis, weights: Weights) -> bool:
@@ -225,6 +277,19 @@ def _is_insignificant(hypothesis: Hypothesis, weights: Weights) -> bool:
     effect, own = hypothesis.effect, {c: weights[c] for c in members_of(weights, hypothesis)}
     drifts = effect.physics.sense is not None and is_constant(effect)
     return may_be_none(own) and not effect.signature.saturates and not drifts
+
+
+def _needed(finding: Finding, thresholds: Thresholds) -> float:
+    """Return the ratio of simulated errors with and without a finding that it has to reach.
+
+    A simulation from motor angles is insensitive to small parameter errors. Another model-form
+    error may dominate it, such as an open loop that resonates. A finding that explains most of a
+    residual therefore need not improve a simulation.
+    """
+    if finding.holdout is HoldOut.DOMINANT:
+        return np.inf
+    lenient = finding.is_faint or is_number(finding.hypothesis)
+    return 1.0 if lenient else thresholds.whole_share
 
 
 def _allowed(measured: Measurement, candidate: Candidate, weights: Array, half: Array) -> Array:

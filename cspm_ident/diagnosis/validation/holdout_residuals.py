@@ -9,7 +9,9 @@ from types import MappingProxyType
 import numpy as np
 from numpy.typing import NDArray
 
+from cspm_ident.diagnosis.regression.block_gram import BlockGram
 from cspm_ident.diagnosis.residuals.corrected_measurement import as_found
+from cspm_ident.diagnosis.residuals.free_shapes import Driver
 from cspm_ident.diagnosis.residuals.recorded_equations import equations_of
 from cspm_ident.diagnosis.residuals.regressors import Candidate, Place
 from cspm_ident.diagnosis.residuals.residual_equation import Equation, in_noise
@@ -18,7 +20,6 @@ from cspm_ident.diagnosis.validation.holdout_simulation import LEAD_S
 from cspm_ident.diagnosis.validation.materiality import accuracy_of
 from cspm_ident.diagnosis.validation.remainder import Remainder, independent_noise, remainders_of
 from cspm_ident.signals.measurement import Measurement
-from cspm_msgs_py.errors import InputError
 
 Array = NDArray[np.float64]
 
@@ -36,6 +37,8 @@ class HeldOut:
         before: with the file's model.
         retuned: with the file's parameters fitted to the searched data, nothing added.
         after: with the findings.
+        ceiling: with free functions of every driver fitted to the searched data, as a black-box
+            model.
         noise: white part of what is left with the findings, from rows that share no window.
         remainders: what is left with the findings of each channel, without reversals; empty without
             such rows.
@@ -48,6 +51,7 @@ class HeldOut:
     before: float
     retuned: float
     after: float
+    ceiling: float
     noise: float
     remainders: tuple[Remainder, ...] = ()
     steady: float | None = None
@@ -70,6 +74,7 @@ def judged(
     retuned: Mapping[Candidate, Array],
     found: Mapping[Candidate, Array],
     noise: Mapping[Place, Array],
+    free: Mapping[Place, float],
     searched: Mapping[Place, Sequence[Equation]] = MappingProxyType({}),
     thresholds: Thresholds = DEFAULT_THRESHOLDS,
 ) -> tuple[HeldOut, ...]:
@@ -81,6 +86,7 @@ def judged(
         retuned: weights of the file's own parameters.
         found: weights of the findings.
         noise: noise of each residual, its unit.
+        free: residual after fitting free functions, root mean square in units of the noise.
         searched: what the findings leave of the searched data, without reversals. Its noise counts
             as well.
         thresholds: those of residuals.
@@ -94,6 +100,7 @@ def judged(
             [each.get(place, ()) for each in (described, tuned, after)],
             searched.get(place, ()),
             noise[place],
+            free.get(place, float("nan")),
             accuracy_of(measurements[0].machine, place),
         )
         for place in described
@@ -104,6 +111,7 @@ def _held_out(
     stages: Sequence[Sequence[Equation]],
     searched: Sequence[Equation],
     noise: Array,
+    free: float,
     accuracy: float,
 ) -> HeldOut:
     """Return one hold-out residual: with the file's model, re-tuned, and with the findings."""
@@ -122,10 +130,32 @@ def _held_out(
         before=before,
         retuned=tuned,
         after=found,
+        ceiling=unit * free,
         noise=unit * float(np.sqrt(np.mean(floor**2))),
         remainders=remainders_of(calm, floor, noise, accuracy),
         steady=None if steady is None else unit * steady,
     )
+
+
+def free_functions(searched: BlockGram, judge: BlockGram) -> dict[Place, float]:
+    """Return hold-out residuals of free functions of all drivers, fitted to the searched data.
+
+    Root mean squares in units of the noise. They are the reference of a black-box model, which has
+    the relevant signals but no physics.
+    """
+    weights: dict[Candidate | Driver, Array] = {}
+    for place in searched.places:
+        own = [t for t in searched.terms if isinstance(t, Driver) and t.place == place.place]
+        columns = np.intersect1d(place.columns, searched.with_nuisance(own))
+        at = np.searchsorted(place.columns, columns)
+        gram, target = place.whole[np.ix_(at, at)], place.whole[at, -1]
+        fitted = np.linalg.pinv(gram, hermitian=True, rcond=1e-9) @ target
+        full = np.zeros(searched.width)
+        full[columns] = fitted
+        weights |= {term: full[searched.slices[term]] for term in own}
+    left = judge.left_with(weights)
+    rows = {place.place: max(1.0, float(place.rows.sum())) for place in judge.places}
+    return {place: float(np.sqrt(max(0.0, left[place]) / count)) for place, count in rows.items()}
 
 
 def rms(equations: Sequence[Equation]) -> float:
@@ -142,19 +172,6 @@ def _steady(equations: Sequence[Equation]) -> float | None:
     if not any(equation.turning.any() for equation in equations):
         return None
     return rms([equation.steady for equation in equations])
-
-
-def equations_with(
-    measurement: Measurement, weights: Mapping[Candidate, Array], thresholds: Thresholds
-) -> list[Equation]:
-    """Return the residuals of a machine that has the findings, without regressors.
-
-    If no such machine bears what was measured, the findings are ignored.
-    """
-    try:
-        return equations_of(as_found(measurement, weights), (), thresholds=thresholds)
-    except InputError:
-        return equations_of(measurement, (), thresholds=thresholds)
 
 
 def residuals_of(
@@ -174,7 +191,9 @@ def residuals_of(
     parts = [
         [
             equation.within(start, np.inf)
-            for equation in equations_with(m.since(start - LEAD_S), weights, thresholds)
+            for equation in equations_of(
+                as_found(m.since(start - LEAD_S), weights), (), thresholds=thresholds
+            )
         ]
         for m, start in measurements
     ]

@@ -148,4 +148,4 @@ def test_without_held_out_data_what_is_found_is_reported_unjudged(tmp_path):
         "winch_coulomb_friction",
         ("surge_2",),
     )
-    assert found.considered == ()
+    assert found.rejected == ()

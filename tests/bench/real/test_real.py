@@ -16,11 +16,11 @@ TRUTH = {"winch_coulomb_friction": {"torque": (0.02, 0.03)}, "winch_torque_offse
 SET = Dataset("a", "b", "c", "d", "e", ["f"], TRUTH, "known", plausible=["winch_load_friction"])
 
 
-def finding(effect, value=0.025, half=0.002, others=()):
+def finding(effect, value=0.025, half=0.002, others=(), probability=0.9):
     ends = None if half is None else [value - half, value + half]
     return {
         "effect": effect,
-        "presence": "tied" if others else "certain",
+        "probability": probability,
         "parameters": [{"name": "torque", "value": value, "ci95": ends}],
         "alternatives": [{"effect": other} for other in others],
     }
@@ -28,7 +28,6 @@ def finding(effect, value=0.025, half=0.002, others=()):
 
 DRY, OFFSET = finding("winch_coulomb_friction"), finding("winch_torque_offset")
 FALSE = finding("winch_torque_gain")
-UNKNOWN = {"effect": "unknown", "probability": None, "parameters": [], "alternatives": []}
 
 
 @pytest.mark.parametrize(
@@ -41,7 +40,7 @@ UNKNOWN = {"effect": "unknown", "probability": None, "parameters": [], "alternat
         ("effect", [DRY, OFFSET, finding("winch_load_friction")], RIGHT),
         ("tie", [finding("winch_load_friction", others=["winch_coulomb_friction"]), OFFSET], RIGHT),
         ("effect", [DRY, OFFSET, FALSE], WRONG),
-        ("unknown", [UNKNOWN], REFUSED),
+        ("unknown", [finding("winch_torque_gain", probability=0.09)], REFUSED),
         ("unknown", [], REFUSED),
         ("not_excited", [], REFUSED),
         ("consistent", [], WRONG),

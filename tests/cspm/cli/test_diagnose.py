@@ -175,6 +175,7 @@ def test_friction_deleted_from_a_real_machine_comes_back_in_order(emps):
     (fit,) = found["residuals"]
     # The published symmetric model leaves 5.98 %, with its constant force 4.9 %.
     assert fit["held_out"]["nrmse_after"] <= 0.045
+    assert fit["held_out"]["nrmse_after"] < fit["held_out"]["nrmse_black_box"]
     (simulated,) = found["fit"]
     assert simulated["held_out"]["nrmse_after"] < 0.05 * simulated["held_out"]["nrmse_before"]
 
@@ -191,10 +192,12 @@ def test_one_term_deleted_from_a_real_machine_is_named_first(emps, deleted):
 
 @pytest.mark.compiled
 def test_what_differs_by_direction_explains_more_than_the_published_offset(emps):
+    """It is doubtful: what is left beyond the noise is a tenth and more of what it takes."""
     found = emps()
-    assert found["verdict"] == "effect"
+    assert found["verdict"] == "unknown"
     (finding,) = named(found)
-    assert (finding["effect"], finding["presence"]) == (DIRECTIONAL, "certain")
+    assert finding["effect"] == DIRECTIONAL
+    assert "This may be a part of that" in finding["statement"]
     (fit,) = found["residuals"]
     assert 0.07 < fit["held_out"]["nrmse_before"] < 0.08
     assert fit["held_out"]["nrmse_after"] < 0.045

@@ -35,8 +35,8 @@ def test_each_threshold_belongs_to_one_stage():
 @pytest.mark.parametrize(
     ("name", "value", "allowed"),
     [
-        ("unknown_share", 1.2, "0 to 1"),
-        ("unknown_share", -0.1, "0 to 1"),
+        ("confirmed_share", 1.2, "0 to 1"),
+        ("confirmed_share", -0.1, "0 to 1"),
         ("material_share", 1.0, "0 to 0.99"),
         ("tie_sigma", float("nan"), "0 or more"),
         ("tie_sigma", float("inf"), "0 or more"),

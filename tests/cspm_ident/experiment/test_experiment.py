@@ -230,7 +230,7 @@ def tied(measurement):
         Status.TIED,
         coefficients=(Coefficients(RUBBING, np.array([0.03]), np.array([0.001])),),
     )
-    fit = HeldOut(Place(Channel.SHAFT, "surge_2"), 0.1, 0.03, 0.03, 0.001, 0.001)
+    fit = HeldOut(Place(Channel.SHAFT, "surge_2"), 0.1, 0.03, 0.03, 0.001, 0.001, 0.001)
     return Diagnosis(
         searched=(short,),
         held_out=(),

@@ -1,11 +1,20 @@
 """A diagnosis whose numbers are given, not computed."""
 
+from dataclasses import replace
+
 import numpy as np
 from run_samples import SCENARIOS
 
 from cspm_ident.block_simulation import Input
 from cspm_ident.diagnosis.diagnosis import Diagnosis
-from cspm_ident.diagnosis.finding import Finding, Improvement, Shape, Status, Unexplained
+from cspm_ident.diagnosis.finding import (
+    Finding,
+    HoldOut,
+    Improvement,
+    Shape,
+    Unexplained,
+    reported_status,
+)
 from cspm_ident.diagnosis.parameter import Coefficients
 from cspm_ident.diagnosis.regression.block_regression import Gain
 from cspm_ident.diagnosis.regression.hypothesis import Hypothesis
@@ -55,14 +64,14 @@ def diagnosis(named=True, alternatives=(), unknown=(), rejected=(), lines=(), re
         Gain(900.0, 10.0),
         0.99,
         tuple(alternatives),
-        status=Status.TIED if alternatives else Status.REPORTED,
+        holdout=HoldOut.CONFIRMED,
         coefficients=(Coefficients(RUBBING, np.array([TORQUE]), np.array([0.001])),),
         region=region,
         improvement=Improvement(OUTPUT.name, OUTPUT.unit, 1.46, 0.0071),
     )
     shape = Shape(np.linspace(0.0, 1.0, 7), np.arange(7.0) - 3.0)
     unexplained = tuple(Unexplained(*each, shape) for each in unknown)
-    return Diagnosis(
+    found = Diagnosis(
         searched=(measured,),
         held_out=(),
         findings=(*((finding,) if named else ()), *rejected),
@@ -79,12 +88,13 @@ def diagnosis(named=True, alternatives=(), unknown=(), rejected=(), lines=(), re
         curves=held_out_curves([[part]], weights),
         noise={PLACE: np.array([NOISE])},
     )
+    return judged(found, found.findings)
 
 
 def held_out(after, measured=0.15, steady=None):
     """A winch's residual on held-out data, with so much left after the findings."""
     left = remainder(after if steady is None else steady, measured)
-    return HeldOut(PLACE, measured, TORQUE, TORQUE, after, NOISE, (left,), steady)
+    return HeldOut(PLACE, measured, TORQUE, TORQUE, after, NOISE, NOISE, (left,), steady)
 
 
 def remainder(rms, measured=0.15, place=PLACE, component=""):
@@ -92,3 +102,16 @@ def remainder(rms, measured=0.15, place=PLACE, component=""):
     stretch = Stretch(3.0, 4.0, 0.6)
     sizes = rms, NOISE, 1000, measured, float("nan")
     return Remainder(place, component, *sizes, "angle [rad]", 0.5, 0.6, stretch)
+
+
+def judged(found, findings, aliased=()):
+    """Return a diagnosis with other findings, those that are reported with their status."""
+    return replace(
+        found,
+        findings=tuple(
+            replace(each, status=reported_status(each, found.unexplained, aliased))
+            if each.is_reported
+            else each
+            for each in findings
+        ),
+    )

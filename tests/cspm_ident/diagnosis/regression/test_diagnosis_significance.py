@@ -9,8 +9,11 @@ from cspm_ident.diagnosis.regression.block_gram import gather
 from cspm_ident.diagnosis.regression.block_regression import BlockRegression, Gain
 from cspm_ident.diagnosis.regression.hypothesis import (
     Hypothesis,
+    boldness,
     is_seen_to_begin,
+    is_spread,
     may_be_none,
+    unusual,
 )
 from cspm_ident.diagnosis.regression.joint_fit import Fits
 from cspm_ident.diagnosis.regression.significance import Significance
@@ -49,6 +52,7 @@ def test_every_effect_has_an_equal_part_of_the_false_alarms():
     significance = Significance(Fits(gram, BlockRegression(gram)), candidates)
     assert significance.below(DRY) == pytest.approx(RATE / 2)
     assert significance.below(WET) == pytest.approx(RATE / 4)
+    assert significance.below(WET, known=2) == pytest.approx(3.0 * RATE / 4)
     spent = sum(significance.below(candidate.effect) for candidate in candidates)
     assert spent == pytest.approx(RATE)
 
@@ -60,8 +64,8 @@ def test_what_is_little_on_one_element_is_reported_of_all_if_one_number_is_bette
     search = Search(gram)
     one, two = (Candidate(DRY, name) for name in NAMES)
     beside = np.append(search.fits.columns([]), gram.columns_of([one]))
-    share = search.significance.share(beside, gram.columns_of([two]))
-    assert share < 0.1
+    gain = search.sums.gain(beside, gram.columns_of([two]))
+    assert not search.significance.counts(beside, Hypothesis(DRY, (two,)), gain)
     (named,) = search.run().findings
     assert named.hypothesis.elements == elements
     assert named.hypothesis.common is (elements == NAMES)
@@ -79,6 +83,20 @@ def test_what_one_system_reads_has_one_number_unless_data_say_otherwise(second, 
     assert dry.elements == NAMES[:1]
 
 
+@pytest.mark.parametrize(("second", "hum", "same"), [(0.3, 1.0, True), (0.2, 0.0, False)])
+def test_all_elements_may_share_a_number_only_if_their_own_agree(second, hum, same):
+    search = Search(gather([winches(second, hum)], BLOCK_S))
+    both = Hypothesis(DRY, tuple(Candidate(DRY, name) for name in NAMES), common=True)
+    assert search.scopes.agree(both, search.fits.columns([])) is same
+
+
+def test_one_element_alone_says_nothing_of_all():
+    """The other's number is known too badly to contradict, and not known to be one."""
+    search = Search(gather([winches(0.0, 40.0)], BLOCK_S))
+    both = Hypothesis(DRY, tuple(Candidate(DRY, name) for name in NAMES), common=True)
+    assert not search.scopes.agree(both, search.fits.columns([]))
+
+
 def test_a_common_number_is_that_of_the_sum_of_columns():
     """Fitted by hand to both winches' rows."""
     equations = winches(0.1)
@@ -91,6 +109,50 @@ def test_a_common_number_is_that_of_the_sum_of_columns():
     assert found == [pytest.approx(expected[0], rel=1e-9)] * 2
     apart = [w for w, _ in search.fits.weights([replace(both, common=False)]).values()]
     assert apart[0][0] - apart[1][0] == pytest.approx(0.2, abs=0.1)
+
+
+MANY = ("a", "b", "c", "d")
+
+
+def several(frictions, hums):
+    """Winches of which some are too loud to show their dry friction."""
+    found = []
+    for k, (name, friction, hum) in enumerate(zip(MANY, frictions, hums, strict=True)):
+        rng = np.random.default_rng(k)
+        times = STEP * np.arange(ROWS)
+        speed = np.sin(2.1 * times + k) + 0.6 * np.sin(0.83 * times)
+        column = np.sign(speed)[:, None]
+        target = friction * column[:, 0] + (0.05 + hum) * rng.standard_normal(ROWS)
+        shaped = {Candidate(DRY, name): column[:, :, None]}
+        found.append(Equation(Place(Channel.SHAFT, name), times, target[:, None], shaped, column))
+    return found
+
+
+@pytest.mark.parametrize(
+    ("frictions", "hums", "elements"),
+    [
+        ((0.3, 0.3, 0.3, 0.3), (0.0, 0.0, 40.0, 40.0), MANY),
+        ((0.3, 0.3, 0.0, 0.0), (0.0, 0.0, 40.0, 0.0), ("a", "b", "c")),
+        ((0.3, 0.0, 0.0, 0.0), (0.0, 40.0, 40.0, 40.0), ("a",)),
+    ],
+)
+def test_what_is_on_half_of_all_elements_is_on_those_that_may_as_well_have_it(
+    frictions, hums, elements
+):
+    search = Search(gather([several(frictions, hums)], BLOCK_S))
+    whole = Hypothesis(DRY, tuple(Candidate(DRY, name) for name in MANY))
+    assert search.scopes.pruned(whole, search.fits.columns([])).elements == elements
+
+
+@pytest.mark.parametrize(
+    ("elements", "of", "spread"),
+    [(("a", "b"), MANY, True), (("a",), MANY, False), (("a",), MANY[:2], False)],
+)
+def test_half_of_several_elements_is_as_good_as_all(elements, of, spread):
+    one, all_of = (Hypothesis(DRY, tuple(Candidate(DRY, n) for n in e)) for e in (elements, of))
+    assert is_spread(one, all_of) is spread
+    other = Hypothesis(WET, tuple(Candidate(WET, name) for name in of))
+    assert not is_spread(one, other)
 
 
 def curved(amount, dry=0.3):
@@ -133,16 +195,10 @@ def warming(amount):
     return Equation(equation.place, equation.times, target, columns, target)
 
 
-def effects_of(finding):
-    """The effect of a finding, and those that explain it as well."""
-    rivals = (rival.hypothesis.effect for rival in finding.alternatives)
-    return [finding.hypothesis.effect, *rivals]
-
-
 @pytest.mark.parametrize(("amount", "reported"), [(1.0, True), (0.2, False)])
-def test_a_finding_whose_amount_drifts_leaves_a_function_of_time(amount, reported):
+def test_a_finding_whose_amount_drifts_is_doubtful(amount, reported):
     found = Search(gather([[warming(amount)]], BLOCK_S)).run()
-    assert any(DRY in effects_of(named) for named in found.findings)
+    assert any(named.hypothesis.effect is DRY for named in found.findings)
     time = Driver(Place(Channel.SHAFT, "one"), "time [s]")
     assert (time in [driver for driver, *_ in found.unexplained]) is reported
 
@@ -170,8 +226,25 @@ def test_a_block_within_which_something_begins_shows_nothing_unknown(onset, repo
     search = jerked(3.0)
     (candidate,) = (c for c in search.heard if c.effect is DRY)
     begun = Hypothesis(DRY, (candidate,), onset=onset)
-    search.fits = search.fits.delayed(begun)
-    assert bool(search.unexplained([begun])) is reported
+    assert bool(search.delayed(begun).unexplained([begun])) is reported
+
+
+@pytest.mark.parametrize(("amount", "elements"), [(0.3, MANY), (0.0, ("a",))])
+def test_elements_do_not_go_all_at_once_if_together_they_surely_act(amount, elements):
+    """Three columns are equal, so that none of them is distinguished from another."""
+    rng = np.random.default_rng(6)
+    first, second = (np.sign(rng.standard_normal((ROWS, 1))) for _ in range(2))
+    columns = {Candidate(DRY, "a"): first[:, :, None]}
+    for name in MANY[1:]:
+        own = second + 1e-4 * rng.standard_normal((ROWS, 1))
+        columns[Candidate(DRY, name)] = own[:, :, None]
+    target = 0.3 * first + amount * second + 0.05 * rng.standard_normal((ROWS, 1))
+    place = Place(Channel.WRENCH, "bar")
+    search = Search(
+        gather([[Equation(place, STEP * np.arange(ROWS), target, columns, target)]], 0.5)
+    )
+    whole = Hypothesis(DRY, tuple(columns))
+    assert search.scopes.pruned(whole, search.fits.columns([])).elements == elements
 
 
 STIFFNESS, LENGTH = catalogue()["cable_stiffness"], catalogue()["cable_length_offset"]
@@ -198,6 +271,13 @@ def test_of_two_wrong_numbers_that_do_the_same_the_usual_one_is_reported(metres,
     assert found.findings[0].alternatives
 
 
+def test_how_unusual_a_wrong_number_is():
+    stiff, long, dry = (Candidate(e, "a") for e in (STIFFNESS, LENGTH, DRY))
+    weights = {c: np.array([-0.1]) for c in (stiff, long, dry)}
+    sizes = [unusual(weights, Hypothesis(c.effect, (c,))) for c in (stiff, long, dry)]
+    assert sizes == pytest.approx([2.0, 10.0, 1.0])
+
+
 def test_an_effect_has_one_shape_on_all_elements():
     """Each element alone would have the other shape than the one that is reported first."""
     effect, rng = catalogue()["cable_transverse_damping"], np.random.default_rng(10)
@@ -217,13 +297,20 @@ def test_an_effect_has_one_shape_on_all_elements():
 
 @pytest.mark.parametrize(("delay", "effect"), [(1e-4, LATE), (1e-3, WET)])
 def test_clocks_as_of_a_healthy_machine_come_before_what_explains_a_little_more(delay, effect):
-    """What friction explains beyond the delay is a hundredth of what is left, and negligible."""
+    """What friction explains beyond the delay is a hundredth of what is left, worth no word."""
     wave, more = np.random.default_rng(11).standard_normal((2, ROWS, 1))
     late = {Candidate(LATE, body): 3e3 * wave for body in ("bar", "winch_frame")}
     wet = Candidate(WET, "a")
     columns = {**late, wet: 1e2 * (6e3 * delay * wave + 0.005 * more)}
     found = Search(explained_by(columns, {wet: 0.01})).run().findings
     assert [named.hypothesis.effect for named in found] == [effect]
+
+
+def test_a_beginning_has_to_be_worth_more_than_nothing_too():
+    dry = Candidate(DRY, "one")
+    always, late = Hypothesis(DRY, (dry,)), Hypothesis(DRY, (dry,), onset=4)
+    assert boldness(late) == boldness(late, always) > boldness(always) == 0.0
+    assert boldness(late, late) == 0.0
 
 
 @pytest.mark.parametrize(

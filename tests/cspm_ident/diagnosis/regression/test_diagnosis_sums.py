@@ -243,6 +243,16 @@ def test_weights_beyond_a_base_leave_the_base_as_it_is():
     np.testing.assert_allclose(found, expected, rtol=1e-8)
 
 
+def test_columns_that_others_span_are_known():
+    equation = made()[0]
+    doubled = dict(equation.columns) | {THIRD: 2.0 * equation.columns[FIRST]}
+    same = Equation(PLACE, equation.times, equation.target, doubled, equation.measured)
+    sums = sums_of(same)[1]
+    assert sums.spanned(np.array([1]), np.array([2]), np.array([0]))[0] > 0.999
+    other = sums_of(equation)[1]
+    assert other.spanned(np.array([1]), np.array([2]), np.array([0]))[0] < 0.1
+
+
 def test_nuisance_is_fitted_wherever_a_model_is_judged():
     equation, _, target = made()
     start = np.ones((ROWS, 1, 1))

@@ -74,21 +74,23 @@ def test_so_that_it_predicts_another_motion_that_shows_it():
     assert left["free"] > 10.0 * left["none"]
 
 
+def test_what_is_not_shown_counts_as_no_number():
+    gram, sums = made(3)
+    own = np.arange(6)
+    assert sums.freedom(own) == pytest.approx(2.0, abs=0.1)
+    assert made(3, hidden=1.0)[1].freedom(own) == pytest.approx(6.0, abs=0.1)
+    assert plain(gram).freedom(own) == 6.0
+
+
 def test_combinations_keep_what_is_known_of_their_parts():
-    """A sum of two numbers of a usual size is as sure as both: by so much it is smaller."""
-    gram, sums = made(4)
+    """A sum of two numbers of a usual size is as sure as both; fitted alone it is the same."""
+    _, sums = made(4)
     turn = np.zeros((6, 1))
     turn[2:4] = 1.0
-    products = np.diag(gram.places[0].whole)[2:4].sum()
+    combined, _, own = sums.combined(np.zeros(0, dtype=int), np.arange(6), turn)
+    products = (sums.lengths[2:4] ** 2).sum()
     expected = 2.0 * USUAL**-2.0
-    ridge, free = (
-        combined.weights(own)[0]
-        for combined, _, own in (
-            each.combined(np.zeros(0, dtype=int), np.arange(6), turn)
-            for each in (sums, plain(gram))
-        )
-    )
-    assert ridge / free == pytest.approx(products / (products + expected), rel=0.05)
+    assert combined.freedom(own) == pytest.approx(products / (products + expected), rel=0.05)
 
 
 def test_a_column_of_zeros_is_not_excited_by_what_is_known_of_it():

@@ -8,9 +8,22 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from diagnosis_samples import NOISE, PLACE, RUBBING, TORQUE, diagnosis, equation, held_out
+from diagnosis_samples import (
+    NOISE,
+    PLACE,
+    RUBBING,
+    TORQUE,
+    diagnosis,
+    equation,
+    held_out,
+    judged,
+)
 
-from cspm_ident.diagnosis.finding import Reason, Region, Status
+from cspm_ident.diagnosis.finding import (
+    HoldOut,
+    Region,
+    is_doubtful,
+)
 from cspm_ident.diagnosis.regression.block_regression import Gain
 from cspm_ident.diagnosis.regression.hypothesis import Hypothesis, Rival, is_constant
 from cspm_ident.diagnosis.reporting.diagnosis_page import write_diagnosis_page
@@ -39,6 +52,7 @@ LOADED = Candidate(catalogue()["winch_load_friction"], "surge_2")
 WIDER = Candidate(catalogue()["winch_drum_radius"], "surge_2")
 
 TRUSTED = DEFAULT_THRESHOLDS.trusted_probability
+DOUBTED = DEFAULT_THRESHOLDS.doubtful_factor
 
 
 HUM = Line(Place(Channel.WRENCH, "bar"), 1, 2.7, 0.314, 1e-9)
@@ -66,6 +80,17 @@ def test_what_rivals_leave_is_shared_by_how_far_they_lie_behind():
         (other,) = tied["alternatives"]
         assert other["probability"] == pytest.approx(odds * tied["probability"])
         assert tied["probability"] + other["probability"] == pytest.approx(TRUSTED)
+        assert other["beside"] is None
+
+
+def test_an_alternative_that_needs_a_wrong_number_names_it(tmp_path):
+    beside = Hypothesis(WIDER.effect, (WIDER,))
+    found = diagnosis(alternatives=[Rival(Hypothesis(LOADED.effect, (LOADED,)), 0.0, beside)])
+    (tied,) = diagnosis_data(found)["findings"]
+    assert tied["alternatives"][0]["effect"] == "winch_load_friction"
+    assert tied["alternatives"][0]["beside"] == "winch_drum_radius"
+    words = "winch_load_friction on surge_2 beside a wrong winch_drum_radius"
+    assert words in section(page_of(tmp_path, found), "hypotheses")
 
 
 def test_a_curve_is_what_the_found_columns_leave():
@@ -226,40 +251,51 @@ def test_a_periodic_force_from_outside_is_unknown(tmp_path):
     assert verdict_of(diagnosis(named=False)) is Verdict.CONSISTENT
 
 
-@pytest.mark.parametrize("left", [89.0, 901.0])
-def test_a_finding_comes_before_what_nothing_explains_beside_it(left, tmp_path):
-    """The finding gains 900; what is unknown beside it takes nothing from what it is worth."""
+@pytest.mark.parametrize(("left", "doubtful"), [(91.0, True), (89.0, False)])
+def test_a_finding_beside_much_that_nothing_explains_is_doubtful(left, doubtful, tmp_path):
+    """The finding gains 900: a tenth of that is much."""
     found = diagnosis(unknown=[(Driver(PLACE, "tension [N]"), Gain(left, 1.0), 0.2)])
     data = diagnosis_data(found)
-    assert [f["effect"] for f in data["findings"]] == ["winch_coulomb_friction", "unknown"]
+    order = ["winch_coulomb_friction", "unknown"]
+    assert [f["effect"] for f in data["findings"]] == (order[::-1] if doubtful else order)
     (finding,) = named_in(data)
-    assert finding["probability"] == TRUSTED
-    assert "torque 30.0 ± 1.0 mN·m." in finding["statement"]
-    assert all(n["ci95"] is not None for n in finding["parameters"])
-    assert verdict_of(found) is Verdict.EFFECT
-    page = page_of(tmp_path, found)
-    assert page.index("Winch surge 2 has dry friction") < page.index("a function of tension")
+    assert finding["probability"] == TRUSTED * (DOUBTED if doubtful else 1.0)
+    assert ("Doubtful: beside it is much that nothing" in finding["statement"]) is doubtful
+    assert ("torque 30 mN·m." in finding["statement"]) is doubtful
+    assert [n["ci95"] is None for n in finding["parameters"]] == [doubtful]
+    assert verdict_of(found) is (Verdict.UNKNOWN if doubtful else Verdict.EFFECT)
+    assert ("Doubtful: beside it" in page_of(tmp_path, found)) is doubtful
 
 
-@pytest.mark.parametrize("tied", [True, False])
-def test_a_finding_says_whether_it_is_certain_and_what_was_fitted_beside_it(tied):
-    """Its numbers depend on all that was fitted with it, not on what was rejected."""
-    rivals = [Rival(Hypothesis(LOADED.effect, (LOADED,)), 0.5)] if tied else []
-    (one,) = diagnosis().findings
-    wider = replace(one, hypothesis=Hypothesis(WIDER.effect, (WIDER,)))
-    open_one, gone = wider.undecided(Reason.MISSED), wider.rejected(Reason.IMPOSSIBLE)
-    data = diagnosis_data(diagnosis(alternatives=rivals, rejected=[open_one, gone]))
-    (finding,) = named_in(data)
-    assert finding["presence"] == ("tied" if tied else "certain")
-    own = {"effect": "winch_drum_radius", "elements": ["surge_2"]}
-    assert finding["conditional_on"] == [{**own, "status": "undecided"}]
-    considered = [(e["effect"], e["elements"], e["status"]) for e in data["considered"]]
-    assert considered == [(*own.values(), "undecided"), (*own.values(), "rejected")]
-    reasons = [each["reason"] for each in data["considered"]]
-    assert reasons == [Reason.MISSED.value, Reason.IMPOSSIBLE.value]
-    assert (open_one.status, gone.status) == (Status.UNDECIDED, Status.REJECTED)
-    assert not open_one.is_reported
-    assert not gone.is_reported
+@pytest.mark.parametrize("faint", [True, False])
+def test_a_finding_that_held_out_data_hardly_show_says_so(faint):
+    found = diagnosis()
+    holdout = HoldOut.FAINT if faint else HoldOut.CONFIRMED
+    found = judged(found, [replace(each, holdout=holdout) for each in found.findings])
+    (finding,) = named_in(diagnosis_data(found))
+    assert ("What was not searched moves so little" in finding["statement"]) is faint
+
+
+def doubted(effect, signal, left):
+    """Whether a finding that gains 900 is doubtful beside a function that gains `left`."""
+    found = diagnosis(unknown=[(Driver(PLACE, signal), Gain(left, 1.0), 0.2)])
+    candidate = Candidate(catalogue()[effect], "surge_2")
+    hypothesis = Hypothesis(candidate.effect, (candidate,))
+    return is_doubtful(replace(found.findings[0], hypothesis=hypothesis), found.unexplained)
+
+
+@pytest.mark.parametrize(
+    ("effect", "signal", "most"),
+    [
+        ("winch_torque_offset", "speed [rad/s]", 900.0),
+        ("winch_torque_offset", "time [s]", 90.0),
+        ("winch_torque_gain", "speed [rad/s]", 90.0),
+    ],
+)
+def test_a_constant_is_doubted_by_what_drifts_or_is_greater(effect, signal, most):
+    """It is the mean of whatever function of speed is there as well."""
+    assert not doubted(effect, signal, most - 1.0)
+    assert doubted(effect, signal, most + 1.0)
 
 
 def test_what_the_catalogue_has_as_constants():
@@ -270,14 +306,27 @@ def test_what_the_catalogue_has_as_constants():
     ]
 
 
-def test_what_alternates_is_unknown_beside_a_finding():
+@pytest.mark.parametrize(("gain", "behind"), [(201.0, False), (199.0, True)])
+def test_the_doubtful_comes_behind_a_greater_unknown_though_another_is_sure(gain, behind):
+    """The sure one gains 9000, the unknown 200: no tenth of that, and much of the other."""
+    found = diagnosis(unknown=[(Driver(PLACE, "tension [N]"), Gain(200.0, 1.0), 0.2)])
+    (one,) = found.findings
+    found = judged(found, [replace(one, gain=Gain(total, 1.0)) for total in (9000.0, gain)])
+    effects = [f["effect"] for f in diagnosis_data(found)["findings"]]
+    coulomb = "winch_coulomb_friction"
+    assert effects == [coulomb, *(("unknown", coulomb) if behind else (coulomb, "unknown"))]
+    assert verdict_of(found) is Verdict.EFFECT
+
+
+def test_what_alternates_comes_first_and_the_rest_is_doubtful():
+    """The finding gains more than all that is unknown."""
     swing = Line(Place(Channel.TENSION, "surge_2"), 0, 500.0, 5.6, 0.0, alternates=True)
     found = diagnosis(lines=[swing])
+    found = judged(found, found.findings, {"surge_2"})
     first, second = diagnosis_data(found)["findings"]
-    assert (first["effect"], first["probability"]) == ("winch_coulomb_friction", TRUSTED)
-    assert (second["effect"], second["region"]["at"]) == ("unknown", [500.0])
-    assert verdict_of(found) is Verdict.EFFECT
-    assert verdict_of(diagnosis(named=False, lines=[swing])) is Verdict.UNKNOWN
+    assert (first["effect"], first["region"]["at"]) == ("unknown", [500.0])
+    assert second["probability"] == pytest.approx(TRUSTED * DOUBTED)
+    assert verdict_of(found) is Verdict.UNKNOWN
 
 
 def test_where_a_finding_shows_is_reported():

@@ -9,7 +9,7 @@ from hypothesis import strategies as st
 from rich.console import Console
 
 from cspm.commands.diagnose_command import print_diagnosis
-from cspm_ident.diagnosis.finding import Reason, Status
+from cspm_ident.diagnosis.finding import Rejection, Status
 from cspm_ident.diagnosis.regression.block_regression import Gain
 from cspm_ident.diagnosis.reporting.diagnosis_page import write_diagnosis_page
 from cspm_ident.diagnosis.reporting.verdict import SENTENCES, Verdict, diagnosis_data, verdict_of
@@ -75,19 +75,19 @@ def printed(found, data):
     return taken.get()
 
 
-@pytest.mark.parametrize("reason", Reason)
-def test_what_is_rejected_is_reported_with_its_own_reason(reason, tmp_path):
+@pytest.mark.parametrize("reason", Rejection)
+def test_what_is_not_kept_is_reported_with_its_own_reason(reason, tmp_path):
     (finding,) = diagnosis().findings
-    gone = replace(finding, status=Status.REJECTED, reason=reason)
-    assert finding.reason_words == ""
+    gone = replace(finding, status=Status.REJECTED, rejection=reason)
+    assert finding.reason_not_kept == ""
     found = diagnosis(named=False, rejected=[gone])
     data = diagnosis_data(found)
     text = printed(found, data)
-    assert f"rejected, {finding.hypothesis.words}: {reason.value}\n" in text
+    assert f"not kept, {finding.hypothesis.words}: {reason.value}\n" in text
     write_diagnosis_page(tmp_path / "page.html", found, data)
     page = (tmp_path / "page.html").read_text(encoding="utf-8")
     assert f">{reason.value}</td>" in page
-    for other in set(Reason) - {reason}:
+    for other in set(Rejection) - {reason}:
         assert other.value not in text
         assert other.value not in page
 

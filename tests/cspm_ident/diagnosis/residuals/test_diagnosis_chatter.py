@@ -1,14 +1,19 @@
-"""Tensions that alternate from one reading to the next."""
+"""Tensions that alternate from one reading to the next, and what is doubtful then."""
 
 import numpy as np
 import pytest
 from run_samples import SCENARIOS
 
+from cspm_ident.diagnosis.finding import Finding, is_doubtful
+from cspm_ident.diagnosis.regression.block_regression import Gain
+from cspm_ident.diagnosis.regression.hypothesis import Hypothesis
 from cspm_ident.diagnosis.reporting.statement import line_statement
 from cspm_ident.diagnosis.residuals.aliased_tension import chatters_of
+from cspm_ident.diagnosis.residuals.regressors import Candidate
 from cspm_ident.signals.measurement import Measurement
 from cspm_ident.signals.samples import Samples
 from cspm_msgs_py.testbed import load_testbed
+from cspm_sim.effects import catalogue
 
 THESIS = load_testbed(SCENARIOS / "testbeds" / "thesis.yaml")
 N, STEP = 4000, 1e-3
@@ -60,3 +65,19 @@ def test_its_amplitude_is_reported():
 
 def test_without_load_cells_nothing_alternates():
     assert chatters_of(Measurement(SCENARIOS, "ab" * 32, THESIS)) == ()
+
+
+@pytest.mark.parametrize(
+    ("effect", "element", "doubtful"),
+    [
+        ("tension_gain", "hoist_1", True),
+        ("tension_gain", "hoist_2", False),
+        ("bar_mass", "bar", True),
+        ("frame_flexibility", "winch_frame", True),
+    ],
+)
+def test_what_is_reported_by_readings_that_alternate_is_doubtful(effect, element, doubtful):
+    own = catalogue()[effect]
+    finding = Finding(Hypothesis(own, (Candidate(own, element),)), Gain(9000.0, 10.0), 0.9)
+    assert is_doubtful(finding, (), {"hoist_1"}) is doubtful
+    assert not is_doubtful(finding, ())

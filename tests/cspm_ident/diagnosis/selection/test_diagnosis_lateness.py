@@ -11,6 +11,7 @@ from cspm_ident.diagnosis.regression.hypothesis import (
     may_be_negligible,
 )
 from cspm_ident.diagnosis.regression.parameter_estimates import of_clocks
+from cspm_ident.diagnosis.residuals.free_shapes import Knots
 from cspm_ident.diagnosis.residuals.regressors import Candidate, Place
 from cspm_ident.diagnosis.residuals.residual_equation import Equation
 from cspm_ident.diagnosis.selection.search import Search
@@ -49,6 +50,10 @@ def test_what_is_late_is_reported_of_two_that_explain_the_same(delay, apart):
     """Also where the noise of its readings makes it explain a hundredth less."""
     late = TRACKER if delay > 0.0 else CELLS
     assert [h.effect for h in named(cable(delay, apart))] == [late]
+
+
+def test_what_explains_much_more_is_reported_though_it_be_early():
+    assert [h.effect for h in named(cable(0.003, apart=0.6))] == [CELLS]
 
 
 def rig(delay, drag=0.0, like=1.0, seed=7):
@@ -92,6 +97,15 @@ def test_only_effects_on_stamps_are_early_and_only_below_zero():
     assert not early(Candidate(DRAG, "surge_1"), -1.0)
 
 
+def test_early_readings_beside_late_ones_say_the_same_again():
+    search = Search(gather([[cable(0.003, apart=0.1)]], BLOCK_S))
+    late, early = Hypothesis(TRACKER, (POSE,)), Hypothesis(CELLS, (TENSION,))
+    drag = Hypothesis(DRAG, (Candidate(DRAG, "surge_1"),))
+    assert search.fits.contradicts(early, [late])
+    assert not search.fits.contradicts(early, [])
+    assert not search.fits.contradicts(drag, [late])
+
+
 @pytest.mark.parametrize(("half", "reported"), [(0.2 * CLOCK, True), (0.7 * CLOCK, False)])
 def test_a_delay_counts_from_where_its_interval_leaves_what_clocks_may_be_apart(half, reported):
     for sign in (1.0, -1.0):
@@ -104,3 +118,17 @@ def test_a_delay_between_two_clocks_counts_from_twice_what_one_may_be_off(delay,
     for sign in (1.0, -1.0):
         found = of_clocks({TENSION: (np.array([sign * delay]), np.array([0.01 * CLOCK]))})
         assert may_be_negligible(found) is not reported
+
+
+@pytest.mark.parametrize(("delay", "reported"), [(0.5 * CLOCK, False), (4.0 * CLOCK, True)])
+def test_what_healthy_clocks_may_have_done_is_nothing_unknown(delay, reported):
+    """A slow motion's delay is a function of time, of which clocks explain what clocks may do."""
+    times = STEP * np.arange(ROWS)
+    rate = 2000.0 * np.sin(0.5 * times)
+    noise = 0.05 * np.random.default_rng(6).standard_normal(ROWS)
+    target = (delay * rate + noise)[:, None]
+    place = Place(Channel.TENSION, "surge_1")
+    columns = {POSE: rate[:, None, None], **Knots().columns(place, {"time [s]": times})}
+    search = Search(gather([[Equation(place, times, target, columns, target)]], BLOCK_S))
+    assert search._unexplained([], [])
+    assert bool(search.unexplained([])) is reported

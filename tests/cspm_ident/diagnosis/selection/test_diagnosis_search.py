@@ -2,10 +2,11 @@
 
 import numpy as np
 import pytest
+from scipy.stats import norm
 
 from cspm_ident.diagnosis.regression.block_gram import gather
 from cspm_ident.diagnosis.regression.block_regression import BlockRegression
-from cspm_ident.diagnosis.regression.coefficients import weights_of
+from cspm_ident.diagnosis.regression.coefficients import at_once, weights_of
 from cspm_ident.diagnosis.regression.parameter_estimates import of_shafts
 from cspm_ident.diagnosis.reporting.formula_hint import sketch
 from cspm_ident.diagnosis.residuals.free_shapes import KNOTS, Driver, Knots
@@ -14,7 +15,7 @@ from cspm_ident.diagnosis.residuals.residual_equation import Equation
 from cspm_ident.diagnosis.selection.onset import onset_of
 from cspm_ident.diagnosis.selection.search import Search
 from cspm_ident.diagnosis.validation.detection_limits import detection_limits
-from cspm_ident.diagnosis.validation.holdout_residuals import rms
+from cspm_ident.diagnosis.validation.holdout_residuals import free_functions, rms
 from cspm_sim.effects import Channel, catalogue
 
 ROWS, STEP, BLOCK_S = 4800, 0.01, 1.0
@@ -100,6 +101,13 @@ def test_rows_that_stick_do_not_mislead_and_others_are_all_used():
     assert abs(misled - TORQUE) > half
 
 
+def test_free_functions_leave_what_is_no_function_of_a_driver():
+    first, second = turning(seed=1), turning(seed=2)
+    gram, judge = (gather([[each]], BLOCK_S) for each in (first, second))
+    left = free_functions(gram, judge)[PLACE]
+    assert 0.05 < left < 0.5 * rms([second])
+
+
 def test_knots_are_those_of_the_first_recording():
     knots = Knots()
     wide, narrow = np.linspace(-1.0, 1.0, 50), np.linspace(-0.2, 3.0, 50)
@@ -123,7 +131,7 @@ def test_an_effect_below_its_limit_is_not_reported_and_one_above_it_is():
     for factor, reported in ((0.5, False), (2.0, True)):
         less = factor * limit.least - TORQUE
         found_here = found(turning(missing=lambda speed, less=less: less * np.sign(speed)))
-        assert any(each.is_reported for each in found_here.findings) is reported
+        assert bool(found_here.findings) is reported
 
 
 def test_what_is_never_reported_is_fitted_before_a_residual_counts():
@@ -177,8 +185,8 @@ def test_a_wrong_number_of_the_file_does_not_begin():
     target = 0.3 * column * (times > 24.0) + 0.05 * rng.standard_normal(ROWS)
     for term, begins in ((stiffness, False), (friction, True)):
         shaped = {term: column[:, None, None]}
-        named = found(Equation(place, times, target[:, None], shaped, target[:, None])).findings
-        assert any(each.hypothesis.onset > 0 for each in named) is begins
+        (named,) = found(Equation(place, times, target[:, None], shaped, target[:, None])).findings
+        assert (named.hypothesis.onset > 0) is begins
 
 
 BIAS, OFFSET = "tension_bias", "winch_torque_offset"
@@ -235,3 +243,16 @@ def mixed(own):
 def test_elements_that_another_effect_explains_are_left_out(own, expected):
     named = found(mixed(own)).findings
     assert {(n.hypothesis.effect.id, n.hypothesis.elements) for n in named} == expected
+
+
+@pytest.mark.parametrize("count", [1, 8])
+def test_intervals_at_once_hold_all_weights_in_nineteen_of_twenty(count):
+    rng = np.random.default_rng(5)
+    errors = rng.standard_normal((20_000, count))
+    half = np.array([norm.isf(0.025)])
+    many = [Candidate(catalogue()["winch_viscous_friction"], f"w{k}") for k in range(count)]
+    wide = at_once({c: (np.zeros(1), half) for c in many})
+    widths = np.array([wide[c][1][0] for c in many])
+    assert np.all(np.abs(errors) < widths, axis=1).mean() == pytest.approx(0.95, abs=0.005)
+    assert (widths[0] == half[0]) == (count == 1)
+    assert at_once({}) == {}

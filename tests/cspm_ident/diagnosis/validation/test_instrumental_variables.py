@@ -136,4 +136,4 @@ def test_a_healthy_machine_whose_bar_stands_still_is_consistent(tmp_path):
     )
     found = diagnose([read_measurement(tmp_path / "healthy")])
     assert verdict_of(found) is Verdict.CONSISTENT
-    assert any(is_proportional(each.hypothesis.effect) for each in found.considered)
+    assert any(is_proportional(each.hypothesis.effect) for each in found.rejected)

@@ -103,7 +103,7 @@ def _remarks(winch: IdentifiedWinch, torque_age: float) -> Iterator[str]:
             " out. A counter that rolls over: `wrap` in the mapping"
         )
     if winch.from_speed:
-        yield f"{winch.name}: motion from the drive's speed, which is less noisy than the angle"
+        yield f"{winch.name}: accelerations from the drive's speed; the angle is too noisy for them"
     late = winch.lateness
     if late is None:
         yield f"torque taken to act {1e3 * torque_age:g} ms before its stamp"

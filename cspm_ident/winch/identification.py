@@ -21,14 +21,7 @@ from cspm_ident.estimation import (
     fit_linear,
 )
 from cspm_ident.winch.recording import WinchSignals, signal_rows
-from cspm_ident.winch.weak_form import (
-    HALF_WIDTH_S,
-    acceleration_weights,
-    first_of,
-    half_width_of,
-    make_window,
-    weigh,
-)
+from cspm_ident.winch.weak_form import HALF_WIDTH_S, first_of, make_window, weigh
 from cspm_msgs_py.errors import InputError
 from cspm_sim.effects import Effect, catalogue
 from cspm_sim.effects.effect import Channel
@@ -219,36 +212,33 @@ def _weak(
     rows: Array, signals: WinchSignals, effects: Sequence[Effect], half_width: float
 ) -> _Weak:
     step = signals.angle.interval
-    half = half_width_of(step, half_width)
+    half = max(2, round(half_width / step))
     width = 2 + sum(effect.regressors(rows[:1]).shape[2] for effect in effects)
     if len(rows) < 2 * half + 1:
         none = np.zeros(0)
         return _Weak(none, np.zeros((0, width)), none.astype(np.bool_), none, (0.0, 0))
     window, stride = make_window(half, step), max(1, half // 2)
-    from_speed = signals.speed is not None
-    averaged = window.averaged(step, from_speed=from_speed)
-    pull = signals.radius * rows[:, WinchSignal.TENSION] + signals.load_torque(rows)
+    load = rows[:, WinchSignal.TORQUE] - signals.radius * rows[:, WinchSignal.TENSION]
+    load = load - signals.load_torque(rows)
     speed = rows[:, WinchSignal.SPEED]
-    column, weights = acceleration_weights(half, step, from_speed=from_speed)
-    inertia = weigh(weights, rows[:, column], stride)
+    if signals.speed is None:
+        inertia = weigh(window.second, rows[:, WinchSignal.ANGLE], stride)
+    else:
+        inertia = weigh(first_of(half, step), speed, stride)
     none = np.zeros((len(rows), 0))  # where inertia alone is left
     added = np.concatenate([none, *(effect.regressors(rows)[:, 0] for effect in effects)], axis=1)
-    target = weigh(window.weights, rows[:, WinchSignal.TORQUE], stride)
-    target = target - weigh(averaged, pull, stride) - signals.load_inertia * inertia
-    added = weigh(averaged, added, stride)
+    target = weigh(window.weights, load, stride) - signals.load_inertia * inertia
+    # The mean of the signs is ±1 where the shaft turns one way throughout.
+    signs = np.sign(speed)
+    one_way = weigh(np.full(len(window.weights), 1.0 / len(window.weights)), signs, stride)
+    turns = np.abs(one_way) < 1.0 - 0.5 / len(window.weights)
+    added = weigh(window.weights, added, stride)
     rate = weigh(first_of(half, step), rows[:, WinchSignal.TORQUE], stride)
     view = np.lib.stride_tricks.sliding_window_view(np.abs(speed), len(window.weights))
     fastest = view[::stride].max(axis=1)
     moving = (float(np.mean(speed**2)), len(speed))
     columns = np.column_stack([inertia, added, -rate])
-    return _Weak(target, columns, _reverses(speed, len(averaged), stride), fastest, moving)
-
-
-def _reverses(speed: Array, width: int, stride: int) -> NDArray[np.bool_]:
-    """Return in which windows the sign of the speed does not stay."""
-    # The mean of the signs is ±1 where the shaft turns one way throughout.
-    one_way = weigh(np.full(width, 1.0 / width), np.sign(speed), stride)
-    return np.asarray(np.abs(one_way) < 1.0 - 0.5 / width)
+    return _Weak(target, columns, turns, fastest, moving)
 
 
 def _instrument_columns(

@@ -13,6 +13,7 @@ from cspm_ident.recording_roles import check_roles
 from cspm_ident.signals.jumps import jumps, without_jumps
 from cspm_ident.signals.measurement import Measurement
 from cspm_ident.signals.prediction_noise import prediction_noise
+from cspm_ident.signals.samples import Samples
 from cspm_ident.winch.identification import INERTIA, WinchFit, identify_winch
 from cspm_ident.winch.identified_winch import (
     DESCRIBED,
@@ -23,7 +24,11 @@ from cspm_ident.winch.identified_winch import (
     is_one_signed,
 )
 from cspm_ident.winch.lateness import at_age, fit_beside_lateness, lateness_of
-from cspm_ident.winch.motion_source import MotionSource, source_of, with_source
+from cspm_ident.winch.motion_source import (
+    MotionSource,
+    motion_source,
+    speed_agrees,
+)
 from cspm_ident.winch.parsimony import without_unseen
 from cspm_ident.winch.reconstruction import TorqueError, torque_error
 from cspm_ident.winch.recording import WinchSignals, winch_signals
@@ -67,8 +72,8 @@ def identify_winches(
 ) -> WinchesResult:
     """Fit inertia and effects of winches, each by itself, and predict the torque of recordings.
 
-    Jumps of an encoder are left out; see `jumps`. Motion is taken from the drive's speed where that
-    shows it better than the angle; see `with_source`.
+    Jumps of an encoder are left out; see `jumps`. Accelerations are taken from the drive's speed
+    where the angle is too noisy for them; see `motion_source`.
 
     Args:
         searched: to fit, at least one, all of one machine.
@@ -118,17 +123,10 @@ def _identified(
 ) -> IdentifiedWinch:
     recordings = (*searched, *held_out)
     raw = [winch_signals(each, name, way.torque_age) for each in recordings]
-    index = searched[0].machine.cable_names.index(name)
-    signals = [
-        with_source(
-            replace(own, angle=without_jumps(own.angle)),
-            None if each.speed is None else each.speed.column(index),
-        )
-        for each, own in zip(recordings, raw, strict=True)
-    ]
+    signals = [replace(each, angle=without_jumps(each.angle)) for each in raw]
     own = signals[: len(searched)]
     reversals = _reversals(own, way)
-    source = source_of(own, way.effects, reversals=reversals)
+    source = motion_source(own, _speeds(searched, own, name), way.effects, reversals=reversals)
     late = lateness_of(source.signals, way.effects, reversals=reversals) if way.lateness else None
     if late is not None:
         source = source._replace(signals=at_age(source.signals, late.age))
@@ -143,7 +141,11 @@ def _identified(
     )
     equations = {DESCRIBED: described, FITTED: fitted_equation(fit, way.effects)}
     age = way.torque_age if late is None else late.age
-    judged = at_age(signals, age)
+    others = signals[len(searched) :]
+    if source.signals[0].speed is not None:
+        speeds = _speeds(held_out, others, name)
+        others = [replace(each, speed=own) for each, own in zip(others, speeds, strict=True)]
+    judged = at_age([*source.signals, *others], age)
     judgements = tuple(
         WinchJudgement(each, i >= len(searched), _errors(own, equations, way.band))
         for i, (each, own) in enumerate(zip(recordings, judged, strict=True))
@@ -163,8 +165,23 @@ def _identified(
             for each, s in zip(recordings, raw, strict=True)
             if len(jumps(s.angle))
         ),
-        any(each.speed is not None for each in source.signals),
+        source.signals[0].speed is not None,
     )
+
+
+def _speeds(
+    recordings: Sequence[Measurement], signals: Sequence[WinchSignals], name: str
+) -> list[Samples | None]:
+    """Return the speeds that drives report, where they are the angles' derivatives.
+
+    There may be no recording, as where none is held out.
+    """
+    found: list[Samples | None] = []
+    for each, own in zip(recordings, signals, strict=True):
+        index = each.machine.cable_names.index(name)
+        speed = None if each.speed is None else each.speed.column(index)
+        found.append(speed if speed is not None and speed_agrees(own.angle, speed) else None)
+    return found
 
 
 def _reversals(signals: Sequence[WinchSignals], way: _Way) -> bool:

@@ -1,4 +1,4 @@
-"""What a winch's motion is taken from, and whether accelerations stand out of its noise."""
+"""Whether a winch's accelerations stand out of the noise of what they are taken from."""
 
 from __future__ import annotations
 
@@ -13,16 +13,8 @@ from cspm_ident.signals.prediction_noise import prediction_noise
 from cspm_ident.signals.samples import Samples
 from cspm_ident.signals.smoothing import band_of
 from cspm_ident.winch.identification import linear_effects, winch_records
-from cspm_ident.winch.recording import WinchSignals, signal_rows
-from cspm_ident.winch.weak_form import (
-    HALF_WIDTH_S,
-    acceleration_weights,
-    first_of,
-    half_width_of,
-    make_window,
-    weigh,
-)
-from cspm_msgs_py.errors import InputError
+from cspm_ident.winch.recording import WinchSignals
+from cspm_ident.winch.weak_form import HALF_WIDTH_S, first_of, make_window
 
 Array = NDArray[np.float64]
 
@@ -36,9 +28,6 @@ _UNEVEN = 0.01
 # Samples over which a reported speed is summed, and the largest share of the angle's changes, as a
 # variance, that it may miss: a tenth of the speed, less than the inertia's interval would say.
 _STRETCH = 10
-# Of what both noises say, as a variance: two standard deviations.
-_DISTORTED = 4.0
-_FRICTIONS = ("winch_viscous_friction", "winch_coulomb_friction")
 _FEWEST = 4
 _DISAGREEMENT = 0.01
 
@@ -66,58 +55,33 @@ class MotionSource(NamedTuple):
         return self.noise_share <= LARGEST_SHARE
 
 
-def with_source(signals: WinchSignals, drive: Samples | None) -> WinchSignals:
-    """Return the readings of one recording with the drive's speed, where that shows motion better.
-
-    That is where it adds up to the angle, has less noise in the accelerations, and, unless the
-    angle has too much for any, differs from the angle's by no more than noise: what a drive has
-    filtered or reports late is not noisy, and wrong. What was found is kept with the angles.
+def motion_source(
+    signals: Sequence[WinchSignals],
+    speeds: Sequence[Samples | None],
+    effects: Sequence[str],
+    *,
+    reversals: bool,
+) -> MotionSource:
+    """Return the angle as the source of accelerations, or the drive's speed if that is too noisy.
 
     Args:
-        signals: readings of one winch, without `speed`; the torque does not matter.
-        drive: speed that it reports [rad/s], one column; None where it does not.
+        signals: readings of one winch, one entry per recording.
+        speeds: as the drive reports them [rad/s], one column, entry by entry; None where it does
+            not.
+        effects: see `identify_winch`.
+        reversals: see `identify_winch`.
+
+    Raises:
+        InputError: see `identify_winch`.
     """
-    if drive is None:
-        return signals
-    reported = replace(signals, speed=drive)
-    better = signals.angle.kept((with_source, drive), lambda: _is_better(signals, reported))
-    return reported if better else signals
-
-
-def _is_better(signals: WinchSignals, reported: WinchSignals) -> bool:
-    assert reported.speed is not None
-    if not speed_agrees(signals.angle, reported.speed):
-        return False
-    angle, speed = recorded_source(signals), recorded_source(reported)
-    if angle is None or speed is None or speed.noise_share >= angle.noise_share:
-        return False
-    if not angle.shows_acceleration:
-        return True
-    apart = np.concatenate(
-        [_apart(rows, signals.angle.interval) for _, rows in signal_rows(reported)]
-    )
-    noise = _acceleration_noise(signals) + _acceleration_noise(reported)
-    return float(np.mean(apart**2)) <= _DISTORTED * noise
-
-
-def _apart(rows: Array, step: float) -> Array:
-    """Return the drive's accelerations less the angle's, weighted (k,) [rad/s²]."""
-    half = half_width_of(step)
-    if len(rows) < 2 * half + 1:
-        return np.zeros(0)
-    sources = (acceleration_weights(half, step, from_speed=each) for each in (True, False))
-    by_speed, by_angle = (weigh(weights, rows[:, column], 1) for column, weights in sources)
-    return np.asarray(by_speed - by_angle)
-
-
-def recorded_source(signals: WinchSignals) -> MotionSource | None:
-    """Return one recording's source, without reversals if it can be; None if nothing moves."""
-    for reversals in (False, True):
-        try:
-            return source_of([signals], _FRICTIONS, reversals=reversals)
-        except InputError:
-            continue
-    return None
+    own = source_of(signals, effects, reversals=reversals)
+    if own.shows_acceleration or any(speed is None for speed in speeds):
+        return own
+    reported = [replace(s, speed=speed) for s, speed in zip(signals, speeds, strict=True)]
+    other = source_of(reported, effects, reversals=reversals)
+    if other.noise_share < own.noise_share:
+        return other._replace(stamp_error=own.stamp_error)
+    return own
 
 
 def source_of(
@@ -149,7 +113,7 @@ def source_of(
 def _acceleration_noise(signals: WinchSignals) -> float:
     """Return the variance that noise of the readings has in weighted accelerations [rad²/s⁴]."""
     step = signals.angle.interval
-    half = half_width_of(step)
+    half = max(2, round(HALF_WIDTH_S / step))
     if signals.speed is not None:
         return prediction_noise(signals.speed) * float(np.sum(first_of(half, step) ** 2))
     second = make_window(half, step).second

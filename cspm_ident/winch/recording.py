@@ -13,6 +13,7 @@ from cspm_ident.signals.measurement import TENSION, Measurement
 from cspm_ident.signals.samples import Samples
 from cspm_ident.signals.smoothing import smoothed
 from cspm_ident.signals.timeline import joined
+from cspm_ident.signals.winch_motion import joined_motion
 from cspm_msgs_py.errors import InputError
 from cspm_msgs_py.testbed import Testbed
 from cspm_sim.effects import Effect
@@ -153,7 +154,7 @@ def signal_rows(
     Args:
         signals: the readings.
         band: kept of the angle [Hz]; by default what exceeds its noise.
-        moved: the angle's motion where it is known, see `moved_along`; the band does not count.
+        moved: the shaft's motion where it is known, see `moved_along`; the band does not count.
 
     Returns:
         Pairs of times [s], shape (n,), and signals, shape (n, len(WinchSignal)).
@@ -180,20 +181,28 @@ def signal_rows(
     return tables
 
 
-def moved_along(angle: Samples, band: float | None = None) -> list[Moved]:
-    """Return how a shaft moved by its angle, for each stretch without a hole.
+def moved_along(
+    angle: Samples, band: float | None = None, drive: Samples | None = None
+) -> list[Moved]:
+    """Return how a shaft moved, for each stretch without a hole.
 
     Args:
         angle: of the encoder, one column [rad].
         band: kept of it [Hz]; by default what exceeds its noise.
+        drive: speed that the drive reports, one column [rad/s]: angle and speed then come from both
+            sensors, see `winch_motion`.
     """
     slow, step, found = smoothed(angle, band), angle.interval, []
     for start, end in slow.spans:
         times = start + step * np.arange(int((end - start) / step + 1e-6) + 1)
         times = angle.shared.setdefault((moved_along, start, end), np.minimum(times, end))
         moved = np.empty((len(times), 3), order="F")
-        for derivative, column in enumerate(moved.T):
-            column[:] = slow.at(times, derivative)[:, 0]
+        if drive is None:
+            moved[:, 0], moved[:, 1] = slow.at(times)[:, 0], slow.at(times, 1)[:, 0]
+        else:
+            motion = joined_motion(angle, drive, times)
+            moved[:, 0], moved[:, 1] = motion.angles[:, 0], motion.speeds[:, 0]
+        moved[:, 2] = slow.at(times, 2)[:, 0]
         found.append(Moved(times, moved))
     return found
 

@@ -7,8 +7,6 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from cspm_sim.effects.signals import WinchSignal
-
 Array = NDArray[np.float64]
 
 _POWER = 4
@@ -30,19 +28,13 @@ class Window(NamedTuple):
     weights: Array
     second: Array
 
-    def averaged(self, step: float, *, from_speed: bool = False) -> Array:
+    def averaged(self, step: float) -> Array:
         """Return weights of what is read at instants and acts all the time between, shape (w,).
 
-        A second difference of angles is the acceleration averaged over a step before and one after,
-        the middle weighing most; so is what a drive holds. That of readings is taken to fourth
-        order (Numerov). A central difference of speeds averages all of both steps alike.
+        A second difference of angles is the acceleration averaged over a step before and one after;
+        so is what a drive holds. That of readings is taken to fourth order (Numerov).
         """
-        return self.weights + step**2 / (6.0 if from_speed else 12.0) * self.second
-
-
-def half_width_of(step: float, half_width: float = HALF_WIDTH_S) -> int:
-    """Return the samples from a window's middle to its end, of times [s]."""
-    return max(2, round(half_width / step))
+        return self.weights + step**2 / 12.0 * self.second
 
 
 def make_window(half_width: int, step: float) -> Window:
@@ -74,21 +66,6 @@ def first_of(half_width: int, step: float) -> Array:
     window = np.where(np.abs(s) < 1.0, (1.0 - s**2), 0.0) ** _POWER
     window /= window.sum()
     return np.asarray((window[:-2] - window[2:]) / (2.0 * step))
-
-
-def acceleration_weights(
-    half_width: int, step: float, *, from_speed: bool
-) -> tuple[WinchSignal, Array]:
-    """Return the signal of which accelerations are taken, and its weights, by summation by parts.
-
-    Args:
-        half_width: see `make_window`.
-        step: time between samples [s].
-        from_speed: whether it is the speed instead of the angle.
-    """
-    if from_speed:
-        return WinchSignal.SPEED, first_of(half_width, step)
-    return WinchSignal.ANGLE, make_window(half_width, step).second
 
 
 def weigh(weights: Array, values: Array, stride: int) -> Array:

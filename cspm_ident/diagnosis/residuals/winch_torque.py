@@ -16,9 +16,8 @@ from cspm_ident.diagnosis.thresholds import DEFAULT_THRESHOLDS, Thresholds
 from cspm_ident.side_by_side import side_by_side
 from cspm_ident.signals.measurement import TENSION, WINCHES, Measurement
 from cspm_ident.signals.samples import Samples
-from cspm_ident.winch.motion_source import with_source
 from cspm_ident.winch.recording import moved_along, signal_rows, winch_signals
-from cspm_ident.winch.weak_form import acceleration_weights, half_width_of, make_window, weigh
+from cspm_ident.winch.weak_form import HALF_WIDTH_S, make_window, weigh
 from cspm_msgs_py.errors import InputError
 from cspm_msgs_py.testbed import Cable
 from cspm_sim.effect_entries import Action
@@ -80,17 +79,17 @@ def _tables(measurement: Measurement, i: int, thresholds: Thresholds) -> Iterato
     except InputError:
         return
     drive = None if measurement.speed is None else measurement.speed.column(i)
-    signals = with_source(signals, drive)
-    moved = signals.angle.kept(moved_along, lambda: moved_along(signals.angle))
+    moved = signals.angle.kept(
+        (moved_along, drive), lambda: moved_along(signals.angle, None, drive)
+    )
     for times, rows in signal_rows(signals, moved=moved):
-        half = half_width_of(signals.angle.interval)
+        half = max(2, round(HALF_WIDTH_S / signals.angle.interval))
         angles = rows[:, WinchSignal.ANGLE]
         if len(rows) < 2 * half + 1 or not _turns(angles, signals.angle, ratio):
             continue
         sensors = (WINCHES,) if signals.tension is None else (WINCHES, TENSION)
         lost = _lost(signals.torque, measurement.torque_age, times)
-        share, by_speed = thresholds.reversal_speed_share, signals.speed is not None
-        yield _Shaft(rows, cable, half, times, lost, sensors, share, from_speed=by_speed)
+        yield _Shaft(rows, cable, half, times, lost, sensors, thresholds.reversal_speed_share)
 
 
 def may_reverse(speeds: Array, share: float, width: int) -> NDArray[np.bool_]:
@@ -145,14 +144,11 @@ class _Shaft:
         lost: NDArray[np.bool_],
         sensors: tuple[str, ...],
         still_share: float,
-        *,
-        from_speed: bool,
     ) -> None:
         self._sensors, inertia, name = sensors, winch.rotor_inertia, winch.name
         self._rows, self._inertia, self._name = rows, inertia, name
         self._step = float(times[1] - times[0])
         self._window, self._stride = make_window(half, self._step), max(1, half // 2)
-        self._motion, self._rate = acceleration_weights(half, self._step, from_speed=from_speed)
         speed = np.abs(rows[:, WinchSignal.SPEED])
         view, width = np.lib.stride_tricks.sliding_window_view, len(self._window.weights)
         windows = view(speed, width)[:: self._stride]
@@ -169,7 +165,7 @@ class _Shaft:
         rows = self._rows
         pulled = rows[:, WinchSignal.RADIUS] * rows[:, WinchSignal.TENSION]
         target = self._weighed(rows[:, WinchSignal.TORQUE]) - self._averaged(pulled)
-        target = target - self._inertia * self._accelerated(rows[:, self._motion])
+        target = target - self._inertia * self._accelerated(rows[:, WinchSignal.ANGLE])
         gain = 1.0
         for action in known:
             effect = action.effect
@@ -219,20 +215,17 @@ class _Shaft:
         change = effect.regressors(reading)[:, 0]
         if tension:
             return self._averaged(-self._rows[:, WinchSignal.RADIUS, None] * change)
-        if self._motion is not WinchSignal.ANGLE:
-            change = np.zeros_like(change)
         return -self._inertia * self._accelerated(change)
 
     def _weighed(self, values: Array) -> Array:
         return np.asarray(weigh(self._window.weights, values, self._stride)[self._moving])
 
     def _averaged(self, values: Array) -> Array:
-        by_speed = self._motion is WinchSignal.SPEED
-        weights = self._window.averaged(self._step, from_speed=by_speed)
+        weights = self._window.averaged(self._step)
         return np.asarray(weigh(weights, values, self._stride)[self._moving])
 
     def _accelerated(self, values: Array) -> Array:
-        return np.asarray(weigh(self._rate, values, self._stride)[self._moving])
+        return np.asarray(weigh(self._window.second, values, self._stride)[self._moving])
 
 
 def _as_reported(

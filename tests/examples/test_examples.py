@@ -21,7 +21,7 @@ SHOWN = {
     "own_reference": r"radius in the end: 0\.(049|050)\d* m",
     "own_effect": r"resisting torque = coefficient.*\nfastest: .* rad/s\nfastest: ",
     "compare_recordings": r"hoist_1: \+\d\.\d+ N more with the heavy bar",
-    "identify_winch": r"winch_coulomb_friction torque: 0\.0(19\d*|20\d*|2) N·m",
+    "identify_winch": r"winch_coulomb_friction torque: 0\.0(19|20)\d* N·m",
     "sweep_gain": r"\n +15 +\d\.\d{4} +\d+\.\d\d\n",
     "read_into_pandas": r"tension/sway_4",
     "linear_analysis": r"torque of hoist_1.*\ngain .*\n.*crosses over at \d+\.\d rad/s",

@@ -75,7 +75,7 @@ def test_a_guess_is_asked_until_it_is_a_number(machine):
 
 @pytest.mark.slow
 def test_the_command_names_friction_and_leaves_its_pages(cspm, tmp_path, monkeypatch):
-    monkeypatch.setattr(demo_command, "DURATION_S", 14.0)
+    monkeypatch.setattr(demo_command, "DURATION_S", 8.0)
     words = ("demo", "--seed", "4", "--effect", "winch_coulomb_friction", "--out", "shown")
     code, out, err = cspm(*words, "--json", "demo.json")
     assert (code, err) == (0, "")

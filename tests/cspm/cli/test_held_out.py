@@ -1,32 +1,12 @@
 """Which recordings judge: those after `--held-out`, one each, and none by its place alone."""
 
 import pytest
-import typer
 from error_lines import said
-from typer.core import TyperGroup
 
-from cspm.cli import main as cli
-from cspm.cli.app import app
 from cspm.cli.held_out import JudgedCommand, refuse_searched_after_held_out
 from cspm_msgs_py.errors import InputError
 
 JUDGED = [("diagnose",), ("identify", "lengths"), ("identify", "system"), ("identify", "winch")]
-
-
-@pytest.fixture(scope="module")
-def commands():
-    """All commands by their words."""
-
-    def below(command, words):
-        if not isinstance(command, TyperGroup):
-            return {words: command}
-        return {k: v for n, c in command.commands.items() for k, v in below(c, (*words, n)).items()}
-
-    with pytest.MonkeyPatch.context() as patch:
-        patch.setattr("sys.argv", ["cspm", "--version"])
-        with pytest.raises(SystemExit):
-            cli.main()
-    return below(typer.main.get_command(app), ())
 
 
 def test_all_commands_with_the_option_look_at_the_order(commands):

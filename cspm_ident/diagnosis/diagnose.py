@@ -158,8 +158,7 @@ def _findings(
     aliased = {line.place.element for line in lines}
 
     def described(finding: Finding) -> Finding:
-        left = rest_share(concerned(fit, finding), own.thresholds)
-        status = reported_status(finding, unexplained, aliased, own.thresholds, left)
+        status = reported_status(finding, aliased)
         region = region_of(own.rows, finding.hypothesis.candidates, own.first, own.thresholds)
         return replace(finding, status=status, region=region)
 

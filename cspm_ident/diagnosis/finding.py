@@ -203,56 +203,21 @@ class Finding:
         return parameters_of(own, doubtful=self.is_doubtful)
 
 
-def reported_status(
-    finding: Finding,
-    unexplained: Sequence[Unexplained],
-    aliased: Collection[str] = (),
-    thresholds: Thresholds = DEFAULT_THRESHOLDS,
-    left: float = 0.0,
-) -> Status:
-    """Return the status of a finding that is reported; see `is_doubtful`.
+def reported_status(finding: Finding, aliased: Collection[str] = ()) -> Status:
+    """Return the status of a finding that is reported.
 
-    It is doubtful as well where the intervals of all its coefficients contain zero. They include
-    the model-form error, which is then as large as the effect.
-    """
-    intervals = {c.candidate: (c.values, c.half_widths) for c in finding.coefficients}
-    drifts = finding.hypothesis.effect.physics.sense is not None
-    if may_be_none(intervals) and not (drifts or finding.hypothesis.effect.signature.saturates):
-        return Status.DOUBTFUL
-    if is_doubtful(finding, unexplained, aliased, thresholds, left):
-        return Status.DOUBTFUL
-    return Status.TIED if finding.alternatives else Status.REPORTED
-
-
-def is_doubtful(
-    finding: Finding,
-    unexplained: Sequence[Unexplained],
-    aliased: Collection[str] = (),
-    thresholds: Thresholds = DEFAULT_THRESHOLDS,
-    left: float = 0.0,
-) -> bool:
-    """Return whether unexplained residuals are large relative to the gain of a finding.
-
-    An unexplained function of a signal does not make a constant doubtful, unless it gains
-    more than the constant. An unexplained function of time does, as the constant may have drifted.
+    It is doubtful where the intervals of all its coefficients contain zero. They include what a
+    free function of any signal beside it may move them by. It is doubtful as well where it depends
+    on an aliased tension, which alternates from one reading to the next.
 
     Args:
         finding: the finding to judge.
-        unexplained: residuals that no effect explains.
-        aliased: cables with aliased tension, which alternates from one reading to the next. Any
-            finding that depends on these is doubtful.
-        thresholds: `minor_share`.
-        left: what all findings leave of its held-out residuals beyond the noise, as a share of
-            what they take; see `rest_share`.
+        aliased: cables with aliased tension.
     """
+    intervals = {c.candidate: (c.values, c.half_widths) for c in finding.coefficients}
+    drifts = finding.hypothesis.effect.physics.sense is not None
+    exempt = drifts or finding.hypothesis.effect.signature.saturates
     misread = {*aliased, *_FED_BY_ALL} if aliased else set()
-    if misread & set(finding.elements):
-        return True
-    gained, constant = finding.gain.total, is_constant(finding.hypothesis.effect)
-    share = thresholds.minor_share
-    if left > (1.0 if constant else share):
-        return True
-    return any(
-        each.gain.total > gained * (1.0 if constant and not each.driver.of_time else share)
-        for each in unexplained
-    )
+    if (may_be_none(intervals) and not exempt) or misread & set(finding.elements):
+        return Status.DOUBTFUL
+    return Status.TIED if finding.alternatives else Status.REPORTED

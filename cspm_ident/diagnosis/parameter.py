@@ -70,9 +70,6 @@ def parameters_of(own: Coefficients, *, doubtful: bool = False) -> list[Paramete
     effect, weights, widths = own.candidate.effect, own.values, own.half_widths
     values = effect.values(weights.tolist(), **own.candidate.nonlinear)
     element = own.candidate.element
-    if doubtful:
-        reported = ((p, values[p.name]) for p in effect.parameters)
-        return [Parameter(element, p.name, value, p.unit, value, value) for p, value in reported]
     if not np.all(np.isfinite(widths)):
         return [
             _parameter(element, p, values[p.name], p.minimum, p.maximum) for p in effect.parameters

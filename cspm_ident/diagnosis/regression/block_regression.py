@@ -363,6 +363,15 @@ class BlockRegression:
 
         return np.asarray(1.0 - left(both) / np.maximum(left(base), RANK))
 
+    def projected(self, base: Index, columns: Index) -> tuple[Array, Array]:
+        """Return weights of a base for columns, (base, m), and products of what is left, (m, m).
+
+        All columns are scaled to length 1.
+        """
+        cross = self._whole.at(base, columns)
+        turned = pseudo_inverse(self._whole.at(base, base)) @ cross
+        return turned, np.asarray(self._whole.at(columns, columns) - cross.T @ turned)
+
     def left_from(self, base: Index, columns: Index) -> Array:
         """Return Σ residual² where `columns` act only from each block on, shape (blocks,)."""
         own, table = slice(len(base), -1), np.concatenate([base, columns, [len(self._starts) - 1]])

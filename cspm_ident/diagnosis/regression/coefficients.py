@@ -49,8 +49,7 @@ def weights_of(
         base: columns that are fitted beside them; None: the nuisance.
     """
     beside = gram.nuisance if base is None else base
-    number = _numbers(gram, candidates, common)
-    causes = np.eye(number.max(initial=-1) + 1)[number]
+    causes, number = causes_of(gram, candidates, common)
     sums, beside, own = sums.combined(beside, gram.columns_of(candidates), causes)
     free = sums.weights(np.concatenate([beside, own]))[len(beside) :]
     values = gram.parted(candidates, free[number])
@@ -64,6 +63,20 @@ def at_once(weights: Weights) -> Weights:
         return weights
     wider = float(norm.isf(_OUTSIDE / len(weights)) / norm.isf(_OUTSIDE))
     return {c: (own, wider * half) for c, (own, half) in weights.items()}
+
+
+def causes_of(
+    gram: BlockGram, candidates: Sequence[Candidate], common: Collection[str]
+) -> tuple[Array, Index]:
+    """Return which columns share a free parameter, (columns, parameters), and each one's index.
+
+    Args:
+        gram: of the candidates' regressors.
+        candidates: fitted together.
+        common: ids of effects whose candidates all share their weights.
+    """
+    number = _numbers(gram, candidates, common)
+    return np.eye(number.max(initial=-1) + 1)[number], number
 
 
 def _numbers(gram: BlockGram, candidates: Sequence[Candidate], common: Collection[str]) -> Index:

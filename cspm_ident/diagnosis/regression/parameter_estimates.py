@@ -113,7 +113,7 @@ def of_clocks(weights: Weights) -> Weights:
 
 def of_forms(
     weights: Weights,
-    model_form_error: Mapping[Candidate, float],
+    moved: Mapping[Candidate, Array],
     thresholds: Thresholds = DEFAULT_THRESHOLDS,
 ) -> Weights:
     """Return the weights, with intervals that include the model-form error.
@@ -124,14 +124,14 @@ def of_forms(
 
     Args:
         weights: as found.
-        model_form_error: of each candidate, as a share of its amplitude.
+        moved: how far free functions may move them; see `moved_by_functions`.
         thresholds: `model_form_error_share`.
     """
     found, form_error = dict(weights), float(np.sqrt(thresholds.model_form_error_share))
     for candidate, (values, half) in weights.items():
         least = 0.0 if candidate.effect.is_correction else form_error
-        share = max(model_form_error[candidate], least)
-        found[candidate] = values, np.hypot(half, share * np.abs(values))
+        wider = np.maximum(moved[candidate], least * np.abs(values))
+        found[candidate] = values, np.hypot(half, wider)
     return found
 
 

@@ -12,7 +12,6 @@ from cspm_ident.diagnosis.finding import (
     Rejection,
     Status,
     Unexplained,
-    is_doubtful,
 )
 from cspm_ident.diagnosis.regression.block_gram import BlockGram
 from cspm_ident.diagnosis.regression.hypothesis import Hypothesis
@@ -252,7 +251,7 @@ def _left_open(
     limits = search.thresholds
     most = limits.majority_share * max(each.gain.total for each in unexplained)
     large = [each for each in silent if each.gain.total >= most]
-    return tuple(e for e in large if is_doubtful(e, unexplained, thresholds=limits))
+    return tuple(e for e in large)
 
 
 def _would_be_unexplained(search: Search, finding: Finding, kept: Sequence[Finding]) -> bool:

@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 from cspm_ident.diagnosis.finding import Finding, HoldOut, Onset, Rejection, Status
 from cspm_ident.diagnosis.parameter import Coefficients
 from cspm_ident.diagnosis.regression.coefficients import Weights
+from cspm_ident.diagnosis.regression.discrepancy import moved_by_functions
 from cspm_ident.diagnosis.regression.hypothesis import (
     Hypothesis,
     bounded,
@@ -323,15 +324,12 @@ def _in_all(
 
 def _model_form_errors(
     search: Search, kept: Sequence[Finding], found: Iterable[Candidate]
-) -> dict[Candidate, float]:
-    """Return each candidate's model-form error, relative to its amplitude, for final shapes."""
+) -> dict[Candidate, Array]:
+    """Return how far free functions may move each candidate's weights, for final shapes."""
     hypotheses, final = [each.hypothesis for each in kept], list(found)
-    shares: dict[Candidate, float] = {}
-    for each in hypotheses:
-        own = search.fits.model_form_error(each, [h for h in hypotheses if h is not each])
-        by_element = {candidate.element: share for candidate, share in own.items()}
-        shares |= {c: by_element[c.element] for c in members_of(final, each)}
-    return shares
+    moved = moved_by_functions(search.fits, hypotheses)
+    at = {(c.effect_id, c.element): half for c, half in moved.items()}
+    return {c: at[c.effect_id, c.element] for c in final}
 
 
 def _onsets(

@@ -56,9 +56,9 @@ class Finding:
     """Something that the described machine lacks, or was suspected of.
 
     Attributes:
-        status: `reported`; `tied`, alternatives explain the data as well; `doubtful`, something
-            unknown is beside it; `rejected`, held-out data do not confirm it; `negligible`, it is
-            there, but too small to matter.
+        status: `reported`; `tied`, alternatives explain the data as well; `doubtful`, its interval
+            contains zero; `rejected`, held-out data do not confirm it; `negligible`, it is there,
+            but too small to matter.
         effect: id from the catalogue, or `unknown`.
         elements: the cables or bodies that have it.
         subsystem: `winch`, `cable`, `bar`, `frame` or `sensor`.
@@ -69,7 +69,7 @@ class Finding:
         alternatives: what explains the data as well.
         onset: when it began [s]; None where it was there all the time.
         region: where in the signals it shows; empty where it does everywhere.
-        reason: why it is rejected; empty where it is not.
+        reason: why it is rejected or doubtful; empty where it is neither.
     """
 
     status: str
@@ -121,6 +121,11 @@ class Diagnosis:
         return tuple(_without_numbers(each) for each in self.result.rejected)
 
     @property
+    def doubtful(self) -> tuple[Finding, ...]:
+        """What is in the improved machine, and too uncertain to be named."""
+        return tuple(_without_numbers(each) for each in self.result.doubtful)
+
+    @property
     def negligible(self) -> tuple[Finding, ...]:
         """What is there, too small to matter."""
         return tuple(_without_numbers(each) for each in self.result.negligible)
@@ -149,8 +154,8 @@ class Diagnosis:
 
     @cached_property
     def improved_testbed(self) -> Testbed | None:
-        """The machine with all that was found; None where nothing was named."""
-        if not self.result.reported:
+        """The machine with all that was found; None where nothing was."""
+        if not self.result.in_model:
             return None
         return Testbed(improved_testbed(self.result, IMPROVED))
 
@@ -173,7 +178,7 @@ class Diagnosis:
         write_json(place / REPORT, self.data)
         draw_diagnosis(place / PICTURE, self.result)
         write_diagnosis_page(place / PAGE, self.result, self.data)
-        if self.result.reported:
+        if self.result.in_model:
             improved = improved_testbed(self.result, str(place / IMPROVED))
             (place / IMPROVED).write_text(improved.text, encoding="utf-8")
         return place
@@ -242,7 +247,7 @@ def _closed_loop(
     found: Result, measurement: Measurement, step: Callable[[str], None]
 ) -> tuple[ClosedLoopFit, ...]:
     """Return how well the machine with what was found repeats a recording; () without findings."""
-    if not found.reported:
+    if not found.in_model:
         return ()
     return simulate_closed_loop(measurement, improved_testbed(found, IMPROVED), step)
 

@@ -149,10 +149,9 @@ def _text(k: int, stratum: str, item: Mapping[str, Any], found: Diagnosis) -> st
         for c in item["concealed"]
     )
     reported = [
-        *_named(found, doubtful=False),
+        *_named(found),
         *(unknown_statement(found, each) for each in found.unexplained),
         *(line_statement(line) for line in found.lines),
-        *_named(found, doubtful=True),
     ]
     lines = "\n".join(f"- {sentence}" for sentence in reported) or "- nothing"
     return (
@@ -163,12 +162,11 @@ def _text(k: int, stratum: str, item: Mapping[str, Any], found: Diagnosis) -> st
     )
 
 
-def _named(found: Diagnosis, *, doubtful: bool) -> Iterator[str]:
-    """Yield what is said of the findings that are doubtful, or of the others, and their rivals."""
+def _named(found: Diagnosis) -> Iterator[str]:
+    """Yield what is said of the findings, and their rivals."""
     for finding in found.reported:
-        if finding.is_doubtful == doubtful:
-            yield statement_of(found, finding)
-            yield from (f"as well explained by {rival.words}" for rival in finding.alternatives)
+        yield statement_of(found, finding)
+        yield from (f"as well explained by {rival.words}" for rival in finding.alternatives)
 
 
 def _amounts(concealed: Mapping[str, Any]) -> str:

@@ -18,7 +18,7 @@ from cspm.diagnosis import diagnose
 from cspm_ident.diagnosis.diagnosis import Diagnosis
 from cspm_ident.diagnosis.reporting.completeness import completeness_sentence
 from cspm_ident.diagnosis.reporting.empirical_statement import stage_errors, stage_names
-from cspm_ident.diagnosis.reporting.finding_statement import statement_of
+from cspm_ident.diagnosis.reporting.finding_statement import considered_words, statement_of
 from cspm_ident.diagnosis.reporting.statement import (
     channel_of,
     drive_of,
@@ -153,12 +153,8 @@ def explain_command(name: str) -> None:
     make_console().print(Markdown(effect_section(effects[name])))
 
 
-def _print_named(
-    console: Console, found: Diagnosis, experiments: Sequence[Sequence[str]], *, doubtful: bool
-) -> None:
+def _print_named(console: Console, found: Diagnosis, experiments: Sequence[Sequence[str]]) -> None:
     for finding, own in zip(found.reported, experiments, strict=True):
-        if finding.is_doubtful != doubtful:
-            continue
         say(console, f"• {statement_of(found, finding)}")
         for rival, experiment in zip(finding.alternatives, own, strict=True):
             say(console, f"  as well explained by {rival.words}; to distinguish: {experiment}")
@@ -194,7 +190,7 @@ def print_diagnosis(
         say(console, SENTENCES[verdict])
     experiments = _experiments(found, data, folder)
     _print_cut_short(console, found)
-    _print_named(console, found, experiments, doubtful=False)
+    _print_named(console, found, experiments)
     if complete := completeness_sentence(found):
         say(console, complete)
     for each in found.unexplained:
@@ -205,9 +201,8 @@ def print_diagnosis(
         say(console, f"• {line_statement(line)}")
     for left in found.undescribed[:_MOST_REMAINDERS]:
         say(console, f"• {remainder_statement(left)}")
-    _print_named(console, found, experiments, doubtful=True)
-    for finding in found.rejected:
-        say(console, f"not kept, {finding.hypothesis.words}: {finding.reason_not_kept}")
+    for finding in found.considered:
+        say(console, f"not named, {considered_words(finding)}: {finding.reason_not_kept}")
     for finding in found.negligible:
         say(
             console,

@@ -55,7 +55,6 @@ from cspm_ident.diagnosis.validation.remainder import (
     is_immaterial,
 )
 from cspm_ident.diagnosis.validation.residual_curves import held_out_curves
-from cspm_ident.diagnosis.validation.rest import concerned, rest_share
 from cspm_ident.signals.measurement import Measurement
 from cspm_sim.effects import Effect, catalogue
 
@@ -114,7 +113,7 @@ def _diagnosis(own: JudgedSearch, model: Model, data: Data, effects: Sequence[Ef
     return Diagnosis(
         searched=recordings.searched,
         held_out=recordings.held_out,
-        findings=_findings(own, model, unexplained, lines, fit),
+        findings=_findings(own, model, lines),
         unexplained=_with_shapes(search, acceptance.tested, own.last.knots, unexplained),
         tested=own.found.tested,
         tables=tables,
@@ -142,18 +141,14 @@ def _aliased_lines(recordings: Recordings, thresholds: Thresholds) -> tuple[Line
 def _findings(
     own: JudgedSearch,
     model: Model,
-    unexplained: Sequence[Unexplained],
     lines: Sequence[Line],
-    fit: Sequence[HeldOut],
 ) -> tuple[Finding, ...]:
     """Return all findings: reported with status and region, negligible, and rejected.
 
     Args:
         own: the judged search.
         model: of the findings that are kept.
-        unexplained: residuals that these leave unexplained.
         lines: of aliased tensions.
-        fit: held-out residuals with and without the model.
     """
     aliased = {line.place.element for line in lines}
 
@@ -223,10 +218,10 @@ def _useful(own: JudgedSearch, data: Data) -> tuple[Acceptance, Model]:
     A rival takes the place of a rejected finding where one passes the hold-out test.
     """
     search, acceptance = own.search, own.acceptance
-    model = modelled(search, acceptance.kept, data)
+    model = modelled(search, acceptance.kept, data, acceptance.beside)
     while gone := model.useless:
         acceptance = with_rivals(search, own.judge, acceptance.rejecting(gone), gone)
-        model = modelled(search, acceptance.kept, data)
+        model = modelled(search, acceptance.kept, data, acceptance.beside)
     return acceptance, model
 
 

@@ -84,8 +84,13 @@ class Diagnosis:
 
     @property
     def reported(self) -> tuple[Finding, ...]:
-        """Findings in the report, tied and doubtful ones included, the most important first."""
+        """Findings that are named, tied ones included, the most important first."""
         return tuple(each for each in self.findings if each.is_reported)
+
+    @property
+    def doubtful(self) -> tuple[Finding, ...]:
+        """Findings that are in the model, and too uncertain to be named."""
+        return tuple(each for each in self.findings if each.is_doubtful)
 
     @property
     def negligible(self) -> tuple[Finding, ...]:
@@ -96,3 +101,13 @@ class Diagnosis:
     def rejected(self) -> tuple[Finding, ...]:
         """Findings that are not in the model."""
         return tuple(each for each in self.findings if each.status is Status.REJECTED)
+
+    @property
+    def in_model(self) -> tuple[Finding, ...]:
+        """Findings whose numbers are in the improved file."""
+        return (*self.reported, *self.doubtful)
+
+    @property
+    def considered(self) -> tuple[Finding, ...]:
+        """Findings that are not named, each with its reason."""
+        return (*self.doubtful, *self.rejected)

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Collection, Sequence
+from collections.abc import Collection
 from dataclasses import dataclass, field
 from enum import Enum
 from typing import NamedTuple
@@ -15,24 +15,25 @@ from cspm_ident.diagnosis.regression.block_regression import Gain
 from cspm_ident.diagnosis.regression.hypothesis import (
     Hypothesis,
     Rival,
-    is_constant,
     may_be_none,
 )
 from cspm_ident.diagnosis.residuals.free_shapes import Driver
-from cspm_ident.diagnosis.thresholds import DEFAULT_THRESHOLDS, Thresholds
 
 Array = NDArray[np.float64]
 
 # Elements whose equations contain every tension.
 _FED_BY_ALL = frozenset({"bar", "winch_frame"})
+_UNCERTAIN = "cannot tell: its 95 % interval contains zero, or a tension beside it is aliased"
+_UNTESTED = "cannot tell: held-out data move too little to test it"
 
 
 class Status(Enum):
     """The status of a finding.
 
-    Reported, tied and doubtful ones are in the report: a tied one has alternatives that explain the
-    data equally well, and a doubtful one has large unexplained residuals beside it. A negligible
-    one is in the model, but no larger than in a healthy machine. A rejected one is in neither.
+    Reported and tied ones are named: a tied one has alternatives that explain the data equally
+    well. A doubtful one is in the model, and its interval contains zero, so it is not named. A
+    negligible one is in the model, but no larger than in a healthy machine. A rejected one is
+    neither named nor in the model.
     """
 
     REPORTED = "reported"
@@ -45,7 +46,8 @@ class Status(Enum):
 class Rejection(Enum):
     """The reason for the rejection of a finding."""
 
-    HOLDOUT_TEST = "does not lower the residuals of held-out data"
+    HOLDOUT_TEST = "is contradicted by held-out data"
+    UNDECIDED = "is neither confirmed nor contradicted by held-out data"
     NOT_TESTABLE = "held-out data cannot test it, and no unexplained residual is as large"
     FED_BACK = "is noise that controllers feed back"
     IMPOSSIBLE = "has parameters that no such machine has"
@@ -62,6 +64,7 @@ class HoldOut(Enum):
     DOMINANT = "takes more than half of a squared residual"
     FAINT = "moves too little for a single residual, and lowers all together as predicted"
     SILENT = "moves too little to say anything"
+    UNDECIDED = "should lower a residual, and neither lowers nor raises any significantly"
 
 
 class Onset(NamedTuple):
@@ -175,12 +178,12 @@ class Finding:
 
     @property
     def is_reported(self) -> bool:
-        """Whether it is in the report; tied and doubtful findings are."""
-        return self.status in (Status.REPORTED, Status.TIED, Status.DOUBTFUL)
+        """Whether it is named in the report; tied findings are."""
+        return self.status in (Status.REPORTED, Status.TIED)
 
     @property
     def is_doubtful(self) -> bool:
-        """Whether large unexplained residuals beside it make it doubtful."""
+        """Whether it is in the model, and too uncertain to be named."""
         return self.status is Status.DOUBTFUL
 
     @property
@@ -190,7 +193,9 @@ class Finding:
 
     @property
     def reason_not_kept(self) -> str:
-        """Why it was rejected, in words; empty if it was not."""
+        """Why it is not named, in words; empty if it is."""
+        if self.is_doubtful:
+            return _UNTESTED if self.holdout is HoldOut.SILENT else _UNCERTAIN
         return "" if self.rejection is None else self.rejection.value
 
     @property
@@ -200,24 +205,24 @@ class Finding:
 
     def parameters_on(self, own: Coefficients) -> list[Parameter]:
         """Return the parameters on the element of the coefficients `own`."""
-        return parameters_of(own, doubtful=self.is_doubtful)
+        return parameters_of(own)
 
 
 def reported_status(finding: Finding, aliased: Collection[str] = ()) -> Status:
     """Return the status of a finding that is reported.
 
     It is doubtful where the intervals of all its coefficients contain zero. They include what a
-    free function of any signal beside it may move them by. It is doubtful as well where it depends
-    on an aliased tension, which alternates from one reading to the next.
+    free function of any signal beside it may move them by. It is doubtful as well where held-out
+    data cannot test it, and where it depends on an aliased tension, which alternates from one
+    reading to the next.
 
     Args:
         finding: the finding to judge.
         aliased: cables with aliased tension.
     """
     intervals = {c.candidate: (c.values, c.half_widths) for c in finding.coefficients}
-    drifts = finding.hypothesis.effect.physics.sense is not None
-    exempt = drifts or finding.hypothesis.effect.signature.saturates
     misread = {*aliased, *_FED_BY_ALL} if aliased else set()
-    if (may_be_none(intervals) and not exempt) or misread & set(finding.elements):
+    untested = finding.holdout is HoldOut.SILENT
+    if may_be_none(intervals) or untested or misread & set(finding.elements):
         return Status.DOUBTFUL
     return Status.TIED if finding.alternatives else Status.REPORTED

@@ -39,7 +39,7 @@ class Parameter(NamedTuple):
         value: in `unit`.
         unit: SI.
         low, high: ends of its 95 % interval, within the catalogue's bounds. They equal the value
-            where it was searched on a grid, or where the finding is doubtful.
+            where it was searched on a grid.
         is_open: whether the ends are the catalogue's bounds, because the data give none.
     """
 
@@ -57,16 +57,8 @@ class Parameter(NamedTuple):
         return (self.low, self.high) if self.low < self.high and not self.is_open else None
 
 
-def parameters_of(own: Coefficients, *, doubtful: bool = False) -> list[Parameter]:
-    """Return the parameters of an effect on one element.
-
-    A doubtful finding has no intervals: they cover measurement noise for a given law, but not the
-    bias from unexplained residuals.
-
-    Args:
-        own: the effect's coefficients.
-        doubtful: whether their finding is doubtful.
-    """
+def parameters_of(own: Coefficients) -> list[Parameter]:
+    """Return the parameters of an effect on one element."""
     effect, weights, widths = own.candidate.effect, own.values, own.half_widths
     values = effect.values(weights.tolist(), **own.candidate.nonlinear)
     element = own.candidate.element

@@ -29,9 +29,7 @@ Index = NDArray[np.intp]
 _OUTSIDE = 0.025
 
 
-def moved_by_functions(
-    fits: Fits, hypotheses: Sequence[Hypothesis]
-) -> dict[Candidate, Array]:
+def moved_by_functions(fits: Fits, hypotheses: Sequence[Hypothesis]) -> dict[Candidate, Array]:
     """Return half widths by which a free function may move each weight, by candidate.
 
     The largest over all signals of the residuals in which a hypothesis acts. A function of time
@@ -63,9 +61,7 @@ def moved_by_functions(
     return gram.parted(candidates, found[number])
 
 
-def _moved(
-    sums: BlockRegression, base: Index, own: Index, function: Index, gain: float
-) -> Array:
+def _moved(sums: BlockRegression, base: Index, own: Index, function: Index, gain: float) -> Array:
     """Return half widths of 95 % intervals of weights for a function that gains so much.
 
     Args:

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections import Counter
 from collections.abc import Iterable, Sequence
 
 import numpy as np
@@ -11,7 +10,6 @@ from numpy.typing import NDArray
 from cspm_ident.diagnosis.regression.block_gram import BlockGram
 from cspm_ident.diagnosis.regression.block_regression import BlockRegression, Gain
 from cspm_ident.diagnosis.regression.coefficients import Weights, at_once, values_of, weights_of
-from cspm_ident.diagnosis.regression.collinearity import freely_gained_at
 from cspm_ident.diagnosis.regression.hypothesis import (
     Hypothesis,
     bounded,
@@ -24,6 +22,7 @@ from cspm_ident.diagnosis.regression.hypothesis import (
     is_timing,
     parts_of,
 )
+from cspm_ident.diagnosis.residuals.free_shapes import Driver
 from cspm_ident.diagnosis.residuals.regressors import Candidate, Place
 from cspm_ident.diagnosis.thresholds import Thresholds
 
@@ -89,6 +88,16 @@ class Fits:
         """Return the hold-out gain of a hypothesis beyond a base."""
         return self.sums.gain(base, self.own_columns(hypothesis))
 
+    def has_few_stretches(self, hypothesis: Hypothesis, others: Sequence[Hypothesis]) -> bool:
+        """Return whether too few independent stretches of time determine its weights.
+
+        Their intervals then hold too rarely to decide anything.
+        """
+        base, own, sums = self.columns(others), self.own_columns(hypothesis), self.sums
+        if hypothesis.common:
+            sums, base, own = self.shared(base, hypothesis)
+        return bool(np.all(sums.long_run(base, own).few_stretches))
+
     def delayed(self, hypothesis: Hypothesis) -> Fits:
         """Return the same with a hypothesis acting only from its onset on."""
         if not hypothesis.onset:
@@ -100,39 +109,13 @@ class Fits:
         """Return the same with the regression's columns acting only from a block on."""
         return Fits(self.gram, self.sums.delayed(columns, block))
 
-    def model_form_error(
-        self, hypothesis: Hypothesis, others: Sequence[Hypothesis]
-    ) -> dict[Candidate, float]:
-        """Return the model-form error of each candidate as a share of its amplitude, from 0 to 1.
-
-        It is the square root of a ratio of squares. Numerator: the largest gain of a free function
-        beside the hypothesis in a residual that the candidate acts on. Denominator: the candidate's
-        gain beyond all others. Where several candidates act on one residual, they share the error
-        equally.
-        """
-        base, own = self.columns(others), self.own_columns(hypothesis)
-        apart = [(c,) for c in hypothesis.candidates]
-        causes = [hypothesis.candidates] if hypothesis.common else apart
-        late = self.delayed(hypothesis)
-        free = freely_gained_at(late.gram, late.sums, base, own)
-        parts = {cause: self.gram.columns_of(cause) for cause in causes}
-        where = {cause: self.gram.places_of(mine) for cause, mine in parts.items()}
-        acting = Counter(place for places in where.values() for place in places)
-        found: dict[Candidate, float] = {}
-        for cause, mine in parts.items():
-            rest = np.concatenate([base, np.setdiff1d(own, mine)])
-            gained = float(late.sums.gains_beyond(rest, [mine])[0])
-            most = max(free[place] / acting[place] for place in where[cause])
-            share = float(np.sqrt(most / max(gained, most))) if most else 0.0
-            found |= dict.fromkeys(cause, share)
-        return found
-
     def may_be_untruth(self, chosen: Sequence[Hypothesis]) -> list[bool]:
         """Return for each hypothesis whether the model-form error of the others may explain it.
 
-        True where that error is as large as the hypothesis's gain in every residual it acts on.
-        Three kinds have no such error: corrections of the file or of readings, clock offsets of a
-        healthy machine, and constants, whose error is a function of time.
+        True where that error is as large as the hypothesis's gain in every residual it acts on. It
+        counts as far as it can look like the hypothesis; see `_likeness`. Three kinds have no such
+        error: corrections of the file or of readings, clock offsets of a healthy machine, and
+        constants, whose error is a function of time.
         """
         taken = [self._taken(h, chosen) for h in chosen]
         share = self.thresholds.model_form_error_share
@@ -141,13 +124,42 @@ class Fits:
             for k, h in enumerate(chosen)
             if not is_exact(h.effect) and not self.is_negligible(h, chosen)
         ]
+
+        def mistaken(k: int, place: Place) -> float:
+            return share * sum(
+                taken[i][place] * self._likeness(chosen[i], chosen[k], place)
+                for i in laws
+                if i != k and taken[i][place] > 0.0
+            )
+
         return [
             all(
-                taken[k][place] <= share * sum(max(0.0, taken[i][place]) for i in laws if i != k)
+                taken[k][place] <= mistaken(k, place)
                 for place in self.gram.places_of(self.own_columns(h))
             )
             for k, h in enumerate(chosen)
         ]
+
+    def _likeness(self, law: Hypothesis, other: Hypothesis, place: Place) -> float:
+        """Return the share of a law's model-form error that can look like another hypothesis.
+
+        The error of a function of a signal is a function of that signal. So it is the share of the
+        other's columns that free functions of the law's signal span; all of it, as far as the law
+        is no function of a single signal.
+        """
+        own, others = self.own_columns(law), self.own_columns(other)
+        (every,) = (p.columns for p in self.gram.places if p.place == place)
+        shares = [(0.0, 1.0)]
+        for driver in self.gram.terms:
+            if isinstance(driver, Driver) and driver.place == place and not driver.of_time:
+                free = self.gram.columns_of([driver])
+                spanned = [
+                    self.sums.spanned(self.gram.nuisance, free, np.intersect1d(each, every))
+                    for each in (own, others)
+                ]
+                shares.append((float(spanned[0].min()), float(spanned[1].max())))
+        function, alike = max(shares)
+        return 1.0 - function + function * alike
 
     def _taken(self, hypothesis: Hypothesis, chosen: Sequence[Hypothesis]) -> dict[Place, float]:
         """Return a hypothesis's gain in squares in each residual, beyond the others."""

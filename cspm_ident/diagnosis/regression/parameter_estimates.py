@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Container, Mapping, Sequence
 
 import numpy as np
+from numpy.typing import NDArray
 
 from cspm_ident.diagnosis.regression.block_gram import gather
 from cspm_ident.diagnosis.regression.block_regression import BlockRegression
@@ -16,6 +17,7 @@ from cspm_ident.diagnosis.thresholds import DEFAULT_THRESHOLDS, Thresholds
 from cspm_model.robust_statistics import huber_fit
 from cspm_sim.effects import Channel
 
+Array = NDArray[np.float64]
 Parts = Sequence[Sequence[Equation]]
 
 

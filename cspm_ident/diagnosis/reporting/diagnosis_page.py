@@ -15,6 +15,7 @@ from cspm_ident.diagnosis.finding import Finding
 from cspm_ident.diagnosis.regression.hypothesis import Hypothesis
 from cspm_ident.diagnosis.reporting.empirical_statement import stage_errors, stage_names
 from cspm_ident.diagnosis.reporting.evidence_figure import caption_of, driver_figure, overlay_figure
+from cspm_ident.diagnosis.reporting.finding_statement import considered_words
 from cspm_ident.diagnosis.reporting.machine_drawing import drawing
 from cspm_ident.diagnosis.reporting.machine_part import Part, part_behind, parts_of
 from cspm_ident.diagnosis.reporting.page_checks import (
@@ -228,9 +229,9 @@ def _hypotheses(found: Diagnosis, data: dict[str, Any]) -> str:
     rows: list[tuple[str, ...]] = []
     for finding, entry in zip(found.reported, named_in(data), strict=True):
         rows += _ranked(finding, entry)
-    for finding in found.rejected:
+    for finding in found.considered:
         size = _in_errors(finding.gain.total, finding.gain.error)
-        rows.append((finding.hypothesis.words, "not kept", "", size, finding.reason_not_kept))
+        rows.append((considered_words(finding), "not named", "", size, finding.reason_not_kept))
     for driver, gain, share, _ in found.unexplained:
         name = f"a function of {driver.signal}, {driver.place.element}"
         size = _in_errors(gain.total, gain.error)
@@ -245,7 +246,7 @@ def _hypotheses(found: Diagnosis, data: dict[str, Any]) -> str:
     count = (
         f"<p>{found.tested} hypotheses were looked at. Probabilities are those among"
         f" what explains the same, times {trusted:g}: the share of findings without a rival that"
-        " were right in blind recordings; a tenth of it beside as much that nothing explains.</p>"
+        " were right in blind recordings.</p>"
     )
     return count + table_html(heads, rows, "hypotheses and their evidence")
 

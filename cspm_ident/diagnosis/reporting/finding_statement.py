@@ -11,14 +11,10 @@ from cspm_ident.diagnosis.parameter import Coefficients, Parameter
 from cspm_ident.diagnosis.reporting.machine_part import Kind, kind_of
 from cspm_ident.diagnosis.reporting.quantity import amount_words
 from cspm_ident.diagnosis.reporting.statement import channel_of
+from cspm_ident.diagnosis.validation.concerned import concerned
 from cspm_ident.diagnosis.validation.holdout_residuals import HeldOut
-from cspm_ident.diagnosis.validation.rest import concerned
 from cspm_sim.effects import Block, Channel, Effect, Elements
 
-_DOUBT = (
-    " Doubtful: beside it is much that nothing in the catalogue explains. This may be a part of"
-    " that, so its numbers have no interval."
-)
 # Of a wave: how often it comes back per turn. It is reported though it was searched on a grid.
 _ORDER = "order"
 _FAINT = " What was not searched moves so little that it shows little of it."
@@ -28,13 +24,18 @@ def statement_of(diagnosis: Diagnosis, finding: Finding) -> str:
     """Return a finding's elements, effect, size, onset, region and improvement, in sentences."""
     effect, region = finding.hypothesis.effect, finding.region
     doubt = _FAINT if finding.is_faint else ""
-    doubt += _DOUBT if finding.is_doubtful else ""
     where = f" It shows where {region_words(region)}." if region is not None else ""
     return (
         f"{_subject(effect, finding.elements)} {_difference(effect)}:"
         f" {_sizes(finding)}.{_since(finding)}{_elsewhere(diagnosis, finding)}"
         f" {_improvement(diagnosis, finding)}{where}{doubt}"
     )
+
+
+def considered_words(finding: Finding) -> str:
+    """Return a finding that is not named in words, with its numbers where it has any."""
+    numbers = f": {_sizes(finding)}" if finding.coefficients else ""
+    return f"{finding.hypothesis.words}{numbers}"
 
 
 def _subject(effect: Effect, elements: Sequence[str]) -> str:

@@ -32,7 +32,7 @@ def improved_testbed(diagnosis: Diagnosis, source: str) -> TestbedFile:
     content = yaml.load(diagnosis.searched[0].testbed.text)
     entries = content.setdefault("effects", CommentedSeq())
     hashes = tuple(measurement.sha256 for measurement in diagnosis.searched)
-    for finding in diagnosis.reported:
+    for finding in diagnosis.in_model:
         for own in finding.coefficients:
             elements = [own.candidate.element]
             entry = CommentedMap({"effect": finding.effect, "elements": elements})

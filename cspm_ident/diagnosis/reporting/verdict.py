@@ -61,12 +61,12 @@ SENTENCES = {
 
 
 def verdict_of(diagnosis: Diagnosis) -> Verdict:
-    """Return the verdict; doubtful findings are ignored.
+    """Return the verdict; only findings that are named count.
 
     The model is consistent only where all that is left on held-out data is noise or immaterial, and
     some measured quantity exceeds its noise enough to show a difference.
     """
-    certain = [each for each in diagnosis.reported if not each.is_doubtful]
+    certain = diagnosis.reported
     if not certain:
         if diagnosis.unexplained or diagnosis.lines or diagnosis.beyond_noise:
             return Verdict.UNKNOWN
@@ -83,10 +83,8 @@ def probability_of(finding: Finding, thresholds: Thresholds = DEFAULT_THRESHOLDS
 
     A rival's odds are exp(−k²/2), where it lies k standard deviations behind the finding.
     """
-    trusted = thresholds.trusted_probability
-    if finding.is_doubtful:
-        trusted *= thresholds.doubtful_factor
-    return trusted / (1.0 + sum(_odds(rival) for rival in finding.alternatives))
+    rivals = sum(_odds(rival) for rival in finding.alternatives)
+    return thresholds.trusted_probability / (1.0 + rivals)
 
 
 def _odds(rival: Rival) -> float:
@@ -127,6 +125,7 @@ def diagnosis_data(diagnosis: Diagnosis, testbed: Path | None = None) -> dict[st
         "verdict": verdict_of(diagnosis).value,
         "thresholds": diagnosis.thresholds.values,
         "findings": _findings(diagnosis),
+        "considered": [considered_entry(each) for each in diagnosis.considered],
         "not_excited": [
             {"effect": name, "elements": list(elements)} for name, elements in diagnosis.not_excited
         ],
@@ -137,7 +136,7 @@ def diagnosis_data(diagnosis: Diagnosis, testbed: Path | None = None) -> dict[st
         "fit": [_simulated_fit(each) for each in diagnosis.simulated],
         "residuals": [_equation_fit(each, diagnosis.thresholds) for each in diagnosis.fit],
         "energy": [_power(each) for each in lost_powers(diagnosis.curves)],
-        "model": IMPROVED if diagnosis.reported or diagnosis.tables else None,
+        "model": IMPROVED if diagnosis.in_model or diagnosis.tables else None,
     }
 
 
@@ -149,20 +148,16 @@ def named_in(data: Mapping[str, Any]) -> list[dict[str, Any]]:
 def _findings(diagnosis: Diagnosis) -> list[dict[str, Any]]:
     """Return the findings, the most important first.
 
-    A doubtful finding never comes first. It follows the unexplained residual that makes it
-    doubtful, unless a certain finding precedes it and the unexplained residual is smaller.
+    Findings are in descending order of gain; a larger unexplained residual precedes them.
     """
     found = diagnosis.reported
     named = [_finding(diagnosis, each) for each in found]
-    # Findings are in descending order of gain.
-    ahead = next((k for k, each in enumerate(found) if each.is_doubtful), len(found))
-    if ahead:
-        most = max((each.gain.total for each in diagnosis.unexplained), default=0.0)
-        ahead = sum(each.gain.total >= most for each in found)
+    most = max((each.gain.total for each in diagnosis.unexplained), default=0.0)
+    ahead = sum(each.gain.total >= most for each in found)
     unknown = [_unknown(diagnosis, each) for each in diagnosis.unexplained]
     lines = map(_line, diagnosis.lines)
     # Beside a finding, what is left is reported with the residuals: no model is exact.
-    left = [] if ahead else map(_remainder, diagnosis.undescribed)
+    left = [] if found else map(_remainder, diagnosis.undescribed)
     return [*named[:ahead], *unknown, *lines, *left, *named[ahead:]]
 
 
@@ -182,21 +177,13 @@ def _finding(diagnosis: Diagnosis, finding: Finding) -> dict[str, Any]:
         "elements": list(finding.elements),
         "effect": finding.effect,
         "probability": probability,
+        "presence": "tied" if finding.alternatives else "certain",
         "statement": statement_of(diagnosis, finding),
         "onset_s": onset.time if onset is not None else None,
         "onset_ci95_s": [onset.low, onset.high] if onset is not None else None,
         "region": _region(finding.region),
         "shows_at": shown_place(diagnosis, finding),
-        "parameters": [
-            {
-                "element": n.element,
-                "name": n.name,
-                "value": n.value,
-                "unit": n.unit,
-                "ci95": None if n.ci95 is None else list(n.ci95),
-            }
-            for n in finding.parameters
-        ],
+        "parameters": _numbers(finding),
         "alternatives": [
             {
                 "effect": rival.hypothesis.effect.id,
@@ -208,6 +195,29 @@ def _finding(diagnosis: Diagnosis, finding: Finding) -> dict[str, Any]:
             for rival in finding.alternatives
         ],
     }
+
+
+def considered_entry(finding: Finding) -> dict[str, Any]:
+    """Return an entry of `considered`: what is not named, with the reason and its numbers."""
+    return {
+        "effect": finding.effect,
+        "elements": list(finding.elements),
+        "reason": finding.reason_not_kept,
+        "parameters": _numbers(finding),
+    }
+
+
+def _numbers(finding: Finding) -> list[dict[str, Any]]:
+    return [
+        {
+            "element": n.element,
+            "name": n.name,
+            "value": n.value,
+            "unit": n.unit,
+            "ci95": None if n.ci95 is None else list(n.ci95),
+        }
+        for n in finding.parameters
+    ]
 
 
 def _region(region: Region | None) -> dict[str, Any]:

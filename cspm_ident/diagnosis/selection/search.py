@@ -47,6 +47,9 @@ from cspm_ident.diagnosis.thresholds import DEFAULT_THRESHOLDS, Thresholds
 Array = NDArray[np.float64]
 Index = NDArray[np.intp]
 
+# Hypotheses beside each of which a further one is looked for, where none is significant alone.
+_PROMISING = 3
+
 
 class Search:
     """Searches a catalogue for the effects that explain the residuals of some recordings."""
@@ -118,7 +121,7 @@ class Search:
         while sum(not self.fits.is_negligible(h, chosen) for h in chosen) < most:
             self._progress(f"effect {len(chosen) + 1}")
             best = self._best(chosen)
-            found = self._beside_clocks(chosen) if best is None else (best,)
+            found = self._pair(chosen) if best is None else (best,)
             if not found:
                 break
             for each in found:
@@ -126,25 +129,36 @@ class Search:
                 chosen = joined(chosen, each)
         return self._merged(self._needed(self._exchanged(chosen)))
 
-    def _beside_clocks(self, chosen: Sequence[Hypothesis]) -> tuple[Hypothesis, ...]:
-        """Return a clock effect of healthy size and a hypothesis significant only beside it.
+    def _pair(self, chosen: Sequence[Hypothesis]) -> tuple[Hypothesis, ...]:
+        """Return two hypotheses of which each is significant only beside the other.
 
-        The result is empty without such a pair, or where no residual is unexplained.
+        Two large errors hide each other, and a clock error of healthy size hides any. The result is
+        empty without such a pair, or where no residual is unexplained.
         """
         if not self._unexplained(chosen, ()):
             return ()
-        for clock in clocks_of(self._free(chosen)):
-            found = self._best([*chosen, clock])
+        clocks = tuple(clocks_of(self._free(chosen)))
+        for first in (*clocks, *self._promising(chosen)):
+            found = self._best([*chosen, first])
             if found is None:
                 continue
-            both = [*chosen, clock, found]
+            both = [*chosen, first, found]
             late = self.delayed(found)
-            base, gain = self._others(clock, both), late._gain(clock, both)
-            significant = late.significance.counts(base, clock, gain, len(chosen) + 1)
-            healthy = late.fits.is_negligible(clock, both)
-            if significant and healthy:
-                return clock, found
+            base, gain = self._others(first, both), late._gain(first, both)
+            significant = late.significance.counts(base, first, gain, len(chosen) + 1)
+            if significant and (first not in clocks or late.fits.is_negligible(first, both)):
+                return first, found
         return ()
+
+    def _promising(self, chosen: Sequence[Hypothesis]) -> list[Hypothesis]:
+        """Return plausible hypotheses that take most of hold-out blocks, significant or not."""
+        base, free = self.fits.columns(chosen), self._free(chosen)
+        gains = self.sums.gains_beyond(base, [self._of(c) for c in free])
+        likely = screened(free, gains, self.thresholds.screened_candidates)
+        scopes = [h for c in likely for h in self.scopes.of(c, free, base)]
+        gained = [self.fits.gain(h, base).total for h in scopes]
+        best = [scopes[k] for k in np.argsort(gained)[::-1] if gained[k] > 0.0]
+        return [h for h in best if self.fits.is_plausible([*chosen, h])][:_PROMISING]
 
     def _clocks(self) -> list[Hypothesis]:
         """Return the clock effect of healthy size, on signals that one system reads.

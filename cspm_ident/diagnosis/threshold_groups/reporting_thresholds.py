@@ -16,11 +16,6 @@ class ReportingThresholds:
         "Probability of a finding without an alternative.",
         "Sealed blind recordings, parts 4 to 8: 268 of 297 were right.",
     )
-    doubtful_factor: float = share(
-        0.1,
-        "Factor on the probability of a doubtful finding.",
-        "Sealed blind recordings: 4 of 41 were right.",
-    )
     noise_floor_ratio: float = ratio(
         1.5,
         "Multiple of its noise up to which what is left of a residual is at the noise.",

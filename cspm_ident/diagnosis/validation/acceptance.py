@@ -46,6 +46,12 @@ class Acceptance:
         return tuple(each for each in self.findings if each.status is not Status.REJECTED)
 
     @property
+    def beside(self) -> tuple[Hypothesis, ...]:
+        """Hypotheses that stay in the fits, which held-out data neither confirm nor contradict."""
+        undecided = (e for e in self.findings if e.rejection is Rejection.UNDECIDED)
+        return tuple(each.hypothesis for each in undecided)
+
+    @property
     def tested(self) -> tuple[Finding, ...]:
         """Kept findings that held-out data excite."""
         return tuple(each for each in self.kept if each.holdout is not HoldOut.SILENT)
@@ -103,17 +109,22 @@ def accepted(
         block: length of the blocks [s].
     """
     tested = _tested(search, judge, found.findings)
-    confirmed = [e for e in tested if e.status is not Status.REJECTED and not _is_silent(e)]
+    confirmed = [e for e in tested if _is_confirmed(e)]
     contradicted = [e for e in tested if e.status is Status.REJECTED]
     silent = [e for e in tested if _is_silent(e)]
+    undecided = [
+        replace(e, status=Status.REJECTED, rejection=Rejection.UNDECIDED)
+        for e in tested
+        if e.holdout is HoldOut.UNDECIDED
+    ]
     kept, fed_back = _shown_by_reference(search, confirmed, searched, rows, block)
-    left_open = _left_open(search, kept, contradicted, silent, fed_back)
+    left_open = _left_open(search, kept, [*contradicted, *undecided], silent, fed_back)
     untestable = [
         replace(e, status=Status.REJECTED, rejection=Rejection.NOT_TESTABLE)
         for e in silent
         if e not in left_open
     ]
-    rejected = (*contradicted, *untestable)
+    rejected = (*contradicted, *undecided, *untestable)
     # Otherwise a residual would be reported as unexplained that held-out data excite as little.
     if left_open and not unexplained_beside(search, (*kept, *left_open), rejected, fed_back):
         left_open = tuple(replace(each, holdout=HoldOut.FAINT) for each in left_open)
@@ -143,7 +154,7 @@ def with_rivals(
             if _form(rival) in tried:
                 continue
             tested = holdout_tested(search.fits, judge, [*acceptance.kept, rival])[-1]
-            if tested.status is not Status.REJECTED and not _is_silent(tested):
+            if _is_confirmed(tested):
                 return _with(acceptance, tested)
     return acceptance
 
@@ -166,6 +177,11 @@ def _shared(search: Search, finding: Finding, kept: Sequence[Finding]) -> Iterat
         yield search.finding_of(replace(own, common=True), _hypotheses(kept))
 
 
+def _is_confirmed(finding: Finding) -> bool:
+    failed = finding.status is Status.REJECTED or finding.holdout is HoldOut.UNDECIDED
+    return not failed and not _is_silent(finding)
+
+
 def _is_silent(finding: Finding) -> bool:
     return finding.holdout is HoldOut.SILENT
 
@@ -177,11 +193,13 @@ def _tested(search: Search, judge: BlockGram, found: Sequence[Finding]) -> tuple
     """
     tested = holdout_tested(search.fits, judge, found)
     for k, each in enumerate(tested):
-        if each.status is not Status.REJECTED:
+        if _is_confirmed(each) or _is_silent(each):
             continue
         for rival in _rivals(search, found[k], found):
             others = [*found[:k], rival, *found[k + 1 :]]
-            if holdout_tested(search.fits, judge, others)[k].status is not Status.REJECTED:
+            rated = holdout_tested(search.fits, judge, others)[k]
+            uncontradicted = each.status is Status.REJECTED and _is_silent(rated)
+            if _is_confirmed(rated) or uncontradicted:
                 return _tested(search, judge, others)
     return tested
 

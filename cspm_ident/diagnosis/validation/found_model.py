@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import replace
+from itertools import compress
 from typing import NamedTuple
 
 import numpy as np
@@ -151,18 +152,24 @@ class Model(NamedTuple):
         return [worst.rejected(Rejection.NO_IMPROVEMENT)] if worst.excess > 0.0 else []
 
 
-def modelled(search: Search, kept: Sequence[Finding], data: Data) -> Model:
+def modelled(
+    search: Search, kept: Sequence[Finding], data: Data, beside: Sequence[Hypothesis] = ()
+) -> Model:
     """Return the model of the findings, fitted and validated.
 
     Args:
         search: the search that found them.
         kept: the findings.
         data: for fitting the parameters and validating the model.
+        beside: hypotheses that are fitted beside them, and are not in the model.
     """
     limits = search.thresholds
     onsets = _onsets(kept, steady(data.rows), search.gram.times, limits)
     since = max((onset.time for onset in onsets if onset is not None), default=-np.inf)
-    weights, upper_ends = _fitted(search, kept, data, since)
+    together = [*(each.hypothesis for each in kept), *beside]
+    weights, upper_ends = _fitted(search, together, data, since)
+    open_ones = {c for each in beside for c in members_of(weights, each)}
+    weights = {c: own for c, own in weights.items() if c not in open_ones}
     immaterial = _immaterial(search, kept, data)
     weights = of_scales(weights, {place.place for place in search.gram.places})
     weights = of_clocks(of_drives(weights, 2.0 * data.searched[0].torque_age))
@@ -175,7 +182,13 @@ def modelled(search: Search, kept: Sequence[Finding], data: Data) -> Model:
         c: (_allowed(data.searched[0], c, own, half), half) for c, (own, half) in weights.items()
     }
     zero = [_is_insignificant(each.hypothesis, weights) for each in kept]
-    weights = of_forms(weights, _model_form_errors(search, kept, weights), limits)
+    weights = of_forms(weights, _moved(search, together, weights), limits)
+    shown = [
+        none and _is_shown_elsewhere(search, each, together)
+        for each, none in zip(kept, zero, strict=True)
+    ]
+    weights |= _without_intervals(compress(kept, shown), weights)
+    zero = [none and not known for none, known in zip(zero, shown, strict=True)]
     assessments = []
     for each, onset, small, none in zip(kept, onsets, negligible, zero, strict=True):
         own = {c: weights[c] for c in members_of(weights, each.hypothesis)}
@@ -191,7 +204,7 @@ def modelled(search: Search, kept: Sequence[Finding], data: Data) -> Model:
 
 
 def _fitted(
-    search: Search, kept: Sequence[Finding], data: Data, since: float
+    search: Search, hypotheses: Sequence[Hypothesis], data: Data, since: float
 ) -> tuple[Weights, dict[Candidate, Array]]:
     """Return weights fitted from a time [s] on, and upper ends over all time constants."""
 
@@ -199,8 +212,8 @@ def _fitted(
         return [[e.within(since, np.inf) for e in part] for part in data.searched_part(parts)]
 
     rows = [[e.within(since, np.inf) for e in part] for part in data.rows]
-    weights = _parameters(search, kept, data, cut, rows)
-    return weights, _in_all(kept, weights, data, cut, search.thresholds)
+    weights = _parameters(search, hypotheses, data, cut, rows)
+    return weights, _in_all(hypotheses, weights, data, cut, search.thresholds)
 
 
 def _may_be_negligible(finding: Finding, weights: Weights) -> bool:
@@ -280,6 +293,22 @@ def _is_insignificant(hypothesis: Hypothesis, weights: Weights) -> bool:
     return may_be_none(own) and not effect.signature.saturates and not drifts
 
 
+def _without_intervals(found: Iterable[Finding], weights: Weights) -> Weights:
+    """Return the weights of some findings with unbounded intervals."""
+    own = [c for each in found for c in members_of(weights, each.hypothesis)]
+    return {c: (weights[c][0], np.full_like(weights[c][1], np.inf)) for c in own}
+
+
+def _is_shown_elsewhere(search: Search, finding: Finding, together: Sequence[Hypothesis]) -> bool:
+    """Return whether held-out data show a finding whose interval has too few stretches to hold.
+
+    It then takes most of a held-out residual, and its numbers have no interval.
+    """
+    others = [h for h in together if h is not finding.hypothesis]
+    dominant = finding.holdout is HoldOut.DOMINANT
+    return dominant and search.fits.has_few_stretches(finding.hypothesis, others)
+
+
 def _needed(finding: Finding, thresholds: Thresholds) -> float:
     """Return the ratio of simulated errors with and without a finding that it has to reach.
 
@@ -300,13 +329,12 @@ def _allowed(measured: Measurement, candidate: Candidate, weights: Array, half: 
 
 def _parameters(
     search: Search,
-    kept: Sequence[Finding],
+    hypotheses: Sequence[Hypothesis],
     data: Data,
     cut: Cut,
     rows: Parts,
 ) -> Weights:
-    """Return the weights of the kept findings, refined where regressors depend on them."""
-    hypotheses = [each.hypothesis for each in kept]
+    """Return the weights of hypotheses, refined where regressors depend on them."""
     if any(needs_refining(hypothesis.effect) for hypothesis in hypotheses):
         given = data.noise, data.block, cut, data.assumed, search.thresholds
         return refine(data.searched, hypotheses, *given)
@@ -314,22 +342,24 @@ def _parameters(
 
 
 def _in_all(
-    kept: Sequence[Finding], weights: Weights, data: Data, cut: Cut, thresholds: Thresholds
+    hypotheses: Sequence[Hypothesis],
+    weights: Weights,
+    data: Data,
+    cut: Cut,
+    thresholds: Thresholds,
 ) -> dict[Candidate, Array]:
-    """Return upper ends of findings that may have parts with other time constants."""
-    hypotheses = [each.hypothesis for each in kept]
+    """Return upper ends of hypotheses that may have parts with other time constants."""
     given = data.noise, data.block, cut, data.assumed, thresholds
     return spectra(data.searched, hypotheses, weights, *given)
 
 
-def _model_form_errors(
-    search: Search, kept: Sequence[Finding], found: Iterable[Candidate]
+def _moved(
+    search: Search, hypotheses: Sequence[Hypothesis], found: Iterable[Candidate]
 ) -> dict[Candidate, Array]:
     """Return how far free functions may move each candidate's weights, for final shapes."""
-    hypotheses, final = [each.hypothesis for each in kept], list(found)
     moved = moved_by_functions(search.fits, hypotheses)
     at = {(c.effect_id, c.element): half for c, half in moved.items()}
-    return {c: at[c.effect_id, c.element] for c in final}
+    return {c: at[c.effect_id, c.element] for c in found}
 
 
 def _onsets(

@@ -28,15 +28,22 @@ def holdout_tested(fits: Fits, judge: BlockGram, found: Sequence[Finding]) -> tu
     Args:
         fits: those of the searched data.
         judge: Gram matrices of the held-out data.
-        found: the findings; one that fails is removed from the fit of those after it.
+        found: the findings; one that fails is removed from the fit of those after it. One that is
+            neither confirmed nor contradicted stays in the fit, and predicts nothing.
     """
-    kept, tested = list(found), []
+    kept = list(found)
+    beside: list[Finding] = []
+    tested = []
     for each in found:
-        whole = fits.values([other.hypothesis for other in kept])
         own = set(each.hypothesis.candidates)
+        whole = fits.values([other.hypothesis for other in (*kept, *beside)])
+        open_ones = {c for other in beside for c in other.hypothesis.candidates}
+        whole = {c: weights for c, weights in whole.items() if c not in open_ones}
         outcome = _Lowered(judge, whole, own, fits.thresholds).outcome
-        if outcome in (None, HoldOut.SILENT):
+        if outcome in (None, HoldOut.SILENT, HoldOut.UNDECIDED):
             kept.remove(each)
+        if outcome is HoldOut.UNDECIDED:
+            beside.append(each)
         tested.append(
             replace(each, status=Status.REJECTED, rejection=Rejection.HOLDOUT_TEST)
             if outcome is None
@@ -77,7 +84,9 @@ class _Lowered:
             return HoldOut.DOMINANT if self.most else HoldOut.CONFIRMED
         if self.as_expected:
             return HoldOut.FAINT
-        return HoldOut.SILENT if self.says_nothing else None
+        if self.raises:
+            return None
+        return HoldOut.UNDECIDED if self._shows else HoldOut.SILENT
 
     @property
     def any_or_none(self) -> bool:
@@ -107,10 +116,9 @@ class _Lowered:
         return bool(self._taken.sum() >= share * self._expected.sum())
 
     @property
-    def says_nothing(self) -> bool:
-        """Whether the predicted reduction is insignificant, and so is any increase."""
-        against = self._taken.sum() < -self._thresholds.certain_sigma * self._error
-        return not self._shows and not bool(against)
+    def raises(self) -> bool:
+        """Whether the finding raises all residuals together significantly."""
+        return bool(self._taken.sum() < -self._thresholds.certain_sigma * self._error)
 
     @property
     def _could_take_much(self) -> bool:

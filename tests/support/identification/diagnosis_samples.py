@@ -109,9 +109,7 @@ def judged(found, findings, aliased=()):
     return replace(
         found,
         findings=tuple(
-            replace(each, status=reported_status(each, found.unexplained, aliased))
-            if each.is_reported
-            else each
+            replace(each, status=reported_status(each, aliased)) if each.is_reported else each
             for each in findings
         ),
     )

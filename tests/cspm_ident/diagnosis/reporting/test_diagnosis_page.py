@@ -22,7 +22,6 @@ from diagnosis_samples import (
 from cspm_ident.diagnosis.finding import (
     HoldOut,
     Region,
-    is_doubtful,
 )
 from cspm_ident.diagnosis.regression.block_regression import Gain
 from cspm_ident.diagnosis.regression.hypothesis import Hypothesis, Rival, is_constant
@@ -52,7 +51,6 @@ LOADED = Candidate(catalogue()["winch_load_friction"], "surge_2")
 WIDER = Candidate(catalogue()["winch_drum_radius"], "surge_2")
 
 TRUSTED = DEFAULT_THRESHOLDS.trusted_probability
-DOUBTED = DEFAULT_THRESHOLDS.doubtful_factor
 
 
 HUM = Line(Place(Channel.WRENCH, "bar"), 1, 2.7, 0.314, 1e-9)
@@ -251,20 +249,34 @@ def test_a_periodic_force_from_outside_is_unknown(tmp_path):
     assert verdict_of(diagnosis(named=False)) is Verdict.CONSISTENT
 
 
-@pytest.mark.parametrize(("left", "doubtful"), [(91.0, True), (89.0, False)])
-def test_a_finding_beside_much_that_nothing_explains_is_doubtful(left, doubtful, tmp_path):
-    """The finding gains 900: a tenth of that is much."""
+@pytest.mark.parametrize(("half", "doubtful"), [(0.029, False), (0.031, True)])
+def test_a_finding_whose_interval_contains_zero_is_not_named(half, doubtful, tmp_path):
+    found = diagnosis()
+    (one,) = found.findings
+    own = [each._replace(half_widths=np.array([half])) for each in one.coefficients]
+    found = judged(found, [replace(one, coefficients=tuple(own))])
+    data = diagnosis_data(found)
+    named, considered = named_in(data), data["considered"]
+    assert [len(named), len(considered)] == [not doubtful, doubtful]
+    (entry,) = [*named, *considered]
+    assert entry["effect"] == "winch_coulomb_friction"
+    assert entry["parameters"][0]["value"] == pytest.approx(0.03)
+    assert len(entry["parameters"][0]["ci95"]) == 2
+    assert entry.get("presence") == (None if doubtful else "certain")
+    assert ("cannot tell" in page_of(tmp_path, found)) is doubtful
+    assert data["model"] == "testbed.improved.yaml"
+
+
+@pytest.mark.parametrize(("left", "first"), [(901.0, "unknown"), (899.0, "winch_coulomb_friction")])
+def test_what_is_larger_comes_first(left, first):
+    """The finding gains 900. It keeps its interval and its probability beside what is unknown."""
     found = diagnosis(unknown=[(Driver(PLACE, "tension [N]"), Gain(left, 1.0), 0.2)])
     data = diagnosis_data(found)
-    order = ["winch_coulomb_friction", "unknown"]
-    assert [f["effect"] for f in data["findings"]] == (order[::-1] if doubtful else order)
+    assert data["findings"][0]["effect"] == first
     (finding,) = named_in(data)
-    assert finding["probability"] == TRUSTED * (DOUBTED if doubtful else 1.0)
-    assert ("Doubtful: beside it is much that nothing" in finding["statement"]) is doubtful
-    assert ("torque 30 mN·m." in finding["statement"]) is doubtful
-    assert [n["ci95"] is None for n in finding["parameters"]] == [doubtful]
-    assert verdict_of(found) is (Verdict.UNKNOWN if doubtful else Verdict.EFFECT)
-    assert ("Doubtful: beside it" in page_of(tmp_path, found)) is doubtful
+    assert finding["probability"] == TRUSTED
+    assert finding["parameters"][0]["ci95"] is not None
+    assert verdict_of(found) is Verdict.EFFECT
 
 
 @pytest.mark.parametrize("faint", [True, False])
@@ -276,28 +288,6 @@ def test_a_finding_that_held_out_data_hardly_show_says_so(faint):
     assert ("What was not searched moves so little" in finding["statement"]) is faint
 
 
-def doubted(effect, signal, left):
-    """Whether a finding that gains 900 is doubtful beside a function that gains `left`."""
-    found = diagnosis(unknown=[(Driver(PLACE, signal), Gain(left, 1.0), 0.2)])
-    candidate = Candidate(catalogue()[effect], "surge_2")
-    hypothesis = Hypothesis(candidate.effect, (candidate,))
-    return is_doubtful(replace(found.findings[0], hypothesis=hypothesis), found.unexplained)
-
-
-@pytest.mark.parametrize(
-    ("effect", "signal", "most"),
-    [
-        ("winch_torque_offset", "speed [rad/s]", 900.0),
-        ("winch_torque_offset", "time [s]", 90.0),
-        ("winch_torque_gain", "speed [rad/s]", 90.0),
-    ],
-)
-def test_a_constant_is_doubted_by_what_drifts_or_is_greater(effect, signal, most):
-    """It is the mean of whatever function of speed is there as well."""
-    assert not doubted(effect, signal, most - 1.0)
-    assert doubted(effect, signal, most + 1.0)
-
-
 def test_what_the_catalogue_has_as_constants():
     assert [name for name, effect in catalogue().items() if is_constant(effect)] == [
         "bar_constant_wrench",
@@ -306,26 +296,15 @@ def test_what_the_catalogue_has_as_constants():
     ]
 
 
-@pytest.mark.parametrize(("gain", "behind"), [(201.0, False), (199.0, True)])
-def test_the_doubtful_comes_behind_a_greater_unknown_though_another_is_sure(gain, behind):
-    """The sure one gains 9000, the unknown 200: no tenth of that, and much of the other."""
-    found = diagnosis(unknown=[(Driver(PLACE, "tension [N]"), Gain(200.0, 1.0), 0.2)])
-    (one,) = found.findings
-    found = judged(found, [replace(one, gain=Gain(total, 1.0)) for total in (9000.0, gain)])
-    effects = [f["effect"] for f in diagnosis_data(found)["findings"]]
-    coulomb = "winch_coulomb_friction"
-    assert effects == [coulomb, *(("unknown", coulomb) if behind else (coulomb, "unknown"))]
-    assert verdict_of(found) is Verdict.EFFECT
-
-
-def test_what_alternates_comes_first_and_the_rest_is_doubtful():
+def test_what_alternates_is_reported_and_nothing_is_named_by_it():
     """The finding gains more than all that is unknown."""
     swing = Line(Place(Channel.TENSION, "surge_2"), 0, 500.0, 5.6, 0.0, alternates=True)
     found = diagnosis(lines=[swing])
     found = judged(found, found.findings, {"surge_2"})
-    first, second = diagnosis_data(found)["findings"]
+    data = diagnosis_data(found)
+    (first,) = data["findings"]
     assert (first["effect"], first["region"]["at"]) == ("unknown", [500.0])
-    assert second["probability"] == pytest.approx(TRUSTED * DOUBTED)
+    assert [each["effect"] for each in data["considered"]] == ["winch_coulomb_friction"]
     assert verdict_of(found) is Verdict.UNKNOWN
 
 

@@ -169,7 +169,6 @@ def test_of_several_numbers_those_that_may_be_nothing_have_none():
     [
         (5.0, "torque 30 mN·m, too few data for an interval", None),
         (np.inf, "torque 30 mN·m, too few data for an interval", None),
-        (0.5, "Doubtful", None),
         (0.001, "torque 30.0 ± 1.0 mN·m.", [0.029, 0.031]),
     ],
 )

@@ -12,6 +12,7 @@ from cspm.commands.diagnose_command import print_diagnosis
 from cspm_ident.diagnosis.finding import Rejection, Status
 from cspm_ident.diagnosis.regression.block_regression import Gain
 from cspm_ident.diagnosis.reporting.diagnosis_page import write_diagnosis_page
+from cspm_ident.diagnosis.reporting.finding_statement import considered_words
 from cspm_ident.diagnosis.reporting.verdict import SENTENCES, Verdict, diagnosis_data, verdict_of
 from cspm_ident.diagnosis.residuals.free_shapes import Driver
 
@@ -83,7 +84,7 @@ def test_what_is_not_kept_is_reported_with_its_own_reason(reason, tmp_path):
     found = diagnosis(named=False, rejected=[gone])
     data = diagnosis_data(found)
     text = printed(found, data)
-    assert f"not kept, {finding.hypothesis.words}: {reason.value}\n" in text
+    assert f"not named, {considered_words(finding)}: {reason.value}\n" in text
     write_diagnosis_page(tmp_path / "page.html", found, data)
     page = (tmp_path / "page.html").read_text(encoding="utf-8")
     assert f">{reason.value}</td>" in page

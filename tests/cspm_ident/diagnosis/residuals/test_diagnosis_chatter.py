@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from run_samples import SCENARIOS
 
-from cspm_ident.diagnosis.finding import Finding, is_doubtful
+from cspm_ident.diagnosis.finding import Finding, Status, reported_status
 from cspm_ident.diagnosis.regression.block_regression import Gain
 from cspm_ident.diagnosis.regression.hypothesis import Hypothesis
 from cspm_ident.diagnosis.reporting.statement import line_statement
@@ -79,5 +79,5 @@ def test_without_load_cells_nothing_alternates():
 def test_what_is_reported_by_readings_that_alternate_is_doubtful(effect, element, doubtful):
     own = catalogue()[effect]
     finding = Finding(Hypothesis(own, (Candidate(own, element),)), Gain(9000.0, 10.0), 0.9)
-    assert is_doubtful(finding, (), {"hoist_1"}) is doubtful
-    assert not is_doubtful(finding, ())
+    assert (reported_status(finding, {"hoist_1"}) is Status.DOUBTFUL) is doubtful
+    assert reported_status(finding) is Status.REPORTED

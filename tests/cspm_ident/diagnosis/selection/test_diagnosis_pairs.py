@@ -134,5 +134,5 @@ def rig(friction, delay, noise=0.02):
 @pytest.mark.parametrize(("friction", "found"), [(0.0, False), (0.015, True), (0.15, False)])
 def test_friction_is_looked_for_beside_what_healthy_clocks_do_to_load_cells(friction, found):
     """Where anything is left; ten times as late is no healthy clock."""
-    pair = rig(friction, friction / RATE)._beside_clocks([])
+    pair = rig(friction, friction / RATE)._pair([])
     assert [h.candidates for h in pair] == ([(LATE,), (DRY,)] if found else [])

@@ -76,16 +76,17 @@ def test_no_weight_is_more_significant_than_the_form_of_its_law():
     """Be it seen to be off or not; a number of the file or of a reading has none."""
     unseen = np.sqrt(DEFAULT_THRESHOLDS.model_form_error_share)
     cases = (
-        ("winch_coulomb_friction", 0.1, 0.1),
+        ("winch_coulomb_friction", 0.3, 0.1),
         ("winch_viscous_friction", 0.0, unseen),
-        ("cable_stiffness", 0.1, 0.1),
+        ("cable_stiffness", 0.3, 0.1),
         ("cable_axial_damping", 0.0, 0.0),
         ("tension_bias", 0.0, 0.0),
     )
     for effect, seen, share in cases:
         candidate = Candidate(catalogue()[effect], "hoist_1")
         given = np.array([-3.0, 0.0]), np.array([0.4, 0.4])
-        values, half = of_forms({candidate: given}, {candidate: seen})[candidate]
+        moved = np.array([seen, 0.0])
+        values, half = of_forms({candidate: given}, {candidate: moved})[candidate]
         np.testing.assert_allclose(half, [np.hypot(0.4, 3.0 * share), 0.4])
         np.testing.assert_array_equal(values, given[0])
 

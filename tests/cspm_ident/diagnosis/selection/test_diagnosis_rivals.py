@@ -171,22 +171,6 @@ def test_less_than_the_model_form_error_decides_nothing():
     assert rival.behind == pytest.approx(2.0 / 4.0, rel=0.1)
 
 
-@pytest.mark.parametrize("model_form_error", [0.0, 0.14, 0.28])
-def test_a_form_is_off_by_the_amplitude_of_what_a_free_function_finds_beside_it(model_form_error):
-    fits = Search(gather([[torque_of(model_form_error)]], BLOCK_S)).fits
-    (share,) = fits.model_form_error(only("winch_viscous_friction"), []).values()
-    assert share == pytest.approx(model_form_error, rel=0.1, abs=0.01)
-
-
-def test_a_form_that_explains_nothing_is_off_by_all_of_it():
-    fits = Search(gather([[torque_of(0.28)]], BLOCK_S)).fits
-    rubbing = only("winch_coulomb_friction")
-    (share,) = fits.model_form_error(rubbing, [only("winch_viscous_friction")]).values()
-    assert share == 1.0
-    (share,) = fits.model_form_error(rubbing, []).values()
-    assert share < 0.5
-
-
 def test_no_model_is_true_to_less_than_half_a_percent():
     (named,) = named_in(torque_of(0.0, rival=0.04))
     (rival,) = named.alternatives

@@ -228,4 +228,4 @@ def test_no_rival_is_taken_that_held_out_data_contradict_or_are_silent_on():
 def test_an_interval_that_contains_zero_is_doubtful(half, status):
     (candidate,) = DRY.hypothesis.candidates
     own = Coefficients(candidate, np.array([0.03]), half * np.array([0.03]))
-    assert reported_status(replace(DRY, coefficients=(own,)), ()) is status
+    assert reported_status(replace(DRY, coefficients=(own,))) is status

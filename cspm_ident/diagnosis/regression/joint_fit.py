@@ -147,17 +147,14 @@ class Fits:
         other's columns that free functions of the law's signal span; all of it, as far as the law
         is no function of a single signal.
         """
-        own, others = self.own_columns(law), self.own_columns(other)
         (every,) = (p.columns for p in self.gram.places if p.place == place)
-        shares = [(0.0, 1.0)]
+        own, others = (np.intersect1d(self.own_columns(h), every) for h in (law, other))
+        shares = [(0.0, 1.0)] if len(own) else [(1.0, 0.0)]
         for driver in self.gram.terms:
             if isinstance(driver, Driver) and driver.place == place and not driver.of_time:
-                free = self.gram.columns_of([driver])
-                spanned = [
-                    self.sums.spanned(self.gram.nuisance, free, np.intersect1d(each, every))
-                    for each in (own, others)
-                ]
-                shares.append((float(spanned[0].min()), float(spanned[1].max())))
+                free, base = self.gram.columns_of([driver]), self.gram.nuisance
+                like = self.sums.spanned(base, free, own).min(initial=1.0)
+                shares.append((float(like), float(self.sums.spanned(base, free, others).max())))
         function, alike = max(shares)
         return 1.0 - function + function * alike
 

@@ -24,6 +24,7 @@ from cspm_ident.diagnosis.reporting.statement import (
     drive_of,
     line_statement,
     remainder_statement,
+    simulated_statement,
     tension_statement,
     unit_of,
     unknown_statement,
@@ -201,6 +202,9 @@ def print_diagnosis(
         say(console, f"• {line_statement(line)}")
     for left in found.undescribed[:_MOST_REMAINDERS]:
         say(console, f"• {remainder_statement(left)}")
+    if not (found.reported or found.unexplained or found.lines or found.undescribed):
+        for fit in found.simulated_beyond[:1]:
+            say(console, f"• {simulated_statement(fit)}")
     for finding in found.considered:
         say(console, f"not named, {considered_words(finding)}: {finding.reason_not_kept}")
     for finding in found.negligible:

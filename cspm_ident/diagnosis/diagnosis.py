@@ -8,6 +8,7 @@ from dataclasses import dataclass, field
 import numpy as np
 from numpy.typing import NDArray
 
+from cspm_ident.block_simulation import Input
 from cspm_ident.diagnosis.finding import Finding, Status, Unexplained
 from cspm_ident.diagnosis.residuals.regressors import Candidate, Place
 from cspm_ident.diagnosis.residuals.spectral_lines import Line
@@ -76,6 +77,18 @@ class Diagnosis:
         """What is left beyond the noise where no function and no spectral line describes it."""
         described = {e.driver.place for e in self.unexplained} | {e.place for e in self.lines}
         return tuple(each for each in self.beyond_noise if each.place not in described)
+
+    @property
+    def simulated_beyond(self) -> tuple[SimulatedFit, ...]:
+        """Simulations of cables and bar far from what was measured, the farthest first.
+
+        Those from torques integrate their noise twice, in any machine.
+        """
+        far = self.thresholds.driven_noise_ratio
+        torques = Input.SHAFT, Input.TORQUE
+        own = (e for e in self.simulated if e.output.drive not in torques)
+        beyond = (e for e in own if e.final > far * e.floor > 0.0)
+        return tuple(sorted(beyond, key=lambda each: -each.final / each.floor))
 
     @property
     def is_excited(self) -> bool:

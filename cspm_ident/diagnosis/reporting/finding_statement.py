@@ -9,7 +9,7 @@ from cspm_ident.diagnosis.diagnosis import Diagnosis
 from cspm_ident.diagnosis.finding import Finding, Improvement, Onset, Region
 from cspm_ident.diagnosis.parameter import Coefficients, Parameter
 from cspm_ident.diagnosis.reporting.machine_part import Kind, kind_of
-from cspm_ident.diagnosis.reporting.quantity import amount_words
+from cspm_ident.diagnosis.reporting.quantity import amount_words, percent_words
 from cspm_ident.diagnosis.reporting.statement import channel_of
 from cspm_ident.diagnosis.validation.concerned import concerned
 from cspm_ident.diagnosis.validation.holdout_residuals import HeldOut
@@ -170,8 +170,7 @@ def _improvement(diagnosis: Diagnosis, finding: Finding) -> str:
 
 
 def _share(fit: HeldOut, value: float) -> str:
-    percent = 100.0 * value / max(fit.measured, 1e-300)
-    return f"{percent:.2g} %" if percent < 100.0 else f"{percent:.0f} %"
+    return percent_words(value, fit.measured)
 
 
 def _simulated(improvement: Improvement | None) -> str:

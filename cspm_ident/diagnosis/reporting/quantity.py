@@ -8,6 +8,8 @@ from math import floor, isfinite, log10
 _SMALL = 0.1
 # Powers of 1000; kilograms are converted to grams before they get a prefix.
 _PREFIXES = ("", "m", "µ", "n")
+# Beyond ten times the whole, a share says no more than that.
+_MOST_PERCENT = 1000
 # Share of an interval's width by which an interval is asymmetric, and both ends are given.
 _ASLANT = 0.1
 
@@ -31,6 +33,14 @@ def amount_words(value: float, unit: str, ends: tuple[float, float] | None = Non
     half = 0.5 * (up + down)
     digits = max(0, 1 - floor(log10(half)))
     return f"{value:.{digits}f} ± {half:.{digits}f}{name}"
+
+
+def percent_words(size: float, whole: float) -> str:
+    """Return `2.6 %`, a size as a share of a whole; `over 1000 %` where that says no more."""
+    percent = 100.0 * size / max(whole, 1e-300)
+    if percent >= _MOST_PERCENT:
+        return f"over {_MOST_PERCENT} %"
+    return f"{percent:.2g} %" if percent < 99.5 else f"{percent:.0f} %"
 
 
 def _scaled(size: float, unit: str) -> tuple[float, str]:

@@ -9,7 +9,7 @@ from cspm_ident.block_simulation import Input
 from cspm_ident.diagnosis.diagnosis import Diagnosis
 from cspm_ident.diagnosis.finding import Shape, Unexplained
 from cspm_ident.diagnosis.reporting.formula_hint import is_even, sketch
-from cspm_ident.diagnosis.reporting.quantity import amount_words
+from cspm_ident.diagnosis.reporting.quantity import amount_words, percent_words
 from cspm_ident.diagnosis.residuals.free_shapes import Driver
 from cspm_ident.diagnosis.residuals.spectral_lines import Line
 from cspm_ident.diagnosis.thresholds import DEFAULT_THRESHOLDS, Thresholds
@@ -31,8 +31,7 @@ def unknown_statement(diagnosis: Diagnosis, unexplained: Unexplained) -> str:
     formula = formula_of(driver, shape, diagnosis.thresholds)
     hint = f"; as a hint, it runs like {formula}" if formula else ""
     size = "".join(
-        f", {100.0 * np.sqrt(share) * fit.after / max(fit.measured, 1e-300):.2g} % of what was"
-        " measured"
+        f", {percent_words(np.sqrt(share) * fit.after, fit.measured)} of what was measured"
         for fit in diagnosis.fit
         if fit.place == driver.place
     )
@@ -96,10 +95,10 @@ def remainder_statement(left: Remainder) -> str:
     unit = "N·m" if turns else "N"
     where = _CHANNELS[left.place.channel].format(left.place.element)
     where += f" in {left.component}" if left.component else ""
-    percent = 100.0 * left.rms / max(left.measured, 1e-300)
     words = (
         f"On held-out data {where} differs from the model by {amount_words(left.rms, unit)},"
-        f" {left.ratio:.2g} times its noise and {percent:.2g} % of what was measured"
+        f" {left.ratio:.2g} times its noise and {percent_words(left.rms, left.measured)} of what"
+        " was measured"
     )
     if left.share >= _SHOWN:
         words += f"; {100 * left.share:.0f} % of the squares are a function of {left.driver}"
@@ -109,6 +108,15 @@ def remainder_statement(left: Remainder) -> str:
             f" {left.stretch.start:.3g} and {left.stretch.end:.3g} s"
         )
     return f"{words}. Nothing in the catalogue explains it."
+
+
+def simulated_statement(fit: SimulatedFit) -> str:
+    """Return how far a simulation of held-out data is from what was measured."""
+    return (
+        f"Simulated from measured {drive_of(fit)}, {fit.output.name} differs by"
+        f" {amount_words(fit.final, fit.output.unit)} on held-out data,"
+        f" {fit.final / fit.floor:.2g} times its noise. Nothing in the catalogue explains it."
+    )
 
 
 def formula_of(

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from enum import Enum
 from math import exp
 from pathlib import Path
@@ -21,6 +21,7 @@ from cspm_ident.diagnosis.reporting.statement import (
     formula_of,
     line_statement,
     remainder_statement,
+    simulated_statement,
     unknown_statement,
 )
 from cspm_ident.diagnosis.residuals.spectral_lines import Line
@@ -63,12 +64,13 @@ SENTENCES = {
 def verdict_of(diagnosis: Diagnosis) -> Verdict:
     """Return the verdict; only findings that are named count.
 
-    The model is consistent only where all that is left on held-out data is noise or immaterial, and
-    some measured quantity exceeds its noise enough to show a difference.
+    The model is consistent only where all that is left on held-out data is noise or immaterial, no
+    simulation of cables or bar is far from what was measured, and some measured quantity exceeds
+    its noise enough to show a difference.
     """
     certain = diagnosis.reported
     if not certain:
-        if diagnosis.unexplained or diagnosis.lines or diagnosis.beyond_noise:
+        if any(_open(diagnosis)):
             return Verdict.UNKNOWN
         return Verdict.CONSISTENT if diagnosis.is_excited else Verdict.NOT_EXCITED
     if any(each.alternatives for each in certain):
@@ -76,6 +78,12 @@ def verdict_of(diagnosis: Diagnosis) -> Verdict:
     if all(each.hypothesis.effect.physics.alter is not None for each in certain):
         return Verdict.PARAMETER
     return Verdict.EFFECT
+
+
+def _open(diagnosis: Diagnosis) -> Sequence[Sequence[object]]:
+    """Return what shows that something is missing."""
+    residuals = diagnosis.unexplained, diagnosis.lines, diagnosis.beyond_noise
+    return (*residuals, diagnosis.simulated_beyond)
 
 
 def probability_of(finding: Finding, thresholds: Thresholds = DEFAULT_THRESHOLDS) -> float:
@@ -158,7 +166,8 @@ def _findings(diagnosis: Diagnosis) -> list[dict[str, Any]]:
     lines = map(_line, diagnosis.lines)
     # Beside a finding, what is left is reported with the residuals: no model is exact.
     left = [] if found else map(_remainder, diagnosis.undescribed)
-    return [*named[:ahead], *unknown, *lines, *left, *named[ahead:]]
+    entries = [*named[:ahead], *unknown, *lines, *left, *named[ahead:]]
+    return entries or [_simulated_remainder(each) for each in diagnosis.simulated_beyond[:1]]
 
 
 def _recording(role: str, measurement: Measurement) -> dict[str, Any]:
@@ -252,6 +261,21 @@ def _remainder(left: Remainder) -> dict[str, Any]:
         "statement": remainder_statement(left),
         "onset_s": None,
         "region": {"driver": left.driver or "time [s]", "at": [], "adds": [], "hint": None},
+        "parameters": [],
+        "alternatives": [],
+    }
+
+
+def _simulated_remainder(fit: SimulatedFit) -> dict[str, Any]:
+    """Return the finding of a simulation that is far from what was measured."""
+    return {
+        "subsystem": _BLOCKS[fit.output.kind].value,
+        "elements": [fit.output.element],
+        "effect": UNKNOWN,
+        "probability": None,
+        "statement": simulated_statement(fit),
+        "onset_s": None,
+        "region": {},
         "parameters": [],
         "alternatives": [],
     }

@@ -9,12 +9,15 @@ from hypothesis import strategies as st
 from rich.console import Console
 
 from cspm.commands.diagnose_command import print_diagnosis
+from cspm_ident.block_simulation import Input, Output
 from cspm_ident.diagnosis.finding import Rejection, Status
 from cspm_ident.diagnosis.regression.block_regression import Gain
 from cspm_ident.diagnosis.reporting.diagnosis_page import write_diagnosis_page
 from cspm_ident.diagnosis.reporting.finding_statement import considered_words
 from cspm_ident.diagnosis.reporting.verdict import SENTENCES, Verdict, diagnosis_data, verdict_of
 from cspm_ident.diagnosis.residuals.free_shapes import Driver
+from cspm_ident.diagnosis.validation.holdout_simulation import SimulatedFit
+from cspm_sim.effects import Channel
 
 
 def with_left(named, *left):
@@ -56,6 +59,29 @@ def test_what_is_left_is_reported_with_size_driver_and_time():
         "60 % of the squares lie between 3 and 4 s",
     ):
         assert words in entry["statement"]
+
+
+@pytest.mark.parametrize(
+    ("drive", "times", "verdict"),
+    [
+        (Input.WINCH, 11.0, Verdict.UNKNOWN),
+        (Input.WINCH, 9.0, Verdict.CONSISTENT),
+        (Input.CABLE, 447.0, Verdict.UNKNOWN),
+        (Input.SHAFT, 447.0, Verdict.CONSISTENT),
+        (Input.TORQUE, 447.0, Verdict.CONSISTENT),
+    ],
+)
+def test_simulated_cables_and_bars_vote(drive, times, verdict):
+    """Those from torques do not: they integrate noise twice."""
+    pose = Output(drive, "bar/pose/sway", "m", "bar", Channel.WRENCH)
+    fit = SimulatedFit(pose, 0.3, times * 1e-3, times * 1e-3, times * 1e-3, 1e-3)
+    found = replace(with_left(False, remainder(NOISE)), simulated=(fit,))
+    data = diagnosis_data(found)
+    assert verdict_of(found) is verdict
+    statements = [each["statement"] for each in data["findings"]]
+    assert [f"{times:.2g} times its noise" in each for each in statements] == (
+        [True] if verdict is Verdict.UNKNOWN else []
+    )
 
 
 def test_what_a_free_function_describes_is_not_reported_twice():

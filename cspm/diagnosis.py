@@ -20,9 +20,13 @@ from cspm_ident.diagnosis.diagnosis import Diagnosis as Result
 from cspm_ident.diagnosis.finding import Finding as FoundEffect
 from cspm_ident.diagnosis.finding import Status
 from cspm_ident.diagnosis.reporting.improved_file import improved_testbed
-from cspm_ident.diagnosis.reporting.verdict import IMPROVED, diagnosis_data
+from cspm_ident.diagnosis.reporting.verdict import IMPROVED, diagnosis_data, named_in
 from cspm_ident.diagnosis.thresholds import thresholds_of
-from cspm_ident.diagnosis.validation.closed_loop import ClosedLoopFit, simulate_closed_loop
+from cspm_ident.diagnosis.validation.closed_loop import (
+    ClosedLoopFit,
+    SimulatedLoop,
+    simulate_closed_loop,
+)
 from cspm_ident.diagnosis.validation.controller_parity import Parity, controller_parity
 from cspm_ident.experiment.experiment_files import write_experiments
 from cspm_ident.signals.measurement import Measurement
@@ -231,25 +235,38 @@ def diagnose(
             step("looking at the data")
             searched, judged = (without_regimes(each, look.result()) for each in (searched, judged))
         found = diagnose_measurements(searched, judged, step, thresholds=limits)
-        loop = _closed_loop(found, (judged or searched)[0], step) if closed_loop else ()
+        measured = (judged or searched)[0]
+        loop = _closed_loop(found, measured, step) if closed_loop else SimulatedLoop()
         step("controllers")
         checks, parity = look.result(), tuple(stepped.result())
     data = diagnosis_data(found, _path(testbed)) | {
         "data_checks": [each.data() for each in checks],
-        "closed_loop": [each._asdict() for each in loop],
+        "closed_loop": [each._asdict() for each in loop.fits],
         "controllers": [each._asdict() for each in parity],
     }
+    _add_consequences(data, loop)
     progress(1.0, "done")
-    return Diagnosis(found, data, loop, parity)
+    return Diagnosis(found, data, loop.fits, parity)
 
 
 def _closed_loop(
     found: Result, measurement: Measurement, step: Callable[[str], None]
-) -> tuple[ClosedLoopFit, ...]:
-    """Return how well the machine with what was found repeats a recording; () without findings."""
+) -> SimulatedLoop:
+    """Return a recording simulated again with the machine as found; empty without findings."""
     if not found.in_model:
-        return ()
-    return simulate_closed_loop(measurement, improved_testbed(found, IMPROVED), step)
+        return SimulatedLoop()
+    fewer = [improved_testbed(found, IMPROVED, without=each) for each in found.reported]
+    return simulate_closed_loop(measurement, improved_testbed(found, IMPROVED), fewer, step)
+
+
+def _add_consequences(data: dict[str, Any], loop: SimulatedLoop) -> None:
+    """Add to each finding that names an effect the tracking error with and without it."""
+    tracked = loop.without or [None] * len(named_in(data))
+    for entry, without in zip(named_in(data), tracked, strict=True):
+        entry["consequence"] = None
+        if loop.tracking is not None and without is not None:
+            both = {"with": loop.tracking, "without": without}
+            entry["consequence"] = {name: each._asdict() for name, each in both.items()}
 
 
 def _path(testbed: AnyTestbed | None) -> Path | None:

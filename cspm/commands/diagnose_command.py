@@ -18,7 +18,11 @@ from cspm.diagnosis import diagnose
 from cspm_ident.diagnosis.diagnosis import Diagnosis
 from cspm_ident.diagnosis.reporting.completeness import completeness_sentence
 from cspm_ident.diagnosis.reporting.empirical_statement import stage_errors, stage_names
-from cspm_ident.diagnosis.reporting.finding_statement import considered_words, statement_of
+from cspm_ident.diagnosis.reporting.finding_statement import (
+    consequence_words,
+    considered_words,
+    statement_of,
+)
 from cspm_ident.diagnosis.reporting.statement import (
     channel_of,
     drive_of,
@@ -154,9 +158,15 @@ def explain_command(name: str) -> None:
     make_console().print(Markdown(effect_section(effects[name])))
 
 
-def _print_named(console: Console, found: Diagnosis, experiments: Sequence[Sequence[str]]) -> None:
-    for finding, own in zip(found.reported, experiments, strict=True):
-        say(console, f"• {statement_of(found, finding)}")
+def _print_named(
+    console: Console,
+    found: Diagnosis,
+    entries: Sequence[Mapping[str, Any]],
+    experiments: Sequence[Sequence[str]],
+) -> None:
+    for finding, entry, own in zip(found.reported, entries, experiments, strict=True):
+        cost = consequence_words(entry.get("consequence"))
+        say(console, f"• {statement_of(found, finding)}{cost}")
         for rival, experiment in zip(finding.alternatives, own, strict=True):
             say(console, f"  as well explained by {rival.words}; to distinguish: {experiment}")
 
@@ -191,7 +201,7 @@ def print_diagnosis(
         say(console, SENTENCES[verdict])
     experiments = _experiments(found, data, folder)
     _print_cut_short(console, found)
-    _print_named(console, found, experiments)
+    _print_named(console, found, named_in(data), experiments)
     if complete := completeness_sentence(found):
         say(console, complete)
     for each in found.unexplained:

@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
+from typing import Any
 
 from cspm_ident.channel_words import channel_words
 from cspm_ident.diagnosis.diagnosis import Diagnosis
@@ -30,6 +31,17 @@ def statement_of(diagnosis: Diagnosis, finding: Finding) -> str:
         f" {_sizes(finding)}.{_since(finding)}{_elsewhere(diagnosis, finding)}"
         f" {_improvement(diagnosis, finding)}{where}{doubt}"
     )
+
+
+def consequence_words(consequence: Mapping[str, Any] | None) -> str:
+    """Return what a finding costs, from `consequence` of `diagnosis.json`; empty if not known."""
+    if consequence is None:
+        return ""
+    with_it, without = (
+        f"{amount_words(each['position_m'], 'm')} and {amount_words(each['angle_rad'], 'rad')}"
+        for each in (consequence["with"], consequence["without"])
+    )
+    return f" The tracking error is {with_it} RMS with it, {without} without it."
 
 
 def considered_words(finding: Finding) -> str:

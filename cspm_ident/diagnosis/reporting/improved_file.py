@@ -8,6 +8,7 @@ import numpy as np
 from ruamel.yaml.comments import CommentedMap, CommentedSeq
 
 from cspm_ident.diagnosis.diagnosis import Diagnosis
+from cspm_ident.diagnosis.finding import Finding
 from cspm_ident.diagnosis.reporting.empirical_statement import table_entries
 from cspm_ident.fitted_testbed import FittedNumber
 from cspm_msgs_py.testbed import EffectEntry, TestbedFile, parse_testbed
@@ -16,7 +17,9 @@ from cspm_msgs_py.yaml_file import round_trip
 _UNBOUNDED = (-np.inf, np.inf)
 
 
-def improved_testbed(diagnosis: Diagnosis, source: str) -> TestbedFile:
+def improved_testbed(
+    diagnosis: Diagnosis, source: str, without: Finding | None = None
+) -> TestbedFile:
     """Return the searched machine's file with an entry under `effects` for every finding.
 
     Every parameter carries its source recordings and its interval; all else is unchanged.
@@ -24,6 +27,7 @@ def improved_testbed(diagnosis: Diagnosis, source: str) -> TestbedFile:
     Args:
         diagnosis: the diagnosis.
         source: name of the new file in errors.
+        without: a finding to leave out.
 
     Raises:
         InputError: the parameters do not make a valid machine.
@@ -32,7 +36,7 @@ def improved_testbed(diagnosis: Diagnosis, source: str) -> TestbedFile:
     content = yaml.load(diagnosis.searched[0].testbed.text)
     entries = content.setdefault("effects", CommentedSeq())
     hashes = tuple(measurement.sha256 for measurement in diagnosis.searched)
-    for finding in diagnosis.in_model:
+    for finding in (each for each in diagnosis.in_model if each is not without):
         for own in finding.coefficients:
             elements = [own.candidate.element]
             entry = CommentedMap({"effect": finding.effect, "elements": elements})

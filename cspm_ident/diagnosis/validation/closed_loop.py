@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import tempfile
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import replace
 from pathlib import Path
 from typing import NamedTuple
@@ -19,8 +19,10 @@ from cspm_msgs_py.recording.reader import Recording
 from cspm_msgs_py.recording.run_record import SIM, own_controllers
 from cspm_msgs_py.scenario import ClosedLoop
 from cspm_msgs_py.testbed import TestbedFile
+from cspm_run.bundle import Bundle
 from cspm_run.recorded_bundle import recorded_bundle
 from cspm_run.recorded_run import run
+from cspm_run.run_result import RunResult
 
 Array = NDArray[np.float64]
 
@@ -46,10 +48,39 @@ class ClosedLoopFit(NamedTuple):
     after: float
 
 
+class Tracking(NamedTuple):
+    """How well a simulated bar follows its reference, as root mean squares.
+
+    Attributes:
+        position_m: of the distance [m].
+        angle_rad: of the rotation [rad].
+    """
+
+    position_m: float
+    angle_rad: float
+
+
+class SimulatedLoop(NamedTuple):
+    """A recorded closed loop, simulated again.
+
+    Attributes:
+        fits: its differences to the recording.
+        tracking: with all findings; None where the loop cannot be simulated.
+        without: with all but one finding each.
+    """
+
+    fits: tuple[ClosedLoopFit, ...] = ()
+    tracking: Tracking | None = None
+    without: tuple[Tracking | None, ...] = ()
+
+
 def simulate_closed_loop(
-    recorded: Measurement, improved: TestbedFile, progress: Callable[[str], None] = lambda _: None
-) -> tuple[ClosedLoopFit, ...]:
-    """Return the differences of a recording and its scenario simulated under its controllers.
+    recorded: Measurement,
+    improved: TestbedFile,
+    without: Sequence[TestbedFile] = (),
+    progress: Callable[[str], None] = lambda _: None,
+) -> SimulatedLoop:
+    """Return a recording's scenario simulated again under its controllers.
 
     At most half a minute from the start is simulated. Waves follow the recorded seed, and so does
     the sensors' noise if the recording is of a simulation. Empty where the recording has no closed
@@ -58,18 +89,12 @@ def simulate_closed_loop(
     Args:
         recorded: the recording, with the file's model.
         improved: the test-bed with the findings.
+        without: the same without one finding each.
         progress: called with a text on each step.
     """
-    try:
-        bundle = replace(recorded_bundle(recorded.path), plant=SIM)
-        with Recording(recorded.path) as recording:
-            own = own_controllers(recording)
-    except CspmError:
-        return ()
-    if own is not None:
-        return ()
-    if not isinstance(bundle.scenario.control, ClosedLoop) or recorded.bar_pose is None:
-        return ()
+    bundle = _runnable(recorded)
+    if bundle is None:
+        return SimulatedLoop()
     seconds = min(LONGEST_S, recorded.duration)
     steps = round(seconds * bundle.scenario.rates.plant)
     found = []
@@ -77,10 +102,37 @@ def simulate_closed_loop(
         for name, machine in (("described", recorded.testbed), ("found", improved)):
             progress(f"closed loop with the machine as {name}")
             folder = Path(place) / name
-            if run(replace(bundle, testbed=machine), folder, steps=steps).failure:
-                return ()
+            result = run(replace(bundle, testbed=machine), folder, steps=steps)
+            if result.failure:
+                return SimulatedLoop()
             found.append(read_measurement(folder))
-    return tuple(_fits(recorded.within(0.0, seconds), *found))
+    tracking = _tracking(result)
+    fits = tuple(_fits(recorded.within(0.0, seconds), *found))
+    fewer = []
+    for machine in without:
+        progress("closed loop without each finding")
+        fewer.append(_tracking(run(replace(bundle, testbed=machine), None, steps=steps)))
+    return SimulatedLoop(fits, tracking, tuple(fewer))
+
+
+def _runnable(recorded: Measurement) -> Bundle | None:
+    """Return the recorded run, to be simulated; None where it has no loop that can be."""
+    try:
+        bundle = replace(recorded_bundle(recorded.path), plant=SIM)
+        with Recording(recorded.path) as recording:
+            own = own_controllers(recording)
+    except CspmError:
+        return None
+    closed = isinstance(bundle.scenario.control, ClosedLoop)
+    return bundle if own is None and closed and recorded.bar_pose is not None else None
+
+
+def _tracking(result: RunResult) -> Tracking | None:
+    """Return how well a run followed its reference; None where it failed."""
+    if result.failure:
+        return None
+    errors = result.statistics.rms_error
+    return Tracking(*(float(np.linalg.norm(part)) for part in (errors[:3], errors[3:])))
 
 
 def _fits(recorded: Measurement, before: Measurement, after: Measurement) -> list[ClosedLoopFit]:

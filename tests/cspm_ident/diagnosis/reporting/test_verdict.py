@@ -9,14 +9,14 @@ from hypothesis import strategies as st
 from rich.console import Console
 
 from cspm.commands.diagnose_command import print_diagnosis
-from cspm_ident.block_simulation import Input, Output
+from cspm_ident.block_simulation import Input
 from cspm_ident.diagnosis.finding import Rejection, Status
 from cspm_ident.diagnosis.regression.block_regression import Gain
 from cspm_ident.diagnosis.reporting.diagnosis_page import write_diagnosis_page
 from cspm_ident.diagnosis.reporting.finding_statement import considered_words
 from cspm_ident.diagnosis.reporting.verdict import SENTENCES, Verdict, diagnosis_data, verdict_of
 from cspm_ident.diagnosis.residuals.free_shapes import Driver
-from cspm_ident.diagnosis.validation.holdout_simulation import SimulatedFit
+from cspm_ident.diagnosis.validation.holdout_simulation import Output, SimulatedFit
 from cspm_sim.effects import Channel
 
 

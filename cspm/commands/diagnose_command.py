@@ -26,6 +26,7 @@ from cspm_ident.diagnosis.reporting.finding_statement import (
 from cspm_ident.diagnosis.reporting.statement import (
     channel_of,
     drive_of,
+    extrapolation_statement,
     line_statement,
     remainder_statement,
     simulated_statement,
@@ -225,6 +226,8 @@ def print_diagnosis(
     drawn = tension_statement(found)
     if drawn is not None:
         say(console, drawn)
+    for beyond in found.extrapolated:
+        say(console, extrapolation_statement(beyond))
     _print_fits(console, found)
     for name, elements in found.not_excited:
         if elements:

@@ -44,6 +44,7 @@ from cspm_ident.diagnosis.selection.search_pass import (
 from cspm_ident.diagnosis.thresholds import DEFAULT_THRESHOLDS, Thresholds
 from cspm_ident.diagnosis.validation.acceptance import Acceptance, with_rivals
 from cspm_ident.diagnosis.validation.detection_limits import detection_limits
+from cspm_ident.diagnosis.validation.extrapolation import Extrapolation, extrapolations
 from cspm_ident.diagnosis.validation.found_model import Data, Model, modelled
 from cspm_ident.diagnosis.validation.holdout_residuals import HeldOut, free_functions, judged
 from cspm_ident.diagnosis.validation.holdout_simulation import (
@@ -128,8 +129,18 @@ def _diagnosis(own: JudgedSearch, model: Model, data: Data, effects: Sequence[Ef
         places=tuple(place.place for place in search.gram.places),
         curves=held_out_curves(steady(own.last.judge_parts), first),
         noise=own.last.noise,
+        extrapolated=_extrapolated(own, model),
         thresholds=own.thresholds,
     )
+
+
+def _extrapolated(own: JudgedSearch, model: Model) -> tuple[Extrapolation, ...]:
+    """Return the signals that held-out data take beyond what was searched, where findings act."""
+    candidates = [c for each in model.findings for c in each.hypothesis.candidates]
+    gram = own.search.gram
+    places = gram.places_of(gram.columns_of(candidates))
+    parts = own.last.search_parts, own.last.judge_parts
+    return extrapolations(*parts, places, own.thresholds.material_share)
 
 
 def _aliased_lines(recordings: Recordings, thresholds: Thresholds) -> tuple[Line, ...]:

@@ -14,6 +14,7 @@ from cspm_ident.diagnosis.residuals.regressors import Candidate, Place
 from cspm_ident.diagnosis.residuals.spectral_lines import Line
 from cspm_ident.diagnosis.thresholds import DEFAULT_THRESHOLDS, Thresholds
 from cspm_ident.diagnosis.validation.detection_limits import Limit
+from cspm_ident.diagnosis.validation.extrapolation import Extrapolation
 from cspm_ident.diagnosis.validation.holdout_residuals import HeldOut
 from cspm_ident.diagnosis.validation.holdout_simulation import SimulatedFit
 from cspm_ident.diagnosis.validation.remainder import Remainder
@@ -42,6 +43,7 @@ class Diagnosis:
         places: all residuals.
         curves: the residuals on held-out data, over time.
         noise: standard deviation of each residual from row to row, one per channel.
+        extrapolated: signals that held-out data take beyond what was searched, where effects act.
         thresholds: those that were used.
     """
 
@@ -59,6 +61,7 @@ class Diagnosis:
     places: tuple[Place, ...]
     curves: tuple[Curve, ...]
     noise: dict[Place, Array]
+    extrapolated: tuple[Extrapolation, ...] = ()
     thresholds: Thresholds = DEFAULT_THRESHOLDS
 
     @property

@@ -26,6 +26,7 @@ from cspm_ident.diagnosis.reporting.page_checks import (
 from cspm_ident.diagnosis.reporting.statement import (
     channel_of,
     drive_of,
+    extrapolation_statement,
     tension_statement,
     unit_of,
 )
@@ -290,6 +291,7 @@ def _fit(found: Diagnosis) -> str:
             "<p><i>Named</i> is the model with the effects that were found; <i>after</i> has tables"
             " of values as well, which describe the rest and explain nothing.</p>"
         )
+    text += "".join(f"<p>{escape(extrapolation_statement(e))}</p>" for e in found.extrapolated)
     return text + table_html(heads, rows, "root mean square of every residual")
 
 

@@ -13,6 +13,7 @@ from cspm_ident.diagnosis.reporting.quantity import amount_words, percent_words
 from cspm_ident.diagnosis.residuals.free_shapes import Driver
 from cspm_ident.diagnosis.residuals.spectral_lines import Line
 from cspm_ident.diagnosis.thresholds import DEFAULT_THRESHOLDS, Thresholds
+from cspm_ident.diagnosis.validation.extrapolation import Extrapolation
 from cspm_ident.diagnosis.validation.holdout_residuals import HeldOut
 from cspm_ident.diagnosis.validation.holdout_simulation import SimulatedFit
 from cspm_ident.diagnosis.validation.remainder import Remainder
@@ -110,6 +111,19 @@ def remainder_statement(left: Remainder) -> str:
     return f"{words}. Nothing in the catalogue explains it."
 
 
+def extrapolation_statement(beyond: Extrapolation) -> str:
+    """Return how far held-out data take a signal beyond what was searched."""
+    name, unit = beyond.signal.rstrip("]").split(" [")
+    searched, reached = (
+        f"{low:.3g} to {high:.3g}" for low, high in (beyond.searched, beyond.held_out)
+    )
+    return (
+        f"Held-out data of {channel_of(beyond)} take the {name} from {reached} {unit}, where"
+        f" {searched} {unit} was searched: for {100 * beyond.share:.0f} % of their rows the"
+        " findings are extrapolated."
+    )
+
+
 def simulated_statement(fit: SimulatedFit) -> str:
     """Return how far a simulation of held-out data is from what was measured."""
     return (
@@ -127,7 +141,7 @@ def formula_of(
     return sketch(shape.knots, shape.values, name, thresholds)
 
 
-def channel_of(fit: HeldOut | Power | Remainder | Curve) -> str:
+def channel_of(fit: HeldOut | Power | Remainder | Curve | Extrapolation) -> str:
     """Return the public name of a residual's measured quantity."""
     return _CHANNELS[fit.place.channel].format(fit.place.element)
 

@@ -139,6 +139,9 @@ def diagnosis_data(diagnosis: Diagnosis, testbed: Path | None = None) -> dict[st
         ],
         "explained": explained_share(diagnosis) if diagnosis.reported else None,
         "left": left_entries(diagnosis),
+        "extrapolated": [
+            each._asdict() | {"place": channel_of(each)} for each in diagnosis.extrapolated
+        ],
         "detection_limits": [limit._asdict() for limit in diagnosis.limits],
         "empirical": empirical_entries(diagnosis),
         "fit": [_simulated_fit(each) for each in diagnosis.simulated],

@@ -18,12 +18,14 @@ from cspm_ident.diagnosis.regression.hypothesis import (
     may_be_none,
 )
 from cspm_ident.diagnosis.residuals.free_shapes import Driver
+from cspm_ident.diagnosis.residuals.regressors import Place
 
 Array = NDArray[np.float64]
 
 # Elements whose equations contain every tension.
 _FED_BY_ALL = frozenset({"bar", "winch_frame"})
 _UNCERTAIN = "cannot tell: its 95 % interval contains zero, or a tension beside it is aliased"
+_HARMFUL = "cannot tell: it raises held-out residuals of {}, so that it may stand for another cause"
 _UNTESTED = "cannot tell: held-out data move too little to test it"
 
 
@@ -152,6 +154,7 @@ class Finding:
         onset: when it began; None where it acts all the time or began between recordings.
         region: range of a signal that holds most of its gain; None where no range does.
         improvement: of simulations of held-out data; None where no simulation depends on it.
+        raises: hold-out residuals that it raises significantly.
     """
 
     hypothesis: Hypothesis
@@ -165,6 +168,7 @@ class Finding:
     onset: Onset | None = None
     region: Region | None = None
     improvement: Improvement | None = None
+    raises: tuple[Place, ...] = ()
 
     @property
     def effect(self) -> str:
@@ -195,6 +199,8 @@ class Finding:
     def reason_not_kept(self) -> str:
         """Why it is not named, in words; empty if it is."""
         if self.is_doubtful:
+            if self.raises:
+                return _HARMFUL.format(", ".join(dict.fromkeys(e.element for e in self.raises)))
             return _UNTESTED if self.holdout is HoldOut.SILENT else _UNCERTAIN
         return "" if self.rejection is None else self.rejection.value
 
@@ -213,8 +219,8 @@ def reported_status(finding: Finding, aliased: Collection[str] = ()) -> Status:
 
     It is doubtful where the intervals of all its coefficients contain zero. They include what a
     free function of any signal beside it may move them by. It is doubtful as well where held-out
-    data cannot test it, and where it depends on an aliased tension, which alternates from one
-    reading to the next.
+    data cannot test it, where it raises a residual of theirs, and where it depends on an aliased
+    tension, which alternates from one reading to the next.
 
     Args:
         finding: the finding to judge.
@@ -222,7 +228,7 @@ def reported_status(finding: Finding, aliased: Collection[str] = ()) -> Status:
     """
     intervals = {c.candidate: (c.values, c.half_widths) for c in finding.coefficients}
     misread = {*aliased, *_FED_BY_ALL} if aliased else set()
-    untested = finding.holdout is HoldOut.SILENT
+    untested = finding.holdout is HoldOut.SILENT or finding.raises
     if may_be_none(intervals) or untested or misread & set(finding.elements):
         return Status.DOUBTFUL
     return Status.TIED if finding.alternatives else Status.REPORTED

@@ -55,7 +55,7 @@ SENTENCES = {
     Verdict.EFFECT: "Physics is missing in the model.",
     Verdict.PARAMETER: "A number of the test-bed file is wrong; no physics is missing.",
     Verdict.TIE: "Something is missing, and several causes explain these recordings equally well.",
-    Verdict.UNKNOWN: "Something is missing that the catalogue does not have.",
+    Verdict.UNKNOWN: "Something is missing that nothing in the catalogue explains for certain.",
     Verdict.NOT_EXCITED: "These recordings cannot tell: nothing that was measured moves enough"
     " beyond its noise to decide.",
 }
@@ -65,8 +65,8 @@ def verdict_of(diagnosis: Diagnosis) -> Verdict:
     """Return the verdict; only findings that are named count.
 
     The model is consistent only where all that is left on held-out data is noise or immaterial, no
-    simulation of cables or bar is far from what was measured, and some measured quantity exceeds
-    its noise enough to show a difference.
+    simulation of cables or bar is far from what was measured, nothing lowers one residual and
+    raises another, and some measured quantity exceeds its noise enough to show a difference.
     """
     certain = diagnosis.reported
     if not certain:
@@ -83,7 +83,8 @@ def verdict_of(diagnosis: Diagnosis) -> Verdict:
 def _open(diagnosis: Diagnosis) -> Sequence[Sequence[object]]:
     """Return what shows that something is missing."""
     residuals = diagnosis.unexplained, diagnosis.lines, diagnosis.beyond_noise
-    return (*residuals, diagnosis.simulated_beyond)
+    stand_ins = [each for each in diagnosis.doubtful if each.raises]
+    return (*residuals, diagnosis.simulated_beyond, stand_ins)
 
 
 def probability_of(finding: Finding, thresholds: Thresholds = DEFAULT_THRESHOLDS) -> float:

@@ -39,7 +39,7 @@ from cspm_ident.diagnosis.selection.onset import onset_of
 from cspm_ident.diagnosis.selection.refinement import Cut, needs_refining, refine, spectra
 from cspm_ident.diagnosis.selection.search import Search
 from cspm_ident.diagnosis.thresholds import Thresholds
-from cspm_ident.diagnosis.validation.holdout_degradation import harm, squares_left
+from cspm_ident.diagnosis.validation.holdout_degradation import harm, raised, squares_left
 from cspm_ident.diagnosis.validation.holdout_simulation import (
     Baselines,
     SimulatedFit,
@@ -276,7 +276,8 @@ def _simulated(
             improvement = improvement_by(data.baselines, simulated, values, own)
             without = left({c: w for c, w in values.items() if c not in own})
             worse = harm(without, every, thresholds)
-            finding = replace(each.finding, improvement=improvement)
+            harmed = raised(without, every, thresholds)
+            finding = replace(each.finding, improvement=improvement, raises=harmed)
             each = each._replace(finding=finding, degradation=worse)
         judged.append(each)
     return Model(tuple(judged), weights, simulated)

@@ -53,6 +53,27 @@ def squares_left(
     return left
 
 
+def raised(
+    without: Squares, with_it: Squares, thresholds: Thresholds = DEFAULT_THRESHOLDS
+) -> tuple[Place, ...]:
+    """Return the hold-out residuals whose squares a finding raises by most of them, significantly.
+
+    What makes one residual worse is no certain cause of another: it may stand for something else.
+
+    Args:
+        without: squares left without the finding, by residual and block.
+        with_it: squares left with it, likewise.
+        thresholds: those of held-out data.
+    """
+    found = []
+    for place in (each for each in without if each in with_it):
+        gained = gain_of(without[place] - with_it[place])
+        most = gained.total < -thresholds.majority_share * float(without[place].sum())
+        if most and gained.total < -thresholds.tie_sigma * gained.error:
+            found.append(place)
+    return tuple(found)
+
+
 def harm(without: Squares, with_it: Squares, thresholds: Thresholds = DEFAULT_THRESHOLDS) -> float:
     """Return the squares by which a finding raises the hold-out residuals; 0 if it does not.
 

@@ -3,7 +3,7 @@
 from dataclasses import replace
 
 import pytest
-from diagnosis_samples import NOISE, PLACE, diagnosis, held_out, remainder
+from diagnosis_samples import NOISE, PLACE, diagnosis, held_out, judged, remainder
 from hypothesis import given
 from hypothesis import strategies as st
 from rich.console import Console
@@ -152,3 +152,15 @@ def test_no_two_statements_of_a_report_contradict_each_other(named, levels, spre
         assert ("That is the noise floor" in each["statement"]) <= (residual["at_noise"] is True)
     if residual["at_noise"] is False:
         assert "1 of 1 at their noise" not in text
+
+
+@pytest.mark.parametrize(("raises", "verdict"), [(True, Verdict.UNKNOWN), (False, Verdict.EFFECT)])
+def test_what_makes_another_residual_worse_is_not_named_and_nothing_is_consistent(raises, verdict):
+    found = with_left(True, remainder(NOISE))
+    (one,) = found.findings
+    found = judged(found, [replace(one, raises=(PLACE,) * raises)])
+    assert verdict_of(found) is verdict
+    assert [each["reason"] for each in diagnosis_data(found)["considered"]] == [
+        f"cannot tell: it raises held-out residuals of {PLACE.element}, so that it may stand for"
+        " another cause"
+    ] * raises

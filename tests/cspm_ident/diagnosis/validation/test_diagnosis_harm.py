@@ -8,7 +8,7 @@ from cspm_ident.diagnosis.residuals.recorded_equations import equations_of
 from cspm_ident.diagnosis.residuals.regressors import Place
 from cspm_ident.diagnosis.residuals.residual_equation import steady
 from cspm_ident.diagnosis.selection.search_pass import noise_of
-from cspm_ident.diagnosis.validation.holdout_degradation import harm, squares_left
+from cspm_ident.diagnosis.validation.holdout_degradation import harm, raised, squares_left
 from cspm_ident.diagnosis.validation.holdout_residuals import rms
 from cspm_ident.diagnosis.validation.holdout_simulation import baselines_of
 from cspm_sim.effects import Channel
@@ -63,3 +63,20 @@ def test_what_is_right_takes_squares_and_thrice_of_it_adds_them(crept):
     assert described[HEALTHY].sum() == pytest.approx(rms([late]) ** 2 * late.target.size, rel=0.05)
     by_block = [np.sum(late.within(t, t + BLOCK_S).target ** 2) for t in (START_S, START_S + 1.0)]
     assert np.all(described[HEALTHY][[0, 2]] > 0.2 * np.array(by_block))
+
+
+@pytest.mark.parametrize(
+    ("with_it", "scatter", "places"),
+    [
+        # Less is left of both, or more of one by less than half.
+        ((60.0, 900.0), 0.0, ()),
+        ((140.0, 900.0), 0.0, ()),
+        # More than half again, surely or by the chance of a few blocks.
+        ((160.0, 900.0), 0.0, (ONE,)),
+        ((160.0, 900.0), 30.0, ()),
+        # Whatever it takes elsewhere.
+        ((160.0, 100.0), 0.0, (ONE,)),
+    ],
+)
+def test_what_raises_a_residual_is_known_by_it(with_it, scatter, places):
+    assert raised(left(100.0, 1000.0), left(*with_it, scatter)) == places

@@ -6,11 +6,9 @@ from collections.abc import Mapping
 from typing import Any, NamedTuple
 
 from bench.real.dataset import Dataset
-from cspm_ident.diagnosis.reporting.verdict import UNKNOWN
+from cspm_ident.diagnosis.reporting.verdict import UNKNOWN, named_in
 
 RIGHT, PARTLY, REFUSED, WRONG = "right", "partly", "refused", "wrong"
-# Probability from which on a finding is stated as certain rather than as doubtful.
-_CERTAIN = 0.3
 
 
 class Judgement(NamedTuple):
@@ -21,7 +19,7 @@ class Judgement(NamedTuple):
             named, yet something true is missing or out of range; refused: nothing is named, and
             the verdict says that something is unknown or cannot be decided; wrong: something false
             is named as certain, or nothing is said to be missing.
-        named: what was named as certain, with its value.
+        named: what was named, certain or tied, with its value.
         why: what is missing or false; empty where it is right.
     """
 
@@ -32,20 +30,20 @@ class Judgement(NamedTuple):
 
 def judgement_of(dataset: Dataset, found: Mapping[str, Any]) -> Judgement:
     """Return the judgement of the contents of a `diagnosis.json`."""
-    certain = [each for each in found["findings"] if (each["probability"] or 0.0) >= _CERTAIN]
-    words = tuple(_words(each) for each in certain)
+    named = named_in(found)
+    words = tuple(_words(each) for each in named)
     known = {*dataset.truth, *dataset.plausible}
-    false = [each["effect"] for each in certain if not known & _ways(each)]
+    false = [each["effect"] for each in named if not known & _ways(each)]
     if false:
         return Judgement(WRONG, words, f"not there: {', '.join(false)}")
-    if not certain:
+    if not named:
         if found["verdict"] in (UNKNOWN, "not_excited"):
             return Judgement(REFUSED, words, f"verdict: {found['verdict']}")
         return Judgement(WRONG, words, f"verdict: {found['verdict']}")
     missing = [
         name
         for name, ranges in dataset.truth.items()
-        if not any(name in _ways(each) and _is_in(each, name, ranges) for each in certain)
+        if not any(name in _ways(each) and _is_in(each, name, ranges) for each in named)
     ]
     if missing:
         return Judgement(PARTLY, words, f"missing or out of range: {', '.join(missing)}")

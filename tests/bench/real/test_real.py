@@ -16,11 +16,10 @@ TRUTH = {"winch_coulomb_friction": {"torque": (0.02, 0.03)}, "winch_torque_offse
 SET = Dataset("a", "b", "c", "d", "e", ["f"], TRUTH, "known", plausible=["winch_load_friction"])
 
 
-def finding(effect, value=0.025, half=0.002, others=(), probability=0.9):
+def finding(effect, value=0.025, half=0.002, others=()):
     ends = None if half is None else [value - half, value + half]
     return {
         "effect": effect,
-        "probability": probability,
         "parameters": [{"name": "torque", "value": value, "ci95": ends}],
         "alternatives": [{"effect": other} for other in others],
     }
@@ -40,7 +39,8 @@ FALSE = finding("winch_torque_gain")
         ("effect", [DRY, OFFSET, finding("winch_load_friction")], RIGHT),
         ("tie", [finding("winch_load_friction", others=["winch_coulomb_friction"]), OFFSET], RIGHT),
         ("effect", [DRY, OFFSET, FALSE], WRONG),
-        ("unknown", [finding("winch_torque_gain", probability=0.09)], REFUSED),
+        ("tie", [finding("winch_torque_gain", others=["winch_coulomb_friction"]), OFFSET], RIGHT),
+        ("unknown", [{"effect": "unknown"}], REFUSED),
         ("unknown", [], REFUSED),
         ("not_excited", [], REFUSED),
         ("consistent", [], WRONG),

@@ -26,6 +26,7 @@ from cspm_ident.diagnosis.finding import (
 )
 from cspm_ident.diagnosis.judged_search import JudgedSearch, searched_and_judged
 from cspm_ident.diagnosis.one_number import with_one_number
+from cspm_ident.diagnosis.parameter import Coefficients
 from cspm_ident.diagnosis.residuals.aliased_tension import chatters_of
 from cspm_ident.diagnosis.residuals.data_split import first_part, whole_part
 from cspm_ident.diagnosis.residuals.free_shapes import Knots
@@ -170,7 +171,18 @@ def _findings(
 
     reported = map(described, _reported(own.search, own.acceptance, model))
     negligible = (each for each in model.findings if each.status is Status.NEGLIGIBLE)
-    return (*reported, *negligible, *own.acceptance.rejected, *own.acceptance.fed_back)
+    gone = (*own.acceptance.rejected, *own.acceptance.fed_back)
+    return (*reported, *negligible, *(_with_numbers(own, each) for each in gone))
+
+
+def _with_numbers(own: JudgedSearch, finding: Finding) -> Finding:
+    """Return a rejected finding with the numbers that it would have beside those in the model."""
+    if finding.coefficients:
+        return finding
+    kept = [each.hypothesis for each in own.acceptance.kept]
+    weights = own.search.fits.weights([*kept, finding.hypothesis])
+    found = (Coefficients(c, *weights[c]) for c in finding.hypothesis.candidates)
+    return replace(finding, coefficients=tuple(found))
 
 
 def _tables(

@@ -182,7 +182,8 @@ def modelled(
         c: (_allowed(data.searched[0], c, own, half), half) for c, (own, half) in weights.items()
     }
     zero = [_is_insignificant(each.hypothesis, weights) for each in kept]
-    weights = of_forms(weights, _moved(search, together, weights), limits)
+    silent = [each.hypothesis for each in kept if each.holdout is HoldOut.SILENT]
+    weights = of_forms(weights, _moved(search, together, silent, weights), limits)
     shown = [
         none and _is_shown_elsewhere(search, each, together)
         for each, none in zip(kept, zero, strict=True)
@@ -355,10 +356,18 @@ def _in_all(
 
 
 def _moved(
-    search: Search, hypotheses: Sequence[Hypothesis], found: Iterable[Candidate]
+    search: Search,
+    hypotheses: Sequence[Hypothesis],
+    silent: Sequence[Hypothesis],
+    found: Iterable[Candidate],
 ) -> dict[Candidate, Array]:
-    """Return how far free functions may move each candidate's weights, for final shapes."""
-    moved = moved_by_functions(search.fits, hypotheses)
+    """Return how far free functions may move each candidate's weights, for final shapes.
+
+    What held-out data cannot test may be such a function: it moves the others like one.
+    """
+    tested = [h for h in hypotheses if h not in silent]
+    moved = moved_by_functions(search.fits, hypotheses) if silent else {}
+    moved |= moved_by_functions(search.fits, tested)
     at = {(c.effect_id, c.element): half for c, half in moved.items()}
     return {c: at[c.effect_id, c.element] for c in found}
 

@@ -86,7 +86,8 @@ class _Lowered:
             return HoldOut.FAINT
         if self.raises:
             return None
-        return HoldOut.UNDECIDED if self._shows else HoldOut.SILENT
+        should = self._shows or self._could_take_much
+        return HoldOut.UNDECIDED if should else HoldOut.SILENT
 
     @property
     def any_or_none(self) -> bool:

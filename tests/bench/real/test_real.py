@@ -11,7 +11,7 @@ from bench.real.judgement import PARTLY, REFUSED, RIGHT, WRONG, judgement_of
 from cspm_sim.effects import catalogue
 
 ROOT = Path(__file__).resolve().parents[4] / "shared" / "data"
-ROOTS = (ROOT / "real", ROOT)
+ROOTS = (ROOT / "real", ROOT / "open", ROOT)
 TRUTH = {"winch_coulomb_friction": {"torque": (0.02, 0.03)}, "winch_torque_offset": {}}
 SET = Dataset("a", "b", "c", "d", "e", ["f"], TRUTH, "known", plausible=["winch_load_friction"])
 

@@ -7,6 +7,7 @@ from cspm_ident.diagnosis.regression.block_gram import gather
 from cspm_ident.diagnosis.regression.block_regression import BlockRegression
 from cspm_ident.diagnosis.regression.hypothesis import Hypothesis, is_exact
 from cspm_ident.diagnosis.regression.joint_fit import Fits
+from cspm_ident.diagnosis.residuals.free_shapes import Knots
 from cspm_ident.diagnosis.residuals.regressors import Candidate, Place
 from cspm_ident.diagnosis.residuals.residual_equation import Equation
 from cspm_sim.effects import Channel, catalogue
@@ -71,3 +72,18 @@ def test_it_is_held_against_what_the_law_takes_where_it_shows(elsewhere, model_f
 def test_numbers_readings_and_constants_have_no_model_form_error(strong, exact):
     assert is_exact(catalogue()[strong]) is exact
     assert may_be_untruth(strong, "winch_load_friction", (SHAFT, (1.0, 0.01))) is not exact
+
+
+@pytest.mark.parametrize(("signal", "form_error"), [(STRONG, True), (WEAK, False)])
+def test_the_error_of_a_function_of_a_signal_is_a_function_of_that_signal(signal, form_error):
+    """A companion by its own signal is none; one that is a function of the law's signal may be."""
+    own = [only("winch_viscous_friction"), only("winch_load_friction")]
+    shape = signal - np.mean(signal) if form_error else signal
+    companion = np.abs(shape) if form_error else shape
+    target = STRONG + 0.02 * companion + 0.01 * np.random.default_rng(6).standard_normal(ROWS)
+    columns = {h.candidates[0]: c for h, c in zip(own, (STRONG, companion), strict=True)}
+    columns = {c: values[:, None, None] for c, values in columns.items()}
+    columns |= Knots().columns(SHAFT, {"speed [rad/s]": STRONG, "tension [N]": WEAK})
+    made = Equation(SHAFT, TIMES, target[:, None], columns, target[:, None])
+    gram = gather([[made]], BLOCK_S)
+    assert Fits(gram, BlockRegression(gram)).may_be_untruth(own)[1] is form_error

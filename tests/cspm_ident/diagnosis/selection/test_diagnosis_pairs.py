@@ -131,8 +131,35 @@ def rig(friction, delay, noise=0.02):
     return Search(gather([[Equation(place, times, target[:, None], shaped, target[:, None])]], 2.0))
 
 
-@pytest.mark.parametrize(("friction", "found"), [(0.0, False), (0.015, True), (0.15, False)])
-def test_friction_is_looked_for_beside_what_healthy_clocks_do_to_load_cells(friction, found):
-    """Where anything is left; ten times as late is no healthy clock."""
+@pytest.mark.parametrize("friction", [0.0, 0.015, 0.15])
+def test_friction_is_looked_for_beside_late_load_cells_where_anything_is_left(friction):
+    """Ten times as late is no healthy clock, and a fault of its own."""
     pair = rig(friction, friction / RATE)._pair([])
-    assert [h.candidates for h in pair] == ([(LATE,), (DRY,)] if found else [])
+    assert {h.candidates for h in pair} == ({(LATE,), (DRY,)} if friction else set())
+
+
+def hidden(size, seed=3):
+    """A shaft with an inertia and dry friction that cancel in every other block."""
+    rng, times = np.random.default_rng(seed), STEP * np.arange(ROWS)
+    turning = np.sin(2.0 * np.pi * times)
+    turned = np.where((times // 2.0) % 2, 1.0, -1.0) * turning
+    place = Place(Channel.SHAFT, WINCH)
+    inertia, dry = (
+        Candidate(catalogue()[name], WINCH) for name in ("winch_inertia", "winch_coulomb_friction")
+    )
+    columns = {inertia: turning, dry: turned}
+    columns |= Knots().columns(place, {"angle [rad]": turning})
+    target = size * (turning + turned) + 0.02 * rng.standard_normal(ROWS)
+    shaped = {term: np.reshape(c, (ROWS, 1, -1)) for term, c in columns.items()}
+    made = Equation(place, times, target[:, None], shaped, target[:, None])
+    return Search(gather([[made]], 2.0)), {inertia, dry}
+
+
+@pytest.mark.parametrize(("size", "both"), [(0.5, True), (0.0, False)])
+def test_two_large_errors_that_hide_each_other_are_found_together(size, both):
+    search, own = hidden(size)
+    assert search._best([]) is None
+    found = {h.candidates[0] for h in search._pair([])}
+    assert found == (own if both else set())
+    named = {each.hypothesis.candidates[0] for each in search.run().findings}
+    assert named == found

@@ -47,6 +47,8 @@ def winch(weight, loud=1.0, rows=ROWS, seed=1):
         # There it takes none though it should.
         (0.0, 0.2, None),
         (0.0, 1.0, None),
+        # Half of it would lower as much as the rest raises.
+        (0.5, 1.0, HoldOut.UNDECIDED),
         # It moves so little that what it takes says nothing.
         (1.0, 0.02, HoldOut.SILENT),
     ],

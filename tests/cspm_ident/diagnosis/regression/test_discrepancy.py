@@ -77,3 +77,35 @@ def test_a_function_of_a_signal_unlike_the_law_moves_it_little(share, moved):
     law = 0.1 * np.sign(np.sin(6.0 * other))
     _, half = fitted(law, {"speed [rad/s]": speed, "tension [N]": other})
     assert (half > 0.2 * TRUE) is moved
+
+
+SPEEDS = {name: np.sin(rate * TIMES) for name, rate in (("a", 2.1), ("b", 3.7))}
+FIRST, SECOND = (Candidate(VISCOUS, name) for name in SPEEDS)
+
+
+def moved(*places, common=False):
+    """How far functions move two winches' friction, at places with so much of a curve in each."""
+    equations = []
+    for place, names, curved in places:
+        columns = {Candidate(VISCOUS, name): SPEEDS[name][:, None, None] for name in names}
+        columns |= Knots().columns(place, {"speed [rad/s]": SPEEDS[names[0]]})
+        rough = 0.01 * np.random.default_rng(5).standard_normal(ROWS)
+        bent = curved * SPEEDS[names[0]] ** 3
+        target = (sum(SPEEDS[name] for name in names) + bent + rough)[:, None]
+        equations.append(Equation(place, TIMES, target, columns, target))
+    gram = gather([equations], BLOCK_S)
+    both = Hypothesis(VISCOUS, (FIRST, SECOND), common=common)
+    return moved_by_functions(Fits(gram, BlockRegression(gram)), [both])
+
+
+def test_a_function_moves_what_acts_where_it_shows():
+    shafts = [(Place(Channel.SHAFT, n), (n,), c) for n, c in (("a", 0.2), ("b", 0.0))]
+    found = moved(*shafts)
+    assert found[FIRST] > 0.02
+    assert found[SECOND] < 0.1 * found[FIRST]
+
+
+def test_what_has_one_cause_moves_as_one():
+    shafts = [(Place(Channel.SHAFT, n), (n,), c) for n, c in (("a", 0.2), ("b", 0.0))]
+    found = moved(*shafts, common=True)
+    assert found[FIRST] == found[SECOND] > 0.02

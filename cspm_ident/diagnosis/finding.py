@@ -15,8 +15,10 @@ from cspm_ident.diagnosis.regression.block_regression import Gain
 from cspm_ident.diagnosis.regression.hypothesis import (
     Hypothesis,
     Rival,
+    is_number,
     may_be_none,
 )
+from cspm_ident.diagnosis.residuals.file_effects import is_less
 from cspm_ident.diagnosis.residuals.free_shapes import Driver
 from cspm_ident.diagnosis.residuals.regressors import Place
 
@@ -189,6 +191,16 @@ class Finding:
     def is_doubtful(self) -> bool:
         """Whether it is in the model, and too uncertain to be named."""
         return self.status is Status.DOUBTFUL
+
+    @property
+    def is_less(self) -> bool:
+        """Whether it is less of an effect than the file says."""
+        return any(is_less(self.effect, {n.name: n.value}) for n in self.parameters)
+
+    @property
+    def is_of_file(self) -> bool:
+        """Whether it is another number of the file: a wrong one, or less of an effect it has."""
+        return is_number(self.hypothesis) or self.is_less
 
     @property
     def is_faint(self) -> bool:

@@ -12,6 +12,7 @@ from cspm_ident.diagnosis.parameter import Coefficients, Parameter
 from cspm_ident.diagnosis.reporting.machine_part import Kind, kind_of
 from cspm_ident.diagnosis.reporting.quantity import amount_words, percent_words
 from cspm_ident.diagnosis.reporting.statement import channel_of
+from cspm_ident.diagnosis.residuals.file_effects import is_less
 from cspm_ident.diagnosis.validation.concerned import concerned
 from cspm_ident.diagnosis.validation.holdout_residuals import HeldOut
 from cspm_sim.effects import Block, Channel, Effect, Elements
@@ -27,7 +28,7 @@ def statement_of(diagnosis: Diagnosis, finding: Finding) -> str:
     doubt = _FAINT if finding.is_faint else ""
     where = f" It shows where {region_words(region)}." if region is not None else ""
     return (
-        f"{_subject(effect, finding.elements)} {_difference(effect)}:"
+        f"{_subject(effect, finding.elements)} {_difference(finding)}:"
         f" {_sizes(finding)}.{_since(finding)}{_elsewhere(diagnosis, finding)}"
         f" {_improvement(diagnosis, finding)}{where}{doubt}"
     )
@@ -66,9 +67,12 @@ def _subject(effect: Effect, elements: Sequence[str]) -> str:
     return f"{words.capitalize()} {listed} {verb}"
 
 
-def _difference(effect: Effect) -> str:
+def _difference(finding: Finding) -> str:
+    effect = finding.hypothesis.effect
     if effect.physics.alter is not None:
         return f"another {effect.words} than the test-bed file says"
+    if finding.is_less:
+        return f"less {effect.words} than the test-bed file says"
     return f"{effect.words} that the model does not have"
 
 
@@ -108,7 +112,8 @@ def _may_be_absent(effect: Effect, number: Parameter) -> bool:
 def _name(effect: Effect, number: Parameter) -> str:
     """Return a parameter's name, marked where it is an offset from the file's value."""
     (absent,) = (p.absent for p in effect.parameters if p.name == number.name)
-    added = effect.physics.alter is not None and absent == 0.0
+    less = is_less(effect.id, {number.name: number.value})
+    added = less or (effect.physics.alter is not None and absent == 0.0)
     return f"{number.name.replace('_', ' ')}{' off by' if added else ''}"
 
 

@@ -75,7 +75,7 @@ def verdict_of(diagnosis: Diagnosis) -> Verdict:
         return Verdict.CONSISTENT if diagnosis.is_excited else Verdict.NOT_EXCITED
     if any(each.alternatives for each in certain):
         return Verdict.TIE
-    if all(each.hypothesis.effect.physics.alter is not None for each in certain):
+    if all(each.is_of_file for each in certain):
         return Verdict.PARAMETER
     return Verdict.EFFECT
 

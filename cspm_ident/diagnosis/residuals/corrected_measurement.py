@@ -7,6 +7,7 @@ from collections.abc import Mapping
 import numpy as np
 from numpy.typing import NDArray
 
+from cspm_ident.diagnosis.residuals.file_effects import joined_entries
 from cspm_ident.diagnosis.residuals.regressors import Candidate
 from cspm_ident.diagnosis.residuals.sensor_readings import pose_rows, reading_rows
 from cspm_ident.signals.measurement import BAR, FRAME, TENSION, WINCHES, Measurement
@@ -35,7 +36,7 @@ def with_found(measurement: Measurement, weights: Mapping[Candidate, Array]) -> 
         for candidate, own in weights.items()
     ]
     machine = measurement.machine
-    machine = machine.model_copy(update={"effects": (*machine.effects, *entries)})
+    machine = machine.model_copy(update={"effects": joined_entries(machine, entries)})
     return measurement.with_machine(machine)
 
 

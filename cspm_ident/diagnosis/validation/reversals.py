@@ -106,7 +106,11 @@ def _wider(
     for form in _forms(gram, own):
         if _is_case(own, form, rows):
             weights = fits.weights([*beside, form])
-            reported = near_rest([weights[c] for c in form.candidates], thresholds)
+            fitted = [weights[c] for c in form.candidates]
+            # Less friction than the file says is another number, without a breakaway of its own.
+            if any(values[1] < 0.0 for values, _ in fitted):
+                continue
+            reported = near_rest(fitted, thresholds)
             forms.setdefault(form.effect.id, []).append((form, reported))
     for same_effect in forms.values():
         if left_open := _left_open(same_effect, thresholds):

@@ -1,0 +1,103 @@
+"""Less of an effect than the file says, down to nothing."""
+
+import pytest
+from measured_samples import measured_with
+
+from cspm_ident.diagnosis.diagnose import diagnose
+from cspm_ident.diagnosis.reporting.finding_statement import statement_of
+from cspm_ident.diagnosis.reporting.improved_file import improved_testbed
+from cspm_ident.diagnosis.reporting.verdict import Verdict, verdict_of
+from cspm_ident.diagnosis.residuals.file_effects import (
+    is_less,
+    joined_entries,
+    may_be_less,
+    with_file_bounds,
+)
+from cspm_msgs_py.testbed import EffectEntry, parse_testbed
+from cspm_run.library import named_testbed
+from cspm_sim.effects import catalogue
+
+DRY = "winch_coulomb_friction"
+MACHINE = named_testbed("thesis").testbed
+
+
+def entry(torque, *elements):
+    return EffectEntry(effect=DRY, elements=elements, parameters={"torque": torque})
+
+
+def with_effects(*entries):
+    return MACHINE.model_copy(update={"effects": entries})
+
+
+def test_bounds_hold_for_the_file_and_the_increment():
+    """With a twentieth more, which noise takes; without an entry nothing is less than nothing."""
+    dry, gain = catalogue()[DRY], catalogue()["winch_torque_gain"]
+    lowered, same = with_file_bounds([dry, gain], with_effects(entry(0.01), entry(0.02, "surge_1")))
+    assert lowered.parameters[0].minimum == pytest.approx(-0.021)
+    assert same is gain
+    (untouched,) = with_file_bounds([dry], with_effects())
+    assert untouched is dry
+
+
+@pytest.mark.parametrize(
+    ("effect", "less"),
+    [
+        (DRY, True),
+        ("winch_viscous_friction", True),
+        # A number of the file, a reading, one that may be negative, one with memory, of a body.
+        ("cable_stiffness", False),
+        ("tension_gain", False),
+        ("winch_torque_offset", False),
+        ("cable_hysteresis", False),
+        ("bar_linear_damping", False),
+    ],
+)
+def test_what_may_be_less_than_a_file_says(effect, less):
+    assert may_be_less(catalogue()[effect]) is less
+
+
+def test_what_is_less_is_taken_off_the_entry_of_its_element():
+    names = [cable.name for cable in MACHINE.cables]
+    first, *others = names
+    found = joined_entries(with_effects(entry(0.02)), [entry(-0.005, first)])
+    assert [(e.elements, e.numbers["torque"]) for e in found] == [
+        (tuple(others), 0.02),
+        ((first,), pytest.approx(0.015)),
+    ]
+    gone = joined_entries(with_effects(entry(0.02, first)), [entry(-0.0201, first)])
+    assert [(e.elements, e.numbers["torque"]) for e in gone] == [((first,), 0.0)]
+
+
+def test_more_of_it_and_what_the_file_lacks_are_entries_of_their_own():
+    more = entry(0.005, "surge_1")
+    assert joined_entries(with_effects(entry(0.02)), [more]) == (entry(0.02), more)
+    less = entry(-0.005, "surge_1")
+    assert joined_entries(with_effects(), [less]) == (less,)
+
+
+def test_an_entry_below_nothing_is_less():
+    assert is_less(DRY, {"torque": -1e-6})
+    assert not is_less(DRY, {"torque": 0.0})
+    assert not is_less("winch_torque_offset", {"torque": -0.5})
+
+
+WORN = """
+effects:
+  - effect: winch_coulomb_friction
+    elements: [surge]
+    parameters: {torque: 0.011}
+"""
+
+
+@pytest.mark.slow
+def test_a_machine_with_less_friction_than_its_file_says_has_another_number(tmp_path):
+    measured = measured_with(WORN, tmp_path / "recorded", "one_winch", "duration=15")
+    believed = parse_testbed(measured.testbed.text + WORN.replace("0.011", "0.015"), "believed")
+    found = diagnose([measured.with_testbed(believed)])
+    assert verdict_of(found) is Verdict.PARAMETER
+    (finding,) = found.reported
+    assert "less dry friction than the test-bed file says: torque off by -4" in statement_of(
+        found, finding
+    )
+    (improved,) = improved_testbed(found, "improved").testbed.effects
+    assert improved.numbers["torque"] == pytest.approx(0.011, abs=1e-4)

@@ -85,8 +85,11 @@ class Diagnosis:
     def simulated_beyond(self) -> tuple[SimulatedFit, ...]:
         """Simulations of cables and bar far from what was measured, the farthest first.
 
-        Those from torques integrate their noise twice, in any machine.
+        Those from torques integrate their noise twice, in any machine. Without load cells the state
+        in which a simulation begins is not known well enough.
         """
+        if any(each.tension is None for each in (*self.searched, *self.held_out)):
+            return ()
         far = self.thresholds.driven_noise_ratio
         torques = Input.SHAFT, Input.TORQUE
         own = (e for e in self.simulated if e.output.drive not in torques)

@@ -98,6 +98,13 @@ class Fits:
             sums, base, own = self.shared(base, hypothesis)
         return bool(np.all(sums.long_run(base, own).few_stretches))
 
+    def is_hidden(self, hypothesis: Hypothesis, chosen: Sequence[Hypothesis]) -> bool:
+        """Return whether a column of a hypothesis is collinear with those of the others."""
+        others = [self.own_columns(h) for h in chosen if h is not hypothesis]
+        own = self.own_columns(hypothesis)
+        spanned = self.sums.spanned(self.gram.nuisance, np.concatenate(others), own)
+        return bool(np.any(spanned > 1.0 - self.thresholds.material_share))
+
     def delayed(self, hypothesis: Hypothesis) -> Fits:
         """Return the same with a hypothesis acting only from its onset on."""
         if not hypothesis.onset:

@@ -130,10 +130,9 @@ class Search:
         return self._merged(self._needed(self._exchanged(chosen)))
 
     def _pair(self, chosen: Sequence[Hypothesis]) -> tuple[Hypothesis, ...]:
-        """Return two hypotheses of which each is significant only beside the other.
+        """Return two hypotheses of which each is significant only beside the other; else none.
 
-        Two large errors hide each other, and a clock error of healthy size hides any. The result is
-        empty without such a pair, or where no residual is unexplained.
+        Two large errors hide each other, and a clock error of healthy size hides any.
         """
         if not self._unexplained(chosen, ()):
             return ()
@@ -152,13 +151,17 @@ class Search:
 
     def _promising(self, chosen: Sequence[Hypothesis]) -> list[Hypothesis]:
         """Return plausible hypotheses that take most of hold-out blocks, significant or not."""
-        base, free = self.fits.columns(chosen), self._free(chosen)
-        gains = self.sums.gains_beyond(base, [self._of(c) for c in free])
-        likely = screened(free, gains, self.thresholds.screened_candidates)
-        scopes = [h for c in likely for h in self.scopes.of(c, free, base)]
+        base, scopes = self.fits.columns(chosen), self._scopes(chosen)
         gained = [self.fits.gain(h, base).total for h in scopes]
         best = [scopes[k] for k in np.argsort(gained)[::-1] if gained[k] > 0.0]
         return [h for h in best if self.fits.is_plausible([*chosen, h])][:_PROMISING]
+
+    def _scopes(self, chosen: Sequence[Hypothesis]) -> list[Hypothesis]:
+        """Return what takes most beside the chosen, each on the elements that it may have."""
+        base, free = self.fits.columns(chosen), self._free(chosen)
+        gains = self.sums.gains_beyond(base, [self._of(c) for c in free])
+        likely = screened(free, gains, self.thresholds.screened_candidates)
+        return [h for c in likely for h in self.scopes.of(c, free, base)]
 
     def _clocks(self) -> list[Hypothesis]:
         """Return the clock effect of healthy size, on signals that one system reads.
@@ -214,7 +217,7 @@ class Search:
                 or (
                     not self.fits.is_negligible(own, chosen)
                     and may_be_none({c: weights[c] for c in members_of(weights, own)})
-                    and self._is_hidden(own, chosen)
+                    and self.fits.is_hidden(own, chosen)
                 )
                 or not self._is_there(own, self._others(own, chosen), gains[k], chosen)
             )
@@ -222,13 +225,6 @@ class Search:
             if needless and (self.fits.are_early(chosen) or not self.fits.are_early(rest)):
                 return int(k)
         return None
-
-    def _is_hidden(self, hypothesis: Hypothesis, chosen: Sequence[Hypothesis]) -> bool:
-        """Return whether a column of a hypothesis is collinear with those of the others."""
-        others = [self.fits.own_columns(h) for h in chosen if h is not hypothesis]
-        own = self.fits.own_columns(hypothesis)
-        spanned = self.sums.spanned(self.gram.nuisance, np.concatenate(others), own)
-        return bool(np.any(spanned > 1.0 - self.thresholds.material_share))
 
     def _is_there(
         self, hypothesis: Hypothesis, base: Index, gain: Gain, chosen: Sequence[Hypothesis]
@@ -264,11 +260,7 @@ class Search:
             self._look_for(self._effects)
 
     def _best(self, chosen: Sequence[Hypothesis]) -> Hypothesis | None:
-        base = self.fits.columns(chosen)
-        free = self._free(chosen)
-        gains = self.sums.gains_beyond(base, [self._of(c) for c in free])
-        likely = screened(free, gains, self.thresholds.screened_candidates)
-        scopes = [h for c in likely for h in self.scopes.of(c, free, base)]
+        base, free, scopes = self.fits.columns(chosen), self._free(chosen), self._scopes(chosen)
         late = [d for h in scopes for d in self._late(h, free, base)]
         best = self._surest([*scopes, *late], chosen, base)
         if best is None:
@@ -321,8 +313,7 @@ class Search:
 
         Its shape is the one that leaves the smallest sum of squares.
         """
-        # A wrong parameter of the test-bed file acts all the time.
-        if is_number(hypothesis):
+        if is_number(hypothesis):  # It acts all the time.
             return
         first = self.thresholds.onset_blocks
         last = self.sums.blocks - 2 * first

@@ -185,10 +185,7 @@ class Search:
         return chosen
 
     def _needed(self, chosen: Sequence[Hypothesis]) -> list[Hypothesis]:
-        """Return the selection without redundant hypotheses, removing the weakest first.
-
-        The first were selected without the later ones, so all scopes and tests are repeated.
-        """
+        """Return the selection without redundant hypotheses, all scopes and tests repeated."""
         kept = list(chosen)
         for k, hypothesis in enumerate(kept):
             kept[k] = self.scopes.pruned(hypothesis, self._others(hypothesis, kept))

@@ -14,6 +14,7 @@ from numpy.typing import NDArray
 from cspm_model.kernels.trajectory import eulers_along
 from cspm_msgs_py.dofs import DOFS
 from cspm_msgs_py.errors import InputError
+from cspm_msgs_py.installed.extra_library import extra_library
 from cspm_msgs_py.recording.rows import Rows
 from cspm_msgs_py.topics import POSE, Topic
 
@@ -257,7 +258,7 @@ class Signals(ABC):
         Raises:
             InputError: pandas is not installed, or a signal is not recorded.
         """
-        pd = _library("pandas")
+        pd = extra_library("pandas", "tables", "to_pandas")
         tables = [
             pd.DataFrame(
                 s.values,
@@ -280,7 +281,7 @@ class Signals(ABC):
         Raises:
             InputError: xarray is not installed, or a signal is not recorded.
         """
-        xr = _library("xarray")
+        xr = extra_library("xarray", "tables", "to_xarray")
         found: xarray.Dataset = xr.Dataset(
             {
                 s.name.strip("/"): xr.DataArray(
@@ -349,12 +350,3 @@ def _dimension(signal: Signal) -> str:
     if signal.columns == DOFS:
         return "dof"
     return f"field of {signal.name}" if signal.name.startswith("/") else "cable"
-
-
-def _library(name: str) -> Any:  # noqa: ANN401 - a module
-    try:
-        return __import__(name)
-    except ModuleNotFoundError as err:
-        raise InputError(
-            f"to_{name}: {err.name} is not installed, allowed: after `pip install {name}`"
-        ) from None

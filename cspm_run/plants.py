@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Collection, Mapping, Sequence
-from importlib import import_module
 from importlib.metadata import version as metadata_version
 
 import numpy as np
@@ -11,6 +10,7 @@ from numpy.typing import NDArray
 
 from cspm_model.motion import Motion
 from cspm_msgs_py.errors import InputError
+from cspm_msgs_py.installed.extra_library import extra_library
 from cspm_msgs_py.recording.run_record import MUJOCO, SIM
 from cspm_msgs_py.testbed import Testbed
 from cspm_sim.any_plant import AnyPlant
@@ -79,12 +79,7 @@ def require_mujoco(what: str) -> None:
     Raises:
         InputError: it is.
     """
-    try:
-        import_module("mujoco")
-    except ModuleNotFoundError as err:
-        raise InputError(
-            f"{what}: {err.name} is not installed, allowed: after `pip install cspm[mujoco]`"
-        ) from None
+    extra_library("mujoco", "mujoco", what)
     found = metadata_version("mujoco")
     if int(found.split(".")[0]) < OLDEST_MUJOCO:
         raise InputError(

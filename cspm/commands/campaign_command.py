@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass
-from importlib.util import find_spec
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -13,8 +12,8 @@ from rich.console import Console
 from rich.markup import escape
 from rich.table import Table
 
+from cspm.campaign import require_engine
 from cspm.commands.progress_shown import shown
-from cspm_msgs_py.errors import InputError
 from cspm_msgs_py.interruption import interruptible
 from cspm_run.output.console import make_console, say
 from cspm_run.output.json_file import write_json
@@ -22,7 +21,6 @@ from cspm_run.output.json_file import write_json
 if TYPE_CHECKING:
     from cspm.campaign.campaign import Campaign
 
-_NEEDED = ("distributed", "bokeh", "cryptography", "pyarrow")
 # Failures that are printed; the table has all.
 _MOST_FAILURES = 5
 
@@ -57,7 +55,7 @@ def campaign_command(request: CampaignRequest, json: Path | None) -> bool:
         CspmError: the scheduler was lost.
     """
     console = make_console()
-    _check_engine()
+    require_engine()
     from cspm.campaign.campaign import run_campaign
     from cspm.campaign.campaign_folder import TABLE
     from cspm.campaign.campaign_page import write_campaign_page
@@ -94,7 +92,7 @@ def list_command(file: Path, json: Path | None) -> None:
     Raises:
         InputError: the file has a fault.
     """
-    _check_engine()
+    require_engine()
     from cspm.campaign.campaign import command_of, plan_of
 
     console, plan = make_console(), plan_of(file)
@@ -103,14 +101,6 @@ def list_command(file: Path, json: Path | None) -> None:
         say(console, command)
     if json is not None:
         write_json(json, {"runs": commands})
-
-
-def _check_engine() -> None:
-    for name in _NEEDED:
-        if find_spec(name) is None:
-            raise InputError(
-                f"campaign: {name} is not installed, allowed: after `pip install 'cspm[campaign]'`"
-            )
 
 
 def spread_table(title: str, metrics: Mapping[str, Mapping[str, Any]]) -> Table:

@@ -231,7 +231,9 @@ def test_a_machine_without_bar_has_no_bar_pose():
 def test_without_pandas_the_remedy_is_reported(calm, monkeypatch):
     for name in ("pandas", "xarray"):
         monkeypatch.setitem(sys.modules, name, None)
-        with pytest.raises(cspm.InputError, match=f"allowed: after `pip install {name}`"):
+        with pytest.raises(
+            cspm.InputError, match=rf"^to_{name}: {name} .* `pip install 'cspm\[tables\]'`$"
+        ):
             getattr(calm, f"to_{name}")()
 
 

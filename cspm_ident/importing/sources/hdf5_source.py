@@ -8,10 +8,10 @@ from typing import Any
 
 import numpy as np
 
-from cspm_ident.importing.sources.extras import needed
 from cspm_ident.importing.sources.loaded_table import LARGEST_SIDE, LoadedTable, Vector, signals
 from cspm_ident.importing.sources.mat_source import EXPORT
 from cspm_msgs_py.errors import InputError
+from cspm_msgs_py.installed.extra_library import extra_library
 
 _HIDDEN = ("#refs#", "#subsystem#")
 
@@ -31,7 +31,7 @@ class Hdf5Source(LoadedTable):
         """
         super().__init__(path)
         self.kind = "MATLAB file of version 7.3" if matlab else "HDF5 file"
-        h5py = needed("h5py", path)
+        h5py = extra_library("h5py", "files", str(path), ", or a text table")
         objects: list[str] = []
         try:
             with h5py.File(path, "r") as file:

@@ -6,9 +6,9 @@ from pathlib import Path
 
 import numpy as np
 
-from cspm_ident.importing.sources.extras import needed
 from cspm_ident.importing.sources.loaded_table import LoadedTable, Vector
 from cspm_msgs_py.errors import InputError
+from cspm_msgs_py.installed.extra_library import extra_library
 
 
 class ParquetSource(LoadedTable):
@@ -23,7 +23,7 @@ class ParquetSource(LoadedTable):
             InputError: pyarrow is missing, or the file is damaged.
         """
         super().__init__(path)
-        parquet = needed("pyarrow.parquet", path)
+        parquet = extra_library("pyarrow.parquet", "files", str(path), ", or a text table")
         try:
             self._file = parquet.ParquetFile(path)
         except Exception as err:  # of many kinds, whatever the damage makes the reader do

@@ -9,9 +9,9 @@ from typing import Any
 import numpy as np
 
 from cspm_ident.importing.mapping import CsvFormat
-from cspm_ident.importing.sources.extras import needed
 from cspm_ident.importing.sources.loaded_table import LoadedTable, Vector
 from cspm_msgs_py.errors import InputError
+from cspm_msgs_py.installed.extra_library import extra_library
 
 Row = tuple[Any, ...]
 
@@ -62,7 +62,7 @@ class SpreadsheetSource(LoadedTable):
                 )
 
     def _rows(self) -> list[Row]:
-        openpyxl = needed("openpyxl", self.path)
+        openpyxl = extra_library("openpyxl", "files", str(self.path), ", or a text table")
         try:
             book = openpyxl.load_workbook(self.path, read_only=True, data_only=True)
         except Exception as err:  # of many kinds, whatever the damage makes the reader do

@@ -1,13 +1,15 @@
 """What a campaign's file may say, and what each fault is answered with."""
 
 import io
+import sys
 
 import pytest
 from rich.console import Console
 
+import cspm.campaign
 from cspm.campaign.campaign_file import load_campaign
 from cspm.campaign.variants import variants_of
-from cspm.commands.campaign_command import spread_table
+from cspm.commands.campaign_command import list_command, spread_table
 from cspm_msgs_py.errors import InputError
 
 
@@ -89,3 +91,15 @@ def test_the_table_of_a_campaign_is_whole_on_a_terminal_of_60_columns():
     for word in (*names, "0.000123", "12.3", "123", "1.23e+04", "mrad", "largest"):
         assert word in text
     assert "…" not in text
+
+
+@pytest.mark.parametrize("absent", ["distributed", "pyarrow"])
+def test_a_campaign_without_its_engine_is_one_line(tmp_path, monkeypatch, absent):
+    monkeypatch.setitem(sys.modules, absent, None)
+    line = (
+        rf"^campaign: {absent} is not installed, allowed: after `pip install 'cspm\[campaign\]'`$"
+    )
+    with pytest.raises(InputError, match=line):
+        list_command(written(tmp_path, "scenario: calm"), None)
+    with pytest.raises(InputError, match=line):
+        cspm.campaign.run_campaign  # noqa: B018

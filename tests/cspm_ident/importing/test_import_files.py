@@ -145,7 +145,8 @@ def test_what_is_not_installed_is_named_with_its_remedy(tmp_path, monkeypatch, n
         monkeypatch.setitem(sys.modules, known, None)
     (tmp_path / name).write_bytes(start + bytes(600))
     assert fault(tmp_path / name) == (
-        f"{name}: reading it needs {module}, allowed: pip install 'cspm[files]', or a text table"
+        f"{name}: {module} is not installed, allowed: after `pip install 'cspm[files]'`, or a text"
+        " table"
     )
 
 

@@ -79,7 +79,7 @@ def test_it_says_what_to_install(monkeypatch):
     monkeypatch.setitem(sys.modules, "mujoco", None)
     with pytest.raises(
         InputError,
-        match=r"^plant mujoco: mujoco is not installed, allowed: after `pip install cspm\[mujoco\]",
+        match=r"^plant mujoco: mujoco is not .*, allowed: after `pip install 'cspm\[mujoco\]'`$",
     ):
         assemble(bundle.scenario, bundle.testbed.testbed, Path(), "mujoco")
 

@@ -17,6 +17,7 @@ from cspm_msgs_py.new_folder import refuse_existing
 from cspm_msgs_py.recording.attached_testbed import TESTBED
 from cspm_msgs_py.testbed import TestbedFile
 from cspm_msgs_py.yaml_file import dump_yaml
+from cspm_run.library import find_mapping
 from cspm_run.recorded_run import CONTRACT_VERSION
 
 MAPPING, REPORT = "mapping.yaml", "import.yaml"
@@ -39,7 +40,7 @@ def import_recording(
         source: a text table, a spreadsheet, a Parquet, HDF5 or .mat file, or a bag: a rosbag2
             folder, an .mcap or .db3 file, or a ROS 1 .bag.
         folder: a new one for the recording.
-        mapping: file that says which column is which number, in which unit; see
+        mapping: which column is which number, in which unit: a name of the library or a file; see
             `docs/reference/import-mapping.md`.
         testbed: the machine that was recorded: a name, a file or a `Testbed`.
         progress: called now and then with the share that is done and what is being done.
@@ -50,12 +51,12 @@ def import_recording(
     Examples:
         >>> import cspm
         >>> recording = cspm.import_recording(
-        ...     "DATA_EMPS.mat", "emps", mapping="emps.yaml", testbed="emps"
+        ...     "DATA_EMPS.mat", "emps", mapping="emps", testbed="emps"
         ... )  # doctest: +SKIP
     """
     place = Path(folder)
     refuse_existing(place)
-    described, machine = load_mapping(Path(mapping)), as_file(testbed)
+    described, machine = load_mapping(find_mapping(str(mapping))), as_file(testbed)
 
     def reading(share: float) -> None:
         progress(0.5 * share, "reading")

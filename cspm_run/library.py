@@ -1,4 +1,4 @@
-"""The scenarios and test-beds that come with the package, and how a name finds one."""
+"""The scenarios, test-beds and mappings that come with the package, and how a name finds one."""
 
 from __future__ import annotations
 
@@ -60,6 +60,20 @@ def find_testbed(name: str) -> Path:
     """
     folders = [folder / "testbeds" for folder in library_folders()]
     return _find(name, "test-bed", folders, testbed_names)
+
+
+def find_mapping(name: str) -> Path:
+    """Return the mapping file of an import that `name` means: a path, or a name from the library.
+
+    Raises:
+        InputError: there is none; the line lists the library.
+    """
+    folders = [folder / "mappings" for folder in library_folders()]
+
+    def names() -> list[str]:
+        return sorted({path.stem for folder in folders for path in folder.glob("*.yaml")})
+
+    return _find(name, "mapping", folders, names)
 
 
 @overload

@@ -189,8 +189,7 @@ def damping(request: RigRequest, json: Path | None) -> bool:
     cls=JudgedCommand,
     epilog="""Examples:
 
-cspm import DATA_EMPS.mat --mapping scenarios/mappings/emps.yaml --testbed
-scenarios/testbeds/emps.yaml --out emps
+cspm import DATA_EMPS.mat --mapping emps --testbed emps --out emps
 
 cspm identify winch emps --held-out emps_pulses --out fitted
 

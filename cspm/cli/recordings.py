@@ -86,8 +86,7 @@ def resim(
 
 cspm import lab.csv --mapping lab_mapping.yaml --testbed my_rig.yaml --dry-run
 
-cspm import DATA_EMPS.mat --mapping scenarios/mappings/emps.yaml --testbed
-scenarios/testbeds/emps.yaml --out emps
+cspm import DATA_EMPS.mat --mapping emps --testbed emps --out emps
 
 Exit code: 0 done, 2 unusable input.""",
 )

@@ -16,7 +16,7 @@ from cspm_ident.importing.column_store import ColumnStore
 from cspm_ident.importing.mapping import load_mapping
 from cspm_ident.importing.preparation import prepare
 from cspm_msgs_py.new_folder import refuse_existing
-from cspm_run.library import named_testbed
+from cspm_run.library import find_mapping, named_testbed
 from cspm_run.output.console import make_console, say
 from cspm_run.output.json_file import write_json
 
@@ -40,7 +40,7 @@ def import_command(request: Import, json: Path | None) -> None:
     console = make_console()
     refuse_existing(request.out)
     mapping, testbed = (
-        load_mapping(request.mapping),
+        load_mapping(find_mapping(str(request.mapping))),
         named_testbed(request.testbed),
     )
     with ColumnStore() as store:

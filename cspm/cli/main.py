@@ -38,6 +38,7 @@ def main() -> None:
     import_module("cspm.cli.ros")
     import_module("cspm.cli.new")
     import_module("cspm.cli.campaign")
+    import_module("cspm.cli.installation")
     run_app(app, "cspm")
 
 

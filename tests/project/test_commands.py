@@ -64,6 +64,7 @@ NOT_RUN: dict[str, str] = {
     # A network, or files of the reader.
     "export ROS_": f"of several computers; {ROS_TESTS}/runtime/test_network_namespaces.py",
     "pip install": "needs a network; tests/project/test_wheel.py",
+    "pip wheel": "needs a network; tests/project/test_wheel.py",
     "cspm info recordings/my_bag": "a bag of the reader; tests/cspm_ident/importing",
     "cspm import my_bag": "a bag of the reader; tests/cspm_ident/importing",
 }

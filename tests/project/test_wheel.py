@@ -168,6 +168,19 @@ def test_a_base_installation_imports_a_table_and_shows_what_it_made(environment,
     assert run([cspm, "view", "--help"], tmp_path).startswith("Usage: cspm view")
 
 
+def test_a_base_installation_knows_what_it_lacks(environment, tmp_path):
+    run([environment / "bin" / "cspm", "doctor", "--json", "found.json"], tmp_path)
+    found = json.loads((tmp_path / "found.json").read_text(encoding="utf-8"))["parts"]
+    parts = {each["name"]: each for each in found}
+    assert parts["python"]["found"].endswith(f" in {environment}")
+    assert parts["cspm"]["there"]
+    for extra in ("files", "tables", "campaign", "mujoco"):
+        assert parts[f"extra {extra}"]["remedy"] == f"`pip install 'cspm[{extra}]'`"
+    assert parts["extra view"]["there"]
+    assert parts["ros"]["remedy"].startswith("`pip install 'cspm[ros]'`")
+    assert "middleware" not in parts
+
+
 @pytest.mark.parametrize(
     ("words", "extra"),
     [

@@ -44,7 +44,12 @@ class Sensor(StrictModel):
     delay: NonNegativeFloat = 0.0
     rate: PositiveInt
 
-    @field_validator("noise", "resolution", mode="before")
+    @field_validator(
+        "noise",
+        "resolution",
+        mode="before",
+        json_schema_input_type=NonNegativeFloat | tuple[NonNegativeFloat, ...],
+    )
     @classmethod
     def _listed(cls, value: object) -> object:
         if isinstance(value, int | float):

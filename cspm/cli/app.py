@@ -30,7 +30,7 @@ class _Listed(typer.core.TyperGroup):
     order = (
         *("demo", "new", "run", "view", "info", "recover", "resim", "import", "compare"),
         *("identify", "diagnose", "campaign", "analyze"),
-        *("doctor", "replay", "check-drivers", "urdf", "node"),
+        *("doctor", "schema", "replay", "check-drivers", "urdf", "node"),
     )
 
     def list_commands(self, ctx: typer.Context) -> list[str]:  # type: ignore[override]

@@ -1,4 +1,4 @@
-"""Commands about the installation itself: doctor."""
+"""Commands about the installation and its files: doctor, schema."""
 
 from __future__ import annotations
 
@@ -36,3 +36,33 @@ def doctor(
     from cspm.commands.installation.doctor_command import doctor_command
 
     doctor_command(json, listed=listed)
+
+
+@app.command(
+    epilog="""Examples:
+
+cspm schema testbed > testbed.schema.json
+
+cspm schema scenario --json scenario.schema.json
+
+In an editor with the YAML language server the first line of a file is then
+# yaml-language-server: $schema=testbed.schema.json
+
+Exit code: 0 done, 2 unusable input."""
+)
+def schema(
+    kind: Annotated[
+        str,
+        typer.Argument(
+            metavar="KIND", help="Of file: testbed, scenario, mapping, campaign or diagnosis."
+        ),
+    ],
+    json: Json = None,
+) -> None:
+    """Print the JSON Schema of a kind of file, for editors that complete and check keys.
+
+    It is made from what the reader itself checks by. With --json it goes to a file.
+    """
+    from cspm.commands.installation.schema_command import schema_command
+
+    schema_command(kind, json)

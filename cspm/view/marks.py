@@ -2,14 +2,13 @@
 
 from __future__ import annotations
 
-import json
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable
 from dataclasses import asdict, dataclass
 from pathlib import Path
 from typing import Any
 
 from cspm_ident.diagnosis.reporting.machine_part import Kind, Part, parts_of
-from cspm_ident.diagnosis.reporting.verdict import SCHEMA
+from cspm_ident.diagnosis_file import FindingPart, read_diagnosis
 from cspm_msgs_py.errors import InputError
 from cspm_msgs_py.testbed import Testbed
 from cspm_sim.effects import catalogue
@@ -51,34 +50,27 @@ def read_marks(path: Path, machine: Testbed, recording: str) -> tuple[Mark, ...]
     Raises:
         InputError: it cannot be read, is no diagnosis, or is one of another machine.
     """
-    file = path / "diagnosis.json" if path.is_dir() else path
-    try:
-        data = json.loads(file.read_text(encoding="utf-8"))
-    except (OSError, ValueError) as err:
-        raise InputError(f"{file}: cannot be read as JSON ({err})") from None
-    if not isinstance(data, dict) or data.get("schema") != SCHEMA:
-        raise InputError(f"{file}: no diagnosis, allowed: a file with schema {SCHEMA}")
-    marks = tuple(mark for each in data["findings"] for mark in _marks(each, machine, recording))
+    findings = read_diagnosis(path).findings
+    marks = tuple(mark for each in findings for mark in _marks(each, machine, recording))
     known = {*machine.cable_names, "bar", "winch_frame"}
     strange = next((mark.element for mark in marks if mark.element not in known), None)
     if strange is not None:
         allowed = ", ".join(sorted(known))
-        raise InputError(f"{file}: about {strange}, allowed on this machine: {allowed}")
+        raise InputError(f"{path}: about {strange}, allowed on this machine: {allowed}")
     return marks
 
 
-def _marks(finding: Mapping[str, Any], machine: Testbed, recording: str) -> Iterable[Mark]:
-    when = finding["onset_s"]
-    shown = finding.get("shows_at")
-    if when is None and shown is not None and Path(shown["recording"]).resolve().name == recording:
-        when = shown["time_s"]
-    for element in finding["elements"]:
+def _marks(finding: FindingPart, machine: Testbed, recording: str) -> Iterable[Mark]:
+    when, shown = finding.onset_s, finding.shows_at
+    if when is None and shown is not None and Path(shown.recording).resolve().name == recording:
+        when = shown.time_s
+    for element in finding.elements:
         for part in _parts(finding, element, machine):
-            yield Mark(part.kind.value, part.element, part.words, finding["statement"], when)
+            yield Mark(part.kind.value, part.element, part.words, finding.statement, when)
 
 
-def _parts(finding: Mapping[str, Any], element: str, machine: Testbed) -> Iterable[Part]:
-    effect = catalogue().get(finding["effect"])
+def _parts(finding: FindingPart, element: str, machine: Testbed) -> Iterable[Part]:
+    effect = catalogue().get(finding.effect)
     if effect is not None:
         return parts_of(effect, element, machine.cable_names)
-    return [Part(_KINDS.get(finding["subsystem"], Kind.BODY), element)]
+    return [Part(_KINDS.get(finding.subsystem, Kind.BODY), element)]

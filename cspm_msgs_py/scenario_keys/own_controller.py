@@ -58,7 +58,12 @@ def _spelled_out(value: object) -> object:
     return {"python": value} if isinstance(value, str) else value
 
 
-OwnControllers = dict[StageName, Annotated[OwnController, BeforeValidator(_spelled_out)]]
+OwnControllers = dict[
+    StageName,
+    Annotated[
+        OwnController, BeforeValidator(_spelled_out, json_schema_input_type=str | OwnController)
+    ],
+]
 
 
 def path_of(named: OwnController, folder: Path) -> Path:

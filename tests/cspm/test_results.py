@@ -2,6 +2,7 @@
 
 import json
 
+import jsonschema
 import numpy as np
 import pytest
 
@@ -9,6 +10,8 @@ import cspm
 from cspm.identification.identified import Identification
 from cspm.parameters import Parameter, Parameters
 from cspm.progress import by_steps
+from cspm.schemas.file_schema import schema_of
+from cspm_ident.diagnosis_file import read_diagnosis
 
 
 @pytest.fixture(scope="module")
@@ -70,7 +73,11 @@ def test_findings_of_a_planted_friction(recording, tmp_path):
     assert 0.0 < friction.probability < 1.0
     assert "winch_coulomb_friction" in found.improved_testbed.text
     place = found.write(tmp_path / "verdict")
-    assert json.loads((place / "diagnosis.json").read_text())["verdict"] == found.verdict
+    data = json.loads((place / "diagnosis.json").read_text())
+    assert data["verdict"] == found.verdict
+    jsonschema.validate(data, schema_of("diagnosis"))
+    (read,) = (each for each in read_diagnosis(place).findings if each.effect == friction.effect)
+    assert read.parameters[0].value == friction.parameters["torque"].value
     assert (place / "testbed.improved.yaml").read_text() == found.improved_testbed.text
 
 

@@ -1,1 +1,1 @@
-"""Commands about the installation itself."""
+"""Commands about the installation and its files."""

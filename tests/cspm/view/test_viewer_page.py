@@ -146,14 +146,28 @@ def finding(**changed):
         "elements": ["surge_2"],
         "effect": "winch_coulomb_friction",
         "statement": "Friction.",
+        "probability": 0.9,
         "onset_s": None,
+        "region": {},
+        "parameters": [],
+        "alternatives": [],
         "shows_at": {"recording": "some/where/today", "time_s": 3.5},
     }
     return entry | changed
 
 
 def marks_of(path, machine, *findings, schema="cspm.diagnosis/1"):
-    path.write_text(json.dumps({"schema": schema, "findings": findings}))
+    data = {
+        "schema": schema,
+        "recordings": [],
+        "testbed": {"path": "thesis.yaml", "sha256": "0"},
+        "verdict": "effect",
+        "findings": findings,
+        "not_excited": [],
+        "fit": [],
+        "model": None,
+    }
+    path.write_text(json.dumps(data))
     return read_marks(path, machine, "today")
 
 
@@ -181,6 +195,10 @@ def test_marks_are_the_parts_of_the_findings(thesis, tmp_path):
     [
         ("{", ": cannot be read as JSON"),
         ("[]", ": no diagnosis, allowed: a file with schema cspm.diagnosis/1"),
+        (
+            '{"schema": "cspm.diagnosis/1"}',
+            ": recordings: missing, a value is required",
+        ),
         ('{"schema": "other/1"}', ": no diagnosis, allowed: a file with schema cspm.diagnosis/1"),
     ],
 )

@@ -1,0 +1,1 @@
+"""JSON Schemas of the files that cspm reads and writes."""

@@ -68,11 +68,13 @@ def diagnose(
     Every residual is driven by what was measured, so that feedback cannot hide an effect. What is
     found is judged on data that was not searched.
     """
-    from cspm.commands.diagnose_command import DiagnoseRequest, diagnose_command, explain_command
-
     if explain is not None:
+        from cspm.commands.catalogue.explain_command import explain_command
+
         explain_command(explain)
         return
+    from cspm.commands.diagnose_command import DiagnoseRequest, diagnose_command
+
     if not recordings:
         raise InputError("diagnose: no recording, allowed: one or more, or --explain EFFECT")
     diagnose_command(

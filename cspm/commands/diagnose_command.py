@@ -41,7 +41,6 @@ from cspm_ident.diagnosis.reporting.verdict import (
 )
 from cspm_ident.diagnosis.validation.closed_loop import ClosedLoopFit
 from cspm_ident.diagnosis.validation.controller_parity import Parity
-from cspm_msgs_py.errors import InputError
 from cspm_msgs_py.new_folder import refuse_existing
 from cspm_msgs_py.testbed import Testbed
 from cspm_run.library import named_testbed
@@ -141,22 +140,6 @@ def _print_parity(console: Console, parity: Sequence[Parity]) -> None:
                 f" described {each.node} makes of the recorded measurements (up to"
                 f" {each.largest:.2g})",
             )
-
-
-def explain_command(name: str) -> None:
-    """Print an effect's description, its signature and the effects it is confounded with.
-
-    Raises:
-        InputError: there is no such effect.
-    """
-    from rich.markdown import Markdown
-
-    from cspm_sim.effects.document import effect_section
-
-    effects = catalogue()
-    if name not in effects:
-        raise InputError(f"--explain {name}: allowed: {', '.join(effects)}")
-    make_console().print(Markdown(effect_section(effects[name])))
 
 
 def _print_named(

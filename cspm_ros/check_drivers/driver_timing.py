@@ -5,7 +5,7 @@ from __future__ import annotations
 from typing import NamedTuple
 
 import numpy as np
-from scipy.stats import theilslopes
+import scipy
 
 from cspm_ros.check_drivers.driver_observation import Array, Finding, Heard, Stamps, seconds
 
@@ -214,7 +214,7 @@ def _speed_up(at: Array, ages: Array) -> tuple[float, float, float]:
     The bounds of Theil and Sen are those of independent ages. A queue gives its messages common
     delays, so the bounds are widened as for a first-order autoregression (Bayley, Hammersley 1946).
     """
-    fit = theilslopes(ages, at, 0.99)
+    fit = scipy.stats.theilslopes(ages, at, 0.99)
     rest = ages - fit.slope * at
     rest -= rest.mean()
     memory = float(np.clip(rest[1:] @ rest[:-1] / max(rest @ rest, 1e-300), 0.0, 0.99))

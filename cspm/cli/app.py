@@ -28,7 +28,7 @@ class _Listed(typer.core.TyperGroup):
     """Lists the commands in the order in which a newcomer needs them."""
 
     order = (
-        *("demo", "new", "run", "view", "info", "recover", "resim", "import", "compare"),
+        *("demo", "new", "run", "view", "info", "recover", "resim", "import", "export", "compare"),
         *("identify", "diagnose", "campaign", "analyze"),
         *("doctor", "schema", "replay", "check-drivers", "urdf", "node"),
     )

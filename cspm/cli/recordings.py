@@ -1,4 +1,4 @@
-"""Commands about recordings: info, recover, resim, import."""
+"""Commands about recordings: info, recover, resim, import, export."""
 
 from __future__ import annotations
 
@@ -126,3 +126,40 @@ def import_(
         raise InputError(f"--out {out} --dry-run: allowed: one of both")
     folder = out if out is not None else new_folder(mapping.stem)
     import_command(Import(file, mapping, testbed, None if dry_run else folder), json)
+
+
+@app.command(
+    epilog="""Examples:
+
+cspm export recordings/calm-20260131-120000 --out calm.csv
+
+cspm export today --out today.mat --signals tension,winch_torque
+
+Exit code: 0 done, 2 unusable input."""
+)
+def export(
+    bag: Annotated[
+        Path, typer.Argument(metavar="REC", help="A recording: its folder or its MCAP file.")
+    ],
+    out: Annotated[
+        Path,
+        typer.Option(metavar="FILE", help="A new file: .csv, .parquet, or .mat for MATLAB."),
+    ],
+    signals: Annotated[
+        str | None,
+        typer.Option(
+            metavar="NAME,…",
+            help="Such as bar_pose,tension.",
+            show_default="all that are recorded",
+        ),
+    ] = None,
+    json: Json = None,
+) -> None:
+    """Write a recording's signals as a text table, as Parquet or for MATLAB, in SI units.
+
+    Nothing is interpolated: a row for each stamp, and nothing where a signal has none then.
+    """
+    from cspm.commands.recordings.export_command import export_command
+
+    names = [] if signals is None else [name.strip() for name in signals.split(",")]
+    export_command(bag, out, names, json)

@@ -95,6 +95,7 @@ END
 """
 RECIPES = {
     "docs/how-to/add-an-effect.md": Recipe(OILY),
+    "docs/how-to/export.md": Recipe("cspm run rest --duration 0.1 --out today"),
     "docs/how-to/import-a-table.md": Recipe(RIG),
     "docs/how-to/view.md": Recipe("cspm run calm --duration 3 --out today"),
     "docs/how-to/write-a-testbed-file.md": Recipe(

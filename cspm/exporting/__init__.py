@@ -1,0 +1,1 @@
+"""Signals as files of other programs: text tables, Parquet, MATLAB."""

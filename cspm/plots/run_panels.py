@@ -28,9 +28,10 @@ def draw_errors(
         time: of the bins, shape (n,) [s].
         bands: lowest and highest value per bin, shape (n, 2, 6 or more).
         axes_of: the degrees of freedom to draw.
-        limit: the requirement, in the unit of the bands.
+        limit: the requirement, in the unit of the bands [mm or mrad].
     """
-    axes.axhspan(-limit, limit, color=BAND, label=f"required ± {limit:g}")
+    unit = "mm" if axes_of[0] < 3 else "mrad"
+    axes.axhspan(-limit, limit, color=BAND, label=f"required ± {limit:g} {unit}")
     worst = max(axes_of, key=lambda d: float(np.abs(bands[:, :, d]).max(initial=0.0)))
     for i, d in enumerate(axes_of):
         draw_envelope(axes, time, bands[:, 0, d], bands[:, 1, d], COLOURS[i], DOFS[d])

@@ -18,6 +18,8 @@ TUTORIALS = [
 MARKED = re.compile(
     r"<!-- (step|file|not tested)(?:: ([^>]+?))? -->\n```(\w*)\n(.*?)```", re.DOTALL
 )
+# A whole line of `cspm resim`.
+QUOTED = re.compile(r"`(identical: [^`]+)`")
 BLOCK = re.compile(r"^```\w*\n(?:.*\n)*?```$", re.MULTILINE)
 
 
@@ -60,6 +62,7 @@ def test_every_block_of_a_tutorial_says_what_it_is(page: Path) -> None:
 @pytest.mark.compiled
 @pytest.mark.parametrize("page", TUTORIALS, ids=lambda page: page.stem)
 def test_a_tutorial_can_be_followed_literally(page: Path, tmp_path: Path) -> None:
+    printed = ""
     for step in steps_of(page):
         if step.kind == "file":
             (tmp_path / step.note).write_text(step.text, encoding="utf-8")
@@ -68,3 +71,6 @@ def test_a_tutorial_can_be_followed_literally(page: Path, tmp_path: Path) -> Non
             found = follow(step, tmp_path)
             assert found.returncode == wanted, f"{step.text}\n{found.stdout}\n{found.stderr}"
             assert "Traceback" not in found.stderr
+            printed += found.stdout
+    for line in QUOTED.findall(page.read_text(encoding="utf-8")):
+        assert line in printed

@@ -43,7 +43,7 @@ _OPPOSES = {WINCH_TORQUE: ("speed", 1), CABLE_TENSION: ("rate of elongation", 1)
 # A residual that was not reported is described where it falls by this factor: the root mean square
 # that is left is then what noise is for the goal of 1.5 times the noise.
 _WORTHWHILE_RATIO = 1.5
-NOTE = "describes what is left and does not explain it"
+NOTE = "describes the unmodelled residual and does not explain it"
 
 
 class Searched(NamedTuple):

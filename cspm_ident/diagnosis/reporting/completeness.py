@@ -53,7 +53,7 @@ def completeness_sentence(diagnosis: Diagnosis) -> str:
     subject = "All findings together explain" if len(diagnosis.reported) > 1 else "It explains"
     percent = 100.0 * min(share, 1.0)
     rest = _rest(diagnosis.beyond_noise)
-    left = f"; {_percent(100.0 - percent)} is left{rest}" if percent < 99.95 else ""
+    left = f"; {_percent(100.0 - percent)} is unmodelled{rest}" if percent < 99.95 else ""
     return f"{subject} {_percent(percent)} of what was missing on held-out data{left}."
 
 

@@ -63,7 +63,7 @@ _SECTIONS = {
     "simulated": "Simulated again",
     "energy": "Where energy goes",
     "controllers": "Controllers stepped again",
-    "limits": "What would have shown",
+    "limits": "Detection limits",
     "silent": "Not testable here",
     "next": "What to do next",
     "sources": "Recordings and files",
@@ -245,8 +245,8 @@ def _hypotheses(found: Diagnosis, data: dict[str, Any]) -> str:
     heads = ("hypothesis", "verdict", "probability", "gain in standard errors", "residual taken")
     trusted = found.thresholds.trusted_probability
     count = (
-        f"<p>{found.tested} hypotheses were looked at. Probabilities are those among"
-        f" what explains the same, times {trusted:g}: the share of findings without a rival that"
+        f"<p>{found.tested} hypotheses were tested. A probability compares rival"
+        f" explanations, times {trusted:g}: the share of findings without a rival that"
         " were right in blind recordings.</p>"
     )
     return count + table_html(heads, rows, "hypotheses and their evidence")
@@ -284,7 +284,7 @@ def _fit(found: Diagnosis) -> str:
     text = (
         f"<p>Root mean square on {judged}. <i>Re-tuned</i> is the file with its own numbers fitted"
         " and nothing added; <i>black box</i> is free functions of every signal instead of"
-        " physics; <i>noise</i> is the white part of what is left.</p>"
+        " physics; <i>noise</i> is the white part of the residual.</p>"
     )
     if found.tables:
         text += (
@@ -334,7 +334,7 @@ def _limits(found: Diagnosis) -> str:
         for (effect, parameter, unit), least in sizes.items()
     ]
     heads = ("effect", "parameter", "on the clearest element", "on the least clear", "unit")
-    text = "<p>More of an effect than this would have been reported, beside what was found.</p>"
+    text = "<p>A larger effect than this, beside what was found, would be reported.</p>"
     return text + table_html(heads, rows, "limits of detection") if rows else ""
 
 
@@ -383,7 +383,7 @@ def _steps(found: Diagnosis, data: dict[str, Any]) -> list[str]:
 def _experiment(purpose: str, file: str | None, advice: str) -> str:
     """Return one line of HTML: which scenario to run, or what to do where there is none."""
     if file is None:
-        reason = "no motion that the recordings show to be safe shows more than they do"
+        reason = "no recorded-safe motion would separate these better"
         return escape(f"{purpose}: {advice} ({reason}).")
     said = escape(f"{purpose}, record ")
     return f"{said}<a href='{escape(file)}'><code>cspm run {escape(file)}</code></a>."

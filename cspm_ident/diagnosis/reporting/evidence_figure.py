@@ -51,9 +51,9 @@ def _dependence(curve: Curve, signal: str) -> str:
         100.0 * float(np.sum(_means(v, home, len(edges) - 1)[home] ** 2)) / whole
         for v in (curve.before, curve.after)
     )
-    then = f", and {after:.2g} % are left that are" if curve.touched else ""
+    then = f" before, {after:.2g} % after" if curve.touched else ""
     name = signal.split(" [")[0]
-    return f"Of its squares {before:.2g} % are a function of {name}{then}."
+    return f"{name[:1].upper()}{name[1:]} explains {before:.2g} % of the squared residual{then}."
 
 
 def driver_figure(curve: Curve, name: str) -> go.Figure:

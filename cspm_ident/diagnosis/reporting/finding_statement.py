@@ -19,6 +19,7 @@ from cspm_sim.effects import Block, Channel, Effect, Elements
 
 # Of a wave: how often it comes back per turn. It is reported though it was searched on a grid.
 _ORDER = "order"
+_KINDS = {Block.WINCH: "winches", Block.CABLE: "cables"}
 _FAINT = " What was not searched moves so little that it shows little of it."
 
 
@@ -127,13 +128,13 @@ def _since(finding: Finding) -> str:
         return f" It begins with block {block} of the recordings."
     # A parameter of the file is wrong all the time, so no onset is searched.
     number_of_file = finding.hypothesis.effect.physics.alter is not None
-    return "" if number_of_file else " It is there from the start."
+    return "" if number_of_file else " Present throughout."
 
 
 def _elsewhere(diagnosis: Diagnosis, finding: Finding) -> str:
     """Return that no other element has the effect, where the same size was detectable on all."""
     effect = finding.hypothesis.effect
-    if effect.block not in (Block.WINCH, Block.CABLE) or len(effect.linear) != 1:
+    if effect.block not in _KINDS or len(effect.linear) != 1:
         return ""
     others = set(diagnosis.searched[0].machine.cable_names) - set(finding.elements)
     limits = {
@@ -150,7 +151,7 @@ def _elsewhere(diagnosis: Diagnosis, finding: Finding) -> str:
     if least > min(abs(n.value - absent) for n in numbers):
         return ""
     reported = amount_words(least, parameter.unit)
-    return f" No other {effect.block.value} has it: {reported} would have shown."
+    return f" Other {_KINDS[effect.block]}: none above the detection limit of {reported}."
 
 
 def _suspected(diagnosis: Diagnosis, effect: Effect) -> set[str]:

@@ -30,7 +30,7 @@ def data_table(data: dict[str, Any]) -> str:
 
 def energy_table(found: Diagnosis) -> str:
     """Return the mean power of every residual as an HTML table; empty without any."""
-    heads = ("residual", "before [W]", "after [W]", "95 % interval [W]", "what is left")
+    heads = ("residual", "before [W]", "after [W]", "95 % interval [W]", "residual power")
     rows = []
     for power in lost_powers(found.curves):
         ends = f"{power.after - power.half:.2g} to {power.after + power.half:.2g}"
@@ -38,8 +38,8 @@ def energy_table(found: Diagnosis) -> str:
         rows.append((channel_of(power), *reported))
     text = (
         "<p>Mean power that the machine loses beyond the model, on held-out data: residuals times"
-        " the measured rates that they act at. Friction, drag and dampers take energy; where what"
-        " is left gives some, another cause remains: a drive, a sensor or a force from outside.</p>"
+        " the measured rates that they act at. Friction, drag and dampers take energy. Where the"
+        " rest gives some, another cause remains: a drive, a sensor or a force from outside.</p>"
     )
     return text + table_html(heads, rows, "power beyond the model") if rows else ""
 

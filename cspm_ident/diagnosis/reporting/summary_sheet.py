@@ -74,7 +74,7 @@ def _sureness(data: Mapping[str, Any]) -> str:
     first = next(iter(data["findings"]), None)
     if first is None or first["probability"] is None:
         return ""
-    text = f"Probability {100 * first['probability']:.0f} %, among all that explains the same."
+    text = f"{100 * first['probability']:.0f} % likely, compared with the rival explanations."
     return f"<p>{escape(text)}</p>"
 
 

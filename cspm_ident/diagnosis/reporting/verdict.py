@@ -50,8 +50,8 @@ class Verdict(Enum):
 
 
 SENTENCES = {
-    Verdict.CONSISTENT: "The recordings agree with the model: what is left on held-out data is"
-    " noise or immaterial, and a difference of relevant size would have shown.",
+    Verdict.CONSISTENT: "The recordings agree with the model: the residual on held-out data is"
+    " noise or immaterial, and a relevant difference is above the detection limit.",
     Verdict.EFFECT: "Physics is missing in the model.",
     Verdict.PARAMETER: "A number of the test-bed file is wrong; no physics is missing.",
     Verdict.TIE: "Something is missing, and several causes explain these recordings equally well.",

@@ -93,7 +93,7 @@ class Search:
         chosen = self._chosen()
         found = [self.finding_of(hypothesis, chosen) for hypothesis in chosen]
         found.sort(key=lambda each: -each.gain.total)
-        self._progress("what is left")
+        self._progress("unmodelled residual")
         return SearchResult(tuple(found), self.unexplained(chosen), len(self._effects))
 
     def first(self) -> Hypothesis | None:

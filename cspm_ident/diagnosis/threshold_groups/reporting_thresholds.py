@@ -18,7 +18,7 @@ class ReportingThresholds:
     )
     noise_floor_ratio: float = ratio(
         1.5,
-        "Multiple of its noise up to which what is left of a residual is at the noise.",
+        "Multiple of its noise up to which a residual is at the noise.",
         "White noise of 200 rows exceeds it with probability 0.001.",
     )
     immaterial_share: float = share(

@@ -60,7 +60,7 @@ def test_the_improved_file_has_the_table_and_reads_back(found):
     assert (action.effect.id, action.name) == ("empirical", "surge")
     ((_, values),) = found.tables.items()
     assert list(action.values.values()) == pytest.approx(values, rel=1e-6)
-    assert "describes what is left and does not explain it" in improved.text
+    assert "describes the unmodelled residual and does not explain it" in improved.text
     place = "effects[0].parameters.values"
     assert improved.provenance[place].provenance == "fitted"
 

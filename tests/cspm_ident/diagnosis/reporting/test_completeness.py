@@ -36,7 +36,9 @@ def test_nothing_is_explained_where_nothing_was_missing_and_less_where_a_finding
 
 def test_the_sentence_names_the_share_and_the_rest():
     said = completeness_sentence(with_levels(10.0, 3.0))
-    assert said.startswith("It explains 92 % of what was missing on held-out data; 8 % is left")
+    assert said.startswith(
+        "It explains 92 % of what was missing on held-out data; 8 % is unmodelled"
+    )
     assert completeness_sentence(with_levels(10.0, 1.0)).startswith("It explains 100.0 % of")
 
 

@@ -125,12 +125,12 @@ def test_a_caption_says_how_far_a_residual_depends_on_its_driver():
     reported = caption_of(curve, "speed [rad/s]")
     assert "root mean square is 0.03 N·m before and 0.001" in reported
     share, left = map(
-        float, re.search(r"squares (\S+) % are.*and (\S+) % are left", reported).groups()
+        float, re.search(r"Speed explains (\S+) % of.*before, (\S+) % after", reported).groups()
     )
     assert share > 90.0
     assert left < 0.01
     (unsolved,) = held_out_curves([[equation()]], {})
-    assert "are left" not in caption_of(unsolved, "speed [rad/s]")
+    assert caption_of(unsolved, "speed [rad/s]").endswith(" % of the squared residual.")
 
 
 def test_a_signal_explains_what_is_a_function_of_it():

@@ -32,7 +32,7 @@ def test_a_finding_says_what_how_much_since_when_and_what_it_is_worth():
     (finding,) = diagnosis_data(diagnosis())["findings"]
     reported = finding["statement"]
     start = "Winch surge 2 has dry friction that the model does not have: torque 30.0 ± 1.0 mN·m."
-    assert reported.startswith(f"{start} It is there from the start.")
+    assert reported.startswith(f"{start} Present throughout.")
     # 0.03 and 0.001 N·m of 0.15, where noise is 0.001.
     assert "the torque of winch surge 2 falls from 20 % to 0.67 % of what was measured" in reported
     angle = "Simulated, the error of the angle of winch surge 2 falls from 1.46 rad to 7.1 mrad."
@@ -73,7 +73,9 @@ def test_that_no_other_winch_has_it_is_reported_where_it_would_have_shown(least,
     others = [n for n in THESIS.testbed.cable_names if n != "surge_2" and n not in missing]
     limits = tuple(Limit(RUBBING.effect_id, n, "torque", least, "N·m", True) for n in others)
     (finding,) = diagnosis_data(replace(diagnosis(), limits=limits))["findings"]
-    assert ("No other winch has it: 2 mN·m would have shown." in finding["statement"]) is reported
+    assert (
+        "Other winches: none above the detection limit of 2 mN·m." in finding["statement"]
+    ) is reported
 
 
 def test_of_an_effect_that_may_be_elsewhere_that_is_not_reported():
@@ -92,7 +94,7 @@ def test_a_beginning_is_reported(low):
     found = judged(found, [replace(each, onset=onset) for each in found.findings])
     (finding,) = diagnosis_data(found)["findings"]
     assert ("It begins at 12.3 s (12.1 to 12.5 s)." in finding["statement"]) is (low is not None)
-    assert ("from the start" in finding["statement"]) is (low is None)
+    assert ("Present throughout" in finding["statement"]) is (low is None)
 
 
 @pytest.mark.parametrize(

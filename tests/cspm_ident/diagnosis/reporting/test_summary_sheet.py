@@ -28,7 +28,7 @@ def test_the_sheet_has_all_that_one_forwards_before_any_script(page):
     assert "winch surge 2 marked" in sheet
     assert "torque of dry friction" in sheet
     assert "29 mN·m to 31 mN·m" in sheet
-    assert re.search(r"Probability \d+ %, among", sheet)
+    assert re.search(r"\d+ % likely, compared with the rival explanations\.", sheet)
     assert "<b>Next:</b> <code>cspm run SCENARIO" in sheet
     assert "residual of the torque of winch surge 2 before and after" in sheet
     assert f'stroke="{BEFORE}"' in sheet

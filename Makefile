@@ -2,7 +2,10 @@
 PYTHON ?= python3
 VENV := .venv
 BIN := $(VENV)/bin
-PIP := $(BIN)/python -m pip install --quiet --disable-pip-version-check
+# Says every ten seconds that an installation goes on, which by itself would take a page or be silent.
+PIP := ( s=0; while sleep 10 > /dev/null 2>&1; do s=$$((s + 10)); echo "cspm: installing, $$s s"; done ) & \
+  ticker=$$!; trap 'kill $$ticker' EXIT; trap 'exit 130' INT TERM; \
+  $(BIN)/python -m pip install --quiet --disable-pip-version-check
 SCENARIO ?= worst_case worst_case_past_thesis
 # More workers than processors: tests of real time and of ROS 2 wait more than they compute. Each
 # begins with its share of the files in order, and takes over from another what that has not begun:

@@ -21,7 +21,7 @@ COMMAND = ("cspm", "demo", "--seed", "3", "--effect", "winch_coulomb_friction", 
 WIDTH = 96
 # Rich names a font in the network, which no picture loads.
 _FONT = re.compile(r"@font-face \{.*?\}\s*", re.S)
-_PROGRESS = re.compile(r"(%, \d+ s left|, \d+ s)$")
+_PROGRESS = re.compile(r", \d+ s( left| so far)?$")
 _STEP = re.compile(r"^\d  ")
 
 

@@ -6,7 +6,7 @@ import threading
 from rich.console import Console
 
 from cspm.commands import progress_shown
-from cspm.commands.progress_shown import progress_line, shown
+from cspm.commands.progress_shown import Remaining, progress_line, shown
 
 
 def console(terminal):
@@ -14,8 +14,19 @@ def console(terminal):
 
 
 def test_a_line_says_what_how_far_and_what_is_left():
-    assert progress_line("searching", 0.25, 30.0) == "searching, 25%, 90 s left"
-    assert progress_line("reading", 0.0, 12.4) == "reading, 12 s"
+    assert progress_line("searching", 0.25, 30.0, Remaining()) == "searching, 25%, 90 s left"
+    assert progress_line("reading", 0.0, 12.4, Remaining()) == "reading, 12 s"
+    assert progress_line("simulating", 1.0, 40.0, Remaining()) == "simulating, 100%, 40 s"
+
+
+def test_what_is_left_never_grows():
+    """A step stands at 57 %; then the work goes on faster than was said, and slower again."""
+    remaining = Remaining()
+    said = [
+        remaining.words(share, elapsed)
+        for share, elapsed in [(0.57, 50.0), (0.57, 52.0), (0.57, 60.0), (0.9, 150.0), (0.9, 190.0)]
+    ]
+    assert said == ["38 s left", "36 s left", "60 s so far", "17 s left", "190 s so far"]
 
 
 def test_where_nobody_watches_there_is_a_line_now_and_then(monkeypatch):

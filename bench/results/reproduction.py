@@ -1,34 +1,36 @@
 """Tables 8-1 and 8-2 beside ours, over seeds: `python -m bench.results.reproduction`.
 
 Runs the thesis's two seas under its controllers and past them, writes the tables of docs/results.md
-and every run into results/reproduction.csv. About half an hour on two processors.
+and every run into results/reproduction.csv. Some fifty minutes on two processors. `--cases NAME …`
+runs these alone and keeps the other rows; without a name the tables are written from what is kept.
 """
 
 from __future__ import annotations
 
 import argparse
-import csv
 import os
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from concurrent.futures import as_completed
-from dataclasses import dataclass
 from pathlib import Path
+from typing import NamedTuple
 
-import numpy as np
-from numpy.typing import NDArray
 from rich.console import Console
 
-from bench.markdown import markdown_table
 from bench.page import into_page
-from bench.results.result_tables import THESIS_TABLES
+from bench.results.outcome import Outcome, measure, read_csv, write_csv
+from bench.results.reproduction_tables import (
+    deep_block,
+    factor_block,
+    hoist_block,
+    largest_block,
+    once_block,
+    past_block,
+    spread_block,
+)
 from bench.results.tracking import Case
 from cspm.campaign.cluster import worker_pool
-from cspm_control.analysis.cable_groups import cable_groups
-from cspm_msgs_py.dofs import CONTROLLED_AXES, DOFS
-from cspm_msgs_py.scenario import load_scenario
+from cspm_msgs_py.scenario import MotionControl, load_scenario
 from cspm_run.library import find_scenario
-
-Array = NDArray[np.float64]
 
 ROOT = Path(__file__).resolve().parents[2]
 PAGE = ROOT / "docs" / "results.md"
@@ -36,7 +38,7 @@ TABLE = ROOT / "results" / "reproduction.csv"
 # The thesis simulates without sensor noise.
 IDEAL = "sensors=ideal"
 SEEDS = 20
-PAST, SIX = "worst_case_past_thesis", "worst_case_six_dof"
+FEW = 5  # where a tendency is enough
 ONCE = {
     "calm": ("calm", (IDEAL,)),
     "calm, with sensor noise": ("calm", ()),
@@ -49,133 +51,78 @@ ONCE = {
             "target.motion.amplitudes=[0.1105, 0.0865, 0.318, 0.027, 0.2164, 0.1068]",
         ),
     ),
-    "worst case, 4 m": ("worst_case_4m", (IDEAL,)),
 }
-SPREAD = {"worst case": ("worst_case", (IDEAL,)), "past": (PAST, ()), "six": (SIX, ())}
-WANTED_TENSION = 2.0 + 1e-6  # N
+WORST, DEEP = "worst case", "worst case, 4 m"
+PAST = "`worst_case_past_thesis`"
+SIX = "`worst_case_six_dof`"
+HIGHER = f"{PAST}, tensions from 2 N"
+# Bandwidths of the hoists' force loops [rad/s] and the part of the run that figure 8-6 shows [s].
+HOIST_LOOPS = (1000, 400, 200, 100)
+FIGURE_8_6 = "duration=80.0"
 
 
-@dataclass(frozen=True)
-class Outcome:
-    """What one run came to.
-
-    Attributes:
-        case: name of what was run.
-        seed: of the sea.
-        duration: simulated [s].
-        rms: pose errors (6,) [m, rad].
-        largest: the same.
-        within: share of time within the requirement, of the controlled coordinates.
-        within_six: the same of all six.
-        low: share of time at 2 N or less, by group of cables.
-        least: tension [N].
-        failure: why it ended early, or nothing.
-    """
+class Job(NamedTuple):
+    """A run to make; as for `measure`."""
 
     case: str
+    scenario: str
+    overrides: tuple[str, ...]
     seed: int
-    duration: float
-    rms: Array
-    largest: Array
-    within: float
-    within_six: float
-    low: Mapping[str, float]
-    least: float
-    failure: str
 
 
-def measure(case: str, scenario: str, overrides: Sequence[str], seed: int) -> Outcome:
-    """Run a scenario with one seed."""
-    run = Case(scenario, (*overrides, f"seed={seed}"))
-    bundle = run.bundle()
-    errors, tensions, _, failure = run.run()
-    requirement = bundle.scenario.requirement
-    kept = np.abs(errors) <= np.repeat([requirement.position, requirement.angle], 3)
-    groups = cable_groups(bundle.testbed.testbed.cable_names)
-    return Outcome(
-        case=case,
-        seed=seed,
-        duration=len(errors) / bundle.scenario.rates.plant,
-        rms=np.sqrt((errors**2).mean(axis=0)),
-        largest=np.abs(errors).max(axis=0),
-        within=float(kept[:, list(CONTROLLED_AXES)].all(axis=1).mean()),
-        within_six=float(kept.all(axis=1).mean()),
-        low={
-            name: float((tensions[:, members] <= WANTED_TENSION).any(axis=1).mean())
-            for name, members in groups.items()
-        },
-        least=float(tensions.min()),
-        failure=failure,
-    )
-
-
-def once_block(found: Mapping[str, Outcome]) -> str:
-    """Return table 8-1 beside ours."""
-    names = [name for name in ONCE if name.startswith("calm")]
-    largest, rms = THESIS_TABLES["calm"]
-    rows = []
-    for i, dof in enumerate(DOFS):
-        unit = 1e3
-        scale = 1.0 if i < 3 else 1e3
-        ours = [f"{unit * found[n].rms[i]:.3g}, {unit * found[n].largest[i]:.3g}" for n in names]
-        thesis = f"{scale * (rms[i] or 0.0):.3g}, {scale * (largest[i] or 0.0):.3g}"
-        rows.append([f"{dof} [{'mm' if i < 3 else 'mrad'}]", thesis, *ours])
-    low = [", ".join(f"{100 * v:.2g} %" for v in found[n].low.values()) for n in names]
-    rows.append([f"time at 2 N: {', '.join(found['calm'].low)}", "surge only, once", *low])
-    return markdown_table(["RMS, largest", "thesis", *names], rows)
-
-
-def spread_block(found: Sequence[Outcome]) -> str:
-    """Return table 8-2 beside the spread of ours over seeds."""
-    _, rms = THESIS_TABLES["worst case"]
-    ours = 1e3 * np.array([each.rms for each in found])
-    rows = []
-    for i, dof in enumerate(DOFS):
-        thesis = (rms[i] or 0.0) * (1.0 if i < 3 else 1e3)
-        low, high = np.percentile(ours[:, i], [5, 95])
-        middle = float(np.exp(np.log(ours[:, i]).mean()))
-        rank = int((ours[:, i] < thesis).sum())
-        cells = f"{thesis:.3g}", f"{middle:.3g}", f"{low:.3g} to {high:.3g}"
-        rows.append([f"{dof} [{'mm' if i < 3 else 'mrad'}]", *cells, f"{rank} of {len(found)}"])
-    heads = [
-        "RMS",
-        "thesis",
-        "ours, geometric mean",
-        "5 to 95 % of seeds",
-        "seeds below the thesis",
+def jobs(seeds: int = SEEDS) -> list[Job]:
+    """Return every run of the page."""
+    once = [
+        Job(name, scenario, overrides, load_scenario(find_scenario(scenario)).seed)
+        for name, (scenario, overrides) in ONCE.items()
     ]
-    return markdown_table(heads, rows)
+    spread = {
+        WORST: ("worst_case", (IDEAL,)),
+        DEEP: ("worst_case_4m", (IDEAL,)),
+        **{_hoists(loop): ("worst_case", _slow_hoists(loop)) for loop in HOIST_LOOPS},
+        PAST: ("worst_case_past_thesis", ()),
+        HIGHER: ("worst_case_past_thesis", ("control.tension_distribution.lower_limit=2.0",)),
+        SIX: ("worst_case_six_dof", ()),
+    }
+    few = {HIGHER, *map(_hoists, HOIST_LOOPS)}
+    return once + [
+        Job(name, *what, seed)
+        for name, what in spread.items()
+        for seed in range(1, (min(FEW, seeds) if name in few else seeds) + 1)
+    ]
 
 
-def past_block(found: Mapping[str, Sequence[Outcome]]) -> str:
-    """Return how the controllers past the thesis do over seeds."""
-    rows = []
-    for name, outcomes in found.items():
-        shares = [o.within_six if name == SIX else o.within for o in outcomes]
-        worst = 1e3 * np.array([o.rms for o in outcomes])[:, :3].max()
-        rows.append(
-            [
-                f"`{name}`",
-                f"{worst:.3g} mm",
-                f"{sum(share >= 0.99 for share in shares)} of {len(shares)}",
-                f"{100 * min(shares):.1f} %",
-                f"{min(o.least for o in outcomes):.2f} N",
-            ]
-        )
-    heads = ["", "largest RMS", "seeds within 99 % of the time", "worst seed", "least tension"]
-    return markdown_table(heads, rows)
+def _hoists(bandwidth: int) -> str:
+    return f"{bandwidth} rad/s"
 
 
-def write_csv(path: Path, found: Sequence[Outcome]) -> None:
-    """Write every run, a row each, in SI units."""
-    with path.open("w", newline="", encoding="utf-8") as file:
-        rows = csv.writer(file)
-        heads = [f"{kind}_{dof}" for kind in ("rms", "largest") for dof in DOFS]
-        shares = ["within", "within_six", "least_tension", "failure"]
-        rows.writerow(["case", "seed", "duration", *heads, *shares])
-        for o in sorted(found, key=lambda each: (each.case, each.seed)):
-            values = [f"{v:.6g}" for v in (*o.rms, *o.largest, o.within, o.within_six, o.least)]
-            rows.writerow([o.case, o.seed, o.duration, *values, o.failure])
+def _slow_hoists(bandwidth: int) -> tuple[str, ...]:
+    """Return the overrides of slower hoist loops below the motion loops of `worst_case`."""
+    control = Case("worst_case", (IDEAL,)).bundle().scenario.control
+    motion = getattr(control, "motion", None)
+    assert isinstance(motion, MotionControl)
+    gains = ", ".join(
+        f"{dof}: {{kp: {g.kp:.6g}, ki: {g.ki:.6g}, kd: {g.kd:.6g}}}"
+        for dof, g in (motion.gains or {}).items()
+    )
+    loops = f"control.force.bandwidth={{hoist: {bandwidth}, surge: 1000, sway: 1000}}"
+    return IDEAL, FIGURE_8_6, f"control.motion.gains={{{gains}}}", loops
+
+
+def blocks(found: Sequence[Outcome]) -> dict[str, str]:
+    """Return the tables of the page by their marks."""
+    of = {
+        name: [o for o in found if o.case == name] for name in dict.fromkeys(o.case for o in found)
+    }
+    return {
+        "table 8-1": once_block({name: of[name][0] for name in ONCE}),
+        "table 8-2": spread_block(of[WORST]),
+        "table 8-2, largest": largest_block(of[WORST]),
+        "factors": factor_block(of["calm"][0], of[WORST]),
+        "hoists": hoist_block({_hoists(loop): of[_hoists(loop)] for loop in HOIST_LOOPS}),
+        "deep": deep_block(of[DEEP]),
+        "past": past_block({name: of[name] for name in (PAST, HIGHER, SIX)}, SIX),
+    }
 
 
 def main() -> None:
@@ -183,27 +130,21 @@ def main() -> None:
     parser = argparse.ArgumentParser(prog="python -m bench.results.reproduction")
     parser.add_argument("--seeds", type=int, default=SEEDS)
     parser.add_argument("--workers", type=int, default=os.cpu_count() or 1)
+    parser.add_argument("--cases", nargs="*", help="run these alone; other rows are kept")
     options = parser.parse_args()
-    jobs = [(name, *what, _seed(what[0])) for name, what in ONCE.items()]
-    jobs += [
-        (name, *what, seed) for name, what in SPREAD.items() for seed in range(1, options.seeds + 1)
-    ]
-    console, found = Console(), []
+    wanted = [j for j in jobs(options.seeds) if options.cases is None or j.case in options.cases]
+    made = {job.case for job in wanted}
+    found = [o for o in read_csv(TABLE) if o.case not in made] if options.cases is not None else []
+    console = Console()
     with worker_pool(options.workers) as pool:
-        futures = [pool.submit(measure, *job) for job in jobs]
+        futures = [pool.submit(measure, *job) for job in wanted]
         for done, future in enumerate(as_completed(futures), 1):
             found.append(future.result())
-            console.print(f"{done} of {len(jobs)}: {found[-1].case}, seed {found[-1].seed}")
+            console.print(f"{done} of {len(wanted)}: {found[-1].case}, seed {found[-1].seed}")
     write_csv(TABLE, found)
-    by_case = {name: [o for o in found if o.case == name] for name in (*ONCE, *SPREAD)}
-    into_page(PAGE, "table 8-1", once_block({name: by_case[name][0] for name in ONCE}))
-    into_page(PAGE, "table 8-2", spread_block(by_case["worst case"]))
-    into_page(PAGE, "past", past_block({PAST: by_case["past"], SIX: by_case["six"]}))
+    for name, text in blocks(found).items():
+        into_page(PAGE, name, text)
     console.print(f"written {PAGE}, {TABLE}")
-
-
-def _seed(scenario: str) -> int:
-    return load_scenario(find_scenario(scenario)).seed
 
 
 if __name__ == "__main__":

@@ -29,7 +29,7 @@ PAST_FIGURES = {
     "available": "that time",
     "least": "least tension [N]",
     "slack": "any slack",
-    "not_met": "wrench not met",
+    "not_met": "wrench infeasible",
 }
 PAST_FORMATS = {
     "within_feasible": "{:.2%}",
@@ -66,8 +66,8 @@ def _number(value: float | None) -> str:
 def _rest(found: Mapping[str, Any]) -> str:
     low, high = found["tensions"]
     return (
-        f"{found['duration']:.0f} s, tensions {low:.2f} to {high:.1f} N, wanted wrench not met"
-        f" {found['not_met']:.1%} of the time"
+        f"{found['duration']:.0f} s, tensions {low:.2f} to {high:.1f} N, commanded wrench"
+        f" infeasible {found['not_met']:.1%} of the time"
     )
 
 
@@ -80,7 +80,7 @@ def tracking_block(found: Found) -> str:
         "roll, pitch, yaw [mrad]",
         "within ± 2 mm, ± 4 mrad",
     ]
-    heads += ["least tension [N]", "any slack", "wrench not met", ""]
+    heads += ["least tension [N]", "any slack", "wrench infeasible", ""]
     rows = []
     for name, each in found.items():
         rms = [1e3 * value for value in each["rms"]]

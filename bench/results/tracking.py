@@ -25,7 +25,7 @@ from cspm_sim.plant import Plant
 
 Array = NDArray[np.float64]
 Effects = tuple[tuple[str, tuple[str, ...], Mapping[str, float]], ...]
-# Errors (n, 6), tensions (n, cables), whether the wrench was not met (n,), and the failure.
+# Errors (n, 6), tensions (n, cables), whether the wrench was infeasible (n,), and the failure.
 Run = tuple[Array, Array, NDArray[np.bool_], str]
 SCENARIOS = Path(__file__).resolve().parents[2] / "scenarios"
 
@@ -118,7 +118,7 @@ class Tracking:
         within: share of time within the scenario's requirement, in all controlled coordinates.
         tensions: lowest and highest of any cable.
         slack: share of time with any cable at zero.
-        not_met: share of time with the wanted wrench not met.
+        not_met: share of time with the commanded wrench infeasible.
     """
 
     duration: float
@@ -159,7 +159,7 @@ def motions_of_bundle(bundle: Bundle) -> dict[str, Motion]:
 def follow(
     bundle: Bundle, believed: Testbed | None = None, loads: Sequence[tuple[float, float]] = ()
 ) -> Run:
-    """Run, and return errors (n, 6), tensions (n, cables), wrench not met (n,), and the failure.
+    """Run, and return errors (n, 6), tensions (n, cables), wrench infeasible (n,), and the failure.
 
     Controllers are those of the machine that is `believed` to be there; `loads` as of a `Case`.
     """

@@ -83,15 +83,16 @@ def thesis_plant(
     period_ns: int = 1_000_000,
     pose: tuple[float, ...] = OPERATING_POINT,
     load: float = 1.0,
+    file: Path = TESTBED,
 ) -> Plant:
     """Return the thesis's machine at rest without effects, its bar `load` times as heavy."""
-    testbed = _loaded(load_testbed(TESTBED).testbed, load)
+    testbed = _loaded(load_testbed(file).testbed, load)
     return Plant(testbed, Motion.still(np.zeros(6)), period_ns, bar_pose=pose)
 
 
-def thesis_laws() -> dict[str, Law]:
+def thesis_laws(file: Path = TESTBED) -> dict[str, Law]:
     """Return each class's law at its elastic length at the operating point."""
-    plant = thesis_plant()
+    plant = thesis_plant(file=file)
     return {
         name: Law(
             _law(plant.testbed.cables[i]),

@@ -39,6 +39,12 @@ class Testbed:
 
     file: TestbedFile
 
+    def __repr__(self) -> str:
+        """Return name, cables and effects; the text has every number."""
+        effects = ", ".join(entry.effect for entry in self.effects) or "none"
+        cables = f"{len(self.cables)} cable{'s' * (len(self.cables) != 1)}"
+        return f"Testbed({self.name!r}, {cables}, effects: {effects})"
+
     def __post_init__(self) -> None:
         try:
             altered_testbed(self.description, read_actions(self.description))
@@ -139,7 +145,7 @@ class Testbed:
         """
         place = Path(path)
         if place.exists():
-            raise InputError(f"{place}: exists, allowed: a new file")
+            raise InputError(f"{place}: already exists, allowed: a new file")
         try:
             place.write_text(self.text, encoding="utf-8")
         except OSError as err:

@@ -1,4 +1,4 @@
-"""Links of the site that leave docs/, and names in its tables.
+"""Links of the site that leave docs/, names in its tables, and the order of its sections.
 
 The site is read offline: a link to a file outside docs/ becomes its text with the file's name, and
 a picture outside docs/ is copied to the site. Long names in cells may be broken after `/`, `.` and
@@ -12,10 +12,12 @@ from typing import Protocol
 
 from mkdocs.config.defaults import MkDocsConfig
 from mkdocs.structure.files import File, Files
+from mkdocs.structure.nav import Navigation
 
 ROOT = Path(__file__).resolve().parents[2]
 LINK = re.compile(r"(!?)\[([^\]]*)\]\((\.\.[^)\s#]*)(?:#[^)\s]*)?\)")
 CELL = re.compile(r"<td.*?</td>", re.DOTALL)
+SECTIONS = ("Tutorials", "How to", "Reference", "Explanation", "Decisions")
 # The theme's, without names.
 SEARCH = ('data-md-component="search" role="dialog"', 'id="__search"')
 CODE = re.compile(r"(?<=<code>)[^<]+(?=</code>)")
@@ -37,6 +39,12 @@ def on_files(files: Files, config: MkDocsConfig, **_: object) -> Files:
             if mark and not target.startswith("docs/") and target not in files.src_uris:
                 files.append(File.generated(config, target, abs_src_path=str(ROOT / target)))
     return files
+
+
+def on_nav(nav: Navigation, **_: object) -> Navigation:
+    """List tutorials before how-to pages, and decisions last, as the front page does."""
+    nav.items.sort(key=lambda item: SECTIONS.index(item.title) if item.is_section else -1)
+    return nav
 
 
 def on_page_markdown(markdown: str, page: _Page, **_: object) -> str:

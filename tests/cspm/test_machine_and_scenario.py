@@ -34,10 +34,16 @@ def test_a_saved_test_bed_is_loaded_again(thesis, tmp_path):
     heavy = thesis.with_parameter("bar.mass", 5.2)
     path = heavy.save(tmp_path / "heavy.yaml")
     assert cspm.load_testbed(path).sha256 == heavy.sha256
-    with pytest.raises(cspm.InputError, match=r"heavy.yaml: exists, allowed: a new file"):
+    with pytest.raises(cspm.InputError, match=r"heavy.yaml: already exists, allowed: a new file"):
         heavy.save(path)
     with pytest.raises(cspm.InputError, match=r"cannot be written \(No such file"):
         heavy.save(tmp_path / "nowhere" / "heavy.yaml")
+
+
+def test_a_testbed_shows_itself_in_a_line():
+    found = repr(cspm.load_testbed("thesis"))
+    assert found == "Testbed('thesis', 8 cables, effects: bar_linear_damping)"
+    assert repr(cspm.load_testbed("one_winch")) == "Testbed('one_winch', 1 cable, effects: none)"
 
 
 @pytest.mark.parametrize(

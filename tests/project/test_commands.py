@@ -77,10 +77,6 @@ class Recipe(NamedTuple):
     ends: dict[str, int] = {}
 
 
-RIG = (
-    f"cp {ROOT}/scenarios/testbeds/one_winch.yaml rig.yaml;"
-    " sed -i 's/name: surge$/name: winch/' rig.yaml"
-)
 OILY = f"""
 mkdir my_effects
 cp {ROOT}/examples/effects/winch_churning.py my_effects/
@@ -96,7 +92,6 @@ END
 RECIPES = {
     "docs/how-to/add-an-effect.md": Recipe(OILY),
     "docs/how-to/export.md": Recipe("cspm run rest --duration 0.1 --out today"),
-    "docs/how-to/import-a-table.md": Recipe(RIG),
     "docs/how-to/view.md": Recipe("cspm run calm --duration 3 --out today"),
     "docs/how-to/write-a-testbed-file.md": Recipe(
         ends={"cspm run hang.yaml --set testbed.cables.left.drum_radius=-1 --out wrong": 2}

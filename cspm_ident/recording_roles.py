@@ -32,5 +32,6 @@ def check_roles(searched: Sequence[Measurement], held_out: Sequence[Measurement]
     for each in held_out:
         if each.sha256 in seen:
             raise InputError(
-                f"--held-out {each.path}: is searched as well, allowed: recordings that are not"
+                f"--held-out {each.path}: is already used for the search, allowed: another"
+                " recording"
             )

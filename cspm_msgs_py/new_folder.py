@@ -14,7 +14,7 @@ def refuse_existing(folder: Path | None) -> None:
         InputError: the folder exists.
     """
     if folder is not None and folder.exists():
-        raise InputError(f"{folder}: exists, allowed: a new folder")
+        raise InputError(f"{folder}: already exists, allowed: a new folder")
 
 
 def new_folder(folder: str | Path) -> Path:

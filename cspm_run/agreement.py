@@ -154,7 +154,7 @@ _CAUSES = """
   With ideal sensors the difference is more than ten thousand times smaller, and likewise with
   noise and no rounding (`tests/cspm_sim/mujoco/test_mujoco_run.py`).
 - **The table of the cable law.** Ours reads tension from a table that is within 10⁻⁹ N of the
-  integral; MuJoCo's plant evaluates the integral. This is what is left with locked winches.
+  integral; MuJoCo's plant evaluates the integral. This remains with locked winches.
 - **The integration.** Both use the classical Runge-Kutta scheme, ours on Euler angles, MuJoCo's on
   a quaternion. At equal steps most of its error is common to both and does not show; the line with
   ours at 0.25 ms shows it. It falls with the fourth power of the step

@@ -74,7 +74,7 @@ def unmet_line(bundle: Bundle) -> str | None:
     if first is None:
         return None
     return (
-        f"reference out of reach of the tension limits, as at {first:.4g} s;"
+        f"reference infeasible within the tension limits, as at {first:.4g} s;"
         " cspm analyze reference shows where"
     )
 

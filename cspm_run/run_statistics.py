@@ -18,7 +18,7 @@ class RunStatistics:
         envelope: shape (BINS, 2, 6 + n): lowest and highest pose error and tension per time bin.
         bin_steps: plant steps per bin.
         squares: sums of the squared pose errors, (6,).
-        counts: steps, and those with a slack cable and with a wrench not met.
+        counts: steps, and those with a slack cable and with an infeasible wrench.
     """
 
     def __init__(self, steps: int, n_cables: int) -> None:

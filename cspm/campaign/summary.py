@@ -51,7 +51,7 @@ def reading_of(column: str) -> Reading:
             {"min": "lowest tension", "max": "highest tension"}.get(rest, rest), "N", 1.0
         )
     if column in _SHARES:
-        name = "a cable slack" if column == _SHARES[0] else "wrench not met"
+        name = "a cable slack" if column == _SHARES[0] else "wrench infeasible"
         return Reading(f"{name}, share of time", "%", 1e2)
     return Reading(column, "", 1.0)
 

@@ -78,7 +78,8 @@ def _recorded(
     console: Console, request: DemoRequest, described: Testbed, truth: list[Concealed]
 ) -> tuple[Recording, Run]:
     """Return what the real machine does, and what its description says that it does."""
-    say(console, f"1  A machine is built by its drawing, but for something. (seed {request.seed})")
+    hidden = "one hidden change" if len(truth) == 1 else f"{len(truth)} hidden changes"
+    say(console, f"1  A machine is built to its drawing, with {hidden}. (seed {request.seed})")
     machine = described
     for each in truth:
         machine = machine.with_effect(each.effect, each.element, **each.parameters)

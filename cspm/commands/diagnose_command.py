@@ -127,7 +127,7 @@ def _print_cut_short(console: Console, found: Diagnosis) -> None:
     """Print which recordings were cut short because their writer was killed."""
     for each in (*found.searched, *found.held_out):
         if not each.complete:
-            say(console, f"{each.path}: was not closed; of it {each.duration:.1f} s are left")
+            say(console, f"{each.path}: was not closed; {each.duration:.1f} s of it are readable")
 
 
 def _print_parity(console: Console, parity: Sequence[Parity]) -> None:
@@ -223,8 +223,7 @@ def print_diagnosis(
     if reported:
         say(
             console,
-            f"{len(reported)} effects would have been reported from some size on, which"
-            " diagnosis.json has by element under detection_limits",
+            f"Detection limits of {len(reported)} effects: see detection_limits in diagnosis.json.",
         )
 
 

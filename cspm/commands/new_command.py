@@ -53,7 +53,7 @@ def new_command(
     picture = Path(f"{name}.svg")
     for path in (machine, scenario, picture):
         if path.exists():
-            raise InputError(f"{path}: exists, allowed: a new file, or another name")
+            raise InputError(f"{path}: already exists, allowed: a new file, or another name")
     planned = layout(kind, size)
     radius = RADIUS_SHARE * min(size[0], size[2] if planned.upright else size[1])
     machine.write_text(testbed_text(name, planned, mass), encoding="utf-8")

@@ -188,7 +188,7 @@ def beside_table(results: Mapping[str, RunResult], requirement: Requirement) -> 
     table.add_section()
     ranges = [f"{row['tension']['min']:.2f} to {row['tension']['max']:.1f} N" for row in rows]
     table.add_row("tensions", "", *ranges)
-    table.add_row("wrench not met", "", *(f"{row['infeasible_share']:.1%}" for row in rows))
+    table.add_row("wrench infeasible", "", *(f"{row['infeasible_share']:.1%}" for row in rows))
     return table
 
 

@@ -29,7 +29,7 @@ def urdf_command(testbed: str, out: Path | None) -> None:
         with out.open("x", encoding="utf-8") as file:
             file.write(text)
     except FileExistsError:
-        raise InputError(f"--out {out}: exists, allowed: a new file") from None
+        raise InputError(f"--out {out}: already exists, allowed: a new file") from None
     except OSError as err:
         raise InputError(f"--out {out}: cannot be written ({err.strerror})") from None
     say(make_console(), f"urdf {out}")

@@ -74,7 +74,7 @@ def _limit(axes: Axes, *values: float) -> None:
 
 
 def _shade(axes: Axes, demand: ReferenceDemand) -> None:
-    """Shade the stretches in which the wrench is not met."""
+    """Shade the stretches in which the wrench is infeasible."""
     edges = np.flatnonzero(np.diff((~demand.met).astype(int), prepend=0, append=0))
     pairs: Sequence[tuple[int, int]] = [(int(a), int(b)) for a, b in edges.reshape(-1, 2)]
     for first, end in pairs:

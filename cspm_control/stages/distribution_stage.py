@@ -24,7 +24,7 @@ from cspm_msgs_py.stepping.stage import Send
 Array = NDArray[np.float64]
 
 # What is counted: whether the last wrench cannot be met, steps since the last status, and of these
-# those with a wrench not met and with a tension at a limit.
+# those with an infeasible wrench and with a tension at a limit.
 INFEASIBLE, STEPS, INFEASIBLE_STEPS, SATURATED_STEPS, COUNTS = range(5)
 
 
@@ -85,7 +85,7 @@ class DistributionStage:
             send(DISTRIBUTION_INTERNALS, np.concatenate(both))
 
     def status(self) -> Status:
-        """Return shares of steps with a wrench not met, and with a tension at a limit.
+        """Return shares of steps with an infeasible wrench, and with a tension at a limit.
 
         And the largest missing share of a wrench.
         """

@@ -51,7 +51,7 @@ def standstill_check(measurement: Measurement) -> DataCheck:
         for name, column in _angles(measurement)
         if not _still(column) and (share := standing_share(column)) > _MOSTLY
     ]
-    remedy = "record more motion; standing rows say nothing of friction and are left out"
+    remedy = "record more motion; standing rows say nothing of friction and are excluded"
     well = "no winch stands still for most of the time"
     return check_of("standstill", measurement.path, found, well, remedy)
 

@@ -137,7 +137,7 @@ def _restore_in_place(
             continue
         broken, beside = Path(f"{file}{BROKEN_SUFFIX}"), Path(f"{file}.restoring")
         if broken.exists():
-            raise InputError(f"{broken}: exists, allowed: move it away first")
+            raise InputError(f"{broken}: already exists, allowed: move it away first")
         result = _restore(file, beside)
         damaged, lost = damaged + result[0], lost + result[1]
         _exchange(file, beside, broken)

@@ -96,7 +96,7 @@ class RecordingWriter:
             self._write_head(attachments, metadata)
             self._write_metadata()
         except FileExistsError:
-            raise InputError(f"{folder}: exists, allowed: a new folder") from None
+            raise InputError(f"{folder}: already exists, allowed: a new folder") from None
         except OSError as err:
             raise InputError(f"{folder}: cannot be written ({err.strerror})") from None
         self._room = threading.Semaphore(_BLOCKS_UNDERWAY)

@@ -27,7 +27,7 @@ AMOUNTS: dict[str, str] = {
     "sensor_noisy": "standard deviation of what is added, in the sensor's unit",
     "sensor_biased": "what is added, in the sensor's unit",
     "sensor_late": "by how much messages come later than their stamps say, s",
-    "winch_weak": "share of the torque that is left",
+    "winch_weak": "remaining share of the torque",
 }
 ON_SENSORS = tuple(kind for kind in KINDS if kind.startswith("sensor_"))
 ON_CABLES = ("winch_weak", "cable_cut")

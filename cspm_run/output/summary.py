@@ -59,8 +59,8 @@ def print_summary(console: Console, result: RunResult, requirement: Requirement)
         console.print(_delays(result.delays), soft_wrap=True)
     tension = f"tensions {data['tension']['min']:.2f} to {data['tension']['max']:.2f} N"
     console.print(
-        f"{tension} · any cable slack {data['slack_share']:.2%} of the time · wanted wrench not met"
-        f" within the tension limits {data['infeasible_share']:.1%} of the time",
+        f"{tension} · any cable slack {data['slack_share']:.2%} of the time · commanded wrench"
+        f" infeasible (tension limits) {data['infeasible_share']:.1%} of the time",
         soft_wrap=True,
     )
     for line in result.warnings:

@@ -46,7 +46,7 @@ def test_a_winch_is_identified_with_intervals_that_hold_the_truth(recording, tmp
     assert {"winch_viscous_friction", "winch_coulomb_friction"} <= effects
     written = found.write(tmp_path / "fitted")
     assert cspm.load_testbed(written["testbed"]).sha256 == found.testbed.sha256
-    with pytest.raises(cspm.InputError, match="fitted: exists, allowed: a new folder"):
+    with pytest.raises(cspm.InputError, match="fitted: already exists, allowed: a new folder"):
         found.write(tmp_path / "fitted")
 
 
@@ -85,7 +85,7 @@ def test_what_is_no_recording_is_refused(recording, tmp_path):
     run = cspm.simulate("one_winch", duration=0.01)
     with pytest.raises(cspm.InputError, match=r"is no recording, allowed: one that cspm.open or"):
         cspm.diagnose([run])
-    with pytest.raises(cspm.InputError, match="is searched as well, allowed: recordings that are"):
+    with pytest.raises(cspm.InputError, match="is already used for the search, allowed: another"):
         cspm.diagnose(recording, held_out=recording)
     with pytest.raises(cspm.InputError, match="drive wind: allowed: winch, torque, tension"):
         cspm.compare(recording, drive="wind")

@@ -41,7 +41,7 @@ def test_a_saved_run_is_what_the_command_line_records(calm, tmp_path):
     one, other = (next(tmp_path.glob(f"{each}/*.mcap")) for each in ("calm", "other/calm"))
     assert one.read_bytes() == other.read_bytes()
     assert (saved.path / "summary.json").exists()
-    with pytest.raises(cspm.InputError, match="calm: exists, allowed: a new folder"):
+    with pytest.raises(cspm.InputError, match="calm: already exists, allowed: a new folder"):
         calm.save(tmp_path / "calm")
 
 

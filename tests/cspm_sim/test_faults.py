@@ -140,7 +140,7 @@ def test_what_is_put_in_begins_at_the_next_step(thesis):
         ({"fault": "brake", "on": "surge_2"}, "on surge_2, allowed for brake: nothing"),
         (
             {"fault": "winch_weak", "on": "surge_2"},
-            "amount None, allowed for winch_weak: share of the torque that is left",
+            "amount None, allowed for winch_weak: remaining share of the torque",
         ),
         (
             {"fault": "sensor_frozen", "on": "/bar/pose", "amount": 1.0},
@@ -148,7 +148,7 @@ def test_what_is_put_in_begins_at_the_next_step(thesis):
         ),
         (
             {"fault": "winch_weak", "on": "surge_2", "amount": 1.5},
-            "amount 1.5, allowed: 0 to 1, share of the torque that is left",
+            "amount 1.5, allowed: 0 to 1, remaining share of the torque",
         ),
         (
             {"fault": "sensor_late", "on": "/bar/pose", "amount": -1.0},

@@ -199,7 +199,7 @@ def _onsets(found: Data, driver: Sequence[float]) -> str:
         "Of what was named and began late, an onset was given for"
         f" {share_words(found['reported'])}, with a median error of"
         f" {'—' if error is None else f'{error:.1f} s'}, and its interval held the truth for"
-        f" {share_words(found['held'])}; of what was there from the start, one was given for"
+        f" {share_words(found['held'])}; of effects present throughout, one was given for"
         f" {share_words(found['false'])}. Of the unknown that was recognised, the signal that it"
         f" depends on was right, on its elements, for {share_words(driver)}."
     )

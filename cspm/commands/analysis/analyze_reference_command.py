@@ -41,11 +41,11 @@ def analyze_reference_command(
 
 
 def _lines(found: ReferenceAnalysis) -> list[str]:
-    lines = ["the wrench is met within the tension limits all the time"]
+    lines = ["the wrench is feasible within the tension limits all the time"]
     if found.worst is not None:
         time, dof = found.worst
         share = f"{found.unmet_share:.1%}"
-        lines = [f"wrench out of reach {share} of the time, most in {dof} at {time:.4g} s"]
+        lines = [f"wrench infeasible {share} of the time, most in {dof} at {time:.4g} s"]
     loads = [f"{name} {share:.0%}" for name, share in found.overloaded.items()]
     lines.append(
         f"motor torque over its limit: {', '.join(loads)}"

@@ -64,7 +64,7 @@ def test_the_required_acceleration_is_what_the_scenarios_reference_has():
             ["--acceleration=-1,0,0,0,0,0"],
             "--acceleration -1,0,0,0,0,0: allowed: six numbers that are not negative",
         ),
-        (["--out", "."], ".: exists, allowed: a new folder"),
+        (["--out", "."], ".: already exists, allowed: a new folder"),
         (["--testbed", "none.yaml"], "none.yaml: "),
     ],
 )
@@ -137,7 +137,7 @@ def test_reference_prints_draws_and_writes_what_it_needs(cspm, tmp_path):
     )
     assert (code, err) == (0, "")
     data = json.loads((tmp_path / "asked.json").read_text())
-    assert f"wrench out of reach {data['unmet_share']:.1%} of the time, most in" in out
+    assert f"wrench infeasible {data['unmet_share']:.1%} of the time, most in" in out
     assert data["unmet_share"] > 0.0
     assert f"at {data['worst']['time']:.4g} s" in out
     assert "motor torque within limits" in out
@@ -149,7 +149,7 @@ def test_a_motor_that_the_reference_overloads_is_named(cspm):
         *("analyze", "reference", "ipanema", "--set", "testbed.cables.c3.torque_limit=2.0")
     )
     assert code == 0
-    assert "the wrench is met within the tension limits all the time" in out
+    assert "the wrench is feasible within the tension limits all the time" in out
     assert re.search(r"motor torque over its limit: c3 \d{3}%", out)
 
 
@@ -159,13 +159,13 @@ def test_a_run_without_a_reference_for_its_bar_is_refused(refused):
     )
 
 
-def test_a_run_says_before_it_starts_where_its_reference_is_out_of_reach(cspm):
+def test_a_run_says_before_it_starts_where_its_reference_is_infeasible(cspm):
     arguments = ("--duration", "20", "--no-record")
     code, out, _ = cspm("run", "worst_case_steep", *arguments)
     assert code == 0
-    assert re.search(r"reference out of reach of the tension limits, as at 1\d\.\d* s;", out)
+    assert re.search(r"reference infeasible within the tension limits, as at 1\d\.\d* s;", out)
     _, within, _ = cspm("run", "ipanema", "--no-record")
-    assert "out of reach" not in within
+    assert "reference infeasible" not in within
 
 
 def test_sag_prints_and_writes_what_heavy_cables_do(cspm, tmp_path):

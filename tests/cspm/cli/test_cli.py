@@ -175,7 +175,7 @@ def test_folders_that_cannot_be_had(refused, tmp_path):
     (tmp_path / "taken").mkdir()
     (tmp_path / "file").write_text("")
     line = refused("run", "one_winch", "--duration", "0.01", "--out", "taken")
-    assert line == "taken: exists, allowed: a new folder"
+    assert line == "taken: already exists, allowed: a new folder"
     line = refused("run", "one_winch", "--duration", "0.01", "--out", "file/bag")
     assert line == f"{tmp_path}/file/bag: cannot be written (Not a directory)"
 

@@ -222,8 +222,14 @@ def test_a_recording_counts_once_whatever_its_name_and_has_to_be_long_enough(csp
     assert cspm(capsys, "run", "rest", "--duration", 1, "--out", "part")[0] == 0
     for arguments, message in (
         (("once", "copied"), "copied: the same recording as once, allowed: each once"),
-        (("once", "--held-out", "once"), "--held-out once: is searched as well, allowed: "),
-        (("once", "--held-out", "copied"), "--held-out copied: is searched as well, allowed: "),
+        (
+            ("once", "--held-out", "once"),
+            "--held-out once: is already used for the search, allowed: ",
+        ),
+        (
+            ("once", "--held-out", "copied"),
+            "--held-out copied: is already used for the search, allowed: ",
+        ),
         (("once", "--held-out", "part"), "--held-out part: shares 100 % of its rows with once"),
         (("once",), "once: 1.4 s to search, allowed: 3 s or more; without --held-out "),
     ):
@@ -237,7 +243,7 @@ def test_a_recording_counts_once_whatever_its_name_and_has_to_be_long_enough(csp
     [
         ((), "no recording, allowed: one or more, or --explain EFFECT"),
         (("--explain", "gremlins"), "--explain gremlins: allowed: bar_com, "),
-        (("one", "--out", "taken"), "taken: exists, allowed: a new folder"),
+        (("one", "--out", "taken"), "taken: already exists, allowed: a new folder"),
     ],
 )
 def test_unusable_input_is_one_line(cspm, capsys, arguments, message):

@@ -116,7 +116,9 @@ def test_bad_input_is_one_line(refused, bags, tmp_path):
         "--cutoff -1: allowed: a frequency above 0 Hz"
     )
     (tmp_path / "taken").mkdir()
-    assert refused("damping", bag, "--out", "taken") == "taken: exists, allowed: a new folder"
+    assert (
+        refused("damping", bag, "--out", "taken") == "taken: already exists, allowed: a new folder"
+    )
     sines = bags["sines", "short"]
     assert refused("stiffness", sines) == (
         f"cable: 0 slow cycles of stretching and releasing in {sines}, allowed: at least 2"

@@ -132,7 +132,7 @@ def test_what_cannot_be_done_is_one_line_and_leaves_nothing(lab, tmp_path):
         (tmp_path / name).write_text(text)
     before = sorted(tmp_path.iterdir())
     for arguments, how, reported in (
-        (["--out", "there"], {}, "there: exists, allowed: a new folder"),
+        (["--out", "there"], {}, "there: already exists, allowed: a new folder"),
         (["--out", "b", "--dry-run"], {}, "--out b --dry-run: allowed: one of both"),
         (["--out", "b"], {"source": "no.csv"}, "no.csv: no such file, allowed: a text table"),
         (["--out", "b"], {"mapping": "lab"}, "lab: no such mapping, allowed: emps or a file"),

@@ -64,7 +64,7 @@ def test_each_fault_is_one_line_and_writes_nothing(here, given, text):
 
 def test_what_exists_is_kept(here):
     (here / "mine.yaml").write_text("kept")
-    with pytest.raises(InputError, match=r"mine\.yaml: exists, allowed: a new file"):
+    with pytest.raises(InputError, match=r"mine\.yaml: already exists, allowed: a new file"):
         new_command("mine", "point", (2.0, 2.0, 2.0), 5.0, run=False)
     assert (here / "mine.yaml").read_text() == "kept"
 

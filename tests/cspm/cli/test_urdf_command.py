@@ -21,7 +21,9 @@ def test_it_is_printed_or_written_as_python_gives_it(tmp_path, capsys):
 def test_a_file_that_is_there_stays(tmp_path):
     there = tmp_path / "there.urdf"
     there.write_text("mine")
-    with pytest.raises(InputError, match=re.escape(f"--out {there}: exists, allowed: a new file")):
+    with pytest.raises(
+        InputError, match=re.escape(f"--out {there}: already exists, allowed: a new file")
+    ):
         urdf_command("thesis", there)
     assert there.read_text() == "mine"
 

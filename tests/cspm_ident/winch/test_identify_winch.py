@@ -218,9 +218,9 @@ def test_bad_input_is_one_line(cspm, short):
     assert refused("--winches", "a,,b") == "--winches a,,b: allowed: names with commas between them"
     assert refused("--band", "0") == "--band 0: allowed: a frequency above 0 Hz"
     assert refused("--held-out", short) == (
-        f"--held-out {short}: is searched as well, allowed: recordings that are not"
+        f"--held-out {short}: is already used for the search, allowed: another recording"
     )
-    assert refused("--out", ".") == ".: exists, allowed: a new folder"
+    assert refused("--out", ".") == ".: already exists, allowed: a new folder"
 
 
 def test_help_says_what_to_do(cspm):

@@ -96,7 +96,7 @@ def test_into_another_folder(tmp_path, sample):
     assert report.restored == [tmp_path / "out" / "out_0.mcap"]
     assert (folder / "calm_0.mcap").read_bytes() == before
     assert overview(tmp_path / "out").message_count == report.messages
-    with pytest.raises(InputError, match=r"/out: exists, allowed: a new folder$"):
+    with pytest.raises(InputError, match=r"/out: already exists, allowed: a new folder$"):
         recover(folder, tmp_path / "out")
 
 
@@ -208,7 +208,7 @@ def test_an_earlier_original_is_not_overwritten(tmp_path, sample):
     folder = kill(tmp_path / "k", source, ends[1])
     (folder / "calm_0.mcap.broken").write_bytes(b"kept")
     with pytest.raises(
-        InputError, match=r"calm_0.mcap.broken: exists, allowed: move it away first$"
+        InputError, match=r"calm_0.mcap.broken: already exists, allowed: move it away first$"
     ):
         recover(folder)
     assert (folder / "calm_0.mcap.broken").read_bytes() == b"kept"

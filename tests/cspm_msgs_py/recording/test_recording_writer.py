@@ -187,7 +187,7 @@ def test_nothing_recorded_is_a_recording_too(tmp_path):
 
 def test_an_existing_folder_is_refused_and_left_alone(tmp_path):
     (tmp_path / "x").mkdir()
-    with pytest.raises(InputError, match=r"/x: exists, allowed: a new folder$"):
+    with pytest.raises(InputError, match=r"/x: already exists, allowed: a new folder$"):
         new_writer(tmp_path / "x")
     assert not list((tmp_path / "x").iterdir())
 

@@ -221,7 +221,7 @@ def test_an_existing_folder_is_left_alone(tmp_path):
     (tmp_path / "bag").mkdir()
     with pytest.raises(InputError) as caught:
         graph(bundle_of("one_winch"), tmp_path / "bag", steps=10)
-    assert str(caught.value) == f"{tmp_path}/bag: exists, allowed: a new folder"
+    assert str(caught.value) == f"{tmp_path}/bag: already exists, allowed: a new folder"
 
 
 @contextmanager

@@ -169,5 +169,5 @@ def test_hardware_that_dies_is_missed(warm, tmp_path):
 
 def test_an_existing_folder_is_left_alone(tmp_path):
     (tmp_path / "bag").mkdir()
-    with pytest.raises(InputError, match="exists, allowed: a new folder"):
+    with pytest.raises(InputError, match="already exists, allowed: a new folder"):
         run_realtime(slow_bundle(), tmp_path / "bag", steps=10, domain_id=new_domain())

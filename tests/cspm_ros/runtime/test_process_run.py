@@ -328,7 +328,7 @@ def test_what_a_node_cannot_do_is_reported_as_its_last_words(tmp_path):
         processes(bundle_of("one_winch"), tmp_path / "bag", steps=10)
     assert str(caught.value) == (
         "recorder ended with exit code 2 before the run did: cspm node recorder:"
-        f" {tmp_path}/bag: exists, allowed: a new folder"
+        f" {tmp_path}/bag: already exists, allowed: a new folder"
     )
     assert list((tmp_path / "bag").iterdir()) == []
 

@@ -16,6 +16,7 @@ import numpy as np
 from ruamel.yaml.comments import CommentedMap, CommentedSeq
 
 from cspm_msgs_py.errors import InputError
+from cspm_msgs_py.near_name import allowed_names
 from cspm_msgs_py.testbed import EffectEntry, Testbed, TestbedFile
 from cspm_msgs_py.yaml_file import dump_yaml, parse_yaml, round_trip
 
@@ -135,7 +136,7 @@ def _place(node: Any, part: str | int, key: str) -> str | int:  # noqa: ANN401 -
         raise InputError(f"{key}: [{part}], allowed: 0 to {len(node) - 1}")
     names = [_named(each) for each in node]
     if part not in names:
-        raise InputError(f"{key}: no {part}, allowed: {', '.join(map(str, names))}")
+        raise InputError(f"{key}: no {part}, {allowed_names(str(part), map(str, names))}")
     return names.index(part)
 
 

@@ -8,6 +8,8 @@ from typing import Any, Literal, NamedTuple, get_args, get_origin
 from pydantic import BaseModel, ValidationError
 from pydantic_core import ErrorDetails
 
+from cspm_msgs_py.near_name import allowed_names
+
 Place = tuple[int | str, ...]
 # Tags of values that may be written as a number or as a mapping.
 NUMBER, MAPPING = "(number)", "(mapping)"
@@ -67,7 +69,7 @@ def _text(fault: ErrorDetails, model: type[BaseModel]) -> str:
     if kind == "extra_forbidden":
         *parents, last = fault["loc"]
         parent = _spot(model, tuple(parents))
-        return f"{_join(parent.path, last)}: unknown key, allowed: {_keys(parent)}"
+        return f"{_join(parent.path, last)}: unknown key, {allowed_names(str(last), _keys(parent))}"
     spot = _spot(model, fault["loc"])
     if kind == "missing":
         return f"{spot.path}: missing, a value is required"
@@ -158,8 +160,8 @@ def _tags(model: type[BaseModel]) -> set[Any]:
     return {tag for key in model.model_fields for tag in _literals(model, key)}
 
 
-def _keys(spot: _Spot) -> str:
-    return ", ".join(dict.fromkeys(key for model in _models(spot) for key in model.model_fields))
+def _keys(spot: _Spot) -> list[str]:
+    return list(dict.fromkeys(key for model in _models(spot) for key in model.model_fields))
 
 
 def _join(path: str, part: int | str) -> str:

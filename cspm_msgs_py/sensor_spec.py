@@ -6,6 +6,7 @@ from collections.abc import Mapping
 
 from pydantic import NonNegativeFloat, PositiveInt, field_validator
 
+from cspm_msgs_py.near_name import allowed_names
 from cspm_msgs_py.topics import Topic
 from cspm_msgs_py.yaml_file import StrictModel
 
@@ -71,7 +72,7 @@ def check_sensor_topics(sensors: Mapping[str, Sensor], topics: Mapping[str, Topi
     possible = [name for name in MEASURED if name in topics]
     for name, sensor in sensors.items():
         if name not in possible:
-            raise ValueError(f"sensors.{name}: no such sensor, allowed: {', '.join(possible)}")
+            raise ValueError(f"sensors.{name}: no such sensor, {allowed_names(name, possible)}")
         kinds = quantities(topics[name])
         for key in ("noise", "resolution"):
             given = getattr(sensor, key)

@@ -7,6 +7,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, overload
 
 from cspm_msgs_py.errors import InputError
+from cspm_msgs_py.near_name import allowed_names
 
 if TYPE_CHECKING:
     from cspm_msgs_py.testbed import TestbedFile
@@ -101,4 +102,4 @@ def _find(name: str, kind: str, folders: Iterable[Path], names: Callable[[], lis
     for folder in folders:
         if (folder / f"{name}.yaml").is_file():
             return folder / f"{name}.yaml"
-    raise InputError(f"{name}: no such {kind}, allowed: {', '.join(names())} or a file")
+    raise InputError(f"{name}: no such {kind}, {allowed_names(name, names(), 'a file')}")

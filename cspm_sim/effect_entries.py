@@ -10,6 +10,7 @@ from numba.core.errors import NumbaError
 from numpy.typing import NDArray
 
 from cspm_msgs_py.errors import InputError
+from cspm_msgs_py.near_name import allowed_names
 from cspm_msgs_py.testbed import EffectEntry, Testbed
 from cspm_msgs_py.testbed_keys.effect_table import EMPIRICAL
 from cspm_sim.effects import Block, Effect, Elements, Hook, catalogue
@@ -153,8 +154,8 @@ def _of_entry(entry: EffectEntry, testbed: Testbed) -> Iterator[Action]:
     where = f"effects: {entry.effect}"
     effect = catalogue().get(entry.effect) if entry.table is None else table_effect(entry.table)
     if effect is None:
-        allowed = ", ".join((*catalogue(), EMPIRICAL))
-        raise InputError(f"{where}: no such effect, allowed: {allowed}")
+        known = allowed_names(entry.effect, (*catalogue(), EMPIRICAL))
+        raise InputError(f"{where}: no such effect, {known}")
     values = _ordered(effect, entry, where) if entry.table is None else _tabled(effect)
     if effect.acts_on is Elements.CABLES:
         yield from _on_cables(effect, entry, testbed, values, where)
@@ -168,7 +169,7 @@ def _on_cables(
     names = testbed.cable_names
     for element in entry.elements or names:
         if element not in names:
-            raise InputError(f"{where}: no element '{element}', allowed: {', '.join(names)}")
+            raise InputError(f"{where}: no element '{element}', {allowed_names(element, names)}")
         index = names.index(element)
         if effect.block is Block.CABLE and not testbed.cables[index].has_cable:
             with_cable = [cable.name for cable in testbed.cables if cable.has_cable]

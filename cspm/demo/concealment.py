@@ -10,6 +10,7 @@ from numpy.random import Generator
 
 from cspm.testbed import Testbed
 from cspm_msgs_py.errors import InputError
+from cspm_msgs_py.near_name import allowed_names
 from cspm_msgs_py.testbed import Cable
 from cspm_sim.effects import Effect, catalogue
 
@@ -74,7 +75,7 @@ def drawn(
         InputError: an effect that is not one of `CONCEALABLE`.
     """
     if named is not None and named not in CONCEALABLE:
-        raise InputError(f"--effect {named}: allowed: {', '.join(CONCEALABLE)}")
+        raise InputError(f"--effect {named}: {allowed_names(named, CONCEALABLE)}")
     names = [str(name) for name in random.permutation(list(CONCEALABLE))]
     if named is not None:
         names.insert(0, named)

@@ -23,6 +23,7 @@ from cspm_ident.rig.specimen import Specimen
 from cspm_ident.rig.stiffness_fit import ASYMPTOTE_SHARE, Fitted, above_cap, fit_law
 from cspm_ident.vaf import error_percent, vaf
 from cspm_msgs_py.errors import InputError
+from cspm_msgs_py.near_name import allowed_names
 
 Array = NDArray[np.float64]
 
@@ -197,7 +198,7 @@ def split(
     labels = [one.label for one in specimens]
     for label in verify:
         if label not in labels:
-            raise InputError(f"--verify {label}: no such cable, allowed: {', '.join(labels)}")
+            raise InputError(f"--verify {label}: no such cable, {allowed_names(label, labels)}")
     fitted = [one for one in specimens if one.label not in verify]
     if not fitted:
         raise InputError(f"--verify {', '.join(verify)}: leaves no cable to fit, allowed: some")

@@ -10,6 +10,7 @@ from pydantic import Discriminator, PositiveFloat, Tag
 
 from cspm_msgs_py.errors import InputError
 from cspm_msgs_py.model_fault import MAPPING, NUMBER
+from cspm_msgs_py.near_name import allowed_names
 
 
 def _form(value: object) -> str:
@@ -46,5 +47,5 @@ def values_per_cable(
     allowed = dict.fromkeys((*map(cable_kind, names), *names))
     unknown = [name for name in given if name not in allowed]
     if unknown:
-        raise InputError(f"{key}: {unknown[0]}, allowed: {', '.join(allowed)}")
+        raise InputError(f"{key}: {unknown[0]}, {allowed_names(unknown[0], allowed)}")
     return tuple(given.get(name, given.get(cable_kind(name), default)) for name in names)

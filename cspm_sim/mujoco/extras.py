@@ -9,6 +9,7 @@ from numpy.typing import NDArray
 
 from cspm_msgs_py.dofs import DOFS
 from cspm_msgs_py.errors import InputError
+from cspm_msgs_py.near_name import allowed_names
 from cspm_msgs_py.testbed import EffectEntry, Testbed
 
 Array = NDArray[np.float64]
@@ -96,7 +97,7 @@ def _cables(entry: EffectEntry, testbed: Testbed) -> list[int]:
     names = testbed.cable_names
     unknown = [element for element in entry.elements if element not in names]
     if unknown:
-        allowed = ", ".join(names)
-        raise InputError(f"effects: {entry.effect}: no element '{unknown[0]}', allowed: {allowed}")
+        known = allowed_names(unknown[0], names)
+        raise InputError(f"effects: {entry.effect}: no element '{unknown[0]}', {known}")
     # Without repetition in `names` each element has one place; one named twice counts twice.
     return sorted({names.index(element) for element in entry.elements or names})

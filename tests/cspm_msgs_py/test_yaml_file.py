@@ -73,7 +73,8 @@ FAULTS = [
     ),
     (
         {**DRAWER, "shapes": [{"kind": "round", "radius": 1}, {"kind": "square", "size": 1}]},
-        "shapes[1].size: unknown key, allowed: kind, side, angle (and 1 more fault)",
+        "shapes[1].size: unknown key, allowed: kind, side, angle; did you mean side?"
+        " (and 1 more fault)",
     ),
     (
         {**DRAWER, "lid": {"kind": "square", "side": 1, "angle": 2}},

@@ -84,7 +84,8 @@ def test_what_is_nowhere_is_one_line():
     with pytest.raises(InputError) as caught:
         find_scenario("clam")
     assert str(caught.value) == (
-        f"clam: no such scenario, allowed: {', '.join(scenario_names())} or a file"
+        f"clam: no such scenario, allowed: {', '.join(scenario_names())} or a file;"
+        " did you mean calm?"
     )
     with pytest.raises(InputError) as caught:
         find_scenario("nowhere/mine.yaml")

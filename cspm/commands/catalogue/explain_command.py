@@ -5,6 +5,7 @@ from __future__ import annotations
 from rich.markdown import Markdown
 
 from cspm_msgs_py.errors import InputError
+from cspm_msgs_py.near_name import allowed_names
 from cspm_run.output.console import make_console
 from cspm_sim.effects import catalogue
 from cspm_sim.effects.document import effect_section
@@ -18,5 +19,5 @@ def explain_command(name: str) -> None:
     """
     effects = catalogue()
     if name not in effects:
-        raise InputError(f"--explain {name}: allowed: {', '.join(effects)}")
+        raise InputError(f"--explain {name}: {allowed_names(name, effects)}")
     make_console().print(Markdown(effect_section(effects[name])))

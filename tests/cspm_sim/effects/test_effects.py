@@ -410,7 +410,9 @@ def test_an_effect_acts_on_its_element_alone():
         (
             [entry("winch_friction", torque=1.0)],
             "effects: winch_friction: no such effect, allowed: "
-            + ", ".join((*catalogue(), "empirical")),
+            + ", ".join((*catalogue(), "empirical"))
+            + "; did you mean winch_load_friction, winch_curved_friction or"
+            " winch_viscous_friction?",
         ),
         (
             [entry("winch_coulomb_friction", ["c9"], torque=0.1)],

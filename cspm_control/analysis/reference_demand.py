@@ -62,6 +62,11 @@ def reference_demand(
     times: Array = spacing * np.arange(round(duration / spacing) + 1, dtype=np.float64)
     motion = np.array([bar.at(time) for time in times])
     frames = np.array([frame.at(time) for time in times])
+    return demand_of(machine, times, motion, frames)
+
+
+def demand_of(machine: Governed, times: Array, motion: Array, frames: Array) -> ReferenceDemand:
+    """Return what poses and derivatives of bar and winch frame (k, 18) need at `times` (k,) [s]."""
     tensions, missing, met = _tensions(machine, motion, frames)
     speeds, torques = _shafts(machine.cables, motion, frames, tensions)
     worst = None if met.all() else _worst(machine, times, np.where(met[:, None], 0.0, missing))

@@ -50,6 +50,11 @@ class PublisherBinding:
         self._bind(gid, node)
         return ""
 
+    @property
+    def left(self) -> bool:
+        """Whether the bound publisher is no longer there."""
+        return self.bound is not None and self.bound not in self._publishers()
+
     def excess(self) -> str:
         """Return in one line that several publishers may send, empty if not."""
         found = self._candidates()
@@ -68,7 +73,7 @@ class PublisherBinding:
             gid: identity of its publisher; None where the middleware gives none: then messages
                 count while there is one publisher.
             now_ns: the present instant [ns].
-            safe: whether the winches are in their safe state.
+            safe: whether one that fell silent may be replaced, as in the winches' safe state.
         """
         if gid is not None and gid == self.bound:
             self._heard_ns = now_ns

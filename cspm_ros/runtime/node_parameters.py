@@ -67,6 +67,9 @@ class NodeParameters:
     goal_duration: float = _value(
         GOAL_S, "real time, wave_trajectory: how long the bar takes to a goal [s]", least=0.1
     )
+    goal_sender: str = _value(
+        "", "real time, wave_trajectory: the node whose goals count; empty: the first to publish"
+    )
     until_stdin_closes: bool = _value(False, "stop when standard input is closed")
     bag: str = _value("", "player: what to play; others: a recording that names the scenario")
     rate: float = _value(1.0, "player: bag time per wall time; 0, in lockstep: as nodes can")

@@ -166,7 +166,7 @@ def _run_realtime(
             session.deliver(FAREWELL_S)
     else:
         _check_part(node, bundle.scenario.name, schedule)
-        stage = run.stage(node, parameters.goal_duration)
+        stage = run.stage(node, parameters.goal_duration, parameters.goal_sender)
         _go_ahead(node, parameters)
         session.spin_until(lambda: stage.ended or session.stopped)
 

@@ -30,7 +30,7 @@ from cspm_msgs_py.topics import (
     Topic,
 )
 from cspm_ros.inject.fault_port import FaultPort
-from cspm_ros.runtime.goal_port import add_goals
+from cspm_ros.runtime.goal_port import GoalPort, make_goals
 from cspm_ros.runtime.node_parameters import GOAL_S
 from cspm_ros.runtime.nodes_of_run import NodesOfRun
 from cspm_ros.runtime.realtime_recorder_node import RealtimeRecorderNode
@@ -88,11 +88,12 @@ class RealtimeRun(NodesOfRun):
         return RealtimePlantNode(node, run, make_watchdog(bundle.scenario, run.plant))
 
     def stage(
-        self, node: ContractNode, goal_duration: float = GOAL_S
+        self, node: ContractNode, goal_duration: float = GOAL_S, goal_sender: str = ""
     ) -> RealtimeNode | RealtimeWaveNode:
         """Return the node of the controller that `node` is named after.
 
-        `goal_duration` is how long the bar takes to a goal [s].
+        `goal_duration` is how long the bar takes to a goal [s], `goal_sender` the node whose goals
+        count, empty: the first to publish.
         """
         self.name_machine(node)
         bundle, schedule = self.bundle, self.schedule
@@ -104,8 +105,8 @@ class RealtimeRun(NodesOfRun):
             stage = assemble_stage(node.name, bundle.scenario, bundle.testbed.testbed, place)
         if node.name == WAVE_TRAJECTORY:
             if isinstance(stage, WaveStage) and BAR_REFERENCE in stage.trajectories:
-                machine = bundle.testbed.testbed
-                add_goals(node, stage, bundle.scenario, machine, goal_duration)
+                goals = make_goals(stage, bundle.scenario, bundle.testbed.testbed, goal_duration)
+                GoalPort(node, goals, goal_sender)
             return RealtimeWaveNode(node, stage, schedule, topics, edges)
         guard = stage if isinstance(stage, GuardedStage) else None
         timed = TorqueStage | AngleStage | MotionStage | OwnStage | GuardedOwnStage

@@ -34,13 +34,13 @@ def followed(trajectory, begin, end):
     return np.array(found)
 
 
-def at_rest_check(_):
+def any_way(*_):
     return None
 
 
 @pytest.fixture
 def trajectory():
-    return GoalTrajectory(waving(), DURATION, at_rest_check)
+    return GoalTrajectory(waving(), DURATION, any_way)
 
 
 def test_without_a_goal_it_is_the_motion(trajectory):
@@ -106,18 +106,38 @@ def test_before_the_run_there_is_no_goal(trajectory):
     assert str(caught.value) == "the run has not begun, allowed: a goal while it is under way"
 
 
-def test_a_way_that_the_machine_cannot_hold_is_refused_and_nothing_moves():
+def test_a_way_that_the_machine_cannot_make_is_refused_and_nothing_moves():
     asked = []
 
-    def check(pose):
-        asked.append(pose)
-        if pose[2] > 2.14:
+    def check(times, rows):
+        asked.append((times, rows))
+        if rows[:, 2].max() > 2.14:
             raise InputError("too deep")
 
     trajectory = GoalTrajectory(waving(), DURATION, check)
     before = followed(trajectory, 0, 10)[-1]
     with pytest.raises(InputError, match=r"^too deep$"):
         trajectory.go(GOAL)
-    assert len(asked) == 3
+    assert len(asked) == 1
     assert followed(trajectory, 10, 11)[0] == pytest.approx(before, abs=1e-3)
     assert not trajectory.at_goal
+
+
+@pytest.mark.parametrize("back", [False, True])
+def test_what_is_checked_is_what_is_then_sent(back):
+    asked = []
+    trajectory = GoalTrajectory(waving(), DURATION, lambda *way: asked.append(way))
+    followed(trajectory, 0, 1000)
+    trajectory.go(GOAL)
+    sent = followed(trajectory, 1000, 3100)
+    if back:
+        trajectory.go(None)
+        sent = followed(trajectory, 3100, 5200)
+    times, rows = asked[-1]
+    begin = 3099 if back else 999
+    assert times[0] == pytest.approx(begin * 1e-3)
+    assert times[-1] - times[0] == pytest.approx(DURATION)
+    # The passage begins with the next step, 1 ms later.
+    steps = np.round((times - times[0]) * 1e3).astype(int)
+    assert rows == pytest.approx(sent[steps], abs=2e-3)
+    assert len(rows) > 20

@@ -119,3 +119,13 @@ def test_a_named_stranger_is_one_from_the_start_of_the_run_on():
     assert made.fault_if_known(A, 0, begun=True) == (
         f"{TOPIC}: not bound to a publisher, waits for a publisher of {TOPIC} by plant"
     )
+
+
+def test_who_is_bound_may_have_left():
+    graph = Graph(a="camera")
+    made = binding(graph)
+    assert not made.left
+    assert made.fault(A, 0) is None
+    assert not made.left
+    graph.nodes = {B: "other"}
+    assert made.left

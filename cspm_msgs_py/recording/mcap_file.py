@@ -45,8 +45,9 @@ from cspm_msgs_py.recording.records import (
     spans_in,
 )
 
-# In a channel's metadata: messages on its topic that nobody of the recorded run obeyed.
+# In a channel's metadata: messages that nobody of the recorded run obeyed; and before its topic.
 REFUSED = "cspm_refused"
+REFUSED_ROOT = "/refused"
 _FOOTER_SIZE = HEAD.size + 20 + len(MAGIC)
 _HEAD_SIZE = 256
 _RUN = 1 << 22

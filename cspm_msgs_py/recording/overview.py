@@ -65,7 +65,7 @@ class Overview:
         end_ns: latest log time [ns], 0 without messages.
         message_count: number of messages.
         topics: in the order of the recording.
-        refused: number of messages that nobody of the run obeyed, by topic.
+        refused: number of messages that nobody of the run obeyed, by topic, `/refused/…`.
         attachments: length of each attached file [bytes] by name.
         metadata: metadata records by name.
         scenario: the name that the attached scenario gives itself, None without one.

@@ -109,7 +109,7 @@ class Recording(Closing):
 
     @cached_property
     def refused(self) -> dict[str, int]:
-        """Number of messages that nobody of the recorded run obeyed, by topic that has any."""
+        """Number of messages that nobody of the recorded run obeyed, by topic, `/refused/…`."""
         counts: Counter[str] = Counter()
         for file in self.files:
             found, admitted = message_counts(file), {each.id for each in file.admitted}

@@ -7,8 +7,8 @@ one being written. With blocks of 0.05 s that is at most 0.15 s of log time.
 from __future__ import annotations
 
 import threading
-from collections import Counter
 from collections.abc import Mapping
+from dataclasses import replace
 from importlib.metadata import version
 from pathlib import Path
 from queue import SimpleQueue
@@ -25,7 +25,7 @@ from cspm_msgs_py.message import carries_row
 from cspm_msgs_py.recording.block import Batch, BlockPart, compress, merge
 from cspm_msgs_py.recording.channel_buffer import ChannelBuffer
 from cspm_msgs_py.recording.derived import Derived
-from cspm_msgs_py.recording.mcap_file import REFUSED
+from cspm_msgs_py.recording.mcap_file import REFUSED, REFUSED_ROOT
 from cspm_msgs_py.recording.rosbag2_metadata import (
     ROS_DISTRO,
     FileEntry,
@@ -136,7 +136,7 @@ class RecordingWriter:
     def append_refused(self, name: str, log_ns: int, payload: bytes) -> None:
         """Record a message as it came that nobody of the run obeyed, from its CDR bytes.
 
-        It is on its topic, in a channel of its own: others' readers see it there, ours do not.
+        It is on `/refused` and its topic's name: who plays the topic itself sends what was obeyed.
 
         Raises:
             InputError: the topic was not declared.
@@ -145,8 +145,9 @@ class RecordingWriter:
         channel = self._refused.get(name)
         if channel is None:
             like = self._channels.index(self._declared(name))
-            channel = self._refused[name] = ChannelBuffer(name, self._turn)
-            self._topics.append(self._topics[like])
+            topic = replace(self._topics[like], name=f"{REFUSED_ROOT}{name}")
+            channel = self._refused[name] = ChannelBuffer(topic.name, self._turn)
+            self._topics.append(topic)
             self._hashes.append(self._hashes[like])
             self._counts.append(0)
             self._layouts.append(None)
@@ -214,7 +215,7 @@ class RecordingWriter:
 
     def _derive(self, derived: Derived, block: _Block) -> None:
         """Add to a block what follows from it."""
-        # Messages that were refused have channels of the same names behind these.
+        # Messages that were refused have channels behind these.
         of_topic = dict(zip(self._by_name, block, strict=False))
         for name, log_ns, payload in derived.of(of_topic):
             of_topic[name].logs.append(log_ns)
@@ -281,18 +282,12 @@ class RecordingWriter:
         self._announced = i + 1
 
     def _write_metadata(self) -> None:
-        counts = Counter[str]()
-        for topic, count in zip(self._topics, self._counts, strict=True):
-            counts[topic.name] += count
+        described = zip(self._topics, self._hashes, self._counts, strict=True)
         entries = [
             TopicEntry(
-                name,
-                self._topics[i].ros_type,
-                self._hashes[i],
-                contract_qos(latched=self._topics[i].latched),
-                counts[name],
+                topic.name, topic.ros_type, found, contract_qos(latched=topic.latched), count
             )
-            for i, name in enumerate(self._by_name)
+            for topic, found, count in described
         ]
         first, last = self._sink.span_ns
         write_metadata(

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Collection, Mapping
+from collections.abc import Callable, Collection, Mapping
 from functools import partial
 from itertools import cycle
 from typing import TYPE_CHECKING
@@ -15,14 +15,15 @@ from cspm_msgs_py.recording.writer import RecordingWriter
 from cspm_msgs_py.ros.bound_flag import read_flag
 from cspm_msgs_py.ros.contract_node import ContractNode, ros_class
 from cspm_msgs_py.ros.fault_line import FaultLine
-from cspm_msgs_py.ros.graph_publishers import bind, census_of
+from cspm_msgs_py.ros.graph_publishers import GraphPublishers, bind, census_of
 from cspm_msgs_py.ros.intake import Intake
 from cspm_msgs_py.ros.leader import Leader
 from cspm_msgs_py.ros.rcl.tagged_taker import Tagged
 from cspm_msgs_py.ros.rendezvous import FollowerSide
-from cspm_msgs_py.schedule import DIAGNOSTICS_RATE
+from cspm_msgs_py.schedule import DIAGNOSTICS_RATE, FORCE_CONTROLLER
 from cspm_msgs_py.stepping.admission import Admission
-from cspm_msgs_py.topics import DIAGNOSTICS, SAFE, Topic
+from cspm_msgs_py.stepping.publisher_binding import PublisherBinding
+from cspm_msgs_py.topics import BRAKE, DIAGNOSTICS, SAFE, Topic
 from cspm_ros.runtime.topic_buffer import TopicBuffer
 
 if TYPE_CHECKING:
@@ -36,7 +37,7 @@ _WRITE_EVERY_S = 0.02
 class RealtimeRecorderNode:
     """Writes what comes, with the time at which it came.
 
-    What does not count in the run is written as it came, apart from what does, and reported.
+    What does not count in the run is written as it came, on topics of its own, and reported.
 
     Attributes:
         refused: how many messages were unusable, and why the last was.
@@ -124,7 +125,8 @@ class RealtimeRecorderNode:
     def _subscribe(self, name: str, topic: Topic) -> None:
         message_class = ros_class(topic.ros_type)
         if not carries_row(topic.ros_type):
-            take = partial(self._take_other, name)
+            of_guard = name in (BRAKE.name, SAFE.name)
+            take = self._take_flag(topic) if of_guard else partial(self._take_other, name)
             self._intake.subscribe_tagged(topic, message_class, take)
             return
         buffer = self._buffers[name] = self._buffer(topic)
@@ -161,13 +163,37 @@ class RealtimeRecorderNode:
         """Whether clocks and publishers may change: before the run, and in the safe state."""
         return self._safe or not self._begun
 
+    def _take_flag(self, topic: Topic) -> Callable[[Tagged], None]:
+        """Return what takes a flag of the force controller, and nobody else's."""
+        name, node = topic.name, self._node
+        publishers = GraphPublishers(node.node, topic)
+        binding = PublisherBinding(name, [FORCE_CONTROLLER], publishers)
+
+        def take(message: Tagged) -> None:
+            log_ns, payload = message.received_ns, message.payload
+            fault = binding.fault_if_known(message.gid, node.now_ns(), begun=self._begun, safe=True)
+            try:
+                flag = read_flag(name, payload)
+            except InputError as err:
+                fault = fault or str(err)
+            if fault is not None:
+                self._refuse_row(name, log_ns, payload, fault)
+                return
+            self._safe = flag if name == SAFE.name else self._safe
+            self._writer.append_payload(name, log_ns, payload)
+
+        return take
+
     def _take_other(self, name: str, message: Tagged) -> None:
         log_ns, payload = message.received_ns, message.payload
-        if name == SAFE.name:
-            self._safe = read_flag(name, payload)
-        if name == DIAGNOSTICS.name and not self._looks_right(payload):
-            return
-        self._writer.append_payload(name, log_ns, payload)
+        try:
+            if name == DIAGNOSTICS.name:
+                decode_diagnostics(payload)
+        except InputError as err:
+            self._writer.append_refused(name, log_ns, payload)
+            self._refuse(f"{name}: {err}")
+        else:
+            self._writer.append_payload(name, log_ns, payload)
 
     def _tell(self) -> None:
         fault = self._node.clock_fault()
@@ -182,14 +208,6 @@ class RealtimeRecorderNode:
 
     def _write_next(self) -> None:
         next(self._next).write()
-
-    def _looks_right(self, payload: bytes) -> bool:
-        try:
-            decode_diagnostics(payload)
-        except InputError as err:
-            self._refuse(f"{DIAGNOSTICS.name}: {err}")
-            return False
-        return True
 
     def _refuse_row(self, name: str, log_ns: int, payload: bytes, reason: str) -> None:
         self._writer.append_refused(name, log_ns, payload)

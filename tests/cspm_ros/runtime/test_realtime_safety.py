@@ -40,6 +40,7 @@ from cspm_msgs_py.schedule import (
     WAVE_TRAJECTORY,
     WINCH_STATE,
 )
+from cspm_msgs_py.topics import BRAKE
 from cspm_ros.runtime.exit_watchdog import IN_ORDER
 
 load_ros()
@@ -422,7 +423,7 @@ def test_foreign_messages_are_answered_with_the_safe_state_and_its_reason(warm, 
     ):
         send = {
             topic.name: witness.publisher(topic, (RECORDER,))
-            for topic in (tension, command, pose, torque, truth)
+            for topic in (tension, command, pose, torque, truth, BRAKE)
         }
         send[twist.name] = witness.publisher(twist)
         graph.start()
@@ -449,26 +450,43 @@ def test_foreign_messages_are_answered_with_the_safe_state_and_its_reason(warm, 
                 witness.until_reset(PLANT)
             witness.until_reset(FORCE_CONTROLLER)
             witness.until_running(*GUARDS)
+        send[BRAKE.name](b"\0\1\0\0\1")
+        held = witness.until_state(WATCHDOG, "hold")
+        assert f"{BRAKE.name}: {stranger} force_controller alone" in held.values["reason"]
+        witness.until_state(FORCE_CONTROLLER, "hold")
+        witness.until_reset(PLANT)
+        witness.until_reset(FORCE_CONTROLLER)
+        witness.until_running(*GUARDS)
         assert set(graph.end().values()) <= IN_ORDER
     evidence = Evidence(graph.folder)
-    assert len(evidence.alarms(FORCE_CONTROLLER)) == len(cases)
+    assert len(evidence.alarms(FORCE_CONTROLLER)) == len(cases) + 1
+    assert True not in evidence.brakes
     for reacted, sent_ns, sending in took:
         until = sent_ns + sending + 10 * PERIOD
         gap = evidence.longest_gap(TORQUE_COMMAND, sent_ns - PERIOD, until)
         assert reacted <= 2 * PERIOD + MS + gap + sending
     assert np.ptp(heave(evidence)) < SAG
-    # What nobody obeyed is recorded as it came, and apart from what counted.
+    # What nobody obeyed is recorded as it came, and on topics of its own.
+    refused = {
+        TENSION: 5,
+        TENSION_COMMAND: 3,
+        BAR_POSE: 2,
+        TRUTH: 1,
+        TORQUE_COMMAND: 1,
+        BRAKE.name: 1,
+    }
     with Recording(graph.folder) as recording:
-        assert recording.refused == {
-            TENSION: 5,
-            TENSION_COMMAND: 3,
-            BAR_POSE: 2,
-            TRUTH: 1,
-            TORQUE_COMMAND: 1,
-        }
+        assert recording.refused == {f"/refused{name}": n for name, n in refused.items()}
         assert np.abs(recording.rows(BAR_POSE).rows[:, 2] - 2.0).max() < SAG
     frames = {m.header.frame_id for m in rosbags_messages(graph.folder, BAR_POSE)}
+    assert frames == {"world_ned"}
+    frames = {m.header.frame_id for m in rosbags_messages(graph.folder, f"/refused{BAR_POSE}")}
     assert frames == {"world_ned", "map"}
+    for topic in (tension, command, torque):
+        obeyed = [m.effort.tolist() for m in rosbags_messages(graph.folder, topic.name)]
+        apart = [m.effort.tolist() for m in rosbags_messages(graph.folder, f"/refused{topic.name}")]
+        assert five.tolist() not in obeyed
+        assert len(apart) == refused[topic.name]
     # Strangers' numbers are no losses.
     lost = [s.values["lost"] for s in evidence.statuses if s.name == "recorder"]
     assert set(lost) == {"0"}

@@ -32,7 +32,7 @@ class Safety(StrictModel):
         pose_acceleration: largest acceleration of a body's points [m/s²], beyond which a pose
             trembles by more than its sensor's noise; None: what the cables can give the bar.
         following_error: largest distance of the bar's points from where they are wanted [m]; None:
-            half the machine's size.
+            three times the simulated tracking error, at most half the machine's size.
         torque_mismatch: torque at the motor shaft by which tension and motion may be missed [N·m];
             None: a twentieth of each motor's limit.
     """

@@ -10,7 +10,7 @@ from numpy.typing import ArrayLike, NDArray
 Array = NDArray[np.float64]
 # White noise turns at two of three readings, smooth motion hardly ever (Kendall's turning points).
 # Half of what noise makes in so many readings shows that there was some.
-_WINDOW, _TURNS = 30.0, 10.0
+WINDOW, TURNS = 30.0, 10.0
 # Of readings that are independent, one in so many is said to be repeated by mistake: at 1 kHz one
 # in thirty years.
 _ONCE_IN = 1e12
@@ -66,8 +66,8 @@ class RepeatedReading:
             if self._change is not None:
                 turned = change * self._change < 0.0
                 before = np.zeros(len(row)) if self._turns is None else self._turns
-                self._turns = before * (1.0 - 1.0 / _WINDOW) + turned
-                self._noisy = self._noisy or bool(self._turns.max() >= _TURNS)
+                self._turns = before * (1.0 - 1.0 / WINDOW) + turned
+                self._noisy = self._noisy or bool(self._turns.max() >= TURNS)
             self._change = change
         self._row = row.copy()
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import replace
 from pathlib import Path
 
-from cspm_control.plausibility.make import make_plausibility
+from cspm_control.plausibility.make import MachinePlausibility, make_plausibility
 from cspm_control.safety import GuardedStage, check_real_time
 from cspm_control.stages.angle_stage import AngleStage
 from cspm_control.stages.motion_stage import MotionStage
@@ -19,7 +19,7 @@ from cspm_msgs_py.recording.writer import RecordingWriter
 from cspm_msgs_py.ros.contract_node import ContractNode
 from cspm_msgs_py.ros.leader import Leader
 from cspm_msgs_py.ros.realtime_node import RealtimeNode, RealtimeWaveNode
-from cspm_msgs_py.schedule import BAR_REFERENCE, CLOCK, PLANT, WAVE_TRAJECTORY
+from cspm_msgs_py.schedule import BAR_POSE, BAR_REFERENCE, CLOCK, PLANT, WAVE_TRAJECTORY
 from cspm_msgs_py.topics import (
     BRAKE,
     DIAGNOSTICS,
@@ -34,6 +34,7 @@ from cspm_ros.runtime.goal_port import GoalPort, make_goals
 from cspm_ros.runtime.node_parameters import GOAL_S
 from cspm_ros.runtime.nodes_of_run import NodesOfRun
 from cspm_ros.runtime.realtime_recorder_node import RealtimeRecorderNode
+from cspm_ros.runtime.tracking_error import following_error
 from cspm_ros.runtime.warm_up import warm_up
 from cspm_run.assembly import assemble_stage
 from cspm_run.plant_guard import make_watchdog
@@ -118,10 +119,20 @@ class RealtimeRun(NodesOfRun):
             topics,
             edges,
             safety.stale_after,
-            plausibility=make_plausibility(node.name, bundle.scenario, bundle.testbed.testbed),
+            plausibility=self._plausibility(node.name),
             on_start=stage.start if isinstance(stage, timed) else None,
             on_safe=stage.suspend if isinstance(stage, MotionStage | OwnStage) else None,
         )
+
+    def _plausibility(self, node: str) -> MachinePlausibility:
+        """Return what a node judges its inputs by, with a following error from the machine."""
+        scenario, testbed = self.bundle.scenario, self.bundle.testbed.testbed
+        plan = self.schedule.nodes[node]
+        if {BAR_POSE, BAR_REFERENCE} <= {*plan.inputs, *plan.held}:
+            near = {"following_error": following_error(self.bundle)}
+            safety = scenario.safety.model_copy(update=near)
+            scenario = scenario.model_copy(update={"safety": safety})
+        return make_plausibility(node, scenario, testbed)
 
     def new_recording(self, folder: Path, mode: str) -> RecordingWriter:
         """Return the recording that the run fills.

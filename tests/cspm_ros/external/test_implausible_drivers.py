@@ -126,6 +126,25 @@ def test_each_kind_of_nonsense_leads_to_the_safe_state_with_its_reason(warm, tmp
         lab.report()
         run.go_on()
 
+        def stick(number=None):
+            lab.stuck = number
+
+        reasons.append(run.provoked(lambda: stick(SWAY_2), stick))
+        assert reasons[-1].startswith("/cables/tension: the same effort of sway_2 for 5")
+        stick()
+        run.go_on()
+
+        def turn(speed=0.0, standing=None):
+            lab.turning, lab.standing = speed, standing
+
+        turn(1.0)
+        witness.until_more(TENSION, 300)
+        witness.until_running(FORCE_CONTROLLER)
+        reasons.append(run.provoked(lambda: turn(1.0, SWAY_2), turn))
+        assert reasons[-1].startswith("/winches/state: the same angle of sway_2 for 5")
+        turn()
+        run.go_on()
+
         reasons.append(run.provoked(lambda: lab.report(0.6), lab.report))
         assert reasons[-1].startswith("/winches/state: torque without motion of sway_2: ")
         lab.report()

@@ -12,6 +12,8 @@ from realtime_graph import LATE, Evidence, Graph, Witness, slow_bundle, warm_pro
 from ros_graph import assert_same, load_ros, new_domain
 from run_samples import bundle_of
 
+from bench.performance.slow_machine import slow_overrides
+
 load_ros()
 
 from cspm_msgs_py.diagnostics import decode_diagnostics  # noqa: E402
@@ -183,3 +185,20 @@ def test_the_command_says_what_is_allowed(tmp_path):
     assert said("brake") == (
         f"cspm inject: no node plant in ROS domain {domain}, allowed: while a run is under way"
     )
+
+
+@pytest.mark.slow
+@pytest.mark.realtime
+def test_a_pose_aside_by_more_than_thrice_the_tracking_error_trips(tmp_path):
+    fault = '{"at": 2.0, "fault": "sensor_biased", "on": "/bar/pose", "amount": 0.05}'
+    waits = ("safety.stale_after=0.5", "safety.watchdog=0.5")
+    bundle = bundle_of("rest", *slow_overrides(), *waits, f"faults=[{fault}]")
+    with (
+        Graph(warm_processes(), bundle, tmp_path) as graph,
+        Witness(graph.domain) as witness,
+    ):
+        graph.start()
+        reason = witness.until_state(FORCE_CONTROLLER, "hold").values["reason"]
+        assert set(graph.end().values()) <= IN_ORDER
+    assert reason.startswith("motion_controller: /bar/pose: 0.0")
+    assert " m from /bar/reference, allowed: at most 0.012 m (safety.following_error)" in reason

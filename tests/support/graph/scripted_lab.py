@@ -17,9 +17,8 @@ NOISE = 0.02
 
 def clamped_bundle(*overrides):
     """Return the scenario of the clamped bar, patient with a busy computer."""
-    return bundle_of(
-        CLAMPED, "duration=600", "safety.stale_after=0.5", "safety.watchdog=0.5", *overrides
-    )
+    patient = ("safety.stale_after=0.5", "safety.watchdog=0.5", "safety.following_error=0.5")
+    return bundle_of(CLAMPED, "duration=600", *patient, *overrides)
 
 
 class ScriptedLab:
@@ -31,6 +30,9 @@ class ScriptedLab:
         bar: position of the bar, (3,) [m]; it goes there at 2 m/s, or at once by `jump`.
         reported: what is added to the torques that the drives report, (n,) [N·m].
         at_fault: the drive that reports wrong torques, by its number.
+        stuck: the load cell that repeats itself, by its number; None: none does.
+        turning: speed of all motors [rad/s].
+        standing: the encoder that stands while its motor turns, by its number.
     """
 
     def __init__(self, session, testbed):
@@ -40,6 +42,9 @@ class ScriptedLab:
         self.bar, self._at = np.array([0.0, 0.0, 2.0]), np.array([0.0, 0.0, 2.0])
         self.torques = 5.0 * self.radii
         self.reported, self.at_fault = np.zeros(len(self.radii)), 0
+        self.stuck: int | None = None
+        self.turning, self.standing = 0.0, None
+        self._tensions, self._angles = np.zeros(len(self.radii)), np.zeros(len(self.radii))
         self._rng = np.random.default_rng(1)
         topics = testbed.topics
         self._send = {
@@ -72,15 +77,22 @@ class ScriptedLab:
     def _noise(self):
         return NOISE * self._rng.standard_normal(len(self.radii))
 
+    def _measure_winches(self):
+        numbers = np.arange(len(self.radii))
+        tensions = self.torques / self.radii + self._noise()
+        self._tensions = np.where(numbers == self.stuck, self._tensions, tensions)
+        self._angles = self._angles + (numbers != self.standing) * self.turning / RATE
+
     def _measure(self):
         way = self.bar - self._at
         self._at = self._at + np.clip(way, -STEP, STEP)
-        still = np.zeros(2 * len(self.radii))
+        self._measure_winches()
+        speeds = np.full(len(self.radii), self.turning)
         rows = {
             FRAME_POSE: np.array([0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 1.0]),
             BAR_POSE: np.array([*self._at, 0.0, 0.0, 0.0, 1.0]),
-            WINCH_STATE: np.concatenate([still, self.torques + self.reported]),
-            TENSION: self.torques / self.radii + self._noise(),
+            WINCH_STATE: np.concatenate([self._angles, speeds, self.torques + self.reported]),
+            TENSION: self._tensions,
         }
         stamp = self._node.now_ns()
         for name, row in rows.items():

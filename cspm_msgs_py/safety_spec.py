@@ -4,7 +4,12 @@ from __future__ import annotations
 
 from typing import Annotated, Literal
 
-from pydantic import Field, PositiveFloat
+from pydantic import (
+    Field,
+    PositiveFloat,
+    SerializerFunctionWrapHandler,
+    model_serializer,
+)
 
 from cspm_msgs_py.yaml_file import StrictModel
 
@@ -26,6 +31,8 @@ class Safety(StrictModel):
             other within one period of the force controller, which never acts.
         watchdog: the plant goes to the safe state by itself without a torque command for so long
             [s].
+        lateness: largest age of the state that a torque command answers [s], in real time; None:
+            what the delay margin of the force loops allows.
         stop_heartbeat: longest silence of the emergency stop [s]; None: it may be silent.
         workspace: largest distance of a body from its mean position [m]; None: the machine's size.
         pose_speed: largest speed of a body's points [m/s]; None: what the cables can give the bar.
@@ -43,9 +50,18 @@ class Safety(StrictModel):
     tension_trip: PositiveFloat | None = None
     torque_slew: PositiveFloat | None = None
     watchdog: Wait = 0.05
+    lateness: Wait | None = None
     stop_heartbeat: Wait | None = None
     workspace: PositiveFloat | None = None
     pose_speed: PositiveFloat | None = None
     pose_acceleration: PositiveFloat | None = None
     following_error: PositiveFloat | None = None
     torque_mismatch: PositiveFloat | None = None
+
+    @model_serializer(mode="wrap")
+    def _written(self, write: SerializerFunctionWrapHandler) -> dict[str, object]:
+        """Leave out what was added to recordings later, so that those of before stay the same."""
+        found: dict[str, object] = write(self)
+        if self.lateness is None:
+            found.pop("lateness", None)
+        return found

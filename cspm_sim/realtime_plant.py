@@ -12,6 +12,7 @@ from cspm_msgs_py.errors import DivergenceError, InputError
 from cspm_msgs_py.schedule import TORQUE_COMMAND, Schedule
 from cspm_msgs_py.stepping.admission import Admission
 from cspm_msgs_py.stepping.delay_histogram import DelayHistogram
+from cspm_msgs_py.stepping.lateness import too_busy
 from cspm_msgs_py.stepping.publisher_binding import PublisherBinding
 from cspm_sim.simulator import Simulator
 from cspm_sim.watchdog import Watchdog
@@ -45,6 +46,7 @@ class RealtimePlant:
         publish_status: Callable[[int, Status], None],
         *,
         binding: PublisherBinding | None = None,
+        lateness_ns: int | None = None,
         on_fault: Callable[[str], None] = lambda _: None,
     ) -> None:
         """Take the plant, how many steps to make, and what looks after its drives.
@@ -56,6 +58,7 @@ class RealtimePlant:
             watchdog: what looks after the drives.
             publish_status: where diagnostics go.
             binding: whose torque commands count; None: anybody's.
+            lateness_ns: how old the state may be that a command answers [ns]; None: any age.
             on_fault: called with why the drives went to their safe state by a message.
         """
         self._simulator = simulator
@@ -64,11 +67,11 @@ class RealtimePlant:
         self._watchdog = watchdog
         self._publish_status = publish_status
         self._admission = Admission(TORQUE_COMMAND, binding)
-        self._on_fault = on_fault
+        self._lateness_ns, self._on_fault = lateness_ns, on_fault
         self._torque_timing = schedule.topics.get(TORQUE_COMMAND)
         self._start_ns: int | None = None
         self._step = -1
-        self._commanded = False
+        self._commanded = self._safe = False
         self.failure: str | None = None
         self.missed = self.late = 0
         self.delays = DelayHistogram()
@@ -94,12 +97,16 @@ class RealtimePlant:
         """Take a torque command.
 
         Raises:
-            InputError: it is another publisher's, or its stamp is one that cannot be.
+            InputError: it is another publisher's, its stamp is one that cannot be, or it comes
+                too late.
         """
         fault = self._admission.fault(stamp_ns, now_ns, gid, safe=self._watchdog.safe)
+        if fault is None and self._start_ns is not None and self._lateness_ns is not None:
+            what = f"{TORQUE_COMMAND} answers a state of"
+            fault = too_busy(what, now_ns - stamp_ns, self._lateness_ns)
         if fault is not None:
             raise InputError(fault)
-        self._watchdog.command(now_ns, torque)
+        self._watchdog.command(now_ns, torque, stamp_ns)
         self._simulator.torque = torque
         if self._start_ns is not None:
             self._note_command(stamp_ns - self._start_ns, now_ns - stamp_ns)
@@ -145,6 +152,10 @@ class RealtimePlant:
         safe = self._watchdog.torque(now_ns)
         if safe is not None:
             simulator.torque = safe
+            if not self._safe:
+                # Or controllers would go on as if they were obeyed.
+                self._on_fault(self._watchdog.reason)
+        self._safe = safe is not None
         try:
             simulator.advance()
         except DivergenceError as err:

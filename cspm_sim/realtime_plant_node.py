@@ -28,8 +28,17 @@ RESET = "~/reset"
 class RealtimePlantNode:
     """Steps the plant by the wall; it leads the run."""
 
-    def __init__(self, node: ContractNode, run: PlantRun, watchdog: Watchdog) -> None:
-        """Connect the plant to the ROS node; its watchdog releases or holds it."""
+    def __init__(
+        self,
+        node: ContractNode,
+        run: PlantRun,
+        watchdog: Watchdog,
+        lateness_ns: int | None = None,
+    ) -> None:
+        """Connect the plant to the ROS node; its watchdog releases or holds it.
+
+        `lateness_ns` is how old the state may be that a command answers [ns]; None: any age.
+        """
         topics, edges, schedule = run.topics, run.edges, run.schedule
         self._node, self._watchdog = node, watchdog
         node.keep_time()
@@ -51,6 +60,7 @@ class RealtimePlantNode:
             watchdog,
             status,
             binding=self._binding,
+            lateness_ns=lateness_ns,
             on_fault=self._line.report,
         )
         self.leader = Leader(

@@ -8,12 +8,13 @@ from numpy.typing import NDArray
 from cspm_msgs_py.diagnostics import Level, Status
 from cspm_msgs_py.schedule import PLANT, TORQUE_COMMAND
 from cspm_msgs_py.stepping.latch import Latch
+from cspm_msgs_py.stepping.lateness import too_busy
 from cspm_msgs_py.stepping.safe_state import SafeState, Winches
 from cspm_sim.any_plant import AnyPlant
 
 Array = NDArray[np.float64]
 
-_SILENCE, _COMMAND = "silence", "command"
+_SILENCE, _COMMAND, _LATENESS = "silence", "command", "lateness"
 
 
 class Watchdog:
@@ -25,13 +26,28 @@ class Watchdog:
 
     name = f"{PLANT}/watchdog"
 
-    def __init__(self, plant: AnyPlant, safe_state: SafeState, patience: float) -> None:
-        """Take the plant, where to go, and how long to wait for a command [s]."""
-        self._plant = plant
+    def __init__(
+        self,
+        plant: AnyPlant,
+        safe_state: SafeState,
+        patience: float,
+        oldest_ns: int | None = None,
+    ) -> None:
+        """Take the plant and where to go.
+
+        Args:
+            plant: whose drives are guarded.
+            safe_state: where they go.
+            patience: how long to wait for a command [s].
+            oldest_ns: how old the state may be that the torques in force answer [ns]; None: any
+                age.
+        """
+        self._plant, self._oldest_ns = plant, oldest_ns
         self._safe_state = safe_state
         self._patience_ns = round(patience * 1e9)
         self._latch = Latch()
         self._commanded_ns: int | None = None
+        self._answered_ns: int | None = None
         self._entered = False
         self._brake_wanted = plant.locked
 
@@ -40,9 +56,14 @@ class Watchdog:
         """Whether the drives are in their safe state."""
         return self._latch.open
 
-    def command(self, now_ns: int, torque: Array) -> None:
-        """Take note of a torque command (n,) [N·m] that came now."""
-        self._commanded_ns = now_ns
+    @property
+    def reason(self) -> str:
+        """Why the drives are in their safe state, empty if they are not."""
+        return self._latch.reason or ""
+
+    def command(self, now_ns: int, torque: Array, answered_ns: int | None = None) -> None:
+        """Take note of a torque command (n,) [N·m] that came now, and answers a state of then."""
+        self._commanded_ns, self._answered_ns = now_ns, answered_ns
         self._latch.stand(now_ns, _COMMAND, self._fault(torque))
 
     def trip(self, now_ns: int, reason: str) -> None:
@@ -61,6 +82,9 @@ class Watchdog:
         """
         if self._commanded_ns is not None:
             self._latch.stand(now_ns, _SILENCE, self._silence(now_ns, self._commanded_ns))
+        if self._answered_ns is not None and self._oldest_ns is not None:
+            what, age = f"{TORQUE_COMMAND} in force answers a state of", now_ns - self._answered_ns
+            self._latch.stand(now_ns, _LATENESS, too_busy(what, age, self._oldest_ns))
         if not self._latch.open:
             return None
         if not self._entered:

@@ -3,7 +3,6 @@
 import signal
 import sys
 import time
-from operator import le
 
 import rclpy
 from geometry_msgs.msg import Point, Pose, PoseStamped
@@ -40,7 +39,7 @@ class Driver(Node):
         super().__init__("driver")
         self.hardware, self.commanded = Hardware(), float("inf")  # when the last command came
         self.braked = self.tripped = False
-        self.watchdog = self.declare_parameter("watchdog", 0.05).value  # s
+        self.watchdog = self.declare_parameter("watchdog", 0.04).value  # s; the loop's delay margin
         self.winches = self.create_publisher(JointState, "/winches/state", 10)
         self.cells = self.create_publisher(JointState, "/cables/tension", 10)
         self.poses = {name: self.create_publisher(PoseStamped, name, 10) for name in POSES}
@@ -63,8 +62,9 @@ class Driver(Node):
 
     def _command(self, message: JointState) -> None:
         self.commanded, torques = time.monotonic(), list(message.effort)
-        named = list(message.name) == CABLES and len(torques) == len(CABLES)
-        self.tripped |= not (named and all(map(le, map(abs, torques), LIMITS)))
+        age = (self.get_clock().now() - rclpy.time.Time.from_msg(message.header.stamp)).nanoseconds
+        ok = age < 1e9 * self.watchdog and [*message.name, len(torques)] == [*CABLES, len(LIMITS)]
+        self.tripped |= not (ok and all(abs(t) <= m for t, m in zip(torques, LIMITS, strict=True)))
         if not self.tripped:
             self.hardware.write(torques, self.braked)
 

@@ -36,7 +36,7 @@ from cspm_run.recorded_bundle import recorded_bundle
 
 DOMAIN = 93
 # Somebody else's work on this computer is no fault of the graph.
-_PATIENT = ("safety.stale_after=0.5", "safety.watchdog=0.5")
+_PATIENT = ("safety.stale_after=0.5", "safety.watchdog=0.5", "safety.lateness=0.5")
 # A bar that hangs still need not go half the machine's size, the default.
 _NEAR = ("safety.following_error=0.1",)
 _SETTLES_S, _STARTS_S = 1.5, 60.0

@@ -105,7 +105,8 @@ def _reaction(case: ReactionCase) -> float | None:
 
 
 def _bundle(state: str) -> Bundle:
-    safety = f"safety={{state: {state}, stale_after: {WAIT_S}, watchdog: {WAIT_S}}}"
+    waits = ", ".join(f"{key}: {WAIT_S}" for key in ("stale_after", "watchdog", "lateness"))
+    safety = f"safety={{state: {state}, {waits}}}"
     overrides = (*slow_overrides(), safety, f"duration={DURATION_S}")
     scenario = load_scenario(SCENARIOS / "rest.yaml", overrides)
     testbed = load_testbed(SCENARIOS / scenario.testbed)

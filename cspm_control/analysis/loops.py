@@ -89,7 +89,7 @@ def analyse_loops(testbed: Testbed, control: ClosedLoop, timing: LoopTiming) -> 
         motion[way], growth[way] = _cascaded_motion(testbed, control, clock)
     force = _designed_force(testbed, control)
     for way, clock in ((SAMPLED, prompt), (LATE, timing)):
-        force[way] = _sampled_force(testbed, control, clock)
+        force[way] = sampled_force(testbed, control, clock)
     return LoopAnalysis(motion, force, growth)
 
 
@@ -148,9 +148,8 @@ def _sampled_motion(
     return found
 
 
-def _sampled_force(
-    testbed: Testbed, control: ClosedLoop, timing: LoopTiming
-) -> dict[str, LoopView]:
+def sampled_force(testbed: Testbed, control: ClosedLoop, timing: LoopTiming) -> dict[str, LoopView]:
+    """Return the sampled force loop of each cable alone, by name."""
     continuous = tension_plant(testbed, nominal_parameters(testbed), control.motion.design_pose)
     gains = control.force.gains or {}
     plant = force_plant_sampled(continuous, timing)

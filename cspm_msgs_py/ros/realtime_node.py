@@ -41,6 +41,7 @@ class RealtimeNode:
         stale_after: float,
         *,
         plausibility: Plausibility | None = None,
+        lateness_ns: int | None = None,
         on_start: Callable[[int], None] | None = None,
         on_safe: Callable[[bool], None] | None = None,
     ) -> None:
@@ -55,6 +56,7 @@ class RealtimeNode:
             edges: who reads what in this run.
             stale_after: age beyond its due at which an input is too old [s].
             plausibility: says which inputs cannot be true.
+            lateness_ns: of a guard, how old the state may be that it answers [ns]; None: any age.
             on_start: called with the first instant [ns] of the run.
             on_safe: called with whether the winches are in their safe state.
         """
@@ -78,6 +80,7 @@ class RealtimeNode:
             guard,
             bindings=self._bindings,
             plausibility=plausibility,
+            lateness_ns=lateness_ns,
             on_fault=self._line.report,
         )
         self._subscribe([topics[name] for name in read])

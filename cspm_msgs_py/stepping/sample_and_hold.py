@@ -18,6 +18,7 @@ from cspm_msgs_py.diagnostics import Level, Status
 from cspm_msgs_py.errors import ControllerError, InputError
 from cspm_msgs_py.schedule import CLOCK, DIAGNOSTICS_RATE, FORCE_CONTROLLER, TENSION, Schedule
 from cspm_msgs_py.stepping.admission import Admission
+from cspm_msgs_py.stepping.lateness import too_busy
 from cspm_msgs_py.stepping.plausibility import Anything, Plausibility
 from cspm_msgs_py.stepping.publisher_binding import PublisherBinding
 from cspm_msgs_py.stepping.stage import Guard, Stage
@@ -26,6 +27,10 @@ Array = NDArray[np.float64]
 Publish = Callable[[int, int, Array], None]
 
 _NO_ROW = np.zeros(0)
+
+
+def _send_nothing(topic: str, row: Array) -> None:
+    """Leave a message out."""
 
 
 class SampleAndHold:
@@ -49,6 +54,7 @@ class SampleAndHold:
         *,
         bindings: Mapping[str, PublisherBinding] | None = None,
         plausibility: Plausibility | None = None,
+        lateness_ns: int | None = None,
         on_fault: Callable[[str], None] = lambda _: None,
     ) -> None:
         """Make the node's part.
@@ -62,6 +68,8 @@ class SampleAndHold:
             guard: the stage itself, where it has a safe state.
             bindings: to whom inputs are bound, by topic; absent: to nobody.
             plausibility: says which inputs cannot be true; absent: any can.
+            lateness_ns: of a guard, how old the state may be that it answers [ns]; None: any age.
+                Beyond it the guard goes to its safe state and nothing is sent.
             on_fault: where there is no guard, called with what has to lead to the safe state.
         """
         plan = schedule.nodes[stage.node]
@@ -73,6 +81,7 @@ class SampleAndHold:
         # The force controllers follow the tensions that they close their loop on.
         self._trigger = TENSION if TENSION in plan.inputs else plan.inputs[0]
         interval = schedule.topics[self._trigger].divider
+        self._lateness_ns, self._interval_ns = lateness_ns, interval * schedule.period_ns
         self._triggered = self._trigger != CLOCK and interval <= plan.divider
         # Half an interval allows for jitter where the sensor is faster than the controller.
         self._wait_ns = self._period_ns - interval * schedule.period_ns // 2
@@ -200,11 +209,14 @@ class SampleAndHold:
             known = self._came if self._computed_ns is not None else ()
             ages = {name: self._age(name, now_ns) for name in known}
             self._stamp = now_ns
+            # Who has no input of now has nothing to say: the drives hold by themselves.
+            late = self._is_late(self._guard, now_ns, self._interval_ns)
+            send = _send_nothing if late else self._send
             believed = self._rows
             if self._implausible:
                 # Nobody holds a winch by a state that cannot be true.
                 believed = {k: row for k, row in self._rows.items() if k not in self._implausible}
-            self._guard.watch(now_ns, ages, self._send, believed)
+            self._guard.watch(now_ns, ages, send, believed)
         if now_ns >= self._status_due:
             self._status_due = now_ns + 1_000_000_000 // DIAGNOSTICS_RATE
             self._publish_status(now_ns, self._status(now_ns))
@@ -214,6 +226,8 @@ class SampleAndHold:
             return
         if self._guard is not None:
             self._look_at_clock(self._guard, now_ns)
+            if self._is_late(self._guard, now_ns):
+                return
         elif self._too_old(self._inputs, now_ns):
             self.stale += 1
             return
@@ -228,6 +242,20 @@ class SampleAndHold:
         since = self._period_ns if self._computed_ns is None else stamp_ns - self._computed_ns
         self._computed_ns = stamp_ns
         self.late += (behind > self._period_ns) + max(0, round(since / self._period_ns) - 1)
+
+    def _is_late(self, guard: Guard, now_ns: int, more_ns: int = 0) -> bool:
+        """Return whether the input that is answered is too old, and trip the guard if it is.
+
+        `more_ns` is allowed beside until the next one comes [ns].
+        """
+        stamp = self._admissions[self._trigger].stamp_ns if self._trigger != CLOCK else None
+        if self._lateness_ns is None or self._computed_ns is None or stamp is None:
+            return False
+        allowed = self._lateness_ns + (more_ns if self._triggered else self._interval_ns)
+        reason = too_busy(f"{self._stage.node} answers {self._trigger} of", now_ns - stamp, allowed)
+        if reason is not None:
+            guard.trip(now_ns, reason)
+        return reason is not None
 
     def _look_at_clock(self, guard: Guard, now_ns: int) -> None:
         """Trip after a standstill of the node itself: others have taken over meanwhile."""

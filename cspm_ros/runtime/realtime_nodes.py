@@ -19,7 +19,14 @@ from cspm_msgs_py.recording.writer import RecordingWriter
 from cspm_msgs_py.ros.contract_node import ContractNode
 from cspm_msgs_py.ros.leader import Leader
 from cspm_msgs_py.ros.realtime_node import RealtimeNode, RealtimeWaveNode
-from cspm_msgs_py.schedule import BAR_POSE, BAR_REFERENCE, CLOCK, PLANT, WAVE_TRAJECTORY
+from cspm_msgs_py.schedule import (
+    BAR_POSE,
+    BAR_REFERENCE,
+    CLOCK,
+    PLANT,
+    TORQUE_COMMAND,
+    WAVE_TRAJECTORY,
+)
 from cspm_msgs_py.topics import (
     BRAKE,
     DIAGNOSTICS,
@@ -31,6 +38,7 @@ from cspm_msgs_py.topics import (
 )
 from cspm_ros.inject.fault_port import FaultPort
 from cspm_ros.runtime.goal_port import GoalPort, make_goals
+from cspm_ros.runtime.lateness import lateness_ns
 from cspm_ros.runtime.node_parameters import GOAL_S
 from cspm_ros.runtime.nodes_of_run import NodesOfRun
 from cspm_ros.runtime.realtime_recorder_node import RealtimeRecorderNode
@@ -86,7 +94,14 @@ class RealtimeRun(NodesOfRun):
             run = self.plant_run(steps, place, realtime=True)
         if run.faults is not None:
             FaultPort(node.node, run.faults)
-        return RealtimePlantNode(node, run, make_watchdog(bundle.scenario, run.plant))
+        lateness, oldest = lateness_ns(bundle), None
+        if lateness is not None:
+            # Until the next command has come.
+            oldest = (
+                lateness + self.schedule.topics[TORQUE_COMMAND].divider * self.schedule.period_ns
+            )
+        watchdog = make_watchdog(bundle.scenario, run.plant, oldest)
+        return RealtimePlantNode(node, run, watchdog, lateness)
 
     def stage(
         self, node: ContractNode, goal_duration: float = GOAL_S, goal_sender: str = ""
@@ -120,6 +135,7 @@ class RealtimeRun(NodesOfRun):
             edges,
             safety.stale_after,
             plausibility=self._plausibility(node.name),
+            lateness_ns=None if guard is None else lateness_ns(bundle),
             on_start=stage.start if isinstance(stage, timed) else None,
             on_safe=stage.suspend if isinstance(stage, MotionStage | OwnStage) else None,
         )

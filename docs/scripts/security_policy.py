@@ -28,7 +28,7 @@ _RATES = (
     "rates={plant: 200, winches: 200, load_cells: 200, motion_capture: 100, wave_trajectory: 100,"
     " motion_controller: 100, tension_distribution: 100, force_controller: 200}"
 )
-_SETTINGS = (_RATES, "safety.stale_after=2", "safety.watchdog=2", "duration=8")
+_SETTINGS = (_RATES, "safety.stale_after=2", "safety.watchdog=2", "safety.lateness=2", "duration=8")
 # What a rule allows, by what ROS 2 calls it: the element, its entries, and the attribute.
 _RULES = {
     "publishers": ("topics", "topic", "publish"),

@@ -41,6 +41,7 @@ def test_what_a_scenario_does_that_says_nothing_about_safety():
         ("stale_after", [0.05], 11, "less than or equal to 10"),
         ("watchdog", [0.001, 10.0], 0.0, "greater than 0"),
         ("watchdog", [0.05], 11, "less than or equal to 10"),
+        ("lateness", ["null", 0.001, 10.0], 0.0, "greater than 0"),
         ("tension_trip", ["null", 0.1, 1e4], 0.0, "greater than 0"),
         ("torque_slew", ["null", 0.1, 1e4], -1.0, "greater than 0"),
     ],

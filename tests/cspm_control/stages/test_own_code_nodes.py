@@ -19,7 +19,7 @@ pytestmark = pytest.mark.compiled
 FAILS = "{motion_controller: {python: 'lift.py:Lift', parameters: {fails_at: 0.2}}}"
 STEPS = 300
 # A busy machine makes inputs late.
-PATIENT = ("safety.stale_after=5.0", "safety.watchdog=5.0")
+PATIENT = ("safety.stale_after=5.0", "safety.watchdog=5.0", "safety.lateness=5.0")
 
 
 @pytest.fixture(scope="module")

@@ -42,11 +42,12 @@ MS = 1_000_000
 START_S = 300.0
 # Patient with a busy computer.
 WAIT = 0.3
+PATIENT = ("stale_after", "lateness")
 
 
 @pytest.fixture(scope="module")
 def bundle():
-    return bundle_of(SCENARIO, f"safety.stale_after={WAIT}")
+    return bundle_of(SCENARIO, *(f"safety.{key}={WAIT}" for key in PATIENT))
 
 
 @pytest.fixture(scope="module")
@@ -212,6 +213,21 @@ def test_it_brakes_on_commands_that_cannot_be_used(domain, bundle, changes):
         assert listener.counts[WINCH_STATE] == silent
 
 
+def test_it_brakes_on_a_command_that_answers_an_old_state(domain, bundle):
+    with Process(domain, watchdog=10.0) as driver, Listener(bundle, driver.domain) as listener:
+        listener.until_more(WINCH_STATE, 10)
+        listener.follow(np.zeros(8), 10)
+        made = message_of(listener.topic, listener.node.now_ns() - 9_000 * MS, np.zeros(8))
+        listener.send(serialize(made))
+        listener.until_more(WINCH_STATE, 10)
+        made = message_of(listener.topic, listener.node.now_ns() - 10_001 * MS, np.zeros(8))
+        listener.send(serialize(made))
+        listener.until_more(TENSION, 50)
+        silent = listener.counts[WINCH_STATE]
+        listener.follow(np.zeros(8), 50)
+        assert listener.counts[WINCH_STATE] == silent
+
+
 class External:
     """`cspm run … --plant external`, and what it prints line by line."""
 
@@ -253,7 +269,8 @@ class External:
 @pytest.mark.slow
 @pytest.mark.parametrize("processes", ["--one-process", "--process-per-node"])
 def test_a_run_waits_for_it_says_so_starts_and_records(bundle, tmp_path, processes):
-    patient = ("--set", f"safety.stale_after={WAIT}", "--duration", "3")
+    waits = [word for key in PATIENT for word in ("--set", f"safety.{key}={WAIT}")]
+    patient = (*waits, "--duration", "3")
     with External(tmp_path / "bag", processes, *patient) as run:
         run.until(f"waits for {', '.join(MEASURED)}")
         with Process(run.domain, watchdog=WAIT) as driver:

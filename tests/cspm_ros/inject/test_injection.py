@@ -191,7 +191,7 @@ def test_the_command_says_what_is_allowed(tmp_path):
 @pytest.mark.realtime
 def test_a_pose_aside_by_more_than_thrice_the_tracking_error_trips(tmp_path):
     fault = '{"at": 2.0, "fault": "sensor_biased", "on": "/bar/pose", "amount": 0.05}'
-    waits = ("safety.stale_after=0.5", "safety.watchdog=0.5")
+    waits = [f"safety.{key}=0.5" for key in ("stale_after", "watchdog", "lateness")]
     bundle = bundle_of("rest", *slow_overrides(), *waits, f"faults=[{fault}]")
     with (
         Graph(warm_processes(), bundle, tmp_path) as graph,

@@ -37,6 +37,7 @@ load_ros()
 pytestmark = [pytest.mark.slow, pytest.mark.realtime]
 
 MS = 1_000_000
+WAITS = ("stale_after", "watchdog", "lateness")
 
 
 @pytest.mark.parametrize("processes", [TOGETHER, APART])
@@ -129,7 +130,7 @@ def warm():
 
 def test_deadlines_missed_are_counted_reported_and_recorded(warm, tmp_path):
     """A node that stood still for a while missed what was due then."""
-    bundle = slow_bundle("safety.stale_after=5.0", "safety.watchdog=5.0")
+    bundle = slow_bundle(*(f"safety.{key}=5" for key in WAITS))
     with (
         Graph(warm, bundle, tmp_path) as graph,
         Witness(graph.domain, topics_of(bundle, TENSION)) as witness,
@@ -159,7 +160,7 @@ def test_deadlines_missed_are_counted_reported_and_recorded(warm, tmp_path):
 
 def test_on_a_busy_processor_deadlines_are_missed_and_reported(warm, tmp_path):
     """At 1 kHz, with more to do than the processor can."""
-    bundle = bundle_of("rest", "safety.stale_after=10.0", "safety.watchdog=10.0")
+    bundle = bundle_of("rest", *(f"safety.{key}=10" for key in WAITS))
     burners = [
         subprocess.Popen([sys.executable, "-c", "while True: pass"])
         for _ in range(3 * (os.cpu_count() or 1))

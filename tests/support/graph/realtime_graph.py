@@ -57,7 +57,7 @@ def slow_bundle(*overrides, scenario="rest"):
 
     Such a computer lets the bar go astray by more than three times its tracking error.
     """
-    waits = (f"safety.{key}={STALE_AFTER}" for key in ("stale_after", "watchdog"))
+    waits = (f"safety.{key}={STALE_AFTER}" for key in ("stale_after", "watchdog", "lateness"))
     wait = (*waits, "safety.following_error=0.5")
     return bundle_of(scenario, *slow_overrides(), *wait, *overrides)
 

@@ -17,7 +17,8 @@ NOISE = 0.02
 
 def clamped_bundle(*overrides):
     """Return the scenario of the clamped bar, patient with a busy computer."""
-    patient = ("safety.stale_after=0.5", "safety.watchdog=0.5", "safety.following_error=0.5")
+    keys = ("stale_after", "watchdog", "lateness", "following_error")
+    patient = [f"safety.{key}=0.5" for key in keys]
     return bundle_of(CLAMPED, "duration=600", *patient, *overrides)
 
 

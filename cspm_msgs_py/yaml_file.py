@@ -11,12 +11,16 @@ from pydantic import BaseModel, ConfigDict, ValidationError
 from ruamel.yaml import YAML
 from ruamel.yaml.constructor import DuplicateKeyError
 from ruamel.yaml.error import MarkedYAMLError, YAMLError
+from ruamel.yaml.nodes import CollectionNode, Node
 
 from cspm_msgs_py.errors import InputError
 from cspm_msgs_py.model_fault import fault_line
 
 DEEPEST = 50
 WIDEST = 10_000
+# Far above what describes a machine or a run, and read in seconds.
+LARGEST, MOST_VALUES = 1_000_000, 200_000
+SIZE_ALLOWED = f"allowed: at most {LARGEST}"
 DEPTH_ALLOWED = f"allowed: at most {DEEPEST} levels"
 KINDS = {type(None): "an empty file", list: "a list", str: "a text", int: "a number"}
 
@@ -46,6 +50,10 @@ def read_text(path: Path) -> str:
         InputError: the file is missing or unreadable.
     """
     try:
+        if path.exists() and not path.is_file():
+            raise InputError(f"{path}: unreadable (no regular file), allowed: a YAML file")
+        if path.stat().st_size > LARGEST:
+            raise InputError(f"{path}: {path.stat().st_size} bytes, {SIZE_ALLOWED}")
         return path.read_text(encoding="utf-8")
     except FileNotFoundError:
         raise InputError(f"{path}: no such file, allowed: a YAML file") from None
@@ -60,7 +68,7 @@ def parse_yaml(text: str, source: str) -> Any:  # noqa: ANN401 - whatever the te
         InputError: the text is not YAML or repeats a key.
     """
     try:
-        content = YAML(typ="safe", pure=True).load(text)
+        content = _load(text, source)
     except MarkedYAMLError as err:
         raise InputError(f"{source}: {_yaml_fault(err)}") from None
     except (YAMLError, ValueError) as err:
@@ -69,6 +77,44 @@ def parse_yaml(text: str, source: str) -> Any:  # noqa: ANN401 - whatever the te
         raise InputError(f"{source}: nested without end, {DEPTH_ALLOWED}") from None
     _check_shape(content, source)
     return content
+
+
+def _load(text: str, source: str) -> Any:  # noqa: ANN401 - whatever the text holds
+    """Return what `YAML.load` does, once its aliases are known to stand for little."""
+    if len(text) > LARGEST:
+        raise InputError(f"{source}: {len(text)} characters, {SIZE_ALLOWED}")
+    constructor, parser = YAML(typ="safe", pure=True).get_constructor_parser(io.StringIO(text))
+    try:
+        node = constructor.composer.get_single_node()
+        if node is None:
+            return None
+        written = _written_out(node, source, {})
+        if written > MOST_VALUES:
+            raise InputError(
+                f"{source}: {written:.3g} values with its aliases written out, allowed: at most"
+                f" {MOST_VALUES}"
+            )
+        return constructor.construct_document(node)
+    finally:
+        parser.dispose()
+
+
+def _written_out(node: Node, source: str, known: dict[int, int]) -> int:
+    """Return how many values a node has written out; `known`: those of nodes seen before, by id.
+
+    A node that is part of itself has no end.
+    """
+    if id(node) in known:
+        if not known[id(node)]:
+            raise InputError(f"{source}: nested without end, {DEPTH_ALLOWED}")
+        return known[id(node)]
+    known[id(node)] = 0
+    count, inner = 1, node.value if isinstance(node, CollectionNode) else ()
+    for each in inner:
+        parts = each if isinstance(each, tuple) else (each,)
+        count += sum(_written_out(part, source, known) for part in parts)
+    known[id(node)] = count
+    return count
 
 
 def _yaml_fault(err: MarkedYAMLError) -> str:

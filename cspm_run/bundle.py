@@ -105,11 +105,11 @@ def make_bundle(scenario: Scenario, testbed: TestbedFile, folder: Path) -> Bundl
     def contained(body: Body, role: str) -> Body:
         motion = body.motion
         if isinstance(motion, FileMotion):
-            name = _take(folder / motion.path, role, files)
+            name = _take(folder, motion.path, role, files)
             origins[name] = str(folder / motion.path)
             return body.model_copy(update={"motion": motion.model_copy(update={"path": name})})
         if isinstance(motion, VesselMotion):
-            name = _take(folder / motion.rao, role, files)
+            name = _take(folder, motion.rao, role, files)
             origins[name] = str(folder / motion.rao)
             return body.model_copy(update={"motion": motion.model_copy(update={"rao": name})})
         return body
@@ -150,6 +150,11 @@ def read_bundle(attachments: Mapping[str, bytes], source: str) -> Bundle:
         )
     text = attachments[SCENARIO].decode(errors="replace")
     scenario = parse_scenario(text, f"{source}: {SCENARIO}")
+    for key, path in _motion_files(scenario).items():
+        if path not in attachments:
+            raise InputError(
+                f"{source}: {SCENARIO}: {key}: {path!r}, allowed: a file that the recording carries"
+            )
     return Bundle(
         scenario,
         attached_testbed(attachments, source),
@@ -194,8 +199,25 @@ def refusal(scenario: Scenario, recording: str) -> str:
     )
 
 
-def _take(path: Path, role: str, files: dict[str, bytes]) -> str:
+def _motion_files(scenario: Scenario) -> dict[str, str]:
+    """Return the paths of files that motions read, by key of the scenario."""
+    found = {}
+    for role in ("winch_frame", "target"):
+        motion = getattr(scenario, role).motion
+        if isinstance(motion, FileMotion):
+            found[f"{role}.motion.path"] = motion.path
+        elif isinstance(motion, VesselMotion):
+            found[f"{role}.motion.rao"] = motion.rao
+    return found
+
+
+def _take(folder: Path, named: str, role: str, files: dict[str, bytes]) -> str:
+    path = folder / named
     try:
+        if not path.resolve().is_relative_to(folder.resolve()):
+            raise InputError(f"{path}: leads outside, allowed: a file in the scenario's folder")
+        if path.exists() and not path.is_file():
+            raise InputError(f"{path}: no regular file, allowed: a file")
         content = path.read_bytes()
     except OSError as err:
         raise InputError(f"{path}: not readable ({err.strerror}), allowed: a file") from None

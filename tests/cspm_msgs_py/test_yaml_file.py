@@ -1,4 +1,6 @@
+import os
 import re
+from pathlib import Path
 from typing import Annotated, Literal
 
 import pytest
@@ -173,6 +175,54 @@ def test_text_that_is_not_yaml_is_refused_in_one_line(text, fault):
         parse_yaml(text, "d.yaml")
     assert str(caught.value).startswith(f"d.yaml: {fault}")
     assert "\n" not in str(caught.value)
+
+
+def bomb(levels, width, merge=False):
+    """Text whose aliases stand for width ** levels values."""
+    lines = ["a0: &a0 {x: 1}"]
+    for i in range(1, levels + 1):
+        each = ", ".join([f"*a{i - 1}"] * width)
+        lines.append(f"a{i}: &a{i} " + (f"{{<<: [{each}]}}" if merge else f"{{x: [{each}]}}"))
+    return "\n".join(lines)
+
+
+@pytest.mark.parametrize("merge", [False, True])
+@pytest.mark.parametrize(("levels", "width"), [(9, 9), (40, 2), (30, 100)])
+def test_aliases_that_stand_for_too_much_are_refused_at_once(levels, width, merge):
+    with pytest.raises(InputError) as caught:
+        parse_yaml(bomb(levels, width, merge), "d.yaml")
+    assert re.fullmatch(
+        r"d\.yaml: \S+ values with its aliases written out, allowed: at most 200000",
+        str(caught.value),
+    )
+
+
+def test_few_aliases_mean_what_they_stand_for():
+    found = parse_yaml(bomb(2, 3), "d.yaml")
+    assert found["a2"] == {"x": [{"x": [{"x": 1}] * 3}] * 3}
+    assert parse_yaml("a: &b {c: 1}\nd: {<<: *b, e: 2}", "d.yaml")["d"] == {"c": 1, "e": 2}
+
+
+def test_text_has_its_largest_size(tmp_path):
+    with pytest.raises(InputError) as caught:
+        parse_yaml("a" * 1_000_001, "d.yaml")
+    assert str(caught.value) == "d.yaml: 1000001 characters, allowed: at most 1000000"
+    path = tmp_path / "d.yaml"
+    path.write_bytes(b"#" * 1_000_001)
+    with pytest.raises(InputError) as caught:
+        read_yaml(path)
+    assert str(caught.value) == f"{path}: 1000001 bytes, allowed: at most 1000000"
+    path.write_bytes(b"#" * 1_000_000)
+    assert read_yaml(path) is None
+
+
+def test_a_pipe_and_a_device_are_not_waited_for(tmp_path):
+    os.mkfifo(tmp_path / "pipe.yaml")
+    for path in (tmp_path / "pipe.yaml", Path("/dev/zero")):
+        with pytest.raises(InputError) as caught:
+            read_yaml(path)
+        expected = f"{path}: unreadable (no regular file), allowed: a YAML file"
+        assert str(caught.value) == expected
 
 
 @given(text=st.text(max_size=60))

@@ -1,3 +1,5 @@
+import os
+
 import numpy as np
 import pytest
 from run_samples import SCENARIOS, bundle_of
@@ -145,3 +147,61 @@ def test_still_bodies_need_no_files():
     with Bundle(bundle.scenario, bundle.testbed, {"a.csv": b"x"}).unpacked() as place:
         assert (place / "a.csv").read_bytes() == b"x"
     assert not place.exists()
+
+
+@pytest.mark.parametrize("path", ["/etc/hostname", "../outside.csv", "/dev/zero", "absent.csv"])
+@pytest.mark.parametrize("key", ["path", "rao"])
+def test_a_recording_reads_what_it_carries_and_no_other_file(scenario_path, path, key):
+    carried = bundle_of(scenario_path).attachments()
+    name = {"path": "winch_frame_motion.csv", "rao": "target_motion.mat"}[key]
+    text = carried["scenario.yaml"].decode()
+    assert read_bundle(carried, "bag").files
+    changed = carried | {"scenario.yaml": text.replace(name, path).encode()}
+    role = {"path": "winch_frame", "rao": "target"}[key]
+    with pytest.raises(InputError) as caught:
+        read_bundle(changed, "bag")
+    assert str(caught.value) == (
+        f"bag: scenario.yaml: {role}.motion.{key}: {path!r}, allowed: a file that the recording"
+        " carries"
+    )
+
+
+def linked(place):
+    place.symlink_to("/etc/hostname")
+
+
+def climbing(place):
+    place.symlink_to(place.parent.parent.parent)
+
+
+@pytest.mark.parametrize(
+    ("make", "text"),
+    [
+        (linked, "leads outside, allowed: a file in the scenario's folder"),
+        (climbing, "leads outside, allowed: a file in the scenario's folder"),
+        (os.mkfifo, "no regular file, allowed: a file"),
+    ],
+)
+def test_a_scenario_reads_files_of_its_own_folder_alone(scenario_path, make, text):
+    path = scenario_path.parent / "boat.mat"
+    path.unlink()
+    make(path)
+    with pytest.raises(InputError) as caught:
+        bundle_of(scenario_path)
+    assert str(caught.value) == f"{path}: {text}"
+
+
+def test_a_link_inside_the_folder_is_a_file(scenario_path):
+    path = scenario_path.parent / "boat.mat"
+    path.rename(path.with_name("ship.mat"))
+    path.symlink_to("ship.mat")
+    assert "target_motion.mat" in bundle_of(scenario_path).files
+
+
+@pytest.mark.parametrize("path", ["/etc/hostname", "../hostname", "/dev/zero"])
+def test_a_scenario_names_no_file_elsewhere(scenario_path, path):
+    scenario_path.write_text(scenario_path.read_text().replace("boat.mat", path))
+    with pytest.raises(InputError) as caught:
+        bundle_of(scenario_path)
+    found = scenario_path.parent / path
+    assert str(caught.value) == f"{found}: leads outside, allowed: a file in the scenario's folder"

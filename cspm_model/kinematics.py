@@ -11,6 +11,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from cspm_model.kernels.cable import PULLEY_RADIUS
 from cspm_model.kernels.kinematics import cable_geometry
 from cspm_model.kernels.rotation import (
     body_rate_to_euler_rate,
@@ -54,7 +55,11 @@ def geometry(cables: Array, bar_pose: ArrayLike, frame_pose: ArrayLike) -> Cable
     if not (out.lengths > LENGTH_TOLERANCE).all():
         i = int(np.argmin(out.lengths))
         if np.isnan(out.lengths[i]):
-            raise SingularityError(f"cable {i}: its attachment lies inside its pulley")
+            place = ", ".join(f"{value:.4g}" for value in _pose(bar_pose))
+            raise SingularityError(
+                f"cable {i}: its attachment lies inside its pulley with the bar at [{place}] (m,"
+                f" rad), allowed: outside its radius of {cables[i, PULLEY_RADIUS]:g} m"
+            )
         raise SingularityError(f"cable {i}: length 0 m, its direction does not exist")
     return out
 

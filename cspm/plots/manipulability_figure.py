@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 
 from cspm.plots.picture_style import save
 from cspm_control.analysis.cable_structure import CableStructure, structures
-from cspm_control.analysis.manipulability import manipulability
+from cspm_control.analysis.manipulability import available_accelerations
 from cspm_control.analysis.pose_grid import Grid, both_ways
 from cspm_model.kernels.machine import PlantParameters
 
@@ -74,6 +74,8 @@ def _ellipses(
             values = [np.array([pose[axis]]) for axis in (0, 1, 2, 4, 5)]
             values[plane[0]], values[plane[1]] = np.array([across]), np.array([height])
             pulls = structures(machine, Grid(*values))[0]
+            if np.isnan(pulls).any():
+                continue
             rows = [pulls[machine.axes.index(axis)] for axis in plane if axis in machine.axes]
             left, lengths, _ = np.linalg.svd(np.array([*rows, *[0.0 * pulls[0]] * (2 - len(rows))]))
             x, y = size * (left * lengths) @ circle
@@ -93,7 +95,7 @@ def _accelerations(
     depths: Array,
 ) -> None:
     found = [
-        manipulability(machine, parameters, (*pose[:2], depth, *pose[3:])).available
+        available_accelerations(machine, parameters, (*pose[:2], depth, *pose[3:]))
         for depth in depths
     ]
     for dof in found[0]:

@@ -74,7 +74,7 @@ def cable_structure(testbed: Testbed, pose: ArrayLike) -> CableStructure:
 def structures(machine: CableStructure, grid: Grid) -> Array:
     """Return −Jᵀ, rows `machine.axes`, at all poses of a grid, (P·Q, m, n).
 
-    Orientations are fastest.
+    Orientations are fastest. NaN where a cable has no direction, as inside its pulley.
     """
     arms = np.ascontiguousarray(np.einsum("qij,nj->qni", grid.rotations, machine.attachments))
     out = np.empty((grid.size, len(machine.axes), len(machine.outlets)))

@@ -13,8 +13,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from cspm_control.analysis.cable_structure import CableStructure, structures, wanted_at_rest
-from cspm_control.analysis.pose_grid import Grid
-from cspm_control.analysis.wrench_set import wrench_set
+from cspm_control.analysis.pose_grid import GRID_AXES, Grid
+from cspm_control.analysis.wrench_set import all_directed, wrench_set
 from cspm_model.kernels.machine import PlantParameters
 from cspm_model.linearisation import mass_matrix
 from cspm_model.spanned_axes import gyration_radius
@@ -61,16 +61,24 @@ class Manipulability(NamedTuple):
 
 
 def measures(machine: CableStructure, structure: Array, radius: float) -> Array:
-    """Return √det(S·Sᵀ), (P,), of structure matrices (P, m, n), moments over `radius`."""
-    scaled = _scaled(machine, structure, radius)
-    return np.sqrt(np.maximum(np.linalg.det(scaled @ np.swapaxes(scaled, -1, -2)), 0.0))
+    """Return √det(S·Sᵀ), (P,), of structure matrices (P, m, n), moments over `radius`.
+
+    NaN where they are.
+    """
+    found, there = np.full(len(structure), np.nan), all_directed(structure)
+    scaled = _scaled(machine, structure[there], radius)
+    squared = np.linalg.det(scaled @ np.swapaxes(scaled, -1, -2))
+    found[there] = np.sqrt(np.maximum(squared, 0.0))
+    return found
 
 
 def conditions(structure: Array) -> Array:
-    """Return κ of (6-11), (P,), of structure matrices (P, m, n)."""
-    values = np.linalg.svd(structure, compute_uv=False)
+    """Return κ of (6-11), (P,), of structure matrices (P, m, n); NaN where they are."""
+    found, there = np.full(len(structure), np.nan), all_directed(structure)
+    values = np.linalg.svd(structure[there], compute_uv=False)
     with np.errstate(divide="ignore"):
-        return np.asarray(values[:, 0] / values[:, -1])
+        found[there] = values[:, 0] / values[:, -1]
+    return found
 
 
 def mass_columns(machine: CableStructure, parameters: PlantParameters, grid: Grid) -> Array:
@@ -85,16 +93,11 @@ def manipulability(
     machine: CableStructure, parameters: PlantParameters, pose: tuple[float, ...]
 ) -> Manipulability:
     """Return the manipulability at a pose x y z φ θ ψ, its roll taken as 0."""
-    grid = Grid(*(np.array([pose[axis]]) for axis in (0, 1, 2, 4, 5)))
+    grid = _one(pose)
     structure = structures(machine, grid)
     mass = mass_columns(machine, parameters, grid)
-    wrenches = wrench_set(structure, machine.limits, wanted_at_rest(machine, grid))
     radius = gyration_radius(parameters)
     dofs = [DOFS[axis] for axis in machine.axes]
-    available = {
-        dof: tuple(float(wrenches.reach(sign * mass[:, :, i])[0]) for sign in (-1.0, 1.0))
-        for i, dof in enumerate(dofs)
-    }
     return Manipulability(
         rank=len(machine.axes),
         measure=float(measures(machine, structure, radius)[0]),
@@ -102,8 +105,30 @@ def manipulability(
         scaled_condition=float(conditions(_scaled(machine, structure, radius))[0]),
         force=_ellipsoids(structure[0], dofs),
         acceleration=_ellipsoids(np.linalg.solve(mass[0], structure[0]), dofs),
-        available={dof: (low, high) for dof, (low, high) in available.items()},
+        available=available_accelerations(machine, parameters, pose),
     )
+
+
+def available_accelerations(
+    machine: CableStructure, parameters: PlantParameters, pose: Sequence[float]
+) -> dict[str, tuple[float, float]]:
+    """Return `Manipulability.available` at a pose x y z φ θ ψ, its roll taken as 0.
+
+    NaN where a cable has no direction, as inside its pulley.
+    """
+    grid = _one(pose)
+    mass = mass_columns(machine, parameters, grid)
+    wanted = wanted_at_rest(machine, grid)
+    wrenches = wrench_set(structures(machine, grid), machine.limits, wanted)
+    found: dict[str, tuple[float, float]] = {}
+    for i, axis in enumerate(machine.axes):
+        against, along = (float(wrenches.reach(sign * mass[:, :, i])[0]) for sign in (-1.0, 1.0))
+        found[DOFS[axis]] = (against, along)
+    return found
+
+
+def _one(pose: Sequence[float]) -> Grid:
+    return Grid(*(np.array([pose[axis]]) for axis in GRID_AXES.values()))
 
 
 def _scaled(machine: CableStructure, structure: Array, radius: float) -> Array:

@@ -6,7 +6,7 @@ Poses are the product of positions and orientations, orientations fastest.
 
 from __future__ import annotations
 
-from math import sqrt
+from math import isfinite, nan, sqrt
 
 import numpy as np
 from numba import njit
@@ -32,11 +32,18 @@ ROUND_OFF = 1e-9
 
 
 @njit(cache=True, error_model="numpy", nogil=True)
-def structure(position: Array, arms: Array, outlets: Array, axes: Integers, out: Array) -> None:
+def structure(position: Array, arms: Array, outlets: Array, axes: Integers, out: Array) -> bool:
     """Write −Jᵀ of (2-13), rows `axes` of force and moment in world axes, to `out` (m, n).
 
-    `arms` (n, 3) run from the bar's origin to the attachments, world axes; `outlets` are
-    (n, OUTLET_COLUMNS).
+    False, with NaN in all of `out`, where a cable has no direction: its attachment is at its exit
+    or inside its pulley, where no machine can be.
+
+    Args:
+        position: of the bar, (3,) [m].
+        arms: from the bar's origin to the attachments, world axes, (n, 3) [m].
+        outlets: (n, OUTLET_COLUMNS).
+        axes: rows that are written, (m,).
+        out: (m, n).
     """
     for i in range(arms.shape[0]):
         bx, by, bz = arms[i, 0], arms[i, 1], arms[i, 2]
@@ -50,16 +57,20 @@ def structure(position: Array, arms: Array, outlets: Array, axes: Integers, out:
         else:
             scale = scale / sqrt(x * x + y * y + z * z)
         x, y, z = x * scale, y * scale, z * scale
+        if not isfinite(x + y + z):
+            out[:] = nan
+            return False
         column = (x, y, z, by * z - bz * y, bz * x - bx * z, bx * y - by * x)
         for row in range(axes.shape[0]):
             out[row, i] = column[axes[row]]
+    return True
 
 
 @njit(cache=True, error_model="numpy", nogil=True)
 def all_structures(
     positions: Array, arms: Array, outlets: Array, axes: Integers, out: Array
 ) -> None:
-    """Write `structure` of all poses to `out` (P·Q, m, n)."""
+    """Write `structure` of all poses to `out` (P·Q, m, n); NaN where a cable has no direction."""
     count = arms.shape[0]
     for pose in range(out.shape[0]):
         structure(positions[pose // count], arms[pose % count], outlets, axes, out[pose])
@@ -128,7 +139,9 @@ def pseudo_inverse_holds(
     rows, system = np.empty((m, n)), np.empty((m, m + 1))
     for pose in range(first, last):
         wrench = wrenches[pose % count]
-        structure(positions[pose // count], arms[pose % count], outlets, axes, rows)
+        out[pose] = structure(positions[pose // count], arms[pose % count], outlets, axes, rows)
+        if not out[pose]:
+            continue
         size = 0.0
         for i in range(m):
             size = max(size, abs(wrench[i]))
@@ -182,7 +195,9 @@ def general_holds(
     start = 0
     for pose in range(first, last):
         wrench = wrenches[pose % count]
-        structure(positions[pose // count], arms[pose % count], outlets, axes, rows)
+        out[pose] = structure(positions[pose // count], arms[pose % count], outlets, axes, rows)
+        if not out[pose]:
+            continue
         size = 0.0
         for i in range(m):
             size = max(size, abs(wrench[i]))

@@ -27,7 +27,8 @@ class WrenchSet(NamedTuple):
 
     Attributes:
         normals: of K facets, outward, (P, K, m); zero where there is no facet.
-        room: how far rest is within each facet, along its normal, (P, K).
+        room: how far rest is within each facet, along its normal, (P, K); −inf where a cable has
+            no direction.
     """
 
     normals: Array
@@ -58,15 +59,22 @@ class WrenchSet(NamedTuple):
         return np.where(self.holds, factors.min(axis=1), np.nan)
 
 
+def all_directed(structure: Array) -> NDArray[np.bool_]:
+    """Return at which poses of (P, m, n) all cables have a direction, (P,); the others are NaN."""
+    return ~np.isnan(structure).any(axis=(1, 2))
+
+
 def wrench_set(structure: Array, limits: ArrayLike, wanted: Array) -> WrenchSet:
     """Return the wrench sets of structure matrices.
 
     Args:
-        structure: −Jᵀ, (P, m, n).
+        structure: −Jᵀ, (P, m, n); poses with NaN give no wrench.
         limits: tensions (n, 2) [N].
         wanted: of the cables at rest, (P, m) [N, N·m].
     """
     low, high = np.asarray(limits, dtype=float).T
+    directed = all_directed(structure)
+    structure = np.where(directed[:, None, None], structure, 0.0)
     half = _normals(structure)
     normals = np.concatenate([half, -half], axis=1)
     pulls = np.einsum("pkm,pmn->pkn", normals, structure)
@@ -74,6 +82,7 @@ def wrench_set(structure: Array, limits: ArrayLike, wanted: Array) -> WrenchSet:
     room = farthest - np.einsum("pkm,pm->pk", normals, wanted)
     # A set of parallel columns bounds nothing; round-off would make it a narrow slit.
     room[~normals.any(axis=2)] = np.inf
+    room[~directed] = -np.inf
     return WrenchSet(normals, room)
 
 

@@ -137,7 +137,11 @@ def test_an_attachment_inside_its_pulley_is_refused():
     content = changed(general_content(), "cables.1.pulley", {"radius": 3.0, "axis": [1, 0, 0]})
     with pytest.raises(SingularityError) as caught:
         geometry(nominal_parameters(build(content)).cables, BAR, FRAME)
-    assert str(caught.value) == "cable 1: its attachment lies inside its pulley"
+    place = ", ".join(f"{value:.4g}" for value in BAR)
+    assert str(caught.value) == (
+        f"cable 1: its attachment lies inside its pulley with the bar at [{place}] (m, rad),"
+        " allowed: outside its radius of 3 m"
+    )
 
 
 @pytest.mark.parametrize(

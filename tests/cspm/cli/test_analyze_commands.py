@@ -3,12 +3,16 @@
 import json
 import re
 
+import numpy as np
 import pytest
+import yaml
+from machines import build, point_content
 from run_samples import SCENARIOS
 
 from cspm.analysis import workspace
 from cspm.commands.analysis.analyzed_machine import read_machine
-from cspm_control.analysis.pose_grid import GRIDS
+from cspm_control.analysis.cable_structure import cable_structure, structures
+from cspm_control.analysis.pose_grid import GRIDS, workspace_grids
 
 LIMITED = {"surge", "sway", "pitch", "yaw"}
 
@@ -70,6 +74,24 @@ def test_the_required_acceleration_is_what_the_scenarios_reference_has():
 )
 def test_bad_input_of_workspace_is_one_line(refused, arguments, text):
     assert refused("analyze", "workspace", *arguments).startswith(text)
+
+
+def test_poses_inside_pulleys_are_outside_what_is_drawn(cspm, tmp_path):
+    content = point_content()
+    for each in content["cables"]:
+        each["pulley"] = {"radius": 0.15, "axis": [0, 0, -1]}
+    (tmp_path / "pulleys.yaml").write_text(yaml.safe_dump(content))
+    machine = cable_structure(build(content), (0.0, 0.0, 2.0, 0.0, 0.0, 0.0))
+    grid = workspace_grids("point", machine.exits, machine.axes, [0.0] * 6)["general"]
+    assert np.isnan(structures(machine, grid)).any()
+    for command, pictures in (
+        (("workspace", "--coarse", "2"), ("workspace.png", "maps.png")),
+        (("manipulability", "--pose", "0.7,-0.9,0,0,0,0"), ("manipulability.png",)),
+    ):
+        place = f"{command[0]}_found"
+        code, _, err = cspm("analyze", *command, "--testbed", "pulleys.yaml", "--out", place)
+        assert (code, err) == (0, "")
+        assert {each.name for each in (tmp_path / place).glob("*.png")} == set(pictures)
 
 
 @pytest.mark.slow

@@ -9,9 +9,11 @@ from machines import build, general_content, point_content, pulley_content
 from scipy.optimize import linprog
 
 from cspm_control.analysis.cable_structure import cable_structure, structures, wanted_at_rest
+from cspm_control.analysis.manipulability import conditions, measures
 from cspm_control.analysis.pose_grid import GRIDS, Grid, steps, workspace_grids
 from cspm_control.analysis.published_workspace import OURS, workspace_claims
 from cspm_control.analysis.workspace import ALGORITHMS, CHUNK, static_workspace
+from cspm_control.analysis.workspace_kernels import PULLEY_AXIS, PULLEY_RADIUS
 from cspm_control.analysis.workspace_limits import limits, sweep
 from cspm_control.analysis.workspace_result import analyse_workspace
 from cspm_control.analysis.wrench_set import wrench_set
@@ -126,6 +128,38 @@ def test_on_the_thesis_slices_bases_find_all_that_any_tensions_hold():
         held = static_workspace(machine, grid, "general").ravel()
         np.testing.assert_array_equal(held, sets.holds)
         assert 0 < held.sum() < len(held)
+
+
+def test_a_pose_inside_a_pulley_is_outside_the_workspace():
+    """Though the other cables could hold the bar there; a pose beside it is judged as ever."""
+    plain = cable_structure(THESIS, CENTRE)
+    outlets = plain.outlets.copy()
+    outlets[0, PULLEY_RADIUS], outlets[0, PULLEY_AXIS] = 0.8, 1.0
+    machine = plain._replace(outlets=outlets)
+    others = plain._replace(
+        outlets=plain.outlets[1:], attachments=plain.attachments[1:], limits=plain.limits[1:]
+    )
+    zero = np.zeros(1)
+    grid = Grid(zero, zero, np.array([1.0, 2.0]), zero, zero)
+    found = structures(machine, grid)
+    np.testing.assert_array_equal(np.isnan(found).all(axis=(1, 2)), [True, False])
+    for algorithm in ALGORITHMS:
+        assert static_workspace(others, grid, algorithm).all()
+        held = static_workspace(machine, grid, algorithm).ravel()
+        np.testing.assert_array_equal(held, [False, True])
+    wanted = np.tile(wanted_at_rest(machine, grid), (2, 1))
+    sets = wrench_set(found, machine.limits, wanted)
+    np.testing.assert_array_equal(sets.holds, [False, True])
+    for numbers in (sets.reach(wanted), conditions(found), measures(machine, found, 0.1)):
+        np.testing.assert_array_equal(np.isnan(numbers), [True, False])
+
+
+def test_an_attachment_at_its_exit_is_outside_the_workspace():
+    machine = cable_structure(GENERAL, CENTRE)
+    corner = machine.exits[0] - machine.attachments[0]
+    grid = Grid(*(np.array([v]) for v in (*corner, 0.0, 0.0)))
+    assert np.isnan(structures(machine, grid)).all()
+    assert not any(static_workspace(machine, grid, each).item() for each in ALGORITHMS)
 
 
 def test_reach_and_factor_are_what_linear_programs_find():

@@ -65,6 +65,39 @@ class ShownPart(_Part):
     time_s: float
 
 
+class TrackedPart(_Part):
+    """How well the bar follows its reference: RMS of the distance [m] and the rotation [rad]."""
+
+    position_m: float
+    angle_rad: float
+
+
+class ConsequencePart(_Part):
+    """What a finding costs in tracking error; `with` and `without` it."""
+
+    with_: TrackedPart = Field(alias="with")
+    without: TrackedPart
+
+
+class ConsideredPart(_Part):
+    """What was considered and is not named, with the reason and its numbers."""
+
+    effect: str
+    elements: tuple[str, ...]
+    reason: str
+    parameters: tuple[ParameterPart, ...]
+
+
+class ExtrapolatedPart(_Part):
+    """A signal that held-out data take beyond what was searched, for a share of their rows."""
+
+    place: str
+    signal: str
+    searched: Interval
+    held_out: Interval
+    share: float
+
+
 class FindingPart(_Part):
     """Something that the described machine lacks; `effect` is `unknown` where nothing names it.
 
@@ -83,6 +116,8 @@ class FindingPart(_Part):
     alternatives: tuple[AlternativePart, ...]
     onset_ci95_s: Interval | None = None
     shows_at: ShownPart | None = None
+    presence: Literal["certain", "tied"] | None = None
+    consequence: ConsequencePart | None = None
 
 
 class NotExcitedPart(_Part):
@@ -148,6 +183,8 @@ class DiagnosisFile(_Part):
     thresholds: dict[str, float] = {}
     explained: float | None = None
     left: tuple[LeftPart, ...] = ()
+    considered: tuple[ConsideredPart, ...] = ()
+    extrapolated: tuple[ExtrapolatedPart, ...] = ()
     data_checks: tuple[DataCheckPart, ...] = ()
 
 

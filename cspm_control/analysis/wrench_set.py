@@ -61,7 +61,7 @@ class WrenchSet(NamedTuple):
 
 def all_directed(structure: Array) -> NDArray[np.bool_]:
     """Return at which poses of (P, m, n) all cables have a direction, (P,); the others are NaN."""
-    return ~np.isnan(structure).any(axis=(1, 2))
+    return np.asarray(~np.isnan(structure).any(axis=(1, 2)))
 
 
 def wrench_set(structure: Array, limits: ArrayLike, wanted: Array) -> WrenchSet:

@@ -3,7 +3,8 @@
 Controllers feed sensor noise back into motion and tensions. Regressors in proportion to these then
 correlate with the same noise in the residuals, even where nothing is missing. The reference motion
 is free of noise and serves as instrument (Söderström, Stoica, Instrumental variable methods for
-system identification, Springer 1983).
+system identification, Springer 1983). Where it is not known, the slow part of a finding does: what
+a loop does between the rows of a slow log is not in it.
 """
 
 from __future__ import annotations
@@ -12,6 +13,7 @@ from collections.abc import Collection, Iterator, Mapping, Sequence, Set
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.ndimage import uniform_filter1d
 
 from cspm_ident.diagnosis.residuals.regressors import Candidate
 from cspm_ident.diagnosis.residuals.residual_equation import Equation
@@ -27,6 +29,9 @@ Array = NDArray[np.float64]
 _LEAST = 1e-9
 # Most rows of a recording or equation: more add nothing on a planned motion, and take memory.
 _ROWS = 20_000
+# Rows over which a finding is averaged to be its own instrument where no reference is known. Of
+# white noise a twentieth of the squares is left, which is half of what an instrument has to hold.
+_SLOW_ROWS = 20
 
 
 def is_proportional(effect: Effect) -> bool:
@@ -81,11 +86,11 @@ def shows_in_reference_motion(
 
     The residual is regressed on the finding's weighted regressors with a scale s, by instrumental
     variables. An effect of the machine gives s = 1 whatever the noise; fed-back noise gives any s.
-    True where no equation has both the finding and instruments.
+    True where no equation has the finding.
 
     Args:
         parts: equations of each recording, in units of their noise.
-        wanted: instruments of each recording.
+        wanted: instruments of each recording; None: the finding's own slow part.
         own: the finding's candidates.
         weights: coefficients of all findings.
         block_s: length of blocks that are nearly independent [s].
@@ -95,7 +100,6 @@ def shows_in_reference_motion(
     found = [
         pair
         for part, instruments in zip(parts, wanted, strict=True)
-        if instruments is not None
         for equation in part
         if not mine.isdisjoint(equation.columns)
         # One at a time, because all steady equations together take much memory.
@@ -115,7 +119,7 @@ def shows_in_reference_motion(
 
 def _moments(
     equation: Equation,
-    wanted: Samples,
+    wanted: Samples | None,
     own: Set[Candidate],
     weights: Mapping[Candidate, Array],
     block_s: float,
@@ -128,7 +132,7 @@ def _moments(
         return
     mine = [c for c in own if c in equation.columns]
     thin = _thinning(len(equation.times))
-    basis = _basis(_at(wanted, equation.times[thin]))
+    basis = None if wanted is None else _basis(_at(wanted, equation.times[thin]))
     home = (equation.times[thin] / block_s).astype(int)
     others = [c for c in weights if c in equation.columns and c not in own]
     for k in range(equation.target.shape[1]):
@@ -141,12 +145,17 @@ def _moments(
             each - taken @ (taken.T @ each)
             for each in (np.asarray(equation.target[thin, k], dtype=float), effect)
         )
-        instrument = basis @ (basis.T @ effect)
+        instrument = _slow(effect) if basis is None else basis @ (basis.T @ effect)
         instrument = instrument - taken @ (taken.T @ instrument)
         for block in np.unique(home):
             rows = home == block
             reported, moved = instrument[rows], effect[rows]
             yield float(reported @ left[rows]), float(reported @ moved), float(moved @ moved)
+
+
+def _slow(effect: Array) -> Array:
+    """Return a moving average over rows, (k,)."""
+    return np.asarray(uniform_filter1d(effect, _SLOW_ROWS, mode="nearest"))
 
 
 def _thinning(rows: int) -> slice:

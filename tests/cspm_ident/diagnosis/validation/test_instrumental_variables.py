@@ -66,8 +66,18 @@ def test_what_is_missing_shows_whatever_is_fed_back(missing):
     assert not shows(1.0, missing=0.0, fed_back=0.3, beside=5.0)
 
 
-def test_without_instruments_nothing_is_refused():
-    assert shows(0.0, missing=0.0, fed_back=0.3, wanted=None)
+def test_without_a_reference_a_finding_has_to_show_in_its_own_slow_part():
+    """Noise that is fed back is in neighbouring rows alone, and motion is not."""
+    assert not shows(0.0, missing=0.0, fed_back=0.3, wanted=None)
+    assert not shows(1.0, missing=0.0, fed_back=3.0, wanted=None)
+    assert shows(1.0, missing=0.2, fed_back=0.05, wanted=None)
+
+
+def test_an_equation_of_few_rows_has_a_slow_part_too():
+    short = Equation(
+        PLACE, TIMES[:3], ASKED[:3, None], {INERTIA: ASKED[:3, None, None]}, ASKED[:3, None]
+    )
+    assert shows_in_reference_motion([[short]], [None], [INERTIA], {INERTIA: np.ones(1)}, 0.5)
 
 
 def test_winches_that_stand_still_feed_nothing_back():

@@ -209,9 +209,11 @@ class SampleAndHold:
             known = self._came if self._computed_ns is not None else ()
             ages = {name: self._age(name, now_ns) for name in known}
             self._stamp = now_ns
-            # Who has no input of now has nothing to say: the drives hold by themselves.
+            # Who has no input of now has nothing to say: the drives hold by themselves. A stale one
+            # is answered by nothing, so that its torques cannot be late.
             late = self._is_late(self._guard, now_ns, self._interval_ns)
-            send = _send_nothing if late else self._send
+            silent = late and self._age(self._trigger, now_ns) <= self._stale_ns
+            send = _send_nothing if silent else self._send
             believed = self._rows
             if self._implausible:
                 # Nobody holds a winch by a state that cannot be true.

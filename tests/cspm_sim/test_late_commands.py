@@ -233,7 +233,7 @@ def test_a_late_controller_falls_silent_and_says_so(tmp_path):
     wall.plant._on_fault = lambda _: None
     wall.go(6)
     assert not wall.force.safe
-    wall.go(10)
+    wall.go(3)
     assert wall.force.safe
     assert wall.dog.safe
     assert not sent

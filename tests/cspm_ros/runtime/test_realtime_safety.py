@@ -218,7 +218,7 @@ def test_when_the_force_controllers_are_killed_the_plant_stops_itself(warm, tmp_
 
 
 def test_a_patient_watchdog_lets_the_last_torques_stand(warm, tmp_path):
-    bundle = slow_bundle("safety.watchdog=10.0")
+    bundle = slow_bundle("safety.watchdog=10.0", "safety.lateness=10.0")
     with (
         Graph(warm, bundle, tmp_path) as graph,
         Witness(graph.domain, topics_of(bundle, TENSION)) as witness,

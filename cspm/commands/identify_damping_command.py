@@ -10,10 +10,11 @@ from rich.markup import escape
 from rich.table import Table
 
 from cspm.commands.identify_outcome import hand_out, interval_text
+from cspm.commands.progress_shown import shown
 from cspm.identification.cables import identified_damping
 from cspm.rig import RigRequest
 from cspm_ident.rig.damping import DAMPING, DampingResult
-from cspm_run.output.console import say
+from cspm_run.output.console import make_console, say
 
 
 def identify_damping_command(request: RigRequest, json: Path | None) -> bool:
@@ -24,7 +25,9 @@ def identify_damping_command(request: RigRequest, json: Path | None) -> bool:
     Raises:
         InputError: recordings, test-bed or options cannot be used.
     """
-    return hand_out(identified_damping(request), print_damping, request.out, json)
+    with shown(make_console(), "fitting"):
+        found = identified_damping(request)
+    return hand_out(found, print_damping, request.out, json)
 
 
 def print_damping(console: Console, result: DampingResult) -> None:

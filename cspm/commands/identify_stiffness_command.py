@@ -10,12 +10,13 @@ from rich.markup import escape
 from rich.table import Table
 
 from cspm.commands.identify_outcome import hand_out, interval_text
+from cspm.commands.progress_shown import shown
 from cspm.identification.cables import identified_stiffness
 from cspm.rig import RigRequest
 from cspm_ident.rig.flanks import DOWN, UP
 from cspm_ident.rig.stiffness import MEAN, StiffnessResult
 from cspm_ident.rig.stiffness_fit import NAMES
-from cspm_run.output.console import say
+from cspm_run.output.console import make_console, say
 
 LAW = "k = min(a/l^b (e^(c t) - e^(d t)), E A/l)"
 
@@ -28,7 +29,9 @@ def identify_stiffness_command(request: RigRequest, json: Path | None) -> bool:
     Raises:
         InputError: recordings, test-bed or options cannot be used.
     """
-    return hand_out(identified_stiffness(request), print_stiffness, request.out, json)
+    with shown(make_console(), "fitting"):
+        found = identified_stiffness(request)
+    return hand_out(found, print_stiffness, request.out, json)
 
 
 def print_stiffness(console: Console, result: StiffnessResult) -> None:

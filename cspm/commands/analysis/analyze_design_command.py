@@ -11,6 +11,7 @@ from rich.table import Table
 
 from cspm.analysis.design import design_of
 from cspm.analysis.machine import AnalyzedMachine
+from cspm.commands.progress_shown import shown
 from cspm_control.analysis.loop_view import LoopView
 from cspm_control.analysis.loops import (
     CASCADE,
@@ -66,7 +67,8 @@ def analyze_design_command(
     """
     refuse_existing(folder)
     console = make_console()
-    found = design_of(machine, computing)
+    with shown(console, "loops"):
+        found = design_of(machine, computing)
     _show(console, machine, found.control, found.result, found.timing, found.groups)
     if folder is not None:
         say(console, f"written {', '.join(map(str, found.write(folder)))}")

@@ -14,6 +14,7 @@ from rich.table import Table
 from cspm.analysis.linear import linear_of
 from cspm.analysis.machine import AnalyzedMachine
 from cspm.commands.analysis.claim_table import claim_table
+from cspm.commands.progress_shown import shown
 from cspm_control.analysis.claim import Claim
 from cspm_control.analysis.gain import condition
 from cspm_control.analysis.linear import (
@@ -40,7 +41,8 @@ def analyze_linear_command(
     """
     refuse_existing(folder)
     console = make_console()
-    found = linear_of(machine)
+    with shown(console, "linearising"):
+        found = linear_of(machine)
     _show(console, machine, found.result, found.claims)
     if folder is not None:
         picture, model = found.write(folder)

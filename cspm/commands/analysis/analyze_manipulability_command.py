@@ -12,6 +12,7 @@ from rich.table import Table
 
 from cspm.analysis.machine import AnalyzedMachine
 from cspm.analysis.manipulability import manipulability_of
+from cspm.commands.progress_shown import shown
 from cspm_control.analysis.manipulability import Ellipsoid, Manipulability
 from cspm_model.parameters import nominal_parameters
 from cspm_model.spanned_axes import gyration_radius
@@ -36,7 +37,8 @@ def analyze_manipulability_command(
     """
     refuse_existing(folder)
     console = make_console()
-    found = manipulability_of(machine)
+    with shown(console, "manipulability"):
+        found = manipulability_of(machine)
     radius = gyration_radius(nominal_parameters(machine.testbed))
     _show(console, machine, found.result, radius)
     if folder is not None:

@@ -9,6 +9,7 @@ from rich import box
 from rich.table import Table
 
 from cspm.analysis.reference import ReferenceAnalysis, reference_of
+from cspm.commands.progress_shown import shown
 from cspm.commands.run_command import bundle_from
 from cspm_msgs_py.new_folder import refuse_existing
 from cspm_msgs_py.recording.run_record import SIM
@@ -29,8 +30,9 @@ def analyze_reference_command(
         CspmError: the folder exists, or no bar follows a reference.
     """
     refuse_existing(folder)
-    found = reference_of(bundle_from(path, overrides, machine, SIM))
     console = make_console()
+    with shown(console, "reference"):
+        found = reference_of(bundle_from(path, overrides, machine, SIM))
     console.print(_table(found))
     for line in _lines(found):
         say(console, line)

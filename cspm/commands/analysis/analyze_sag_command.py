@@ -9,6 +9,7 @@ from rich.table import Table
 
 from cspm.analysis.machine import AnalyzedMachine
 from cspm.analysis.sag import SagAnalysis, sag_of
+from cspm.commands.progress_shown import shown
 from cspm_run.output.console import make_console, say
 from cspm_run.output.json_file import write_json
 
@@ -21,8 +22,9 @@ def analyze_sag_command(
     Raises:
         CspmError: no density, a cable over a pulley, or nothing holds bar and cables.
     """
-    found = sag_of(machine, linear_density)
     console = make_console()
+    with shown(console, "sag"):
+        found = sag_of(machine, linear_density)
     pose = ", ".join(f"{value:g}" for value in machine.pose)
     say(console, f"{machine.testbed.name} at [{pose}] (m, rad), at rest, by elastic catenaries")
     console.print(_table(found))

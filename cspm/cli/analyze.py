@@ -12,7 +12,7 @@ from cspm.cli.app import MARKUP, Json, app
 analyze = typer.Typer(
     no_args_is_help=True,
     rich_markup_mode=MARKUP,
-    help="What a machine and its controllers can do, beside what the thesis says of its own.",
+    help="Say what a machine can do. With its controllers, beside what the thesis says of its own.",
 )
 app.add_typer(analyze, name="analyze")
 
@@ -50,7 +50,7 @@ cspm analyze linear worst_case_4m --pose 0,0,4,0,0,0 --json linear.json
 
 cspm analyze linear --testbed my_rig.yaml --pose 0,0,1.5,0,0,0
 
-Exit code: 0 done, 1 the bar cannot hang there, 2 unusable input."""
+Exit code: 0 done, 1 the bar cannot hang there, 2 unusable input, 130 interrupted."""
 )
 def linear(
     scenario: ScenarioName = DEFAULT_SCENARIO,
@@ -59,7 +59,7 @@ def linear(
     out: Folder = None,
     json: Json = None,
 ) -> None:
-    """Linearise about rest: modes, damping, singular values, relative gains, condition numbers.
+    """Linearise about rest. Modes, damping, singular values, relative gains, condition numbers.
 
     Once with cable directions held, as the thesis does, and once exactly.
     """
@@ -105,7 +105,7 @@ def workspace(
     out: Folder = None,
     json: Json = None,
 ) -> None:
-    """Find where the cables can hold the bar: the thesis's algorithms 1 and 2, and beyond.
+    """Find where cables can hold the bar. By the thesis's algorithms 1 and 2, and beyond.
 
     Beyond: tensions from their lowest limit, room for an acceleration, conditioning,
     manipulability.
@@ -125,7 +125,7 @@ cspm analyze manipulability
 
 cspm analyze manipulability --pose 0.1,0,1,0,0.2,0 --out manipulability --json found.json
 
-Exit code: 0 done, 2 unusable input."""
+Exit code: 0 done, 2 unusable input, 130 interrupted."""
 )
 def manipulability(
     scenario: ScenarioName = DEFAULT_SCENARIO,
@@ -134,7 +134,7 @@ def manipulability(
     out: Folder = None,
     json: Json = None,
 ) -> None:
-    """Report how well the cables move the bar at a pose: Yoshikawa's measure and ellipsoids.
+    """Say how well cables move the bar. At a pose, by Yoshikawa's measure and ellipsoids.
 
     And what acceleration gravity and the cables' limits leave in each DOF.
     """
@@ -151,7 +151,7 @@ cspm analyze reference calm --out reference
 
 cspm analyze reference my_scenario.yaml --set target.motion.scale=0.5 --json reference.json
 
-Exit code: 0 done, 2 unusable input."""
+Exit code: 0 done, 2 unusable input, 130 interrupted."""
 )
 def reference(
     scenario: ScenarioName = DEFAULT_SCENARIO,
@@ -165,7 +165,7 @@ def reference(
     out: Folder = None,
     json: Json = None,
 ) -> None:
-    """Look whether the machine can follow the reference: wrench, tensions, speeds and torques.
+    """Check that the reference is feasible. Wrench, tensions, speeds and torques.
 
     As if bar and cables followed it exactly; the picture shades where no tensions will do.
     """
@@ -183,7 +183,7 @@ cspm analyze sag --linear-density 0.001
 
 cspm analyze sag cogiro --linear-density 0.05 --pose 2,0,1,0,0,0 --json sag.json
 
-Exit code: 0 done, 1 no tensions hold bar and cables, 2 unusable input."""
+Exit code: 0 done, 1 no tensions hold bar and cables, 2 unusable input, 130 interrupted."""
 )
 def sag(
     scenario: ScenarioName = DEFAULT_SCENARIO,
@@ -198,7 +198,7 @@ def sag(
     ] = None,
     json: Json = None,
 ) -> None:
-    """Report how cables with weight hold the bar at rest: tensions, sag and what stiffness is left.
+    """Report sag of heavy cables at rest. Their tensions, shape and remaining stiffness.
 
     Beside the tensions of straight cables without weight, which controllers assume.
     """
@@ -217,7 +217,7 @@ cspm analyze design calm --computing 0.002 --json design.json
 
 cspm analyze design my_scenario.yaml --pose 0,0,4,0,0,0
 
-Exit code: 0 done, 1 the bar cannot hang there, 2 unusable input."""
+Exit code: 0 done, 1 the bar cannot hang there, 2 unusable input, 130 interrupted."""
 )
 def design(
     scenario: ScenarioName = DEFAULT_SCENARIO,
@@ -237,7 +237,7 @@ def design(
     out: Folder = None,
     json: Json = None,
 ) -> None:
-    """Look at a scenario's control loops: margins as designed, as sampled, and as they cascade.
+    """Look at the control loops. Margins as designed, as sampled, and as they cascade.
 
     Gains that the scenario does not give are designed first, at its design pose; the loops are
     looked at where --pose says.

@@ -73,7 +73,7 @@ def campaign(
     ] = False,
     json: Json = None,
 ) -> None:
-    """Make many runs that differ in seeds, values, effects or controllers, side by side.
+    """Make many runs side by side. They differ in seeds, values, effects or controllers.
 
     The folder gets runs.parquet, one row a run, and campaign.html. The same command goes on where
     it was interrupted.

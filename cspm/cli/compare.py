@@ -42,7 +42,7 @@ cspm compare today --testbed my_rig.yaml --drive torque --horizon 0.2
 
 cspm compare today --delay /bar/pose=0.008 --delay /winch_frame/pose=0.008
 
-Exit code: 0 done, 2 unusable input.""",
+Exit code: 0 done, 2 unusable input, 130 interrupted.""",
 )
 def compare(
     recording: Annotated[
@@ -89,7 +89,7 @@ def compare(
     ] = None,
     json: Json = None,
 ) -> None:
-    """Simulate a recording from its own measured inputs, and report where both differ.
+    """Compare a recording with its model. Simulates its measured inputs, says where both differ.
 
     The whole, then cables and bar alone, each from what was measured.
     """

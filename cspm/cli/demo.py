@@ -24,7 +24,7 @@ cspm demo --seed 7 --hard
 
 cspm demo --effect winch_coulomb_friction --no-guess
 
-Exit code: 0 done, whatever was named; 2 unusable input."""
+Exit code: 0 done, whatever was named; 2 unusable input, 130 interrupted."""
 )
 def demo(
     seed: Annotated[
@@ -52,7 +52,7 @@ def demo(
     ] = None,
     json: Json = None,
 ) -> None:
-    """Conceal an effect in a machine, let you guess, diagnose it, and reveal it, in three minutes.
+    """Guess and diagnose a hidden fault. In three minutes: concealed, found, revealed.
 
     The recording, the verdict's page and a page with the improved model beside the recording stay.
     """

@@ -22,7 +22,7 @@ cspm diagnose monday tuesday --testbed my_rig.yaml --json diagnosis.json
 
 cspm diagnose --explain winch_coulomb_friction
 
-Exit code: 0 done, whatever the verdict; 2 unusable input.""",
+Exit code: 0 done, whatever the verdict; 2 unusable input, 130 interrupted.""",
 )
 def diagnose(
     recordings: Annotated[
@@ -63,7 +63,7 @@ def diagnose(
     leave_out_regimes: LeaveOutRegimes = False,
     json: Json = None,
 ) -> None:
-    """Locate the mismatch of recording and model, name what is missing, and show the fit improve.
+    """Find what physics a model lacks. Where it differs, what is missing, how the fit improves.
 
     Every residual is driven by what was measured, so that feedback cannot hide an effect. What is
     found is judged on data that was not searched.

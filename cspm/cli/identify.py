@@ -22,7 +22,7 @@ RigCommand: TypeAlias = "Callable[[RigRequest, Path | None], bool]"
 identify = typer.Typer(
     no_args_is_help=True,
     rich_markup_mode=MARKUP,
-    help="Fit parameters to recordings, with 95 % intervals, and write them into a test-bed file.",
+    help="Fit parameters to recordings. With 95 % intervals, written into a test-bed file.",
 )
 app.add_typer(identify, name="identify")
 
@@ -158,7 +158,7 @@ cspm identify stiffness ramps --verify hoist_180 --out hoist_stiffness""",
     "stiffness",
 )
 def stiffness(request: RigRequest, json: Path | None) -> bool:
-    """Identify the stiffness law of one kind of cable from slow ramps at several lengths.
+    """Fit a cable's stiffness to slow ramps. One kind of cable, at several lengths.
 
     Stretching and releasing are kept apart, and the hysteresis between them is reported.
     """
@@ -176,7 +176,7 @@ cspm identify damping sines --stiffness hoist_stiffness/fitted_testbed.yaml --ve
 --out hoist_damping"""
 )
 def damping(request: RigRequest, json: Path | None) -> bool:
-    """Identify the damping of one kind of cable from multi-sines at several lengths.
+    """Fit a cable's damping to multi-sines. One kind of cable, at several lengths.
 
     Identify the stiffness first, and give its fitted test-bed file by --stiffness.
     """
@@ -246,7 +246,7 @@ def winch(
     out: Out = None,
     json: Json = None,
 ) -> None:
-    """Identify inertia and friction of winches from their own angle, torque and tension.
+    """Fit inertia and friction of winches. From their own angle, torque and tension.
 
     Each winch by itself, in weak form: nothing is differentiated that carries noise.
     """
@@ -289,7 +289,7 @@ def lengths(
     out: Out = None,
     json: Json = None,
 ) -> None:
-    """Hold encoders against the cable lengths that measured poses give: scale, zero and sag."""
+    """Hold encoders against cable lengths. Those of measured poses give scale, zero and sag."""
     from cspm.commands.identify_lengths_command import identify_lengths_command
 
     _end(identify_lengths_command(tuple(recordings), tuple(held_out or ()), testbed, out, json))
@@ -362,7 +362,7 @@ def system(
     ] = None,
     json: Json = None,
 ) -> None:
-    """Identify bar, cables and damping of a whole machine from its motion.
+    """Fit bar, cables and damping at once. Of a whole machine, from its motion.
 
     Windows of each recording are simulated from measured motor angles and the frame's pose, and
     compared with the bar's pose and the tensions.

@@ -16,7 +16,8 @@ from cspm.cli.app import RUN_FAILED, Json, app, new_folder
 from cspm.cli.shared_options import COMMAND, Browser, Port, add_shared_options
 from cspm_msgs_py.control_spec.motion_laws import MOTION_LAWS
 from cspm_msgs_py.errors import CspmError, InputError
-from cspm_run.library import find_scenario, scenario_names
+from cspm_msgs_py.new_folder import refuse_existing
+from cspm_run.library import find_scenario, find_testbed, scenario_names
 
 MODES = ("inprocess", "graph", "processes", "realtime")
 BAD_USAGE = 2
@@ -58,7 +59,8 @@ def run_app(commands: typer.Typer, name: str) -> NoReturn:
         fail(err.line, err.exit_code)
     except _UsageError as err:
         command = err.ctx.command_path if err.ctx else name
-        line = f"{err.format_message().rstrip('.')}; see `{command} --help`"
+        said = err.format_message().rstrip(".")
+        line = f"{said}{'' if said.endswith('?') else ';'} see `{command} --help`"
         _fail(command, line, BAD_USAGE)
     except OSError as err:
         fail(f"{err.filename or 'system'}: {err.strerror or err}", RUN_FAILED)
@@ -249,12 +251,20 @@ def run(
     browser: Browser = None,
     json: Json = None,
 ) -> None:
-    """Simulate a scenario: record it, draw it, and report how well the bar followed.
+    """Simulate a scenario. Record it, draw it, and report how well the bar followed.
 
     Ctrl-C ends the run early with a complete recording.
     """
+    # What can be refused by its name is, before the parts of a run are loaded.
     if mode not in MODES:
         raise InputError(f"--mode {mode}: allowed: {', '.join(MODES)}")
+    settings = _settings(overrides or (), duration=duration, seed=seed)
+    paths = [find_scenario(scenario) for scenario in scenarios]
+    if testbed is not None:
+        find_testbed(str(testbed))
+    folder = out if out is not None else new_folder("+".join(Path(s).stem for s in scenarios))
+    place = folder if record else None
+    refuse_existing(place)
     from cspm.commands.run_beside_command import Settings, run_beside_command
     from cspm.commands.run_command import RunnerOptions, run_command
     from cspm_msgs_py.recording.run_record import EXTERNAL
@@ -262,12 +272,6 @@ def run(
 
     if plant not in (*PLANTS, EXTERNAL):
         raise InputError(f"--plant {plant}: allowed: {', '.join((*PLANTS, EXTERNAL))}")
-    settings = [f"duration={duration}"] * (duration is not None)
-    settings += [f"seed={seed}"] * (seed is not None)
-    settings = [*(overrides or []), *settings]
-    folder = out if out is not None else new_folder("+".join(Path(s).stem for s in scenarios))
-    place = folder if record else None
-    paths = [find_scenario(scenario) for scenario in scenarios]
     if view:
         from cspm.commands.run_view_command import WatchRequest, check_watchable, run_view_command
 
@@ -297,6 +301,16 @@ def run(
             paths, Settings(settings, place, json, plant, testbed, effects or (), names)
         )
     raise typer.Exit(0 if finished else RUN_FAILED)
+
+
+def _settings(overrides: Sequence[str], **options: float | None) -> list[str]:
+    """Return what overrides and options of their own set; one value must not hide another."""
+    for name, value in options.items():
+        twice = [each for each in overrides if each.partition("=")[0] == name]
+        if twice and value is not None:
+            raise InputError(f"--set {twice[0]}: --{name} sets it as well, allowed: one of both")
+    given = [f"{name}={value}" for name, value in options.items() if value is not None]
+    return [*overrides, *given]
 
 
 def _check_beside(mode: str, plant: str, own_nodes: Sequence[str], *, under_laws: bool) -> None:

@@ -21,7 +21,7 @@ cspm new my_robot
 
 cspm new gantry --kind crossed --size 4,3,2.5 --mass 12
 
-Exit code: 0 done, 2 unusable input."""
+Exit code: 0 done, 2 unusable input, 130 interrupted."""
 )
 def new(
     name: Annotated[str, typer.Argument(metavar="NAME", help="The robot's name.")],
@@ -33,7 +33,7 @@ def new(
     run: Annotated[bool, typer.Option(help="Whether to run the scenario.")] = True,
     json: Json = None,
 ) -> None:
-    """Write the first test-bed and scenario of your own robot, check, draw and run them."""
+    """Begin a robot of your own. Write its test-bed and scenario, check, draw and run them."""
     from cspm.commands.new_command import new_command
 
     try:

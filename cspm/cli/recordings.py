@@ -18,7 +18,7 @@ def info(
     ],
     json: Json = None,
 ) -> None:
-    """Show a recording's topics, rates in Hz, longest gaps in ms, duration and scenario."""
+    """Summarise a recording. Topics, rates in Hz, longest gaps in ms, duration, scenario."""
     from cspm.commands.info_command import info_command
 
     info_command(bag, json)
@@ -42,7 +42,7 @@ def recover(
     ] = None,
     json: Json = None,
 ) -> None:
-    """Restore a recording whose writer was killed, with its index and metadata.
+    """Restore a recording that was cut off. With its index and metadata.
 
     At most the last 0.2 s before the kill are lost.
     """
@@ -71,7 +71,7 @@ def resim(
     ] = None,
     json: Json = None,
 ) -> None:
-    """Repeat a run from its recording alone, and say whether every message is identical.
+    """Repeat a run from its recording. Say whether every message is identical.
 
     Bit for bit, in every field. Otherwise the first difference is printed: topic, message, field.
     """
@@ -88,7 +88,7 @@ cspm import lab.csv --mapping lab_mapping.yaml --testbed my_rig.yaml --dry-run
 
 cspm import DATA_EMPS.mat --mapping emps --testbed emps --out emps
 
-Exit code: 0 done, 2 unusable input.""",
+Exit code: 0 done, 2 unusable input, 130 interrupted.""",
 )
 def import_(
     file: Annotated[
@@ -116,7 +116,7 @@ def import_(
     ] = False,
     json: Json = None,
 ) -> None:
-    """Turn a recording of others into one of the contract; every conversion is shown.
+    """Turn a table or bag into a recording. Every conversion is shown.
 
     What looks wrong is reported: units, signs, gaps, clocks. Nothing is interpolated.
     """

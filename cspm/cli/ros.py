@@ -22,7 +22,7 @@ cspm node plant --ros-args -p scenario:=calm
 cspm node recorder --ros-args -p scenario:=calm -p folder:=calm_run""",
 )
 def node(context: typer.Context) -> None:
-    """Run one node of the graph: plant, wave_trajectory, motion_controller, … (cspm node --help).
+    """Run one node of the ROS 2 graph. Such as plant, wave_trajectory or motion_controller.
 
     Everything it needs to know are ROS 2 parameters; `--ros-args --params-file FILE` reads them.
     """
@@ -113,7 +113,7 @@ def replay(
     ] = None,
     json: Json = None,
 ) -> None:
-    """Play a bag to the ROS 2 graph, with /clock, or through nodes to compare their commands.
+    """Play a recording to the ROS 2 graph. With /clock, or through nodes to compare commands.
 
     The services /player/pause (std_srvs/SetBool) and /player/step (std_srvs/Trigger) steer it too.
     """
@@ -183,7 +183,7 @@ def check_drivers(
     ] = None,
     json: Json = None,
 ) -> None:
-    """Listen to somebody's drivers, and say what does not fit the machine and the contract.
+    """Listen to drivers, and judge them. Say what fits neither machine nor contract.
 
     Per topic: type, quality of service, names, rate, jitter, stamps, units, signs; and whether the
     topics agree with each other and with the machine's geometry. A bar that moves shows more.
@@ -207,7 +207,7 @@ cspm inject cable_cut --on hoist_1
 
 cspm inject node_killed --on force_controller
 
-Exit code: 0 the run has it, 1 no answer, 2 unusable input."""
+Exit code: 0 the run has it, 1 no answer, 2 unusable input, 130 interrupted."""
 )
 def inject(
     fault: Annotated[
@@ -235,7 +235,7 @@ def inject(
     ] = None,
     json: Json = None,
 ) -> None:
-    """Let something fail in a run in real time that is under way, to see what the rest does.
+    """Let a part fail in a real-time run. It is under way, and you see what the rest does.
 
     Faults are recorded in /diagnostics. A scenario's `faults:` has them at given times, in every
     mode.
@@ -252,7 +252,7 @@ cspm urdf thesis > thesis.urdf
 
 cspm urdf lab.yaml --out lab.urdf
 
-Exit code: 0 done, 2 unusable input."""
+Exit code: 0 done, 2 unusable input, 130 interrupted."""
 )
 def urdf(
     testbed: Annotated[
@@ -263,7 +263,7 @@ def urdf(
         typer.Option(metavar="FILE", help="A new file; without it to standard output."),
     ] = None,
 ) -> None:
-    """Write a machine as URDF, for robot_state_publisher, RViz, Foxglove and ros2_control.
+    """Write a machine as URDF. For robot_state_publisher, RViz, Foxglove and ros2_control.
 
     Its joints are the winches, named as in /winches/state. Bar, target and winch frame are joints
     of the type floating: their poses come on topics, not from angles.

@@ -32,7 +32,7 @@ Browser = Annotated[
     ),
 ]
 
-_CODES = "Exit code: 0 done, 1 failed, 2 unusable input."
+_CODES = "Exit code: 0 done, 1 failed, 2 unusable input, 130 interrupted."
 
 
 def add_shared_options(command: Any) -> None:  # noqa: ANN401 - a command or a group of commands

@@ -29,7 +29,7 @@ cspm view today --diagnosis verdict --html today.html
 
 cspm view measured simulated
 
-Exit code: 0 done, 2 unusable input."""
+Exit code: 0 done, 2 unusable input, 130 interrupted."""
 )
 def view(
     recordings: Annotated[
@@ -64,7 +64,7 @@ def view(
     browser: Browser = None,
     json: Json = None,
 ) -> None:
-    """Show a recording: the machine in 3-D beside its signals, with a timeline.
+    """Show a recording in 3-D. The machine beside its signals, with a timeline.
 
     Serves a page to browsers on this computer, or writes it as one file.
     """

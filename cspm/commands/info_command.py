@@ -10,33 +10,23 @@ from rich.console import Console
 from rich.markup import escape
 from rich.table import Table
 
-from cspm_msgs_py.recording.overview import Overview, overview
+from cspm_msgs_py.recording.overview import Overview, TopicOverview, overview
 from cspm_msgs_py.recording.recover import recover
 from cspm_msgs_py.recording.run_record import RECORD_NAME, SIM
 from cspm_run.output.console import make_console, say
 from cspm_run.output.json_file import write_json
+
+_NUMBERS = ("messages", "rate [Hz]", "longest gap [ms]", "at [s]")
+# What the type of a message needs at least to be recognised, in characters.
+_LEAST_TYPE = 16
+_ROOM = 1000
 
 
 def info_command(bag: Path, json: Path | None) -> None:
     """Print a summary of a recording."""
     console = make_console()
     found = overview(bag)
-    table = Table(title=escape(str(found.path)), box=box.SIMPLE)
-    table.add_column("topic", no_wrap=True)
-    # The one that gives way where the terminal is narrow.
-    table.add_column("type", overflow="ellipsis")
-    for column in ("messages", "rate [Hz]", "longest gap [ms]", "at [s]"):
-        table.add_column(escape(column), justify="right", no_wrap=True)
-    for topic in found.topics:
-        table.add_row(
-            escape(topic.name),
-            escape(topic.ros_type),
-            str(topic.count),
-            "" if topic.rate_hz is None else f"{topic.rate_hz:.1f}",
-            "" if topic.gap_ns is None else f"{topic.gap_ns * 1e-6:.3f}",
-            "" if topic.gap_at_ns is None else f"{(topic.gap_at_ns - found.start_ns) * 1e-9:.3f}",
-        )
-    console.print(table)
+    say_topics(console, found)
     say(
         console,
         f"{found.message_count} messages over {found.duration_s:.3f} s,"
@@ -60,6 +50,39 @@ def info_command(bag: Path, json: Path | None) -> None:
     _say_troubles(console, bag, found)
     if json is not None:
         write_json(json, dataclasses.asdict(found) | {"path": str(found.path)})
+
+
+def say_topics(console: Console, found: Overview) -> None:
+    """Print a table of the topics, or a paragraph each where the terminal is too narrow for it."""
+    table = Table(title=escape(str(found.path)), box=box.SIMPLE)
+    table.add_column("topic", no_wrap=True)
+    # The one that gives way.
+    table.add_column("type", overflow="ellipsis")
+    for column in _NUMBERS:
+        table.add_column(escape(column), justify="right", no_wrap=True)
+    for topic in found.topics:
+        table.add_row(escape(topic.name), escape(topic.ros_type), *_numbers(topic, found.start_ns))
+    longest_type = max((len(topic.ros_type) for topic in found.topics), default=0)
+    # Measured as if there were room, since a measure ends at the width of the terminal.
+    whole = console.measure(table, options=console.options.update(max_width=_ROOM)).maximum
+    if whole - longest_type + _LEAST_TYPE <= console.width:
+        console.print(table)
+        return
+    say(console, str(found.path))
+    for topic in found.topics:
+        count, rate, gap, at = _numbers(topic, found.start_ns)
+        often = f", {rate} Hz" if rate else ""
+        longest_gap = f", gap ≤ {gap} ms at {at} s" if gap else ""
+        say(console, f"{topic.name}\n  {topic.ros_type}\n  {count} messages{often}{longest_gap}")
+
+
+def _numbers(topic: TopicOverview, start_ns: int) -> tuple[str, str, str, str]:
+    return (
+        str(topic.count),
+        "" if topic.rate_hz is None else f"{topic.rate_hz:.1f}",
+        "" if topic.gap_ns is None else f"{topic.gap_ns * 1e-6:.3f}",
+        "" if topic.gap_at_ns is None else f"{(topic.gap_at_ns - start_ns) * 1e-9:.3f}",
+    )
 
 
 def _say_troubles(console: Console, bag: Path, found: Overview) -> None:

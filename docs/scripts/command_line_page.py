@@ -37,7 +37,8 @@ _HEAD = """\
 # Command line
 
 Every command with its arguments and options, as `cspm COMMAND --help` shows them. Exit codes: 0
-done, 1 the result is negative or incomplete, 2 unusable input.
+done, 1 the result is negative or incomplete, 2 unusable input, 130 interrupted by Ctrl-C before
+there was a result.
 
 This page is generated: `python docs/scripts/command_line_page.py`.
 """

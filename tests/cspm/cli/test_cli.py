@@ -169,6 +169,13 @@ def test_unknown_scenarios_list_the_known(refused):
     line = refused("run", "storm")
     assert line.startswith("storm: no such scenario, allowed: calm, ")
     assert line.endswith(" or a file")
+    assert refused("run", "clam").endswith(" or a file; did you mean calm?")
+
+
+def test_a_value_is_set_once(refused):
+    line = refused("run", "rest", "--duration", "1", "--set", "duration=-1")
+    assert line == "--set duration=-1: --duration sets it as well, allowed: one of both"
+    assert refused("run", "rest", "--set", "duration=-1").startswith(f"{REST}: duration: ")
 
 
 def test_folders_that_cannot_be_had(refused, tmp_path):

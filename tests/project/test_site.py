@@ -6,11 +6,13 @@ import subprocess
 import sys
 from html.parser import HTMLParser
 from pathlib import Path
+from types import SimpleNamespace
 from urllib.parse import unquote, urlsplit
 
 import pytest
 from accessibility import serious_findings
 from driven_browser import driven_browser
+from mkdocs.utils import dirname_to_title
 
 ROOT = Path(__file__).resolve().parents[2]
 LEADS = {"a": "href", "img": "src", "link": "href", "script": "src"}
@@ -134,3 +136,17 @@ def test_pages_of_each_kind_can_be_read_by_all(site: Path, scheme: str, tmp_path
             # Colours change in an eighth of a second.
             browser.run("await Promise.all(document.getAnimations().map(each => each.finished))")
             assert (page, serious_findings(browser)) == (page, [])
+
+
+def test_tutorials_are_listed_before_decisions(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.syspath_prepend(str(ROOT / "docs" / "scripts"))
+    hook = importlib.import_module("site_links")
+    names = ("", "Decisions", "Explanation", "How to", "Reference", "Tutorials")
+    items = [SimpleNamespace(title=name, is_section=bool(name)) for name in names]
+    nav = hook.on_nav(SimpleNamespace(items=items))
+    found = [item.title for item in nav.items]
+    assert found == ["", "Tutorials", "How to", "Reference", "Explanation", "Decisions"]
+    folders = {
+        dirname_to_title(place.name) for place in (ROOT / "docs").iterdir() if place.is_dir()
+    }
+    assert set(hook.SECTIONS) <= folders

@@ -94,6 +94,11 @@ class Run(Signals):
         return self._result.simulated
 
     @property
+    def alarms(self) -> tuple[str, ...]:
+        """Return the lines of `summary["warnings"]` but that on the time spent at limits."""
+        return self._result.warnings
+
+    @property
     def summary(self) -> dict[str, Any]:
         """Return what `summary.json` holds; see `docs/reference/contract.md`."""
         return summary_data(self._result)
@@ -204,7 +209,8 @@ def simulate(
     Warns:
         RuntimeWarning: the run failed on its way, as `Run.failure` has it; what there is up to then
             is returned.
-        UserWarning: a cable carried, or may carry, more than its breaking force allows.
+        UserWarning: a cable carried, or may carry, more than its breaking force allows; the loops
+            are not stable, or a limit cycle stayed.
 
     Examples:
         >>> import cspm
@@ -308,7 +314,7 @@ def warn_of(run: Run, *, stacklevel: int) -> None:
     name = run.summary["scenario"]
     if run.failure is not None:
         warnings.warn(f"{name}: {run.failure}", RuntimeWarning, stacklevel=stacklevel)
-    for line in run.summary["warnings"]:
+    for line in run.alarms:
         warnings.warn(f"{name}: {line}", UserWarning, stacklevel=stacklevel)
 
 

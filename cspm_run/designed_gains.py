@@ -2,10 +2,13 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass, field
 from functools import lru_cache
 
 from cspm_control.design.gains import (
+    BANDWIDTH_RATIO,
+    MOTION_BANDWIDTH,
     check_separation,
     design_force_gains,
     design_motion_gains,
@@ -17,6 +20,7 @@ from cspm_control.design.state_feedback import design_feedback_gains
 from cspm_control.stages.make import controlled_axes
 from cspm_model.parameters import nominal_parameters
 from cspm_msgs_py.dofs import Dof
+from cspm_msgs_py.errors import InputError
 from cspm_msgs_py.scenario import (
     ClosedLoop,
     FeedbackControl,
@@ -26,7 +30,11 @@ from cspm_msgs_py.scenario import (
 )
 from cspm_msgs_py.schedule import BAR_POSE
 from cspm_msgs_py.testbed import Testbed
+from cspm_run.stability.loop_growth import loop_growth
 
+# By what the bandwidth is lowered, step by step, where the loops are not stable together; and by
+# what their gains may then rise at once: the 6 dB of one loop.
+LOWERED, SPARE_GAIN = 0.8, 2.0
 # Machines and controllers whose gains are kept: runs that differ in their seeds share a design.
 _KEPT = 64
 
@@ -97,16 +105,78 @@ def _motion_gains(
     if designed and wanted:
         check_separation(motion_margins(testbed, parameters, pose, wanted, axes), force)
     wanted |= motion.gains or {}
-    widest = design_widest_gains(
-        testbed,
-        parameters,
-        pose,
-        [dof for dof in motion.controlled if dof not in wanted],
-        dead_time=_motion_dead_time(scenario, testbed),
-        force_bandwidth=min(found.bandwidth for found in force.values()),
-        axes=axes,
-    )
-    return {dof: wanted.get(dof) or widest[dof] for dof in motion.controlled}
+    left = [dof for dof in motion.controlled if dof not in wanted]
+    if not left:
+        return {dof: wanted[dof] for dof in motion.controlled}
+
+    def with_widest(force_bandwidth: float) -> dict[Dof, PidGains]:
+        widest = design_widest_gains(
+            testbed,
+            parameters,
+            pose,
+            left,
+            dead_time=_motion_dead_time(scenario, testbed),
+            force_bandwidth=force_bandwidth,
+            axes=axes,
+        )
+        return {dof: wanted.get(dof) or widest[dof] for dof in motion.controlled}
+
+    slowest = min(found.bandwidth for found in force.values())
+    return _stable(control, scenario, testbed, with_widest, slowest)
+
+
+def _stable(
+    control: ClosedLoop,
+    scenario: Scenario,
+    testbed: Testbed,
+    design: Callable[[float], dict[Dof, PidGains]],
+    slowest: float,
+) -> dict[Dof, PidGains]:
+    """Return the motion gains of the largest bandwidth that is stable with all loops closed.
+
+    The procedure of section 7-1 looks at each loop by itself, with cables that do not turn. Where
+    its gains are not stable together, motion loops are designed as for slower force loops, until
+    twice their gains are stable; where none are, they stay what they are, and a run says so.
+
+    Args:
+        control: with the gains of its force controllers.
+        scenario: whose rates and sensors count.
+        testbed: the machine.
+        design: returns gains by the bandwidth of the slowest force loop [rad/s].
+        slowest: that bandwidth.
+
+    Raises:
+        InputError: no gains meet what is asked for.
+    """
+    gains = design(slowest)
+    if not _unstable(control, scenario, testbed, gains):
+        return gains
+    bandwidth = LOWERED * slowest
+    while bandwidth >= BANDWIDTH_RATIO * MOTION_BANDWIDTH:
+        try:
+            slower = design(bandwidth)
+        except InputError:
+            break
+        raised = {dof: _times(SPARE_GAIN, pid) for dof, pid in slower.items()}
+        if not any(_unstable(control, scenario, testbed, each) for each in (slower, raised)):
+            return slower
+        bandwidth *= LOWERED
+    return gains
+
+
+def _unstable(
+    control: ClosedLoop, scenario: Scenario, testbed: Testbed, gains: dict[Dof, PidGains]
+) -> bool:
+    """Return whether motion gains are known not to be stable at the design pose."""
+    motion = control.motion.model_copy(update={"gains": gains})
+    control = control.model_copy(update={"motion": motion})
+    designed = scenario.model_copy(update={"control": control, "controllers": {}})
+    found = loop_growth(designed, testbed)
+    return found is not None and found.unstable
+
+
+def _times(factor: float, pid: PidGains) -> PidGains:
+    return PidGains(kp=factor * pid.kp, ki=factor * pid.ki, kd=factor * pid.kd)
 
 
 def _motion_dead_time(scenario: Scenario, testbed: Testbed) -> float:

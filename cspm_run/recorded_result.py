@@ -4,13 +4,13 @@ from __future__ import annotations
 
 from pathlib import Path
 
-from cspm_model.cable_strength import strength_warnings
 from cspm_msgs_py.recording.overview import overview
 from cspm_run.bundle import Bundle
 from cspm_run.controlled_dofs import controlled_dofs
 from cspm_run.recorded_statistics import recording_statistics
 from cspm_run.recorded_timing import first_alarm, timing_of, torque_delays
 from cspm_run.run_result import RunResult
+from cspm_run.stability.run_warnings import limits_met, run_warnings
 
 
 def recorded_result(
@@ -47,7 +47,8 @@ def recorded_result(
         has_bar=testbed.bar is not None,
         interrupted=interrupted and failure is None,
         failure=failure or first_alarm(folder),
-        warnings=strength_warnings(testbed, statistics.highest_tensions),
+        warnings=run_warnings(scenario, testbed, statistics, late=timed),
+        limits_met=limits_met(scenario, statistics),
         timing=timing_of(folder) if timed else {},
         delays=torque_delays(folder) if timed else None,
     )

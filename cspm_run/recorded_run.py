@@ -7,7 +7,6 @@ from importlib.metadata import version
 from pathlib import Path
 from typing import Protocol
 
-from cspm_model.cable_strength import strength_warnings
 from cspm_msgs_py.diagnostics import Level, Status, encode_diagnostics
 from cspm_msgs_py.errors import ControllerError, DivergenceError
 from cspm_msgs_py.interruption import interruptible
@@ -23,6 +22,7 @@ from cspm_run.loop import Loop
 from cspm_run.recorded_scene import RecordedScene
 from cspm_run.run_result import RunResult
 from cspm_run.run_statistics import RunStatistics
+from cspm_run.stability.run_warnings import limits_met, run_warnings
 from cspm_run.stepping import Stepping
 from cspm_sim.simulator import Publish
 
@@ -188,7 +188,7 @@ def simulate(
         hardware_id: in statuses; None for the machine's name.
     """
     scenario, plant = parts.scenario, parts.plant
-    statistics = RunStatistics(steps, len(plant.tensions))
+    statistics = RunStatistics(steps, len(plant.tensions), parts.period_ns * 1e-9)
     publish: Mapping[str, Publish] = {}
     take: Mapping[str, TakeBlock] = {}
     if writer is not None:
@@ -232,5 +232,6 @@ def simulate(
         has_bar=parts.testbed.bar is not None,
         interrupted=stopped and failure is None,
         failure=failure or (alarms[0] if alarms else None),
-        warnings=strength_warnings(parts.testbed, statistics.highest_tensions),
+        warnings=run_warnings(scenario, parts.testbed, statistics),
+        limits_met=limits_met(scenario, statistics),
     )

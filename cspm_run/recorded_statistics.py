@@ -11,10 +11,16 @@ from numpy.typing import NDArray
 from cspm_msgs_py.diagnostics import decode_diagnostics
 from cspm_msgs_py.recording.reader import Recording
 from cspm_msgs_py.recording.rows import Rows
-from cspm_msgs_py.schedule import BAR_POSE, BAR_REFERENCE, TENSION, TENSION_DISTRIBUTION
+from cspm_msgs_py.schedule import (
+    BAR_POSE,
+    BAR_REFERENCE,
+    TENSION,
+    TENSION_DISTRIBUTION,
+    TORQUE_COMMAND,
+)
 from cspm_msgs_py.testbed import Testbed
 from cspm_msgs_py.topics import DIAGNOSTICS
-from cspm_run.run_statistics import RunStatistics
+from cspm_run.run_statistics import KEPT_PERIOD, RunStatistics, torque_limits
 
 Array = NDArray[np.float64]
 
@@ -31,7 +37,8 @@ def recording_statistics(path: Path, testbed: Testbed) -> RunStatistics:
         counts = {name: topic.count for name, topic in recording.topics.items()}
         tension = _present(counts, TENSION)
         pose = _present(counts, BAR_POSE)
-        names = [name for name in (tension, pose, BAR_REFERENCE) if name and counts.get(name)]
+        wanted = (tension, pose, BAR_REFERENCE, TORQUE_COMMAND)
+        names = [name for name in wanted if name and counts.get(name)]
         rows = recording.rows_of(names)
         shares = _infeasible_shares(recording) if counts.get(DIAGNOSTICS.name) else np.zeros(0)
     if tension is None:
@@ -45,10 +52,23 @@ def recording_statistics(path: Path, testbed: Testbed) -> RunStatistics:
     infeasible[: round(float(shares.mean() * steps)) if len(shares) else 0] = True
     limit = np.array([0.0 if cable.has_cable else -1.0 for cable in testbed.cables])
     slack = np.any(tensions.rows <= limit, axis=1)
-    statistics = RunStatistics(steps, tensions.rows.shape[1])
+    saturated = _saturated(tensions.log_ns, rows.get(TORQUE_COMMAND), testbed)
+    period = 1e-9 * float(np.median(np.diff(tensions.log_ns))) if steps > 1 else KEPT_PERIOD
+    statistics = RunStatistics(steps, tensions.rows.shape[1], period)
     for i in range(steps):
-        statistics.add(errors[i], tensions.rows[i], bool(slack[i]), bool(infeasible[i]))
+        met = bool(slack[i]), bool(infeasible[i]), bool(saturated[i])
+        statistics.add(errors[i], tensions.rows[i], *met)
     return statistics
+
+
+def _saturated(
+    at_ns: NDArray[np.int64], torques: Rows | None, testbed: Testbed
+) -> NDArray[np.bool_]:
+    """Return at which instants a motor is commanded its torque limit, (k,)."""
+    if torques is None or not len(torques.rows):
+        return np.zeros(len(at_ns), dtype=bool)
+    found = np.abs(_held(at_ns, torques)) >= torque_limits(testbed)
+    return np.asarray(found.any(axis=1))
 
 
 def _present(counts: dict[str, int], name: str) -> str | None:

@@ -27,6 +27,7 @@ class RunResult:
         interrupted: whether the user ended it early.
         failure: what went wrong, in one line, if anything did.
         warnings: what is not as it should be though the run went on, a line each.
+        limits_met: a line on how much of the time a closed loop was at a limit, if it matters.
         timing: in real time, what each node reported of its deadlines and inputs, by node.
         delays: in real time, how late torque commands came to the simulated plant.
     """
@@ -44,6 +45,7 @@ class RunResult:
     interrupted: bool = False
     failure: str | None = None
     warnings: tuple[str, ...] = ()
+    limits_met: str | None = None
     timing: dict[str, dict[str, float]] = field(default_factory=dict)
     delays: DelayHistogram | None = None
 

@@ -6,9 +6,13 @@ import numpy as np
 from numba import njit
 from numpy.typing import NDArray
 
+from cspm_msgs_py.testbed import Testbed
+
 Array = NDArray[np.float64]
 
 BINS = 2000
+# Tensions that are kept of the end: four seconds at a thousand instants per second.
+KEPT, KEPT_PERIOD = 4096, 1e-3
 
 
 class RunStatistics:
@@ -18,26 +22,46 @@ class RunStatistics:
         envelope: shape (BINS, 2, 6 + n): lowest and highest pose error and tension per time bin.
         bin_steps: plant steps per bin.
         squares: sums of the squared pose errors, (6,).
-        counts: steps, and those with a slack cable and with an infeasible wrench.
+        counts: steps, and those with a slack cable, with an infeasible wrench and with a motor at its
+            limit.
+        kept: tensions (KEPT, n) [N], one instant of `kept_steps`; the oldest are replaced.
+        kept_steps: from one instant that is kept to the next.
+        period: of a step [s].
     """
 
-    def __init__(self, steps: int, n_cables: int) -> None:
-        """Prepare for `steps` steps of a machine with `n_cables` cables."""
+    def __init__(self, steps: int, n_cables: int, period: float = KEPT_PERIOD) -> None:
+        """Prepare for `steps` steps of `period` [s] of a machine with `n_cables` cables."""
         self.bin_steps = max(1, -(-steps // BINS))
         self.envelope: Array = np.empty((BINS, 2, 6 + n_cables))
         self.envelope[:, 0], self.envelope[:, 1] = np.inf, -np.inf
         self.squares = np.zeros(6)
-        self.counts = np.zeros(3, dtype=np.int64)
+        self.counts = np.zeros(4, dtype=np.int64)
+        self.kept_steps = max(1, round(KEPT_PERIOD / period))
+        self.period = period
+        self.kept: Array = np.zeros((KEPT, n_cables))
 
-    def add(self, error: Array, tensions: Array, slack: bool, infeasible: bool) -> None:
+    def add(
+        self,
+        error: Array,
+        tensions: Array,
+        slack: bool,
+        infeasible: bool,
+        saturated: bool = False,
+    ) -> None:
         """Count one step with pose error (6,) [m, rad] and tensions (n,) [N]."""
         add_step(self.envelope[self.steps // self.bin_steps], error, tensions, self.squares)
-        self.counts += (1, slack, infeasible)
+        keep_step(self.kept, self.steps, self.kept_steps, tensions)
+        self.counts += (1, slack, infeasible, saturated)
 
     @property
     def steps(self) -> int:
         """How many steps were counted."""
         return int(self.counts[0])
+
+    @property
+    def span(self) -> float:
+        """Time that was counted [s]."""
+        return self.steps * self.period
 
     @property
     def max_error(self) -> Array:
@@ -78,6 +102,22 @@ class RunStatistics:
         """Share of time with a wrench that no allowed tensions give."""
         return float(self.counts[2] / max(1, self.steps))
 
+    @property
+    def saturated_share(self) -> float:
+        """Share of time with any motor at its torque limit."""
+        return float(self.counts[3] / max(1, self.steps))
+
+    @property
+    def kept_period(self) -> float:
+        """From one instant that is kept to the next [s]."""
+        return self.kept_steps * self.period
+
+    @property
+    def last_tensions(self) -> Array:
+        """The tensions kept of the end, (k, n) [N], the oldest first."""
+        count = -(-self.steps // self.kept_steps)
+        return self.kept[:count] if count <= KEPT else np.roll(self.kept, -(count % KEPT), axis=0)
+
     def _used(self) -> Array:
         return self.envelope[: -(-self.steps // self.bin_steps)]
 
@@ -92,3 +132,26 @@ def add_step(envelope: Array, error: Array, tensions: Array, squares: Array) -> 
     for i in range(tensions.shape[0]):
         envelope[0, 6 + i] = min(envelope[0, 6 + i], tensions[i])
         envelope[1, 6 + i] = max(envelope[1, 6 + i], tensions[i])
+
+
+@njit(cache=True)
+def keep_step(kept: Array, step: int, kept_steps: int, tensions: Array) -> None:
+    """Keep the tensions (n,) of a step in `kept` (k, n), if it is one of those that are kept."""
+    if step % kept_steps == 0:
+        row = kept[step // kept_steps % kept.shape[0]]
+        for i in range(tensions.shape[0]):
+            row[i] = tensions[i]
+
+
+def torque_limits(testbed: Testbed) -> Array:
+    """Return the largest torque of each motor, (n,) [N·m]."""
+    return np.array([cable.torque_limit for cable in testbed.cables], dtype=float)
+
+
+@njit(cache=True)
+def any_at_limit(torques: Array, limits: Array) -> bool:
+    """Return whether any of the torques (n,) is at its limit (n,), or beyond it [N·m]."""
+    found = 0
+    for i in range(limits.shape[0]):
+        found += abs(torques[i]) >= limits[i]
+    return found > 0

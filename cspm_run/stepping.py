@@ -10,7 +10,7 @@ import numpy as np
 from cspm_msgs_py.recording.writer import BLOCK_NS
 from cspm_run.compiled.compiled_loop import CompiledLoop, TakeBlock, first_compiled_step
 from cspm_run.loop import Loop
-from cspm_run.run_statistics import RunStatistics
+from cspm_run.run_statistics import RunStatistics, any_at_limit, torque_limits
 from cspm_sim.plant import Plant
 
 PROGRESS_STEPS = 50
@@ -35,6 +35,7 @@ class Stepping:
             steps: of the plant.
         """
         self._loop, self._statistics, self._take, self._steps = loop, statistics, take, steps
+        self._limits = torque_limits(loop.parts.testbed)
         self._compiled: CompiledLoop | None = None
         self.elapsed = 0.0
 
@@ -85,4 +86,5 @@ class Stepping:
             bar_pose, tensions = plant.bar_state[:6].copy(), plant.tensions.copy()
             loop.step()
             error = zero if reference is None else reference[:6] - bar_pose
-            self._statistics.add(error, tensions, loop.slack, loop.infeasible)
+            saturated = any_at_limit(loop.simulator.torque, self._limits)
+            self._statistics.add(error, tensions, loop.slack, loop.infeasible, saturated)

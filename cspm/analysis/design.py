@@ -16,12 +16,13 @@ from cspm.testbed import AnyTestbed
 from cspm_control.analysis.cable_groups import cable_groups
 from cspm_control.analysis.loop_view import LoopView
 from cspm_control.analysis.loops import LoopAnalysis, analyse_loops, pid_law
-from cspm_control.analysis.sampled_loops import LoopTiming, loop_timing
+from cspm_control.analysis.sampled_loops import LoopTiming
 from cspm_msgs_py.control_spec.force import PiGains
 from cspm_msgs_py.errors import InputError
 from cspm_msgs_py.new_folder import new_folder
 from cspm_msgs_py.scenario import ClosedLoop
 from cspm_run.assembly import resolve
+from cspm_run.stability.loop_growth import period_of_force, timing_of
 
 PICTURES = ("motion_loops.png", "force_loops.png")
 # Gains of cables of one kind that differ by less, as a share, are shown once.
@@ -135,10 +136,8 @@ def _closed_loop(
     # The gains are those of the design pose; how they do is checked here.
     motion = designed.motion.model_copy(update={"design_pose": machine.pose})
     control = designed.model_copy(update={"motion": motion})
-    ideal = scenario.sensors == "ideal"
-    delays = {} if ideal else {name: each.delay for name, each in machine.testbed.sensors.items()}
-    late = 1.0 / scenario.rates.force_controller if computing is None else computing
-    return control, loop_timing(scenario.rates, delays, late)
+    late = period_of_force(scenario.rates) if computing is None else computing
+    return control, timing_of(scenario, machine.testbed, late)
 
 
 def _data(

@@ -34,7 +34,7 @@ from cspm_msgs_py.schedule import MOTION_CONTROLLER
 from cspm_run.bundle import Bundle
 from cspm_run.output.console import make_console, say
 from cspm_run.output.json_file import write_json
-from cspm_run.output.summary import summary_data
+from cspm_run.output.summary import summary_data, warned
 from cspm_run.recorded_run import run
 from cspm_run.run_result import RunResult
 from cspm_run.stage_warm_up import compile_apart, is_compiled
@@ -167,7 +167,7 @@ def _check_laws(paths: Sequence[Path], overrides: Sequence[str], laws: Sequence[
 def _show(console: Console, results: Mapping[str, RunResult], requirement: Requirement) -> None:
     console.print(beside_table(results, requirement))
     for name, result in results.items():
-        for line in result.warnings:
+        for line in warned(result):
             say(console, f"warning: {name}: {line}")
 
 

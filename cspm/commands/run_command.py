@@ -32,6 +32,7 @@ from cspm_run.output.summary import print_summary, summary_data
 from cspm_run.recorded_run import INPROCESS, run
 from cspm_run.resim import resimulate
 from cspm_run.run_result import RunResult
+from cspm_run.stability.run_warnings import unstable_line
 from cspm_run.stage_warm_up import compile_beside
 
 
@@ -74,7 +75,9 @@ def run_command(
     options.check(bundle)
     refuse_existing(folder)
     runner = options.runner(console)
-    for line in limit_warnings(bundle.testbed.testbed):
+    testbed = bundle.testbed.testbed
+    unstable = unstable_line(bundle.scenario, testbed, late=mode == REALTIME)
+    for line in (*limit_warnings(testbed), *([unstable] if unstable else [])):
         say(Console(stderr=True), f"warning: {line}")
     for line in free_of(bundle):
         say(console, line)

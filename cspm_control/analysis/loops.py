@@ -161,9 +161,20 @@ def sampled_force(testbed: Testbed, control: ClosedLoop, timing: LoopTiming) -> 
     return found
 
 
-def _cascaded_motion(
+def cascade_growth(
     testbed: Testbed, control: ClosedLoop, timing: LoopTiming
-) -> tuple[dict[str, LoopView], tuple[float, float]]:
+) -> tuple[float, float]:
+    """Return how fast the slowest motion changes with all loops closed, as in `LoopAnalysis`.
+
+    Arguments and errors as `analyse_loops`, torques late by `timing`.
+    """
+    return _growth(_cascade(testbed, control, timing)[1])
+
+
+def _cascade(
+    testbed: Testbed, control: ClosedLoop, timing: LoopTiming
+) -> tuple[SampledSystem, SampledSystem]:
+    """Return wanted wrench to pose with the force loops closed, and with all loops closed."""
     parameters, motion = nominal_parameters(testbed), pid_law(control)
     point = operating_point(testbed, parameters, motion.design_pose)
     model = linear_model(testbed, parameters, point, exact=True)
@@ -171,7 +182,14 @@ def _cascaded_motion(
     gains = {name: (control.force.gains or {})[name] for name in testbed.cable_names}
     axes = controlled_axes(control)
     plant = cascade_plant(model, parameters, point, rows, timing, gains, axes)
-    everything = closed(plant, motion_controllers(motion, plant.period, axes))
+    return plant, closed(plant, motion_controllers(motion, plant.period, axes))
+
+
+def _cascaded_motion(
+    testbed: Testbed, control: ClosedLoop, timing: LoopTiming
+) -> tuple[dict[str, LoopView], tuple[float, float]]:
+    motion, axes = pid_law(control), controlled_axes(control)
+    plant, everything = _cascade(testbed, control, timing)
     found = {}
     for dof, pid in (motion.gains or {}).items():
         output = slice(DOFS.index(dof), DOFS.index(dof) + 1)

@@ -36,13 +36,18 @@ def summary_data(result: RunResult) -> dict[str, Any]:
         "infeasible_share": statistics.infeasible_share,
         "controlled": list(result.controlled),
         "messages": result.messages,
-        "warnings": list(result.warnings),
+        "warnings": warned(result),
     }
     if result.timing:
         found["realtime"] = result.timing
     if result.delays is not None:
         found["torque_delays"] = {"up_to_ms": [*UP_TO_MS, None], "commands": result.delays.counts}
     return found
+
+
+def warned(result: RunResult) -> list[str]:
+    """Return all that a run warns of, a line each."""
+    return [*result.warnings, *([result.limits_met] if result.limits_met else [])]
 
 
 def print_summary(console: Console, result: RunResult, requirement: Requirement) -> None:
@@ -63,7 +68,7 @@ def print_summary(console: Console, result: RunResult, requirement: Requirement)
         f" infeasible (tension limits) {data['infeasible_share']:.1%} of the time",
         soft_wrap=True,
     )
-    for line in result.warnings:
+    for line in warned(result):
         say(console, f"warning: {line}")
     console.print(f"simulated {result.simulated:g} s at {result.real_time_factor:.1f} × real time")
 

@@ -29,6 +29,10 @@ def assert_equal(kept, found):
     np.testing.assert_allclose(found.rms_error, kept.rms_error, rtol=1e-9, atol=1e-14)
     assert found.tension_range == kept.tension_range
     assert found.slack_share == kept.slack_share
+    assert found.saturated_share == pytest.approx(kept.saturated_share, abs=2.0 / kept.steps)
+    assert found.kept_steps == kept.kept_steps
+    assert found.period == pytest.approx(kept.period)
+    np.testing.assert_array_equal(found.last_tensions, kept.last_tensions)
     assert found.bin_steps == kept.bin_steps
     np.testing.assert_allclose(found.envelope, kept.envelope, rtol=1e-9, atol=1e-14)
 

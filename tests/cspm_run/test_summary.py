@@ -18,7 +18,7 @@ from cspm_msgs_py.stepping.delay_histogram import UP_TO_MS, DelayHistogram
 from cspm_run.output.json_file import write_json
 from cspm_run.output.summary import print_summary, summary_data
 from cspm_run.recorded_run import run
-from cspm_run.run_statistics import BINS, RunStatistics
+from cspm_run.run_statistics import BINS, KEPT, RunStatistics
 
 REQUIREMENT = Requirement()
 UNWINDING = "control={mode: torque, torque: {surge_1: {offset: -0.2}}}"
@@ -184,10 +184,12 @@ def test_tally_against_numpy():
     steps = 2 * BINS + 345
     errors, tensions = rng.normal(size=(steps, 6)), rng.uniform(1.0, 9.0, (steps, 3))
     slack, infeasible = rng.random(steps) < 0.3, rng.random(steps) < 0.6
+    saturated = rng.random(steps) < 0.2
     statistics = RunStatistics(steps, 3)
     assert statistics.bin_steps == 3
     for i in range(steps):
-        statistics.add(errors[i], tensions[i], bool(slack[i]), bool(infeasible[i]))
+        met = bool(slack[i]), bool(infeasible[i]), bool(saturated[i])
+        statistics.add(errors[i], tensions[i], *met)
     np.testing.assert_array_equal(statistics.max_error, np.abs(errors).max(axis=0))
     np.testing.assert_allclose(statistics.rms_error, np.sqrt((errors**2).mean(axis=0)), rtol=1e-12)
     assert statistics.tension_range == (tensions.min(), tensions.max())
@@ -195,6 +197,7 @@ def test_tally_against_numpy():
         slack.mean(),
         infeasible.mean(),
     )
+    assert statistics.saturated_share == saturated.mean()
     # The figure's envelope: lowest and highest of every three steps, also of the unfinished bin.
     for i in (0, 7, steps // 3):
         part = slice(3 * i, 3 * i + 3)
@@ -202,8 +205,23 @@ def test_tally_against_numpy():
         np.testing.assert_array_equal(statistics.envelope[i], [both.min(axis=0), both.max(axis=0)])
 
 
+@pytest.mark.parametrize(
+    ("steps", "period", "every"), [(9000, 1e-3, 1), (9001, 1e-4, 10), (300, 1e-4, 10), (7, 0.01, 1)]
+)
+def test_the_tensions_of_the_end_are_kept(steps, period, every):
+    tensions = np.random.default_rng(2).uniform(1.0, 9.0, (steps, 2))
+    statistics = RunStatistics(steps, 2, period)
+    for row in tensions:
+        statistics.add(np.zeros(6), row, False, False)
+    np.testing.assert_array_equal(statistics.last_tensions, tensions[::every][-KEPT:])
+    assert statistics.kept_period == pytest.approx(every * period)
+    assert statistics.span == pytest.approx(steps * period)
+
+
 def test_a_tally_of_nothing():
     statistics = RunStatistics(10, 2)
+    assert statistics.last_tensions.shape == (0, 2)
+    assert statistics.saturated_share == 0.0
     np.testing.assert_array_equal(statistics.max_error, np.zeros(6))
     np.testing.assert_array_equal(statistics.rms_error, np.zeros(6))
     assert statistics.tension_range == (0.0, 0.0)

@@ -52,7 +52,7 @@ def assert_same(bundle, steps, change=lambda parts: parts):
     """Make a run both ways; return the compiled one once every bit is found to be the same."""
     staged, compiled = (MadeRun(bundle, steps, by, change) for by in (Staged, Stepping))
     assert_same_messages(staged, compiled)
-    for part in ("envelope", "squares", "counts"):
+    for part in ("envelope", "squares", "counts", "kept"):
         one, other = getattr(staged.statistics, part), getattr(compiled.statistics, part)
         np.testing.assert_array_equal(other, one, err_msg=part)
     return compiled

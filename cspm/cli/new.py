@@ -21,13 +21,18 @@ cspm new my_robot
 
 cspm new gantry --kind crossed --size 4,3,2.5 --mass 12
 
+cspm new wall --kind planar --size 3,2
+
 Exit code: 0 done, 2 unusable input, 130 interrupted."""
 )
 def new(
     name: Annotated[str, typer.Argument(metavar="NAME", help="The robot's name.")],
     kind: Annotated[str, typer.Option(metavar="KIND", help="How its cables run.")] = "suspended",
     size: Annotated[
-        str, typer.Option(metavar="X,Y,Z", help="The frame that carries the winches, in m.")
+        str,
+        typer.Option(
+            metavar="X,Y,Z", help="The frame that carries the winches, in m; planar: X,Z."
+        ),
     ] = "2,2,2",
     mass: Annotated[float, typer.Option(metavar="KG", help="Mass of the platform.")] = 5.0,
     run: Annotated[bool, typer.Option(help="Whether to run the scenario.")] = True,
@@ -36,8 +41,18 @@ def new(
     """Begin a robot of your own. Write its test-bed and scenario, check, draw and run them."""
     from cspm.commands.new_command import new_command
 
+    new_command(name, kind, _frame(size, kind), mass, json, run=run)
+
+
+def _frame(size: str, kind: str) -> tuple[float, float, float]:
+    """Return x y z of the frame [m]; a planar robot has no y, for which its x stands."""
+    planar = kind == "planar"
     try:
-        x, y, z = (float(value) for value in size.split(","))
+        numbers = [float(value) for value in size.split(",")]
+        x, y, z = [numbers[0], *numbers] if planar and len(numbers) == 2 else numbers
     except ValueError:
-        raise InputError(f"--size {size}: allowed: three numbers in m, such as 2,2,2") from None
-    new_command(name, kind, (x, y, z), mass, json, run=run)
+        few = "two or " if planar else ""
+        raise InputError(
+            f"--size {size}: allowed: {few}three numbers in m, such as 2,2,2"
+        ) from None
+    return x, y, z

@@ -23,7 +23,7 @@ from cspm_msgs_py.recording.run_record import EXTERNAL, SIM
 from cspm_msgs_py.scenario import load_scenario
 from cspm_msgs_py.schedule import schedule_of
 from cspm_ros.runtime.stall_watchdog import PATIENCE_S, check_patience
-from cspm_run.before_run import free_of, unmet_line
+from cspm_run.before_run import free_of, stopping_lines, unmet_line
 from cspm_run.bundle import Bundle
 from cspm_run.library import named_testbed
 from cspm_run.output.console import make_console, say
@@ -79,7 +79,7 @@ def run_command(
     unstable = unstable_line(bundle.scenario, testbed, late=mode == REALTIME)
     for line in (*limit_warnings(testbed), *([unstable] if unstable else [])):
         say(Console(stderr=True), f"warning: {line}")
-    for line in free_of(bundle):
+    for line in (*free_of(bundle), *stopping_lines(bundle)):
         say(console, line)
     unmet = unmet_line(bundle)
     if unmet:

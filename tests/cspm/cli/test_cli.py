@@ -173,8 +173,9 @@ def test_unknown_scenarios_list_the_known(refused):
 
 
 def test_a_value_is_set_once(refused):
-    line = refused("run", "rest", "--duration", "1", "--set", "duration=-1")
-    assert line == "--set duration=-1: --duration sets it as well, allowed: one of both"
+    for name, setting in (("duration", "duration=-1"), ("seed", "seed=3")):
+        line = refused("run", "rest", "calm", f"--{name}", "1", "--set", setting)
+        assert line == f"--set {setting}: --{name} sets it as well, allowed: one of both"
     assert refused("run", "rest", "--set", "duration=-1").startswith(f"{REST}: duration: ")
 
 

@@ -62,6 +62,28 @@ def test_each_fault_is_one_line_and_writes_nothing(here, given, text):
     assert not list(here.iterdir())
 
 
+def test_a_planar_robot_has_a_size_of_two_numbers(here, cspm):
+    for name, size in (("two", "3,2"), ("three", "3,3,2")):
+        code, _, err = cspm("new", name, "--kind", "planar", "--size", size, "--no-run")
+        assert (code, err) == (0, "")
+    texts = [(here / f"{name}_testbed.yaml").read_text() for name in ("two", "three")]
+    assert texts[0].replace("two", "three") == texts[1]
+    assert "exit: [1.5, 0.0, 2.0]" in texts[0]
+
+
+@pytest.mark.parametrize(
+    ("kind", "size", "allowed"),
+    [
+        ("planar", "3", "two or three numbers in m"),
+        ("planar", "3,x", "two or three numbers in m"),
+        ("point", "3,2", "three numbers in m"),
+    ],
+)
+def test_a_size_of_other_numbers_is_refused(refused, kind, size, allowed):
+    line = refused("new", "mine", "--kind", kind, "--size", size)
+    assert line == f"--size {size}: allowed: {allowed}, such as 2,2,2"
+
+
 def test_what_exists_is_kept(here):
     (here / "mine.yaml").write_text("kept")
     with pytest.raises(InputError, match=r"mine\.yaml: already exists, allowed: a new file"):

@@ -34,10 +34,10 @@ def length_check(measurement: Measurement) -> DataCheck:
 def excitation_check(measurement: Measurement) -> DataCheck:
     """Return whether every winch, and every pose that is measured, moves."""
     still = [f"{name} does not move" for name, column in _angles(measurement) if _still(column)]
-    for words, pose in (
-        ("the bar", measurement.bar_pose),
-        ("the winch frame", measurement.frame_pose),
-    ):
+    frame = measurement.frame_pose
+    if frame is not None and not np.ptp(frame.values, axis=0).any():
+        frame = None  # a constant, of a frame that is fixed
+    for words, pose in (("the bar", measurement.bar_pose), ("the winch frame", frame)):
         if pose is not None and all(_still(pose.column(i)) for i in range(pose.values.shape[1])):
             still.append(f"{words} does not move")
     remedy = "what depends on this motion cannot be tested here"

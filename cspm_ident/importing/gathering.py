@@ -14,7 +14,7 @@ from cspm_ident.importing.joint_parts import without_empty_parts
 from cspm_ident.importing.mapping import Clock, MappingFile
 from cspm_ident.importing.mending import Mended, mend
 from cspm_ident.importing.time_base import Times, set_stamps, single_precision, times_of
-from cspm_ident.importing.topic_messages import TopicMessages, gather
+from cspm_ident.importing.topic_messages import Index, SkippedMessages, TopicMessages, gather
 from cspm_ident.importing.unwrapping import Unwrapper
 from cspm_msgs_py.errors import InputError
 
@@ -63,7 +63,8 @@ def gather_topics(
         InputError: see `gather`.
     """
     found = Gathered([], {}, {}, {}, [])
-    for whole in plan.topics:
+    # What stands still has no clock of its own.
+    for whole in sorted(plan.topics, key=lambda each: each.is_constant):
         name = whole.topic.name
         series = _series(whole, times, store, found)
         planned, empty = whole, tuple[str, ...]()
@@ -74,10 +75,24 @@ def gather_topics(
         joints = whole.topic.joint_names
         found.empty.extend(f"{name} {part}/{joint}" for part in empty for joint in joints)
         where = f"{mapping.path}: channels.{name}"
-        found.messages[name] = gather(
-            planned, series, mapping.mapping, origin_ns, where, trial=trial
+        found.messages[name] = (
+            _beside(planned, series, list(found.messages.values()))
+            if whole.is_constant
+            else gather(planned, series, mapping.mapping, origin_ns, where, trial=trial)
         )
+    order = [each.topic.name for each in plan.topics]
+    found.topics.sort(key=lambda each: order.index(each.topic.name))
     return found
+
+
+def _beside(
+    planned: PlannedTopic, series: dict[str, ColumnSeries], others: list[TopicMessages]
+) -> TopicMessages:
+    """Return a topic of constants, a message at each of those of another topic: a pose, if any."""
+    poses = [each for each in others if "qw" in each.topic.fields]
+    stamps = (poses or others)[0].stamp_ns
+    places: dict[str, Index | None] = dict.fromkeys(series)
+    return TopicMessages(planned.topic, stamps, series, places, SkippedMessages())
 
 
 def stamps_of_clocks(

@@ -59,6 +59,11 @@ class PlannedTopic:
     topic: Topic
     fields: tuple[PlannedField, ...]
 
+    @property
+    def is_constant(self) -> bool:
+        """Whether no number of it comes from a column: what stands still."""
+        return all(field.column is None for field in self.fields)
+
 
 @dataclass(frozen=True)
 class ImportPlan:
@@ -113,8 +118,10 @@ def plan_import(mapping: MappingFile, testbed: Testbed, source: Source) -> Impor
         # Load cells on some cables: the others have no number.
         rest = [PlannedField(f, None, nan) for f in topic.fields if f not in fields]
         planned.append(PlannedTopic(topic, (*read, *rest) if topic.joint_names else tuple(read)))
-        if all(field.column is None for field in planned[-1].fields):
+        if planned[-1].is_constant and topic.joint_names:
             raise InputError(f"{key}: constants only, allowed: at least one column")
+    if all(each.is_constant for each in planned):
+        raise InputError(f"{where}: channels: constants only, allowed: at least one column")
     return ImportPlan(tuple(planned), clocks)
 
 

@@ -201,3 +201,16 @@ def test_a_sensor_of_the_file_that_was_not_recorded_is_named(name):
     fixed = measurement.with_machine(machine)
     assert sensor_check(fixed).ok
     assert fixed.knows_frame
+
+
+def test_a_winch_frame_that_is_a_constant_is_fixed_and_none_that_should_move():
+    times = np.arange(2000) * 0.01
+    file, noise = load_testbed(THESIS), np.random.default_rng(4).standard_normal((2000, 6))
+    moving = np.cumsum(0.01 * np.ones((2000, 6)), axis=0)
+    fixed = Samples(times, np.tile([0.1, 0.0, -0.2, 0.0, 0.0, 0.5], (2000, 1)))
+    told = Samples(times, fixed.values + 1e-4 * noise)
+    for frame, words in ((fixed, ""), (told, "the winch frame does not move")):
+        poses = {"frame_pose": frame, "bar_pose": Samples(times, moving)}
+        found = excitation_check(Measurement(Path("some"), "", file, **poses))
+        assert found.ok == (not words)
+        assert words in found.what

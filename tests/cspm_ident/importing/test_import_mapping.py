@@ -226,3 +226,33 @@ def test_a_pose_comes_whole_with_angles_or_a_quaternion(tmp_path):
         imported(path, POSE % "roll: {constant: 0}", THESIS)
     with pytest.raises(InputError, match="angles and quaternion, allowed: one of both"):
         imported(path, POSE % "roll: {constant: 0}\n    qw: {constant: 1}", THESIS)
+
+
+FIXED = """
+name: lab
+clocks: {pc: {rate: 100}, slow: {rate: 20}}
+channels:
+  /winch_frame/pose: {x: {constant: 0.1}, y: {constant: 0}, z: {constant: -0.2},
+    roll: {constant: 0}, pitch: {constant: 0}, yaw: {constant: 0.5}}
+  /bar/twist: {vx: {column: v, unit: m/s}, vy: {constant: 0}, vz: {constant: 0},
+    wx: {constant: 0}, wy: {constant: 0}, wz: {constant: 0}}
+  /bar/pose: {x: {column: x, unit: m, clock: slow}, y: {constant: 0}, z: {constant: 2},
+    roll: {constant: 0}, pitch: {constant: 0}, yaw: {constant: 0}}
+"""
+
+
+def test_a_winch_frame_that_is_fixed_may_be_all_constants(tmp_path):
+    path = table(tmp_path / "a.csv", {"v": np.zeros(50), "x": np.linspace(0.0, 1.0, 50)})
+    found = imported(path, FIXED, THESIS)
+    assert list(found.topics)[-1] == "/winch_frame/pose"
+    np.testing.assert_array_equal(found.stamps["/winch_frame/pose"], found.stamps["/bar/pose"])
+    assert len(found.stamps["/bar/twist"]) == 50
+    pose = [0.1, 0.0, -0.2, 0.0, 0.0, np.sin(0.25), np.cos(0.25)]
+    np.testing.assert_allclose(found.rows["/winch_frame/pose"], np.tile(pose, (50, 1)), atol=1e-15)
+
+
+def test_constants_alone_are_no_recording(tmp_path):
+    text = FIXED.split("  /bar/twist")[0]
+    path = table(tmp_path / "a.csv", {"v": np.zeros(50)})
+    with pytest.raises(InputError, match="channels: constants only, allowed: at least one column"):
+        imported(path, text, THESIS)

@@ -22,8 +22,8 @@ class RunStatistics:
         envelope: shape (BINS, 2, 6 + n): lowest and highest pose error and tension per time bin.
         bin_steps: plant steps per bin.
         squares: sums of the squared pose errors, (6,).
-        counts: steps, and those with a slack cable, with an infeasible wrench and with a motor at its
-            limit.
+        counts: steps, and those with a slack cable, with an infeasible wrench and with a motor at
+            its limit.
         kept: tensions (KEPT, n) [N], one instant of `kept_steps`; the oldest are replaced.
         kept_steps: from one instant that is kept to the next.
         period: of a step [s].

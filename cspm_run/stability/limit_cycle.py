@@ -75,7 +75,7 @@ def _spectrum(tension: Array, period: float) -> tuple[Array, Array]:
     window = np.hanning(count)
     values = np.fft.rfft(window * (tension - tension.mean()))
     power: Array = 2.0 * np.abs(values) ** 2 / (count * np.sum(window**2))
-    return np.fft.rfftfreq(count, period), power
+    return np.asarray(np.fft.rfftfreq(count, period), dtype=float), power
 
 
 def _amplitude_at(frequency: float, tension: Array, period: float) -> float:

@@ -57,7 +57,7 @@ def _shares(scenario: Scenario, statistics: RunStatistics) -> list[tuple[str, fl
         return []
     shares = (
         ("a cable slack", statistics.slack_share),
-        ("wanted wrench not met", statistics.infeasible_share),
+        ("the commanded wrench infeasible", statistics.infeasible_share),
         ("a motor at its torque limit", statistics.saturated_share),
     )
     return [(what, share) for what, share in shares if share >= NOTED_SHARE]

@@ -223,7 +223,8 @@ def simulate(
     with tempfile.TemporaryDirectory(prefix="cspm-reference-") as place:
         if reference is not None:
             chosen = with_reference(chosen, reference, Path(place))
-        bundle = bundle_of(chosen, None if testbed is None else as_file(testbed), plant)
+        machine = None if testbed is None else as_file(testbed)
+        bundle = bundle_of(chosen, machine, plant, own=Path(place))
     total = bundle.scenario.duration
 
     def show(now: float) -> None:
@@ -237,13 +238,16 @@ def simulate(
     return run
 
 
-def bundle_of(scenario: Scenario, testbed: TestbedFile | None, plant: str) -> Bundle:
+def bundle_of(
+    scenario: Scenario, testbed: TestbedFile | None, plant: str, own: Path | None = None
+) -> Bundle:
     """Return the self-contained description of a run.
 
     Args:
         scenario: as requested.
         testbed: a machine instead of the scenario's.
         plant: one of `PLANTS`, or `external`.
+        own: a folder of motions that the caller wrote, beside the scenario's.
 
     Raises:
         InputError: scenario and test-bed do not fit, or an effect is not possible.
@@ -253,7 +257,7 @@ def bundle_of(scenario: Scenario, testbed: TestbedFile | None, plant: str) -> Bu
     resolved = resolve(scenario.description, machine.testbed, scenario.path.parent)
     if plant == EXTERNAL:
         refuse_cuts(EXTERNAL, resolved.events)
-    bundle = make_bundle(resolved, machine, scenario.path.parent)
+    bundle = make_bundle(resolved, machine, scenario.path.parent, own)
     if bundle.scenario.controllers:
         # Before anything is recorded, and in every mode.
         with bundle.unpacked() as place:

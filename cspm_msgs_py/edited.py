@@ -16,8 +16,8 @@ import numpy as np
 from ruamel.yaml.comments import CommentedMap, CommentedSeq
 
 from cspm_msgs_py.errors import InputError
-from cspm_msgs_py.near_name import allowed_names
 from cspm_msgs_py.testbed import EffectEntry, Testbed, TestbedFile
+from cspm_msgs_py.testbed_keys.near_name import allowed_names
 from cspm_msgs_py.yaml_file import dump_yaml, parse_yaml, round_trip
 
 # `cables[2].rotor_inertia` → `cables`, `2`, `rotor_inertia`. A topic's name is one part.

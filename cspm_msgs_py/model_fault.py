@@ -8,7 +8,7 @@ from typing import Any, Literal, NamedTuple, get_args, get_origin
 from pydantic import BaseModel, ValidationError
 from pydantic_core import ErrorDetails
 
-from cspm_msgs_py.near_name import allowed_names
+from cspm_msgs_py.testbed_keys.near_name import allowed_names
 
 Place = tuple[int | str, ...]
 # Tags of values that may be written as a number or as a mapping.

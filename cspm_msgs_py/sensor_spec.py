@@ -6,7 +6,7 @@ from collections.abc import Mapping
 
 from pydantic import NonNegativeFloat, PositiveInt, field_validator
 
-from cspm_msgs_py.near_name import allowed_names
+from cspm_msgs_py.testbed_keys.near_name import allowed_names
 from cspm_msgs_py.topics import Topic
 from cspm_msgs_py.yaml_file import StrictModel
 

@@ -93,8 +93,16 @@ class Bundle:
         return text
 
 
-def make_bundle(scenario: Scenario, testbed: TestbedFile, folder: Path) -> Bundle:
+def make_bundle(
+    scenario: Scenario, testbed: TestbedFile, folder: Path, own: Path | None = None
+) -> Bundle:
     """Return the self-contained description of a run whose scenario file lies in `folder`.
+
+    Args:
+        scenario: resolved.
+        testbed: the machine.
+        folder: of the scenario's file, whose motions have to be in it.
+        own: a further folder, of motions that the caller wrote.
 
     Raises:
         InputError: a file that a motion or a controller reads cannot be read.
@@ -105,11 +113,11 @@ def make_bundle(scenario: Scenario, testbed: TestbedFile, folder: Path) -> Bundl
     def contained(body: Body, role: str) -> Body:
         motion = body.motion
         if isinstance(motion, FileMotion):
-            name = _take(folder, motion.path, role, files)
+            name = _take((folder, own), motion.path, role, files)
             origins[name] = str(folder / motion.path)
             return body.model_copy(update={"motion": motion.model_copy(update={"path": name})})
         if isinstance(motion, VesselMotion):
-            name = _take(folder, motion.rao, role, files)
+            name = _take((folder, own), motion.rao, role, files)
             origins[name] = str(folder / motion.rao)
             return body.model_copy(update={"motion": motion.model_copy(update={"rao": name})})
         return body
@@ -211,10 +219,11 @@ def _motion_files(scenario: Scenario) -> dict[str, str]:
     return found
 
 
-def _take(folder: Path, named: str, role: str, files: dict[str, bytes]) -> str:
-    path = folder / named
+def _take(folders: tuple[Path, Path | None], named: str, role: str, files: dict[str, bytes]) -> str:
+    path = folders[0] / named
+    inside = [each.resolve() for each in folders if each is not None]
     try:
-        if not path.resolve().is_relative_to(folder.resolve()):
+        if not any(path.resolve().is_relative_to(each) for each in inside):
             raise InputError(f"{path}: leads outside, allowed: a file in the scenario's folder")
         if path.exists() and not path.is_file():
             raise InputError(f"{path}: no regular file, allowed: a file")

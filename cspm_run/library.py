@@ -7,7 +7,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, overload
 
 from cspm_msgs_py.errors import InputError
-from cspm_msgs_py.near_name import allowed_names
+from cspm_msgs_py.testbed_keys.near_name import allowed_names
 
 if TYPE_CHECKING:
     from cspm_msgs_py.testbed import TestbedFile

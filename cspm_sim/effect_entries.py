@@ -10,9 +10,9 @@ from numba.core.errors import NumbaError
 from numpy.typing import NDArray
 
 from cspm_msgs_py.errors import InputError
-from cspm_msgs_py.near_name import allowed_names
 from cspm_msgs_py.testbed import EffectEntry, Testbed
 from cspm_msgs_py.testbed_keys.effect_table import EMPIRICAL
+from cspm_msgs_py.testbed_keys.near_name import allowed_names
 from cspm_sim.effects import Block, Effect, Elements, Hook, catalogue
 from cspm_sim.effects.empirical import table_effect
 from cspm_sim.effects.winch_load import load_effects

@@ -29,7 +29,7 @@ def doctor(
     ] = False,
     json: Json = None,
 ) -> None:
-    """Look at this computer: what is there, what is missing, and what adds it.
+    """Say what this computer lacks. And what is there, and what adds the rest.
 
     Python, the compiled kernels, ROS 2 and its middleware, extras, processors, priorities, browser.
     """
@@ -59,7 +59,7 @@ def schema(
     ],
     json: Json = None,
 ) -> None:
-    """Print the JSON Schema of a kind of file, for editors that complete and check keys.
+    """Print the JSON Schema of a file. Editors complete and check keys by it.
 
     It is made from what the reader itself checks by. With --json it goes to a file.
     """

@@ -45,7 +45,7 @@ def new(
 
 
 def _frame(size: str, kind: str) -> tuple[float, float, float]:
-    """Return x y z of the frame [m]; a planar robot has no y, for which its x stands."""
+    """Return x y z of the frame [m]; a planar robot has no y: its x is taken."""
     planar = kind == "planar"
     try:
         numbers = [float(value) for value in size.split(",")]

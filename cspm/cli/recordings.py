@@ -155,7 +155,7 @@ def export(
     ] = None,
     json: Json = None,
 ) -> None:
-    """Write a recording's signals as a text table, as Parquet or for MATLAB, in SI units.
+    """Write a recording's signals as a table. As text, Parquet or for MATLAB, in SI units.
 
     Nothing is interpolated: a row for each stamp, and nothing where a signal has none then.
     """

@@ -25,6 +25,7 @@ def node(context: typer.Context) -> None:
     """Run one node of the ROS 2 graph. Such as plant, wave_trajectory or motion_controller.
 
     Everything it needs to know are ROS 2 parameters; `--ros-args --params-file FILE` reads them.
+    `cspm node plant --help` prints this as well.
     """
     name, *rest = context.args or ["--help"]
     if {"--help", "-h"} & {name, *rest}:

@@ -10,8 +10,8 @@ from numpy.random import Generator
 
 from cspm.testbed import Testbed
 from cspm_msgs_py.errors import InputError
-from cspm_msgs_py.near_name import allowed_names
 from cspm_msgs_py.testbed import Cable
+from cspm_msgs_py.testbed_keys.near_name import allowed_names
 from cspm_sim.effects import Effect, catalogue
 
 BAR = "bar"

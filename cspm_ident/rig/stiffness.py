@@ -23,7 +23,7 @@ from cspm_ident.rig.specimen import Specimen
 from cspm_ident.rig.stiffness_fit import ASYMPTOTE_SHARE, Fitted, above_cap, fit_law
 from cspm_ident.vaf import error_percent, vaf
 from cspm_msgs_py.errors import InputError
-from cspm_msgs_py.near_name import allowed_names
+from cspm_msgs_py.testbed_keys.near_name import allowed_names
 
 Array = NDArray[np.float64]
 

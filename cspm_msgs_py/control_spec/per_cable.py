@@ -10,7 +10,7 @@ from pydantic import Discriminator, PositiveFloat, Tag
 
 from cspm_msgs_py.errors import InputError
 from cspm_msgs_py.model_fault import MAPPING, NUMBER
-from cspm_msgs_py.near_name import allowed_names
+from cspm_msgs_py.testbed_keys.near_name import allowed_names
 
 
 def _form(value: object) -> str:

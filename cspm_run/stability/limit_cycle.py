@@ -51,7 +51,7 @@ def oscillation(tensions: Array, period: float) -> Oscillation | None:
 
 
 def _line(tension: Array, period: float) -> tuple[float, float] | None:
-    """Return frequency [Hz] and amplitude [N] of what stands out of a tension's spectrum."""
+    """Return frequency [Hz] and amplitude [N] of the peak in a tension's spectrum."""
     frequencies, power = _spectrum(tension, period)
     judged = np.flatnonzero(frequencies >= max(LOWEST, PERIODS / (len(tension) * period)))
     if not len(judged):

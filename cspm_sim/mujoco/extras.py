@@ -9,8 +9,8 @@ from numpy.typing import NDArray
 
 from cspm_msgs_py.dofs import DOFS
 from cspm_msgs_py.errors import InputError
-from cspm_msgs_py.near_name import allowed_names
 from cspm_msgs_py.testbed import EffectEntry, Testbed
+from cspm_msgs_py.testbed_keys.near_name import allowed_names
 
 Array = NDArray[np.float64]
 

@@ -2,7 +2,7 @@
 
 import pytest
 
-from cspm_msgs_py.near_name import allowed_names
+from cspm_msgs_py.testbed_keys.near_name import allowed_names
 
 NAMES = ("calm", "calm_4m", "worst_case")
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 from rich.markdown import Markdown
 
 from cspm_msgs_py.errors import InputError
-from cspm_msgs_py.near_name import allowed_names
+from cspm_msgs_py.testbed_keys.near_name import allowed_names
 from cspm_run.output.console import make_console
 from cspm_sim.effects import catalogue
 from cspm_sim.effects.document import effect_section

@@ -68,7 +68,7 @@ def test_a_planar_robot_has_a_size_of_two_numbers(here, cspm):
         assert (code, err) == (0, "")
     texts = [(here / f"{name}_testbed.yaml").read_text() for name in ("two", "three")]
     assert texts[0].replace("two", "three") == texts[1]
-    assert "exit: [1.5, 0.0, 2.0]" in texts[0]
+    assert "exit: [1.5, 0, 2]" in texts[0]
 
 
 @pytest.mark.parametrize(

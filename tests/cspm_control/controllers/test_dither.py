@@ -139,7 +139,7 @@ def test_in_a_run_only_the_torque_changes_and_at_the_first_instant_nothing(tmp_p
         (
             ("{hoist_9: 0.01}", 80),
             ".amplitude: hoist_9, allowed: hoist, surge, sway, hoist_1, hoist_2, surge_1, surge_2,"
-            " sway_1, sway_2, sway_3, sway_4",
+            " sway_1, sway_2, sway_3, sway_4; did you mean hoist_2, hoist_1 or hoist?",
         ),
         (
             (5.0, 80),

@@ -38,7 +38,8 @@ def test_a_name_that_is_no_cable_is_refused_in_one_line():
     with pytest.raises(InputError) as caught:
         values_per_cable({"hoist": 1.0, "hoist_3": 2.0}, NAMES, 1.0, "key")
     assert str(caught.value) == (
-        "key: hoist_3, allowed: hoist, surge, left, hoist_1, hoist_2, surge_1"
+        "key: hoist_3, allowed: hoist, surge, left, hoist_1, hoist_2, surge_1; did you mean"
+        " hoist_2, hoist_1 or hoist?"
     )
 
 

@@ -28,7 +28,9 @@ _RATES = (
     "rates={plant: 200, winches: 200, load_cells: 200, motion_capture: 100, wave_trajectory: 100,"
     " motion_controller: 100, tension_distribution: 100, force_controller: 200}"
 )
-_SETTINGS = (_RATES, "safety.stale_after=2", "safety.watchdog=2", "safety.lateness=2", "duration=8")
+_SETTINGS = (_RATES, "safety.stale_after=2", "safety.watchdog=2", "safety.lateness=2")
+# Simulated [s]. In lockstep a second takes a fifth of one, and nodes need some to find each other.
+_DURATIONS = {"graph": 30, "realtime": 8}
 # What a rule allows, by what ROS 2 calls it: the element, its entries, and the attribute.
 _RULES = {
     "publishers": ("topics", "topic", "publish"),
@@ -46,6 +48,7 @@ def endpoints(mode: str, domain: int = DOMAIN) -> Endpoints:
     environment = os.environ | {"ROS_DOMAIN_ID": str(domain)}
     with tempfile.TemporaryDirectory() as place, Session(domain_id=domain) as session:
         settings = [word for each in _SETTINGS for word in ("--set", each)]
+        settings += ["--set", f"duration={_DURATIONS[mode]}"]
         run = ["run", "rest", "--mode", mode, "--quiet", "--out", f"{place}/run", *settings]
         view = ["node", VIEWER, "--ros-args", "-p", "scenario:=rest"]
         cspm = [sys.executable, "-m", "cspm"]

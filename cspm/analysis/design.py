@@ -16,13 +16,13 @@ from cspm.testbed import AnyTestbed
 from cspm_control.analysis.cable_groups import cable_groups
 from cspm_control.analysis.loop_view import LoopView
 from cspm_control.analysis.loops import LoopAnalysis, analyse_loops, pid_law
-from cspm_control.analysis.sampled_loops import LoopTiming
+from cspm_control.analysis.sampled_loops import LoopTiming, timing_of
 from cspm_msgs_py.control_spec.force import PiGains
 from cspm_msgs_py.errors import InputError
 from cspm_msgs_py.new_folder import new_folder
 from cspm_msgs_py.scenario import ClosedLoop
 from cspm_run.assembly import resolve
-from cspm_run.stability.loop_growth import period_of_force, timing_of
+from cspm_run.stability.loop_growth import period_of_force
 
 PICTURES = ("motion_loops.png", "force_loops.png")
 # Gains of cables of one kind that differ by less, as a share, are shown once.

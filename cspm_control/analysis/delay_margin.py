@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 
 from cspm_control.analysis.loops import sampled_force
-from cspm_control.analysis.sampled_loops import loop_timing
+from cspm_control.analysis.sampled_loops import sensor_delays, timing_of
 from cspm_control.safe_state import FREQUENCY
 from cspm_msgs_py.scenario import ClosedLoop, Scenario
 from cspm_msgs_py.schedule import TENSION
@@ -28,14 +28,12 @@ def largest_age(scenario: Scenario, testbed: Testbed) -> float:
         ConvergenceError: the bar cannot hang at the design pose.
     """
     assert isinstance(scenario.control, ClosedLoop)
-    ideal = scenario.sensors == "ideal"
-    delays = {} if ideal else {name: each.delay for name, each in testbed.sensors.items()}
-    views = sampled_force(testbed, scenario.control, loop_timing(scenario.rates, delays, 0.0))
+    views = sampled_force(testbed, scenario.control, timing_of(scenario, testbed, 0.0))
     found = [each.margins for each in views.values() if each.margins.crossover > 0.0]
     least = min((each.phase_margin / each.crossover for each in found), default=math.inf)
     if scenario.safety.state == "hold":
         least = min(least, hold_margin())
-    return delays.get(TENSION, 0.0) + max(0.0, least)
+    return sensor_delays(scenario, testbed).get(TENSION, 0.0) + max(0.0, least)
 
 
 def hold_margin() -> float:

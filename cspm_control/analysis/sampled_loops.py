@@ -16,7 +16,8 @@ from cspm_model.linearisation import OperatingPoint, StateSpace
 from cspm_msgs_py.control_spec.force import PiGains
 from cspm_msgs_py.dofs import CONTROLLED_AXES, DOFS
 from cspm_msgs_py.errors import InputError
-from cspm_msgs_py.scenario import MotionControl, PidGains, Rates
+from cspm_msgs_py.scenario import MotionControl, PidGains, Rates, Scenario
+from cspm_msgs_py.testbed import Testbed
 
 Array = NDArray[np.float64]
 
@@ -46,6 +47,21 @@ class LoopTiming:
     tension_delay: int
     pose_delay: int
     torque_delay: int
+
+
+def sensor_delays(scenario: Scenario, testbed: Testbed) -> dict[str, float]:
+    """Return the delays of a scenario's sensors [s], by topic; ideal ones have none."""
+    ideal = scenario.sensors == "ideal"
+    return {} if ideal else {name: each.delay for name, each in testbed.sensors.items()}
+
+
+def timing_of(scenario: Scenario, testbed: Testbed, computing: float) -> LoopTiming:
+    """Return the timing of a scenario's loops; `computing` from measurement to torque [s].
+
+    Raises:
+        InputError: the rates or the time are none that the analysis can follow.
+    """
+    return loop_timing(scenario.rates, sensor_delays(scenario, testbed), computing)
 
 
 def loop_timing(rates: Rates, delays: Mapping[str, float], computing: float) -> LoopTiming:

@@ -85,9 +85,8 @@ class JudgedSearch(NamedTuple):
     @property
     def first(self) -> dict[Candidate, Array]:
         """The weights of the kept findings in the search."""
-        kept, beside = [each.hypothesis for each in self.acceptance.kept], self.acceptance.beside
-        values = self.search.fits.values([*kept, *beside])
-        return {c: values[c] for each in kept for c in each.candidates}
+        kept = [each.hypothesis for each in self.acceptance.kept]
+        return self.search.fits.values(kept, self.acceptance.beside)
 
     def searched_left(self, data: Data, model: Model) -> dict[Place, list[Equation]]:
         """Return what a model leaves of the searched data, without reversals, by residual.

@@ -7,7 +7,7 @@ from functools import lru_cache
 from typing import NamedTuple
 
 from cspm_control.analysis.loops import cascade_growth
-from cspm_control.analysis.sampled_loops import LoopTiming, loop_timing
+from cspm_control.analysis.sampled_loops import LoopTiming, timing_of
 from cspm_msgs_py.errors import CspmError
 from cspm_msgs_py.scenario import ClosedLoop, MotionControl, Rates, Scenario
 from cspm_msgs_py.schedule import FORCE_CONTROLLER, MOTION_CONTROLLER, TENSION_DISTRIBUTION
@@ -45,17 +45,6 @@ class _Question:
     control: ClosedLoop = field(compare=False)
     timing: LoopTiming = field(compare=False)
     testbed: Testbed = field(compare=False)
-
-
-def timing_of(scenario: Scenario, testbed: Testbed, computing: float) -> LoopTiming:
-    """Return the timing of a scenario's loops; `computing` from measurement to torque [s].
-
-    Raises:
-        InputError: the rates or the time are none that the analysis can follow.
-    """
-    ideal = scenario.sensors == "ideal"
-    delays = {} if ideal else {name: each.delay for name, each in testbed.sensors.items()}
-    return loop_timing(scenario.rates, delays, computing)
 
 
 def period_of_force(rates: Rates) -> float:

@@ -64,9 +64,17 @@ class Fits:
         """Return the weights of hypotheses fitted together, with half their intervals' widths."""
         return weights_of(self.gram, self.sums, *parts_of(hypotheses))
 
-    def values(self, hypotheses: Sequence[Hypothesis]) -> dict[Candidate, Array]:
-        """Return the weights without intervals, which takes less time."""
-        return values_of(self.gram, self.sums, *parts_of(hypotheses))
+    def values(
+        self, hypotheses: Sequence[Hypothesis], beside: Sequence[Hypothesis] = ()
+    ) -> dict[Candidate, Array]:
+        """Return the weights without intervals, which takes less time.
+
+        Args:
+            hypotheses: fitted together.
+            beside: fitted with them, their weights left out.
+        """
+        found = values_of(self.gram, self.sums, *parts_of([*hypotheses, *beside]))
+        return {c: found[c] for each in hypotheses for c in each.candidates}
 
     def shared(self, base: Index, hypothesis: Hypothesis) -> tuple[BlockRegression, Index, Index]:
         """Return a regression in which all elements of a hypothesis share their weights.

@@ -24,16 +24,17 @@ from cspm_ident.diagnosis.reporting.statement import (
     simulated_statement,
     unknown_statement,
 )
+from cspm_ident.diagnosis.residuals.regressors import Place
 from cspm_ident.diagnosis.residuals.spectral_lines import Line
 from cspm_ident.diagnosis.thresholds import DEFAULT_THRESHOLDS, Thresholds
 from cspm_ident.diagnosis.validation.holdout_residuals import HeldOut
 from cspm_ident.diagnosis.validation.holdout_simulation import SimulatedFit
 from cspm_ident.diagnosis.validation.remainder import Remainder
 from cspm_ident.diagnosis.validation.residual_power import Power, lost_powers
+from cspm_ident.diagnosis_file import SCHEMA
 from cspm_ident.signals.measurement import Measurement
 from cspm_sim.effects import Block, Channel
 
-SCHEMA = "cspm.diagnosis/1"
 IMPROVED = "testbed.improved.yaml"
 UNKNOWN = "unknown"
 
@@ -238,69 +239,44 @@ def _region(region: Region | None) -> dict[str, Any]:
 
 
 def _line(line: Line) -> dict[str, Any]:
-    return {
-        "subsystem": _BLOCKS[line.place.channel].value,
-        "elements": [line.place.element],
-        "effect": UNKNOWN,
-        "probability": None,
-        "statement": line_statement(line),
-        "onset_s": None,
-        "region": {
-            "driver": "frequency [Hz]",
-            "at": [line.frequency],
-            "adds": [line.amplitude],
-            "hint": None,
-        },
-        "parameters": [],
-        "alternatives": [],
-    }
+    at, adds = [line.frequency], [line.amplitude]
+    region = {"driver": "frequency [Hz]", "at": at, "adds": adds, "hint": None}
+    return _unnamed(line.place, line_statement(line), region)
 
 
 def _remainder(left: Remainder) -> dict[str, Any]:
-    return {
-        "subsystem": _BLOCKS[left.place.channel].value,
-        "elements": [left.place.element],
-        "effect": UNKNOWN,
-        "probability": None,
-        "statement": remainder_statement(left),
-        "onset_s": None,
-        "region": {"driver": left.driver or "time [s]", "at": [], "adds": [], "hint": None},
-        "parameters": [],
-        "alternatives": [],
-    }
+    driver = left.driver or "time [s]"
+    region: dict[str, Any] = {"driver": driver, "at": [], "adds": [], "hint": None}
+    return _unnamed(left.place, remainder_statement(left), region)
 
 
 def _simulated_remainder(fit: SimulatedFit) -> dict[str, Any]:
     """Return the finding of a simulation that is far from what was measured."""
-    return {
-        "subsystem": _BLOCKS[fit.output.kind].value,
-        "elements": [fit.output.element],
-        "effect": UNKNOWN,
-        "probability": None,
-        "statement": simulated_statement(fit),
-        "onset_s": None,
-        "region": {},
-        "parameters": [],
-        "alternatives": [],
-    }
+    return _unnamed(Place(fit.output.kind, fit.output.element), simulated_statement(fit), {})
 
 
 def _unknown(diagnosis: Diagnosis, unexplained: Unexplained) -> dict[str, Any]:
     driver, _, _, shape = unexplained
     assert shape is not None
+    region = {
+        "driver": driver.signal,
+        "at": shape.knots.tolist(),
+        "adds": shape.values.tolist(),
+        "hint": formula_of(driver, shape, diagnosis.thresholds),
+    }
+    return _unnamed(driver.place, unknown_statement(diagnosis, unexplained), region)
+
+
+def _unnamed(place: Place, statement: str, region: Mapping[str, Any]) -> dict[str, Any]:
+    """Return a finding that names no effect."""
     return {
-        "subsystem": _BLOCKS[driver.place.channel].value,
-        "elements": [driver.place.element],
+        "subsystem": _BLOCKS[place.channel].value,
+        "elements": [place.element],
         "effect": UNKNOWN,
         "probability": None,
-        "statement": unknown_statement(diagnosis, unexplained),
+        "statement": statement,
         "onset_s": None,
-        "region": {
-            "driver": driver.signal,
-            "at": shape.knots.tolist(),
-            "adds": shape.values.tolist(),
-            "hint": formula_of(driver, shape, diagnosis.thresholds),
-        },
+        "region": dict(region),
         "parameters": [],
         "alternatives": [],
     }

@@ -256,7 +256,7 @@ def _left_open(
     silent: Sequence[Finding],
     fed_back: Sequence[Finding],
 ) -> tuple[Finding, ...]:
-    """Return the findings that are reported as doubtful, though held-out data do not excite them.
+    """Return the findings that stay in the model, though held-out data do not excite them.
 
     Each explains as much as the residual that is unexplained without it, which held-out data do
     not excite either.
@@ -266,10 +266,8 @@ def _left_open(
     unexplained = unexplained_beside(search, kept, (*contradicted, *silent), fed_back)
     if not unexplained:
         return tuple(e for e in silent if _would_be_unexplained(search, e, kept))
-    limits = search.thresholds
-    most = limits.majority_share * max(each.gain.total for each in unexplained)
-    large = [each for each in silent if each.gain.total >= most]
-    return tuple(e for e in large)
+    most = search.thresholds.majority_share * max(each.gain.total for each in unexplained)
+    return tuple(each for each in silent if each.gain.total >= most)
 
 
 def _would_be_unexplained(search: Search, finding: Finding, kept: Sequence[Finding]) -> bool:

@@ -181,15 +181,7 @@ def modelled(
     weights = {
         c: (_allowed(data.searched[0], c, own, half), half) for c, (own, half) in weights.items()
     }
-    zero = [_is_insignificant(each.hypothesis, weights) for each in kept]
-    silent = [each.hypothesis for each in kept if each.holdout is HoldOut.SILENT]
-    weights = of_forms(weights, _moved(search, together, silent, weights), limits)
-    shown = [
-        none and _is_shown_elsewhere(search, each, together)
-        for each, none in zip(kept, zero, strict=True)
-    ]
-    weights |= _without_intervals(compress(kept, shown), weights)
-    zero = [none and not known for none, known in zip(zero, shown, strict=True)]
+    weights, zero = _with_forms(search, kept, together, weights)
     assessments = []
     for each, onset, small, none in zip(kept, onsets, negligible, zero, strict=True):
         own = {c: weights[c] for c in members_of(weights, each.hypothesis)}
@@ -202,6 +194,21 @@ def modelled(
     if any(each.is_insignificant or not each.is_possible for each in assessments):
         return Model(tuple(assessments), weights)
     return _simulated(assessments, weights, data, limits)
+
+
+def _with_forms(
+    search: Search, kept: Sequence[Finding], together: Sequence[Hypothesis], weights: Weights
+) -> tuple[Weights, list[bool]]:
+    """Return weights with the model-form error in their intervals, and what noise alone may be."""
+    zero = [_is_insignificant(each.hypothesis, weights) for each in kept]
+    shown = [
+        none and _is_shown_elsewhere(search, each, together)
+        for each, none in zip(kept, zero, strict=True)
+    ]
+    silent = [each.hypothesis for each in kept if each.holdout is HoldOut.SILENT]
+    wider = of_forms(weights, _moved(search, together, silent, weights), search.thresholds)
+    wider |= _without_intervals(compress(kept, shown), wider)
+    return wider, [none and not known for none, known in zip(zero, shown, strict=True)]
 
 
 def _fitted(
@@ -306,9 +313,8 @@ def _is_shown_elsewhere(search: Search, finding: Finding, together: Sequence[Hyp
 
     It then takes most of a held-out residual, and its numbers have no interval.
     """
-    others = [h for h in together if h is not finding.hypothesis]
-    dominant = finding.holdout is HoldOut.DOMINANT
-    return dominant and search.fits.has_few_stretches(finding.hypothesis, others)
+    own, dominant = finding.hypothesis, finding.holdout is HoldOut.DOMINANT
+    return dominant and search.fits.has_few_stretches(own, [h for h in together if h is not own])
 
 
 def _needed(finding: Finding, thresholds: Thresholds) -> float:

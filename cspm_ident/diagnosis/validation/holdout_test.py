@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 from cspm_ident.diagnosis.finding import Finding, HoldOut, Rejection, Status
 from cspm_ident.diagnosis.regression.block_gram import BlockGram
 from cspm_ident.diagnosis.regression.block_regression import gain_of
+from cspm_ident.diagnosis.regression.hypothesis import Hypothesis
 from cspm_ident.diagnosis.regression.joint_fit import Fits
 from cspm_ident.diagnosis.residuals.regressors import Candidate
 from cspm_ident.diagnosis.thresholds import Thresholds
@@ -32,18 +33,16 @@ def holdout_tested(fits: Fits, judge: BlockGram, found: Sequence[Finding]) -> tu
             neither confirmed nor contradicted stays in the fit, and predicts nothing.
     """
     kept = list(found)
-    beside: list[Finding] = []
+    beside: list[Hypothesis] = []
     tested = []
     for each in found:
         own = set(each.hypothesis.candidates)
-        whole = fits.values([other.hypothesis for other in (*kept, *beside)])
-        open_ones = {c for other in beside for c in other.hypothesis.candidates}
-        whole = {c: weights for c, weights in whole.items() if c not in open_ones}
+        whole = fits.values([other.hypothesis for other in kept], beside)
         outcome = _Lowered(judge, whole, own, fits.thresholds).outcome
         if outcome in (None, HoldOut.SILENT, HoldOut.UNDECIDED):
             kept.remove(each)
         if outcome is HoldOut.UNDECIDED:
-            beside.append(each)
+            beside.append(each.hypothesis)
         tested.append(
             replace(each, status=Status.REJECTED, rejection=Rejection.HOLDOUT_TEST)
             if outcome is None

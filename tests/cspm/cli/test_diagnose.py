@@ -192,12 +192,16 @@ def test_one_term_deleted_from_a_real_machine_is_named_first(emps, deleted):
 
 @pytest.mark.compiled
 def test_what_differs_by_direction_explains_more_than_the_published_offset(emps):
-    """It is doubtful: what is left beyond the noise is a tenth and more of what it takes."""
+    """It is named beside what is left beyond the noise, which widens its interval."""
     found = emps()
-    assert found["verdict"] == "unknown"
+    assert found["verdict"] == "effect"
     (finding,) = named(found)
-    assert finding["effect"] == DIRECTIONAL
-    assert "This may be a part of that" in finding["statement"]
+    assert (finding["effect"], finding["presence"]) == (DIRECTIONAL, "certain")
+    (number,) = finding["parameters"]
+    assert number["value"] == pytest.approx(-0.0039, rel=0.1)
+    low, high = number["ci95"]
+    assert low < number["value"] < high < 0.0
+    assert found["left"]
     (fit,) = found["residuals"]
     assert 0.07 < fit["held_out"]["nrmse_before"] < 0.08
     assert fit["held_out"]["nrmse_after"] < 0.045

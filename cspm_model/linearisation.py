@@ -18,12 +18,12 @@ import numpy as np
 import scipy
 from numpy.typing import ArrayLike, NDArray
 
+from cspm_model.end_slopes import end_slopes
 from cspm_model.equilibrium import find_equilibrium, gravity_wrench
 from cspm_model.kernels import bar as bar_kernel
 from cspm_model.kernels import cable as cable_kernel
 from cspm_model.kernels.cable import elastic_tension, law_curve, law_scale
 from cspm_model.kernels.machine import BAR_STATES, PlantParameters
-from cspm_model.kernels.pulley import pulley_turning
 from cspm_model.kinematics import RANK_TOLERANCE, euler_rates, geometry, rotation
 from cspm_msgs_py.dofs import DOFS
 from cspm_msgs_py.errors import InputError
@@ -289,30 +289,17 @@ def _geometric_stiffness(parameters: PlantParameters, point: OperatingPoint) -> 
     weight = gravity_wrench(parameters, point.bar_pose)[:3]
     com = to_world @ bar[bar_kernel.COM : bar_kernel.COM + 3]
     out[3:, 3:] = _cross_matrix(weight) @ _cross_matrix(com)
-    for i, (tension, length) in enumerate(zip(point.tensions, point.lengths, strict=True)):
+    # A force turns with its exit as it does against the attachment's own motion.
+    slopes = end_slopes(cables, point.bar_pose[None], point.frame_pose[None])
+    turns = slopes.exit_wrenches[0, :, :3] @ rotation(point.frame_pose).T
+    for i, tension in enumerate(point.tensions):
         direction = point.jacobian[i, :3]
         arm = _cross_matrix(to_world @ cables[i, cable_kernel.ATTACHMENT :][:3])
-        motion = np.hstack([np.eye(3), -arm])
-        if cables[i, cable_kernel.PULLEY_RADIUS] > 0.0:
-            turn = _pulley_turn(cables[i], point) @ motion
-        else:
-            parts = cables[i, cable_kernel.PARTS]
-            turn = (parts**2 * motion - np.outer(direction, direction @ motion)) / length
+        turn = turns[i] @ np.hstack([np.eye(3), -arm])
         out[:3] -= tension * turn
         out[3:] -= tension * arm @ turn
         out[3:, 3:] -= tension * _cross_matrix(direction) @ arm
     return out
-
-
-def _pulley_turn(cable: Array, point: OperatingPoint) -> Array:
-    """Return the derivative of a cable's direction by its attachment, (3, 3) [1/m]."""
-    frame = rotation(point.frame_pose)
-    end = point.bar_pose[:3] + rotation(point.bar_pose) @ cable[cable_kernel.ATTACHMENT :][:3]
-    apart = tuple(end - point.frame_pose[:3] - frame @ cable[cable_kernel.EXIT :][:3])
-    axis = tuple(frame @ cable[cable_kernel.PULLEY_AXIS :][:3])
-    radius, parts = cable[cable_kernel.PULLEY_RADIUS], cable[cable_kernel.PARTS]
-    columns = [pulley_turning(apart, axis, radius, tuple(unit)) for unit in np.eye(3)]
-    return parts * np.array(columns).T
 
 
 def _cross_matrix(v: Array) -> Array:

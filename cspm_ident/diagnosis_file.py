@@ -88,6 +88,18 @@ class ConsideredPart(_Part):
     parameters: tuple[ParameterPart, ...]
 
 
+class CalibratedPart(_Part):
+    """A number of the file that is off by no more than its accuracy, one standard deviation."""
+
+    effect: str
+    element: str
+    name: str
+    value: float
+    unit: str
+    ci95: Interval | None
+    accuracy: float
+
+
 class ExtrapolatedPart(_Part):
     """A signal that held-out data take beyond what was searched, for a share of their rows."""
 
@@ -184,6 +196,7 @@ class DiagnosisFile(_Part):
     explained: float | None = None
     left: tuple[LeftPart, ...] = ()
     considered: tuple[ConsideredPart, ...] = ()
+    calibrated: tuple[CalibratedPart, ...] = ()
     extrapolated: tuple[ExtrapolatedPart, ...] = ()
     data_checks: tuple[DataCheckPart, ...] = ()
 

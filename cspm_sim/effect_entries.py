@@ -157,7 +157,9 @@ def _of_entry(entry: EffectEntry, testbed: Testbed) -> Iterator[Action]:
         known = allowed_names(entry.effect, (*catalogue(), EMPIRICAL))
         raise InputError(f"{where}: no such effect, {known}")
     values = _ordered(effect, entry, where) if entry.table is None else _tabled(effect)
-    if effect.acts_on is Elements.CABLES:
+    if effect.acts_on is Elements.CELLS and entry.elements in ((), (Elements.CELLS.value,)):
+        yield Action(effect, 0, Elements.CELLS.value, values)
+    elif effect.acts_on in (Elements.CABLES, Elements.CELLS):
         yield from _on_cables(effect, entry, testbed, values, where)
     else:
         yield from _on_others(effect, entry, testbed, values, where)

@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 from cspm_msgs_py.errors import InputError
 from cspm_msgs_py.testbed import Testbed
 from cspm_sim.effect_entries import Action, read_actions
+from cspm_sim.effects import Elements
 
 Array = NDArray[np.float64]
 
@@ -26,6 +27,14 @@ class SensorFault:
         """Whether readings can be older than their stamps say."""
         sense = self.action.effect.physics.sense
         return sense is not None and sense.lateness is not None
+
+    @property
+    def read(self) -> slice:
+        """The columns of the sensor's quantities that it acts on."""
+        alone = self.action.effect.acts_on is Elements.CELLS
+        if not alone or self.action.name == Elements.CELLS.value:
+            return slice(None)
+        return slice(self.action.element, self.action.element + 1)
 
     def lateness(self, time: float) -> float:
         """Return by how much a reading stamped `time` [s] is older than that [s]."""
@@ -60,16 +69,14 @@ class Past:
         """Add the present, later than all before."""
         self._rows.append((time, values.copy()))
 
-    def at(self, time: float) -> Array:
-        """Return the quantities at a time [s] no earlier than any before."""
-        rows = self._rows
-        while len(rows) > 1 and rows[1][0] <= time:
+    def at(self, times: Array) -> Array:
+        """Return each quantity at a time of its own [s], none earlier than any before."""
+        rows, least = self._rows, times.min()
+        while len(rows) > 1 and rows[1][0] <= least:
             rows.popleft()
-        begin, first = rows[0]
-        if time <= begin or len(rows) == 1:
-            return first
-        end, second = rows[1]
-        return np.asarray(first + (time - begin) / (end - begin) * (second - first))
+        noted, values = (np.array(each) for each in zip(*rows, strict=True))
+        columns = zip(times, values.T, strict=True)
+        return np.array([np.interp(time, noted, own) for time, own in columns])
 
 
 def sensor_faults(testbed: Testbed, topic: str) -> list[SensorFault]:

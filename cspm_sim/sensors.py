@@ -121,7 +121,10 @@ class SensorModel:
 
     def _faulty(self, time: float, values: Array) -> Array:
         if self._past is not None:
-            values = self._past.at(time - sum(fault.lateness(time) for fault in self._faults))
+            times = np.full(len(values), time)
+            for fault in self._faults:
+                times[fault.read] -= fault.lateness(time)
+            values = self._past.at(times)
         for fault in self._faults:
             values = fault.reading(values)
         return values

@@ -19,6 +19,7 @@ from cspm_ident.diagnosis.diagnosis import Diagnosis
 from cspm_ident.diagnosis.reporting.completeness import completeness_sentence
 from cspm_ident.diagnosis.reporting.empirical_statement import stage_errors, stage_names
 from cspm_ident.diagnosis.reporting.finding_statement import (
+    calibrated_words,
     consequence_words,
     considered_words,
     statement_of,
@@ -201,7 +202,9 @@ def print_diagnosis(
             say(console, f"• {simulated_statement(fit)}")
     for finding in found.considered:
         say(console, f"not named, {considered_words(finding)}: {finding.reason_not_kept}")
-    for finding in found.negligible:
+    for finding in found.calibrated:
+        say(console, f"calibrated within the accuracy of a survey: {calibrated_words(finding)}")
+    for finding in (each for each in found.negligible if each not in found.calibrated):
         say(
             console,
             f"taken into account, too small to matter: {finding.hypothesis.words}",

@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 
 from cspm_ident.block_simulation import Input
 from cspm_ident.diagnosis.finding import Finding, Status, Unexplained
+from cspm_ident.diagnosis.regression.hypothesis import is_surveyed
 from cspm_ident.diagnosis.residuals.regressors import Candidate, Place
 from cspm_ident.diagnosis.residuals.spectral_lines import Line
 from cspm_ident.diagnosis.thresholds import DEFAULT_THRESHOLDS, Thresholds
@@ -122,9 +123,14 @@ class Diagnosis:
         return tuple(each for each in self.findings if each.status is Status.REJECTED)
 
     @property
+    def calibrated(self) -> tuple[Finding, ...]:
+        """Surveyed places that are off by no more than their accuracy."""
+        return tuple(e for e in self.negligible if is_surveyed(e.hypothesis.effect))
+
+    @property
     def in_model(self) -> tuple[Finding, ...]:
         """Findings whose numbers are in the improved file."""
-        return (*self.reported, *self.doubtful)
+        return (*self.reported, *self.doubtful, *self.calibrated)
 
     @property
     def considered(self) -> tuple[Finding, ...]:

@@ -179,8 +179,8 @@ class Finding:
 
     @property
     def elements(self) -> tuple[str, ...]:
-        """The elements on which it acts."""
-        return self.hypothesis.elements
+        """The elements on which it acts, as a test-bed file lists them."""
+        return self.hypothesis.scope
 
     @property
     def is_reported(self) -> bool:
@@ -218,8 +218,12 @@ class Finding:
 
     @property
     def parameters(self) -> tuple[Parameter, ...]:
-        """All parameters, element by element."""
-        return tuple(p for own in self.coefficients for p in self.parameters_on(own))
+        """All parameters, element by element; those of all load cells once."""
+        elements = self.elements
+        if elements == self.hypothesis.elements:
+            return tuple(p for own in self.coefficients for p in self.parameters_on(own))
+        once = (self.parameters_on(own) for own in self.coefficients[:1])
+        return tuple(p._replace(element=elements[0]) for each in once for p in each)
 
     def parameters_on(self, own: Coefficients) -> list[Parameter]:
         """Return the parameters on the element of the coefficients `own`."""

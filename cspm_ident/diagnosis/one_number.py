@@ -43,23 +43,31 @@ def with_one_number(own: JudgedSearch, model: Model, data: Data) -> tuple[Accept
     if (len(found) == 1 and is_number(found[0].hypothesis)) or _is_at_noise(own, Model((), {})):
         return None
     before = _left(own, model, data)
+    calibrated = _calibrated(own)
     for hypothesis in _promising(own, found):
         finding = own.search.finding_of(hypothesis, [])
-        (tested,) = holdout_tested(own.search.fits, own.judge, [finding])
+        tested = holdout_tested(own.search.fits, own.judge, [finding, *calibrated])[0]
         if tested.status is Status.REJECTED:
             continue
-        alone = modelled(own.search, [tested], data)
+        alone = modelled(own.search, [tested, *calibrated], data)
         if alone.useless or not _is_at_noise(own, alone):
             continue
         left = _left(own, alone, data)
         worse = np.sum([left[place] - before[place] for place in before if place in left], axis=0)
         if behind(paired(worse)) > own.thresholds.tie_sigma:
             continue
-        (kept,) = alone.findings
         rest = tuple(each for each in own.acceptance.findings if each.status is Status.REJECTED)
         kept = replace(tested, alternatives=_with_rival(own, tested, found, worse))
-        return Acceptance((kept, *rest)), modelled(own.search, [kept], data)
+        every = (kept, *calibrated)
+        return Acceptance((*every, *rest)), modelled(own.search, every, data)
     return None
+
+
+def _calibrated(own: JudgedSearch) -> list[Finding]:
+    """Return the findings of surveyed places within their accuracy."""
+    kept, fits = own.acceptance.kept, own.search.fits
+    chosen = [each.hypothesis for each in kept]
+    return [each for each in kept if fits.is_calibration(each.hypothesis, chosen)]
 
 
 def _promising(own: JudgedSearch, found: list[Finding]) -> Iterator[Hypothesis]:
@@ -77,7 +85,9 @@ def _promising(own: JudgedSearch, found: list[Finding]) -> Iterator[Hypothesis]:
         if gain > best.get(candidate.effect_id, (-np.inf, candidate))[0]:
             best[candidate.effect_id] = float(gain), candidate
     # The first scope holds the elements on which the effect is significant.
-    scopes = [search.scopes.of(c, numbers, base)[0] for _, c in best.values()]
+    scopes = [
+        search.scopes.pruned(search.scopes.of(c, numbers, base)[0], base) for _, c in best.values()
+    ]
     squares = [float(fits.sums.gains_beyond(base, [fits.own_columns(h)])[0]) for h in scopes]
     for k in np.argsort(squares)[::-1][:_TRIED]:
         if squares[k] >= own.thresholds.majority_share * taken and fits.is_plausible([scopes[k]]):

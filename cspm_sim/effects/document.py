@@ -61,7 +61,7 @@ _ELEMENTS = {
     Elements.BAR: "`bar`",
     Elements.FRAME: "`winch_frame`",
     Elements.BODIES: "`bar`, `winch_frame`, both where none is named",
-    Elements.CELLS: "`load_cells`, all together",
+    Elements.CELLS: "named cables, each cell by itself; `load_cells` or none named: all together",
 }
 
 

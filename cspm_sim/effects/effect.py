@@ -195,8 +195,8 @@ class Signature:
             shrink the residual by which it is judged.
         shares_noise: whether its columns are readings from which its residual is made as well, so
             that their noise alone correlates both.
-        negligible: how far parameters, by name, may lie from where the effect is absent in a
-            healthy machine; less is taken into account and not reported.
+        negligible: how far below and above where the effect is absent parameters, by name, may lie
+            in a healthy machine; less is taken into account and not reported.
     """
 
     regression: Regression
@@ -210,7 +210,7 @@ class Signature:
     tied: bool = False
     rescales: bool = False
     shares_noise: bool = False
-    negligible: Mapping[str, float] = field(default_factory=dict)
+    negligible: Mapping[str, tuple[float, float]] = field(default_factory=dict)
 
 
 @dataclass(frozen=True)
@@ -326,7 +326,7 @@ class Effect:
         """Return whether values are such as a healthy machine has as well."""
         limits = self.signature.negligible
         return bool(limits) and all(
-            abs(values[p.name] - (p.absent or 0.0)) <= limits[p.name]
+            limits[p.name][0] <= values[p.name] - (p.absent or 0.0) <= limits[p.name][1]
             for p in self.parameters
             if p.name in limits
         )

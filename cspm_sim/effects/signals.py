@@ -44,6 +44,8 @@ class CableSignal(IntEnum):
     GRAVITY = 14
     DAMPING = 15  # ∂t/∂ε̇ of the nominal damper [N·s/m]
     DOWNWARD = 16  # share of the cable's direction downwards, from exit to attachment
+    LENGTH_BY_EXIT = 17  # three, slopes of its length over the exit x y z in winch frame axes
+    LENGTH_BY_ATTACHMENT = 20  # three, over the attachment x y z in bar axes
 
 
 class BarSignal(IntEnum):
@@ -68,6 +70,9 @@ class EndSignal(IntEnum):
     LENGTH = 9
     GRAVITY = 10
     EXIT_VELOCITY = 11  # three
+    TENSION = 14
+    WRENCH_BY_EXIT = 15  # 6 × 3 row by row, slopes per newton of its wrench on the bar
+    WRENCH_BY_ATTACHMENT = 33  # likewise, over the attachment
 
 
 class FrameSignal(IntEnum):

@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from cspm_ident.diagnosis.residuals.regressors import Candidate
 from cspm_ident.diagnosis.thresholds import DEFAULT_THRESHOLDS, Thresholds
-from cspm_sim.effects import Effect
+from cspm_sim.effects import Effect, Elements
 
 Array = NDArray[np.float64]
 
@@ -43,6 +43,12 @@ class Hypothesis:
         return tuple(candidate.element for candidate in self.candidates)
 
     @property
+    def scope(self) -> tuple[str, ...]:
+        """The elements by the name under which a test-bed file lists them."""
+        every = self.common and self.effect.acts_on is Elements.CELLS
+        return (Elements.CELLS.value,) if every else self.elements
+
+    @property
     def causes(self) -> int:
         """Number of faults it assumes: one for each element that has its own parameters."""
         return 1 if self.common else len(self.candidates)
@@ -50,7 +56,7 @@ class Hypothesis:
     @property
     def words(self) -> str:
         """Effect and elements, as readable text."""
-        return f"{self.effect.id} on {', '.join(self.elements)}"
+        return f"{self.effect.id} on {', '.join(self.scope)}"
 
 
 class Rival(NamedTuple):
@@ -303,6 +309,11 @@ def unusual(weights: Mapping[Candidate, Array], hypothesis: Hypothesis) -> float
 def is_timing(effect: Effect) -> bool:
     """Return whether an effect makes readings older than their stamps."""
     return effect.physics.sense is not None and effect.physics.sense.lateness is not None
+
+
+def is_surveyed(effect: Effect) -> bool:
+    """Return whether an effect moves a surveyed place, which no machine knows exactly."""
+    return effect.physics.alter is not None and bool(effect.signature.negligible)
 
 
 def is_early(weights: Mapping[Candidate, Array], hypothesis: Hypothesis) -> bool:

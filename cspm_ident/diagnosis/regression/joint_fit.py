@@ -18,6 +18,7 @@ from cspm_ident.diagnosis.regression.hypothesis import (
     is_early,
     is_exact,
     is_negligible,
+    is_surveyed,
     is_tied,
     is_timing,
     parts_of,
@@ -232,3 +233,7 @@ class Fits:
         """Return whether its weights are within a healthy machine's range, so it is no finding."""
         found = self.values(chosen)
         return is_negligible({c: found[c] for c in hypothesis.candidates})
+
+    def is_calibration(self, hypothesis: Hypothesis, chosen: Sequence[Hypothesis]) -> bool:
+        """Return whether it moves surveyed places by no more than their accuracy."""
+        return is_surveyed(hypothesis.effect) and self.is_negligible(hypothesis, chosen)

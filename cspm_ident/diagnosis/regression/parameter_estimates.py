@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 from cspm_ident.diagnosis.regression.block_gram import gather
 from cspm_ident.diagnosis.regression.block_regression import BlockRegression
 from cspm_ident.diagnosis.regression.coefficients import Weights, weights_of
+from cspm_ident.diagnosis.regression.hypothesis import is_timing
 from cspm_ident.diagnosis.residuals.drive_torque import time_constant
 from cspm_ident.diagnosis.residuals.regressors import Candidate, Place
 from cspm_ident.diagnosis.residuals.residual_equation import Equation, steady
@@ -107,8 +108,9 @@ def of_clocks(weights: Weights) -> Weights:
     found = dict(weights)
     for candidate, (values, half) in weights.items():
         effect = candidate.effect
-        if effect.signature.negligible:
-            own = np.array([effect.signature.negligible.get(p.name, 0.0) for p in effect.linear])
+        if effect.signature.negligible and is_timing(effect):
+            limits = effect.signature.negligible
+            own = np.array([limits.get(p.name, (0.0, 0.0))[1] for p in effect.linear])
             found[candidate] = values, np.hypot(half, own)
     return found
 

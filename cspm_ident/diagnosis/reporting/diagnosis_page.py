@@ -15,7 +15,7 @@ from cspm_ident.diagnosis.finding import Finding
 from cspm_ident.diagnosis.regression.hypothesis import Hypothesis
 from cspm_ident.diagnosis.reporting.empirical_statement import stage_errors, stage_names
 from cspm_ident.diagnosis.reporting.evidence_figure import caption_of, driver_figure, overlay_figure
-from cspm_ident.diagnosis.reporting.finding_statement import considered_words
+from cspm_ident.diagnosis.reporting.finding_statement import calibrated_words, considered_words
 from cspm_ident.diagnosis.reporting.machine_drawing import drawing
 from cspm_ident.diagnosis.reporting.machine_part import Part, part_behind, parts_of
 from cspm_ident.diagnosis.reporting.page_checks import (
@@ -233,6 +233,11 @@ def _hypotheses(found: Diagnosis, data: dict[str, Any]) -> str:
     for finding in found.considered:
         size = _in_errors(finding.gain.total, finding.gain.error)
         rows.append((considered_words(finding), "not named", "", size, finding.reason_not_kept))
+    for finding in found.calibrated:
+        size = _in_errors(finding.gain.total, finding.gain.error)
+        rows.append(
+            (calibrated_words(finding), "calibrated", "", size, f"{100 * finding.share:.0f} %")
+        )
     for driver, gain, share, _ in found.unexplained:
         name = f"a function of {driver.signal}, {driver.place.element}"
         size = _in_errors(gain.total, gain.error)

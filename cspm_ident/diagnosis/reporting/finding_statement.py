@@ -52,11 +52,19 @@ def considered_words(finding: Finding) -> str:
     return f"{finding.hypothesis.words}{numbers}"
 
 
+def calibrated_words(finding: Finding) -> str:
+    """Return what a survey had to be corrected by, within its accuracy."""
+    largest = max(finding.parameters, key=lambda each: abs(each.value))
+    size = amount_words(abs(largest.value), largest.unit)
+    words, elements = finding.hypothesis.effect.words, ", ".join(finding.elements)
+    return f"{words} of {elements}, by up to {size} ({largest.name} of {largest.element})"
+
+
 def _subject(effect: Effect, elements: Sequence[str]) -> str:
     """Return the faulty elements as the subject of a sentence, with its verb."""
     many = len(elements) > 1
     verb = "have" if many else "has"
-    if effect.acts_on is Elements.CELLS:
+    if tuple(elements) == (Elements.CELLS.value,):
         return "All load cells have"
     kind = kind_of(effect)
     listed = " and ".join(", ".join(elements).rsplit(", ", 1)).replace("_", " ")

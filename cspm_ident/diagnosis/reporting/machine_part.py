@@ -50,7 +50,7 @@ _SENSORS = {WINCHES: Kind.WINCH, TENSION: Kind.LOAD_CELL}
 
 def parts_of(effect: Effect, element: str, cables: Sequence[str]) -> list[Part]:
     """Return the parts that an effect on an element concerns, in a machine with given cables."""
-    if effect.acts_on is Elements.CELLS:
+    if element == Elements.CELLS.value:
         return [Part(Kind.LOAD_CELL, name) for name in cables]
     return [Part(kind_of(effect), element)]
 

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from enum import Enum
 from math import exp
 from pathlib import Path
@@ -136,6 +136,7 @@ def diagnosis_data(diagnosis: Diagnosis, testbed: Path | None = None) -> dict[st
         "thresholds": diagnosis.thresholds.values,
         "findings": _findings(diagnosis),
         "considered": [considered_entry(each) for each in diagnosis.considered],
+        "calibrated": [entry for each in diagnosis.calibrated for entry in _calibrated(each)],
         "not_excited": [
             {"effect": name, "elements": list(elements)} for name, elements in diagnosis.not_excited
         ],
@@ -201,7 +202,7 @@ def _finding(diagnosis: Diagnosis, finding: Finding) -> dict[str, Any]:
         "alternatives": [
             {
                 "effect": rival.hypothesis.effect.id,
-                "elements": list(rival.hypothesis.elements),
+                "elements": list(rival.hypothesis.scope),
                 "beside": None if rival.beside is None else rival.beside.effect.id,
                 "probability": probability * _odds(rival),
                 "separating_experiment": None,
@@ -232,6 +233,13 @@ def _numbers(finding: Finding) -> list[dict[str, Any]]:
         }
         for n in finding.parameters
     ]
+
+
+def _calibrated(finding: Finding) -> Iterator[dict[str, Any]]:
+    """Yield the entries of a survey's errors, each with the accuracy of such a survey."""
+    usual = {parameter.name: parameter.usual for parameter in finding.hypothesis.effect.parameters}
+    for entry in _numbers(finding):
+        yield {"effect": finding.effect, **entry, "accuracy": usual[entry["name"]]}
 
 
 def _region(region: Region | None) -> dict[str, Any]:

@@ -19,6 +19,7 @@ from cspm_ident.diagnosis.residuals.machine_signals import (
 )
 from cspm_ident.signals.cable_motion import damping_of
 from cspm_model.elastic_law import elongation_at, law_at
+from cspm_model.end_slopes import EndSlopes, end_slopes
 from cspm_model.equilibrium import unstretched_lengths
 from cspm_model.kernels.cable import EXIT, GEAR_RATIO, OFFSET_LENGTH, RADIUS
 from cspm_model.kernels.machine import PlantParameters
@@ -323,7 +324,7 @@ class Suspension:
         """Return `CableSignal` columns of cable i."""
         count, cables = len(self.signals.times), self.parameters.cables
         # Column by column in memory, as they are read.
-        rows = np.zeros((count, len(CableSignal)), order="F")
+        rows = np.zeros((count, int(CableSignal.LENGTH_BY_ATTACHMENT) + 3), order="F")
         lengths, wound = self._spans.lengths[:, i], self._wound[:, i]
         directions = self._spans.directions[:, i]
         for column, values in {
@@ -346,7 +347,20 @@ class Suspension:
             CableSignal.GRAVITY: self._testbed.gravity,
         }.items():
             rows[:, column] = values
+        rows[:, CableSignal.LENGTH_BY_EXIT :] = self._length_by_ends[:, i]
         return rows
+
+    @cached_property
+    def _length_by_ends(self) -> Array:
+        """Slopes of the cables' lengths over their exits and attachments, (k, n, 6)."""
+        slopes = [self._end_slopes(i) for i in range(len(self.parameters.cables))]
+        lengths = ([s.exit_lengths, s.attachment_lengths] for s in slopes)
+        return np.concatenate([np.concatenate(each, axis=2) for each in lengths], axis=1)
+
+    def _end_slopes(self, i: int) -> EndSlopes:
+        """Return slopes over cable i's ends; one cable at a time to save memory."""
+        poses = self.signals.bar.poses, self.signals.frame.poses
+        return end_slopes(self.parameters.cables[i : i + 1], *poses)
 
     def end_rows(self, i: int) -> Array:
         """Return `EndSignal` columns of cable i."""
@@ -354,7 +368,10 @@ class Suspension:
         apart, exits = end_velocities(spans, self.bar, self._frame, place)
         gravity = np.full((len(self.signals.times), 1), self._testbed.gravity)
         parts = (spans.directions[:, 0], apart[:, 0], spans.arms[:, 0], spans.lengths)
-        return np.hstack([*parts, gravity, exits[:, 0]])
+        slopes, count = self._end_slopes(i), len(gravity)
+        wrenches = (slopes.exit_wrenches, slopes.attachment_wrenches)
+        ends = (each.reshape(count, 18) for each in wrenches)
+        return np.hstack([*parts, gravity, exits[:, 0], self.signals.tensions[:, i, None], *ends])
 
     @cached_property
     def bar_rows(self) -> Array:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import replace
 from functools import partial
 from itertools import chain
@@ -324,9 +324,7 @@ class _Stretch:
         if topic == TENSION and self._drawn is not None:
             return
         if topic in (TENSION, WINCHES):
-            every = range(len(self._machine.cables))
-            cables = every if effect.acts_on is Elements.CELLS else [i]
-            yield from self._read_joints(effect, cables, topic)
+            yield from self._read_joint(effect, i, topic)
             return
         changes = [self._changed(*faulty) for faulty in self._misplaced(effect, name)]
         tensions = np.stack([c[0] for c in changes], axis=2)
@@ -355,21 +353,8 @@ class _Stretch:
             step = small_step(change)
             yield self._signals.with_pose_change(body, change, step), step
 
-    def _read_joints(
-        self, effect: Effect, cables: Iterable[int], topic: str
-    ) -> Iterator[tuple[Place, Array]]:
-        """Yield the change of cable and bar residuals by a fault of tensions or an angle."""
-        wrench = np.zeros_like(self._here.wrench_residuals)
-        for i in cables:
-            column, change = self._read_joint(effect, i, topic)
-            yield Place(Channel.TENSION, self._machine.cable_names[i]), column[:, None, None]
-            if topic == TENSION:
-                wrench -= self._here.pulled(i, change)
-        if topic == TENSION:
-            yield Place(Channel.WRENCH, BAR), self._weighed(wrench, Channel.WRENCH)[:, :, None]
-
-    def _read_joint(self, effect: Effect, i: int, topic: str) -> tuple[Array, Array]:
-        """Return a reading fault's change of its cable's weighted residual, and of the reading."""
+    def _read_joint(self, effect: Effect, i: int, topic: str) -> Iterator[tuple[Place, Array]]:
+        """Yield the change of cable and bar residuals by a fault of a tension or an angle."""
         signals = self._signals
         readings = signals.tensions if topic == TENSION else signals.angles
         rescaled = effect.signature.rescales * self._here.tension_residuals[:, i]
@@ -384,8 +369,13 @@ class _Stretch:
             speeds[:, i] += step * np.gradient(change, signals.step)
             moved = replace(signals, angles=changed, speeds=speeds)
         there = self._here.with_joints(moved).of_cable(i).tension_residuals[:, 0]
-        residual = (there - self._here.tension_residuals[:, i]) / step
-        return self._weighed(residual, Channel.TENSION), change
+        residual = self._weighed(
+            (there - self._here.tension_residuals[:, i]) / step, Channel.TENSION
+        )
+        yield Place(Channel.TENSION, self._machine.cable_names[i]), residual[:, None, None]
+        if topic == TENSION:
+            wrench = self._weighed(-self._here.pulled(i, change), Channel.WRENCH)
+            yield Place(Channel.WRENCH, BAR), wrench[:, :, None]
 
     def _misread(
         self, effect: Effect, i: int, drawn: DrawnTension

@@ -6,8 +6,9 @@ from collections.abc import Mapping
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.interpolate import CubicSpline
 
-from cspm_ident.diagnosis.residuals.file_effects import joined_entries
+from cspm_ident.diagnosis.residuals.file_effects import joined_entries, of_all_cells
 from cspm_ident.diagnosis.residuals.regressors import Candidate
 from cspm_ident.diagnosis.residuals.sensor_readings import pose_rows, reading_rows
 from cspm_ident.signals.measurement import BAR, FRAME, TENSION, WINCHES, Measurement
@@ -36,6 +37,7 @@ def with_found(measurement: Measurement, weights: Mapping[Candidate, Array]) -> 
         for candidate, own in weights.items()
     ]
     machine = measurement.machine
+    entries = of_all_cells(entries, machine)
     machine = machine.model_copy(update={"effects": joined_entries(machine, entries)})
     return measurement.with_machine(machine)
 
@@ -126,6 +128,12 @@ def _true_readings(measurement: Measurement, action: Action) -> Measurement:
         late = np.array(
             [effect.physics.sense.lateness(float(t), parameters) for t in samples.times]
         )
+        if action.name in measurement.machine.cable_names:
+            values, i = samples.values.copy(), action.element
+            reading = CubicSpline(samples.times, values[:, i], extrapolate=False)
+            there = np.clip(samples.times + late, samples.times[0], samples.times[-1])
+            values[:, i] = reading(there)
+            return measurement.with_samples(kind, Samples(samples.times, values))
         return measurement.with_samples(kind, Samples(samples.times - late, samples.values))
     values, weights = samples.values, effect.weights(action.values)
     for _ in range(_FIXED_POINTS):

@@ -54,6 +54,20 @@ def joined_entries(machine: Testbed, entries: Iterable[EffectEntry]) -> tuple[Ef
     return tuple(found)
 
 
+def of_all_cells(entries: Sequence[EffectEntry], machine: Testbed) -> list[EffectEntry]:
+    """Return entries with one for all load cells where each of them has the same."""
+    found: list[EffectEntry] = []
+    for entry in entries:
+        alike = [e for e in entries if (e.effect, e.parameters) == (entry.effect, entry.parameters)]
+        acting = {name for each in alike for name in each.elements}
+        cells = entry.table is None and catalogue()[entry.effect].acts_on is Elements.CELLS
+        if not (cells and acting == set(machine.cable_names)):
+            found.append(entry)
+        elif entry is alike[0]:
+            found.append(entry.model_copy(update={"elements": (Elements.CELLS.value,)}))
+    return found
+
+
 def _most(effect: Effect, machine: Testbed) -> Mapping[str, float]:
     """Return the largest value of each parameter among a file's entries of an effect."""
     own = [each.numbers for each in machine.effects if each.effect == effect.id]

@@ -69,10 +69,8 @@ def elements_of(effect: Effect, cables: tuple[str, ...], bodies: tuple[str, ...]
         cables: names of the cables.
         bodies: of `bar` and `winch_frame` those that the machine has.
     """
-    if effect.acts_on is Elements.CABLES:
+    if effect.acts_on in (Elements.CABLES, Elements.CELLS):
         return list(cables)
     if effect.acts_on is Elements.BODIES:
         return list(bodies)
-    if effect.acts_on is Elements.CELLS:
-        return [effect.acts_on.value]
     return [effect.acts_on.value] if effect.acts_on.value in bodies else []

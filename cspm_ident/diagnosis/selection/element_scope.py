@@ -9,7 +9,13 @@ from itertools import compress
 import numpy as np
 from numpy.typing import NDArray
 
-from cspm_ident.diagnosis.regression.hypothesis import Hypothesis, has_one_system, is_spread
+from cspm_ident.diagnosis.regression.hypothesis import (
+    Hypothesis,
+    has_one_system,
+    is_negligible,
+    is_spread,
+    is_surveyed,
+)
 from cspm_ident.diagnosis.regression.joint_fit import Fits
 from cspm_ident.diagnosis.regression.significance import Significance
 from cspm_ident.diagnosis.residuals.regressors import Candidate
@@ -65,12 +71,16 @@ class Scopes:
         members = hypothesis.candidates
         each, half = self._each(hypothesis, base)
         there = np.any(np.abs(each) > half, axis=1)
+        if is_surveyed(hypothesis.effect):
+            there &= [not is_negligible({c: own}) for c, own in zip(members, each, strict=True)]
         if not there.any():
             return hypothesis
         kept = replace(hypothesis, candidates=tuple(compress(members, there)))
         if is_spread(kept, self._everywhere(hypothesis), self._fits.thresholds):
             there |= np.all(np.abs(each - np.median(each[there], axis=0)) <= half, axis=1)
         kept = replace(hypothesis, candidates=tuple(compress(members, there)))
+        if is_surveyed(hypothesis.effect):
+            return kept
         gone = replace(hypothesis, candidates=tuple(compress(members, ~there)))
         return hypothesis if gone.candidates and self._act(gone, kept, base) else kept
 

@@ -32,7 +32,7 @@ from cspm_ident.diagnosis.regression.significance import Significance
 from cspm_ident.diagnosis.residuals.free_shapes import Driver
 from cspm_ident.diagnosis.residuals.regressors import Candidate
 from cspm_ident.diagnosis.selection.alternatives import alternatives_of
-from cspm_ident.diagnosis.selection.common_clock import clocks_of
+from cspm_ident.diagnosis.selection.common_clock import clocks_of, survey_of
 from cspm_ident.diagnosis.selection.element_scope import Scopes
 from cspm_ident.diagnosis.selection.merge import one_instead
 from cspm_ident.diagnosis.selection.onset import first_block
@@ -116,7 +116,7 @@ class Search:
         return self.gram.parted(own, self.sums.weights(self.gram.with_nuisance(own)))
 
     def _chosen(self) -> list[Hypothesis]:
-        chosen = self._clocks()
+        chosen = self._surveyed(self._clocks())
         most = self.thresholds.most_effects
         while sum(not self.fits.is_negligible(h, chosen) for h in chosen) < most:
             self._progress(f"effect {len(chosen) + 1}")
@@ -127,6 +127,7 @@ class Search:
             for each in found:
                 self._begin(each)
                 chosen = joined(chosen, each)
+            chosen = self._surveyed(chosen)
         return self._merged(self._needed(self._exchanged(chosen)))
 
     def _pair(self, chosen: Sequence[Hypothesis]) -> tuple[Hypothesis, ...]:
@@ -177,6 +178,19 @@ class Search:
         best = self._surest(late, (), self.fits.columns([]))
         return [] if best is None else [best]
 
+    def _surveyed(self, chosen: list[Hypothesis]) -> list[Hypothesis]:
+        """Return the selection with errors of the survey, if hold-out blocks show them.
+
+        Only where all of them are as small as in a healthy machine.
+        """
+        survey = survey_of(self._free(chosen))
+        base, own = self.fits.columns(chosen), [self.fits.own_columns(h) for h in survey]
+        gain = self.sums.gain(base, np.concatenate([base[:0], *own]))
+        if gain.total <= self.thresholds.certain_sigma * gain.error:
+            return chosen
+        both = [*chosen, *survey]
+        return both if all(self.fits.is_calibration(h, both) for h in survey) else chosen
+
     def _merged(self, chosen: list[Hypothesis]) -> list[Hypothesis]:
         """Return the selection after each merge of several faults into one effect."""
         while merging := one_instead(self.fits, self.significance, chosen, self._free(chosen)):
@@ -188,7 +202,8 @@ class Search:
         """Return the selection without redundant hypotheses, all scopes and tests repeated."""
         kept = list(chosen)
         for k, hypothesis in enumerate(kept):
-            kept[k] = self.scopes.pruned(hypothesis, self._others(hypothesis, kept))
+            if not self.fits.is_calibration(hypothesis, kept):
+                kept[k] = self.scopes.pruned(hypothesis, self._others(hypothesis, kept))
         while (needless := self._needless(kept)) is not None:
             del kept[needless]
         return kept
@@ -209,6 +224,8 @@ class Search:
         may_be_untruth = self.fits.may_be_untruth(chosen)
         for k in np.argsort([gain.total for gain in gains]):
             own = chosen[k]
+            if gains[k].total > 0.0 and self.fits.is_calibration(own, chosen):
+                continue
             needless = (
                 may_be_untruth[k]
                 or (
@@ -331,6 +348,8 @@ class Search:
         """
         together = [*chosen, hypothesis]
         if not self.fits.is_plausible(together) or self.fits.contradicts(hypothesis, chosen):
+            return None
+        if self.fits.is_calibration(hypothesis, together):
             return None
         gained = before - self.fits.held_out(hypothesis, base)
         known = len(chosen)

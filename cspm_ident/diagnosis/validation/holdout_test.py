@@ -85,8 +85,7 @@ class _Lowered:
             return HoldOut.FAINT
         if self.raises:
             return None
-        should = self._shows or self._could_take_much
-        return HoldOut.UNDECIDED if should else HoldOut.SILENT
+        return HoldOut.UNDECIDED if self._should_show else HoldOut.SILENT
 
     @property
     def any_or_none(self) -> bool:
@@ -123,6 +122,12 @@ class _Lowered:
     @property
     def _could_take_much(self) -> bool:
         return bool(np.any(self._expected > self._thresholds.material_share * self._without))
+
+    @property
+    def _should_show(self) -> bool:
+        """Whether the finding would change held-out data visibly, beyond the scatter of blocks."""
+        visible = self._expected.sum() > self._error
+        return self._shows or bool(visible and self._could_take_much)
 
     @property
     def _shows(self) -> bool:

@@ -36,11 +36,12 @@ def _creep(parameters: Array, signals: Array, states: Array, rates: Array) -> No
 
 
 def _rest(parameters: Array, signals: Array) -> Sequence[float]:
-    return parameters[0] * signals[ELASTIC_TENSION], 1.0 / signals[UNSTRETCHED]
+    stretched = parameters[0] * signals[ELASTIC_TENSION] - parameters[2]
+    return stretched, 1.0 / signals[UNSTRETCHED]
 
 
 def _columns(signals: Array, time_constant: float) -> Array:
-    """Return what creep adds that was at rest under the tension of the beginning."""
+    """Return what creep adds that was at rest under the tension of the beginning, and was not."""
     time = signals[:, CableSignal.TIME]
     lengths = signals[:, CableSignal.WOUND] * signals[:, CableSignal.LENGTH]
     tension = signals[:, CableSignal.TENSION] - signals[:, CableSignal.DAMPER]
@@ -50,8 +51,9 @@ def _columns(signals: Array, time_constant: float) -> Array:
     crept = means.copy()
     crept[0] = np.median(tension[time - time[0] <= _BEGINNING_S])
     relaxed(means, kept, crept)
-    grown = (crept[:, 0] - crept[0, 0]) * lengths / lengths[0]
-    return np.asarray((-signals[:, CableSignal.STIFFNESS] * grown)[:, None, None])
+    missing = -np.exp(-(time - time[0]) / time_constant)
+    grown = np.stack([crept[:, 0] - crept[0, 0], missing], axis=1) * (lengths / lengths[0])[:, None]
+    return np.asarray((-signals[:, CableSignal.STIFFNESS, None] * grown)[:, None])
 
 
 EFFECT = Effect(
@@ -60,6 +62,14 @@ EFFECT = Effect(
     parameters=(
         EffectParameter("compliance", "m/N", 0.0, 0.1, meaning="of the cable at the start"),
         EffectParameter("time_constant", "s", 0.01, 1e5, absent=None),
+        EffectParameter(
+            "initial_deficit",
+            "m",
+            -1.0,
+            1.0,
+            meaning="of creep at the start against that at rest under its load",
+            default=0.0,
+        ),
     ),
     physics=Physics(
         kernels={Hook.CABLE: _stretch, Hook.LOADED_CABLE: _creep},

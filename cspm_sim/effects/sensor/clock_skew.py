@@ -40,7 +40,7 @@ EFFECT = Effect(
     signature=Signature(
         regression=Regression(Channel.READING, _columns),
         # What two free clocks do.
-        negligible={"skew": 2e-5},
+        negligible={"skew": (-2e-5, 2e-5)},
     ),
     description=Description(
         noun="a clock of another rate",

@@ -35,7 +35,7 @@ EFFECT = Effect(
     signature=Signature(
         regression=Regression(Channel.READING, _columns),
         # As well as clocks are set to each other.
-        negligible={"delay": 2.5e-4},
+        negligible={"delay": (-2.5e-4, 2.5e-4)},
     ),
     description=Description(
         noun="a delay",

@@ -126,8 +126,16 @@ def test_late_load_cells_read_what_all_tensions_were():
     rows = readings(sensor(testbed, "/cables/tension"), values)
     assert rows[30_000_000] == pytest.approx(0.0265 * np.arange(1.0, 9.0), abs=1e-12)
     assert sensor_faults(testbed, "/winches/state") == []
-    with pytest.raises(InputError, match=r"elements \['c1'\], allowed: \[load_cells\] or none"):
-        sensor_faults(machine(entry("tension_delay", ["c1"], delay=0.1)), "/cables/tension")
+    with pytest.raises(InputError, match="tension_delay: no element 'bar', allowed: c0"):
+        sensor_faults(machine(entry("tension_delay", ["bar"], delay=0.1)), "/cables/tension")
+
+
+def test_one_late_load_cell_leaves_the_others_in_time():
+    effects = entry("tension_delay", ["c1"], delay=0.0035), entry("tension_delay", delay=0.002)
+    values = np.outer(1e-3 * np.arange(40), np.ones(8))
+    rows = readings(sensor(machine(*effects), "/cables/tension"), values)
+    expected = [0.0245 if i == 1 else 0.028 for i in range(8)]
+    assert rows[30_000_000] == pytest.approx(expected, abs=1e-12)
 
 
 def test_a_late_pose_and_a_delayed_message_add_up():
@@ -176,7 +184,7 @@ def test_the_past_forgets_what_is_asked_for_no_more():
     past = Past()
     for k in range(1000):
         past.note(1e-3 * k, np.array([float(k)]))
-        assert past.at(1e-3 * k - 0.0105) == pytest.approx(max(0.0, k - 10.5), abs=1e-9)
+        assert past.at(np.array([1e-3 * k - 0.0105])) == pytest.approx(max(0.0, k - 10.5), abs=1e-9)
     assert len(past._rows) <= 13
 
 

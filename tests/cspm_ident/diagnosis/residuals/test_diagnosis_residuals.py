@@ -111,12 +111,12 @@ def test_what_candidates_do_not_touch_may_be_left_out(measurement, equations):
             assert np.array_equal(equation.target, equations[equation.place].target)
 
 
-def test_load_cells_that_are_late_touch_every_winch(measurement):
-    late = Candidate(catalogue()["tension_delay"], "load_cells")
-    found = equations_of(measurement, [late.effect], touched=[late])
+def test_a_late_load_cell_touches_its_winch_alone(measurement):
+    effect, names = catalogue()["tension_delay"], measurement.machine.cable_names
+    found = equations_of(measurement, [effect], touched=[Candidate(effect, names[0])])
     shafts = [e for e in found if e.place.channel is Channel.SHAFT]
-    assert [e.place.element for e in shafts] == list(measurement.machine.cable_names)
-    assert all(late in equation.columns for equation in shafts)
+    assert [e.place.element for e in shafts] == list(names)
+    assert all(list(e.columns) == [Candidate(effect, e.place.element)] for e in shafts)
 
 
 @pytest.mark.parametrize(

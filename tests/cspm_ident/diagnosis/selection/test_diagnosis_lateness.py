@@ -21,6 +21,7 @@ ROWS, STEP, BLOCK_S = 2400, 0.01, 0.5
 TRACKER, CELLS = catalogue()["pose_delay"], catalogue()["tension_delay"]
 DRAG = catalogue()["winch_viscous_friction"]
 CLOCK = 2.5e-4  # as well as clocks are set to each other [s]
+STAMP = 1e-3  # as well as a log stamps what it takes too early [s]
 POSE, TENSION = Candidate(TRACKER, "bar"), Candidate(CELLS, "load_cells")
 
 
@@ -91,9 +92,9 @@ def test_only_effects_on_stamps_are_early_and_only_below_zero():
         return is_early({candidate: np.array([value])}, Hypothesis(candidate.effect, (candidate,)))
 
     assert [is_timing(effect) for effect in (TRACKER, CELLS, DRAG)] == [True, True, False]
-    assert early(TENSION, -2.0 * CLOCK)
-    assert not early(TENSION, 2.0 * CLOCK)
-    assert not early(TENSION, -0.9 * CLOCK)
+    assert early(TENSION, -1.1 * STAMP)
+    assert not early(TENSION, 1.1 * STAMP)
+    assert not early(TENSION, -0.9 * STAMP)
     assert not early(Candidate(DRAG, "surge_1"), -1.0)
 
 
@@ -115,8 +116,10 @@ def test_a_delay_counts_from_where_its_interval_leaves_what_clocks_may_be_apart(
 
 @pytest.mark.parametrize(("delay", "reported"), [(1.9 * CLOCK, False), (2.1 * CLOCK, True)])
 def test_a_delay_between_two_clocks_counts_from_twice_what_one_may_be_off(delay, reported):
-    for sign in (1.0, -1.0):
-        found = of_clocks({TENSION: (np.array([sign * delay]), np.array([0.01 * CLOCK]))})
+    for candidate, least in ((TENSION, 0.0), (TENSION, CLOCK - STAMP), (POSE, 0.0)):
+        sign = 1.0 if least == 0.0 else -1.0
+        value = np.array([sign * delay + least])
+        found = of_clocks({candidate: (value, np.array([0.01 * CLOCK]))})
         assert may_be_negligible(found) is not reported
 
 

@@ -1,0 +1,64 @@
+"""A cable's attachment point beside the place that the test-bed file says."""
+
+import numpy as np
+
+from cspm_msgs_py.testbed import Testbed
+from cspm_sim.effects.alteration import altered_cable
+from cspm_sim.effects.effect import (
+    Array,
+    Block,
+    Channel,
+    Description,
+    Effect,
+    Physics,
+    Regression,
+    Signature,
+    Values,
+)
+from cspm_sim.effects.signals import CableSignal, EndSignal
+from cspm_sim.effects.survey import HEALTHY, shifted, survey_parameters
+
+_LENGTH = slice(CableSignal.LENGTH_BY_ATTACHMENT, CableSignal.LENGTH_BY_ATTACHMENT + 3)
+_WRENCH = slice(EndSignal.WRENCH_BY_ATTACHMENT, EndSignal.WRENCH_BY_ATTACHMENT + 18)
+
+
+def _alter(testbed: Testbed, element: int, values: Values) -> Testbed:
+    place = testbed.cables[element].attachment
+    if place is None:
+        return testbed
+    return altered_cable(testbed, element, attachment=shifted(place, values))
+
+
+def _columns(signals: Array) -> Array:
+    """Return the first order: a longer cable pulls more."""
+    stiffness = signals[:, CableSignal.STIFFNESS, None]
+    return np.asarray((stiffness * signals[:, _LENGTH])[:, None])
+
+
+def _wrench(signals: Array) -> Array:
+    """Return the change of the wrench at constant tension."""
+    slopes = signals[:, _WRENCH].reshape(-1, 6, 3)
+    return np.asarray(signals[:, EndSignal.TENSION, None, None] * slopes)
+
+
+EFFECT = Effect(
+    id="cable_attachment_offset",
+    block=Block.CABLE,
+    parameters=survey_parameters("attachment", "bar_ned"),
+    physics=Physics(alter=_alter),
+    signature=Signature(
+        regression=Regression(Channel.TENSION, _columns),
+        partners=(Regression(Channel.WRENCH, _wrench),),
+        negligible=HEALTHY,
+    ),
+    description=Description(
+        noun="attachment point",
+        equation="attachment point = attachment + (x, y, z) in bar_ned",
+        shows=(
+            "tension residual of one cable follows its direction in the bar; a moment on the bar"
+        ),
+        confounded_with=("pose_offset", "cable_exit_offset", "bar_com"),
+        separating_experiment="turn the bar about all axes at one place, then translate it",
+        reference="thesis (2-2); tolerances of a survey: docs/reference/accuracies.md",
+    ),
+)

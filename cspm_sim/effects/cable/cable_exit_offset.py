@@ -1,0 +1,66 @@
+"""A cable's exit point beside the place that the test-bed file says."""
+
+import numpy as np
+
+from cspm_msgs_py.testbed import Testbed
+from cspm_sim.effects.alteration import altered_cable
+from cspm_sim.effects.effect import (
+    Array,
+    Block,
+    Channel,
+    Description,
+    Effect,
+    Physics,
+    Regression,
+    Signature,
+    Values,
+)
+from cspm_sim.effects.signals import CableSignal, EndSignal
+from cspm_sim.effects.survey import HEALTHY, shifted, survey_parameters
+
+_LENGTH = slice(CableSignal.LENGTH_BY_EXIT, CableSignal.LENGTH_BY_EXIT + 3)
+_WRENCH = slice(EndSignal.WRENCH_BY_EXIT, EndSignal.WRENCH_BY_EXIT + 18)
+
+
+def _alter(testbed: Testbed, element: int, values: Values) -> Testbed:
+    place = testbed.cables[element].exit
+    if place is None:
+        return testbed
+    return altered_cable(testbed, element, exit=shifted(place, values))
+
+
+def _columns(signals: Array) -> Array:
+    """Return the first order: a longer cable pulls more."""
+    stiffness = signals[:, CableSignal.STIFFNESS, None]
+    return np.asarray((stiffness * signals[:, _LENGTH])[:, None])
+
+
+def _wrench(signals: Array) -> Array:
+    """Return the change of the wrench at constant tension."""
+    slopes = signals[:, _WRENCH].reshape(-1, 6, 3)
+    return np.asarray(signals[:, EndSignal.TENSION, None, None] * slopes)
+
+
+EFFECT = Effect(
+    id="cable_exit_offset",
+    block=Block.CABLE,
+    parameters=survey_parameters("exit", "winch_frame_ned"),
+    physics=Physics(alter=_alter),
+    signature=Signature(
+        regression=Regression(Channel.TENSION, _columns),
+        partners=(Regression(Channel.WRENCH, _wrench),),
+        negligible=HEALTHY,
+    ),
+    description=Description(
+        noun="exit point",
+        equation="exit point = exit + (x, y, z) in winch_frame_ned",
+        shows=(
+            "tension residual of one cable follows its direction, so the poses of bar and frame"
+        ),
+        confounded_with=("frame_pose_offset", "cable_attachment_offset", "cable_stiffness"),
+        separating_experiment=(
+            "move the bar through the workspace along all axes, translations and rotations apart"
+        ),
+        reference="thesis (2-2); tolerances of a survey: docs/reference/accuracies.md",
+    ),
+)

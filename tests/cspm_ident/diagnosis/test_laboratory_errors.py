@@ -1,0 +1,69 @@
+"""Errors that every laboratory has: of its survey, its clocks, and memory from before the start."""
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+import cspm
+
+RIGS = Path(__file__).resolve().parents[4] / "shared" / "cases" / "30_rigs"
+
+pytestmark = [pytest.mark.compiled, pytest.mark.slow]
+
+
+def rig(folder, name):
+    """A rig by another hand, in counts, rpm, kgf and millimetres, diagnosed."""
+    source = RIGS / name
+    if not source.exists():
+        pytest.skip(f"no recordings in {RIGS}")
+    given = {"mapping": source / "map.yaml", "testbed": source / "rig.yaml"}
+    cspm.import_recording(source / "drive.csv", folder / "rec", **given)
+    return cspm.diagnose(folder / "rec")
+
+
+@pytest.mark.parametrize("name", ["healthy_survey_0.5mm", "healthy_survey_1mm"])
+def test_a_survey_within_its_accuracy_is_calibrated_and_no_fault(tmp_path, name):
+    found = rig(tmp_path, name)
+    assert (found.verdict, len(found.findings)) == ("consistent", 0)
+    calibrated = found.data["calibrated"]
+    assert {each["name"] for each in calibrated} <= {"x", "y", "z"}
+    assert max(abs(each["value"]) for each in calibrated) < 3.7e-3
+
+
+@pytest.mark.parametrize(
+    ("name", "effect", "element", "parameter", "truth"),
+    [
+        ("attachment_off", "cable_attachment_offset", "c3", "x", 0.005),
+        ("one_cell_late", "tension_delay", "h2", "delay", 0.008),
+        ("creep_from_fresh", "cable_creep", "h1", "compliance", 1e-5),
+        ("less_friction", "winch_coulomb_friction", "h2", "torque", -0.004),
+    ],
+)
+def test_what_is_off_on_a_rig_is_named_where_it_is(
+    tmp_path, name, effect, element, parameter, truth
+):
+    (finding,) = rig(tmp_path, name).findings
+    assert (finding.effect, list(finding.elements)) == (effect, [element])
+    low, high = finding.parameters[parameter].ci95
+    assert low <= truth <= high
+
+
+def test_an_attachment_is_distinguished_from_a_survey_of_all_ends(tmp_path):
+    """0.7 mm everywhere is calibrated; 10 mm at one attachment are a wrong number of the file."""
+    scenario, size = cspm.load_scenario("calm"), np.random.default_rng(2)
+    machine = scenario.testbed
+    for cable in machine.cables:
+        for effect in ("cable_exit_offset", "cable_attachment_offset"):
+            moved = dict(zip("xyz", size.normal(0.0, 7e-4, 3), strict=True))
+            if (effect, cable) == ("cable_attachment_offset", "surge_1"):
+                moved = {"x": 0.01, "y": 0.0, "z": 0.0}
+            machine = machine.with_effect(effect, cable, **moved)
+    run = cspm.simulate(scenario, testbed=machine, seed=2, duration=12.0)
+    recording = run.save(tmp_path / "recorded")
+    found = cspm.diagnose(recording, testbed=scenario.testbed, closed_loop=False)
+    (finding,) = found.findings
+    assert (found.verdict, list(finding.elements)) == ("parameter", ["surge_1"])
+    low, high = finding.parameters["x"].ci95
+    assert finding.effect == "cable_attachment_offset"
+    assert low <= 0.01 <= high

@@ -51,7 +51,12 @@ EFFECT = Effect(
         noun="centre of mass",
         equation="the bar's centre of mass = com + (x, y, z) in bar_ned; inertia about it stays",
         shows="bar wrench residual is a moment, the weight times an arm that turns with the bar",
-        confounded_with=("bar_constant_wrench", "pose_offset", "bar_restoring"),
+        confounded_with=(
+            "bar_constant_wrench",
+            "pose_offset",
+            "bar_restoring",
+            "cable_attachment_offset",
+        ),
         separating_experiment="hold still at two pitches or rolls and at two tension levels",
         reference="thesis (2-11), (2-12)",
     ),

@@ -59,6 +59,7 @@ EFFECT = Effect(
             "tension_gain",
             "cable_sag",
             "cable_length_offset",
+            "cable_exit_offset",
             "cable_creep",
             "encoder_scale",
             "frame_flexibility",

@@ -60,7 +60,7 @@ EFFECT = Effect(
         noun="an offset",
         equation="measured pose = pose, followed by the offset in the body's own axes",
         shows="cable length residuals in the pattern of one displacement that turns with the body",
-        confounded_with=("frame_pose_offset", "bar_com"),
+        confounded_with=("frame_pose_offset", "bar_com", "cable_attachment_offset"),
         separating_experiment="turn the body about two axes: the offset turns with it",
         reference="marker frame against body frame, thesis (2-3), (2-4)",
     ),

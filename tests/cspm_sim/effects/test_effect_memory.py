@@ -341,7 +341,8 @@ def left_over(signals):
     ("effect", "parameters"),
     [
         ("cable_hysteresis", {"force": 1.0, "displacement": 1e-3}),
-        ("cable_creep", {"compliance": 1e-3, "time_constant": 0.3}),
+        ("cable_creep", {"compliance": 1e-3, "time_constant": 0.3, "initial_deficit": 0.0}),
+        ("cable_creep", {"compliance": 1e-3, "time_constant": 0.3, "initial_deficit": 2e-3}),
     ],
 )
 def test_columns_of_a_cable_with_memory_are_what_its_law_leaves_over(effect, parameters):

@@ -31,6 +31,14 @@ ALTERED = [
     (entry("winch_inertia", ["c2"], inertia=1e-4), {"cables.2.rotor_inertia": 3.4e-4}),
     (entry("winch_drum_radius", ["c2"], radius=0.005), {"cables.2.drum_radius": 0.03}),
     (entry("cable_length_offset", ["c2"], offset=-0.1), {"cables.2.offset_length": 0.2}),
+    (
+        entry("cable_exit_offset", ["c2"], x=0.01, y=-0.02, z=0.03),
+        {"cables.2.exit": [-0.94, 0.73, -0.35]},
+    ),
+    (
+        entry("cable_attachment_offset", ["c2"], x=0.01, y=-0.02, z=0.03),
+        {"cables.2.attachment": [-0.40, 0.16, 0.09]},
+    ),
     (entry("cable_axial_damping", ["c2"], scale=1.5), {"cables.2.damping.factor": 1.5}),
     (
         entry("cable_stiffness", ["c2"], scale=1.25),

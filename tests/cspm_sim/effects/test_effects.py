@@ -66,6 +66,8 @@ CONTRACT = {
     "cable_creep": "compliance time_constant",
     "cable_sag": "linear_density",
     "cable_length_offset": "offset",
+    "cable_exit_offset": "x y z",
+    "cable_attachment_offset": "x y z",
     "pulley_friction": "coefficient wrap",
     "cable_transverse_damping": "coefficient",
     "bar_mass": "mass",

@@ -23,6 +23,16 @@ from cspm_sim.kernels.plant import make_scratch, plant_rate, state_count
 from cspm_sim.parameters import plant_parameters
 
 
+def wrench_slopes(line, arm, base, turn):
+    """Wrench per newton of a cable by its exit and its attachment, (6, 3) each."""
+    length, pull = np.linalg.norm(line), line / np.linalg.norm(line)
+    across = (np.eye(3) - np.outer(pull, pull)) / length
+    of_exit, of_attachment = across @ base, -across @ turn
+    moments = [np.cross(arm, of_exit.T).T, np.cross(arm, of_attachment.T).T]
+    moments[1] -= np.cross(turn.T, pull).T
+    return np.vstack([of_exit, moments[0]]), np.vstack([of_attachment, moments[1]])
+
+
 class Snapshots:
     """`count` instants of a machine with a bar, `effects` added; all arrays by instant."""
 
@@ -99,7 +109,7 @@ class Snapshots:
 
     def cable(self, i):
         """Signals of cable i."""
-        out = np.zeros((len(self.states), len(CableSignal)))
+        out = np.zeros((len(self.states), CableSignal.LENGTH_BY_ATTACHMENT + 3))
         row, damping = self.p0.cables[i], self.nominal.cables[i].damping
         for k, state in enumerate(self.states):
             unstretched, span = state[12 + i], self.spans[k, i]
@@ -124,6 +134,9 @@ class Snapshots:
             out[k, CableSignal.SPEED], out[k, CableSignal.DAMPING] = speed, damper
             out[k, CableSignal.HORIZONTAL] = np.hypot(span[0], span[1])
             out[k, CableSignal.DOWNWARD] = span[2]
+            base, turn = rotation(self.frames[k][:6]), rotation(state[:6])
+            out[k, CableSignal.LENGTH_BY_EXIT :][:3] = -span[:3] @ base
+            out[k, CableSignal.LENGTH_BY_ATTACHMENT :] = span[:3] @ turn
         out[:, CableSignal.GRAVITY] = self.nominal.gravity
         out[:, CableSignal.ANGLE] = self.angles(i)
         out[:, CableSignal.RADIUS], out[:, CableSignal.GEAR] = (
@@ -159,7 +172,7 @@ class Snapshots:
 
     def ends(self, i):
         """Signals of cable i's end at the bar."""
-        out = np.zeros((len(self.states), EndSignal.EXIT_VELOCITY + 3))
+        out = np.zeros((len(self.states), EndSignal.WRENCH_BY_ATTACHMENT + 18))
         cable = self.nominal.cables[i]
         for k, (state, frame) in enumerate(zip(self.states, self.frames, strict=True)):
             turn, base = rotation(state[:6]), rotation(frame[:6])
@@ -174,8 +187,12 @@ class Snapshots:
             line = state[:3] + arm - frame[:3] - exit_arm
             out[k, :3], out[k, 3:6] = line / np.linalg.norm(line), velocity - exit_velocity
             out[k, 6:9], out[k, EndSignal.LENGTH] = arm, np.linalg.norm(line)
-            out[k, EndSignal.EXIT_VELOCITY :] = exit_velocity
+            out[k, EndSignal.EXIT_VELOCITY :][:3] = exit_velocity
+            by_exit, by_attachment = wrench_slopes(line, arm, base, turn)
+            out[k, EndSignal.WRENCH_BY_EXIT :][:18] = by_exit.ravel()
+            out[k, EndSignal.WRENCH_BY_ATTACHMENT :] = by_attachment.ravel()
         out[:, EndSignal.GRAVITY] = self.nominal.gravity
+        out[:, EndSignal.TENSION] = self.spans[:, i, TENSION]
         return out
 
     def wrench_residual(self):

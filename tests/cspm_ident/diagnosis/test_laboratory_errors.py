@@ -59,7 +59,7 @@ def test_an_attachment_is_distinguished_from_a_survey_of_all_ends(tmp_path):
             if (effect, cable) == ("cable_attachment_offset", "surge_1"):
                 moved = {"x": 0.01, "y": 0.0, "z": 0.0}
             machine = machine.with_effect(effect, cable, **moved)
-    run = cspm.simulate(scenario, testbed=machine, seed=2, duration=12.0)
+    run = cspm.simulate(scenario, testbed=machine, seed=2, duration=20.0)
     recording = run.save(tmp_path / "recorded")
     found = cspm.diagnose(recording, testbed=scenario.testbed, closed_loop=False)
     (finding,) = found.findings

@@ -10,7 +10,7 @@ from importlib.util import find_spec
 from pathlib import Path
 
 PACKAGES = (
-    *("cspm", "cspm_control", "cspm_ident", "cspm_model"),
+    *("cspm", "cspm_checks", "cspm_control", "cspm_ident", "cspm_model"),
     *("cspm_msgs_py", "cspm_run", "cspm_sim"),
 )
 # Whose versions decide the last digits of a run, or whether its kernels compile.

@@ -7,8 +7,8 @@ from rich.console import Console
 from rich.markup import escape
 from rich.table import Table
 
-from cspm_ident.importing.checks.pace import Pace
-from cspm_ident.importing.checks.suspicion import Suspicion
+from cspm_checks.pace import Pace
+from cspm_checks.suspicion import Suspicion
 from cspm_ident.importing.report import FieldReport, ImportReport, TopicReport
 from cspm_run.output.console import say
 

@@ -8,7 +8,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from cspm_ident.importing.checks.value_suspicions import SAMPLE
+from cspm_checks.value_suspicions import SAMPLE
 from cspm_ident.importing.column_store import pieces
 
 Array = NDArray[np.float64]

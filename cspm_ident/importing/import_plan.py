@@ -6,12 +6,12 @@ from collections.abc import Collection
 from dataclasses import dataclass, replace
 from math import isnan, nan
 
+from cspm_checks.channel import field_quantity
 from cspm_ident.importing.conversion import Conversion, conversion_of
 from cspm_ident.importing.mapping import ChannelSource, Clock, MappingFile
 from cspm_ident.importing.sources.joined_source import file_of
 from cspm_ident.importing.sources.row_choice import row_choice
 from cspm_ident.importing.sources.source import Source
-from cspm_ident.importing.units import field_quantity
 from cspm_msgs_py.errors import InputError
 from cspm_msgs_py.message import PARTS
 from cspm_msgs_py.testbed import Testbed

@@ -7,12 +7,11 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from cspm_checks.outliers import find_outliers
 from cspm_ident.importing.mapping import ChannelSource
-from cspm_ident.importing.outliers import Outliers, outliers_of
 from cspm_ident.importing.time_base import Times
 
 Array = NDArray[np.float64]
-_GAP = 1.5
 
 
 @dataclass(frozen=True)
@@ -28,23 +27,6 @@ class Mended:
     masked: NDArray[np.intp]
     joined: NDArray[np.intp]
     sizes: Array
-
-
-def find_outliers(values: Array, stamp_ns: NDArray[np.int64]) -> tuple[Outliers, NDArray[np.intp]]:
-    """Return what is impossible in a channel, and the rows that its places count.
-
-    Args:
-        values: shape (n,), NaN where there is none.
-        stamp_ns: shape (n,).
-    """
-    rows = np.flatnonzero(~np.isnan(values))
-    between = np.diff(stamp_ns[rows])
-    usual = np.median(between) if len(between) else 0.0
-    whole = (between > 0) & (between <= _GAP * max(usual, 1.0))
-    # Stamps that scatter leave no message out.
-    if len(whole) and whole.mean() < 0.5:
-        whole = np.ones(len(between), dtype=bool)
-    return outliers_of(values[rows], whole), rows
 
 
 def mend(values: Array, times: Times, source: ChannelSource) -> tuple[Array, Mended | None]:

@@ -7,11 +7,10 @@ from contextlib import closing
 from dataclasses import dataclass
 from pathlib import Path
 
-from cspm_ident.importing.checks.clock_suspicions import refuse_two_clocks
-from cspm_ident.importing.checks.pace import pace_of
-from cspm_ident.importing.checks.suspicion import Suspicion
-from cspm_ident.importing.checks.suspicions import suspicions_of
-from cspm_ident.importing.checks.time_suspicions import is_beyond_devices
+from cspm_checks.clocks import refuse_two_clocks
+from cspm_checks.pace import pace_of
+from cspm_checks.suspicion import Suspicion
+from cspm_checks.time_suspicions import is_beyond_devices
 from cspm_ident.importing.column_store import ColumnStore
 from cspm_ident.importing.fingerprint import fingerprint
 from cspm_ident.importing.gathering import Gathered, gather_topics, stamps_of_clocks
@@ -22,6 +21,7 @@ from cspm_ident.importing.sources.joined_source import file_of, in_file
 from cspm_ident.importing.sources.opening import open_source
 from cspm_ident.importing.sources.row_choice import row_choice
 from cspm_ident.importing.sources.source import Progress, Source
+from cspm_ident.importing.suspicions import suspicions_of
 from cspm_ident.importing.topic_messages import TopicMessages
 from cspm_msgs_py.errors import InputError
 from cspm_msgs_py.testbed import Testbed, TestbedFile

@@ -10,9 +10,9 @@ from typing import Any
 
 import numpy as np
 
-from cspm_ident.importing.checks.pace import Pace, pace_of
-from cspm_ident.importing.checks.suspicion import Suspicion
-from cspm_ident.importing.checks.value_suspicions import resolution
+from cspm_checks.pace import Pace, pace_of
+from cspm_checks.suspicion import Suspicion
+from cspm_checks.value_suspicions import resolution
 from cspm_ident.importing.field_statistics import statistics_of
 from cspm_ident.importing.import_plan import PlannedField, PlannedTopic
 from cspm_ident.importing.topic_messages import SkippedMessages, TopicMessages

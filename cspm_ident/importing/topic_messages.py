@@ -65,6 +65,11 @@ class TopicMessages:
     tolerance: Tolerance | None = None
     late_parts: dict[str, int] = field(default_factory=dict)
 
+    @property
+    def measured(self) -> tuple[str, ...]:
+        """Fields that columns gave, not constants."""
+        return tuple(name for name, at in self.places.items() if at is not None)
+
     def only(self, chosen: slice | NDArray[np.bool_]) -> TopicMessages:
         """Return some of the messages."""
         # Fields of one clock share their rows, which may be many.

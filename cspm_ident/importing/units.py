@@ -8,7 +8,6 @@ import numpy as np
 
 from cspm_ident.importing.time_text import TEXT_UNITS
 from cspm_msgs_py.errors import InputError
-from cspm_msgs_py.topics import Topic
 
 COUNTS = "counts"
 _TURN = 2.0 * np.pi
@@ -51,19 +50,6 @@ TIME_ZEROS = {"datenum": 719529.0, "excel": 25569.0}
 """What MATLAB and spreadsheets count for the beginning of 1970 [d]."""
 TIME_UNITS = (*TIME_FACTORS, *TEXT_UNITS)
 
-_JOINT_QUANTITIES = {"position": "rad", "velocity": "rad/s", "effort": "N·m"}
-_FIELD_QUANTITIES = {
-    **dict.fromkeys(("x", "y", "z"), "m"),
-    **dict.fromkeys(("qx", "qy", "qz", "qw"), "1"),
-    **dict.fromkeys(("roll", "pitch", "yaw"), "rad"),
-    **dict.fromkeys(("vx", "vy", "vz"), "m/s"),
-    **dict.fromkeys(("wx", "wy", "wz"), "rad/s"),
-    **dict.fromkeys(("ax", "ay", "az"), "m/s²"),
-    **dict.fromkeys(("alphax", "alphay", "alphaz"), "rad/s²"),
-    **dict.fromkeys(("fx", "fy", "fz"), "N"),
-    **dict.fromkeys(("mx", "my", "mz"), "N·m"),
-}
-
 
 class Unit(NamedTuple):
     """A unit: the SI unit of its quantity (`rad` for `deg`), and its factor to that."""
@@ -93,13 +79,3 @@ def unit_of(name: str, where: str) -> Unit:
 def units_for(quantity: str) -> tuple[str, ...]:
     """Return the names of the units of a quantity, given by its SI unit."""
     return tuple(_FACTORS[quantity])
-
-
-def field_quantity(topic: Topic, field: str) -> str:
-    """Return the SI unit of a field of a topic; `roll`, `pitch`, `yaw` are fields of poses too."""
-    part, _, joint = field.partition("/")
-    if not joint:
-        return _FIELD_QUANTITIES[field]
-    if topic.name in ("/cables/tension", "/tension_command"):
-        return "N"
-    return _JOINT_QUANTITIES[part]

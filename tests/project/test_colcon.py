@@ -36,6 +36,7 @@ ROOMS = (
     "cspm",
     "cspm_msgs_py",
     "cspm_model",
+    "cspm_checks",
     "cspm_sim",
     "cspm_control",
     "cspm_run",

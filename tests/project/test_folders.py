@@ -10,8 +10,8 @@ import pytest
 ROOT = Path(__file__).resolve().parents[2]
 MOST_FILES = 25
 PACKAGES = (
-    *("cspm", "cspm_msgs_py", "cspm_model", "cspm_sim", "cspm_control", "cspm_run", "cspm_ident"),
-    *("cspm_ros", "bench"),
+    *("cspm", "cspm_msgs_py", "cspm_model", "cspm_checks", "cspm_sim", "cspm_control"),
+    *("cspm_run", "cspm_ident", "cspm_ros", "bench"),
 )
 FOLDERS = sorted({path.parent for name in PACKAGES for path in (ROOT / name).rglob("*.py")})
 

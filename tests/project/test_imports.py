@@ -15,6 +15,7 @@ ROOT = Path(__file__).resolve().parents[2]
 ORDER = (
     "cspm_msgs_py",
     "cspm_model",
+    "cspm_checks",
     "cspm_sim",
     "cspm_control",
     "cspm_run",

@@ -20,6 +20,7 @@ PACKAGES = {
     "cspm",
     "cspm_msgs_py",
     "cspm_model",
+    "cspm_checks",
     "cspm_sim",
     "cspm_control",
     "cspm_run",

@@ -6,8 +6,8 @@ from pathlib import Path
 import pytest
 from import_samples import imported
 
-from cspm_ident.importing.checks.catalogue import CHECKS, check_table
-from cspm_ident.importing.checks.suspicion import Suspicion
+from cspm_checks.catalogue import CHECKS, check_table
+from cspm_checks.suspicion import Suspicion
 from cspm_ident.importing.mapping import (
     BesideFile,
     ChannelSource,
@@ -21,7 +21,8 @@ from cspm_msgs_py.yaml_file import parse_yaml, validate
 
 DOCS = Path(__file__).resolve().parents[3] / "docs" / "reference"
 PAGE = (DOCS / "import-mapping.md").read_text(encoding="utf-8")
-SOURCES = Path(__file__).resolve().parents[3] / "cspm_ident" / "importing"
+ROOT = Path(__file__).resolve().parents[3]
+SOURCES = (ROOT / "cspm_checks", ROOT / "cspm_ident" / "importing")
 
 
 def test_the_example_is_a_mapping():
@@ -83,7 +84,9 @@ def test_every_unit_on_the_page_is_one_and_none_is_missing():
 
 def test_the_table_of_checks_is_that_of_the_code():
     assert f"<!-- checks -->\n{check_table()}\n" in PAGE
-    code = "".join(path.read_text(encoding="utf-8") for path in SOURCES.rglob("*.py"))
+    code = "".join(
+        path.read_text(encoding="utf-8") for each in SOURCES for path in each.rglob("*.py")
+    )
     # Once in the catalogue, and once where it is reported.
     assert [kind for kind in CHECKS if code.count(f'"{kind}"') < 2] == []
     with pytest.raises(KeyError):

@@ -5,9 +5,9 @@ import pytest
 from import_samples import ONE_WINCH, THESIS, imported, table
 from scipy.signal import lfilter
 
-from cspm_ident.importing.checks.robust_line import robust_line
-from cspm_ident.importing.checks.time_suspicions import held_suspicions
-from cspm_ident.importing.checks.value_suspicions import resolution
+from cspm_checks.robust_line import robust_line
+from cspm_checks.time_suspicions import held_suspicions
+from cspm_checks.value_suspicions import resolution
 
 STATE, TENSION = "/winches/state", "/cables/tension"
 RADIUS = 0.025

@@ -8,8 +8,8 @@ from hypothesis import given
 from hypothesis import strategies as st
 from import_samples import imported, table
 
+from cspm_checks.pace import pace_of
 from cspm_ident.importing import column_store
-from cspm_ident.importing.checks.pace import pace_of
 from cspm_ident.importing.mapping import Clock
 from cspm_ident.importing.time_base import out_of_order, times_of
 from cspm_ident.importing.unwrapping import Unwrapper

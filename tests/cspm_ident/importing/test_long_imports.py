@@ -8,12 +8,12 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from import_samples import imported, table
 
+from cspm_checks import pace as paces
+from cspm_checks import stretches as stretching
+from cspm_checks.pace import pace_of
+from cspm_checks.stretches import joined
+from cspm_checks.suspicion import Suspicion
 from cspm_ident.importing import column_store
-from cspm_ident.importing.checks import pace as paces
-from cspm_ident.importing.checks import stretches as stretching
-from cspm_ident.importing.checks.pace import pace_of
-from cspm_ident.importing.checks.stretches import joined
-from cspm_ident.importing.checks.suspicion import Suspicion
 from cspm_ident.importing.field_statistics import statistics_of
 from cspm_ident.importing.joint_parts import absent_numbers
 

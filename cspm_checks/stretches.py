@@ -8,9 +8,9 @@ from math import ceil, inf
 
 import numpy as np
 
-from cspm_ident.importing.checks.pace import STRETCH
-from cspm_ident.importing.checks.suspicion import Suspicion
-from cspm_ident.importing.topic_messages import TopicMessages
+from cspm_checks.pace import STRETCH
+from cspm_checks.series import Log, TopicColumns
+from cspm_checks.suspicion import Suspicion
 
 LASTING = {
     "velocity",
@@ -27,7 +27,7 @@ LASTING = {
 """Kinds that are of the whole recording; a stretch alone may be at rest, or move too little."""
 
 
-def stretches(messages: Mapping[str, TopicMessages]) -> Iterator[dict[str, TopicMessages]]:
+def stretches(messages: Log) -> Iterator[dict[str, TopicColumns]]:
     """Yield the messages of all topics, a stretch of time each; topics without any are left out.
 
     Args:

@@ -4,9 +4,9 @@ import numpy as np
 import pytest
 from import_samples import imported, mapping_file, table
 
-from cspm_ident.importing.checks.lateness import lateness
-from cspm_ident.importing.checks.pace import pace_of
-from cspm_ident.importing.checks.series import SensorSeries
+from cspm_checks.lateness import lateness
+from cspm_checks.pace import pace_of
+from cspm_checks.series import SensorSeries
 from cspm_ident.importing.time_base import single_precision
 
 STATE = "/winches/state"

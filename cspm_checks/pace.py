@@ -6,7 +6,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from cspm_ident.importing.time_base import Stamps
+from cspm_checks.series import Stamps
 
 GAP = 1.5
 IRREGULAR = 0.01

@@ -5,8 +5,8 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from cspm_ident.importing.checks.series import SensorSeries
-from cspm_ident.importing.checks.suspicion import Suspicion
+from cspm_checks.series import SensorSeries
+from cspm_checks.suspicion import Suspicion
 
 Array = NDArray[np.float64]
 SHORTEST = 50

@@ -6,8 +6,8 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from import_samples import imported, table
 
-from cspm_ident.importing.checks.outlier_suspicions import nearest_round
-from cspm_ident.importing.outliers import outliers_of
+from cspm_checks.outlier_suspicions import nearest_round
+from cspm_checks.outliers import outliers_of
 
 STATE = "/winches/state"
 COUNT, STEP = 3000, 0.004

@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.signal import savgol_filter
 
-from cspm_ident.importing.checks.series import SensorSeries
+from cspm_checks.series import SensorSeries
 
 Array = NDArray[np.float64]
 SEGMENTS = 8

@@ -15,8 +15,8 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.stats import t as student
 
-from cspm_ident.importing.checks.motion import SEGMENTS, SHORTEST, even, motion_columns, smoothed
-from cspm_ident.importing.checks.series import SensorSeries
+from cspm_checks.motion import SEGMENTS, SHORTEST, even, motion_columns, smoothed
+from cspm_checks.series import SensorSeries
 
 Array = NDArray[np.float64]
 LONGEST_S = 0.25

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass, field
 
-from cspm_ident.importing.checks.catalogue import CHECKS
+from cspm_checks.catalogue import CHECKS
 
 
 @dataclass(frozen=True)

@@ -7,15 +7,12 @@ against it, by the same time. What the winches differ by is the error.
 
 from __future__ import annotations
 
-from collections.abc import Mapping
-
 import numpy as np
 from numpy.typing import NDArray
 from scipy.stats import t as student
 
-from cspm_ident.importing.checks.lateness import Lateness, lateness
-from cspm_ident.importing.checks.series import SensorSeries, series_of
-from cspm_ident.importing.topic_messages import TopicMessages
+from cspm_checks.lateness import Lateness, lateness
+from cspm_checks.series import Log, SensorSeries, TopicColumns, series_of
 from cspm_model.kernels.trajectory import eulers_along, lengths_along
 from cspm_model.parameters import nominal_parameters
 from cspm_msgs_py.testbed import Testbed
@@ -27,7 +24,7 @@ STATE, BAR, FRAME = "/winches/state", "/bar/pose", "/winch_frame/pose"
 FEWEST_WINCHES = 3
 
 
-def comparable(messages: Mapping[str, TopicMessages], testbed: Testbed) -> bool:
+def comparable(messages: Log, testbed: Testbed) -> bool:
     """Return whether there are a bar's pose and the angles of winches that carry it."""
     state = messages.get(STATE)
     angles = state is not None and "position" in state.topic.parts
@@ -35,9 +32,7 @@ def comparable(messages: Mapping[str, TopicMessages], testbed: Testbed) -> bool:
     return angles and BAR in messages and cables >= FEWEST_WINCHES
 
 
-def pose_lateness(
-    messages: Mapping[str, TopicMessages], testbed: Testbed, origin_ns: int
-) -> Lateness | None:
+def pose_lateness(messages: Log, testbed: Testbed, origin_ns: int) -> Lateness | None:
     """Return how late poses are against the winches; None where the signals cannot tell.
 
     Args:
@@ -55,9 +50,7 @@ def pose_lateness(
     return _of_all(told) if len(told) >= FEWEST_WINCHES else None
 
 
-def _lengths(
-    messages: Mapping[str, TopicMessages], testbed: Testbed, origin_ns: int
-) -> tuple[Array, Array]:
+def _lengths(messages: Log, testbed: Testbed, origin_ns: int) -> tuple[Array, Array]:
     """Return instants of the bar's pose [s], shape (k,), and lengths there, shape (k, n) [m]."""
     time, bar = _poses(messages[BAR], origin_ns)
     frame = np.zeros_like(bar)
@@ -71,7 +64,7 @@ def _lengths(
     return time, lengths
 
 
-def _poses(topic: TopicMessages, origin_ns: int) -> tuple[Array, Array]:
+def _poses(topic: TopicColumns, origin_ns: int) -> tuple[Array, Array]:
     """Return instants [s], shape (k,), and poses with Euler angles, shape (k, 6)."""
     rows, stamps = topic.rows(slice(None)), topic.stamp_ns
     order = np.argsort(stamps, kind="stable")

@@ -9,9 +9,10 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from cspm_ident.importing.checks.series import SensorSeries
-from cspm_ident.importing.checks.suspicion import Suspicion
-from cspm_ident.importing.checks.value_suspicions import OVER, cable_of, resolution
+from cspm_checks.channel import Channel
+from cspm_checks.series import SensorSeries
+from cspm_checks.suspicion import Suspicion
+from cspm_checks.value_suspicions import OVER, cable_of, resolution
 from cspm_msgs_py.testbed import Testbed
 from cspm_msgs_py.topics import Topic
 
@@ -23,28 +24,27 @@ _UNEVEN = 0.2
 
 
 def acceleration_suspicions(
-    topic: Topic, field: str, quantity: str, series: SensorSeries, testbed: Testbed
+    channel: Channel, series: SensorSeries, testbed: Testbed
 ) -> list[Suspicion]:
     """Return whether a position accelerates as the machine cannot.
 
     Args:
-        topic: the channel's.
-        field: its name in the message.
-        quantity: SI unit of the position.
+        channel: which it is.
         series: its values.
         testbed: the machine.
     """
-    limit = _limit(topic, field, testbed)
+    limit = _limit(channel.topic, channel.field, testbed)
     found = lasting_acceleration(series) if np.isfinite(limit) else None
     if found is None:
         return []
     largest, rounding = found
     if largest <= OVER * limit + rounding:
         return []
-    text = f"accelerates by {largest:.4g} {quantity}/s², where torque, tension and weight allow"
+    unit = f"{channel.quantity}/s²"
+    text = f"accelerates by {largest:.4g} {unit}, where torque, tension and weight allow"
     text += f" {limit:.4g}: unit of the position, or of time?"
     numbers = {"largest": largest, "limit": limit}
-    return [Suspicion(f"{topic.name} {field}", "implausible", text, numbers)]
+    return [Suspicion(channel.where, "implausible", text, numbers)]
 
 
 def lasting_acceleration(series: SensorSeries) -> tuple[float, float] | None:

@@ -3,9 +3,9 @@
 import numpy as np
 import pytest
 
-from cspm_ident.importing.checks.drive_balance import drive_balance
-from cspm_ident.importing.checks.relations import balance_suspicions
-from cspm_ident.importing.checks.series import SensorSeries
+from cspm_checks.drive_balance import drive_balance
+from cspm_checks.relations import balance_suspicions
+from cspm_checks.series import SensorSeries
 
 INERTIA, VISCOUS, COULOMB = 0.0095, 0.02, 0.2
 

@@ -7,7 +7,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from cspm_ident.importing.checks.suspicion import Suspicion
+from cspm_checks.channel import Channel
+from cspm_checks.suspicion import Suspicion
 from cspm_msgs_py.sensor_spec import MEASURED, quantities
 from cspm_msgs_py.testbed import Cable, Testbed
 from cspm_msgs_py.topics import Topic
@@ -41,12 +42,10 @@ def resolution(values: Array) -> float | None:
     return step if np.median(multiples) < 10 and fits.mean() > 0.99 else None
 
 
-def value_suspicions(
-    topic: Topic, field: str, quantity: str, values: Array, testbed: Testbed
-) -> list[Suspicion]:
+def value_suspicions(channel: Channel, values: Array, testbed: Testbed) -> list[Suspicion]:
     """Return what looks wrong in a channel's values, shape (n,) [SI]."""
     values = values[~np.isnan(values)]
-    where = f"{topic.name} {field}"
+    topic, field, where, quantity = channel.topic, channel.field, channel.where, channel.quantity
     if not len(values):
         return [Suspicion(where, "empty", "no number at all")]
     if np.ptp(values) == 0.0:

@@ -5,8 +5,8 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from cspm_ident.importing.checks.pace import GAP, JITTERED_GAP, Pace
-from cspm_ident.importing.checks.suspicion import Suspicion
+from cspm_checks.pace import GAP, JITTERED_GAP, Pace
+from cspm_checks.suspicion import Suspicion
 
 RATE_TOLERANCE = 0.01
 IRREGULAR_SHARE = 0.01

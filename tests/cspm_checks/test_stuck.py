@@ -4,8 +4,8 @@ import numpy as np
 import pytest
 from import_samples import imported, table
 
-from cspm_ident.importing.checks.series import SensorSeries
-from cspm_ident.importing.checks.stuck import frozen_suspicions, stuck_suspicions
+from cspm_checks.series import SensorSeries
+from cspm_checks.stuck import frozen_suspicions, stuck_suspicions
 
 STATE, TENSION = "/winches/state", "/cables/tension"
 T = np.arange(4000) * 1e-3

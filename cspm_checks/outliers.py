@@ -30,6 +30,7 @@ _CLEAR_STEP = 0.25
 _NEAR_END = 4.0
 _AGAINST = 0.8
 _BACK = 0.2
+_GAP = 1.5
 
 
 @dataclass(frozen=True)
@@ -51,6 +52,23 @@ class Outliers:
     sizes: Array
     period: float | None = None
     period_error: float = 0.0
+
+
+def find_outliers(values: Array, stamp_ns: NDArray[np.int64]) -> tuple[Outliers, NDArray[np.intp]]:
+    """Return what is impossible in a channel, and the rows that its places count.
+
+    Args:
+        values: shape (n,), NaN where there is none.
+        stamp_ns: shape (n,).
+    """
+    rows = np.flatnonzero(~np.isnan(values))
+    between = np.diff(stamp_ns[rows])
+    usual = np.median(between) if len(between) else 0.0
+    whole = (between > 0) & (between <= _GAP * max(usual, 1.0))
+    # Stamps that scatter leave no message out.
+    if len(whole) and whole.mean() < 0.5:
+        whole = np.ones(len(between), dtype=bool)
+    return outliers_of(values[rows], whole), rows
 
 
 def outliers_of(values: Array, whole_steps: NDArray[np.bool_]) -> Outliers:

@@ -4,11 +4,12 @@ import numpy as np
 import pytest
 from run_samples import SCENARIOS
 
-from cspm_ident.importing.checks.acceleration import (
+from cspm_checks.acceleration import (
     acceleration_suspicions,
     lasting_acceleration,
 )
-from cspm_ident.importing.checks.series import SensorSeries
+from cspm_checks.channel import Channel
+from cspm_checks.series import SensorSeries
 from cspm_msgs_py.testbed import load_testbed
 
 MACHINE = load_testbed(SCENARIOS / "testbeds" / "thesis.yaml").testbed
@@ -19,7 +20,7 @@ LARGEST = 8.0 * np.pi**2
 
 def suspected(values, time=TIME, topic="/winches/state", field="position/surge_1"):
     series = SensorSeries(time, values)
-    return acceleration_suspicions(MACHINE.topics[topic], field, "rad", series, MACHINE)
+    return acceleration_suspicions(Channel(MACHINE.topics[topic], field), series, MACHINE)
 
 
 def test_a_sine_accelerates_as_its_second_derivative():

@@ -11,8 +11,8 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from cspm_ident.importing.checks.motion import SEGMENTS, SHORTEST, even, motion_columns, smoothed
-from cspm_ident.importing.checks.series import SensorSeries
+from cspm_checks.motion import SEGMENTS, SHORTEST, even, motion_columns, smoothed
+from cspm_checks.series import SensorSeries
 
 Array = NDArray[np.float64]
 FEWEST = 4

@@ -6,20 +6,19 @@ nothing of it is recorded.
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator
 
 import numpy as np
 from numpy.typing import NDArray
 
-from cspm_ident.importing.checks.drive_balance import Balance, drive_balance
-from cspm_ident.importing.checks.lateness import Lateness, lateness
-from cspm_ident.importing.checks.pace import GAP
-from cspm_ident.importing.checks.robust_line import RobustLine, robust_line
-from cspm_ident.importing.checks.series import SensorSeries, series_of
-from cspm_ident.importing.checks.stuck import stuck_suspicions
-from cspm_ident.importing.checks.suspicion import Suspicion
-from cspm_ident.importing.checks.value_suspicions import resolution
-from cspm_ident.importing.topic_messages import TopicMessages
+from cspm_checks.drive_balance import Balance, drive_balance
+from cspm_checks.lateness import Lateness, lateness
+from cspm_checks.pace import GAP
+from cspm_checks.robust_line import RobustLine, robust_line
+from cspm_checks.series import Log, SensorSeries, TopicColumns, series_of
+from cspm_checks.stuck import stuck_suspicions
+from cspm_checks.suspicion import Suspicion
+from cspm_checks.value_suspicions import resolution
 from cspm_msgs_py.testbed import Cable, Testbed
 
 Array = NDArray[np.float64]
@@ -46,9 +45,7 @@ _LIKELY = {
 }
 
 
-def relation_suspicions(
-    messages: Mapping[str, TopicMessages], testbed: Testbed, poses: Lateness | None
-) -> list[Suspicion]:
+def relation_suspicions(messages: Log, testbed: Testbed, poses: Lateness | None) -> list[Suspicion]:
     """Return which channels contradict each other.
 
     Args:
@@ -73,8 +70,8 @@ def relation_suspicions(
 
 
 def _torque_relations(
-    state: TopicMessages,
-    cells: TopicMessages | None,
+    state: TopicColumns,
+    cells: TopicColumns | None,
     cable: Cable,
     origin_ns: int,
     *,
@@ -152,7 +149,7 @@ def late_suspicions(where: str, leader: str, late: Lateness | None) -> list[Susp
 
 
 def _position_pairs(
-    messages: Mapping[str, TopicMessages], origin_ns: int
+    messages: Log, origin_ns: int
 ) -> Iterator[tuple[str, SensorSeries, SensorSeries]]:
     """Yield name, position and velocity of what has both."""
     for topic in messages.values():

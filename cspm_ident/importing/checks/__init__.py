@@ -1,1 +1,0 @@
-"""What looks wrong in an import: nothing is changed by it."""

@@ -80,9 +80,11 @@ def test_the_page_of_the_command_line_is_up_to_date(monkeypatch: pytest.MonkeyPa
     assert committed == command_line.page(), "run: python docs/scripts/command_line_page.py"
 
 
-@pytest.mark.parametrize("page", sorted((ROOT / "docs").rglob("*.md")), ids=lambda page: page.stem)
-def test_lists_of_a_page_are_lists_on_the_site(page: Path) -> None:
-    assert unseparated(page.read_text(encoding="utf-8")) == []
+def test_lists_of_pages_are_lists_on_the_site() -> None:
+    pages = sorted((ROOT / "docs").rglob("*.md"))
+    assert len(pages) > 80
+    found = {page.stem: unseparated(page.read_text(encoding="utf-8")) for page in pages}
+    assert {page: lines for page, lines in found.items() if lines} == {}
 
 
 def test_the_check_sees_what_becomes_plain_text() -> None:

@@ -12,13 +12,14 @@ import re
 import shutil
 import subprocess
 import sys
-import tempfile
 from collections.abc import Sequence
 from pathlib import Path
 from typing import NamedTuple
 
 from rich.console import Console
 from rich.table import Table
+
+from cspm_msgs_py.new_folder import ScratchFolder
 
 ROOT = Path(__file__).resolve().parents[1]
 _FAILED = re.compile(r"^(?:FAILED|ERROR) (\S+)", re.MULTILINE)
@@ -187,9 +188,9 @@ def main() -> int:
     parser.add_argument("words", nargs="*", metavar="WORD", help="of the names; otherwise all")
     words = parser.parse_args().words
     chosen = [m for m in MUTATIONS if not words or any(word in m.name for word in words)]
-    with tempfile.TemporaryDirectory() as place:
-        copy_checkout(Path(place))
-        results = [try_mutation(Path(place), mutation) for mutation in chosen]
+    with ScratchFolder("mutations") as place:
+        copy_checkout(place)
+        results = [try_mutation(place, mutation) for mutation in chosen]
     Console().print(table_of(results))
     return int(any(result.noticed_by is None for result in results))
 

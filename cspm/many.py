@@ -3,11 +3,9 @@
 from __future__ import annotations
 
 import os
-import tempfile
 from collections import deque
 from collections.abc import Callable, Collection, Iterable, Iterator, Mapping
 from concurrent.futures import Future, ThreadPoolExecutor
-from pathlib import Path
 from typing import Any
 
 from cspm.progress import Progress, silent
@@ -16,6 +14,7 @@ from cspm.scenario import as_scenario, with_changes
 from cspm.simulation import Run, bundle_of, simulate_in_memory, warn_of
 from cspm.testbed import as_file
 from cspm_msgs_py.errors import InputError
+from cspm_msgs_py.new_folder import ScratchFolder
 from cspm_msgs_py.recording.run_record import SIM
 from cspm_run.plants import PLANTS
 
@@ -119,8 +118,8 @@ def _run_of(variant: Variant, kept: tuple[str, ...] | None) -> Run:
     duration, seed = variant.get("duration"), variant.get("seed")
     chosen = with_changes(as_scenario(variant["scenario"]), duration=duration, seed=seed)
     reference, testbed = variant.get("reference"), variant.get("testbed")
-    with tempfile.TemporaryDirectory(prefix="cspm-reference-") as folder:
+    with ScratchFolder("reference") as folder:
         if reference is not None:
-            chosen = with_reference(chosen, reference, Path(folder))
+            chosen = with_reference(chosen, reference, folder)
         bundle = bundle_of(chosen, None if testbed is None else as_file(testbed), plant)
     return simulate_in_memory(bundle, variant.get("controllers") or {}, lambda _: None, kept)

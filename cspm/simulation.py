@@ -3,9 +3,7 @@
 from __future__ import annotations
 
 import shutil
-import tempfile
 import warnings
-import weakref
 from collections.abc import Callable, Collection, Mapping, Sequence
 from dataclasses import replace
 from functools import partial
@@ -21,7 +19,7 @@ from cspm.signals import Signals
 from cspm.testbed import AnyTestbed, Testbed, as_file, check_plant
 from cspm_control.stages.own_code import load_controller
 from cspm_msgs_py.errors import InputError
-from cspm_msgs_py.new_folder import refuse_existing
+from cspm_msgs_py.new_folder import ScratchFolder, refuse_existing
 from cspm_msgs_py.recording.rows import Rows
 from cspm_msgs_py.recording.run_record import EXTERNAL, OWN_CONTROLLERS, SIM
 from cspm_msgs_py.recording.writer import RecordingWriter
@@ -70,13 +68,13 @@ class Run(Signals):
         result: RunResult,
         source: MemoryRecorder | Recording,
         about: Mapping[str, str],
-        place: Path | None = None,
+        place: ScratchFolder | None = None,
         *,
         partial: bool = False,
     ) -> None:
         """Take what was run, what it amounted to, its messages, and its metadata record.
 
-        `place` is a folder with the messages, which is removed when the run is not used any more.
+        `place` has the messages, and is removed when the run is not used any more.
         `partial` says that some of the messages were not kept.
         """
         self._partial = partial
@@ -85,8 +83,7 @@ class Run(Signals):
         self.interrupted = result.interrupted
         self._bundle, self._result, self._source = bundle, result, source
         self._about = about
-        if place is not None:
-            weakref.finalize(self, shutil.rmtree, place, ignore_errors=True)
+        self._place = place
 
     @property
     def duration(self) -> float:
@@ -220,11 +217,11 @@ def simulate(
     """
     _check_choices(plant, mode, bool(controllers))
     chosen = with_changes(as_scenario(scenario), duration=duration, seed=seed)
-    with tempfile.TemporaryDirectory(prefix="cspm-reference-") as place:
+    with ScratchFolder("reference") as place:
         if reference is not None:
-            chosen = with_reference(chosen, reference, Path(place))
+            chosen = with_reference(chosen, reference, place)
         machine = None if testbed is None else as_file(testbed)
-        bundle = bundle_of(chosen, machine, plant, own=Path(place))
+        bundle = bundle_of(chosen, machine, plant, own=place)
     total = bundle.scenario.duration
 
     def show(now: float) -> None:
@@ -384,12 +381,8 @@ def _by_nodes(
     runner = ros_runner(
         mode, wait, external=external, apart=False, patience_s=PATIENCE_S, needed_by=f"mode {mode}"
     )
-    place = Path(tempfile.mkdtemp(prefix="cspm-run-"))
-    try:
-        folder = place / bundle.scenario.name
-        result = runner(bundle, folder, show)
-        source = Recording(folder)
-    except BaseException:
-        shutil.rmtree(place, ignore_errors=True)
-        raise
+    place = ScratchFolder("run")
+    folder = place.path / bundle.scenario.name
+    result = runner(bundle, folder, show)
+    source = Recording(folder)
     return Run(bundle, replace(result, folder=None), source, {}, place)

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import tempfile
 from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass, field, replace
@@ -12,6 +11,7 @@ from cspm_control.stages.own_code import read_code, sha256_of
 from cspm_msgs_py.edited import file_of
 from cspm_msgs_py.errors import InputError
 from cspm_msgs_py.motion_spec import FileMotion, VesselMotion
+from cspm_msgs_py.new_folder import ScratchFolder
 from cspm_msgs_py.recording.attached_testbed import TESTBED, attached_testbed
 from cspm_msgs_py.recording.run_record import SIM
 from cspm_msgs_py.scenario import Scenario, parse_scenario
@@ -78,13 +78,13 @@ class Bundle:
         """
         if self.unasked is not None:
             raise InputError(refusal(self.scenario, self.unasked))
-        with tempfile.TemporaryDirectory(prefix="cspm-") as place:
+        with ScratchFolder("scenario") as place:
             for name, content in self.files.items():
-                (Path(place) / name).write_bytes(content)
+                (place / name).write_bytes(content)
             try:
-                yield Path(place)
+                yield place
             except InputError as err:
-                raise InputError(self._by_origin(str(err), Path(place))) from None
+                raise InputError(self._by_origin(str(err), place)) from None
 
     def _by_origin(self, text: str, place: Path) -> str:
         """Return an error's text with the user's files in place of their copies."""

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import tempfile
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from importlib.metadata import version
@@ -10,6 +9,7 @@ from pathlib import Path
 
 from cspm_msgs_py.diagnostics import hardware_id_of
 from cspm_msgs_py.errors import InputError
+from cspm_msgs_py.new_folder import ScratchFolder
 from cspm_msgs_py.recording.difference import Difference, first_difference
 from cspm_msgs_py.recording.reader import Recording
 from cspm_msgs_py.recording.run_record import (
@@ -86,8 +86,8 @@ def _repeat(
     if clock is None or not clock.count:
         raise InputError(f"{path}: has no /clock messages, allowed: a simulated recording")
     duration = clock.count / bundle.scenario.rates.plant
-    with tempfile.TemporaryDirectory(prefix="cspm-resim-") as place:
-        folder = Path(place) / "again"
+    with ScratchFolder("resim") as place:
+        folder = place / "again"
         run(
             bundle,
             folder,

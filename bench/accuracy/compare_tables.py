@@ -6,7 +6,6 @@ docs/explanation/comparison.md.
 
 from __future__ import annotations
 
-import tempfile
 from collections.abc import Iterable
 from dataclasses import dataclass, replace
 from pathlib import Path
@@ -18,6 +17,7 @@ from cspm_ident.comparison.compare import Comparison, compare
 from cspm_ident.signals.delays import find_delays
 from cspm_ident.signals.measurement import BAR, FRAME, Measurement, read_measurement
 from cspm_ident.signals.timeline import Timeline
+from cspm_msgs_py.new_folder import ScratchFolder
 from cspm_msgs_py.scenario import load_scenario
 from cspm_msgs_py.testbed import load_testbed
 from cspm_run.assembly import resolve
@@ -84,10 +84,10 @@ def main() -> None:
     """Run the whole."""
     console = Console()
     floors, delays = {}, []
-    with tempfile.TemporaryDirectory(prefix="cspm-compare-") as place:
+    with ScratchFolder("compare") as place:
         for number, case in enumerate(CASES):
             console.print(f"{case.title}: recording")
-            measurement = _record(Path(place) / str(number), case)
+            measurement = _record(place / str(number), case)
             console.print(f"{case.title}: comparison")
             floors[case.title] = ratios(compare(measurement))
             console.print(f"{case.title}: delays")

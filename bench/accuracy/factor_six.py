@@ -6,7 +6,6 @@ docs/figures/factor_six.png and writes the tables of docs/explanation/the-factor
 
 from __future__ import annotations
 
-import tempfile
 from collections.abc import Sequence
 from dataclasses import replace
 from pathlib import Path
@@ -28,6 +27,7 @@ from cspm_ident.system.machine import machine_with
 from cspm_ident.system.prediction_test import Judgement, judge
 from cspm_ident.vaf import vaf
 from cspm_msgs_py.dofs import DOFS
+from cspm_msgs_py.new_folder import ScratchFolder
 from cspm_msgs_py.scenario import Scenario, load_scenario
 from cspm_msgs_py.testbed import Testbed, TestbedFile, load_testbed, parse_testbed
 from cspm_run.assembly import resolve
@@ -70,11 +70,11 @@ def main() -> None:
     described = without_factor(load_testbed(SCENARIOS / "testbeds" / "thesis.yaml"))
     machine = described.testbed
     hidden = machine_with(machine, choose(machine, list(HIDDEN)), list(HIDDEN.values()))
-    with tempfile.TemporaryDirectory(prefix="cspm-factor-six-") as place:
+    with ScratchFolder("factor-six") as place:
         found = {}
         for name in (*(f"verification_{n}" for n in LENGTHS), *(f"factor_six_{n}" for n in FITTED)):
             console.print(f"recording {name}")
-            found[name] = record(Path(place) / name, name, described, hidden, "mujoco")
+            found[name] = record(place / name, name, described, hidden, "mujoco")
     judged = [found[f"verification_{name}"] for name in LENGTHS]
     factor = fit_factor(machine, judged)
     console.print(f"factor {factor:.3f}")

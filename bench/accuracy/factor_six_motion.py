@@ -9,10 +9,8 @@ but that factor.
 
 from __future__ import annotations
 
-import tempfile
 from collections.abc import Sequence
 from dataclasses import dataclass
-from pathlib import Path
 
 from rich.console import Console
 
@@ -33,6 +31,7 @@ from cspm_ident.system.choice import choose
 from cspm_ident.system.machine import machine_with
 from cspm_ident.system.prediction_test import Judgement, judge
 from cspm_msgs_py.dofs import DOFS
+from cspm_msgs_py.new_folder import ScratchFolder
 from cspm_msgs_py.testbed import Testbed, TestbedFile, load_testbed
 
 _SHOWN = DOFS[:3]
@@ -83,9 +82,9 @@ def _rows(variant: Variant, described: TestbedFile) -> list[str]:
     machine = described.testbed
     hidden = machine_with(machine, choose(machine, list(HIDDEN)), list(HIDDEN.values()))
     quiet = _quieter(hidden, variant.quieter)
-    with tempfile.TemporaryDirectory(prefix="cspm-factor-six-") as place:
+    with ScratchFolder("factor-six") as place:
         recordings = [
-            record(Path(place) / n, f"verification_{n}", described, quiet, "sim", variant.slower)
+            record(place / n, f"verification_{n}", described, quiet, "sim", variant.slower)
             for n in LENGTHS
         ]
     factor = fit_factor(machine, recordings)

@@ -7,7 +7,6 @@ what the method can see, not how it does on a real machine; those from MuJoCo ar
 from __future__ import annotations
 
 import argparse
-import tempfile
 import time
 from dataclasses import dataclass, field, replace
 from pathlib import Path
@@ -17,6 +16,7 @@ from cspm_ident.diagnosis.diagnose import diagnose
 from cspm_ident.diagnosis.parameter import Parameter
 from cspm_ident.diagnosis.reporting.verdict import verdict_of
 from cspm_ident.signals.measurement import read_measurement
+from cspm_msgs_py.new_folder import ScratchFolder
 from cspm_msgs_py.scenario import load_scenario
 from cspm_msgs_py.testbed import EffectEntry, load_testbed
 from cspm_run.assembly import resolve
@@ -82,10 +82,10 @@ def main() -> None:
         if options.only in (None, case.effect) and case.cells is not options.without_cells
     ]
     print("| planted | plant, capture | verdict | found | seconds |\n|---|---|---|---|---:|")
-    with tempfile.TemporaryDirectory() as folder:
+    with ScratchFolder("planted-effects") as folder:
         for case in cases:
             seed = FIRST_SEED + CASES.index(case)
-            place = Path(folder) / str(seed)
+            place = folder / str(seed)
             record(case, seed, place)
             cells = "" if case.cells else ", no load cells"
             row = _planted(case), f"{case.plant}, {case.capture} Hz{cells}", *judge(case, place)

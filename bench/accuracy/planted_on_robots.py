@@ -9,13 +9,13 @@ plant whose equations the catalogue shares: they show that the method is not tie
 from __future__ import annotations
 
 import sys
-import tempfile
 from collections.abc import Iterator
 from pathlib import Path
 from typing import NamedTuple
 
 import cspm
 from bench.markdown import markdown_table
+from cspm_msgs_py.new_folder import ScratchFolder
 from cspm_run.library import named_testbed
 
 ROBOTS = {
@@ -71,10 +71,10 @@ def diagnosed(case: Planted, folder: Path) -> tuple[str, ...]:
 def main() -> None:
     """Plant, simulate, diagnose, and write the page."""
     page = Path(sys.argv[1]) if len(sys.argv) > 1 else PAGE
-    with tempfile.TemporaryDirectory() as folder:
+    with ScratchFolder("planted-on-robots") as folder:
         rows = []
         for case in planted():
-            rows.append(diagnosed(case, Path(folder)))
+            rows.append(diagnosed(case, folder))
             print(*rows[-1], sep=" | ", flush=True)
     heads = ("robot", "planted", "value", "verdict", "found, 95 % interval")
     right = sum("✗" not in row[-1] for row in rows)

@@ -6,7 +6,6 @@ numbers throughout, identifies them, and writes the table of results/identificat
 
 from __future__ import annotations
 
-import tempfile
 from collections.abc import Mapping
 from dataclasses import replace
 from pathlib import Path
@@ -21,6 +20,7 @@ from cspm_ident.system.choice import choose
 from cspm_ident.system.identification import SystemResult, identify_system
 from cspm_ident.system.machine import machine_with
 from cspm_msgs_py.dofs import DOFS
+from cspm_msgs_py.new_folder import ScratchFolder
 from cspm_msgs_py.scenario import load_scenario
 from cspm_msgs_py.testbed import Testbed, TestbedFile, load_testbed
 from cspm_run.assembly import resolve
@@ -62,8 +62,8 @@ def record(described: TestbedFile, machine: Testbed) -> Measurement:
     """Return the scenario on the MuJoCo plant of a machine, said to be the described one."""
     scenario = resolve(load_scenario(SCENARIOS / f"{SCENARIO}.yaml"), described.testbed)
     bundle = make_bundle(scenario, described, SCENARIOS).concealing(machine)
-    with tempfile.TemporaryDirectory(prefix="cspm-recovery-") as place:
-        folder = Path(place) / SCENARIO
+    with ScratchFolder("recovery") as place:
+        folder = place / SCENARIO
         run(replace(bundle, plant="mujoco"), folder)
         return read_measurement(folder).with_testbed(described)
 

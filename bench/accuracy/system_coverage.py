@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import tempfile
 from collections.abc import Iterator
 from dataclasses import replace
 from pathlib import Path
@@ -14,6 +13,7 @@ from cspm_ident.signals.noise import with_more_noise
 from cspm_ident.system.choice import choose
 from cspm_ident.system.identification import solve
 from cspm_ident.system.machine import machine_with
+from cspm_msgs_py.new_folder import ScratchFolder
 from cspm_msgs_py.scenario import load_scenario
 from cspm_msgs_py.testbed import Testbed, load_testbed
 from cspm_run.assembly import resolve
@@ -51,8 +51,8 @@ class System:
         other = _silent(damped(other, axial))
         scenario = load_scenario(SCENARIOS / f"{SCENARIO}.yaml", [f"duration={seconds}"])
         bundle = make_bundle(resolve(scenario, other), described, SCENARIOS).concealing(other)
-        with tempfile.TemporaryDirectory(prefix="cspm-coverage-") as place:
-            folder = Path(place) / SCENARIO
+        with ScratchFolder("coverage") as place:
+            folder = place / SCENARIO
             run(replace(bundle, plant="mujoco"), folder)
             self.clean: Measurement = read_measurement(folder).with_testbed(described)
 

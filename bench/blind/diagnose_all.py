@@ -18,6 +18,7 @@ from bench.blind.scoring.method import CSPM, require_method
 from bench.blind.truth import RECORDINGS, results_of
 from cspm.campaign.cluster import worker_pool
 from cspm_msgs_py.errors import InputError
+from cspm_msgs_py.new_folder import ScratchFolder
 
 DIAGNOSIS, TIMES, FAILURE = "diagnosis.json", "times.json", "failure.txt"
 _KEPT = ("PATH", "LANG", "LD_LIBRARY_PATH", "VIRTUAL_ENV")
@@ -59,8 +60,8 @@ def run(
         )
     tell(f"diagnosing {len(names)} recordings", 0, len(names))
     # Made here, so that nothing is left of a worker that is ended.
-    with tempfile.TemporaryDirectory(prefix="cspm-blind-") as rooms, worker_pool(processes) as pool:
-        program = (sys.executable, Path(rooms))
+    with ScratchFolder("blind") as rooms, worker_pool(processes) as pool:
+        program = (sys.executable, rooms)
         begun = {
             pool.submit(
                 _diagnose, *program, recordings / name, _places(folder, methods, name)

@@ -8,7 +8,6 @@ from __future__ import annotations
 
 import argparse
 import json
-import tempfile
 from collections.abc import Iterator, Mapping
 from pathlib import Path
 from typing import Any
@@ -28,6 +27,7 @@ from cspm_ident.diagnosis.reporting.statement import line_statement, unknown_sta
 from cspm_ident.diagnosis.reporting.verdict import verdict_of
 from cspm_ident.diagnosis.validation.residual_curves import Curve
 from cspm_ident.signals.measurement import read_measurement
+from cspm_msgs_py.new_folder import ScratchFolder
 from cspm_msgs_py.recording.reader import Recording
 from cspm_sim.effects import catalogue
 
@@ -52,9 +52,9 @@ def main() -> None:
     parser.add_argument("--keep", type=Path, help="folder in which the recordings stay")
     arguments = parser.parse_args()
     seed, console, parts = arguments.seed, Console(), []
-    with tempfile.TemporaryDirectory(prefix="cspm-gallery-") as place:
+    with ScratchFolder("gallery") as place:
         for k, stratum in enumerate(STRATA, start=1):
-            folder = (arguments.keep or Path(place)) / stratum
+            folder = (arguments.keep or place) / stratum
             truth = folder.with_suffix(".json")
             with console.status(f"{stratum}: recording"):
                 make(Request(folder, truth, seed, 1, "dev", (stratum,), DURATION_S))

@@ -13,7 +13,6 @@ import argparse
 import os
 import subprocess
 import sys
-import tempfile
 import time
 from collections.abc import Iterator
 from pathlib import Path
@@ -24,6 +23,7 @@ from rclpy.client import Client
 from bench.performance.slow_machine import slow_overrides
 from cspm_msgs_py.diagnostics import Level, decode_diagnostics
 from cspm_msgs_py.errors import CspmError, InputError
+from cspm_msgs_py.new_folder import ScratchFolder
 from cspm_msgs_py.recording import Recording
 from cspm_msgs_py.ros.contract_node import ContractNode, ros_class
 from cspm_msgs_py.ros.session import Session
@@ -145,8 +145,8 @@ def main() -> int:
     parser.add_argument("--seed", type=int, default=1)
     parser.add_argument("--out", type=Path, help="folder of the recording, which is kept")
     options = parser.parse_args()
-    with tempfile.TemporaryDirectory() as place:
-        folder = options.out or Path(place) / "faults"
+    with ScratchFolder("faults") as place:
+        folder = options.out or place / "faults"
         seconds = 60.0 * options.minutes + 2.0 * _STARTS_S
         settings = (*slow_overrides(), *_PATIENT, *_NEAR, f"duration={round(seconds)}")
         command = [sys.executable, "-m", "cspm", "run", "rest", "--mode", "realtime", "--quiet"]

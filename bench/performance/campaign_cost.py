@@ -7,10 +7,8 @@ each worker on, so that start-up and the first imports do not count; they are sh
 from __future__ import annotations
 
 import argparse
-import tempfile
 import time
 from collections.abc import Mapping, Sequence
-from pathlib import Path
 from typing import Any, NamedTuple
 
 from rich.console import Console
@@ -19,6 +17,7 @@ from rich.table import Table
 from bench.performance.plant_speed import plant_step
 from bench.performance.thesis_machine import PERIOD_NS, ThesisMachine, roll_damping
 from cspm.campaign.campaign import run_campaign
+from cspm_msgs_py.new_folder import ScratchFolder
 
 # Of the plant, on the machine for which the goals were set.
 REFERENCE_SPEED = 850.0
@@ -65,8 +64,8 @@ def measured(scenario: str, duration: float, runs: int, workers: int) -> Cost:
         workers: processes.
     """
     ends: list[float] = []
-    with tempfile.TemporaryDirectory() as place:
-        file = Path(place) / "seeds.yaml"
+    with ScratchFolder("campaign-cost") as place:
+        file = place / "seeds.yaml"
         text = _FILE.format(scenario=scenario, duration=duration, runs=runs)
         file.write_text(text, encoding="utf-8")
         begun = time.perf_counter()
@@ -77,7 +76,7 @@ def measured(scenario: str, duration: float, runs: int, workers: int) -> Cost:
 
         machine = ThesisMachine(roll_damping())
         before = plant_step(machine)
-        done = run_campaign(file, Path(place) / "out", workers=workers, progress=note)
+        done = run_campaign(file, place / "out", workers=workers, progress=note)
         step = 0.5e-6 * (before + plant_step(machine))
     plant = step * duration / (PERIOD_NS * 1e-9)
     return _cost(workers, ends, done.rows, plant)

@@ -2,11 +2,9 @@
 
 from __future__ import annotations
 
-import tempfile
-from pathlib import Path
-
 from bench.performance.measured_figure import Advance, Figure
 from bench.performance.thesis_machine import worst_case
+from cspm_msgs_py.new_folder import ScratchFolder
 from cspm_run.recorded_run import run
 
 GROUP = "closed loop, worst case"
@@ -20,8 +18,8 @@ def measure_closed_loop(repetitions: int, duration: float, advance: Advance) -> 
     for _ in range(repetitions):
         silent.append(run(bundle, None).real_time_factor)
         advance(GROUP)
-        with tempfile.TemporaryDirectory(prefix="cspm-bench-") as place:
-            recorded.append(run(bundle, Path(place) / "loop").real_time_factor)
+        with ScratchFolder("bench") as place:
+            recorded.append(run(bundle, place / "loop").real_time_factor)
         advance(GROUP)
     note = f"{repetitions} runs of {duration:g} s simulated, all rates 1 kHz, in turns"
     return [

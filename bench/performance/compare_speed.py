@@ -8,7 +8,6 @@ from __future__ import annotations
 import argparse
 import os
 import resource
-import tempfile
 import time
 from pathlib import Path
 
@@ -16,6 +15,7 @@ from rich.console import Console
 
 from bench.performance.child import finish, start_cspm
 from bench.performance.host import describe_machine, is_busy
+from cspm_msgs_py.new_folder import ScratchFolder
 
 
 def main() -> None:
@@ -32,8 +32,8 @@ def main() -> None:
         console.print(f"{key}: {value}", highlight=False, soft_wrap=True)
     if is_busy():
         console.print("other programs are at work: the wall clock will show too much")
-    with tempfile.TemporaryDirectory(prefix="cspm-bench-") as place:
-        recording = options.recording or Path(place) / "recording"
+    with ScratchFolder("bench") as place:
+        recording = options.recording or place / "recording"
         if options.recording is None:
             settings = ["--set", f"duration={options.duration}", "--out", str(recording)]
             _cspm("run", options.scenario, *settings)

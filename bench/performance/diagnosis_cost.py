@@ -7,7 +7,6 @@ speed before and after, which tells how fast the processor is.
 from __future__ import annotations
 
 import argparse
-import tempfile
 import time
 from pathlib import Path
 from typing import NamedTuple
@@ -16,6 +15,7 @@ from bench.accuracy.planted_effects import PlantedCase, record
 from bench.performance.child import start_cspm, watched
 from bench.performance.plant_speed import plant_step
 from bench.performance.thesis_machine import PERIOD_NS, SCENARIOS, ThesisMachine, roll_damping
+from cspm_msgs_py.new_folder import ScratchFolder
 
 SEED = 100
 PLANTED = PlantedCase("winch_coulomb_friction", ("surge_2",), {"torque": 0.031})
@@ -47,14 +47,14 @@ def main() -> None:
     arguments = parser.parse_args()
     columns = ("recording", "took [s]", "of the processor [s]", "memory [GB]", "plant [×]")
     print(f"| {' | '.join(columns)} |\n|---|---:|---:|---:|---:|")
-    with tempfile.TemporaryDirectory() as place:
+    with ScratchFolder("diagnosis-cost") as place:
         if arguments.recording is not None:
-            print_cost(arguments.recording.name, cost_of(arguments.recording, Path(place)))
+            print_cost(arguments.recording.name, cost_of(arguments.recording, place))
             return
         for duration in arguments.recorded:
-            folder = Path(place) / f"{duration:g} s"
+            folder = place / f"{duration:g} s"
             record(PLANTED, SEED, folder, duration)
-            print_cost(folder.name, cost_of(folder, Path(place)))
+            print_cost(folder.name, cost_of(folder, place))
 
 
 def print_cost(name: str, cost: Cost) -> None:

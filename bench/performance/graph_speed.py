@@ -2,13 +2,12 @@
 
 from __future__ import annotations
 
-import tempfile
 from collections.abc import Callable
 from functools import partial
-from pathlib import Path
 
 from bench.performance.measured_figure import Advance, Figure
 from bench.performance.thesis_machine import worst_case
+from cspm_msgs_py.new_folder import ScratchFolder
 from cspm_run.run_result import RunResult
 
 GROUP = "ROS 2 graph, worst case, recorded"
@@ -34,8 +33,8 @@ def _in_step(repetitions: int, duration: float, advance: Advance) -> list[Figure
     missing = 0
     for _ in range(repetitions):
         for name, runner in runners.items():
-            with tempfile.TemporaryDirectory(prefix="cspm-bench-") as place:
-                result = runner(worst_case(duration), Path(place) / "run", domain_id=DOMAIN_ID)
+            with ScratchFolder("bench") as place:
+                result = runner(worst_case(duration), place / "run", domain_id=DOMAIN_ID)
             factors[name].append(result.real_time_factor)
             missing += round(1000 * duration) - result.messages["/clock"]
             advance(GROUP)
@@ -57,8 +56,8 @@ def _by_the_wall(duration: float, advance: Advance) -> list[Figure]:
         "a process per node": (partial(run_processes, mode="realtime"), None),
     }
     for name, (runner, most) in runners.items():
-        with tempfile.TemporaryDirectory(prefix="cspm-bench-") as place:
-            wall = runner(worst_case(duration), Path(place) / "run", domain_id=DOMAIN_ID)
+        with ScratchFolder("bench") as place:
+            wall = runner(worst_case(duration), place / "run", domain_id=DOMAIN_ID)
         advance(GROUP)
         note = f"{wall.simulated:g} s, all rates 1 kHz"
         lost = wall.timing["recorder"]["lost"]

@@ -7,7 +7,6 @@ channels three times, and for each size a bag of joint states, and prints times 
 from __future__ import annotations
 
 import sys
-import tempfile
 import time
 from functools import cache
 from pathlib import Path
@@ -21,6 +20,7 @@ from rosbags.rosbag2 import StoragePlugin, Writer
 from rosbags.typesys import Stores, get_typestore
 
 from bench.performance.child import start_cspm, watched
+from cspm_msgs_py.new_folder import ScratchFolder
 from cspm_msgs_py.testbed import load_testbed
 from cspm_msgs_py.topics import POSE
 from cspm_msgs_py.yaml_file import dump_yaml
@@ -36,15 +36,13 @@ def main() -> None:
     """Measure and print."""
     sizes = [float(word) for word in sys.argv[1:]] or [0.25, 1.0]
     shown = Table("source", "size GB", "time s", "resident MB", "own MB")
-    with tempfile.TemporaryDirectory(prefix="cspm-bench-") as folder:
-        place = Path(folder)
+    with ScratchFolder("bench") as place:
         write_table(place)
         found = [imported(place, "lab.csv", f"table_{k}") for k in range(REPEATS)]
         size = (place / "lab.csv").stat().st_size / 1e9
         shown.add_row("table", *cells(size, sorted(found)[REPEATS // 2]))
     for size in sizes:
-        with tempfile.TemporaryDirectory(prefix="cspm-bench-") as folder:
-            place = Path(folder)
+        with ScratchFolder("bench") as place:
             write_bag(place, size)
             shown.add_row("bag", *cells(size, imported(place, "bag", "out")))
     Console().print(shown)

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import argparse
-import tempfile
 import time
 from functools import partial
 from pathlib import Path
@@ -17,6 +16,7 @@ from rich.table import Table
 from bench.performance.graph_speed import DOMAIN_ID
 from bench.performance.host import describe_machine
 from bench.performance.thesis_machine import shipped
+from cspm_msgs_py.new_folder import ScratchFolder
 from cspm_msgs_py.stepping.delay_histogram import UP_TO_MS, DelayHistogram
 from cspm_ros.runtime.process_run import run_processes
 from cspm_ros.runtime.realtime_run import run_realtime
@@ -50,10 +50,10 @@ def main() -> None:
     arguments = parser.parse_args()
     machine, alone = describe_machine(), wakes(ALONE_S)
     runner = run_realtime if arguments.one_process else partial(run_processes, mode="realtime")
-    with tempfile.TemporaryDirectory(prefix="cspm-bench-") as place:
+    with ScratchFolder("bench") as place:
         rates = [f"rates.{name}=100" for name in SLOW]
         bundle = shipped("calm", f"duration={60.0 * arguments.minutes}", *rates)
-        result = runner(bundle, Path(place) / "run", domain_id=DOMAIN_ID)
+        result = runner(bundle, place / "run", domain_id=DOMAIN_ID)
     console = Console(width=100)
     for key, value in machine.items():
         console.print(f"{key}: {value}")

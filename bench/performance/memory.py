@@ -3,14 +3,13 @@
 from __future__ import annotations
 
 import shutil
-import tempfile
 import time
-from pathlib import Path
 
 import numpy as np
 
 from bench.performance.child import SAMPLE_S, start_cspm, watched
 from bench.performance.measured_figure import Advance, Figure
+from cspm_msgs_py.new_folder import ScratchFolder
 
 GROUP = "memory, worst case"
 BYTES_PER_SECOND = 1.6e6
@@ -22,13 +21,13 @@ SHORTEST_FOR_GROWTH_S = 600.0
 
 def measure_memory(duration: float, recorded: bool, advance: Advance) -> list[Figure]:
     """Run for `duration` [s] of simulated time and watch the process's resident memory."""
-    with tempfile.TemporaryDirectory(prefix="cspm-bench-") as place:
+    with ScratchFolder("bench") as place:
         needed = BYTES_PER_SECOND * duration * recorded
         if shutil.disk_usage(place).free < 1.5 * needed:
             raise RuntimeError(
                 f"{place}: {needed / 1e9:.1f} GB and half as much again must be free"
             )
-        target = ["--out", str(Path(place) / "long")] if recorded else ["--no-record"]
+        target = ["--out", str(place / "long")] if recorded else ["--no-record"]
         seconds, sizes = _watch(["run", "worst_case", "--duration", str(duration), *target])
     advance(GROUP)
     what = f"{duration:g} s {'with' if recorded else 'without'} recording"

@@ -2,11 +2,10 @@
 
 from __future__ import annotations
 
-import tempfile
 import time
 from collections.abc import Callable
-from pathlib import Path
 
+from cspm_msgs_py.new_folder import ScratchFolder
 from cspm_run.bundle import Bundle
 from cspm_run.recorded_run import run, steps_of
 
@@ -33,5 +32,5 @@ def run_steps(bundle: Bundle, steps: int, recorded: bool) -> None:
     if not recorded:
         run(bundle, None, steps=steps)
         return
-    with tempfile.TemporaryDirectory(prefix="cspm-bench-") as place:
-        run(bundle, Path(place) / "loop", steps=steps)
+    with ScratchFolder("bench") as place:
+        run(bundle, place / "loop", steps=steps)

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import os
 import signal
-import tempfile
 import time
 from collections.abc import Iterator
 from contextlib import suppress
@@ -22,6 +21,7 @@ from bench.performance.slow_machine import PERIOD_S, slow_overrides
 from bench.performance.thesis_machine import SCENARIOS
 from cspm_msgs_py.diagnostics import decode_diagnostics
 from cspm_msgs_py.errors import CspmError
+from cspm_msgs_py.new_folder import ScratchFolder
 from cspm_msgs_py.recording.reader import Recording
 from cspm_msgs_py.recording.recover import recover
 from cspm_msgs_py.scenario import load_scenario
@@ -92,8 +92,8 @@ def _reaction(case: ReactionCase) -> float | None:
     from cspm_ros.runtime.process_run import run_processes
 
     strike = _Strike(case.node, case.number)
-    with tempfile.TemporaryDirectory(prefix="cspm-bench-") as place:
-        folder = Path(place) / "run"
+    with ScratchFolder("bench") as place:
+        folder = place / "run"
         # What the others did is in the recording.
         with suppress(CspmError):
             run_processes(_bundle(case.state), folder, strike, mode=REALTIME, domain_id=DOMAIN_ID)

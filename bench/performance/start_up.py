@@ -3,13 +3,13 @@
 from __future__ import annotations
 
 import subprocess
-import tempfile
 import time
 from pathlib import Path
 
 from bench.performance.child import finish, start_cspm
 from bench.performance.measured_figure import Advance, Figure
 from cspm_msgs_py.errors import InputError
+from cspm_msgs_py.new_folder import ScratchFolder
 from cspm_msgs_py.recording.mcap_file import McapFile
 
 GROUP = "start-up, rest"
@@ -20,7 +20,7 @@ def measure_start_up(first: int, later: int, advance: Advance) -> list[Figure]:
     """Start `first` times with nothing compiled, and `later` times with what these compiled."""
     fresh, warm = [], []
     for i in range(first):
-        with tempfile.TemporaryDirectory(prefix="cspm-bench-") as cache:
+        with ScratchFolder("bench") as cache:
             fresh.append(_time_to_first_chunk(cache))
             advance(GROUP)
             if i == first - 1:
@@ -36,12 +36,13 @@ def measure_start_up(first: int, later: int, advance: Advance) -> list[Figure]:
     ]
 
 
-def _time_to_first_chunk(cache: str) -> float:
-    with tempfile.TemporaryDirectory(prefix="cspm-bench-") as place:
-        folder = Path(place) / "start"
+def _time_to_first_chunk(cache: Path) -> float:
+    with ScratchFolder("bench") as place:
+        folder = place / "start"
         began = time.perf_counter()
         child = start_cspm(
-            ["run", "rest", "--duration", "1", "--out", str(folder)], {"NUMBA_CACHE_DIR": cache}
+            ["run", "rest", "--duration", "1", "--out", str(folder)],
+            {"NUMBA_CACHE_DIR": str(cache)},
         )
         elapsed = _wait_for_chunk(child, folder / "start_0.mcap", began)
         finish(child)

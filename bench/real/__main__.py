@@ -5,7 +5,6 @@ from __future__ import annotations
 import argparse
 import json
 import sys
-import tempfile
 from collections.abc import Sequence
 from pathlib import Path
 from typing import Any, NamedTuple
@@ -18,6 +17,7 @@ from bench.real.dataset import Dataset, datasets
 from bench.real.judgement import Judgement, judgement_of
 from bench.real.least_squares import least_error
 from cspm_ident.signals.measurement import read_measurement
+from cspm_msgs_py.new_folder import ScratchFolder
 
 _HEADS = (
     "data set",
@@ -47,8 +47,8 @@ class Row(NamedTuple):
 
 def measured(dataset: Dataset, place: Path) -> Row:
     """Import, diagnose and judge one data set."""
-    with tempfile.TemporaryDirectory() as folder:
-        search, held_out = dataset.imported(place, Path(folder))
+    with ScratchFolder("real") as folder:
+        search, held_out = dataset.imported(place, folder)
         found = cspm.diagnose(search, held_out=held_out)
         (fit,) = found.result.fit
         own = [[read_measurement(each) for each in part] for part in (search, held_out)]

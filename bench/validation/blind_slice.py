@@ -10,7 +10,6 @@ import json
 from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
 from pathlib import Path
-from tempfile import TemporaryDirectory
 from typing import Any
 
 from bench.blind import make as making
@@ -22,6 +21,7 @@ from bench.blind.scoring.scorecard import scorecard
 from bench.blind.stored_results import read_results
 from bench.blind.stratum import Case, Stratum
 from bench.validation.check import Check, Finding, at_least, at_most
+from cspm_msgs_py.new_folder import ScratchFolder
 
 SEED, DURATION_S = 5, 30.0
 WORST, CALM, RIG = ("worst_case_steep",), ("calm_broadband",), ("one_winch",)
@@ -127,8 +127,8 @@ def judged(card: Mapping[str, Any]) -> list[Finding]:
 
 def measure() -> list[Finding]:
     """Record, diagnose and score the whole slice."""
-    with TemporaryDirectory() as place:
-        return judged(card_of(CASES, Path(place)))
+    with ScratchFolder("blind-slice") as place:
+        return judged(card_of(CASES, place))
 
 
 CHECKS = (

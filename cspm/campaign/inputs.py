@@ -5,7 +5,6 @@ from __future__ import annotations
 import hashlib
 import io
 import json
-import tempfile
 import zipfile
 from collections.abc import Iterable, Iterator
 from dataclasses import dataclass
@@ -16,6 +15,7 @@ from typing import Any
 from cspm.campaign.campaign_file import file_in
 from cspm.campaign.variants import Variant
 from cspm_msgs_py.motion_spec import FileMotion, VesselMotion
+from cspm_msgs_py.new_folder import ScratchFolder
 from cspm_msgs_py.recording.attached_testbed import TESTBED
 from cspm_msgs_py.scenario import load_scenario
 from cspm_msgs_py.testbed import load_testbed
@@ -74,11 +74,11 @@ def pack(variants: Iterable[Variant], metrics: Iterable[str] = ()) -> Inputs:
 
 
 @lru_cache(maxsize=_KEPT)
-def unpacked(packed: bytes) -> tempfile.TemporaryDirectory[str]:
+def unpacked(packed: bytes) -> ScratchFolder:
     """Return the folder of what was packed, which lives as long as this process keeps it."""
-    folder = tempfile.TemporaryDirectory(prefix="cspm-campaign-")
+    folder = ScratchFolder("campaign")
     with zipfile.ZipFile(io.BytesIO(packed)) as archive:
-        archive.extractall(folder.name)
+        archive.extractall(folder.path)
     return folder
 
 

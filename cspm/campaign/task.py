@@ -6,12 +6,10 @@ import faulthandler
 import hashlib
 import os
 import platform
-import tempfile
 import time
 from collections.abc import Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass
-from pathlib import Path
 
 from cspm.campaign.campaign_folder import Row
 from cspm.campaign.code_version import code_version
@@ -29,6 +27,7 @@ from cspm.diagnosis import diagnose
 from cspm.scenario import Scenario
 from cspm.simulation import Run, bundle_of, simulate_in_memory
 from cspm_msgs_py.errors import CspmError, InputError
+from cspm_msgs_py.new_folder import ScratchFolder
 from cspm_msgs_py.scenario import load_scenario
 from cspm_msgs_py.testbed import TestbedFile, load_testbed
 from cspm_run.bundle import SCENARIO, Bundle
@@ -109,7 +108,7 @@ def check_values(task: Task) -> None:
 
 def _described(task: Task) -> tuple[Scenario, TestbedFile, TestbedFile]:
     """Return a task's scenario, its machine, and the machine with all changes."""
-    folder = Path(unpacked(task.packed).name)
+    folder = unpacked(task.packed).path
 
     def here(text: str) -> str:
         for path, place in task.places.items():
@@ -159,19 +158,19 @@ def _about(bundle: Bundle) -> Row:
 def _metric(name: str, task: Task) -> Metric:
     file = name.rpartition(":")[0]
     place = task.places.get(file)
-    return load_metric(name, Path(unpacked(task.packed).name) / place if place else None)
+    return load_metric(name, unpacked(task.packed).path / place if place else None)
 
 
 def _diagnosed(run: Run, machine: TestbedFile) -> Row:
-    with tempfile.TemporaryDirectory(prefix="cspm-campaign-") as place:
-        recording = run.save(Path(place) / "run")
+    with ScratchFolder("campaign") as place:
+        recording = run.save(place / "run")
         return diagnosis_columns(diagnose(recording, testbed=machine, closed_loop=False))
 
 
 @contextmanager
 def _named_by_origin(task: Task) -> Iterator[None]:
     """Name the user's files in errors, not their copies."""
-    folder = Path(unpacked(task.packed).name)
+    folder = unpacked(task.packed).path
     try:
         yield
     except InputError as err:

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import dataclasses
 import shlex
-import tempfile
 from collections.abc import Callable, Sequence
 from pathlib import Path
 
@@ -18,7 +17,7 @@ from cspm.simulation import PROCESSES, REALTIME, Runner, bundle_of, ros_runner
 from cspm.summary_files import summarise
 from cspm_model.cable_strength import limit_warnings
 from cspm_msgs_py.errors import CspmError, InputError
-from cspm_msgs_py.new_folder import refuse_existing
+from cspm_msgs_py.new_folder import ScratchFolder, refuse_existing
 from cspm_msgs_py.recording.run_record import EXTERNAL, SIM
 from cspm_msgs_py.scenario import load_scenario
 from cspm_msgs_py.schedule import schedule_of
@@ -244,8 +243,8 @@ def _run_with_progress(
         if folder is not None:
             return runner(bundle, folder, show)
         # The result of a ROS graph is read from its recording.
-        with tempfile.TemporaryDirectory(prefix="cspm-run-") as place:
-            result = runner(bundle, Path(place) / scenario.name, show)
+        with ScratchFolder("run") as place:
+            result = runner(bundle, place / scenario.name, show)
             return dataclasses.replace(result, folder=None)
 
 

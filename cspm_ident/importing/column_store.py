@@ -6,13 +6,14 @@ from collections.abc import Iterator
 from copy import copy
 from mmap import MADV_DONTNEED, mmap
 from pathlib import Path
-from tempfile import TemporaryDirectory
 from types import TracebackType
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 from typing_extensions import Self
+
+from cspm_msgs_py.new_folder import ScratchFolder
 
 Array = NDArray[Any]
 PIECE = 200_000
@@ -44,7 +45,7 @@ class ColumnStore:
 
     def __init__(self) -> None:
         """Create an empty temporary folder."""
-        self._folder = TemporaryDirectory(prefix="cspm-import-")
+        self._folder = ScratchFolder("import")
         self._kinds: dict[str, np.dtype[Any]] = {}
         self._paths: dict[str, Path] = {}
         self._prefix = ""
@@ -70,7 +71,7 @@ class ColumnStore:
         return name
 
     def _begin(self, name: str, kind: np.dtype[Any]) -> None:
-        self._paths[name] = Path(self._folder.name) / f"{len(self._paths)}.bin"
+        self._paths[name] = self._folder.path / f"{len(self._paths)}.bin"
         self._paths[name].touch()
         self._kinds[name] = kind
 
@@ -90,4 +91,4 @@ class ColumnStore:
         error: BaseException | None,
         trace: TracebackType | None,
     ) -> None:
-        self._folder.cleanup()
+        self._folder.close()

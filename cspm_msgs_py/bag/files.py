@@ -7,7 +7,6 @@ from contextlib import ExitStack
 from dataclasses import replace
 from functools import partial
 from pathlib import Path
-from tempfile import TemporaryDirectory
 
 import zstandard
 
@@ -17,6 +16,7 @@ from cspm_msgs_py.bag.ros1_runs import Ros1Runs
 from cspm_msgs_py.bag.run import StoredFile, StoredMessage, StoredRun
 from cspm_msgs_py.bag.sqlite_runs import SqliteRuns
 from cspm_msgs_py.errors import InputError
+from cspm_msgs_py.new_folder import ScratchFolder
 from cspm_msgs_py.recording.chunk import LARGEST_CHUNK
 from cspm_msgs_py.recording.mcap_file import BareFileError
 from cspm_msgs_py.recording.records import MAGIC as MCAP_MAGIC
@@ -57,7 +57,7 @@ def open_files(
         raise InputError(f"{path}: stored as {bag.storage}, allowed: {', '.join(_STORAGES)}")
     paths = bag.files
     if bag.compression == "file":
-        folder = Path(stack.enter_context(TemporaryDirectory(prefix="cspm-bag-")))
+        folder = stack.enter_context(ScratchFolder("bag"))
         paths = [_unpack_file(file, folder / file.stem) for file in paths]
     files, faults = [], list(bag.faults)
     for file in paths:

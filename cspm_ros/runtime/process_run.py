@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import math
 import os
-import tempfile
 import time
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
@@ -15,6 +14,7 @@ from cspm_control.safety import check_real_time
 from cspm_msgs_py.errors import CspmError, InputError
 from cspm_msgs_py.graph import RECORDER
 from cspm_msgs_py.interruption import interruptible
+from cspm_msgs_py.new_folder import ScratchFolder
 from cspm_msgs_py.recording.overview import overview
 from cspm_msgs_py.ros.domain_claim import refuse_claimed
 from cspm_msgs_py.schedule import PLANT, schedule_of
@@ -90,8 +90,7 @@ def run_processes(
     # In lockstep the recorder has 48 steps of time; by the wall clock it would lose messages.
     behind = () if mode == REALTIME else (RECORDER,)
     refuse_claimed(domain_id or int(os.environ.get("ROS_DOMAIN_ID") or 0), START)
-    with tempfile.TemporaryDirectory(prefix="cspm-run-") as made:
-        place = Path(made)
+    with ScratchFolder("run") as place:
         parameters = NodeParameters(
             plant=bundle.plant,
             pace=REALTIME if mode == REALTIME else LOCKSTEP,

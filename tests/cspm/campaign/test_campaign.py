@@ -21,6 +21,7 @@ METRICS = '''\
 """What one laboratory looks at."""
 
 import os
+import threading
 from pathlib import Path
 
 
@@ -37,8 +38,8 @@ def troubled(run):
     if seed == 5 and not mark.exists():
         mark.touch()
         os._exit(9)
-    while seed == 4:
-        pass
+    if seed == 4:
+        threading.Event().wait()
     return 1.0
 '''
 

@@ -20,7 +20,7 @@ from cspm_ident.diagnosis.diagnosis import Diagnosis as Result
 from cspm_ident.diagnosis.finding import Finding as FoundEffect
 from cspm_ident.diagnosis.finding import Status
 from cspm_ident.diagnosis.reporting.improved_file import improved_testbed
-from cspm_ident.diagnosis.reporting.verdict import IMPROVED, diagnosis_data, named_in
+from cspm_ident.diagnosis.reporting.verdict import diagnosis_data, named_in
 from cspm_ident.diagnosis.thresholds import thresholds_of
 from cspm_ident.diagnosis.validation.closed_loop import (
     ClosedLoopFit,
@@ -28,12 +28,12 @@ from cspm_ident.diagnosis.validation.closed_loop import (
     simulate_closed_loop,
 )
 from cspm_ident.diagnosis.validation.controller_parity import Parity, controller_parity
+from cspm_ident.diagnosis_file import IMPROVED, REPORT
 from cspm_ident.experiment.experiment_files import write_experiments
 from cspm_ident.signals.measurement import Measurement
 from cspm_msgs_py.new_folder import new_folder
 from cspm_run.output.json_file import write_json
 
-REPORT = "diagnosis.json"
 PICTURE = "diagnosis.png"
 PAGE = "diagnosis.html"
 

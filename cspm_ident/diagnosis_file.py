@@ -13,6 +13,8 @@ from cspm_msgs_py.yaml_file import validate
 
 Version = Literal["cspm.diagnosis/1"]
 (SCHEMA,) = get_args(Version)
+# What a folder of a diagnosis holds.
+REPORT, IMPROVED = "diagnosis.json", "testbed.improved.yaml"
 Interval = tuple[float, float]
 
 
@@ -207,7 +209,7 @@ def read_diagnosis(path: Path) -> DiagnosisFile:
     Raises:
         InputError: it cannot be read, is no diagnosis, or has a key with a fault.
     """
-    file = path / "diagnosis.json" if path.is_dir() else path
+    file = path / REPORT if path.is_dir() else path
     try:
         data = json.loads(file.read_text(encoding="utf-8"))
     except (OSError, ValueError) as err:

@@ -29,7 +29,7 @@ class _Listed(typer.core.TyperGroup):
 
     order = (
         *("demo", "new", "run", "view", "info", "recover", "resim", "import", "export", "compare"),
-        *("identify", "diagnose", "campaign", "analyze"),
+        *("identify", "diagnose", "bundle", "merge", "campaign", "analyze"),
         *("doctor", "schema", "replay", "check-drivers", "urdf", "node"),
     )
 

@@ -1,7 +1,8 @@
-"""Commands about the installation and its files: doctor, schema."""
+"""Commands about the installation and files: doctor, schema, merge."""
 
 from __future__ import annotations
 
+from pathlib import Path
 from typing import Annotated
 
 import typer
@@ -66,3 +67,41 @@ def schema(
     from cspm.commands.installation.schema_command import schema_command
 
     schema_command(kind, json)
+
+
+@app.command(
+    epilog="""Examples:
+
+cspm merge my_rig.yaml verdict/testbed.improved.yaml
+
+cspm merge my_rig.yaml verdict/testbed.improved.yaml --out my_rig.yaml
+
+Exit code: 0 done, 2 unusable input."""
+)
+def merge(
+    testbed: Annotated[
+        Path, typer.Argument(metavar="TESTBED", help="Your own test-bed file, with its comments.")
+    ],
+    improved: Annotated[
+        Path,
+        typer.Argument(
+            metavar="IMPROVED", help="The file that a diagnosis or an identification wrote."
+        ),
+    ],
+    out: Annotated[
+        Path | None,
+        typer.Option(
+            metavar="FILE",
+            help="A new file, or TESTBED itself, to write to.",
+            show_default="show the differences alone",
+        ),
+    ] = None,
+    json: Json = None,
+) -> None:
+    """Take improved numbers over into your test-bed file. Comments and order stay.
+
+    Every difference is shown, also those that you made since. The result says what IMPROVED says.
+    """
+    from cspm.commands.installation.merge_command import merge_command
+
+    merge_command(testbed, improved, out, json)

@@ -1,4 +1,4 @@
-"""Commands about recordings: info, recover, resim, import, export."""
+"""Commands about recordings: info, recover, resim, import, export, bundle."""
 
 from __future__ import annotations
 
@@ -163,3 +163,40 @@ def export(
 
     names = [] if signals is None else [name.strip() for name in signals.split(",")]
     export_command(bag, out, names, json)
+
+
+@app.command(
+    epilog="""Examples:
+
+cspm bundle today verdict --out for_anna.zip
+
+cspm bundle monday tuesday verdict --out two_days.zip --testbed my_rig.yaml
+
+Exit code: 0 done, 2 unusable input."""
+)
+def bundle(
+    recordings: Annotated[
+        list[Path],
+        typer.Argument(metavar="REC...", help="All recordings that the verdict was made of."),
+    ],
+    verdict: Annotated[
+        Path, typer.Argument(metavar="VERDICT", help="The folder that diagnose wrote.")
+    ],
+    out: Annotated[Path, typer.Option(metavar="FILE", help="A new zip file.")],
+    testbed: Annotated[
+        Path | None,
+        typer.Option(
+            metavar="FILE",
+            help="The test-bed file that the recordings were compared with.",
+            show_default="the recording's, or where the verdict says it is",
+        ),
+    ] = None,
+    json: Json = None,
+) -> None:
+    """Pack what a colleague needs to repeat a verdict. Without names and paths.
+
+    Recordings, test-bed, verdict and the command. Comments, notes and statuses are left out.
+    """
+    from cspm.commands.recordings.bundle_command import bundle_command
+
+    bundle_command(recordings, verdict, out, testbed, json)

@@ -14,10 +14,11 @@ from cspm.commands.progress_shown import shown
 from cspm.commands.view_command import page_of
 from cspm.demo.concealment import Concealed, drawn
 from cspm.demo.guess import choices, guessed
-from cspm.diagnosis import REPORT, Diagnosis, diagnose
+from cspm.diagnosis import Diagnosis, diagnose
 from cspm.recorded import Recording
 from cspm.simulation import Run, simulate
 from cspm.testbed import Testbed, load_testbed
+from cspm_ident.diagnosis_file import REPORT
 from cspm_msgs_py.new_folder import refuse_existing
 from cspm_run.output.console import make_console, say
 from cspm_run.output.json_file import write_json

@@ -7,7 +7,8 @@ from pathlib import Path
 from typing import Any
 
 from cspm_ident.diagnosis.diagnosis import Diagnosis
-from cspm_ident.diagnosis.reporting.verdict import IMPROVED, named_in
+from cspm_ident.diagnosis.reporting.verdict import named_in
+from cspm_ident.diagnosis_file import IMPROVED
 from cspm_ident.experiment.choice import Question, best_answer, most_showing, safe_plans
 from cspm_msgs_py.scenario import Scenario
 from cspm_msgs_py.yaml_file import dump_yaml

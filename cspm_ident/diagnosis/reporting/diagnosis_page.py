@@ -31,14 +31,9 @@ from cspm_ident.diagnosis.reporting.statement import (
     unit_of,
 )
 from cspm_ident.diagnosis.reporting.summary_sheet import STYLE, summary_sheet
-from cspm_ident.diagnosis.reporting.verdict import (
-    IMPROVED,
-    SENTENCES,
-    Verdict,
-    named_in,
-    verdict_of,
-)
+from cspm_ident.diagnosis.reporting.verdict import SENTENCES, Verdict, named_in, verdict_of
 from cspm_ident.diagnosis.validation.residual_curves import Curve
+from cspm_ident.diagnosis_file import IMPROVED
 from cspm_ident.offline_page import figure_html, table_html, write_offline_page
 from cspm_ident.signals.samples import Samples
 from cspm_sim.effects import catalogue

@@ -31,11 +31,10 @@ from cspm_ident.diagnosis.validation.holdout_residuals import HeldOut
 from cspm_ident.diagnosis.validation.holdout_simulation import SimulatedFit
 from cspm_ident.diagnosis.validation.remainder import Remainder
 from cspm_ident.diagnosis.validation.residual_power import Power, lost_powers
-from cspm_ident.diagnosis_file import SCHEMA
+from cspm_ident.diagnosis_file import IMPROVED, SCHEMA
 from cspm_ident.signals.measurement import Measurement
 from cspm_sim.effects import Block, Channel
 
-IMPROVED = "testbed.improved.yaml"
 UNKNOWN = "unknown"
 
 

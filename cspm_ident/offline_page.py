@@ -16,6 +16,10 @@ from plotly.offline import get_plotlyjs
 
 Array = NDArray[np.float64]
 
+# Orange and blue, which colour-blind readers tell apart, as in grey by lightness; what was measured
+# lies below, wide and pale. Dark pages have lighter ones.
+BEFORE, AFTER, MEASURED = "#d9660a", "#0b5cad", "#9ecae9"
+
 # Points per line: with the extremes of what lies between them, no spike is lost.
 POINTS = 4000
 LAYOUT = {"template": "plotly_white", "margin": {"t": 80, "l": 70, "r": 10}}
@@ -25,9 +29,11 @@ BELOW = {**LAYOUT, "legend": {**LEGEND, "y": 0.0, "yanchor": "bottom"}}
 
 _STYLE = """<style>
 :root {color-scheme: light dark; --back: #fff; --text: #222; --line: #ddd; --accent: #0b5cad;
-  --mark: #b3003c}
+  --mark: #b3003c; --before: #d9660a; --after: #0b5cad; --measured: #9ecae9}
 @media (prefers-color-scheme: dark) {:root {--back: #14181d; --text: #e6eaef; --line: #3a444f;
-  --accent: #78b4f5; --mark: #ff7a9c}}
+  --accent: #78b4f5; --mark: #ff7a9c; --before: #ff9248; --after: #78b4f5; --measured: #46657f}}
+.before {--colour: var(--before)}
+.after {--colour: var(--after)}
 body {font-family: sans-serif; margin: 2em auto; max-width: 1400px; padding: 0 1em;
   color: var(--text); background: var(--back)}
 h1 {font-size: 1.5em; overflow-wrap: anywhere}
@@ -52,8 +58,9 @@ const unpacked = async () => {
   const stream = new Blob([bytes]).stream().pipeThrough(new DecompressionStream("gzip"));
   return new Response(stream).text();
 };
+const css = name => getComputedStyle(document.documentElement).getPropertyValue(name).trim();
+const lines = {"#d9660a": "--before", "#0b5cad": "--after", "#9ecae9": "--measured"};
 const coloured = layout => {
-  const css = name => getComputedStyle(document.documentElement).getPropertyValue(name).trim();
   Object.assign(layout, {paper_bgcolor: css("--back"), plot_bgcolor: css("--back")});
   layout.font = {...layout.font, color: css("--text")};
   for (const name of Object.keys(layout).filter(key => /^[xy]axis/.test(key))) {
@@ -62,7 +69,9 @@ const coloured = layout => {
   return layout;
 };
 const drawn = async place => {
-  const {data, layout} = JSON.parse(place.nextElementSibling.textContent);
+  let text = place.nextElementSibling.textContent;
+  for (const [light, name] of Object.entries(lines)) text = text.replaceAll(light, css(name));
+  const {data, layout} = JSON.parse(text);
   await Plotly.newPlot(place, data, coloured(layout), {responsive: true});
   place.dispatchEvent(new CustomEvent("drawn", {bubbles: true}));
 };

@@ -1,8 +1,7 @@
-"""The page of a campaign: distributions, what moves them, worst and failed runs."""
+"""The page of a campaign: metrics over what is varied, distributions, worst and failed runs."""
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from html import escape
 from pathlib import Path
 from typing import Any
@@ -12,11 +11,11 @@ from plotly.subplots import make_subplots
 
 from cspm.campaign.campaign import Campaign
 from cspm.campaign.campaign_folder import PAGE
+from cspm.campaign.metric_figures import metric_figure
 from cspm.campaign.summary import SPREAD, axes_of, reading_of, spread_cells
-from cspm.plots.picture_style import COLOURS
-from cspm_ident.offline_page import LAYOUT, figure_html, scrolled, table_html, write_offline_page
+from cspm_ident.offline_page import AFTER, LAYOUT, figure_html, table_html, write_offline_page
 
-_ACROSS, _HEIGHT = 3, 260
+_HEIGHT = 260
 _MOST_LISTED = 30
 
 
@@ -31,18 +30,35 @@ def write_campaign_page(campaign: Campaign, found: dict[str, Any]) -> Path:
         OSError: the file cannot be written.
     """
     parts = [f"<p class=verdict>{escape(headline(campaign, found))}</p>"]
+    if found["sensitivities"]:
+        parts += _metric_parts(campaign, found) + _sensitivity_parts(found)
     if found["metrics"]:
         drawn = figure_html(_distributions(campaign, found))
-        parts += [_spread_table(found), scrolled(drawn, "distributions of the metrics")]
-    if found["sensitivities"]:
-        parts += _sensitivity_parts(campaign, found)
+        parts += ["<h2>How they are spread</h2>", _spread_table(found)]
+        parts.append(f"<details><summary>Distributions</summary>{drawn}</details>")
     if found["verdicts"]:
         rows = [(name, str(count)) for name, count in found["verdicts"].items()]
         parts += ["<h2>Verdicts</h2>", table_html(("verdict", "runs"), rows, "verdicts")]
     parts += _worst_parts(found) + _failure_parts(campaign)
     path = campaign.folder / PAGE
-    write_offline_page(path, f"Campaign {campaign.file.name}", parts)
+    write_offline_page(path, _page_title(campaign, found), parts)
     return path
+
+
+def _page_title(campaign: Campaign, found: dict[str, Any]) -> str:
+    """Return the campaign and what moves its first metric most, in a line."""
+    name = f"Campaign {campaign.file.name}"
+    metric = next(iter(found["metrics"]), None)
+    ranked = [
+        (abs(each[metric]["rho"]), axis)
+        for axis, each in found["sensitivities"].items()
+        if metric in each
+    ]
+    if metric is None or not ranked:
+        return f"{name}: {found['ended']} of {found['runs']} runs"
+    share, axis = max(ranked)
+    what = reading_of(metric).name
+    return f"{name}: {what} follows {axis} most (rank correlation {share:.2f})"
 
 
 def headline(campaign: Campaign, found: dict[str, Any]) -> str:
@@ -62,19 +78,31 @@ def _spread_table(found: dict[str, Any]) -> str:
 def _distributions(campaign: Campaign, found: dict[str, Any]) -> go.Figure:
     names = [*found["metrics"]]
     titles = [_title(name) for name in names]
-    figure = make_subplots(-(-len(names) // _ACROSS), _ACROSS, subplot_titles=titles)
+    # One below the other: beside each other their titles overlap on a phone.
+    figure = make_subplots(len(names), 1, subplot_titles=titles)
     for place, name in enumerate(names):
         scale = reading_of(name).scale
         values = [scale * row[name] for row in campaign.rows if row.get(name) is not None]
-        bars = go.Histogram(x=values, marker_color=COLOURS[0], name=titles[place])
-        figure.add_trace(bars, place // _ACROSS + 1, place % _ACROSS + 1)
-    height = _HEIGHT * -(-len(names) // _ACROSS)
-    figure.update_layout(**LAYOUT, height=height, showlegend=False)
-    figure.update_yaxes(title_text="runs", col=1)
+        bars = go.Histogram(x=values, marker_color=AFTER, name=titles[place])
+        figure.add_trace(bars, place + 1, 1)
+    figure.update_layout(**LAYOUT, height=_HEIGHT * len(names), showlegend=False)
+    figure.update_yaxes(title_text="runs")
     return figure
 
 
-def _sensitivity_parts(campaign: Campaign, found: dict[str, Any]) -> list[str]:
+def _metric_parts(campaign: Campaign, found: dict[str, Any]) -> list[str]:
+    """Return each metric over each varied value; the first metric open, the others folded."""
+    axes, parts = [*found["sensitivities"]], ["<h2>What moves them</h2>"]
+    parts.append("<p>Points are runs; diamonds are means of runs, with their 95 % intervals.</p>")
+    for place, metric in enumerate(found["metrics"]):
+        drawn = figure_html(metric_figure(campaign.rows, metric, axes))
+        opened = " open" if place == 0 else ""
+        said = escape(reading_of(metric).name)
+        parts.append(f"<details{opened}><summary>{said}</summary>{drawn}</details>")
+    return parts
+
+
+def _sensitivity_parts(found: dict[str, Any]) -> list[str]:
     axes, metrics = [*found["sensitivities"]], [*found["metrics"]]
     tests = sum(len(each) for each in found["sensitivities"].values())
 
@@ -87,37 +115,9 @@ def _sensitivity_parts(campaign: Campaign, found: dict[str, Any]) -> list[str]:
     rows = [(reading_of(each).name, *(cell(axis, each) for axis in axes)) for each in metrics]
     heads = ("", *axes)
     return [
-        "<h2>What moves them</h2>",
         "<p>Spearman's rank correlation, −1 to 1; a dot where chance explains it.</p>",
         table_html(heads, rows, "rank correlations"),
-        scrolled(figure_html(_scatter(campaign, axes, metrics)), "a metric over an axis"),
     ]
-
-
-def _scatter(campaign: Campaign, axes: Sequence[str], metrics: Sequence[str]) -> go.Figure:
-    """Return each metric over each axis, one at a time, by a menu."""
-    figure, buttons = go.Figure(), []
-    pairs = [(axis, metric) for axis in axes for metric in metrics]
-    for place, (axis, metric) in enumerate(pairs):
-        shown = [row for row in campaign.rows if row.get(metric) is not None]
-        scale = reading_of(metric).scale
-        figure.add_scatter(
-            x=[row.get(axis) or 0.0 for row in shown],
-            y=[scale * row[metric] for row in shown],
-            text=[f"run {row['run']}" for row in shown],
-            mode="markers",
-            marker_color=COLOURS[0],
-            visible=place == 0,
-        )
-        visible = [each == place for each in range(len(pairs))]
-        titles = {"xaxis.title.text": axis, "yaxis.title.text": _title(metric)}
-        label = f"{reading_of(metric).name} over {axis}"
-        buttons.append({"label": label, "method": "update", "args": [{"visible": visible}, titles]})
-    menu = {"buttons": buttons, "x": 0.0, "xanchor": "left", "y": 1.12, "yanchor": "bottom"}
-    figure.update_layout(**LAYOUT, height=480, showlegend=False, updatemenus=[menu])
-    figure.update_xaxes(title_text=pairs[0][0])
-    figure.update_yaxes(title_text=_title(pairs[0][1]))
-    return figure
 
 
 def _title(column: str) -> str:

@@ -138,7 +138,7 @@ def _sensitivities(
             continue
         for metric in metrics:
             pairs = [
-                (_as_number(row.get(axis)), row[metric])
+                (number_of(row.get(axis)), row[metric])
                 for row in rows
                 if isinstance(row.get(metric), (int, float))
             ]
@@ -150,7 +150,7 @@ def _sensitivities(
     return found
 
 
-def _as_number(value: object) -> float | None:
+def number_of(value: object) -> float | None:
     """Return a number; what is absent, as an effect that is not there, counts as 0."""
     if value is None:
         return 0.0

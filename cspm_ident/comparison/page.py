@@ -14,7 +14,10 @@ from cspm_ident.channel_words import channel_words
 from cspm_ident.comparison.channel_fit import ChannelFit
 from cspm_ident.comparison.compare import Comparison
 from cspm_ident.offline_page import (
+    AFTER,
+    BEFORE,
     BELOW,
+    MEASURED,
     figure_html,
     table_html,
     thinned,
@@ -28,7 +31,9 @@ _ENTRY_PIXELS = 20
 # Points per line of channels that are drawn at once, and of those that are folded.
 _LINE_POINTS, _FOLDED_POINTS = 2000, 800
 # Channels that are drawn at once; the others are folded.
-_OPEN = 6
+_OPEN = 5
+# Below it a VAF says no more than that nothing is explained [%].
+_LEAST_VAF = -100.0
 # An error beyond this multiple of its noise floor is named in the verdict. Of a floor that is
 # known to a tenth, 1.5 lies five standard errors above it.
 _BEYOND = 1.5
@@ -76,17 +81,42 @@ def write_page(path: Path, comparison: Comparison) -> None:
     Raises:
         OSError: the file cannot be written.
     """
-    title = f"{comparison.measurement.path.name}: measured and simulated"
     ranked = sorted(comparison.channels, key=_excess, reverse=True)
-    parts = [_verdict(ranked), _table(ranked, comparison)]
+    parts = [_verdict(ranked), _worst(ranked[:_OPEN])]
     parts += [_channel(each, comparison, _LINE_POINTS) for each in ranked[:_OPEN]]
     if ranked[_OPEN:]:
         folded = "".join(_channel(each, comparison, _FOLDED_POINTS) for each in ranked[_OPEN:])
         title_of_rest = f"The other {len(ranked) - _OPEN} channels, which differ less"
-        parts.append(f"<details><summary>{title_of_rest}</summary>{folded}</details>")
+        parts.append(_folded(title_of_rest, folded))
+    parts.append(_folded("All numbers of all channels", _table(ranked, comparison)))
     parts += [_block(block, comparison) for block in _BLOCKS]
-    parts.append(f"<h2>How it was compared</h2>{_about(comparison)}")
-    write_offline_page(path, title, [*parts, _LINKED])
+    parts.append(_folded("How it was compared", _about(comparison)))
+    write_offline_page(path, _title(ranked, comparison), [*parts, _LINKED])
+
+
+def _title(ranked: list[ChannelFit], comparison: Comparison) -> str:
+    """Return the recording and what is worst, in a line."""
+    name = comparison.measurement.path.name
+    if not ranked:
+        return f"{name}: nothing could be compared"
+    if _excess(ranked[0]) <= _BEYOND:
+        return f"{name}: all {len(ranked)} channels agree with the simulation to their noise"
+    worst = channel_words(ranked[0].name)
+    return f"{name}: {worst} is {_times(ranked[0])} × its noise from the simulation"
+
+
+def _folded(title: str, body: str) -> str:
+    return f"<details><summary>{escape(title)}</summary>{body}</details>"
+
+
+def _worst(ranked: list[ChannelFit]) -> str:
+    """Return the worst channels in few columns, linked to their lines."""
+    heads = ("worst channels", "from", "error / floor", "RMS error", "noise floor", "unit")
+    rows = [
+        (channel_words(c.name), c.block, _times(c), f"{c.rms:.3g}", f"{c.floor:.3g}", c.unit)
+        for c in ranked
+    ]
+    return table_html(heads, rows, "the worst channels", [f"#{_id(each)}" for each in ranked])
 
 
 def _excess(channel: ChannelFit) -> float:
@@ -177,10 +207,10 @@ def _table(channels: list[ChannelFit], comparison: Comparison) -> str:
             f"{c.rms:.3g}",
             f"{c.floor:.3g}",
             c.unit,
-            "at rest" if c.vaf is None else f"{c.vaf:.3f}",
-            "" if c.nrmse is None else f"{c.nrmse:.4f}",
-            f"{c.bias:.2g}",
-            "" if c.lag is None else f"{round(1e3 * c.lag, 2) + 0.0:.2f}",
+            _explained(c.vaf),
+            "" if c.nrmse is None else f"{c.nrmse:.3g}",
+            f"{c.bias:.3g}",
+            "" if c.lag is None else f"{1e3 * c.lag + 0.0:.3g}",
         )
         rows.append(cells)
     links = [f"#{_id(each)}" for each in channels]
@@ -192,14 +222,21 @@ def _table(channels: list[ChannelFit], comparison: Comparison) -> str:
     return f"{table_html(heads, rows, 'accuracy by channel', links)}<ul>{note}</ul>"
 
 
+def _explained(vaf: float | None) -> str:
+    """Return the variance accounted for [%] in three digits."""
+    if vaf is None:
+        return "at rest"
+    return f"below −{-_LEAST_VAF:.0f}" if vaf < _LEAST_VAF else f"{vaf:.3g}"
+
+
 def _lines(channel: ChannelFit, points: int) -> go.Figure:
     """Return measured and simulated signal, and below them their difference and its floor."""
     figure = make_subplots(rows=2, cols=1, shared_xaxes=True, vertical_spacing=0.06)
     # The measured line is wide and below, so that it is seen where both agree.
     for values, name, colour, width, row in (
-        (channel.measured, "measured", "#9ecae9", 4, 1),
-        (channel.simulated, "simulated", "#c04a00", 1.2, 1),
-        (channel.error, "measured − simulated", "#0b5cad", 1, 2),
+        (channel.measured, "measured", MEASURED, 4, 1),
+        (channel.simulated, "simulated", BEFORE, 1.2, 1),
+        (channel.error, "measured − simulated", AFTER, 1, 2),
     ):
         times, shown = thinned(channel.times, values, points)
         line = {"color": colour, "width": width}

@@ -16,6 +16,7 @@ from cspm_ident.diagnosis.regression.hypothesis import Hypothesis
 from cspm_ident.diagnosis.reporting.empirical_statement import stage_errors, stage_names
 from cspm_ident.diagnosis.reporting.evidence_figure import caption_of, driver_figure, overlay_figure
 from cspm_ident.diagnosis.reporting.finding_statement import calibrated_words, considered_words
+from cspm_ident.diagnosis.reporting.headline import headline
 from cspm_ident.diagnosis.reporting.machine_drawing import drawing
 from cspm_ident.diagnosis.reporting.machine_part import Part, part_behind, parts_of
 from cspm_ident.diagnosis.reporting.page_checks import (
@@ -77,7 +78,8 @@ def write_diagnosis_page(path: Path, found: Diagnosis, data: dict[str, Any]) -> 
         OSError: the file cannot be written.
     """
     verdict = verdict_of(found)
-    title = f"Diagnosis of {', '.join(m.path.name for m in found.searched)}: {verdict.value}"
+    names = ", ".join(m.path.name for m in found.searched)
+    about = f"<p>Diagnosis of {escape(names)}: {verdict.value}</p>"
     bodies = {
         "data": data_table(data),
         "evidence": _evidence(found),
@@ -104,7 +106,7 @@ def write_diagnosis_page(path: Path, found: Diagnosis, data: dict[str, Any]) -> 
         found, data, _verdict(verdict, data), where, curves, lambda: _steps(found, data)[0]
     )
     details = f"<div class=details><nav aria-label=sections>{links}</nav>{''.join(sections)}</div>"
-    write_offline_page(path, title, [STYLE, _STYLE, sheet, details])
+    write_offline_page(path, headline(found), [STYLE, _STYLE, about, sheet, details])
 
 
 def _verdict(verdict: Verdict, data: dict[str, Any]) -> str:

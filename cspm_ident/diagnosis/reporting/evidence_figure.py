@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from typing import Any
+
 import numpy as np
 import plotly.graph_objects as go
 from numpy.typing import NDArray
@@ -9,15 +11,17 @@ from plotly.subplots import make_subplots
 
 from cspm_ident.diagnosis.reporting.machine_part import part_behind
 from cspm_ident.diagnosis.validation.residual_curves import Curve, bins_of
-from cspm_ident.offline_page import BELOW, thinned
+from cspm_ident.offline_page import AFTER, BEFORE, BELOW, MEASURED, thinned
 from cspm_sim.effects import Channel
 
 Array = NDArray[np.float64]
 
 # Most points of a drawn curve.
 _POINTS = 1500
-# Orange and blue, which colour-blind readers tell apart, as in grey by lightness.
-_BEFORE, _AFTER, _MEASURED = "#d9660a", "#0b5cad", "#9ecae9"
+# Bins of a fitted law along its signal: a step is as wide on the page as one of these.
+_LAW_BINS = 300
+# Share of a law's squares that a signal explains, from which it is drawn as a line over it.
+_OWN = 0.9
 # Ratio to the usual step from which a step counts as a gap.
 _HOLE = 3.0
 _DOTS = {"mode": "markers", "opacity": 0.35}
@@ -59,17 +63,18 @@ def _dependence(curve: Curve, signal: str) -> str:
 def driver_figure(curve: Curve, name: str) -> go.Figure:
     """Return the residual before and after against one of its signals.
 
-    Dots are samples; lines are means over bins with equally many samples. The curve after is
-    omitted where no finding acts on the residual.
+    Dots are samples, and large marks means over bins with equally many samples. The line is the
+    law that was fitted, with its steps. It and what is left after it are omitted where no finding
+    acts on the residual.
     """
     figure = go.Figure()
     signal = curve.signals[name]
     step = max(1, len(signal) // _POINTS)
     edges, home = bins_of(signal)
     centres = _means(signal, home, len(edges) - 1)
-    stages = [(curve.before, "before", _BEFORE, "circle")]
+    stages = [(curve.before, "before", BEFORE, "circle")]
     if curve.touched:
-        stages.append((curve.after, "after", _AFTER, "diamond"))
+        stages.append((curve.after, "after", AFTER, "diamond"))
     for values, stage, colour, symbol in stages:
         marker = {"color": colour, "size": 4, "symbol": symbol}
         shown = _short(signal[::step]), _short(values[::step])
@@ -79,14 +84,43 @@ def driver_figure(curve: Curve, name: str) -> go.Figure:
             x=_short(centres),
             y=_short(_means(values, home, len(edges) - 1)),
             name=f"{stage}, mean",
-            mode="lines+markers",
-            line={"color": colour, "width": 2},
-            marker={"size": 9, "symbol": symbol, "line": {"color": "white", "width": 1}},
+            mode="markers",
+            marker={
+                "color": colour,
+                "size": 9,
+                "symbol": symbol,
+                "line": {"color": "white", "width": 1},
+            },
         )
+    if curve.touched:
+        figure.add_scatter(**_law(signal, curve.before - curve.after))
     figure.update_xaxes(title_text=name)
     figure.update_yaxes(title_text=f"residual [{curve.unit}]")
     figure.update_layout(height=430, **BELOW)
     return figure
+
+
+def _law(signal: Array, law: Array) -> dict[str, Any]:
+    """Return what the findings add to a residual, over one of its signals.
+
+    A line where the signal explains it, with an edge at zero, where laws of friction have their
+    step; otherwise points, since it depends on other signals too.
+    """
+    count = min(_LAW_BINS, max(1, len(signal) // 4))
+    edges = np.unique(np.append(np.quantile(signal, np.linspace(0.0, 1.0, count + 1)), 0.0))
+    edges = edges[(edges >= signal.min()) & (edges <= signal.max())]
+    home = np.clip(np.searchsorted(edges, signal, side="right") - 1, 0, max(len(edges) - 2, 0))
+    means = _means(law, home, max(len(edges) - 1, 1))
+    away = float(np.sum((law - means[home]) ** 2))
+    if away > (1.0 - _OWN) * max(float(np.sum(law**2)), 1e-300):
+        step = max(1, len(signal) // _POINTS)
+        marker = {"color": BEFORE, "size": 3, "symbol": "x"}
+        points = {"x": _short(signal[::step]), "y": _short(law[::step])}
+        return {"name": "fitted law", "mode": "markers", "marker": marker, **points}
+    known = np.bincount(home, minlength=len(means)) > 0
+    x, y = _means(signal, home, len(means))[known], means[known]
+    line = {"color": BEFORE, "width": 3}
+    return {"name": "fitted law", "mode": "lines", "line": line, "x": _short(x), "y": _short(y)}
 
 
 def overlay_figure(curve: Curve) -> go.Figure:
@@ -94,12 +128,12 @@ def overlay_figure(curve: Curve) -> go.Figure:
     figure = make_subplots(rows=2, cols=1, shared_xaxes=True, vertical_spacing=0.06)
     model, improved = curve.measured - curve.before, curve.measured - curve.after
     lines = [
-        (curve.measured, "measured", _MEASURED, 1),
-        (model, "before", _BEFORE, 1),
-        (curve.before, "before", _BEFORE, 2),
+        (curve.measured, "measured", MEASURED, 1),
+        (model, "before", BEFORE, 1),
+        (curve.before, "before", BEFORE, 2),
     ]
     if curve.touched:
-        lines += [(improved, "after", _AFTER, 1), (curve.after, "after", _AFTER, 2)]
+        lines += [(improved, "after", AFTER, 1), (curve.after, "after", AFTER, 2)]
     for values, name, colour, row in lines:
         times, shown = _line(curve.times, values)
         # The measured curve lies below and is wider, so that it is visible where the model agrees.

@@ -60,20 +60,29 @@ def calibrated_words(finding: Finding) -> str:
     return f"{words} of {elements}, by up to {size} ({largest.name} of {largest.element})"
 
 
+_CELLS = (Elements.CELLS.value,)
+
+
 def _subject(effect: Effect, elements: Sequence[str]) -> str:
     """Return the faulty elements as the subject of a sentence, with its verb."""
-    many = len(elements) > 1
-    verb = "have" if many else "has"
-    if tuple(elements) == (Elements.CELLS.value,):
-        return "All load cells have"
-    kind = kind_of(effect)
+    words, kind = subject_words(effect, elements), kind_of(effect)
+    many = len(elements) > 1 and kind is not Kind.MARKERS
+    verb = "have" if many or tuple(elements) == _CELLS else "has"
+    return f"{words[:1].upper()}{words[1:]} {verb}"
+
+
+def subject_words(effect: Effect, elements: Sequence[str]) -> str:
+    """Return the parts that an effect on elements concerns, such as `winches sway 1 and sway 2`."""
+    if tuple(elements) == _CELLS:
+        return "all load cells"
+    kind, many = kind_of(effect), len(elements) > 1
     listed = " and ".join(", ".join(elements).rsplit(", ", 1)).replace("_", " ")
     if kind is Kind.BODY:
-        return f"The {listed} {verb}"
+        return f"the {listed}"
     if kind is Kind.MARKERS:
-        return f"The motion capture of {listed} has"
+        return f"the motion capture of {listed}"
     words = {Kind.WINCH: "winches"}.get(kind, f"{kind.value}s") if many else kind.value
-    return f"{words.capitalize()} {listed} {verb}"
+    return f"{words} {listed}"
 
 
 def _difference(finding: Finding) -> str:
@@ -174,9 +183,7 @@ def _suspected(diagnosis: Diagnosis, effect: Effect) -> set[str]:
 
 def _improvement(diagnosis: Diagnosis, finding: Finding) -> str:
     """Return the change of the held-out error, in the finding's own residual and simulated."""
-    best = max(
-        concerned(diagnosis.fit, finding), key=lambda fit: fit.before / max(fit.after, 1e-300)
-    )
+    best = clearest_fit(diagnosis, finding)
     limits = diagnosis.thresholds
     at_noise = best.tabled is None and best.is_at_noise(limits)
     noise = "That is the noise floor." if at_noise else f"Noise is {_share(best, best.noise)}."
@@ -192,6 +199,13 @@ def _improvement(diagnosis: Diagnosis, finding: Finding) -> str:
         f"With {'all that was found' if together else 'it'} the held-out error of the"
         f" {channel_words(channel_of(best))} {course} of what was measured. {noise}"
         f" {_simulated(finding.improvement)}"
+    )
+
+
+def clearest_fit(diagnosis: Diagnosis, finding: Finding) -> HeldOut:
+    """Return the held-out errors of the residual in which a finding helps most."""
+    return max(
+        concerned(diagnosis.fit, finding), key=lambda fit: fit.before / max(fit.after, 1e-300)
     )
 
 

@@ -16,8 +16,8 @@ Array = NDArray[np.float64]
 _WIDTH, _HEIGHT, _LEFT, _TOP, _FOOT = 520.0, 300.0, 64.0, 30.0, 34.0
 # As many points as a line of this width shows.
 _POINTS = 800
-# Orange and blue, which colour-blind readers tell apart, and print dark and darker.
-BEFORE, AFTER = "#d9660a", "#0b5cad"
+# Classes of a page's style, which has other colours for dark screens.
+_BEFORE, _AFTER = "before", "after"
 
 
 def residual_drawing(curve: Curve, words: str) -> str:
@@ -29,12 +29,12 @@ def residual_drawing(curve: Curve, words: str) -> str:
     """
     limit = float(np.abs(curve.before).max()) or 1.0
     span = float(curve.times[0]), float(curve.times[-1])
-    lines = [_line(curve.times, curve.before, span, limit, BEFORE, 1.0)]
-    texts = [_text(_LEFT, 18.0, f"before {_size(curve.before, curve.unit)}", BEFORE)]
+    lines = [_line(curve.times, curve.before, span, limit, _BEFORE, 1.0)]
+    texts = [_text(_LEFT, 18.0, f"before {_size(curve.before, curve.unit)}", _BEFORE)]
     if curve.touched:
-        lines.append(_line(curve.times, curve.after, span, limit, AFTER, 1.3))
+        lines.append(_line(curve.times, curve.after, span, limit, _AFTER, 1.3))
         after = f"after {_size(curve.after, curve.unit)}"
-        texts.append(_text(0.5 * (_LEFT + _WIDTH), 18.0, after, AFTER))
+        texts.append(_text(0.5 * (_LEFT + _WIDTH), 18.0, after, _AFTER))
     middle = 0.5 * (_TOP + _HEIGHT - _FOOT)
     for value in (-limit, 0.0, limit):
         y = _y(np.array([value]), limit)[0]
@@ -63,18 +63,18 @@ def _y(values: Array, limit: float) -> Array:
 
 
 def _line(
-    times: Array, values: Array, span: tuple[float, float], limit: float, colour: str, width: float
+    times: Array, values: Array, span: tuple[float, float], limit: float, stage: str, width: float
 ) -> str:
     shown_times, shown = thinned(times, values, _POINTS)
     share = (shown_times - span[0]) / max(span[1] - span[0], 1e-9)
     x, y = _LEFT + (_WIDTH - _LEFT) * share, _y(np.clip(shown, -limit, limit), limit)
     points = " ".join(f"{a:.1f},{b:.1f}" for a, b in zip(x, y, strict=True))
-    return f'<polyline points="{points}" fill=none stroke="{colour}" stroke-width="{width}"/>'
+    return f'<polyline points="{points}" class={stage} fill=none stroke-width="{width}"/>'
 
 
 def _text(
-    x: float, y: float, words: str, colour: str = "", anchor: str = "start", more: str = ""
+    x: float, y: float, words: str, stage: str = "", anchor: str = "start", more: str = ""
 ) -> str:
-    fill = f' fill="{colour}" font-weight=bold' if colour else ""
+    fill = f" class={stage} font-weight=bold" if stage else ""
     content = escape(words.replace("-", "−"))
     return f'<text x="{x:.1f}" y="{y:.1f}" text-anchor={anchor}{fill}{more}>{content}</text>'

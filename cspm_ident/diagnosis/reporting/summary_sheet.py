@@ -23,7 +23,8 @@ STYLE = """<style>
 .pair figure {margin: 0}
 figcaption {font-size: 0.95em}
 .residual {width: 100%; height: auto; font-size: 14px}
-.residual text:not([fill]) {fill: var(--text)}
+.residual text {fill: var(--colour, var(--text))}
+.residual polyline {stroke: var(--colour)}
 .residual .grid {stroke: var(--line)}
 @page {size: A4; margin: 14mm}
 @media print {

@@ -28,7 +28,7 @@ from cspm_msgs_py.errors import InputError
 
 DURATION = 14.0
 # Channels that the page does not fold.
-OPEN = 6
+OPEN = 5
 PULLED = """
 name: pulled
 testbed: fixed_frame.yaml

@@ -9,6 +9,7 @@ from cspm_msgs_py.ros.contract_node import ContractNode, ros_class
 from cspm_msgs_py.ros.rendezvous import PlantSide
 
 _LOOK_EVERY_S = 0.02
+_PROVING = "the drivers' proof, a wiggle of each winch"
 # From the announcement to the start, so that all know in time.
 _NOTICE_NS = 200_000_000
 
@@ -66,8 +67,15 @@ class Leader:
         missing, apart = self._missing(), ", ".join(sorted(self._side.apart))
         if apart and not missing:
             missing = [f"drivers to reach {apart}"]
+        if self._side.proving and not missing:
+            missing = [_PROVING]
         found = [*self._side.unmatched(), *missing]
         return found if found or self._called else [f"a call of /{self._node.name}/start"]
+
+    @property
+    def busy(self) -> bool:
+        """Whether the start waits for a call, or for drivers that prove what they are."""
+        return not self._called or self.waiting() == [_PROVING]
 
     @property
     def elapsed(self) -> float:
@@ -105,10 +113,13 @@ class Leader:
     def _look(self) -> None:
         now = self._node.now_ns()
         if self.start_ns is None:
-            if not self.waiting():
+            waiting = self.waiting()
+            if not waiting:
                 # What is waited for may have taken its time to say that it is there.
                 self.start_ns = self._node.now_ns() + _NOTICE_NS
                 self._side.tell_start_at(self.start_ns)
                 self._on_start(self.start_ns)
+            elif self._called and waiting == [_PROVING]:
+                self._side.ask_for_proofs()
         elif now >= self.start_ns + self._duration_ns:
             self.end()

@@ -18,6 +18,7 @@ from cspm_msgs_py.ros.guard_ports import GuardPorts
 from cspm_msgs_py.ros.rendezvous import FollowerSide
 from cspm_msgs_py.schedule import CLOCK, FORCE_CONTROLLER, TORQUE_COMMAND, Schedule
 from cspm_msgs_py.stepping.plausibility import Plausibility
+from cspm_msgs_py.stepping.proof import Proof
 from cspm_msgs_py.stepping.sample_and_hold import SampleAndHold, WallTrajectory
 from cspm_msgs_py.stepping.stage import Guard, Stage
 from cspm_msgs_py.topics import DIAGNOSTICS, SAFE, Topic
@@ -44,6 +45,7 @@ class RealtimeNode:
         lateness_ns: int | None = None,
         on_start: Callable[[int], None] | None = None,
         on_safe: Callable[[bool], None] | None = None,
+        proof: Proof | None = None,
     ) -> None:
         """Connect the stage; `guard` is the same stage where it has a safe state.
 
@@ -59,10 +61,12 @@ class RealtimeNode:
             lateness_ns: of a guard, how old the state may be that it answers [ns]; None: any age.
             on_start: called with the first instant [ns] of the run.
             on_safe: called with whether the winches are in their safe state.
+            proof: what drivers have to show before the run; None: they are our own.
         """
         plan = schedule.nodes[stage.node]
         self._node, self._guard = node, guard
         self._on_start, self._on_safe = on_start, on_safe
+        self._proof, self._steadily = proof, False
         node.keep_time()
         read = [name for name in (*plan.inputs, *plan.held) if name != CLOCK]
         self._foreign = [name for name in read if not edges[name].senders]
@@ -71,6 +75,7 @@ class RealtimeNode:
         self._line = FaultLine(node, None if guard is None else self._hear_of_fault)
         self._bindings = {name: bind(node, topics[name], edges) for name in read}
         publish = {name: node.publisher(topics[name], edges[name].readers) for name in plan.outputs}
+        self._publish = publish
         self._loop = SampleAndHold(
             stage,
             schedule,
@@ -87,7 +92,11 @@ class RealtimeNode:
         self._connect_guard(FORCE_CONTROLLER in schedule.nodes)
         self._unsteady_ns = node.now_ns()
         self._leader = FollowerSide(
-            node, schedule.period_ns, on_start=self._start, ready=self._connected
+            node,
+            schedule.period_ns,
+            on_start=self._start,
+            ready=self._connected,
+            proving=lambda: self._steadily and proof is not None and not proof.passed,
         )
         node.every(plan.divider * schedule.period_ns * 1e-9, self._tick)
 
@@ -143,10 +152,14 @@ class RealtimeNode:
     def _connected(self) -> bool:
         """Return whether all inputs are bound and drivers have been heard without a pause.
 
-        And whether they read the commands to them.
+        And whether they read the commands to them, and have proved what they are to prove.
         """
         if self._loop.begun:
             return True
+        self._steadily = self._steady()
+        return self._steadily and (self._proof is None or self._proof.passed)
+
+    def _steady(self) -> bool:
         if any([binding.missing() for binding in self._bindings.values()]):
             return False
         now = self._node.now_ns()
@@ -161,7 +174,20 @@ class RealtimeNode:
             self._loop.alarm(self._node.now_ns(), fault)
             if self._foreign and self._loop.safe:
                 self._node.accept_clock()
+        if self._proof is not None:
+            self._prove(self._proof)
         self._loop.tick(self._node.now_ns())
+
+    def _prove(self, proof: Proof) -> None:
+        """Have drivers prove what they are, then hold the machine until the stage computes."""
+        if self._loop.computed or self._loop.safe:
+            self._proof = None
+            proof.close()
+        elif not self._steadily or not (proof.under_way or self._leader.asked()):
+            proof.restart()
+        elif (command := proof.torque(self._node.now_ns())) is not None:
+            stamp_ns, torque = command
+            self._publish[TORQUE_COMMAND](stamp_ns, stamp_ns, torque)
 
 
 class RealtimeWaveNode:

@@ -1,10 +1,11 @@
 """The nodes of a run find each other, start and end together.
 
 Followers report to the leader, a simulated plant where there is one, on `/run/progress`
-that they are connected (stamp −1 s), or are but for somebody else's drivers (−2 s); in lockstep
-also, later, through which instant they are complete. The leader announces on `/run/start` that the
-run begins, in real time at which instant the motions do. It announces on `/run/end` at which
-instant the run ended.
+that they are connected (stamp −1 s), or are but for somebody else's drivers (−2 s), or but for the
+proof of these (−3 s), which the leader asks for on `/run/start` (−3 s) again and again once all
+else is there; in lockstep also, later, through which instant they are complete. The leader
+announces on `/run/start` that the run begins, in real time at which instant the motions do. It
+announces on `/run/end` at which instant the run ended.
 """
 
 from __future__ import annotations
@@ -22,7 +23,7 @@ PROGRESS, START, END = "/run/progress", "/run/start", "/run/end"
 _HEADER = "std_msgs/msg/Header"
 _NANOSECONDS = 1_000_000_000
 _LOOK_EVERY_S = 0.05
-_READY, _APART = -1, -2
+_READY, _APART, _PROVING = -1, -2, -3
 # How long it may take on one machine until all who are there are seen.
 SETTLE_S = 0.5
 
@@ -41,6 +42,7 @@ class FollowerSide:
         on_end: Callable[[int], None] = lambda _: None,
         on_start: Callable[[int], None] = lambda _: None,
         ready: Callable[[], bool] = lambda: True,
+        proving: Callable[[], bool] = lambda: False,
     ) -> None:
         """Announce the node as soon as all its readers are connected, again and again.
 
@@ -53,8 +55,9 @@ class FollowerSide:
                 be this run's.
             on_start: called with the first instant [ns] of a run in real time.
             ready: whether the node is connected to what is not of this run, looked at in turn.
+            proving: whether nothing is left but drivers that have to prove what they are.
         """
-        self._node, self._ready = node, ready
+        self._node, self._ready, self._proving = node, ready, proving
         self._period_ns = period_ns
         self._on_end = on_end
         self._header = ros_class(_HEADER)
@@ -62,7 +65,7 @@ class FollowerSide:
         self._on_start = on_start
         node.node.create_subscription(self._header, local(START), self._start, contract_qos(None))
         node.node.create_subscription(self._header, local(END), self._end, contract_qos(None))
-        self._connected = False
+        self._connected, self._asked = False, -SETTLE_S
         self._timer = node.every(_LOOK_EVERY_S, self._announce)
         self.end_ns: int | None = None
 
@@ -81,12 +84,17 @@ class FollowerSide:
             heard = bool(self._publisher.get_subscription_count())
             self._connected = heard and not self._node.unmatched()
         if self._connected:
-            self._send((_READY if self._ready() else _APART) * _NANOSECONDS)
+            unready = _PROVING if self._proving() else _APART
+            self._send((_READY if self._ready() else unready) * _NANOSECONDS)
 
     def _send(self, stamp_ns: int) -> None:
         message = self._header(frame_id=self._node.name)
         message.stamp.sec, message.stamp.nanosec = divmod(stamp_ns, _NANOSECONDS)
         self._publisher.publish(message)
+
+    def asked(self) -> bool:
+        """Return whether the leader has asked for proofs within the last half second."""
+        return time.monotonic() - self._asked < SETTLE_S
 
     def _end(self, message: object) -> None:
         end_ns = _stamp_of(message)
@@ -98,7 +106,11 @@ class FollowerSide:
         self.end_ns = end_ns
 
     def _start(self, message: object) -> None:
-        self._on_start(_stamp_of(message))
+        stamp_ns = _stamp_of(message)
+        if stamp_ns < 0:
+            self._asked = time.monotonic()
+        else:
+            self._on_start(stamp_ns)
 
 
 class PlantSide:
@@ -107,6 +119,7 @@ class PlantSide:
     Attributes:
         absent: nodes of the run that have not announced themselves yet.
         apart: nodes that have, and are not connected to somebody else's drivers yet.
+        proving: nodes that have, and are to have those drivers prove what they are.
     """
 
     def __init__(
@@ -128,6 +141,7 @@ class PlantSide:
         self._settled = time.monotonic() + SETTLE_S
         self.absent = set(others)
         self.apart: set[str] = set()
+        self.proving: set[str] = set()
 
     def unmatched(self) -> list[str]:
         """Return what is still missing before the run can start.
@@ -174,6 +188,10 @@ class PlantSide:
         """Announce at which instant [ns] the run begins: on the ROS clock, in lockstep 0."""
         self._starter.publish(self._stamped(stamp_ns))
 
+    def ask_for_proofs(self) -> None:
+        """Have those that are to prove somebody's drivers do so: all else is there."""
+        self._starter.publish(self._stamped(_PROVING * _NANOSECONDS))
+
     def _stamped(self, stamp_ns: int) -> object:
         message = self._header(frame_id=self._node.name)
         message.stamp.sec, message.stamp.nanosec = divmod(stamp_ns, _NANOSECONDS)
@@ -182,7 +200,8 @@ class PlantSide:
     def _take(self, message: object) -> None:
         name, total = message.frame_id, _stamp_of(message)  # type: ignore[attr-defined]
         self.absent.discard(name)
-        (self.apart.add if total == _APART * _NANOSECONDS else self.apart.discard)(name)
+        for code, names in ((_APART, self.apart), (_PROVING, self.proving)):
+            (names.add if total == code * _NANOSECONDS else names.discard)(name)
         if total >= 0 and name in self._others:
             self._on_progress(name, total // self._period_ns)
 

@@ -189,6 +189,11 @@ class SampleAndHold:
         """Whether the run has begun."""
         return self._start_ns is not None or self._computed_ns is not None
 
+    @property
+    def computed(self) -> bool:
+        """Whether the stage has computed anything yet."""
+        return self._computed_ns is not None
+
     def reset(self, now_ns: int) -> str | None:
         """Leave the safe state; return why not in one line while an input is not fresh."""
         read = [name for name in self._delays if name != CLOCK]

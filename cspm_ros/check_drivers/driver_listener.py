@@ -5,9 +5,6 @@ from __future__ import annotations
 import time
 from collections.abc import Callable
 from contextlib import suppress
-from typing import Any
-
-from rclpy.qos import DurabilityPolicy, ReliabilityPolicy
 
 from cspm_msgs_py.errors import InputError
 from cspm_msgs_py.graph import RECORDER
@@ -29,6 +26,7 @@ from cspm_ros.check_drivers.driver_endpoints import (
     check_torque_command,
 )
 from cspm_ros.check_drivers.driver_observation import Finding, Observation
+from cspm_ros.check_drivers.graph_endpoints import endpoint_of
 from cspm_ros.runtime.discovery import Discovery
 
 NODE = "check_drivers"
@@ -166,12 +164,12 @@ class DriverListener:
 
     def _publishers(self, name: str) -> list[Endpoint]:
         return [
-            _endpoint(info) for info in self._node.node.get_publishers_info_by_topic(local(name))
+            endpoint_of(info) for info in self._node.node.get_publishers_info_by_topic(local(name))
         ]
 
     def _subscriptions(self, name: str) -> list[Endpoint]:
         found = self._node.node.get_subscriptions_info_by_topic(local(name))
-        return [each for each in map(_endpoint, found) if each.node != RECORDER]
+        return [each for each in map(endpoint_of, found) if each.node != RECORDER]
 
 
 class _Ear:
@@ -226,13 +224,3 @@ class _Ear:
             return [Finding(self._topic.name, "losses", True, "none lost on the way")]
         text = f"{lost} messages lost on the way here: the network or this computer is too slow"
         return [Finding(self._topic.name, "losses", None, text)]
-
-
-def _endpoint(info: Any) -> Endpoint:  # noqa: ANN401 - rclpy's classes have no types
-    qos = info.qos_profile
-    return Endpoint(
-        node=f"{info.node_namespace}/{info.node_name}".strip("/"),
-        ros_type=info.topic_type,
-        reliable=qos.reliability != ReliabilityPolicy.BEST_EFFORT,
-        transient_local=qos.durability == DurabilityPolicy.TRANSIENT_LOCAL,
-    )

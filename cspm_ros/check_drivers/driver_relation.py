@@ -99,7 +99,7 @@ def rate_relation(value: Series, rate: Series) -> Relation:
     change = np.diff(np.interp(edges, value.times, value.values))
     expected = np.diff(np.interp(edges, rate.times, integral))
     noise = rate.noise * np.sqrt((edges[1] - edges[0]) * rate.spacing)
-    return _relation(change, expected, np.sqrt(2.0) * value.noise, noise)
+    return relate(change, expected, np.sqrt(2.0) * value.noise, noise)
 
 
 def value_relation(first: Series, second: Series, floor: float) -> Relation:
@@ -109,7 +109,7 @@ def value_relation(first: Series, second: Series, floor: float) -> Relation:
         return _UNRELATED
     a = np.interp(edges, first.times, first.values)
     b = np.interp(edges, second.times, second.values)
-    return _relation(a - a.mean(), b - b.mean(), max(first.noise, floor), max(second.noise, floor))
+    return relate(a - a.mean(), b - b.mean(), max(first.noise, floor), max(second.noise, floor))
 
 
 def _edges(first: Series, second: Series) -> Array:
@@ -118,7 +118,8 @@ def _edges(first: Series, second: Series) -> Array:
     return np.arange(start, end, block)
 
 
-def _relation(a: Array, b: Array, noise_a: float, noise_b: float) -> Relation:
+def relate(a: Array, b: Array, noise_a: float, noise_b: float) -> Relation:
+    """Return how `b` relates to `a`, (n,) each, with the noise of one value of each."""
     size_a, size_b = float(np.sqrt(np.mean(a**2))), float(np.sqrt(np.mean(b**2)))
     if size_a == 0.0 or size_b == 0.0:
         swamped = max(size_a, size_b) <= SURELY_CLEAR * max(noise_a, noise_b)

@@ -149,7 +149,7 @@ def _run_realtime(
     elif node.name == RECORDER:
         folder = parameters.recording_folder
         writer = stack.enter_context(run.new_recording(folder, parameters.recorded_mode))
-        recorder, leader = run.recorder(node, writer, steps)
+        recorder, leader = run.recorder(node, writer, steps, parameters.patience)
         _go_ahead(node, parameters)
         stack.callback(recorder.close)
         if leader is not None and parameters.start_on_call:

@@ -23,9 +23,11 @@ from cspm_msgs_py.schedule import (
     BAR_POSE,
     BAR_REFERENCE,
     CLOCK,
+    FORCE_CONTROLLER,
     PLANT,
     TORQUE_COMMAND,
     WAVE_TRAJECTORY,
+    WINCH_STATE,
 )
 from cspm_msgs_py.topics import (
     BRAKE,
@@ -36,6 +38,7 @@ from cspm_msgs_py.topics import (
     SAFE,
     Topic,
 )
+from cspm_ros.check_drivers.proof_port import ProofPort
 from cspm_ros.inject.fault_port import FaultPort
 from cspm_ros.runtime.goal_port import GoalPort, make_goals
 from cspm_ros.runtime.lateness import lateness_ns
@@ -138,7 +141,21 @@ class RealtimeRun(NodesOfRun):
             lateness_ns=None if guard is None else lateness_ns(bundle),
             on_start=stage.start if isinstance(stage, timed) else None,
             on_safe=stage.suspend if isinstance(stage, MotionStage | OwnStage) else None,
+            proof=self._proof(node) if self._proves and node.name == FORCE_CONTROLLER else None,
         )
+
+    @property
+    def _proves(self) -> bool:
+        """Whether somebody's drivers have to prove what they are by a wiggle of their winches."""
+        commanded = FORCE_CONTROLLER in self.members and WINCH_STATE in self.measured()
+        return commanded and PLANT not in self.members
+
+    def _proof(self, node: ContractNode) -> ProofPort:
+        # Loads parts of SciPy, which no other run needs.
+        from cspm_ros.check_drivers.driver_proof import DriverProof
+
+        testbed = self.bundle.testbed.testbed
+        return ProofPort(node, testbed, DriverProof(testbed, self.measured()))
 
     def _plausibility(self, node: str) -> MachinePlausibility:
         """Return what a node judges its inputs by, with a following error from the machine."""
@@ -161,9 +178,12 @@ class RealtimeRun(NodesOfRun):
         return recording_of(bundle, folder, mode, self.topics())
 
     def recorder(
-        self, node: ContractNode, writer: RecordingWriter, steps: int
+        self, node: ContractNode, writer: RecordingWriter, steps: int, patience_s: float
     ) -> tuple[RealtimeRecorderNode, Leader | None]:
-        """Return the recorder's node, and the leader if it leads."""
+        """Return the recorder's node, and the leader if it leads.
+
+        `patience_s` is how long it waits for drivers that are there to fit [s].
+        """
         self.name_machine(node)
         period_ns = self.schedule.period_ns
         made = RealtimeRecorderNode(node, period_ns, self.topics(), self.edges, writer)
@@ -172,9 +192,10 @@ class RealtimeRun(NodesOfRun):
             return made, None
         self.claim(node)
         others = [name for name in self.members if name != RECORDER]
+        needed, duration_ns = self.measured(), steps * period_ns
+        testbed, rates = self.bundle.testbed.testbed, self.bundle.scenario.rates
         # Loads parts of SciPy, which no other run needs.
         from cspm_ros.check_drivers.driver_statics import DriverStatics
 
-        needed = self.measured()
-        statics = DriverStatics(self.bundle.testbed.testbed, self.bundle.scenario.rates, needed)
-        return made, made.lead(others, needed, steps * period_ns, statics)
+        statics = DriverStatics(testbed, rates, needed)
+        return made, made.lead(others, needed, duration_ns, patience_s, statics)

@@ -32,6 +32,7 @@ if TYPE_CHECKING:
 _LISTENING = "a second of each driver's messages"
 _TAKE_EVERY_S = 0.01
 _WRITE_EVERY_S = 0.02
+_LOOK_EVERY_S = 0.2
 
 
 class RealtimeRecorderNode:
@@ -81,11 +82,13 @@ class RealtimeRecorderNode:
         others: Collection[str],
         needed: Collection[str],
         duration_ns: int,
+        patience_s: float,
         statics: DriverStatics,
     ) -> Leader:
         """Start the run once `others` and a message of each of the topics `needed` are there.
 
-        And once `statics`, which hears them, has found no error; its `InputError` ends the session.
+        And once `statics`, which hears them, has found no error. Its `InputError` ends the session,
+        and so does that of drivers that are there without a start for longer than `patience_s` [s].
         """
         bound = [topic for topic in self._topics.values() if carries_row(topic.ros_type)]
         excess = census_of(self._node, bound, self._edges)
@@ -105,7 +108,21 @@ class RealtimeRecorderNode:
             missing=missing,
             on_start=self._begin,
         )
+        self._wait_for_drivers(self._leader, needed, patience_s)
         return self._leader
+
+    def _wait_for_drivers(self, leader: Leader, needed: Collection[str], patience_s: float) -> None:
+        """Give the start up where drivers are there and do not fit."""
+        # Asks the graph, which a run with a simulated plant has no need of.
+        from cspm_ros.check_drivers.driver_patience import DriverPatience
+
+        patience = DriverPatience(self._node, [self._topics[name] for name in needed], patience_s)
+
+        def look() -> None:
+            silent = [name for name in needed if name not in self._came]
+            patience.look("" if leader.busy else leader.waits(), silent)
+
+        self._node.every(_LOOK_EVERY_S, look)
 
     @property
     def ended(self) -> bool:

@@ -71,7 +71,7 @@ def run_realtime(
             run.stage(session.node(name))
         writer = stack.enter_context(run.new_recording(folder, REALTIME))
         recorder, leading = run.recorder(
-            leads if external else session.node(RECORDER), writer, steps
+            leads if external else session.node(RECORDER), writer, steps, patience_s
         )
         stack.callback(recorder.close)
         leader = leading if plant is None else plant.leader

@@ -61,9 +61,9 @@ def module():
     return found
 
 
-def test_it_has_less_than_80_lines_and_needs_ros_alone():
+def test_it_has_at_most_120_lines_and_needs_ros_alone():
     text = DRIVER.read_text(encoding="utf-8")
-    assert len(text.splitlines()) < 80
+    assert len(text.splitlines()) <= 120
     roots = set()
     for node in ast.walk(ast.parse(text)):
         if isinstance(node, ast.Import):

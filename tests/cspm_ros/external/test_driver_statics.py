@@ -71,6 +71,9 @@ def test_after_a_restart_a_second_is_heard_again(lab):
         (TENSION, lambda feed: feed.scaled(-1.0), "inverted, or not zeroed?"),
         (WINCHES, lambda feed: feed.scaled(-1.0, slice(16, 24)), "the torque that holds"),
         (BAR, lambda feed: feed.described(frame_id="map"), "all messages: frame 'map', expected"),
+        (BAR, lambda feed: feed.scaled(np.nan, slice(1)), "x: NaN, infinite or beyond 1e+12"),
+        (TENSION, lambda feed: feed.shifted(-20_000 * 1_000_000), "20.0 s behind this computer's"),
+        (WINCHES, lambda feed: feed.only(slice(None, None, 4)), "250 Hz, expected 1000 Hz (rates"),
     ],
 )
 def test_statics_that_are_wrong_are_refused(lab, topic, change, text):
@@ -94,6 +97,32 @@ def test_the_first_fault_is_named_and_the_others_counted():
     found = [Finding(BAR, "axes", False, "z up"), Finding(TENSION, "units", False, "grams")]
     with pytest.raises(InputError, match=r"^drivers: /bar/pose: z up \(and 1 more\); allowed: "):
         refuse_static_faults(found)
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize(
+    ("fault", "reason"),
+    [
+        ({"unreliable": (BAR,)}, "drivers: /bar/pose: best effort (from lab), expected reliable"),
+        (
+            {"mute": (BAR,)},
+            "drivers: all are there, and the run did not begin within 1 s: waits for /bar/pose",
+        ),
+    ],
+    ids=["best_effort", "patience"],
+)
+def test_drivers_that_nobody_hears_end_a_run_with_the_reason(tmp_path, fault, reason):
+    bundle = clamped_bundle()
+    with ExitStack() as stack:
+        arguments = ("--plant", "external", TOGETHER, "--patience", "1")
+        command = stack.enter_context(Command(tmp_path, bundle, *arguments))
+        witness = stack.enter_context(Witness(command.domain))
+        ScriptedLab(witness.session, bundle.testbed.testbed, **fault)
+        witness.until(lambda: command.process.poll() is not None, "the refusal")
+        code, _, err = command.done()
+    assert code == 2, err
+    (line,) = err.strip().splitlines()[-1:]
+    assert reason in line
 
 
 @pytest.mark.slow

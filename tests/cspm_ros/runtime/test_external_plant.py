@@ -32,6 +32,7 @@ from cspm_msgs_py.schedule import (
     WINCH_STATE,
     schedule_of,
 )
+from cspm_ros.check_drivers.winch_wiggle import FARTHEST, TRAVEL
 from cspm_ros.runtime.exit_watchdog import IN_ORDER
 from cspm_ros.runtime.progress_file import read_report
 
@@ -41,6 +42,7 @@ pytestmark = [pytest.mark.slow, pytest.mark.realtime]
 MS = 1_000_000
 MEASURED = (FRAME_POSE, BAR_POSE, WINCH_STATE, TENSION)
 TRUTH = "/truth/bar/pose"
+RADII = np.array([0.0025] * 2 + [0.025] * 6)
 
 
 @pytest.fixture(scope="module")
@@ -115,9 +117,13 @@ def test_a_run_waits_for_the_hardware_and_holds_its_bar(warm, tmp_path, plant):
         assert stamps[-1] > start + 1800 * MS
     assert np.ptp(evidence.rows[BAR_POSE].rows[:, 2]) < 0.005
     assert not evidence.alarms(FORCE_CONTROLLER)
-    # The first command came after the first reference, whatever the age of what it answers.
-    commanded = evidence.rows[TORQUE_COMMAND].log_ns[0]
-    assert commanded > evidence.rows["/bar/reference"].log_ns[0] - 20 * MS
+    # Each winch was wiggled both ways before the first reference, and none went far.
+    states = evidence.rows[WINCH_STATE]
+    before = states.rows[states.stamp_ns < start, : len(RADII)] * RADII
+    wiggled = before - before[0]
+    assert (wiggled.max(axis=0) > 0.9 * TRAVEL).all()
+    assert (wiggled.min(axis=0) < -0.9 * TRAVEL).all()
+    assert np.abs(wiggled).max() < FARTHEST
 
 
 def test_a_run_waits_until_each_controller_hears_the_hardware(warm, tmp_path):

@@ -5,6 +5,10 @@ from pathlib import Path
 import numpy as np
 from run_samples import bundle_of
 
+from cspm_msgs_py.message import message_of
+from cspm_msgs_py.ros.contract_node import ros_class
+from cspm_msgs_py.ros.qos import contract_qos
+from cspm_msgs_py.ros_types import serialize
 from cspm_msgs_py.schedule import BAR_POSE, FRAME_POSE, TENSION, TORQUE_COMMAND, WINCH_STATE
 
 CLAMPED = Path(__file__).resolve().parents[3] / "examples" / "clamped_bar.yaml"
@@ -13,6 +17,8 @@ RATE = 200
 STEP = 0.01
 # Of the load cells [N], as in the test-bed file.
 NOISE = 0.02
+# Of the cables, which give way to the torques while the bar is clamped [N/m].
+STIFFNESS = 5000.0
 
 
 def clamped_bundle(*overrides):
@@ -36,7 +42,8 @@ class ScriptedLab:
         standing: the encoder that stands while its motor turns, by its number.
     """
 
-    def __init__(self, session, testbed):
+    def __init__(self, session, testbed, unreliable=(), mute=()):
+        """Send in a session: topics that are `unreliable` by best effort, those `mute` nothing."""
         self._node = session.node("lab")
         self._cables = testbed.cables
         self.radii = np.array([cable.drum_radius / cable.gear_ratio for cable in self._cables])
@@ -45,15 +52,24 @@ class ScriptedLab:
         self.reported, self.at_fault = np.zeros(len(self.radii)), 0
         self.stuck: int | None = None
         self.turning, self.standing = 0.0, None
+        self._wound = np.zeros(len(self.radii))
         self._tensions, self._angles = np.zeros(len(self.radii)), np.zeros(len(self.radii))
         self._rng = np.random.default_rng(1)
         topics = testbed.topics
         self._send = {
-            name: self._node.publisher(topics[name])
+            name: self._best_effort(topics[name])
+            if name in unreliable
+            else self._node.publisher(topics[name])
             for name in (FRAME_POSE, BAR_POSE, WINCH_STATE, TENSION)
         }
+        self._send |= dict.fromkeys(mute, lambda *_: None)
         self._node.subscribe_rows(topics[TORQUE_COMMAND], self._command, lambda _: None)
         session.every(1.0 / RATE, self._measure)
+
+    def _best_effort(self, topic):
+        qos = contract_qos(reliability="best_effort")
+        publisher = self._node.node.create_publisher(ros_class(topic.ros_type), topic.name, qos)
+        return lambda _, stamp, row: publisher.publish(serialize(message_of(topic, stamp, row)))
 
     def jump(self, x, y, z):
         """Put the bar somewhere."""
@@ -84,6 +100,13 @@ class ScriptedLab:
         self._tensions = np.where(numbers == self.stuck, self._tensions, tensions)
         self._angles = self._angles + (numbers != self.standing) * self.turning / RATE
 
+    def _stretch(self):
+        """Return by how much the torques wind the cables' stretch up (n,) [rad]."""
+        wound = (self.torques / self.radii - 5.0) / STIFFNESS / self.radii
+        stands = np.arange(len(self.radii)) == self.standing
+        self._wound = np.where(stands, self._wound, wound)
+        return self._wound
+
     def _measure(self):
         way = self.bar - self._at
         self._at = self._at + np.clip(way, -STEP, STEP)
@@ -92,7 +115,9 @@ class ScriptedLab:
         rows = {
             FRAME_POSE: np.array([0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 1.0]),
             BAR_POSE: np.array([*self._at, 0.0, 0.0, 0.0, 1.0]),
-            WINCH_STATE: np.concatenate([self._angles, speeds, self.torques + self.reported]),
+            WINCH_STATE: np.concatenate(
+                [self._angles + self._stretch(), speeds, self.torques + self.reported]
+            ),
             TENSION: self._tensions,
         }
         stamp = self._node.now_ns()

@@ -188,7 +188,7 @@ def motion_subsystem(
             pseudo-inverse meets what it can; the controllers leave the roll moment out.
     """
     radii = parameters.cables[:, cable_kernel.RADIUS]
-    tensions = -np.linalg.pinv(point.jacobian[:, list(axes)].T, rcond=RANK_TOLERANCE)
+    tensions = wrench_tensions(point, axes)
     pose_rows = model.C[:6].copy()
     to_body = rotation(point.bar_pose).T
     euler = np.array([euler_rates(point.bar_pose, to_body @ axis) for axis in np.eye(3)]).T
@@ -202,6 +202,11 @@ def motion_subsystem(
         inputs=tuple(f"wrench {DOFS[axis]}" for axis in axes),
         outputs=model.outputs[:6],
     )
+
+
+def wrench_tensions(point: OperatingPoint, axes: Sequence[int] = ALL_AXES) -> Array:
+    """Return the least tensions per unit of wrench along axes, −(Jᵀ)†, shape (n, axes)."""
+    return -np.linalg.pinv(point.jacobian[:, list(axes)].T, rcond=RANK_TOLERANCE)
 
 
 def tension_subsystem(model: StateSpace) -> StateSpace:

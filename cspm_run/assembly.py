@@ -29,6 +29,7 @@ from cspm_msgs_py.scenario import (
 from cspm_msgs_py.scenario_keys.events import check_cables, cuts_by_step
 from cspm_msgs_py.schedule import (
     BAR_REFERENCE,
+    FRAME_REFERENCE,
     MOTION_CONTROLLER,
     RATE_OF_SENSOR,
     TARGET_POSE,
@@ -41,14 +42,14 @@ from cspm_msgs_py.stepping.stage import Stage
 from cspm_msgs_py.testbed import Testbed
 from cspm_run.controlled_dofs import with_controlled_dofs
 from cspm_run.designed_gains import with_gains
-from cspm_run.motions import motions_of, reference_poses
+from cspm_run.motions import REFERENCE_POSES, motions_of, reference_poses
 from cspm_run.plants import make_plant
 from cspm_sim.any_plant import AnyPlant
 from cspm_sim.faults import Faults
 from cspm_sim.plant import Plant
 from cspm_sim.sensor_fault import sensor_faults
 from cspm_sim.sensors import AnySensor, SensorModel
-from cspm_sim.step_stability import axial_modes, check_step
+from cspm_sim.step_stability import axial_modes, steps_along, steps_needed
 
 Array = NDArray[np.float64]
 
@@ -263,16 +264,33 @@ def _plant(
         cuts=cuts_by_step(scenario.events, testbed.cable_names, period_ns),
     )
     if isinstance(made, Plant):
-        modes = axial_modes(
-            made.parameters,
-            made.bar_state[:6] if testbed.bar else None,
-            made.frame[:6],
-            (made.unstretched_lengths, made.lengths),
-            made.tensions,
-            locked=made.locked,
-        )
-        check_step(modes, scenario.rates.plant)
+        made.substeps = _substeps(scenario, testbed, made, motions)
     return made
+
+
+def _substeps(
+    scenario: Scenario, testbed: Testbed, plant: Plant, motions: Mapping[str, Motion]
+) -> int:
+    """Return how many steps of the integration a period needs, at the start and later.
+
+    Raises:
+        InputError: more than any run would wait for.
+    """
+    lengths, rate = (plant.unstretched_lengths, plant.lengths), scenario.rates.plant
+    if testbed.bar is None:
+        modes = axial_modes(
+            plant.parameters, None, plant.frame[:6], lengths, plant.tensions, locked=plant.locked
+        )
+        return steps_needed(modes, rate)
+    times = np.linspace(0.0, scenario.duration, REFERENCE_POSES)
+    bars, frames = (
+        np.array([motions[name].at(time)[:6] for time in times])
+        for name in (BAR_REFERENCE, FRAME_REFERENCE)
+    )
+    bars[0] = plant.bar_state[:6]
+    return steps_along(
+        plant.parameters, (bars, frames), lengths, plant.tensions, rate, locked=plant.locked
+    )
 
 
 def _start_tensions(testbed: Testbed, control: Control) -> Array | None:

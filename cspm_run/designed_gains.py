@@ -6,11 +6,12 @@ from collections.abc import Callable
 from dataclasses import dataclass, field
 from functools import lru_cache
 
+from cspm_control.analysis.sampled_loops import sensor_delays
+from cspm_control.design.force_gains import design_force_gains
 from cspm_control.design.gains import (
     BANDWIDTH_RATIO,
     MOTION_BANDWIDTH,
     check_separation,
-    design_force_gains,
     design_motion_gains,
     design_widest_gains,
     force_margins,
@@ -19,6 +20,7 @@ from cspm_control.design.gains import (
 from cspm_control.design.state_feedback import design_feedback_gains
 from cspm_control.stages.make import controlled_axes
 from cspm_model.parameters import nominal_parameters
+from cspm_msgs_py.control_spec.force import FORCE_BANDWIDTH
 from cspm_msgs_py.dofs import Dof
 from cspm_msgs_py.errors import InputError
 from cspm_msgs_py.scenario import (
@@ -28,7 +30,7 @@ from cspm_msgs_py.scenario import (
     PidGains,
     Scenario,
 )
-from cspm_msgs_py.schedule import BAR_POSE
+from cspm_msgs_py.schedule import BAR_POSE, TENSION
 from cspm_msgs_py.testbed import Testbed
 from cspm_run.stability.loop_growth import loop_growth
 
@@ -80,7 +82,9 @@ def _designed(question: _Question) -> ClosedLoop:
     parameters = nominal_parameters(testbed)
     motion, force = control.motion, control.force
     pose = motion.design_pose
-    force_gains = force.gains or design_force_gains(testbed, parameters, pose, force.bandwidth)
+    force_gains = force.gains or design_force_gains(
+        testbed, parameters, pose, force.bandwidth, _force_dead_time(scenario, testbed)
+    )
     control = control.model_copy(update={"force": force.model_copy(update={"gains": force_gains})})
     if isinstance(motion, MotionControl) and _lacks_gains(motion):
         gains = _motion_gains(control, scenario, testbed, designed=force.gains is None)
@@ -99,7 +103,8 @@ def _motion_gains(
     motion, axes = control.motion, controlled_axes(control)
     assert isinstance(motion, MotionControl)
     parameters, pose = nominal_parameters(testbed), motion.design_pose
-    force = force_margins(testbed, parameters, pose, control.force.gains or {})
+    force_gains = control.force.gains or {}
+    force = force_margins(testbed, parameters, pose, force_gains)
     crossover = {dof: motion.crossover[dof] for dof in motion.controlled if dof in motion.crossover}
     wanted = design_motion_gains(testbed, parameters, pose, crossover, axes)
     if designed and wanted:
@@ -117,11 +122,14 @@ def _motion_gains(
             left,
             dead_time=_motion_dead_time(scenario, testbed),
             force_bandwidth=force_bandwidth,
+            force_gains=force_gains,
             axes=axes,
         )
         return {dof: wanted.get(dof) or widest[dof] for dof in motion.controlled}
 
-    slowest = min(found.bandwidth for found in force.values())
+    # The torque that goes ahead makes up for a slow loop.
+    ahead = {name for name, each in force_gains.items() if each.feedforward}
+    slowest = min(FORCE_BANDWIDTH if n in ahead else force[n].bandwidth for n in force)
     return _stable(control, scenario, testbed, with_widest, slowest)
 
 
@@ -177,6 +185,12 @@ def _unstable(
 
 def _times(factor: float, pid: PidGains) -> PidGains:
     return PidGains(kp=factor * pid.kp, ki=factor * pid.ki, kd=factor * pid.kd)
+
+
+def _force_dead_time(scenario: Scenario, testbed: Testbed) -> float:
+    """Return by how much holding the torque and the load cells delay a force loop [s]."""
+    delays = sensor_delays(scenario, testbed)
+    return 0.5 / scenario.rates.force_controller + delays.get(TENSION, 0.0)
 
 
 def _motion_dead_time(scenario: Scenario, testbed: Testbed) -> float:

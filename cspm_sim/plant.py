@@ -33,6 +33,7 @@ from cspm_sim.kernels.phases import (
     LOCKED,
     NEXT_CUT,
     PERIODIC,
+    SUBSTEPS,
     TORQUE,
     UPRIGHT,
     advance_phase,
@@ -56,7 +57,7 @@ class Plant:
     current state: `bar_state` (12: position, Euler angles, velocity in world axes, ω in bar axes),
     `unstretched_lengths`, `angles`, `speeds` (n each), `tensions` (n) and `frame` (18). `locked`
     may be set at any time: the brakes, which stop the motors at once. `cut` names the cables that
-    have parted.
+    have parted. `substeps` is how many steps of the integration a period has; see `step_stability`.
     """
 
     def __init__(
@@ -91,7 +92,7 @@ class Plant:
         self._actions = read_actions(testbed)
         self.period_ns = period_ns
         self.frame_motion = frame_motion
-        self.steps = 0
+        self.steps, self.substeps = 0, 1
         self.cut: tuple[str, ...] = ()
         self._cuts = dict(cuts or {})
         n = len(testbed.cables)
@@ -179,14 +180,17 @@ class Plant:
         integers[PERIODIC] = self.frame_motion.periodic
         integers[ADDRESS] = address_of(plant_advance, ADVANCE)
 
+        numbers = np.array([self.frame_motion.spacing, 0.0])
+
         def refresh() -> None:
-            integers[LOCKED] = self._locked
+            integers[LOCKED], integers[SUBSTEPS] = self._locked, self.substeps
             integers[NEXT_CUT] = min(self._cuts, default=-1)
+            numbers[1] = self.period_ns * 1e-9 / self.substeps
 
         return make_phase(
             advance_phase,
             integers,
-            np.array([self.frame_motion.spacing, self.period_ns * 1e-9]),
+            numbers,
             self.state,
             self.frame,
             self._frames,

@@ -5,10 +5,13 @@ from __future__ import annotations
 from typing import NamedTuple
 
 import numpy as np
+import scipy
 from numpy.typing import NDArray
 
 from cspm_model.kernels.machine import BAR_STATES, PlantParameters
+from cspm_model.kinematics import geometry
 from cspm_model.motion import Motion
+from cspm_msgs_py.errors import InputError
 from cspm_sim.kernels.blocks import (
     simulate_from_tensions,
     simulate_from_torques,
@@ -17,6 +20,7 @@ from cspm_sim.kernels.blocks import (
 )
 from cspm_sim.kernels.hooks import check_order
 from cspm_sim.kernels.plant import make_scratch, state_count
+from cspm_sim.step_stability import axial_modes, steps_needed
 
 Array = NDArray[np.float64]
 
@@ -69,35 +73,38 @@ class PlantBlocks:
             speeds: their derivatives [rad/s].
             bars: the bar's states, (steps + 1, 12), where the cables alone are to be run.
         """
+        count = 1 if bars is not None else self._substeps(start, state, locked=True)
+        angles, speeds = _refined(angles, speeds, self.period, count)
         out = np.full((len(angles), self.size + self.cables), np.nan)
         good = simulate_from_winches(
             state.copy(),
             np.ascontiguousarray(angles),
             np.ascontiguousarray(speeds),
             np.zeros((0, BAR_STATES)) if bars is None else np.ascontiguousarray(bars),
-            *self._motion(start),
+            *self._motion(start, count),
             self.parameters,
             np.zeros((3, 18)),
             make_scratch(self.size, self.cables),
             np.zeros((2, self.cables)),
             out,
         )
-        return self._result(out, good)
+        return self._result(out, good, count)
 
     def by_torques(self, start: int, state: Array, torques: Array) -> BlockResponse:
         """Return the whole plant's motion under given torques, (steps, n) [N·m], each held."""
-        out = np.full((len(torques) + 1, self.size + self.cables), np.nan)
+        count = self._substeps(start, state, locked=False)
+        out = np.full((count * len(torques) + 1, self.size + self.cables), np.nan)
         good = simulate_from_torques(
             state.copy(),
-            np.ascontiguousarray(torques),
-            *self._motion(start),
+            np.repeat(torques, count, axis=0),
+            *self._motion(start, count),
             self.parameters,
             np.zeros((3, 18)),
             make_scratch(self.size, self.cables),
             np.zeros((2, self.cables)),
             out,
         )
-        return self._result(out, good)
+        return self._result(out, good, count)
 
     def by_tensions(self, start: int, state: Array, tensions: Array) -> BlockResponse:
         """Return the bar's motion under given tensions, (steps + 1, n) [N].
@@ -138,9 +145,39 @@ class PlantBlocks:
         out[good:] = np.nan
         return BlockResponse(out, tensions, good)
 
-    def _motion(self, start: int) -> tuple[Array, float, int, float]:
-        return self.frame_motion.knots, self.frame_motion.spacing, start, self.period
+    def _substeps(self, start: int, state: Array, *, locked: bool) -> int:
+        """Return how many steps of the integration a period needs at a state.
 
-    def _result(self, out: Array, good: int) -> BlockResponse:
+        One where no number would do: then what comes out is not finite, which the caller sees.
+        """
+        if not self.first or not np.isfinite(state).all():
+            return 1
+        frame = self.frame_motion.at(start * self.period)[:6]
+        lengths = state[self.first : self.first + self.cables]
+        try:
+            stretched = geometry(self.parameters.cables, state[:6], frame).lengths
+            modes = axial_modes(
+                self.parameters, state[:6], frame, (lengths, stretched), None, locked=locked
+            )
+            return steps_needed(modes, round(1.0 / self.period))
+        except InputError:
+            return 1
+
+    def _motion(self, start: int, count: int = 1) -> tuple[Array, float, int, float]:
+        motion, period = self.frame_motion, self.period / count
+        return motion.knots, motion.spacing, count * start, period
+
+    def _result(self, out: Array, good: int, count: int) -> BlockResponse:
         out[good:] = np.nan
-        return BlockResponse(out[:, : self.size], out[:, self.size :], good)
+        rows = out[::count]
+        return BlockResponse(rows[:, : self.size], rows[:, self.size :], -(-good // count))
+
+
+def _refined(angles: Array, speeds: Array, period: float, count: int) -> tuple[Array, Array]:
+    """Return angles and speeds at `count` steps per period, by their cubic Hermite interpolant."""
+    if count == 1:
+        return angles, speeds
+    times = period * np.arange(len(angles))
+    between = period / count * np.arange(count * (len(angles) - 1) + 1)
+    curve = scipy.interpolate.CubicHermiteSpline(times, angles, speeds)
+    return curve(between), curve(between, 1)

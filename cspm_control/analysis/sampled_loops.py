@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 
 from cspm_control.analysis.sampled_system import SampledSystem, closed, diagonal, sample, series
 from cspm_model.equilibrium import gravity_wrench
+from cspm_model.kernels.cable import RADIUS
 from cspm_model.kernels.machine import PlantParameters
 from cspm_model.kinematics import RANK_TOLERANCE, geometry
 from cspm_model.linearisation import OperatingPoint, StateSpace
@@ -174,9 +175,11 @@ def cascade_plant(
     seen = sampled.every(timing.force)
     ignoring = _nothing(6, seen.period)
     controllers = diagonal([ignoring, *(pi_system(g, seen.period) for g in force.values())])
-    inner = (
-        closed(seen, controllers).part(POSE, slice(6, None)).every(timing.motion // timing.force)
-    )
+    loops = closed(seen, controllers)
+    radii = parameters.cables[:, RADIUS]
+    ahead = np.diag([each.feedforward for each in force.values()] * radii)
+    loops.B[len(controllers.A) :, 6:] += seen.B @ ahead
+    inner = loops.part(POSE, slice(6, None)).every(timing.motion // timing.force)
     per_wrench, per_pose = distribution_slopes(parameters, point, axes)
     return SampledSystem(
         inner.A + inner.B @ per_pose @ inner.C,

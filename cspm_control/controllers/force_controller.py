@@ -22,7 +22,8 @@ class ForceController:
     Attributes:
         torque_limits: largest torque of each motor, (n,) [N·m].
         saturated: how many torques of the last step stand at their limit.
-        gains: proportional gain and integral frequency of each, (n, 2).
+        gains: of each its proportional gain, its integral frequency, and the torque that goes ahead
+            per wanted tension, (n, 3).
         period: time between steps [s].
         integral: the integral terms, (n,) [N·m].
         terms: proportional and integral terms of the last torques, shape (2, n) [N·m].
@@ -39,7 +40,12 @@ class ForceController:
             torque_limits: shape (n,) [N·m].
             period: time between steps [s].
         """
-        self.gains = np.array([(g.kp, g.integral_frequency) for g in gains])
+        self.gains = np.array(
+            [
+                (g.kp, g.integral_frequency, g.feedforward * radius)
+                for g, radius in zip(gains, radii, strict=True)
+            ]
+        )
         self._radii = radii
         self.torque_limits = torque_limits
         self.period = period
@@ -65,7 +71,8 @@ class ForceController:
         ahead = self._nothing if ahead is None else ahead
         if not self._started:
             proportional = self.gains[:, 0] * (wanted - measured)
-            self.integral[:] = self._radii * measured - proportional - ahead
+            balancing = self._radii * measured - self.gains[:, 2] * wanted
+            self.integral[:] = balancing - proportional - ahead
             self._started = True
         torque = np.empty(len(wanted))
         self.saturated = pi_torques(
@@ -99,7 +106,7 @@ def pi_torques(
     for i in range(wanted.shape[0]):
         error = wanted[i] - measured[i]
         terms[0, i], terms[1, i] = gains[i, 0] * error, integral[i]
-        torque = gains[i, 0] * error + integral[i] + ahead[i]
+        torque = gains[i, 0] * error + integral[i] + (gains[i, 2] * wanted[i] + ahead[i])
         out[i] = min(limits[i], max(-limits[i], torque))
         if out[i] != torque:
             saturated += 1

@@ -11,6 +11,7 @@ from typing import TypeVar
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from cspm_control.design.drive_limited import motion_plant_of_slow_loops
 from cspm_control.design.margins import (
     ComplexArray,
     GridResponse,
@@ -30,8 +31,7 @@ from cspm_model.linearisation import (
     operating_point,
     tension_subsystem,
 )
-from cspm_msgs_py.control_spec.force import FORCE_BANDWIDTH, PiGains
-from cspm_msgs_py.control_spec.per_cable import values_per_cable
+from cspm_msgs_py.control_spec.force import PiGains
 from cspm_msgs_py.dofs import CONTROLLED_AXES, DOFS
 from cspm_msgs_py.errors import InputError
 from cspm_msgs_py.scenario import PidGains
@@ -53,14 +53,7 @@ MOTION_BANDWIDTH = 7.3  # rad/s
 # Requirements on the force loops, section 7-2.
 LARGEST_FORCE_BANDWIDTH = 1000.0  # rad/s
 BANDWIDTH_RATIO = 10.0
-BANDWIDTH_KEY = "control.force.bandwidth"
 
-# The force loop's integral frequency is the largest that keeps the open loop's phase 60° away from
-# −180° at every frequency, and at most this share of the bandwidth, where it costs 3° of phase. A
-# steel cable, whose resonance is little damped, keeps 30°, the least that is usual: Åström,
-# Hägglund, Advanced PID Control (2006), section 4.6.
-LEAST_PHASE_MARGIN = np.radians(30.0)
-LARGEST_INTEGRAL_SHARE = 1.0 / 20.0
 # Margins are interpolated on this grid while the widest loop is looked for: within 0.02 dB.
 DESIGN_POINTS_PER_DECADE = 240
 
@@ -110,6 +103,7 @@ def design_widest_gains(
     *,
     dead_time: float,
     force_bandwidth: float,
+    force_gains: Mapping[str, PiGains] | None = None,
     axes: Sequence[int] = CONTROLLED_AXES,
 ) -> dict[Dof, PidGains]:
     """Return the PID of largest crossover per DOF, by the procedure of section 7-1.
@@ -121,6 +115,7 @@ def design_widest_gains(
         dofs: whose loops to design.
         dead_time: what sampling and sensors delay the loop by [s].
         force_bandwidth: of the slowest force loop [rad/s], ten times what a motion loop may have.
+        force_gains: of the force loops, which count where one is slow: where its torque goes ahead.
         axes: world axes of the wrench that the tensions meet.
 
     Raises:
@@ -131,7 +126,7 @@ def design_widest_gains(
     _check_dofs(dict.fromkeys(dofs), axes)
     if not dofs:
         return {}
-    plant = motion_plant(testbed, parameters, design_pose, axes)
+    plant = motion_plant(testbed, parameters, design_pose, axes, force_gains)
     frequencies = loop_frequencies(plant, MOTION_BANDWIDTH, DESIGN_POINTS_PER_DECADE)
     responses = plant.response(frequencies) * np.exp(-1j * frequencies * dead_time)[:, None, None]
     requirement = LoopRequirement(
@@ -165,43 +160,6 @@ def motion_margins(
     frequencies = loop_frequencies(model, MOTION_BANDWIDTH)
     plant = GridResponse(model, frequencies)
     return {dof: margins(motion_loop(plant, dof, g), frequencies) for dof, g in gains.items()}
-
-
-def design_force_gains(
-    testbed: Testbed,
-    parameters: PlantParameters,
-    design_pose: ArrayLike,
-    bandwidth: float | dict[str, float],
-) -> dict[str, PiGains]:
-    """Return the PI per cable whose closed loop has −3 dB at its bandwidth, section 7-2.
-
-    Args:
-        testbed: the machine.
-        parameters: its kernel parameters.
-        design_pose: the bar's pose x y z φ θ ψ with the winch frame at the origin.
-        bandwidth: one for all cables, or by name or kind of cable [rad/s]; a cable that is not
-            named has the default.
-
-    Raises:
-        InputError: the machine has no bar or no such cable, a bandwidth is above the thesis's
-            limit, or a cable's loop would come near −180°.
-        ConvergenceError: the bar cannot hang at the design pose.
-    """
-    names = testbed.cable_names
-    bandwidths = values_per_cable(bandwidth, names, FORCE_BANDWIDTH, BANDWIDTH_KEY)
-    for name, wanted in zip(names, bandwidths, strict=True):
-        if not 0.0 < wanted <= LARGEST_FORCE_BANDWIDTH:
-            whose = f" of {name}" if isinstance(bandwidth, dict) else ""
-            raise InputError(
-                f"{BANDWIDTH_KEY}: {wanted:g} rad/s{whose}, allowed: above 0 and at most"
-                f" {LARGEST_FORCE_BANDWIDTH:g} rad/s"
-            )
-    model = tension_plant(testbed, parameters, design_pose)
-    plants = {wanted: _grid_response(model, wanted) for wanted in set(bandwidths)}
-    return {
-        name: _design_force_loop(name, i, *plants[bandwidths[i]], bandwidths[i])
-        for i, name in enumerate(names)
-    }
 
 
 def force_margins(
@@ -250,10 +208,12 @@ def motion_plant(
     parameters: PlantParameters,
     design_pose: ArrayLike,
     axes: Sequence[int] = CONTROLLED_AXES,
+    force_gains: Mapping[str, PiGains] | None = None,
 ) -> StateSpace:
     """Return the motion sub-system (6-2) that the motion controller is designed on.
 
-    `axes` are the world axes of the wrench that the tensions meet, its inputs.
+    `axes` are the world axes of the wrench that the tensions meet, its inputs. Force loops that
+    are slow, those whose torque goes ahead, are part of it.
 
     Raises:
         InputError: the machine has no bar or cannot exert all controlled forces.
@@ -262,6 +222,9 @@ def motion_plant(
     point = operating_point(testbed, parameters, design_pose)
     _check_rank(point, axes)
     model = linear_model(testbed, parameters, point)
+    gains = [force_gains[name] for name in testbed.cable_names] if force_gains else []
+    if any(each.feedforward for each in gains):
+        return motion_plant_of_slow_loops(model, parameters, point, gains, axes)
     return motion_subsystem(model, parameters, point, axes)
 
 
@@ -305,45 +268,6 @@ def force_loop(plant: StateSpace | GridResponse, i: int, gains: PiGains) -> Resp
     return loop
 
 
-def _grid_response(model: StateSpace, bandwidth: float) -> tuple[GridResponse, Array]:
-    """Return a plant's response about a bandwidth [rad/s], and the frequencies of its grid."""
-    frequencies = loop_frequencies(model, bandwidth)
-    return GridResponse(model, frequencies), frequencies
-
-
-def _design_force_loop(
-    name: str, i: int, plant: GridResponse, frequencies: Array, bandwidth: float
-) -> PiGains:
-    """Return the PI of cable `i` for a bandwidth [rad/s]; see `design_force_gains`."""
-    response = plant.response(frequencies)[:, i, i]
-    integral = _integral_frequency(name, frequencies, response, bandwidth)
-    at_bandwidth = plant.response(bandwidth)[0, i, i]
-    shape = (1.0 + integral / (1j * bandwidth)) * at_bandwidth
-    # The root Kp > 0 of 2·|Kp·g|² = |1 + Kp·g|².
-    kp = (shape.real + np.hypot(shape.real, np.abs(shape))) / np.abs(shape) ** 2
-    gains = PiGains(kp=float(kp), integral_frequency=integral)
-    _check_force(name, bandwidth, margins(force_loop(plant, i, gains), frequencies))
-    return gains
-
-
-def _integral_frequency(
-    name: str, frequencies: Array, response: ComplexArray, bandwidth: float
-) -> float:
-    phase, largest = np.unwrap(np.angle(response)), LARGEST_INTEGRAL_SHARE * bandwidth
-    for margin in (PHASE_MARGIN, LEAST_PHASE_MARGIN):
-        room = phase + np.pi - margin
-        if room.min() > 0.0:
-            lag = room < 0.5 * np.pi  # elsewhere any integral frequency will do
-            return float(np.min(frequencies[lag] * np.tan(room[lag]), initial=largest))
-    worst = int(phase.argmin())
-    raise InputError(
-        f"control.force: {name}'s tension falls {-np.degrees(phase[worst]):.0f}° behind its torque"
-        f" at {frequencies[worst]:.4g} rad/s at any bandwidth, allowed: less than"
-        f" {np.degrees(np.pi - LEAST_PHASE_MARGIN):.0f}°; a cable with more damping, a winch with"
-        " less inertia, or control.force.gains chosen by hand"
-    )
-
-
 def _check_dofs(given: Mapping[Dof, object], axes: Sequence[int]) -> None:
     possible = [DOFS[axis] for axis in axes]
     unknown = [dof for dof in given if dof not in possible]
@@ -377,12 +301,3 @@ def _check_motion(dof: str, frequency: float, found: Margins) -> None:
                 f"control.motion.crossover: {dof} at {frequency:g} rad/s has a {name} of"
                 f" {value:.3g}{unit}, allowed: at least {least:.3g}{unit}"
             )
-
-
-def _check_force(name: str, bandwidth: float, found: Margins) -> None:
-    if abs(found.bandwidth - bandwidth) > 1e-3 * bandwidth:
-        raise InputError(
-            f"{BANDWIDTH_KEY}: at {bandwidth:g} rad/s the loop of {name} already falls"
-            f" below −3 dB at {found.bandwidth:.4g} rad/s, allowed: a bandwidth above the"
-            " resonances of the cables"
-        )

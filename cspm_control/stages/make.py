@@ -290,7 +290,7 @@ def wanted_tension_limits(control: ClosedLoop, testbed: Testbed) -> NDArray[np.f
 
 def force_stage(control: ClosedLoop, scenario: Scenario, testbed: Testbed) -> ForceStage:
     """Return the force controllers."""
-    gains, rate = control.force.gains or {}, scenario.rates.force_controller
+    rate = scenario.rates.force_controller
     tensions = wanted_tension_limits(control, testbed)
     safety = scenario.safety
     limits = ForceLimits(
@@ -301,8 +301,9 @@ def force_stage(control: ClosedLoop, scenario: Scenario, testbed: Testbed) -> Fo
     radii = nominal_parameters(testbed).cables[:, RADIUS].copy()
     torque_limits = np.array([cable.torque_limit for cable in testbed.cables])
     dither, names = control.force.dither, testbed.cable_names
+    gains = control.force.gains_of(names)
     return ForceStage(
-        ForceController([gains[name] for name in names], radii, torque_limits, period=1.0 / rate),
+        ForceController(gains, radii, torque_limits, period=1.0 / rate),
         limits,
         names,
         make_safe_state(scenario, testbed),

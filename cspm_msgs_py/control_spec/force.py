@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+
 from pydantic import PositiveFloat
 
 from cspm_msgs_py.control_spec.per_cable import PerCable
@@ -11,10 +13,14 @@ FORCE_BANDWIDTH = 800.0  # rad/s
 
 
 class PiGains(StrictModel):
-    """Gains of Kp·(e + ω_i·∫e), thesis (7-4); Kp in N·m/N at the motor shaft, ω_i in rad/s."""
+    """Gains of Kp·(e + ω_i·∫e), thesis (7-4); Kp in N·m/N at the motor shaft, ω_i in rad/s.
+
+    `feedforward` is the share of the torque that balances the wanted tension which goes ahead.
+    """
 
     kp: float
     integral_frequency: float
+    feedforward: float = 0.0
 
 
 class LoadCellBias(StrictModel):
@@ -64,6 +70,12 @@ class ForceControl(StrictModel):
     friction_feedforward: FrictionFeedforward | None = None
     winch_feedforward: WinchFeedforward | None = None
     dither: Dither | None = None
+
+    def gains_of(self, names: Sequence[str]) -> list[PiGains]:
+        """Return the gains of cables; a torque that `winch_feedforward` has is not there twice."""
+        given = self.gains or {}
+        ahead = {} if self.winch_feedforward is None else {"feedforward": 0.0}
+        return [given[name].model_copy(update=ahead) for name in names]
 
     @property
     def looks_ahead(self) -> bool:

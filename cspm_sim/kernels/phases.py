@@ -54,8 +54,9 @@ call_advance, call_report = caller_of(ADVANCE), caller_of(REPORT)
 
 # Integers of `advance_phase`: where the torques are in the row, whether the brakes are set, at
 # which step a cable parts, which state is not finite (-1: none), whether the frame's motion is
-# periodic, whether the bar is to stay upright, and the address of `plant_advance`.
-TORQUE, LOCKED, NEXT_CUT, BAD, PERIODIC, UPRIGHT, ADDRESS, ADVANCE_INTEGERS = range(8)
+# periodic, whether the bar is to stay upright, the address of `plant_advance`, and how many steps
+# of the integration a period has.
+TORQUE, LOCKED, NEXT_CUT, BAD, PERIODIC, UPRIGHT, ADDRESS, SUBSTEPS, ADVANCE_INTEGERS = range(9)
 
 
 @njit(cache=True, error_model="numpy", _nrt=False)
@@ -78,7 +79,7 @@ def advance_phase(step: int, row: Array, places: Places) -> int:
         matrix_at(places, 11),
     )
     scratch = Scratch(matrix_at(places, 12), columns_at(places, 13), vector_at(places, 14))
-    first = integers[TORQUE]
+    first, substeps = integers[TORQUE], integers[SUBSTEPS]
     integers[BAD] = call_advance(
         integers[ADDRESS],
         state,
@@ -86,8 +87,8 @@ def advance_phase(step: int, row: Array, places: Places) -> int:
         fixed_matrix_at(places, 6),
         numbers[0],
         integers[PERIODIC] != 0,
-        step,
-        1,
+        step * substeps,
+        substeps,
         integers[LOCKED] != 0,
         numbers[1],
         parameters,

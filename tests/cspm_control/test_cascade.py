@@ -6,7 +6,8 @@ import numpy as np
 import pytest
 from cascade import CROSSOVER, SCENARIO, Cascade
 
-from cspm_control.design.gains import design_force_gains, design_motion_gains
+from cspm_control.design.force_gains import design_force_gains
+from cspm_control.design.gains import design_motion_gains
 from cspm_msgs_py.control_spec.force import ForceControl, PiGains
 from cspm_msgs_py.scenario import PidGains
 from cspm_msgs_py.testbed import load_testbed

@@ -12,9 +12,11 @@ from cspm_model.motion import Motion
 from cspm_msgs_py.testbed import load_testbed
 from cspm_sim.plant import Plant
 from cspm_sim.plant_blocks import PlantBlocks
+from cspm_sim.step_stability import axial_modes, steps_needed
 
 PERIOD_NS = 1_000_000
 STEPS = 1500
+STEEL_POSE = [0, 0, 1.2, 0, 0, 0]
 
 
 @dataclass
@@ -156,3 +158,39 @@ def test_rows_after_a_divergence_are_not_numbers(simulated, blocks):
     found = blocks.by_torques(0, state, simulated.torques[:10])
     assert found.good == 0
     assert np.isnan(found.states).all()
+
+
+def steel_motion(steps):
+    """A plant on steel ropes of 5 mm, its states and the torques that moved it."""
+    testbed = load_testbed(SCENARIOS / "testbeds" / "suspended_four.yaml").testbed
+    rope = testbed.cables[0].stiffness.model_copy(
+        update={"youngs_modulus": 2.0e11, "diameter": 5.0e-3}
+    )
+    cables = tuple(cable.model_copy(update={"stiffness": rope}) for cable in testbed.cables)
+    testbed = testbed.model_copy(update={"cables": cables})
+    plant = Plant(testbed, swaying_frame(), PERIOD_NS, bar_pose=STEEL_POSE)
+    lengths = plant.unstretched_lengths, plant.lengths
+    modes = axial_modes(
+        plant.parameters, plant.bar_state[:6], plant.frame[:6], lengths, None, locked=False
+    )
+    plant.substeps = steps_needed(modes, 1000)
+    balance = plant.tensions * plant.parameters.cables[:, RADIUS]
+    states, torques = [plant.state.copy()], []
+    for k in range(steps):
+        torques.append(balance * (1 + 0.02 * np.sin(8e-3 * k + np.arange(len(balance)))))
+        plant.step(torques[-1])
+        states.append(plant.state.copy())
+    return plant, np.array(states), np.array(torques)
+
+
+def test_stiff_cables_take_as_many_steps_in_blocks():
+    plant, states, torques = steel_motion(300)
+    assert plant.substeps > 1
+    blocks, n = PlantBlocks(plant.parameters, plant.frame_motion, PERIOD_NS), len(torques[0])
+    found = blocks.by_torques(0, states[0], torques)
+    assert found.good == len(states)
+    np.testing.assert_allclose(found.states, states, atol=1e-9)
+    turned = states[:, 12 + n : 12 + 2 * n], states[:, 12 + 2 * n : 12 + 3 * n]
+    wound = blocks.by_winches(0, states[0], *turned)
+    assert wound.good == len(states)
+    np.testing.assert_allclose(wound.states[:, :3], states[:, :3], atol=1e-5)

@@ -1,4 +1,4 @@
-"""The check of the plant's step: modes by a second road, and both sides of stability."""
+"""The plant's steps: modes by a second road, both sides of stability, and their accuracy."""
 
 from pathlib import Path
 
@@ -6,13 +6,14 @@ import numpy as np
 import pytest
 from machines import LINEAR, build, point_content, rig_content
 
+from cspm_model.kernels.cable import RADIUS
 from cspm_model.linearisation import linear_model, operating_point
 from cspm_model.parameters import nominal_parameters
 from cspm_msgs_py.errors import InputError
 from cspm_msgs_py.scenario import load_scenario
 from cspm_msgs_py.testbed import load_testbed
 from cspm_run.assembly import assemble, resolve
-from cspm_sim.step_stability import axial_modes, check_step, is_stable
+from cspm_sim.step_stability import axial_modes, is_stable, steps_along, steps_needed
 
 SCENARIOS = Path(__file__).resolve().parents[2] / "scenarios"
 
@@ -69,24 +70,71 @@ def test_both_sides_of_the_border_of_the_classical_runge_kutta_step(z, stable):
     assert is_stable(np.array([1000.0 * z]), 1000) == bool(stable)
 
 
-def test_the_line_names_the_rate_that_is_enough():
+def test_a_fast_mode_takes_as_many_steps_as_are_accurate():
+    assert steps_needed(np.array([2800.0j, -2800.0j]), 1000) == 1
+    assert steps_needed(np.array([3834.0j, -3834.0j]), 1000) == 8
+    assert steps_needed(np.array([3834.0j, -3834.0j]), 2000) == 1
+    assert steps_needed(np.zeros(0), 1000) == 1
     with pytest.raises(InputError) as caught:
-        check_step(np.array([3834.0j, -3834.0j]), 1000)
+        steps_needed(np.array([200_000.0j]), 1000)
     assert str(caught.value) == (
-        "rates.plant: 1000 Hz, a step of 1 ms, with cables whose axial mode has 3834 rad/s,"
-        " allowed: 2000 Hz or more; `--set rates.plant=…`"
+        "rates.plant: 1000 Hz, with cables whose axial mode has 2e+05 rad/s, allowed: at most"
+        " 1e+05 rad/s; a softer cable, a heavier bar or winch, or a higher rate: `--set"
+        " rates.plant=…`"
     )
-    check_step(np.array([3834.0j, -3834.0j]), 2000)
 
 
-def test_a_run_of_steel_cables_is_refused_before_it_begins():
-    scenario = load_scenario(SCENARIOS / "robots" / "suspended_four.yaml")
-    testbed = load_testbed(SCENARIOS / "testbeds" / "suspended_four.yaml").testbed
+def test_the_shortest_cables_of_a_reference_count():
+    content = stiff(point_content())
+    testbed, pose = build(content), np.array([0.1, 0.05, 1.0, 0.0, 0.0, 0.0])
+    parameters = nominal_parameters(testbed)
+    point = operating_point(testbed, parameters, pose)
+    lengths = point.unstretched_lengths, point.lengths
+    poses, still = np.array([pose, pose - [0, 0, 0.9, 0, 0, 0]]), np.zeros((2, 6))
+    far, near = (
+        steps_along(parameters, (bars, still[:1]), lengths, point.tensions, 200, locked=False)
+        for bars in (poses[:1], poses[1:])
+    )
+    assert far == steps_needed(modes_of(testbed, pose), 200) == 1
+    assert near == 7
+    both = steps_along(parameters, (poses, still), lengths, point.tensions, 200, locked=False)
+    assert both == near
+
+
+def steel(testbed):
     thick = testbed.cables[0].stiffness.model_copy(
         update={"youngs_modulus": 2.0e11, "diameter": 5.0e-3}
     )
-    steel = [cable.model_copy(update={"stiffness": thick}) for cable in testbed.cables]
-    resolved = resolve(scenario, testbed)
-    with pytest.raises(InputError, match=r"rates\.plant: 1000 Hz, a step of 1 ms"):
-        assemble(resolved, testbed.model_copy(update={"cables": tuple(steel)}), SCENARIOS)
-    assemble(resolved, testbed, SCENARIOS)
+    cables = [cable.model_copy(update={"stiffness": thick}) for cable in testbed.cables]
+    return testbed.model_copy(update={"cables": tuple(cables)})
+
+
+@pytest.fixture(scope="module")
+def suspended():
+    """The scenario of four cables, and the machine with steel ropes of 5 mm in their place."""
+    scenario = load_scenario(SCENARIOS / "robots" / "suspended_four.yaml")
+    testbed = load_testbed(SCENARIOS / "testbeds" / "suspended_four.yaml").testbed
+    return scenario, testbed, steel(testbed)
+
+
+def assembled(scenario, testbed):
+    return assemble(resolve(scenario, testbed), testbed, SCENARIOS).plant
+
+
+@pytest.mark.compiled
+def test_steel_ropes_at_1_khz_are_as_right_as_with_steps_far_shorter(suspended):
+    scenario, soft, testbed = suspended
+    assert assembled(scenario, soft).substeps == 1
+    plants = [assembled(scenario, testbed) for _ in range(2)]
+    needed = plants[0].substeps
+    assert needed > 1
+    plants[1].substeps = 16 * needed
+    balance = plants[0].parameters.cables[:, RADIUS] * plants[0].tensions
+    for k in range(300):
+        torque = balance * (1.0 + 0.1 * np.sin(0.04 * k + np.arange(4)))
+        for plant in plants:
+            plant.step(torque)
+    moved = np.abs(plants[1].bar_state[:3] - assembled(scenario, testbed).bar_state[:3]).max()
+    assert moved > 1e-3
+    np.testing.assert_allclose(plants[0].bar_state, plants[1].bar_state, atol=2e-5)
+    np.testing.assert_allclose(plants[0].tensions, plants[1].tensions, rtol=2e-3)

@@ -34,6 +34,15 @@ def test_pi_in_closed_form():
         np.testing.assert_allclose(torque, expected, rtol=1e-10)
 
 
+def test_the_torque_of_the_wanted_tension_goes_ahead():
+    gains = [PiGains(kp=0.01, integral_frequency=0.0, feedforward=0.5)]
+    found = ForceController(gains, RADII[:1], LIMITS[:1], period=PERIOD)
+    at, more = np.array([10.0]), np.array([14.0])
+    assert found.step(at, at)[0] == pytest.approx(RADII[0] * 10.0)
+    expected = RADII[0] * 10.0 + 0.5 * RADII[0] * 4.0 + 0.01 * 4.0
+    assert found.step(more, at)[0] == pytest.approx(expected)
+
+
 def test_too_little_tension_winds_in():
     found = controller()
     at = np.array([10.0, 10.0])

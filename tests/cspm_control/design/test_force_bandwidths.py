@@ -6,7 +6,8 @@ from run_samples import THESIS_CABLES, bundle_of
 
 from cspm.analysis.design import analyze_design, gain_groups
 from cspm.commands.analysis.analyze_design_command import analyze_design_command
-from cspm_control.design.gains import design_force_gains, force_margins, motion_margins
+from cspm_control.design.force_gains import design_force_gains
+from cspm_control.design.gains import force_margins, motion_margins
 from cspm_model.parameters import nominal_parameters
 from cspm_msgs_py.control_spec.force import PiGains
 from cspm_msgs_py.control_spec.per_cable import values_per_cable

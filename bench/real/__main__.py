@@ -15,7 +15,7 @@ import cspm
 from bench.markdown import markdown_table
 from bench.real.dataset import Dataset, datasets
 from bench.real.judgement import Judgement, judgement_of
-from bench.real.least_squares import least_error
+from bench.real.least_squares import least_squares
 from cspm_ident.signals.measurement import read_measurement
 from cspm_msgs_py.new_folder import ScratchFolder
 
@@ -52,7 +52,7 @@ def measured(dataset: Dataset, place: Path) -> Row:
         found = cspm.diagnose(search, held_out=held_out)
         (fit,) = found.result.fit
         own = [[read_measurement(each) for each in part] for part in (search, held_out)]
-        true_terms = least_error(*own, dataset.truth)
+        true_terms = least_squares(*own, dataset.truth).error
     after = fit.after if fit.steady is None else fit.steady
     judgement = judgement_of(dataset, found.data)
     return Row(

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Collection, Sequence
 from itertools import product
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -18,10 +19,24 @@ Array = NDArray[np.float64]
 Shape = tuple[tuple[str, float], ...]
 
 
-def least_error(
+class LeastSquares(NamedTuple):
+    """What the true terms make of recordings.
+
+    Attributes:
+        amounts: by effect and parameter, in the effects' units.
+        unexplained: RMS torque that is left of the searched rows [N·m].
+        error: RMS torque that is left of the judged rows [N·m].
+    """
+
+    amounts: dict[str, dict[str, float]]
+    unexplained: float
+    error: float
+
+
+def least_squares(
     searched: Sequence[Measurement], held_out: Sequence[Measurement], effects: Collection[str]
-) -> float:
-    """Return the RMS torque [N·m] that the true terms leave of held-out rows without reversals.
+) -> LeastSquares:
+    """Return the fit of the true terms of one winch on rows without reversals.
 
     Every combination of their nonlinear parameters on the catalogue's grid is tried on the searched
     rows. Nothing of the search, its tests or its refinement is used.
@@ -39,8 +54,27 @@ def least_error(
         fitted = [e.within(-np.inf, end) for e, end in zip(fitted, ends, strict=True)]
     best = min((_solved(fitted, terms) for terms in _choices(fitted)), key=lambda each: each[0])
     _, terms, weights = best
-    left = [e.target[:, 0] - _columns(e, terms) @ weights for e in judged]
+    return LeastSquares(
+        _amounts(fitted[0], terms, weights),
+        _left(fitted, terms, weights),
+        _left(judged, terms, weights),
+    )
+
+
+def _left(rows: Sequence[Equation], terms: Sequence[Candidate], weights: Array) -> float:
+    left = [e.target[:, 0] - _columns(e, terms) @ weights for e in rows]
     return float(np.sqrt(np.mean(np.concatenate(left) ** 2)))
+
+
+def _amounts(
+    row: Equation, terms: Sequence[Candidate], weights: Array
+) -> dict[str, dict[str, float]]:
+    found, rest = {}, list(weights)
+    for term in terms:
+        count = row.columns[term].shape[2]
+        own, rest = rest[:count], rest[count:]
+        found[term.effect_id] = term.effect.values(own, **term.nonlinear)
+    return found
 
 
 def _rows(measurements: Sequence[Measurement], effects: Sequence[object]) -> list[Equation]:
@@ -60,6 +94,8 @@ def _choices(rows: Sequence[Equation]) -> list[list[Candidate]]:
 
 
 def _columns(equation: Equation, terms: Sequence[Candidate]) -> Array:
+    if not terms:
+        return np.empty((len(equation.times), 0))
     return np.hstack([equation.columns[term][:, 0] for term in terms]).astype(float)
 
 

@@ -30,6 +30,7 @@ def main() -> None:
     """Run the command line; every error is one line on stderr and an exit code."""
     # They add their commands when they are loaded.
     import_module("cspm.cli.recordings")
+    import_module("cspm.cli.data")
     import_module("cspm.cli.compare")
     import_module("cspm.cli.analyze")
     import_module("cspm.cli.diagnose")

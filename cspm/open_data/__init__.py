@@ -1,0 +1,1 @@
+"""Recordings of others that their licences let anyone use, fetched from the publisher."""

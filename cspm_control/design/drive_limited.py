@@ -17,10 +17,9 @@ from numpy.typing import NDArray
 
 from cspm_control.design.margins import ComplexArray, Margins, grid_margins
 from cspm_model.kernels.cable import RADIUS
-from cspm_model.kernels.machine import PlantParameters
+from cspm_model.kernels.machine import BAR_STATES, PlantParameters
 from cspm_model.linearisation import (
     ALL_AXES,
-    BAR_STATES,
     OperatingPoint,
     StateSpace,
     motion_subsystem,
